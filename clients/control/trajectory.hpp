@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace drivebench::control {
+
+/// A point-to-point move of cubic speed: up with ω = c1·t² + c2·t³ (c1 = 3ω_max/t1², c2 = −2ω_max/t1³),
+/// cruise at ω_max, down with the mirrored cubic. Angle, speed and acceleration are continuous, the jerk is
+/// not. In the book's times: t1 = ramp_up, t2 = ramp_up + cruise, t3 = t2 + ramp_down. Source: Chiasson 2005,
+/// ch. 2 (TRJ-01); there both ramps are equal and ω_max = θ_f/t2 (the printed θ_f/t1 is a misprint).
+struct TrajectoryParameters {
+  double distance_rad;  ///< signed
+  double ramp_up_s;
+  double cruise_s;  ///< may be 0
+  double ramp_down_s;
+
+  /// Everything that is wrong, one sentence each; empty when the move can be made.
+  std::vector<std::string> problems() const;
+
+  double max_speed_rad_s() const noexcept;  ///< signed like the distance; a symmetric ramp covers ω_max·t1/2
+  double duration_s() const noexcept;
+};
+
+/// What a controller should follow at one instant.
+struct Reference {
+  double angle_rad = 0.0;
+  double speed_rad_s = 0.0;
+  double acceleration_rad_s2 = 0.0;
+  double jerk_rad_s3 = 0.0;
+};
+
+/// The move at time t after its start: rest at 0 before it, rest at the distance after it.
+Reference trajectory_at(const TrajectoryParameters& p, double t_s) noexcept;
+
+}  // namespace drivebench::control

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+
+namespace drivebench {
+
+/// Current measurement of the phases: amplifier, noise and analog-to-digital converter.
+struct CurrentSensorParameters {
+  int bits = 0;                ///< resolution of the converter; 0: ideal, neither quantised nor limited
+  double full_scale_a = 10.0;  ///< the converter spans -full_scale to +full_scale less one step
+  double gain_a = 1.0;         ///< of phase a
+  double gain_b = 1.0;
+  double offset_a_a = 0.0;  ///< of phase a
+  double offset_b_a = 0.0;
+  double noise_rms_a = 0.0;  ///< Gaussian, white from tick to tick
+};
+
+/// One measured phase current and whether the converter was at its end.
+struct CurrentReading {
+  double current_a;
+  bool saturated;
+};
+
+/// gain i + offset + noise, rounded to the nearest step, limited to the range of the converter.
+CurrentReading read_current(const CurrentSensorParameters& p, double gain, double offset_a, double current_a,
+                            double unit_noise) noexcept;
+
+}  // namespace drivebench

@@ -1,0 +1,88 @@
+#pragma once
+
+#include "plant/frames.hpp"
+
+namespace drivebench {
+
+/// Two-phase equivalent of a squirrel-cage induction machine (power-invariant transform), no saturation.
+struct InductionMachineParameters {
+  int pole_pairs = 1;
+  double stator_resistance_ohm = 0.0;
+  double rotor_resistance_ohm = 0.0;
+  double stator_inductance_h = 0.0;
+  double rotor_inductance_h = 0.0;
+  double mutual_inductance_h = 0.0;
+};
+
+/// Leakage factor sigma = 1 - M^2/(L_R L_S); the machine exists for 0 < sigma < 1 only.
+double leakage_factor(const InductionMachineParameters& p) noexcept;
+
+/// The constants that the equations use, derived once from the parameters. Source: Chiasson 2005, (8.6).
+struct InductionMachineConstants {
+  double pole_pairs;
+  double sigma;                       ///< leakage factor [1]
+  double eta_per_s;                   ///< R_R/L_R
+  double beta_per_h;                  ///< M/(sigma L_R L_S)
+  double gamma_per_s;                 ///< M^2 R_R/(sigma L_R^2 L_S) + R_S/(sigma L_S)
+  double mutual_inductance_h;         ///< M
+  double transient_inductance_h;      ///< sigma L_S
+  double transient_reluctance_per_h;  ///< 1/(sigma L_S)
+  double torque_constant;             ///< n_p M/L_R [1]; J mu of the book
+  double stator_resistance_ohm;       ///< R_S
+  double rotor_resistance_ohm;        ///< R_R
+  double rotor_inductance_h;          ///< L_R
+};
+
+InductionMachineConstants constants_of(const InductionMachineParameters& p) noexcept;
+
+/// Stator currents and rotor flux linkages, all in the stator frame (axes a, b).
+struct InductionMachineState {
+  double i_a_a = 0.0;
+  double i_b_a = 0.0;
+  double psi_a_wb = 0.0;
+  double psi_b_wb = 0.0;
+};
+
+/// What is connected to the terminals. A phase that does not conduct (factor 0) keeps its current at zero.
+struct TerminalInput {
+  TwoPhase voltage_v{};
+  TwoPhase conducts{1.0, 1.0};  ///< 1: connected to its voltage, 0: open
+};
+
+/// Rotor-flux model, motor convention, rotation positive from phase a to phase b:
+///   i_a'   = eta beta psi_a + beta n_p w psi_b - gamma i_a + u_a/(sigma L_S)
+///   i_b'   = eta beta psi_b - beta n_p w psi_a - gamma i_b + u_b/(sigma L_S)
+///   psi_a' = -eta psi_a - n_p w psi_b + eta M i_a
+///   psi_b' = -eta psi_b + n_p w psi_a + eta M i_b
+/// No sine of the angle occurs. Source: Chiasson 2005, (8.3)-(8.6).
+inline InductionMachineState derivative(const InductionMachineConstants& c, const InductionMachineState& x,
+                                        double speed_rad_s, const TerminalInput& u) noexcept {
+  const double omega_e = c.pole_pairs * speed_rad_s;
+  const double emf_a = c.beta_per_h * (c.eta_per_s * x.psi_a_wb + omega_e * x.psi_b_wb);
+  const double emf_b = c.beta_per_h * (c.eta_per_s * x.psi_b_wb - omega_e * x.psi_a_wb);
+  return {
+      .i_a_a =
+          u.conducts.a * (emf_a - c.gamma_per_s * x.i_a_a + u.voltage_v.a * c.transient_reluctance_per_h),
+      .i_b_a =
+          u.conducts.b * (emf_b - c.gamma_per_s * x.i_b_a + u.voltage_v.b * c.transient_reluctance_per_h),
+      .psi_a_wb = c.eta_per_s * (c.mutual_inductance_h * x.i_a_a - x.psi_a_wb) - omega_e * x.psi_b_wb,
+      .psi_b_wb = c.eta_per_s * (c.mutual_inductance_h * x.i_b_a - x.psi_b_wb) + omega_e * x.psi_a_wb,
+  };
+}
+
+/// Torque on the rotor: n_p (M/L_R) (i_b psi_a - i_a psi_b). Source: Chiasson 2005, (8.3).
+inline double torque_nm(const InductionMachineConstants& c, const InductionMachineState& x) noexcept {
+  return c.torque_constant * (x.i_b_a * x.psi_a_wb - x.i_a_a * x.psi_b_wb);
+}
+
+/// Voltage across each terminal pair that carries no current and is left open.
+TwoPhase open_circuit_voltage_v(const InductionMachineConstants& c, const InductionMachineState& x,
+                                double speed_rad_s) noexcept;
+
+/// Magnetic energy: sigma L_S |i|^2/2 + |psi|^2/(2 L_R).
+double stored_energy_j(const InductionMachineConstants& c, const InductionMachineState& x) noexcept;
+
+/// Copper losses of stator and rotor: R_S |i|^2 + R_R |i_R|^2 with i_R = (psi - M i)/L_R.
+double losses_w(const InductionMachineConstants& c, const InductionMachineState& x) noexcept;
+
+}  // namespace drivebench

@@ -1,0 +1,196 @@
+#include "protocols/sample_codec.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "protocols/framing.hpp"
+#include "protocols/wire.hpp"
+
+namespace drivebench {
+namespace {
+
+/// One signal, with its row known at compile time: the table becomes straight-line code.
+template <std::size_t Row>
+std::byte* put_signal(std::byte* out, const Sample& sample, SignalMask mask) noexcept {
+  constexpr Signal kSignal = kSignals[Row];
+  constexpr auto kField = static_cast<std::uint32_t>(Row + 1);
+  if ((mask >> Row & 1) == 0) return out;
+  if constexpr (kSignal.type == SignalType::kReal) {
+    const auto bits = std::bit_cast<std::uint64_t>(sample.*kSignal.as_real);
+    if (bits == 0) return out;
+    return wire::put_fixed64(wire::put_varint(out, wire::tag(kField, wire::kFixed64)), bits);
+  } else {
+    std::uint64_t value = 0;
+    if constexpr (kSignal.type == SignalType::kUnsigned) {
+      value = sample.*kSignal.as_unsigned;
+    } else {
+      value = wire::zigzag(sample.*kSignal.as_signed);
+    }
+    if (value == 0) return out;
+    return wire::put_varint(wire::put_varint(out, wire::tag(kField, wire::kVarint)), value);
+  }
+}
+
+void store(Sample& sample, const Signal& signal, std::uint64_t value) noexcept {
+  switch (signal.type) {
+    case SignalType::kUnsigned:
+      sample.*signal.as_unsigned = value;
+      break;
+    case SignalType::kSigned:
+      sample.*signal.as_signed = wire::unzigzag(value);
+      break;
+    case SignalType::kReal:
+      sample.*signal.as_real = std::bit_cast<double>(value);
+      break;
+  }
+}
+
+/// A sample in which every signal has the value that proto3 leaves out.
+constexpr Sample zero_sample() noexcept {
+  Sample sample;
+  sample.command_tick = 0;
+  sample.index_tick = 0;
+  return sample;
+}
+
+}  // namespace
+
+std::size_t encode_sample(const Sample& sample, SignalMask mask, std::byte* out) noexcept {
+  std::byte* end = out;
+  [&]<std::size_t... Row>(std::index_sequence<Row...>) {
+    ((end = put_signal<Row>(end, sample, mask)), ...);
+  }(std::make_index_sequence<kSignals.size()>{});
+  return static_cast<std::size_t>(end - out);
+}
+
+namespace {
+
+// Field numbers of bench.proto; a test compares them with the descriptors.
+constexpr std::uint32_t kEnvelopeId = 1;
+constexpr std::uint32_t kEnvelopeExchangeReply = 8;
+constexpr std::uint32_t kEnvelopeSamples = 10;
+constexpr std::uint32_t kExchangeReplySamples = 1;
+constexpr std::uint32_t kAxisSampleAxis = 1;
+constexpr std::uint32_t kAxisSampleSample = 2;
+constexpr std::uint32_t kSamplesAxis = 1;
+constexpr std::uint32_t kSamplesDropped = 2;
+constexpr std::uint32_t kSamplesSamples = 3;
+
+/// Grows a buffer from its end; lengths of nested messages take a fixed three bytes, as they are known only
+/// afterwards.
+class MessageWriter {
+ public:
+  explicit MessageWriter(std::vector<std::byte>& out) : out_(out) {}
+
+  std::byte* room(std::size_t size) {
+    out_.resize(out_.size() + size);
+    return out_.data() + out_.size() - size;
+  }
+  void used(const std::byte* end) { out_.resize(static_cast<std::size_t>(end - out_.data())); }
+
+  void varint(std::uint32_t field, std::uint64_t value) {
+    if (value == 0) return;
+    used(wire::put_varint(wire::put_varint(room(20), wire::tag(field, wire::kVarint)), value));
+  }
+
+  /// Opens a nested message; close() with what this returned.
+  std::size_t open(std::uint32_t field) {
+    used(wire::put_varint(room(5), wire::tag(field, wire::kBytes)));
+    room(kLengthBytes);
+    return out_.size();
+  }
+  void close(std::size_t begin) {
+    std::uint64_t size = out_.size() - begin;
+    for (std::size_t i = 0; i < kLengthBytes; ++i, size >>= 7) {
+      out_[begin - kLengthBytes + i] = std::byte((size & 0x7f) | (i + 1 < kLengthBytes ? 0x80 : 0));
+    }
+  }
+
+  void sample(std::uint32_t field, const Sample& sample, SignalMask mask) {
+    const std::size_t begin = open(field);
+    std::byte* const out = room(kMaxSampleBytes);
+    used(out + encode_sample(sample, mask, out));
+    close(begin);
+  }
+
+ private:
+  static constexpr std::size_t kLengthBytes = 3;  // enough for any frame this server sends
+
+  std::vector<std::byte>& out_;
+};
+
+/// Leaves room for the length of a frame, and fills it in.
+class FrameWriter {
+ public:
+  explicit FrameWriter(std::vector<std::byte>& out) : out_(out), begin_(out.size()) {
+    out_.resize(begin_ + kFrameHeaderSize);
+  }
+  ~FrameWriter() {
+    const auto header = frame_header(static_cast<std::uint32_t>(out_.size() - begin_ - kFrameHeaderSize));
+    std::copy(header.begin(), header.end(), out_.begin() + static_cast<std::ptrdiff_t>(begin_));
+  }
+  FrameWriter(const FrameWriter&) = delete;
+  FrameWriter& operator=(const FrameWriter&) = delete;
+
+ private:
+  std::vector<std::byte>& out_;
+  std::size_t begin_;
+};
+
+}  // namespace
+
+void append_exchange_reply(std::vector<std::byte>& out, std::uint64_t id,
+                           std::span<const AxisSampleView> samples) {
+  const FrameWriter frame(out);
+  MessageWriter writer(out);
+  writer.varint(kEnvelopeId, id);
+  const std::size_t reply = writer.open(kEnvelopeExchangeReply);
+  for (const AxisSampleView& view : samples) {
+    const std::size_t axis_sample = writer.open(kExchangeReplySamples);
+    writer.varint(kAxisSampleAxis, view.axis);
+    writer.sample(kAxisSampleSample, *view.sample, kAllSignals);
+    writer.close(axis_sample);
+  }
+  writer.close(reply);
+}
+
+void append_samples(std::vector<std::byte>& out, std::uint32_t axis, std::uint64_t dropped,
+                    std::span<const Sample> samples, SignalMask mask) {
+  const FrameWriter frame(out);
+  MessageWriter writer(out);
+  const std::size_t message = writer.open(kEnvelopeSamples);
+  writer.varint(kSamplesAxis, axis);
+  writer.varint(kSamplesDropped, dropped);
+  for (const Sample& sample : samples)
+    writer.sample(kSamplesSamples, sample, mask);
+  writer.close(message);
+}
+
+std::optional<Sample> decode_sample(std::span<const std::byte> bytes) noexcept {
+  Sample sample = zero_sample();
+  const std::byte* in = bytes.data();
+  const std::byte* const end = in + bytes.size();
+  while (in != end) {
+    std::uint64_t tag = 0;
+    in = wire::get_varint(in, end, tag);
+    if (in == nullptr) return std::nullopt;
+    const std::uint64_t row = (tag >> 3) - 1;
+    if (row >= kSignals.size()) return std::nullopt;
+    const bool real = kSignals[row].type == SignalType::kReal;
+    if ((tag & 7) != (real ? wire::kFixed64 : wire::kVarint)) return std::nullopt;
+    std::uint64_t value = 0;
+    if (real) {
+      if (end - in < 8) return std::nullopt;
+      std::memcpy(&value, in, sizeof(value));
+      in += sizeof(value);
+    } else {
+      in = wire::get_varint(in, end, value);
+      if (in == nullptr) return std::nullopt;
+    }
+    store(sample, kSignals[row], value);
+  }
+  return sample;
+}
+
+}  // namespace drivebench

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "plant/axis.hpp"
+#include "protocols/sample.hpp"
+#include "server/digest.hpp"
+#include "server/input.hpp"
+
+namespace drivebench {
+
+/// What the bench does to an axis whose controller is gone.
+enum class SafeAction : std::uint32_t { kFreewheel, kZeroVoltage };
+
+/// State of the control of an axis, as Sample.state shows it.
+enum class ControlState : std::uint64_t {
+  kIdle = 0,     ///< nobody commands it: safe action
+  kRun = 1,      ///< commands arrive
+  kHold = 2,     ///< commands are missing, the last one holds
+  kTimeout = 3,  ///< latched: too many were missing, or the controller left; safe action
+  kFault = 4,    ///< latched: trip, overrun or divergence; safe action
+};
+
+/// What the bench needs to know of one axis.
+struct AxisSetup {
+  AxisParameters parameters;
+  SafeAction on_link_loss = SafeAction::kFreewheel;
+};
+
+/// What the bench needs to know of itself.
+struct BenchSetup {
+  std::int64_t period_ns = 125'000;
+  int substeps = 5;
+  std::uint64_t seed = 1;
+  int command_delay_ticks = 1;  ///< 0: command(k) holds from tick k; 1: from tick k+1
+  Tick watchdog_ticks = 20;
+  Tick lease_ticks = 16'000;
+  std::vector<AxisSetup> axes;
+};
+
+/// Sees everything that happens, in order, inside the tick: must neither wait, allocate, lock nor throw.
+class BenchObserver {
+ public:
+  virtual ~BenchObserver() = default;
+  /// An input came in before tick `now` ran; it acts at input.tick, which may be later.
+  virtual void on_input(Tick now, const Input& input) noexcept = 0;
+  virtual void on_sample(std::uint32_t axis, const Sample& sample) noexcept = 0;
+};
+
+/// The bench: single-threaded, deterministic, without clock, thread or I/O. The same setup and the same
+/// inputs at the same ticks give the same samples, bit for bit.
+class Bench {
+ public:
+  explicit Bench(const BenchSetup& setup, BenchObserver* observer = nullptr);
+
+  /// Takes an input. One for a later tick is kept until then (at most kMaxScheduled); all others act at the
+  /// start of the present tick, with their tick set to it.
+  Refused submit(const Input& input) noexcept;
+
+  /// One tick: inputs that are due, commands, plant, sensors.
+  void step() noexcept;
+
+  Tick tick() const noexcept { return tick_; }
+  std::size_t axis_count() const noexcept { return axes_.size(); }
+  const Sample& sample(std::size_t axis) const noexcept { return axes_[axis].sample; }
+  const Axis& axis(std::size_t index) const noexcept { return axes_[index].axis; }
+  Owner owner(std::size_t axis) const noexcept { return axes_[axis].control.owner; }
+  /// Whether a command for the present tick has come in.
+  bool has_command(std::size_t axis) const noexcept { return axes_[axis].control.fresh != 0; }
+
+  /// A hash of everything the future depends on and of every sample so far.
+  std::uint64_t state_hash() const noexcept;
+
+  /// The whole state as bytes, for restore() on a bench with the same setup in this or another process.
+  std::vector<std::byte> save() const;
+  /// False, with nothing changed, if the bytes are not a state of such a bench.
+  bool restore(std::span<const std::byte> saved);
+
+  static constexpr std::size_t kMaxScheduled = 256;
+
+ private:
+  /// What the control of an axis remembers. 8-byte members only.
+  struct Control {
+    Owner owner = 0;
+    Tick renewed = 0;  ///< tick of the last renewal of the lease
+    ControlState state = ControlState::kIdle;
+    std::int64_t fresh = 0;  ///< 1: a command came in for this tick
+    Command newest{};        ///< the last command accepted
+    Command in_force{};
+    std::int64_t silent_ticks = 0;  ///< ticks without a command, late ones not counted
+    std::uint64_t missed = 0;
+    std::uint64_t refused = 0;
+  };
+  struct AxisRuntime {
+    Axis axis;
+    SafeAction on_link_loss;
+    Control control;
+    Sample sample;
+  };
+
+  Refused apply(const Input& input) noexcept;
+  Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
+  Refused accept(AxisRuntime& a, const Command& command, Owner owner) noexcept;
+  Refused change_lease(AxisRuntime& a, LeaseAction action, Owner owner) noexcept;
+  void lose_controller(AxisRuntime& a, std::uint64_t fault) noexcept;
+  void apply_due() noexcept;
+  PhaseCommand supervise(AxisRuntime& a) noexcept;
+  void take_sample(std::size_t index) noexcept;
+  PhaseCommand safe_command(const AxisRuntime& a) const noexcept;
+
+  /// Calls visit(block) for every piece of the state, each a struct of 8-byte members.
+  template <class Self, class Visitor>
+  static void for_each_block(Self& self, Visitor visit);
+
+  BenchSetup setup_;
+  BenchObserver* observer_;
+  Tick tick_ = 0;
+  std::int64_t late_now_ = 0;  ///< 1: the present tick started late
+  std::uint64_t late_ticks_ = 0;
+  Digest samples_;  ///< of all samples so far
+  std::uint64_t scheduled_ = 0;
+  std::array<PackedInput, kMaxScheduled> schedule_{};  ///< sorted by tick, first come first served within one
+  std::vector<AxisRuntime> axes_;
+};
+
+}  // namespace drivebench

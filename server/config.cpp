@@ -1,0 +1,54 @@
+#include "server/config.hpp"
+
+#include <arpa/inet.h>
+
+#include <utility>
+
+#include "server/config_words.hpp"
+
+namespace drivebench {
+namespace {
+
+std::string listed(const std::vector<ConfigProblem>& problems) {
+  std::string text;
+  for (const ConfigProblem& p : problems) {
+    if (!text.empty()) text += '\n';
+    text += p.file + (p.line > 0 ? ":" + std::to_string(p.line) : "") + ": " + p.key +
+            (p.key.empty() ? "" : " ") + p.rule;
+  }
+  return text;
+}
+
+}  // namespace
+
+ConfigError::ConfigError(std::vector<ConfigProblem> problems)
+    : std::runtime_error(listed(problems)), problems_(std::move(problems)) {}
+
+std::string_view name_of(RunMode mode) noexcept {
+  return kRunModeWords[static_cast<std::size_t>(mode)];
+}
+
+std::string_view name_of(PacerKind pacer) noexcept {
+  return kPacerWords[static_cast<std::size_t>(pacer)];
+}
+
+std::string_view name_of(SafeAction action) noexcept {
+  return kSafeActionWords[static_cast<std::size_t>(action)];
+}
+
+bool is_address(const std::string& text) noexcept {
+  in_addr v4{};
+  in6_addr v6{};
+  return text == "localhost" || ::inet_pton(AF_INET, text.c_str(), &v4) == 1 ||
+         ::inet_pton(AF_INET6, text.c_str(), &v6) == 1;
+}
+
+bool is_loopback(const std::string& address) noexcept {
+  in_addr v4{};
+  in6_addr v6{};
+  if (address == "localhost") return true;
+  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+}  // namespace drivebench

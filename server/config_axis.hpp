@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+
+#include "server/config.hpp"
+#include "server/strict_table.hpp"
+
+namespace drivebench {
+
+/// One [[axis]] of a bench file, with its motor file.
+struct AxisReading {
+  AxisConfig config;
+  AxisSetup setup;
+  bool machine_valid = false;  ///< setup.parameters.machine is complete and free of problems
+};
+
+AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
+                      ProblemList& problems);
+
+/// A duration given as seconds, rounded to the nearest tick, or as ticks; not both.
+std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key, std::string_view ticks_key,
+                               std::int64_t period_ns);
+
+}  // namespace drivebench

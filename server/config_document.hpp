@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "server/config.hpp"
+
+namespace drivebench {
+
+/// Collects problems; beyond a hundred it only counts, so that a file of garbage costs no time.
+class ProblemList {
+ public:
+  void add(const std::string& file, int line, std::string key, std::string rule);
+  bool full() const noexcept { return problems_.size() >= kMost; }
+  /// Throws ConfigError, sorted by file and line, if there are any.
+  void throw_if_any();
+
+ private:
+  static constexpr std::size_t kMost = 100;
+  std::vector<ConfigProblem> problems_;
+  std::size_t dropped_ = 0;
+};
+
+/// A value of a TOML document with its place: keeps the TOML library out of all files but one.
+struct ConfigNode {
+  enum class Kind { kTable, kArray, kScalar };
+  /// What a scalar that configurations have no use for is called, for example "a date".
+  struct Other {
+    std::string_view what;
+  };
+
+  std::string key;  ///< empty within an array
+  int line = 0;
+  Kind kind = Kind::kTable;
+  std::variant<Other, std::string, std::int64_t, double, bool> scalar;
+  std::vector<ConfigNode> children;
+};
+
+/// The document, or nothing, with the problem added. Bounds size, line length and nesting, so that no text
+/// can cost more than some milliseconds or the stack.
+std::optional<ConfigNode> parse_document(std::string_view text, const std::string& file,
+                                         ProblemList& problems);
+
+/// A whole regular file of at most `limit` bytes, or why it cannot be had, as the end of "the file ...".
+struct FileText {
+  std::string text;
+  std::string why_not;           ///< empty: text is the file
+  bool others_may_read = false;  ///< group or others
+};
+FileText read_file(const std::filesystem::path& file, std::size_t limit);
+
+inline constexpr std::size_t kMaxConfigBytes = 256 * 1024;
+
+/// The text fit for one line of a terminal: control characters replaced, cut after 160 bytes.
+std::string printable(std::string_view text);
+
+/// The shortest decimal text that reads back as the same double.
+std::string shortest(double value);
+
+}  // namespace drivebench

@@ -1,0 +1,218 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/config.hpp"
+#include "server/config_axis.hpp"
+#include "server/config_document.hpp"
+#include "server/config_words.hpp"
+#include "server/strict_table.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::int64_t kMaxSeed = INT64_MAX;  // the largest integer of TOML
+constexpr double kDefaultLeaseS = 2.0;
+constexpr int kLastCpu = 1023;
+constexpr std::size_t kMaxUnixPath = 107;  // sockaddr_un
+constexpr std::size_t kMaxToken = 200;
+
+/// A duration in units of `ns_per_unit`, which must come to whole nanoseconds.
+std::optional<std::int64_t> read_ns(StrictTable& table, std::string_view key, double ns_per_unit,
+                                    double minimum, double maximum) {
+  const auto value = table.real(key, minimum, maximum);
+  if (!value) return std::nullopt;
+  const double ns = *value * ns_per_unit;
+  const double whole = std::round(ns);
+  if (std::abs(ns - whole) > 1e-6 + 1e-15 * ns) {
+    table.report(key, "is " + shortest(*value) + " but must be whole nanoseconds; the nearest is " +
+                          shortest(whole / ns_per_unit));
+    return std::nullopt;
+  }
+  return static_cast<std::int64_t>(whole);
+}
+
+void read_lease(StrictTable& bench, bool period_valid, BenchSetup& setup) {
+  const auto ticks = read_ticks(bench, "lease_s", "lease_ticks", setup.period_ns);
+  if (ticks) {
+    setup.lease_ticks = *ticks;
+  } else {
+    const Tick default_ticks = std::llround(kDefaultLeaseS * 1e9 / static_cast<double>(setup.period_ns));
+    setup.lease_ticks = std::max(default_ticks, setup.watchdog_ticks);
+  }
+  if (period_valid && setup.lease_ticks < setup.watchdog_ticks) {
+    bench.report(
+        bench.has("lease_s") ? "lease_s" : "lease_ticks",
+        "comes to " + std::to_string(setup.lease_ticks) +
+            " ticks but must not be shorter than watchdog_ticks = " + std::to_string(setup.watchdog_ticks));
+  }
+}
+
+/// Whether period and substeps are known.
+bool read_bench(StrictTable& bench, BenchConfig& config) {
+  for (const std::string_view key : {"name", "mode", "period_us"})
+    bench.require(key);
+  config.name = bench.identifier("name").value_or("");
+  const auto mode = bench.choice("mode", kRunModeWords);
+  config.mode = static_cast<RunMode>(mode.value_or(static_cast<std::size_t>(config.mode)));
+
+  BenchSetup& setup = config.setup;
+  const auto period_ns = read_ns(bench, "period_us", 1e3, 1.0, 1e6);
+  setup.period_ns = period_ns.value_or(setup.period_ns);
+  const auto substeps = bench.integer("substeps", 1, kMaxSubsteps);
+  setup.substeps = static_cast<int>(substeps.value_or(setup.substeps));
+  setup.seed = static_cast<std::uint64_t>(
+      bench.integer("seed", 0, kMaxSeed).value_or(static_cast<std::int64_t>(setup.seed)));
+  setup.watchdog_ticks = bench.integer("watchdog_ticks", 1, 1'000'000).value_or(setup.watchdog_ticks);
+  read_lease(bench, period_ns.has_value(), setup);
+
+  const bool realtime = config.mode == RunMode::kRealtime;
+  setup.command_delay_ticks =
+      static_cast<int>(bench.integer("command_delay_ticks", 0, 1).value_or(realtime ? 1 : 0));
+  if (mode && realtime && setup.command_delay_ticks == 0) {
+    bench.report(
+        "command_delay_ticks",
+        "is 0 but must be 1 in real time: tick k starts before any answer to sample k can have come");
+  }
+  bench.finish();
+  return period_ns && (substeps || !bench.has("substeps"));
+}
+
+void read_realtime(StrictTable table, RealtimeConfig& realtime) {
+  const auto pacer = table.choice("pacer", kPacerWords);
+  realtime.pacer = static_cast<PacerKind>(pacer.value_or(static_cast<std::size_t>(realtime.pacer)));
+  realtime.max_lateness_ns =
+      read_ns(table, "max_lateness_ms", 1e6, 1e-3, 1e6).value_or(realtime.max_lateness_ns);
+  realtime.cpu = static_cast<int>(table.integer("cpu", -1, kLastCpu).value_or(realtime.cpu));
+  realtime.priority = static_cast<int>(table.integer("priority", 0, 99).value_or(realtime.priority));
+  table.finish();
+}
+
+std::string read_token(StrictTable& tcp, const std::filesystem::path& folder) {
+  const auto name = tcp.text("token_file", 800);
+  if (!name) return {};
+  const std::string path = (folder / *name).lexically_normal().string();
+  const FileText file = read_file(path, 4096);
+  std::string token = file.text.substr(0, file.text.find('\n'));
+  if (token.ends_with('\r')) token.pop_back();
+  const bool printable_only =
+      std::all_of(token.begin(), token.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  if (!file.why_not.empty()) {
+    tcp.report("token_file", "names " + path + ", which " + file.why_not);
+  } else if (file.others_may_read) {
+    tcp.report("token_file", "names " + path + ", which others may read: chmod 600 it");
+  } else if (token.empty() || token.size() > kMaxToken || !printable_only) {
+    tcp.report("token_file", "names " + path + ", whose first line must be 1 to " +
+                                 std::to_string(kMaxToken) + " printable ASCII characters");
+  } else {
+    return token;
+  }
+  return {};
+}
+
+void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig& tcp) {
+  if (const auto address = table.text("address", 64)) {
+    tcp.address = *address;
+    if (!is_address(*address)) {
+      table.report("address",
+                   "is \"" + printable(*address) + "\" but must be an IPv4 or IPv6 address or \"localhost\"");
+    } else if (!is_loopback(*address) && !table.has("token_file")) {
+      table.report("address", "is " + *address + ", which other computers can reach: name a token_file");
+    }
+  }
+  tcp.port = static_cast<std::uint16_t>(table.integer("port", 0, 65535).value_or(tcp.port));
+  tcp.unix_path = table.text("unix_path", kMaxUnixPath).value_or("");
+  tcp.token = read_token(table, folder);
+  tcp.max_sessions =
+      static_cast<std::uint32_t>(table.integer("max_sessions", 1, 10'000).value_or(tcp.max_sessions));
+  table.finish();
+}
+
+/// Fastest rate of the machine and its shaft at standstill: of the two real poles of currents and flux,
+/// s^2 + (gamma + eta) s + eta R_S/(sigma L_S), and the shaft's f/J.
+double fastest_rate_per_s(const AxisParameters& p) {
+  const InductionMachineConstants c = constants_of(p.machine);
+  const double half_sum = 0.5 * (c.gamma_per_s + c.eta_per_s);
+  const double product = c.eta_per_s * c.stator_resistance_ohm * c.transient_reluctance_per_h;
+  const double electrical = half_sum + std::sqrt(std::max(0.0, half_sum * half_sum - product));
+  if (!(p.mechanics.inertia_kgm2 > 0.0)) return electrical;
+  return std::max(electrical, p.mechanics.viscous_friction_nms / p.mechanics.inertia_kgm2);
+}
+
+/// The integration step may be half the fastest time constant: RK4 is stable up to 2.8 of it, and accurate to
+/// 1e-4 of a transient at one half.
+void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& axis) {
+  constexpr double kMaxStep = 0.5;
+  const double period_s = static_cast<double>(setup.period_ns) * 1e-9;
+  const double rate_per_s = fastest_rate_per_s(axis.setup.parameters);
+  if (period_s * rate_per_s <= kMaxStep * setup.substeps) return;
+  const double needed = std::ceil(period_s * rate_per_s / kMaxStep);
+  std::string rule = "comes to steps of " + shortest(period_s * 1e6 / setup.substeps) +
+                     " us, too long for the fastest time constant of axis \"" + axis.config.name + "\", " +
+                     shortest(std::round(1e9 / rate_per_s) * 1e-3) + " us: ";
+  if (needed <= kMaxSubsteps) {
+    rule += "at least " + shortest(needed) + " substeps are needed";
+  } else {
+    rule += "even " + std::to_string(kMaxSubsteps) + " substeps would need a period_us of at most " +
+            shortest(std::floor(kMaxSubsteps * kMaxStep / rate_per_s * 1e9) * 1e-3);
+  }
+  bench.report(bench.has("substeps") ? "substeps" : "period_us", std::move(rule));
+}
+
+std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::path& folder,
+                                   ProblemList& problems, const BenchConfig& config) {
+  root.require("axis");
+  std::vector<AxisReading> axes;
+  std::size_t loads = 0;
+  for (StrictTable& table : root.tables("axis", kMaxAxes)) {
+    AxisReading axis = read_axis(table, folder, config.setup.period_ns, problems);
+    const std::string& name = axis.config.name;
+    const auto same = [&](const AxisReading& other) { return other.config.name == name; };
+    if (!name.empty() && std::any_of(axes.begin(), axes.end(), same)) {
+      table.report("name", "is \"" + name + "\", the name of another axis");
+    }
+    loads += axis.config.loads.size();
+    if (loads > kMaxLoads) {
+      table.report("load", "brings the loads of all axes to " + std::to_string(loads) + " but there may be " +
+                               std::to_string(kMaxLoads));
+    }
+    axes.push_back(std::move(axis));
+  }
+  return axes;
+}
+
+}  // namespace
+
+BenchConfig parse_config(std::string_view text, const std::string& name,
+                         const std::filesystem::path& folder) {
+  ProblemList problems;
+  BenchConfig config;
+  if (const auto document = parse_document(text, name, problems)) {
+    StrictTable root(&*document, "", 1, name, problems);
+    root.require("bench");
+    StrictTable bench = root.table("bench");
+    const bool timing_valid = bench.exists() && read_bench(bench, config);
+    read_realtime(root.table("realtime"), config.realtime);
+    read_tcp(root.table("tcp"), folder, config.tcp);
+    for (const AxisReading& axis : read_axes(root, folder, problems, config)) {
+      if (timing_valid && axis.machine_valid) check_step(bench, config.setup, axis);
+      config.setup.axes.push_back(axis.setup);
+      config.axes.push_back(axis.config);
+    }
+    root.finish();
+  }
+  problems.throw_if_any();
+  return config;
+}
+
+BenchConfig load_config(const std::filesystem::path& file) {
+  const FileText read = read_file(file, kMaxConfigBytes);
+  if (!read.why_not.empty()) throw ConfigError({{file.string(), 0, {}, read.why_not}});
+  return parse_config(read.text, file.string(), file.parent_path());
+}
+
+}  // namespace drivebench

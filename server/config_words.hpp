@@ -1,0 +1,13 @@
+#pragma once
+
+#include <array>
+#include <string_view>
+
+namespace drivebench {
+
+// The words of the configuration, in the order of their enumerations.
+inline constexpr std::array<std::string_view, 3> kRunModeWords{"realtime", "lockstep", "free"};
+inline constexpr std::array<std::string_view, 2> kPacerWords{"sleep", "sleep+spin"};
+inline constexpr std::array<std::string_view, 2> kSafeActionWords{"freewheel", "zero_voltage"};
+
+}  // namespace drivebench

@@ -1,0 +1,120 @@
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "plant/parameters.hpp"
+#include "server/config.hpp"
+#include "server/config_document.hpp"
+#include "server/digest.hpp"
+
+namespace drivebench {
+namespace {
+
+std::string in_quotes(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+/// A TOML float: without point or exponent it would read as an integer, and -0 lose its sign.
+std::string real(double value) {
+  std::string text = shortest(value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+}
+
+void append(std::string& text, std::string_view key, const std::string& value) {
+  text.append(key).append(" = ").append(value).append("\n");
+}
+
+void append_timing(std::string& text, const BenchSetup& setup) {
+  append(text, "period_us", real(static_cast<double>(setup.period_ns) / 1e3));
+  append(text, "substeps", std::to_string(setup.substeps));
+  append(text, "seed", std::to_string(setup.seed));
+  append(text, "command_delay_ticks", std::to_string(setup.command_delay_ticks));
+  append(text, "watchdog_ticks", std::to_string(setup.watchdog_ticks));
+  append(text, "lease_ticks", std::to_string(setup.lease_ticks));
+}
+
+std::string value_text(const Parameter& row, double value) {
+  if (!row.integer) return real(value);
+  if (row.minimum == 0.0 && row.maximum == 1.0) return value != 0.0 ? "true" : "false";
+  return std::to_string(static_cast<std::int64_t>(value));
+}
+
+void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config) {
+  append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
+  std::string_view section;
+  for (const Parameter& row : axis_parameters()) {
+    const std::size_t dot = row.name.find('.');
+    if (section != row.name.substr(0, dot)) {
+      section = row.name.substr(0, dot);
+      text.append("\n[axis.").append(section).append("]\n");
+    }
+    append(text, row.name.substr(dot + 1), value_text(row, row.get(setup.parameters)));
+  }
+  for (const LoadEvent& load : config.loads) {
+    text += "\n[[axis.load]]\n";
+    append(text, "at_tick", std::to_string(load.tick));
+    append(text, "load_nm", real(load.change.load_nm));
+    append(text, "ramp_ticks", std::to_string(load.change.ramp_ticks));
+  }
+}
+
+void append_service(std::string& text, const RealtimeConfig& realtime, const TcpConfig& tcp) {
+  text += "\n[realtime]\n";
+  append(text, "pacer", in_quotes(name_of(realtime.pacer)));
+  append(text, "max_lateness_ms", real(static_cast<double>(realtime.max_lateness_ns) / 1e6));
+  append(text, "cpu", std::to_string(realtime.cpu));
+  append(text, "priority", std::to_string(realtime.priority));
+  text += "\n[tcp]\n";
+  // Without the token, which stays secret, an address that others can reach would be refused.
+  if (is_loopback(tcp.address)) append(text, "address", in_quotes(tcp.address));
+  append(text, "port", std::to_string(tcp.port));
+  if (!tcp.unix_path.empty()) append(text, "unix_path", in_quotes(tcp.unix_path));
+  append(text, "max_sessions", std::to_string(tcp.max_sessions));
+}
+
+}  // namespace
+
+std::string to_toml(const BenchConfig& config) {
+  std::string text = "[bench]\n";
+  append(text, "name", in_quotes(config.name));
+  append(text, "mode", in_quotes(name_of(config.mode)));
+  append_timing(text, config.setup);
+  append_service(text, config.realtime, config.tcp);
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    text += "\n[[axis]]\n";
+    append(text, "name", in_quotes(config.axes[i].name));
+    if (!config.axes[i].motor.empty()) append(text, "motor_name", in_quotes(config.axes[i].motor));
+    append_axis(text, config.setup.axes[i], config.axes[i]);
+  }
+  return text;
+}
+
+std::string physics_toml(const BenchConfig& config) {
+  std::string text = "[bench]\n";
+  append_timing(text, config.setup);
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    text += "\n[[axis]]\n";
+    append_axis(text, config.setup.axes[i], config.axes[i]);
+  }
+  return text;
+}
+
+std::uint64_t configuration_hash(const BenchConfig& config) {
+  const std::string text = physics_toml(config);
+  Digest digest;
+  digest.add(text.size());
+  for (std::size_t i = 0; i < text.size(); i += 8) {
+    std::uint64_t word = 0;
+    for (const char c : std::string_view(text).substr(i, 8))
+      word = word << 8 | static_cast<unsigned char>(c);
+    digest.add(word);
+  }
+  return digest.value();
+}
+
+}  // namespace drivebench

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+namespace drivebench {
+
+/// Mixes words into a 64-bit digest. Four lanes, so that the multiplications overlap; not cryptographic.
+class Digest {
+ public:
+  constexpr void add(std::uint64_t word) noexcept {
+    std::uint64_t& lane = lanes_[position_++ & 3u];
+    lane = std::rotl((lane ^ word) * 0x9e37'79b9'7f4a'7c15u, 29);
+  }
+
+  /// Adds a struct of 8-byte members word by word.
+  template <class Block>
+  void add_block(const Block& block) noexcept {
+    static_assert(std::is_trivially_copyable_v<Block> && sizeof(Block) % 8 == 0);
+    std::uint64_t words[sizeof(Block) / 8];
+    std::memcpy(words, &block, sizeof(Block));
+    for (const std::uint64_t word : words)
+      add(word);
+  }
+
+  constexpr std::uint64_t value() const noexcept {
+    std::uint64_t result = position_;
+    for (const std::uint64_t lane : lanes_)
+      result = (std::rotl(result, 23) ^ lane) * 0xc2b2'ae3d'27d4'eb4fu;
+    return result ^ (result >> 32);
+  }
+
+ private:
+  std::uint64_t lanes_[4] = {0x243f'6a88'85a3'08d3u, 0x1319'8a2e'0370'7344u, 0xa409'3822'299f'31d0u,
+                             0x082e'fa98'ec4e'6c89u};
+  std::uint64_t position_ = 0;
+};
+
+}  // namespace drivebench

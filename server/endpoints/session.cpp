@@ -1,0 +1,208 @@
+#include "server/endpoints/session.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "protocols/descriptor_set.hpp"
+#include "server/build_id.hpp"
+#include "server/endpoints/description.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::uint32_t kProtocolVersion = 1;
+
+/// Compares without telling by its duration where the first difference is.
+bool same_token(std::string_view a, std::string_view b) noexcept {
+  unsigned difference = a.size() == b.size() ? 0 : 1;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    difference |= static_cast<unsigned>(a[i]) ^ static_cast<unsigned>(b.empty() ? '\0' : b[i % b.size()]);
+  }
+  return difference == 0;
+}
+
+}  // namespace
+
+Session::Session(Outbox::Socket socket, std::string peer, SessionContext& context)
+    : socket_(std::move(socket)),
+      outbox_(socket_),
+      peer_(std::move(peer)),
+      context_(context),
+      engine_(context.engine),
+      reader_(kMaxRequestFrame),
+      leased_(context.engine.config().axes.size()) {
+  reader_.set_max_payload(kMaxFrameBeforeHello);
+  socket_.non_blocking(true);
+  outbox_.on_idle = [this] { send_samples(); };
+}
+
+asio::awaitable<void> Session::run() {
+  const std::shared_ptr<Session> self = shared_from_this();
+  asio::steady_timer hello_timer(socket_.get_executor(), kHelloLimit);
+  hello_timer.async_wait([self](const boost::system::error_code& error) {
+    if (!error && !self->greeted_) self->close();
+  });
+  boost::system::error_code error;
+  bool open = true;
+  while (open && !error) {
+    const std::span<std::byte> space = reader_.free_space();
+    const std::size_t count = co_await socket_.async_read_some(
+        asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
+    reader_.received(count);
+    while (const auto frame = open ? reader_.next() : std::nullopt)
+      open = handle(*frame);
+    if (!reader_.error().empty()) {
+      refuse(0, v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
+      open = false;
+    }
+  }
+  hello_timer.cancel();
+  give_leases_back();
+  close();
+}
+
+bool Session::handle(std::span<const std::byte> frame) {
+  if (!request_.ParseFromArray(frame.data(), static_cast<int>(frame.size()))) {
+    refuse(0, v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
+    return false;
+  }
+  if (!greeted_ && request_.kind_case() != v1::Envelope::kHello) {
+    refuse(request_.id(), v1::REFUSAL_UNAUTHENTICATED, "the first message must be hello", "kind");
+    return false;
+  }
+  return dispatch();
+}
+
+bool Session::dispatch() {
+  switch (request_.kind_case()) {
+    case v1::Envelope::kExchange:
+      exchange(request_.exchange());
+      break;
+    case v1::Envelope::kHello:
+      return greet(request_.hello());
+    case v1::Envelope::kLease:
+      lease(request_.lease());
+      break;
+    case v1::Envelope::kSubscribe:
+      subscribe(request_.subscribe());
+      break;
+    case v1::Envelope::kReadParameters:
+      read_parameters(request_.read_parameters());
+      break;
+    case v1::Envelope::kWriteParameter:
+      write_parameter(request_.write_parameter());
+      break;
+    case v1::Envelope::kSetLoad:
+      set_load(request_.set_load());
+      break;
+    case v1::Envelope::kClearFaults:
+      clear_faults(request_.clear_faults());
+      break;
+    case v1::Envelope::kStatusRequest:
+      report_status();
+      break;
+    default:
+      refuse(request_.id(), v1::REFUSAL_MALFORMED, "not a request", "kind");
+      break;
+  }
+  return true;
+}
+
+bool Session::greet(const v1::Hello& hello) {
+  const std::uint64_t id = request_.id();
+  if (hello.protocol_min() > kProtocolVersion || hello.protocol_max() < kProtocolVersion) {
+    refuse(id, v1::REFUSAL_VERSION,
+           "this server speaks protocol " + std::to_string(kProtocolVersion) + ", the client " +
+               std::to_string(hello.protocol_min()) + " to " + std::to_string(hello.protocol_max()),
+           "protocol_max");
+    return false;
+  }
+  if (hello.client().size() > 100) {
+    refuse(id, v1::REFUSAL_OUT_OF_RANGE, "the client's name is longer than 100 bytes", "client");
+    return false;
+  }
+  if (!context_.token.empty() && !same_token(hello.token(), context_.token)) {
+    spdlog::warn("{}: wrong or no token", peer_);
+    refuse(id, v1::REFUSAL_UNAUTHENTICATED, "wrong or no token", "token");
+    return false;
+  }
+  greeted_ = true;
+  reader_.set_max_payload(kMaxRequestFrame);
+  reply_.Clear();
+  reply_.set_id(id);
+  v1::Welcome& welcome = *reply_.mutable_welcome();
+  welcome.set_protocol(kProtocolVersion);
+  welcome.set_build_id(std::string(build_id()));
+  *welcome.mutable_bench() = describe(engine_);
+  welcome.set_descriptor_set(bench_descriptor_set());
+  send(reply_);
+  return true;
+}
+
+void Session::turn_away(std::string_view sentence) {
+  refuse(0, v1::REFUSAL_BUSY, std::string(sentence), "session");
+}
+
+void Session::on_tick() {
+  if (waiting_) {
+    const WaitingExchange waiting = std::move(*waiting_);
+    waiting_.reset();
+    reply_exchange(waiting.id, waiting.axes);
+  }
+  if (subscriptions_.empty()) return;
+  for (Subscription& s : subscriptions_) {
+    const Sample& newest = engine_.newest(s.axis);
+    if (newest.tick % s.decimation != 0) continue;
+    if (s.size == s.ring.size()) {
+      s.begin = (s.begin + 1) % s.ring.size();
+      --s.size;
+      ++s.dropped;
+    }
+    s.ring[(s.begin + s.size++) % s.ring.size()] = newest;
+  }
+  send_samples();
+}
+
+void Session::send_samples() {
+  for (Subscription& s : subscriptions_) {
+    while (s.size > 0 && outbox_.idle() && socket_.is_open()) {
+      // What lies in one piece of the ring goes into one message.
+      const std::size_t count = std::min({s.size, kSamplesPerMessage, s.ring.size() - s.begin});
+      scratch_.clear();
+      append_samples(scratch_, s.axis, s.dropped, std::span(s.ring).subspan(s.begin, count), s.mask);
+      s.begin = (s.begin + count) % s.ring.size();
+      s.size -= count;
+      s.dropped = 0;
+      outbox_.send(scratch_, shared_from_this());
+    }
+  }
+}
+
+void Session::reply_exchange(std::uint64_t id, std::span<const std::uint32_t> axes) {
+  views_.clear();
+  for (const std::uint32_t axis : axes)
+    views_.push_back({axis, &engine_.newest(axis)});
+  scratch_.clear();
+  append_exchange_reply(scratch_, id, views_);
+  outbox_.send(scratch_, shared_from_this());
+}
+
+void Session::send(const v1::Envelope& envelope) {
+  const std::size_t size = envelope.ByteSizeLong();
+  scratch_.resize(kFrameHeaderSize + size);
+  const auto header = frame_header(static_cast<std::uint32_t>(size));
+  std::copy(header.begin(), header.end(), scratch_.begin());
+  envelope.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(scratch_.data()) +
+                                           kFrameHeaderSize);
+  outbox_.send(scratch_, shared_from_this());
+}
+
+void Session::give_leases_back() {
+  for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
+    if (!leased_[axis]) continue;
+    leased_[axis] = false;
+    engine_.request({.tick = 0, .axis = axis, .owner = owner_, .action = LeaseAction::kLost},
+                    [](Refused, Tick) {});
+  }
+}
+
+}  // namespace drivebench

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bench.pb.h"
+#include "protocols/catalogue.hpp"
+#include "protocols/framing.hpp"
+#include "protocols/sample_codec.hpp"
+#include "server/endpoints/outbox.hpp"
+#include "server/engine.hpp"
+
+namespace drivebench {
+
+/// What all sessions share.
+struct SessionContext {
+  Engine& engine;
+  std::string token;  ///< what Hello must carry; empty: nothing
+  std::function<std::size_t()> session_count;
+};
+
+/// One client on a stream socket: Hello first, then requests. Every request gets an answer with its id; what
+/// cannot be done is refused with a code, a sentence and the field. An error ends this session and nothing
+/// else.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  Session(Outbox::Socket socket, std::string peer, SessionContext& context);
+
+  /// Reads and answers until the peer or an error ends the session, then gives its leases back.
+  asio::awaitable<void> run();
+
+  /// After each tick: answers a waiting exchange, serves subscriptions.
+  void on_tick();
+
+  /// Refuses the connection itself, before anything was read.
+  void turn_away(std::string_view sentence);
+  void close() { outbox_.close(); }
+
+ private:
+  static constexpr auto kHelloLimit = std::chrono::seconds(2);
+  static constexpr std::size_t kSubscriptionDepth = 256;
+  static constexpr std::size_t kSamplesPerMessage = 32;
+
+  struct Subscription {
+    std::uint32_t axis = 0;
+    std::uint32_t decimation = 0;
+    SignalMask mask = kAllSignals;
+    std::vector<Sample> ring;
+    std::size_t begin = 0;
+    std::size_t size = 0;
+    std::uint64_t dropped = 0;
+  };
+  struct WaitingExchange {
+    std::uint64_t id;
+    std::vector<std::uint32_t> axes;
+  };
+
+  bool handle(std::span<const std::byte> frame);
+  bool dispatch();
+  bool greet(const v1::Hello& hello);
+  void lease(const v1::LeaseRequest& request);
+  void exchange(const v1::Exchange& request);
+  void subscribe(const v1::Subscribe& request);
+  void read_parameters(const v1::ReadParameters& request);
+  void write_parameter(const v1::WriteParameter& request);
+  void set_load(const v1::SetLoad& request);
+  void clear_faults(const v1::ClearFaults& request);
+  void report_status();
+
+  /// These refuse the present request if the answer is no.
+  bool axis_exists(std::uint32_t axis);
+  bool may_change(std::uint32_t axis);
+
+  void request(const Input& input, const char* field, std::function<void()> on_done = nullptr);
+  void done(std::uint64_t id, Tick tick);
+  void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
+  void refuse(std::uint64_t id, Refused why, const char* field);
+  void reply_exchange(std::uint64_t id, std::span<const std::uint32_t> axes);
+  void send_samples();
+  void send(const v1::Envelope& envelope);
+  void give_leases_back();
+
+  Outbox::Socket socket_;
+  Outbox outbox_;
+  std::string peer_;
+  SessionContext& context_;
+  Engine& engine_;
+  FrameReader reader_;
+  v1::Envelope request_;
+  v1::Envelope reply_;
+  std::vector<std::byte> scratch_;
+  std::vector<AxisSampleView> views_;
+  bool greeted_ = false;
+  Owner owner_ = 0;
+  std::vector<bool> leased_;  // by axis
+  std::optional<WaitingExchange> waiting_;
+  std::vector<Subscription> subscriptions_;
+};
+
+}  // namespace drivebench

@@ -1,0 +1,246 @@
+// What a session does for each request.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "plant/parameters.hpp"
+#include "server/endpoints/description.hpp"
+#include "server/endpoints/session.hpp"
+#include "server/input_codec.hpp"
+
+namespace drivebench {
+namespace {
+
+struct RefusalText {
+  v1::RefusalCode code;
+  const char* sentence;
+};
+
+RefusalText text_of(Refused why) noexcept {
+  switch (why) {
+    case Refused::kUnknownAxis:
+      return {v1::REFUSAL_UNKNOWN_AXIS, "there is no such axis"};
+    case Refused::kNotOwner:
+      return {v1::REFUSAL_NOT_OWNER, "this session does not hold the lease of the axis"};
+    case Refused::kOwned:
+      return {v1::REFUSAL_OWNED, "another session holds the lease of the axis"};
+    case Refused::kNotFinite:
+      return {v1::REFUSAL_NOT_FINITE, "a value is not a finite number"};
+    case Refused::kLatched:
+      return {v1::REFUSAL_LATCHED, "a latched fault is in force; its owner must clear it first"};
+    case Refused::kStale:
+      return {v1::REFUSAL_STALE,
+              "the command answers a sample that is too old, already answered or not taken yet"};
+    case Refused::kBusy:
+      return {v1::REFUSAL_BUSY, "too many requests are waiting for the bench"};
+    case Refused::kNot:
+      break;
+  }
+  return {v1::REFUSAL_UNSPECIFIED, ""};
+}
+
+}  // namespace
+
+void Session::refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field) {
+  reply_.Clear();
+  reply_.set_id(id);
+  v1::Refusal& refusal = *reply_.mutable_refusal();
+  refusal.set_code(code);
+  refusal.set_message(message);
+  refusal.set_field(field);
+  send(reply_);
+}
+
+void Session::refuse(std::uint64_t id, Refused why, const char* field) {
+  const RefusalText text = text_of(why);
+  refuse(id, text.code, text.sentence, field);
+}
+
+void Session::done(std::uint64_t id, Tick tick) {
+  reply_.Clear();
+  reply_.set_id(id);
+  reply_.mutable_done()->set_tick(static_cast<std::uint64_t>(tick));
+  reply_.mutable_done()->set_owner(owner_);
+  send(reply_);
+}
+
+bool Session::axis_exists(std::uint32_t axis) {
+  if (axis < leased_.size()) return true;
+  refuse(request_.id(), v1::REFUSAL_UNKNOWN_AXIS,
+         "axis " + std::to_string(axis) + " does not exist; the bench has " + std::to_string(leased_.size()),
+         "axis");
+  return false;
+}
+
+bool Session::may_change(std::uint32_t axis) {
+  if (!axis_exists(axis)) return false;
+  const Owner owner = engine_.newest(axis).owner;
+  if (engine_.config().mode == RunMode::kFree || (owner != 0 && owner == owner_)) return true;
+  refuse(request_.id(), Refused::kNotOwner, "axis");
+  return false;
+}
+
+void Session::request(const Input& input, const char* field, std::function<void()> on_done) {
+  engine_.request(
+      input, [self = shared_from_this(), id = request_.id(), field, on_done](Refused refused, Tick tick) {
+        if (refused != Refused::kNot) return self->refuse(id, refused, field);
+        if (on_done) on_done();
+        self->done(id, tick);
+      });
+}
+
+void Session::lease(const v1::LeaseRequest& r) {
+  if (!axis_exists(r.axis())) return;
+  if (r.action() < v1::LeaseRequest::ACTION_ACQUIRE || r.action() > v1::LeaseRequest::ACTION_RELEASE) {
+    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE, "the action must be acquire, renew or release",
+                  "action");
+  }
+  if (engine_.config().mode == RunMode::kFree) {
+    return refuse(request_.id(), v1::REFUSAL_WRONG_MODE, "a free run takes no controller", "action");
+  }
+  if (owner_ == 0) owner_ = engine_.new_owner();
+  const auto action = static_cast<LeaseAction>(r.action());
+  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, "axis",
+          [this, axis = r.axis(), action] { leased_[axis] = action != LeaseAction::kRelease; });
+}
+
+void Session::exchange(const v1::Exchange& r) {
+  const std::uint64_t id = request_.id();
+  if (waiting_)
+    return refuse(id, v1::REFUSAL_BUSY, "an exchange of this session is still waiting for its tick",
+                  "commands");
+  WaitingExchange waiting{.id = id, .axes = {}};
+  if (r.commands().empty()) {
+    for (std::uint32_t axis = 0; axis < leased_.size(); ++axis)
+      waiting.axes.push_back(axis);
+    return reply_exchange(id, waiting.axes);
+  }
+  for (const v1::Command& command : r.commands()) {
+    if (!axis_exists(command.axis())) return;
+    if (std::find(waiting.axes.begin(), waiting.axes.end(), command.axis()) != waiting.axes.end()) {
+      return refuse(id, v1::REFUSAL_OUT_OF_RANGE, "two commands for one axis", "commands.axis");
+    }
+    if (!decode_command(command)) {
+      return refuse(id, v1::REFUSAL_OUT_OF_RANGE,
+                    "gates is " + std::to_string(command.gates()) + " but must be 0 to 2", "commands.gates");
+    }
+    waiting.axes.push_back(command.axis());
+  }
+  for (const v1::Command& command : r.commands()) {
+    const Refused refused = engine_.command(command.axis(), owner_, *decode_command(command));
+    if (refused != Refused::kNot) return refuse(id, refused, "commands");
+  }
+  waiting_ = std::move(waiting);
+  engine_.advance();
+}
+
+void Session::subscribe(const v1::Subscribe& r) {
+  if (!axis_exists(r.axis())) return;
+  Subscription wanted;
+  wanted.axis = r.axis();
+  wanted.decimation = r.decimation();
+  if (r.signals_size() > 0) wanted.mask = 0;
+  for (const std::string& name : r.signals()) {
+    const Signal* signal = find_signal(name);
+    if (signal == nullptr) {
+      return refuse(request_.id(), v1::REFUSAL_UNKNOWN_SIGNAL,
+                    "there is no signal '" + name.substr(0, 100) + "'", "signals");
+    }
+    wanted.mask |= SignalMask{1} << (signal - kSignals.data());
+  }
+  std::erase_if(subscriptions_, [&](const Subscription& s) { return s.axis == r.axis(); });
+  if (wanted.decimation > 0) {
+    wanted.ring.resize(kSubscriptionDepth);
+    subscriptions_.push_back(std::move(wanted));
+  }
+  done(request_.id(), engine_.tick());
+}
+
+void Session::read_parameters(const v1::ReadParameters& r) {
+  if (!axis_exists(r.axis())) return;
+  reply_.Clear();
+  reply_.set_id(request_.id());
+  v1::ParameterValues& values = *reply_.mutable_parameter_values();
+  const Parameter* const table = axis_parameters().data();
+  for (const std::string& name : r.names()) {
+    const Parameter* row = find_parameter(name);
+    if (row == nullptr) {
+      return refuse(request_.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
+                    "there is no parameter '" + name.substr(0, 100) + "'", "names");
+    }
+    *values.add_parameters() = describe_parameter(engine_, r.axis(), static_cast<std::size_t>(row - table));
+  }
+  for (std::size_t row = 0; r.names().empty() && row < axis_parameters().size(); ++row) {
+    *values.add_parameters() = describe_parameter(engine_, r.axis(), row);
+  }
+  send(reply_);
+}
+
+void Session::write_parameter(const v1::WriteParameter& r) {
+  if (!may_change(r.axis())) return;
+  const Parameter* row = find_parameter(r.name());
+  if (row == nullptr) {
+    return refuse(request_.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
+                  "there is no parameter '" + r.name().substr(0, 100) + "'", "name");
+  }
+  if (!row->live) {
+    return refuse(request_.id(), v1::REFUSAL_READ_ONLY, r.name() + " cannot be changed while the bench runs",
+                  "name");
+  }
+  const auto index = static_cast<std::uint32_t>(row - axis_parameters().data());
+  if (const std::string problem = engine_.try_parameter(r.axis(), index, r.value()); !problem.empty()) {
+    const bool finite = std::isfinite(r.value());
+    return refuse(request_.id(), finite ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
+                  r.name() + " " + problem, "value");
+  }
+  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = ParameterWrite{index, r.value()}}, "name");
+}
+
+void Session::set_load(const v1::SetLoad& r) {
+  if (!may_change(r.axis())) return;
+  constexpr std::uint64_t kMaxTicks = std::uint64_t{1} << 53;
+  if (!std::isfinite(r.load_nm()) || std::abs(r.load_nm()) > 1e6) {
+    return refuse(request_.id(),
+                  std::isfinite(r.load_nm()) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
+                  "the load must lie between -1e6 and 1e6 N*m", "load_nm");
+  }
+  if (r.ramp_ticks() > kMaxTicks || r.at_tick() > kMaxTicks) {
+    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE, "ticks must lie below 2^53", "ramp_ticks");
+  }
+  const LoadChange change{.load_nm = r.load_nm(), .ramp_ticks = static_cast<Tick>(r.ramp_ticks())};
+  request({.tick = static_cast<Tick>(r.at_tick()), .axis = r.axis(), .owner = owner_, .action = change},
+          "at_tick");
+}
+
+void Session::clear_faults(const v1::ClearFaults& r) {
+  if (!axis_exists(r.axis())) return;
+  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = ClearFaults{}}, "axis");
+}
+
+void Session::report_status() {
+  reply_.Clear();
+  reply_.set_id(request_.id());
+  v1::Status& status = *reply_.mutable_status();
+  status.set_mode(wire_mode(engine_.config().mode));
+  status.set_tick(static_cast<std::uint64_t>(engine_.tick()));
+  status.set_late_ticks(engine_.newest(0).late_ticks);
+  status.set_worst_lateness_s(static_cast<double>(engine_.worst_lateness_ns()) * 1e-9);
+  status.set_sessions(static_cast<std::uint32_t>(context_.session_count()));
+  if (const Recorder* recorder = engine_.recorder()) {
+    status.set_recording(recorder->file());
+    status.set_recording_gaps(recorder->gaps());
+  }
+  for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
+    std::array<std::byte, kMaxSampleBytes> bytes;
+    const std::size_t size = encode_sample(engine_.newest(axis), kAllSignals, bytes.data());
+    v1::AxisSample& sample = *status.add_axes();
+    sample.set_axis(axis);
+    sample.mutable_sample()->ParseFromArray(bytes.data(), static_cast<int>(size));
+  }
+  status.set_state_hash(engine_.state_hash());
+  for (const std::string& note : engine_.notes())
+    status.add_notes(note);
+  send(reply_);
+}
+
+}  // namespace drivebench

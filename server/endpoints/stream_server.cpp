@@ -1,0 +1,148 @@
+#include "server/endpoints/stream_server.hpp"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <stdexcept>
+
+namespace drivebench {
+namespace {
+
+using asio::ip::tcp;
+using UnixProtocol = asio::local::stream_protocol;
+
+// After an accept that failed for want of descriptors: a pause instead of a spin.
+constexpr auto kAcceptPause = std::chrono::milliseconds(100);
+// A peer that vanished without a word is noticed after this time when something is on its way to it.
+constexpr int kUserTimeoutMs = 3000;
+constexpr int kSendBufferBytes = 64 * 1024;
+
+tcp::endpoint endpoint_of(const TcpConfig& config) {
+  const std::string address = config.address == "localhost" ? "127.0.0.1" : config.address;
+  return {asio::ip::make_address(address), config.port};
+}
+
+std::string peer_name(const tcp::socket& socket) {
+  boost::system::error_code error;
+  const tcp::endpoint remote = socket.remote_endpoint(error);
+  return error ? "tcp peer" : remote.address().to_string() + ":" + std::to_string(remote.port());
+}
+
+std::string peer_name(const UnixProtocol::socket&) {
+  return "unix peer";
+}
+
+void tune(tcp::socket& socket) {
+  boost::system::error_code ignored;
+  socket.set_option(tcp::no_delay(true), ignored);
+  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+  socket.set_option(asio::socket_base::keep_alive(true), ignored);
+  socket.set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_USER_TIMEOUT>(kUserTimeoutMs),
+                    ignored);
+  socket.set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(1), ignored);
+  socket.set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(1), ignored);
+}
+
+void tune(UnixProtocol::socket& socket) {
+  boost::system::error_code ignored;
+  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+}
+
+}  // namespace
+
+StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig& config)
+    : io_(io),
+      config_(config),
+      context_{engine, config.token, [this] { return sessions_.size(); }},
+      tcp_(io),
+      unix_(io) {
+  try {
+    const tcp::endpoint endpoint = endpoint_of(config);
+    tcp_.open(endpoint.protocol());
+    tcp_.set_option(tcp::acceptor::reuse_address(true));
+    tcp_.bind(endpoint);
+    tcp_.listen();
+  } catch (const boost::system::system_error& error) {
+    throw std::runtime_error("cannot listen on " + config.address + ":" + std::to_string(config.port) + ": " +
+                             error.code().message());
+  }
+  asio::co_spawn(io_, accept_from(tcp_), asio::detached);
+  if (config.unix_path.empty()) return;
+  try {
+    ::unlink(config.unix_path.c_str());
+    unix_.open();
+    unix_.bind(UnixProtocol::endpoint(config.unix_path));
+    unix_.listen();
+  } catch (const boost::system::system_error& error) {
+    throw std::runtime_error("cannot listen on unix:" + config.unix_path + ": " + error.code().message());
+  }
+  asio::co_spawn(io_, accept_from(unix_), asio::detached);
+}
+
+StreamServer::~StreamServer() {
+  if (!config_.unix_path.empty()) ::unlink(config_.unix_path.c_str());
+}
+
+std::string StreamServer::tcp_address() const {
+  const tcp::endpoint endpoint = tcp_.local_endpoint();
+  const std::string address = endpoint.address().to_string();
+  return (endpoint.address().is_v6() ? "[" + address + "]" : address) + ":" + std::to_string(endpoint.port());
+}
+
+template <class Acceptor>
+asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
+  while (acceptor.is_open()) {
+    boost::system::error_code error;
+    typename Acceptor::protocol_type::socket socket =
+        co_await acceptor.async_accept(asio::redirect_error(asio::use_awaitable, error));
+    if (error == asio::error::operation_aborted) co_return;
+    if (error) {
+      spdlog::warn("cannot accept a client: {}", error.message());
+      asio::steady_timer pause(io_, kAcceptPause);
+      co_await pause.async_wait(asio::use_awaitable);
+      continue;
+    }
+    tune(socket);
+    std::string peer = peer_name(socket);
+    start(Socket(std::move(socket)), std::move(peer));
+  }
+}
+
+void StreamServer::start(Socket socket, std::string peer) {
+  auto session = std::make_shared<Session>(std::move(socket), std::move(peer), context_);
+  if (sessions_.size() >= config_.max_sessions) {
+    session->turn_away("this bench serves " + std::to_string(config_.max_sessions) + " sessions at most");
+    session->close();
+    return;
+  }
+  sessions_.push_back(session);
+  asio::co_spawn(io_, serve(std::move(session)), asio::detached);
+}
+
+asio::awaitable<void> StreamServer::serve(std::shared_ptr<Session> session) {
+  try {
+    co_await session->run();
+  } catch (const std::exception& error) {
+    spdlog::error("a session ended: {}", error.what());
+    session->close();
+  }
+  std::erase(sessions_, session);
+}
+
+void StreamServer::on_tick() {
+  // By index: a session that finds its peer gone may end another one's wait, never this loop.
+  for (std::size_t i = 0; i < sessions_.size(); ++i)
+    sessions_[i]->on_tick();
+}
+
+void StreamServer::close() {
+  boost::system::error_code ignored;
+  tcp_.close(ignored);
+  unix_.close(ignored);
+  for (const auto& session : sessions_)
+    session->close();
+}
+
+}  // namespace drivebench

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/asio.hpp"
+#include "server/endpoints/session.hpp"
+
+namespace drivebench {
+
+/// Accepts clients on TCP and on a unix socket, and tells them about every tick.
+class StreamServer {
+ public:
+  /// Binds at once; throws boost::system::system_error with the address in what() if that fails.
+  StreamServer(asio::io_context& io, Engine& engine, const TcpConfig& config);
+  ~StreamServer();
+
+  /// Address and port that the system gave, "127.0.0.1:7300".
+  std::string tcp_address() const;
+
+  void on_tick();
+  /// Stops accepting and ends every session; what was queued is lost.
+  void close();
+
+ private:
+  using Socket = Outbox::Socket;
+
+  template <class Acceptor>
+  asio::awaitable<void> accept_from(Acceptor& acceptor);
+  void start(Socket socket, std::string peer);
+  asio::awaitable<void> serve(std::shared_ptr<Session> session);
+
+  asio::io_context& io_;
+  TcpConfig config_;
+  SessionContext context_;
+  asio::ip::tcp::acceptor tcp_;
+  asio::local::stream_protocol::acceptor unix_;
+  std::vector<std::shared_ptr<Session>> sessions_;
+};
+
+}  // namespace drivebench

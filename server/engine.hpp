@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/bench.hpp"
+#include "server/config.hpp"
+#include "server/recorder.hpp"
+#include "server/verdict.hpp"
+
+namespace boost::asio {
+class io_context;
+}
+
+namespace drivebench {
+
+/// One run: the bench, its recorder and what makes its ticks happen, as the endpoints see it. All methods are
+/// called, and all callbacks come, on the I/O thread.
+class Engine {
+ public:
+  /// Whether an input was carried out, and the tick at whose start.
+  using Answer = std::function<void(Refused, Tick)>;
+
+  virtual ~Engine() = default;
+
+  /// Gives an axis its next command. Only the newest one before a tick counts.
+  virtual Refused command(std::uint32_t axis, Owner owner, const Command& command) = 0;
+  /// Lockstep: runs the present tick if the commands of all controlled axes are there. Otherwise time goes on
+  /// by itself.
+  virtual void advance() = 0;
+  /// Any other input; the answer comes when the bench has taken it.
+  virtual void request(const Input& input, Answer answer) = 0;
+  /// Ends the run: safe action, recording closed.
+  virtual Verdict stop() = 0;
+  /// Hash of the present state; 0 while another thread is changing it.
+  virtual std::uint64_t state_hash() const = 0;
+  /// Lateness so far; ticks that were late stand in every sample.
+  virtual std::int64_t worst_lateness_ns() const = 0;
+
+  /// Called after each tick, when newest() has changed.
+  std::function<void()> on_tick;
+  /// Called once, when a run that has an end has reached it.
+  std::function<void()> on_end;
+
+  const Sample& newest(std::size_t axis) const { return newest_[axis]; }
+  Tick tick() const { return static_cast<Tick>(newest_[0].tick); }
+  const BenchConfig& config() const { return config_; }
+  const Recorder* recorder() const { return recorder_.get(); }
+  /// What the machine did not grant, for people.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  /// The parameters in force, with those writes that are on their way.
+  const AxisParameters& parameters(std::size_t axis) const { return parameters_[axis]; }
+  /// What is wrong with a write: empty, and then it counts as done; the caller sends the input.
+  std::string try_parameter(std::size_t axis, std::uint32_t row, double value);
+
+  /// A number for the next controller.
+  Owner new_owner() { return ++owners_; }
+
+ protected:
+  Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder);
+
+  BenchConfig config_;
+  std::unique_ptr<Recorder> recorder_;
+  std::vector<Sample> newest_;
+  std::vector<std::string> notes_;
+
+ private:
+  std::vector<AxisParameters> parameters_;
+  Owner owners_ = 0;
+};
+
+/// Ticks run on the I/O thread, in the call that brings the last command.
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder);
+
+/// Ticks run on a thread of their own: paced by the clock, or as fast as possible when the mode is free.
+/// Stops by itself after max_ticks, if given.
+std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                             boost::asio::io_context& io, std::optional<Tick> max_ticks);
+
+/// Hands the load events of the configuration to the bench.
+void schedule_loads(const BenchConfig& config, Bench& bench);
+
+}  // namespace drivebench

@@ -1,0 +1,67 @@
+#include <utility>
+
+#include "server/engine.hpp"
+
+namespace drivebench {
+namespace {
+
+class LockstepEngine final : public Engine {
+ public:
+  LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder)
+      : Engine(config, std::move(recorder)), bench_(config_.setup, recorder_.get()) {
+    schedule_loads(config_, bench_);
+    show();
+  }
+
+  Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+    return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
+  }
+
+  void advance() override {
+    bool commanded = false;
+    for (std::size_t i = 0; i < bench_.axis_count(); ++i) {
+      const bool latched = (bench_.sample(i).faults & kLatchedFaults) != 0;
+      if (bench_.owner(i) != 0 && !bench_.has_command(i) && !latched) return;
+      commanded = commanded || bench_.has_command(i);
+    }
+    if (!commanded) return;  // without a controller a lockstep bench stands still
+    if (recorder_) recorder_->wait_for_room();
+    bench_.step();
+    show();
+    if (on_tick) on_tick();
+  }
+
+  void request(const Input& input, Answer answer) override {
+    const Refused refused = bench_.submit(input);
+    answer(refused, bench_.tick());
+    advance();  // the controller that everybody waited for may just have left
+  }
+
+  Verdict stop() override {
+    const Verdict verdict{.mode = RunMode::kLockstep,
+                          .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                          .gaps = recorder_ ? recorder_->gaps() : 0,
+                          .state_hash = bench_.state_hash()};
+    if (recorder_) recorder_->finish(verdict);
+    return verdict;
+  }
+
+  std::uint64_t state_hash() const override { return bench_.state_hash(); }
+  std::int64_t worst_lateness_ns() const override { return 0; }
+
+ private:
+  void show() {
+    for (std::size_t i = 0; i < newest_.size(); ++i)
+      newest_[i] = bench_.sample(i);
+  }
+
+  Bench bench_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder) {
+  return std::make_unique<LockstepEngine>(config, std::move(recorder));
+}
+
+}  // namespace drivebench

@@ -1,0 +1,257 @@
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "server/asio.hpp"
+#include "server/build_id.hpp"
+#include "server/config.hpp"
+#include "server/endpoints/stream_server.hpp"
+#include "server/engine.hpp"
+#include "server/replay.hpp"
+
+namespace drivebench {
+namespace {
+
+enum ExitCode { kOk = 0, kFailed = 1, kUnusable = 2, kTooLate = 3 };
+
+struct Options {
+  std::string config;
+  std::string mode;
+  std::string replay;
+  std::string record;
+  std::string unix_path;
+  int port = -1;
+  int command_delay_ticks = -1;
+  double duration_s = 0.0;
+  std::int64_t fail_on_late = -1;
+  bool json = false;
+  bool check_config = false;
+};
+
+void print_line(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+/// The configuration of the file with what the command line changes.
+BenchConfig configure(const Options& o) {
+  BenchConfig config = load_config(o.config);
+  if (!o.mode.empty()) {
+    config.mode = o.mode == "realtime" ? RunMode::kRealtime
+                  : o.mode == "free"   ? RunMode::kFree
+                                       : RunMode::kLockstep;
+    config.setup.command_delay_ticks =
+        config.mode == RunMode::kRealtime ? 1 : config.setup.command_delay_ticks;
+  }
+  if (o.port >= 0) config.tcp.port = static_cast<std::uint16_t>(o.port);
+  if (!o.unix_path.empty()) config.tcp.unix_path = o.unix_path;
+  if (o.command_delay_ticks >= 0) config.setup.command_delay_ticks = o.command_delay_ticks;
+  return config;
+}
+
+void print_ready(const Options& o, const BenchConfig& config, const StreamServer& server) {
+  if (o.json) {
+    const nlohmann::json ready{{"event", "ready"},
+                               {"tcp", server.tcp_address()},
+                               {"unix", config.tcp.unix_path},
+                               {"mode", name_of(config.mode)},
+                               {"bench", config.name}};
+    return print_line(ready.dump());
+  }
+  print_line(fmt::format("ready tcp={} unix={} mode={} bench={}", server.tcp_address(), config.tcp.unix_path,
+                         name_of(config.mode), config.name));
+}
+
+void print_verdict(const Options& o, const Verdict& v) {
+  if (o.json) {
+    const nlohmann::json verdict{{"event", "verdict"},
+                                 {"mode", name_of(v.mode)},
+                                 {"ticks", v.ticks},
+                                 {"late_ticks", v.late_ticks},
+                                 {"lateness_p50_us", static_cast<double>(v.lateness_p50_ns) * 1e-3},
+                                 {"lateness_p99_us", static_cast<double>(v.lateness_p99_ns) * 1e-3},
+                                 {"worst_lateness_us", static_cast<double>(v.lateness_worst_ns) * 1e-3},
+                                 {"exact", v.exact()},
+                                 {"realtime_valid", v.realtime_valid()},
+                                 {"gaps", v.gaps},
+                                 {"state_hash", fmt::format("{:016x}", v.state_hash)},
+                                 {"recording", o.record},
+                                 {"sentence", v.sentence()}};
+    return print_line(verdict.dump());
+  }
+  print_line(fmt::format("{}; state hash {:016x}", v.sentence(), v.state_hash));
+  if (!o.record.empty()) print_line(fmt::format("recorded in {}", o.record));
+}
+
+std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config, asio::io_context& io) {
+  std::unique_ptr<Recorder> recorder;
+  if (!o.record.empty()) recorder = std::make_unique<Recorder>(o.record, config);
+  if (config.mode == RunMode::kLockstep) return make_lockstep_engine(config, std::move(recorder));
+  std::optional<Tick> max_ticks;
+  if (o.duration_s > 0.0) {
+    max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
+  }
+  return make_threaded_engine(config, std::move(recorder), io, max_ticks);
+}
+
+int serve(const Options& o) {
+  const BenchConfig config = configure(o);
+  if (o.check_config) {
+    print_line(fmt::format("{}: no problems; bench {}, {} axes, {} mode", o.config, config.name,
+                           config.axes.size(), name_of(config.mode)));
+    return kOk;
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  asio::io_context io(1);
+  asio::signal_set signals(io, SIGINT, SIGTERM);
+  signals.async_wait([&io](const boost::system::error_code& error, int) {
+    if (!error) io.stop();
+  });
+  const std::unique_ptr<Engine> engine = make_engine(o, config, io);
+  StreamServer server(io, *engine, config.tcp);
+  engine->on_tick = [&server] { server.on_tick(); };
+  engine->on_end = [&io] { io.stop(); };
+  for (const std::string& note : engine->notes())
+    spdlog::warn("{}", note);
+  print_ready(o, config, server);
+  io.run();
+  signals.cancel();
+  const Verdict verdict = engine->stop();
+  server.close();
+  print_verdict(o, verdict);
+  const bool too_late =
+      o.fail_on_late >= 0 && verdict.late_ticks > static_cast<std::uint64_t>(o.fail_on_late);
+  return too_late ? kTooLate : kOk;
+}
+
+/// A whole file, mapped for reading.
+class MappedFile {
+ public:
+  explicit MappedFile(const std::string& path) {
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat info {};
+    if (descriptor < 0 || ::fstat(descriptor, &info) != 0) {
+      throw std::system_error(errno, std::generic_category(), "cannot read " + path);
+    }
+    size_ = static_cast<std::size_t>(info.st_size);
+    if (size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
+    ::close(descriptor);
+    if (data_ == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "cannot map " + path);
+  }
+  ~MappedFile() {
+    if (data_ != nullptr) ::munmap(data_, size_);
+  }
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+nlohmann::json as_json(const ReplayReport& report) {
+  using Result = ReplayReport::Result;
+  nlohmann::json json{{"equal", report.result == Result::kEqual},
+                      {"usable", report.result != Result::kUnusable},
+                      {"ticks", report.ticks},
+                      {"samples", report.samples},
+                      {"inputs", report.inputs},
+                      {"state_hash", fmt::format("{:016x}", report.state_hash)},
+                      {"recorded_by", report.recorded_by},
+                      {"problem", report.problem}};
+  if (report.difference) {
+    json["first_difference"] = {{"tick", report.difference->tick},
+                                {"axis", report.difference->axis},
+                                {"signal", report.difference->signal},
+                                {"recorded", report.difference->recorded},
+                                {"replayed", report.difference->replayed}};
+  }
+  return json;
+}
+
+int replay_file(const Options& o) {
+  const MappedFile file(o.replay);
+  const bool terminal = ::isatty(STDERR_FILENO) != 0;
+  const ReplayReport report = replay(
+      file.bytes(),
+      terminal ? +[](double share) { fmt::print(stderr, "\rreplaying {:3.0f} %", 100.0 * share); } : nullptr);
+  if (terminal) fmt::print(stderr, "\r                \r");
+  if (o.json) {
+    print_line(as_json(report).dump());
+  } else {
+    const char* const verdict = report.result == ReplayReport::Result::kEqual       ? "equal, bit for bit"
+                                : report.result == ReplayReport::Result::kDifferent ? "DIFFERENT"
+                                                                                    : "cannot be replayed";
+    print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {})",
+                           o.replay, verdict, report.ticks, report.samples, report.inputs, report.state_hash,
+                           report.recorded_by.empty() ? "nobody" : report.recorded_by));
+    if (!report.problem.empty()) print_line("  " + report.problem);
+  }
+  switch (report.result) {
+    case ReplayReport::Result::kEqual:
+      return kOk;
+    case ReplayReport::Result::kDifferent:
+      return kFailed;
+    case ReplayReport::Result::kUnusable:
+      break;
+  }
+  return kUnusable;
+}
+
+int run(int argc, char** argv) {
+  Options o;
+  CLI::App app(
+      "drivebench-server: emulates electric drives in deterministic real time and serves them to "
+      "controllers.");
+  app.set_version_flag("--version", std::string(build_id()));
+  auto* config = app.add_option("config", o.config, "bench file (TOML)");
+  auto* replay =
+      app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server");
+  config->excludes(replay);
+  app.add_option("--mode", o.mode, "instead of the mode in the bench file")
+      ->check(CLI::IsMember({"realtime", "lockstep", "free"}));
+  app.add_option("--port", o.port, "TCP port; 0: chosen by the system")->check(CLI::Range(0, 65535));
+  app.add_option("--unix", o.unix_path, "also listen on this unix socket");
+  app.add_option("--record", o.record, "write an MCAP recording to this new file");
+  app.add_option("--duration", o.duration_s, "stop after this much plant time [s] (realtime and free)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--command-delay-ticks", o.command_delay_ticks, "0 or 1, instead of the bench file's")
+      ->check(CLI::Range(0, 1));
+  app.add_option("--fail-on-late", o.fail_on_late, "exit 3 if more ticks than this were late")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--json", o.json, "print JSON lines");
+  app.add_flag("--check-config", o.check_config, "only check the bench file");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUnusable;
+  }
+  if (o.config.empty() && o.replay.empty()) {
+    fmt::print(stderr, "a bench file is needed, for example configs/benches/servo.toml; see --help\n");
+    return kUnusable;
+  }
+  return o.replay.empty() ? serve(o) : replay_file(o);
+}
+
+}  // namespace
+}  // namespace drivebench
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("drivebench"));
+  try {
+    return drivebench::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return drivebench::kUnusable;
+  }
+}

@@ -1,0 +1,202 @@
+#include "server/recorder.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <system_error>
+
+#include "bench.pb.h"
+#include "plant/parameters.hpp"
+#include "protocols/descriptor_set.hpp"
+#include "protocols/mcap.hpp"
+#include "protocols/sample_codec.hpp"
+#include "server/build_id.hpp"
+#include "server/input_codec.hpp"
+#include "server/recording.hpp"
+
+namespace drivebench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kFlushInterval = std::chrono::milliseconds(100);
+constexpr auto kSyncInterval = std::chrono::seconds(1);
+constexpr auto kIdleSleep = std::chrono::milliseconds(1);
+
+/// Two seconds of entries: one sample of each axis and a few inputs for each tick.
+std::size_t ring_capacity(const BenchConfig& config) {
+  const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
+  return static_cast<std::size_t>(ticks * static_cast<double>(config.axes.size())) + 1024;
+}
+
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
+}  // namespace
+
+/// The file and its MCAP structure. After the first failed write nothing more is written, and every entry
+/// counts as lost.
+class Recorder::File {
+ public:
+  File(const std::filesystem::path& path, const BenchConfig& config)
+      : period_ns_(config.setup.period_ns),
+        descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)) {
+    if (descriptor_ < 0) {
+      throw std::system_error(errno, std::generic_category(), "cannot create the recording " + path.string());
+    }
+    mcap_.emplace([this](std::span<const std::byte> bytes) { write_all(bytes); },
+                  McapWriterOptions{.profile = std::string(kRecordingProfile),
+                                    .library = "drivebench " + std::string(build_id())});
+    const std::string toml = to_toml(config);
+    mcap_->add_attachment(kConfigurationAttachment, "application/toml", 0, bytes_of(toml));
+    const std::string descriptors = bench_descriptor_set();
+    const auto schema = [&](const char* name) {
+      return mcap_->add_schema(name, "protobuf", bytes_of(descriptors));
+    };
+    const std::uint16_t sample = schema("drivebench.v1.Sample");
+    inputs_ = mcap_->add_channel(kInputTopic, schema("drivebench.v1.Input"), "protobuf");
+    verdict_ = mcap_->add_channel(kVerdictTopic, schema("drivebench.v1.Verdict"), "protobuf");
+    for (const AxisConfig& axis : config.axes) {
+      samples_.push_back(mcap_->add_channel(sample_topic(axis.name), sample, "protobuf"));
+    }
+    sequences_.resize(samples_.size());
+  }
+  ~File() { ::close(descriptor_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  void write(const SampleEntry& entry) {
+    const std::uint16_t channel = samples_[entry.axis];
+    const auto room =
+        mcap_->begin_message(header(channel, sequences_[entry.axis]++, entry.sample.tick), kMaxSampleBytes);
+    mcap_->end_message(encode_sample(entry.sample, kAllSignals, room.data()));
+  }
+
+  void write(const InputEntry& entry) {
+    encode_input(entry.received, entry.input, input_);
+    add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
+  }
+
+  void write(const Verdict& v) {
+    v1::Verdict message;
+    encode_verdict(v, message);
+    add(verdict_, 0, v.ticks, message);
+    mcap_->finish();
+    if (::fsync(descriptor_) != 0) failed_ = true;
+  }
+
+  void flush() { mcap_->flush(); }
+  void sync() {
+    if (::fdatasync(descriptor_) != 0) failed_ = true;
+  }
+  bool failed() const { return failed_; }
+
+ private:
+  McapMessageHeader header(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick) const {
+    const std::uint64_t time_ns = tick * static_cast<std::uint64_t>(period_ns_);
+    return {.channel = channel, .sequence = sequence, .log_time_ns = time_ns, .publish_time_ns = time_ns};
+  }
+
+  void add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick,
+           const google::protobuf::Message& message) {
+    const std::size_t size = message.ByteSizeLong();
+    const auto room = mcap_->begin_message(header(channel, sequence, tick), size);
+    message.SerializeToArray(room.data(), static_cast<int>(size));
+    mcap_->end_message(size);
+  }
+
+  void write_all(std::span<const std::byte> bytes) {
+    while (!bytes.empty() && !failed_) {
+      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+      if (written > 0) {
+        bytes = bytes.subspan(static_cast<std::size_t>(written));
+      } else if (errno != EINTR) {
+        failed_ = true;
+      }
+    }
+  }
+
+  std::int64_t period_ns_;
+  int descriptor_;
+  bool failed_ = false;
+  std::optional<McapWriter> mcap_;
+  std::uint16_t inputs_ = 0;
+  std::uint16_t verdict_ = 0;
+  std::uint32_t input_sequence_ = 0;
+  std::vector<std::uint16_t> samples_;
+  std::vector<std::uint32_t> sequences_;
+  v1::Input input_;
+};
+
+Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config)
+    : file_(file.string()),
+      ring_(ring_capacity(config)),
+      room_for_tick_(config.axes.size() + 512),
+      writer_(std::make_unique<File>(file, config)),
+      thread_([this] { run(); }) {}
+
+Recorder::~Recorder() {
+  stop_.store(true);
+  if (thread_.joinable()) thread_.join();
+}
+
+void Recorder::push(const Entry& entry) noexcept {
+  if (!ring_.push(entry)) gaps_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void Recorder::on_input(Tick now, const Input& input) noexcept {
+  push(InputEntry{now, input});
+}
+
+void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
+  push(SampleEntry{axis, sample});
+}
+
+void Recorder::wait_for_room() noexcept {
+  while (ring_.room() < room_for_tick_)
+    std::this_thread::sleep_for(std::chrono::microseconds(50));
+}
+
+bool Recorder::drain() {
+  bool any = false;
+  for (const Entry* entry = ring_.front(); entry != nullptr; entry = ring_.front()) {
+    any = true;
+    if (writer_->failed()) {
+      gaps_.fetch_add(1, std::memory_order_relaxed);
+    } else {
+      std::visit([this](const auto& e) { writer_->write(e); }, *entry);
+    }
+    ring_.pop();
+  }
+  return any;
+}
+
+void Recorder::run() {
+  auto last_flush = Clock::now();
+  auto last_sync = last_flush;
+  while (!stop_.load()) {
+    if (!drain()) std::this_thread::sleep_for(kIdleSleep);
+    const auto now = Clock::now();
+    if (now - last_flush >= kFlushInterval) {
+      writer_->flush();
+      last_flush = now;
+    }
+    if (now - last_sync >= kSyncInterval) {
+      writer_->sync();
+      last_sync = now;
+    }
+  }
+}
+
+void Recorder::finish(const Verdict& verdict) {
+  stop_.store(true);
+  thread_.join();
+  drain();
+  Verdict final_verdict = verdict;
+  final_verdict.gaps = gaps();
+  writer_->write(final_verdict);
+}
+
+}  // namespace drivebench

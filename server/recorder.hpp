@@ -1,0 +1,67 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "server/bench.hpp"
+#include "server/config.hpp"
+#include "server/spsc_ring.hpp"
+#include "server/verdict.hpp"
+
+namespace drivebench {
+
+/// Writes every sample and every input of a run to an MCAP file, on a thread of its own behind a bounded
+/// ring. The tick only copies into the ring; when the ring is full the entry is lost and counted. What is
+/// written is flushed every 100 ms and synced to the disk every second.
+class Recorder final : public BenchObserver {
+ public:
+  /// Creates the file; throws std::system_error if it exists or cannot be made.
+  Recorder(const std::filesystem::path& file, const BenchConfig& config);
+  ~Recorder() override;
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void on_input(Tick now, const Input& input) noexcept override;
+  void on_sample(std::uint32_t axis, const Sample& sample) noexcept override;
+
+  /// Outside the tick, where wall time does not matter: returns when the ring has room for a tick.
+  void wait_for_room() noexcept;
+
+  /// Entries lost because the ring was full or the disk refused them.
+  std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }
+  const std::string& file() const noexcept { return file_; }
+
+  /// Drains the ring, writes the verdict and closes the file.
+  void finish(const Verdict& verdict);
+
+ private:
+  struct SampleEntry {
+    std::uint32_t axis;
+    Sample sample;
+  };
+  struct InputEntry {
+    Tick received;
+    Input input;
+  };
+  using Entry = std::variant<SampleEntry, InputEntry>;
+  class File;
+
+  void push(const Entry& entry) noexcept;
+  void run();
+  bool drain();
+
+  std::string file_;
+  SpscRing<Entry> ring_;
+  std::size_t room_for_tick_;
+  std::unique_ptr<File> writer_;
+  std::atomic<std::uint64_t> gaps_{0};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace drivebench

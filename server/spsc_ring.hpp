@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <bit>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+namespace drivebench {
+
+/// A bounded queue between one producer thread and one consumer thread, wait-free on both sides. The capacity
+/// is rounded up to a power of two; all memory is taken and touched at construction.
+template <class T>
+class SpscRing {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  explicit SpscRing(std::size_t capacity) : slots_(std::bit_ceil(capacity)) {}
+
+  /// Producer: false if the ring is full.
+  bool push(const T& value) noexcept {
+    const std::size_t tail = tail_.load(std::memory_order_relaxed);
+    if (tail - head_seen_ == slots_.size()) {
+      head_seen_ = head_.load(std::memory_order_acquire);
+      if (tail - head_seen_ == slots_.size()) return false;
+    }
+    slots_[tail & (slots_.size() - 1)] = value;
+    tail_.store(tail + 1, std::memory_order_release);
+    return true;
+  }
+
+  /// Producer: how many more would fit now.
+  std::size_t room() noexcept {
+    head_seen_ = head_.load(std::memory_order_acquire);
+    return slots_.size() - (tail_.load(std::memory_order_relaxed) - head_seen_);
+  }
+
+  /// Consumer: the oldest entry, or null. It stays valid until pop().
+  const T* front() noexcept {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    if (head == tail_seen_) {
+      tail_seen_ = tail_.load(std::memory_order_acquire);
+      if (head == tail_seen_) return nullptr;
+    }
+    return &slots_[head & (slots_.size() - 1)];
+  }
+  void pop() noexcept { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+
+  std::size_t capacity() const noexcept { return slots_.size(); }
+
+ private:
+  static constexpr std::size_t kCacheLine = 64;
+
+  std::vector<T> slots_;
+  alignas(kCacheLine) std::atomic<std::size_t> head_{0};
+  std::size_t tail_seen_ = 0;  // of the consumer
+  alignas(kCacheLine) std::atomic<std::size_t> tail_{0};
+  std::size_t head_seen_ = 0;  // of the producer
+};
+
+}  // namespace drivebench

@@ -1,0 +1,255 @@
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <deque>
+#include <thread>
+#include <variant>
+
+#include "server/asio.hpp"
+#include "server/engine.hpp"
+#include "server/mailbox.hpp"
+#include "server/pacer.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::size_t kRequestCapacity = 256;
+
+/// From the tick thread to the I/O thread.
+struct TickedSample {
+  std::uint32_t axis;
+  Sample sample;
+};
+struct Outcome {
+  Refused refused;
+  Tick tick;
+};
+struct Ended {};
+using Event = std::variant<TickedSample, Outcome, Ended>;
+
+struct OwnedCommand {
+  Owner owner = 0;
+  Command command{};
+};
+
+/// Passes what the bench reports on to the recorder and to the I/O thread.
+class Tap final : public BenchObserver {
+ public:
+  Tap(Recorder* recorder, SpscRing<Event>& events) : recorder_(recorder), events_(events) {}
+  void on_input(Tick now, const Input& input) noexcept override {
+    if (recorder_ != nullptr) recorder_->on_input(now, input);
+  }
+  void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
+    if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
+    events_.push(
+        TickedSample{axis, sample});  // a full ring costs the viewers a sample, never the bench its time
+  }
+
+ private:
+  Recorder* recorder_;
+  SpscRing<Event>& events_;
+};
+
+class ThreadedEngine final : public Engine {
+ public:
+  ThreadedEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context& io,
+                 std::optional<Tick> max_ticks)
+      : Engine(config, std::move(recorder)),
+        max_ticks_(max_ticks),
+        requests_(kRequestCapacity),
+        events_(4096 + 64 * config_.axes.size()),
+        tap_(recorder_.get(), events_),
+        bench_(config_.setup, &tap_),
+        mailboxes_(config_.axes.size()),
+        wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        pacer_(config_.mode == RunMode::kRealtime
+                   ? make_realtime_pacer(config_.realtime.pacer, config_.setup.period_ns)
+                   : make_free_pacer()) {
+    schedule_loads(config_, bench_);
+    for (std::size_t i = 0; i < newest_.size(); ++i)
+      newest_[i] = bench_.sample(i);
+    await_wake();
+    std::atomic<bool> ready{false};
+    thread_ = std::thread([this, &ready] { run(ready); });
+    while (!ready.load())
+      std::this_thread::yield();  // notes_ is written before the run starts
+  }
+
+  ~ThreadedEngine() override {
+    stop_.store(true);
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+    const Sample& newest = newest_[axis];
+    if (owner == 0 || newest.owner != owner) return refuse_command(axis, owner, Refused::kNotOwner);
+    const TwoPhase& voltage_v = command.phases.voltage_v;
+    if (!std::isfinite(voltage_v.a) || !std::isfinite(voltage_v.b)) {
+      return refuse_command(axis, owner, Refused::kNotFinite);
+    }
+    if ((newest.faults & kLatchedFaults) != 0) return refuse_command(axis, owner, Refused::kLatched);
+    if (command.answers > static_cast<Tick>(newest.tick)) return refuse_command(axis, owner, Refused::kStale);
+    mailboxes_[axis].write({.owner = owner, .command = command});
+    return Refused::kNot;
+  }
+
+  void advance() override {}
+
+  void request(const Input& input, Answer answer) override {
+    if (!requests_.push(input)) return answer(Refused::kBusy, tick());
+    answers_.push_back(std::move(answer));
+  }
+
+  Verdict stop() override {
+    stop_.store(true);
+    thread_.join();
+    const Verdict verdict{.mode = config_.mode,
+                          .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                          .late_ticks = bench_.sample(0).late_ticks,
+                          .lateness_p50_ns = lateness_.percentile_ns(0.5),
+                          .lateness_p99_ns = lateness_.percentile_ns(0.99),
+                          .lateness_worst_ns = lateness_.worst_ns(),
+                          .gaps = recorder_ ? recorder_->gaps() : 0,
+                          .state_hash = bench_.state_hash()};
+    if (recorder_) recorder_->finish(verdict);
+    return verdict;
+  }
+
+  std::uint64_t state_hash() const override { return 0; }
+  std::int64_t worst_lateness_ns() const override {
+    return worst_lateness_ns_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  // ---- tick thread ----
+
+  void run(std::atomic<bool>& ready) {
+    if (config_.mode == RunMode::kRealtime) notes_ = enter_realtime(config_.realtime);
+    ready.store(true);
+    while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_)) {
+      look_at_the_clock();
+      take_requests();
+      if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
+      bench_.step();
+      notify();
+    }
+    while (!events_.push(Ended{}) && !stop_.load())
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    notify();
+  }
+
+  void look_at_the_clock() noexcept {
+    const std::int64_t lateness_ns = pacer_->wait();
+    if (config_.mode != RunMode::kRealtime) return;
+    lateness_.add(lateness_ns);
+    if (lateness_ns > worst_lateness_ns_.load(std::memory_order_relaxed)) {
+      worst_lateness_ns_.store(lateness_ns, std::memory_order_relaxed);
+    }
+    if (lateness_ns > config_.realtime.max_lateness_ns) {
+      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = Overrun{}});
+      pacer_->resynchronise();
+    } else if (lateness_ns >= config_.setup.period_ns) {
+      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = LateTick{}});
+    }
+  }
+
+  void take_requests() noexcept {
+    for (std::size_t n = 0; n < kRequestCapacity; ++n) {
+      const Input* input = requests_.front();
+      if (input == nullptr || events_.room() == 0) break;
+      events_.push(Outcome{bench_.submit(*input), bench_.tick()});
+      requests_.pop();
+    }
+    for (std::uint32_t axis = 0; axis < mailboxes_.size(); ++axis) {
+      if (const auto newest = mailboxes_[axis].take()) {
+        bench_.submit(
+            {.tick = bench_.tick(), .axis = axis, .owner = newest->owner, .action = newest->command});
+      }
+    }
+  }
+
+  /// Wakes the I/O thread, unless that is on its way already: in free mode most ticks cost no system call.
+  void notify() noexcept {
+    if (wake_pending_.exchange(true)) return;
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = ::write(wake_.native_handle(), &one, sizeof(one));
+  }
+
+  // ---- I/O thread ----
+
+  Refused refuse_command(std::uint32_t axis, Owner owner, Refused why) {
+    request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
+    return why;
+  }
+
+  void await_wake() {
+    wake_.async_wait(
+        asio::posix::stream_descriptor::wait_read, [this](const boost::system::error_code& error) {
+          if (error) return;
+          std::uint64_t count = 0;
+          [[maybe_unused]] const ssize_t got = ::read(wake_.native_handle(), &count, sizeof(count));
+          wake_pending_.exchange(
+              false);  // not a plain store: it must see what was pushed before the flag was set
+          drain_events();
+          await_wake();
+        });
+  }
+
+  void drain_events() {
+    for (std::size_t n = 0; n < events_.capacity(); ++n) {
+      const Event* event = events_.front();
+      if (event == nullptr) return;
+      const Event copy = *event;
+      events_.pop();
+      std::visit([this](const auto& e) { handle(e); }, copy);
+    }
+  }
+
+  void handle(const TickedSample& s) {
+    newest_[s.axis] = s.sample;
+    if (s.axis + 1 < newest_.size()) return;
+    answer_outcomes();
+    if (on_tick) on_tick();
+  }
+  // Answers wait for the samples of their tick, so that whoever gets one finds newest() as it says.
+  void handle(const Outcome& outcome) { outcomes_.push_back(outcome); }
+  void handle(const Ended&) {
+    answer_outcomes();
+    if (on_end) on_end();
+  }
+
+  void answer_outcomes() {
+    for (; !outcomes_.empty(); outcomes_.pop_front()) {
+      const Answer answer = std::move(answers_.front());
+      answers_.pop_front();
+      answer(outcomes_.front().refused, outcomes_.front().tick);
+    }
+  }
+
+  std::optional<Tick> max_ticks_;
+  SpscRing<Input> requests_;
+  SpscRing<Event> events_;
+  Tap tap_;
+  Bench bench_;
+  std::deque<Mailbox<OwnedCommand>> mailboxes_;
+  asio::posix::stream_descriptor wake_;
+  std::atomic<bool> wake_pending_{false};
+  std::deque<Answer> answers_;    // of the requests in flight, in order
+  std::deque<Outcome> outcomes_;  // that have come back, to be answered with the samples of their tick
+  std::unique_ptr<Pacer> pacer_;
+  LatenessHistogram lateness_;
+  std::atomic<std::int64_t> worst_lateness_ns_{0};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                             asio::io_context& io, std::optional<Tick> max_ticks) {
+  return std::make_unique<ThreadedEngine>(config, std::move(recorder), io, max_ticks);
+}
+
+}  // namespace drivebench

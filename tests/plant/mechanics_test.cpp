@@ -1,0 +1,163 @@
+// The motor has no flux and its terminals are shorted here, so that the shaft sees load and friction only.
+#include "plant/mechanics.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/plant/servo_axis.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr PhaseCommand kShorted{.gates = Gates::kZeroVoltage, .voltage_v = {}};
+constexpr double kInertia_kgm2 = 2e-4;
+constexpr double kCoulomb_nm = 0.02;
+constexpr double kStatic_nm = 0.05;
+
+Axis shaft_with(double viscous_nms, double coulomb_nm, double static_nm) {
+  AxisParameters p = servo_axis();
+  p.mechanics = {.inertia_kgm2 = kInertia_kgm2,
+                 .viscous_friction_nms = viscous_nms,
+                 .coulomb_friction_nm = coulomb_nm,
+                 .static_friction_nm = static_nm};
+  return {p, kServoTiming, 1, 0};
+}
+
+AxisSample run(Axis& axis, Tick from, Tick to) {
+  for (Tick tick = from; tick < to; ++tick)
+    axis.advance(kShorted, tick);
+  return axis.sample(to);
+}
+
+// Kills: friction that pushes, stiction that holds above its limit or lets go below it.
+TEST(Mechanics, TheFrictionBranchFollowsTheMotionAndAtRestTheDrivingTorque) {
+  const ShaftParameters p{.inertia_kgm2 = 1.0,
+                          .coulomb_friction_nm = kCoulomb_nm,
+                          .static_friction_nm = kStatic_nm};
+  EXPECT_EQ(friction_branch(p, 1e-12, -9.0).direction, 1.0);
+  EXPECT_EQ(friction_branch(p, -1e-12, 9.0).direction, -1.0);
+  EXPECT_EQ(friction_branch(p, 0.0, kStatic_nm).turns, 0.0);
+  EXPECT_EQ(friction_branch(p, -0.0, -kStatic_nm).turns, 0.0);
+  EXPECT_EQ(friction_branch(p, 0.0, 0.0501).turns, 1.0);
+  EXPECT_EQ(friction_branch(p, 0.0, 0.0501).direction, 1.0);
+  EXPECT_EQ(friction_branch(p, 0.0, -0.0501).direction, -1.0);
+  EXPECT_NEAR(derivative(p, {.speed_rad_s = 3.0}, 0.7, 0.2, {.turns = 1.0, .direction = 1.0}).speed_rad_s,
+              0.7 - 0.2 - kCoulomb_nm, 1e-15);
+}
+
+// w = w0 exp(-f t/J). Kills: a wrong factor of the viscous friction.
+TEST(Mechanics, ViscousFrictionSlowsExponentially) {
+  Axis axis = shaft_with(1e-3, 0.0, 0.0);
+  spin(axis, 80.0);
+  const AxisSample s = run(axis, 0, 800);  // 0.1 s, half a time constant
+  EXPECT_NEAR(s.speed_rad_s, 80.0 * std::exp(-0.5), 1e-9);
+  EXPECT_NEAR(s.angle_rad, 80.0 * 0.2 * (1.0 - std::exp(-0.5)), 1e-9);
+}
+
+// Kills: stiction that is only Coulomb friction, breakaway in the wrong direction, Coulomb friction that keeps
+// the static value once the shaft turns.
+TEST(Mechanics, AShaftBreaksAwayOnlyAboveTheStaticFriction) {
+  for (const double sign : {1.0, -1.0}) {
+    Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
+    axis.set_load(-sign * kStatic_nm, 0, 0);
+    AxisSample s = run(axis, 0, 2000);
+    EXPECT_EQ(s.speed_rad_s, 0.0);
+    EXPECT_EQ(s.angle_rad, 0.0);
+    EXPECT_EQ(s.faults, kShaftHeld);
+    constexpr double kLoad_nm = 0.0501;
+    axis.set_load(-sign * kLoad_nm, 2000, 0);
+    s = run(axis, 2000, 2080);  // 10 ms
+    EXPECT_NEAR(s.speed_rad_s, sign * (kLoad_nm - kCoulomb_nm) / kInertia_kgm2 * 0.01, 1e-11);
+    EXPECT_EQ(s.faults, 0u);
+  }
+}
+
+// From w0 the shaft stops after J w0/tau_C, having turned J w0^2/(2 tau_C). Kills: a stop that is missed,
+// chatters or creeps, a stop at the end of the substep in place of its instant.
+TEST(Mechanics, CoulombFrictionStopsTheShaftAtTheClosedFormTimeAndAngleAndHoldsIt) {
+  constexpr double kSpeed_rad_s = 7.7;
+  const double stop_s = kInertia_kgm2 * kSpeed_rad_s / kCoulomb_nm;  // 77 ms = 616 ticks
+  for (const double sign : {1.0, -1.0}) {
+    Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
+    spin(axis, sign * kSpeed_rad_s);
+    AxisSample s = run(axis, 0, 615);
+    EXPECT_NEAR(s.speed_rad_s, sign * kCoulomb_nm / kInertia_kgm2 * (stop_s - 615 * kServoTick_s), 1e-11);
+    EXPECT_EQ(s.faults & kShaftHeld, 0u);
+    s = run(axis, 615, 617);
+    EXPECT_EQ(s.speed_rad_s, 0.0);
+    EXPECT_EQ(s.faults, kShaftHeld);
+    const double angle_rad = s.angle_rad;
+    EXPECT_NEAR(angle_rad, sign * 0.5 * kSpeed_rad_s * stop_s, 1e-11);
+    s = run(axis, 617, 10'000);
+    EXPECT_EQ(s.angle_rad, angle_rad);
+    EXPECT_EQ(s.speed_rad_s, 0.0);
+  }
+}
+
+// Kills: a stop that falls within a substep and is only seen at its end; 0.4 of a substep here.
+TEST(Mechanics, TheStopIsLocatedWithinTheSubstep) {
+  Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
+  constexpr double kStop_s = 35e-6;
+  constexpr double kSpeed_rad_s = kStop_s * kCoulomb_nm / kInertia_kgm2;
+  spin(axis, kSpeed_rad_s, 1.0);
+  EXPECT_NEAR(run(axis, 0, 1).angle_rad, 1.0 + 0.5 * kSpeed_rad_s * kStop_s, 1e-15);
+  ASSERT_EQ(axis.last_tick().size(), 6u);  // five substeps, one cut in two
+  EXPECT_NEAR(axis.last_tick()[1].duration_s, 10e-6, 1e-15);
+  EXPECT_EQ(axis.last_tick()[1].end_rad_s, 0.0);
+}
+
+// An opposing load above the static friction turns the shaft round: decelerated by load and friction, then
+// accelerated by load less friction. Below it the shaft stops and stays. Kills: friction that keeps its old
+// direction after the reversal.
+TEST(Mechanics, AnOpposingLoadReversesTheShaftOnlyIfItExceedsTheStaticFriction) {
+  constexpr double kSpeed_rad_s = 5.0;
+  for (const double load_nm : {0.045, 0.08}) {
+    Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
+    spin(axis, kSpeed_rad_s);
+    axis.set_load(load_nm, 0, 0);
+    const AxisSample s = run(axis, 0, 400);
+    const double stop_s = kInertia_kgm2 * kSpeed_rad_s / (load_nm + kCoulomb_nm);
+    const double back_s = 400 * kServoTick_s - stop_s;
+    const double back_rad_s2 = load_nm > kStatic_nm ? (load_nm - kCoulomb_nm) / kInertia_kgm2 : 0.0;
+    EXPECT_NEAR(s.speed_rad_s, -back_rad_s2 * back_s, 1e-10);
+    EXPECT_NEAR(s.angle_rad, 0.5 * kSpeed_rad_s * stop_s - 0.5 * back_rad_s2 * back_s * back_s, 1e-10);
+    EXPECT_EQ(s.faults, load_nm > kStatic_nm ? 0u : kShaftHeld);
+  }
+}
+
+// Kills: a step that acts a tick early or late.
+TEST(Mechanics, ALoadStepActsFromItsTickOn) {
+  LoadTorque load;
+  EXPECT_EQ(load.at(0), 0.0);
+  load.go_to(0.3, 50, 0);
+  EXPECT_EQ(load.at(50), 0.3);
+  EXPECT_EQ(load.at(1'000'000), 0.3);
+
+  Axis axis = shaft_with(0.0, 0.0, 0.0);
+  run(axis, 0, 50);
+  EXPECT_EQ(axis.sample(50).speed_rad_s, 0.0);
+  axis.set_load(0.3, 50, 0);
+  EXPECT_NEAR(run(axis, 50, 51).speed_rad_s, -0.3 / kInertia_kgm2 * kServoTick_s, 1e-12);
+}
+
+// Kills: a ramp that starts from zero, ends a tick early or late, or jumps when it is replaced on the way.
+TEST(Mechanics, ALoadRampGoesFromThePresentValueToTheTargetInItsTicks) {
+  LoadTorque load;
+  load.go_to(0.2, 0, 0);
+  load.go_to(1.0, 100, 40);
+  EXPECT_EQ(load.at(100), 0.2);
+  EXPECT_NEAR(load.at(110), 0.4, 1e-15);
+  EXPECT_NEAR(load.at(139), 0.98, 1e-15);
+  EXPECT_EQ(load.at(140), 1.0);
+  EXPECT_EQ(load.at(141), 1.0);
+  load.go_to(1.0, 200, 0);
+  load.go_to(0.0, 300, 10);
+  load.go_to(1.0, 305, 5);  // replaces it half way
+  EXPECT_NEAR(load.at(305), 0.5, 1e-15);
+  EXPECT_NEAR(load.at(306), 0.6, 1e-15);
+  EXPECT_EQ(load.at(310), 1.0);
+}
+
+}  // namespace
+}  // namespace drivebench
