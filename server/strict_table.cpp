@@ -145,7 +145,7 @@ std::vector<StrictTable> StrictTable::tables(std::string_view key, std::size_t m
     return result;
   }
   if (node->children.size() > most) {
-    report(key, "occurs " + std::to_string(node->children.size()) + " times but may at most " +
+    report(key, "occurs " + std::to_string(node->children.size()) + " times but may occur at most " +
                     std::to_string(most) + " times");
     return result;
   }

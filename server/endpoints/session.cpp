@@ -151,7 +151,12 @@ void Session::on_tick() {
   if (subscriptions_.empty()) return;
   for (Subscription& s : subscriptions_) {
     const Sample& newest = engine_.newest(s.axis);
-    if (newest.tick % s.decimation != 0) continue;
+    if (newest.tick == s.last_tick) continue;
+    const bool is_due = newest.tick % s.decimation == 0;
+    // A bench that runs faster than this thread skips ticks here; they count as lost.
+    s.dropped += newest.tick / s.decimation - s.last_tick / s.decimation - (is_due ? 1 : 0);
+    s.last_tick = newest.tick;
+    if (!is_due) continue;
     if (s.size == s.ring.size()) {
       s.begin = (s.begin + 1) % s.ring.size();
       --s.size;

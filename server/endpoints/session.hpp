@@ -53,6 +53,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::vector<Sample> ring;
     std::size_t begin = 0;
     std::size_t size = 0;
+    std::uint64_t last_tick = 0;  ///< seen
     std::uint64_t dropped = 0;
   };
   struct WaitingExchange {

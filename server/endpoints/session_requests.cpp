@@ -139,6 +139,7 @@ void Session::subscribe(const v1::Subscribe& r) {
   Subscription wanted;
   wanted.axis = r.axis();
   wanted.decimation = r.decimation();
+  wanted.last_tick = static_cast<std::uint64_t>(engine_.tick());
   if (r.signals_size() > 0) wanted.mask = 0;
   for (const std::string& name : r.signals()) {
     const Signal* signal = find_signal(name);
