@@ -27,6 +27,13 @@ std::int64_t floor_divide(std::int64_t count, std::int64_t divisor) noexcept {
   return quotient - (count % divisor < 0 ? 1 : 0);
 }
 
+/// Fritsch and Carlson: end slopes between 0 and 3 times the mean slope make the cubic monotonic.
+bool is_monotonic(double rise, double start_slope, double end_slope) noexcept {
+  const double limit = 3.0 * std::abs(rise);
+  return start_slope * rise >= 0.0 && end_slope * rise >= 0.0 && std::abs(start_slope) <= limit &&
+         std::abs(end_slope) <= limit;
+}
+
 }  // namespace
 
 Encoder::Encoder(const EncoderParameters& p, double period_s) noexcept
@@ -54,6 +61,14 @@ Encoder::Piece Encoder::part(const Piece& whole, double from, double to) noexcep
           .end_slope = curve.slope(to) * width};
 }
 
+bool Encoder::has_no_edge(const AngleSegment& segment) const noexcept {
+  const double start = position(segment.start_rad);
+  const double end = position(segment.end_rad);
+  const double slope_scale = counts_per_rad_ * segment.duration_s;
+  return floor_to_integer(start) == floor_to_integer(end) &&
+         is_monotonic(end - start, segment.start_rad_s * slope_scale, segment.end_rad_s * slope_scale);
+}
+
 Encoder::Pieces Encoder::monotonic_pieces(const AngleSegment& segment) const noexcept {
   const double slope_scale = counts_per_rad_ * segment.duration_s;
   const Piece whole{.start_s = segment.start_s,
@@ -62,12 +77,7 @@ Encoder::Pieces Encoder::monotonic_pieces(const AngleSegment& segment) const noe
                     .end = position(segment.end_rad),
                     .start_slope = segment.start_rad_s * slope_scale,
                     .end_slope = segment.end_rad_s * slope_scale};
-  const double rise = whole.end - whole.start;
-  // Fritsch and Carlson: end slopes between 0 and 3 times the mean slope make the cubic monotonic.
-  const auto tame = [rise](double slope) {
-    return slope * rise >= 0.0 && std::abs(slope) <= 3.0 * std::abs(rise);
-  };
-  if (tame(whole.start_slope) && tame(whole.end_slope)) return {{whole}, 1};
+  if (is_monotonic(whole.end - whole.start, whole.start_slope, whole.end_slope)) return {{whole}, 1};
 
   const Hermite curve(whole.start, whole.end, whole.start_slope, whole.end_slope);
   const double a = 3.0 * curve.cubic;
@@ -122,6 +132,8 @@ void Encoder::follow(EncoderState& state, std::span<const AngleSegment> segments
   std::size_t found = 0;
   bool index_found = false;
   for (std::size_t n = segments.size(); n-- > 0;) {
+    const bool starts_at_count = n > 0 || count_at(segments[0].start_rad, turn) == state.count;
+    if (starts_at_count && has_no_edge(segments[n])) continue;
     const Pieces pieces = monotonic_pieces(segments[n]);
     for (int i = pieces.size; i-- > 0;) {
       const Piece& piece = pieces.piece[static_cast<std::size_t>(i)];

@@ -96,6 +96,7 @@ class Encoder {
   };
 
   double position(double angle_rad) const noexcept;
+  bool has_no_edge(const AngleSegment& segment) const noexcept;
   Pieces monotonic_pieces(const AngleSegment& segment) const noexcept;
   static Piece part(const Piece& whole, double from, double to) noexcept;
   static double time_of(const Piece& piece, double boundary) noexcept;

@@ -55,7 +55,7 @@ struct FileText {
 };
 FileText read_file(const std::filesystem::path& file, std::size_t limit);
 
-inline constexpr std::size_t kMaxConfigBytes = 256 * 1024;
+inline constexpr std::size_t kMaxConfigBytes = 262'144;
 
 /// The text fit for one line of a terminal: control characters replaced, cut after 160 bytes.
 std::string printable(std::string_view text);

@@ -1,0 +1,137 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <bit>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include "plant/parameters.hpp"
+#include "server/config.hpp"
+
+namespace drivebench::test {
+
+namespace fs = std::filesystem;
+
+inline const fs::path kConfigs = fs::path(__FILE__).parent_path() / "../../configs";
+
+inline std::string read(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// A folder of its own for the files of a test.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "drivebench-config-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no folder for the test");
+    path_ = name;
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name, std::ios::binary) << text;
+    return path_ / name;
+  }
+
+ private:
+  fs::path path_;
+};
+
+/// A bench that needs no other file; its line numbers are what the tests below name.
+inline const std::string kBench =
+    "[bench]\n"                        // 1
+    "name = \"b\"\n"                   // 2
+    "mode = \"lockstep\"\n"            // 3
+    "period_us = 125\n"                // 4
+    "[[axis]]\n"                       // 5
+    "name = \"x\"\n"                   // 6
+    "[axis.machine]\n"                 // 7
+    "pole_pairs = 3\n"                 // 8
+    "stator_resistance_ohm = 1.7\n"    // 9
+    "rotor_resistance_ohm = 3.9\n"     // 10
+    "stator_inductance_h = 0.014\n"    // 11
+    "rotor_inductance_h = 0.014\n"     // 12
+    "mutual_inductance_h = 0.0117\n"   // 13
+    "[axis.mechanics]\n"               // 14
+    "inertia_kgm2 = 1.1e-4\n"          // 15
+    "[axis.amplifier]\n"               // 16
+    "voltage_limit_v = 80\n"           // 17
+    "over_current_a = 6.0\n"           // 18
+    "[axis.encoder]\n"                 // 19
+    "counts_per_revolution = 2000\n";  // 20
+
+/// kBench with one piece of text exchanged.
+inline std::string with(const std::string& piece, const std::string& other) {
+  std::string text = kBench;
+  const std::size_t at = text.find(piece);
+  if (at == std::string::npos) throw std::logic_error("kBench has no " + piece);
+  return text.replace(at, piece.size(), other);
+}
+
+inline BenchConfig parse(const std::string& text) {
+  return parse_config(text, "b.toml", "/nonexistent");
+}
+
+/// All problems as "line key rule" lines.
+inline std::string problems_of(const std::string& text, const fs::path& folder = "/nonexistent") {
+  try {
+    parse_config(text, "b.toml", folder);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+/// Everything but token and files, bit for bit.
+inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
+  EXPECT_EQ(x.name, y.name);
+  EXPECT_EQ(x.mode, y.mode);
+  EXPECT_EQ(x.setup.period_ns, y.setup.period_ns);
+  EXPECT_EQ(x.setup.substeps, y.setup.substeps);
+  EXPECT_EQ(x.setup.seed, y.setup.seed);
+  EXPECT_EQ(x.setup.command_delay_ticks, y.setup.command_delay_ticks);
+  EXPECT_EQ(x.setup.watchdog_ticks, y.setup.watchdog_ticks);
+  EXPECT_EQ(x.setup.lease_ticks, y.setup.lease_ticks);
+  EXPECT_EQ(x.realtime.pacer, y.realtime.pacer);
+  EXPECT_EQ(x.realtime.max_lateness_ns, y.realtime.max_lateness_ns);
+  EXPECT_EQ(x.realtime.cpu, y.realtime.cpu);
+  EXPECT_EQ(x.realtime.priority, y.realtime.priority);
+  EXPECT_EQ(x.tcp.address, y.tcp.address);
+  EXPECT_EQ(x.tcp.port, y.tcp.port);
+  EXPECT_EQ(x.tcp.unix_path, y.tcp.unix_path);
+  EXPECT_EQ(x.tcp.max_sessions, y.tcp.max_sessions);
+  ASSERT_EQ(x.axes.size(), y.axes.size());
+  ASSERT_EQ(x.setup.axes.size(), y.setup.axes.size());
+  for (std::size_t i = 0; i < x.axes.size(); ++i) {
+    EXPECT_EQ(x.axes[i].name, y.axes[i].name);
+    EXPECT_EQ(x.axes[i].motor, y.axes[i].motor);
+    EXPECT_EQ(x.setup.axes[i].on_link_loss, y.setup.axes[i].on_link_loss);
+    for (const Parameter& row : axis_parameters()) {
+      EXPECT_EQ(std::bit_cast<std::uint64_t>(row.get(x.setup.axes[i].parameters)),
+                std::bit_cast<std::uint64_t>(row.get(y.setup.axes[i].parameters)))
+          << row.name;
+    }
+    ASSERT_EQ(x.axes[i].loads.size(), y.axes[i].loads.size());
+    for (std::size_t j = 0; j < x.axes[i].loads.size(); ++j) {
+      EXPECT_EQ(x.axes[i].loads[j].tick, y.axes[i].loads[j].tick);
+      EXPECT_EQ(x.axes[i].loads[j].change.ramp_ticks, y.axes[i].loads[j].change.ramp_ticks);
+      EXPECT_EQ(std::bit_cast<std::uint64_t>(x.axes[i].loads[j].change.load_nm),
+                std::bit_cast<std::uint64_t>(y.axes[i].loads[j].change.load_nm));
+    }
+  }
+}
+
+}  // namespace drivebench::test
