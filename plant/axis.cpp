@@ -162,7 +162,8 @@ void Axis::wrap_angle() noexcept {
 bool Axis::finite() const noexcept {
   const DriveState& x = state_.drive;
   const double size = std::abs(x.machine.i_a_a) + std::abs(x.machine.i_b_a) + std::abs(x.machine.psi_a_wb) +
-                      std::abs(x.machine.psi_b_wb) + std::abs(x.shaft.speed_rad_s) + std::abs(x.shaft.angle_rad);
+                      std::abs(x.machine.psi_b_wb) + std::abs(x.shaft.speed_rad_s) +
+                      std::abs(x.shaft.angle_rad);
   return size < kEnvelope;  // false for NaN as well
 }
 

@@ -137,8 +137,8 @@ void Encoder::follow(EncoderState& state, std::span<const AngleSegment> segments
     const Pieces pieces = monotonic_pieces(segments[n]);
     for (int i = pieces.size; i-- > 0;) {
       const Piece& piece = pieces.piece[static_cast<std::size_t>(i)];
-      // The tick starts with the count that the last one ended with: where the angle wraps in between, rounding
-      // can put it on the other side of a boundary.
+      // The tick starts with the count that the last one ended with: where the angle wraps in between,
+      // rounding can put it on the other side of a boundary.
       const std::int64_t first = n == 0 && i == 0 ? state.count - base : floor_to_integer(piece.start);
       const std::int64_t end = floor_to_integer(piece.end);
       if (first == end) continue;

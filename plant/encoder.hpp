@@ -60,8 +60,9 @@ class Encoder {
  public:
   Encoder(const EncoderParameters& p, double period_s) noexcept;
 
-  /// Follows the shaft through one tick, given as consecutive segments, from the count in the state. The cost does not depend on the
-  /// speed: only the last two edges and the index are located. `turn` is the turn in which the tick started.
+  /// Follows the shaft through one tick, given as consecutive segments, from the count in the state. The cost
+  /// does not depend on the speed: only the last two edges and the index are located. `turn` is the turn in
+  /// which the tick started.
   void follow(EncoderState& state, std::span<const AngleSegment> segments, Tick tick,
               std::int64_t turn) const noexcept;
 
@@ -120,9 +121,8 @@ void Encoder::for_each_edge(std::span<const AngleSegment> segments, std::int64_t
       while (count != last) {
         const std::int64_t boundary = (direction > 0 ? count + 1 : count) - base;
         count += direction;
-        visit(Edge{.time_s = time_of(piece, static_cast<double>(boundary)),
-                   .count = count,
-                   .direction = direction});
+        visit(Edge{
+            .time_s = time_of(piece, static_cast<double>(boundary)), .count = count, .direction = direction});
       }
     }
   }

@@ -86,7 +86,7 @@ Refused Bench::apply(const Input& input) noexcept {
 
 Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
   if (const auto* command = std::get_if<Command>(&input.action)) {
-    const Refused refused = accept(a, *command, input.owner);
+    const Refused refused = accept(input.axis, *command, input.owner);
     if (refused != Refused::kNot) ++a.control.refused;
     return refused;
   }
@@ -111,15 +111,24 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
   return Refused::kNot;
 }
 
-Refused Bench::accept(AxisRuntime& a, const Command& command, Owner owner) noexcept {
-  Control& c = a.control;
+Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept {
+  const AxisRuntime& a = axes_[axis];
+  const Control& c = a.control;
   if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
   if (!std::isfinite(command.phases.voltage_v.a) || !std::isfinite(command.phases.voltage_v.b)) {
     return Refused::kNotFinite;
   }
   if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
-  c.renewed = tick_;  // a latched axis keeps its owner, who alone can clear it
-  if ((a.axis.state().faults & kLatchedFaults) != 0) return Refused::kLatched;
+  return (a.axis.state().faults & kLatchedFaults) != 0 ? Refused::kLatched : Refused::kNot;
+}
+
+Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noexcept {
+  Control& c = axes_[axis].control;
+  const Refused why = would_refuse(axis, owner, command);
+  if (why == Refused::kNot || why == Refused::kLatched) {
+    c.renewed = tick_;  // a latched axis keeps its owner, who alone can clear it
+  }
+  if (why != Refused::kNot) return why;
   c.newest = command;
   c.fresh = 1;
   return Refused::kNot;

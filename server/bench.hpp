@@ -66,6 +66,9 @@ class Bench {
   /// One tick: inputs that are due, commands, plant, sensors.
   void step() noexcept;
 
+  /// Why a command for the present tick would be turned away.
+  Refused would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept;
+
   Tick tick() const noexcept { return tick_; }
   std::size_t axis_count() const noexcept { return axes_.size(); }
   const Sample& sample(std::size_t axis) const noexcept { return axes_[axis].sample; }
@@ -106,7 +109,7 @@ class Bench {
 
   Refused apply(const Input& input) noexcept;
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
-  Refused accept(AxisRuntime& a, const Command& command, Owner owner) noexcept;
+  Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
   Refused change_lease(AxisRuntime& a, LeaseAction action, Owner owner) noexcept;
   void lose_controller(AxisRuntime& a, std::uint64_t fault) noexcept;
   void apply_due() noexcept;

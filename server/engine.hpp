@@ -27,6 +27,8 @@ class Engine {
 
   virtual ~Engine() = default;
 
+  /// Why command() would turn this away now.
+  virtual Refused check(std::uint32_t axis, Owner owner, const Command& command) const = 0;
   /// Gives an axis its next command. Only the newest one before a tick counts.
   virtual Refused command(std::uint32_t axis, Owner owner, const Command& command) = 0;
   /// Lockstep: runs the present tick if the commands of all controlled axes are there. Otherwise time goes on
@@ -45,6 +47,9 @@ class Engine {
   std::function<void()> on_tick;
   /// Called once, when a run that has an end has reached it.
   std::function<void()> on_end;
+
+  /// Who holds the lease of the axis, as far as the I/O thread knows.
+  virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
 
   const Sample& newest(std::size_t axis) const { return newest_[axis]; }
   Tick tick() const { return static_cast<Tick>(newest_[0].tick); }

@@ -13,6 +13,10 @@ class LockstepEngine final : public Engine {
     show();
   }
 
+  Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
+    return bench_.would_refuse(axis, owner, command);
+  }
+
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
   }
@@ -38,14 +42,17 @@ class LockstepEngine final : public Engine {
   }
 
   Verdict stop() override {
-    const Verdict verdict{.mode = RunMode::kLockstep,
+    Verdict verdict{.mode = RunMode::kLockstep,
                           .ticks = static_cast<std::uint64_t>(bench_.tick()),
-                          .gaps = recorder_ ? recorder_->gaps() : 0,
                           .state_hash = bench_.state_hash()};
-    if (recorder_) recorder_->finish(verdict);
+    if (recorder_) {
+      recorder_->finish(verdict);
+      verdict.gaps = recorder_->gaps();
+    }
     return verdict;
   }
 
+  Owner owner(std::size_t axis) const override { return bench_.owner(axis); }
   std::uint64_t state_hash() const override { return bench_.state_hash(); }
   std::int64_t worst_lateness_ns() const override { return 0; }
 

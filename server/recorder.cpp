@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <system_error>
+#include <utility>
 
 #include "bench.pb.h"
 #include "plant/parameters.hpp"
@@ -36,8 +37,8 @@ std::span<const std::byte> bytes_of(std::string_view text) {
 
 }  // namespace
 
-/// The file and its MCAP structure. After the first failed write nothing more is written, and every entry
-/// counts as lost.
+/// The file and its MCAP structure. After the first failed write nothing more is written; what was on its way
+/// then and every later entry count as lost.
 class Recorder::File {
  public:
   File(const std::filesystem::path& path, const BenchConfig& config)
@@ -68,6 +69,7 @@ class Recorder::File {
   File& operator=(const File&) = delete;
 
   void write(const SampleEntry& entry) {
+    ++unsaved_;
     const std::uint16_t channel = samples_[entry.axis];
     const auto room =
         mcap_->begin_message(header(channel, sequences_[entry.axis]++, entry.sample.tick), kMaxSampleBytes);
@@ -75,6 +77,7 @@ class Recorder::File {
   }
 
   void write(const InputEntry& entry) {
+    ++unsaved_;
     encode_input(entry.received, entry.input, input_);
     add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
   }
@@ -85,6 +88,7 @@ class Recorder::File {
     add(verdict_, 0, v.ticks, message);
     mcap_->finish();
     if (::fsync(descriptor_) != 0) failed_ = true;
+    if (failed_ && unsaved_ == 0) unsaved_ = 1;  // the end of the file, without which it does not replay
   }
 
   void flush() { mcap_->flush(); }
@@ -92,6 +96,9 @@ class Recorder::File {
     if (::fdatasync(descriptor_) != 0) failed_ = true;
   }
   bool failed() const { return failed_; }
+
+  /// Entries that were given to write() and will never reach the file; each is told once.
+  std::uint64_t take_lost() { return failed_ ? std::exchange(unsaved_, 0) : 0; }
 
  private:
   McapMessageHeader header(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick) const {
@@ -116,11 +123,13 @@ class Recorder::File {
         failed_ = true;
       }
     }
+    if (!failed_) unsaved_ = 0;  // one call brings a whole chunk
   }
 
   std::int64_t period_ns_;
   int descriptor_;
   bool failed_ = false;
+  std::uint64_t unsaved_ = 0;
   std::optional<McapWriter> mcap_;
   std::uint16_t inputs_ = 0;
   std::uint16_t verdict_ = 0;
@@ -170,6 +179,7 @@ bool Recorder::drain() {
     }
     ring_.pop();
   }
+  count_lost();
   return any;
 }
 
@@ -181,6 +191,7 @@ void Recorder::run() {
     const auto now = Clock::now();
     if (now - last_flush >= kFlushInterval) {
       writer_->flush();
+      count_lost();
       last_flush = now;
     }
     if (now - last_sync >= kSyncInterval) {
@@ -190,6 +201,10 @@ void Recorder::run() {
   }
 }
 
+void Recorder::count_lost() {
+  gaps_.fetch_add(writer_->take_lost(), std::memory_order_relaxed);
+}
+
 void Recorder::finish(const Verdict& verdict) {
   stop_.store(true);
   thread_.join();
@@ -197,6 +212,7 @@ void Recorder::finish(const Verdict& verdict) {
   Verdict final_verdict = verdict;
   final_verdict.gaps = gaps();
   writer_->write(final_verdict);
+  count_lost();
 }
 
 }  // namespace drivebench

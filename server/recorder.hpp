@@ -36,7 +36,7 @@ class Recorder final : public BenchObserver {
   std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }
   const std::string& file() const noexcept { return file_; }
 
-  /// Drains the ring, writes the verdict and closes the file.
+  /// Drains the ring, writes the verdict and closes the file; gaps() is final then.
   void finish(const Verdict& verdict);
 
  private:
@@ -54,6 +54,7 @@ class Recorder final : public BenchObserver {
   void push(const Entry& entry) noexcept;
   void run();
   bool drain();
+  void count_lost();
 
   std::string file_;
   SpscRing<Entry> ring_;

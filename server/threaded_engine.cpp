@@ -82,17 +82,23 @@ class ThreadedEngine final : public Engine {
     if (thread_.joinable()) thread_.join();
   }
 
-  Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+  Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
     const Sample& newest = newest_[axis];
-    if (owner == 0 || newest.owner != owner) return refuse_command(axis, owner, Refused::kNotOwner);
+    if (owner == 0 || newest.owner != owner) return Refused::kNotOwner;
     const TwoPhase& voltage_v = command.phases.voltage_v;
-    if (!std::isfinite(voltage_v.a) || !std::isfinite(voltage_v.b)) {
-      return refuse_command(axis, owner, Refused::kNotFinite);
+    if (!std::isfinite(voltage_v.a) || !std::isfinite(voltage_v.b)) return Refused::kNotFinite;
+    if ((newest.faults & kLatchedFaults) != 0) return Refused::kLatched;
+    return command.answers > static_cast<Tick>(newest.tick) ? Refused::kStale : Refused::kNot;
+  }
+
+  Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+    const Refused why = check(axis, owner, command);
+    if (why != Refused::kNot) {
+      request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
+      return why;
     }
-    if ((newest.faults & kLatchedFaults) != 0) return refuse_command(axis, owner, Refused::kLatched);
-    if (command.answers > static_cast<Tick>(newest.tick)) return refuse_command(axis, owner, Refused::kStale);
     mailboxes_[axis].write({.owner = owner, .command = command});
-    return Refused::kNot;
+    return why;
   }
 
   void advance() override {}
@@ -105,15 +111,17 @@ class ThreadedEngine final : public Engine {
   Verdict stop() override {
     stop_.store(true);
     thread_.join();
-    const Verdict verdict{.mode = config_.mode,
+    Verdict verdict{.mode = config_.mode,
                           .ticks = static_cast<std::uint64_t>(bench_.tick()),
                           .late_ticks = bench_.sample(0).late_ticks,
                           .lateness_p50_ns = lateness_.percentile_ns(0.5),
                           .lateness_p99_ns = lateness_.percentile_ns(0.99),
                           .lateness_worst_ns = lateness_.worst_ns(),
-                          .gaps = recorder_ ? recorder_->gaps() : 0,
                           .state_hash = bench_.state_hash()};
-    if (recorder_) recorder_->finish(verdict);
+    if (recorder_) {
+      recorder_->finish(verdict);
+      verdict.gaps = recorder_->gaps();
+    }
     return verdict;
   }
 
@@ -178,11 +186,6 @@ class ThreadedEngine final : public Engine {
   }
 
   // ---- I/O thread ----
-
-  Refused refuse_command(std::uint32_t axis, Owner owner, Refused why) {
-    request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
-    return why;
-  }
 
   void await_wake() {
     wake_.async_wait(

@@ -33,7 +33,7 @@ class Outbox {
   /// Called when the queue has become empty again.
   std::function<void()> on_idle;
 
-  /// Sends what is queued, if it can be sent at once, and shuts the socket down.
+  /// Shuts the socket down; what is queued is lost.
   void close() noexcept;
 
  private:

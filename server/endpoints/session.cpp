@@ -202,6 +202,7 @@ void Session::send(const v1::Envelope& envelope) {
 }
 
 void Session::give_leases_back() {
+  over_ = true;
   for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
     if (!leased_[axis]) continue;
     leased_[axis] = false;

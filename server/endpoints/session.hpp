@@ -97,6 +97,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::vector<std::byte> scratch_;
   std::vector<AxisSampleView> views_;
   bool greeted_ = false;
+  bool over_ = false;  ///< the peer is gone
   Owner owner_ = 0;
   std::vector<bool> leased_;  // by axis
   std::optional<WaitingExchange> waiting_;

@@ -74,7 +74,7 @@ bool Session::axis_exists(std::uint32_t axis) {
 
 bool Session::may_change(std::uint32_t axis) {
   if (!axis_exists(axis)) return false;
-  const Owner owner = engine_.newest(axis).owner;
+  const Owner owner = engine_.owner(axis);
   if (engine_.config().mode == RunMode::kFree || (owner != 0 && owner == owner_)) return true;
   refuse(request_.id(), Refused::kNotOwner, "axis");
   return false;
@@ -101,7 +101,10 @@ void Session::lease(const v1::LeaseRequest& r) {
   if (owner_ == 0) owner_ = engine_.new_owner();
   const auto action = static_cast<LeaseAction>(r.action());
   request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, "axis",
-          [this, axis = r.axis(), action] { leased_[axis] = action != LeaseAction::kRelease; });
+          [this, axis = r.axis(), action] {
+            leased_[axis] = action != LeaseAction::kRelease;
+            if (over_) give_leases_back();  // the peer left before the bench answered
+          });
 }
 
 void Session::exchange(const v1::Exchange& r) {
@@ -126,10 +129,15 @@ void Session::exchange(const v1::Exchange& r) {
     }
     waiting.axes.push_back(command.axis());
   }
+  // All or none: a command that was taken would bar its axis from the next try.
   for (const v1::Command& command : r.commands()) {
-    const Refused refused = engine_.command(command.axis(), owner_, *decode_command(command));
-    if (refused != Refused::kNot) return refuse(id, refused, "commands");
+    if (engine_.check(command.axis(), owner_, *decode_command(command)) == Refused::kNot) continue;
+    const RefusalText text = text_of(engine_.command(command.axis(), owner_, *decode_command(command)));
+    return refuse(id, text.code, text.sentence + (" (axis " + std::to_string(command.axis()) + ")"),
+                  "commands");
   }
+  for (const v1::Command& command : r.commands())
+    engine_.command(command.axis(), owner_, *decode_command(command));
   waiting_ = std::move(waiting);
   engine_.advance();
 }

@@ -3,8 +3,8 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
+#include <filesystem>
 #include <stdexcept>
 
 namespace drivebench {
@@ -50,6 +50,20 @@ void tune(UnixProtocol::socket& socket) {
   socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
 }
 
+/// Removes the socket file of a server that is gone; throws if the path is anything else.
+void make_way(asio::io_context& io, const std::string& path) {
+  const std::filesystem::file_status status = std::filesystem::symlink_status(path);
+  if (!std::filesystem::exists(status)) return;
+  if (!std::filesystem::is_socket(status)) {
+    throw std::runtime_error("cannot listen on unix:" + path + ": the file exists and is not a socket");
+  }
+  boost::system::error_code error;
+  UnixProtocol::socket probe(io);
+  probe.connect(UnixProtocol::endpoint(path), error);
+  if (!error) throw std::runtime_error("cannot listen on unix:" + path + ": another server listens there");
+  std::filesystem::remove(path);
+}
+
 }  // namespace
 
 StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig& config)
@@ -70,8 +84,8 @@ StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig
   }
   asio::co_spawn(io_, accept_from(tcp_), asio::detached);
   if (config.unix_path.empty()) return;
+  make_way(io_, config.unix_path);
   try {
-    ::unlink(config.unix_path.c_str());
     unix_.open();
     unix_.bind(UnixProtocol::endpoint(config.unix_path));
     unix_.listen();
@@ -82,7 +96,7 @@ StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig
 }
 
 StreamServer::~StreamServer() {
-  if (!config_.unix_path.empty()) ::unlink(config_.unix_path.c_str());
+  close();
 }
 
 std::string StreamServer::tcp_address() const {
@@ -140,7 +154,11 @@ void StreamServer::on_tick() {
 void StreamServer::close() {
   boost::system::error_code ignored;
   tcp_.close(ignored);
-  unix_.close(ignored);
+  if (unix_.is_open()) {
+    unix_.close(ignored);
+    std::error_code gone_already;
+    std::filesystem::remove(config_.unix_path, gone_already);
+  }
   for (const auto& session : sessions_)
     session->close();
 }

@@ -66,9 +66,9 @@ TEST(Amplifier, TheSaturationFlagLastsAsLongAsTheClipping) {
   EXPECT_EQ(axis.sample(2).voltage_v.b, 15.0);
 }
 
-// The current rises by 25 us V/(sigma L_S) = 0.59 A per substep of 100 V, so that 1 A is exceeded at the second
-// of five. Masked, it is a flag and clips nothing; unmasked, the diodes empty the phase within the same tick.
-// Kills: a trip that waits for the next tick, a limit that clips, a flag that latches.
+// The current rises by 25 us V/(sigma L_S) = 0.59 A per substep of 100 V, so that 1 A is exceeded at the
+// second of five. Masked, it is a flag and clips nothing; unmasked, the diodes empty the phase within the
+// same tick. Kills: a trip that waits for the next tick, a limit that clips, a flag that latches.
 TEST(Amplifier, OverCurrentIsAFlagAndUnmaskedTripsWithinTheTick) {
   for (const bool trips : {false, true}) {
     for (const double sign : {1.0, -1.0}) {
@@ -169,9 +169,9 @@ Freewheel freewheel(double link_v) {
   return f;
 }
 
-// The stored energy goes to the link, into heat and to the shaft; the closing of the sum is limited by the step
-// at which a phase opens. Kills: diodes with the voltage of the link the wrong way round, energy that vanishes
-// when a phase opens.
+// The stored energy goes to the link, into heat and to the shaft; the closing of the sum is limited by the
+// step at which a phase opens. Kills: diodes with the voltage of the link the wrong way round, energy that
+// vanishes when a phase opens.
 TEST(Amplifier, FreewheelingReturnsEnergyToTheLink) {
   const Freewheel f = freewheel(40.0);
   EXPECT_GT(f.into_link_j, 0.25 * f.stored_before_j);

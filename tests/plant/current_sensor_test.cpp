@@ -49,6 +49,11 @@ TEST(CurrentSensor, TheConverterStopsAtItsEndsAndSaysSo) {
     EXPECT_TRUE(r.saturated);
   }
   EXPECT_FALSE(read_current(p, 1.0, 0.0, -10.0, 0.0).saturated);
+  // Ties go up: the upper one is beyond the last code, the lower one on the first.
+  EXPECT_EQ(read_current(p, 1.0, 0.0, 10.0 - 0.5 * kStep_a, 0.0).current_a, 10.0 - kStep_a);
+  EXPECT_TRUE(read_current(p, 1.0, 0.0, 10.0 - 0.5 * kStep_a, 0.0).saturated);
+  EXPECT_EQ(read_current(p, 1.0, 0.0, -10.0 - 0.5 * kStep_a, 0.0).current_a, -10.0);
+  EXPECT_FALSE(read_current(p, 1.0, 0.0, -10.0 - 0.5 * kStep_a, 0.0).saturated);
 }
 
 // 20000 draws: the rms estimate scatters by 0.5 %, the mean by 0.7 % of the rms, the correlation by 0.7 %.
@@ -92,12 +97,8 @@ TEST(CurrentSensor, TheNoiseIsAFunctionOfSeedAxisAndTick) {
 // Kills: gains or offsets of the phases exchanged; a saturated converter that the fault word does not show.
 TEST(CurrentSensor, EachPhaseHasItsOwnGainAndOffsetAndSaturationIsAFaultBit) {
   AxisParameters p = servo_axis();
-  p.current_sensor = {.bits = 10,
-                      .full_scale_a = 8.0,
-                      .gain_a = 2.0,
-                      .gain_b = 1.0,
-                      .offset_a_a = 0.5,
-                      .offset_b_a = -1.0};
+  p.current_sensor = {
+      .bits = 10, .full_scale_a = 8.0, .gain_a = 2.0, .gain_b = 1.0, .offset_a_a = 0.5, .offset_b_a = -1.0};
   Axis axis(p, kServoTiming, 1, 0);
   AxisState state = axis.state();
   state.drive.machine = {.i_a_a = 1.0, .i_b_a = 3.0};

@@ -32,9 +32,8 @@ AxisSample run(Axis& axis, Tick from, Tick to) {
 
 // Kills: friction that pushes, stiction that holds above its limit or lets go below it.
 TEST(Mechanics, TheFrictionBranchFollowsTheMotionAndAtRestTheDrivingTorque) {
-  const ShaftParameters p{.inertia_kgm2 = 1.0,
-                          .coulomb_friction_nm = kCoulomb_nm,
-                          .static_friction_nm = kStatic_nm};
+  const ShaftParameters p{
+      .inertia_kgm2 = 1.0, .coulomb_friction_nm = kCoulomb_nm, .static_friction_nm = kStatic_nm};
   EXPECT_EQ(friction_branch(p, 1e-12, -9.0).direction, 1.0);
   EXPECT_EQ(friction_branch(p, -1e-12, 9.0).direction, -1.0);
   EXPECT_EQ(friction_branch(p, 0.0, kStatic_nm).turns, 0.0);
@@ -55,8 +54,8 @@ TEST(Mechanics, ViscousFrictionSlowsExponentially) {
   EXPECT_NEAR(s.angle_rad, 80.0 * 0.2 * (1.0 - std::exp(-0.5)), 1e-9);
 }
 
-// Kills: stiction that is only Coulomb friction, breakaway in the wrong direction, Coulomb friction that keeps
-// the static value once the shaft turns.
+// Kills: stiction that is only Coulomb friction, breakaway in the wrong direction, Coulomb friction that
+// keeps the static value once the shaft turns.
 TEST(Mechanics, AShaftBreaksAwayOnlyAboveTheStaticFriction) {
   for (const double sign : {1.0, -1.0}) {
     Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
@@ -93,6 +92,26 @@ TEST(Mechanics, CoulombFrictionStopsTheShaftAtTheClosedFormTimeAndAngleAndHoldsI
     EXPECT_EQ(s.angle_rad, angle_rad);
     EXPECT_EQ(s.speed_rad_s, 0.0);
   }
+}
+
+// With viscous friction f the speed crosses zero in a curve, after (J/f) log(1 + f w0/tau_C). Kills: a stop
+// that leaves the remainder of the estimated crossing in the speed.
+TEST(Mechanics, BothFrictionsTogetherStopTheShaftAtExactlyZero) {
+  constexpr double kViscous_nms = 4e-3;
+  constexpr double kSpeed_rad_s = 30.0;
+  Axis axis = shaft_with(kViscous_nms, kCoulomb_nm, kStatic_nm);
+  spin(axis, kSpeed_rad_s);
+  Tick tick = 0;
+  while (axis.state().drive.shaft.speed_rad_s != 0.0 && tick < 10'000) {
+    ASSERT_GT(axis.state().drive.shaft.speed_rad_s, 0.0);
+    axis.advance(kShorted, tick++);
+  }
+  const double time_constant_s = kInertia_kgm2 / kViscous_nms;
+  const double stop_s = time_constant_s * std::log(1.0 + kViscous_nms * kSpeed_rad_s / kCoulomb_nm);
+  EXPECT_EQ(tick, static_cast<Tick>(std::ceil(stop_s / kServoTick_s)));
+  EXPECT_NEAR(axis.sample(tick).angle_rad,
+              time_constant_s * (kSpeed_rad_s - kCoulomb_nm / kInertia_kgm2 * stop_s), 1e-9);
+  ASSERT_EQ(axis.last_tick().size(), 6u);
 }
 
 // Kills: a stop that falls within a substep and is only seen at its end; 0.4 of a substep here.

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/link/address.hpp"
+
+/// The subcommands of `drivebench`: an options struct each and a function that gives the exit code. main.cpp
+/// turns the command line into the former and exceptions into the latter.
+namespace drivebench::command {
+
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitFailed = 1;     ///< the run failed
+inline constexpr int kExitUsage = 2;      ///< the command line or a configuration is wrong
+inline constexpr int kExitNoConnect = 3;  ///< nothing answers, or it does not let us in
+inline constexpr int kExitCutShort = 3;   ///< export: the recording ends early; what is there was written
+
+/// The user can put it right: exit code 2.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct LinkChoice {
+  std::string address{link::kDefaultAddress};
+  std::string token;
+};
+
+struct DescribeOptions {
+  LinkChoice link;
+  bool json = false;
+};
+int run_describe(const DescribeOptions& options);
+
+struct StatusOptions {
+  LinkChoice link;
+  bool json = false;
+};
+int run_status(const StatusOptions& options);
+
+struct WatchOptions {
+  LinkChoice link;
+  bool json = false;
+  std::string axis = "0";            ///< number or name
+  std::vector<std::string> signals;  ///< empty: a choice of ours
+  double rate_hz = 10.0;             ///< in the bench's time
+  std::uint64_t count = 0;           ///< 0: until interrupted
+};
+int run_watch(const WatchOptions& options);
+
+/// A load torque at a time after the start of the trajectory.
+struct LoadAt {
+  double load_nm = 0.0;
+  double after_s = 0.0;
+};
+
+struct ParameterSetting {
+  std::string name;
+  double value = 0.0;
+};
+
+struct ControlOptions {
+  LinkChoice link;
+  bool json = false;
+  bool list = false;
+  std::string preset = "book/8.2.2";
+  std::string axis = "0";  ///< number or name
+  std::string csv_file;    ///< empty: none
+  std::vector<LoadAt> loads;
+  std::vector<ParameterSetting> settings;
+  bool clear_faults = false;
+};
+int run_control(const ControlOptions& options);
+
+/// Both replace this process by drivebench-server.
+int run_serve(const std::vector<std::string>& arguments);
+struct ReplayOptions {
+  std::string recording;
+  bool json = false;
+};
+int run_replay(const ReplayOptions& options);
+
+struct ExportOptions {
+  std::string recording;
+  bool json = false;
+  std::string out_file;              ///< empty: standard output
+  std::string axis;                  ///< name; empty: the first in the file
+  std::vector<std::string> signals;  ///< empty: all
+  std::uint64_t from_tick = 0;
+  std::uint64_t to_tick = std::numeric_limits<std::uint64_t>::max();
+};
+int run_export(const ExportOptions& options);
+
+struct DemoOptions {
+  bool json = false;
+  std::string folder = "recordings";
+};
+int run_demo(const DemoOptions& options);
+
+}  // namespace drivebench::command

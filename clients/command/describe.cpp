@@ -1,0 +1,58 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "clients/command/commands.hpp"
+#include "clients/command/json.hpp"
+#include "clients/command/session.hpp"
+
+namespace drivebench::command {
+namespace {
+
+void print_parameters(const v1::AxisDescription& axis) {
+  fmt::print("  {:<36}{:>12} {:<11}{:>22}  {}\n", "parameter", "value", "unit", "limits", "meaning");
+  for (const v1::ParameterDescription& p : axis.parameters()) {
+    fmt::print("  {:<36}{:>12.6g} {:<11}{:>22}  {}{}\n", p.name(), p.value(), p.unit(),
+               fmt::format("{:g} .. {:g}", p.minimum(), p.maximum()), p.live() ? "[live] " : "", p.meaning());
+  }
+}
+
+void print_signals(const v1::BenchDescription& bench) {
+  fmt::print("\n  {:<20}{:<8}{:<8}{}\n", "signal", "unit", "kind", "meaning");
+  for (const v1::SignalDescription& s : bench.signals()) {
+    const char* kind = s.kind() == v1::SignalDescription::KIND_TRUTH    ? "truth"
+                       : s.kind() == v1::SignalDescription::KIND_SENSOR ? "sensor"
+                                                                        : "status";
+    fmt::print("  {:<20}{:<8}{:<8}{}\n", s.name(), s.unit(), kind, s.meaning());
+  }
+}
+
+}  // namespace
+
+int run_describe(const DescribeOptions& options) {
+  const link::Link bench_link = open_link(options.link, "describe");
+  const v1::Welcome& welcome = bench_link.welcome();
+  if (options.json) {
+    fmt::print("{}\n", describe_json(welcome));
+    return kExitOk;
+  }
+  const v1::BenchDescription& bench = welcome.bench();
+  fmt::print("bench {} at {}, {}, build {}\n", bench.name(), bench_link.peer(), name_of(bench.mode()),
+             welcome.build_id());
+  fmt::print(
+      "period {:g} us ({:g} kHz), {} substeps, command delay {} tick{}, watchdog {} ticks, lease {:g} s\n",
+      bench.period_s() * 1e6, 1e-3 / bench.period_s(), bench.substeps(), bench.command_delay_ticks(),
+      bench.command_delay_ticks() == 1 ? "" : "s", bench.watchdog_ticks(), bench.lease_s());
+  fmt::print("seed {}, configuration {:016x}\n", bench.seed(), bench.configuration_hash());
+  for (int i = 0; i < bench.axes_size(); ++i) {
+    fmt::print("\naxis {} ({}): {}\n", i, bench.axes(i).name(), bench.axes(i).machine());
+    print_parameters(bench.axes(i));
+  }
+  print_signals(bench);
+  fmt::print("\n  {:<26}{}\n", "fault", "meaning");
+  for (const v1::FaultDescription& f : bench.faults())
+    fmt::print("  {:<26}{}\n", f.name(), f.meaning());
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,45 @@
+#include "clients/command/installation.hpp"
+
+#include <cstdlib>
+#include <vector>
+
+#include "clients/command/commands.hpp"
+
+namespace drivebench::command {
+namespace fs = std::filesystem;
+
+fs::path own_executable() {
+  return fs::read_symlink("/proc/self/exe");
+}
+
+fs::path server_executable() {
+  const fs::path server = own_executable().parent_path() / "drivebench-server";
+  if (!fs::exists(server)) throw UsageError("there is no " + server.string());
+  return server;
+}
+
+fs::path find_config(std::string_view choice) {
+  std::error_code ignored;
+  const fs::path as_path(choice);
+  if (fs::is_regular_file(as_path, ignored)) return as_path;
+
+  std::vector<fs::path> folders;
+  if (const char* chosen = std::getenv("DRIVEBENCH_CONFIGS"); chosen != nullptr) folders.emplace_back(chosen);
+  folders.emplace_back("configs");
+  // build/release/bin and an installation's bin are at most three folders below the one with configs.
+  fs::path above = own_executable().parent_path();
+  for (int i = 0; i < 4; ++i, above = above.parent_path())
+    folders.push_back(above / "configs");
+
+  std::string looked_at;
+  const fs::path file = as_path.extension() == ".toml" ? as_path : fs::path(std::string(choice) + ".toml");
+  for (const fs::path& folder : folders) {
+    fs::path found = folder / "benches" / file;
+    if (fs::is_regular_file(found, ignored)) return found;
+    looked_at += "\n  " + found.string();
+  }
+  throw UsageError("no bench file '" + std::string(choice) + "'; looked for\n  " + as_path.string() +
+                   looked_at);
+}
+
+}  // namespace drivebench::command

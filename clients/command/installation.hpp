@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace drivebench::command {
+
+/// This program's own file.
+std::filesystem::path own_executable();
+
+/// drivebench-server, which stands next to this program. Throws UsageError when it does not.
+std::filesystem::path server_executable();
+
+/// A bench file: `choice` as a path, or else the name of a bench ("servo" or "servo.toml") in `benches/` of
+/// the folder DRIVEBENCH_CONFIGS, of `configs` here or of `configs` in a folder above the program. Throws
+/// UsageError with all places looked at.
+std::filesystem::path find_config(std::string_view choice);
+
+}  // namespace drivebench::command

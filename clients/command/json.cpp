@@ -1,0 +1,220 @@
+#include "clients/command/json.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "clients/command/session.hpp"
+#include "clients/control/presets.hpp"
+
+namespace drivebench::command {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ControlReport, bench, mode, axis, preset, failure, samples, missed_ticks,
+                                   late_ticks, first_tick, duration_s, wall_s, peak_error_counts,
+                                   final_error_counts, final_true_error_counts, peak_speed_rad_s,
+                                   peak_current_a, peak_command_voltage_v, peak_voltage_v, exchange_p50_us,
+                                   exchange_p99_us, exchange_max_us)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerReady, tcp, mode, bench)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerVerdict, ticks, late_ticks, worst_lateness_us, exact, realtime_valid,
+                                   state_hash, recording, sentence)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DemoReplay, equal, ticks, samples, state_hash, problem)
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A line that is a JSON object with this event; a discarded value otherwise.
+nlohmann::json object_of(std::string_view line, std::string_view event) {
+  nlohmann::json object = nlohmann::json::parse(line, nullptr, false);
+  if (!object.is_object()) return nlohmann::json(nlohmann::json::value_t::discarded);
+  if (!event.empty() && object.value("event", std::string()) != event) {
+    return nlohmann::json(nlohmann::json::value_t::discarded);
+  }
+  return object;
+}
+
+template <class T>
+std::optional<T> parsed(std::string_view line, std::string_view event) {
+  try {
+    const nlohmann::json object = object_of(line, event);
+    if (object.is_discarded()) return std::nullopt;
+    return object.get<T>();
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+Json faults_of(const v1::BenchDescription& bench, std::uint64_t faults) {
+  Json names = Json::array();
+  for (const v1::FaultDescription& fault : bench.faults()) {
+    if ((faults & fault.bit()) != 0) names.push_back(fault.name());
+  }
+  return names;
+}
+
+Json value_as_json(const Signal& signal, const Sample& sample) {
+  if (signal.type == SignalType::kUnsigned) return sample.*signal.as_unsigned;
+  if (signal.type == SignalType::kSigned) return sample.*signal.as_signed;
+  return sample.*signal.as_real;
+}
+
+Json parameters_of(const v1::AxisDescription& axis) {
+  Json rows = Json::array();
+  for (const v1::ParameterDescription& p : axis.parameters()) {
+    rows.push_back({{"name", p.name()},
+                    {"value", p.value()},
+                    {"unit", p.unit()},
+                    {"minimum", p.minimum()},
+                    {"maximum", p.maximum()},
+                    {"integer", p.integer()},
+                    {"live", p.live()},
+                    {"meaning", p.meaning()}});
+  }
+  return rows;
+}
+
+const char* name_of(v1::SignalDescription::Kind kind) {
+  if (kind == v1::SignalDescription::KIND_STATUS) return "status";
+  if (kind == v1::SignalDescription::KIND_SENSOR) return "sensor";
+  return "truth";
+}
+
+Json demo_run(const DemoRun& run) {
+  return {{"peak_error_counts", run.control.peak_error_counts},
+          {"final_error_counts", run.control.final_error_counts},
+          {"peak_current_a", run.control.peak_current_a},
+          {"peak_voltage_v", run.control.peak_voltage_v},
+          {"duration_s", run.control.duration_s},
+          {"samples", run.control.samples},
+          {"missed_ticks", run.control.missed_ticks},
+          {"late_ticks", run.verdict.late_ticks},
+          {"worst_lateness_us", run.verdict.worst_lateness_us},
+          {"exchange_p50_us", run.control.exchange_p50_us},
+          {"exchange_p99_us", run.control.exchange_p99_us},
+          {"exact", run.verdict.exact},
+          {"realtime_valid", run.verdict.realtime_valid},
+          {"state_hash", run.verdict.state_hash},
+          {"verdict", run.verdict.sentence},
+          {"recording", run.recording},
+          {"failure", run.failure}};
+}
+
+}  // namespace
+
+std::string describe_json(const v1::Welcome& welcome) {
+  const v1::BenchDescription& bench = welcome.bench();
+  Json out = {{"bench", bench.name()},
+              {"mode", command::name_of(bench.mode())},
+              {"build_id", welcome.build_id()},
+              {"protocol", welcome.protocol()},
+              {"period_s", bench.period_s()},
+              {"substeps", bench.substeps()},
+              {"command_delay_ticks", bench.command_delay_ticks()},
+              {"watchdog_ticks", bench.watchdog_ticks()},
+              {"lease_s", bench.lease_s()},
+              {"seed", bench.seed()},
+              {"configuration_hash", fmt::format("{:016x}", bench.configuration_hash())}};
+  for (const v1::AxisDescription& axis : bench.axes()) {
+    out["axes"].push_back(
+        {{"name", axis.name()}, {"machine", axis.machine()}, {"parameters", parameters_of(axis)}});
+  }
+  for (const v1::SignalDescription& s : bench.signals()) {
+    out["signals"].push_back({{"name", s.name()},
+                              {"unit", s.unit()},
+                              {"kind", name_of(s.kind())},
+                              {"minimum", s.minimum()},
+                              {"maximum", s.maximum()},
+                              {"meaning", s.meaning()}});
+  }
+  for (const v1::FaultDescription& f : bench.faults()) {
+    out["faults"].push_back(
+        {{"bit", f.bit()}, {"name", f.name()}, {"latched", f.latched()}, {"meaning", f.meaning()}});
+  }
+  return out.dump(2);
+}
+
+std::string status_json(const v1::Status& status, const v1::BenchDescription& bench) {
+  Json out = {{"mode", command::name_of(status.mode())},
+              {"tick", status.tick()},
+              {"late_ticks", status.late_ticks()},
+              {"worst_lateness_s", status.worst_lateness_s()},
+              {"sessions", status.sessions()},
+              {"recording", status.recording()},
+              {"recording_gaps", status.recording_gaps()},
+              {"state_hash", status.state_hash() == 0 ? "" : fmt::format("{:016x}", status.state_hash())},
+              {"notes", Json::array()},
+              {"axes", Json::array()}};
+  for (const std::string& note : status.notes())
+    out["notes"].push_back(note);
+  for (const v1::AxisSample& each : status.axes()) {
+    const Sample sample = plain(each.sample());
+    Json axis = {{"axis", each.axis()}, {"faults_set", faults_of(bench, sample.faults)}};
+    for (const Signal& signal : kSignals)
+      axis[std::string(signal.name)] = value_as_json(signal, sample);
+    out["axes"].push_back(axis);
+  }
+  return out.dump(2);
+}
+
+std::string sample_json(const Sample& sample, std::uint32_t axis, std::uint64_t dropped,
+                        const std::vector<const Signal*>& signals) {
+  Json out = {{"axis", axis}, {"dropped", dropped}};
+  for (const Signal* signal : signals)
+    out[std::string(signal->name)] = value_as_json(*signal, sample);
+  return out.dump();
+}
+
+std::string presets_json() {
+  Json out = Json::array();
+  for (const control::Preset& preset : control::presets()) {
+    out.push_back({{"name", preset.name},
+                   {"source", preset.source},
+                   {"expectation", preset.expectation},
+                   {"sample_rate_hz", preset.controller.sample_rate_hz},
+                   {"counts_per_revolution", preset.controller.counts_per_revolution}});
+  }
+  return out.dump(2);
+}
+
+std::string control_json(const ControlReport& report) {
+  return nlohmann::json(report).dump();
+}
+
+std::string export_json(std::string_view out_file, std::string_view axis, std::uint64_t rows,
+                        std::string_view problem) {
+  return Json{{"out", out_file}, {"axis", axis}, {"rows", rows}, {"problem", problem}}.dump();
+}
+
+std::string demo_json(const DemoReport& report) {
+  return Json{{"lockstep", demo_run(report.lockstep)},
+              {"realtime", demo_run(report.realtime)},
+              {"replay",
+               {{"equal", report.replay.equal},
+                {"ticks", report.replay.ticks},
+                {"samples", report.replay.samples},
+                {"state_hash", report.replay.state_hash},
+                {"problem", report.replay.problem}}}}
+      .dump(2);
+}
+
+std::string error_json(std::string_view kind, std::string_view message, std::string_view field) {
+  return Json{{"error", {{"kind", kind}, {"message", message}, {"field", field}}}}.dump();
+}
+
+std::optional<ServerReady> parse_ready(std::string_view line) {
+  return parsed<ServerReady>(line, "ready");
+}
+
+std::optional<ServerVerdict> parse_verdict(std::string_view line) {
+  return parsed<ServerVerdict>(line, "verdict");
+}
+
+std::optional<ControlReport> parse_control(std::string_view line) {
+  return parsed<ControlReport>(line, "");
+}
+
+std::optional<DemoReplay> parse_replay(std::string_view line) {
+  return parsed<DemoReplay>(line, "");
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/command/demo_report.hpp"
+#include "clients/command/servo_run.hpp"
+#include "protocols/catalogue.hpp"
+
+/// All JSON that the command writes and reads, so that one file pays for the parser.
+namespace drivebench::command {
+
+std::string describe_json(const v1::Welcome& welcome);
+std::string status_json(const v1::Status& status, const v1::BenchDescription& bench);
+/// One line: axis, dropped and the chosen signals.
+std::string sample_json(const Sample& sample, std::uint32_t axis, std::uint64_t dropped,
+                        const std::vector<const Signal*>& signals);
+std::string presets_json();
+std::string control_json(const ControlReport& report);
+std::string export_json(std::string_view out_file, std::string_view axis, std::uint64_t rows,
+                        std::string_view problem);
+std::string demo_json(const DemoReport& report);
+std::string error_json(std::string_view kind, std::string_view message, std::string_view field);
+
+// Of a line of text; nothing if it is not what it should be.
+std::optional<ServerReady> parse_ready(std::string_view line);
+std::optional<ServerVerdict> parse_verdict(std::string_view line);
+std::optional<ControlReport> parse_control(std::string_view line);
+std::optional<DemoReplay> parse_replay(std::string_view line);
+
+}  // namespace drivebench::command

@@ -1,0 +1,212 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+
+#include "clients/command/commands.hpp"
+#include "clients/command/json.hpp"
+#include "clients/link/tcp_link.hpp"
+
+namespace drivebench::command {
+namespace {
+
+double number(std::string_view text, std::string_view whole) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) {
+    throw UsageError(fmt::format("'{}' in '{}' is not a number", text, whole));
+  }
+  return value;
+}
+
+std::pair<std::string_view, std::string_view> split(std::string_view text, char at, std::string_view form) {
+  const std::size_t place = text.find(at);
+  if (place == std::string_view::npos) throw UsageError(fmt::format("'{}' should be {}", text, form));
+  return {text.substr(0, place), text.substr(place + 1)};
+}
+
+/// `0.1@0.0365`: N·m at seconds after the start of the trajectory.
+LoadAt parse_load(std::string_view text) {
+  const auto [load, after] = split(text, '@', "NM@SECONDS, for example 0.1@0.0365");
+  const LoadAt parsed = {.load_nm = number(load, text), .after_s = number(after, text)};
+  if (parsed.after_s < 0.0) throw UsageError(fmt::format("'{}': the trajectory starts at 0", text));
+  return parsed;
+}
+
+/// `machine.rotor_resistance_ohm=5.85`
+ParameterSetting parse_setting(std::string_view text) {
+  const auto [name, value] = split(text, '=', "NAME=VALUE");
+  return {.name = std::string(name), .value = number(value, text)};
+}
+
+/// Everything the command line can say, and what to do about it.
+struct CommandLine {
+  CLI::App app{"drivebench: a hardware-in-the-loop test bench for electric drives."};
+  std::function<int()> action;
+  LinkChoice link;
+  bool json = false;
+  StatusOptions status;
+  DescribeOptions describe;
+  WatchOptions watch;
+  ControlOptions control;
+  std::vector<std::string> loads;
+  std::vector<std::string> settings;
+  ReplayOptions replay;
+  ExportOptions export_;
+  DemoOptions demo;
+
+  CommandLine() {
+    // Not CLI11's envname(): it lets the options of subcommands that were not named overwrite ours.
+    if (const char* address = std::getenv("DRIVEBENCH_LINK"); address != nullptr) link.address = address;
+    if (const char* token = std::getenv("DRIVEBENCH_TOKEN"); token != nullptr) link.token = token;
+    app.require_subcommand(1);
+    app.footer("Exit codes: 0 ok, 1 the run failed, 2 usage or configuration, 3 cannot connect.");
+    add_serve();
+    add_demo();
+    add_observers();
+    add_control();
+    add_recordings();
+  }
+
+  bool knows(std::string_view subcommand) const {
+    return !app.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == subcommand; }).empty();
+  }
+
+ private:
+  CLI::App* add(const std::string& name, const std::string& description) {
+    CLI::App* sub = app.add_subcommand(name, description);
+    sub->add_flag("--json", json, "print JSON");
+    return sub;
+  }
+
+  CLI::App* add_linked(const std::string& name, const std::string& description) {
+    CLI::App* sub = add(name, description);
+    sub->add_option("--link", link.address, "tcp:HOST:PORT or unix:PATH; else from DRIVEBENCH_LINK")
+        ->capture_default_str();
+    sub->add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
+    return sub;
+  }
+
+  void add_serve() {
+    CLI::App* sub = app.add_subcommand(
+        "serve", "start drivebench-server: serve [BENCH.toml or name, default servo] [its arguments]");
+    sub->prefix_command();
+    sub->callback([this, sub] { action = [sub] { return run_serve(sub->remaining()); }; });
+  }
+
+  void add_demo() {
+    CLI::App* sub = add("demo", "one move in lockstep and in real time, compared, recorded and replayed");
+    sub->add_option("--keep", demo.folder, "folder for the recordings")->capture_default_str();
+    sub->callback([this] {
+      demo.json = json;
+      action = [this] { return run_demo(demo); };
+    });
+  }
+
+  void add_observers() {
+    add_linked("describe", "axes, parameters, signals and faults of a bench")->callback([this] {
+      describe = {.link = link, .json = json};
+      action = [this] { return run_describe(describe); };
+    });
+    add_linked("status", "what a bench is doing")->callback([this] {
+      status = {.link = link, .json = json};
+      action = [this] { return run_status(status); };
+    });
+    CLI::App* sub = add_linked("watch", "live values of an axis");
+    sub->add_option("--axis", watch.axis, "number or name")->capture_default_str();
+    sub->add_option("--signals", watch.signals, "names, separated by commas")->delimiter(',');
+    sub->add_option("--rate", watch.rate_hz, "samples per second of the bench's time")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    sub->add_option("--count", watch.count, "end after so many samples; 0: never")->capture_default_str();
+    sub->callback([this] {
+      watch.link = link;
+      watch.json = json;
+      action = [this] { return run_watch(watch); };
+    });
+  }
+
+  void add_control() {
+    CLI::App* sub = add_linked("control", "run the reference controller on a move");
+    sub->add_option("--preset", control.preset, "gains and move by name")->capture_default_str();
+    sub->add_flag("--list", control.list, "print the presets and end");
+    sub->add_option("--axis", control.axis, "number or name")->capture_default_str();
+    sub->add_option("--csv", control.csv_file, "write every sample to this file");
+    sub->add_option(
+        "--load", loads,
+        "NM@SECONDS: load torque at a time after the start of the trajectory; put back at the end");
+    sub->add_option("--set", settings, "NAME=VALUE: write a parameter of the axis first; it stays");
+    sub->add_flag("--clear", control.clear_faults, "clear latched faults first");
+    sub->callback([this] {
+      control.link = link;
+      control.json = json;
+      for (const std::string& load : loads)
+        control.loads.push_back(parse_load(load));
+      for (const std::string& setting : settings)
+        control.settings.push_back(parse_setting(setting));
+      action = [this] { return run_control(control); };
+    });
+  }
+
+  void add_recordings() {
+    CLI::App* sub = add("replay", "re-simulate a recording and compare it bit for bit");
+    sub->add_option("FILE", replay.recording, "an MCAP recording")->required();
+    sub->callback([this] {
+      replay.json = json;
+      action = [this] { return run_replay(replay); };
+    });
+    sub = add("export", "the samples of a recording as CSV");
+    sub->add_option("FILE", export_.recording, "an MCAP recording")->required();
+    sub->add_option("--out", export_.out_file, "instead of standard output");
+    sub->add_option("--axis", export_.axis, "name; default: the first in the file");
+    sub->add_option("--signals", export_.signals, "names, separated by commas")->delimiter(',');
+    sub->add_option("--from", export_.from_tick, "first tick");
+    sub->add_option("--to", export_.to_tick, "last tick");
+    sub->footer("Exit code 3: the recording ends early; what is there was written.");
+    sub->callback([this] {
+      export_.json = json;
+      action = [this] { return run_export(export_); };
+    });
+  }
+};
+
+int fail(const CommandLine& line, int code, std::string_view kind, std::string_view message,
+         std::string_view field = {}) {
+  std::fflush(stdout);
+  if (line.json) fmt::print("{}\n", error_json(kind, message, field));
+  fmt::print(stderr, "drivebench: {}\n", message);
+  return code;
+}
+
+int run(int argc, char** argv) {
+  CommandLine line;
+  try {
+    if (argc > 1 && argv[1][0] != '-' && !line.knows(argv[1])) {
+      throw UsageError(fmt::format("no subcommand '{}'; --help lists them", argv[1]));
+    }
+    line.app.parse(argc, argv);
+    return line.action();
+  } catch (const CLI::ParseError& error) {
+    return line.app.exit(error) == 0 ? kExitOk : kExitUsage;
+  } catch (const UsageError& error) {
+    return fail(line, kExitUsage, "usage", error.what());
+  } catch (const link::AddressError& error) {
+    return fail(line, kExitUsage, "usage", error.what());
+  } catch (const link::ConnectError& error) {
+    return fail(line, kExitNoConnect, "connect", error.what());
+  } catch (const link::Refused& refused) {
+    return fail(line, kExitFailed, "refused", refused.what(), refused.field());
+  } catch (const std::exception& error) {
+    return fail(line, kExitFailed, "failed", error.what());
+  }
+}
+
+}  // namespace
+}  // namespace drivebench::command
+
+int main(int argc, char** argv) {
+  return drivebench::command::run(argc, argv);
+}

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "clients/command/commands.hpp"
+#include "clients/link/tcp_link.hpp"
+#include "protocols/sample.hpp"
+
+/// What the subcommands that talk to a bench share.
+namespace drivebench::command {
+
+/// Connects as `drivebench SUBCOMMAND`. A bench that does not let us in is a ConnectError too.
+link::Link open_link(const LinkChoice& choice, std::string_view subcommand);
+
+/// The axis with this number or name. Throws UsageError with the axes there are.
+std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
+
+/// The sample of `axis` in an answer; throws LinkError if the bench left it out.
+const v1::Sample& sample_of(const v1::ExchangeReply& reply, std::uint32_t axis);
+
+/// For loops over the catalogue.
+Sample plain(const v1::Sample& message);
+
+const char* name_of(v1::Mode mode) noexcept;
+const char* name_of_state(std::uint64_t state) noexcept;
+
+/// The names of the bits that are set, separated by blanks; "none".
+std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults);
+std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
+
+/// From now on SIGINT and SIGTERM only make interrupted() true; the second one ends the process.
+void catch_interrupts();
+bool interrupted() noexcept;
+
+/// A line on standard error for what takes longer than a second: redrawn in a terminal, else every 5 s.
+class Progress {
+ public:
+  explicit Progress(std::string what) : what_(std::move(what)) {}
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void update(double fraction, std::string_view doing);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::string what_;
+  Clock::time_point started_ = Clock::now();
+  Clock::time_point shown_ = started_;
+  bool drawn_ = false;
+};
+
+}  // namespace drivebench::command

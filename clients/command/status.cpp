@@ -1,0 +1,47 @@
+#include <fmt/format.h>
+
+#include "clients/command/commands.hpp"
+#include "clients/command/json.hpp"
+#include "clients/command/session.hpp"
+
+namespace drivebench::command {
+
+int run_status(const StatusOptions& options) {
+  link::Link bench_link = open_link(options.link, "status");
+  const v1::BenchDescription& bench = bench_link.welcome().bench();
+  const v1::Status& status = bench_link.status();
+  if (options.json) {
+    fmt::print("{}\n", status_json(status, bench));
+    return kExitOk;
+  }
+  fmt::print("bench {} at {}: {}, tick {} ({:.3f} s), {} session{}\n", bench.name(), bench_link.peer(),
+             name_of(status.mode()), status.tick(), static_cast<double>(status.tick()) * bench.period_s(),
+             status.sessions(), status.sessions() == 1 ? "" : "s");
+  if (status.mode() == v1::MODE_REALTIME) {
+    fmt::print("late ticks {}, worst lateness {:.1f} us\n", status.late_ticks(),
+               status.worst_lateness_s() * 1e6);
+  }
+  if (status.state_hash() != 0) fmt::print("state hash {:016x}\n", status.state_hash());
+  if (status.recording().empty()) {
+    fmt::print("not recording\n");
+  } else {
+    fmt::print("recording {}, {} gaps\n", status.recording(), status.recording_gaps());
+  }
+  for (const v1::AxisSample& each : status.axes()) {
+    const v1::Sample& s = each.sample();
+    const auto i = static_cast<int>(each.axis());
+    fmt::print("axis {} ({}): {}, owner {}, faults {}\n", i,
+               i < bench.axes_size() ? bench.axes(i).name() : "?", name_of_state(s.state()),
+               s.owner() == 0 ? "nobody" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()));
+    fmt::print(
+        "  count {}, i_a {:.3f} A, i_b {:.3f} A, u_a {:.2f} V, u_b {:.2f} V, speed {:.3f} rad/s, load {:g} "
+        "N*m\n",
+        s.encoder_count(), s.i_a_a(), s.i_b_a(), s.u_a_v(), s.u_b_v(), s.speed_rad_s(), s.load_nm());
+    fmt::print("  missed commands {}, refused commands {}\n", s.missed_commands(), s.refused_commands());
+  }
+  for (const std::string& note : status.notes())
+    fmt::print("note: {}\n", note);
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

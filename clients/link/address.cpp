@@ -1,0 +1,126 @@
+#include "clients/link/address.hpp"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <cerrno>
+#include <charconv>
+#include <memory>
+#include <system_error>
+
+namespace drivebench::link {
+namespace {
+
+[[noreturn]] void bad_address(std::string_view text, std::string_view rule) {
+  throw AddressError("'" + std::string(text) + "' is not an address: " + std::string(rule));
+}
+
+bool is_port(std::string_view text) {
+  unsigned value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size() && value >= 1 && value <= 65535;
+}
+
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
+
+/// 0, or why it did not work.
+int connect_within(int fd, const sockaddr* peer, socklen_t size, std::chrono::milliseconds deadline) {
+  if (::connect(fd, peer, size) != 0 && errno != EINPROGRESS) return errno;
+  pollfd waiting = {.fd = fd, .events = POLLOUT, .revents = 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&waiting, 1, static_cast<int>(deadline.count()));
+  } while (ready < 0 && errno == EINTR);
+  if (ready == 0) return ETIMEDOUT;
+  int error = 0;
+  socklen_t error_size = sizeof error;
+  if (::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &error_size) != 0) return errno;
+  if (error == 0) ::fcntl(fd, F_SETFL, ::fcntl(fd, F_GETFL) & ~O_NONBLOCK);
+  return error;
+}
+
+FileDescriptor new_socket(int family) {
+  return FileDescriptor(::socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+}
+
+FileDescriptor connect_unix(const Address& address, std::chrono::milliseconds deadline) {
+  sockaddr_un peer = {};
+  peer.sun_family = AF_UNIX;
+  address.path.copy(peer.sun_path, sizeof peer.sun_path - 1);
+  FileDescriptor fd = new_socket(AF_UNIX);
+  const int error =
+      fd.is_open() ? connect_within(fd.get(), reinterpret_cast<const sockaddr*>(&peer), sizeof peer, deadline)
+                   : errno;
+  if (error != 0) throw ConnectError("nothing answers at " + to_string(address) + ": " + reason(error));
+  return fd;
+}
+
+FileDescriptor connect_tcp(const Address& address, std::chrono::milliseconds deadline) {
+  addrinfo hints = {};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
+      error != 0) {
+    throw ConnectError("no such host: " + address.host + " (" + ::gai_strerror(error) + ")");
+  }
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> list(found, &::freeaddrinfo);
+  int error = 0;
+  for (const addrinfo* peer = list.get(); peer != nullptr; peer = peer->ai_next) {
+    FileDescriptor fd = new_socket(peer->ai_family);
+    error = fd.is_open() ? connect_within(fd.get(), peer->ai_addr, peer->ai_addrlen, deadline) : errno;
+    if (error != 0) continue;
+    const int on = 1;
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    return fd;
+  }
+  throw ConnectError("nothing answers at " + to_string(address) + ": " + reason(error));
+}
+
+}  // namespace
+
+Address parse_address(std::string_view text) {
+  constexpr std::string_view kUnix = "unix:";
+  constexpr std::string_view kTcp = "tcp:";
+  if (text.starts_with(kUnix)) {
+    const std::string_view path = text.substr(kUnix.size());
+    if (path.empty()) bad_address(text, "after unix: comes the path of a socket");
+    if (path.size() >= sizeof(sockaddr_un::sun_path)) {
+      bad_address(text, "the path of a unix socket has at most 107 bytes");
+    }
+    return {.host = {}, .port = {}, .path = std::string(path)};
+  }
+  const std::string_view place = text.starts_with(kTcp) ? text.substr(kTcp.size()) : text;
+  std::string_view host = place;
+  std::string_view port = "7300";
+  const std::size_t colon = place.rfind(':');
+  if (colon != std::string_view::npos && place.find(']', colon) == std::string_view::npos) {
+    host = place.substr(0, colon);
+    port = place.substr(colon + 1);
+  }
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  if (host.empty()) bad_address(text, "expected tcp:HOST:PORT, HOST:PORT or unix:PATH");
+  if (host.find('/') != std::string_view::npos) {
+    bad_address(text, "a host has no '/'; a unix socket is written unix:PATH");
+  }
+  if (!is_port(port)) bad_address(text, "the port must be a number from 1 to 65535");
+  return {.host = std::string(host), .port = std::string(port), .path = {}};
+}
+
+std::string to_string(const Address& address) {
+  if (!address.path.empty()) return "unix:" + address.path;
+  const bool is_ipv6 = address.host.find(':') != std::string::npos;
+  return "tcp:" + (is_ipv6 ? "[" + address.host + "]" : address.host) + ":" + address.port;
+}
+
+FileDescriptor connect_to(const Address& address, std::chrono::milliseconds deadline) {
+  return address.path.empty() ? connect_tcp(address, deadline) : connect_unix(address, deadline);
+}
+
+}  // namespace drivebench::link

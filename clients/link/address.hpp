@@ -1,0 +1,49 @@
+#pragma once
+
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "clients/link/file_descriptor.hpp"
+
+namespace drivebench::link {
+
+/// The link failed and is closed: the peer is gone, silent or does not speak the protocol.
+class LinkError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Nothing answers at the address.
+class ConnectError : public LinkError {
+ public:
+  using LinkError::LinkError;
+};
+
+/// The text is not an address.
+class AddressError : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+inline constexpr std::string_view kDefaultAddress = "tcp:127.0.0.1:7300";
+
+/// Where a bench listens: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300) or
+/// `unix:PATH`.
+struct Address {
+  std::string host;
+  std::string port;
+  std::string path;  ///< of a unix socket; then host and port are empty
+};
+
+/// Throws AddressError.
+Address parse_address(std::string_view text);
+
+/// `tcp:HOST:PORT` or `unix:PATH`.
+std::string to_string(const Address& address);
+
+/// A connected, blocking stream socket, without Nagle's delay. Throws ConnectError.
+FileDescriptor connect_to(const Address& address, std::chrono::milliseconds deadline);
+
+}  // namespace drivebench::link

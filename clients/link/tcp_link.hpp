@@ -1,0 +1,130 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/link/address.hpp"
+#include "protocols/framing.hpp"
+
+namespace drivebench::link {
+
+/// The bench turned a request down and told why; the link goes on. what() is its sentence.
+class Refused : public std::runtime_error {
+ public:
+  explicit Refused(const v1::Refusal& refusal)
+      : std::runtime_error(refusal.message()), code_(refusal.code()), field_(refusal.field()) {}
+
+  v1::RefusalCode code() const noexcept { return code_; }
+  const std::string& field() const noexcept { return field_; }  ///< what it is about; may be empty
+
+ private:
+  v1::RefusalCode code_;
+  std::string field_;
+};
+
+/// What a controller asks of one axis, in answer to the sample of `tick`.
+struct Command {
+  std::uint32_t axis = 0;
+  std::uint64_t tick = 0;
+  v1::Gates gates = v1::GATES_OFF;
+  double u_a_v = 0.0;
+  double u_b_v = 0.0;
+};
+
+struct LoadChange {
+  double load_nm = 0.0;
+  std::uint64_t ramp_ticks = 0;  ///< 0: a step
+  std::uint64_t at_tick = 0;     ///< 0: as soon as possible
+};
+
+struct LinkOptions {
+  std::string client = "drivebench";  ///< a name for the server's log
+  std::string token;
+  std::chrono::milliseconds deadline{5000};  ///< for connecting and for every answer
+};
+
+/// The client side of the wire (protocols/bench.proto) on one blocking socket, for one thread.
+///
+/// Every request throws Refused when the bench turns it down, and LinkError when the link fails or no answer
+/// comes in time; after a LinkError the link is closed and stays so. References to answers hold until the
+/// next request, whose arguments must not point into them. Samples of subscriptions that come in between are
+/// kept for next_samples().
+class Link {
+ public:
+  /// Connects and says hello. Throws AddressError, ConnectError, LinkError, Refused.
+  explicit Link(std::string_view address, const LinkOptions& options = {});
+  /// The same over a connected stream socket; `peer` is its name in errors.
+  Link(FileDescriptor socket, std::string peer, const LinkOptions& options = {});
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+
+  /// What the bench said of itself when the link was made.
+  const v1::Welcome& welcome() const noexcept { return welcome_; }
+  const std::string& peer() const noexcept { return peer_; }
+  /// For all further answers. A lockstep exchange may have to wait for the controllers of other axes.
+  void set_deadline(std::chrono::milliseconds deadline);
+
+  /// Commands in, samples out: see Exchange in bench.proto. Lockstep: tick k runs, sample k+1 comes back.
+  /// Real time: the first sample taken after the commands came in. No commands: the newest sample of every
+  /// axis.
+  const v1::ExchangeReply& exchange(std::span<const Command> commands);
+
+  /// The number that Sample.owner shows for this session.
+  std::uint64_t acquire(std::uint32_t axis);
+  void renew(std::uint32_t axis);
+  void release(std::uint32_t axis);
+
+  /// All parameters if no names are given.
+  const v1::ParameterValues& read_parameters(std::uint32_t axis, std::span<const std::string> names = {});
+  // These give the tick at whose start the request was carried out.
+  std::uint64_t write_parameter(std::uint32_t axis, std::string_view name, double value);
+  std::uint64_t set_load(std::uint32_t axis, const LoadChange& change);
+  std::uint64_t clear_faults(std::uint32_t axis);
+
+  const v1::Status& status();
+
+  /// Every `decimation`-th tick from now on; 0 ends the subscription. No signals: all.
+  void subscribe(std::uint32_t axis, std::uint32_t decimation, std::span<const std::string> signals = {});
+  /// The oldest samples that were sent and not yet taken; nothing if none come within `wait`.
+  std::optional<v1::Samples> next_samples(std::chrono::milliseconds wait);
+
+  /// Samples kept for next_samples() at most; beyond it the oldest messages go, and are counted as dropped.
+  static constexpr std::size_t kMaxKeptSamples = 65536;
+
+ private:
+  void hello(const LinkOptions& options);
+  v1::Envelope& new_request();
+  const v1::Envelope& ask(v1::Envelope& request, v1::Envelope::KindCase expected);
+  void send(const v1::Envelope& request);
+  const v1::Envelope& await_answer();
+  v1::Envelope* next_envelope();
+  void receive_some();
+  std::uint64_t lease(std::uint32_t axis, v1::LeaseRequest::Action action);
+  void keep(const v1::Samples& samples);
+  [[noreturn]] void fail(const std::string& what);
+
+  FileDescriptor socket_;
+  std::string peer_;
+  std::chrono::milliseconds deadline_;
+  v1::Welcome welcome_;
+  std::uint64_t last_id_ = 0;
+  std::vector<std::byte> out_;
+  FrameReader reader_;
+  std::vector<char> first_block_;  // what the arena starts with: an exchange needs no other memory
+  google::protobuf::Arena arena_;  // holds one request and its answer
+  std::deque<v1::Samples> kept_;
+  std::size_t kept_samples_ = 0;
+  std::uint64_t dropped_ = 0;  // samples lost from kept_ since the last one taken
+};
+
+}  // namespace drivebench::link

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <sched.h>
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace drivebench::speed {
+
+std::int64_t now_ns() noexcept;
+
+/// Two CPUs this process may use; the same one twice if there is no other.
+struct CpuPair {
+  int near = 0;  ///< for this program: the client
+  int far = 0;   ///< for the other end: the server
+};
+CpuPair cpu_pair();
+
+/// Keeps the calling thread, and the processes it starts meanwhile, on one CPU as long as this object lives.
+class Pinned {
+ public:
+  explicit Pinned(int cpu);
+  ~Pinned();
+  Pinned(const Pinned&) = delete;
+  Pinned& operator=(const Pinned&) = delete;
+
+ private:
+  cpu_set_t before_{};
+};
+
+/// Model and number of the CPUs, and the kernel: a figure says nothing without them.
+std::string machine_description();
+
+/// A new folder for what a measurement writes, gone with this object.
+class ScratchFolder {
+ public:
+  ScratchFolder();
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace drivebench::speed

@@ -1,0 +1,81 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "tests/benchmark/machine.hpp"
+#include "tests/benchmark/measurements.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+struct Measurement {
+  const char* name;
+  const char* what;
+  std::vector<Row> (*measure)(const Plan&);
+};
+
+constexpr std::array kMeasurements = std::to_array<Measurement>({
+    {"tick", "a tick against the bare integration", measure_tick},
+    {"free", "free mode with recording", measure_free_mode},
+    {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
+    {"realtime", "lateness of the pacers and of the server", measure_realtime},
+    {"recorder", "ten axes at 20 kHz into the recorder", measure_recorder},
+    {"memory", "memory of the server with 32 viewers", measure_memory},
+});
+
+bool is_wanted(const Measurement& measurement, const std::vector<std::string>& only) {
+  return only.empty() || std::find(only.begin(), only.end(), measurement.name) != only.end();
+}
+
+int run(int argc, char** argv) {
+  std::vector<std::string> names;
+  std::string list;
+  for (const Measurement& m : kMeasurements) {
+    names.emplace_back(m.name);
+    list += fmt::format("  {:<9} {}\n", m.name, m.what);
+  }
+  std::vector<std::string> only;
+  bool json = false;
+  bool strict = false;
+  Plan plan;
+  CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about a minute.");
+  app.add_option("--only", only, "these measurements only, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names));
+  app.add_option("--soak", plan.soak_minutes, "minutes of the memory measurement")
+      ->check(CLI::Range(0.1, 1440.0))
+      ->capture_default_str();
+  app.add_flag("--json", json, "print one JSON object");
+  app.add_flag("--strict", strict, "exit 1 if a figure is over its limit");
+  app.footer("Measurements:\n" + list);
+  CLI11_PARSE(app, argc, argv);
+
+  std::vector<Row> rows;
+  for (const Measurement& m : kMeasurements) {
+    if (!is_wanted(m, only)) continue;
+    fmt::print(stderr, "measuring {}: {}\n", m.name, m.what);
+    for (Row& row : m.measure(plan))
+      rows.push_back(std::move(row));
+  }
+  if (json) {
+    fmt::print("{}\n", as_json(machine_description(), rows).dump(2));
+  } else {
+    print_table(machine_description(), rows);
+  }
+  const auto is_over = [](const Row& row) { return judgement(row) == Judgement::kOver; };
+  return strict && std::any_of(rows.begin(), rows.end(), is_over) ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace drivebench::speed
+
+int main(int argc, char** argv) {
+  try {
+    return drivebench::speed::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  }
+}

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "tests/benchmark/report.hpp"
+
+/// The measurements, one file each. They throw when something does not work at all.
+namespace drivebench::speed {
+
+struct Plan {
+  double soak_minutes = 0.2;  ///< of the memory measurement
+};
+
+/// A whole tick against the bare integration of the same substeps.
+std::vector<Row> measure_tick(const Plan& plan);
+/// Free mode with recording, on one CPU, against real time.
+std::vector<Row> measure_free_mode(const Plan& plan);
+/// A lockstep exchange against a blocking ping-pong of the same sizes.
+std::vector<Row> measure_exchange(const Plan& plan);
+/// The pacers against a bare clock_nanosleep loop; the server in real time.
+std::vector<Row> measure_realtime(const Plan& plan);
+/// Ten axes at 20 kHz into the recorder.
+std::vector<Row> measure_recorder(const Plan& plan);
+/// Resident memory of the server with a controller and 32 viewers.
+std::vector<Row> measure_memory(const Plan& plan);
+
+}  // namespace drivebench::speed

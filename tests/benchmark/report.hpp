@@ -1,0 +1,42 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace drivebench::speed {
+
+/// What a figure must keep to.
+struct Limit {
+  enum class Kind {
+    kRatioAtMost,  ///< measured / floor
+    kAtMost,
+    kAtLeast,
+  };
+  Kind kind;
+  double value;
+};
+
+/// One figure.
+struct Row {
+  std::string name;
+  std::string unit{};  ///< empty: a number
+  double measured = 0.0;
+  std::optional<double> floor{};  ///< the same, of the least that could do the job, in the same run
+  std::optional<Limit> limit{};   ///< none: for information
+  double gone = 0.0;              ///< share of the time that the gap canary found taken away
+  std::string note{};
+
+  std::optional<double> ratio() const;
+};
+
+/// kNotJudged: too much time was gone. A figure that has to be small or large by itself, and is, stays
+/// within: disturbances can only have spoiled it.
+enum class Judgement { kWithin, kOver, kNotJudged, kForInformation };
+Judgement judgement(const Row& row);
+
+void print_table(const std::string& machine, const std::vector<Row>& rows);
+nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows);
+
+}  // namespace drivebench::speed

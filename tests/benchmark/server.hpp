@@ -1,0 +1,39 @@
+#pragma once
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "clients/command/process.hpp"
+#include "plant/frames.hpp"
+#include "server/config.hpp"
+
+namespace drivebench::speed {
+
+/// The bench file of the servo motor.
+BenchConfig servo_config();
+
+/// Two-phase voltages of the line start: 80 V at 60 Hz, from which the servo turns with 125.4 rad/s. Sampled
+/// at 8 kHz; three periods, after which it repeats.
+const std::vector<TwoPhase>& line_voltages();
+
+/// drivebench-server as a process of its own.
+class Server {
+ public:
+  /// Starts it with these arguments and --json, and waits until it is ready.
+  explicit Server(std::vector<std::string> arguments);
+
+  const std::string& address() const { return address_; }
+
+  /// Waits for the end of a run that has one; its verdict.
+  nlohmann::json wait(std::chrono::seconds at_most);
+  /// Ends the run; its verdict.
+  nlohmann::json stop();
+
+ private:
+  command::Process process_;
+  std::string address_;
+};
+
+}  // namespace drivebench::speed

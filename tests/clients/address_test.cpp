@@ -1,0 +1,56 @@
+#include "clients/link/address.hpp"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <string>
+
+namespace drivebench::link {
+namespace {
+
+using namespace std::chrono_literals;
+
+std::string round_trip(std::string_view text) {
+  return to_string(parse_address(text));
+}
+
+// Catches a form of address that is taken apart at the wrong place.
+TEST(Address, ReadsEveryForm) {
+  EXPECT_EQ(round_trip("tcp:127.0.0.1:7300"), "tcp:127.0.0.1:7300");
+  EXPECT_EQ(round_trip("127.0.0.1:81"), "tcp:127.0.0.1:81");
+  EXPECT_EQ(round_trip("localhost"), "tcp:localhost:7300");
+  EXPECT_EQ(round_trip("[::1]:81"), "tcp:[::1]:81");
+  EXPECT_EQ(round_trip("tcp:[::1]"), "tcp:[::1]:7300");
+  EXPECT_EQ(round_trip("unix:/run/a:b"), "unix:/run/a:b");
+}
+
+// Catches an address that would connect somewhere else than written, or a path that is cut off.
+TEST(Address, RefusesWhatIsNone) {
+  for (const std::string text : {"", "tcp:", ":7300", "host:", "host:0", "host:65536", "host:12x",
+                                 "unix:", "/run/bench.sock", "http://host:80"}) {
+    EXPECT_THROW(parse_address(text), AddressError) << text;
+  }
+  EXPECT_THROW(parse_address("unix:/" + std::string(107, 'a')), AddressError);
+  EXPECT_NO_THROW(parse_address("unix:/" + std::string(106, 'a')));
+}
+
+// Catches a connection that is reported as made when nobody listens, and a socket left non-blocking.
+TEST(Address, ConnectsOnlyWhereSomebodyListens) {
+  const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in here = {};
+  here.sin_family = AF_INET;
+  here.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof here;
+  ASSERT_EQ(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&here), size), 0);
+  ASSERT_EQ(::getsockname(listener.get(), reinterpret_cast<sockaddr*>(&here), &size), 0);
+  const Address address = parse_address("127.0.0.1:" + std::to_string(ntohs(here.sin_port)));
+  EXPECT_THROW(connect_to(address, 1s), ConnectError);
+  ASSERT_EQ(::listen(listener.get(), 1), 0);
+  EXPECT_TRUE(connect_to(address, 1s).is_open());
+  EXPECT_THROW(connect_to(parse_address("unix:/nowhere/bench.sock"), 1s), ConnectError);
+}
+
+}  // namespace
+}  // namespace drivebench::link

@@ -1,0 +1,235 @@
+// The link against a peer that answers whatever a test wants, good and bad.
+#include "clients/link/tcp_link.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/clients/fake_peer.hpp"
+
+namespace drivebench::link {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A welcome to Hello; for the rest what `rest` says.
+FakePeer::Answer welcoming(FakePeer::Answer rest) {
+  return [rest = std::move(rest)](const v1::Envelope& request) {
+    if (!request.has_hello()) return rest(request);
+    v1::Envelope welcome;
+    welcome.set_id(request.id());
+    welcome.mutable_welcome()->set_protocol(1);
+    welcome.mutable_welcome()->mutable_bench()->set_name("bench of " + request.hello().client());
+    return FakePeer::framed(welcome);
+  };
+}
+
+v1::Envelope answer_to(const v1::Envelope& request) {
+  v1::Envelope answer;
+  answer.set_id(request.id());
+  return answer;
+}
+
+std::string samples_frame(std::uint32_t axis, std::uint64_t first_tick, int count) {
+  v1::Envelope unasked;
+  unasked.mutable_samples()->set_axis(axis);
+  for (int i = 0; i < count; ++i)
+    unasked.mutable_samples()->add_samples()->set_tick(first_tick + static_cast<std::uint64_t>(i));
+  return FakePeer::framed(unasked);
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const LinkError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+// Catches a Hello without its name or a welcome that is lost when the arena is reset.
+TEST(Link, KeepsTheWelcomeOverLaterRequests) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope answer = answer_to(request);
+    answer.mutable_status()->set_tick(7);
+    return FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "peer", {.client = "me"});
+  EXPECT_EQ(link.status().tick(), 7U);
+  EXPECT_EQ(link.status().tick(), 7U);
+  EXPECT_EQ(link.welcome().bench().name(), "bench of me");
+}
+
+// Catches a field of a command that is not sent, and an answer that belongs to another request.
+TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope answer = answer_to(request);
+    for (const v1::Command& command : request.exchange().commands()) {
+      v1::AxisSample& sample = *answer.mutable_exchange_reply()->add_samples();
+      sample.set_axis(command.axis());
+      sample.mutable_sample()->set_tick(command.tick() + 1);
+      sample.mutable_sample()->set_u_a_v(command.u_a_v());
+      sample.mutable_sample()->set_u_b_v(command.u_b_v());
+      sample.mutable_sample()->set_state(command.gates());
+    }
+    return FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "peer");
+  for (std::uint64_t tick = 0; tick < 1000; ++tick) {
+    const Command commands[] = {
+        {.axis = 3, .tick = tick, .gates = v1::GATES_ZERO, .u_a_v = 1.5, .u_b_v = -2.5},
+        {.axis = 4, .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = 4.0}};
+    const v1::ExchangeReply& reply = link.exchange(commands);
+    ASSERT_EQ(reply.samples_size(), 2);
+    EXPECT_EQ(reply.samples(0).axis(), 3U);
+    EXPECT_EQ(reply.samples(0).sample().tick(), tick + 1);
+    EXPECT_EQ(reply.samples(0).sample().u_a_v(), 1.5);
+    EXPECT_EQ(reply.samples(0).sample().u_b_v(), -2.5);
+    EXPECT_EQ(reply.samples(0).sample().state(), 2U);
+    EXPECT_EQ(reply.samples(1).sample().u_a_v(), 4.0);
+  }
+}
+
+// Catches a refusal that looks like an answer, and a link that gives up after one.
+TEST(Link, ThrowsARefusalWithItsCodeAndFieldAndGoesOn) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope answer = answer_to(request);
+    if (request.has_status_request()) {
+      answer.mutable_status()->set_tick(1);
+    } else {
+      answer.mutable_refusal()->set_code(v1::REFUSAL_OUT_OF_RANGE);
+      answer.mutable_refusal()->set_message("it is 5 but must be 4");
+      answer.mutable_refusal()->set_field("machine." + request.write_parameter().name());
+    }
+    return FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "peer");
+  try {
+    link.write_parameter(0, "x", 5.0);
+    ADD_FAILURE() << "no refusal";
+  } catch (const Refused& refused) {
+    EXPECT_EQ(refused.code(), v1::REFUSAL_OUT_OF_RANGE);
+    EXPECT_STREQ(refused.what(), "it is 5 but must be 4");
+    EXPECT_EQ(refused.field(), "machine.x");
+  }
+  EXPECT_EQ(link.status().tick(), 1U);
+}
+
+// Catches samples that are taken for the answer, lost or reordered.
+TEST(Link, KeepsSamplesThatComeBeforeAnAnswer) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope answer = answer_to(request);
+    answer.mutable_status()->set_tick(9);
+    return samples_frame(1, 10, 2) + samples_frame(1, 12, 1) + FakePeer::framed(answer) +
+           samples_frame(1, 13, 1);
+  }));
+  Link link(peer.client_end(), "peer");
+  EXPECT_EQ(link.status().tick(), 9U);
+  std::vector<std::uint64_t> ticks;
+  for (int message = 0; message < 3; ++message) {
+    const std::optional<v1::Samples> samples = link.next_samples(5s);
+    ASSERT_TRUE(samples.has_value());
+    for (const v1::Sample& sample : samples->samples())
+      ticks.push_back(sample.tick());
+  }
+  EXPECT_EQ(ticks, (std::vector<std::uint64_t>{10, 11, 12, 13}));
+  EXPECT_FALSE(link.next_samples(0ms).has_value());
+}
+
+// Catches a queue without bound, and losses that nobody is told about.
+TEST(Link, DropsTheOldestSamplesAndCountsThem) {
+  constexpr int kPerMessage = 1024;
+  constexpr auto kMessages = static_cast<int>(Link::kMaxKeptSamples / kPerMessage) + 3;
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope answer = answer_to(request);
+    answer.mutable_status();
+    std::string bytes;
+    for (int i = 0; i < kMessages; ++i)
+      bytes += samples_frame(0, static_cast<std::uint64_t>(i) * kPerMessage, kPerMessage);
+    return bytes + FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "peer");
+  link.status();
+  const std::optional<v1::Samples> oldest = link.next_samples(0ms);
+  ASSERT_TRUE(oldest.has_value());
+  EXPECT_EQ(oldest->dropped(), 3U * kPerMessage);
+  EXPECT_EQ(oldest->samples(0).tick(), 3U * kPerMessage);
+  EXPECT_EQ(link.next_samples(0ms)->dropped(), 0U);
+}
+
+// Catches a client that hangs on a dead server, and one that takes a late answer for the next request's.
+TEST(Link, GivesUpOnASilentPeerAndStaysClosed) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    return request.has_status_request() ? std::string(1, '\0') : std::string();
+  }));
+  Link link(peer.client_end(), "the bench");
+  link.set_deadline(20ms);
+  EXPECT_EQ(message_of([&] { link.status(); }), "the bench gave no answer within 20 ms");
+  EXPECT_EQ(message_of([&] { link.status(); }), "the link to the bench is closed");
+  EXPECT_EQ(message_of([&] { link.next_samples(1ms); }), "the link to the bench is closed");
+}
+
+// Catches a peer that keeps the link waiting for ever with samples.
+TEST(Link, GivesUpWhenOnlySamplesCome) {
+  FakePeer peer(welcoming([](const v1::Envelope&) { return std::string(); }));
+  FakePeer flood([](const v1::Envelope&) { return std::string(); });
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()), 0);
+  std::thread sender([fd = ends[1]] {
+    const FileDescriptor socket(fd);
+    const std::string frame = samples_frame(0, 1, 1);
+    while (::send(socket.get(), frame.data(), frame.size(), MSG_NOSIGNAL) > 0) {
+    }
+  });
+  EXPECT_EQ(message_of([&] { Link(FileDescriptor(ends[0]), "the bench", {.deadline = 20ms}); }),
+            "the bench gave no answer within 20 ms");
+  sender.join();
+}
+
+// Catches trust in what comes: another protocol, an oversized frame, another kind, another id, the end.
+TEST(Link, NamesWhatIsWrongWithAPeer) {
+  const auto talk = [](FakePeer::Answer answer) {
+    FakePeer peer(std::move(answer));
+    return message_of([&] { Link(peer.client_end(), "it", {.deadline = 2s}); });
+  };
+  EXPECT_EQ(talk([](const v1::Envelope&) { return std::string("HTTP/1.1 400 Bad Request\r\n"); }),
+            "it does not speak this protocol: it sent a frame longer than allowed here");
+  EXPECT_EQ(talk([](const v1::Envelope&) { return std::string("\0\0\0\1\xff", 5); }),
+            "it does not speak this protocol: it sent a frame that is no envelope");
+  EXPECT_EQ(talk([](const v1::Envelope&) { return std::string(); }), "it closed the connection");
+  EXPECT_EQ(talk([](const v1::Envelope& request) {
+              v1::Envelope answer = answer_to(request);
+              answer.mutable_done();
+              return FakePeer::framed(answer);
+            }),
+            "it answered with done where welcome was due");
+  EXPECT_EQ(talk([](const v1::Envelope& request) {
+              v1::Envelope answer = answer_to(request);
+              answer.set_id(99);
+              answer.mutable_welcome();
+              return FakePeer::framed(answer);
+            }),
+            "it answered request 99 when 1 was asked");
+  EXPECT_EQ(talk([](const v1::Envelope& request) {
+              v1::Envelope answer = answer_to(request);
+              answer.mutable_welcome()->set_protocol(2);
+              return FakePeer::framed(answer);
+            }),
+            "it speaks protocol 2, this program speaks 1");
+}
+
+// Catches an answer of exactly the size cap that does not fit, and one that comes in pieces.
+TEST(Link, TakesAnswersUpToTheCap) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope answer = answer_to(request);
+    answer.mutable_status()->add_notes(std::string(kMaxReplyFrame - 100, 'n'));
+    const std::size_t missing = kMaxReplyFrame - answer.ByteSizeLong();
+    answer.mutable_status()->mutable_notes(0)->append(missing, 'n');
+    EXPECT_EQ(answer.ByteSizeLong(), kMaxReplyFrame);
+    return FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "peer");
+  for (int i = 0; i < 3; ++i)
+    EXPECT_GT(link.status().notes(0).size(), kMaxReplyFrame - 100);
+}
+
+}  // namespace
+}  // namespace drivebench::link

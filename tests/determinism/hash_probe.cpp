@@ -1,0 +1,110 @@
+// Runs a bench through a script that touches every branch of the plant, and prints the state hash every 1000
+// ticks. Built several times with different compilers and options: all must print the same.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "plant/parameters.hpp"
+#include "plant/trig.hpp"
+#include "server/bench.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr Owner kController = 7;
+
+AxisParameters noisy_servo() {
+  AxisParameters p;
+  p.machine = {.pole_pairs = 3,
+               .stator_resistance_ohm = 1.7,
+               .rotor_resistance_ohm = 3.9,
+               .stator_inductance_h = 0.014,
+               .rotor_inductance_h = 0.014,
+               .mutual_inductance_h = 0.0117};
+  p.mechanics = {.inertia_kgm2 = 1.1e-4, .viscous_friction_nms = 1.4e-4};
+  p.amplifier = {.voltage_limit_v = 80.0, .gain = 1.01, .offset_a_v = 0.3, .offset_b_v = -0.2};
+  p.amplifier.over_current_a = 9.0;
+  p.amplifier.over_current_trip = false;
+  p.current_sensor = {.bits = 12, .full_scale_a = 20.0, .gain_a = 1.02, .offset_b_a = 0.05};
+  p.current_sensor.noise_rms_a = 0.02;
+  return p;
+}
+
+BenchSetup two_axes() {
+  AxisSetup first{.parameters = noisy_servo()};
+  AxisSetup second{.parameters = noisy_servo(), .on_link_loss = SafeAction::kZeroVoltage};
+  second.parameters.mechanics.coulomb_friction_nm = 0.02;
+  second.parameters.mechanics.static_friction_nm = 0.03;
+  second.parameters.encoder = {.counts_per_revolution = 4096, .half_count_offset = true};
+  second.parameters.amplifier.over_current_trip = true;
+  second.parameters.current_sensor.bits = 0;
+  return {.seed = 12345, .axes = {first, second}};
+}
+
+std::uint32_t row_of(const char* name) {
+  const Parameter* row = find_parameter(name);
+  if (row == nullptr) std::abort();
+  return static_cast<std::uint32_t>(row - axis_parameters().data());
+}
+
+/// A voltage that turns with the measured angle plus a slip, and answers the measured current: what is
+/// rounded differently once comes back and grows.
+Command answer(const Sample& s, double amplitude_v, double slip_rad_s) {
+  const double electrical_rad = 3.0 * static_cast<double>(s.encoder_count % 2000) * 3.14159e-3;
+  const CosSin turning = cos_sin(electrical_rad + slip_rad_s * 125e-6 * static_cast<double>(s.tick));
+  const TwoPhase voltage_v{amplitude_v * turning.cos - 1.3 * s.i_a_a, amplitude_v * turning.sin - 1.3 * s.i_b_a};
+  return {.answers = static_cast<Tick>(s.tick), .phases = {.gates = Gates::kVoltage, .voltage_v = voltage_v}};
+}
+
+Command one_of_the_script(const Sample& s) {
+  const Tick phase = static_cast<Tick>(s.tick) % 4000;
+  if (phase < 1500) return answer(s, 40.0, 120.0);
+  if (phase < 2200) return answer(s, 70.0, -200.0);  // reverses: the shaft passes through standstill
+  Command command = answer(s, 100.0, 300.0);         // saturates, and exceeds the current limit
+  if (phase >= 3000) command.phases.gates = Gates::kOff;
+  if (phase >= 3600) command.phases.gates = Gates::kZeroVoltage;
+  return command;
+}
+
+int run(Tick ticks) {
+  Bench bench(two_axes());
+  const auto submit = [&bench](std::uint32_t axis, const auto& action, Tick tick = 0) {
+    bench.submit({.tick = tick, .axis = axis, .owner = kController, .action = action});
+  };
+  for (std::uint32_t axis = 0; axis < 2; ++axis)
+    submit(axis, LeaseAction::kAcquire);
+  submit(0, LoadChange{.load_nm = 0.05, .ramp_ticks = 333}, 700);
+  submit(1, LoadChange{.load_nm = -0.1, .ramp_ticks = 0}, 1200);
+  submit(0, ParameterWrite{row_of("machine.rotor_resistance_ohm"), 5.1}, 2500);
+  submit(1, ParameterWrite{row_of("mechanics.inertia_kgm2"), 2.3e-4}, 6100);
+  std::uint64_t seen = 0;
+  while (bench.tick() < ticks) {
+    for (std::uint32_t axis = 0; axis < 2; ++axis) {
+      const bool silent = bench.tick() % 5000 > 4970;  // long enough for the watchdog
+      if (!silent) submit(axis, one_of_the_script(bench.sample(axis)));
+      if (bench.tick() % 1000 == 999) submit(axis, ClearFaults{});
+    }
+    bench.step();
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      seen |= bench.sample(axis).faults;
+    if (bench.tick() % 1000 == 0) {
+      std::printf("%lld %016llx\n", static_cast<long long>(bench.tick()),
+                  static_cast<unsigned long long>(bench.state_hash()));
+    }
+  }
+  constexpr std::uint64_t kWanted =
+      kVoltageSaturated | kCurrentSensorSaturated | kOverCurrent | kShaftHeld | kOverCurrentTrip | kCommandTimeout;
+  if (ticks >= 20'000 && (seen & kWanted) != kWanted) {
+    std::fprintf(stderr, "the script no longer reaches every branch: faults seen %llx\n",
+                 static_cast<unsigned long long>(seen));
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace drivebench
+
+int main(int argc, char** argv) {
+  return drivebench::run(argc > 1 ? std::atoll(argv[1]) : 20'000);
+}

@@ -1,0 +1,177 @@
+#include "plant/machines/induction_machine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <random>
+
+#include "tests/plant/servo_axis.hpp"
+
+namespace drivebench {
+namespace {
+
+struct Point {
+  InductionMachineState x;
+  double speed_rad_s;
+  TwoPhase voltage_v;
+};
+
+Point random_point(std::mt19937_64& engine) {
+  const auto draw = [&engine](double size) {
+    return std::uniform_real_distribution<double>(-size, size)(engine);
+  };
+  return {.x = {draw(20.0), draw(20.0), draw(0.2), draw(0.2)},
+          .speed_rad_s = draw(900.0),
+          .voltage_v = {draw(80.0), draw(80.0)}};
+}
+
+/// What of the input power is neither stored, nor lost, nor delivered to the shaft, as a fraction of it.
+double unbalanced(const InductionMachineConstants& c, const Point& p, const InductionMachineState& slope,
+                  double torque) {
+  // The stored energy is quadratic: a central difference along the slope is its exact derivative.
+  constexpr double kStep_s = 1e-4;
+  const auto moved = [&](double dt) {
+    return stored_energy_j(c, {p.x.i_a_a + dt * slope.i_a_a, p.x.i_b_a + dt * slope.i_b_a,
+                               p.x.psi_a_wb + dt * slope.psi_a_wb, p.x.psi_b_wb + dt * slope.psi_b_wb});
+  };
+  const double storing_w = (moved(kStep_s) - moved(-kStep_s)) / (2.0 * kStep_s);
+  const double in_a_w = p.voltage_v.a * p.x.i_a_a;
+  const double in_b_w = p.voltage_v.b * p.x.i_b_a;
+  return std::abs(in_a_w + in_b_w - storing_w - losses_w(c, p.x) - torque * p.speed_rad_s) /
+         (std::abs(in_a_w) + std::abs(in_b_w));
+}
+
+// Case 1 of the reference table, tolerance 5e-5 relative. Kills: exchanged inductances, a lost square.
+TEST(InductionMachine, TheServoMotorHasTheDerivedConstantsOfTheReference) {
+  const InductionMachineConstants c = constants_of(kServoMachine);
+  const auto expect = [](double value, double reference) { EXPECT_NEAR(value, reference, 5e-5 * reference); };
+  expect(c.sigma, 0.30158);
+  expect(c.transient_inductance_h, 4.2221e-3);
+  expect(c.transient_reluctance_per_h, 1.0 / 4.2221e-3);
+  expect(c.eta_per_s, 278.571);
+  expect(c.beta_per_h, 197.936);
+  expect(c.gamma_per_s, 1047.77);
+  expect(c.torque_constant, 2.5071);
+  expect(c.torque_constant / kServoInertia_kgm2, 22792.2);
+  EXPECT_EQ(leakage_factor(kServoMachine), c.sigma);
+}
+
+// The same with all five parameters different, by the definitions of the model. Kills: L_R taken for L_S,
+// which the servo motor (L_R = L_S) cannot show.
+TEST(InductionMachine, RotorAndStatorInductanceAreNotExchanged) {
+  const InductionMachineConstants c = constants_of({.pole_pairs = 2,
+                                                    .stator_resistance_ohm = 9.7,
+                                                    .rotor_resistance_ohm = 8.6,
+                                                    .stator_inductance_h = 0.67,
+                                                    .rotor_inductance_h = 0.4,
+                                                    .mutual_inductance_h = 0.49});
+  const double sigma = 1.0 - 0.49 * 0.49 / (0.67 * 0.4);
+  EXPECT_NEAR(c.sigma, sigma, 1e-15);
+  EXPECT_NEAR(c.eta_per_s, 8.6 / 0.4, 1e-12);
+  EXPECT_NEAR(c.beta_per_h, 0.49 / (sigma * 0.67 * 0.4), 1e-12);
+  EXPECT_NEAR(c.gamma_per_s, 0.49 * 0.49 * 8.6 / (sigma * 0.4 * 0.4 * 0.67) + 9.7 / (sigma * 0.67), 1e-10);
+  EXPECT_NEAR(c.torque_constant, 2.0 * 0.49 / 0.4, 1e-15);
+}
+
+// Case 3. The book misprints signs, the power balance does not. Kills: any wrong sign or factor in the model.
+TEST(InductionMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
+  std::mt19937_64 engine(11);
+  for (int i = 0; i < 10'000; ++i) {
+    InductionMachineParameters p = kServoMachine;
+    p.pole_pairs = 1 + i % 4;
+    p.rotor_inductance_h *= 1.0 + 0.1 * (i % 3);
+    const InductionMachineConstants c = constants_of(p);
+    const Point point = random_point(engine);
+    const InductionMachineState slope =
+        derivative(c, point.x, point.speed_rad_s, {.voltage_v = point.voltage_v});
+    // Relative to |u_a i_a| + |u_b i_b|, since the phases may cancel.
+    ASSERT_LT(unbalanced(c, point, slope, torque_nm(c, point.x)), 1e-9) << "state " << i;
+  }
+}
+
+constexpr std::size_t kTerms = 16;
+struct TermByTerm {
+  InductionMachineState slope;
+  double torque_nm;
+};
+
+/// The model once more, each term with a sign of its own.
+TermByTerm signed_model(const InductionMachineConstants& c, const Point& p,
+                        const std::array<double, kTerms>& sign) {
+  const auto& [i_a, i_b, psi_a, psi_b] = p.x;
+  const double w = c.pole_pairs * p.speed_rad_s;
+  const double eta = c.eta_per_s;
+  const double beta = c.beta_per_h;
+  const double inverse = 1.0 / (c.sigma * kServoMachine.stator_inductance_h);
+  const double magnetising = eta * c.mutual_inductance_h;
+  return {
+      .slope = {.i_a_a = sign[0] * eta * beta * psi_a + sign[1] * beta * w * psi_b -
+                         sign[2] * c.gamma_per_s * i_a + sign[3] * p.voltage_v.a * inverse,
+                .i_b_a = sign[4] * eta * beta * psi_b - sign[5] * beta * w * psi_a -
+                         sign[6] * c.gamma_per_s * i_b + sign[7] * p.voltage_v.b * inverse,
+                .psi_a_wb = -sign[8] * eta * psi_a - sign[9] * w * psi_b + sign[10] * magnetising * i_a,
+                .psi_b_wb = -sign[11] * eta * psi_b + sign[12] * w * psi_a + sign[13] * magnetising * i_b},
+      .torque_nm = c.torque_constant * (sign[14] * i_b * psi_a - sign[15] * i_a * psi_b)};
+}
+
+// Proves that the balance above notices every sign, and that the product has the signs of the copy.
+TEST(InductionMachine, FlippingAnySignBreaksThePowerBalance) {
+  const InductionMachineConstants c = constants_of(kServoMachine);
+  std::array<double, kTerms> sign;
+  sign.fill(1.0);
+  for (std::size_t flipped = 0; flipped <= kTerms; ++flipped) {
+    if (flipped < kTerms) sign[flipped] = -1.0;
+    std::mt19937_64 engine(12);
+    double worst = 0.0;
+    for (int i = 0; i < 100; ++i) {
+      const Point point = random_point(engine);
+      const TermByTerm model = signed_model(c, point, sign);
+      worst = std::max(worst, unbalanced(c, point, model.slope, model.torque_nm));
+      if (flipped < kTerms) continue;
+      const InductionMachineState slope =
+          derivative(c, point.x, point.speed_rad_s, {.voltage_v = point.voltage_v});
+      EXPECT_NEAR(slope.i_a_a, model.slope.i_a_a, 1e-8);
+      EXPECT_NEAR(slope.i_b_a, model.slope.i_b_a, 1e-8);
+      EXPECT_NEAR(slope.psi_a_wb, model.slope.psi_a_wb, 1e-11);
+      EXPECT_NEAR(slope.psi_b_wb, model.slope.psi_b_wb, 1e-11);
+      EXPECT_NEAR(torque_nm(c, point.x), model.torque_nm, 1e-12);
+    }
+    if (flipped < kTerms) {
+      EXPECT_GT(worst, 0.01) << "term " << flipped;
+      sign[flipped] = 1.0;
+    } else {
+      EXPECT_LT(worst, 1e-9);
+    }
+  }
+}
+
+// Conventions: a positive voltage gives a positive current at standstill, and a current ahead of the flux
+// (from a to b) a positive torque. Kills: a wrong pair of signs that leaves the power balance intact.
+TEST(InductionMachine, PositiveVoltageDrivesPositiveCurrentAndCurrentAheadOfTheFluxPositiveTorque) {
+  const InductionMachineConstants c = constants_of(kServoMachine);
+  const InductionMachineState slope = derivative(c, {}, 0.0, {.voltage_v = {1.0, 2.0}});
+  EXPECT_NEAR(slope.i_a_a, 1.0 / 4.2221e-3, 0.02);
+  EXPECT_NEAR(slope.i_b_a, 2.0 / 4.2221e-3, 0.04);
+  EXPECT_GT(torque_nm(c, {.i_b_a = 1.0, .psi_a_wb = 0.1}), 0.0);
+  EXPECT_LT(torque_nm(c, {.i_a_a = 1.0, .psi_b_wb = 0.1}), 0.0);
+}
+
+// Kills: an open phase that drifts, a back-emf of the wrong sign.
+TEST(InductionMachine, TheOpenCircuitVoltageKeepsTheCurrentAtZeroAndAnOpenPhaseKeepsItsOwn) {
+  const InductionMachineConstants c = constants_of(kServoMachine);
+  const InductionMachineState x{.psi_a_wb = 0.03, .psi_b_wb = -0.05};
+  const TwoPhase open_v = open_circuit_voltage_v(c, x, 150.0);
+  const InductionMachineState connected = derivative(c, x, 150.0, {.voltage_v = open_v});
+  EXPECT_NEAR(connected.i_a_a, 0.0, 1e-10);
+  EXPECT_NEAR(connected.i_b_a, 0.0, 1e-10);
+  const InductionMachineState open =
+      derivative(c, x, 150.0, {.voltage_v = {55.0, 55.0}, .conducts = {1.0, 0.0}});
+  EXPECT_NE(open.i_a_a, 0.0);
+  EXPECT_EQ(open.i_b_a, 0.0);
+}
+
+}  // namespace
+}  // namespace drivebench

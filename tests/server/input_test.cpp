@@ -1,0 +1,82 @@
+#include "server/input.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+#include <vector>
+
+namespace drivebench {
+namespace {
+
+Input input_with(const decltype(Input::action)& action) {
+  return {.tick = -5, .axis = 3, .owner = 0xffff'ffff'ffff'fffeu, .action = action};
+}
+
+/// One of each kind, in the order of the variant.
+std::vector<Input> one_of_each() {
+  return {input_with(ClearFaults{}),
+          input_with(Command{.answers = 1'234'567'890'123,
+                             .phases = {.gates = Gates::kZeroVoltage, .voltage_v = {-0.1, 1e300}}}),
+          input_with(LeaseAction::kLost),
+          input_with(LoadChange{.load_nm = -0.3, .ramp_ticks = 1'000'000'007}),
+          input_with(ParameterWrite{.row = 17, .value = 3.9}),
+          input_with(LateTick{}),
+          input_with(Overrun{}),
+          input_with(RefusedCommand{})};
+}
+
+// Kills: a field that packing loses, exchanges or narrows; a kind without its pair of functions.
+TEST(Input, EveryKindSurvivesPackingWordForWord) {
+  const std::vector<Input> inputs = one_of_each();
+  ASSERT_EQ(inputs.size(), std::variant_size_v<decltype(Input::action)>);
+  for (std::size_t kind = 0; kind < inputs.size(); ++kind) {
+    const PackedInput packed = pack(inputs[kind]);
+    EXPECT_EQ(packed.kind, kind);
+    const Input back = unpack(packed);
+    EXPECT_EQ(back.tick, -5);
+    EXPECT_EQ(back.axis, 3u);
+    EXPECT_EQ(back.owner, 0xffff'ffff'ffff'fffeu);
+    ASSERT_EQ(back.action.index(), kind);
+    const PackedInput again = pack(back);
+    EXPECT_EQ(std::memcmp(&packed, &again, sizeof(packed)), 0);
+  }
+  const auto command = std::get<Command>(unpack(pack(inputs[1])).action);
+  EXPECT_EQ(command.answers, 1'234'567'890'123);
+  EXPECT_EQ(command.phases.gates, Gates::kZeroVoltage);
+  EXPECT_EQ(command.phases.voltage_v.a, -0.1);
+  EXPECT_EQ(command.phases.voltage_v.b, 1e300);
+  EXPECT_EQ(std::get<LeaseAction>(unpack(pack(inputs[2])).action), LeaseAction::kLost);
+  const auto load = std::get<LoadChange>(unpack(pack(inputs[3])).action);
+  EXPECT_EQ(load.load_nm, -0.3);
+  EXPECT_EQ(load.ramp_ticks, 1'000'000'007);
+  const auto write = std::get<ParameterWrite>(unpack(pack(inputs[4])).action);
+  EXPECT_EQ(write.row, 17u);
+  EXPECT_EQ(write.value, 3.9);
+}
+
+// Kills: words of the stack in a packed input, which would make equal states hash differently.
+TEST(Input, UnusedWordsAreZero) {
+  for (const Input& input : one_of_each()) {
+    const PackedInput packed = pack(input);
+    const std::size_t used = std::holds_alternative<Command>(input.action)          ? 4
+                             : std::holds_alternative<LoadChange>(input.action)     ? 2
+                             : std::holds_alternative<ParameterWrite>(input.action) ? 2
+                             : std::holds_alternative<LeaseAction>(input.action)    ? 1
+                                                                                    : 0;
+    for (std::size_t i = used; i < 4; ++i)
+      EXPECT_EQ(packed.words[i], 0u);
+  }
+}
+
+// Kills: a kind from a damaged file that reads past the table.
+TEST(Input, AnUnknownKindIsAClearByNobody) {
+  for (const std::uint64_t kind : {std::uint64_t{8}, std::numeric_limits<std::uint64_t>::max()}) {
+    const Input input = unpack({.tick = 4, .axis = 1, .owner = 0, .kind = kind, .words = {1, 2, 3, 4}});
+    EXPECT_TRUE(std::holds_alternative<ClearFaults>(input.action));
+    EXPECT_EQ(input.owner, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace drivebench

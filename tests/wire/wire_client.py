@@ -1,0 +1,195 @@
+"""A server process and a blocking client for the wire tests: frames of bench.proto over TCP or a unix socket."""
+import atexit
+import importlib
+import json
+import os
+import pathlib
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+
+REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
+SERVER = pathlib.Path(os.environ.get("DRIVEBENCH_SERVER", REPOSITORY / "build/release/bin/drivebench-server"))
+PROTO = REPOSITORY / "protocols/bench.proto"
+BENCHES = REPOSITORY / "configs/benches"
+
+# How long anything may take before a test says that it hangs. No test measures time.
+PATIENCE_S = 30.0
+
+
+def _generated():
+    folder = tempfile.mkdtemp(prefix="drivebench-pb2-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    subprocess.run(["protoc", f"--python_out={folder}", f"-I{PROTO.parent}", str(PROTO)], check=True)
+    sys.path.insert(0, folder)
+    return importlib.import_module("bench_pb2")
+
+
+pb = _generated()
+
+
+class Closed(Exception):
+    """The server ended the connection."""
+
+
+def frame(payload):
+    return struct.pack(">I", len(payload)) + payload
+
+
+class Server:
+    """A drivebench-server on ports of its own; ended with the `with` block."""
+
+    def __init__(self, *options, config=None, text=None, unix=False, before=None):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-wire-"))
+        config = config or BENCHES / "servo.toml"
+        if text is not None:
+            config = self.folder / "bench.toml"
+            config.write_text(text, encoding="utf-8")
+        self.unix_path = str(self.folder / "bench.sock") if unix else None
+        command = [str(SERVER), str(config), "--port", "0", "--json", *options]
+        if unix:
+            command += ["--unix", self.unix_path]
+        self.log = open(self.folder / "stderr", "w+", encoding="utf-8")
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True, preexec_fn=before)
+        line = self.process.stdout.readline()
+        if not line:
+            self.process.wait()
+            raise RuntimeError(f"the server did not start: {self.errors()}")
+        self.ready = json.loads(line)
+        host, port = self.ready["tcp"].rsplit(":", 1)
+        self.address = (host, int(port))
+        self.verdict = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        self.process.stdout.close()
+        self.log.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def errors(self):
+        self.log.flush()
+        return (self.folder / "stderr").read_text(encoding="utf-8")
+
+    def stop(self, number=15):
+        """Ends it with a signal; the exit code. The verdict it printed is then in `verdict`."""
+        self.process.send_signal(number)
+        out, _ = self.process.communicate(timeout=PATIENCE_S)
+        lines = [json.loads(line) for line in out.splitlines()]
+        self.verdict = next((line for line in lines if line["event"] == "verdict"), None)
+        return self.process.returncode
+
+    def raw(self, receive_buffer=None, unix=False):
+        s = socket.socket(socket.AF_UNIX if unix else socket.AF_INET, socket.SOCK_STREAM)
+        if receive_buffer:
+            s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        s.settimeout(PATIENCE_S)
+        s.connect(self.unix_path if unix else self.address)
+        if not unix:
+            s.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return s
+
+    def client(self, hello=True, **options):
+        return Client(self.raw(**options), hello)
+
+
+class Client:
+    """One connection. Samples that come unasked are kept in `samples`."""
+
+    def __init__(self, sock, hello=True):
+        self.socket = sock
+        self.samples = []
+        self.last_id = 0
+        self.owner = 0
+        self.welcome = None
+        self.buffer = b""
+        if hello:
+            self.welcome = self.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="wire test")).welcome
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self.socket.close()
+
+    def send_bytes(self, data):
+        self.socket.sendall(data)
+
+    def send(self, **kind):
+        self.last_id += 1
+        self.send_bytes(frame(pb.Envelope(id=self.last_id, **kind).SerializeToString()))
+        return self.last_id
+
+    def receive_bytes(self, count):
+        while len(self.buffer) < count:
+            try:
+                got = self.socket.recv(1 << 16)
+            except (ConnectionResetError, BrokenPipeError):
+                got = b""
+            if not got:
+                raise Closed
+            self.buffer += got
+        data, self.buffer = self.buffer[:count], self.buffer[count:]
+        return data
+
+    def receive(self):
+        (length,) = struct.unpack(">I", self.receive_bytes(4))
+        return pb.Envelope.FromString(self.receive_bytes(length))
+
+    def answer_to(self, number):
+        while True:
+            envelope = self.receive()
+            if envelope.WhichOneof("kind") == "samples":
+                self.samples.append(envelope.samples)
+            elif envelope.id == number:
+                return envelope
+            else:
+                raise AssertionError(f"an answer to nothing: {envelope}")
+
+    def ask(self, **kind):
+        return self.answer_to(self.send(**kind))
+
+    def is_closed(self):
+        """Waits for the end of the connection, whatever comes before."""
+        try:
+            while True:
+                self.receive()
+        except Closed:
+            return True
+        except socket.timeout:
+            return False
+
+    # ---- what the tests do all the time ----
+
+    def lease(self, action=pb.LeaseRequest.ACTION_ACQUIRE, axis=0):
+        answer = self.ask(lease=pb.LeaseRequest(axis=axis, action=action))
+        if answer.WhichOneof("kind") == "done":
+            self.owner = answer.done.owner
+        return answer
+
+    def newest(self, axis=0):
+        return self.ask(exchange=pb.Exchange()).exchange_reply.samples[axis].sample
+
+    def exchange(self, tick, u_a_v=0.0, u_b_v=0.0, gates=pb.GATES_VOLTAGE, axis=0):
+        command = pb.Command(axis=axis, tick=tick, gates=gates, u_a_v=u_a_v, u_b_v=u_b_v)
+        return self.ask(exchange=pb.Exchange(commands=[command]))
+
+    def step(self, tick, *voltages, **options):
+        """One exchange that must go well: the sample after it."""
+        answer = self.exchange(tick, *voltages, **options)
+        if answer.WhichOneof("kind") != "exchange_reply":
+            raise AssertionError(f"tick {tick}: {answer}")
+        return answer.exchange_reply.samples[0].sample
+
+    def status(self):
+        return self.ask(status_request=pb.StatusRequest()).status
