@@ -8,7 +8,8 @@ namespace rk4_detail {
 
 struct AnyMember {
   template <class T>
-  constexpr operator T() const noexcept;  // NOLINT(google-explicit-constructor): stands for a member of any type
+  constexpr operator T()
+      const noexcept;  // NOLINT(google-explicit-constructor): stands for a member of any type
 };
 
 /// Number of members of a plain struct, from the longest list that initialises it.
@@ -21,8 +22,9 @@ constexpr std::size_t member_count() {
   }
 }
 
-/// f(member of x, member of y) for every double in the (possibly nested) state. Structured bindings keep each member a
-/// value of its own, which g++ holds in registers; through arrays and bit_cast the same sums take three times as long.
+/// f(member of x, member of y) for every double in the (possibly nested) state. Structured bindings keep each
+/// member a value of its own, which g++ holds in registers; through arrays and bit_cast the same sums take
+/// three times as long.
 template <class F>
 constexpr double zip(const F& f, double x, double y) noexcept {
   return f(x, y);
@@ -59,8 +61,8 @@ constexpr State advanced(const State& x, double factor, const State& slope) noex
   return rk4_detail::zip([factor](double a, double k) { return a + factor * k; }, x, slope);
 }
 
-/// One classical fourth-order Runge-Kutta step of x' = derivative(x) over step_s. A state is a plain struct of doubles or
-/// of such structs.
+/// One classical fourth-order Runge-Kutta step of x' = derivative(x) over step_s. A state is a plain struct
+/// of doubles or of such structs.
 template <class State, class Derivative>
 constexpr State rk4_step(const State& x, double step_s, const Derivative& derivative) noexcept {
   const State k1 = derivative(x);

@@ -14,9 +14,9 @@ namespace drivebench {
 inline constexpr std::size_t kFrameHeaderSize = 4;
 
 /// Size caps of the payload. Requests are small; descriptions and batches of samples are not.
-inline constexpr std::size_t kMaxFrameBeforeHello = 4 * 1024;
-inline constexpr std::size_t kMaxRequestFrame = 64 * 1024;
-inline constexpr std::size_t kMaxReplyFrame = 1024 * 1024;
+inline constexpr std::size_t kMaxFrameBeforeHello = std::size_t{4} * 1024;
+inline constexpr std::size_t kMaxRequestFrame = std::size_t{64} * 1024;
+inline constexpr std::size_t kMaxReplyFrame = std::size_t{1024} * 1024;
 
 std::array<std::byte, kFrameHeaderSize> frame_header(std::uint32_t payload_size) noexcept;
 

@@ -103,6 +103,7 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
     ++a.control.refused;
   } else {
     if (input.owner == 0 || input.owner != a.control.owner) return Refused::kNotOwner;
+    if ((a.axis.state().faults & kLatchedFaults) == 0) return Refused::kNot;
     a.axis.clear_faults();
     a.control.state = ControlState::kIdle;
     a.control.in_force = {};

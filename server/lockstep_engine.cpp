@@ -43,8 +43,8 @@ class LockstepEngine final : public Engine {
 
   Verdict stop() override {
     Verdict verdict{.mode = RunMode::kLockstep,
-                          .ticks = static_cast<std::uint64_t>(bench_.tick()),
-                          .state_hash = bench_.state_hash()};
+                    .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                    .state_hash = bench_.state_hash()};
     if (recorder_) {
       recorder_->finish(verdict);
       verdict.gaps = recorder_->gaps();

@@ -83,6 +83,7 @@ class Recorder::File {
   }
 
   void write(const Verdict& v) {
+    ++unsaved_;
     v1::Verdict message;
     encode_verdict(v, message);
     add(verdict_, 0, v.ticks, message);

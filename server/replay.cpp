@@ -50,7 +50,9 @@ class Replayer {
     for (McapMessage message; more && reader_.next(message);) {
       if (!bench_ && !build_bench()) break;
       const std::string_view topic = reader_.channels().at(message.header.channel).topic;
-      if (topic == kInputTopic) {
+      if (has_verdict_) {
+        more = unusable("something follows its verdict");
+      } else if (topic == kInputTopic) {
         more = feed(message.payload);
       } else if (topic == kVerdictTopic) {
         more = judge(message.payload);
@@ -107,8 +109,8 @@ class Replayer {
       input = decode_input(message);
     if (!input) return unusable(fmt::format("an input at tick {} cannot be read", bench_->tick()));
     if (static_cast<Tick>(message.received_tick()) != bench_->tick()) {
-      return unusable(fmt::format("samples between tick {} and an input of tick {} are missing", bench_->tick(),
-                                  message.received_tick()));
+      return unusable(fmt::format("samples between tick {} and an input of tick {} are missing",
+                                  bench_->tick(), message.received_tick()));
     }
     bench_->submit(*input);
     ++report_.inputs;
@@ -119,10 +121,14 @@ class Replayer {
     const std::optional<Sample> recorded = decode_sample(payload);
     if (!recorded) return unusable(fmt::format("a sample after tick {} cannot be read", bench_->tick()));
     const auto tick = static_cast<Tick>(recorded->tick);
-    if (tick == bench_->tick() + 1) bench_->step();
-    if (tick != bench_->tick()) {
-      return different(fmt::format("after tick {} a sample of tick {} follows", bench_->tick(), tick));
+    // Tick by tick, of all axes in order, so that none can be missing or doubled.
+    const bool next_tick = axis == 0 && report_.samples > 0;
+    const Tick expected = bench_->tick() + (next_tick ? 1 : 0);
+    if (axis != report_.samples % config_.axes.size() || tick != expected) {
+      return different(fmt::format("after {} samples, up to tick {}, follows one of {} at tick {}",
+                                   report_.samples, bench_->tick(), config_.axes[axis].name, tick));
     }
+    if (next_tick) bench_->step();
     ++report_.samples;
     const Sample& replayed = bench_->sample(axis);
     for (const Signal& signal : kSignals) {
@@ -161,6 +167,10 @@ class Replayer {
       unusable("it holds no samples");
     } else if (!has_verdict_) {
       unusable("it ends without a verdict");
+    } else if (verdict_.ticks() != report_.ticks ||
+               report_.samples != (report_.ticks + 1) * config_.axes.size()) {
+      different(fmt::format("its verdict speaks of {} ticks but there are {} samples of {} ticks",
+                            verdict_.ticks(), report_.samples, report_.ticks));
     } else if (verdict_.state_hash() != report_.state_hash) {
       different(fmt::format("all samples are equal but the state hash was {:016x} and replays as {:016x}",
                             verdict_.state_hash(), report_.state_hash));

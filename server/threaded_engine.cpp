@@ -112,12 +112,12 @@ class ThreadedEngine final : public Engine {
     stop_.store(true);
     thread_.join();
     Verdict verdict{.mode = config_.mode,
-                          .ticks = static_cast<std::uint64_t>(bench_.tick()),
-                          .late_ticks = bench_.sample(0).late_ticks,
-                          .lateness_p50_ns = lateness_.percentile_ns(0.5),
-                          .lateness_p99_ns = lateness_.percentile_ns(0.99),
-                          .lateness_worst_ns = lateness_.worst_ns(),
-                          .state_hash = bench_.state_hash()};
+                    .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                    .late_ticks = bench_.sample(0).late_ticks,
+                    .lateness_p50_ns = lateness_.percentile_ns(0.5),
+                    .lateness_p99_ns = lateness_.percentile_ns(0.99),
+                    .lateness_worst_ns = lateness_.worst_ns(),
+                    .state_hash = bench_.state_hash()};
     if (recorder_) {
       recorder_->finish(verdict);
       verdict.gaps = recorder_->gaps();

@@ -85,11 +85,11 @@ struct ReplayOptions {
 int run_replay(const ReplayOptions& options);
 
 struct ExportOptions {
-  std::string recording;
+  std::string recording{};
   bool json = false;
-  std::string out_file;              ///< empty: standard output
-  std::string axis;                  ///< name; empty: the first in the file
-  std::vector<std::string> signals;  ///< empty: all
+  std::string out_file{};              ///< empty: standard output
+  std::string axis{};                  ///< name; empty: the first in the file
+  std::vector<std::string> signals{};  ///< empty: all
   std::uint64_t from_tick = 0;
   std::uint64_t to_tick = std::numeric_limits<std::uint64_t>::max();
 };

@@ -75,6 +75,21 @@ DemoRun run_mode(const std::string& mode, int command_delay_ticks, const fs::pat
   return run;
 }
 
+/// Real time needs this machine to run the controller within the watchdog's 20 ticks, 2.5 ms; a busy machine
+/// may not, so it gets three chances, each recorded.
+DemoRun run_realtime(const fs::path& folder, const std::string& stamp) {
+  constexpr int kChances = 3;
+  DemoRun run;
+  for (int attempt = 1; attempt <= kChances; ++attempt) {
+    const std::string number = attempt == 1 ? "" : fmt::format("-{}", attempt);
+    run = run_mode("realtime", 1, folder / fmt::format("demo-{}-realtime{}.mcap", stamp, number));
+    run.attempts = attempt;
+    if (run.failure.empty()) break;
+    fmt::print(stderr, "demo: real time, attempt {} of {}: {}\n", attempt, kChances, run.failure);
+  }
+  return run;
+}
+
 DemoReplay replay(const std::string& recording) {
   Process server({server_executable().string(), "--replay", recording, "--json"});
   const auto report = await(server, Process::in(60s), parse_replay);
@@ -153,7 +168,7 @@ int run_demo(const DemoOptions& options) {
   fmt::print(stderr, "demo: the move in lockstep\n");
   report.lockstep = run_mode("lockstep", 0, folder / fmt::format("demo-{}-lockstep.mcap", stamp));
   fmt::print(stderr, "demo: the move in real time\n");
-  report.realtime = run_mode("realtime", 1, folder / fmt::format("demo-{}-realtime.mcap", stamp));
+  report.realtime = run_realtime(folder, stamp);
   fmt::print(stderr, "demo: replaying the lockstep recording\n");
   report.replay = replay(report.lockstep.recording);
 

@@ -33,6 +33,7 @@ struct DemoRun {
   ServerVerdict verdict;
   std::string recording;
   std::string failure;  ///< empty: none
+  int attempts = 1;
 };
 
 /// What re-simulating the lockstep recording gave.

@@ -13,15 +13,14 @@ fs::path own_executable() {
 }
 
 fs::path server_executable() {
-  const fs::path server = own_executable().parent_path() / "drivebench-server";
+  fs::path server = own_executable().parent_path() / "drivebench-server";
   if (!fs::exists(server)) throw UsageError("there is no " + server.string());
   return server;
 }
 
 fs::path find_config(std::string_view choice) {
   std::error_code ignored;
-  const fs::path as_path(choice);
-  if (fs::is_regular_file(as_path, ignored)) return as_path;
+  if (fs::is_regular_file(choice, ignored)) return choice;
 
   std::vector<fs::path> folders;
   if (const char* chosen = std::getenv("DRIVEBENCH_CONFIGS"); chosen != nullptr) folders.emplace_back(chosen);
@@ -32,13 +31,13 @@ fs::path find_config(std::string_view choice) {
     folders.push_back(above / "configs");
 
   std::string looked_at;
-  const fs::path file = as_path.extension() == ".toml" ? as_path : fs::path(std::string(choice) + ".toml");
+  const fs::path file = fs::path(choice).extension() == ".toml" ? fs::path(choice) : fs::path(std::string(choice) + ".toml");
   for (const fs::path& folder : folders) {
     fs::path found = folder / "benches" / file;
     if (fs::is_regular_file(found, ignored)) return found;
     looked_at += "\n  " + found.string();
   }
-  throw UsageError("no bench file '" + std::string(choice) + "'; looked for\n  " + as_path.string() +
+  throw UsageError("no bench file '" + std::string(choice) + "'; looked for\n  " + fs::path(choice).string() +
                    looked_at);
 }
 

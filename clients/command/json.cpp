@@ -96,6 +96,7 @@ Json demo_run(const DemoRun& run) {
           {"state_hash", run.verdict.state_hash},
           {"verdict", run.verdict.sentence},
           {"recording", run.recording},
+          {"attempts", run.attempts},
           {"failure", run.failure}};
 }
 

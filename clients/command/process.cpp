@@ -20,6 +20,7 @@ using namespace std::chrono_literals;
 
 std::vector<char*> c_arguments(std::vector<std::string>& arguments) {
   std::vector<char*> pointers;
+  pointers.reserve(arguments.size() + 1);
   for (std::string& argument : arguments)
     pointers.push_back(argument.data());
   pointers.push_back(nullptr);

@@ -161,6 +161,11 @@ ServoRun run_servo_move(link::Link& bench, std::uint32_t axis, const control::Pr
     }
   } catch (const link::Refused& refused) {
     run.failure = fmt::format("the bench refused: {}", refused.what());
+    if (refused.code() == v1::REFUSAL_LATCHED) {
+      const v1::BenchDescription& description = bench.welcome().bench();
+      const std::uint64_t faults = sample_of(bench.exchange({}), axis).faults();
+      run.failure = "the bench latched " + fault_names(description, latched_faults(description, faults));
+    }
   }
   run.wall_s = microseconds(Clock::now() - started) * 1e-6;
   return run;

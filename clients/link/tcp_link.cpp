@@ -16,7 +16,7 @@ using Clock = std::chrono::steady_clock;
 using Kind = v1::Envelope::KindCase;
 
 constexpr std::uint32_t kProtocol = 1;
-constexpr std::size_t kFirstBlock = 16 * 1024;
+constexpr std::size_t kFirstBlock = std::size_t{16} * 1024;
 
 std::string name_of(Kind kind) {
   const auto* field = v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(kind));

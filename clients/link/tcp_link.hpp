@@ -49,7 +49,7 @@ struct LoadChange {
 
 struct LinkOptions {
   std::string client = "drivebench";  ///< a name for the server's log
-  std::string token;
+  std::string token{};
   std::chrono::milliseconds deadline{5000};  ///< for connecting and for every answer
 };
 

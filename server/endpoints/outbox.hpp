@@ -19,7 +19,7 @@ class Outbox {
   using Socket = asio::generic::stream_protocol::socket;
 
   /// Queued bytes above which the peer is cut off.
-  static constexpr std::size_t kMaxQueued = 1024 * 1024;
+  static constexpr std::size_t kMaxQueued = std::size_t{1024} * 1024;
   static constexpr auto kNoProgressLimit = std::chrono::seconds(2);
 
   explicit Outbox(Socket& socket) : socket_(socket), timer_(socket.get_executor()) {}

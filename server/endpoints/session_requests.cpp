@@ -241,7 +241,9 @@ void Session::report_status() {
   }
   for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
     std::array<std::byte, kMaxSampleBytes> bytes;
-    const std::size_t size = encode_sample(engine_.newest(axis), kAllSignals, bytes.data());
+    Sample now = engine_.newest(axis);
+    now.owner = engine_.owner(axis);  // in lockstep it may have changed while time stood still
+    const std::size_t size = encode_sample(now, kAllSignals, bytes.data());
     v1::AxisSample& sample = *status.add_axes();
     sample.set_axis(axis);
     sample.mutable_sample()->ParseFromArray(bytes.data(), static_cast<int>(size));

@@ -28,7 +28,7 @@ namespace {
 constexpr double kMaxP50Ratio = 1.25;
 constexpr double kMaxP99Ratio = 1.5;
 constexpr std::size_t kBlock = 2000;
-constexpr std::size_t kRounds = 12;
+constexpr std::size_t kRounds = 10;
 
 struct Sizes {
   std::size_t request = 0;  ///< bytes on the wire, header included

@@ -54,7 +54,12 @@ std::string machine_description() {
   }
   utsname system{};
   uname(&system);
-  return fmt::format("{}, {} CPUs, Linux {}, {}", model, cpus, system.release, __VERSION__);
+#ifdef __clang__
+  const char* const compiler = "";  // its version string says "Clang"
+#else
+  const char* const compiler = "g++ ";
+#endif
+  return fmt::format("{}, {} CPUs, Linux {}, {}{}", model, cpus, system.release, compiler, __VERSION__);
 }
 
 ScratchFolder::ScratchFolder() {

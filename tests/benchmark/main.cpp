@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
@@ -50,7 +51,11 @@ int run(int argc, char** argv) {
   app.add_flag("--json", json, "print one JSON object");
   app.add_flag("--strict", strict, "exit 1 if a figure is over its limit");
   app.footer("Measurements:\n" + list);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
   std::vector<Row> rows;
   for (const Measurement& m : kMeasurements) {

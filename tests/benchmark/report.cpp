@@ -23,6 +23,18 @@ const char* name_of(Judgement judgement) {
   return "-";
 }
 
+const char* key_of(Limit::Kind kind) {
+  switch (kind) {
+    case Limit::Kind::kRatioAtMost:
+      return "ratio_at_most";
+    case Limit::Kind::kAtMost:
+      return "at_most";
+    case Limit::Kind::kAtLeast:
+      break;
+  }
+  return "at_least";
+}
+
 /// Three significant digits, without an exponent.
 std::string number(double value) {
   const double size = value < 0.0 ? -value : value;
@@ -93,7 +105,7 @@ nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows)
         {"note", row.note}};
     if (row.floor) entry["floor"] = *row.floor;
     if (row.ratio()) entry["ratio"] = *row.ratio();
-    if (row.limit) entry["limit"] = limit_text(row);
+    if (row.limit) entry["limit"] = {{key_of(row.limit->kind), row.limit->value}};
     list.push_back(std::move(entry));
   }
   return {{"machine", machine}, {"rows", std::move(list)}};

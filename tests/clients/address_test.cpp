@@ -1,6 +1,7 @@
 #include "clients/link/address.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -48,7 +49,9 @@ TEST(Address, ConnectsOnlyWhereSomebodyListens) {
   const Address address = parse_address("127.0.0.1:" + std::to_string(ntohs(here.sin_port)));
   EXPECT_THROW(connect_to(address, 1s), ConnectError);
   ASSERT_EQ(::listen(listener.get(), 1), 0);
-  EXPECT_TRUE(connect_to(address, 1s).is_open());
+  const FileDescriptor connected = connect_to(address, 1s);
+  ASSERT_TRUE(connected.is_open());
+  EXPECT_EQ(::fcntl(connected.get(), F_GETFL) & O_NONBLOCK, 0);
   EXPECT_THROW(connect_to(parse_address("unix:/nowhere/bench.sock"), 1s), ConnectError);
 }
 

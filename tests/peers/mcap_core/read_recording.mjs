@@ -14,6 +14,7 @@ class Summary {
   attachments = [];
   metadata = {};
   first = {};
+  last = {};
 
   addSchema({ id, name, encoding }) {
     this.schemas.set(id, { name, encoding });
@@ -29,6 +30,7 @@ class Summary {
       this.first[channel.topic] = Buffer.from(data).toString("hex");
       channel.first_log_time = channel.last_log_time = logTime;
     }
+    this.last[channel.topic] = Buffer.from(data).toString("hex");
     if (logTime < channel.first_log_time) channel.first_log_time = logTime;
     if (logTime > channel.last_log_time) channel.last_log_time = logTime;
   }
@@ -53,6 +55,7 @@ class Summary {
       attachments: this.attachments,
       metadata: Object.fromEntries(Object.entries(this.metadata).sort(byKey)),
       first: Object.fromEntries(Object.entries(this.first).sort(byKey)),
+      last: Object.fromEntries(Object.entries(this.last).sort(byKey)),
     };
     return JSON.stringify(object, (_, value) => (typeof value === "bigint" ? String(value) : value));
   }

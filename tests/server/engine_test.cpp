@@ -1,0 +1,303 @@
+#include "server/engine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "plant/parameters.hpp"
+#include "server/asio.hpp"
+#include "tests/server/run_config.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr Owner kMe = 1;
+constexpr Owner kStranger = 2;
+
+Input lease(LeaseAction action, std::uint32_t axis = 0, Owner owner = kMe) {
+  return {.tick = 0, .axis = axis, .owner = owner, .action = action};
+}
+
+/// Carries out a request and hands back the answer, which lockstep gives at once.
+Refused ask(Engine& engine, const Input& input) {
+  std::optional<Refused> got;
+  engine.request(input, [&got](Refused refused, Tick) { got = refused; });
+  EXPECT_TRUE(got) << "no answer";
+  return got.value_or(Refused::kBusy);
+}
+
+// ---- lockstep ----
+
+// Catches: a tick that runs without its command, or does not run with it; on_tick before the sample is there.
+TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
+  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  std::vector<Tick> seen;
+  engine->on_tick = [&] { seen.push_back(engine->tick()); };
+  engine->advance();
+  EXPECT_EQ(engine->tick(), 0) << "nobody controls";
+  EXPECT_EQ(ask(*engine, lease(LeaseAction::kAcquire)), Refused::kNot);
+  engine->advance();
+  EXPECT_EQ(engine->tick(), 0) << "no command";
+  for (Tick tick = 0; tick < 5; ++tick) {
+    EXPECT_EQ(engine->command(0, kMe, voltage(tick, 10.0, 0.0)), Refused::kNot);
+    EXPECT_EQ(engine->tick(), tick) << "the tick runs in advance()";
+    engine->advance();
+    EXPECT_EQ(engine->newest(0).u_a_v, 10.0);
+  }
+  EXPECT_EQ(seen, (std::vector<Tick>{1, 2, 3, 4, 5}));
+  EXPECT_EQ(engine->stop().ticks, 5u);
+}
+
+// Catches: a bench that waits for ever for a controller that has left.
+TEST(LockstepEngine, ALeaseGivenBackLetsTheOthersGoOn) {
+  const auto engine = make_lockstep_engine(servo_bench(2), nullptr);
+  ask(*engine, lease(LeaseAction::kAcquire, 0, kMe));
+  ask(*engine, lease(LeaseAction::kAcquire, 1, kStranger));
+  engine->command(0, kMe, voltage(0, 1.0, 0.0));
+  engine->advance();
+  EXPECT_EQ(engine->tick(), 0);
+  ask(*engine, lease(LeaseAction::kLost, 1, kStranger));
+  EXPECT_EQ(engine->tick(), 1);
+}
+
+// Catches: an owner that is looked up in a sample from before the lease.
+TEST(LockstepEngine, TheOwnerIsKnownBeforeTheNextTick) {
+  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  EXPECT_EQ(engine->owner(0), 0u);
+  ask(*engine, lease(LeaseAction::kAcquire));
+  EXPECT_EQ(engine->owner(0), kMe);
+  ask(*engine, lease(LeaseAction::kRelease));
+  EXPECT_EQ(engine->owner(0), 0u);
+}
+
+// Catches: check() and command() that do not agree, or a check that leaves a trace in the state.
+TEST(LockstepEngine, CheckSaysWhatCommandWouldAnswer) {
+  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  ask(*engine, lease(LeaseAction::kAcquire));
+  engine->command(0, kMe, voltage(0, 1.0, 0.0));
+  engine->advance();
+  const std::uint64_t before = engine->state_hash();
+  EXPECT_EQ(engine->check(0, kStranger, voltage(1, 1.0, 0.0)), Refused::kNotOwner);
+  EXPECT_EQ(engine->check(0, 0, voltage(1, 1.0, 0.0)), Refused::kNotOwner);
+  EXPECT_EQ(engine->check(0, kMe, voltage(1, std::nan(""), 0.0)), Refused::kNotFinite);
+  EXPECT_EQ(engine->check(0, kMe, voltage(1, 0.0, INFINITY)), Refused::kNotFinite);
+  EXPECT_EQ(engine->check(0, kMe, voltage(0, 1.0, 0.0)), Refused::kStale);
+  EXPECT_EQ(engine->check(0, kMe, voltage(2, 1.0, 0.0)), Refused::kStale);
+  EXPECT_EQ(engine->check(0, kMe, voltage(1, 1.0, 0.0)), Refused::kNot);
+  EXPECT_EQ(engine->state_hash(), before);
+  EXPECT_EQ(engine->command(0, kMe, voltage(2, 1.0, 0.0)), Refused::kStale);
+  EXPECT_NE(engine->state_hash(), before) << "a refusal is counted";
+}
+
+// Catches: a write whose limits, rules or read-back are lost between engine and table.
+TEST(LockstepEngine, ParametersAreTriedBeforeTheyAreWritten) {
+  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto row = [](const char* name) {
+    return static_cast<std::uint32_t>(find_parameter(name) - axis_parameters().data());
+  };
+  EXPECT_EQ(engine->try_parameter(0, row("amplifier.gain"), 1.5), "");
+  EXPECT_EQ(engine->parameters(0).amplifier.gain, 1.5);
+  EXPECT_NE(engine->try_parameter(0, row("amplifier.gain"), -1.0), "");
+  EXPECT_NE(engine->try_parameter(0, row("amplifier.gain"), std::nan("")), "");
+  EXPECT_NE(engine->try_parameter(0, row("mechanics.coulomb_friction_nm"), 1.0), "") << "static friction is 0";
+  EXPECT_EQ(engine->parameters(0).amplifier.gain, 1.5);
+  EXPECT_EQ(engine->parameters(0).mechanics.coulomb_friction_nm, 0.0);
+}
+
+// ---- threads ----
+
+/// The same run without any engine.
+struct DirectRun {
+  explicit DirectRun(const BenchConfig& config, Tick ticks) : bench(config.setup) {
+    schedule_loads(config, bench);
+    keep();
+    while (bench.tick() < ticks) {
+      bench.step();
+      keep();
+    }
+  }
+  void keep() {
+    for (std::size_t axis = 0; axis < bench.axis_count(); ++axis)
+      samples.push_back(bench.sample(axis));
+  }
+  Bench bench;
+  std::vector<Sample> samples;
+};
+
+BenchConfig free_bench() {
+  BenchConfig config = servo_bench(2);
+  config.mode = RunMode::kFree;
+  config.axes[0].loads = {{.tick = 100, .change = {.load_nm = 0.2, .ramp_ticks = 50}}};
+  config.axes[1].loads = {{.tick = 0, .change = {.load_nm = -0.1, .ramp_ticks = 0}}};
+  return config;
+}
+
+// Catches: a thread, a ring or a recorder that changes the run by a bit; an end that comes early, late or never.
+TEST(ThreadedEngine, AFreeRunIsTheDirectRunBitForBit) {
+  constexpr Tick kTicks = 5000;
+  const BenchConfig config = free_bench();
+  const DirectRun direct(config, kTicks);
+  for (const bool recorded : {false, true}) {
+    const TestFolder folder;
+    asio::io_context io(1);
+    const auto engine = make_threaded_engine(
+        config, recorded ? std::make_unique<Recorder>(folder / "run.mcap", config) : nullptr, io, kTicks);
+    int ends = 0;
+    std::size_t wrong = 0;
+    std::size_t compared = 0;
+    engine->on_tick = [&] {
+      for (std::size_t axis = 0; axis < 2; ++axis, ++compared) {
+        const Sample& newest = engine->newest(axis);
+        const Sample& expected = direct.samples[2 * newest.tick + axis];
+        if (std::memcmp(&newest, &expected, sizeof(Sample)) != 0) ++wrong;
+      }
+    };
+    engine->on_end = [&] {
+      ++ends;
+      io.stop();
+    };
+    io.run();
+    const Verdict verdict = engine->stop();
+    EXPECT_EQ(ends, 1);
+    EXPECT_EQ(wrong, 0u);
+    EXPECT_GT(compared, 0u);
+    EXPECT_EQ(verdict.ticks, static_cast<std::uint64_t>(kTicks));
+    EXPECT_EQ(verdict.late_ticks, 0u);
+    EXPECT_EQ(verdict.gaps, 0u);
+    EXPECT_EQ(verdict.state_hash, direct.bench.state_hash());
+    EXPECT_TRUE(verdict.exact());
+  }
+}
+
+// Catches: answers that are lost, doubled, out of order, or come before the sample of their tick.
+TEST(ThreadedEngine, RequestsAreAnsweredInOrderWithTheirTick) {
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kFree;
+  asio::io_context io(1);
+  const auto engine = make_threaded_engine(config, nullptr, io, std::nullopt);
+  constexpr int kRequests = 200;
+  std::vector<int> answered;
+  Tick last = 0;
+  for (int n = 0; n < kRequests; ++n) {
+    const Input input = n % 2 == 0 ? lease(n % 4 == 0 ? LeaseAction::kAcquire : LeaseAction::kRelease)
+                                   : lease(LeaseAction::kRenew, 0, kStranger);
+    engine->request(input, [&, n](Refused refused, Tick tick) {
+      answered.push_back(n);
+      EXPECT_EQ(refused, n % 2 == 0 ? Refused::kNot : Refused::kNotOwner) << n;
+      EXPECT_GE(tick, last);
+      EXPECT_GT(engine->tick(), tick) << "the sample that shows it is there";
+      last = tick;
+      if (n == kRequests - 1) io.stop();
+    });
+  }
+  io.run();
+  engine->stop();
+  ASSERT_EQ(answered.size(), static_cast<std::size_t>(kRequests));
+  for (int n = 0; n < kRequests; ++n)
+    EXPECT_EQ(answered[static_cast<std::size_t>(n)], n);
+}
+
+// Catches: a queue of requests without end. More of them than fit are refused at once, and every one is
+// answered once.
+TEST(ThreadedEngine, TooManyRequestsAreRefusedAsBusy) {
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kFree;
+  asio::io_context io(1);
+  const auto engine = make_threaded_engine(config, nullptr, io, std::nullopt);
+  // While nothing is drained here, the bench can report at most as many outcomes as its ring holds.
+  constexpr int kRequests = 20'000;
+  int busy = 0;
+  int answered = 0;
+  for (int n = 0; n < kRequests; ++n) {
+    engine->request(lease(LeaseAction::kAcquire), [&](Refused refused, Tick) {
+      ++answered;
+      if (refused == Refused::kBusy) ++busy;
+      if (answered == kRequests) io.stop();
+    });
+  }
+  EXPECT_GT(busy, 0);
+  EXPECT_EQ(answered, busy);
+  io.run();
+  EXPECT_EQ(answered, kRequests);
+  engine->stop();
+}
+
+// Catches: commands that never reach the tick thread, real time that waits for them, and a run of a given
+// length that is longer or shorter.
+TEST(ThreadedEngine, RealtimeTakesCommandsAndEndsByItself) {
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kRealtime;
+  config.setup.command_delay_ticks = 1;
+  config.setup.watchdog_ticks = 1'000'000;
+  config.realtime.max_lateness_ns = 3'600'000'000'000;  // a slow machine is late here, not in error
+  asio::io_context io(1);
+  const auto engine = make_threaded_engine(config, nullptr, io, 2000);
+  bool owned = false;
+  std::uint64_t commanded = 0;
+  bool ended = false;
+  engine->request(lease(LeaseAction::kAcquire), [&owned](Refused refused, Tick) { owned = refused == Refused::kNot; });
+  engine->on_tick = [&] {
+    if (owned) engine->command(0, kMe, voltage(engine->tick(), 12.0, 0.0));
+    if (engine->newest(0).u_a_v == 12.0) ++commanded;
+  };
+  engine->on_end = [&] {
+    ended = true;
+    io.stop();
+  };
+  io.run();
+  EXPECT_TRUE(ended);
+  const Verdict verdict = engine->stop();
+  EXPECT_EQ(verdict.ticks, 2000u);
+  EXPECT_GT(commanded, 0u);
+  EXPECT_EQ(engine->state_hash(), 0u) << "another thread owns the state";
+  EXPECT_EQ(verdict.realtime_valid(), verdict.late_ticks == 0);
+}
+
+// Catches: a bad command that reaches the tick thread, or is not counted there.
+TEST(ThreadedEngine, BadCommandsAreRefusedAtOnceAndCountedByTheBench) {
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kFree;
+  asio::io_context io(1);
+  const auto engine = make_threaded_engine(config, nullptr, io, std::nullopt);
+  EXPECT_EQ(engine->command(0, kMe, voltage(0, 1.0, 0.0)), Refused::kNotOwner);
+  engine->request(lease(LeaseAction::kAcquire), [&](Refused, Tick) {
+    EXPECT_EQ(engine->owner(0), kMe);
+    EXPECT_EQ(engine->command(0, kMe, voltage(0, std::nan(""), 0.0)), Refused::kNotFinite);
+    EXPECT_EQ(engine->command(0, kMe, voltage(1ll << 60, 1.0, 0.0)), Refused::kStale);
+    EXPECT_EQ(engine->command(0, kStranger, voltage(0, 1.0, 0.0)), Refused::kNotOwner);
+    engine->request(lease(LeaseAction::kRenew), [&](Refused, Tick) { io.stop(); });
+  });
+  io.run();
+  EXPECT_EQ(engine->newest(0).refused_commands, 4u);
+  engine->stop();
+}
+
+// Catches: an overrun that is only counted. The first tick is due at once; the next one comes after the limit
+// because the I/O thread cannot delay it, so the limit is set to nothing.
+TEST(ThreadedEngine, LatenessBeyondTheLimitIsALatchedFault) {
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kRealtime;
+  config.realtime.pacer = PacerKind::kSleep;
+  config.realtime.max_lateness_ns = -1;  // every tick is beyond it
+  asio::io_context io(1);
+  const auto engine = make_threaded_engine(config, nullptr, io, 20);
+  engine->on_end = [&io] { io.stop(); };
+  io.run();
+  const Verdict verdict = engine->stop();
+  EXPECT_EQ(verdict.late_ticks, 20u);
+  EXPECT_NE(engine->newest(0).faults & kBenchOverrun, 0u);
+  EXPECT_FALSE(verdict.realtime_valid());
+}
+
+// Catches: a thread that outlives an engine which was never stopped.
+TEST(ThreadedEngine, MayBeDestroyedWhileItRuns) {
+  asio::io_context io(1);
+  BenchConfig config = free_bench();
+  make_threaded_engine(config, nullptr, io, std::nullopt).reset();
+}
+
+}  // namespace
+}  // namespace drivebench
