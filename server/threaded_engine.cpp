@@ -1,6 +1,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <deque>
@@ -58,6 +59,10 @@ class ThreadedEngine final : public Engine {
                  std::optional<Tick> max_ticks)
       : Engine(config, std::move(recorder)),
         max_ticks_(max_ticks),
+        ticks_per_wake_(
+            config_.mode == RunMode::kRealtime
+                ? 1
+                : static_cast<Tick>(std::max(kEventsPerWake / config_.axes.size(), std::size_t{1}))),
         requests_(kRequestCapacity),
         events_(4096 + 64 * config_.axes.size()),
         tap_(recorder_.get(), events_),
@@ -141,10 +146,12 @@ class ThreadedEngine final : public Engine {
       take_requests();
       if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
       bench_.step();
-      notify();
+      if (bench_.tick() % ticks_per_wake_ == 0) notify();
     }
-    while (!events_.push(Ended{}) && !stop_.load())
+    while (!events_.push(Ended{}) && !stop_.load()) {
+      notify();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
     notify();
   }
 
@@ -178,7 +185,7 @@ class ThreadedEngine final : public Engine {
     }
   }
 
-  /// Wakes the I/O thread, unless that is on its way already: in free mode most ticks cost no system call.
+  /// Wakes the I/O thread, unless that is on its way already.
   void notify() noexcept {
     if (wake_pending_.exchange(true)) return;
     const std::uint64_t one = 1;
@@ -231,7 +238,11 @@ class ThreadedEngine final : public Engine {
     }
   }
 
+  // In free mode a wake-up costs more than several ticks; the ring holds what comes in between.
+  static constexpr std::size_t kEventsPerWake = 256;
+
   std::optional<Tick> max_ticks_;
+  Tick ticks_per_wake_;
   SpscRing<Input> requests_;
   SpscRing<Event> events_;
   Tap tap_;

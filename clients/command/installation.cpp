@@ -31,13 +31,14 @@ fs::path find_config(std::string_view choice) {
     folders.push_back(above / "configs");
 
   std::string looked_at;
-  const fs::path file = fs::path(choice).extension() == ".toml" ? fs::path(choice) : fs::path(std::string(choice) + ".toml");
+  fs::path file(choice);
+  if (file.extension() != ".toml") file += ".toml";
   for (const fs::path& folder : folders) {
     fs::path found = folder / "benches" / file;
     if (fs::is_regular_file(found, ignored)) return found;
     looked_at += "\n  " + found.string();
   }
-  throw UsageError("no bench file '" + std::string(choice) + "'; looked for\n  " + fs::path(choice).string() +
+  throw UsageError("no bench file '" + std::string(choice) + "'; looked for\n  " + std::string(choice) +
                    looked_at);
 }
 

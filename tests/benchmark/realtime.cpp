@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <ctime>
@@ -40,16 +41,23 @@ class BarePacer final : public Pacer {
   std::int64_t due_ns_ = 0;
 };
 
-Percentiles lateness_us(Pacer& pacer) {
+struct Lateness {
+  Percentiles us;
+  double late_share;  ///< of the ticks, those that started after their period was over
+};
+
+Lateness lateness(Pacer& pacer) {
   std::vector<double> us(kTicksPerBlock);
   pacer.wait();
   for (double& each : us)
     each = static_cast<double>(pacer.wait()) * 1e-3;
-  return percentiles(us);
+  const auto late = std::count_if(us.begin(), us.end(), [](double each) { return each * 1e3 >= kPeriodNs; });
+  return {.us = percentiles(us),
+          .late_share = static_cast<double>(late) / static_cast<double>(kTicksPerBlock)};
 }
 
 struct Round {
-  Percentiles bare, sleep, sleep_spin;
+  Lateness bare, sleep, sleep_spin;
 };
 
 /// On a thread of its own, which gets the treatment of the server's tick; what it was not granted goes to
@@ -61,21 +69,21 @@ Rounds<Round> alternate(std::vector<std::string>& notes) {
     notes = enter_realtime({.cpu = cpu[0]});
     rounds = undisturbed_rounds(cpu, kRounds, []() -> Round {
       BarePacer bare;
-      return {.bare = lateness_us(bare),
-              .sleep = lateness_us(*make_realtime_pacer(PacerKind::kSleep, kPeriodNs)),
-              .sleep_spin = lateness_us(*make_realtime_pacer(PacerKind::kSleepSpin, kPeriodNs))};
+      return {.bare = lateness(bare),
+              .sleep = lateness(*make_realtime_pacer(PacerKind::kSleep, kPeriodNs)),
+              .sleep_spin = lateness(*make_realtime_pacer(PacerKind::kSleepSpin, kPeriodNs))};
     });
   }).join();
   ::munlockall();  // enter_realtime locked the memory of the whole program
   return rounds;
 }
 
-Row row(const char* name, const Rounds<Round>& rounds, Percentiles Round::*pacer) {
-  const auto p50 = [&](Percentiles Round::*each) {
-    return median(rounds.results, [each](const Round& round) { return (round.*each).p50; });
+Row row(const char* name, const Rounds<Round>& rounds, Lateness Round::*pacer) {
+  const auto p50 = [&](Lateness Round::*each) {
+    return median(rounds.results, [each](const Round& round) { return (round.*each).us.p50; });
   };
-  const auto p99 = [&](Percentiles Round::*each) {
-    return median(rounds.results, [each](const Round& round) { return (round.*each).p99; });
+  const auto p99 = [&](Lateness Round::*each) {
+    return median(rounds.results, [each](const Round& round) { return (round.*each).us.p99; });
   };
   return {.name = name,
           .unit = "us",
@@ -87,17 +95,23 @@ Row row(const char* name, const Rounds<Round>& rounds, Percentiles Round::*pacer
                               p50(&Round::bare))};
 }
 
-Row late_ticks_of_server() {
+Row late_ticks_of_server(const Rounds<Round>& rounds) {
+  double bare_share = 0.0;
+  for (const Round& round : rounds.results)
+    bare_share += round.bare.late_share / static_cast<double>(rounds.results.size());
   const std::string bench = command::find_config("servo-realtime").string();
   Server server({bench, "--duration", std::to_string(kServerSeconds)});
   const nlohmann::json verdict = server.wait(std::chrono::seconds(10 * kServerSeconds));
   return {.name = "late ticks of the server",
           .measured = verdict.at("late_ticks").get<double>(),
-          .note = fmt::format(
-              "of {} in {} s, not pinned; lateness p50 {:.1f} us, p99 {:.1f} us, worst {:.1f} us",
-              verdict.at("ticks").get<std::int64_t>(), kServerSeconds,
-              verdict.at("lateness_p50_us").get<double>(), verdict.at("lateness_p99_us").get<double>(),
-              verdict.at("worst_lateness_us").get<double>())};
+          .floor = bare_share * verdict.at("ticks").get<double>(),
+          .gone = rounds.gone,
+          .note = fmt::format("of {} in {} s, not pinned; floor: clock_nanosleep alone; lateness p50 {:.1f} "
+                              "us, p99 {:.1f} us, worst {:.1f} us",
+                              verdict.at("ticks").get<std::int64_t>(), kServerSeconds,
+                              verdict.at("lateness_p50_us").get<double>(),
+                              verdict.at("lateness_p99_us").get<double>(),
+                              verdict.at("worst_lateness_us").get<double>())};
 }
 
 }  // namespace
@@ -106,7 +120,8 @@ std::vector<Row> measure_realtime(const Plan&) {
   std::vector<std::string> notes;
   const Rounds<Round> rounds = alternate(notes);
   std::vector<Row> rows{row("lateness p99, sleep", rounds, &Round::sleep),
-                        row("lateness p99, sleep+spin", rounds, &Round::sleep_spin), late_ticks_of_server()};
+                        row("lateness p99, sleep+spin", rounds, &Round::sleep_spin),
+                        late_ticks_of_server(rounds)};
   for (const std::string& note : notes)
     rows[0].note += "; " + note;
   return rows;

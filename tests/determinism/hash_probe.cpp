@@ -52,7 +52,8 @@ std::uint32_t row_of(const char* name) {
 Command answer(const Sample& s, double amplitude_v, double slip_rad_s) {
   const double electrical_rad = 3.0 * static_cast<double>(s.encoder_count % 2000) * 3.14159e-3;
   const CosSin turning = cos_sin(electrical_rad + slip_rad_s * 125e-6 * static_cast<double>(s.tick));
-  const TwoPhase voltage_v{amplitude_v * turning.cos - 1.3 * s.i_a_a, amplitude_v * turning.sin - 1.3 * s.i_b_a};
+  const TwoPhase voltage_v{amplitude_v * turning.cos - 1.3 * s.i_a_a,
+                           amplitude_v * turning.sin - 1.3 * s.i_b_a};
   return {.answers = static_cast<Tick>(s.tick), .phases = {.gates = Gates::kVoltage, .voltage_v = voltage_v}};
 }
 
@@ -92,8 +93,8 @@ int run(Tick ticks) {
                   static_cast<unsigned long long>(bench.state_hash()));
     }
   }
-  constexpr std::uint64_t kWanted =
-      kVoltageSaturated | kCurrentSensorSaturated | kOverCurrent | kShaftHeld | kOverCurrentTrip | kCommandTimeout;
+  constexpr std::uint64_t kWanted = kVoltageSaturated | kCurrentSensorSaturated | kOverCurrent | kShaftHeld |
+                                    kOverCurrentTrip | kCommandTimeout;
   if (ticks >= 20'000 && (seen & kWanted) != kWanted) {
     std::fprintf(stderr, "the script no longer reaches every branch: faults seen %llx\n",
                  static_cast<unsigned long long>(seen));

@@ -1,4 +1,5 @@
-// Preloaded: counts what a thread calls that could wait, allocate or enter the kernel, from guard_begin() to guard_end().
+// Preloaded: counts what a thread calls that could wait, allocate or enter the kernel, from guard_begin() to
+// guard_end().
 #include <dlfcn.h>
 #include <pthread.h>
 #include <time.h>

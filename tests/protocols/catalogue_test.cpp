@@ -29,7 +29,8 @@ FieldDescriptor::Type wire_type(SignalType type) {
   return FieldDescriptor::TYPE_DOUBLE;
 }
 
-// Catches: a signal that is added to the table or to bench.proto only, in another order, or with another type.
+// Catches: a signal that is added to the table or to bench.proto only, in another order, or with another
+// type.
 TEST(Catalogue, IsTheMessageSampleOfTheWire) {
   const Descriptor& message = *v1::Sample::descriptor();
   ASSERT_EQ(static_cast<std::size_t>(message.field_count()), kSignals.size());
@@ -47,7 +48,8 @@ TEST(Catalogue, IsTheMessageSampleOfTheWire) {
 TEST(Catalogue, RowsAreTheMembersOfSampleInOrder) {
   for (std::size_t row = 0; row < kSignals.size(); ++row) {
     const Signal& signal = kSignals[row];
-    const int pointers = (signal.as_unsigned != nullptr) + (signal.as_signed != nullptr) + (signal.as_real != nullptr);
+    const int pointers =
+        (signal.as_unsigned != nullptr) + (signal.as_signed != nullptr) + (signal.as_real != nullptr);
     EXPECT_EQ(pointers, 1) << signal.name;
     std::uint64_t words[kSampleWords] = {};
     words[row] = 0x4010'0000'0000'0000u;  // 4.0 as a double
@@ -90,11 +92,13 @@ TEST(Catalogue, DescriptorSetDescribesTheWholeWire) {
   google::protobuf::DescriptorPool pool;
   for (const auto& file : set.file())
     ASSERT_NE(pool.BuildFile(file), nullptr) << file.name();
-  for (const char* name : {"drivebench.v1.Envelope", "drivebench.v1.Sample", "drivebench.v1.Input", "drivebench.v1.Verdict"}) {
+  for (const char* name :
+       {"drivebench.v1.Envelope", "drivebench.v1.Sample", "drivebench.v1.Input", "drivebench.v1.Verdict"}) {
     const Descriptor* message = pool.FindMessageTypeByName(name);
     ASSERT_NE(message, nullptr) << name;
   }
-  EXPECT_EQ(pool.FindMessageTypeByName("drivebench.v1.Sample")->DebugString(), v1::Sample::descriptor()->DebugString());
+  EXPECT_EQ(pool.FindMessageTypeByName("drivebench.v1.Sample")->DebugString(),
+            v1::Sample::descriptor()->DebugString());
 }
 
 // Catches: a number of the wire that was changed: recordings and clients of yesterday would misread it. The
@@ -119,7 +123,8 @@ TEST(Catalogue, NumbersOfTheWireStayAsTheyAre) {
   command.set_u_a_v(1.0);
   command.set_u_b_v(-2.0);
   EXPECT_EQ(exchange.SerializeAsString(),
-            "\x3a\x1a\x0a\x18\x08\x01\x10\x05\x18\x01\x21\x00\x00\x00\x00\x00\x00\xf0\x3f\x29\x00\x00\x00\x00\x00\x00"
+            "\x3a\x1a\x0a\x18\x08\x01\x10\x05\x18\x01\x21\x00\x00\x00\x00\x00\x00\xf0\x3f\x29\x00\x00\x00\x00"
+            "\x00\x00"
             "\x00\xc0"s);
 
   v1::Envelope welcome;

@@ -107,7 +107,8 @@ TEST(SampleCodec, EverySignalAloneReadsBackThroughProtobuf) {
       v1::Sample message;
       ASSERT_TRUE(message.ParseFromString(encoded(sample))) << signal.name;
       for (const Signal& other : kSignals) {
-        EXPECT_EQ(word(message, other), word(sample, other)) << signal.name << " " << value << " " << other.name;
+        EXPECT_EQ(word(message, other), word(sample, other))
+            << signal.name << " " << value << " " << other.name;
       }
       // The bytes are what protobuf itself writes.
       EXPECT_EQ(encoded(sample), message.SerializeAsString()) << signal.name;
@@ -173,12 +174,13 @@ TEST(SampleCodec, WhatIsNotASampleIsRefused) {
   }
   EXPECT_GT(refused, whole.size() / 2);
   using namespace std::string_literals;
-  for (const std::string& bad : {"\x00\x00"s,                                             // field 0
-                                 "\xe0\x01\x01"s,                                         // field 28
-                                 "\x09\x00\x00\x00\x00\x00\x00\x00\x00"s,                 // tick as fixed64
-                                 "\x80\x01\x00"s,                                         // i_a_a as varint
-                                 "\x08\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01"s,     // eleven bytes of varint
-                                 "\x0a\x01\x00"s}) {                                      // tick as bytes
+  for (const std::string& bad :
+       {"\x00\x00"s,                                          // field 0
+        "\xe0\x01\x01"s,                                      // field 28
+        "\x09\x00\x00\x00\x00\x00\x00\x00\x00"s,              // tick as fixed64
+        "\x80\x01\x00"s,                                      // i_a_a as varint
+        "\x08\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01"s,  // eleven bytes of varint
+        "\x0a\x01\x00"s}) {                                   // tick as bytes
     EXPECT_EQ(decode_sample(bytes_of(bad)), std::nullopt) << bad.size();
   }
 }
@@ -218,7 +220,8 @@ TEST(SampleCodec, HandWrittenFramesReadBackThroughProtobuf) {
   EXPECT_TRUE(std::signbit(envelope.exchange_reply().samples(0).sample().i_a_a()));
   EXPECT_EQ(envelope.exchange_reply().samples(0).sample().command_tick(), -1);
   EXPECT_EQ(envelope.exchange_reply().samples(1).axis(), 300u);
-  EXPECT_EQ(std::bit_cast<std::uint64_t>(envelope.exchange_reply().samples(1).sample().psi_b_wb()), kNanWithPayload);
+  EXPECT_EQ(std::bit_cast<std::uint64_t>(envelope.exchange_reply().samples(1).sample().psi_b_wb()),
+            kNanWithPayload);
 
   out.clear();
   const std::array<Sample, 2> both{first, second};
@@ -240,7 +243,8 @@ TEST(SampleCodec, FramesMayFollowEachOtherInOneBuffer) {
   append_samples(out, 1, 0, {}, kAllSignals);
   const std::size_t first = out.size();
   append_exchange_reply(out, 2, std::to_array<AxisSampleView>({{0, &sample}}));
-  EXPECT_EQ(envelope_of({out.begin(), out.begin() + static_cast<std::ptrdiff_t>(first)}).samples().axis(), 1u);
+  EXPECT_EQ(envelope_of({out.begin(), out.begin() + static_cast<std::ptrdiff_t>(first)}).samples().axis(),
+            1u);
   EXPECT_EQ(envelope_of({out.begin() + static_cast<std::ptrdiff_t>(first), out.end()}).id(), 2u);
 }
 

@@ -83,7 +83,7 @@ TEST(LockstepEngine, CheckSaysWhatCommandWouldAnswer) {
   EXPECT_EQ(engine->check(0, kStranger, voltage(1, 1.0, 0.0)), Refused::kNotOwner);
   EXPECT_EQ(engine->check(0, 0, voltage(1, 1.0, 0.0)), Refused::kNotOwner);
   EXPECT_EQ(engine->check(0, kMe, voltage(1, std::nan(""), 0.0)), Refused::kNotFinite);
-  EXPECT_EQ(engine->check(0, kMe, voltage(1, 0.0, INFINITY)), Refused::kNotFinite);
+  EXPECT_EQ(engine->check(0, kMe, voltage(1, 0.0, HUGE_VAL)), Refused::kNotFinite);
   EXPECT_EQ(engine->check(0, kMe, voltage(0, 1.0, 0.0)), Refused::kStale);
   EXPECT_EQ(engine->check(0, kMe, voltage(2, 1.0, 0.0)), Refused::kStale);
   EXPECT_EQ(engine->check(0, kMe, voltage(1, 1.0, 0.0)), Refused::kNot);
@@ -102,7 +102,8 @@ TEST(LockstepEngine, ParametersAreTriedBeforeTheyAreWritten) {
   EXPECT_EQ(engine->parameters(0).amplifier.gain, 1.5);
   EXPECT_NE(engine->try_parameter(0, row("amplifier.gain"), -1.0), "");
   EXPECT_NE(engine->try_parameter(0, row("amplifier.gain"), std::nan("")), "");
-  EXPECT_NE(engine->try_parameter(0, row("mechanics.coulomb_friction_nm"), 1.0), "") << "static friction is 0";
+  EXPECT_NE(engine->try_parameter(0, row("mechanics.coulomb_friction_nm"), 1.0), "")
+      << "static friction is 0";
   EXPECT_EQ(engine->parameters(0).amplifier.gain, 1.5);
   EXPECT_EQ(engine->parameters(0).mechanics.coulomb_friction_nm, 0.0);
 }
@@ -135,7 +136,8 @@ BenchConfig free_bench() {
   return config;
 }
 
-// Catches: a thread, a ring or a recorder that changes the run by a bit; an end that comes early, late or never.
+// Catches: a thread, a ring or a recorder that changes the run by a bit; an end that comes early, late or
+// never.
 TEST(ThreadedEngine, AFreeRunIsTheDirectRunBitForBit) {
   constexpr Tick kTicks = 5000;
   const BenchConfig config = free_bench();
@@ -238,7 +240,8 @@ TEST(ThreadedEngine, RealtimeTakesCommandsAndEndsByItself) {
   bool owned = false;
   std::uint64_t commanded = 0;
   bool ended = false;
-  engine->request(lease(LeaseAction::kAcquire), [&owned](Refused refused, Tick) { owned = refused == Refused::kNot; });
+  engine->request(lease(LeaseAction::kAcquire),
+                  [&owned](Refused refused, Tick) { owned = refused == Refused::kNot; });
   engine->on_tick = [&] {
     if (owned) engine->command(0, kMe, voltage(engine->tick(), 12.0, 0.0));
     if (engine->newest(0).u_a_v == 12.0) ++commanded;

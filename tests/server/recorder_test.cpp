@@ -68,8 +68,9 @@ TEST(Recorder, EverySampleAndInputIsInTheFileInOrder) {
   for (std::uint64_t tick = 0; tick < kTicks; ++tick) {
     recorder.wait_for_room();
     if (tick % 10 == 0) {
-      recorder.on_input(static_cast<Tick>(tick),
-                        {.tick = static_cast<Tick>(tick + 5), .axis = 1, .owner = 3, .action = LoadChange{0.5, 7}});
+      recorder.on_input(
+          static_cast<Tick>(tick),
+          {.tick = static_cast<Tick>(tick + 5), .axis = 1, .owner = 3, .action = LoadChange{0.5, 7}});
     }
     for (std::uint32_t axis = 0; axis < 2; ++axis)
       recorder.on_sample(axis, sample_of(tick, axis + 1e-3 * static_cast<double>(tick)));
@@ -85,7 +86,8 @@ TEST(Recorder, EverySampleAndInputIsInTheFileInOrder) {
     const auto& samples = recording.samples.at(sample_topic(config.axes[axis].name));
     ASSERT_EQ(samples.size(), kTicks);
     for (std::uint64_t tick = 0; tick < kTicks; ++tick) {
-      ASSERT_TRUE(same_words(samples[tick], sample_of(tick, axis + 1e-3 * static_cast<double>(tick)))) << tick;
+      ASSERT_TRUE(same_words(samples[tick], sample_of(tick, axis + 1e-3 * static_cast<double>(tick))))
+          << tick;
     }
   }
   ASSERT_EQ(recording.inputs.size(), kTicks / 10);

@@ -30,8 +30,7 @@ Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr) {
   const TestFolder folder;
   BenchConfig config = servo_bench(2);
   config.axes[1].loads = {{.tick = 5, .change = {.load_nm = 0.02, .ramp_ticks = 3}}};
-  const auto engine =
-      make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config));
+  const auto engine = make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config));
   const auto send = [&engine](std::uint32_t axis, const auto& action, Tick tick = 0) {
     engine->request({.tick = tick, .axis = axis, .owner = 1, .action = action}, [](Refused, Tick) {});
   };
@@ -164,7 +163,8 @@ TEST(Replay, ATruncatedRecordingIsUnusable) {
   const Bytes recording = record(12);
   std::mt19937 random(7);
   for (std::size_t size = 0; size < recording.size(); size += 1 + random() % 50) {
-    const ReplayReport report = replayed({recording.begin(), recording.begin() + static_cast<std::ptrdiff_t>(size)});
+    const ReplayReport report =
+        replayed({recording.begin(), recording.begin() + static_cast<std::ptrdiff_t>(size)});
     EXPECT_EQ(report.result, Result::kUnusable) << size;
     EXPECT_FALSE(report.problem.empty());
   }
@@ -212,15 +212,18 @@ TEST(Replay, AMissingOrDoubledSampleIsADifference) {
   });
   for (int n = 0; n < static_cast<int>(topics.size()); ++n) {
     if (topics[static_cast<std::size_t>(n)] == kInputTopic) continue;
-    const ReplayReport report = replayed(rewritten(recording, [](Entry&) { return true; }, n));
-    EXPECT_NE(report.result, Result::kEqual) << "message " << n << " twice: " << topics[static_cast<std::size_t>(n)];
+    const ReplayReport report = replayed(rewritten(
+        recording, [](Entry&) { return true; }, n));
+    EXPECT_NE(report.result, Result::kEqual)
+        << "message " << n << " twice: " << topics[static_cast<std::size_t>(n)];
   }
 }
 
 // Catches: a tick number that is believed.
 TEST(Replay, ASampleOfAnotherTickIsADifference) {
   const Bytes recording = record(20);
-  for (const std::uint64_t wrong : {std::uint64_t{0}, std::uint64_t{9}, std::uint64_t{11}, ~std::uint64_t{0}}) {
+  for (const std::uint64_t wrong :
+       {std::uint64_t{0}, std::uint64_t{9}, std::uint64_t{11}, ~std::uint64_t{0}}) {
     const ReplayReport report = replayed(rewritten(recording, [&](Entry& entry) {
       if (entry.topic != "/axis0/sample") return true;
       Sample sample = *decode_sample(entry.payload);
@@ -248,10 +251,13 @@ Bytes with_verdict(const Bytes& recording, const std::function<void(v1::Verdict&
 // Catches: a state hash, a number of ticks or a count of losses that is written and never read.
 TEST(Replay, TheVerdictMustAgree) {
   const Bytes recording = record(20);
-  EXPECT_EQ(replayed(with_verdict(recording, [](v1::Verdict& v) { v.set_state_hash(v.state_hash() ^ 1); })).result,
-            Result::kDifferent);
-  EXPECT_EQ(replayed(with_verdict(recording, [](v1::Verdict& v) { v.set_gaps(1); })).result, Result::kUnusable);
-  EXPECT_NE(replayed(with_verdict(recording, [](v1::Verdict& v) { v.set_ticks(19); })).result, Result::kEqual);
+  EXPECT_EQ(
+      replayed(with_verdict(recording, [](v1::Verdict& v) { v.set_state_hash(v.state_hash() ^ 1); })).result,
+      Result::kDifferent);
+  EXPECT_EQ(replayed(with_verdict(recording, [](v1::Verdict& v) { v.set_gaps(1); })).result,
+            Result::kUnusable);
+  EXPECT_NE(replayed(with_verdict(recording, [](v1::Verdict& v) { v.set_ticks(19); })).result,
+            Result::kEqual);
   EXPECT_EQ(replayed(rewritten(recording, [](Entry& e) { return e.topic != kVerdictTopic; })).result,
             Result::kUnusable);
 }
