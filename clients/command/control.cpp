@@ -2,6 +2,8 @@
 
 #include <cstdio>
 #include <fstream>
+#include <stdexcept>
+#include <utility>
 
 #include "clients/command/commands.hpp"
 #include "clients/command/json.hpp"
@@ -57,11 +59,19 @@ void prepare(link::Link& bench, std::uint32_t axis, const ControlOptions& option
   }
 }
 
-void write_text(const std::string& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
+/// Open before the move, so that a report is not lost to a folder that does not exist.
+std::ofstream opened(const std::string& file) {
+  std::ofstream out;
+  if (!file.empty()) out.open(file, std::ios::binary);
   if (!out) throw UsageError("cannot write " + file);
+  return out;
+}
+
+void write_csv(std::ofstream out, const ControlOptions& options, const ServoRun& run) {
+  if (options.csv_file.empty()) return;
+  out << to_csv(run.rows);
+  out.close();
+  if (!out) throw std::runtime_error("cannot write " + options.csv_file);
 }
 
 void print_report(const ControlReport& r) {
@@ -99,6 +109,7 @@ int run_control(const ControlOptions& options) {
   const v1::BenchDescription& description = bench.welcome().bench();
   const std::uint32_t axis = axis_number(description, options.axis);
   check_fit(description, axis, preset);
+  std::ofstream csv = opened(options.csv_file);
 
   catch_interrupts();
   prepare(bench, axis, options);
@@ -117,12 +128,12 @@ int run_control(const ControlOptions& options) {
   report.mode = name_of(description.mode());
   report.axis = description.axes(static_cast<int>(axis)).name();
   report.preset = preset.name;
-  if (!options.csv_file.empty()) write_text(options.csv_file, to_csv(run.rows));
   if (options.json) {
     fmt::print("{}\n", control_json(report));
   } else {
     print_report(report);
   }
+  write_csv(std::move(csv), options, run);
   if (report.failure.empty()) return kExitOk;
   std::fflush(stdout);
   fmt::print(stderr, "drivebench: the move did not end: {}\n", report.failure);

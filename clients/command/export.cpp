@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -136,10 +137,21 @@ struct Exported {
   std::string other_axes;
 };
 
+/// Refuses what would cost the output file what it held, or the recording itself.
+void check_files(const McapReader& reader, const ExportOptions& options) {
+  if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap) {
+    throw UsageError(fmt::format("{} is not a recording: {}", options.recording, reader.problem()->what));
+  }
+  std::error_code ignored;
+  if (std::filesystem::equivalent(options.recording, options.out_file, ignored)) {
+    throw UsageError(fmt::format("--out {} is the recording itself", options.out_file));
+  }
+}
+
 /// Everything that can be read, row by row. Without a name the axis is the first that comes.
-Exported export_rows(McapReader& reader, const ExportOptions& options, std::size_t file_size, Output& out) {
+Exported export_rows(McapReader& reader, const ExportOptions& options,
+                     const std::vector<const Signal*>& signals, std::size_t file_size, Output& out) {
   constexpr std::size_t kPiece = 1U << 16;
-  const std::vector<const Signal*> signals = chosen_signals(options.signals);
   Exported done;
   done.axis = options.axis;
   Progress progress("export");
@@ -181,19 +193,19 @@ Exported export_rows(McapReader& reader, const ExportOptions& options, std::size
 int run_export(const ExportOptions& options) {
   const MappedFile file(options.recording);
   McapReader reader(file.bytes());
+  const std::vector<const Signal*> signals = chosen_signals(options.signals);
+  check_files(reader, options);
   Output out(options.out_file);
-  const Exported done = export_rows(reader, options, file.bytes().size(), out);
+  const Exported done = export_rows(reader, options, signals, file.bytes().size(), out);
 
   const std::string problem = reader.problem() ? reader.problem()->what : "";
-  const bool is_foreign = reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap;
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the CSV
   if (options.json) {
     fmt::print(told, "{}\n", export_json(options.out_file, done.axis, done.rows, problem));
-  } else if (!is_foreign) {
+  } else {
     fmt::print(told, "export: {} samples of axis {}{}{}\n", done.rows, done.axis.empty() ? "?" : done.axis,
                options.out_file.empty() ? "" : " to ", options.out_file);
   }
-  if (is_foreign) throw UsageError(fmt::format("{} is not a recording: {}", options.recording, problem));
   if (!problem.empty()) {
     fmt::print(stderr, "drivebench: the recording is not whole: {}\n", problem);
     return kExitCutShort;

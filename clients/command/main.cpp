@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -16,7 +17,7 @@ namespace {
 double number(std::string_view text, std::string_view whole) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) {
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) {
     throw UsageError(fmt::format("'{}' in '{}' is not a number", text, whole));
   }
   return value;
@@ -32,7 +33,10 @@ std::pair<std::string_view, std::string_view> split(std::string_view text, char 
 LoadAt parse_load(std::string_view text) {
   const auto [load, after] = split(text, '@', "NM@SECONDS, for example 0.1@0.0365");
   const LoadAt parsed = {.load_nm = number(load, text), .after_s = number(after, text)};
-  if (parsed.after_s < 0.0) throw UsageError(fmt::format("'{}': the trajectory starts at 0", text));
+  constexpr double kLatest_s = 3600.0;
+  if (parsed.after_s < 0.0 || parsed.after_s > kLatest_s) {
+    throw UsageError(fmt::format("'{}': the time must lie between 0 and {:g} s", text, kLatest_s));
+  }
   return parsed;
 }
 
@@ -40,6 +44,12 @@ LoadAt parse_load(std::string_view text) {
 ParameterSetting parse_setting(std::string_view text) {
   const auto [name, value] = split(text, '=', "NAME=VALUE");
   return {.name = std::string(name), .value = number(value, text)};
+}
+
+/// For unsigned options: without it -1 is 2^64 - 1.
+CLI::Validator not_negative() {
+  return {[](std::string& text) { return text.starts_with('-') ? text + " is negative" : std::string(); },
+          ""};
 }
 
 /// Everything the command line can say, and what to do about it.
@@ -118,11 +128,14 @@ struct CommandLine {
     CLI::App* sub = add_linked("watch", "live values of an axis");
     sub->add_option("--axis", watch.axis, "number or name")->capture_default_str();
     sub->add_option("--signals", watch.signals, "names, separated by commas")->delimiter(',');
-    sub->add_option("--rate", watch.rate_hz, "samples per second of the bench's time")
-        ->check(CLI::PositiveNumber)
+    sub->add_option("--rate", watch.rate_hz, "samples per second of the bench's time")->capture_default_str();
+    sub->add_option("--count", watch.count, "end after so many samples; 0: never")
+        ->check(not_negative())
         ->capture_default_str();
-    sub->add_option("--count", watch.count, "end after so many samples; 0: never")->capture_default_str();
     sub->callback([this] {
+      if (!std::isfinite(watch.rate_hz) || watch.rate_hz <= 0.0) {
+        throw UsageError(fmt::format("--rate {} is not a number above 0", watch.rate_hz));
+      }
       watch.link = link;
       watch.json = json;
       action = [this] { return run_watch(watch); };
@@ -163,8 +176,8 @@ struct CommandLine {
     sub->add_option("--out", export_.out_file, "instead of standard output");
     sub->add_option("--axis", export_.axis, "name; default: the first in the file");
     sub->add_option("--signals", export_.signals, "names, separated by commas")->delimiter(',');
-    sub->add_option("--from", export_.from_tick, "first tick");
-    sub->add_option("--to", export_.to_tick, "last tick");
+    sub->add_option("--from", export_.from_tick, "first tick")->check(not_negative());
+    sub->add_option("--to", export_.to_tick, "last tick")->check(not_negative());
     sub->footer("Exit code 3: the recording ends early; what is there was written.");
     sub->callback([this] {
       export_.json = json;

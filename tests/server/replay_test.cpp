@@ -219,6 +219,18 @@ TEST(Replay, AMissingOrDoubledSampleIsADifference) {
   }
 }
 
+// Catches: samples that are only counted: one of an axis twice in the place of another axis's.
+TEST(Replay, ASampleInThePlaceOfAnotherAxisIsADifference) {
+  Entry first;
+  const ReplayReport report = replayed(rewritten(record(20), [&first](Entry& entry) {
+    if (entry.topic == "/axis0/sample") first = entry;
+    if (entry.topic == "/axis1/sample" && decode_sample(entry.payload)->tick == 7) entry = first;
+    return true;
+  }));
+  EXPECT_EQ(report.result, Result::kDifferent);
+  EXPECT_NE(report.problem.find("axis0 at tick 7"), std::string::npos) << report.problem;
+}
+
 // Catches: a tick number that is believed.
 TEST(Replay, ASampleOfAnotherTickIsADifference) {
   const Bytes recording = record(20);
