@@ -8,7 +8,7 @@
 namespace drivebench::wire {
 
 /// Building blocks of the protobuf wire format, for the few messages that are sent at tick rate.
-enum Type : std::uint32_t { kVarint = 0, kFixed64 = 1, kBytes = 2, kFixed32 = 5 };
+enum Type : std::uint32_t { kVarint = 0, kFixed64 = 1, kBytes = 2 };
 
 constexpr std::uint64_t tag(std::uint32_t field, Type type) noexcept {
   return field << 3 | type;
@@ -20,10 +20,6 @@ constexpr std::uint64_t zigzag(std::int64_t value) noexcept {
 
 constexpr std::int64_t unzigzag(std::uint64_t value) noexcept {
   return static_cast<std::int64_t>(value >> 1 ^ (~(value & 1) + 1));
-}
-
-constexpr std::size_t varint_size(std::uint64_t value) noexcept {
-  return static_cast<std::size_t>(std::bit_width(value | 1) + 6) / 7;
 }
 
 inline std::byte* put_varint(std::byte* out, std::uint64_t value) noexcept {

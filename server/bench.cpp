@@ -91,7 +91,7 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
     return refused;
   }
   if (const auto* lease = std::get_if<LeaseAction>(&input.action))
-    return change_lease(a, *lease, input.owner);
+    return change_lease(input.axis, *lease, input.owner);
   if (const auto* load = std::get_if<LoadChange>(&input.action)) {
     if (!std::isfinite(load->load_nm)) return Refused::kNotFinite;
     a.axis.set_load(load->load_nm, tick_, load->ramp_ticks);
@@ -120,7 +120,7 @@ Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& comman
     return Refused::kNotFinite;
   }
   if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
-  return (a.axis.state().faults & kLatchedFaults) != 0 ? Refused::kLatched : Refused::kNot;
+  return is_latched(axis) && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
 }
 
 Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noexcept {
@@ -135,8 +135,8 @@ Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noe
   return Refused::kNot;
 }
 
-Refused Bench::change_lease(AxisRuntime& a, LeaseAction action, Owner owner) noexcept {
-  Control& c = a.control;
+Refused Bench::change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept {
+  Control& c = axes_[axis].control;
   if (owner == 0) return Refused::kNotOwner;
   if (action == LeaseAction::kAcquire) {
     if (c.owner != 0 && c.owner != owner) return Refused::kOwned;
@@ -146,15 +146,36 @@ Refused Bench::change_lease(AxisRuntime& a, LeaseAction action, Owner owner) noe
   }
   if (owner != c.owner) return Refused::kNotOwner;
   c.renewed = tick_;
-  if (action == LeaseAction::kRelease) lose_controller(a, 0);
-  if (action == LeaseAction::kLost) lose_controller(a, kLeaseLost);
+  if (action == LeaseAction::kRelease) lose_controller(axis, 0);
+  if (action == LeaseAction::kLost) lose_controller(axis, kLeaseLost);
   return Refused::kNot;
 }
 
-void Bench::lose_controller(AxisRuntime& a, std::uint64_t fault) noexcept {
+void Bench::lose_controller(std::size_t axis, std::uint64_t fault) noexcept {
+  AxisRuntime& a = axes_[axis];
+  forget_scheduled(axis, a.control.owner);
   const bool was_active = a.control.state == ControlState::kRun || a.control.state == ControlState::kHold;
   if (was_active) a.axis.latch(fault);
   a.control = {.missed = a.control.missed, .refused = a.control.refused};
+}
+
+void Bench::forget_scheduled(std::size_t axis, Owner owner) noexcept {
+  const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
+  const auto kept = std::remove_if(schedule_.begin(), end, [axis, owner](const PackedInput& input) {
+    return input.axis == axis && input.owner == owner;
+  });
+  std::fill(kept, end, PackedInput{});
+  scheduled_ = static_cast<std::uint64_t>(kept - schedule_.begin());
+}
+
+void Bench::dismiss_controllers() noexcept {
+  bool dismissed = false;
+  for (std::uint32_t axis = 0; axis < axes_.size(); ++axis) {
+    if (owner(axis) == 0) continue;
+    submit({.tick = tick_, .axis = axis, .owner = owner(axis), .action = LeaseAction::kLost});
+    dismissed = true;
+  }
+  if (dismissed) step();
 }
 
 PhaseCommand Bench::safe_command(const AxisRuntime& a) const noexcept {
@@ -162,9 +183,10 @@ PhaseCommand Bench::safe_command(const AxisRuntime& a) const noexcept {
           .voltage_v = {}};
 }
 
-PhaseCommand Bench::supervise(AxisRuntime& a) noexcept {
+PhaseCommand Bench::supervise(std::size_t axis) noexcept {
+  AxisRuntime& a = axes_[axis];
   Control& c = a.control;
-  if (c.owner != 0 && tick_ - c.renewed >= setup_.lease_ticks) lose_controller(a, kLeaseLost);
+  if (c.owner != 0 && tick_ - c.renewed >= setup_.lease_ticks) lose_controller(axis, kLeaseLost);
   if (c.fresh != 0) {
     c.silent_ticks = 0;
     c.state = ControlState::kRun;
@@ -190,8 +212,8 @@ PhaseCommand Bench::supervise(AxisRuntime& a) noexcept {
 void Bench::step() noexcept {
   apply_due();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
-    AxisRuntime& a = axes_[i];
-    a.axis.advance(supervise(a), tick_);
+    const PhaseCommand command = supervise(i);
+    axes_[i].axis.advance(command, tick_);
   }
   ++tick_;
   late_now_ = 0;

@@ -66,6 +66,15 @@ class Bench {
   /// One tick: inputs that are due, commands, plant, sensors.
   void step() noexcept;
 
+  /// Takes every lease back and, if there was one, runs a tick of safe action: the end of a run.
+  void dismiss_controllers() noexcept;
+
+  /// Whether a latched fault is in force on an axis. Its commands are refused, except those with the gates
+  /// off.
+  bool is_latched(std::size_t axis) const noexcept {
+    return (axes_[axis].axis.state().faults & kLatchedFaults) != 0;
+  }
+
   /// Why a command for the present tick would be turned away.
   Refused would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept;
 
@@ -110,10 +119,11 @@ class Bench {
   Refused apply(const Input& input) noexcept;
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
   Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
-  Refused change_lease(AxisRuntime& a, LeaseAction action, Owner owner) noexcept;
-  void lose_controller(AxisRuntime& a, std::uint64_t fault) noexcept;
+  Refused change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept;
+  void lose_controller(std::size_t axis, std::uint64_t fault) noexcept;
   void apply_due() noexcept;
-  PhaseCommand supervise(AxisRuntime& a) noexcept;
+  void forget_scheduled(std::size_t axis, Owner owner) noexcept;
+  PhaseCommand supervise(std::size_t axis) noexcept;
   void take_sample(std::size_t index) noexcept;
   PhaseCommand safe_command(const AxisRuntime& a) const noexcept;
 

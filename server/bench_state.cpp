@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "plant/parameters.hpp"
 #include "server/bench.hpp"
@@ -99,7 +100,13 @@ bool Bench::restore(std::span<const std::byte> saved) {
   if (word != kMagic) return false;
   take(word);
   if (word != setup_hash(setup_)) return false;
-  for_each_block(*this, take);
+  Bench restored(*this);
+  for_each_block(restored, take);
+  if (restored.scheduled_ > kMaxScheduled) return false;
+  for (const PackedInput& input : restored.schedule_) {
+    if (input.axis >= axes_.size()) return false;
+  }
+  *this = std::move(restored);
   return true;
 }
 

@@ -45,6 +45,8 @@ class Engine {
 
   /// Called after each tick, when newest() has changed.
   std::function<void()> on_tick;
+  /// Called after on_tick, when there is no newer tick that on_tick has not told of yet.
+  std::function<void()> on_newest;
   /// Called once, when a run that has an end has reached it.
   std::function<void()> on_end;
 

@@ -124,7 +124,11 @@ void encode_verdict(const Verdict& verdict, v1::Verdict& message) {
   message.set_exact(verdict.exact());
   message.set_realtime_valid(verdict.realtime_valid());
   message.set_late_ticks(verdict.late_ticks);
-  message.set_worst_lateness_s(static_cast<double>(verdict.lateness_worst_ns) * 1e-9);
+  message.set_worst_lateness_s(static_cast<double>(verdict.lateness.worst_ns()) * 1e-9);
+  if (verdict.mode == RunMode::kRealtime) {
+    for (const std::uint64_t count : verdict.lateness.buckets())
+      message.add_lateness_counts(count);
+  }
   message.set_gaps(verdict.gaps);
   message.set_state_hash(verdict.state_hash);
   message.set_sentence(verdict.sentence());

@@ -24,8 +24,7 @@ class LockstepEngine final : public Engine {
   void advance() override {
     bool commanded = false;
     for (std::size_t i = 0; i < bench_.axis_count(); ++i) {
-      const bool latched = (bench_.sample(i).faults & kLatchedFaults) != 0;
-      if (bench_.owner(i) != 0 && !bench_.has_command(i) && !latched) return;
+      if (bench_.owner(i) != 0 && !bench_.has_command(i) && !bench_.is_latched(i)) return;
       commanded = commanded || bench_.has_command(i);
     }
     if (!commanded) return;  // without a controller a lockstep bench stands still
@@ -33,6 +32,7 @@ class LockstepEngine final : public Engine {
     bench_.step();
     show();
     if (on_tick) on_tick();
+    if (on_newest) on_newest();
   }
 
   void request(const Input& input, Answer answer) override {
@@ -42,6 +42,7 @@ class LockstepEngine final : public Engine {
   }
 
   Verdict stop() override {
+    bench_.dismiss_controllers();
     Verdict verdict{.mode = RunMode::kLockstep,
                     .ticks = static_cast<std::uint64_t>(bench_.tick()),
                     .state_hash = bench_.state_hash()};

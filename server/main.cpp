@@ -1,15 +1,14 @@
-#include <fcntl.h>
 #include <fmt/core.h>
+#include <google/protobuf/stubs/logging.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <nlohmann/json.hpp>
 
+#include "protocols/mapped_file.hpp"
 #include "server/asio.hpp"
 #include "server/build_id.hpp"
 #include "server/config.hpp"
@@ -54,6 +53,15 @@ BenchConfig configure(const Options& o) {
   if (o.port >= 0) config.tcp.port = static_cast<std::uint16_t>(o.port);
   if (!o.unix_path.empty()) config.tcp.unix_path = o.unix_path;
   if (o.command_delay_ticks >= 0) config.setup.command_delay_ticks = o.command_delay_ticks;
+  // Written so that NaN is refused, which CLI11 lets pass.
+  if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
+    throw std::runtime_error("--duration: a lockstep run ends when its controller does");
+  }
+  if (!(o.duration_s <= 1e9)) throw std::runtime_error("--duration: must be at most 1e9 s");
+  if (config.mode == RunMode::kRealtime && config.setup.command_delay_ticks == 0) {
+    throw std::runtime_error(
+        "--command-delay-ticks 0: in real time a command holds from the next tick on, 1");
+  }
   return config;
 }
 
@@ -70,21 +78,34 @@ void print_ready(const Options& o, const BenchConfig& config, const StreamServer
                          name_of(config.mode), config.name));
 }
 
+/// The buckets that are not empty, as [upper edge in us, count].
+nlohmann::json lateness_rows(const LatenessHistogram& lateness) {
+  nlohmann::json rows = nlohmann::json::array();
+  double edge_us = static_cast<double>(LatenessHistogram::kFirstEdgeNs) * 1e-3;
+  for (const std::uint64_t count : lateness.buckets()) {
+    if (count > 0) rows.push_back({edge_us, count});
+    edge_us *= 2.0;
+  }
+  return rows;
+}
+
 void print_verdict(const Options& o, const Verdict& v) {
   if (o.json) {
-    const nlohmann::json verdict{{"event", "verdict"},
-                                 {"mode", name_of(v.mode)},
-                                 {"ticks", v.ticks},
-                                 {"late_ticks", v.late_ticks},
-                                 {"lateness_p50_us", static_cast<double>(v.lateness_p50_ns) * 1e-3},
-                                 {"lateness_p99_us", static_cast<double>(v.lateness_p99_ns) * 1e-3},
-                                 {"worst_lateness_us", static_cast<double>(v.lateness_worst_ns) * 1e-3},
-                                 {"exact", v.exact()},
-                                 {"realtime_valid", v.realtime_valid()},
-                                 {"gaps", v.gaps},
-                                 {"state_hash", fmt::format("{:016x}", v.state_hash)},
-                                 {"recording", o.record},
-                                 {"sentence", v.sentence()}};
+    const nlohmann::json verdict{
+        {"event", "verdict"},
+        {"mode", name_of(v.mode)},
+        {"ticks", v.ticks},
+        {"late_ticks", v.late_ticks},
+        {"lateness_p50_us", static_cast<double>(v.lateness.percentile_ns(0.5)) * 1e-3},
+        {"lateness_p99_us", static_cast<double>(v.lateness.percentile_ns(0.99)) * 1e-3},
+        {"worst_lateness_us", static_cast<double>(v.lateness.worst_ns()) * 1e-3},
+        {"lateness_histogram", lateness_rows(v.lateness)},
+        {"exact", v.exact()},
+        {"realtime_valid", v.realtime_valid()},
+        {"gaps", v.gaps},
+        {"state_hash", fmt::format("{:016x}", v.state_hash)},
+        {"recording", o.record},
+        {"sentence", v.sentence()}};
     return print_line(verdict.dump());
   }
   print_line(fmt::format("{}; state hash {:016x}", v.sentence(), v.state_hash));
@@ -112,52 +133,33 @@ int serve(const Options& o) {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   asio::io_context io(1);
-  asio::signal_set signals(io, SIGINT, SIGTERM);
+  asio::signal_set signals(io, SIGINT, SIGTERM, SIGHUP);
   signals.async_wait([&io](const boost::system::error_code& error, int) {
     if (!error) io.stop();
   });
+  StreamServer server(io, config.tcp);  // first: a port in use must not leave a recording behind
   const std::unique_ptr<Engine> engine = make_engine(o, config, io);
-  StreamServer server(io, *engine, config.tcp);
-  engine->on_tick = [&server] { server.on_tick(); };
+  server.serve(*engine);
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
     spdlog::warn("{}", note);
   print_ready(o, config, server);
-  io.run();
-  signals.cancel();
+  bool broken = false;
+  try {
+    io.run();
+  } catch (const std::exception& error) {
+    spdlog::critical("the run ends: {}", error.what());
+    broken = true;
+  }
+  signals.clear();  // from here on a second signal ends the program at once
   const Verdict verdict = engine->stop();
   server.close();
   print_verdict(o, verdict);
+  if (broken || verdict.gaps > 0) return kFailed;
   const bool too_late =
       o.fail_on_late >= 0 && verdict.late_ticks > static_cast<std::uint64_t>(o.fail_on_late);
   return too_late ? kTooLate : kOk;
 }
-
-/// A whole file, mapped for reading.
-class MappedFile {
- public:
-  explicit MappedFile(const std::string& path) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    struct stat info {};
-    if (descriptor < 0 || ::fstat(descriptor, &info) != 0) {
-      throw std::system_error(errno, std::generic_category(), "cannot read " + path);
-    }
-    size_ = static_cast<std::size_t>(info.st_size);
-    if (size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
-    ::close(descriptor);
-    if (data_ == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "cannot map " + path);
-  }
-  ~MappedFile() {
-    if (data_ != nullptr) ::munmap(data_, size_);
-  }
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
-  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
-
- private:
-  void* data_ = nullptr;
-  std::size_t size_ = 0;
-};
 
 nlohmann::json as_json(const ReplayReport& report) {
   using Result = ReplayReport::Result;
@@ -248,6 +250,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_logger_mt("drivebench"));
+  google::protobuf::SetLogHandler(nullptr);  // a peer could fill the log with text that is not UTF-8
   try {
     return drivebench::run(argc, argv);
   } catch (const std::exception& error) {

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <system_error>
 #include <utility>
@@ -25,10 +26,14 @@ constexpr auto kFlushInterval = std::chrono::milliseconds(100);
 constexpr auto kSyncInterval = std::chrono::seconds(1);
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
+/// At most a quarter of a gigabyte, whatever the configuration asks for.
+constexpr std::size_t kMaxRingEntries = std::size_t{1} << 20;
+
 /// Two seconds of entries: one sample of each axis and a few inputs for each tick.
 std::size_t ring_capacity(const BenchConfig& config) {
   const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
-  return static_cast<std::size_t>(ticks * static_cast<double>(config.axes.size())) + 1024;
+  const auto entries = static_cast<std::size_t>(ticks * static_cast<double>(config.axes.size())) + 1024;
+  return std::min(entries, kMaxRingEntries);
 }
 
 std::span<const std::byte> bytes_of(std::string_view text) {
@@ -97,6 +102,16 @@ class Recorder::File {
     if (::fdatasync(descriptor_) != 0) failed_ = true;
   }
   bool failed() const { return failed_; }
+
+  /// Does something with the file that may run out of memory; that is a failure like that of a disk.
+  template <class Action>
+  void attempt(Action action) noexcept {
+    try {
+      action(*this);
+    } catch (const std::exception&) {
+      failed_ = true;
+    }
+  }
 
   /// Entries that were given to write() and will never reach the file; each is told once.
   std::uint64_t take_lost() { return failed_ ? std::exchange(unsaved_, 0) : 0; }
@@ -169,14 +184,14 @@ void Recorder::wait_for_room() noexcept {
     std::this_thread::sleep_for(std::chrono::microseconds(50));
 }
 
-bool Recorder::drain() {
+bool Recorder::drain() noexcept {
   bool any = false;
   for (const Entry* entry = ring_.front(); entry != nullptr; entry = ring_.front()) {
     any = true;
     if (writer_->failed()) {
       gaps_.fetch_add(1, std::memory_order_relaxed);
     } else {
-      std::visit([this](const auto& e) { writer_->write(e); }, *entry);
+      writer_->attempt([&](File& file) { std::visit([&file](const auto& e) { file.write(e); }, *entry); });
     }
     ring_.pop();
   }
@@ -191,7 +206,7 @@ void Recorder::run() {
     if (!drain()) std::this_thread::sleep_for(kIdleSleep);
     const auto now = Clock::now();
     if (now - last_flush >= kFlushInterval) {
-      writer_->flush();
+      writer_->attempt([](File& file) { file.flush(); });
       count_lost();
       last_flush = now;
     }

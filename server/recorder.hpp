@@ -53,7 +53,7 @@ class Recorder final : public BenchObserver {
 
   void push(const Entry& entry) noexcept;
   void run();
-  bool drain();
+  bool drain() noexcept;
   void count_lost();
 
   std::string file_;

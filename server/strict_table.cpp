@@ -144,6 +144,10 @@ std::vector<StrictTable> StrictTable::tables(std::string_view key, std::size_t m
            "is " + described(*node) + " but must be a list of tables, each headed [[" + path_of(key) + "]]");
     return result;
   }
+  if (node->children.empty()) {
+    report(key, "is empty; leave it out or give it a table, headed [[" + path_of(key) + "]]");
+    return result;
+  }
   if (node->children.size() > most) {
     report(key, "occurs " + std::to_string(node->children.size()) + " times but may occur at most " +
                     std::to_string(most) + " times");

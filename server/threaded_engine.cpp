@@ -68,6 +68,7 @@ class ThreadedEngine final : public Engine {
         tap_(recorder_.get(), events_),
         bench_(config_.setup, &tap_),
         mailboxes_(config_.axes.size()),
+        sent_(config_.axes.size()),
         wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         pacer_(config_.mode == RunMode::kRealtime
                    ? make_realtime_pacer(config_.realtime.pacer, config_.setup.period_ns)
@@ -92,8 +93,12 @@ class ThreadedEngine final : public Engine {
     if (owner == 0 || newest.owner != owner) return Refused::kNotOwner;
     const TwoPhase& voltage_v = command.phases.voltage_v;
     if (!std::isfinite(voltage_v.a) || !std::isfinite(voltage_v.b)) return Refused::kNotFinite;
-    if ((newest.faults & kLatchedFaults) != 0) return Refused::kLatched;
-    return command.answers > static_cast<Tick>(newest.tick) ? Refused::kStale : Refused::kNot;
+    const bool repeated = sent_[axis].owner == owner && command.answers <= sent_[axis].command.answers;
+    if (repeated || command.answers < 0 || command.answers > static_cast<Tick>(newest.tick)) {
+      return Refused::kStale;
+    }
+    const bool latched = (newest.faults & kLatchedFaults) != 0;
+    return latched && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
   }
 
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
@@ -102,7 +107,8 @@ class ThreadedEngine final : public Engine {
       request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
       return why;
     }
-    mailboxes_[axis].write({.owner = owner, .command = command});
+    sent_[axis] = {.owner = owner, .command = command};
+    mailboxes_[axis].write(sent_[axis]);
     return why;
   }
 
@@ -116,12 +122,11 @@ class ThreadedEngine final : public Engine {
   Verdict stop() override {
     stop_.store(true);
     thread_.join();
+    bench_.dismiss_controllers();
     Verdict verdict{.mode = config_.mode,
                     .ticks = static_cast<std::uint64_t>(bench_.tick()),
                     .late_ticks = bench_.sample(0).late_ticks,
-                    .lateness_p50_ns = lateness_.percentile_ns(0.5),
-                    .lateness_p99_ns = lateness_.percentile_ns(0.99),
-                    .lateness_worst_ns = lateness_.worst_ns(),
+                    .lateness = lateness_,
                     .state_hash = bench_.state_hash()};
     if (recorder_) {
       recorder_->finish(verdict);
@@ -208,13 +213,15 @@ class ThreadedEngine final : public Engine {
   }
 
   void drain_events() {
+    const Tick before = tick();
     for (std::size_t n = 0; n < events_.capacity(); ++n) {
       const Event* event = events_.front();
-      if (event == nullptr) return;
+      if (event == nullptr) break;
       const Event copy = *event;
       events_.pop();
       std::visit([this](const auto& e) { handle(e); }, copy);
     }
+    if (tick() != before && on_newest) on_newest();
   }
 
   void handle(const TickedSample& s) {
@@ -248,6 +255,7 @@ class ThreadedEngine final : public Engine {
   Tap tap_;
   Bench bench_;
   std::deque<Mailbox<OwnedCommand>> mailboxes_;
+  std::vector<OwnedCommand> sent_;  // the last command put into each mailbox
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
   std::deque<Answer> answers_;    // of the requests in flight, in order

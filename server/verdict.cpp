@@ -7,9 +7,9 @@ namespace {
 
 std::string timing(const Verdict& v) {
   const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
-  const std::string lateness =
-      fmt::format("lateness p50 {:.1f} us, p99 {:.1f} us, worst {:.1f} us", us(v.lateness_p50_ns),
-                  us(v.lateness_p99_ns), us(v.lateness_worst_ns));
+  const std::string lateness = fmt::format(
+      "lateness p50 below {:.1f} us, p99 below {:.1f} us, worst {:.1f} us", us(v.lateness.percentile_ns(0.5)),
+      us(v.lateness.percentile_ns(0.99)), us(v.lateness.worst_ns()));
   switch (v.mode) {
     case RunMode::kRealtime:
       if (v.late_ticks == 0)

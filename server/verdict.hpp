@@ -4,6 +4,7 @@
 #include <string>
 
 #include "server/config.hpp"
+#include "server/pacer.hpp"
 
 namespace drivebench {
 
@@ -12,10 +13,8 @@ struct Verdict {
   RunMode mode = RunMode::kLockstep;
   std::uint64_t ticks = 0;
   std::uint64_t late_ticks = 0;
-  std::int64_t lateness_p50_ns = 0;
-  std::int64_t lateness_p99_ns = 0;
-  std::int64_t lateness_worst_ns = 0;
-  std::uint64_t gaps = 0;  ///< entries that the recorder lost
+  LatenessHistogram lateness{};  ///< empty outside real time
+  std::uint64_t gaps = 0;      ///< entries that the recorder lost
   std::uint64_t state_hash = 0;
 
   /// Every sample follows from the recorded inputs alone, and the recording has them all.

@@ -44,19 +44,27 @@ void apply_settings(link::Link& bench, std::uint32_t axis, const std::vector<Par
   }
 }
 
-/// Leased and without latched faults, or an exception that says what to do.
-void prepare(link::Link& bench, std::uint32_t axis, const ControlOptions& options) {
+void refuse_latched_faults(link::Link& bench, std::uint32_t axis) {
+  const v1::BenchDescription& description = bench.welcome().bench();
+  const std::uint64_t latched = latched_faults(description, sample_of(bench.exchange({}), axis).faults());
+  if (latched == 0) return;
+  throw UsageError(
+      fmt::format("the axis has latched {}; --clear clears it", fault_names(description, latched)));
+}
+
+/// Leased, without latched faults and at rest, or an exception that says what to do. The load at that time.
+double prepare(link::Link& bench, std::uint32_t axis, const ControlOptions& options) {
   bench.acquire(axis);
   if (options.clear_faults) {
     bench.clear_faults(axis);
-    return;
+  } else {
+    refuse_latched_faults(bench, axis);
   }
-  const v1::BenchDescription& description = bench.welcome().bench();
-  const std::uint64_t latched = latched_faults(description, sample_of(bench.exchange({}), axis).faults());
-  if (latched != 0) {
-    throw UsageError(
-        fmt::format("the axis has latched {}; --clear clears it", fault_names(description, latched)));
-  }
+  apply_settings(bench, axis, options.settings);
+  const double load_nm = let_rest(bench, axis);
+  // In lockstep no tick may have run since a fault came, so that no sample showed it before.
+  if (bench.welcome().bench().mode() == v1::MODE_LOCKSTEP) refuse_latched_faults(bench, axis);
+  return load_nm;
 }
 
 /// Open before the move, so that a report is not lost to a folder that does not exist.
@@ -112,9 +120,7 @@ int run_control(const ControlOptions& options) {
   std::ofstream csv = opened(options.csv_file);
 
   catch_interrupts();
-  prepare(bench, axis, options);
-  apply_settings(bench, axis, options.settings);
-  const double load_before_nm = let_rest(bench, axis);
+  const double load_before_nm = prepare(bench, axis, options);
   const ServoRun run = run_servo_move(bench, axis, preset, options.loads);
   if (!options.loads.empty()) bench.set_load(axis, {.load_nm = load_before_nm});
   try {

@@ -1,7 +1,4 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -16,8 +13,8 @@
 #include "clients/command/commands.hpp"
 #include "clients/command/json.hpp"
 #include "clients/command/session.hpp"
-#include "clients/link/file_descriptor.hpp"
 #include "protocols/catalogue.hpp"
+#include "protocols/mapped_file.hpp"
 #include "protocols/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 
@@ -28,32 +25,13 @@ std::string system_reason() {
   return std::generic_category().message(errno);
 }
 
-/// A file's bytes, read only.
-class MappedFile {
- public:
-  explicit MappedFile(const std::string& path) {
-    const link::FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    struct stat info = {};
-    if (!file.is_open() || ::fstat(file.get(), &info) != 0) {
-      throw UsageError(fmt::format("cannot read {}: {}", path, system_reason()));
-    }
-    size_ = static_cast<std::size_t>(info.st_size);
-    if (size_ == 0) return;
-    start_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file.get(), 0);
-    if (start_ == MAP_FAILED) throw UsageError(fmt::format("cannot read {}: {}", path, system_reason()));
+MappedFile opened(const std::string& path) {
+  try {
+    return MappedFile(path);
+  } catch (const std::system_error& error) {
+    throw UsageError(error.what());
   }
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
-  ~MappedFile() {
-    if (size_ != 0) ::munmap(start_, size_);
-  }
-
-  std::span<const std::byte> bytes() const noexcept { return {static_cast<const std::byte*>(start_), size_}; }
-
- private:
-  void* start_ = nullptr;
-  std::size_t size_ = 0;
-};
+}
 
 /// Standard output or a file.
 class Output {
@@ -191,7 +169,7 @@ Exported export_rows(McapReader& reader, const ExportOptions& options,
 }  // namespace
 
 int run_export(const ExportOptions& options) {
-  const MappedFile file(options.recording);
+  const MappedFile file = opened(options.recording);
   McapReader reader(file.bytes());
   const std::vector<const Signal*> signals = chosen_signals(options.signals);
   check_files(reader, options);

@@ -61,6 +61,10 @@ asio::awaitable<void> Session::run() {
 }
 
 bool Session::handle(std::span<const std::byte> frame) {
+  constexpr std::size_t kOrdinaryFrame = 4096;
+  if (last_frame_ > kOrdinaryFrame)
+    request_ = v1::Envelope();  // it keeps the memory of the largest frame so far
+  last_frame_ = frame.size();
   if (!request_.ParseFromArray(frame.data(), static_cast<int>(frame.size()))) {
     refuse(0, v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
     return false;
@@ -142,12 +146,14 @@ void Session::turn_away(std::string_view sentence) {
   refuse(0, v1::REFUSAL_BUSY, std::string(sentence), "session");
 }
 
+void Session::on_newest() {
+  if (!waiting_) return;
+  const WaitingExchange waiting = std::move(*waiting_);
+  waiting_.reset();
+  reply_exchange(waiting.id, waiting.axes);
+}
+
 void Session::on_tick() {
-  if (waiting_) {
-    const WaitingExchange waiting = std::move(*waiting_);
-    waiting_.reset();
-    reply_exchange(waiting.id, waiting.axes);
-  }
   if (subscriptions_.empty()) return;
   for (Subscription& s : subscriptions_) {
     const Sample& newest = engine_.newest(s.axis);

@@ -34,8 +34,11 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Reads and answers until the peer or an error ends the session, then gives its leases back.
   asio::awaitable<void> run();
 
-  /// After each tick: answers a waiting exchange, serves subscriptions.
+  /// After each tick: serves subscriptions.
   void on_tick();
+  /// When newest() of the engine is up to date: answers a waiting exchange.
+  void on_newest();
+  bool greeted() const noexcept { return greeted_; }
 
   /// Refuses the connection itself, before anything was read.
   void turn_away(std::string_view sentence);
@@ -66,6 +69,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool greet(const v1::Hello& hello);
   void lease(const v1::LeaseRequest& request);
   void exchange(const v1::Exchange& request);
+  void abandon_exchange(std::uint32_t axis);
   void subscribe(const v1::Subscribe& request);
   void read_parameters(const v1::ReadParameters& request);
   void write_parameter(const v1::WriteParameter& request);
@@ -93,6 +97,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Engine& engine_;
   FrameReader reader_;
   v1::Envelope request_;
+  std::size_t last_frame_ = 0;
   v1::Envelope reply_;
   std::vector<std::byte> scratch_;
   std::vector<AxisSampleView> views_;

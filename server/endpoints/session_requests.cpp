@@ -103,8 +103,18 @@ void Session::lease(const v1::LeaseRequest& r) {
   request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, "axis",
           [this, axis = r.axis(), action] {
             leased_[axis] = action != LeaseAction::kRelease;
+            if (!leased_[axis]) abandon_exchange(axis);
             if (over_) give_leases_back();  // the peer left before the bench answered
           });
+}
+
+/// An exchange that waits for a tick of an axis that has just been released would wait for ever.
+void Session::abandon_exchange(std::uint32_t axis) {
+  if (!waiting_ || std::find(waiting_->axes.begin(), waiting_->axes.end(), axis) == waiting_->axes.end())
+    return;
+  const std::uint64_t id = waiting_->id;
+  waiting_.reset();
+  refuse(id, Refused::kNotOwner, "commands");
 }
 
 void Session::exchange(const v1::Exchange& r) {
@@ -147,7 +157,7 @@ void Session::subscribe(const v1::Subscribe& r) {
   Subscription wanted;
   wanted.axis = r.axis();
   wanted.decimation = r.decimation();
-  wanted.last_tick = static_cast<std::uint64_t>(engine_.tick());
+  wanted.last_tick = engine_.newest(r.axis()).tick;
   if (r.signals_size() > 0) wanted.mask = 0;
   for (const std::string& name : r.signals()) {
     const Signal* signal = find_signal(name);

@@ -4,6 +4,7 @@
 #include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 
@@ -18,6 +19,7 @@ constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 // A peer that vanished without a word is noticed after this time when something is on its way to it.
 constexpr int kUserTimeoutMs = 3000;
 constexpr int kSendBufferBytes = 64 * 1024;
+constexpr std::ptrdiff_t kMaxSilentSessions = 32;
 
 tcp::endpoint endpoint_of(const TcpConfig& config) {
   const std::string address = config.address == "localhost" ? "127.0.0.1" : config.address;
@@ -66,12 +68,8 @@ void make_way(asio::io_context& io, const std::string& path) {
 
 }  // namespace
 
-StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig& config)
-    : io_(io),
-      config_(config),
-      context_{engine, config.token, [this] { return sessions_.size(); }},
-      tcp_(io),
-      unix_(io) {
+StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config)
+    : io_(io), config_(config), tcp_(io), unix_(io) {
   try {
     const tcp::endpoint endpoint = endpoint_of(config);
     tcp_.open(endpoint.protocol());
@@ -82,7 +80,6 @@ StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig
     throw std::runtime_error("cannot listen on " + config.address + ":" + std::to_string(config.port) + ": " +
                              error.code().message());
   }
-  asio::co_spawn(io_, accept_from(tcp_), asio::detached);
   if (config.unix_path.empty()) return;
   make_way(io_, config.unix_path);
   try {
@@ -92,7 +89,21 @@ StreamServer::StreamServer(asio::io_context& io, Engine& engine, const TcpConfig
   } catch (const boost::system::system_error& error) {
     throw std::runtime_error("cannot listen on unix:" + config.unix_path + ": " + error.code().message());
   }
-  asio::co_spawn(io_, accept_from(unix_), asio::detached);
+}
+
+void StreamServer::serve(Engine& engine) {
+  context_.emplace(SessionContext{engine, config_.token, [this] { return sessions_.size(); }});
+  // By index: a session may be added while another one answers; none is removed.
+  engine.on_tick = [this] {
+    for (std::size_t i = 0; i < sessions_.size(); ++i)
+      sessions_[i]->on_tick();
+  };
+  engine.on_newest = [this] {
+    for (std::size_t i = 0; i < sessions_.size(); ++i)
+      sessions_[i]->on_newest();
+  };
+  asio::co_spawn(io_, accept_from(tcp_), asio::detached);
+  if (unix_.is_open()) asio::co_spawn(io_, accept_from(unix_), asio::detached);
 }
 
 StreamServer::~StreamServer() {
@@ -118,24 +129,36 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
       co_await pause.async_wait(asio::use_awaitable);
       continue;
     }
-    tune(socket);
-    std::string peer = peer_name(socket);
-    start(Socket(std::move(socket)), std::move(peer));
+    try {
+      tune(socket);
+      std::string peer = peer_name(socket);
+      start(Socket(std::move(socket)), std::move(peer));
+    } catch (const std::exception& problem) {
+      spdlog::error("a client could not be taken: {}", problem.what());
+    }
   }
 }
 
 void StreamServer::start(Socket socket, std::string peer) {
-  auto session = std::make_shared<Session>(std::move(socket), std::move(peer), context_);
+  auto session = std::make_shared<Session>(std::move(socket), std::move(peer), *context_);
+  const auto silent =
+      std::count_if(sessions_.begin(), sessions_.end(), [](const auto& other) { return !other->greeted(); });
+  std::string why_not;
   if (sessions_.size() >= config_.max_sessions) {
-    session->turn_away("this bench serves " + std::to_string(config_.max_sessions) + " sessions at most");
+    why_not = "this bench serves " + std::to_string(config_.max_sessions) + " sessions at most";
+  } else if (silent >= kMaxSilentSessions) {
+    why_not = "too many sessions have not said hello yet";
+  }
+  if (!why_not.empty()) {
+    session->turn_away(why_not);
     session->close();
     return;
   }
   sessions_.push_back(session);
-  asio::co_spawn(io_, serve(std::move(session)), asio::detached);
+  asio::co_spawn(io_, run(std::move(session)), asio::detached);
 }
 
-asio::awaitable<void> StreamServer::serve(std::shared_ptr<Session> session) {
+asio::awaitable<void> StreamServer::run(std::shared_ptr<Session> session) {
   try {
     co_await session->run();
   } catch (const std::exception& error) {
@@ -143,12 +166,6 @@ asio::awaitable<void> StreamServer::serve(std::shared_ptr<Session> session) {
     session->close();
   }
   std::erase(sessions_, session);
-}
-
-void StreamServer::on_tick() {
-  // By index: a session that finds its peer gone may end another one's wait, never this loop.
-  for (std::size_t i = 0; i < sessions_.size(); ++i)
-    sessions_[i]->on_tick();
 }
 
 void StreamServer::close() {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,14 +14,16 @@ namespace drivebench {
 /// Accepts clients on TCP and on a unix socket, and tells them about every tick.
 class StreamServer {
  public:
-  /// Binds at once; throws boost::system::system_error with the address in what() if that fails.
-  StreamServer(asio::io_context& io, Engine& engine, const TcpConfig& config);
+  /// Listens at once; throws std::runtime_error that names the address if that fails.
+  StreamServer(asio::io_context& io, const TcpConfig& config);
   ~StreamServer();
 
   /// Address and port that the system gave, "127.0.0.1:7300".
   std::string tcp_address() const;
 
-  void on_tick();
+  /// Starts accepting clients of this run and telling them about its ticks.
+  void serve(Engine& engine);
+
   /// Stops accepting and ends every session; what was queued is lost.
   void close();
 
@@ -30,11 +33,11 @@ class StreamServer {
   template <class Acceptor>
   asio::awaitable<void> accept_from(Acceptor& acceptor);
   void start(Socket socket, std::string peer);
-  asio::awaitable<void> serve(std::shared_ptr<Session> session);
+  asio::awaitable<void> run(std::shared_ptr<Session> session);
 
   asio::io_context& io_;
   TcpConfig config_;
-  SessionContext context_;
+  std::optional<SessionContext> context_;
   asio::ip::tcp::acceptor tcp_;
   asio::local::stream_protocol::acceptor unix_;
   std::vector<std::shared_ptr<Session>> sessions_;

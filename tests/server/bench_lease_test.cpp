@@ -178,5 +178,52 @@ TEST(BenchLease, AReleaseIsNoFaultALostControllerIsOne) {
   }
 }
 
+// Kills: a run that ends with voltage on the motor, a lease that outlives the run, a tick when nobody was
+// there.
+TEST(BenchLease, DismissingTheControllersEndsTheRunWithATickOfSafeAction) {
+  BenchSetup setup = servo_setup();
+  setup.axes[0].on_link_loss = SafeAction::kZeroVoltage;
+  Bench bench = owned_bench(setup, kOwner);
+  submit_volts(bench, kOwner, 12.0);
+  bench.step();
+  bench.dismiss_controllers();
+  EXPECT_EQ(bench.tick(), 2);
+  EXPECT_EQ(bench.sample(0).u_a_v, 0.0);
+  EXPECT_EQ(bench.sample(0).owner, 0u);
+  EXPECT_EQ(bench.sample(0).faults & kLeaseLost, kLeaseLost);
+  bench.dismiss_controllers();
+  EXPECT_EQ(bench.tick(), 2);
+}
+
+// Kills: a load that a controller had planned and that hits its successor, and loads of the configuration
+// that go with it.
+TEST(BenchLease, WhatAControllerHadScheduledGoesWithIt) {
+  Bench bench = owned_bench(servo_setup(), kOwner);
+  bench.submit({.tick = 5, .axis = 0, .owner = kOwner, .action = LoadChange{0.5, 0}});
+  bench.submit({.tick = 8, .axis = 0, .owner = 0, .action = LoadChange{0.25, 0}});
+  submit_lease(bench, LeaseAction::kRelease, kOwner);
+  step(bench, 7);
+  EXPECT_EQ(bench.sample(0).load_nm, 0.0);
+  step(bench, 2);
+  EXPECT_EQ(bench.sample(0).load_nm, 0.25);
+}
+
+// In lockstep time passes only with commands: a controller must be able to watch the motor run down after a
+// trip. Kills: gates that a latched axis lets through, and a latched axis whose time stands still.
+TEST(BenchLease, ALatchedAxisTakesOnlyCommandsWithTheGatesOff) {
+  BenchSetup setup = servo_setup();
+  setup.watchdog_ticks = 2;
+  Bench bench = owned_bench(setup, kOwner);
+  submit_volts(bench, kOwner, 12.0);
+  step(bench, 3);
+  ASSERT_TRUE(bench.is_latched(0));
+  EXPECT_EQ(submit_volts(bench, kOwner, 12.0), Refused::kLatched);
+  const Command off{.answers = bench.tick(), .phases = {.gates = Gates::kOff, .voltage_v = {}}};
+  EXPECT_EQ(bench.submit({.tick = bench.tick(), .axis = 0, .owner = kOwner, .action = off}), Refused::kNot);
+  EXPECT_TRUE(bench.has_command(0));
+  bench.step();
+  EXPECT_EQ(state_of(bench), ControlState::kTimeout);
+}
+
 }  // namespace
 }  // namespace drivebench

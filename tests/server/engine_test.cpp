@@ -48,7 +48,7 @@ TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
     EXPECT_EQ(engine->newest(0).u_a_v, 10.0);
   }
   EXPECT_EQ(seen, (std::vector<Tick>{1, 2, 3, 4, 5}));
-  EXPECT_EQ(engine->stop().ticks, 5u);
+  EXPECT_EQ(engine->stop().ticks, 6u) << "the last tick is one of safe action";
 }
 
 // Catches: a bench that waits for ever for a controller that has left.
@@ -255,7 +255,7 @@ TEST(ThreadedEngine, RealtimeTakesCommandsAndEndsByItself) {
   io.run();
   EXPECT_TRUE(ended);
   const Verdict verdict = engine->stop();
-  EXPECT_EQ(verdict.ticks, 2000u);
+  EXPECT_EQ(verdict.ticks, 2001u) << "the last tick is one of safe action";
   EXPECT_GT(commanded, 0u);
   EXPECT_EQ(engine->state_hash(), 0u) << "another thread owns the state";
   EXPECT_EQ(verdict.realtime_valid(), verdict.late_ticks == 0);

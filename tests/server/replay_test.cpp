@@ -26,9 +26,9 @@ using Bytes = std::vector<std::byte>;
 
 /// A lockstep run in which everything happens that a recording can hold: two axes, a lease, commands, loads
 /// from the file and from outside, a parameter write, refused commands, a clear.
-Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr) {
+Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
   const TestFolder folder;
-  BenchConfig config = servo_bench(2);
+  BenchConfig config = servo_bench(axes);
   config.axes[1].loads = {{.tick = 5, .change = {.load_nm = 0.02, .ramp_ticks = 3}}};
   const auto engine = make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config));
   const auto send = [&engine](std::uint32_t axis, const auto& action, Tick tick = 0) {
@@ -45,7 +45,7 @@ Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr) {
     engine->advance();
   }
   const Verdict verdict = engine->stop();
-  EXPECT_EQ(verdict.ticks, static_cast<std::uint64_t>(ticks));
+  EXPECT_EQ(verdict.ticks, static_cast<std::uint64_t>(ticks) + 1) << "the last tick is one of safe action";
   if (state_hash != nullptr) *state_hash = verdict.state_hash;
   return content_of(folder / "run.mcap");
 }
@@ -95,9 +95,9 @@ TEST(Replay, ARunReplaysBitForBit) {
   const Bytes recording = record(500, &state_hash);
   const ReplayReport report = replayed(recording);
   EXPECT_EQ(report.result, Result::kEqual) << report.problem;
-  EXPECT_EQ(report.ticks, 500u);
-  EXPECT_EQ(report.samples, 2 * 501u) << "of two axes, with those of tick 0";
-  EXPECT_EQ(report.inputs, 1 + 1 + 1 + 1 + 1 + 1 + 1 + 500u);
+  EXPECT_EQ(report.ticks, 501u);
+  EXPECT_EQ(report.samples, 2 * 502u) << "of two axes, with those of tick 0";
+  EXPECT_EQ(report.inputs, 1 + 1 + 1 + 1 + 1 + 1 + 1 + 500u + 1) << "the last one takes the lease back";
   EXPECT_EQ(report.state_hash, state_hash);
   EXPECT_NE(report.recorded_by.find("drivebench"), std::string::npos);
   EXPECT_FALSE(report.difference);
@@ -222,13 +222,13 @@ TEST(Replay, AMissingOrDoubledSampleIsADifference) {
 // Catches: samples that are only counted: one of an axis twice in the place of another axis's.
 TEST(Replay, ASampleInThePlaceOfAnotherAxisIsADifference) {
   Entry first;
-  const ReplayReport report = replayed(rewritten(record(20), [&first](Entry& entry) {
-    if (entry.topic == "/axis0/sample") first = entry;
-    if (entry.topic == "/axis1/sample" && decode_sample(entry.payload)->tick == 7) entry = first;
+  const ReplayReport report = replayed(rewritten(record(20, nullptr, 3), [&first](Entry& entry) {
+    if (entry.topic == "/axis1/sample") first = entry;
+    if (entry.topic == "/axis2/sample" && decode_sample(entry.payload)->tick == 7) entry = first;
     return true;
   }));
   EXPECT_EQ(report.result, Result::kDifferent);
-  EXPECT_NE(report.problem.find("axis0 at tick 7"), std::string::npos) << report.problem;
+  EXPECT_NE(report.problem.find("axis1 at tick 7"), std::string::npos) << report.problem;
 }
 
 // Catches: a tick number that is believed.
