@@ -22,7 +22,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kFlushInterval = std::chrono::milliseconds(100);
+// In plant time, not wall time: the same run gives the same file, byte for byte.
+constexpr std::int64_t kFlushIntervalNs = 100'000'000;
 constexpr auto kSyncInterval = std::chrono::seconds(1);
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
@@ -48,6 +49,7 @@ class Recorder::File {
  public:
   File(const std::filesystem::path& path, const BenchConfig& config)
       : period_ns_(config.setup.period_ns),
+        flush_ticks_(static_cast<std::uint64_t>(std::max<std::int64_t>(kFlushIntervalNs / period_ns_, 1))),
         descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)) {
     if (descriptor_ < 0) {
       throw std::system_error(errno, std::generic_category(), "cannot create the recording " + path.string());
@@ -74,6 +76,7 @@ class Recorder::File {
   File& operator=(const File&) = delete;
 
   void write(const SampleEntry& entry) {
+    if (entry.axis == 0 && entry.sample.tick % flush_ticks_ == 0) mcap_->flush();
     ++unsaved_;
     const std::uint16_t channel = samples_[entry.axis];
     const auto room =
@@ -97,7 +100,6 @@ class Recorder::File {
     if (failed_ && unsaved_ == 0) unsaved_ = 1;  // the end of the file, without which it does not replay
   }
 
-  void flush() { mcap_->flush(); }
   void sync() {
     if (::fdatasync(descriptor_) != 0) failed_ = true;
   }
@@ -131,20 +133,28 @@ class Recorder::File {
   }
 
   void write_all(std::span<const std::byte> bytes) {
-    while (!bytes.empty() && !failed_) {
-      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    std::span<const std::byte> rest = bytes;
+    while (!rest.empty() && !failed_) {
+      const ssize_t written = ::write(descriptor_, rest.data(), rest.size());
       if (written > 0) {
-        bytes = bytes.subspan(static_cast<std::size_t>(written));
+        rest = rest.subspan(static_cast<std::size_t>(written));
       } else if (errno != EINTR) {
         failed_ = true;
       }
     }
-    if (!failed_) unsaved_ = 0;  // one call brings a whole chunk
+    if (!failed_) {
+      unsaved_ = 0;  // one call brings a whole chunk
+      whole_bytes_ += static_cast<off_t>(bytes.size());
+    } else if (::ftruncate(descriptor_, whole_bytes_) != 0) {
+      return;  // the torn chunk stays; readers find its end missing
+    }
   }
 
   std::int64_t period_ns_;
+  std::uint64_t flush_ticks_;
   int descriptor_;
   bool failed_ = false;
+  off_t whole_bytes_ = 0;  // of the file, up to the last chunk that was written whole
   std::uint64_t unsaved_ = 0;
   std::optional<McapWriter> mcap_;
   std::uint16_t inputs_ = 0;
@@ -200,16 +210,10 @@ bool Recorder::drain() noexcept {
 }
 
 void Recorder::run() {
-  auto last_flush = Clock::now();
-  auto last_sync = last_flush;
+  auto last_sync = Clock::now();
   while (!stop_.load()) {
     if (!drain()) std::this_thread::sleep_for(kIdleSleep);
     const auto now = Clock::now();
-    if (now - last_flush >= kFlushInterval) {
-      writer_->attempt([](File& file) { file.flush(); });
-      count_lost();
-      last_flush = now;
-    }
     if (now - last_sync >= kSyncInterval) {
       writer_->sync();
       last_sync = now;
