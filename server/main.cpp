@@ -123,6 +123,18 @@ std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config,
   return make_threaded_engine(config, std::move(recorder), io, max_ticks);
 }
 
+/// Shows how far a run of known length is, twice a second, if somebody watches.
+asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
+  asio::steady_timer timer(co_await asio::this_coro::executor);
+  const double period_s = static_cast<double>(engine.config().setup.period_ns) * 1e-9;
+  for (;;) {
+    timer.expires_after(std::chrono::milliseconds(500));
+    co_await timer.async_wait(asio::use_awaitable);
+    fmt::print(stderr, "\r{:.1f} of {:.1f} s ", static_cast<double>(engine.tick()) * period_s, duration_s);
+    std::fflush(stderr);
+  }
+}
+
 int serve(const Options& o) {
   const BenchConfig config = configure(o);
   if (o.check_config) {
@@ -144,6 +156,9 @@ int serve(const Options& o) {
   for (const std::string& note : engine->notes())
     spdlog::warn("{}", note);
   print_ready(o, config, server);
+  if (o.duration_s > 0.0 && ::isatty(STDERR_FILENO) != 0) {
+    asio::co_spawn(io, show_progress(*engine, o.duration_s), asio::detached);
+  }
   bool broken = false;
   try {
     io.run();
@@ -151,6 +166,7 @@ int serve(const Options& o) {
     spdlog::critical("the run ends: {}", error.what());
     broken = true;
   }
+  if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   signals.clear();  // from here on a second signal ends the program at once
   const Verdict verdict = engine->stop();
   server.close();

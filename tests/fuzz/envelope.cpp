@@ -1,0 +1,58 @@
+// Messages of the wire and of recordings: every command and input that is taken can be written down and read
+// back.
+#include <bench.pb.h>
+#include <google/protobuf/stubs/logging.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "server/input_codec.hpp"
+#include "tests/fuzz/fuzz.hpp"
+
+namespace drivebench::fuzz {
+namespace {
+
+bool equal(const Input& a, const Input& b) noexcept {
+  const PackedInput x = pack(a);
+  const PackedInput y = pack(b);
+  return x.tick == y.tick && x.axis == y.axis && x.owner == y.owner && x.kind == y.kind &&
+         std::ranges::equal(x.words, y.words);
+}
+
+void check_input(const v1::Input& message) {
+  const std::optional<Input> input = decode_input(message);
+  if (!input) return;
+  const auto* lease = std::get_if<LeaseAction>(&input->action);
+  require(lease == nullptr || v1::LeaseRequest::Action_IsValid(static_cast<int>(*lease)),
+          "only known lease actions are taken");
+  v1::Input written;
+  encode_input(static_cast<Tick>(message.received_tick()), *input, written);
+  const std::optional<Input> again = decode_input(written);
+  require(again && equal(*input, *again), "an input survives a recording");
+  require(equal(*input, unpack(pack(*input))), "an input survives a saved state");
+}
+
+/// What a session does with the commands of an exchange, and what a recording may hold of them.
+void check_commands(const v1::Exchange& exchange) {
+  for (const v1::Command& each : exchange.commands()) {
+    const std::optional<Command> command = decode_command(each);
+    require(command.has_value() == v1::Gates_IsValid(each.gates()), "only known gates make a command");
+    v1::Input recorded;
+    *recorded.mutable_command() = each;
+    check_input(recorded);
+  }
+}
+
+}  // namespace
+}  // namespace drivebench::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace drivebench;
+  // Protobuf would print a line for each text that is not UTF-8.
+  [[maybe_unused]] static const auto kPrinter = google::protobuf::SetLogHandler(nullptr);
+  v1::Envelope envelope;
+  if (envelope.ParseFromArray(data, static_cast<int>(size))) fuzz::check_commands(envelope.exchange());
+  v1::Input input;
+  if (input.ParseFromArray(data, static_cast<int>(size))) fuzz::check_input(input);
+  return 0;
+}

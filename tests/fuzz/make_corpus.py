@@ -1,0 +1,198 @@
+#!/usr/bin/python3
+"""Writes tests/fuzz/corpus anew from real messages: needed when bench.proto, the bench files or the recorder change.
+
+    /usr/bin/python3 tests/fuzz/make_corpus.py
+
+Recordings lose their schemas' text (15 KB) and their checksums (0: not given), so that mutations get past them."""
+import pathlib
+import re
+import struct
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "wire"))
+from wire_client import BENCHES, Server, frame, pb  # noqa: E402
+
+MAGIC = b"\x89MCAP0\r\n"
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, CHUNK_INDEX = 1, 2, 3, 4, 5, 6, 8
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, DATA_END = 9, 10, 11, 12, 13, 15
+
+
+def put(target, name, data):
+    folder = HERE / "corpus" / target
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_bytes(data)
+
+
+def record_a_run(path):
+    """Six ticks with every kind of input that a client can give."""
+    with Server("--record", str(path)) as server, server.client() as client:
+        client.lease()
+        client.step(0, 10.0, -5.0)
+        client.ask(set_load=pb.SetLoad(load_nm=0.1, ramp_ticks=3, at_tick=2))
+        client.ask(write_parameter=pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.85))
+        client.ask(clear_faults=pb.ClearFaults())
+        for tick in range(1, 6):
+            client.step(tick, 20.0, 3.0, gates=pb.GATES_ZERO if tick == 4 else pb.GATES_VOLTAGE)
+        client.exchange(2)  # refused: stale
+        client.close()
+        if server.stop() != 0:
+            raise RuntimeError(server.errors())
+
+
+# ---- recordings, taken apart and put together without what makes them long ----
+
+def records(data, at=0):
+    while at < len(data):
+        (size,) = struct.unpack_from("<Q", data, at + 1)
+        yield data[at], data[at + 9:at + 9 + size]
+        at += 9 + size
+
+
+def text(value):
+    value = value.encode() if isinstance(value, str) else value
+    return struct.pack("<I", len(value)) + value
+
+
+def record(opcode, content):
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+def without_text(schema):
+    name_size, = struct.unpack_from("<I", schema, 2)
+    encoding_size, = struct.unpack_from("<I", schema, 6 + name_size)
+    return schema[:10 + name_size + encoding_size] + text(b"")
+
+
+def with_configuration(attachment, config):
+    at = 16
+    for _ in range(2):
+        at += 4 + struct.unpack_from("<I", attachment, at)[0]
+    return attachment[:at] + struct.pack("<Q", len(config)) + config + struct.pack("<I", 0)
+
+
+def configuration_of(attachment):
+    at = 16
+    for _ in range(2):
+        at += 4 + struct.unpack_from("<I", attachment, at)[0]
+    (size,) = struct.unpack_from("<Q", attachment, at)
+    return attachment[at + 8:at + 8 + size]
+
+
+def taken_apart(recording):
+    parts = {SCHEMA: [], CHANNEL: [], MESSAGE: [], ATTACHMENT: []}
+    for opcode, content in records(recording[8:-8]):
+        if opcode == DATA_END:
+            return parts
+        if opcode == CHUNK:
+            for inner, body in records(content[40:]):
+                parts[inner].append(without_text(body) if inner == SCHEMA else body)
+        elif opcode in parts:
+            parts[opcode].append(content)
+    raise RuntimeError("the recording does not end")
+
+
+def put_together(parts, attachment, chunked, metadata=()):
+    """A whole MCAP file with summary; a checksum of 0 says that there is none."""
+    out = MAGIC + record(HEADER, text("") + text("fuzz"))
+    indexes = b""
+
+    def indexed(opcode, content, index_opcode, index):
+        nonlocal out, indexes
+        written = record(opcode, content)
+        indexes += record(index_opcode, index(len(out), len(written)))
+        out += written
+
+    if attachment:
+        indexed(ATTACHMENT, attachment, ATTACHMENT_INDEX,
+                lambda at, size: struct.pack("<QQQQQ", at, size, 0, 0, 0) + text("bench.toml") + text(""))
+    for content in metadata:
+        indexed(METADATA, content, METADATA_INDEX, lambda at, size: struct.pack("<QQ", at, size) + text("m"))
+    body = b"".join(record(kind, each) for kind in (SCHEMA, CHANNEL, MESSAGE) for each in parts[kind])
+    if chunked:
+        content = struct.pack("<QQQI", 0, 750000, len(body), 0) + text("") + struct.pack("<Q", len(body)) + body
+        indexed(CHUNK, content, CHUNK_INDEX, lambda at, size: struct.pack("<QQQQIQ", 0, 750000, at, size, 0, 0)
+                + text("") + struct.pack("<QQ", len(body), len(body)))
+    else:
+        out += body
+    out += record(DATA_END, struct.pack("<I", 0))
+    summary = len(out)
+    out += b"".join(record(kind, each) for kind in (SCHEMA, CHANNEL) for each in parts[kind])
+    out += record(STATISTICS, struct.pack(
+        "<QHIIIIQQI", len(parts[MESSAGE]), len(parts[SCHEMA]), len(parts[CHANNEL]), 1 if attachment else 0,
+        len(metadata), 1 if chunked else 0, 0, 750000, 0))
+    return out + indexes + record(FOOTER, struct.pack("<QQI", summary, 0, 0)) + MAGIC
+
+
+def make_recordings(recording):
+    parts = taken_apart(recording)
+    attachment = parts[ATTACHMENT][0]
+    config = configuration_of(attachment)
+    put("config", "recorded.toml", config)
+    put("recording", "chunked.mcap", put_together(parts, with_configuration(attachment, config), True))
+    put("recording", "loose.mcap", put_together(parts, with_configuration(attachment, config), False))
+    few = {**parts, MESSAGE: parts[MESSAGE][:6]}
+    small = with_configuration(attachment, b"[bench]")
+    pairs = text(text("key") + text("value") + text("other") + text(""))
+    put("mcap_reader", "chunked.mcap", put_together(few, small, True))
+    put("mcap_reader", "loose.mcap", put_together(few, None, False, [text("m") + pairs]))
+    inputs = [body[22:] for body in parts[MESSAGE] if b"inputs" in channel_of(parts, body)]
+    samples = [body[22:] for body in parts[MESSAGE] if b"sample" in channel_of(parts, body)]
+    for i, body in enumerate(dict.fromkeys(inputs)):
+        put("envelope", f"input-{i}", body)
+    for i in (0, 1, len(samples) - 1):
+        put("sample_codec", f"sample-{i}", samples[i])
+
+
+def channel_of(parts, message):
+    return next(channel for channel in parts[CHANNEL] if channel[:2] == message[:2])
+
+
+# ---- the wire ----
+
+def make_messages():
+    extreme = pb.Sample()
+    for field in pb.Sample.DESCRIPTOR.fields:
+        high = {field.TYPE_UINT64: 2**64 - 1, field.TYPE_SINT64: -2**63}.get(field.type, -1.7976931348623157e308)
+        setattr(extreme, field.name, high)
+    put("sample_codec", "extreme", extreme.SerializeToString())
+    requests = {
+        "hello": pb.Envelope(id=1, hello=pb.Hello(protocol_min=1, protocol_max=1, client="fuzz", token="secret")),
+        "lease": pb.Envelope(id=2, lease=pb.LeaseRequest(axis=1, action=pb.LeaseRequest.ACTION_ACQUIRE)),
+        "exchange": pb.Envelope(id=2**64 - 1, exchange=pb.Exchange(commands=[
+            pb.Command(tick=7, gates=pb.GATES_VOLTAGE, u_a_v=-80.0, u_b_v=1e300), pb.Command(axis=1, gates=2)])),
+        "subscribe": pb.Envelope(id=3, subscribe=pb.Subscribe(decimation=8, signals=["i_a_a", "angle_rad"])),
+        "load": pb.Envelope(id=4, set_load=pb.SetLoad(load_nm=0.1, ramp_ticks=2**64 - 1, at_tick=5)),
+        "parameter": pb.Envelope(id=5, write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.5)),
+        "reply": pb.Envelope(id=6, exchange_reply=pb.ExchangeReply(samples=[pb.AxisSample(sample=extreme)])),
+    }
+    for name, message in requests.items():
+        put("envelope", name, message.SerializeToString())
+    stream = b"".join(frame(requests[name].SerializeToString()) for name in ("hello", "lease", "exchange"))
+    put("frame_reader", "bytewise", bytes([255, 1, 1]) + stream)
+    put("frame_reader", "odd-cuts", bytes([255, 4, 3, 5, 200, 1]) + stream * 3)
+    put("frame_reader", "low-cap", bytes([30, 0]) + stream)
+    put("frame_reader", "empty-frame", bytes([255, 2, 9, 2]) + stream + bytes(4))
+
+
+def make_configs():
+    inline = (BENCHES / "servo-realtime.toml").read_text(encoding="utf-8")
+    motor = (BENCHES.parent / "motors/servo-im.toml").read_text(encoding="utf-8")
+    motor = re.sub(r"^\[", "[axis.", motor[motor.index("[machine]"):], flags=re.M)
+    inline = inline.replace('motor = "../motors/servo-im.toml"', 'motor_name = "servo"') + motor
+    inline += '[[axis.load]]\nat_s = 0.5\nload_nm = 0.1\nramp_s = 0.01\n'
+    put("config", "servo-realtime.toml", re.sub(r"[ ]*#.*", "", inline).encode())
+    put("config", "missing-motor.toml", (BENCHES / "servo.toml").read_bytes())
+    put("config", "letters.toml", "ä = 1\nn\u0291me = 2\nwin[\u1200\n".encode())  # once undefined behaviour in toml++
+    put("config", "oddities.toml", b'bench.name = "\\u00e9\\n"\nbench.mode = \'lockstep\'\nbench = { period_us = 0x7d }\n'
+        b'[tcp]\naddress = "0.0.0.0"\nport = 65536\n[[axis]]\nname = """a\nb"""\nx = [1, 2.5, nan, -inf, 1979-05-27]\n')
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        run = pathlib.Path(folder) / "run.mcap"
+        record_a_run(run)
+        make_recordings(run.read_bytes())
+    make_messages()
+    make_configs()
