@@ -76,8 +76,8 @@ class ConfigError : public std::runtime_error {
 /// Reads a bench file and the motor files that it names (relative to it). Throws ConfigError.
 BenchConfig load_config(const std::filesystem::path& file);
 
-/// Reads a bench from text; `name` stands for the file in messages, `folder` is where motor files are looked
-/// for.
+/// Reads a bench from text; `name` stands for the file in messages, `folder` is where the files that it names
+/// are looked for. Without a folder it may name none.
 BenchConfig parse_config(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
 /// The configuration as one TOML text that needs no other file and reads back equal, bit for bit; all but the

@@ -42,6 +42,10 @@ struct MotorFile {
 
 void read_motor_file(StrictTable& axis, const std::string& motor, const std::filesystem::path& folder,
                      ProblemList& problems, MotorFile& result) {
+  if (folder.empty()) {
+    axis.report("motor", std::string(kNoOtherFiles));
+    return;
+  }
   result.path = (folder / motor).lexically_normal().string();
   const FileText file = read_file(result.path, kMaxConfigBytes);
   if (!file.why_not.empty()) {

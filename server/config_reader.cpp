@@ -95,6 +95,10 @@ void read_realtime(StrictTable table, RealtimeConfig& realtime) {
 std::string read_token(StrictTable& tcp, const std::filesystem::path& folder) {
   const auto name = tcp.text("token_file", 800);
   if (!name) return {};
+  if (folder.empty()) {
+    tcp.report("token_file", std::string(kNoOtherFiles));
+    return {};
+  }
   const std::string path = (folder / *name).lexically_normal().string();
   const FileText file = read_file(path, 4096);
   std::string token = file.text.substr(0, file.text.find('\n'));
@@ -212,7 +216,7 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
 BenchConfig load_config(const std::filesystem::path& file) {
   const FileText read = read_file(file, kMaxConfigBytes);
   if (!read.why_not.empty()) throw ConfigError({{file.string(), 0, {}, read.why_not}});
-  return parse_config(read.text, file.string(), file.parent_path());
+  return parse_config(read.text, file.string(), std::filesystem::absolute(file).parent_path());
 }
 
 }  // namespace drivebench

@@ -138,8 +138,17 @@ asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
 int serve(const Options& o) {
   const BenchConfig config = configure(o);
   if (o.check_config) {
-    print_line(fmt::format("{}: no problems; bench {}, {} axes, {} mode", o.config, config.name,
-                           config.axes.size(), name_of(config.mode)));
+    if (o.json) {
+      const nlohmann::json checked{{"event", "checked"},
+                                   {"bench", config.name},
+                                   {"axes", config.axes.size()},
+                                   {"mode", name_of(config.mode)}};
+      print_line(checked.dump());
+    } else {
+      print_line(fmt::format("{}: no problems; bench {}, {} {}, {} mode", o.config, config.name,
+                             config.axes.size(), config.axes.size() == 1 ? "axis" : "axes",
+                             name_of(config.mode)));
+    }
     return kOk;
   }
   std::signal(SIGPIPE, SIG_IGN);

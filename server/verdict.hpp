@@ -14,7 +14,7 @@ struct Verdict {
   std::uint64_t ticks = 0;
   std::uint64_t late_ticks = 0;
   LatenessHistogram lateness{};  ///< empty outside real time
-  std::uint64_t gaps = 0;      ///< entries that the recorder lost
+  std::uint64_t gaps = 0;        ///< entries that the recorder lost
   std::uint64_t state_hash = 0;
 
   /// Every sample follows from the recorded inputs alone, and the recording has them all.

@@ -148,5 +148,18 @@ TEST(ConfigFiles, OneDamagedByteEitherLoadsOrGivesAConfigError) {
   EXPECT_GT(refused, 1000);
 }
 
+// Catches: a recording from a stranger whose configuration makes the replay open files of this machine.
+TEST(ConfigFiles, ATextWithoutAFolderMayNameNoOtherFile) {
+  try {
+    parse_config("[tcp]\ntoken_file = 'secret'\n[[axis]]\nname = 'a'\nmotor = 'motor.toml'\n", "bench.toml",
+                 {});
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("motor names another file"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("token_file names another file"), std::string::npos)
+        << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace drivebench::test
