@@ -1,5 +1,6 @@
 #include "plant/axis.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -88,18 +89,19 @@ void Axis::record_segment(double start_s, double duration_s, const ShaftState& f
 void Axis::substep(double start_s, double duration_s, const PhaseCommand& command, TwoPhase voltage_v,
                    double load_nm) noexcept {
   const bool freewheels = command.gates == Gates::kOff;
+  const bool has_events = freewheels || has_dry_friction_;
   for (std::size_t events = 0;; ++events) {
     const DriveState from = state_.drive;
     const Branch branch = branch_at(from, command, voltage_v, load_nm);
     state_.voltage_v = branch.terminals.voltage_v;
     DriveState to = integrated(from, duration_s, branch, load_nm);
     double fraction = 1.0;
-    if (events < kMaxEvents && (freewheels || has_dry_friction_)) {
+    if (has_events && events < kMaxEvents) {
       const double stop =
           has_dry_friction_ ? zero_crossing(from.shaft.speed_rad_s, to.shaft.speed_rad_s) : 1.0;
       const double a_off = freewheels ? zero_crossing(from.machine.i_a_a, to.machine.i_a_a) : 1.0;
       const double b_off = freewheels ? zero_crossing(from.machine.i_b_a, to.machine.i_b_a) : 1.0;
-      fraction = std::fmin(stop, std::fmin(a_off, b_off));
+      fraction = std::min({stop, a_off, b_off});
       if (fraction < 1.0) {
         to = integrated(from, fraction * duration_s, branch, load_nm);
         if (fraction == stop) to.shaft.speed_rad_s = 0.0;
@@ -123,15 +125,19 @@ void Axis::advance(const PhaseCommand& command, Tick tick) noexcept {
   last_tick_turn_ = state_.turns;
   last_tick_count_ = state_.encoder.count;
   const double load_nm = state_.load.at(tick);
+  const double limit_a = p_.amplifier.over_current_a;
+  PhaseCommand effective = command;
+  if ((state_.faults & kOverCurrentTrip) != 0) effective.gates = Gates::kOff;
+  const AmplifierOutput output = amplifier_output(p_.amplifier, effective);
+  if (output.saturated) state_.faults |= kVoltageSaturated;
   for (int n = 0; n < timing_.substeps; ++n) {
-    PhaseCommand effective = command;
-    if ((state_.faults & kOverCurrentTrip) != 0) effective.gates = Gates::kOff;
-    const AmplifierOutput output = amplifier_output(p_.amplifier, effective);
-    if (output.saturated) state_.faults |= kVoltageSaturated;
     substep(n * step_s_, step_s_, effective, output.voltage_v, load_nm);
-    const double limit_a = p_.amplifier.over_current_a;
     if (std::abs(state_.drive.machine.i_a_a) > limit_a || std::abs(state_.drive.machine.i_b_a) > limit_a) {
-      state_.faults |= kOverCurrent | (p_.amplifier.over_current_trip ? kOverCurrentTrip : 0);
+      state_.faults |= kOverCurrent;
+      if (p_.amplifier.over_current_trip) {
+        state_.faults |= kOverCurrentTrip;
+        effective.gates = Gates::kOff;  // for the substeps that are left, too
+      }
     }
   }
   if (!finite()) {

@@ -22,8 +22,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// In plant time, not wall time: the same run gives the same file, byte for byte.
-constexpr std::int64_t kFlushIntervalNs = 100'000'000;
+/// In plant time, not wall time: the same run gives the same file, byte for byte. A free run is over a second
+/// of it in some milliseconds.
+std::int64_t flush_interval_ns(RunMode mode) {
+  return mode == RunMode::kFree ? 1'000'000'000 : 100'000'000;
+}
 constexpr auto kSyncInterval = std::chrono::seconds(1);
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
@@ -49,7 +52,8 @@ class Recorder::File {
  public:
   File(const std::filesystem::path& path, const BenchConfig& config)
       : period_ns_(config.setup.period_ns),
-        flush_ticks_(static_cast<std::uint64_t>(std::max<std::int64_t>(kFlushIntervalNs / period_ns_, 1))),
+        flush_ticks_(static_cast<std::uint64_t>(
+            std::max<std::int64_t>(flush_interval_ns(config.mode) / period_ns_, 1))),
         descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)) {
     if (descriptor_ < 0) {
       throw std::system_error(errno, std::generic_category(), "cannot create the recording " + path.string());

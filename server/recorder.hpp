@@ -17,7 +17,8 @@ namespace drivebench {
 
 /// Writes every sample and every input of a run to an MCAP file, on a thread of its own behind a bounded
 /// ring. The tick only copies into the ring; when the ring is full the entry is lost and counted. What has
-/// come is handed to the system after every 100 ms of plant time and synced to the disk every second.
+/// come is handed to the system after every 100 ms of plant time (1 s in free mode) and synced to the disk
+/// every second.
 class Recorder final : public BenchObserver {
  public:
   /// Creates the file; throws std::system_error if it exists or cannot be made.

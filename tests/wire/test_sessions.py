@@ -1,0 +1,241 @@
+#!/usr/bin/python3
+"""Sessions of the server: hello, frames, strangers, leases. Each test names the mistake that it would catch."""
+import os
+import socket
+import struct
+import sys
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from wire_client import Server, frame, pb
+from wire_test import WireTest, until
+
+
+class Hello(WireTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = Server()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.shared.__exit__()
+
+    def still_serves(self):
+        self.assertEqual(self.client(self.shared).welcome.protocol, 1)
+
+    def test_welcome_describes_the_bench(self):
+        """A description that lacks an axis, a signal or the schema of the wire."""
+        welcome = self.client(self.shared).welcome
+        self.assertEqual([axis.name for axis in welcome.bench.axes], ["servo"])
+        self.assertEqual(welcome.bench.mode, pb.MODE_LOCKSTEP)
+        self.assertAlmostEqual(welcome.bench.period_s, 125e-6)
+        self.assertEqual([s.name for s in welcome.bench.signals], [f.name for f in pb.Sample.DESCRIPTOR.fields])
+        self.assertIn(b"drivebench.v1", welcome.descriptor_set)
+        self.assertNotEqual(welcome.build_id, "")
+
+    def test_first_message_must_be_hello(self):
+        """A request that is carried out for somebody who has not introduced himself."""
+        for kind in ({"lease": pb.LeaseRequest(action=1)}, {"status_request": pb.StatusRequest()},
+                     {"exchange": pb.Exchange()}):
+            client = self.client(self.shared, hello=False)
+            self.assertRefused(client.ask(**kind), pb.REFUSAL_UNAUTHENTICATED)
+            self.assertTrue(client.is_closed())
+
+    def test_protocol_version_must_meet_ours(self):
+        """A version check with one bound only."""
+        for low, high in ((0, 0), (2, 9)):
+            client = self.client(self.shared, hello=False)
+            answer = client.ask(hello=pb.Hello(protocol_min=low, protocol_max=high))
+            self.assertRefused(answer, pb.REFUSAL_VERSION, "protocol_max")
+            self.assertTrue(client.is_closed())
+        client = self.client(self.shared, hello=False)
+        self.assertEqual(client.ask(hello=pb.Hello(protocol_min=0, protocol_max=7)).welcome.protocol, 1)
+
+    def test_tcp_01_lengths_that_cannot_be_end_the_session(self):
+        """A length that is believed before it is checked: an allocation of 4 GiB, or an endless wait."""
+        for length in (0, 4097, 2**31 - 1, 2**31, 2**32 - 1):
+            client = self.client(self.shared, hello=False)
+            client.send_bytes(struct.pack(">I", length))
+            self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED, "frame")
+            self.assertTrue(client.is_closed(), length)
+        self.still_serves()
+
+    def test_tcp_01_the_cap_grows_with_hello_and_holds(self):
+        """An off-by-one in a cap, or a cap that hello does not raise."""
+        before = self.client(self.shared, hello=False)
+        hello = pb.Envelope(id=9, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()
+        padding = b"\xf2\x7f"  # an unknown field of bytes, number 2046
+        size = 4096 - len(hello) - len(padding) - 2
+        before.send_bytes(frame(hello + padding + bytes([size & 0x7F | 0x80, size >> 7]) + bytes(size)))
+        self.assertEqual(before.answer_to(9).welcome.protocol, 1)
+        request = pb.Envelope(id=10, status_request=pb.StatusRequest()).SerializeToString()
+        size = 65536 - len(request) - len(padding) - 3
+        filler = padding + bytes([size & 0x7F | 0x80, size >> 7 & 0x7F | 0x80, size >> 14]) + bytes(size)
+        self.assertEqual(len(request + filler), 65536)
+        before.send_bytes(frame(request + filler))
+        self.assertEqual(before.answer_to(10).WhichOneof("kind"), "status")
+        before.send_bytes(struct.pack(">I", 65537))
+        self.assertRefused(before.receive(), pb.REFUSAL_MALFORMED, "frame")
+        self.assertTrue(before.is_closed())
+
+    def test_tcp_02_a_truncated_frame_ends_with_its_connection(self):
+        """A session that waits for ever for the rest of a frame of a peer that is gone."""
+        watcher = self.client(self.shared)
+        before = watcher.status().sessions
+        client = self.client(self.shared)
+        client.send_bytes(struct.pack(">I", 100) + b"half")
+        self.assertEqual(watcher.status().sessions, before + 1)
+        client.close()
+        until(lambda: watcher.status().sessions == before, "the session ended")
+
+    def test_tcp_03_one_byte_at_a_time(self):
+        """A reader that takes a read for a frame."""
+        client = self.client(self.shared, hello=False)
+        for byte in frame(pb.Envelope(id=5, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()):
+            client.send_bytes(bytes([byte]))
+        self.assertEqual(client.answer_to(5).welcome.protocol, 1)
+
+    def test_tcp_03_many_requests_in_one_segment_are_answered_in_order(self):
+        """Frames behind the first one of a read that are lost or answered out of order."""
+        client = self.client(self.shared)
+        ids = range(1000, 1200)
+        client.send_bytes(b"".join(
+            frame(pb.Envelope(id=i, read_parameters=pb.ReadParameters(names=["amplifier.gain"])).SerializeToString())
+            for i in ids))
+        for i in ids:
+            self.assertEqual(client.answer_to(i).parameter_values.parameters[0].name, "amplifier.gain")
+
+    def test_tcp_04_strangers_are_closed(self):
+        """Foreign protocols that keep a session open or take the server down."""
+        for greeting in (b"GET / HTTP/1.1\r\nHost: bench\r\n\r\n", b"SSH-2.0-OpenSSH_9.2p1\r\n",
+                         bytes.fromhex("16030100c8010000c40303") + os.urandom(192),  # TLS client hello
+                         b"\x00\x00\x00\x06\xff\xff\xff\xff\xff\xff", b"\x00\x00\x00\x02\x08"):
+            client = self.client(self.shared, hello=False)
+            client.send_bytes(greeting)
+            client.socket.shutdown(socket.SHUT_WR)
+            self.assertTrue(client.is_closed(), greeting)
+        self.still_serves()
+
+    def test_tcp_07_unknown_fields_are_ignored_and_the_last_scalar_counts(self):
+        """A server that refuses what a newer client adds, or takes the first of two values."""
+        client = self.client(self.shared)
+        twice = b"\x08\x63" + b"\x82\x01\x00" + b"\x08\x07" + b"\xa0\x7f\x01"  # id 99, status_request, id 7, unknown
+        client.send_bytes(frame(twice))
+        self.assertEqual(client.answer_to(7).WhichOneof("kind"), "status")
+
+    def test_tcp_07_answers_are_no_requests(self):
+        """A server that obeys a message which only servers send."""
+        client = self.client(self.shared)
+        for kind in ({"done": pb.Done()}, {"welcome": pb.Welcome()}, {"samples": pb.Samples()}, {}):
+            self.assertRefused(client.ask(**kind) if kind else self.empty(client), pb.REFUSAL_MALFORMED, "kind")
+
+    @staticmethod
+    def empty(client):
+        client.last_id += 1
+        client.send_bytes(frame(pb.Envelope(id=client.last_id).SerializeToString()))
+        return client.answer_to(client.last_id)
+
+    def test_tcp_08_text_that_is_not_utf_8_ends_the_session(self):
+        """A name that breaks the terminal or the JSON of somebody else."""
+        client = self.client(self.shared)
+        client.send_bytes(frame(b"\x08\x01\x6a\x04\x12\x02\xff\xfe"))  # write_parameter { name = FF FE }
+        self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED)
+        self.assertTrue(client.is_closed())
+
+    def test_silent_connection_is_closed(self):
+        """Connections that never say hello and stay for ever."""
+        client = self.client(self.shared, hello=False)
+        self.assertTrue(client.is_closed())
+
+    def test_long_client_name_is_refused(self):
+        """A log that a client fills."""
+        client = self.client(self.shared, hello=False)
+        answer = client.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="x" * 101))
+        self.assertRefused(answer, pb.REFUSAL_OUT_OF_RANGE, "client")
+
+
+class Lease(WireTest):
+    def test_one_owner_at_a_time(self):
+        """Two controllers on one axis; a lease that outlives its holder."""
+        server = self.server()
+        first, second = self.client(server), self.client(server)
+        self.assertDone(first.lease())
+        self.assertNotEqual(first.owner, 0)
+        self.assertRefused(second.lease(), pb.REFUSAL_OWNED, "axis")
+        self.assertRefused(second.lease(pb.LeaseRequest.ACTION_RENEW), pb.REFUSAL_NOT_OWNER)
+        self.assertRefused(second.lease(pb.LeaseRequest.ACTION_RELEASE), pb.REFUSAL_NOT_OWNER)
+        self.assertRefused(second.exchange(0), pb.REFUSAL_NOT_OWNER)
+        self.assertEqual(first.step(0).owner, first.owner)
+        self.assertDone(first.lease(pb.LeaseRequest.ACTION_RENEW))
+        self.assertDone(first.lease(pb.LeaseRequest.ACTION_RELEASE))
+        self.assertDone(second.lease())
+        self.assertNotEqual(first.owner, second.owner)
+
+    def test_a_lease_ends_with_its_connection(self):
+        """An axis that nobody can take because its owner is dead: after close, half-close and reset."""
+        server = self.server()
+        for end in ("close", "half", "reset"):
+            owner = self.client(server)
+            self.assertDone(owner.lease())
+            tick = owner.newest().tick
+            owner.step(tick)
+            if end == "half":
+                owner.socket.shutdown(socket.SHUT_WR)
+            elif end == "reset":
+                owner.send_bytes(struct.pack(">I", 50) + b"mid-frame")
+                owner.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            if end != "half":
+                owner.close()
+            heir = self.client(server)
+            until(lambda: heir.lease().WhichOneof("kind") == "done", f"a lease after {end}")
+            sample = heir.newest()
+            self.assertDone(heir.ask(clear_faults=pb.ClearFaults()))
+            heir.step(sample.tick)
+            heir.lease(pb.LeaseRequest.ACTION_RELEASE)
+            heir.close()
+
+    def test_a_controller_that_vanishes_leaves_a_latched_fault(self):
+        """Taking over a moving axis as if nothing had happened."""
+        server = self.server()
+        owner = self.client(server)
+        owner.lease()
+        for tick in range(5):
+            owner.step(tick, 20.0)
+        owner.close()
+        heir = self.client(server)
+        until(lambda: heir.lease().WhichOneof("kind") == "done", "the lease is free")
+        self.assertRefused(heir.exchange(5), pb.REFUSAL_LATCHED)
+        self.assertDone(heir.ask(clear_faults=pb.ClearFaults()))
+        self.assertEqual(heir.step(5).state, 1)
+
+    def test_actions_that_are_none_are_refused(self):
+        """Clients that write what only recordings may hold (ACTION_LOST), or an unknown number."""
+        client = self.client(self.server())
+        for action in (0, 4, 77):
+            self.assertRefused(client.lease(action), pb.REFUSAL_OUT_OF_RANGE, "action")
+
+    def test_free_mode_takes_no_controller(self):
+        """A controller that believes it controls a run which does not wait for it."""
+        client = self.client(self.server("--mode", "free"))
+        self.assertRefused(client.lease(), pb.REFUSAL_WRONG_MODE)
+
+    def test_a_lease_that_is_asked_for_and_left_at_once_is_free_again(self):
+        """An answer that comes after the session has ended and leaves the axis to a ghost."""
+        server = self.server("--mode", "realtime")
+        for _ in range(30):
+            ghost = self.client(server)
+            ghost.send(lease=pb.LeaseRequest(action=pb.LeaseRequest.ACTION_ACQUIRE))
+            ghost.close()
+        heir = self.client(server)
+        ticks = heir.newest().tick
+        until(lambda: heir.lease().WhichOneof("kind") == "done", "the lease is free")
+        self.assertLess(heir.newest().tick - ticks, 8000, "free only because the lease had run out")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
