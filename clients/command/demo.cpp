@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <fmt/format.h>
 
 #include <chrono>
@@ -19,13 +21,14 @@ using namespace std::chrono_literals;
 constexpr double kPromisedErrorCounts = 2.0;
 
 /// Local time, so that recordings of several demos stand side by side in order.
+/// The time and the process, so that no two demos want the same file.
 std::string time_stamp() {
   const std::time_t now = std::time(nullptr);
   std::tm local = {};
   ::localtime_r(&now, &local);
   std::string text(32, '\0');
   text.resize(std::strftime(text.data(), text.size(), "%Y%m%d-%H%M%S", &local));
-  return text;
+  return fmt::format("{}-{}", text, ::getpid());
 }
 
 /// The first line that `parse` understands; nothing if the output ends or the deadline passes before.
@@ -111,8 +114,11 @@ void print_comparison(const DemoReport& r) {
   const auto row = [](std::string_view name, const std::string& left, const std::string& right) {
     fmt::print("  {:<30}{:>18}{:>18}\n", name, left, right);
   };
-  const auto numbers = [&row](std::string_view name, std::string_view format, double left, double right) {
-    row(name, fmt::format(fmt::runtime(format), left), fmt::format(fmt::runtime(format), right));
+  const auto shown = [](const DemoRun& run, std::string_view format, double value) {
+    return run.failure.empty() ? fmt::format(fmt::runtime(format), value) : std::string("failed");
+  };
+  const auto numbers = [&](std::string_view name, std::string_view format, double left, double right) {
+    row(name, shown(r.lockstep, format, left), shown(r.realtime, format, right));
   };
   fmt::print("180 degree move of an induction servo, {} ({})\n\n", a.preset, a.bench);
   row("", "lockstep", "real time");
