@@ -56,6 +56,7 @@ enum EncoderLevel : std::uint32_t {
   kPeriodValid = 1u << 5,       ///< two edges have been seen
 };
 
+/// Follows a shaft and says what an encoder on it would.
 class Encoder {
  public:
   Encoder(const EncoderParameters& p, double period_s) noexcept;

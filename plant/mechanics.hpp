@@ -12,6 +12,7 @@ struct ShaftParameters {
   double static_friction_nm = 0.0;    ///< holds a shaft that stands; at least the Coulomb friction
 };
 
+/// Speed and angle of the shaft, positive from phase a to phase b.
 struct ShaftState {
   double speed_rad_s = 0.0;
   double angle_rad = 0.0;  ///< within the present turn; the axis counts whole turns

@@ -9,6 +9,7 @@
 
 namespace drivebench {
 
+/// The type of a signal, which is also its encoding.
 enum class SignalType {
   kUnsigned,  ///< uint64 on the wire
   kSigned,    ///< sint64 (zigzag) on the wire

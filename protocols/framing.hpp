@@ -18,6 +18,7 @@ inline constexpr std::size_t kMaxFrameBeforeHello = std::size_t{4} * 1024;
 inline constexpr std::size_t kMaxRequestFrame = std::size_t{64} * 1024;
 inline constexpr std::size_t kMaxReplyFrame = std::size_t{1024} * 1024;
 
+/// What stands before a payload of this size.
 std::array<std::byte, kFrameHeaderSize> frame_header(std::uint32_t payload_size) noexcept;
 
 /// Cuts a byte stream into frames. Holds at most one frame; never allocates after construction.

@@ -15,8 +15,11 @@ namespace drivebench {
 /// How time enters: paced by the clock, by the commands of the controllers, or not at all.
 enum class RunMode { kRealtime, kLockstep, kFree };
 
+/// How the real-time tick waits: by the kernel's timer, or with the last microseconds spent polling the
+/// clock.
 enum class PacerKind { kSleep, kSleepSpin };
 
+/// Section [realtime].
 struct RealtimeConfig {
   PacerKind pacer = PacerKind::kSleepSpin;
   std::int64_t max_lateness_ns = 100'000'000;  ///< beyond it the bench faults and resynchronises
@@ -24,6 +27,7 @@ struct RealtimeConfig {
   int priority = 80;                           ///< SCHED_FIFO, when permitted; 0: ordinary scheduling
 };
 
+/// Section [tcp]: where clients connect.
 struct TcpConfig {
   std::string address = "127.0.0.1";
   std::uint16_t port = 7300;  ///< 0: chosen by the system
@@ -38,6 +42,7 @@ struct LoadEvent {
   LoadChange change{};
 };
 
+/// What the bench file says of an axis beside its physics.
 struct AxisConfig {
   std::string name;
   std::string motor;             ///< name of the motor, for people

@@ -26,6 +26,7 @@ class Digest {
       add(word);
   }
 
+  /// Of the words so far, their order and their number.
   constexpr std::uint64_t value() const noexcept {
     std::uint64_t result = position_;
     for (const std::uint64_t lane : lanes_)

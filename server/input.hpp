@@ -18,6 +18,7 @@ struct Command {
   PhaseCommand phases;
 };
 
+/// What a session does with the lease of an axis.
 enum class LeaseAction : std::uint32_t {
   kAcquire = 1,
   kRenew = 2,
@@ -25,17 +26,19 @@ enum class LeaseAction : std::uint32_t {
   kLost = 4,  ///< the session ended without a release
 };
 
+/// A load torque to go to, at once or in a ramp; positive opposes a positive machine torque.
 struct LoadChange {
   double load_nm;
   Tick ramp_ticks;
 };
 
+/// A parameter to change, already checked against its limits and rules.
 struct ParameterWrite {
   std::uint32_t row;  ///< of axis_parameters()
   double value;
 };
 
-struct ClearFaults {};
+struct ClearFaults {};     ///< by the owner only
 struct LateTick {};        ///< the tick of this input started late; concerns the whole bench
 struct Overrun {};         ///< late beyond the limit: safe action on every axis
 struct RefusedCommand {};  ///< a command for this axis was turned away before it reached the bench

@@ -17,6 +17,7 @@ struct ReplayDifference {
   std::string replayed;
 };
 
+/// What re-simulating a recording gave.
 struct ReplayReport {
   enum class Result {
     kEqual,      ///< every sample and the state hash are equal, bit for bit

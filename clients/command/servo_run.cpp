@@ -60,6 +60,8 @@ ServoRow row_of(const v1::Sample& sample, std::int64_t periods, double start_rad
   row.error_counts = (row.reference_rad - row.angle_rad) * counts_per_rad;
   row.measured_error_counts = move.output().position_error_counts;
   row.speed_rad_s = sample.speed_rad_s();
+  row.speed_observer_rad_s = move.output().speed_observer_rad_s;
+  row.speed_difference_rad_s = move.output().speed_difference_rad_s;
   row.i_a_a = sample.i_a_a();
   row.i_b_a = sample.i_b_a();
   row.command_a_v = move.output().u_a_v;
@@ -208,12 +210,13 @@ ControlReport summary_of(const ServoRun& run, double period_s) {
 std::string to_csv(const std::vector<ServoRow>& rows) {
   std::string csv =
       "tick,time [s],reference [rad],angle [rad],error [counts],measured_error [counts],speed [rad/s],"
-      "i_a [A],i_b [A],command_a [V],command_b [V],u_a [V],u_b [V],exchange [us]\n";
+      "speed_observer [rad/s],speed_difference [rad/s],i_a [A],i_b [A],command_a [V],command_b [V],u_a "
+      "[V],u_b [V],exchange [us]\n";
   for (const ServoRow& r : rows) {
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{:.3f}\n", r.tick,
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.3f}\n", r.tick,
                    r.time_s, r.reference_rad, r.angle_rad, r.error_counts, r.measured_error_counts,
-                   r.speed_rad_s, r.i_a_a, r.i_b_a, r.command_a_v, r.command_b_v, r.u_a_v, r.u_b_v,
-                   r.exchange_us);
+                   r.speed_rad_s, r.speed_observer_rad_s, r.speed_difference_rad_s, r.i_a_a, r.i_b_a,
+                   r.command_a_v, r.command_b_v, r.u_a_v, r.u_b_v, r.exchange_us);
   }
   return csv;
 }

@@ -18,10 +18,12 @@ struct ServoRow {
   std::int64_t periods = 1;  ///< since the row before
   double time_s = 0.0;       ///< after the start of the trajectory
   double reference_rad = 0.0;
-  double angle_rad = 0.0;              ///< true angle since the first sample
-  double error_counts = 0.0;           ///< reference - true angle
-  double measured_error_counts = 0.0;  ///< reference - encoder
-  double speed_rad_s = 0.0;            ///< true
+  double angle_rad = 0.0;               ///< true angle since the first sample
+  double error_counts = 0.0;            ///< reference - true angle
+  double measured_error_counts = 0.0;   ///< reference - encoder
+  double speed_rad_s = 0.0;             ///< true
+  double speed_observer_rad_s = 0.0;    ///< as the controller's observer has it
+  double speed_difference_rad_s = 0.0;  ///< by backward difference of the counts
   double i_a_a = 0.0;
   double i_b_a = 0.0;
   double command_a_v = 0.0;

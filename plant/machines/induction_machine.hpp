@@ -33,6 +33,7 @@ struct InductionMachineConstants {
   double rotor_inductance_h;          ///< L_R
 };
 
+/// The constants of a machine whose parameters are free of problems().
 InductionMachineConstants constants_of(const InductionMachineParameters& p) noexcept;
 
 /// Stator currents and rotor flux linkages, all in the stator frame (axes a, b).

@@ -2,6 +2,7 @@
 
 Numbers: cases 4 to 7 of the acceptance list. The loop is chaotic in its last digits (half a count moves the peak by some
 tenths), so the tests use the bounds of the book, not equality with one run."""
+import csv
 import json
 import pathlib
 import subprocess
@@ -74,6 +75,19 @@ class TheMove(unittest.TestCase):
             hot = move(server, "--set", "machine.rotor_resistance_ohm=5.85")
         self.assertLessEqual(hot["peak_error_counts"], 3.5)
         self.assertGreater(hot["peak_error_counts"], 2.0)
+
+    def test_case_6_the_observer_knows_the_speed_far_better_than_the_difference_of_counts(self):
+        """Would catch: an observer that lags or is fed the wrong sample, and an encoder that is not floor(theta N/2 pi)."""
+        file = self.folder / "move.csv"
+        with Server() as server:
+            move(server, "--csv", str(file))
+        with open(file, newline="", encoding="utf-8") as lines:
+            rows = [{name.split(" ")[0]: float(value) for name, value in row.items()} for row in csv.DictReader(lines)]
+        observer = max(abs(row["speed_observer"] - row["speed"]) for row in rows)
+        difference = max(abs(row["speed_difference"] - row["speed"]) for row in rows)
+        self.assertLess(observer, 1.2)
+        self.assertGreater(difference, 24.0)
+        self.assertLess(difference, 25.2)  # one count in one tick is 25.13 rad/s
 
     def test_case_7_clipping_the_reference_ruins_the_move(self):
         """Would catch: a bench so forgiving that the book's trap does not show."""
