@@ -4,26 +4,16 @@ import os
 import pathlib
 import subprocess
 import tempfile
-import time
 import unittest
 
 from wire_client import BENCHES, PATIENCE_S, SERVER, Server
+from wire_test import until  # noqa: F401
 
 DRIVEBENCH = SERVER.parent / "drivebench"
 SERVO = BENCHES / "servo.toml"
 NOBODY = "tcp:127.0.0.1:1"  # a port on which nobody listens
 
 OK, FAILED, USAGE, NO_CONNECT, CUT_SHORT, TOO_LATE = 0, 1, 2, 3, 3, 3
-
-
-def until(condition, what):
-    """Waits for something that another process does."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        if condition():
-            return
-        time.sleep(0.01)
-    raise AssertionError("never: " + what)
 
 
 def environment(link=NOBODY):
