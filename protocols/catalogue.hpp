@@ -140,13 +140,4 @@ using SignalMask = std::uint64_t;
 static_assert(kSignals.size() <= 64);
 inline constexpr SignalMask kAllSignals = (SignalMask{1} << kSignals.size()) - 1;
 
-/// What a controller of a real bench could see.
-inline constexpr SignalMask kSensorSignals = [] {
-  SignalMask mask = 0;
-  for (std::size_t i = 0; i < kSignals.size(); ++i) {
-    if (kSignals[i].kind != SignalKind::kTruth) mask |= SignalMask{1} << i;
-  }
-  return mask;
-}();
-
 }  // namespace drivebench

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "bench.pb.h"
-#include "plant/parameters.hpp"
 #include "protocols/descriptor_set.hpp"
 #include "protocols/mcap.hpp"
 #include "protocols/sample_codec.hpp"
