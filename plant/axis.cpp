@@ -198,7 +198,8 @@ AxisSample Axis::sample(Tick tick) const noexcept {
           .torque_nm = torque_nm(machine_, x.machine),
           .load_nm = state_.load.at(tick),
           .true_current_a = {x.machine.i_a_a, x.machine.i_b_a},
-          .rotor_flux_wb = {x.machine.psi_a_wb, x.machine.psi_b_wb}};
+          .rotor_flux_wb = {x.machine.psi_a_wb, x.machine.psi_b_wb},
+          .bus_voltage_v = p_.amplifier.voltage_limit_v};
 }
 
 }  // namespace drivebench

@@ -64,6 +64,7 @@ struct AxisSample {
   double load_nm = 0.0;
   TwoPhase true_current_a{};
   TwoPhase rotor_flux_wb{};
+  double bus_voltage_v = 0.0;
 };
 
 /// One emulated drive train: amplifier, induction machine, shaft, load, encoder and current sensors.
@@ -99,6 +100,7 @@ class Axis {
   std::int64_t last_tick_turn() const noexcept { return last_tick_turn_; }
   std::int64_t last_tick_count() const noexcept { return last_tick_count_; }  ///< at its start
   const Encoder& encoder() const noexcept { return encoder_; }
+  const AxisTiming& timing() const noexcept { return timing_; }
 
  private:
   /// What holds between two events: phases that conduct, friction direction.

@@ -109,6 +109,7 @@ inline constexpr auto kSignals = [] {
       real(kTruth, "true_i_b_a", "A", &Sample::true_i_b_a, -100, 100, "true current of phase b"),
       real(kTruth, "psi_a_wb", "Wb", &Sample::psi_a_wb, -10, 10, "rotor flux linkage, stator axis a"),
       real(kTruth, "psi_b_wb", "Wb", &Sample::psi_b_wb, -10, 10, "rotor flux linkage, stator axis b"),
+      real(kSensor, "bus_voltage_v", "V", &Sample::bus_voltage_v, 0, 1000, "voltage of the DC link"),
   });
 }();
 

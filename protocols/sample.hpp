@@ -36,6 +36,7 @@ struct Sample {
   double true_i_b_a = 0.0;
   double psi_a_wb = 0.0;
   double psi_b_wb = 0.0;
+  double bus_voltage_v = 0.0;
 };
 
 inline constexpr std::size_t kSampleWords = sizeof(Sample) / 8;

@@ -256,7 +256,8 @@ void Bench::take_sample(std::size_t index) noexcept {
               .true_i_a_a = s.true_current_a.a,
               .true_i_b_a = s.true_current_a.b,
               .psi_a_wb = s.rotor_flux_wb.a,
-              .psi_b_wb = s.rotor_flux_wb.b};
+              .psi_b_wb = s.rotor_flux_wb.b,
+              .bus_voltage_v = s.bus_voltage_v};
   samples_.add_block(a.sample);
   observer_->on_sample(static_cast<std::uint32_t>(index), a.sample);
 }

@@ -36,6 +36,10 @@ std::string_view name_of(SafeAction action) noexcept {
   return kSafeActionWords[static_cast<std::size_t>(action)];
 }
 
+std::string_view name_of(CanBackend backend) noexcept {
+  return kCanBackendWords[static_cast<std::size_t>(backend)];
+}
+
 bool is_address(const std::string& text) noexcept {
   in_addr v4{};
   in6_addr v6{};
@@ -49,6 +53,13 @@ bool is_loopback(const std::string& address) noexcept {
   if (address == "localhost") return true;
   if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
   return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+bool is_multicast(const std::string& address) noexcept {
+  in_addr v4{};
+  in6_addr v6{};
+  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 28 == 0xE;
+  return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_MULTICAST(&v6);
 }
 
 }  // namespace drivebench

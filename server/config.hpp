@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "protocols/can/profile.hpp"
 #include "server/bench.hpp"
 
 namespace drivebench {
@@ -36,6 +37,46 @@ struct TcpConfig {
   std::uint32_t max_sessions = 256;
 };
 
+/// What carries the frames of a [[can]] section.
+enum class CanBackend { kSocketCan, kUdpMulticast, kSlcan, kSocketcand };
+
+/// Section [[can]]: a bus that controllers share with the bench.
+struct CanConfig {
+  CanBackend backend = CanBackend::kUdpMulticast;
+  /// socketcan: name of the interface; udp_multicast: the group; slcan: the absolute path of a serial device,
+  /// with "@BAUD" if need be, "pty:PATH" (a terminal made at this absolute path) or "tcp:ADDRESS:PORT"
+  /// (listens; an IPv6 address may stand in brackets); socketcand: the address to listen on. What listens,
+  /// does so on a loopback address: neither protocol knows a password.
+  std::string channel = "239.74.163.2";
+  std::uint16_t port = 43113;  ///< udp_multicast and socketcand; 0: chosen by the system (socketcand only)
+  bool required = true;        ///< whether the bench may start without it
+  can::Profile profile;
+  std::int64_t bit_rate = 1'000'000;
+  std::int64_t data_bit_rate = 5'000'000;  ///< FD: of the data phase
+  std::int64_t sample_every_ticks = 1;     ///< real time: a sample frame every so many ticks
+  std::int64_t state_every_ticks = 80;
+  bool edges = false;               ///< FD: sends the times of all encoder edges
+  std::int64_t heartbeat_ms = 100;  ///< wall time; 0: none
+  /// Lets the lease of a controller lapse that stops its heartbeat, once it has sent one.
+  std::int64_t controller_timeout_ms = 1000;
+  /// Lockstep: so long in wall time may the owner of an axis be silent before it loses its lease; 0: for
+  /// ever.
+  std::int64_t idle_timeout_ms = 10'000;
+};
+
+/// Section [modbus].
+struct ModbusConfig {
+  bool enabled = false;  ///< the section exists
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 1502;  ///< 0: chosen by the system
+  bool allow_writes = false;
+  bool unprotected = false;  ///< writes may come from other computers, although Modbus knows no password
+  std::uint32_t max_connections = 32;
+  std::uint32_t requests_per_s = 2000;  ///< per peer address, sustained; 0: no limit
+  std::int64_t frame_timeout_ms = 500;
+  std::int64_t idle_timeout_ms = 10'000;  ///< an owner that says nothing for so long loses its lease
+};
+
 /// A load torque that starts by itself.
 struct LoadEvent {
   Tick tick = 0;
@@ -46,6 +87,7 @@ struct LoadEvent {
 struct AxisConfig {
   std::string name;
   std::string motor;             ///< name of the motor, for people
+  std::uint32_t can_node = 1;    ///< node id on every bus; its number from 1 on unless it says otherwise
   std::vector<LoadEvent> loads;  ///< sorted by tick
 };
 
@@ -57,6 +99,8 @@ struct BenchConfig {
   std::vector<AxisConfig> axes;
   RealtimeConfig realtime;
   TcpConfig tcp;
+  std::vector<CanConfig> can;
+  ModbusConfig modbus;
 };
 
 /// One thing wrong with a configuration, with the place it was found at.
@@ -99,14 +143,18 @@ std::uint64_t configuration_hash(const BenchConfig& config);
 std::string_view name_of(RunMode mode) noexcept;
 std::string_view name_of(PacerKind pacer) noexcept;
 std::string_view name_of(SafeAction action) noexcept;
+std::string_view name_of(CanBackend backend) noexcept;
 
 /// An IPv4 or IPv6 address as text, or "localhost". Strict: neither "127.1" nor "0x7f000001" nor "0" is one.
 bool is_address(const std::string& text) noexcept;
 /// Whether such an address can be reached from this computer only.
 bool is_loopback(const std::string& address) noexcept;
+/// Whether such an address stands for a multicast group.
+bool is_multicast(const std::string& address) noexcept;
 
 /// Limits that a configuration keeps.
 inline constexpr std::size_t kMaxAxes = 64;
+inline constexpr std::size_t kMaxCanBuses = 8;
 inline constexpr std::size_t kMaxLoads =
     Bench::kMaxScheduled / 2;  ///< of all axes; leaves room for the clients
 

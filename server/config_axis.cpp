@@ -166,7 +166,7 @@ std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key,
 }
 
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
-                      ProblemList& problems) {
+                      std::uint32_t default_node, ProblemList& problems) {
   AxisReading result;
   axis.require("name");
   result.config.name = axis.identifier("name").value_or("");
@@ -184,6 +184,8 @@ AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, st
 
   const auto action = axis.choice("on_link_loss", kSafeActionWords);
   result.setup.on_link_loss = static_cast<SafeAction>(action.value_or(0));
+  const auto node = axis.integer("can_node", 1, can::kMaxNode);
+  result.config.can_node = static_cast<std::uint32_t>(node.value_or(default_node));
   result.config.loads = read_loads(axis, period_ns);
   axis.finish();
   return result;

@@ -17,8 +17,9 @@ struct AxisReading {
   bool machine_valid = false;  ///< setup.parameters.machine is complete and free of problems
 };
 
+/// `default_node` is the node id of an axis that does not name one.
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
-                      ProblemList& problems);
+                      std::uint32_t default_node, ProblemList& problems);
 
 /// A duration given as seconds, rounded to the nearest tick, or as ticks; not both.
 std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key, std::string_view ticks_key,

@@ -59,6 +59,8 @@ void set_scalar(ConfigNode& node, const toml::node& source) {
   } else if (const auto* integer = source.as_integer()) {
     if (integer->flags() == toml::value_flags::none) {
       node.scalar = integer->get();
+    } else if (integer->flags() == toml::value_flags::format_as_hexadecimal) {
+      node.scalar = ConfigNode::Hexadecimal{integer->get()};
     } else {
       node.scalar = ConfigNode::Other{"a number that is not decimal"};
     }
@@ -220,6 +222,12 @@ std::string printable(std::string_view text) {
     result += code < 0x20 || code == 0x7F ? '?' : c;
   }
   return size < text.size() ? result + "..." : result;
+}
+
+std::string hexadecimal(std::int64_t value) {
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, 16).ptr;
+  return std::string("0x").append(buffer.data(), end);
 }
 
 std::string shortest(double value) {

@@ -34,11 +34,15 @@ struct ConfigNode {
   struct Other {
     std::string_view what;
   };
+  /// An integer written 0x...
+  struct Hexadecimal {
+    std::int64_t value;
+  };
 
   std::string key;  ///< empty within an array
   int line = 0;
   Kind kind = Kind::kTable;
-  std::variant<Other, std::string, std::int64_t, double, bool> scalar;
+  std::variant<Other, std::string, std::int64_t, double, bool, Hexadecimal> scalar;
   std::vector<ConfigNode> children;
 };
 
@@ -59,6 +63,9 @@ inline constexpr std::size_t kMaxConfigBytes = 262'144;
 
 /// The text fit for one line of a terminal: control characters replaced, cut after 160 bytes.
 std::string printable(std::string_view text);
+
+/// As hexadecimal numbers are written: 0x1a.
+std::string hexadecimal(std::int64_t value);
 
 /// The shortest decimal text that reads back as the same double.
 std::string shortest(double value);

@@ -8,6 +8,7 @@
 
 #include "server/config.hpp"
 #include "server/config_axis.hpp"
+#include "server/config_can.hpp"
 #include "server/config_document.hpp"
 #include "server/config_words.hpp"
 #include "server/strict_table.hpp"
@@ -119,20 +120,35 @@ std::string read_token(StrictTable& tcp, const std::filesystem::path& folder) {
 }
 
 void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig& tcp) {
-  if (const auto address = table.text("address", 64)) {
-    tcp.address = *address;
-    if (!is_address(*address)) {
-      table.report("address",
-                   "is \"" + printable(*address) + "\" but must be an IPv4 or IPv6 address or \"localhost\"");
-    } else if (!is_loopback(*address) && !table.has("token_file")) {
-      table.report("address", "is " + *address + ", which other computers can reach: name a token_file");
-    }
+  tcp.address = table.address("address").value_or(tcp.address);
+  if (!is_loopback(tcp.address) && !table.has("token_file")) {
+    table.report("address", "is " + tcp.address + ", which other computers can reach: name a token_file");
   }
   tcp.port = static_cast<std::uint16_t>(table.integer("port", 0, 65535).value_or(tcp.port));
   tcp.unix_path = table.text("unix_path", kMaxUnixPath).value_or("");
   tcp.token = read_token(table, folder);
   tcp.max_sessions =
       static_cast<std::uint32_t>(table.integer("max_sessions", 1, 10'000).value_or(tcp.max_sessions));
+  table.finish();
+}
+
+void read_modbus(StrictTable table, ModbusConfig& modbus) {
+  modbus.enabled = table.exists();
+  modbus.address = table.address("address").value_or(modbus.address);
+  modbus.port = static_cast<std::uint16_t>(table.integer("port", 0, 65535).value_or(modbus.port));
+  modbus.allow_writes = table.boolean("allow_writes").value_or(modbus.allow_writes);
+  modbus.unprotected = table.boolean("unprotected").value_or(modbus.unprotected);
+  if (modbus.allow_writes && !is_loopback(modbus.address) && !modbus.unprotected) {
+    table.report("allow_writes", "is true at " + modbus.address +
+                                     ", which other computers can reach, and Modbus knows no password: "
+                                     "unprotected = true lets them");
+  }
+  modbus.max_connections =
+      static_cast<std::uint32_t>(table.integer("max_connections", 1, 1024).value_or(modbus.max_connections));
+  modbus.requests_per_s = static_cast<std::uint32_t>(
+      table.integer("requests_per_s", 0, 1'000'000).value_or(modbus.requests_per_s));
+  modbus.frame_timeout_ms = table.integer("frame_timeout_ms", 10, 60'000).value_or(modbus.frame_timeout_ms);
+  modbus.idle_timeout_ms = table.integer("idle_timeout_ms", 100, 86'400'000).value_or(modbus.idle_timeout_ms);
   table.finish();
 }
 
@@ -173,11 +189,16 @@ std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::pat
   std::vector<AxisReading> axes;
   std::size_t loads = 0;
   for (StrictTable& table : root.tables("axis", kMaxAxes)) {
-    AxisReading axis = read_axis(table, folder, config.setup.period_ns, problems);
+    const auto number = static_cast<std::uint32_t>(axes.size() + 1);
+    AxisReading axis = read_axis(table, folder, config.setup.period_ns, number, problems);
     const std::string& name = axis.config.name;
-    const auto same = [&](const AxisReading& other) { return other.config.name == name; };
-    if (!name.empty() && std::any_of(axes.begin(), axes.end(), same)) {
+    const std::uint32_t node = axis.config.can_node;
+    const auto another = [&](auto same) { return std::any_of(axes.begin(), axes.end(), same); };
+    if (!name.empty() && another([&](const AxisReading& other) { return other.config.name == name; })) {
       table.report("name", "is \"" + name + "\", the name of another axis");
+    }
+    if (another([&](const AxisReading& other) { return other.config.can_node == node; })) {
+      table.report("can_node", "is " + std::to_string(node) + ", the node of another axis");
     }
     loads += axis.config.loads.size();
     if (loads > kMaxLoads) {
@@ -207,6 +228,8 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
       config.setup.axes.push_back(axis.setup);
       config.axes.push_back(axis.config);
     }
+    config.can = read_can(root);
+    read_modbus(root.table("modbus"), config.modbus);
     root.finish();
   }
   problems.throw_if_any();

@@ -9,6 +9,8 @@ namespace drivebench {
 inline constexpr std::array<std::string_view, 3> kRunModeWords{"realtime", "lockstep", "free"};
 inline constexpr std::array<std::string_view, 2> kPacerWords{"sleep", "sleep+spin"};
 inline constexpr std::array<std::string_view, 2> kSafeActionWords{"freewheel", "zero_voltage"};
+inline constexpr std::array<std::string_view, 4> kCanBackendWords{"socketcan", "udp_multicast", "slcan",
+                                                                  "socketcand"};
 
 /// The rule for a text without a folder, such as the one in a recording, which may be anybody's.
 inline constexpr std::string_view kNoOtherFiles = "names another file, but this text must stand for itself";

@@ -4,6 +4,7 @@
 
 #include "plant/parameters.hpp"
 #include "server/config.hpp"
+#include "server/config_can.hpp"
 #include "server/config_document.hpp"
 #include "server/digest.hpp"
 
@@ -25,6 +26,10 @@ std::string real(double value) {
   return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
 }
 
+std::string boolean(bool value) {
+  return value ? "true" : "false";
+}
+
 void append(std::string& text, std::string_view key, const std::string& value) {
   text.append(key).append(" = ").append(value).append("\n");
 }
@@ -40,7 +45,7 @@ void append_timing(std::string& text, const BenchSetup& setup) {
 
 std::string value_text(const Parameter& row, double value) {
   if (!row.integer) return real(value);
-  if (row.minimum == 0.0 && row.maximum == 1.0) return value != 0.0 ? "true" : "false";
+  if (row.minimum == 0.0 && row.maximum == 1.0) return boolean(value != 0.0);
   return std::to_string(static_cast<std::int64_t>(value));
 }
 
@@ -77,6 +82,43 @@ void append_service(std::string& text, const RealtimeConfig& realtime, const Tcp
   append(text, "max_sessions", std::to_string(tcp.max_sessions));
 }
 
+void append_can(std::string& text, const CanConfig& bus) {
+  text += "\n[[can]]\n";
+  append(text, "backend", in_quotes(name_of(bus.backend)));
+  append(text, "channel", in_quotes(bus.channel));
+  const bool has_port = bus.backend == CanBackend::kUdpMulticast || bus.backend == CanBackend::kSocketcand;
+  if (has_port) append(text, "port", std::to_string(bus.port));
+  append(text, "required", boolean(bus.required));
+  append(text, "fd", boolean(bus.profile.fd));
+  append(text, "extended", boolean(bus.profile.extended));
+  append(text, "bit_rate", std::to_string(bus.bit_rate));
+  append(text, "data_bit_rate", std::to_string(bus.data_bit_rate));
+  append(text, "sample_every_ticks", std::to_string(bus.sample_every_ticks));
+  append(text, "state_every_ticks", std::to_string(bus.state_every_ticks));
+  append(text, "edges", boolean(bus.edges));
+  append(text, "heartbeat_ms", std::to_string(bus.heartbeat_ms));
+  append(text, "controller_timeout_ms", std::to_string(bus.controller_timeout_ms));
+  append(text, "idle_timeout_ms", std::to_string(bus.idle_timeout_ms));
+  text += "\n[can.ids]\n";
+  for (std::size_t i = 0; i < kCanMessages.size(); ++i)
+    append(text, kCanMessages[i]->name, hexadecimal(bus.profile.base_ids[i]));
+  text += "\n[can.units]\n";
+  for (const auto& [key, unit] : kCanUnits)
+    append(text, key, real(bus.profile.*unit));
+}
+
+void append_modbus(std::string& text, const ModbusConfig& modbus) {
+  text += "\n[modbus]\n";
+  append(text, "address", in_quotes(modbus.address));
+  append(text, "port", std::to_string(modbus.port));
+  append(text, "allow_writes", boolean(modbus.allow_writes));
+  append(text, "unprotected", boolean(modbus.unprotected));
+  append(text, "max_connections", std::to_string(modbus.max_connections));
+  append(text, "requests_per_s", std::to_string(modbus.requests_per_s));
+  append(text, "frame_timeout_ms", std::to_string(modbus.frame_timeout_ms));
+  append(text, "idle_timeout_ms", std::to_string(modbus.idle_timeout_ms));
+}
+
 }  // namespace
 
 std::string to_toml(const BenchConfig& config) {
@@ -85,10 +127,14 @@ std::string to_toml(const BenchConfig& config) {
   append(text, "mode", in_quotes(name_of(config.mode)));
   append_timing(text, config.setup);
   append_service(text, config.realtime, config.tcp);
+  for (const CanConfig& bus : config.can)
+    append_can(text, bus);
+  if (config.modbus.enabled) append_modbus(text, config.modbus);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     text += "\n[[axis]]\n";
     append(text, "name", in_quotes(config.axes[i].name));
     if (!config.axes[i].motor.empty()) append(text, "motor_name", in_quotes(config.axes[i].motor));
+    append(text, "can_node", std::to_string(config.axes[i].can_node));
     append_axis(text, config.setup.axes[i], config.axes[i]);
   }
   return text;

@@ -1,5 +1,7 @@
 #include "server/engine.hpp"
 
+#include <algorithm>
+
 #include "plant/parameters.hpp"
 
 namespace drivebench {
@@ -8,6 +10,9 @@ Engine::Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder)
     : config_(config), recorder_(std::move(recorder)), newest_(config.axes.size()) {
   for (const AxisSetup& axis : config.setup.axes)
     parameters_.push_back(axis.parameters);
+  const bool wanted =
+      std::any_of(config.can.begin(), config.can.end(), [](const CanConfig& bus) { return bus.edges; });
+  if (wanted) edges_.resize(config.axes.size());
 }
 
 std::string Engine::try_parameter(std::size_t axis, std::uint32_t row, double value) {

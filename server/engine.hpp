@@ -10,6 +10,7 @@
 #include "server/bench.hpp"
 #include "server/config.hpp"
 #include "server/recorder.hpp"
+#include "server/tick_edges.hpp"
 #include "server/verdict.hpp"
 
 namespace boost::asio {
@@ -43,10 +44,23 @@ class Engine {
   /// Lateness so far; ticks that were late stand in every sample.
   virtual std::int64_t worst_lateness_ns() const = 0;
 
+  /// Called in turn; added before the run, never taken away.
+  class Listeners {
+   public:
+    void add(std::function<void()> listener) { listeners_.push_back(std::move(listener)); }
+    void operator()() const {
+      for (const auto& listener : listeners_)
+        listener();
+    }
+
+   private:
+    std::vector<std::function<void()>> listeners_;
+  };
+
   /// Called after each tick, when newest() has changed.
-  std::function<void()> on_tick;
+  Listeners on_tick;
   /// Called after on_tick, when there is no newer tick that on_tick has not told of yet.
-  std::function<void()> on_newest;
+  Listeners on_newest;
   /// Called once, when a run that has an end has reached it.
   std::function<void()> on_end;
 
@@ -54,6 +68,8 @@ class Engine {
   virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
 
   const Sample& newest(std::size_t axis) const { return newest_[axis]; }
+  /// The encoder edges of the tick before newest(), if a bus of the configuration sends them.
+  const TickEdges& edges(std::size_t axis) const { return edges_[axis]; }
   Tick tick() const { return static_cast<Tick>(newest_[0].tick); }
   const BenchConfig& config() const { return config_; }
   const Recorder* recorder() const { return recorder_.get(); }
@@ -74,6 +90,7 @@ class Engine {
   BenchConfig config_;
   std::unique_ptr<Recorder> recorder_;
   std::vector<Sample> newest_;
+  std::vector<TickEdges> edges_;  ///< empty: nobody wants them
   std::vector<std::string> notes_;
 
  private:

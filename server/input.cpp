@@ -76,4 +76,26 @@ Input unpack(const PackedInput& packed) noexcept {
   return input;
 }
 
+std::string_view sentence_of(Refused why) noexcept {
+  switch (why) {
+    case Refused::kUnknownAxis:
+      return "there is no such axis";
+    case Refused::kNotOwner:
+      return "this session does not hold the lease of the axis";
+    case Refused::kOwned:
+      return "another session holds the lease of the axis";
+    case Refused::kNotFinite:
+      return "a value is not a finite number";
+    case Refused::kLatched:
+      return "a latched fault is in force; its owner must clear it first";
+    case Refused::kStale:
+      return "the command answers a sample that is too old, already answered or not taken yet";
+    case Refused::kBusy:
+      return "too many requests are waiting for the bench";
+    case Refused::kNot:
+      break;
+  }
+  return {};
+}
+
 }  // namespace drivebench

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 #include <type_traits>
 #include <variant>
 
@@ -79,5 +80,8 @@ enum class Refused : std::uint32_t {
   kStale,
   kBusy
 };
+
+/// The reason for people; empty for kNot.
+std::string_view sentence_of(Refused why) noexcept;
 
 }  // namespace drivebench

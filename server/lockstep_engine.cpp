@@ -30,9 +30,11 @@ class LockstepEngine final : public Engine {
     if (!commanded) return;  // without a controller a lockstep bench stands still
     if (recorder_) recorder_->wait_for_room();
     bench_.step();
+    for (std::size_t i = 0; i < edges_.size(); ++i)
+      edges_[i] = edges_of(bench_, i);
     show();
-    if (on_tick) on_tick();
-    if (on_newest) on_newest();
+    on_tick();
+    on_newest();
   }
 
   void request(const Input& input, Answer answer) override {

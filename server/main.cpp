@@ -13,7 +13,9 @@
 #include "server/build_id.hpp"
 #include "server/config.hpp"
 #include "server/endpoints/stream_server.hpp"
+#include "server/endpoints/transports.hpp"
 #include "server/engine.hpp"
+#include "server/interface_text.hpp"
 #include "server/replay.hpp"
 
 namespace drivebench {
@@ -33,6 +35,9 @@ struct Options {
   std::int64_t fail_on_late = -1;
   bool json = false;
   bool check_config = false;
+  bool allow_overload = false;
+  std::string print;  ///< a description of an interface, instead of a run
+  std::size_t bus = 1;
 };
 
 void print_line(const std::string& line) {
@@ -65,17 +70,33 @@ BenchConfig configure(const Options& o) {
   return config;
 }
 
-void print_ready(const Options& o, const BenchConfig& config, const StreamServer& server) {
+void print_ready(const Options& o, const BenchConfig& config, const StreamServer& server,
+                 const Transports& transports) {
   if (o.json) {
     const nlohmann::json ready{{"event", "ready"},
                                {"tcp", server.tcp_address()},
                                {"unix", config.tcp.unix_path},
+                               {"can", transports.can_names()},
+                               {"modbus", transports.modbus_address()},
                                {"mode", name_of(config.mode)},
                                {"bench", config.name}};
     return print_line(ready.dump());
   }
-  print_line(fmt::format("ready tcp={} unix={} mode={} bench={}", server.tcp_address(), config.tcp.unix_path,
-                         name_of(config.mode), config.name));
+  std::string others;
+  for (const std::string& bus : transports.can_names())
+    others += " can=" + bus;
+  if (config.modbus.enabled) others += " modbus=" + transports.modbus_address();
+  print_line(fmt::format("ready tcp={} unix={}{} mode={} bench={}", server.tcp_address(),
+                         config.tcp.unix_path, others, name_of(config.mode), config.name));
+}
+
+/// In real time a bus must be able to carry what the bench sends.
+void check_bus_loads(const Options& o, const BenchConfig& config) {
+  if (config.mode != RunMode::kRealtime) return;
+  for (const std::string& overload : bus_overloads(config)) {
+    if (!o.allow_overload) throw std::runtime_error(overload + "; --allow-overload starts all the same");
+    spdlog::warn("{}", overload);
+  }
 }
 
 /// The buckets that are not empty, as [upper edge in us, count].
@@ -137,6 +158,10 @@ asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
 
 int serve(const Options& o) {
   const BenchConfig config = configure(o);
+  if (!o.print.empty()) {
+    fmt::print("{}", interface_text(config, o.print, o.bus));
+    return kOk;
+  }
   if (o.check_config) {
     if (o.json) {
       const nlohmann::json checked{{"event", "checked"},
@@ -158,13 +183,17 @@ int serve(const Options& o) {
   signals.async_wait([&io](const boost::system::error_code& error, int) {
     if (!error) io.stop();
   });
-  StreamServer server(io, config.tcp);  // first: a port in use must not leave a recording behind
+  check_bus_loads(o, config);
+  // First: a port in use must not leave a recording behind.
+  StreamServer server(io, config.tcp);
+  Transports transports(io, config);
   const std::unique_ptr<Engine> engine = make_engine(o, config, io);
-  server.serve(*engine);
+  server.serve(*engine, [&transports] { return transports.reports(); });
+  transports.serve(*engine);
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
     spdlog::warn("{}", note);
-  print_ready(o, config, server);
+  print_ready(o, config, server, transports);
   if (o.duration_s > 0.0 && ::isatty(STDERR_FILENO) != 0) {
     asio::co_spawn(io, show_progress(*engine, o.duration_s), asio::detached);
   }
@@ -178,6 +207,7 @@ int serve(const Options& o) {
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   signals.clear();  // from here on a second signal ends the program at once
   const Verdict verdict = engine->stop();
+  transports.close();
   server.close();
   print_verdict(o, verdict);
   if (broken || verdict.gaps > 0) return kFailed;
@@ -258,6 +288,11 @@ int run(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_flag("--json", o.json, "print JSON lines");
   app.add_flag("--check-config", o.check_config, "only check the bench file");
+  app.add_flag("--allow-overload", o.allow_overload,
+               "in real time: start with a CAN bus that cannot carry all frames");
+  app.add_option("--print", o.print, "only print a description of an interface")
+      ->check(CLI::IsMember({"dbc", "can-table", "modbus-map", "modbus-csv"}));
+  app.add_option("--bus", o.bus, "which [[can]] section --print is about, from 1 on");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

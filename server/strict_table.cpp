@@ -18,6 +18,7 @@ std::string described(const ConfigNode& node) {
   if (const auto* text = std::get_if<std::string>(&node.scalar)) return '"' + printable(*text) + '"';
   if (const auto* integer = std::get_if<std::int64_t>(&node.scalar)) return std::to_string(*integer);
   if (const auto* real = std::get_if<double>(&node.scalar)) return shortest(*real);
+  if (std::holds_alternative<ConfigNode::Hexadecimal>(node.scalar)) return "a number that is not decimal";
   return std::get<bool>(node.scalar) ? "true" : "false";
 }
 
@@ -75,6 +76,17 @@ std::optional<std::int64_t> StrictTable::integer(std::string_view key, std::int6
   return std::nullopt;
 }
 
+std::optional<std::int64_t> StrictTable::hexadecimal_integer(std::string_view key, std::int64_t minimum,
+                                                             std::int64_t maximum) {
+  const ConfigNode* node = find(key);
+  const auto* value = node != nullptr ? std::get_if<ConfigNode::Hexadecimal>(&node->scalar) : nullptr;
+  if (value == nullptr) return integer(key, minimum, maximum);
+  take(key);
+  if (value->value >= minimum && value->value <= maximum) return value->value;
+  report(key, outside(hexadecimal(value->value), hexadecimal(minimum), hexadecimal(maximum)));
+  return std::nullopt;
+}
+
 std::optional<double> StrictTable::real(std::string_view key) {
   const ConfigNode* node = take(key);
   if (node == nullptr) return std::nullopt;
@@ -110,6 +122,13 @@ std::optional<std::string> StrictTable::identifier(std::string_view key) {
   std::optional<std::string> value = text(key, 64);
   if (!value || std::all_of(value->begin(), value->end(), belongs_to_identifier)) return value;
   report(key, "is \"" + printable(*value) + "\" but may hold only letters, digits, '.', '_' and '-'");
+  return std::nullopt;
+}
+
+std::optional<std::string> StrictTable::address(std::string_view key) {
+  std::optional<std::string> value = text(key, 64);
+  if (!value || is_address(*value)) return value;
+  report(key, "is \"" + printable(*value) + "\" but must be an IPv4 or IPv6 address or \"localhost\"");
   return std::nullopt;
 }
 

@@ -21,12 +21,17 @@ class StrictTable {
 
   std::optional<bool> boolean(std::string_view key);
   std::optional<std::int64_t> integer(std::string_view key, std::int64_t minimum, std::int64_t maximum);
+  /// The same of an integer that may be written as a hexadecimal number too.
+  std::optional<std::int64_t> hexadecimal_integer(std::string_view key, std::int64_t minimum,
+                                                  std::int64_t maximum);
   std::optional<double> real(std::string_view key);
   std::optional<double> real(std::string_view key, double minimum, double maximum);
   /// Text without control characters, not empty, of at most `most` bytes.
   std::optional<std::string> text(std::string_view key, std::size_t most);
   /// Letters, digits, '.', '_' and '-', at most 64 of them.
   std::optional<std::string> identifier(std::string_view key);
+  /// An IPv4 or IPv6 address or "localhost", as is_address() has it.
+  std::optional<std::string> address(std::string_view key);
   /// One of the words; its index.
   std::optional<std::size_t> choice(std::string_view key, std::span<const std::string_view> words);
 

@@ -27,8 +27,12 @@ struct Outcome {
   Refused refused;
   Tick tick;
 };
+struct AxisEdges {
+  std::uint32_t axis;
+  TickEdges edges;
+};
 struct Ended {};
-using Event = std::variant<TickedSample, Outcome, Ended>;
+using Event = std::variant<TickedSample, Outcome, AxisEdges, Ended>;
 
 struct OwnedCommand {
   Owner owner = 0;
@@ -44,13 +48,17 @@ class Tap final : public BenchObserver {
   }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
     if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
+    if (bench_ != nullptr) events_.push(AxisEdges{axis, edges_of(*bench_, axis)});
     events_.push(
         TickedSample{axis, sample});  // a full ring costs the viewers a sample, never the bench its time
   }
+  /// From now on the encoder edges of each tick go before its samples.
+  void send_edges_of(const Bench& bench) noexcept { bench_ = &bench; }
 
  private:
   Recorder* recorder_;
   SpscRing<Event>& events_;
+  const Bench* bench_ = nullptr;
 };
 
 class ThreadedEngine final : public Engine {
@@ -74,6 +82,7 @@ class ThreadedEngine final : public Engine {
                    ? make_realtime_pacer(config_.realtime.pacer, config_.setup.period_ns)
                    : make_free_pacer()) {
     schedule_loads(config_, bench_);
+    if (!edges_.empty()) tap_.send_edges_of(bench_);
     for (std::size_t i = 0; i < newest_.size(); ++i)
       newest_[i] = bench_.sample(i);
     await_wake();
@@ -221,17 +230,18 @@ class ThreadedEngine final : public Engine {
       events_.pop();
       std::visit([this](const auto& e) { handle(e); }, copy);
     }
-    if (tick() != before && on_newest) on_newest();
+    if (tick() != before) on_newest();
   }
 
   void handle(const TickedSample& s) {
     newest_[s.axis] = s.sample;
     if (s.axis + 1 < newest_.size()) return;
     answer_outcomes();
-    if (on_tick) on_tick();
+    on_tick();
   }
   // Answers wait for the samples of their tick, so that whoever gets one finds newest() as it says.
   void handle(const Outcome& outcome) { outcomes_.push_back(outcome); }
+  void handle(const AxisEdges& e) { edges_[e.axis] = e.edges; }
   void handle(const Ended&) {
     answer_outcomes();
     if (on_end) on_end();

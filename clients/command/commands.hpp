@@ -84,6 +84,22 @@ struct ReplayOptions {
 };
 int run_replay(const ReplayOptions& options);
 
+/// What drivebench-server can print of a bench file.
+struct PrintOptions {
+  std::string config = "servo";  ///< path or name
+  std::string what;              ///< "dbc", "can-table", "modbus-map" or "modbus-csv"
+  unsigned bus = 1;              ///< which of its [[can]] sections
+};
+int run_print(const PrintOptions& options);
+
+struct CanLogOptions {
+  std::string address;
+  std::string out_file;     ///< empty: standard output
+  std::uint64_t count = 0;  ///< frames; 0: until interrupted
+  double duration_s = 0.0;  ///< of wall time; 0: until interrupted
+};
+int run_can_log(const CanLogOptions& options);
+
 struct ExportOptions {
   std::string recording{};
   bool json = false;
@@ -92,6 +108,11 @@ struct ExportOptions {
   std::vector<std::string> signals{};  ///< empty: all
   std::uint64_t from_tick = 0;
   std::uint64_t to_tick = std::numeric_limits<std::uint64_t>::max();
+  std::string format = "csv";      ///< or "candump"
+  std::string interface = "can0";  ///< candump: its name in every line
+  unsigned node_base = 1;          ///< candump: node id of the first axis
+  bool classic = false;            ///< candump: classic frames instead of FD
+  std::string profile{};           ///< candump: keys as in a can: address
 };
 int run_export(const ExportOptions& options);
 

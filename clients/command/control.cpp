@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <fstream>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -34,37 +35,35 @@ void check_fit(const v1::BenchDescription& bench, std::uint32_t axis, const cont
   throw UsageError(text);
 }
 
-void apply_settings(link::Link& bench, std::uint32_t axis, const std::vector<ParameterSetting>& settings) {
+void apply_settings(link::AxisLink& bench, const std::vector<ParameterSetting>& settings) {
   for (const ParameterSetting& setting : settings) {
     try {
-      bench.write_parameter(axis, setting.name, setting.value);
+      bench.write_parameter(setting.name, setting.value);
     } catch (const link::Refused& refused) {
       throw UsageError(fmt::format("--set {}: {}", setting.name, refused.what()));
     }
   }
 }
 
-void refuse_latched_faults(link::Link& bench, std::uint32_t axis) {
-  const v1::BenchDescription& description = bench.welcome().bench();
-  const std::uint64_t latched = latched_faults(description, sample_of(bench.exchange({}), axis).faults());
-  if (latched == 0) return;
-  throw UsageError(
-      fmt::format("the axis has latched {}; --clear clears it", fault_names(description, latched)));
+void refuse_latched_faults(link::AxisLink& bench) {
+  const std::string latched = latched_text(bench.bench(), bench.newest());
+  if (!latched.empty()) {
+    throw UsageError(fmt::format("the axis has latched {}; --clear clears it", latched));
+  }
 }
 
-/// Leased, without latched faults and at rest, or an exception that says what to do. The load at that time.
-double prepare(link::Link& bench, std::uint32_t axis, const ControlOptions& options) {
-  bench.acquire(axis);
+/// Leased, without latched faults and at rest, or an exception that says what to do.
+void prepare(link::AxisLink& bench, const ControlOptions& options, double counts_per_revolution) {
+  bench.acquire();
   if (options.clear_faults) {
-    bench.clear_faults(axis);
+    bench.clear_faults();
   } else {
-    refuse_latched_faults(bench, axis);
+    refuse_latched_faults(bench);
   }
-  apply_settings(bench, axis, options.settings);
-  const double load_nm = let_rest(bench, axis);
+  apply_settings(bench, options.settings);
+  let_rest(bench, counts_per_revolution);
   // In lockstep no tick may have run since a fault came, so that no sample showed it before.
-  if (bench.welcome().bench().mode() == v1::MODE_LOCKSTEP) refuse_latched_faults(bench, axis);
-  return load_nm;
+  if (bench.bench().mode() == v1::MODE_LOCKSTEP) refuse_latched_faults(bench);
 }
 
 /// Open before the move, so that a report is not lost to a folder that does not exist.
@@ -87,13 +86,17 @@ void print_report(const ControlReport& r) {
   const auto row = [](std::string_view name, std::string_view format, double value, std::string_view unit) {
     fmt::print("  {:<34}{:>12} {}\n", name, fmt::format(fmt::runtime(format), value), unit);
   };
-  row("peak error (true angle)", "{:.2f}", r.peak_error_counts, "counts");
+  const char* angle = r.angle_source == "truth" ? "peak error (true angle)" : "peak error (encoder)";
+  row(angle, "{:.2f}", r.peak_error_counts, "counts");
   row("final error (encoder)", "{:.2f}", r.final_error_counts, "counts");
-  row("final error (true angle)", "{:.2f}", r.final_true_error_counts, "counts");
-  row("peak speed", "{:.2f}", r.peak_speed_rad_s, "rad/s");
+  if (r.final_true_error_counts) {
+    row("final error (true angle)", "{:.2f}", *r.final_true_error_counts, "counts");
+  }
+  row(r.speed_source == "truth" ? "peak speed" : "peak speed (observer)", "{:.2f}", r.peak_speed_rad_s,
+      "rad/s");
   row("peak phase current", "{:.2f}", r.peak_current_a, "A");
   row("peak phase voltage, asked for", "{:.1f}", r.peak_command_voltage_v, "V");
-  row("peak phase voltage, applied", "{:.1f}", r.peak_voltage_v, "V");
+  if (r.peak_voltage_v) row("peak phase voltage, applied", "{:.1f}", *r.peak_voltage_v, "V");
   row("duration", "{:.1f}", r.duration_s * 1e3, "ms of the bench's time");
   row("wall time", "{:.1f}", r.wall_s * 1e3, "ms");
   row("samples", "{:.0f}", static_cast<double>(r.samples), "");
@@ -113,26 +116,31 @@ int run_control(const ControlOptions& options) {
     return kExitOk;
   }
   const control::Preset& preset = chosen_preset(options.preset);
-  link::Link bench = open_link(options.link, "control");
-  const v1::BenchDescription& description = bench.welcome().bench();
-  const std::uint32_t axis = axis_number(description, options.axis);
-  check_fit(description, axis, preset);
+  const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
+  const v1::BenchDescription& description = axis->bench();
+  check_fit(description, axis->axis(), preset);
+  if (!options.loads.empty() && !axis->can_set_load()) {
+    throw UsageError("--load needs a tcp: or unix: link");
+  }
   std::ofstream csv = opened(options.csv_file);
 
   catch_interrupts();
-  const double load_before_nm = prepare(bench, axis, options);
-  const ServoRun run = run_servo_move(bench, axis, preset, options.loads);
-  if (!options.loads.empty()) bench.set_load(axis, {.load_nm = load_before_nm});
+  prepare(*axis, options, preset.controller.counts_per_revolution);
+  const double load_before_nm = options.loads.empty() ? 0.0 : axis->newest().load_nm;
+  ServoRun run = run_servo_move(*axis, preset, options.loads);
   try {
-    bench.release(axis);
+    if (!options.loads.empty()) axis->set_load({.load_nm = load_before_nm});
+    axis->release();
   } catch (const link::Refused&) {
     // The lease may have been what was lost; the report says so.
+  } catch (const link::LinkError& error) {
+    if (run.failure.empty()) run.failure = error.what();
   }
 
   ControlReport report = summary_of(run, description.period_s());
   report.bench = description.name();
   report.mode = name_of(description.mode());
-  report.axis = description.axes(static_cast<int>(axis)).name();
+  report.axis = description.axes(static_cast<int>(axis->axis())).name();
   report.preset = preset.name;
   if (options.json) {
     fmt::print("{}\n", control_json(report));

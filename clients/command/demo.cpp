@@ -127,7 +127,7 @@ void print_comparison(const DemoReport& r) {
   numbers("duration [ms of bench time]", "{:.1f}", a.duration_s * 1e3, b.duration_s * 1e3);
   numbers("wall time [ms]", "{:.1f}", a.wall_s * 1e3, b.wall_s * 1e3);
   numbers("peak phase current [A]", "{:.2f}", a.peak_current_a, b.peak_current_a);
-  numbers("peak phase voltage [V]", "{:.1f}", a.peak_voltage_v, b.peak_voltage_v);
+  numbers("peak phase voltage [V]", "{:.1f}", a.peak_voltage_v.value_or(0.0), b.peak_voltage_v.value_or(0.0));
   numbers("samples", "{:.0f}", static_cast<double>(a.samples), static_cast<double>(b.samples));
   numbers("samples missed by controller", "{:.0f}", static_cast<double>(a.missed_ticks),
           static_cast<double>(b.missed_ticks));

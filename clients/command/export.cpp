@@ -1,17 +1,20 @@
+#include <bench.pb.h>
 #include <fmt/format.h>
 
-#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
 #include <map>
-#include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "clients/command/commands.hpp"
+#include "clients/command/export_can.hpp"
 #include "clients/command/json.hpp"
+#include "clients/command/output.hpp"
 #include "clients/command/session.hpp"
 #include "protocols/catalogue.hpp"
 #include "protocols/mapped_file.hpp"
@@ -21,10 +24,6 @@
 namespace drivebench::command {
 namespace {
 
-std::string system_reason() {
-  return std::generic_category().message(errno);
-}
-
 MappedFile opened(const std::string& path) {
   try {
     return MappedFile(path);
@@ -32,33 +31,6 @@ MappedFile opened(const std::string& path) {
     throw UsageError(error.what());
   }
 }
-
-/// Standard output or a file.
-class Output {
- public:
-  explicit Output(const std::string& path)
-      : path_(path.empty() ? "standard output" : path),
-        file_(path.empty() ? stdout : std::fopen(path.c_str(), "wbe"),
-              path.empty() ? &keep_open : &std::fclose) {
-    if (!file_) throw UsageError(fmt::format("cannot write {}: {}", path_, system_reason()));
-  }
-
-  void write(std::string_view text) {
-    if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
-  }
-  void finish() {
-    if (std::fflush(file_.get()) != 0) fail();
-  }
-
- private:
-  static int keep_open(std::FILE*) { return 0; }
-  [[noreturn]] void fail() {
-    throw std::runtime_error(fmt::format("cannot write {}: {}", path_, system_reason()));
-  }
-
-  std::string path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-};
 
 /// The axis whose samples are on this topic, `/<axis>/sample`; empty for other topics.
 std::string_view axis_of(std::string_view topic) {
@@ -111,7 +83,8 @@ void append_row(std::string& text, const Sample& sample, std::uint64_t time_ns,
 
 struct Exported {
   std::string axis;
-  std::uint64_t rows = 0;
+  bool has_header = false;
+  std::uint64_t rows = 0;  ///< or frames
   std::string other_axes;
 };
 
@@ -126,63 +99,148 @@ void check_files(const McapReader& reader, const ExportOptions& options) {
   }
 }
 
-/// Everything that can be read, row by row. Without a name the axis is the first that comes.
-Exported export_rows(McapReader& reader, const ExportOptions& options,
-                     const std::vector<const Signal*>& signals, std::size_t file_size, Output& out) {
+/// Where the messages of an axis are found, by channel.
+class AxisChannels {
+ public:
+  /// Without a name the axis is the first that comes.
+  explicit AxisChannels(std::string axis) : axis_(std::move(axis)) {}
+
+  struct Place {
+    bool is_sample;
+    bool is_wanted;
+    std::uint32_t number;  ///< of the axis: a tick brings the samples of all, in their order
+  };
+  const Place& find(const McapReader& reader, std::uint16_t channel) {
+    const auto known = places_.find(channel);
+    if (known != places_.end()) return known->second;
+    const std::string_view name = axis_of(reader.channels().at(channel).topic);
+    if (!name.empty() && axis_.empty()) axis_ = name;
+    const bool is_wanted = !name.empty() && name == axis_;
+    if (!name.empty() && !is_wanted) others_ += fmt::format("{}{}", others_.empty() ? "" : ", ", name);
+    return places_[channel] = {!name.empty(), is_wanted, name.empty() ? 0 : count_++};
+  }
+  const std::string& axis() const noexcept { return axis_; }
+  const std::string& others() const noexcept { return others_; }
+
+ private:
+  std::string axis_;
+  std::string others_;
+  std::uint32_t count_ = 0;
+  std::map<std::uint16_t, Place> places_;
+};
+
+/// Hands every message that can be read to `take`, and what `take` has left in `text` to the file.
+template <class Take>
+void for_each_message(McapReader& reader, const ExportOptions& options, std::size_t file_size,
+                      std::string& text, Output& out, Take take) {
   constexpr std::size_t kPiece = 1U << 16;
-  Exported done;
-  done.axis = options.axis;
   Progress progress("export");
-  std::string text;
-  bool has_header = false;
-  std::map<std::uint16_t, bool> wanted;  // by channel
   std::uint64_t seen_bytes = 0;
   for (McapMessage message; reader.next(message);) {
     seen_bytes += message.payload.size() + 31;  // a message record's own bytes, for the progress only
-    auto known = wanted.find(message.header.channel);
-    if (known == wanted.end()) {
-      const std::string_view axis = axis_of(reader.channels().at(message.header.channel).topic);
-      if (!axis.empty() && done.axis.empty()) done.axis = axis;
-      known = wanted.emplace(message.header.channel, !axis.empty() && axis == done.axis).first;
-      if (!axis.empty() && axis != done.axis) {
-        done.other_axes += fmt::format("{}{}", done.other_axes.empty() ? "" : ", ", axis);
-      }
-    }
-    if (!known->second) continue;
-    if (!has_header) text += header_of(signals);  // not before it is certain that there is something to head
-    has_header = true;
+    take(message);
+    if (text.size() <= kPiece) continue;
+    out.write(text);
+    text.clear();
+    progress.update(static_cast<double>(seen_bytes) / static_cast<double>(file_size), options.recording);
+  }
+}
+
+/// Everything that can be read, row by row.
+Exported export_rows(McapReader& reader, const ExportOptions& options,
+                     const std::vector<const Signal*>& signals, std::size_t file_size, Output& out) {
+  Exported done;
+  AxisChannels channels(options.axis);
+  std::string text;
+  for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
+    if (!channels.find(reader, message.header.channel).is_wanted) return;
+    if (!done.has_header) text += header_of(signals);  // when there is something to head
+    done.has_header = true;
     const std::optional<Sample> sample = decode_sample(message.payload);
-    if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) continue;
+    if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
     append_row(text, *sample, message.header.log_time_ns, signals);
     ++done.rows;
-    if (text.size() > kPiece) {
-      out.write(text);
-      text.clear();
-      progress.update(static_cast<double>(seen_bytes) / static_cast<double>(file_size), options.recording);
-    }
-  }
+  });
   out.write(text);
-  out.finish();
+  out.flush();
+  done.axis = channels.axis();
+  done.other_axes = channels.others();
+  return done;
+}
+
+/// Whether the recording ends with the verdict of a lockstep run.
+bool is_lockstep(std::span<const std::byte> file) {
+  McapReader reader(file);
+  v1::Verdict verdict;
+  for (McapMessage message; reader.next(message);) {
+    if (reader.channels().at(message.header.channel).topic != "/verdict") continue;
+    verdict.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()));
+  }
+  return verdict.mode() == v1::MODE_LOCKSTEP;
+}
+
+/// The interface, profile and nodes that the frames shall have.
+link::CanAddress can_address_of(const ExportOptions& options) {
+  return link::parse_can_address(fmt::format("can:socketcan:{}?node={}{}{}{}", options.interface,
+                                             options.node_base, options.classic ? "&fd=0" : "",
+                                             options.profile.empty() ? "" : "&", options.profile));
+}
+
+/// The frames of all axes, or of the one that was named.
+Exported export_frames(McapReader& reader, const ExportOptions& options, std::span<const std::byte> file,
+                       Output& out) {
+  Exported done;
+  CandumpText frames(can_address_of(options), is_lockstep(file));
+  AxisChannels channels(options.axis);
+  std::optional<std::uint32_t> only;  // the axis that was named, once a sample of it came
+  for_each_message(reader, options, file.size(), frames.text(), out, [&](const McapMessage& message) {
+    const auto& place = channels.find(reader, message.header.channel);
+    const double time_s = static_cast<double>(message.header.log_time_ns) * 1e-9;
+    if (place.is_sample) {
+      if (!options.axis.empty() && !place.is_wanted) return;
+      only = place.number;
+      const std::optional<Sample> sample = decode_sample(message.payload);
+      if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
+      frames.add(place.number, *sample, time_s);
+    } else if (reader.channels().at(message.header.channel).topic == "/inputs") {
+      v1::Input input;
+      if (!input.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()))) return;
+      const std::uint64_t tick = input.received_tick();
+      if (tick < options.from_tick || tick > options.to_tick) return;
+      if (!options.axis.empty() && input.axis() != only) return;
+      frames.add(input, time_s);
+    }
+  });
+  frames.finish();
+  out.write(frames.text());
+  out.flush();
+  done.rows = frames.frames();
+  done.axis = options.axis.empty() ? "*" : options.axis;
+  done.other_axes = channels.others();
   return done;
 }
 
 }  // namespace
 
 int run_export(const ExportOptions& options) {
+  const bool is_csv = options.format == "csv";
   const MappedFile file = opened(options.recording);
   McapReader reader(file.bytes());
   const std::vector<const Signal*> signals = chosen_signals(options.signals);
+  if (!is_csv) can_address_of(options);  // refuses what is wrong before the file is made
+  if (!is_csv && !options.signals.empty()) throw UsageError("--signals chooses columns of CSV");
   check_files(reader, options);
   Output out(options.out_file);
-  const Exported done = export_rows(reader, options, signals, file.bytes().size(), out);
+  const Exported done = is_csv ? export_rows(reader, options, signals, file.bytes().size(), out)
+                               : export_frames(reader, options, file.bytes(), out);
 
   const std::string problem = reader.problem() ? reader.problem()->what : "";
-  std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the CSV
+  std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
   if (options.json) {
     fmt::print(told, "{}\n", export_json(options.out_file, done.axis, done.rows, problem));
   } else {
-    fmt::print(told, "export: {} samples of axis {}{}{}\n", done.rows, done.axis.empty() ? "?" : done.axis,
-               options.out_file.empty() ? "" : " to ", options.out_file);
+    fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_csv ? "samples" : "frames",
+               done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);
   }
   if (!problem.empty()) {
     fmt::print(stderr, "drivebench: the recording is not whole: {}\n", problem);
@@ -192,7 +250,7 @@ int run_export(const ExportOptions& options) {
     throw UsageError(
         fmt::format("no samples of axis '{}'; the recording has {}", done.axis, done.other_axes));
   }
-  if (!done.other_axes.empty() && options.axis.empty()) {
+  if (is_csv && !done.other_axes.empty() && options.axis.empty()) {
     fmt::print(stderr, "export: the recording also has {}; --axis chooses\n", done.other_axes);
   }
   return kExitOk;

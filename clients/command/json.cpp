@@ -7,13 +7,36 @@
 #include "clients/command/session.hpp"
 #include "clients/control/presets.hpp"
 
+namespace nlohmann {
+
+/// What is not known is null.
+template <class T>
+struct adl_serializer<std::optional<T>> {
+  static void to_json(json& out, const std::optional<T>& value) {
+    if (value) {
+      out = *value;
+    } else {
+      out = nullptr;
+    }
+  }
+  static void from_json(const json& in, std::optional<T>& value) {
+    if (in.is_null()) {
+      value.reset();
+    } else {
+      value = in.get<T>();
+    }
+  }
+};
+
+}  // namespace nlohmann
+
 namespace drivebench::command {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ControlReport, bench, mode, axis, preset, failure, samples, missed_ticks,
-                                   late_ticks, first_tick, duration_s, wall_s, peak_error_counts,
-                                   final_error_counts, final_true_error_counts, peak_speed_rad_s,
-                                   peak_current_a, peak_command_voltage_v, peak_voltage_v, exchange_p50_us,
-                                   exchange_p99_us, exchange_max_us)
+                                   late_ticks, first_tick, duration_s, wall_s, angle_source, speed_source,
+                                   peak_error_counts, final_error_counts, final_true_error_counts,
+                                   peak_speed_rad_s, peak_current_a, peak_command_voltage_v, peak_voltage_v,
+                                   exchange_p50_us, exchange_p99_us, exchange_max_us)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerReady, tcp, mode, bench)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerVerdict, ticks, late_ticks, worst_lateness_us, exact, realtime_valid,
                                    state_hash, recording, sentence)
@@ -83,7 +106,7 @@ Json demo_run(const DemoRun& run) {
   return {{"peak_error_counts", run.control.peak_error_counts},
           {"final_error_counts", run.control.final_error_counts},
           {"peak_current_a", run.control.peak_current_a},
-          {"peak_voltage_v", run.control.peak_voltage_v},
+          {"peak_voltage_v", run.control.peak_voltage_v.value_or(0.0)},
           {"duration_s", run.control.duration_s},
           {"samples", run.control.samples},
           {"missed_ticks", run.control.missed_ticks},
@@ -144,9 +167,17 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
               {"recording_gaps", status.recording_gaps()},
               {"state_hash", status.state_hash() == 0 ? "" : fmt::format("{:016x}", status.state_hash())},
               {"notes", Json::array()},
+              {"transports", Json::array()},
               {"axes", Json::array()}};
   for (const std::string& note : status.notes())
     out["notes"].push_back(note);
+  for (const v1::TransportStatus& transport : status.transports()) {
+    Json counts = Json::object();
+    for (const v1::TransportStatus::Count& count : transport.counts())
+      counts[count.name()] = count.value();
+    out["transports"].push_back(
+        {{"name", transport.name()}, {"state", transport.state()}, {"counts", counts}});
+  }
   for (const v1::AxisSample& each : status.axes()) {
     const Sample sample = plain(each.sample());
     Json axis = {{"axis", each.axis()}, {"faults_set", faults_of(bench, sample.faults)}};

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <functional>
 
+#include "clients/command/can_check.hpp"
 #include "clients/command/commands.hpp"
 #include "clients/command/json.hpp"
 #include "clients/link/tcp_link.hpp"
@@ -64,6 +65,10 @@ struct CommandLine {
   ControlOptions control;
   std::vector<std::string> loads;
   std::vector<std::string> settings;
+  PrintOptions print;
+  CanCheckOptions can_check;
+  bool csv = false;
+  CanLogOptions can_log;
   ReplayOptions replay;
   ExportOptions export_;
   DemoOptions demo;
@@ -78,7 +83,9 @@ struct CommandLine {
     add_demo();
     add_observers();
     add_control();
+    add_interfaces();
     add_recordings();
+    add_export();
   }
 
   bool knows(std::string_view subcommand) const {
@@ -92,10 +99,10 @@ struct CommandLine {
     return sub;
   }
 
-  CLI::App* add_linked(const std::string& name, const std::string& description) {
+  CLI::App* add_linked(const std::string& name, const std::string& description,
+                       const std::string& links = "tcp:HOST:PORT or unix:PATH") {
     CLI::App* sub = add(name, description);
-    sub->add_option("--link", link.address, "tcp:HOST:PORT or unix:PATH; else from DRIVEBENCH_LINK")
-        ->capture_default_str();
+    sub->add_option("--link", link.address, links + "; else from DRIVEBENCH_LINK")->capture_default_str();
     sub->add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
     return sub;
   }
@@ -143,10 +150,13 @@ struct CommandLine {
   }
 
   void add_control() {
-    CLI::App* sub = add_linked("control", "run the reference controller on a move");
+    CLI::App* sub = add_linked("control", "run the reference controller on a move",
+                               "tcp:HOST:PORT, unix:PATH, can:BACKEND:CHANNEL?node=N or "
+                               "modbus:HOST:PORT?unit=N");
     sub->add_option("--preset", control.preset, "gains and move by name")->capture_default_str();
     sub->add_flag("--list", control.list, "print the presets and end");
-    sub->add_option("--axis", control.axis, "number or name")->capture_default_str();
+    sub->add_option("--axis", control.axis, "number or name; CAN and Modbus links name it themselves")
+        ->capture_default_str();
     sub->add_option("--csv", control.csv_file, "write every sample to this file");
     sub->add_option(
         "--load", loads,
@@ -164,6 +174,50 @@ struct CommandLine {
     });
   }
 
+  void add_print(const std::string& name, const std::string& description, bool has_bus) {
+    CLI::App* sub = app.add_subcommand(name, description);
+    sub->add_option("CONFIG", print.config, "bench file or its name")->capture_default_str();
+    if (has_bus) {
+      sub->add_option("--bus", print.bus, "which [[can]] section, from 1 on")
+          ->check(not_negative())
+          ->capture_default_str();
+    } else {
+      sub->add_flag("--csv", csv, "CSV instead of Markdown");
+    }
+    sub->callback([this, name] {
+      print.what = csv ? "modbus-csv" : name;
+      action = [this] { return run_print(print); };
+    });
+  }
+
+  void add_interfaces() {
+    add_print("dbc", "the CAN frames of a bench as a DBC file", true);
+    add_print("can-table", "the CAN frames of a bench in Markdown", true);
+    add_print("modbus-map", "the Modbus registers of a bench", false);
+    CLI::App* can = app.add_subcommand("can", "CAN interfaces of this computer");
+    can->require_subcommand(1);
+    CLI::App* check = can->add_subcommand("check", "how an interface is doing, what is wrong and the cure");
+    check->add_option("IFACE", can_check.interface, "for example can0")->required();
+    check->add_flag("--classic", can_check.classic, "classic frames will do");
+    check->add_flag("--json", json, "print JSON");
+    check->footer("Exit codes: 0 nothing is wrong, 1 something is, 2 there is no such CAN interface.");
+    check->callback([this] {
+      can_check.json = json;
+      action = [this] { return run_can_check(can_check); };
+    });
+    CLI::App* sub = app.add_subcommand("can-log", "write what is on a CAN bus, as candump -l does");
+    sub->add_option("LINK", can_log.address, "can:BACKEND:CHANNEL, for example can:socketcan:vcan0")
+        ->required();
+    sub->add_option("--output", can_log.out_file, "instead of standard output");
+    sub->add_option("--count", can_log.count, "end after so many frames; 0: never")
+        ->check(not_negative())
+        ->capture_default_str();
+    sub->add_option("--duration", can_log.duration_s, "end after so many seconds; 0: never")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    sub->callback([this] { action = [this] { return run_can_log(can_log); }; });
+  }
+
   void add_recordings() {
     CLI::App* sub = add("replay", "re-simulate a recording and compare it bit for bit");
     sub->add_option("FILE", replay.recording, "an MCAP recording")->required();
@@ -171,7 +225,21 @@ struct CommandLine {
       replay.json = json;
       action = [this] { return run_replay(replay); };
     });
-    sub = add("export", "the samples of a recording as CSV");
+  }
+
+  void add_export() {
+    CLI::App* sub = add("export", "a recording as CSV or as a CAN trace");
+    sub->add_option("--format", export_.format, "csv: samples; candump: the frames that a CAN bus would have")
+        ->check(CLI::IsMember({"csv", "candump"}))
+        ->capture_default_str();
+    sub->add_option("--interface", export_.interface, "candump: name of the interface")
+        ->capture_default_str();
+    sub->add_option("--node-base", export_.node_base, "candump: node id of the first axis")
+        ->check(CLI::Range(1, 127))
+        ->capture_default_str();
+    sub->add_flag("--classic", export_.classic, "candump: classic frames instead of FD");
+    sub->add_option("--profile", export_.profile,
+                    "candump: as in a can: link, current_unit_a=0.01&extended=1");
     sub->add_option("FILE", export_.recording, "an MCAP recording")->required();
     sub->add_option("--out", export_.out_file, "instead of standard output");
     sub->add_option("--axis", export_.axis, "name; default: the first in the file");

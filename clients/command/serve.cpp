@@ -12,6 +12,15 @@ int run_serve(const std::vector<std::string>& arguments) {
   replace_process(server);
 }
 
+int run_print(const PrintOptions& options) {
+  std::vector<std::string> server = {server_executable().string(), find_config(options.config).string(),
+                                     "--print", options.what};
+  if (options.what == "dbc" || options.what == "can-table") {
+    server.insert(server.end(), {"--bus", std::to_string(options.bus)});
+  }
+  replace_process(server);
+}
+
 int run_replay(const ReplayOptions& options) {
   std::vector<std::string> server = {server_executable().string(), "--replay", options.recording};
   if (options.json) server.emplace_back("--json");

@@ -6,9 +6,9 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
-#include <span>
 
-#include "protocols/sample_codec.hpp"
+#include "clients/link/can_link.hpp"
+#include "clients/link/modbus_link.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -18,9 +18,32 @@ volatile std::sig_atomic_t interrupt_count = 0;
 }  // namespace
 
 link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
+  if (link::is_can_address(choice.address) || link::is_modbus_address(choice.address)) {
+    throw UsageError(
+        fmt::format("{} needs a tcp: or unix: link; over CAN and Modbus there is only control", subcommand));
+  }
   try {
     return link::Link(choice.address,
                       {.client = fmt::format("drivebench {}", subcommand), .token = choice.token});
+  } catch (const link::Refused& refused) {
+    throw link::ConnectError(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
+  }
+}
+
+std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
+                                          std::string_view subcommand) {
+  const bool is_can = link::is_can_address(choice.address);
+  if (!is_can && !link::is_modbus_address(choice.address)) {
+    std::unique_ptr<link::Link> bench(new link::Link(open_link(choice, subcommand)));  // it does not move
+    const std::uint32_t number = axis_number(bench->welcome().bench(), axis);
+    return std::make_unique<link::TcpAxis>(std::move(bench), number);
+  }
+  if (axis != "0") {
+    throw UsageError(fmt::format("the address names the axis: {}", is_can ? "?node=N" : "?unit=N"));
+  }
+  try {
+    if (is_can) return std::make_unique<link::CanLink>(link::parse_can_address(choice.address));
+    return std::make_unique<link::ModbusLink>(link::parse_modbus_address(choice.address));
   } catch (const link::Refused& refused) {
     throw link::ConnectError(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
   }
@@ -35,18 +58,6 @@ std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view ch
     known += fmt::format("{}{} ({})", i == 0 ? "" : ", ", i, bench.axes(i).name());
   }
   throw UsageError(fmt::format("no axis '{}'; this bench has {}", choice, known));
-}
-
-const v1::Sample& sample_of(const v1::ExchangeReply& reply, std::uint32_t axis) {
-  for (const v1::AxisSample& each : reply.samples()) {
-    if (each.axis() == axis) return each.sample();
-  }
-  throw link::LinkError(fmt::format("the bench answered without a sample of axis {}", axis));
-}
-
-Sample plain(const v1::Sample& message) {
-  const std::string bytes = message.SerializeAsString();
-  return decode_sample(std::as_bytes(std::span(bytes))).value_or(Sample{});
 }
 
 const char* name_of(v1::Mode mode) noexcept {
@@ -84,6 +95,16 @@ std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t fa
     if (fault.latched()) latched |= fault.bit();
   }
   return faults & latched;
+}
+
+std::string latched_text(const v1::BenchDescription& bench, const Sample& sample) {
+  if (bench.faults_size() != 0) {
+    const std::uint64_t latched = latched_faults(bench, sample.faults);
+    return latched == 0 ? "" : fault_names(bench, latched);
+  }
+  constexpr std::uint64_t kTimeout = 3;
+  if (sample.state < kTimeout) return {};
+  return fmt::format("{}, fault word {:#x}", name_of_state(sample.state), sample.faults);
 }
 
 void catch_interrupts() {

@@ -4,11 +4,13 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include "clients/command/commands.hpp"
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/axis_link.hpp"
+#include "clients/link/tcp_axis.hpp"
 #include "protocols/sample.hpp"
 
 /// What the subcommands that talk to a bench share.
@@ -20,11 +22,12 @@ link::Link open_link(const LinkChoice& choice, std::string_view subcommand);
 /// The axis with this number or name. Throws UsageError with the axes there are.
 std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
 
-/// The sample of `axis` in an answer; throws LinkError if the bench left it out.
-const v1::Sample& sample_of(const v1::ExchangeReply& reply, std::uint32_t axis);
+/// Connects to one axis over whatever the address names: tcp, unix, can or modbus. The latter two name the
+/// axis themselves, so that `axis` must be its default "0". As open_link() otherwise.
+std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
+                                          std::string_view subcommand);
 
-/// For loops over the catalogue.
-Sample plain(const v1::Sample& message);
+using link::plain;
 
 const char* name_of(v1::Mode mode) noexcept;
 const char* name_of_state(std::uint64_t state) noexcept;
@@ -32,6 +35,8 @@ const char* name_of_state(std::uint64_t state) noexcept;
 /// The names of the bits that are set, separated by blanks; "none".
 std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults);
 std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
+/// What is latched, for people; empty: nothing. Where the link describes no faults the control state says it.
+std::string latched_text(const v1::BenchDescription& bench, const Sample& sample);
 
 /// From now on SIGINT and SIGTERM only make interrupted() true; the second one ends the process.
 void catch_interrupts();

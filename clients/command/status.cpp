@@ -39,6 +39,13 @@ int run_status(const StatusOptions& options) {
         s.encoder_count(), s.i_a_a(), s.i_b_a(), s.u_a_v(), s.u_b_v(), s.speed_rad_s(), s.load_nm());
     fmt::print("  missed commands {}, refused commands {}\n", s.missed_commands(), s.refused_commands());
   }
+  for (const v1::TransportStatus& transport : status.transports()) {
+    fmt::print("{}: {}\n ", transport.name(), transport.state());
+    for (const v1::TransportStatus::Count& count : transport.counts()) {
+      if (count.value() > 0) fmt::print(" {} {},", count.name(), count.value());
+    }
+    fmt::print(" all else 0\n");
+  }
   for (const std::string& note : status.notes())
     fmt::print("note: {}\n", note);
   return kExitOk;

@@ -13,6 +13,7 @@
 #include "protocols/framing.hpp"
 #include "protocols/sample_codec.hpp"
 #include "server/endpoints/outbox.hpp"
+#include "server/endpoints/transport_report.hpp"
 #include "server/engine.hpp"
 
 namespace drivebench {
@@ -22,6 +23,7 @@ struct SessionContext {
   Engine& engine;
   std::string token;  ///< what Hello must carry; empty: nothing
   std::function<std::size_t()> session_count;
+  std::function<std::vector<TransportReport>()> transports;  ///< the other ways in
 };
 
 /// One client on a stream socket: Hello first, then requests. Every request gets an answer with its id; what

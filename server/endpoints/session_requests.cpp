@@ -11,32 +11,26 @@
 namespace drivebench {
 namespace {
 
-struct RefusalText {
-  v1::RefusalCode code;
-  const char* sentence;
-};
-
-RefusalText text_of(Refused why) noexcept {
+v1::RefusalCode code_of(Refused why) noexcept {
   switch (why) {
     case Refused::kUnknownAxis:
-      return {v1::REFUSAL_UNKNOWN_AXIS, "there is no such axis"};
+      return v1::REFUSAL_UNKNOWN_AXIS;
     case Refused::kNotOwner:
-      return {v1::REFUSAL_NOT_OWNER, "this session does not hold the lease of the axis"};
+      return v1::REFUSAL_NOT_OWNER;
     case Refused::kOwned:
-      return {v1::REFUSAL_OWNED, "another session holds the lease of the axis"};
+      return v1::REFUSAL_OWNED;
     case Refused::kNotFinite:
-      return {v1::REFUSAL_NOT_FINITE, "a value is not a finite number"};
+      return v1::REFUSAL_NOT_FINITE;
     case Refused::kLatched:
-      return {v1::REFUSAL_LATCHED, "a latched fault is in force; its owner must clear it first"};
+      return v1::REFUSAL_LATCHED;
     case Refused::kStale:
-      return {v1::REFUSAL_STALE,
-              "the command answers a sample that is too old, already answered or not taken yet"};
+      return v1::REFUSAL_STALE;
     case Refused::kBusy:
-      return {v1::REFUSAL_BUSY, "too many requests are waiting for the bench"};
+      return v1::REFUSAL_BUSY;
     case Refused::kNot:
       break;
   }
-  return {v1::REFUSAL_UNSPECIFIED, ""};
+  return v1::REFUSAL_UNSPECIFIED;
 }
 
 }  // namespace
@@ -52,8 +46,7 @@ void Session::refuse(std::uint64_t id, v1::RefusalCode code, const std::string& 
 }
 
 void Session::refuse(std::uint64_t id, Refused why, const char* field) {
-  const RefusalText text = text_of(why);
-  refuse(id, text.code, text.sentence, field);
+  refuse(id, code_of(why), std::string(sentence_of(why)), field);
 }
 
 void Session::done(std::uint64_t id, Tick tick) {
@@ -142,8 +135,9 @@ void Session::exchange(const v1::Exchange& r) {
   // All or none: a command that was taken would bar its axis from the next try.
   for (const v1::Command& command : r.commands()) {
     if (engine_.check(command.axis(), owner_, *decode_command(command)) == Refused::kNot) continue;
-    const RefusalText text = text_of(engine_.command(command.axis(), owner_, *decode_command(command)));
-    return refuse(id, text.code, text.sentence + (" (axis " + std::to_string(command.axis()) + ")"),
+    const Refused why = engine_.command(command.axis(), owner_, *decode_command(command));
+    return refuse(id, code_of(why),
+                  std::string(sentence_of(why)) + " (axis " + std::to_string(command.axis()) + ")",
                   "commands");
   }
   for (const v1::Command& command : r.commands())
@@ -261,6 +255,16 @@ void Session::report_status() {
   status.set_state_hash(engine_.state_hash());
   for (const std::string& note : engine_.notes())
     status.add_notes(note);
+  for (const TransportReport& report : context_.transports()) {
+    v1::TransportStatus& transport = *status.add_transports();
+    transport.set_name(report.name);
+    transport.set_state(report.state);
+    for (const auto& [name, value] : report.counts) {
+      v1::TransportStatus::Count& count = *transport.add_counts();
+      count.set_name(std::string(name));
+      count.set_value(value);
+    }
+  }
   send(reply_);
 }
 

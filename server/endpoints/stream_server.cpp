@@ -91,17 +91,18 @@ StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config)
   }
 }
 
-void StreamServer::serve(Engine& engine) {
-  context_.emplace(SessionContext{engine, config_.token, [this] { return sessions_.size(); }});
+void StreamServer::serve(Engine& engine, std::function<std::vector<TransportReport>()> transports) {
+  context_.emplace(
+      SessionContext{engine, config_.token, [this] { return sessions_.size(); }, std::move(transports)});
   // By index: a session may be added while another one answers; none is removed.
-  engine.on_tick = [this] {
+  engine.on_tick.add([this] {
     for (std::size_t i = 0; i < sessions_.size(); ++i)
       sessions_[i]->on_tick();
-  };
-  engine.on_newest = [this] {
+  });
+  engine.on_newest.add([this] {
     for (std::size_t i = 0; i < sessions_.size(); ++i)
       sessions_[i]->on_newest();
-  };
+  });
   asio::co_spawn(io_, accept_from(tcp_), asio::detached);
   if (unix_.is_open()) asio::co_spawn(io_, accept_from(unix_), asio::detached);
 }

@@ -22,7 +22,8 @@ class StreamServer {
   std::string tcp_address() const;
 
   /// Starts accepting clients of this run and telling them about its ticks.
-  void serve(Engine& engine);
+  /// `transports` tells of the other ways in.
+  void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports);
 
   /// Stops accepting and ends every session; what was queued is lost.
   void close();

@@ -2,21 +2,17 @@
 #include <fmt/core.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
-#include <cerrno>
-#include <csignal>
 #include <memory>
+#include <optional>
 #include <stdexcept>
-#include <system_error>
 
 #include "clients/command/installation.hpp"
 #include "clients/link/tcp_link.hpp"
 #include "tests/benchmark/canary.hpp"
+#include "tests/benchmark/child.hpp"
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/server.hpp"
@@ -76,10 +72,6 @@ class Controller {
   std::uint64_t tick_ = 0;
 };
 
-void check(bool good, const char* what) {
-  if (!good) throw std::system_error(errno, std::generic_category(), what);
-}
-
 bool receive_all(int socket, std::span<std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t got = ::recv(socket, bytes.data(), bytes.size(), 0);
@@ -111,19 +103,11 @@ class PingPong {
     auto* const generic = reinterpret_cast<sockaddr*>(&address);
     check(::bind(listener.get(), generic, size) == 0 && ::listen(listener.get(), 1) == 0, "listen");
     check(::getsockname(listener.get(), generic, &size) == 0, "getsockname");
-    child_ = ::fork();
-    check(child_ >= 0, "fork");
-    if (child_ == 0) answer(listener.get());
+    child_.emplace([&] { answer(listener.get()); });
     socket_ =
         link::connect_to({.host = "127.0.0.1", .port = std::to_string(ntohs(address.sin_port)), .path = {}},
                          std::chrono::seconds(5));
   }
-  ~PingPong() {
-    ::kill(child_, SIGKILL);
-    ::waitpid(child_, nullptr, 0);
-  }
-  PingPong(const PingPong&) = delete;
-  PingPong& operator=(const PingPong&) = delete;
 
   void exchange() {
     if (!send_all(socket_.get(), request_) || !receive_all(socket_.get(), reply_)) {
@@ -132,32 +116,19 @@ class PingPong {
   }
 
  private:
-  [[noreturn]] void answer(int listener) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  void answer(int listener) {
     const int socket = ::accept(listener, nullptr, nullptr);
     const int on = 1;
     ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
     while (receive_all(socket, request_) && send_all(socket, reply_)) {
     }
-    ::_exit(0);
   }
 
   std::vector<std::byte> request_;
   std::vector<std::byte> reply_;
-  pid_t child_ = -1;
+  std::optional<Child> child_;
   link::FileDescriptor socket_;
 };
-
-template <class Peer>
-Percentiles time_block(Peer& peer) {
-  std::vector<double> us(kBlock);
-  for (double& each : us) {
-    const std::int64_t begin = now_ns();
-    peer.exchange();
-    each = static_cast<double>(now_ns() - begin) * 1e-3;
-  }
-  return percentiles(us);
-}
 
 struct Round {
   Percentiles floor, tcp, unix_socket;
@@ -167,7 +138,9 @@ Rounds<Round> alternate(Controller& tcp, Controller& unix_socket, PingPong& floo
   const Pinned pinned(cpu.near);
   const std::array cpus{cpu.near, cpu.far};
   return undisturbed_rounds(cpus, kRounds, [&]() -> Round {
-    return {.floor = time_block(floor), .tcp = time_block(tcp), .unix_socket = time_block(unix_socket)};
+    return {.floor = time_exchanges(kBlock, [&] { floor.exchange(); }),
+            .tcp = time_exchanges(kBlock, [&] { tcp.exchange(); }),
+            .unix_socket = time_exchanges(kBlock, [&] { unix_socket.exchange(); })};
   });
 }
 

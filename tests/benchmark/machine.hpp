@@ -11,6 +11,9 @@ namespace drivebench::speed {
 
 std::int64_t now_ns() noexcept;
 
+/// Throws std::system_error with errno unless it is good.
+void check(bool good, const char* what);
+
 /// Two CPUs this process may use; the same one twice if there is no other.
 struct CpuPair {
   int near = 0;  ///< for this program: the client

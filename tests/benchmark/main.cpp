@@ -23,6 +23,11 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
     {"realtime", "lateness of the pacers and of the server", measure_realtime},
     {"recorder", "ten axes at 20 kHz into the recorder", measure_recorder},
+    {"can", "encoding and decoding of a CAN frame", measure_can_codec},
+    {"multicast", "lockstep over udp_multicast against a ping-pong", measure_multicast},
+    {"socketcan", "lockstep over the kernel's CAN against a ping-pong", measure_socketcan},
+    {"modbus", "lockstep over Modbus against plain libmodbus", measure_modbus},
+    {"abuse", "a polite Modbus client beside three that are not", measure_abuse},
     {"memory", "memory of the server with 32 viewers", measure_memory},
 });
 
@@ -41,7 +46,7 @@ int run(int argc, char** argv) {
   bool json = false;
   bool strict = false;
   Plan plan;
-  CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about a minute.");
+  CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about three minutes.");
   app.add_option("--only", only, "these measurements only, separated by commas")
       ->delimiter(',')
       ->check(CLI::IsMember(names));

@@ -24,4 +24,15 @@ std::vector<Row> measure_recorder(const Plan& plan);
 /// Resident memory of the server with a controller and 32 viewers.
 std::vector<Row> measure_memory(const Plan& plan);
 
+/// Encoding and decoding of one CAN frame.
+std::vector<Row> measure_can_codec(const Plan& plan);
+/// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.
+std::vector<Row> measure_multicast(const Plan& plan);
+/// The same over the kernel's CAN; a row that says how where there is none.
+std::vector<Row> measure_socketcan(const Plan& plan);
+/// A lockstep exchange by Modbus function 23 against plain libmodbus.
+std::vector<Row> measure_modbus(const Plan& plan);
+/// What a polite Modbus client notices of others that are not, beside plain libmodbus.
+std::vector<Row> measure_abuse(const Plan& plan);
+
 }  // namespace drivebench::speed

@@ -82,6 +82,10 @@ void print_table(const std::string& machine, const std::vector<Row>& rows) {
   };
   line("name", "measured", "floor", "ratio", "limit", "verdict", "gone", "");
   for (const Row& row : rows) {
+    if (row.skipped) {
+      line(row.name, "-", "-", "-", "-", "skipped", "-", row.note);
+      continue;
+    }
     line(row.name, with_unit(row.measured, row.unit), row.floor ? with_unit(*row.floor, row.unit) : "-",
          row.ratio() ? number(*row.ratio()) : "-", limit_text(row), name_of(judgement(row)),
          fmt::format("{:.1f} %", 100.0 * row.gone), row.note);
@@ -96,6 +100,10 @@ void print_table(const std::string& machine, const std::vector<Row>& rows) {
 nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows) {
   nlohmann::json list = nlohmann::json::array();
   for (const Row& row : rows) {
+    if (row.skipped) {
+      list.push_back({{"name", row.name}, {"verdict", "skipped"}, {"note", row.note}});
+      continue;
+    }
     nlohmann::json entry{
         {"name", row.name},
         {"unit", row.unit},

@@ -27,6 +27,7 @@ struct Row {
   std::optional<Limit> limit{};   ///< none: for information
   double gone = 0.0;              ///< share of the time that the gap canary found taken away
   std::string note{};
+  bool skipped = false;  ///< not measured; the note says why
 
   std::optional<double> ratio() const;
 };

@@ -37,7 +37,12 @@ const std::vector<TwoPhase>& line_voltages() {
 Server::Server(std::vector<std::string> arguments) : process_(command_line(std::move(arguments))) {
   const auto line = process_.read_line(command::Process::in(std::chrono::seconds(10)));
   if (!line) throw std::runtime_error("drivebench-server did not get ready");
-  address_ = "tcp:" + nlohmann::json::parse(*line).at("tcp").get<std::string>();
+  const nlohmann::json ready = nlohmann::json::parse(*line);
+  address_ = "tcp:" + ready.at("tcp").get<std::string>();
+  const std::string modbus = ready.at("modbus").get<std::string>();
+  if (!modbus.empty()) {
+    modbus_port_ = static_cast<std::uint16_t>(std::stoi(modbus.substr(modbus.rfind(':') + 1)));
+  }
 }
 
 nlohmann::json Server::wait(std::chrono::seconds at_most) {

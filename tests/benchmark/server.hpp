@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -25,6 +26,8 @@ class Server {
   explicit Server(std::vector<std::string> arguments);
 
   const std::string& address() const { return address_; }
+  /// 0: it does not speak Modbus.
+  std::uint16_t modbus_port() const { return modbus_port_; }
 
   /// Waits for the end of a run that has one; its verdict.
   nlohmann::json wait(std::chrono::seconds at_most);
@@ -34,6 +37,7 @@ class Server {
  private:
   command::Process process_;
   std::string address_;
+  std::uint16_t modbus_port_ = 0;
 };
 
 }  // namespace drivebench::speed

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <vector>
+
+#include "tests/benchmark/machine.hpp"
 
 namespace drivebench::speed {
 
@@ -30,6 +33,18 @@ struct Percentiles {
 
 inline Percentiles percentiles(const std::vector<double>& values) {
   return {.p50 = percentile(values, 0.5), .p99 = percentile(values, 0.99)};
+}
+
+/// Wall time of so many exchanges [us].
+template <class Exchange>
+Percentiles time_exchanges(std::size_t count, Exchange exchange) {
+  std::vector<double> us(count);
+  for (double& each : us) {
+    const std::int64_t begin = now_ns();
+    exchange();
+    each = static_cast<double>(now_ns() - begin) * 1e-3;
+  }
+  return percentiles(us);
 }
 
 }  // namespace drivebench::speed

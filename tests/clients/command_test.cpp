@@ -37,6 +37,56 @@ class CommandFiles : public testing::Test {
     return text.str();
   }
 
+  /// Two axes, ticks 0 and 1, a command for axis "b" and the verdict of a lockstep run.
+  std::string write_lockstep_run(const std::string& name) const {
+    std::string file;
+    McapWriter writer(
+        [&file](std::span<const std::byte> bytes) {
+          file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        },
+        {.profile = {}, .library = "test"});
+    const auto add = [&writer](std::uint16_t channel, std::uint64_t tick, const std::string& message) {
+      writer.add_message({.channel = channel, .log_time_ns = tick * 125'000},
+                         std::as_bytes(std::span(message)));
+    };
+    const std::uint16_t inputs = writer.add_channel("/inputs", 0, "protobuf");
+    const std::uint16_t verdicts = writer.add_channel("/verdict", 0, "protobuf");
+    const std::array axes = {writer.add_channel("/a/sample", 0, "protobuf"),
+                             writer.add_channel("/b/sample", 0, "protobuf")};
+    for (std::uint64_t tick = 0; tick < 2; ++tick) {
+      for (const std::uint16_t axis : axes) {
+        v1::Sample sample;
+        sample.set_tick(tick);
+        sample.set_command_tick(-1);
+        sample.set_index_tick(-1);
+        sample.set_encoder_count(-5 * static_cast<std::int64_t>(tick));
+        sample.set_i_a_a(static_cast<double>(tick));
+        sample.set_faults(4 * tick);
+        add(axis, tick, sample.SerializeAsString());
+      }
+      v1::Input input;
+      input.set_tick(tick);
+      input.set_received_tick(tick);
+      input.set_axis(1);
+      input.set_owner(0x209);
+      if (tick == 0) {
+        v1::Command& command = *input.mutable_command();
+        command.set_gates(v1::GATES_VOLTAGE);
+        command.set_u_a_v(10.0);
+        command.set_u_b_v(-0.01);
+      } else {
+        input.set_late_tick(true);
+      }
+      add(inputs, tick, input.SerializeAsString());
+    }
+    v1::Verdict verdict;
+    verdict.set_mode(v1::MODE_LOCKSTEP);
+    add(verdicts, 2, verdict.SerializeAsString());
+    writer.finish();
+    std::ofstream(path(name), std::ios::binary) << file;
+    return path(name);
+  }
+
   /// Two axes, ticks 0 to 3, axis "a" with currents that need 17 digits.
   std::string write_recording(const std::string& name, bool whole) const {
     std::string file;
@@ -100,6 +150,82 @@ TEST_F(CommandFiles, ExportRefusesWhatIsNotThere) {
   EXPECT_THROW(run_export({.recording = path("none"), .out_file = path("o")}), UsageError);
   std::ofstream(path("text")) << "tick,time\n";
   EXPECT_THROW(run_export({.recording = path("text"), .out_file = path("o")}), UsageError);
+}
+
+// Catches a frame of the wrong axis, tick or order, a command that is lost, and a profile that is not heeded.
+TEST_F(CommandFiles, ExportWritesTheFramesOfARun) {
+  ExportOptions options = {.recording = write_lockstep_run("r.mcap"), .out_file = path("out.log")};
+  options.format = "candump";
+  options.interface = "vcan0";
+  options.classic = true;
+  options.node_base = 5;
+  options.profile = "current_unit_a=0.01";
+  EXPECT_EQ(run_export(options), kExitOk);
+  EXPECT_EQ(text_of("out.log"),
+            "(0.000000) vcan0 405#0000000000000000\n"
+            "(0.000000) vcan0 485#FFFF000000000000\n"
+            "(0.000000) vcan0 285#0000000000000000\n"
+            "(0.000000) vcan0 185#0000000000000000\n"
+            "(0.000000) vcan0 406#0000000000000000\n"
+            "(0.000000) vcan0 486#FFFF000000000000\n"
+            "(0.000000) vcan0 286#0000000000000000\n"
+            "(0.000000) vcan0 186#0000000000000000\n"
+            "(0.000000) vcan0 080#0000000001\n"
+            "(0.000000) vcan0 206#E803FFFF00000109\n"
+            "(0.000125) vcan0 085#0400000001000000\n"
+            "(0.000125) vcan0 285#FBFFFFFF00000000\n"
+            "(0.000125) vcan0 185#6400000001000000\n"
+            "(0.000125) vcan0 086#0400000001000000\n"
+            "(0.000125) vcan0 286#FBFFFFFF00000000\n"
+            "(0.000125) vcan0 186#6400000001000000\n"
+            "(0.000125) vcan0 080#0100000001\n");
+  options.axis = "b";
+  options.from_tick = 1;
+  options.classic = false;
+  EXPECT_EQ(run_export(options), kExitOk);
+  EXPECT_EQ(text_of("out.log"),
+            "(0.000125) vcan0 086##10400000001000000\n"
+            "(0.000125) vcan0 186##1010000000000803F00000000FBFFFFFF0000000000000000FFFFFFFF00000000\n"
+            "(0.000125) vcan0 080##10100000001\n");
+}
+
+// Catches a trace begun with a profile that cannot be.
+TEST_F(CommandFiles, ExportRefusesAProfileThatCannotBe) {
+  ExportOptions options = {.recording = write_lockstep_run("r.mcap"), .out_file = path("out.log")};
+  options.format = "candump";
+  options.profile = "current_unit_a=0";
+  EXPECT_THROW(run_export(options), link::AddressError);
+  EXPECT_FALSE(fs::exists(path("out.log")));
+  options.profile = "";
+  options.signals = {"i_a_a"};
+  EXPECT_THROW(run_export(options), UsageError);
+  options.signals = {};
+  options.node_base = 127;
+  EXPECT_THROW(run_export(options), UsageError);
+}
+
+// Catches a link of another kind that is taken for the name of a host.
+TEST(Links, OnlyControlGoesOverCanAndModbus) {
+  for (const char* address : {"can:socketcan:vcan0", "modbus:127.0.0.1:1"}) {
+    EXPECT_THROW(run_status({.link = {.address = address, .token = {}}}), UsageError);
+    EXPECT_THROW(run_describe({.link = {.address = address, .token = {}}}), UsageError);
+    EXPECT_THROW(run_watch({.link = {.address = address, .token = {}}, .signals = {}}), UsageError);
+    EXPECT_THROW(open_axis({.address = address, .token = {}}, "1", "control"), UsageError);
+  }
+  EXPECT_THROW(run_can_log({.address = "tcp:127.0.0.1:7300", .out_file = {}}), UsageError);
+}
+
+// Catches a latched fault that is overlooked, or one that is not latched taken for it.
+TEST(Links, LatchedFaultsAreKnownWithOrWithoutADescription) {
+  v1::BenchDescription bench;
+  EXPECT_EQ(latched_text(bench, {.state = 1, .faults = 2}), "");
+  EXPECT_EQ(latched_text(bench, {.state = 4, .faults = 0x102}), "fault, fault word 0x102");
+  v1::FaultDescription& fault = *bench.add_faults();
+  fault.set_bit(2);
+  fault.set_name("trip");
+  fault.set_latched(true);
+  EXPECT_EQ(latched_text(bench, {.state = 4, .faults = 3}), "trip");
+  EXPECT_EQ(latched_text(bench, {.state = 4, .faults = 1}), "");
 }
 
 // Catches a lost line, a wrong exit code, and a signal that looks like success.
@@ -176,6 +302,26 @@ TEST(ServoRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples) 
   EXPECT_EQ(report.exchange_p50_us, 100.0);
   EXPECT_EQ(report.exchange_p99_us, 198.0);
   EXPECT_EQ(report.exchange_max_us, 200.0);
+}
+
+// Catches a report that passes off the encoder's angle for the truth, or shows what nobody measured.
+TEST(ServoRunSummary, SaysWhatItsNumbersRestOn) {
+  ServoRun run;
+  run.rows = {{.tick = 1, .error_counts = 2.0, .u_a_v = 9.0}};
+  ControlReport report = summary_of(run, 0.001);
+  EXPECT_EQ(report.angle_source + " " + report.speed_source, "truth truth");
+  EXPECT_EQ(report.final_true_error_counts, 2.0);
+  EXPECT_EQ(report.peak_voltage_v, 9.0);
+  run.knows_angle = run.knows_speed = run.knows_voltage = false;
+  report = summary_of(run, 0.001);
+  EXPECT_EQ(report.angle_source + " " + report.speed_source, "encoder observer");
+  EXPECT_EQ(report.peak_error_counts, 2.0);
+  EXPECT_FALSE(report.final_true_error_counts.has_value());
+  EXPECT_FALSE(report.peak_voltage_v.has_value());
+  const std::string json = control_json(report);
+  EXPECT_NE(json.find("\"final_true_error_counts\":null"), std::string::npos) << json;
+  ASSERT_TRUE(parse_control(json).has_value());
+  EXPECT_FALSE(parse_control(json)->peak_voltage_v.has_value());
 }
 
 // Catches a preset that is run on a bench it was not made for.

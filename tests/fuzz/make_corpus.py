@@ -189,6 +189,49 @@ def make_configs():
         b'[tcp]\naddress = "0.0.0.0"\nport = 65536\n[[axis]]\nname = """a\nb"""\nx = [1, 2.5, nan, -inf, 1979-05-27]\n')
 
 
+def make_can_frames():
+    """Flags, identifier, size, data. Flags: 1 FD profile, 2 extended profile; 4 FD frame, 8 extended, 16 remote,
+    32 error."""
+    frames = {
+        "classic-currents": (0, 0x181, "dc0512fde8032301"),
+        "classic-command": (0, 0x201, "d204ffff452301c8"),
+        "classic-duties": (0, 0x201, "ff7f0080e8030301"),
+        "classic-encoder": (0, 0x281, "feffffffffff0000"),
+        "classic-counters": (0, 0x481, "ffff020003000402"),
+        "fd-sensors": (5, 0x1FF, "896745230000803f000000c0feffffff0000c07f6f12033b8867452323020200"),
+        "fd-command": (5, 0x201, "452301000000c03f000080be03090000"),
+        "fd-edges": (5, 0x581, "89674523feffffff021a0000" + "3492ff7f" * 13),
+        "fd-request-in-classic": (1, 0x301, "0107efbeadde0000"),
+        "extended-heartbeat": (10, 0x701, "050102077d000000"),
+        "remote": (16, 0x201, "0000000000000000"),
+        "error": (32, 0x201, "0000000000000000"),
+        "huge": (0, 0x123, "ffffffffffffef7f"),
+        "nan": (5, 0x123, "000000000000f87f"),
+    }
+    for name, (flags, number, data) in frames.items():
+        put("can_frame", name, struct.pack("<BIB", flags, number, len(data) // 2) + bytes.fromhex(data))
+
+
+def make_modbus_streams():
+    """A byte for the size of the reads, then frames of every function."""
+    command = struct.pack(">HHHHB", 200, 86, 402, 7, 14) + struct.pack(">HIff", 1, 7, 10.0, -5.0)
+    pdus = {
+        "reads": [bytes([1, 0, 0, 0, 2]), bytes([2, 0, 0, 0, 27]), struct.pack(">BHH", 3, 0, 30),
+                  struct.pack(">BHH", 4, 10200, 86)],
+        "writes": [struct.pack(">BHH", 5, 1, 0xFF00), struct.pack(">BHH", 6, 400, 7), bytes([15, 0, 0, 0, 2, 1, 3]),
+                   struct.pack(">BHHBHhh", 16, 101, 3, 6, 15, 1000, -1000), struct.pack(">BHHH", 22, 101, 0xFF, 8)],
+        "parameters": [struct.pack(">BHHBff", 16, 1000, 4, 8, 0.5, 3.0), struct.pack(">BHHBf", 16, 1004, 2, 4, 1.0)],
+        "exchange": [b"\x17" + command],
+        "others": [bytes([8, 0, 0, 1, 2]), bytes([43, 14, 1, 0]), bytes([43, 14, 4, 6]), bytes([7]), bytes([17])],
+        "wrong": [struct.pack(">BHH", 3, 65535, 126), struct.pack(">BHHBH", 16, 402, 2, 2, 1), bytes([23] + 9 * [0])],
+    }
+    for name, each in pdus.items():
+        frames = [struct.pack(">HHHB", i, 0, len(pdu) + 1, 1) + pdu for i, pdu in enumerate(each)]
+        put("modbus", name, b"\x06" + b"".join(frames))
+    put("modbus", "length", b"\x00" + bytes([0, 1, 0, 0, 0, 1, 1, 3]))
+    put("modbus", "protocol", b"\x00" + bytes([0, 1, 0, 1, 0, 6, 1, 3, 0, 0, 0, 1]))
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         run = pathlib.Path(folder) / "run.mcap"
@@ -196,3 +239,5 @@ if __name__ == "__main__":
         make_recordings(run.read_bytes())
     make_messages()
     make_configs()
+    make_modbus_streams()
+    make_can_frames()

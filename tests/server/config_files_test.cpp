@@ -116,7 +116,10 @@ TEST(ConfigFiles, OneDamagedByteEitherLoadsOrGivesAConfigError) {
   const Folder folder;
   fs::create_directories(folder.path() / "benches");
   fs::create_directories(folder.path() / "motors");
-  const std::string bench = read(kConfigs / "benches/servo.toml");
+  const std::string bench = read(kConfigs / "benches/servo.toml") +
+                            "[[can]]\nbackend = 'slcan'\nchannel = 'tcp:127.0.0.1:0'\nbit_rate = 500_000\n"
+                            "[can.ids]\nstate = 0x600\n[can.units]\ncurrent_a = 1e-3\n"
+                            "[modbus]\naddress = '::1'\nallow_writes = true\n";
   const std::string motor = read(kConfigs / "motors/servo-im.toml");
   folder.write("motors/servo-im.toml", motor);
   int loaded = 0;

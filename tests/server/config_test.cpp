@@ -87,6 +87,7 @@ TEST(Config, CanonicalTextReadsBackBitForBit) {
   config.axes.push_back(config.axes[0]);
   config.axes[1].name = "second";
   config.axes[1].motor = "";
+  config.axes[1].can_node = 127;
   config.setup.axes.push_back(config.setup.axes[0]);
   config.setup.axes[1].on_link_loss = SafeAction::kZeroVoltage;
   AxisParameters& p = config.setup.axes[1].parameters;
@@ -143,6 +144,9 @@ TEST(Config, HashFollowsThePhysicsAndNothingElse) {
   EXPECT_FALSE(changed([](BenchConfig& c) { c.tcp.port = 1; }));
   EXPECT_FALSE(changed([](BenchConfig& c) { c.realtime.pacer = PacerKind::kSleep; }));
   EXPECT_FALSE(changed([](BenchConfig& c) { c.axes[0].motor = "z"; }));
+  EXPECT_FALSE(changed([](BenchConfig& c) { c.axes[0].can_node = 9; }));
+  EXPECT_FALSE(changed([](BenchConfig& c) { c.can.resize(2); }));
+  EXPECT_FALSE(changed([](BenchConfig& c) { c.modbus.enabled = true; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { ++c.setup.period_ns; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { ++c.setup.seed; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { c.setup.command_delay_ticks = 1; }));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <filesystem>
@@ -95,6 +96,41 @@ inline std::string problems_of(const std::string& text, const fs::path& folder =
   return "none";
 }
 
+inline void expect_equal(const CanConfig& x, const CanConfig& y) {
+  EXPECT_EQ(x.backend, y.backend);
+  EXPECT_EQ(x.channel, y.channel);
+  EXPECT_EQ(x.port, y.port);
+  EXPECT_EQ(x.required, y.required);
+  EXPECT_EQ(x.profile.fd, y.profile.fd);
+  EXPECT_EQ(x.profile.extended, y.profile.extended);
+  EXPECT_EQ(x.profile.base_ids, y.profile.base_ids);
+  const auto units = [](const can::Profile& p) {
+    return std::bit_cast<std::array<std::uint64_t, 5>>(std::array{
+        p.current_unit_a, p.voltage_unit_v, p.bus_voltage_unit_v, p.speed_unit_rad_s, p.edge_time_unit_s});
+  };
+  EXPECT_EQ(units(x.profile), units(y.profile));
+  EXPECT_EQ(x.bit_rate, y.bit_rate);
+  EXPECT_EQ(x.data_bit_rate, y.data_bit_rate);
+  EXPECT_EQ(x.sample_every_ticks, y.sample_every_ticks);
+  EXPECT_EQ(x.state_every_ticks, y.state_every_ticks);
+  EXPECT_EQ(x.edges, y.edges);
+  EXPECT_EQ(x.heartbeat_ms, y.heartbeat_ms);
+  EXPECT_EQ(x.controller_timeout_ms, y.controller_timeout_ms);
+  EXPECT_EQ(x.idle_timeout_ms, y.idle_timeout_ms);
+}
+
+inline void expect_equal(const ModbusConfig& x, const ModbusConfig& y) {
+  EXPECT_EQ(x.enabled, y.enabled);
+  EXPECT_EQ(x.address, y.address);
+  EXPECT_EQ(x.port, y.port);
+  EXPECT_EQ(x.allow_writes, y.allow_writes);
+  EXPECT_EQ(x.unprotected, y.unprotected);
+  EXPECT_EQ(x.max_connections, y.max_connections);
+  EXPECT_EQ(x.requests_per_s, y.requests_per_s);
+  EXPECT_EQ(x.frame_timeout_ms, y.frame_timeout_ms);
+  EXPECT_EQ(x.idle_timeout_ms, y.idle_timeout_ms);
+}
+
 /// Everything but token and files, bit for bit.
 inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
   EXPECT_EQ(x.name, y.name);
@@ -113,11 +149,16 @@ inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
   EXPECT_EQ(x.tcp.port, y.tcp.port);
   EXPECT_EQ(x.tcp.unix_path, y.tcp.unix_path);
   EXPECT_EQ(x.tcp.max_sessions, y.tcp.max_sessions);
+  ASSERT_EQ(x.can.size(), y.can.size());
+  for (std::size_t i = 0; i < x.can.size(); ++i)
+    expect_equal(x.can[i], y.can[i]);
+  expect_equal(x.modbus, y.modbus);
   ASSERT_EQ(x.axes.size(), y.axes.size());
   ASSERT_EQ(x.setup.axes.size(), y.setup.axes.size());
   for (std::size_t i = 0; i < x.axes.size(); ++i) {
     EXPECT_EQ(x.axes[i].name, y.axes[i].name);
     EXPECT_EQ(x.axes[i].motor, y.axes[i].motor);
+    EXPECT_EQ(x.axes[i].can_node, y.axes[i].can_node);
     EXPECT_EQ(x.setup.axes[i].on_link_loss, y.setup.axes[i].on_link_loss);
     for (const Parameter& row : axis_parameters()) {
       EXPECT_EQ(std::bit_cast<std::uint64_t>(row.get(x.setup.axes[i].parameters)),

@@ -35,7 +35,7 @@ Refused ask(Engine& engine, const Input& input) {
 TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
   const auto engine = make_lockstep_engine(servo_bench(), nullptr);
   std::vector<Tick> seen;
-  engine->on_tick = [&] { seen.push_back(engine->tick()); };
+  engine->on_tick.add([&] { seen.push_back(engine->tick()); });
   engine->advance();
   EXPECT_EQ(engine->tick(), 0) << "nobody controls";
   EXPECT_EQ(ask(*engine, lease(LeaseAction::kAcquire)), Refused::kNot);
@@ -150,13 +150,13 @@ TEST(ThreadedEngine, AFreeRunIsTheDirectRunBitForBit) {
     int ends = 0;
     std::size_t wrong = 0;
     std::size_t compared = 0;
-    engine->on_tick = [&] {
+    engine->on_tick.add([&] {
       for (std::size_t axis = 0; axis < 2; ++axis, ++compared) {
         const Sample& newest = engine->newest(axis);
         const Sample& expected = direct.samples[2 * newest.tick + axis];
         if (std::memcmp(&newest, &expected, sizeof(Sample)) != 0) ++wrong;
       }
-    };
+    });
     engine->on_end = [&] {
       ++ends;
       io.stop();
@@ -244,10 +244,10 @@ TEST(ThreadedEngine, RealtimeTakesCommandsAndEndsByItself) {
   bool ended = false;
   engine->request(lease(LeaseAction::kAcquire),
                   [&owned](Refused refused, Tick) { owned = refused == Refused::kNot; });
-  engine->on_tick = [&] {
+  engine->on_tick.add([&] {
     if (owned) engine->command(0, kMe, voltage(engine->tick(), 12.0, 0.0));
     if (engine->newest(0).u_a_v == 12.0) ++commanded;
-  };
+  });
   engine->on_end = [&] {
     ended = true;
     io.stop();

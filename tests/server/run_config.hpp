@@ -24,7 +24,10 @@ inline BenchConfig servo_bench(std::size_t axes = 1) {
     AxisSetup axis{.parameters = servo_axis()};
     axis.parameters.current_sensor.noise_rms_a = 0.01;
     config.setup.axes.push_back(axis);
-    config.axes.push_back({.name = "axis" + std::to_string(i), .motor = "servo", .loads = {}});
+    config.axes.push_back({.name = "axis" + std::to_string(i),
+                           .motor = "servo",
+                           .can_node = static_cast<std::uint32_t>(i + 1),
+                           .loads = {}});
   }
   return config;
 }

@@ -3,7 +3,9 @@
 and their exit codes. Each test names the mistake that it would catch."""
 import json
 import signal
+import socket
 import sys
+import threading
 import unittest
 
 try:
@@ -95,7 +97,7 @@ class Observing(CommandTest):
             found = self.json_of("status", link=self.link)
             self.assertSays(self.drivebench("status", link=self.link).stdout, "tick 1 ", "run, owner 1", "2 sessions")
         self.assertKeys(found, "mode", "tick", "late_ticks", "worst_lateness_s", "sessions", "recording",
-                        "recording_gaps", "state_hash", "notes", "axes")
+                        "recording_gaps", "state_hash", "notes", "transports", "axes")
         self.assertEqual((found["tick"], found["sessions"], found["axes"][0]["owner"]), (1, 2, 1))
         self.assertKeys(found["axes"][0], "axis", "faults_set", *(f.name for f in pb.Sample.DESCRIPTOR.fields))
         self.assertEqual(found["axes"][0]["u_a_v"], 10.0)
@@ -241,6 +243,36 @@ class Controlling(CommandTest):
         """A controller of 4 kHz on a bench of 8 kHz."""
         said = self.drivebench("control", "--preset", "book/8.2.2-4khz", link=self.link, code=USAGE).stderr
         self.assertSays(said, "the sample rate [Hz] is 8000 on the bench, 4000 in the preset", "book/8.2.2 would fit")
+
+    def test_a_link_that_breaks_in_a_move_costs_no_sample(self):
+        """A report and a file of samples that are lost with the bench."""
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(listener.close)
+
+        def pass_on(source, drain, most):
+            while most > 0 and (data := source.recv(4096)):
+                drain.sendall(data)
+                most -= len(data)
+            for end in (source, drain):
+                end.shutdown(socket.SHUT_RDWR)
+
+        def carry():
+            client, _ = listener.accept()
+            with client, socket.create_connection(self.bench.address) as bench:
+                up = threading.Thread(target=pass_on, args=(client, bench, float("inf")))
+                up.start()
+                pass_on(bench, client, 100_000)
+                up.join()
+
+        carrier = threading.Thread(target=carry)
+        carrier.start()
+        link = "tcp:%s:%d" % listener.getsockname()
+        found = self.json_of("control", "--csv", "broken.csv", link=link, code=FAILED)
+        carrier.join()
+        self.assertIn("closed", found["failure"])
+        self.assertGreater(found["samples"], 100)
+        rows = (self.folder / "broken.csv").read_text(encoding="utf-8").splitlines()
+        self.assertEqual(len(rows), 1 + found["samples"])
 
     def test_an_interrupted_move_is_a_failed_run(self):
         """An exit code of 0 after half a move."""

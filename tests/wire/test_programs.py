@@ -102,6 +102,12 @@ class Recordings(CommandTest):
         self.assertEqual([row.split(",")[3] for row in rows], ["10", "11", "12"])
         self.assertSays(self.drivebench("export", self.whole, "--out", "all.csv").stdout, "1025 samples of axis servo to all.csv")
 
+    def test_export_of_an_axis_that_is_not_there_is_2(self):
+        """A trace of the commands of other axes, without a sample."""
+        for form in ("csv", "candump"):
+            self.assertSays(self.drivebench("export", self.whole, "--format", form, "--axis", "none", code=USAGE).stderr,
+                            "no samples of axis 'none'; the recording has servo")
+
     def test_export_of_a_cut_recording_writes_what_is_there_and_ends_with_3(self):
         """A crash that costs the samples before it, or is not told."""
         cut = self.written("cut.mcap", self.whole.read_bytes()[:-100])

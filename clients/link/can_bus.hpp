@@ -1,0 +1,36 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "clients/link/can_address.hpp"
+#include "protocols/can/frame.hpp"
+
+namespace drivebench::link {
+
+/// A connection to a CAN bus on blocking calls, for one thread. Throws LinkError when the bus fails.
+class CanBus {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  CanBus() = default;
+  CanBus(const CanBus&) = delete;
+  CanBus& operator=(const CanBus&) = delete;
+  virtual ~CanBus() = default;
+
+  virtual void send(const can::Frame& frame) = 0;
+  /// The next frame of somebody else, perhaps an error frame; nothing if none comes in time or a signal does.
+  /// A time that is past: what has already come.
+  virtual std::optional<can::Frame> receive(Clock::time_point until) = 0;
+};
+
+/// Opens the bus. Where the kernel can filter it delivers only data frames with these identifiers; with none
+/// given, everything. Throws ConnectError.
+std::unique_ptr<CanBus> open_can_bus(const CanAddress& address, std::chrono::milliseconds deadline,
+                                     std::span<const std::uint32_t> ids = {});
+
+}  // namespace drivebench::link

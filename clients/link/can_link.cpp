@@ -1,0 +1,348 @@
+#include "clients/link/can_link.hpp"
+
+#include <algorithm>
+#include <array>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace drivebench::link {
+namespace {
+
+using can::index_of;
+using can::Message;
+using can::Request;
+using can::Result;
+
+constexpr unsigned kModeLockstep = 1;
+constexpr unsigned kStopped = 4;  // of a heartbeat
+
+struct Meaning {
+  v1::RefusalCode code;
+  const char* sentence;
+};
+/// By the result of a reply.
+constexpr auto kMeanings = std::to_array<Meaning>({
+    {v1::REFUSAL_UNSPECIFIED, "done"},
+    {v1::REFUSAL_NOT_OWNER, "this controller does not hold the axis"},
+    {v1::REFUSAL_OWNED, "another controller holds the axis"},
+    {v1::REFUSAL_NOT_FINITE, "a voltage is not a number"},
+    {v1::REFUSAL_LATCHED, "a latched fault is in force; it must be cleared first"},
+    {v1::REFUSAL_STALE, "the tick has been answered"},
+    {v1::REFUSAL_BUSY, "the bench has too much to do"},
+    {v1::REFUSAL_MALFORMED, "the frame is malformed"},
+});
+
+[[noreturn]] void refuse_with(Result result) {
+  const Meaning& meaning =
+      kMeanings[std::min<std::size_t>(static_cast<std::size_t>(result), kMeanings.size() - 1)];
+  refuse(meaning.code, meaning.sentence);
+}
+
+constexpr SignalMask signals_of(const can::MessageRow& row) {
+  SignalMask mask = 0;
+  for (const can::Field& field : row.fields) {
+    for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      if (!field.signal.empty() && kSignals[i].name == field.signal) mask |= SignalMask{1} << i;
+    }
+  }
+  return mask;
+}
+
+/// What the sensors of every sample and the frames about the state carry, without the speed: the state frame
+/// has it, but not of every sample.
+SignalMask signals_in(bool fd) {
+  SignalMask mask = 0;
+  for (const can::MessageRow& row : can::kMessages) {
+    const bool exists = row.variant == can::Variant::kBoth || (row.variant == can::Variant::kFd) == fd;
+    if (exists && row.sender == can::Sender::kBench) mask |= signals_of(row);
+  }
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    if (kSignals[i].kind == SignalKind::kTruth) mask &= ~(SignalMask{1} << i);
+  }
+  return mask;
+}
+
+/// Of a field that holds an unsigned number of at most 32 bits.
+std::uint32_t as_code(double value) {
+  return static_cast<std::uint32_t>(value);
+}
+
+std::vector<std::uint32_t> bench_ids(const CanAddress& address) {
+  std::vector<std::uint32_t> ids;
+  for (const can::MessageRow& row : can::kMessages) {
+    if (row.sender == can::Sender::kBench) ids.push_back(address.profile.id_of(row, address.node));
+  }
+  return ids;
+}
+
+}  // namespace
+
+CanLink::CanLink(const CanAddress& address, const CanLinkOptions& options)
+    : CanLink(open_can_bus(address, options.deadline, bench_ids(address)), address, to_string(address),
+              options) {}
+
+CanLink::CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::string name,
+                 const CanLinkOptions& options)
+    : bus_(std::move(bus)),
+      profile_(address.profile),
+      node_(address.node),
+      name_(std::move(name)),
+      options_(options),
+      known_(signals_in(address.profile.fd)),
+      controller_(std::random_device{}()) {
+  bench_.set_name(name_);
+  bench_.add_axes()->set_name("node " + std::to_string(node_));
+  try {
+    await(
+        "heartbeat", [this] { return bench_.period_s() > 0.0; }, [] {});
+  } catch (const LinkError& error) {
+    throw ConnectError(error.what());
+  }
+}
+
+CanLink::~CanLink() {
+  if (lease_ == 0) return;
+  try {
+    send_request(Request::kRelease);  // no connection ends that would tell the bench
+  } catch (const LinkError&) {
+    return;  // then the lease runs out
+  }
+}
+
+void CanLink::acquire() {
+  const Reply reply = ask(Request::kAcquire);
+  if (reply.result != Result::kDone) refuse_with(reply.result);
+  if (reply.lease == 0) throw LinkError(name_ + " gave the axis without a lease number");
+  lease_ = reply.lease;
+  // The request has the bench send where it stands, so that a lockstep that waits can be joined.
+  await(
+      "state and sample after the request",
+      [this] {
+        const bool has_all = has_state_ && (profile_.fd || has_counters_);
+        return has_all && has_sample_ && bench_.mode() != v1::MODE_UNSPECIFIED;
+      },
+      [this] { send_request(Request::kAcquire); });
+}
+
+void CanLink::release() {
+  const Reply reply = ask(Request::kRelease);
+  lease_ = 0;
+  if (reply.result != Result::kDone) refuse_with(reply.result);
+}
+
+void CanLink::clear_faults() {
+  const Reply reply = ask(Request::kClearFaults);
+  if (reply.result != Result::kDone) refuse_with(reply.result);
+}
+
+void CanLink::write_parameter(std::string_view name, double) {
+  refuse(v1::REFUSAL_READ_ONLY, "parameters cannot be written over CAN", name);
+}
+
+void CanLink::set_load(const LoadChange&) {
+  refuse(v1::REFUSAL_READ_ONLY, "the load cannot be set over CAN", "load");
+}
+
+const Sample& CanLink::newest() {
+  constexpr int kMostWaiting = 10'000;  // on a bus that never falls silent
+  for (int i = 0; i < kMostWaiting && receive(Clock::time_point::min()); ++i) {
+  }
+  await(
+      "sample", [this] { return has_sample_; }, [] {});
+  return sample_;
+}
+
+const Sample& CanLink::exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) {
+  const can::MessageRow& row = *can::find_message(Message::kCommand, profile_.fd);
+  can::Values values{};
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    const std::string_view field = row.fields[i].name;
+    values[i] = field == "tick"   ? static_cast<double>(tick)
+                : field == "u_a"  ? u_a_v
+                : field == "u_b"  ? u_b_v
+                : field == "mode" ? static_cast<double>(gates)
+                                  : static_cast<double>(lease_);
+  }
+  const can::Frame command = can::encode(row, profile_, node_, values);
+  commanded_tick_ = tick;
+  command_result_.reset();
+  asked_ = Request::kCommand;
+  reply_.reset();
+  bus_->send(command);
+  await(
+      "sample after tick " + std::to_string(tick),
+      [this, tick] {
+        check_replies();
+        return has_sample_ && sample_.tick > tick;
+      },
+      [this, &command] {
+        if (is_lockstep()) bus_->send(command);
+      });
+  // In real time a slow controller goes on with the newest sample.
+  while (!is_lockstep() && receive(Clock::time_point::min())) {
+  }
+  return sample_;
+}
+
+/// While a command waits for its sample.
+void CanLink::check_replies() {
+  if (reply_ && reply_->result != Result::kDone) refuse_with(reply_->result);
+  if (!command_result_) return;
+  const Result result = *std::exchange(command_result_, std::nullopt);
+  if (result == Result::kNotOwner) {
+    send_request(Request::kRenew);  // it may be about somebody else; the reply to this is about us
+  } else if (result != Result::kStale) {
+    refuse_with(result);
+  } else if (is_lockstep()) {
+    // The command was repeated, or the network doubled it: the sample that answered it was lost. Who has the
+    // lease and asks for it is sent the newest one.
+    send_request(Request::kAcquire);
+  }
+}
+
+CanLink::Reply CanLink::ask(Request request) {
+  bool repeated = false;
+  reply_.reset();
+  send_request(request);
+  await(
+      "reply to request " + std::to_string(static_cast<unsigned>(request)),
+      [this] { return reply_.has_value(); },
+      [this, request, &repeated] {
+        repeated = true;
+        send_request(request);
+      });
+  asked_ = Request::kCommand;
+  Reply reply = *std::exchange(reply_, std::nullopt);
+  if (request == Request::kRelease && repeated && reply.result == Result::kNotOwner)
+    reply.result = Result::kDone;
+  return reply;
+}
+
+void CanLink::send_request(Request request) {
+  asked_ = request;
+  const can::MessageRow& row = *can::find_message(Message::kRequest, profile_.fd);
+  const std::array<double, 3> values = {static_cast<double>(request),
+                                        static_cast<double>(request == Request::kAcquire ? 0 : lease_),
+                                        static_cast<double>(controller_)};
+  bus_->send(can::encode(row, profile_, node_, values));
+}
+
+template <class Done, class Repeat>
+void CanLink::await(const std::string& what, Done done, Repeat repeat) {
+  if (done()) return;
+  const Clock::time_point give_up = Clock::now() + options_.deadline;
+  Clock::time_point again = Clock::now() + options_.repeat_after;
+  for (;;) {
+    const bool received = receive(std::min(again, give_up));
+    if (received && done()) return;
+    const Clock::time_point now = Clock::now();
+    if (now >= give_up) {
+      std::string text = name_ + " sent no " + what + " of node " + std::to_string(node_) + " within " +
+                         std::to_string(options_.deadline.count()) + " ms";
+      if (misfit_ != can::FrameProblem::kNone) {
+        text += "; its frames have another form (" + std::string(can::name_of(misfit_)) +
+                "): do both ends agree on fd, extended and the identifiers?";
+      }
+      throw LinkError(text);
+    }
+    if (received) continue;
+    repeat();
+    again = now + options_.repeat_after;
+  }
+}
+
+bool CanLink::receive(Clock::time_point until) {
+  const std::optional<can::Frame> frame = bus_->receive(until);
+  if (!frame) return false;
+  const can::Match match = can::match(profile_, *frame);
+  const bool is_mine = match.row != nullptr && match.row->sender == can::Sender::kBench &&
+                       (!match.row->per_node || match.node == node_);
+  if (!is_mine) return true;
+  if (match.ok()) {
+    take(*match.row, can::decode(*match.row, profile_, *frame));
+  } else {
+    misfit_ = match.problem;
+  }
+  return true;
+}
+
+void CanLink::take(const can::MessageRow& row, const can::Values& values) {
+  switch (row.message) {
+    case Message::kHeartbeat: {
+      const unsigned version = as_code(values[index_of(Message::kHeartbeat, true, "profile")]);
+      if (version != can::kProfileVersion) {
+        throw LinkError(name_ + " speaks version " + std::to_string(version) + " of the frame table, this " +
+                        "program version " + std::to_string(can::kProfileVersion));
+      }
+      if (as_code(values[index_of(Message::kHeartbeat, true, "state")]) == kStopped) {
+        throw LinkError(name_ + " has stopped");
+      }
+      bench_.set_period_s(values[index_of(Message::kHeartbeat, true, "period_us")] * 1e-6);
+      return;
+    }
+    case Message::kReply:
+      return take_reply(values);
+    case Message::kEncoder:
+      can::update_sample(row, values, coming_);
+      has_encoder_ = true;
+      return;
+    case Message::kCurrents:
+      can::update_sample(row, values, coming_);
+      // Without its encoder frame it is no sample: the count would be that of the one before.
+      if (std::exchange(has_encoder_, false)) take_sample();
+      return;
+    case Message::kSensors:
+      can::update_sample(row, values, coming_);
+      return take_sample();
+    case Message::kSync:
+      bench_.set_mode(as_code(values[index_of(Message::kSync, true, "mode")]) == kModeLockstep
+                          ? v1::MODE_LOCKSTEP
+                          : v1::MODE_REALTIME);
+      return take_sync_tick(as_code(values[index_of(Message::kSync, true, "tick")]));
+    default:
+      break;
+  }
+  has_state_ |= row.message == Message::kState;
+  has_counters_ |= row.message == Message::kCounters;
+  // A tick in them is the frame's: the sample stays that of its sensors.
+  for (Sample* const sample : {&coming_, &sample_}) {
+    const std::uint64_t tick = sample->tick;
+    can::update_sample(row, values, *sample);
+    sample->tick = tick;
+  }
+}
+
+/// The currents frame has 16 bits of the tick, SYNC 32. If they are of one tick, the sample learns the
+/// others.
+void CanLink::take_sync_tick(std::uint32_t tick) {
+  const bool is_of_sample = has_sample_ && (tick & 0xFFFF) == (sample_.tick & 0xFFFF);
+  if (profile_.fd || !is_of_sample) return;
+  const std::int64_t nearest = can::unwrap(tick, 32, static_cast<std::int64_t>(sample_.tick));
+  coming_.tick = sample_.tick = nearest < 0 ? tick : static_cast<std::uint64_t>(nearest);
+}
+
+void CanLink::take_reply(const can::Values& values) {
+  const auto field = [&values](std::string_view name) {
+    return values[index_of(Message::kReply, true, name)];
+  };
+  const auto request = static_cast<Request>(as_code(field("request")));
+  const Reply reply = {.result = static_cast<Result>(as_code(field("result"))),
+                       .lease = as_code(field("lease"))};
+  if (request == Request::kCommand) {
+    if (as_code(field("tick")) == (commanded_tick_ & 0xFF)) command_result_ = reply.result;
+  } else if (request == asked_ && as_code(field("controller")) == controller_) {
+    reply_ = reply;
+  }
+}
+
+void CanLink::take_sample() {
+  // No SYNC since the sample before: only real time goes on without one.
+  if (bench_.mode() == v1::MODE_UNSPECIFIED && has_sample_ && coming_.tick != sample_.tick) {
+    bench_.set_mode(v1::MODE_REALTIME);
+  }
+  sample_ = coming_;
+  has_sample_ = true;
+}
+
+}  // namespace drivebench::link

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "clients/link/axis_link.hpp"
+#include "clients/link/can_bus.hpp"
+#include "protocols/can/codec.hpp"
+
+namespace drivebench::link {
+
+struct CanLinkOptions {
+  std::chrono::milliseconds deadline{5000};    ///< for every answer
+  std::chrono::milliseconds repeat_after{20};  ///< what got no answer is sent again; frames may be lost
+};
+
+/// A controller of one axis by the native CAN profile. It sees no truth, and of the state, the faults and the
+/// counters what the last frame that carried them said. Ticks and counts are carried on from their low bits.
+class CanLink final : public AxisLink {
+ public:
+  /// Connects and waits for the bench's heartbeat. Throws ConnectError.
+  explicit CanLink(const CanAddress& address, const CanLinkOptions& options = {});
+  /// The same on an open bus; `name` stands for it in errors and in bench().
+  CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::string name,
+          const CanLinkOptions& options = {});
+  /// Gives the axis back if it is still held, without waiting for the answer.
+  ~CanLink() override;
+
+  const v1::BenchDescription& bench() const noexcept override { return bench_; }
+  std::uint32_t axis() const noexcept override { return 0; }
+  SignalMask known() const noexcept override { return known_; }
+
+  void acquire() override;
+  void release() override;
+  void clear_faults() override;
+  const Sample& newest() override;
+  const Sample& exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) override;
+  void write_parameter(std::string_view name, double value) override;
+  bool can_set_load() const noexcept override { return false; }
+  void set_load(const LoadChange& change) override;
+
+ private:
+  using Clock = CanBus::Clock;
+
+  struct Reply {
+    can::Result result;
+    unsigned lease;
+  };
+
+  /// Takes one frame if it comes in time.
+  bool receive(Clock::time_point until);
+  void take(const can::MessageRow& row, const can::Values& values);
+  void take_reply(const can::Values& values);
+  void take_sample();
+  void take_sync_tick(std::uint32_t tick);
+  void send_request(can::Request request);
+  Reply ask(can::Request request);
+  /// Receives until `done`, and calls `repeat` when nothing comes for a while.
+  template <class Done, class Repeat>
+  void await(const std::string& what, Done done, Repeat repeat);
+  void check_replies();
+  bool is_lockstep() const noexcept { return bench_.mode() == v1::MODE_LOCKSTEP; }
+
+  std::unique_ptr<CanBus> bus_;
+  can::Profile profile_;
+  std::uint32_t node_;
+  std::string name_;
+  CanLinkOptions options_;
+  v1::BenchDescription bench_;
+  SignalMask known_ = 0;
+  std::uint32_t controller_;
+  unsigned lease_ = 0;
+
+  Sample coming_;  // classic: holds the encoder frame until the currents come
+  Sample sample_;
+  bool has_encoder_ = false;  // in coming_, and not yet in a sample
+  bool has_sample_ = false;
+  bool has_state_ = false;
+  bool has_counters_ = false;
+  can::FrameProblem misfit_ = can::FrameProblem::kNone;  // of the last frame of the bench that had one
+  std::uint64_t commanded_tick_ = 0;
+  std::optional<can::Result> command_result_;    // of the command for it, if it was turned down
+  can::Request asked_ = can::Request::kCommand;  // request that an answer is expected to; kCommand: none
+  std::optional<Reply> reply_;
+};
+
+}  // namespace drivebench::link

@@ -1,0 +1,237 @@
+#include "clients/link/modbus_link.hpp"
+
+#include <modbus/modbus.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstddef>
+#include <random>
+#include <thread>
+#include <utility>
+
+#include "clients/link/address.hpp"
+#include "protocols/modbus/register_map.hpp"
+
+namespace drivebench::link {
+namespace {
+
+using modbus::Content;
+using modbus::Row;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::string_view kScheme = "modbus:";
+
+/// Of the fixed rows only one has each of these contents.
+constexpr const Row& row_of(Content content) {
+  for (const Row& row : modbus::map_detail::kFixedRows) {
+    if (row.content == content) return row;
+  }
+  std::abort();
+}
+constexpr std::uint16_t address_of(Content content) {
+  return row_of(content).address;
+}
+
+/// The registers from the first word of a row on, as `words` holds those from `start` on.
+double value_of(const Row& row, std::uint16_t start, std::span<const std::uint16_t> words) {
+  return modbus::number_of(row.type,
+                           modbus::get(row.type, modbus::WordOrder::kAbcd, &words[row.address - start]));
+}
+
+struct Meaning {
+  v1::RefusalCode code;
+  const char* sentence;
+};
+/// By the value of the register last_refusal.
+constexpr auto kMeanings = std::to_array<Meaning>({
+    {v1::REFUSAL_BUSY, "the bench is busy"},
+    {v1::REFUSAL_UNKNOWN_AXIS, "there is no such axis"},
+    {v1::REFUSAL_NOT_OWNER, "this controller does not hold the axis"},
+    {v1::REFUSAL_OWNED, "another controller holds the axis"},
+    {v1::REFUSAL_NOT_FINITE, "a voltage is not a number"},
+    {v1::REFUSAL_LATCHED, "a latched fault is in force; it must be cleared first"},
+    {v1::REFUSAL_STALE, "the tick has been answered"},
+    {v1::REFUSAL_BUSY, "the bench has too much to do"},
+    {v1::REFUSAL_OUT_OF_RANGE, "a value is out of range"},
+    {v1::REFUSAL_WRONG_MODE, "the bench runs in another mode"},
+});
+
+}  // namespace
+
+bool is_modbus_address(std::string_view text) noexcept {
+  return text.starts_with(kScheme);
+}
+
+ModbusAddress parse_modbus_address(std::string_view text) {
+  std::string_view place = is_modbus_address(text) ? text.substr(kScheme.size()) : text;
+  ModbusAddress address;
+  if (const std::size_t mark = place.find('?'); mark != std::string_view::npos) {
+    const std::string_view key = place.substr(mark + 1);
+    constexpr std::string_view kUnit = "unit=";
+    const char* const end = key.data() + key.size();
+    const char* const digits = key.starts_with(kUnit) ? key.data() + kUnit.size() : end;
+    const auto [stop, error] = std::from_chars(digits, end, address.unit);
+    if (error != std::errc{} || stop != end || address.unit < 1 || address.unit > 247) {
+      throw AddressError("'" + std::string(text) + "' is not an address: after ? comes unit=1 to unit=247");
+    }
+    place = place.substr(0, mark);
+  }
+  const bool has_port = place.rfind(':') != std::string_view::npos && !place.ends_with(']');
+  try {
+    const Address tcp = parse_address("tcp:" + std::string(place) + (has_port ? "" : ":1502"));
+    address.host = tcp.host;
+    address.port = tcp.port;
+  } catch (const AddressError&) {
+    throw AddressError("'" + std::string(text) + "' is not an address: expected modbus:HOST[:PORT][?unit=N]");
+  }
+  return address;
+}
+
+void ModbusLink::Free::operator()(_modbus* context) const noexcept {
+  ::modbus_close(context);
+  ::modbus_free(context);
+}
+
+ModbusLink::ModbusLink(const ModbusAddress& address, std::chrono::milliseconds deadline)
+    : name_(std::string(kScheme) + address.host + ":" + address.port +
+            "?unit=" + std::to_string(address.unit)),
+      deadline_(deadline),
+      modbus_(::modbus_new_tcp_pi(address.host.c_str(), address.port.c_str())),
+      key_(static_cast<std::uint16_t>(1 + std::random_device{}() % 0xFFFF)) {
+  if (!modbus_) throw ConnectError(name_ + ": " + ::modbus_strerror(errno));
+  const auto us = std::chrono::microseconds(deadline).count();
+  ::modbus_set_slave(modbus_.get(), address.unit);
+  ::modbus_set_response_timeout(modbus_.get(), static_cast<std::uint32_t>(us / 1'000'000),
+                                static_cast<std::uint32_t>(us % 1'000'000));
+  if (::modbus_connect(modbus_.get()) != 0) {
+    throw ConnectError("nothing answers at " + name_ + ": " + ::modbus_strerror(errno));
+  }
+  describe();
+}
+
+void ModbusLink::describe() {
+  std::array<std::uint16_t, row_of(Content::kPeriod).end()> words{};
+  read(0, words);
+  const auto value = [&words](Content content) { return value_of(row_of(content), 0, words); };
+  if (words[0] != modbus::kMarker || words[1] != modbus::kMapVersion) {
+    throw LinkError(name_ + " has no register map of drivebench, version " +
+                    std::to_string(modbus::kMapVersion));
+  }
+  bench_.set_name(name_);
+  bench_.set_period_s(value(Content::kPeriod) * 1e-9);
+  const auto mode = static_cast<unsigned>(value(Content::kMode));
+  bench_.set_mode(mode == 0 ? v1::MODE_REALTIME : mode == 1 ? v1::MODE_LOCKSTEP : v1::MODE_FREE);
+  bench_.add_axes()->set_name(std::to_string(static_cast<unsigned>(value(Content::kAxis))));
+  writes_allowed_ = value(Content::kWrites) != 0.0;
+}
+
+ModbusLink::~ModbusLink() {
+  if (!holds_axis_) return;
+  try {
+    release();  // the end of the connection alone keeps the axis for whoever has the key
+  } catch (const std::exception&) {
+    return;  // then the lease runs out
+  }
+}
+
+void ModbusLink::acquire() {
+  if (!writes_allowed_) refuse(v1::REFUSAL_READ_ONLY, "the bench allows no writes over Modbus");
+  write(address_of(Content::kLeaseKey), key_);
+  holds_axis_ = true;
+}
+
+void ModbusLink::release() {
+  holds_axis_ = false;
+  write(address_of(Content::kRequest), static_cast<std::uint16_t>(modbus::LeaseRequest::kRelease));
+}
+
+void ModbusLink::clear_faults() {
+  write(address_of(Content::kRequest), static_cast<std::uint16_t>(modbus::LeaseRequest::kClearFaults));
+}
+
+void ModbusLink::write_parameter(std::string_view name, double) {
+  refuse(v1::REFUSAL_READ_ONLY, "over Modbus parameters have no names; write their registers", name);
+}
+
+void ModbusLink::set_load(const LoadChange&) {
+  refuse(v1::REFUSAL_READ_ONLY, "the load cannot be set over Modbus", "load");
+}
+
+const Sample& ModbusLink::newest() {
+  std::array<std::uint16_t, modbus::kSampleLength> words{};
+  read(modbus::kSampleStart, words);
+  sample_ = modbus::read_sample(words);
+  return sample_;
+}
+
+const Sample& ModbusLink::exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) {
+  constexpr std::uint16_t kFirst = address_of(Content::kCommandMode);
+  std::array<std::uint16_t, row_of(Content::kVoltageB).end() - kFirst> command{};
+  const auto put = [&command](Content content, std::uint64_t bits) {
+    modbus::put(bits, row_of(content).type, modbus::WordOrder::kAbcd, &command[address_of(content) - kFirst]);
+  };
+  put(Content::kCommandMode, static_cast<std::uint64_t>(gates));
+  put(Content::kCounter, tick);
+  put(Content::kVoltageA, modbus::float_bits(u_a_v));
+  put(Content::kVoltageB, modbus::float_bits(u_b_v));
+  std::array<std::uint16_t, modbus::kSampleLength> words{};
+  check(::modbus_write_and_read_registers(modbus_.get(), kFirst, static_cast<int>(command.size()),
+                                          command.data(), modbus::kSampleStart,
+                                          static_cast<int>(words.size()), words.data()),
+        "the sample after tick " + std::to_string(tick));
+  sample_ = modbus::read_sample(words);
+  // In real time the answer may come within the same tick.
+  const Clock::time_point give_up = Clock::now() + deadline_;
+  while (sample_.tick <= tick) {
+    if (Clock::now() > give_up) throw LinkError(name_ + " gave no sample after tick " + std::to_string(tick));
+    std::this_thread::sleep_for(std::chrono::duration<double>(bench_.period_s() / 4));
+    newest();
+  }
+  return sample_;
+}
+
+void ModbusLink::read(std::uint16_t start, std::span<std::uint16_t> words) {
+  check(::modbus_read_registers(modbus_.get(), start, static_cast<int>(words.size()), words.data()),
+        "registers from " + std::to_string(start));
+}
+
+void ModbusLink::write(std::uint16_t address, std::uint16_t value) {
+  check(::modbus_write_register(modbus_.get(), address, value), "register " + std::to_string(address));
+}
+
+void ModbusLink::check(int result, std::string_view doing) {
+  if (result >= 0) return;
+  switch (errno) {
+    case EMBXILFUN:
+      refuse(v1::REFUSAL_MALFORMED, "the bench does not have this function code", doing);
+    case EMBXILADD:
+      refuse(v1::REFUSAL_READ_ONLY, "there are no such registers, or they cannot be written", doing);
+    case EMBXILVAL:
+      refuse(v1::REFUSAL_OUT_OF_RANGE, "a value is not a number or out of range", doing);
+    case EMBXGPATH:
+    case EMBXGTAR:
+      refuse(v1::REFUSAL_UNKNOWN_AXIS, "the bench has no axis at this unit id", "unit");
+    case EMBXSBUSY:
+    case EMBXSFAIL:
+      refuse_busy();
+    default:
+      break;
+  }
+  const std::string why = ::modbus_strerror(errno);
+  ::modbus_close(modbus_.get());  // a late answer must not pass for the next one's
+  throw LinkError(name_ + " gave no answer about " + std::string(doing) + ": " + why);
+}
+
+/// Exception 6 has many reasons; a register tells which.
+void ModbusLink::refuse_busy() {
+  std::uint16_t why = 0;
+  if (::modbus_read_registers(modbus_.get(), address_of(Content::kLastRefusal), 1, &why) < 0 ||
+      why >= kMeanings.size()) {
+    why = 0;
+  }
+  refuse(kMeanings[why].code, kMeanings[why].sentence);
+}
+
+}  // namespace drivebench::link

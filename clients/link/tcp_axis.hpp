@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "clients/link/axis_link.hpp"
+
+namespace drivebench::link {
+
+/// One axis over the wire of bench.proto, which carries everything.
+class TcpAxis final : public AxisLink {
+ public:
+  TcpAxis(std::unique_ptr<Link> link, std::uint32_t axis) : link_(std::move(link)), axis_(axis) {}
+
+  const v1::BenchDescription& bench() const noexcept override { return link_->welcome().bench(); }
+  std::uint32_t axis() const noexcept override { return axis_; }
+  SignalMask known() const noexcept override { return kAllSignals; }
+
+  void acquire() override { link_->acquire(axis_); }
+  void release() override { link_->release(axis_); }
+  void clear_faults() override { link_->clear_faults(axis_); }
+  const Sample& newest() override;
+  const Sample& exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) override;
+  void write_parameter(std::string_view name, double value) override {
+    link_->write_parameter(axis_, name, value);
+  }
+  bool can_set_load() const noexcept override { return true; }
+  void set_load(const LoadChange& change) override { link_->set_load(axis_, change); }
+
+ private:
+  const Sample& keep(const v1::ExchangeReply& reply);
+
+  std::unique_ptr<Link> link_;
+  std::uint32_t axis_;
+  Sample sample_;
+};
+
+/// A message as a plain sample.
+Sample plain(const v1::Sample& message);
+
+}  // namespace drivebench::link

@@ -1,0 +1,397 @@
+#include "protocols/can/codec.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "protocols/catalogue.hpp"
+
+namespace drivebench::can {
+namespace {
+
+// ---- what the table must keep ----
+
+/// Whole numbers go as whole numbers; a code has no sign.
+constexpr bool can_carry(const Field& field, const Signal& signal) {
+  const bool wraps = field.encoding == Encoding::kCounter || field.encoding == Encoding::kSigned;
+  if (signal.type == SignalType::kReal) return !wraps && field.encoding != Encoding::kCode;
+  return wraps || (field.encoding == Encoding::kCode && signal.type == SignalType::kUnsigned);
+}
+
+constexpr bool is_sound(const MessageRow& row) {
+  if (row.fields.size() > kMaxFields || !is_fd_size(row.size)) return false;
+  if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() tells them apart by it
+  unsigned end = 0;
+  for (const Field& field : row.fields) {
+    if (field.start_bit < end || field.start_bit % 8 != 0) return false;
+    if (field.bits != 8 && field.bits != 16 && field.bits != 32) return false;
+    if (field.encoding == Encoding::kFloat && field.bits != 32) return false;
+    const Signal* const signal = find_signal(field.signal);
+    if (field.signal.empty() != (signal == nullptr)) return false;
+    if (signal != nullptr && !can_carry(field, *signal)) return false;
+    end = field.start_bit + field.bits;
+  }
+  return end <= 8U * row.size;
+}
+
+constexpr bool ids_are_sorted_and_disjoint(bool fd) {
+  std::uint32_t end = 0;
+  for (const MessageRow& row : kMessages) {
+    if (!is_in(row, fd)) continue;
+    const IdRange ids = ids_of(row, row.base_id);
+    if (ids.first < end || ids.last > kMaxStandardId) return false;
+    end = ids.last + 1;
+  }
+  return true;
+}
+
+static_assert(std::ranges::all_of(kMessages, is_sound),
+              "fields are sorted, disjoint, whole bytes, in the frame");
+static_assert(ids_are_sorted_and_disjoint(false) && ids_are_sorted_and_disjoint(true));
+static_assert(kFirstEdgeByte + 2 * kEdgesPerFrame == 64);
+static_assert(32767 * kDutyUnit == 1.0, "the full duty is exactly 1");
+
+// ---- what follows from the table ----
+
+struct Layout {
+  std::array<const Signal*, kMaxFields> signals{};
+  std::uint64_t reserved = 0;  ///< bit n: byte n belongs to no field
+};
+
+/// What match() needs of a row, close together: it looks at all of them.
+struct Key {
+  Message message;
+  bool in_classic;
+  bool in_fd;
+  std::uint8_t first_node;
+  std::uint8_t last_node;
+};
+
+constexpr std::uint64_t bytes_mask(unsigned first, unsigned count) {
+  return count == 0 ? 0 : (~std::uint64_t{0} >> (64 - count)) << first;
+}
+
+constexpr auto kLayouts = [] {
+  std::array<Layout, kMessages.size()> layouts{};
+  for (std::size_t i = 0; i < kMessages.size(); ++i) {
+    const MessageRow& row = kMessages[i];
+    layouts[i].reserved = bytes_mask(0, row.size);
+    if (row.message == Message::kEdges)
+      layouts[i].reserved &= ~bytes_mask(kFirstEdgeByte, 2 * kEdgesPerFrame);
+    for (std::size_t f = 0; f < row.fields.size(); ++f) {
+      const Field& field = row.fields[f];
+      layouts[i].signals[f] = find_signal(field.signal);
+      layouts[i].reserved &= ~bytes_mask(field.start_bit / 8U, field.bits / 8U);
+    }
+  }
+  return layouts;
+}();
+
+constexpr auto kKeys = [] {
+  std::array<Key, kMessages.size()> keys{};
+  for (std::size_t i = 0; i < kMessages.size(); ++i) {
+    const MessageRow& row = kMessages[i];
+    const IdRange nodes = ids_of(row, 0);
+    keys[i] = {row.message, is_in(row, false), is_in(row, true), static_cast<std::uint8_t>(nodes.first),
+               static_cast<std::uint8_t>(nodes.last)};
+  }
+  return keys;
+}();
+
+const Layout& layout_of(const MessageRow& row) noexcept {
+  return kLayouts[static_cast<std::size_t>(&row - kMessages.data())];
+}
+
+constexpr std::size_t kCommandMode = index_of(Message::kCommand, false, "mode");
+
+// ---- numbers ----
+
+constexpr std::uint64_t all_ones(unsigned bits) noexcept {
+  return ~std::uint64_t{0} >> (64 - bits);
+}
+
+/// std::llround without the call, which costs more than all the rest of a field. |value| < 2^63.
+std::int64_t rounded(double value) noexcept {
+  const auto whole = static_cast<std::int64_t>(value);
+  const double rest = value - static_cast<double>(whole);  // exact
+  return whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+}
+
+/// The low bits of an integer of any size.
+std::uint64_t wrapped(double value) noexcept {
+  constexpr double kLimit = 0x1p63;
+  if (std::abs(value) < kLimit) return static_cast<std::uint64_t>(rounded(value));
+  if (!std::isfinite(value)) return 0;
+  return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::fmod(value, 0x1p32)));
+}
+
+/// Rounded within two bounds that a double holds exactly; NaN becomes the lower.
+std::int64_t clamped(double value, std::int64_t low, std::int64_t high) noexcept {
+  if (!(value > static_cast<double>(low))) return low;
+  if (value >= static_cast<double>(high)) return high;
+  return rounded(value);
+}
+
+float single(double value) noexcept {
+  constexpr auto kLargest = static_cast<double>(std::numeric_limits<float>::max());
+  if (value > kLargest) return std::numeric_limits<float>::infinity();
+  if (value < -kLargest) return -std::numeric_limits<float>::infinity();
+  return static_cast<float>(value);
+}
+
+std::uint64_t raw_of(const Field& field, double value, double unit) noexcept {
+  const auto ones = static_cast<std::int64_t>(all_ones(field.bits));
+  switch (field.encoding) {
+    case Encoding::kCounter:
+    case Encoding::kSigned:
+      return wrapped(value);
+    case Encoding::kCode:
+      return static_cast<std::uint64_t>(clamped(value, 0, ones));
+    case Encoding::kUScaled:
+      return static_cast<std::uint64_t>(std::isnan(value) ? ones : clamped(value / unit, 0, ones - 1));
+    case Encoding::kScaled: {
+      const std::int64_t largest = ones >> 1;
+      return static_cast<std::uint64_t>(std::isnan(value) ? -largest - 1
+                                                          : clamped(value / unit, -largest, largest));
+    }
+    case Encoding::kFloat:
+      break;
+  }
+  return std::bit_cast<std::uint32_t>(single(value));
+}
+
+double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
+  constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
+  const std::int64_t number = unwrap(raw, field.bits, 0);
+  switch (field.encoding) {
+    case Encoding::kCounter:
+    case Encoding::kCode:
+      return static_cast<double>(raw);
+    case Encoding::kSigned:
+      return static_cast<double>(number);
+    case Encoding::kUScaled:
+      return raw == all_ones(field.bits) ? kNoValue : static_cast<double>(raw) * unit;
+    case Encoding::kScaled:
+      return number == -1 - static_cast<std::int64_t>(all_ones(field.bits) >> 1)
+                 ? kNoValue
+                 : static_cast<double>(number) * unit;
+    case Encoding::kFloat:
+      break;
+  }
+  return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
+}
+
+/// What a count of a field is worth; `duties`: the message is a command in mode 3.
+double unit_of(const Field& field, const Profile& profile, bool duties) noexcept {
+  return duties && field.encoding == Encoding::kScaled ? kDutyUnit : profile.unit_of(field.scale);
+}
+
+// ---- bytes ----
+
+// One loop of constant length for each size that fields have, which compilers make one move of.
+template <unsigned kBytes>
+void put_bytes(std::uint8_t* at, std::uint64_t raw) noexcept {
+  for (unsigned i = 0; i < kBytes; ++i)
+    at[i] = static_cast<std::uint8_t>(raw >> 8 * i);
+}
+template <unsigned kBytes>
+std::uint64_t get_bytes(const std::uint8_t* at) noexcept {
+  std::uint32_t raw = 0;
+  for (unsigned i = 0; i < kBytes; ++i)
+    raw |= std::uint32_t{at[i]} << 8 * i;
+  return raw;
+}
+
+void put(Frame& frame, const Field& field, std::uint64_t raw) noexcept {
+  std::uint8_t* const at = &frame.data[field.start_bit / 8U];
+  if (field.bits == 8) return put_bytes<1>(at, raw);
+  if (field.bits == 16) return put_bytes<2>(at, raw);
+  put_bytes<4>(at, raw);
+}
+
+std::uint64_t get(const Frame& frame, const Field& field) noexcept {
+  const std::uint8_t* const at = &frame.data[field.start_bit / 8U];
+  if (field.bits == 8) return get_bytes<1>(at);
+  if (field.bits == 16) return get_bytes<2>(at);
+  return get_bytes<4>(at);
+}
+
+FrameProblem problem_of(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept {
+  if (frame.extended != profile.extended) return FrameProblem::kWrongFormat;
+  if (frame.remote) return FrameProblem::kRemote;
+  if (frame.fd && !profile.fd) return FrameProblem::kWrongKind;
+  if (!frame.fd && row.variant == Variant::kFd) return FrameProblem::kWrongKind;
+  if (frame.size != row.size) return FrameProblem::kWrongSize;
+  for (std::uint64_t left = layout_of(row).reserved; left != 0; left &= left - 1) {
+    if (frame.data[static_cast<std::size_t>(std::countr_zero(left))] != 0) return FrameProblem::kReserved;
+  }
+  return FrameProblem::kNone;
+}
+
+Frame empty_frame(const MessageRow& row, const Profile& profile, std::uint32_t node) noexcept {
+  Frame frame;
+  frame.id = profile.id_of(row, node);
+  frame.extended = profile.extended;
+  frame.fd = frame.bit_rate_switch = profile.fd;
+  frame.size = row.size;
+  return frame;
+}
+
+/// raw_of() of the signal's value, without the way over a double for integers.
+std::uint64_t raw_of(const Field& field, const Signal& signal, const Sample& sample,
+                     const Profile& profile) noexcept {
+  if (signal.type == SignalType::kReal)
+    return raw_of(field, sample.*signal.as_real, profile.unit_of(field.scale));
+  if (signal.type == SignalType::kSigned) return static_cast<std::uint64_t>(sample.*signal.as_signed);
+  const std::uint64_t word = sample.*signal.as_unsigned;
+  return field.encoding == Encoding::kCode ? std::min(word, all_ones(field.bits)) : word;
+}
+
+}  // namespace
+
+Frame encode(const MessageRow& row, const Profile& profile, std::uint32_t node,
+             std::span<const double> values) noexcept {
+  Frame frame = empty_frame(row, profile, node);
+  const bool duties =
+      row.message == Message::kCommand && !profile.fd && values[kCommandMode] == double{kDutyMode};
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    const Field& field = row.fields[i];
+    put(frame, field, raw_of(field, values[i], unit_of(field, profile, duties)));
+  }
+  return frame;
+}
+
+Values decode(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept {
+  Values values{};
+  const bool duties = row.message == Message::kCommand && !profile.fd &&
+                      frame.data[row.fields[kCommandMode].start_bit / 8U] == kDutyMode;
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    const Field& field = row.fields[i];
+    values[i] = value_of(field, get(frame, field), unit_of(field, profile, duties));
+  }
+  return values;
+}
+
+Values values_of(const MessageRow& row, const Sample& sample) noexcept {
+  Values values{};
+  const Layout& layout = layout_of(row);
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    if (layout.signals[i] != nullptr) values[i] = drivebench::value_of(*layout.signals[i], sample);
+  }
+  return values;
+}
+
+Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t node,
+                    const Sample& sample) noexcept {
+  Frame frame = empty_frame(row, profile, node);
+  const Layout& layout = layout_of(row);
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    const Field& field = row.fields[i];
+    if (layout.signals[i] != nullptr) put(frame, field, raw_of(field, *layout.signals[i], sample, profile));
+  }
+  return frame;
+}
+
+void update_sample(const MessageRow& row, std::span<const double> values, Sample& sample) noexcept {
+  const Layout& layout = layout_of(row);
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    if (layout.signals[i] == nullptr) continue;
+    const Signal& signal = *layout.signals[i];
+    const Field& field = row.fields[i];
+    const bool wraps = field.encoding == Encoding::kCounter || field.encoding == Encoding::kSigned;
+    if (signal.type == SignalType::kReal) {
+      sample.*signal.as_real = values[i];
+    } else if (signal.type == SignalType::kSigned) {
+      std::int64_t& number = sample.*signal.as_signed;
+      number = unwrap(wrapped(values[i]), field.bits, wraps ? number : 0);
+    } else {
+      std::uint64_t& number = sample.*signal.as_unsigned;
+      const std::uint64_t low_bits = wrapped(values[i]) & all_ones(field.bits);
+      const std::int64_t near = unwrap(low_bits, field.bits, static_cast<std::int64_t>(number));
+      number = wraps && near >= 0 ? static_cast<std::uint64_t>(near) : low_bits;
+    }
+  }
+}
+
+std::string_view name_of(FrameProblem problem) noexcept {
+  constexpr std::array<std::string_view, kFrameProblems> kNames = {
+      "none", "error_frame", "foreign", "wrong_format", "remote", "wrong_kind", "wrong_size", "reserved"};
+  return kNames[static_cast<std::size_t>(problem)];
+}
+
+Match match(const Profile& profile, const Frame& frame) noexcept {
+  if (frame.error) return {nullptr, 0, FrameProblem::kError};
+  for (std::size_t i = 0; i < kKeys.size(); ++i) {
+    const Key& key = kKeys[i];
+    const std::uint32_t node = frame.id - profile.base_ids[static_cast<std::size_t>(key.message)];
+    if (node < key.first_node || node > key.last_node) continue;
+    if (profile.fd ? key.in_fd : key.in_classic)
+      return {&kMessages[i], node, problem_of(kMessages[i], profile, frame)};
+  }
+  return {};
+}
+
+Edge edge_at(const Frame& frame, std::size_t index) noexcept {
+  const std::uint64_t raw = get_bytes<2>(&frame.data[kFirstEdgeByte + 2 * index]);
+  return {static_cast<std::uint16_t>(raw & 0x7FFF), raw >> 15 != 0};
+}
+
+void put_edge(Frame& frame, std::size_t index, Edge edge) noexcept {
+  put_bytes<2>(&frame.data[kFirstEdgeByte + 2 * index], (edge.time & 0x7FFFU) | (edge.down ? 0x8000U : 0U));
+}
+
+namespace {
+
+void add_id_problems(const Profile& profile, std::vector<ProfileProblem>& found) {
+  const std::uint32_t limit = profile.extended ? kMaxExtendedId : kMaxStandardId;
+  std::vector<const MessageRow*> seen;
+  for (const MessageRow& row : kMessages) {
+    if (!is_in(row, profile.fd)) continue;
+    const std::string field = "ids." + std::string(row.name);
+    const std::uint32_t base_id = profile.base_ids[static_cast<std::size_t>(row.message)];
+    const std::uint32_t largest = limit - (row.per_node ? kMaxNode : 0);
+    if (base_id > largest) {
+      found.push_back({field, "must be at most " + std::to_string(largest) +
+                                  (row.per_node ? ", as node ids up to 127 are added to it" : "")});
+      continue;
+    }
+    const IdRange ids = ids_of(row, base_id);
+    for (const MessageRow* other : seen) {
+      const IdRange others = ids_of(*other, profile.base_ids[static_cast<std::size_t>(other->message)]);
+      if (ids.first > others.last || others.first > ids.last) continue;
+      found.push_back(
+          {field, "must keep its identifiers apart from those of ids." + std::string(other->name)});
+    }
+    seen.push_back(&row);
+  }
+}
+
+void add_node_problems(std::span<const std::uint32_t> nodes, std::vector<ProfileProblem>& found) {
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto before = nodes.first(i);
+    if (nodes[i] < 1 || nodes[i] > kMaxNode)
+      found.push_back({"node", "must be 1 to 127, not " + std::to_string(nodes[i])});
+    else if (std::ranges::find(before, nodes[i]) != before.end())
+      found.push_back({"node", "must differ between axes: " + std::to_string(nodes[i]) + " is taken"});
+  }
+}
+
+}  // namespace
+
+std::vector<ProfileProblem> problems(const Profile& profile, std::span<const std::uint32_t> nodes) {
+  std::vector<ProfileProblem> found;
+  add_id_problems(profile, found);
+  const auto check_unit = [&](const char* field, double unit) {
+    if (!(std::isfinite(unit) && unit > 0)) found.push_back({field, "must be a positive number"});
+  };
+  check_unit("current_unit_a", profile.current_unit_a);
+  check_unit("voltage_unit_v", profile.voltage_unit_v);
+  check_unit("bus_voltage_unit_v", profile.bus_voltage_unit_v);
+  check_unit("speed_unit_rad_s", profile.speed_unit_rad_s);
+  check_unit("edge_time_unit_s", profile.edge_time_unit_s);
+  add_node_problems(nodes, found);
+  return found;
+}
+
+}  // namespace drivebench::can

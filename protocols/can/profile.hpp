@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "protocols/can/table.hpp"
+
+namespace drivebench::can {
+
+inline constexpr std::size_t kMessageCount = static_cast<std::size_t>(Message::kHeartbeat) + 1;
+inline constexpr std::uint32_t kMaxNode = 127;
+
+/// Whether a message exists in a variant of the profile.
+constexpr bool is_in(const MessageRow& row, bool fd) noexcept {
+  return row.variant == Variant::kBoth || (row.variant == Variant::kFd) == fd;
+}
+
+struct IdRange {
+  std::uint32_t first;
+  std::uint32_t last;
+};
+/// The identifiers of a message of all nodes.
+constexpr IdRange ids_of(const MessageRow& row, std::uint32_t base_id) noexcept {
+  return row.per_node ? IdRange{base_id + 1, base_id + kMaxNode} : IdRange{base_id, base_id};
+}
+
+/// What both ends of a bus must agree on.
+struct Profile {
+  bool fd = true;         ///< FD frames with float32; otherwise classic frames with scaled integers
+  bool extended = false;  ///< 29-bit identifiers
+  /// By Message; the node id is added to those that have one.
+  std::array<std::uint32_t, kMessageCount> base_ids = [] {
+    std::array<std::uint32_t, kMessageCount> ids{};
+    for (const MessageRow& row : kMessages)
+      ids[static_cast<std::size_t>(row.message)] = row.base_id;
+    return ids;
+  }();
+  // What one count of a scaled field is worth.
+  double current_unit_a = 1e-3;
+  double voltage_unit_v = 1e-2;
+  double bus_voltage_unit_v = 1e-1;
+  double speed_unit_rad_s = 1e-1;
+  double edge_time_unit_s = 1e-6;
+
+  double unit_of(Unit unit) const noexcept {
+    switch (unit) {
+      case Unit::kCurrent:
+        return current_unit_a;
+      case Unit::kVoltage:
+        return voltage_unit_v;
+      case Unit::kBusVoltage:
+        return bus_voltage_unit_v;
+      case Unit::kSpeed:
+        return speed_unit_rad_s;
+      case Unit::kEdgeTime:
+        return edge_time_unit_s;
+      case Unit::kNone:
+        break;
+    }
+    return 1.0;
+  }
+  std::uint32_t id_of(const MessageRow& row, std::uint32_t node) const noexcept {
+    return base_ids[static_cast<std::size_t>(row.message)] + (row.per_node ? node : 0);
+  }
+};
+
+/// An axis on a bus.
+struct BusAxis {
+  std::string name;
+  std::uint32_t node = 1;
+};
+
+}  // namespace drivebench::can

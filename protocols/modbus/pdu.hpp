@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "protocols/modbus/register_map.hpp"
+
+namespace drivebench::modbus {
+
+enum class Function : std::uint8_t {
+  kReadCoils = 1,
+  kReadDiscreteInputs = 2,
+  kReadHoldingRegisters = 3,
+  kReadInputRegisters = 4,
+  kWriteCoil = 5,
+  kWriteRegister = 6,
+  kDiagnostics = 8,
+  kWriteCoils = 15,
+  kWriteRegisters = 16,
+  kMaskWriteRegister = 22,
+  kReadWriteRegisters = 23,
+  kEncapsulated = 43,
+};
+
+enum class Exception : std::uint8_t {
+  kNone = 0,
+  kIllegalFunction = 1,
+  kIllegalAddress = 2,
+  kIllegalValue = 3,
+  kFailure = 4,
+  kBusy = 6,
+  kNoTarget = 11,
+};
+
+inline constexpr std::uint16_t kMaxReadBits = 2000;
+inline constexpr std::uint16_t kMaxReadRegisters = 125;
+inline constexpr std::uint16_t kMaxWriteBits = 1968;
+inline constexpr std::uint16_t kMaxWriteRegisters = 123;
+inline constexpr std::uint16_t kMaxReadWriteRegisters = 121;  ///< written by function 23
+inline constexpr std::size_t kMaxPdu = 253;
+
+/// A request that the map has an answer to. Which members mean something depends on the function.
+struct Request {
+  Function function{};
+  RegisterMap::Range read{};       ///< 3, 4, 23
+  RegisterMap::Range write{};      ///< 6, 16, 22, 23
+  std::uint16_t read_address = 0;  ///< as it came: 1 to 4, 23
+  std::uint16_t read_count = 0;
+  std::uint16_t write_address = 0;  ///< as it came: 5, 6, 15, 16, 22, 23
+  std::uint16_t write_count = 0;
+  std::span<const std::uint8_t> data{};  ///< what is written: words, or packed bits; 22: the two masks
+};
+
+constexpr bool writes(Function function) noexcept {
+  switch (function) {
+    case Function::kWriteCoil:
+    case Function::kWriteRegister:
+    case Function::kWriteCoils:
+    case Function::kWriteRegisters:
+    case Function::kMaskWriteRegister:
+    case Function::kReadWriteRegisters:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// What to do with a PDU.
+struct Verdict {
+  enum class Action : std::uint8_t {
+    kExecute,
+    kRefuse,  ///< with the exception
+    kClose,   ///< it is not as long as its function needs: whatever follows in the stream cannot be trusted
+  };
+  Action action = Action::kClose;
+  Exception exception = Exception::kNone;
+  Request request;  ///< empty when refused, except for the value of a register that may be written
+};
+
+/// Checks a whole PDU, quantity before address before value, as the protocol specification V1.1b3 draws it.
+/// All but what only the axis knows: lease, faults, rules between parameters, the outcome of a mask.
+Verdict validate(std::span<const std::uint8_t> pdu, const RegisterMap& map) noexcept;
+
+/// The words of `data`, most significant byte first.
+std::array<std::uint16_t, kMaxReadRegisters> words_from(std::span<const std::uint8_t> data) noexcept;
+
+}  // namespace drivebench::modbus

@@ -1,0 +1,378 @@
+#include "server/endpoints/can/endpoint.hpp"
+
+#include <fmt/core.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace drivebench::can {
+namespace {
+
+// A bench that heard another with its identifiers stays silent until it has not for this long.
+constexpr auto kConflictPause = std::chrono::seconds(10);
+// As fine as the shortest time-out of the configuration.
+constexpr auto kTimerPeriod = std::chrono::milliseconds(10);
+// States of a heartbeat.
+constexpr double kBootUp = 0.0;
+constexpr double kStopped = 4.0;
+constexpr double kOperational = 5.0;
+
+Result result_of(Refused why) noexcept {
+  switch (why) {
+    case Refused::kNot:
+      return Result::kDone;
+    case Refused::kOwned:
+      return Result::kOwned;
+    case Refused::kNotFinite:
+      return Result::kNotFinite;
+    case Refused::kLatched:
+      return Result::kLatched;
+    case Refused::kStale:
+      return Result::kStale;
+    case Refused::kBusy:
+      return Result::kBusy;
+    case Refused::kUnknownAxis:
+    case Refused::kNotOwner:
+      break;
+  }
+  return Result::kNotOwner;
+}
+
+std::string_view name_of(BusState state) noexcept {
+  switch (state) {
+    case BusState::kUp:
+      return "up";
+    case BusState::kWarning:
+      return "error warning";
+    case BusState::kPassive:
+      return "error passive";
+    case BusState::kDown:
+      return "CAN_DOWN";
+    case BusState::kAbsent:
+      break;
+  }
+  return "CAN_ABSENT";
+}
+
+constexpr std::uint64_t unsigned_of(double value) noexcept {
+  return value > 0.0 ? static_cast<std::uint64_t>(value) : 0;
+}
+
+/// The clock of the stamps may be set back at any time.
+constexpr std::uint64_t not_negative(std::int64_t value) noexcept {
+  return value > 0 ? static_cast<std::uint64_t>(value) : 0;
+}
+
+/// Whether a message with these identifiers comes from a bench.
+bool from_bench(const Match& match) noexcept {
+  return match.row != nullptr && match.row->sender == Sender::kBench;
+}
+
+}  // namespace
+
+Endpoint::Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus)
+    : timer_(io), config_(config), bus_(std::move(bus)) {}
+
+void Endpoint::serve(Engine& engine) {
+  engine_ = &engine;
+  std::vector<std::uint32_t> ids;
+  for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
+    nodes_.push_back({.axis = axis, .id = engine.config().axes[axis].can_node});
+    nodes_.back().index_tick = engine.newest(axis).index_tick;
+    for (const MessageRow& row : kMessages) {
+      const std::uint32_t id = config_.profile.id_of(row, nodes_.back().id);
+      if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+    }
+  }
+  bus_->on_frame = [this](const Frame& frame, std::int64_t stamp_ns) { on_frame(frame, stamp_ns); };
+  bus_->on_state = [this] { on_state(); };
+  bus_->set_filter(ids);
+  last_state_ = bus_->status().state;
+  engine.on_tick.add([this] { on_tick(); });
+  engine.on_newest.add([this] { on_newest(); });
+  for (const Node& node : nodes_)
+    send_heartbeat(node, kBootUp);
+  next_heartbeat_ = Clock::now() + std::chrono::milliseconds(config_.heartbeat_ms);
+  arm_timer();
+}
+
+void Endpoint::close() {
+  if (closed_) return;
+  for (const Node& node : nodes_)
+    send_heartbeat(node, kStopped);
+  closed_ = true;
+  timer_.cancel();
+}
+
+Endpoint::Node* Endpoint::find_node(std::uint32_t id) {
+  const auto found =
+      std::find_if(nodes_.begin(), nodes_.end(), [id](const Node& node) { return node.id == id; });
+  return found == nodes_.end() ? nullptr : &*found;
+}
+
+void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
+  if (measure_latency_ && stamp_ns > 0) {
+    measure_latency_ = false;  // now and then: asking the time costs a system call on some machines
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    latency_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() - stamp_ns;
+    worst_latency_ns_ = std::max(worst_latency_ns_, latency_ns_);
+  }
+  const Match found = match(config_.profile, frame);
+  if (!found.ok()) {
+    ++problems_[static_cast<std::size_t>(found.problem)];
+    return;
+  }
+  if (from_bench(found)) {
+    if (!found.row->per_node || find_node(found.node) != nullptr) note_conflict(frame);
+    return;
+  }
+  Node* const node = find_node(found.node);
+  if (node == nullptr || !transmitting_) return;  // nobody would hear the answer
+  const Values values = decode(*found.row, config_.profile, frame);
+  switch (found.row->message) {
+    case Message::kCommand:
+      return on_command(*node, values);
+    case Message::kRequest:
+      return on_request(*node, values);
+    default:
+      return on_heartbeat(*node, values);
+  }
+}
+
+void Endpoint::on_command(Node& node, const Values& values) {
+  const bool fd = config_.profile.fd;
+  const auto value = [&](std::size_t in_classic, std::size_t in_fd) {
+    return values[fd ? in_fd : in_classic];
+  };
+  constexpr auto field = [](bool of_fd, std::string_view name) {
+    return index_of(Message::kCommand, of_fd, name);
+  };
+  ++commands_;
+  const std::uint64_t low_tick = unsigned_of(value(field(false, "tick"), field(true, "tick")));
+  const std::uint64_t mode = unsigned_of(value(field(false, "mode"), field(true, "mode")));
+  const std::uint64_t lease = unsigned_of(value(field(false, "lease"), field(true, "lease")));
+  const Sample& newest = engine_->newest(node.axis);
+  const std::int64_t answers = unwrap(low_tick, fd ? 32 : 16, static_cast<std::int64_t>(newest.tick));
+  if (mode > kDutyMode) return refuse_malformed(node, static_cast<std::uint8_t>(lease), answers);
+
+  const double volts_per_unit = mode == kDutyMode ? newest.bus_voltage_v : 1.0;
+  const Command command{
+      .answers = answers,
+      .phases = {.gates = mode == kDutyMode ? Gates::kVoltage : static_cast<Gates>(mode),
+                 .voltage_v = {.a = value(field(false, "u_a"), field(true, "u_a")) * volts_per_unit,
+                               .b = value(field(false, "u_b"), field(true, "u_b")) * volts_per_unit}}};
+  // Whoever commands without the lease is nobody: the bench counts it and says no.
+  const Owner owner = node.owner != 0 && lease == node.lease ? node.owner : 0;
+  if (owner != 0) node.spoke = true;
+  const Refused why = engine_->command(node.axis, owner, command);
+  if (why != Refused::kNot) {
+    ++refused_;
+    log_refusal(node, "a command", sentence_of(why));
+    return reply(node, Request::kCommand, result_of(why), 0, static_cast<std::uint8_t>(lease), answers);
+  }
+  engine_->advance();
+}
+
+void Endpoint::refuse_malformed(const Node& node, std::uint8_t lease, std::int64_t answers) {
+  ++refused_;
+  engine_->request({.tick = 0, .axis = node.axis, .owner = node.owner, .action = RefusedCommand{}},
+                   [](Refused, Tick) {});
+  log_refusal(node, "a command", "its mode must be 0 to 3");
+  reply(node, Request::kCommand, Result::kMalformed, 0, lease, answers);
+}
+
+void Endpoint::log_refusal(const Node& node, std::string_view what, std::string_view why) {
+  if (!refusal_log_.allow()) return;
+  spdlog::warn("{}: {} for axis {} was refused: {} ({} more before)", bus_->name(), what, node.axis, why,
+               refusal_log_.held_back());
+}
+
+void Endpoint::on_request(Node& node, const Values& values) {
+  constexpr auto field = [](std::string_view name) { return index_of(Message::kRequest, true, name); };
+  const std::uint64_t code = unsigned_of(values[field("request")]);
+  const std::uint64_t lease = unsigned_of(values[field("lease")]);
+  const auto controller = static_cast<std::uint32_t>(unsigned_of(values[field("controller")]));
+  const auto request = static_cast<Request>(code);
+  if (code == 0 || code > static_cast<std::uint64_t>(Request::kClearFaults)) {
+    ++refused_;
+    log_refusal(node, "a request", "its code must be 1 to 4");
+    return reply(node, request, Result::kMalformed, controller, 0, 0);
+  }
+  if (request == Request::kAcquire) return acquire(node, controller);
+  if (node.owner == 0 || lease != node.lease) {
+    ++refused_;
+    log_refusal(node, "a request", sentence_of(Refused::kNotOwner));
+    return reply(node, request, Result::kNotOwner, controller, 0, 0);
+  }
+  node.heard = Clock::now();
+  act(node, request, controller);
+}
+
+void Endpoint::acquire(Node& node, std::uint32_t controller) {
+  const bool known = node.controller == controller && (node.owner != 0 || node.acquiring);
+  if (engine_->config().mode == RunMode::kFree || (node.acquiring && !known)) {
+    ++refused_;
+    log_refusal(node, "the lease",
+                node.acquiring ? "another controller asks for it" : "a free run takes no controller");
+    return reply(node, Request::kAcquire, Result::kBusy, controller, 0, 0);
+  }
+  if (node.acquiring) return;  // asked again before the answer came
+  if (node.owner != 0 && !known) {
+    ++refused_;
+    log_refusal(node, "the lease", sentence_of(Refused::kOwned));
+    return reply(node, Request::kAcquire, Result::kOwned, controller, 0, 0);
+  }
+  const Owner owner = node.owner != 0 ? node.owner : engine_->new_owner();
+  node.acquiring = true;
+  node.controller = controller;
+  engine_->request({.tick = 0, .axis = node.axis, .owner = owner, .action = LeaseAction::kAcquire},
+                   [this, &node, owner, controller](Refused refused, Tick tick) {
+                     node.acquiring = false;
+                     if (refused == Refused::kNot && !transmitting_) {  // since it was asked
+                       node.owner = owner;
+                       return lose(node, "another bench has its identifiers");
+                     }
+                     if (refused == Refused::kNot) {
+                       if (node.owner == 0)
+                         node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
+                       node.owner = owner;
+                       node.monitored = false;
+                       node.heard = Clock::now();
+                     } else {
+                       ++refused_;
+                       log_refusal(node, "the lease", sentence_of(refused));
+                     }
+                     reply(node, Request::kAcquire, result_of(refused), controller,
+                           refused == Refused::kNot ? node.lease : std::uint8_t{0}, tick);
+                     if (refused != Refused::kNot) return;
+                     // What the controller must know to begin; in lockstep nothing would come by itself.
+                     const Sample& newest = engine_->newest(node.axis);
+                     send_state(node, newest);
+                     send_sensors(node, newest);
+                     if (lockstep()) send_sync(newest.tick);
+                   });
+}
+
+void Endpoint::act(Node& node, Request request, std::uint32_t controller) {
+  Input input{.tick = 0, .axis = node.axis, .owner = node.owner, .action = ClearFaults{}};
+  if (request == Request::kRenew) input.action = LeaseAction::kRenew;
+  if (request == Request::kRelease) input.action = LeaseAction::kRelease;
+  engine_->request(input, [this, &node, request, controller](Refused refused, Tick tick) {
+    const std::uint8_t lease = node.lease;
+    if (request == Request::kRelease && refused == Refused::kNot) {
+      node.owner = 0;
+      node.lease = 0;
+    }
+    if (refused != Refused::kNot) ++refused_;
+    reply(node, request, result_of(refused), controller, lease, tick);
+    send_state(node, engine_->newest(node.axis));
+  });
+}
+
+void Endpoint::on_heartbeat(Node& node, const Values& values) {
+  node.heard = Clock::now();
+  if (node.owner == 0) return;
+  const double state = values[index_of(Message::kControllerHeartbeat, true, "state")];
+  if (state == kBootUp && node.monitored) return lose(node, "its controller has started anew");
+  if (state == kStopped) return lose(node, "its controller says that it has stopped");
+  node.monitored = true;
+}
+
+void Endpoint::lose(Node& node, const char* why) {
+  log_loss(node, why);
+  const Owner owner = node.owner;
+  node.owner = 0;
+  node.lease = 0;
+  engine_->request({.tick = 0, .axis = node.axis, .owner = owner, .action = LeaseAction::kLost},
+                   [](Refused, Tick) {});
+}
+
+void Endpoint::log_loss(const Node& node, std::string_view why) {
+  if (!loss_log_.allow()) return;
+  spdlog::warn("{}: axis {} loses its controller: {} ({} more before)", bus_->name(), node.axis, why,
+               loss_log_.held_back());
+}
+
+void Endpoint::note_conflict(const Frame& frame) {
+  ++conflicts_;
+  conflict_ = Clock::now();
+  if (conflict_log_.allow()) {
+    spdlog::error("{}: ID_CONFLICT: another bench sends with identifier {:#x}; this one falls silent here",
+                  bus_->name(), frame.id);
+  }
+  if (!transmitting_) return;
+  for (Node& node : nodes_) {
+    if (node.owner != 0) lose(node, "another bench has its identifiers");
+    send_heartbeat(node, kStopped);  // so that the other one notices as well
+  }
+  transmitting_ = false;
+}
+
+void Endpoint::on_state() {
+  const BusState state = bus_->status().state;
+  if (state == last_state_) return;
+  if (state_log_.allow()) {
+    spdlog::warn("{}: {}, was {} ({} more changes before)", bus_->name(), name_of(state),
+                 name_of(last_state_), state_log_.held_back());
+  }
+  const bool appeared = last_state_ == BusState::kAbsent;
+  last_state_ = state;
+  if (!appeared) return;
+  for (const Node& node : nodes_)
+    send_heartbeat(node, kBootUp);
+}
+
+void Endpoint::arm_timer() {
+  timer_.expires_after(kTimerPeriod);
+  timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error || closed_) return;
+    on_timer();
+    arm_timer();
+  });
+}
+
+void Endpoint::on_timer() {
+  const Clock::time_point now = Clock::now();
+  if (!transmitting_ && now - conflict_ > kConflictPause) transmitting_ = true;
+  const std::chrono::milliseconds heartbeat_limit(config_.controller_timeout_ms);
+  const std::chrono::milliseconds idle_limit(config_.idle_timeout_ms);
+  measure_latency_ = true;
+  for (Node& node : nodes_) {
+    if (std::exchange(node.spoke, false)) node.heard = now;
+    if (node.owner != 0 && node.monitored && now - node.heard > heartbeat_limit) {
+      ++heartbeats_lost_;
+      lose(node, "its heartbeat stays away");
+    } else if (node.owner != 0 && lockstep() && idle_limit.count() > 0 && now - node.heard > idle_limit) {
+      lose(node, "it has been silent for too long");
+    }
+  }
+  if (config_.heartbeat_ms == 0 || now < next_heartbeat_) return;
+  next_heartbeat_ = std::max(next_heartbeat_ + std::chrono::milliseconds(config_.heartbeat_ms), now);
+  for (const Node& node : nodes_)
+    send_heartbeat(node, kOperational);
+}
+
+TransportReport Endpoint::report() const {
+  const BusStatus& status = bus_->status();
+  TransportReport report{.name = "can " + bus_->name(),
+                         .state = transmitting_ ? std::string(name_of(status.state)) : "ID_CONFLICT",
+                         .counts = {{"sent", status.sent},
+                                    {"confirmed", status.confirmed},
+                                    {"received", status.received},
+                                    {"send_dropped", status.send_dropped},
+                                    {"receive_dropped", status.receive_dropped},
+                                    {"error_frames", status.error_frames},
+                                    {"malformed", status.malformed},
+                                    {"commands", commands_},
+                                    {"refused", refused_},
+                                    {"conflicts", conflicts_},
+                                    {"heartbeats_lost", heartbeats_lost_},
+                                    {"receive_latency_ns", not_negative(latency_ns_)},
+                                    {"worst_receive_latency_ns", not_negative(worst_latency_ns_)}}};
+  for (std::size_t i = 1; i < problems_.size(); ++i)
+    report.counts.emplace_back(can::name_of(static_cast<FrameProblem>(i)), problems_[i]);
+  return report;
+}
+
+}  // namespace drivebench::can

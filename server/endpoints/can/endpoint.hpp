@@ -1,0 +1,113 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocols/can/codec.hpp"
+#include "server/asio.hpp"
+#include "server/endpoints/can/bus.hpp"
+#include "server/endpoints/log_limit.hpp"
+#include "server/endpoints/transport_report.hpp"
+#include "server/engine.hpp"
+
+namespace drivebench::can {
+
+/// The native profile on one bus: sends samples, state and heartbeats of every axis, and lets one controller
+/// at a time command each axis, which knows itself by the lease number that it was given. Nothing that comes
+/// in does more than this controller could over TCP.
+class Endpoint {
+ public:
+  Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus);
+
+  /// Starts to listen and to send: boot-up first.
+  void serve(Engine& engine);
+  TransportReport report() const;
+  std::string name() const { return bus_->name(); }
+  /// Says that it stops, and falls silent. The engine takes the leases back.
+  void close();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// An axis as this bus sees it.
+  struct Node {
+    std::uint32_t axis = 0;
+    std::uint32_t id = 0;
+    Owner owner = 0;         ///< of the controller on this bus; 0: none
+    std::uint8_t lease = 0;  ///< its number; 0: none
+    std::uint8_t last_lease = 0;
+    std::uint32_t controller = 0;  ///< as it calls itself
+    bool acquiring = false;        ///< asked the bench, no answer yet
+    bool monitored = false;        ///< its controller sends heartbeats
+    bool spoke = false;            ///< it commanded since the timer last looked
+    Clock::time_point heard{};     ///< last sign of life of the controller
+    std::uint64_t faults = 0;      ///< last sent
+    std::int64_t index_tick = -1;
+    std::int64_t edges_tick = -1;
+    std::optional<Sample> due{};  ///< a sample that is to be sent
+  };
+
+  void on_frame(const Frame& frame, std::int64_t stamp_ns);
+  void on_command(Node& node, const Values& values);
+  void on_request(Node& node, const Values& values);
+  void on_heartbeat(Node& node, const Values& values);
+  void on_state();
+  void acquire(Node& node, std::uint32_t controller);
+  void act(Node& node, Request request, std::uint32_t controller);
+  void refuse_malformed(const Node& node, std::uint8_t lease, std::int64_t answers);
+  void log_refusal(const Node& node, std::string_view what, std::string_view why);
+  void log_loss(const Node& node, std::string_view why);
+  void lose(Node& node, const char* why);
+  void note_conflict(const Frame& frame);
+
+  void on_tick();
+  void on_newest();
+  void on_timer();
+  void arm_timer();
+  void check_owner(Node& node);
+
+  bool lockstep() const { return engine_->config().mode == RunMode::kLockstep; }
+  Node* find_node(std::uint32_t id);
+  void put(const Frame& frame);
+  void send(Message message, const Node& node, std::span<const double> values);
+  void send_sensors(Node& node, const Sample& sample);
+  void send_state(const Node& node, const Sample& sample);
+  void send_changes(Node& node, const Sample& sample);
+  void send_edges(Node& node);
+  void send_sync(std::uint64_t tick);
+  void send_heartbeat(const Node& node, double state);
+  void reply(const Node& node, Request request, Result result, std::uint32_t controller, std::uint8_t lease,
+             std::int64_t tick);
+
+  asio::steady_timer timer_;
+  CanConfig config_;
+  std::unique_ptr<Bus> bus_;
+  Engine* engine_ = nullptr;
+  std::vector<Node> nodes_;
+  std::vector<Frame> together_;  ///< frames of one tick, to be sent in one go
+  bool collecting_ = false;
+  Clock::time_point conflict_{};  ///< when a frame of another bench last came
+  Clock::time_point next_heartbeat_{};
+  bool closed_ = false;
+  bool transmitting_ = true;  ///< no other bench has our identifiers
+  BusState last_state_ = BusState::kAbsent;
+  std::array<std::uint64_t, kFrameProblems> problems_{};
+  std::uint64_t commands_ = 0;
+  std::uint64_t refused_ = 0;
+  std::uint64_t conflicts_ = 0;
+  std::uint64_t heartbeats_lost_ = 0;
+  bool measure_latency_ = false;  ///< of the next frame that has a stamp
+  std::int64_t latency_ns_ = 0;   ///< from the kernel's stamp to here, newest measured
+  std::int64_t worst_latency_ns_ = 0;
+  LogLimit refusal_log_;
+  LogLimit loss_log_;
+  LogLimit conflict_log_;
+  LogLimit state_log_;
+};
+
+}  // namespace drivebench::can

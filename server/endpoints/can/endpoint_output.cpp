@@ -1,0 +1,130 @@
+// What the endpoint sends.
+#include <algorithm>
+
+#include "server/endpoints/can/endpoint.hpp"
+
+namespace drivebench::can {
+
+void Endpoint::put(const Frame& frame) {
+  if (!transmitting_ || closed_) return;
+  if (collecting_) {
+    together_.push_back(frame);
+  } else {
+    bus_->send(frame);
+  }
+}
+
+void Endpoint::send(Message message, const Node& node, std::span<const double> values) {
+  const MessageRow* const row = find_message(message, config_.profile.fd);
+  put(encode(*row, config_.profile, node.id, values));
+}
+
+void Endpoint::on_tick() {
+  for (Node& node : nodes_) {
+    check_owner(node);
+    const Sample& newest = engine_->newest(node.axis);
+    const auto every = static_cast<std::uint64_t>(lockstep() ? 1 : config_.sample_every_ticks);
+    if (newest.tick % every == 0) node.due = newest;
+    if (config_.edges) send_edges(node);
+  }
+}
+
+/// The newest sample that is due; a bench that runs ahead of this thread skips some.
+void Endpoint::on_newest() {
+  std::optional<std::uint64_t> tick;
+  collecting_ = true;
+  for (Node& node : nodes_) {
+    if (!node.due) continue;
+    tick = node.due->tick;
+    send_changes(node, *node.due);
+    if (node.due->tick % static_cast<std::uint64_t>(config_.state_every_ticks) <
+        static_cast<std::uint64_t>(lockstep() ? 1 : config_.sample_every_ticks)) {
+      send_state(node, *node.due);
+    }
+    send_sensors(node, *node.due);
+    node.due.reset();
+  }
+  if (tick) send_sync(*tick);
+  collecting_ = false;
+  bus_->send_together(together_);
+  together_.clear();
+}
+
+/// The lease may have run out, or gone to nobody with an overrun.
+void Endpoint::check_owner(Node& node) {
+  if (node.owner == 0 || node.acquiring || engine_->owner(node.axis) == node.owner) return;
+  log_loss(node, "its lease has run out");
+  node.owner = 0;
+  node.lease = 0;
+}
+
+void Endpoint::send_sensors(Node& node, const Sample& sample) {
+  const auto send_sample = [&](Message message) {
+    put(encode_sample(*find_message(message, config_.profile.fd), config_.profile, node.id, sample));
+  };
+  if (config_.profile.fd) return send_sample(Message::kSensors);
+  send_sample(Message::kEncoder);
+  send_sample(Message::kCurrents);
+}
+
+void Endpoint::send_state(const Node& node, const Sample& sample) {
+  send(Message::kState, node, values_of(*find_message(Message::kState, config_.profile.fd), sample));
+  if (config_.profile.fd) return;
+  send(Message::kCounters, node, values_of(*find_message(Message::kCounters, false), sample));
+}
+
+void Endpoint::send_changes(Node& node, const Sample& sample) {
+  if (sample.faults != node.faults) {
+    node.faults = sample.faults;
+    send(Message::kFault, node, values_of(*find_message(Message::kFault, config_.profile.fd), sample));
+  }
+  if (sample.index_tick != node.index_tick) {
+    node.index_tick = sample.index_tick;
+    send(Message::kIndex, node, values_of(*find_message(Message::kIndex, config_.profile.fd), sample));
+  }
+}
+
+void Endpoint::send_edges(Node& node) {
+  const TickEdges& edges = engine_->edges(node.axis);
+  if (edges.tick == node.edges_tick) return;
+  node.edges_tick = edges.tick;
+  const MessageRow& row = *find_message(Message::kEdges, true);
+  std::int64_t count = edges.start_count;
+  for (std::uint32_t sent = 0; sent < edges.size || (sent == 0 && edges.incomplete);) {
+    const std::uint32_t size = std::min<std::uint32_t>(edges.size - sent, kEdgesPerFrame);
+    const std::uint32_t following = edges.size - sent - size;
+    Frame frame = encode(row, config_.profile, node.id,
+                         std::array{static_cast<double>(edges.tick), static_cast<double>(count),
+                                    static_cast<double>(size), edges.incomplete ? 255.0 : following});
+    for (std::uint32_t i = 0; i < size; ++i) {
+      const std::uint16_t packed = edges.edge[sent + i];
+      const bool down = (packed & 0x8000u) != 0;
+      put_edge(frame, i, {.time = static_cast<std::uint16_t>(packed & 0x7FFFu), .down = down});
+      count += down ? -1 : 1;
+    }
+    put(frame);
+    sent += size;
+    if (size == 0) break;
+  }
+}
+
+void Endpoint::send_sync(std::uint64_t tick) {
+  send(Message::kSync, nodes_.front(), std::array{static_cast<double>(tick), lockstep() ? 1.0 : 0.0});
+}
+
+void Endpoint::send_heartbeat(const Node& node, double state) {
+  const double period_us = static_cast<double>(engine_->config().setup.period_ns) * 1e-3;
+  send(Message::kHeartbeat, node,
+       std::array{state, static_cast<double>(kProfileVersion),
+                  static_cast<double>(engine_->newest(node.axis).state), static_cast<double>(node.lease),
+                  period_us});
+}
+
+void Endpoint::reply(const Node& node, Request request, Result result, std::uint32_t controller,
+                     std::uint8_t lease, std::int64_t tick) {
+  send(Message::kReply, node,
+       std::array{static_cast<double>(request), static_cast<double>(result), static_cast<double>(controller),
+                  static_cast<double>(lease), static_cast<double>(tick)});
+}
+
+}  // namespace drivebench::can

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+namespace drivebench {
+
+/// At most one log line per 10 s from one source; counts what it kept back.
+class LogLimit {
+ public:
+  /// Whether to log now. Then held_back() says how many lines since the last one were not.
+  bool allow() noexcept {
+    const auto now = std::chrono::steady_clock::now();
+    if (last_ != Time{} && now - last_ < std::chrono::seconds(10)) {
+      ++pending_;
+      return false;
+    }
+    last_ = now;
+    held_back_ = pending_;
+    pending_ = 0;
+    return true;
+  }
+  std::uint64_t held_back() const noexcept { return held_back_; }
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  Time last_{};
+  std::uint64_t pending_ = 0;
+  std::uint64_t held_back_ = 0;
+};
+
+}  // namespace drivebench

@@ -1,0 +1,254 @@
+// How an axis carries out what is written to its registers and coils.
+#include <cmath>
+#include <vector>
+
+#include "plant/parameters.hpp"
+#include "server/endpoints/modbus/axis_desk.hpp"
+
+namespace drivebench::modbus {
+namespace {
+
+constexpr double kReferenceUnit = 0.01;  // of the process data [V]
+
+Exception exception_of(Refused why) noexcept {
+  switch (why) {
+    case Refused::kNot:
+      return Exception::kNone;
+    case Refused::kUnknownAxis:
+      return Exception::kNoTarget;
+    case Refused::kNotFinite:
+      return Exception::kIllegalValue;
+    case Refused::kLatched:
+    case Refused::kStale:
+      return Exception::kFailure;
+    case Refused::kNotOwner:
+    case Refused::kOwned:
+    case Refused::kBusy:
+      break;
+  }
+  return Exception::kBusy;
+}
+
+/// The tick nearest to `newest` with these low bits.
+Tick tick_of(std::uint32_t counter, Tick newest) noexcept {
+  return newest + static_cast<std::int32_t>(counter - static_cast<std::uint32_t>(newest));
+}
+
+float as_float(std::uint64_t bits) noexcept {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
+}
+
+}  // namespace
+
+std::optional<std::uint64_t> AxisDesk::Written::operator[](Content content) const noexcept {
+  for (const Row& row : range.rows) {
+    if (row.content == content)
+      return get(row.type, range.order, &words[std::size_t{row.address} - range.first]);
+  }
+  return std::nullopt;
+}
+
+AxisDesk::Outcome AxisDesk::refuse(Refused why) {
+  last_refusal_ = static_cast<std::uint16_t>(why);
+  return {.exception = exception_of(why), .refusal = last_refusal_};
+}
+
+AxisDesk::Outcome AxisDesk::refuse(Exception exception, Refusal why) {
+  last_refusal_ = static_cast<std::uint16_t>(why);
+  return {.exception = exception, .refusal = last_refusal_};
+}
+
+void AxisDesk::count_refused(const RegisterMap::Range& range) {
+  last_refusal_ = static_cast<std::uint16_t>(Refusal::kOutOfRange);
+  for (const Row& row : range.rows) {
+    if (row.content != Content::kCounter) continue;
+    engine_.request({.tick = 0, .axis = axis_, .owner = 0, .action = RefusedCommand{}}, [](Refused, Tick) {});
+  }
+}
+
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write(RegisterMap::Range range,
+                                                   std::span<const std::uint16_t> words, Visitor who) {
+  const Written written{range, words};
+  if (range.first >= kParameterStart) return write_parameters(written, who);
+  return range.first >= kCommandStart ? write_command(written, who) : write_process(written, who);
+}
+
+/// Hands a command to the bench, which counts it if it refuses it.
+AxisDesk::Outcome AxisDesk::command(const Command& command) {
+  const Refused why = engine_.command(axis_, owner_, command);
+  if (why != Refused::kNot) return refuse(why);
+  engine_.advance();
+  return {.commanded = true};
+}
+
+Command AxisDesk::command_of(const ProcessInput& input, DriveState state) const {
+  Command command = gates_off();
+  if (state == DriveState::kQuickStopActive) command.phases.gates = Gates::kZeroVoltage;
+  if (state != DriveState::kOperationEnabled) return command;
+  command.phases = {.gates = Gates::kVoltage,
+                    .voltage_v = {input.reference_a * kReferenceUnit, input.reference_b * kReferenceUnit}};
+  return command;
+}
+
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visitor who) {
+  ProcessInput input = process_;
+  if (const auto word = written[Content::kControlWord])
+    input.control_word = static_cast<std::uint16_t>(*word);
+  if (const auto bits = written[Content::kReferenceA]) input.reference_a = static_cast<std::int16_t>(*bits);
+  if (const auto bits = written[Content::kReferenceB]) input.reference_b = static_cast<std::int16_t>(*bits);
+  // First of all, so that nothing is cleared by a write that the bench then does not take.
+  const Owner owner = holds(who) ? owner_ : 0;
+  if (const Refused why = engine_.check(axis_, owner, gates_off()); why != Refused::kNot) {
+    engine_.command(axis_, owner, gates_off());  // so that it is counted
+    Outcome outcome = refuse(why);
+    // The client chose no tick here; that this one has its command already is for it to wait out.
+    if (why == Refused::kStale) outcome.exception = Exception::kBusy;
+    co_return outcome;
+  }
+  const DriveState before = drive_state();
+  DriveState state = next_state(before, input.control_word);
+  const bool resets = (input.control_word & ~process_.control_word & kFaultReset) != 0;
+  if (before == DriveState::kFault && resets) {
+    const Input clear{.tick = 0, .axis = axis_, .owner = owner_, .action = ClearFaults{}};
+    const Refused why = co_await ask(clear);
+    if (why != Refused::kNot) co_return refuse(why);
+    if (!holds(who)) co_return refuse(Refused::kNotOwner);  // lost it meanwhile
+    state = DriveState::kSwitchOnDisabled;
+  }
+  const Command wanted = command_of(input, state);
+  if (engine_.check(axis_, owner_, wanted) == Refused::kNot) {
+    process_ = input;
+    state_ = state == DriveState::kFault ? DriveState::kSwitchOnDisabled : state;
+  }
+  co_return command(wanted);
+}
+
+Command AxisDesk::command_of(const CommandInput& input) const {
+  const double unit = input.mode == CommandMode::kDuty ? engine_.newest(axis_).bus_voltage_v : 1.0;
+  Command command{
+      .answers = tick_of(input.counter, engine_.tick()),
+      .phases = {.gates = Gates::kVoltage,
+                 .voltage_v = {unit * static_cast<double>(input.a), unit * static_cast<double>(input.b)}}};
+  if (input.mode == CommandMode::kOff) command.phases = {.gates = Gates::kOff, .voltage_v = {}};
+  if (input.mode == CommandMode::kZeroVoltage)
+    command.phases = {.gates = Gates::kZeroVoltage, .voltage_v = {}};
+  return command;
+}
+
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visitor who) {
+  const auto key = written[Content::kLeaseKey];
+  const auto request = static_cast<LeaseRequest>(written[Content::kRequest].value_or(0));
+  const bool commands = written[Content::kCounter].has_value();
+  const bool gives_back = key == 0u || request == LeaseRequest::kRelease;
+  CommandInput input = command_;
+  if (const auto mode = written[Content::kCommandMode]) input.mode = static_cast<CommandMode>(*mode);
+  if (const auto counter = written[Content::kCounter]) input.counter = static_cast<std::uint32_t>(*counter);
+  if (const auto bits = written[Content::kVoltageA]) input.a = as_float(*bits);
+  if (const auto bits = written[Content::kVoltageB]) input.b = as_float(*bits);
+  const bool beyond = std::abs(input.a) > 1.0f || std::abs(input.b) > 1.0f;
+  const bool asks_more = request != LeaseRequest::kNone && request != LeaseRequest::kRelease;
+  if ((input.mode == CommandMode::kDuty && beyond) || (key == 0u && asks_more) ||
+      (commands && (gives_back || request == LeaseRequest::kClearFaults))) {
+    count_refused(written.range);
+    co_return refuse(Exception::kIllegalValue, Refusal::kOutOfRange);
+  }
+
+  const bool had_lease = leased();
+  if (key.value_or(0) != 0) {
+    if (engine_.config().mode == RunMode::kFree) co_return refuse(Exception::kFailure, Refusal::kWrongMode);
+    // All or nothing: with a command that is refused the lease does not change hands either.
+    if (commands && had_lease && key == key_ &&
+        engine_.check(axis_, owner_, command_of(input)) != Refused::kNot) {
+      co_return refuse(engine_.command(axis_, owner_, command_of(input)));  // so that it is counted
+    }
+    const Refused why = co_await take_lease(static_cast<std::uint16_t>(*key), !commands, who);
+    if (why != Refused::kNot) {
+      if (commands) engine_.command(axis_, 0, command_of(input));  // so that it is counted
+      co_return refuse(why);
+    }
+  }
+  if (!commands) {
+    if (!holds(who)) co_return refuse(Refused::kNotOwner);
+    command_ = input;
+    const LeaseRequest wanted = gives_back ? LeaseRequest::kRelease : request;
+    co_return co_await carry_out(wanted, who);
+  }
+  const Owner owner = holds(who) ? owner_ : 0;
+  if (engine_.check(axis_, owner, command_of(input)) == Refused::kNot) {
+    command_ = input;
+    co_return command(command_of(input));
+  }
+  const Refused why = engine_.command(axis_, owner, command_of(input));
+  if (!had_lease && holds(who)) give_back(LeaseAction::kRelease);  // it goes as it came
+  co_return refuse(why);
+}
+
+asio::awaitable<AxisDesk::Outcome> AxisDesk::carry_out(LeaseRequest request, Visitor who) {
+  if (!holds(who)) co_return refuse(Refused::kNotOwner);
+  Input input{.tick = 0, .axis = axis_, .owner = owner_, .action = ClearFaults{}};
+  if (request == LeaseRequest::kNone) co_return Outcome{};
+  if (request == LeaseRequest::kRelease) input.action = LeaseAction::kRelease;
+  if (request == LeaseRequest::kRenew) input.action = LeaseAction::kRenew;
+  const Refused why = co_await ask(input);
+  if (why != Refused::kNot) co_return refuse(why);
+  if (request == LeaseRequest::kRelease && owner_ == input.owner) forget();
+  if (request == LeaseRequest::kClearFaults) state_ = DriveState::kSwitchOnDisabled;
+  co_return Outcome{};
+}
+
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_coils(std::size_t address, std::size_t count,
+                                                         std::uint8_t bits, Visitor who) {
+  Outcome outcome;
+  for (std::size_t i = 0; i < count && outcome.exception == Exception::kNone; ++i) {
+    const bool on = (bits >> i & 1) != 0;
+    const bool is_lease = address + i == static_cast<std::size_t>(Coil::kLease);
+    const LeaseRequest request = is_lease ? (on ? LeaseRequest::kRenew : LeaseRequest::kRelease)
+                                 : on     ? LeaseRequest::kClearFaults
+                                          : LeaseRequest::kNone;
+    outcome = co_await carry_out(request, who);
+  }
+  co_return outcome;
+}
+
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, Visitor who) {
+  if (!holds(who) && engine_.config().mode != RunMode::kFree) co_return refuse(Refused::kNotOwner);
+  struct Change {
+    std::uint32_t row;
+    double before;
+    double after;
+  };
+  std::vector<Change> changes;
+  for (const Row& row : written.range.rows) {
+    const std::uint64_t bits =
+        get(row.type, written.range.order, &written.words[std::size_t{row.address} - written.range.first]);
+    changes.push_back({.row = row.index,
+                       .before = axis_parameters()[row.index].get(engine_.parameters(axis_)),
+                       .after = number_of(row.type, bits)});
+  }
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    if (engine_.try_parameter(axis_, changes[i].row, changes[i].after).empty()) continue;
+    while (i-- > 0)  // back the way they came
+      engine_.try_parameter(axis_, changes[i].row, changes[i].before);
+    co_return refuse(Exception::kIllegalValue, Refusal::kOutOfRange);
+  }
+  // All on their way before any is waited for: the bench takes them together, in one tick.
+  const Owner owner = holds(who) ? owner_ : 0;
+  std::vector<std::shared_ptr<Asked>> asked;
+  for (const Change& change : changes) {
+    asked.push_back(
+        send({.tick = 0, .axis = axis_, .owner = owner, .action = ParameterWrite{change.row, change.after}}));
+    if (asked.back()->answer == Refused::kBusy) break;  // no room; what follows must not overtake it
+  }
+  if (asked.back()->answer == Refused::kBusy) {
+    for (std::size_t i = changes.size(); i-- > asked.size() - 1;)
+      engine_.try_parameter(axis_, changes[i].row, changes[i].before);
+  }
+  Outcome outcome;
+  for (const auto& each : asked) {
+    const Refused why = co_await answer_to(each);
+    if (why != Refused::kNot) outcome = refuse(why);
+  }
+  co_return outcome;
+}
+
+}  // namespace drivebench::modbus

@@ -1,0 +1,291 @@
+#include "server/endpoints/modbus/connection.hpp"
+
+#include <poll.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <string_view>
+
+namespace drivebench::modbus {
+namespace {
+
+// Answers are sent together while requests are waiting, up to this size.
+constexpr std::size_t kMaxQueued = 8 * kMaxAdu;
+// A command that the bench takes pays for itself and for reading its sample: there is at most one a tick.
+constexpr double kPaidByCommand = 2.0;
+
+std::string_view sentence_of_refusal(std::uint16_t refusal) noexcept {
+  if (refusal == static_cast<std::uint16_t>(Refusal::kOutOfRange)) return "a value is out of range";
+  if (refusal == static_cast<std::uint16_t>(Refusal::kWrongMode)) return "a free run takes no controller";
+  return sentence_of(static_cast<Refused>(refusal));
+}
+
+std::string name_of(const asio::ip::tcp::endpoint& peer) {
+  return "modbus " + peer.address().to_string() + ":" + std::to_string(peer.port());
+}
+
+}  // namespace
+
+Connection::Connection(asio::ip::tcp::socket socket, Visitor number, Shared& shared)
+    : socket_(std::move(socket)),
+      number_(number),
+      shared_(shared),
+      waker_(socket_.get_executor()),
+      timer_(socket_.get_executor()) {
+  boost::system::error_code gone;
+  const asio::ip::tcp::endpoint peer = socket_.remote_endpoint(gone);
+  peer_ = peer.address();
+  name_ = gone ? "modbus peer" : name_of(peer);
+  socket_.non_blocking(true, gone);
+}
+
+void Connection::close() noexcept {
+  open_ = false;
+  boost::system::error_code ignored;
+  socket_.shutdown(asio::ip::tcp::socket::shutdown_both, ignored);
+  socket_.close(ignored);
+  waker_.cancel();
+}
+
+void Connection::cut(std::string_view why) {
+  ++shared_.counts.cut;
+  if (shared_.cut_log.allow()) {
+    spdlog::warn("{}: cut off: {} ({} more since the last such line)", name_, why,
+                 shared_.cut_log.held_back());
+  }
+  close();
+}
+
+bool Connection::has_lease() const noexcept {
+  return std::any_of(shared_.desks.begin(), shared_.desks.end(),
+                     [this](const auto& desk) { return desk->holds(number_); });
+}
+
+void Connection::start_timer() {
+  if (timing_) return;
+  timing_ = true;
+  timer_.expires_after(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms));
+  timer_.async_wait([self = shared_from_this(), run = timer_run_](const boost::system::error_code& error) {
+    if (!error && run == self->timer_run_ && self->open_) self->cut("a frame took too long");
+  });
+}
+
+asio::awaitable<void> Connection::run() {
+  const std::shared_ptr<Connection> self = shared_from_this();
+  boost::system::error_code error;
+  while (open_) {
+    const std::span<std::uint8_t> space = reader_.free_space();
+    const std::size_t count = co_await socket_.async_read_some(
+        asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
+    if (error) break;
+    reader_.received(count);
+    while (open_) {
+      const auto adu = reader_.next();
+      if (!adu) break;
+      stop_timer();
+      const bool go_on = co_await answer(*adu);
+      if (!go_on) open_ = false;
+      if (out_.size() > kMaxQueued) {
+        const bool sent = co_await flush();
+        if (!sent) open_ = false;
+      }
+    }
+    const bool sent = co_await flush();
+    if (!sent) break;
+    if (!reader_.error().empty()) cut(reader_.error());
+    if (reader_.in_frame()) start_timer();
+  }
+  stop_timer();
+  timer_.cancel();
+}
+
+void Connection::end() {
+  for (const auto& desk : shared_.desks)
+    desk->connection_ended(number_);
+  close();
+}
+
+/// Sends what is queued. Most often the kernel takes it at once.
+asio::awaitable<bool> Connection::flush() {
+  boost::system::error_code error;
+  std::size_t sent = 0;
+  while (sent < out_.size() && !error && socket_.is_open()) {
+    const auto rest = asio::buffer(out_.data() + sent, out_.size() - sent);
+    sent += socket_.write_some(rest, error);
+    if (error != asio::error::would_block) continue;
+    start_timer();  // for a peer that takes nothing
+    co_await socket_.async_wait(asio::ip::tcp::socket::wait_write,
+                                asio::redirect_error(asio::use_awaitable, error));
+    stop_timer();
+  }
+  out_.clear();
+  co_return !error;
+}
+
+AxisDesk* Connection::desk_of(std::uint8_t unit) {
+  const std::size_t axis = unit == 0 || unit == 255 ? 0 : unit - 1u;
+  return axis < shared_.desks.size() ? shared_.desks[axis].get() : nullptr;
+}
+
+void Connection::reply(Bytes adu, Bytes pdu) {
+  const std::size_t length = pdu.size() + 1;
+  out_.insert(out_.end(), adu.begin(), adu.begin() + 4);
+  out_.push_back(static_cast<std::uint8_t>(length >> 8));
+  out_.push_back(static_cast<std::uint8_t>(length & 0xff));
+  out_.push_back(adu[6]);
+  out_.insert(out_.end(), pdu.begin(), pdu.end());
+}
+
+void Connection::refuse(Bytes adu, Exception exception) {
+  ++shared_.counts.exceptions;
+  const std::array<std::uint8_t, 2> pdu{static_cast<std::uint8_t>(adu[kMbapSize] | 0x80),
+                                        static_cast<std::uint8_t>(exception)};
+  reply(adu, pdu);
+}
+
+/// False: the connection is to end, after what is queued has been sent.
+asio::awaitable<bool> Connection::answer(Bytes adu) {
+  ++shared_.counts.requests;
+  last_request_ = Clock::now();
+  const RateLimit::Answer rate = shared_.rate.charge(peer_, last_request_);
+  if (rate == RateLimit::Answer::kCut) {
+    co_await flush();
+    cut("too many requests");
+    co_return false;
+  }
+  if (rate == RateLimit::Answer::kRefuse) {
+    ++shared_.counts.throttled;
+    refuse(adu, Exception::kBusy);
+    co_return true;
+  }
+  const Verdict verdict = validate(adu.subspan(kMbapSize), shared_.map);
+  if (verdict.action == Verdict::Action::kClose) {
+    co_await flush();
+    cut("a frame is not as long as its function needs");
+    co_return false;
+  }
+  AxisDesk* const desk = desk_of(adu[6]);
+  if (desk == nullptr) {
+    refuse(adu, Exception::kNoTarget);
+    co_return true;
+  }
+  desk->spoke(number_);
+  if (verdict.action == Verdict::Action::kRefuse) {
+    if (verdict.request.write.count > 0) {
+      desk->count_refused(verdict.request.write);
+      note_refused_write(*desk, static_cast<std::uint16_t>(Refusal::kOutOfRange));
+    }
+    refuse(adu, verdict.exception);
+    co_return true;
+  }
+  co_await execute(*desk, adu, verdict.request);
+  co_return true;
+}
+
+asio::awaitable<void> Connection::execute(AxisDesk& desk, Bytes adu, Request request) {
+  const Bytes pdu = adu.subspan(kMbapSize);
+  if (request.function == Function::kDiagnostics) {
+    reply(adu, pdu);
+    co_return;
+  }
+  if (request.function == Function::kEncapsulated) {
+    const std::vector<std::uint8_t> objects = shared_.identification.answer(pdu);
+    objects.empty() ? refuse(adu, Exception::kIllegalAddress) : reply(adu, objects);
+    co_return;
+  }
+  if (writes(request.function)) {
+    const Exception exception = co_await carry_out_write(desk, request);
+    if (exception != Exception::kNone) {
+      refuse(adu, exception);
+      co_return;
+    }
+  }
+  fill_reply(desk, request);
+  const Bytes answer = shared_.replies.reply(adu);
+  answer.empty() ? refuse(adu, Exception::kFailure)
+                 : static_cast<void>(out_.insert(out_.end(), answer.begin(), answer.end()));
+}
+
+/// Puts what libmodbus will read where it looks for it.
+void Connection::fill_reply(AxisDesk& desk, const Request& request) {
+  const std::size_t from = request.read_address;
+  for (std::size_t i = from; i < from + request.read_count; ++i) {
+    if (request.function == Function::kReadCoils) shared_.replies.coils()[i] = desk.coil(i, number_) ? 1 : 0;
+    if (request.function == Function::kReadDiscreteInputs) {
+      shared_.replies.discrete_inputs()[i] = desk.discrete_input(i) ? 1 : 0;
+    }
+  }
+  if (request.read.count > 0) {
+    desk.read(request.read, number_, shared_.replies.registers().subspan(from, request.read_count));
+  }
+}
+
+asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Request& request) {
+  const bool is_process = request.write.count > 0 && request.write.first < kCommandStart;
+  const bool runs_by_itself = shared_.engine.config().mode != RunMode::kLockstep;
+  if (is_process && runs_by_itself && desk.has_answered_tick(number_))
+    co_await wait_for_tick(desk, shared_.engine.tick());
+  const Tick before = shared_.engine.tick();
+  AxisDesk::Outcome outcome;
+  if (request.write.count == 0) {
+    outcome = co_await desk.write_coils(request.write_address, request.write_count, request.data[0], number_);
+  } else {
+    words_ = words_from(request.data);
+    if (request.function == Function::kMaskWriteRegister) {
+      std::uint16_t now = 0;
+      desk.read(request.write, number_, {&now, 1});
+      words_[0] = static_cast<std::uint16_t>((now & words_[0]) | (words_[1] & ~words_[0]));
+      if (!values_fit(request.write, words_)) {
+        desk.count_refused(request.write);
+        note_refused_write(desk, static_cast<std::uint16_t>(Refusal::kOutOfRange));
+        co_return Exception::kIllegalValue;
+      }
+    }
+    outcome = co_await desk.write(request.write, words_, number_);
+  }
+  if (outcome.exception != Exception::kNone) {
+    note_refused_write(desk, outcome.refusal);
+    co_return outcome.exception;
+  }
+  if (outcome.commanded) {
+    shared_.rate.refund(peer_, kPaidByCommand);
+    if (request.function == Function::kReadWriteRegisters) co_return co_await wait_for_tick(desk, before);
+  }
+  co_return Exception::kNone;
+}
+
+void Connection::note_refused_write(const AxisDesk& desk, std::uint16_t refusal) {
+  ++shared_.counts.refused_writes;
+  if (!shared_.refused_writes_log.allow()) return;
+  spdlog::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_,
+               desk.axis(), sentence_of_refusal(refusal), shared_.refused_writes_log.held_back());
+}
+
+bool Connection::is_peer_gone() {
+  pollfd socket{.fd = socket_.native_handle(), .events = POLLRDHUP, .revents = 0};
+  return ::poll(&socket, 1, 0) > 0;
+}
+
+/// Until the tick after `before`, or kBusy: an exchange is answered with the first sample after its command,
+/// and in real time process data that come twice within a tick count for two.
+asio::awaitable<Exception> Connection::wait_for_tick(AxisDesk& desk, Tick before) {
+  if (shared_.engine.tick() != before) co_return Exception::kNone;
+  const bool sent = co_await flush();  // what came before this request must not wait with it
+  if (!sent) open_ = false;
+  desk.set_waiting(number_, true);
+  waiting_ = true;
+  while (open_ && shared_.engine.tick() == before && desk.holds(number_)) {
+    boost::system::error_code cancelled;
+    waker_.expires_after(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms));
+    co_await waker_.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
+    // Nobody reads meanwhile, so nobody else would notice that the owner is dead.
+    if (!cancelled && open_ && is_peer_gone()) close();
+  }
+  waiting_ = false;
+  desk.set_waiting(number_, false);
+  desk.spoke(number_);
+  // Without a tick the lease is gone, and with it the hope for one.
+  co_return shared_.engine.tick() != before ? Exception::kNone : Exception::kBusy;
+}
+
+}  // namespace drivebench::modbus

@@ -1,0 +1,108 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocols/modbus/mbap.hpp"
+#include "protocols/modbus/pdu.hpp"
+#include "server/asio.hpp"
+#include "server/endpoints/log_limit.hpp"
+#include "server/endpoints/modbus/axis_desk.hpp"
+#include "server/endpoints/modbus/identification.hpp"
+#include "server/endpoints/modbus/rate_limit.hpp"
+#include "server/endpoints/modbus/reply_builder.hpp"
+
+namespace drivebench::modbus {
+
+/// What all connections share.
+struct Shared {
+  Engine& engine;
+  const RegisterMap& map;
+  ReplyBuilder& replies;
+  RateLimit& rate;
+  const Identification& identification;
+  std::vector<std::unique_ptr<AxisDesk>> desks;  ///< by axis
+
+  struct Counts {
+    std::uint64_t requests = 0;
+    std::uint64_t exceptions = 0;
+    std::uint64_t refused_writes = 0;  ///< for want of the lease, a latched fault, staleness, value
+    std::uint64_t throttled = 0;
+    std::uint64_t cut = 0;  ///< connections: malformed frames, time-outs, floods, a full house
+    std::uint64_t turned_away = 0;
+  } counts;
+  LogLimit refused_writes_log;
+  LogLimit cut_log;
+  LogLimit turned_away_log;
+};
+
+/// One client. Requests are answered in the order they came; an error ends this connection and nothing else.
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  Connection(asio::ip::tcp::socket socket, Visitor number, Shared& shared);
+
+  /// Reads and answers until the peer or an error ends the connection.
+  asio::awaitable<void> run();
+  /// Afterwards: its leases begin to lapse.
+  void end();
+
+  /// When a tick has run or a lease has changed hands: an exchange that waits for that goes on.
+  void wake() {
+    if (waiting_) waker_.cancel();
+  }
+  void close() noexcept;
+  /// Closes it with a reason for the log.
+  void cut(std::string_view why);
+
+  const asio::ip::address& peer() const noexcept { return peer_; }
+  bool has_lease() const noexcept;
+  /// Since when it has said nothing.
+  Clock::time_point idle_since() const noexcept { return waiting_ ? Clock::now() : last_request_; }
+
+ private:
+  using Bytes = std::span<const std::uint8_t>;
+
+  /// Closes the connection unless stopped in time.
+  void start_timer();
+  void stop_timer() noexcept {
+    ++timer_run_;
+    timing_ = false;
+  }
+
+  asio::awaitable<bool> answer(Bytes adu);
+  asio::awaitable<void> execute(AxisDesk& desk, Bytes adu, Request request);
+  asio::awaitable<Exception> carry_out_write(AxisDesk& desk, const Request& request);
+  asio::awaitable<Exception> wait_for_tick(AxisDesk& desk, Tick before);
+  /// Whether the peer has closed its end, with or without requests that were not read yet.
+  bool is_peer_gone();
+  void fill_reply(AxisDesk& desk, const Request& request);
+  void note_refused_write(const AxisDesk& desk, std::uint16_t refusal);
+  AxisDesk* desk_of(std::uint8_t unit);
+  void reply(Bytes adu, Bytes pdu);
+  void refuse(Bytes adu, Exception exception);
+  asio::awaitable<bool> flush();
+
+  asio::ip::tcp::socket socket_;
+  Visitor number_;
+  Shared& shared_;
+  asio::ip::address peer_;
+  std::string name_;
+  MbapReader reader_;
+  std::vector<std::uint8_t> out_;
+  std::array<std::uint16_t, kMaxReadRegisters> words_{};  ///< of the write under way
+  asio::steady_timer waker_;
+  asio::steady_timer timer_;
+  std::uint64_t timer_run_ = 0;
+  bool timing_ = false;
+  bool waiting_ = false;
+  bool open_ = true;
+  Clock::time_point last_request_ = Clock::now();
+};
+
+}  // namespace drivebench::modbus

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace drivebench::modbus {
+
+/// What function 43/14 tells of this device: the basic and the regular objects.
+class Identification {
+ public:
+  explicit Identification(const std::string& bench);
+
+  /// The PDU that answers a valid request PDU of function 43/14; empty if an object is asked for by itself
+  /// that does not exist.
+  std::vector<std::uint8_t> answer(std::span<const std::uint8_t> pdu) const;
+
+ private:
+  std::array<std::string, 7> objects_;
+};
+
+}  // namespace drivebench::modbus

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/asio.hpp"
+#include "server/config.hpp"
+#include "server/endpoints/modbus/connection.hpp"
+#include "server/endpoints/transport_report.hpp"
+#include "server/engine.hpp"
+
+namespace drivebench {
+
+/// Serves the axes over Modbus TCP. The register map is protocols/modbus/register_map.hpp.
+class ModbusServer {
+ public:
+  /// Listens at once; throws std::runtime_error that names the address if that fails.
+  ModbusServer(asio::io_context& io, const ModbusConfig& config);
+  ~ModbusServer();
+
+  /// Address and port that the system gave, "127.0.0.1:1502".
+  std::string address() const;
+
+  /// Starts accepting clients of this run.
+  void serve(Engine& engine);
+
+  /// Stops accepting and ends every connection.
+  void close();
+
+  TransportReport report() const;
+
+ private:
+  asio::awaitable<void> accept();
+  void start(asio::ip::tcp::socket socket);
+  bool make_room(const asio::ip::address& newcomer);
+  asio::awaitable<void> run(std::shared_ptr<modbus::Connection> connection);
+
+  asio::io_context& io_;
+  ModbusConfig config_;
+  asio::ip::tcp::acceptor acceptor_;
+  std::vector<modbus::ParameterInfo> parameters_;
+  modbus::RegisterMap map_;
+  modbus::ReplyBuilder replies_;
+  modbus::RateLimit rate_;
+  std::optional<modbus::Identification> identification_;
+  std::optional<modbus::Shared> shared_;
+  modbus::Visitor last_number_ = 0;
+  std::vector<std::shared_ptr<modbus::Connection>> connections_;
+};
+
+}  // namespace drivebench

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/endpoints/can/endpoint.hpp"
+#include "server/endpoints/modbus/modbus_server.hpp"
+#include "server/endpoints/transport_report.hpp"
+
+namespace drivebench {
+
+/// The ways in beside the stream sockets, as configured: every CAN bus, and Modbus.
+class Transports {
+ public:
+  /// Opens them; throws std::runtime_error that names what cannot be had.
+  Transports(asio::io_context& io, const BenchConfig& config);
+
+  void serve(Engine& engine);
+  std::vector<TransportReport> reports() const;
+  void close();
+
+  std::vector<std::string> can_names() const;
+  std::string modbus_address() const;  ///< empty: none
+
+ private:
+  std::vector<std::unique_ptr<can::Endpoint>> can_;
+  std::unique_ptr<ModbusServer> modbus_;
+};
+
+}  // namespace drivebench

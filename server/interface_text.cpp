@@ -1,0 +1,108 @@
+#include "server/interface_text.hpp"
+
+#include <fmt/core.h>
+
+#include <stdexcept>
+
+#include "protocols/can/dbc.hpp"
+#include "protocols/can/table_text.hpp"
+#include "server/endpoints/modbus/map_info.hpp"
+
+namespace drivebench {
+namespace {
+
+const CanConfig& chosen_bus(const BenchConfig& config, std::size_t bus) {
+  static const CanConfig by_default;
+  if (config.can.empty() && bus == 1) return by_default;
+  if (bus >= 1 && bus <= config.can.size()) return config.can[bus - 1];
+  throw std::runtime_error(
+      fmt::format("--bus {}: bench {} has {} [[can]] sections", bus, config.name, config.can.size()));
+}
+
+std::vector<can::BusAxis> bus_axes(const BenchConfig& config) {
+  std::vector<can::BusAxis> axes;
+  for (const AxisConfig& axis : config.axes)
+    axes.push_back({.name = axis.name, .node = axis.can_node});
+  return axes;
+}
+
+/// How much of a bus its frames take in real time, and of what.
+struct Need {
+  double share = 0.0;
+  std::string limit;
+};
+
+/// What the bench itself sends.
+double frames_per_s(const can::BusLoad& load) {
+  double sum = 0.0;
+  for (const can::MessageLoad& message : load.messages) {
+    if (message.row->sender == can::Sender::kBench) sum += message.frames_per_s;
+  }
+  return sum;
+}
+
+Need need_of(const BenchConfig& config, const CanConfig& bus) {
+  const can::BusLoad load = bus_load_of(config, bus);
+  const double datagram_share = frames_per_s(load) / can::kMulticastFramesPerS;
+  if (bus.backend == CanBackend::kUdpMulticast && datagram_share > load.most_share) {
+    return {datagram_share,
+            fmt::format("the {:.0f} datagrams/s that receivers take", can::kMulticastFramesPerS)};
+  }
+  return {load.most_share, fmt::format("what {} bit/s allow", bus.bit_rate)};
+}
+
+/// The least sample_every_ticks with which the bus carries its frames; 0: samples are not what overloads it.
+std::int64_t enough_ticks(const BenchConfig& config, CanConfig bus) {
+  const auto fits = [&](std::int64_t ticks) {
+    bus.sample_every_ticks = ticks;
+    return need_of(config, bus).share <= 1.0;
+  };
+  std::int64_t too_few = bus.sample_every_ticks;
+  std::int64_t enough = too_few + 10'000;
+  if (!fits(enough)) return 0;
+  while (enough - too_few > 1) {
+    const std::int64_t middle = too_few + (enough - too_few) / 2;
+    (fits(middle) ? enough : too_few) = middle;
+  }
+  return enough;
+}
+
+}  // namespace
+
+can::BusLoad bus_load_of(const BenchConfig& config, const CanConfig& bus) {
+  return can::bus_load(bus.profile, {.axes = config.axes.size(),
+                                     .period_s = static_cast<double>(config.setup.period_ns) * 1e-9,
+                                     .sample_every_ticks = static_cast<double>(bus.sample_every_ticks),
+                                     .state_every_ticks = static_cast<double>(bus.state_every_ticks),
+                                     .heartbeat_ms = static_cast<double>(bus.heartbeat_ms),
+                                     .edges = bus.edges,
+                                     .bit_rate = static_cast<double>(bus.bit_rate),
+                                     .data_bit_rate = static_cast<double>(bus.data_bit_rate)});
+}
+
+std::vector<std::string> bus_overloads(const BenchConfig& config) {
+  std::vector<std::string> overloads;
+  for (std::size_t i = 0; i < config.can.size(); ++i) {
+    const CanConfig& bus = config.can[i];
+    const Need need = need_of(config, bus);
+    if (need.share <= 1.0) continue;
+    const std::int64_t enough = enough_ticks(config, bus);
+    const std::string cure = enough != 0 ? fmt::format("raise sample_every_ticks from {} to {}, or period_us",
+                                                       bus.sample_every_ticks, enough)
+                                         : fmt::format("raise period_us or state_every_ticks{}",
+                                                       bus.edges ? ", or leave edges out" : "");
+    overloads.push_back(
+        fmt::format("bus {} must carry {:.0f} % of {}: {}", i + 1, 100.0 * need.share, need.limit, cure));
+  }
+  return overloads;
+}
+
+std::string interface_text(const BenchConfig& config, std::string_view what, std::size_t bus) {
+  if (what == "dbc") return can::dbc_text(config.name, chosen_bus(config, bus).profile, bus_axes(config));
+  if (what.starts_with("modbus")) return modbus::map_of(config, what == "modbus-csv");
+  const CanConfig& chosen = chosen_bus(config, bus);
+  return can::table_text(config.name, chosen.profile, bus_axes(config)) + "\n## Load in real time\n\n" +
+         can::load_text(bus_load_of(config, chosen));
+}
+
+}  // namespace drivebench

@@ -1,0 +1,134 @@
+"""A drive controller made of python-can and the bench's DBC file: it knows the frames from the file alone."""
+import logging
+import math
+import time
+
+import can
+
+logging.getLogger("canmatrix.formats").setLevel(logging.ERROR)  # it misses formats that nobody here needs
+import canmatrix.formats  # noqa: E402
+
+PATIENCE_S = 30.0
+REQUESTS = {"acquire": 1, "renew": 2, "release": 3, "clear_faults": 4}
+
+
+class Refused(Exception):
+    """The bench said no; `code` is the result of its reply."""
+
+    def __init__(self, code):
+        super().__init__(f"result {code}")
+        self.code = code
+
+
+class Drive:
+    """One axis on a python-can bus, in lockstep."""
+
+    def __init__(self, bus, dbc_file, axis="servo", fd=True):
+        self.bus = bus
+        self.fd = fd
+        self.axis = axis
+        self.matrix = canmatrix.formats.loadp_flat(str(dbc_file))
+        self.by_id = {(f.arbitration_id.id, bool(f.arbitration_id.extended)): f for f in self.matrix.frames}
+        self.lease = 0
+        self.received = []  # (name without the axis, values, python-can message)
+        self.seen = {}  # newest values by message name
+
+    def frame(self, name):
+        found = self.matrix.frame_by_name(f"{self.axis}_{name}") or self.matrix.frame_by_name(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def message(self, name, **raw):
+        frame = self.frame(name)
+        data = frame.encode({signal.name: raw.get(signal.name, 0) for signal in frame.signals})
+        return can.Message(arbitration_id=frame.arbitration_id.id, is_extended_id=bool(frame.arbitration_id.extended),
+                           is_fd=self.fd, bitrate_switch=self.fd, data=bytes(data))
+
+    def send(self, name, **raw):
+        self.bus.send(self.message(name, **raw))
+
+    def receive(self, timeout=PATIENCE_S):
+        """The next message of this bench: its name."""
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0:
+            message = self.bus.recv(left)
+            if message is None or message.is_error_frame:
+                continue
+            frame = self.by_id.get((message.arbitration_id, bool(message.is_extended_id)))
+            if frame is None:
+                continue
+            name = frame.name.removeprefix(self.axis + "_")
+            values = {key: value.raw_value if value.signal.is_float else float(value.phys_value)
+                      for key, value in frame.decode(bytearray(message.data)).items()}
+            self.received.append((name, values, message))
+            self.seen[name] = values
+            return name
+        raise AssertionError("the bench says nothing")
+
+    def await_message(self, name):
+        while self.receive() != name:
+            pass
+        return self.seen[name]
+
+    def request(self, what, controller=4711, lease=None):
+        self.send("request", request=REQUESTS[what], controller=controller,
+                  lease=self.lease if lease is None else lease)
+        while True:
+            reply = self.await_message("reply")
+            if reply["request"] == REQUESTS[what] and reply["controller"] == controller:
+                break
+        if reply["result"] != 0:
+            raise Refused(int(reply["result"]))
+        return reply
+
+    def acquire(self, controller=4711):
+        self.lease = int(self.request("acquire", controller, lease=0)["lease"])
+        return self.sample()
+
+    def sample(self):
+        """Waits for SYNC: the newest sensors, whose tick it names."""
+        tick = int(self.await_message("sync")["tick"])
+        if self.fd:
+            sensors = self.seen["sensors"]
+            assert int(sensors["tick"]) == tick, (sensors, tick)
+            return tick, int(sensors["encoder_count"]), sensors["i_a"], sensors["i_b"]
+        currents = self.seen["currents"]
+        assert int(currents["tick"]) == tick % 65536, (currents, tick)
+        return tick, int(self.seen["encoder"]["encoder_count"]), currents["i_a"], currents["i_b"]
+
+    def command(self, tick, u_a, u_b, mode=1):
+        """Voltages, as the DBC scales them."""
+        frame = self.frame("command")
+        bits = 32 if self.fd else 16
+        factor = 1.0 if self.fd else float(frame.signal_by_name("u_a").factor)
+        scaled = (lambda u: u) if self.fd else (lambda u: round(u / factor))
+        self.send("command", tick=tick % (1 << bits), u_a=scaled(u_a), u_b=scaled(u_b), mode=mode, lease=self.lease)
+
+    def step(self, tick, u_a, u_b):
+        """One lockstep tick: the sample after it. Sent again if it was lost on the way."""
+        self.command(tick, u_a, u_b)
+        sample = self.sample()
+        while sample[0] <= tick:
+            sample = self.sample()
+        return sample
+
+
+def open_loop_voltages(tick, period_s=125e-6):
+    """An open-loop start: amplitude and frequency rise together."""
+    time_s = tick * period_s
+    frequency_hz = min(60.0 * time_s / 0.2, 60.0)
+    angle = 2.0 * math.pi * (0.5 * frequency_hz * time_s if time_s < 0.2 else frequency_hz * (time_s - 0.1))
+    amplitude = 10.0 + 40.0 * frequency_hz / 60.0
+    return round(amplitude * math.cos(angle), 2), round(amplitude * math.sin(angle), 2)
+
+
+def open_loop_start(drive, ticks):
+    """Takes the axis, starts the motor, gives the axis back: (tick, count) of every sample."""
+    sample = drive.acquire()
+    counts = [sample[:2]]
+    while sample[0] < ticks:
+        sample = drive.step(sample[0], *open_loop_voltages(sample[0]))
+        counts.append(sample[:2])
+    drive.request("release")
+    return counts

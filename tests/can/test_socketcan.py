@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""The kernel's CAN as users meet it: `drivebench can check`, and can-utils on the bus of a bench. Run by with_can."""
+import json
+import subprocess
+
+from drive_test import DriveTest, PATIENCE_S, run_all, with_bus
+
+
+def shell(line):
+    return subprocess.run(["sh", "-c", line], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+
+
+class CanCheck(DriveTest):
+    interface = "dbcheck0"
+
+    def setUp(self):
+        super().setUp()
+        self.addCleanup(shell, f"ip link del {self.interface}")
+
+    def must(self, line):
+        done = shell(line)
+        self.assertEqual(done.returncode, 0, f"{line}: {done.stderr}")
+
+    def check(self, code):
+        done = self.drivebench("can", "check", self.interface, "--json", code=code)
+        return json.loads(done.stdout)
+
+    # Catches: a cure that does not cure, or is not a line that a shell takes.
+    def test_the_cures_cure(self):
+        found = self.check(code=2)["findings"]
+        self.assertEqual(len(found), 1)
+        self.must(found[0]["cure"].split("a virtual one: ")[1].removeprefix("modprobe vcan; "))
+        self.assertEqual(self.check(code=0)["findings"], [])
+        for broken in ("down", "mtu 16"):
+            with self.subTest(broken):
+                self.must(f"ip link set {self.interface} down; ip link set {self.interface} {broken}")
+                self.must("true" if broken == "down" else f"ip link set {self.interface} up")
+                found = self.check(code=1)["findings"]
+                self.assertEqual(len(found), 1, found)
+                self.must(found[0]["cure"])
+                state = self.check(code=0)
+                self.assertEqual(state["findings"], [])
+                self.assertEqual((state["interface"]["up"], state["interface"]["mtu"]), (True, 72))
+
+    # Catches: counters that stand still.
+    def test_it_counts_frames(self):
+        self.must(f"ip link add dev {self.interface} mtu 72 type vcan && ip link set {self.interface} up")
+        for _ in range(3):
+            self.must(f"cansend {self.interface} 123#1122")
+        state = self.check(code=0)["interface"]
+        self.assertEqual((state["sent"]["frames"], state["received"]["frames"]), (3, 3))
+        text = self.drivebench("can", "check", self.interface).stdout
+        self.assertIn("received 3 frames", text)
+        self.assertIn("no problems", text)
+
+
+class CanUtils(DriveTest):
+    # Catches: frames that can-utils show otherwise, or that the bench does not hear from them.
+    def test_candump_and_cansend_on_the_bus_of_a_bench(self):
+        self.server(text=with_bus(['backend = "socketcan"', 'channel = "vcan0"', "fd = false", "heartbeat_ms = 20"]))
+        listener = self.start("candump", "-L", "vcan0")
+        self.addCleanup(listener.communicate)
+        self.addCleanup(listener.kill)
+        seen = {}
+        while "701" not in seen:  # the heartbeat of node 1: candump listens, the bench speaks
+            self.next_frame(listener, seen)
+        self.assertEqual(len(seen["701"]), 16)
+        shell("cansend vcan0 301#0100050000000000")  # controller 5 asks for the axis
+        while "381" not in seen:
+            self.next_frame(listener, seen)
+        self.assertEqual(seen["301"], "0100050000000000")
+        self.assertEqual(seen["381"][:4], "0100")  # what was asked: done
+
+    def next_frame(self, listener, seen):
+        line = listener.stdout.readline()
+        self.assertTrue(line, "candump ended")
+        _, interface, frame = line.split()
+        self.assertEqual(interface, "vcan0")
+        identifier, data = frame.split("#")
+        seen[identifier] = data
+
+
+if __name__ == "__main__":
+    run_all()

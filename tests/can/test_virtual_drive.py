@@ -1,0 +1,187 @@
+#!/usr/bin/env python3
+"""A motor started over CAN without kernel CAN: python-can and the DBC file against the real server."""
+import re
+import socket
+import time
+
+import can
+
+import dbc_drive
+from drive_test import DriveTest, PATIENCE_S, in_own_network, run_all, with_bus
+
+GROUP = "239.74.163.2"
+UDP = 'backend = "udp_multicast"'
+TICKS = 1600
+
+
+class VirtualDrive(DriveTest):
+    runs = 0
+
+    def open_loop(self, lines, connect, fd):
+        text = with_bus([*lines, f"fd = {str(fd).lower()}"])
+        dbc = self.text_of("dbc", text)
+        self.runs += 1
+        recording = self.folder / f"run{self.runs}.mcap"
+        server = self.server("--record", str(recording), text=text)
+        with connect(server) as bus:
+            drive = dbc_drive.Drive(bus, dbc, fd=fd)
+            counts = dbc_drive.open_loop_start(drive, TICKS)
+        self.assertEqual(server.stop(), 0, server.errors())
+        self.assertTrue(server.verdict["exact"])
+        self.assertEqual([tick for tick, _ in counts], list(range(TICKS + 1)))
+        self.assertCountsRecorded(counts, recording)
+        replay = self.drivebench("replay", recording)
+        self.assertIn("equal, bit for bit", replay.stdout)
+        return server.verdict["state_hash"], drive
+
+    # Catches: frames that python-can reads otherwise than we write them, or a DBC file that does not describe them.
+    def test_open_loop_start_over_udp_multicast(self):
+        for fd in (True, False):
+            with self.subTest(fd=fd):
+                self.open_loop([UDP],
+                               lambda _: can.Bus(interface="udp_multicast", channel=GROUP, fd=True), fd)
+
+    # Catches: a terminal that python-can's slcan driver cannot talk to.
+    def test_open_loop_start_over_slcan(self):
+        pty = self.folder / "can.pty"
+        self.open_loop(['backend = "slcan"', f'channel = "pty:{pty}"'],
+                       lambda _: can.Bus(interface="slcan", channel=str(pty), bitrate=1_000_000, sleep_after_open=0),
+                       False)
+        self.open_loop(['backend = "slcan"', 'channel = "tcp:127.0.0.1:29600"'],
+                       lambda _: can.Bus(interface="slcan", channel="socket://127.0.0.1:29600", bitrate=1_000_000,
+                                         sleep_after_open=0), False)
+
+    # Catches: a socketcand server that a client written from its protocol description cannot use.
+    def test_a_socketcand_session_by_hand(self):
+        text = with_bus(['backend = "socketcand"', 'channel = "127.0.0.1"', "port = 29700", "fd = false"])
+        dbc = self.text_of("dbc", text)
+        recording = self.folder / "run.mcap"
+        server = self.server("--record", str(recording), text=text)
+        with SocketcandBus(("127.0.0.1", 29700)) as bus:
+            counts = dbc_drive.open_loop_start(dbc_drive.Drive(bus, dbc, fd=False), TICKS)
+        self.assertEqual(server.stop(), 0, server.errors())
+        self.assertCountsRecorded(counts, recording)
+
+    # Catches: identifiers that can be configured but are not used, or 29 bits that become 11 somewhere.
+    def test_identifiers_are_as_configured(self):
+        connect = lambda _: can.Bus(interface="udp_multicast", channel=GROUP, fd=True)  # noqa: E731
+        lines = [UDP, "extended = true"]
+        _, drive = self.open_loop([*lines], connect, True)
+        self.assertTrue(all(message.is_extended_id for _, _, message in drive.received))
+        text = with_bus([UDP]) + "[can.ids]\ncommand = 0x120\nsensors = 0x600\n"
+        dbc = self.text_of("dbc", text)
+        server = self.server(text=text)
+        with connect(server) as bus:
+            drive = dbc_drive.Drive(bus, dbc)
+            tick, *_ = drive.acquire()
+            self.assertEqual(drive.message("command").arbitration_id, 0x121)
+            drive.step(tick, 5.0, 0.0)
+            ids = {message.arbitration_id for name, _, message in drive.received if name == "sensors"}
+            self.assertEqual(ids, {0x601})
+        self.assertEqual(server.stop(), 0)
+
+    # CMD-02. Catches: a bus on which real time waits for the controller, a watchdog that does not bite there, or a
+    # bench that hides what it missed.
+    def test_in_real_time_the_watchdog_bites_when_the_controller_falls_silent(self):
+        text = with_bus([UDP, "sample_every_ticks = 2"]).replace('mode = "lockstep"', 'mode = "realtime"')
+        text = text.replace("command_delay_ticks = 0", "command_delay_ticks = 1").replace(
+            "period_us = 125", "period_us = 1000").replace("watchdog_ticks = 20", "watchdog_ticks = 200")
+        dbc = self.text_of("dbc", text)
+        server = self.server(text=text)
+        with can.Bus(interface="udp_multicast", channel=GROUP, fd=True) as bus:
+            drive = dbc_drive.Drive(bus, dbc)
+            drive.acquire()
+            for _ in range(100):
+                tick, *_ = drive.sample()
+                self.assertEqual(tick % 2, 0, "a sample every second tick")
+                drive.command(tick, 5.0, 0.0)
+            self.assertIn("sensors", drive.seen)
+            self.assertGreater(drive.seen["sensors"]["command_tick"], 0, "which command was in force")
+            while drive.await_message("fault")["faults"] != 1 << 9:  # command_timeout
+                pass
+            self.assertGreaterEqual(drive.await_message("sensors")["missed"], 200)
+            tick, *_ = drive.sample()
+            drive.command(tick, 5.0, 0.0)
+            self.assertEqual(drive.await_message("reply")["result"], 4, "latched")
+        server.stop()
+
+    # Catches: a bus that is asked for more than it can carry, without a word.
+    def test_a_bus_that_cannot_carry_its_frames_is_refused(self):
+        text = with_bus([UDP, "fd = false"]).replace('mode = "lockstep"', 'mode = "realtime"').replace(
+            "command_delay_ticks = 0", "command_delay_ticks = 1")
+        bench = self.folder / "bench.toml"
+        bench.write_text(text, encoding="utf-8")
+        refused = self.drivebench_server(bench, "--port", "0", code=2)
+        self.assertRegex(refused.stderr, r"bus 1 must carry 4\d\d % .* sample_every_ticks from 1 to \d")
+        enough = int(re.search(r"from 1 to (\d+)", refused.stderr)[1])
+        bench.write_text(text.replace("fd = false", f"fd = false\nsample_every_ticks = {enough - 1}"), encoding="utf-8")
+        self.drivebench_server(bench, "--port", "0", code=2)
+        fits = text.replace("fd = false", f"fd = false\nsample_every_ticks = {enough}")
+        self.assertEqual(self.server(text=fits).stop(), 0)
+        bench.write_text(text.replace("fd = false", "edges = true"), encoding="utf-8")
+        self.assertIn("or leave edges out", self.drivebench_server(bench, "--port", "0", code=2).stderr)
+        server = self.server("--allow-overload", text=text)
+        self.assertIn("bus 1 must carry", server.errors())
+        self.assertEqual(server.stop(), 0)
+
+    # CAN-11. Catches: two benches on one bus that both go on talking.
+    def test_two_benches_with_the_same_node_both_notice(self):
+        text = with_bus([UDP])
+        first, second = self.server(text=text), self.server(text=text)
+        for server in (first, second):
+            client = server.client()
+            self.addCleanup(client.close)
+            end = time.monotonic() + PATIENCE_S
+            while client.status().transports[0].state != "ID_CONFLICT":
+                self.assertLess(time.monotonic(), end, "no conflict was noticed")
+                time.sleep(0.02)
+
+
+class SocketcandBus:
+    """Just enough of the socketcand protocol, by hand."""
+
+    def __init__(self, address):
+        self.socket = socket.create_connection(address, PATIENCE_S)
+        self.buffer = ""
+        assert self.receive_text() == "hi"
+        self.send_text("open can0")
+        assert self.receive_text() == "ok"
+        self.send_text("rawmode")
+        assert self.receive_text() == "ok"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+    def send_text(self, text):
+        self.socket.sendall(f"< {text} >".encode())
+
+    def receive_text(self):
+        while ">" not in self.buffer:
+            got = self.socket.recv(4096)
+            assert got, "the server closed the connection"
+            self.buffer += got.decode("ascii")
+        element, self.buffer = self.buffer.split(">", 1)
+        return element.strip().removeprefix("<").strip()
+
+    def send(self, message):
+        data = " ".join(f"{byte:02x}" for byte in message.data)
+        self.send_text(f"send {message.arbitration_id:03x} {message.dlc} {data}")
+
+    def recv(self, timeout):
+        self.socket.settimeout(timeout)
+        try:
+            words = self.receive_text().split()
+        except TimeoutError:
+            return None
+        if words[0] != "frame":
+            return None
+        data = bytes.fromhex("".join(words[3:]))
+        return can.Message(arbitration_id=int(words[1], 16), is_extended_id=len(words[1]) > 3, data=data)
+
+
+if __name__ == "__main__":
+    in_own_network()
+    run_all()

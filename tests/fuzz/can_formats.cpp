@@ -1,0 +1,94 @@
+// What the CAN formats take for a frame is one that a bus can carry, and reads back equal after it was
+// written. The same bytes go to all of them.
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "protocols/can/candump.hpp"
+#include "protocols/can/msgpack.hpp"
+#include "protocols/can/slcan.hpp"
+#include "protocols/can/socketcand.hpp"
+#include "protocols/can/text.hpp"
+#include "tests/fuzz/fuzz.hpp"
+
+namespace drivebench::can {
+namespace {
+
+using fuzz::require;
+
+void check_msgpack(std::span<const std::byte> bytes) {
+  const auto frame = decode_msgpack(bytes);
+  if (!frame) return;
+  require(is_possible(*frame), "a bus can carry a frame from a map");
+  std::array<std::byte, kMaxMsgpackFrame> out;
+  const std::size_t size = encode_msgpack(*frame, 1.0, out);
+  Frame expected = *frame;
+  if (expected.remote) expected.data = {};
+  require(size > 0 && decode_msgpack(std::span(out).first(size)) == expected, "a map reads back equal");
+}
+
+void check_slcan(std::string_view text) {
+  SlcanReader reader;
+  for (const char byte : text) {
+    const auto line = reader.push(byte);
+    if (!line) continue;
+    require(line->text.size() <= kMaxSlcanLine, "a line is bounded");
+    const auto frame = parse_slcan(line->text);
+    if (!frame) continue;
+    require(is_possible(*frame), "a bus can carry a frame from a line");
+    std::string out;
+    append_slcan(out, *frame);
+    require(!out.empty() && out.back() == kSlcanOk, "a line has an end");
+    out.pop_back();
+    require(parse_slcan(out) == *frame, "a line reads back equal");
+  }
+}
+
+void check_socketcand(std::string_view text) {
+  SocketcandReader reader;
+  for (const char byte : text) {
+    const auto element = reader.push(byte);
+    if (!element) continue;
+    require(element->text.size() <= kMaxSocketcandElement, "an element is bounded");
+    std::string out;
+    if (const auto frame = parse_socketcand_send(element->text)) {
+      append_socketcand_send(out, *frame);
+      require(is_possible(*frame) && parse_socketcand_send(out.substr(2, out.size() - 4)) == *frame,
+              "a frame to the server reads back equal");
+    } else if (const auto timed = parse_socketcand_frame(element->text)) {
+      append_socketcand_frame(out, timed->frame, timed->time_s);
+      const auto again = parse_socketcand_frame(out.substr(2, out.size() - 4));
+      require(is_possible(timed->frame) && again && again->frame == timed->frame,
+              "a frame to a client reads back equal");
+    }
+  }
+}
+
+void check_candump(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t size = std::min(text.find('\n'), text.size() - 1) + 1;
+    const auto line = parse_candump(text.substr(0, size));
+    text.remove_prefix(size);
+    if (!line) continue;
+    std::string out;
+    append_candump(out, line->time_s, line->interface, line->frame);
+    const auto again = parse_candump(out);
+    require(is_possible(line->frame) && again && again->frame == line->frame &&
+                again->interface == line->interface,
+            "a line of a log reads back equal");
+  }
+}
+
+}  // namespace
+}  // namespace drivebench::can
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace drivebench;
+  const auto bytes = fuzz::as_bytes_of(data, size);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  can::check_msgpack(bytes);
+  can::check_slcan(text);
+  can::check_socketcand(text);
+  can::check_candump(text);
+  return 0;
+}

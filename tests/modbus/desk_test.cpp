@@ -1,0 +1,158 @@
+// Writes that are carried out as a whole: what reaches the bench, in which order, and what stays of a
+// refusal.
+#include "plant/parameters.hpp"
+#include "server/endpoints/modbus/map_info.hpp"
+#include "tests/modbus/modbus_bench.hpp"
+
+namespace drivebench::modbus {
+namespace {
+
+constexpr Visitor kClient = 1;
+
+/// Keeps the inputs that it has room for and answers them when told.
+class SlowEngine final : public Engine {
+ public:
+  explicit SlowEngine(const BenchConfig& config) : Engine(config, nullptr) {}
+
+  std::size_t room = 256;
+  std::vector<Input> inputs;
+
+  void answer_all() {
+    const std::vector<Answer> answers = std::move(answers_);
+    answers_.clear();
+    for (const Answer& answer : answers)
+      answer(Refused::kNot, tick());
+  }
+
+  Refused check(std::uint32_t, Owner, const Command&) const override { return Refused::kNot; }
+  Refused command(std::uint32_t, Owner, const Command&) override { return Refused::kNot; }
+  void advance() override {}
+  void request(const Input& input, Answer answer) override {
+    if (inputs.size() >= room) return answer(Refused::kBusy, tick());
+    inputs.push_back(input);
+    answers_.push_back(std::move(answer));
+  }
+  drivebench::Verdict stop() override { return {}; }
+  std::uint64_t state_hash() const override { return 0; }
+  std::int64_t worst_lateness_ns() const override { return 0; }
+
+ private:
+  std::vector<Answer> answers_;
+};
+
+/// An axis of a free run, where parameters need no lease.
+struct Desk {
+  static BenchConfig config() {
+    BenchConfig config = modbus_bench_config();
+    config.mode = RunMode::kFree;
+    return config;
+  }
+
+  /// Runs until the write waits for the bench or has ended.
+  void write(std::uint16_t address, Words written) {
+    words = std::move(written);
+    const auto range = map.find(address, static_cast<std::uint16_t>(words.size()));
+    ASSERT_TRUE(range);
+    asio::co_spawn(io, axis.write(*range, words, kClient),
+                   [this](const std::exception_ptr&, AxisDesk::Outcome o) { outcome = o; });
+    run();
+  }
+  void run() {
+    io.restart();
+    io.poll();
+  }
+
+  asio::io_context io;
+  SlowEngine engine{config()};
+  std::vector<ParameterInfo> infos = parameter_infos();
+  RegisterMap map{infos, true};
+  AxisDesk axis{io, engine, map, 0};
+  Words words;
+  std::optional<AxisDesk::Outcome> outcome;
+};
+
+double parameter(const Engine& engine, std::size_t row) {
+  return axis_parameters()[row].get(engine.parameters(0));
+}
+
+// Catches: a block of parameters that takes a tick for each of them, and is half written in between.
+TEST(ModbusDesk, ABlockOfParametersGoesToTheBenchTogether) {
+  Desk desk;
+  desk.write(1002, {0x4000, 0, 0x4000, 0});  // 2 ohm each
+  EXPECT_EQ(desk.engine.inputs.size(), 2u);
+  EXPECT_FALSE(desk.outcome) << "the bench has not answered yet";
+  desk.engine.answer_all();
+  desk.run();
+  ASSERT_TRUE(desk.outcome);
+  EXPECT_EQ(desk.outcome->exception, Exception::kNone);
+  EXPECT_EQ(parameter(desk.engine, 1), 2.0);
+  EXPECT_EQ(parameter(desk.engine, 2), 2.0);
+}
+
+// Catches: a parameter that had no room on its way to the bench and reads as if it had arrived.
+TEST(ModbusDesk, AParameterThatDidNotGetThroughReadsAsBefore) {
+  Desk desk;
+  desk.engine.room = 1;
+  const double second = parameter(desk.engine, 2);
+  const double third = parameter(desk.engine, 3);
+  ASSERT_NE(second, 2.0);
+  desk.write(1002, {0x4000, 0, 0x4000, 0, 0x3e00, 0});
+  desk.engine.answer_all();
+  desk.run();
+  ASSERT_TRUE(desk.outcome);
+  EXPECT_EQ(desk.outcome->exception, Exception::kBusy);
+  EXPECT_EQ(desk.outcome->refusal, static_cast<std::uint16_t>(Refused::kBusy));
+  EXPECT_EQ(desk.engine.inputs.size(), 1u);
+  EXPECT_EQ(parameter(desk.engine, 1), 2.0) << "this one is on its way";
+  EXPECT_EQ(parameter(desk.engine, 2), second);
+  EXPECT_EQ(parameter(desk.engine, 3), third);
+}
+
+// Catches: a lease without a connection that a refused command keeps for as long as an owner may be silent,
+// or gives away.
+TEST(ModbusDesk, ARefusedCommandDoesNotProlongALeaseThatLapses) {
+  BenchConfig config = modbus_bench_config();
+  config.setup.lease_ticks = 500'000'000 / config.setup.period_ns;
+  config.modbus.idle_timeout_ms = 1'000'000;
+  ModbusBench bench(config);
+  {
+    Client owner(bench.port());
+    ASSERT_EQ(owner.write(400, {7}), 0);
+  }
+  bench.until([&] { return bench.count("connections") == 0; });
+  Client other(bench.port());
+  Words all{7, 0};
+  const Words stale = command_words(1, 77, 0.0f, 0.0f);
+  all.insert(all.end(), stale.begin(), stale.end());
+  EXPECT_EQ(other.write(400, all), 4);
+  EXPECT_NE(other.read_one(409), 1) << "the lease did not change hands";
+  bench.until([&] { return bench.owner() == 0; });
+}
+
+// Catches: a key that is given back with a request that nobody carries out, and no word of it.
+TEST(ModbusDesk, GivingBackTheLeaseGoesWithNothingElse) {
+  ModbusBench bench;
+  Client client(bench.port());
+  ASSERT_EQ(client.write(400, {7}), 0);
+  for (const std::uint16_t request : Words{1, 3}) {
+    EXPECT_EQ(client.write(400, {0, request}), 3) << request;
+    EXPECT_NE(bench.owner(), 0u);
+  }
+  EXPECT_EQ(client.write(400, {0, 2}), 0) << "says the same twice";
+  EXPECT_EQ(bench.owner(), 0u);
+  ASSERT_EQ(client.write(400, {7}), 0);
+  EXPECT_EQ(client.write(400, {0, 0}), 0);
+  EXPECT_EQ(bench.owner(), 0u);
+}
+
+// Catches: an exchange that reads back the words as they came, whatever the registers show.
+TEST(ModbusDesk, AnExchangeReadsWhatTheRegistersShow) {
+  ModbusBench bench;
+  Client client(bench.port());
+  EXPECT_EQ(Client::words_in(client.ask(read_write_pdu(400, 2, 400, {7, 3}))), (Words{7, 0}))
+      << "request reads as 0";
+  EXPECT_EQ(client.ask(read_write_pdu(399, 2, 400, {7, 3})), exception_pdu(23, 2));
+}
+
+}  // namespace
+}  // namespace drivebench::modbus

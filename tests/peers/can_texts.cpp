@@ -1,0 +1,57 @@
+// For tests/peers/test_can_dbc.py: what the library says of its CAN messages, and frames with the values that
+// they carry.
+//
+//   can_texts dbc|table|frames classic|fd standard|extended
+//
+// A line of `frames`: identifier, data, then NAME=VALUE for each field.
+#include <cstdio>
+#include <cstring>
+#include <random>
+
+#include "protocols/can/codec.hpp"
+#include "protocols/can/dbc.hpp"
+#include "protocols/can/table_text.hpp"
+#include "protocols/can/text.hpp"
+
+namespace {
+using namespace drivebench::can;
+
+void print_frames(const Profile& profile, std::span<const BusAxis> axes) {
+  constexpr int kFramesOfEach = 200;
+  std::mt19937_64 random(3);
+  for (const MessageRow* row : rows_of(profile)) {
+    for (int i = 0; i < kFramesOfEach; ++i) {
+      Frame frame;
+      for (std::size_t byte = 0; byte < row->size; ++byte)
+        frame.data[byte] = static_cast<std::uint8_t>(random() % 4 == 0 ? 0xFF : random());
+      const Values carried = decode(*row, profile, frame);
+      frame = encode(*row, profile, axes[random() % axes.size()].node, carried);  // without reserved bytes
+      std::string line;
+      append_id(line, frame);
+      line += " ";
+      append_data(line, frame);
+      for (std::size_t field = 0; field < row->fields.size(); ++field)
+        line += " " + std::string(row->fields[field].name) + "=" + number_text(carried[field]);
+      std::puts(line.c_str());
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 4) return 2;
+  Profile profile;
+  profile.fd = std::strcmp(argv[2], "fd") == 0;
+  profile.extended = std::strcmp(argv[3], "extended") == 0;
+  if (profile.extended) profile.base_ids[static_cast<std::size_t>(Message::kCommand)] = 0x12340000;
+  profile.edge_time_unit_s = 2.5e-7;
+  const std::vector<BusAxis> axes = {
+      {"servo", 1}, {"2nd \"load\" drive with a long name", 2}, {"2nd \"load\" drive too", 127}};
+  if (std::strcmp(argv[1], "dbc") == 0)
+    std::fputs(dbc_text("Zwei \"Achsen\" \xC3\xA4", profile, axes).c_str(), stdout);
+  else if (std::strcmp(argv[1], "table") == 0)
+    std::fputs(table_text("two axes", profile, axes).c_str(), stdout);
+  else
+    print_frames(profile, axes);
+}

@@ -1,0 +1,154 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "protocols/can/budget.hpp"
+#include "protocols/can/dbc.hpp"
+#include "protocols/can/table_text.hpp"
+
+namespace drivebench::can {
+namespace {
+
+void expect_time(const FrameTime& time, double least_us, double most_us) {
+  EXPECT_NEAR(1e6 * time.least_s, least_us, 1e-6);
+  EXPECT_NEAR(1e6 * time.most_s, most_us, 1e-6);
+}
+
+// Catches: a part of a frame that is not counted. The numbers are counted by hand from ISO 11898-1:2015; of
+// the FD frames of more than 16 bytes with seven fixed stuff bits in 25 bits of stuff count and CRC.
+TEST(CanBudget, FramesTakeThisLong) {
+  expect_time(frame_time(8, false, false, 1e6, 5e6), 111, 135);
+  expect_time(frame_time(0, false, false, 1e6, 5e6), 47, 55);
+  expect_time(frame_time(8, false, true, 1e6, 5e6), 131, 160);
+  expect_time(frame_time(8, false, false, 5e5, 5e6), 222, 270);
+  // 30 bits around the data, 5 and 27 or 32 with them; 4 stuff bits before them
+  expect_time(frame_time(32, true, false, 1e6, 5e6), 30 + 293 / 5.0, 30 + 293 / 5.0 + 4 + 65 / 5.0);
+  expect_time(frame_time(64, true, false, 1e6, 5e6), 30 + 549 / 5.0, 30 + 549 / 5.0 + 4 + 129 / 5.0);
+  expect_time(frame_time(24, true, false, 1e6, 8e6), 30 + 229 / 8.0, 30 + 229 / 8.0 + 4 + 49 / 8.0);
+  expect_time(frame_time(16, true, false, 1e6, 1e6), 30 + 160, 30 + 160 + 4 + 33);
+  expect_time(frame_time(8, true, true, 1e6, 1e6), 49 + 96, 49 + 96 + 8 + 18);
+}
+
+const MessageLoad& load_of(const BusLoad& load, Message message) {
+  for (const MessageLoad& part : load.messages) {
+    if (part.row->message == message) return part;
+  }
+  ADD_FAILURE() << "not counted";
+  return load.messages.at(0);
+}
+
+// Catches: a message, an axis or a rate that is left out of the sum.
+TEST(CanBudget, TheLoadCountsWhatIsSent) {
+  Profile profile;
+  profile.fd = false;
+  BusUse use;
+  BusLoad load = bus_load(profile, use);
+  const double once = 111e-6;
+  const double sync = 87e-6;  // 5 bytes
+  const double heartbeats = 10 * (111e-6 + 55e-6);
+  EXPECT_NEAR(load.least_share, 1000 * sync + 3000 * once + 2 * 12.5 * once + heartbeats, 1e-9);
+  EXPECT_NEAR(load_of(load, Message::kCurrents).frames_per_s, 1000, 1e-9);
+
+  use.axes = 2;
+  EXPECT_NEAR(load_of(bus_load(profile, use), Message::kHeartbeat).frames_per_s, 20, 1e-9);
+  use.sample_every_ticks = 2;
+  use.heartbeat_ms = 0;
+  load = bus_load(profile, use);
+  EXPECT_NEAR(load.least_share, 500 * sync + 2 * 1500 * once + 4 * 12.5 * once, 1e-9);
+  EXPECT_GT(load.most_share, 1.2 * load.least_share);
+
+  profile.fd = true;
+  use.edges = true;
+  load = bus_load(profile, use);
+  EXPECT_NEAR(load_of(load, Message::kEdges).frames_per_s, 2000, 1e-9);
+  EXPECT_NEAR(load_of(load, Message::kSensors).frames_per_s, 1000, 1e-9);
+  EXPECT_NEAR(load_of(load, Message::kState).frames_per_s, 25, 1e-9);
+}
+
+// Catches: rates that the documentation promises and that do not fit, or do with a third of the bus alone.
+TEST(CanBudget, TheDocumentedRatesFit) {
+  Profile profile;
+  profile.fd = false;
+  EXPECT_LT(bus_load(profile, {.period_s = 1.0 / 1000}).most_share, 0.6);
+  EXPECT_GT(bus_load(profile, {.period_s = 1.0 / 2000}).most_share, 1.0);
+  profile.fd = true;
+  EXPECT_LT(bus_load(profile, {.period_s = 1.0 / 2000}).most_share, 0.6);
+  EXPECT_LT(bus_load(profile, {.period_s = 1.0 / 3000, .data_bit_rate = 8e6}).most_share, 0.6);
+  EXPECT_GT(bus_load(profile, {.period_s = 1.0 / 8000}).most_share, 1.0);
+}
+
+TEST(CanBudget, TheTextHasALineForEachMessageAndTheSum) {
+  Profile profile;
+  profile.fd = false;
+  const std::string text = load_text(bus_load(profile, {}));
+  EXPECT_NE(text.find("| currents | 1000.0 | 111 to 135 | 11.1 to 13.5 |\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("| all | 4045.0 |  | 42.4 to 51.5 |\n"), std::string::npos) << text;
+}
+
+// Catches: a list in the table that its loops do not read as its reader does.
+TEST(CanTexts, EveryChoiceIsListed) {
+  std::size_t lists = 0;
+  for (const MessageRow& row : kMessages) {
+    for (const Field& field : row.fields) {
+      const std::vector<Choice> choices = choices_of(field);
+      EXPECT_EQ(choices.size() >= 2, field.unit == "enum") << row.name << " " << field.name;
+      for (std::size_t i = 1; i < choices.size(); ++i)
+        EXPECT_GT(choices[i].number, choices[i - 1].number) << row.name << " " << field.name;
+      if (!choices.empty()) ++lists;
+    }
+  }
+  EXPECT_GE(lists, 10u);
+  const MessageRow& sync = *find_message(Message::kSync, true);
+  const std::vector<Choice> modes = choices_of(sync.fields[1]);
+  ASSERT_EQ(modes.size(), 2u);
+  EXPECT_EQ(modes[0].label, "real time");
+  EXPECT_EQ(modes[1].number, 1u);
+  EXPECT_EQ(modes[1].label, "lockstep");
+}
+
+bool contains(const std::string& text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
+
+// Catches: the lines of a DBC file that programs depend on, by the letter. canmatrix checks the rest
+// (tests/peers/test_can_dbc.py).
+TEST(CanTexts, TheDbcFileHasTheseLines) {
+  Profile profile;
+  profile.fd = false;
+  const std::vector<BusAxis> axes = {{"servo", 1}, {"7th axis", 2}, {"7th-axis", 3}};
+  std::string text = dbc_text("bench \"one\"", profile, axes);
+  EXPECT_TRUE(contains(text,
+                       "BO_ 385 servo_currents: 8 Bench\n SG_ i_a : 0|16@1- (0.001,0) [-32.767|32.767] "
+                       "\"A\" Controller\n"));
+  EXPECT_TRUE(contains(text, " SG_ bus_voltage : 16|16@1+ (0.1,0) [0|6553.4] \"V\" Controller\n"));
+  EXPECT_TRUE(contains(text, "BO_ 514 _7th_axis_command: 8 Controller\n"));
+  EXPECT_TRUE(contains(text, "BO_ 515 node3_command: 8 Controller\n"));
+  EXPECT_TRUE(contains(text, "BO_ 128 sync: 5 Bench\n"));
+  EXPECT_TRUE(contains(text, "VAL_ 513 mode 0 \"gates off\" 1 \"voltages\" 2 \"zero voltage\" 3 \"duties"));
+  EXPECT_TRUE(contains(text, "BA_ \"VFrameFormat\" BO_ 513 0;\n"));
+  EXPECT_TRUE(contains(text, "BA_ \"DBName\" \"bench 'one'\";\n"));
+  EXPECT_FALSE(contains(text, "SIG_VALTYPE_"));
+
+  profile = Profile{};
+  profile.extended = true;
+  text = dbc_text("bench", profile, axes);
+  EXPECT_TRUE(contains(text, "BO_ 2147484033 servo_sensors: 32 Bench\n"));
+  EXPECT_TRUE(contains(text, "SIG_VALTYPE_ 2147484033 i_a : 1;\n"));
+  EXPECT_TRUE(contains(text, "BA_ \"VFrameFormat\" BO_ 2147484033 15;\n"));
+  EXPECT_TRUE(contains(text,
+                       "CM_ SG_ 2147484033 i_a \"measured current of phase a, into the machine; NaN: no "
+                       "value\";\n"));
+}
+
+// Catches: lines of the Markdown table that changed unseen.
+TEST(CanTexts, TheTableHasTheseLines) {
+  Profile profile;
+  profile.fd = false;
+  const std::string text = table_text("bench", profile, std::vector<BusAxis>{{"servo", 1}, {"load", 9}});
+  EXPECT_TRUE(contains(text, "| command | controller | 0x201 | 0x209 |\n"));
+  EXPECT_TRUE(contains(text, "| 2-3 | i_b | int16 x 0.001 | A | -32.767 to 32.767 | 0x8000 | measured"));
+  EXPECT_TRUE(contains(text, "| currents | `181#DC0512FDE8032301` | i_a 1.5 A, i_b -0.75 A, tick 1000, "));
+}
+
+}  // namespace
+}  // namespace drivebench::can

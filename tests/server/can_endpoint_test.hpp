@@ -1,0 +1,155 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "protocols/can/codec.hpp"
+#include "server/asio.hpp"
+#include "server/endpoints/can/endpoint.hpp"
+#include "server/endpoints/can/memory_bus.hpp"
+#include "tests/server/run_config.hpp"
+
+namespace drivebench::can {
+
+/// A message that came in, by field.
+struct Received {
+  const MessageRow* row;
+  std::uint32_t node;
+  Values values;
+  Frame frame;
+
+  double operator[](std::string_view field) const {
+    return values[index_of(row->message, row->variant == Variant::kFd, field)];
+  }
+};
+
+/// A lockstep bench on a bus in memory, and a controller on the same bus that says what it is told to.
+class CanBench {
+ public:
+  explicit CanBench(Profile profile = {}, std::size_t axes = 1) {
+    BenchConfig bench = servo_bench(axes);
+    CanConfig can;
+    can.profile = profile;
+    can.edges = profile.fd;
+    can.state_every_ticks = 4;
+    can.heartbeat_ms = 10;
+    can.controller_timeout_ms = 30;
+    bench.can.push_back(can);
+    setup(bench);
+  }
+  explicit CanBench(const BenchConfig& bench) { setup(bench); }
+
+  /// Lets everything happen that needs no waiting.
+  void settle() {
+    io_.restart();
+    io_.poll();
+  }
+  /// Waits for a message, whatever time that takes; for things that a timer does.
+  Received wait_for(Message message) {
+    for (;;) {
+      if (const auto found = newest(message)) return *found;
+      wait();
+    }
+  }
+  /// Waits until something happens.
+  void wait() {
+    io_.restart();
+    io_.run_one();
+  }
+
+  void send(Message message, std::span<const double> values, std::uint32_t node = 1) {
+    controller_->send(encode(*find_message(message, profile_.fd), profile_, node, values));
+    settle();
+  }
+  void send(const Frame& frame) {
+    controller_->send(frame);
+    settle();
+  }
+  void request(Request request, std::uint8_t lease = 0, std::uint32_t controller = 77,
+               std::uint32_t node = 1) {
+    received.clear();
+    send(
+        Message::kRequest,
+        std::array{static_cast<double>(request), static_cast<double>(lease), static_cast<double>(controller)},
+        node);
+  }
+  /// The lease number; 0 if refused.
+  std::uint8_t acquire(std::uint32_t controller = 77, std::uint32_t node = 1) {
+    request(Request::kAcquire, 0, controller, node);
+    const auto reply = newest(Message::kReply);
+    return reply && (*reply)["result"] == 0.0 ? static_cast<std::uint8_t>((*reply)["lease"])
+                                              : std::uint8_t{0};
+  }
+  /// `answers` may be any number: its low bits go out.
+  void command(double answers, double u_a, double u_b, std::uint8_t lease, double mode = 1.0,
+               std::uint32_t node = 1) {
+    received.clear();
+    if (profile_.fd) {
+      send(Message::kCommand, std::array{answers, u_a, u_b, mode, static_cast<double>(lease)}, node);
+    } else {
+      send(Message::kCommand, std::array{u_a, u_b, answers, mode, static_cast<double>(lease)}, node);
+    }
+  }
+  std::optional<Received> newest(Message message, std::uint32_t node = 1) const {
+    for (auto it = received.rbegin(); it != received.rend(); ++it) {
+      if (it->row->message == message && (!it->row->per_node || it->node == node)) return *it;
+    }
+    return std::nullopt;
+  }
+  /// `result` of the newest reply; -1: there was none.
+  double result() const {
+    const auto reply = newest(Message::kReply);
+    return reply ? (*reply)["result"] : -1.0;
+  }
+  std::uint64_t count(std::string_view name) const {
+    for (const auto& [key, value] : endpoint_->report().counts) {
+      if (key == name) return value;
+    }
+    ADD_FAILURE() << "no count " << name;
+    return 0;
+  }
+
+  Engine& engine() { return *engine_; }
+  Endpoint& endpoint() { return *endpoint_; }
+  MemoryWire& wire() { return wire_; }
+  const Profile& profile() const { return profile_; }
+
+  std::vector<Received> received;
+
+ private:
+  void setup(const BenchConfig& bench) {
+    profile_ = bench.can.front().profile;
+    controller_ = wire_.connect("controller");
+    controller_->on_frame = [this](const Frame& frame, std::int64_t) {
+      const Match found = match(profile_, frame);
+      ASSERT_TRUE(found.ok()) << name_of(found.problem);
+      received.push_back({found.row, found.node, decode(*found.row, profile_, frame), frame});
+    };
+    endpoint_ = std::make_unique<Endpoint>(io_, bench.can.front(), wire_.connect("bench"));
+    engine_ = make_lockstep_engine(bench, nullptr);
+    endpoint_->serve(*engine_);
+    settle();
+  }
+
+  asio::io_context io_{1};
+  MemoryWire wire_{io_};
+  Profile profile_;
+  std::unique_ptr<Bus> controller_;
+  std::unique_ptr<Endpoint> endpoint_;
+  std::unique_ptr<Engine> engine_;
+};
+
+inline Profile classic() {
+  Profile profile;
+  profile.fd = false;
+  return profile;
+}
+
+}  // namespace drivebench::can
