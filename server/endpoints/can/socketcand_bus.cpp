@@ -26,10 +26,6 @@ constexpr std::string_view kOk = "< ok >";
 /// Before open; after it; frames flow; statistics flow.
 enum class Mode : std::uint8_t { kNoBus, kOpen, kRaw, kControl };
 
-double realtime_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 std::size_t data_size(const Frame& frame) {
   return frame.remote ? 0 : frame.size;
 }

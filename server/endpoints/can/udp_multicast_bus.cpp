@@ -111,10 +111,6 @@ bool confine(int fd, const Address& group, unsigned loopback) {
          set_int(fd, IPPROTO_IP, IP_MULTICAST_TTL, 0) && ::bind(fd, source.raw(), source.size()) == 0;
 }
 
-double realtime_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 class UdpMulticastBus final : public VirtualBus {
  public:
   UdpMulticastBus(asio::io_context& io, const CanConfig& config)

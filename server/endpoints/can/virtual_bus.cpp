@@ -65,6 +65,10 @@ std::string reason() {
   return std::system_category().message(errno);
 }
 
+double realtime_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 bool adopt(asio::posix::stream_descriptor& stream, int fd) {
   boost::system::error_code error;
   stream.assign(fd, error);

@@ -49,6 +49,8 @@ class VirtualBus : public Bus {
 
 /// What errno says.
 std::string reason();
+/// Seconds since 1970, for formats whose frames carry the time.
+double realtime_s();
 /// Gives the descriptor to Asio; closes it if that fails.
 bool adopt(asio::posix::stream_descriptor& stream, int fd);
 
