@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "plant/noise.hpp"
-#include "plant/rk4.hpp"
+#include "plant/rounding.hpp"
+#include "plant/shared_shaft.hpp"
 
 namespace drivebench {
 namespace {
@@ -15,191 +15,309 @@ constexpr double kTurnRad = 2.0 * std::numbers::pi;
 // Far outside of every machine of this bench; a state beyond it has diverged.
 constexpr double kEnvelope = 1e9;
 
-double sign_of(double x) noexcept {
-  return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0);
+// Channels of noise of an axis: its analog sensors, then the corruption of commands.
+constexpr std::uint64_t kNoiseChannels = 32;
+constexpr std::uint64_t kCommandNoise = 16;
+
+Connection connection_of(const MachineParameters& machine) noexcept {
+  return std::visit([](const auto& p) { return drivebench::connection_of(p); }, machine);
 }
 
-/// Fraction of a step at which a value that goes linearly from `from` to `to` reaches zero; 1 if it does not.
-double zero_crossing(double from, double to) noexcept {
-  return from * to < 0.0 ? from / (from - to) : 1.0;
+double pole_pairs_of(const MachineParameters& machine) noexcept {
+  return std::visit([](const auto& p) { return drivebench::pole_pairs_of(p); }, machine);
 }
 
-}  // namespace
-
-Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::uint64_t index) noexcept
-    : p_(p),
-      machine_(constants_of(p.machine)),
-      encoder_(p.encoder, timing.period_s),
-      timing_(timing),
-      step_s_(timing.period_s / timing.substeps),
-      seed_(seed),
-      noise_channel_(2 * index),
-      has_dry_friction_(p.mechanics.coulomb_friction_nm > 0.0 || p.mechanics.static_friction_nm > 0.0) {
-  state_.encoder.count = encoder_.count_at(0.0, 0);
+bool has_field(const MachineParameters& machine) noexcept {
+  return std::holds_alternative<SeparateDcMachineParameters>(machine) ||
+         std::holds_alternative<ShuntDcMachineParameters>(machine) ||
+         std::holds_alternative<SeriesDcMachineParameters>(machine) ||
+         std::holds_alternative<WoundRotorMachineParameters>(machine);
 }
 
-void Axis::set_parameters(const AxisParameters& p) noexcept {
-  p_ = p;
-  machine_ = constants_of(p.machine);
-  has_dry_friction_ = p.mechanics.coulomb_friction_nm > 0.0 || p.mechanics.static_friction_nm > 0.0;
+bool shaft_has_events(const MechanicsParameters& p) noexcept {
+  return has_events(p) || p.motion != ShaftMotion::kFree;
 }
 
-Axis::Branch Axis::branch_at(const DriveState& x, const PhaseCommand& command, TwoPhase voltage_v,
-                             double load_nm) const noexcept {
-  Branch branch{{.voltage_v = voltage_v}, {}};
-  if (command.gates == Gates::kOff) {
-    // A diode conducts while current flows, against the voltage of the DC link; without current it starts to
-    // conduct only when the back-emf exceeds that voltage.
-    const TwoPhase open_v = open_circuit_voltage_v(machine_, x.machine, x.shaft.speed_rad_s);
-    const auto diode = [this](double current_a, double open_circuit_v, double& v, double& conducts) {
-      const double link_v = p_.amplifier.voltage_limit_v;
-      conducts = current_a != 0.0 || std::abs(open_circuit_v) > link_v ? 1.0 : 0.0;
-      v = current_a != 0.0 ? -sign_of(current_a) * link_v : sign_of(open_circuit_v) * link_v;
-      if (conducts == 0.0) v = open_circuit_v;
-    };
-    diode(x.machine.i_a_a, open_v.a, branch.terminals.voltage_v.a, branch.terminals.conducts.a);
-    diode(x.machine.i_b_a, open_v.b, branch.terminals.voltage_v.b, branch.terminals.conducts.b);
-  }
-  if (has_dry_friction_) {
-    branch.friction =
-        friction_branch(p_.mechanics, x.shaft.speed_rad_s, torque_nm(machine_, x.machine) - load_nm);
-  }
-  return branch;
+AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
+                 std::uint64_t index) noexcept {
+  const Connection connection = connection_of(p.machine);
+  const std::uint64_t noise = kNoiseChannels * index;
+  return {.p = p,
+          .timing = timing,
+          .step_s = timing.period_s / timing.substeps,
+          .connection = connection,
+          .pole_pairs = pole_pairs_of(p.machine),
+          .drive = Drive(p.drive, connection, timing.period_s, seed, noise + kCommandNoise),
+          .sensors = SensorBank(p.sensors, connection, timing.period_s, seed, noise,
+                                timing.period_s / timing.substeps, has_field(p.machine)),
+          .encoder = Encoder(p.encoder, timing.period_s),
+          .shaft = constants_of(p.mechanics),
+          .shaft_has_events = shaft_has_events(p.mechanics)};
 }
 
-DriveState Axis::integrated(const DriveState& x, double duration_s, const Branch& branch,
-                            double load_nm) const noexcept {
-  return rk4_step(x, duration_s, [&](const DriveState& s) noexcept -> DriveState {
-    return {
-        .machine = derivative(machine_, s.machine, s.shaft.speed_rad_s, branch.terminals),
-        .shaft = derivative(p_.mechanics, s.shaft, torque_nm(machine_, s.machine), load_nm, branch.friction)};
-  });
+RotorMotion motion_of(const AxisState& state) noexcept {
+  return {
+      .angle_rad = state.shaft.angle_rad, .speed_rad_s = state.shaft.speed_rad_s, .electrical = {1.0, 0.0}};
 }
 
-void Axis::record_segment(double start_s, double duration_s, const ShaftState& from,
-                          const ShaftState& to) noexcept {
-  segments_[segment_count_++] = {.start_s = start_s,
-                                 .duration_s = duration_s,
-                                 .start_rad = from.angle_rad,
-                                 .end_rad = to.angle_rad,
-                                 .start_rad_s = from.speed_rad_s,
-                                 .end_rad_s = to.speed_rad_s};
-}
-
-void Axis::substep(double start_s, double duration_s, const PhaseCommand& command, TwoPhase voltage_v,
-                   double load_nm) noexcept {
-  const bool freewheels = command.gates == Gates::kOff;
-  const bool has_events = freewheels || has_dry_friction_;
-  for (std::size_t events = 0;; ++events) {
-    const DriveState from = state_.drive;
-    const Branch branch = branch_at(from, command, voltage_v, load_nm);
-    state_.voltage_v = branch.terminals.voltage_v;
-    DriveState to = integrated(from, duration_s, branch, load_nm);
-    double fraction = 1.0;
-    if (has_events && events < kMaxEvents) {
-      const double stop =
-          has_dry_friction_ ? zero_crossing(from.shaft.speed_rad_s, to.shaft.speed_rad_s) : 1.0;
-      const double a_off = freewheels ? zero_crossing(from.machine.i_a_a, to.machine.i_a_a) : 1.0;
-      const double b_off = freewheels ? zero_crossing(from.machine.i_b_a, to.machine.i_b_a) : 1.0;
-      fraction = std::min({stop, a_off, b_off});
-      if (fraction < 1.0) {
-        to = integrated(from, fraction * duration_s, branch, load_nm);
-        if (fraction == stop) to.shaft.speed_rad_s = 0.0;
-        if (fraction == a_off) to.machine.i_a_a = 0.0;
-        if (fraction == b_off) to.machine.i_b_a = 0.0;
-      }
-    }
-    record_segment(start_s, fraction * duration_s, from.shaft, to.shaft);
-    state_.drive = to;
-    if (fraction == 1.0) return;
-    start_s += fraction * duration_s;
-    duration_s -= fraction * duration_s;
-  }
-}
-
-void Axis::advance(const PhaseCommand& command, Tick tick) noexcept {
-  if ((state_.faults & kDiverged) != 0) return;
-  const DriveState before = state_.drive;
-  state_.faults &= kLatchedFaults;
-  segment_count_ = 0;
-  last_tick_turn_ = state_.turns;
-  last_tick_count_ = state_.encoder.count;
-  const double load_nm = state_.load.at(tick);
-  const double limit_a = p_.amplifier.over_current_a;
-  PhaseCommand effective = command;
-  if ((state_.faults & kOverCurrentTrip) != 0) effective.gates = Gates::kOff;
-  const AmplifierOutput output = amplifier_output(p_.amplifier, effective);
-  if (output.saturated) state_.faults |= kVoltageSaturated;
-  for (int n = 0; n < timing_.substeps; ++n) {
-    substep(n * step_s_, step_s_, effective, output.voltage_v, load_nm);
-    if (std::abs(state_.drive.machine.i_a_a) > limit_a || std::abs(state_.drive.machine.i_b_a) > limit_a) {
-      state_.faults |= kOverCurrent;
-      if (p_.amplifier.over_current_trip) {
-        state_.faults |= kOverCurrentTrip;
-        effective.gates = Gates::kOff;  // for the substeps that are left, too
-      }
-    }
-  }
-  if (!finite()) {
-    state_.drive = before;
-    state_.faults |= kDiverged;
-    segment_count_ = 0;
-    return;
-  }
-  encoder_.follow(state_.encoder, last_tick(), tick, last_tick_turn_);
-  if (has_dry_friction_ && state_.drive.shaft.speed_rad_s == 0.0) state_.faults |= kShaftHeld;
-  wrap_angle();
-}
-
-void Axis::wrap_angle() noexcept {
-  double& angle_rad = state_.drive.shaft.angle_rad;
+/// Brings the angle back into [0, 2 pi) and counts the turns.
+void wrap_angle(AxisState& state) noexcept {
+  double& angle_rad = state.shaft.angle_rad;
   if (angle_rad >= 0.0 && angle_rad < kTurnRad) return;
   const std::int64_t whole = floor_to_integer(angle_rad / kTurnRad);
   angle_rad -= static_cast<double>(whole) * kTurnRad;
-  state_.turns += whole;
+  state.turns += whole;
   if (angle_rad < 0.0) {
     angle_rad = 0.0;  // the quotient was rounded up
   } else if (angle_rad >= kTurnRad) {
     angle_rad = 0.0;  // so little below a turn that the difference is rounded up to it
-    ++state_.turns;
+    ++state.turns;
+  }
+}
+
+/// What decays for hundreds of time constants becomes so small that processors take a hundred times as long
+/// for it.
+void forget_negligible(AxisState& state) noexcept {
+  constexpr double kNegligible = 1e-200;
+  for (double& word : state.machine) {
+    if (std::abs(word) < kNegligible) word = 0.0;
+  }
+  for (double& value : state.sensors.filtered) {
+    if (std::abs(value) < kNegligible) value = 0.0;
+  }
+  for (double* const value :
+       {&state.drive.filtered_v.a, &state.drive.filtered_v.b, &state.drive.filtered_v.c}) {
+    if (std::abs(*value) < kNegligible) *value = 0.0;
+  }
+  if (std::abs(state.shaft.speed_rad_s) < kNegligible) state.shaft.speed_rad_s = 0.0;
+}
+
+}  // namespace
+
+Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::uint64_t index)
+    : core_(core_of(p, timing, seed, index)), train_(make_train(p.machine, has_two_masses(p.mechanics))) {
+  state_.drive = core_.drive.initial();
+  state_.thermal.temperature_k = p.thermal.ambient_k;
+  state_.encoder.count = core_.encoder.count_at(0.0, 0);
+  adjust();
+  state_.sensors =
+      core_.sensors.settled({.bus_v = state_.drive.bus_v, .temperature_k = state_.thermal.temperature_k}, 0);
+}
+
+Axis::Axis(const Axis& other) : core_(other.core_), train_(other.train_->clone()), state_(other.state_) {}
+
+Axis& Axis::operator=(const Axis& other) {
+  if (this != &other) {
+    core_ = other.core_;
+    train_ = other.train_->clone();
+    state_ = other.state_;
+  }
+  return *this;
+}
+
+void Axis::set_parameters(const AxisParameters& p) noexcept {
+  core_.p = p;
+  core_.drive.set_parameters(p.drive);
+  core_.sensors.set_parameters(p.sensors);
+  core_.shaft = constants_of(p.mechanics);
+  core_.shaft_has_events = shaft_has_events(p.mechanics);
+  adjust();
+}
+
+void Axis::restore(const AxisState& state) noexcept {
+  state_ = state;
+  core_.segment_count = 0;
+  adjust();
+}
+
+void Axis::bump(double impulse_nms) noexcept {
+  state_.shaft = bumped(core_.shaft, state_.shaft, impulse_nms);
+}
+
+void Axis::inject(std::size_t row, double value) noexcept {
+  state_.injected.*kInjectableFaults[row].member = value;
+  adjust();
+}
+
+void Axis::adjust() noexcept {
+  Adjustment a = thermal_adjustment(core_.p.thermal, state_.thermal);
+  a.stator_resistance_factor *= 1.0 + state_.injected.stator_resistance_drift;
+  a.rotor_resistance_factor *= 1.0 + state_.injected.rotor_resistance_drift;
+  a.magnet_factor *= 1.0 - state_.injected.demagnetisation;
+  if (core_.p.drive.kind == DriveKind::kSource) {
+    a.series_resistance_ohm = core_.p.drive.source.resistance_ohm;
+    a.series_inductance_h = core_.p.drive.source.inductance_h;
+  }
+  train_->set_machine(core_.p.machine, a);
+}
+
+void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
+  state_.faults &= kLatchedFaults;
+  core_.segment_count = 0;
+  core_.last_tick_turn = state_.turns;
+  core_.last_tick_encoder = state_.encoder;
+  core_.drive.begin_tick(state_.drive, command, state_.injected, tick);
+  if ((state_.faults & kOverCurrentTrip) != 0) core_.drive.switch_off(state_.drive);
+  core_.follows = core_.drive.follows() || core_.sensors.follows() || core_.p.thermal.enabled ||
+                  has_impedance(core_.p.drive);
+}
+
+double Axis::load_at(Tick tick) const noexcept {
+  const double load_nm = state_.load.at(tick);
+  if (core_.p.mechanics.load_profile.empty()) return load_nm;
+  return load_nm + profile_load_nm(core_.p.mechanics, static_cast<double>(tick) * core_.timing.period_s);
+}
+
+void Axis::hold(const MotionState& before) noexcept {
+  state_.machine = before.machine;
+  state_.shaft = before.shaft;
+  state_.drive = core_.drive.initial();
+  state_.sensors.filtered = {};
+  state_.faults |= kDiverged;
+  core_.segment_count = 0;
+}
+
+void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
+  if (!finite()) return hold(before);
+  if (state_.drive.saturated != 0.0) state_.faults |= kVoltageSaturated;
+  core_.encoder.follow(state_.encoder, last_tick(), tick, core_.last_tick_turn, state_.injected);
+  if (core_.shaft_has_events && state_.shaft.speed_rad_s == 0.0) state_.faults |= kShaftHeld;
+  wrap_angle(state_);
+  forget_negligible(state_);
+  if (core_.p.thermal.enabled) {
+    drivebench::advance(core_.p.thermal, state_.thermal, state_.heat_j, core_.timing.period_s);
+    state_.heat_j = 0.0;
+    adjust();
+  }
+  const MachineTruth truth = train_->truth(state_, motion_of(state_));
+  core_.sensors.end_tick(
+      state_.sensors,
+      {.current_a = terminal_currents(core_.connection, truth.current_a, state_.open_terminals),
+       .voltage_v = state_.voltage_v,
+       .bus_v = state_.drive.bus_v,
+       .neutral_v = state_.neutral_v,
+       .temperature_k = state_.thermal.temperature_k,
+       .angle_rad = state_.shaft.angle_rad,
+       .speed_rad_s = state_.shaft.speed_rad_s},
+      tick + 1);
+}
+
+void Axis::advance(const PhaseCommand& command, Tick tick) noexcept {
+  if ((state_.faults & kDiverged) != 0) return;
+  const MotionState before{state_.machine, state_.shaft};
+  begin_tick(command, tick);
+  train_->run(core_, state_, load_at(tick));
+  end_tick(before, tick);
+}
+
+void Axis::advance_pair(Axis& first, Axis& second, const PhaseCommand& first_command,
+                        const PhaseCommand& second_command, Tick tick) noexcept {
+  if (((first.state_.faults | second.state_.faults) & kDiverged) != 0) {
+    first.latch(kDiverged);
+    second.latch(kDiverged);
+    return;
+  }
+  const MotionState first_before{first.state_.machine, first.state_.shaft};
+  const MotionState second_before{second.state_.machine, second.state_.shaft};
+  first.begin_tick(first_command, tick);
+  second.begin_tick(second_command, tick);
+  SharedShaft(first.core_, first.state_, *first.train_, second.core_, second.state_, *second.train_)
+      .run(first.load_at(tick) + second.load_at(tick));
+  if (first.finite() && second.finite()) {
+    first.end_tick(first_before, tick);
+    second.end_tick(second_before, tick);
+  } else {
+    first.hold(first_before);
+    second.hold(second_before);
   }
 }
 
 bool Axis::finite() const noexcept {
-  const DriveState& x = state_.drive;
-  const double size = std::abs(x.machine.i_a_a) + std::abs(x.machine.i_b_a) + std::abs(x.machine.psi_a_wb) +
-                      std::abs(x.machine.psi_b_wb) + std::abs(x.shaft.speed_rad_s) +
-                      std::abs(x.shaft.angle_rad);
+  double size = std::abs(state_.shaft.speed_rad_s) + std::abs(state_.shaft.angle_rad) +
+                std::abs(state_.shaft.load_speed_rad_s) + std::abs(state_.shaft.twist_rad) +
+                std::abs(state_.drive.bus_v);
+  for (const double word : state_.machine)
+    size += std::abs(word);
   return size < kEnvelope;  // false for NaN as well
 }
 
 AxisSample Axis::sample(Tick tick) const noexcept {
-  const DriveState& x = state_.drive;
-  const CurrentSensorParameters& sensor = p_.current_sensor;
-  double noise_a = 0.0;
-  double noise_b = 0.0;
-  if (sensor.noise_rms_a > 0.0) {
-    noise_a = gaussian_noise(seed_, noise_channel_, static_cast<std::uint64_t>(tick));
-    noise_b = gaussian_noise(seed_, noise_channel_ + 1, static_cast<std::uint64_t>(tick));
-  }
-  const CurrentReading a = read_current(sensor, sensor.gain_a, sensor.offset_a_a, x.machine.i_a_a, noise_a);
-  const CurrentReading b = read_current(sensor, sensor.gain_b, sensor.offset_b_a, x.machine.i_b_a, noise_b);
-  return {.current_a = {a.current_a, b.current_a},
+  const MachineTruth truth = train_->truth(state_, motion_of(state_));
+  const SensorReadings r = core_.sensors.readings(state_.sensors, state_.injected, tick);
+  const double turns_rad = static_cast<double>(state_.turns) * kTurnRad;
+  const LoadSide load = load_side(core_.shaft, state_.shaft, turns_rad);
+  return {.current_a = r.current_a,
+          .voltage_v = r.voltage_v,
+          .bus_voltage_v = r.bus_v,
+          .neutral_v = r.neutral_v,
           .encoder_count = state_.encoder.count,
-          .encoder_levels = encoder_.levels(state_.encoder),
-          .edge_age_s = encoder_.edge_age_s(state_.encoder, tick),
+          .encoder_levels = core_.encoder.levels(state_.encoder, state_.injected),
+          .hall_lines =
+              hall_lines(core_.p.sensors.hall, state_.injected, core_.pole_pairs * state_.shaft.angle_rad),
+          .edge_age_s = core_.encoder.edge_age_s(state_.encoder, tick),
           .edge_period_s = state_.encoder.period_s,
           .index_count = state_.encoder.index_count,
           .index_tick = state_.encoder.index_tick,
-          .voltage_v = state_.voltage_v,
-          .faults = state_.faults | (a.saturated || b.saturated ? kCurrentSensorSaturated : 0),
-          .angle_rad = static_cast<double>(state_.turns) * kTurnRad + x.shaft.angle_rad,
-          .speed_rad_s = x.shaft.speed_rad_s,
-          .torque_nm = torque_nm(machine_, x.machine),
-          .load_nm = state_.load.at(tick),
-          .true_current_a = {x.machine.i_a_a, x.machine.i_b_a},
-          .rotor_flux_wb = {x.machine.psi_a_wb, x.machine.psi_b_wb},
-          .bus_voltage_v = p_.amplifier.voltage_limit_v};
+          .tachometer_v = r.tachometer_v,
+          .resolver_sine_v = r.resolver_sine_v,
+          .resolver_cosine_v = r.resolver_cosine_v,
+          .temperature_k = r.temperature_k,
+          .meter_voltage_v = r.meter_voltage_v,
+          .meter_current_a = r.meter_current_a,
+          .meter_power_w = r.meter_power_w,
+          .meter_reactive_var = r.meter_reactive_var,
+          .meter_power_factor = r.meter_power_factor,
+          .faults = state_.faults | (r.saturated ? kCurrentSensorSaturated : 0) |
+                    (r.other_saturated ? kSensorSaturated : 0),
+          .injected = injected_bits(state_.injected),
+          .angle_rad = turns_rad + state_.shaft.angle_rad,
+          .speed_rad_s = state_.shaft.speed_rad_s,
+          .torque_nm = truth.torque_nm,
+          .load_nm = load_at(tick),
+          .true_current_a = terminal_currents(core_.connection, truth.current_a, state_.open_terminals),
+          .rotor_flux_wb = truth.rotor_flux_wb,
+          .load_angle_rad = load.angle_rad,
+          .load_speed_rad_s = load.speed_rad_s,
+          .load_position_m = load.position_m};
+}
+
+namespace {
+
+/// Electrical angular speed at which the emf reaches a voltage; 0 where the emf does not tell.
+double electrical_speed_rad_s(const PmMachineParameters& p, double voltage_v) noexcept {
+  return p.torque_constant_nm_per_a > 0.0 ? p.pole_pairs * voltage_v / p.torque_constant_nm_per_a : 0.0;
+}
+double electrical_speed_rad_s(const BldcMachineParameters& p, double voltage_v) noexcept {
+  return p.torque_constant_nm_per_a > 0.0 ? p.pole_pairs * voltage_v / p.torque_constant_nm_per_a : 0.0;
+}
+template <class Machine>
+double electrical_speed_rad_s(const Machine&, double) noexcept {
+  return 0.0;
+}
+
+}  // namespace
+
+int default_substeps(const AxisParameters& p, double period_s) noexcept {
+  constexpr double kStepsInTimeConstant = 10.0;
+  constexpr double kRadPerStep = 0.2;
+  constexpr double kLongestStepS = 50e-6;
+  constexpr double kCurrentLoopS = 20e-6;
+  double step_s = p.drive.kind == DriveKind::kCurrent ? kCurrentLoopS : kLongestStepS;
+  step_s = std::min(step_s, fastest_time_constant_s(p.mechanics) / kStepsInTimeConstant);
+  std::visit(
+      [&](const auto& machine) {
+        step_s = std::min(step_s, fastest_time_constant_s(machine) / kStepsInTimeConstant);
+        if (p.drive.kind == DriveKind::kCurrent) {
+          // The loop makes of the machine one with K_P in series: it is stable below 2 L/K_P.
+          const Adjustment loop{.series_resistance_ohm = p.drive.current_loop.proportional_v_per_a};
+          step_s = std::min(step_s, 0.5 * fastest_time_constant_s(adjusted(machine, loop)));
+        }
+        const double turning_rad_s = electrical_speed_rad_s(machine, p.drive.amplifier.voltage_limit_v);
+        if (turning_rad_s > 0.0) step_s = std::min(step_s, kRadPerStep / turning_rad_s);
+      },
+      p.machine);
+  const double substeps = std::ceil(period_s / step_s - 1e-9);
+  return static_cast<int>(std::clamp(substeps, 1.0, static_cast<double>(kMaxSubsteps)));
 }
 
 }  // namespace drivebench

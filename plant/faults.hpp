@@ -11,6 +11,7 @@ inline constexpr std::uint64_t kVoltageSaturated = 1u << 0;
 inline constexpr std::uint64_t kCurrentSensorSaturated = 1u << 1;
 inline constexpr std::uint64_t kOverCurrent = 1u << 2;
 inline constexpr std::uint64_t kShaftHeld = 1u << 3;
+inline constexpr std::uint64_t kSensorSaturated = 1u << 4;
 inline constexpr std::uint64_t kOverCurrentTrip = 1u << 8;
 inline constexpr std::uint64_t kCommandTimeout = 1u << 9;
 inline constexpr std::uint64_t kLeaseLost = 1u << 10;
@@ -31,7 +32,8 @@ inline constexpr auto kFaultTable = std::to_array<FaultInfo>({
     {kVoltageSaturated, "voltage_saturated", "the amplifier clipped a phase voltage in this tick"},
     {kCurrentSensorSaturated, "current_sensor_saturated", "a current converter was at the end of its range"},
     {kOverCurrent, "over_current", "a phase current exceeded amplifier.over_current_a in this tick"},
-    {kShaftHeld, "shaft_held", "stiction held the shaft at the end of this tick"},
+    {kShaftHeld, "shaft_held", "stiction or a lock held the shaft at the end of this tick"},
+    {kSensorSaturated, "sensor_saturated", "the converter of another sensor was at the end of its range"},
     {kOverCurrentTrip, "over_current_trip", "latched: over-current switched the gates off"},
     {kCommandTimeout, "command_timeout",
      "latched: no command for watchdog_ticks ticks, safe action in force"},

@@ -36,6 +36,7 @@ struct Dq {
 namespace frames_detail {
 inline constexpr double kRootTwoThirds = 0x1.a20bd700c2c3ep-1;  // sqrt(2/3)
 inline constexpr double kRootHalf = 0x1.6a09e667f3bcdp-1;       // sqrt(1/2)
+inline constexpr double kRootThird = 0x1.279a74590331cp-1;      // sqrt(1/3)
 }  // namespace frames_detail
 
 /// Mean of the phases: of voltages to a common point, the voltage of an isolated motor neutral to that point.

@@ -61,17 +61,29 @@ constexpr State advanced(const State& x, double factor, const State& slope) noex
   return rk4_detail::zip([factor](double a, double k) { return a + factor * k; }, x, slope);
 }
 
-/// One classical fourth-order Runge-Kutta step of x' = derivative(x) over step_s. A state is a plain struct
-/// of doubles or of such structs.
+/// Where in a step a stage of Runge-Kutta stands, for inputs that change within it.
+enum class StepPoint { kStart, kMiddle, kEnd };
+
+/// One classical fourth-order Runge-Kutta step of x' = derivative(x, point) over step_s. A state is a plain
+/// struct of doubles or of such structs.
 template <class State, class Derivative>
+  requires std::is_invocable_v<const Derivative&, const State&, StepPoint>
 constexpr State rk4_step(const State& x, double step_s, const Derivative& derivative) noexcept {
-  const State k1 = derivative(x);
-  const State k2 = derivative(advanced(x, 0.5 * step_s, k1));
-  const State k3 = derivative(advanced(x, 0.5 * step_s, k2));
-  const State k4 = derivative(advanced(x, step_s, k3));
+  const State k1 = derivative(x, StepPoint::kStart);
+  const State k2 = derivative(advanced(x, 0.5 * step_s, k1), StepPoint::kMiddle);
+  const State k3 = derivative(advanced(x, 0.5 * step_s, k2), StepPoint::kMiddle);
+  const State k4 = derivative(advanced(x, step_s, k3), StepPoint::kEnd);
   const State outer = advanced(k1, 1.0, k4);
   const State inner = advanced(k2, 1.0, k3);
   return advanced(x, step_s / 6.0, advanced(outer, 2.0, inner));
+}
+
+/// The same for x' = derivative(x).
+template <class State, class Derivative>
+  requires std::is_invocable_v<const Derivative&, const State&>
+constexpr State rk4_step(const State& x, double step_s, const Derivative& derivative) noexcept {
+  return rk4_step(x, step_s,
+                  [&derivative](const State& s, StepPoint) noexcept -> State { return derivative(s); });
 }
 
 }  // namespace drivebench

@@ -79,7 +79,7 @@ inline constexpr auto kSignals = [] {
       status("missed_commands", "1", &Sample::missed_commands, kAnyTick,
              "ticks for which a controller owed a command and sent none"),
       status("refused_commands", "1", &Sample::refused_commands, kAnyTick,
-             "commands that were stale, not finite, latched out or from a stranger"),
+             "commands that were turned away, and scheduled inputs that could not be carried out"),
       status("late_ticks", "1", &Sample::late_ticks, kAnyTick,
              "ticks of the bench that started after their time"),
       status("state", "enum", &Sample::state, 4, "0 idle, 1 run, 2 hold, 3 timeout, 4 fault"),
@@ -110,6 +110,35 @@ inline constexpr auto kSignals = [] {
       real(kTruth, "psi_a_wb", "Wb", &Sample::psi_a_wb, -10, 10, "rotor flux linkage, stator axis a"),
       real(kTruth, "psi_b_wb", "Wb", &Sample::psi_b_wb, -10, 10, "rotor flux linkage, stator axis b"),
       real(kSensor, "bus_voltage_v", "V", &Sample::bus_voltage_v, 0, 1000, "voltage of the DC link"),
+      real(kSensor, "i_c_a", "A", &Sample::i_c_a, -100, 100, "measured current of phase c, into the machine"),
+      real(kSensor, "i_f_a", "A", &Sample::i_f_a, -100, 100, "measured current of the field winding"),
+      real(kSensor, "u_c_v", "V", &Sample::u_c_v, -1000, 1000, "voltage at phase c during the tick before"),
+      real(kSensor, "u_f_v", "V", &Sample::u_f_v, -1000, 1000, "voltage at the field winding"),
+      real(kSensor, "u_n_v", "V", &Sample::u_n_v, -1000, 1000,
+           "neutral of the motor against the middle of the DC link"),
+      sensor("hall_lines", "bits", &Sample::hall_lines, 7, "Hall lines: 1 line 1, 2 line 2, 4 line 3"),
+      real(kSensor, "tachometer_v", "V", &Sample::tachometer_v, -1000, 1000, "voltage of the tachometer"),
+      real(kSensor, "resolver_sin_v", "V", &Sample::resolver_sin_v, -10, 10,
+           "sine winding of the resolver, demodulated"),
+      real(kSensor, "resolver_cos_v", "V", &Sample::resolver_cos_v, -10, 10,
+           "cosine winding of the resolver, demodulated"),
+      real(kSensor, "temperature_k", "K", &Sample::temperature_k, 0, 1000, "temperature of the windings"),
+      real(kSensor, "meter_u_rms_v", "V", &Sample::meter_u_rms_v, 0, 1000,
+           "power analyser, last whole window: rms voltage"),
+      real(kSensor, "meter_i_rms_a", "A", &Sample::meter_i_rms_a, 0, 100, "power analyser: rms current"),
+      real(kSensor, "meter_p_w", "W", &Sample::meter_p_w, -1e6, 1e6, "power analyser: active power"),
+      real(kSensor, "meter_q_var", "var", &Sample::meter_q_var, -1e6, 1e6, "power analyser: reactive power"),
+      real(kSensor, "meter_pf", "1", &Sample::meter_pf, -1, 1, "power analyser: power factor"),
+      real(kTruth, "true_i_c_a", "A", &Sample::true_i_c_a, -100, 100, "true current of phase c"),
+      real(kTruth, "true_i_f_a", "A", &Sample::true_i_f_a, -100, 100, "true current of the field winding"),
+      real(kTruth, "load_angle_rad", "rad", &Sample::load_angle_rad, -1e6, 1e6,
+           "true angle of the output: behind gear and elastic shaft"),
+      real(kTruth, "load_speed_rad_s", "rad/s", &Sample::load_speed_rad_s, -10000, 10000,
+           "true speed of the output"),
+      real(kTruth, "load_position_m", "m", &Sample::load_position_m, -1000, 1000,
+           "true position of the table on the screw"),
+      status("injected", "bits", &Sample::injected, kAnyTick,
+             "injected faults in force; the description lists the bits"),
   });
 }();
 
@@ -138,7 +167,7 @@ constexpr const Signal* find_signal(std::string_view name) noexcept {
 
 /// A set of signals: bit n is row n.
 using SignalMask = std::uint64_t;
-static_assert(kSignals.size() <= 64);
+static_assert(kSignals.size() < 64);
 inline constexpr SignalMask kAllSignals = (SignalMask{1} << kSignals.size()) - 1;
 
 }  // namespace drivebench

@@ -37,6 +37,27 @@ struct Sample {
   double psi_a_wb = 0.0;
   double psi_b_wb = 0.0;
   double bus_voltage_v = 0.0;
+  double i_c_a = 0.0;
+  double i_f_a = 0.0;
+  double u_c_v = 0.0;
+  double u_f_v = 0.0;
+  double u_n_v = 0.0;
+  std::uint64_t hall_lines = 0;
+  double tachometer_v = 0.0;
+  double resolver_sin_v = 0.0;
+  double resolver_cos_v = 0.0;
+  double temperature_k = 0.0;
+  double meter_u_rms_v = 0.0;
+  double meter_i_rms_a = 0.0;
+  double meter_p_w = 0.0;
+  double meter_q_var = 0.0;
+  double meter_pf = 0.0;
+  double true_i_c_a = 0.0;
+  double true_i_f_a = 0.0;
+  double load_angle_rad = 0.0;
+  double load_speed_rad_s = 0.0;
+  double load_position_m = 0.0;
+  std::uint64_t injected = 0;
 };
 
 inline constexpr std::size_t kSampleWords = sizeof(Sample) / 8;

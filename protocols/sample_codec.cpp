@@ -1,6 +1,7 @@
 #include "protocols/sample_codec.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <utility>
 
@@ -10,24 +11,20 @@
 namespace drivebench {
 namespace {
 
+/// The members of a sample; row n of the catalogue is member n.
+using SampleWords = std::array<std::uint64_t, kSampleWords>;
+
 /// One signal, with its row known at compile time: the table becomes straight-line code.
 template <std::size_t Row>
-std::byte* put_signal(std::byte* out, const Sample& sample, SignalMask mask) noexcept {
-  constexpr Signal kSignal = kSignals[Row];
+std::byte* put_signal(std::byte* out, std::uint64_t word) noexcept {
+  constexpr SignalType kType = kSignals[Row].type;
   constexpr auto kField = static_cast<std::uint32_t>(Row + 1);
-  if ((mask >> Row & 1) == 0) return out;
-  if constexpr (kSignal.type == SignalType::kReal) {
-    const auto bits = std::bit_cast<std::uint64_t>(sample.*kSignal.as_real);
-    if (bits == 0) return out;
-    return wire::put_fixed64(wire::put_varint(out, wire::tag(kField, wire::kFixed64)), bits);
+  if (word == 0) return out;
+  if constexpr (kType == SignalType::kReal) {
+    return wire::put_fixed64(wire::put_varint(out, wire::tag(kField, wire::kFixed64)), word);
   } else {
-    std::uint64_t value = 0;
-    if constexpr (kSignal.type == SignalType::kUnsigned) {
-      value = sample.*kSignal.as_unsigned;
-    } else {
-      value = wire::zigzag(sample.*kSignal.as_signed);
-    }
-    if (value == 0) return out;
+    const std::uint64_t value =
+        kType == SignalType::kUnsigned ? word : wire::zigzag(std::bit_cast<std::int64_t>(word));
     return wire::put_varint(wire::put_varint(out, wire::tag(kField, wire::kVarint)), value);
   }
 }
@@ -57,9 +54,10 @@ constexpr Sample zero_sample() noexcept {
 }  // namespace
 
 std::size_t encode_sample(const Sample& sample, SignalMask mask, std::byte* out) noexcept {
+  const auto words = std::bit_cast<SampleWords>(sample);
   std::byte* end = out;
   [&]<std::size_t... Row>(std::index_sequence<Row...>) {
-    ((end = put_signal<Row>(end, sample, mask)), ...);
+    ((end = (mask >> Row & 1) != 0 ? put_signal<Row>(end, words[Row]) : end), ...);
   }(std::make_index_sequence<kSignals.size()>{});
   return static_cast<std::size_t>(end - out);
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 
 namespace drivebench {
 namespace {
@@ -34,10 +34,11 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
     : setup_(setup), observer_(observer != nullptr ? observer : &nobody()) {
   axes_.reserve(setup.axes.size());
   for (std::size_t i = 0; i < setup.axes.size(); ++i) {
-    axes_.push_back({.axis = Axis(setup.axes[i].parameters, timing_of(setup), setup.seed, i),
-                     .on_link_loss = setup.axes[i].on_link_loss,
-                     .control = {},
-                     .sample = {}});
+    const AxisSetup& axis = setup.axes[i];
+    axes_.push_back({.axis = Axis(axis.parameters, timing_of(setup), setup.seed, i),
+                     .on_link_loss = axis.on_link_loss,
+                     .shaft = axis.shares_shaft_with.value_or(i)});
+    if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
     take_sample(i);
   }
 }
@@ -63,8 +64,13 @@ Refused Bench::submit(const Input& input) noexcept {
 
 void Bench::apply_due() noexcept {
   std::uint64_t due = 0;
-  while (due < scheduled_ && schedule_[due].tick <= tick_)
-    apply(unpack(schedule_[due++]));
+  while (due < scheduled_ && schedule_[due].tick <= tick_) {
+    const Input input = unpack(schedule_[due++]);
+    // Nobody waits for the answer any more: what cannot be carried out is counted (a command counts itself).
+    if (apply(input) != Refused::kNot && !std::holds_alternative<Command>(input.action)) {
+      ++axes_[input.axis].control.refused;
+    }
+  }
   if (due == 0) return;
   std::move(schedule_.begin() + static_cast<std::ptrdiff_t>(due),
             schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_), schedule_.begin());
@@ -96,9 +102,12 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
     if (!std::isfinite(load->load_nm)) return Refused::kNotFinite;
     a.axis.set_load(load->load_nm, tick_, load->ramp_ticks);
   } else if (const auto* write = std::get_if<ParameterWrite>(&input.action)) {
-    AxisParameters p = a.axis.parameters();
-    axis_parameters()[write->row].set(p, write->value);
-    a.axis.set_parameters(p);
+    return write_parameter(a, *write);
+  } else if (const auto* fault = std::get_if<InjectFault>(&input.action)) {
+    return inject(a, *fault);
+  } else if (const auto* bump = std::get_if<ShaftBump>(&input.action)) {
+    if (!std::isfinite(bump->impulse_nms)) return Refused::kNotFinite;
+    axes_[a.shaft].axis.bump(bump->impulse_nms);
   } else if (std::holds_alternative<RefusedCommand>(input.action)) {
     ++a.control.refused;
   } else {
@@ -112,13 +121,74 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
   return Refused::kNot;
 }
 
+Refused Bench::write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept {
+  const AxisParameters& p = a.axis.parameters();
+  const std::span<const Parameter> rows = axis_parameters(p);
+  if (!std::isfinite(write.value)) return Refused::kNotFinite;
+  if (write.row >= rows.size() || write.value < rows[write.row].minimum ||
+      write.value > rows[write.row].maximum) {
+    return Refused::kOutOfRange;
+  }
+  if (write.ramp_ticks <= 0 || rows[write.row].integer) {
+    if (!set_parameter(a, write.row, write.value)) return Refused::kRuleBroken;
+    a.ramps.forget(write.row);
+    return Refused::kNot;
+  }
+  if (a.ramps.count == kMaxRamps && !a.ramps.has(write.row)) return Refused::kTooManyRamps;
+  a.ramps.forget(write.row);
+  a.ramps.add({.row = write.row,
+               .from = rows[write.row].get(p),
+               .to = write.value,
+               .start = tick_,
+               .ticks = write.ramp_ticks});
+  return Refused::kNot;
+}
+
+bool Bench::set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept {
+  AxisParameters p = a.axis.parameters();
+  axis_parameters(p)[row].set(p, value);
+  if (!problems(p).empty()) return false;
+  change_parameters(a, p);
+  return true;
+}
+
+void Bench::follow_ramps(AxisRuntime& a) noexcept {
+  AxisParameters p = a.axis.parameters();
+  const std::span<const Parameter> rows = axis_parameters(p);
+  for (std::size_t i = 0; i < a.ramps.count; ++i)
+    rows[a.ramps.ramp[i].row].set(p, a.ramps.ramp[i].at(tick_));
+  const bool possible = problems(p).empty();
+  if (possible) change_parameters(a, p);
+  for (std::size_t i = a.ramps.count; i-- > 0;) {
+    const ParameterRamp ramp = a.ramps.ramp[i];
+    // Together they break a rule: those that can go on alone do so, the others stay where they are.
+    const bool follows = possible || set_parameter(a, ramp.row, ramp.at(tick_));
+    if (!follows) ++a.control.refused;
+    if (!follows || ramp.is_over(tick_)) a.ramps.remove(i);
+  }
+}
+
+void Bench::change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept {
+  a.axis.set_parameters(p);
+  ++a.parameter_changes;
+}
+
+Refused Bench::inject(AxisRuntime& a, const InjectFault& fault) noexcept {
+  if (!std::isfinite(fault.value)) return Refused::kNotFinite;
+  if (fault.row >= kInjectableFaultCount ||
+      !problem_with(kInjectableFaults[fault.row], fault.value).empty()) {
+    return Refused::kOutOfRange;
+  }
+  a.axis.inject(fault.row, fault.value);
+  return Refused::kNot;
+}
+
 Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept {
   const AxisRuntime& a = axes_[axis];
   const Control& c = a.control;
   if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
-  if (!std::isfinite(command.phases.voltage_v.a) || !std::isfinite(command.phases.voltage_v.b)) {
-    return Refused::kNotFinite;
-  }
+  if (!is_finite(command.phases)) return Refused::kNotFinite;
+  if (!suits(a.axis.parameters().drive.kind, command.phases.gates)) return Refused::kWrongDrive;
   if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
   return is_latched(axis) && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
 }
@@ -180,13 +250,14 @@ void Bench::dismiss_controllers() noexcept {
 
 PhaseCommand Bench::safe_command(const AxisRuntime& a) const noexcept {
   return {.gates = a.on_link_loss == SafeAction::kFreewheel ? Gates::kOff : Gates::kZeroVoltage,
-          .voltage_v = {}};
+          .setpoint = {}};
 }
 
 PhaseCommand Bench::supervise(std::size_t axis) noexcept {
   AxisRuntime& a = axes_[axis];
   Control& c = a.control;
   if (c.owner != 0 && tick_ - c.renewed >= setup_.lease_ticks) lose_controller(axis, kLeaseLost);
+  if (a.axis.injected().command_loss != 0.0) c.fresh = 0;  // taken on the wire, lost on the way to the drive
   if (c.fresh != 0) {
     c.silent_ticks = 0;
     c.state = ControlState::kRun;
@@ -212,8 +283,18 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
 void Bench::step() noexcept {
   apply_due();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
-    const PhaseCommand command = supervise(i);
-    axes_[i].axis.advance(command, tick_);
+    if (axes_[i].ramps.count != 0) follow_ramps(axes_[i]);
+    axes_[i].command = supervise(i);
+  }
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    AxisRuntime& a = axes_[i];
+    if (a.shaft != i) continue;  // advanced with its partner
+    if (a.shares_with == 0) {
+      a.axis.advance(a.command, tick_);
+    } else {
+      AxisRuntime& partner = axes_[a.shares_with];
+      Axis::advance_pair(a.axis, partner.axis, a.command, partner.command, tick_);
+    }
   }
   ++tick_;
   late_now_ = 0;
@@ -257,7 +338,28 @@ void Bench::take_sample(std::size_t index) noexcept {
               .true_i_b_a = s.true_current_a.b,
               .psi_a_wb = s.rotor_flux_wb.a,
               .psi_b_wb = s.rotor_flux_wb.b,
-              .bus_voltage_v = s.bus_voltage_v};
+              .bus_voltage_v = s.bus_voltage_v,
+              .i_c_a = s.current_a.c,
+              .i_f_a = s.current_a.field,
+              .u_c_v = s.voltage_v.c,
+              .u_f_v = s.voltage_v.field,
+              .u_n_v = s.neutral_v,
+              .hall_lines = s.hall_lines,
+              .tachometer_v = s.tachometer_v,
+              .resolver_sin_v = s.resolver_sine_v,
+              .resolver_cos_v = s.resolver_cosine_v,
+              .temperature_k = s.temperature_k,
+              .meter_u_rms_v = s.meter_voltage_v,
+              .meter_i_rms_a = s.meter_current_a,
+              .meter_p_w = s.meter_power_w,
+              .meter_q_var = s.meter_reactive_var,
+              .meter_pf = s.meter_power_factor,
+              .true_i_c_a = s.true_current_a.c,
+              .true_i_f_a = s.true_current_a.field,
+              .load_angle_rad = s.load_angle_rad,
+              .load_speed_rad_s = s.load_speed_rad_s,
+              .load_position_m = s.load_position_m,
+              .injected = s.injected};
   samples_.add_block(a.sample);
   observer_->on_sample(static_cast<std::uint32_t>(index), a.sample);
 }

@@ -12,6 +12,7 @@
 #include "protocols/sample.hpp"
 #include "server/digest.hpp"
 #include "server/input.hpp"
+#include "server/ramps.hpp"
 
 namespace drivebench {
 
@@ -31,6 +32,9 @@ enum class ControlState : std::uint64_t {
 struct AxisSetup {
   AxisParameters parameters;
   SafeAction on_link_loss = SafeAction::kFreewheel;
+  /// Number of the axis, before this one and with a shaft of its own, whose shaft this one turns: a
+  /// dynamometer. Its mechanics are those of both.
+  std::optional<std::size_t> shares_shaft_with{};
 };
 
 /// What the bench needs to know of itself.
@@ -75,6 +79,9 @@ class Bench {
     return (axes_[axis].axis.state().faults & kLatchedFaults) != 0;
   }
 
+  /// How often parameters of an axis have changed since the bench was made.
+  std::uint64_t parameter_changes(std::size_t axis) const noexcept { return axes_[axis].parameter_changes; }
+
   /// Why a command for the present tick would be turned away.
   Refused would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept;
 
@@ -112,13 +119,24 @@ class Bench {
   struct AxisRuntime {
     Axis axis;
     SafeAction on_link_loss;
-    Control control;
-    Sample sample;
+    std::size_t shaft;            ///< the axis whose shaft this one turns: itself, or its partner before it
+    std::size_t shares_with = 0;  ///< the other axis on this shaft; 0: none
+    Control control{};
+    ParameterRamps ramps{};
+    Sample sample{};
+    PhaseCommand command{};  ///< for the present tick
+    std::uint64_t parameter_changes = 0;
   };
 
   Refused apply(const Input& input) noexcept;
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
   Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
+  Refused write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept;
+  /// Sets a parameter unless that would break a rule between values.
+  bool set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept;
+  void change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept;
+  void follow_ramps(AxisRuntime& a) noexcept;
+  Refused inject(AxisRuntime& a, const InjectFault& fault) noexcept;
   Refused change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept;
   void lose_controller(std::size_t axis, std::uint64_t fault) noexcept;
   void apply_due() noexcept;

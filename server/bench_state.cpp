@@ -5,13 +5,13 @@
 #include <cstring>
 #include <utility>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "server/bench.hpp"
 
 namespace drivebench {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3174'6174'7362'7264u;  // "drbstat1"
+constexpr std::uint64_t kMagic = 0x3274'6174'7362'7264u;  // "drbstat2"
 
 std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
   Digest digest;
@@ -23,8 +23,16 @@ std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
   digest.add(static_cast<std::uint64_t>(setup.lease_ticks));
   for (const AxisSetup& axis : setup.axes) {
     digest.add(static_cast<std::uint64_t>(axis.on_link_loss));
-    for (const Parameter& row : axis_parameters())
+    digest.add(axis.shares_shaft_with ? *axis.shares_shaft_with + 1 : 0);
+    digest.add(axis.parameters.machine.index());
+    for (const Parameter& row : axis_parameters(axis.parameters))
       digest.add(std::bit_cast<std::uint64_t>(row.get(axis.parameters)));
+    for (const CurveParameter& row : axis_curves(axis.parameters)) {
+      const std::vector<CurvePoint>& points = row.get(axis.parameters).points();
+      digest.add(points.size());
+      for (const CurvePoint& point : points)
+        digest.add_block(point);
+    }
   }
   return digest.value();
 }
@@ -41,11 +49,12 @@ void Bench::for_each_block(Self& self, Visitor visit) {
   visit(self.schedule_);
   for (auto& a : self.axes_) {
     visit(a.control);
+    visit(a.ramps);
     visit(a.sample);
     AxisState state = a.axis.state();
     visit(state);
     AxisParameters parameters = a.axis.parameters();
-    for (const Parameter& row : axis_parameters()) {
+    for (const Parameter& row : axis_parameters(parameters)) {
       double value = row.get(parameters);
       visit(value);
       if constexpr (!std::is_const_v<Self>) row.set(parameters, value);
@@ -105,6 +114,12 @@ bool Bench::restore(std::span<const std::byte> saved) {
   if (restored.scheduled_ > kMaxScheduled) return false;
   for (const PackedInput& input : restored.schedule_) {
     if (input.axis >= axes_.size()) return false;
+  }
+  for (const AxisRuntime& a : restored.axes_) {
+    const std::size_t rows = axis_parameters(a.axis.parameters()).size();
+    for (const ParameterRamp& ramp : a.ramps.ramp) {
+      if (a.ramps.count > kMaxRamps || ramp.row >= rows) return false;
+    }
   }
   *this = std::move(restored);
   return true;

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "server/config_document.hpp"
 #include "server/config_words.hpp"
 
 namespace drivebench {
@@ -20,6 +21,20 @@ std::string listed(const std::vector<ConfigProblem>& problems) {
 }
 
 }  // namespace
+
+std::string in_quotes(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+std::string real_text(double value) {
+  std::string text = shortest(value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+}
 
 ConfigError::ConfigError(std::vector<ConfigProblem> problems)
     : std::runtime_error(listed(problems)), problems_(std::move(problems)) {}

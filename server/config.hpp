@@ -77,18 +77,18 @@ struct ModbusConfig {
   std::int64_t idle_timeout_ms = 10'000;  ///< an owner that says nothing for so long loses its lease
 };
 
-/// A load torque that starts by itself.
-struct LoadEvent {
+/// Something that happens to an axis by itself: a load, a new parameter value, a fault, a bump.
+struct AxisEvent {
   Tick tick = 0;
-  LoadChange change{};
+  Action action;
 };
 
 /// What the bench file says of an axis beside its physics.
 struct AxisConfig {
   std::string name;
-  std::string motor;             ///< name of the motor, for people
-  std::uint32_t can_node = 1;    ///< node id on every bus; its number from 1 on unless it says otherwise
-  std::vector<LoadEvent> loads;  ///< sorted by tick
+  std::string motor;              ///< name of the motor, for people
+  std::uint32_t can_node = 1;     ///< node id on every bus; its number from 1 on unless it says otherwise
+  std::vector<AxisEvent> events;  ///< in the order of in_order()
 };
 
 /// Everything that a bench file says.
@@ -134,7 +134,7 @@ BenchConfig parse_config(std::string_view text, const std::string& name, const s
 std::string to_toml(const BenchConfig& config);
 
 /// The part of to_toml() that the samples depend on: timing, seed, watchdog and lease, and of each axis its
-/// safe action, parameters and loads. Neither names nor mode, pacer, addresses.
+/// safe action, parameters, curves and events. Neither names nor mode, pacer, addresses.
 std::string physics_toml(const BenchConfig& config);
 
 /// Hash of physics_toml(): two benches with the same hash answer the same inputs with the same samples.
@@ -144,6 +144,10 @@ std::string_view name_of(RunMode mode) noexcept;
 std::string_view name_of(PacerKind pacer) noexcept;
 std::string_view name_of(SafeAction action) noexcept;
 std::string_view name_of(CanBackend backend) noexcept;
+
+/// Events as they follow each other: by tick; within one loads, parameters, faults that end, faults that
+/// begin, bumps.
+std::vector<AxisEvent> in_order(std::vector<AxisEvent> events);
 
 /// An IPv4 or IPv6 address as text, or "localhost". Strict: neither "127.1" nor "0x7f000001" nor "0" is one.
 bool is_address(const std::string& text) noexcept;
@@ -155,7 +159,7 @@ bool is_multicast(const std::string& address) noexcept;
 /// Limits that a configuration keeps.
 inline constexpr std::size_t kMaxAxes = 64;
 inline constexpr std::size_t kMaxCanBuses = 8;
-inline constexpr std::size_t kMaxLoads =
+inline constexpr std::size_t kMaxAxisEvents =
     Bench::kMaxScheduled / 2;  ///< of all axes; leaves room for the clients
 
 }  // namespace drivebench

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "server/config.hpp"
@@ -14,12 +15,12 @@ namespace drivebench {
 struct AxisReading {
   AxisConfig config;
   AxisSetup setup;
-  bool machine_valid = false;  ///< setup.parameters.machine is complete and free of problems
+  bool parameters_valid = false;  ///< setup.parameters are complete and free of problems
 };
 
-/// `default_node` is the node id of an axis that does not name one.
+/// Reads the axis that follows `before`; its number from 1 on is its node id unless it names one.
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
-                      std::uint32_t default_node, ProblemList& problems);
+                      std::span<const AxisReading> before, ProblemList& problems);
 
 /// A duration given as seconds, rounded to the nearest tick, or as ticks; not both.
 std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key, std::string_view ticks_key,

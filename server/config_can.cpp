@@ -210,10 +210,11 @@ void check_place(StrictTable& table, const CanConfig& bus, const std::vector<Can
 
 }  // namespace
 
-std::vector<CanConfig> read_can(StrictTable& root) {
+std::vector<CanConfig> read_can(StrictTable& root, bool wide) {
   std::vector<CanConfig> buses;
   for (StrictTable& table : root.tables("can", kMaxCanBuses)) {
     CanConfig bus;
+    bus.profile.wide = wide;
     table.require("backend");
     const auto backend = table.choice("backend", kCanBackendWords);
     if (backend) {

@@ -11,8 +11,9 @@
 
 namespace drivebench {
 
-/// Reads all [[can]] sections.
-std::vector<CanConfig> read_can(StrictTable& root);
+/// Reads all [[can]] sections. `wide`: an axis has more than phases a and b and an encoder, so that its
+/// frames need identifiers, too.
+std::vector<CanConfig> read_can(StrictTable& root, bool wide);
 
 /// By Message; of a message with two variants, one of them: name and node id are the same.
 inline constexpr auto kCanMessages = [] {

@@ -169,9 +169,9 @@ void ProblemList::throw_if_any() {
 }
 
 std::optional<ConfigNode> parse_document(std::string_view text, const std::string& file,
-                                         ProblemList& problems) {
-  if (text.size() > kMaxConfigBytes) {
-    problems.add(file, 0, {}, "is larger than " + std::to_string(kMaxConfigBytes) + " bytes");
+                                         ProblemList& problems, std::size_t limit) {
+  if (text.size() > limit) {
+    problems.add(file, 0, {}, "is larger than " + std::to_string(limit) + " bytes");
     return std::nullopt;
   }
   if (const int line = overlong_line(text); line != 0) {

@@ -27,6 +27,10 @@ class ProblemList {
   std::size_t dropped_ = 0;
 };
 
+inline constexpr std::size_t kMaxConfigBytes = 262'144;
+/// Of the text in a recording, which holds what stood in CSV files.
+inline constexpr std::size_t kMaxRecordedConfigBytes = 8'388'608;
+
 /// A value of a TOML document with its place: keeps the TOML library out of all files but one.
 struct ConfigNode {
   enum class Kind { kTable, kArray, kScalar };
@@ -49,7 +53,7 @@ struct ConfigNode {
 /// The document, or nothing, with the problem added. Bounds size, line length and nesting, so that no text
 /// can cost more than some milliseconds or the stack.
 std::optional<ConfigNode> parse_document(std::string_view text, const std::string& file,
-                                         ProblemList& problems);
+                                         ProblemList& problems, std::size_t limit = kMaxConfigBytes);
 
 /// A whole regular file of at most `limit` bytes, or why it cannot be had, as the end of "the file ...".
 struct FileText {
@@ -58,8 +62,6 @@ struct FileText {
   bool others_may_read = false;  ///< group or others
 };
 FileText read_file(const std::filesystem::path& file, std::size_t limit);
-
-inline constexpr std::size_t kMaxConfigBytes = 262'144;
 
 /// The text fit for one line of a terminal: control characters replaced, cut after 160 bytes.
 std::string printable(std::string_view text);

@@ -6,11 +6,14 @@
 #include <utility>
 #include <vector>
 
+#include "plant/parameters/parameters.hpp"
 #include "server/config.hpp"
 #include "server/config_axis.hpp"
 #include "server/config_can.hpp"
 #include "server/config_document.hpp"
+#include "server/config_step.hpp"
 #include "server/config_words.hpp"
+#include "server/endpoints/terminals.hpp"
 #include "server/strict_table.hpp"
 
 namespace drivebench {
@@ -53,7 +56,7 @@ void read_lease(StrictTable& bench, bool period_valid, BenchSetup& setup) {
   }
 }
 
-/// Whether period and substeps are known.
+/// Whether the period and the substeps, if there are any, are right.
 bool read_bench(StrictTable& bench, BenchConfig& config) {
   for (const std::string_view key : {"name", "mode", "period_us"})
     bench.require(key);
@@ -152,45 +155,14 @@ void read_modbus(StrictTable table, ModbusConfig& modbus) {
   table.finish();
 }
 
-/// Fastest rate of the machine and its shaft at standstill: of the two real poles of currents and flux,
-/// s^2 + (gamma + eta) s + eta R_S/(sigma L_S), and the shaft's f/J.
-double fastest_rate_per_s(const AxisParameters& p) {
-  const InductionMachineConstants c = constants_of(p.machine);
-  const double half_sum = 0.5 * (c.gamma_per_s + c.eta_per_s);
-  const double product = c.eta_per_s * c.stator_resistance_ohm * c.transient_reluctance_per_h;
-  const double electrical = half_sum + std::sqrt(std::max(0.0, half_sum * half_sum - product));
-  if (!(p.mechanics.inertia_kgm2 > 0.0)) return electrical;
-  return std::max(electrical, p.mechanics.viscous_friction_nms / p.mechanics.inertia_kgm2);
-}
-
-/// The integration step may be half the fastest time constant: RK4 is stable up to 2.8 of it, and accurate to
-/// 1e-4 of a transient at one half.
-void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& axis) {
-  constexpr double kMaxStep = 0.5;
-  const double period_s = static_cast<double>(setup.period_ns) * 1e-9;
-  const double rate_per_s = fastest_rate_per_s(axis.setup.parameters);
-  if (period_s * rate_per_s <= kMaxStep * setup.substeps) return;
-  const double needed = std::ceil(period_s * rate_per_s / kMaxStep);
-  std::string rule = "comes to steps of " + shortest(period_s * 1e6 / setup.substeps) +
-                     " us, too long for the fastest time constant of axis \"" + axis.config.name + "\", " +
-                     shortest(std::round(1e9 / rate_per_s) * 1e-3) + " us: ";
-  if (needed <= kMaxSubsteps) {
-    rule += "at least " + shortest(needed) + " substeps are needed";
-  } else {
-    rule += "even " + std::to_string(kMaxSubsteps) + " substeps would need a period_us of at most " +
-            shortest(std::floor(kMaxSubsteps * kMaxStep / rate_per_s * 1e9) * 1e-3);
-  }
-  bench.report(bench.has("substeps") ? "substeps" : "period_us", std::move(rule));
-}
-
 std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::path& folder,
                                    ProblemList& problems, const BenchConfig& config) {
   root.require("axis");
   std::vector<AxisReading> axes;
-  std::size_t loads = 0;
+  std::size_t events = 0;
+  std::size_t points = 0;
   for (StrictTable& table : root.tables("axis", kMaxAxes)) {
-    const auto number = static_cast<std::uint32_t>(axes.size() + 1);
-    AxisReading axis = read_axis(table, folder, config.setup.period_ns, number, problems);
+    AxisReading axis = read_axis(table, folder, config.setup.period_ns, axes, problems);
     const std::string& name = axis.config.name;
     const std::uint32_t node = axis.config.can_node;
     const auto another = [&](auto same) { return std::any_of(axes.begin(), axes.end(), same); };
@@ -200,10 +172,16 @@ std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::pat
     if (another([&](const AxisReading& other) { return other.config.can_node == node; })) {
       table.report("can_node", "is " + std::to_string(node) + ", the node of another axis");
     }
-    loads += axis.config.loads.size();
-    if (loads > kMaxLoads) {
-      table.report("load", "brings the loads of all axes to " + std::to_string(loads) + " but there may be " +
-                               std::to_string(kMaxLoads));
+    events += axis.config.events.size();
+    if (events > kMaxAxisEvents) {
+      table.report("name", "has events that bring those of all axes to " + std::to_string(events) +
+                               " but there may be " + std::to_string(kMaxAxisEvents));
+    }
+    for (const CurveParameter& row : axis_curves(axis.setup.parameters))
+      points += row.get(axis.setup.parameters).points().size();
+    if (points > kMaxCurvePoints) {
+      table.report("name", "has curves that bring the points of all axes to " + std::to_string(points) +
+                               " but there may be " + std::to_string(kMaxCurvePoints));
     }
     axes.push_back(std::move(axis));
   }
@@ -216,19 +194,25 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
                          const std::filesystem::path& folder) {
   ProblemList problems;
   BenchConfig config;
-  if (const auto document = parse_document(text, name, problems)) {
+  const std::size_t limit = folder.empty() ? kMaxRecordedConfigBytes : kMaxConfigBytes;
+  if (const auto document = parse_document(text, name, problems, limit)) {
     StrictTable root(&*document, "", 1, name, problems);
     root.require("bench");
     StrictTable bench = root.table("bench");
     const bool timing_valid = bench.exists() && read_bench(bench, config);
     read_realtime(root.table("realtime"), config.realtime);
     read_tcp(root.table("tcp"), folder, config.tcp);
-    for (const AxisReading& axis : read_axes(root, folder, problems, config)) {
-      if (timing_valid && axis.machine_valid) check_step(bench, config.setup, axis);
+    const std::vector<AxisReading> axes = read_axes(root, folder, problems, config);
+    if (!bench.has("substeps")) config.setup.substeps = automatic_substeps(axes, config.setup.period_ns);
+    for (const AxisReading& axis : axes) {
+      if (timing_valid && axis.parameters_valid) check_step(bench, config.setup, axis);
       config.setup.axes.push_back(axis.setup);
       config.axes.push_back(axis.config);
     }
-    config.can = read_can(root);
+    const bool wide = std::any_of(axes.begin(), axes.end(), [](const AxisReading& axis) {
+      return terminals_of(axis.setup.parameters).is_wide();
+    });
+    config.can = read_can(root, wide);
     read_modbus(root.table("modbus"), config.modbus);
     root.finish();
   }

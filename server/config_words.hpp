@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
 
 namespace drivebench {
@@ -14,5 +15,10 @@ inline constexpr std::array<std::string_view, 4> kCanBackendWords{"socketcan", "
 
 /// The rule for a text without a folder, such as the one in a recording, which may be anybody's.
 inline constexpr std::string_view kNoOtherFiles = "names another file, but this text must stand for itself";
+
+// Values as TOML has them.
+std::string in_quotes(std::string_view text);
+/// A float: without point or exponent it would read as an integer, and -0 lose its sign.
+std::string real_text(double value);
 
 }  // namespace drivebench

@@ -1,30 +1,20 @@
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "plant/parameters.hpp"
 #include "server/config.hpp"
 #include "server/config_can.hpp"
+#include "server/config_curves.hpp"
 #include "server/config_document.hpp"
+#include "server/config_events.hpp"
+#include "server/config_parameters.hpp"
+#include "server/config_words.hpp"
 #include "server/digest.hpp"
 
 namespace drivebench {
 namespace {
-
-std::string in_quotes(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + '"';
-}
-
-/// A TOML float: without point or exponent it would read as an integer, and -0 lose its sign.
-std::string real(double value) {
-  std::string text = shortest(value);
-  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
-}
 
 std::string boolean(bool value) {
   return value ? "true" : "false";
@@ -35,7 +25,7 @@ void append(std::string& text, std::string_view key, const std::string& value) {
 }
 
 void append_timing(std::string& text, const BenchSetup& setup) {
-  append(text, "period_us", real(static_cast<double>(setup.period_ns) / 1e3));
+  append(text, "period_us", real_text(static_cast<double>(setup.period_ns) / 1e3));
   append(text, "substeps", std::to_string(setup.substeps));
   append(text, "seed", std::to_string(setup.seed));
   append(text, "command_delay_ticks", std::to_string(setup.command_delay_ticks));
@@ -43,35 +33,36 @@ void append_timing(std::string& text, const BenchSetup& setup) {
   append(text, "lease_ticks", std::to_string(setup.lease_ticks));
 }
 
-std::string value_text(const Parameter& row, double value) {
-  if (!row.integer) return real(value);
-  if (row.minimum == 0.0 && row.maximum == 1.0) return boolean(value != 0.0);
-  return std::to_string(static_cast<std::int64_t>(value));
+void append_parameters(std::string& text, const AxisParameters& p, bool shares_shaft) {
+  std::vector<std::string_view> sections;
+  for (const Parameter& row : axis_parameters(p)) {
+    if (std::find(sections.begin(), sections.end(), section_of(row.name)) == sections.end())
+      sections.push_back(section_of(row.name));
+  }
+  for (const std::string_view section : sections) {
+    if (shares_shaft && section == "mechanics") continue;
+    text.append("\n[axis.").append(section).append("]\n");
+    if (section == "machine") append(text, "kind", in_quotes(machine_kind(p)));
+    for (const Parameter& row : axis_parameters(p)) {
+      if (section_of(row.name) == section) append(text, key_of(row.name), value_text(row, row.get(p)));
+    }
+    for (const CurveParameter& row : axis_curves(p)) {
+      if (section_of(row.name) != section || row.get(p).empty()) continue;
+      append(text, key_of(row.name), curve_text(row.get(p)));
+    }
+  }
 }
 
 void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config) {
   append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
-  std::string_view section;
-  for (const Parameter& row : axis_parameters()) {
-    const std::size_t dot = row.name.find('.');
-    if (section != row.name.substr(0, dot)) {
-      section = row.name.substr(0, dot);
-      text.append("\n[axis.").append(section).append("]\n");
-    }
-    append(text, row.name.substr(dot + 1), value_text(row, row.get(setup.parameters)));
-  }
-  for (const LoadEvent& load : config.loads) {
-    text += "\n[[axis.load]]\n";
-    append(text, "at_tick", std::to_string(load.tick));
-    append(text, "load_nm", real(load.change.load_nm));
-    append(text, "ramp_ticks", std::to_string(load.change.ramp_ticks));
-  }
+  append_parameters(text, setup.parameters, setup.shares_shaft_with.has_value());
+  text += events_text(config.events, setup.parameters);
 }
 
 void append_service(std::string& text, const RealtimeConfig& realtime, const TcpConfig& tcp) {
   text += "\n[realtime]\n";
   append(text, "pacer", in_quotes(name_of(realtime.pacer)));
-  append(text, "max_lateness_ms", real(static_cast<double>(realtime.max_lateness_ns) / 1e6));
+  append(text, "max_lateness_ms", real_text(static_cast<double>(realtime.max_lateness_ns) / 1e6));
   append(text, "cpu", std::to_string(realtime.cpu));
   append(text, "priority", std::to_string(realtime.priority));
   text += "\n[tcp]\n";
@@ -104,7 +95,7 @@ void append_can(std::string& text, const CanConfig& bus) {
     append(text, kCanMessages[i]->name, hexadecimal(bus.profile.base_ids[i]));
   text += "\n[can.units]\n";
   for (const auto& [key, unit] : kCanUnits)
-    append(text, key, real(bus.profile.*unit));
+    append(text, key, real_text(bus.profile.*unit));
 }
 
 void append_modbus(std::string& text, const ModbusConfig& modbus) {
@@ -135,6 +126,9 @@ std::string to_toml(const BenchConfig& config) {
     append(text, "name", in_quotes(config.axes[i].name));
     if (!config.axes[i].motor.empty()) append(text, "motor_name", in_quotes(config.axes[i].motor));
     append(text, "can_node", std::to_string(config.axes[i].can_node));
+    if (const auto partner = config.setup.axes[i].shares_shaft_with) {
+      append(text, "shares_shaft_with", in_quotes(config.axes[*partner].name));
+    }
     append_axis(text, config.setup.axes[i], config.axes[i]);
   }
   return text;
@@ -145,6 +139,9 @@ std::string physics_toml(const BenchConfig& config) {
   append_timing(text, config.setup);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     text += "\n[[axis]]\n";
+    if (const auto partner = config.setup.axes[i].shares_shaft_with) {
+      append(text, "shares_shaft_with", std::to_string(*partner));  // a number: names do not count here
+    }
     append_axis(text, config.setup.axes[i], config.axes[i]);
   }
   return text;

@@ -76,10 +76,15 @@ class Engine {
   /// What the machine did not grant, for people.
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// The parameters in force, with those writes that are on their way.
+  /// The parameters in force at newest(), with those writes whose answer is still to come.
   const AxisParameters& parameters(std::size_t axis) const { return parameters_[axis]; }
-  /// What is wrong with a write: empty, and then it counts as done; the caller sends the input.
+  /// What is wrong with a write that acts at once: empty, and then it counts as done; the caller sends the
+  /// input.
   std::string try_parameter(std::size_t axis, std::uint32_t row, double value);
+  /// What is wrong with the value by itself, whatever the others are when a write acts later.
+  std::string problem_with_value(std::size_t axis, std::uint32_t row, double value) const;
+  /// Hash of the configuration, as configuration_hash() has it.
+  std::uint64_t configuration_hash() const { return configuration_hash_; }
 
   /// A number for the next controller.
   Owner new_owner() { return ++owners_; }
@@ -92,9 +97,10 @@ class Engine {
   std::vector<Sample> newest_;
   std::vector<TickEdges> edges_;  ///< empty: nobody wants them
   std::vector<std::string> notes_;
+  std::vector<AxisParameters> parameters_;  ///< parameters(), by axis
 
  private:
-  std::vector<AxisParameters> parameters_;
+  std::uint64_t configuration_hash_;
   Owner owners_ = 0;
 };
 
@@ -106,7 +112,7 @@ std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::uni
 std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
                                              boost::asio::io_context& io, std::optional<Tick> max_ticks);
 
-/// Hands the load events of the configuration to the bench.
-void schedule_loads(const BenchConfig& config, Bench& bench);
+/// Hands the events of the configuration to the bench: there is no other way for what happens by itself.
+void schedule_events(const BenchConfig& config, Bench& bench);
 
 }  // namespace drivebench

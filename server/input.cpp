@@ -1,23 +1,31 @@
 #include "server/input.hpp"
 
 #include <bit>
+#include <cmath>
+
+#include "plant/parameters/rows.hpp"
 
 namespace drivebench {
 namespace {
 
-using Words = std::uint64_t[4];
+using Words = std::uint64_t[6];
 
 // One pair for each action that has contents.
 void put(Words& w, const Command& c) noexcept {
   w[0] = static_cast<std::uint64_t>(c.answers);
   w[1] = static_cast<std::uint64_t>(c.phases.gates);
-  w[2] = std::bit_cast<std::uint64_t>(c.phases.voltage_v.a);
-  w[3] = std::bit_cast<std::uint64_t>(c.phases.voltage_v.b);
+  w[2] = std::bit_cast<std::uint64_t>(c.phases.setpoint.a);
+  w[3] = std::bit_cast<std::uint64_t>(c.phases.setpoint.b);
+  w[4] = std::bit_cast<std::uint64_t>(c.phases.setpoint.c);
+  w[5] = std::bit_cast<std::uint64_t>(c.phases.setpoint.field);
 }
 void get(const Words& w, Command& c) noexcept {
   c.answers = static_cast<Tick>(w[0]);
   c.phases.gates = static_cast<Gates>(w[1]);
-  c.phases.voltage_v = {std::bit_cast<double>(w[2]), std::bit_cast<double>(w[3])};
+  c.phases.setpoint = {.a = std::bit_cast<double>(w[2]),
+                       .b = std::bit_cast<double>(w[3]),
+                       .c = std::bit_cast<double>(w[4]),
+                       .field = std::bit_cast<double>(w[5])};
 }
 
 void put(Words& w, const LeaseAction& action) noexcept {
@@ -39,10 +47,28 @@ void get(const Words& w, LoadChange& change) noexcept {
 void put(Words& w, const ParameterWrite& write) noexcept {
   w[0] = write.row;
   w[1] = std::bit_cast<std::uint64_t>(write.value);
+  w[2] = static_cast<std::uint64_t>(write.ramp_ticks);
 }
 void get(const Words& w, ParameterWrite& write) noexcept {
   write.row = static_cast<std::uint32_t>(w[0]);
   write.value = std::bit_cast<double>(w[1]);
+  write.ramp_ticks = static_cast<Tick>(w[2]);
+}
+
+void put(Words& w, const InjectFault& fault) noexcept {
+  w[0] = fault.row;
+  w[1] = std::bit_cast<std::uint64_t>(fault.value);
+}
+void get(const Words& w, InjectFault& fault) noexcept {
+  fault.row = static_cast<std::uint32_t>(w[0]);
+  fault.value = std::bit_cast<double>(w[1]);
+}
+
+void put(Words& w, const ShaftBump& bump) noexcept {
+  w[0] = std::bit_cast<std::uint64_t>(bump.impulse_nms);
+}
+void get(const Words& w, ShaftBump& bump) noexcept {
+  bump.impulse_nms = std::bit_cast<double>(w[0]);
 }
 
 template <class Empty>
@@ -76,6 +102,22 @@ Input unpack(const PackedInput& packed) noexcept {
   return input;
 }
 
+bool is_finite(const PhaseCommand& command) noexcept {
+  const PhaseValues& x = command.setpoint;
+  return std::isfinite(x.a) && std::isfinite(x.b) && std::isfinite(x.c) && std::isfinite(x.field);
+}
+
+std::string problem_with(const InjectableFault& fault, double value) {
+  if (!std::isfinite(value)) return "is not a finite number";
+  const double minimum = fault.magnitude ? -fault.maximum : 0.0;
+  if (value < minimum || value > fault.maximum) {
+    return "is " + text(value) + " but must lie between " + text(minimum) + " and " + text(fault.maximum) +
+           " " + std::string(fault.unit);
+  }
+  if (fault.integer && value != std::floor(value)) return "is " + text(value) + " but must be a whole number";
+  return {};
+}
+
 std::string_view sentence_of(Refused why) noexcept {
   switch (why) {
     case Refused::kUnknownAxis:
@@ -92,6 +134,14 @@ std::string_view sentence_of(Refused why) noexcept {
       return "the command answers a sample that is too old, already answered or not taken yet";
     case Refused::kBusy:
       return "too many requests are waiting for the bench";
+    case Refused::kWrongDrive:
+      return "GATES_CURRENT needs a drive of kind \"current_amplifier\"; the drive of the axis is another";
+    case Refused::kOutOfRange:
+      return "a value is outside of its limits";
+    case Refused::kRuleBroken:
+      return "the parameter would break a rule with the values that hold now";
+    case Refused::kTooManyRamps:
+      return "16 parameters of the axis are on their way already";
     case Refused::kNot:
       break;
   }

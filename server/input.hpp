@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <variant>
 
-#include "plant/amplifier.hpp"
+#include "plant/drive/drive.hpp"
+#include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
 
 namespace drivebench {
@@ -33,10 +35,23 @@ struct LoadChange {
   Tick ramp_ticks;
 };
 
-/// A parameter to change, already checked against its limits and rules.
+/// A parameter to change, already checked against its limits; the rules between values are looked at when it
+/// acts.
 struct ParameterWrite {
-  std::uint32_t row;  ///< of axis_parameters()
+  std::uint32_t row;  ///< of axis_parameters() of the axis
   double value;
+  Tick ramp_ticks = 0;  ///< 0: a step; else linear from the present value, real numbers only
+};
+
+/// A fault to put into the axis, already checked; a value of 0 takes it away.
+struct InjectFault {
+  std::uint32_t row;  ///< of kInjectableFaults
+  double value;
+};
+
+/// A blow on the shaft, an angular impulse that acts at once.
+struct ShaftBump {
+  double impulse_nms;  ///< positive like a machine torque
 };
 
 struct ClearFaults {};     ///< by the owner only
@@ -44,14 +59,15 @@ struct LateTick {};        ///< the tick of this input started late; concerns th
 struct Overrun {};         ///< late beyond the limit: safe action on every axis
 struct RefusedCommand {};  ///< a command for this axis was turned away before it reached the bench
 
+using Action = std::variant<ClearFaults, Command, LeaseAction, LoadChange, ParameterWrite, LateTick, Overrun,
+                            RefusedCommand, InjectFault, ShaftBump>;
+
 /// Everything that can change a run from outside, with the tick at whose start it takes effect.
 struct Input {
   Tick tick = 0;
   std::uint32_t axis = 0;
   Owner owner = 0;
-  std::variant<ClearFaults, Command, LeaseAction, LoadChange, ParameterWrite, LateTick, Overrun,
-               RefusedCommand>
-      action;
+  Action action;
 };
 static_assert(std::is_trivially_copyable_v<Input>);
 
@@ -61,7 +77,7 @@ struct PackedInput {
   std::uint64_t axis = 0;
   Owner owner = 0;
   std::uint64_t kind = 0;  ///< index of the action
-  std::uint64_t words[4] = {};
+  std::uint64_t words[6] = {};
 };
 
 PackedInput pack(const Input& input) noexcept;
@@ -78,8 +94,32 @@ enum class Refused : std::uint32_t {
   kNotFinite,
   kLatched,
   kStale,
-  kBusy
+  kBusy,
+  kWrongDrive,    ///< the drive of the axis does not take such a setpoint
+  kOutOfRange,    ///< the value is outside of what it is about
+  kRuleBroken,    ///< a parameter would break a rule between values
+  kTooManyRamps,  ///< as many parameters as possible are on their way already
 };
+
+/// Whether all setpoints are finite numbers.
+bool is_finite(const PhaseCommand& command) noexcept;
+
+/// Whether a drive of this kind knows what to do with the setpoints: only a current-mode amplifier takes
+/// currents.
+constexpr bool suits(DriveKind drive, Gates gates) noexcept {
+  return gates != Gates::kCurrent || drive == DriveKind::kCurrent;
+}
+
+/// What is wrong with putting `value` into this fault: empty if nothing is, otherwise a sentence with value
+/// and rule.
+std::string problem_with(const InjectableFault& fault, double value);
+
+/// Ticks that clients may name lie up to here: what a double holds exactly.
+inline constexpr std::uint64_t kMaxTick = std::uint64_t{1} << 53;
+
+/// Largest amounts that configurations and clients may ask for, both signs.
+inline constexpr double kMaxLoadNm = 1e6;
+inline constexpr double kMaxImpulseNms = 1e6;
 
 /// The reason for people; empty for kNot.
 std::string_view sentence_of(Refused why) noexcept;

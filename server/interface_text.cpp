@@ -2,28 +2,41 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "protocols/can/dbc.hpp"
 #include "protocols/can/table_text.hpp"
 #include "server/endpoints/modbus/map_info.hpp"
+#include "server/endpoints/terminals.hpp"
 
 namespace drivebench {
 namespace {
 
-const CanConfig& chosen_bus(const BenchConfig& config, std::size_t bus) {
-  static const CanConfig by_default;
-  if (config.can.empty() && bus == 1) return by_default;
-  if (bus >= 1 && bus <= config.can.size()) return config.can[bus - 1];
-  throw std::runtime_error(
-      fmt::format("--bus {}: bench {} has {} [[can]] sections", bus, config.name, config.can.size()));
-}
-
 std::vector<can::BusAxis> bus_axes(const BenchConfig& config) {
   std::vector<can::BusAxis> axes;
-  for (const AxisConfig& axis : config.axes)
-    axes.push_back({.name = axis.name, .node = axis.can_node});
+  for (std::size_t i = 0; i < config.axes.size(); ++i) {
+    axes.push_back({.name = config.axes[i].name,
+                    .node = config.axes[i].can_node,
+                    .wide = terminals_of(config.setup.axes[i].parameters).is_wide()});
+  }
   return axes;
+}
+
+/// Whether an axis has more than phases a and b and an encoder: its frames need more identifiers.
+bool has_wide_axis(const BenchConfig& config) {
+  return std::any_of(config.setup.axes.begin(), config.setup.axes.end(),
+                     [](const AxisSetup& axis) { return terminals_of(axis.parameters).is_wide(); });
+}
+
+CanConfig chosen_bus(const BenchConfig& config, std::size_t bus) {
+  if (config.can.empty() ? bus != 1 : bus < 1 || bus > config.can.size()) {
+    throw std::runtime_error(
+        fmt::format("--bus {}: bench {} has {} [[can]] sections", bus, config.name, config.can.size()));
+  }
+  CanConfig chosen = config.can.empty() ? CanConfig{} : config.can[bus - 1];
+  chosen.profile.wide = has_wide_axis(config);
+  return chosen;
 }
 
 /// How much of a bus its frames take in real time, and of what.
@@ -70,14 +83,23 @@ std::int64_t enough_ticks(const BenchConfig& config, CanConfig bus) {
 }  // namespace
 
 can::BusLoad bus_load_of(const BenchConfig& config, const CanConfig& bus) {
-  return can::bus_load(bus.profile, {.axes = config.axes.size(),
-                                     .period_s = static_cast<double>(config.setup.period_ns) * 1e-9,
-                                     .sample_every_ticks = static_cast<double>(bus.sample_every_ticks),
-                                     .state_every_ticks = static_cast<double>(bus.state_every_ticks),
-                                     .heartbeat_ms = static_cast<double>(bus.heartbeat_ms),
-                                     .edges = bus.edges,
-                                     .bit_rate = static_cast<double>(bus.bit_rate),
-                                     .data_bit_rate = static_cast<double>(bus.data_bit_rate)});
+  can::Profile profile = bus.profile;
+  profile.wide = has_wide_axis(config);
+  const auto count = [&config](auto has) {
+    return static_cast<std::size_t>(
+        std::count_if(config.setup.axes.begin(), config.setup.axes.end(),
+                      [&](const AxisSetup& axis) { return has(terminals_of(axis.parameters)); }));
+  };
+  return can::bus_load(profile, {.axes = config.axes.size(),
+                                 .wide_axes = count([](const Terminals& t) { return t.is_wide(); }),
+                                 .sensing_axes = count([](const Terminals& t) { return t.speed_sensors; }),
+                                 .period_s = static_cast<double>(config.setup.period_ns) * 1e-9,
+                                 .sample_every_ticks = static_cast<double>(bus.sample_every_ticks),
+                                 .state_every_ticks = static_cast<double>(bus.state_every_ticks),
+                                 .heartbeat_ms = static_cast<double>(bus.heartbeat_ms),
+                                 .edges = bus.edges,
+                                 .bit_rate = static_cast<double>(bus.bit_rate),
+                                 .data_bit_rate = static_cast<double>(bus.data_bit_rate)});
 }
 
 std::vector<std::string> bus_overloads(const BenchConfig& config) {
@@ -100,7 +122,7 @@ std::vector<std::string> bus_overloads(const BenchConfig& config) {
 std::string interface_text(const BenchConfig& config, std::string_view what, std::size_t bus) {
   if (what == "dbc") return can::dbc_text(config.name, chosen_bus(config, bus).profile, bus_axes(config));
   if (what.starts_with("modbus")) return modbus::map_of(config, what == "modbus-csv");
-  const CanConfig& chosen = chosen_bus(config, bus);
+  const CanConfig chosen = chosen_bus(config, bus);
   return can::table_text(config.name, chosen.profile, bus_axes(config)) + "\n## Load in real time\n\n" +
          can::load_text(bus_load_of(config, chosen));
 }

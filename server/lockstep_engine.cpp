@@ -8,8 +8,10 @@ namespace {
 class LockstepEngine final : public Engine {
  public:
   LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder)
-      : Engine(config, std::move(recorder)), bench_(config_.setup, recorder_.get()) {
-    schedule_loads(config_, bench_);
+      : Engine(config, std::move(recorder)),
+        bench_(config_.setup, recorder_.get()),
+        shown_changes_(config_.axes.size()) {
+    schedule_events(config_, bench_);
     show();
   }
 
@@ -39,6 +41,9 @@ class LockstepEngine final : public Engine {
 
   void request(const Input& input, Answer answer) override {
     const Refused refused = bench_.submit(input);
+    if (std::holds_alternative<ParameterWrite>(input.action) && input.axis < parameters_.size()) {
+      parameters_[input.axis] = bench_.axis(input.axis).parameters();  // even if it was refused
+    }
     answer(refused, bench_.tick());
     advance();  // the controller that everybody waited for may just have left
   }
@@ -61,11 +66,16 @@ class LockstepEngine final : public Engine {
 
  private:
   void show() {
-    for (std::size_t i = 0; i < newest_.size(); ++i)
+    for (std::size_t i = 0; i < newest_.size(); ++i) {
       newest_[i] = bench_.sample(i);
+      if (std::exchange(shown_changes_[i], bench_.parameter_changes(i)) != bench_.parameter_changes(i)) {
+        parameters_[i] = bench_.axis(i).parameters();
+      }
+    }
   }
 
   Bench bench_;
+  std::vector<std::uint64_t> shown_changes_;
 };
 
 }  // namespace

@@ -50,7 +50,8 @@ std::span<const std::byte> bytes_of(std::string_view text) {
 class Recorder::File {
  public:
   File(const std::filesystem::path& path, const BenchConfig& config)
-      : period_ns_(config.setup.period_ns),
+      : tables_(parameter_tables(config.setup)),
+        period_ns_(config.setup.period_ns),
         flush_ticks_(static_cast<std::uint64_t>(
             std::max<std::int64_t>(flush_interval_ns(config.mode) / period_ns_, 1))),
         descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)) {
@@ -89,7 +90,7 @@ class Recorder::File {
 
   void write(const InputEntry& entry) {
     ++unsaved_;
-    encode_input(entry.received, entry.input, input_);
+    encode_input(entry.received, entry.input, tables_, input_);
     add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
   }
 
@@ -153,6 +154,7 @@ class Recorder::File {
     }
   }
 
+  ParameterTables tables_;
   std::int64_t period_ns_;
   std::uint64_t flush_ticks_;
   int descriptor_;

@@ -80,6 +80,7 @@ class Replayer {
       } catch (const ConfigError& error) {
         return unusable(fmt::format("its configuration cannot be read: {}", error.what()));
       }
+      tables_ = parameter_tables(config_.setup);
       bench_.emplace(config_.setup);
       for (std::size_t i = 0; i < config_.axes.size(); ++i)
         axes_[sample_topic(config_.axes[i].name)] = i;
@@ -106,7 +107,7 @@ class Replayer {
     v1::Input message;
     std::optional<Input> input;
     if (message.ParseFromArray(payload.data(), static_cast<int>(payload.size())))
-      input = decode_input(message);
+      input = decode_input(message, tables_);
     if (!input) return unusable(fmt::format("an input at tick {} cannot be read", bench_->tick()));
     if (static_cast<Tick>(message.received_tick()) != bench_->tick()) {
       return unusable(fmt::format("samples between tick {} and an input of tick {} are missing",
@@ -182,6 +183,7 @@ class Replayer {
   std::span<const std::byte> recording_;
   McapReader reader_;
   BenchConfig config_;
+  ParameterTables tables_;
   std::optional<Bench> bench_;
   std::map<std::string, std::size_t, std::less<>> axes_;
   v1::Verdict verdict_;

@@ -195,8 +195,8 @@ int StrictTable::line_of(std::string_view key) const {
   return node != nullptr ? node->line : line_;
 }
 
-void StrictTable::report(std::string_view key, std::string rule) {
-  problems_->add(*file_, line_of(key), printable(path_of(key)), std::move(rule));
+void StrictTable::report_at(int line, std::string_view key, std::string rule) {
+  problems_->add(*file_, line, printable(path_of(key)), std::move(rule));
 }
 
 const ConfigNode* StrictTable::find(std::string_view key) const {

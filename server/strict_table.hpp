@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/config_document.hpp"
@@ -35,6 +36,8 @@ class StrictTable {
   /// One of the words; its index.
   std::optional<std::size_t> choice(std::string_view key, std::span<const std::string_view> words);
 
+  /// A value of whatever kind; null if there is none.
+  const ConfigNode* node(std::string_view key) { return take(key); }
   StrictTable table(std::string_view key);
   std::vector<StrictTable> tables(std::string_view key, std::size_t most);
 
@@ -48,7 +51,9 @@ class StrictTable {
   int line() const { return line_; }
   int line_of(std::string_view key) const;
   /// Adds a problem with this key, at its line.
-  void report(std::string_view key, std::string rule);
+  void report(std::string_view key, std::string rule) { report_at(line_of(key), key, std::move(rule)); }
+  /// The same at another line, of something within its value.
+  void report_at(int line, std::string_view key, std::string rule);
 
  private:
   const ConfigNode* find(std::string_view key) const;

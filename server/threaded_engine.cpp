@@ -2,12 +2,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
-#include <cmath>
+#include <cstdlib>
 #include <deque>
+#include <span>
 #include <thread>
+#include <utility>
 #include <variant>
 
+#include "plant/parameters/parameters.hpp"
 #include "server/asio.hpp"
 #include "server/engine.hpp"
 #include "server/mailbox.hpp"
@@ -76,12 +80,18 @@ class ThreadedEngine final : public Engine {
         tap_(recorder_.get(), events_),
         bench_(config_.setup, &tap_),
         mailboxes_(config_.axes.size()),
+        parameter_mail_(config_.axes.size()),
         sent_(config_.axes.size()),
         wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         pacer_(config_.mode == RunMode::kRealtime
                    ? make_realtime_pacer(config_.realtime.pacer, config_.setup.period_ns)
                    : make_free_pacer()) {
-    schedule_loads(config_, bench_);
+    schedule_events(config_, bench_);
+    for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
+      parameters_[i] = bench_.axis(i).parameters();
+      parameter_mail_[i].in_force = values_of(parameters_[i]);
+      parameter_mail_[i].sent = bench_.parameter_changes(i);
+    }
     if (!edges_.empty()) tap_.send_edges_of(bench_);
     for (std::size_t i = 0; i < newest_.size(); ++i)
       newest_[i] = bench_.sample(i);
@@ -100,8 +110,8 @@ class ThreadedEngine final : public Engine {
   Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
     const Sample& newest = newest_[axis];
     if (owner == 0 || newest.owner != owner) return Refused::kNotOwner;
-    const TwoPhase& voltage_v = command.phases.voltage_v;
-    if (!std::isfinite(voltage_v.a) || !std::isfinite(voltage_v.b)) return Refused::kNotFinite;
+    if (!is_finite(command.phases)) return Refused::kNotFinite;
+    if (!suits(parameters(axis).drive.kind, command.phases.gates)) return Refused::kWrongDrive;
     const bool repeated = sent_[axis].owner == owner && command.answers <= sent_[axis].command.answers;
     if (repeated || command.answers < 0 || command.answers > static_cast<Tick>(newest.tick)) {
       return Refused::kStale;
@@ -124,8 +134,12 @@ class ThreadedEngine final : public Engine {
   void advance() override {}
 
   void request(const Input& input, Answer answer) override {
-    if (!requests_.push(input)) return answer(Refused::kBusy, tick());
-    answers_.push_back(std::move(answer));
+    const bool writes = std::holds_alternative<ParameterWrite>(input.action);
+    const bool taken = requests_.push(input);
+    if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;
+    if (writes && !taken) show_parameters(input.axis);  // without this one
+    if (!taken) return answer(Refused::kBusy, tick());
+    answers_.push_back({std::move(answer), writes ? std::optional(input.axis) : std::nullopt});
   }
 
   Verdict stop() override {
@@ -158,10 +172,12 @@ class ThreadedEngine final : public Engine {
     while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_)) {
       look_at_the_clock();
       take_requests();
+      send_parameters();
       if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
       bench_.step();
       if (bench_.tick() % ticks_per_wake_ == 0) notify();
     }
+    send_parameters();
     while (!events_.push(Ended{}) && !stop_.load()) {
       notify();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -199,6 +215,15 @@ class ThreadedEngine final : public Engine {
     }
   }
 
+  /// Before the samples that show them, so that whoever gets an answer finds the parameters as it says.
+  void send_parameters() noexcept {
+    for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
+      ParameterMail& mail = parameter_mail_[i];
+      if (std::exchange(mail.sent, bench_.parameter_changes(i)) == bench_.parameter_changes(i)) continue;
+      mail.newest.write(values_of(bench_.axis(i).parameters()));
+    }
+  }
+
   /// Wakes the I/O thread, unless that is on its way already.
   void notify() noexcept {
     if (wake_pending_.exchange(true)) return;
@@ -223,6 +248,8 @@ class ThreadedEngine final : public Engine {
 
   void drain_events() {
     const Tick before = tick();
+    for (std::size_t i = 0; i < parameter_mail_.size(); ++i)
+      take_parameters(i);
     for (std::size_t n = 0; n < events_.capacity(); ++n) {
       const Event* event = events_.front();
       if (event == nullptr) break;
@@ -249,14 +276,60 @@ class ThreadedEngine final : public Engine {
 
   void answer_outcomes() {
     for (; !outcomes_.empty(); outcomes_.pop_front()) {
-      const Answer answer = std::move(answers_.front());
+      const Waiting waiting = std::move(answers_.front());
       answers_.pop_front();
-      answer(outcomes_.front().refused, outcomes_.front().tick);
+      if (waiting.written_axis) {
+        take_parameters(*waiting.written_axis);
+        --parameter_mail_[*waiting.written_axis].in_flight;
+        show_parameters(*waiting.written_axis);
+      }
+      waiting.answer(outcomes_.front().refused, outcomes_.front().tick);
     }
+  }
+
+  void take_parameters(std::size_t axis) {
+    const auto values = parameter_mail_[axis].newest.take();
+    if (!values) return;
+    parameter_mail_[axis].in_force = *values;
+    show_parameters(axis);
+  }
+
+  /// Takes over the parameters in force, unless writes are on their way that they do not show yet.
+  void show_parameters(std::size_t axis) {
+    const ParameterMail& mail = parameter_mail_[axis];
+    if (mail.in_flight != 0) return;
+    AxisParameters& p = parameters_[axis];
+    const std::span<const Parameter> rows = axis_parameters(p);
+    for (std::size_t row = 0; row < rows.size(); ++row)
+      rows[row].set(p, mail.in_force[row]);
   }
 
   // In free mode a wake-up costs more than several ticks; the ring holds what comes in between.
   static constexpr std::size_t kEventsPerWake = 256;
+
+  static constexpr std::size_t kMaxParameters = 256;
+  using ParameterValues = std::array<double, kMaxParameters>;
+
+  /// The parameters of an axis on their way from the tick thread.
+  struct ParameterMail {
+    Mailbox<ParameterValues> newest;
+    std::uint64_t sent = 0;       // tick thread: changes that were written into the mailbox
+    ParameterValues in_force{};   // I/O thread: what came last
+    std::uint64_t in_flight = 0;  // I/O thread: writes without an answer yet
+  };
+  static ParameterValues values_of(const AxisParameters& p) noexcept {
+    const std::span<const Parameter> rows = axis_parameters(p);
+    if (rows.size() > kMaxParameters) std::abort();
+    ParameterValues values{};
+    for (std::size_t row = 0; row < rows.size(); ++row)
+      values[row] = rows[row].get(p);
+    return values;
+  }
+
+  struct Waiting {
+    Answer answer;
+    std::optional<std::uint32_t> written_axis;  // of a parameter
+  };
 
   std::optional<Tick> max_ticks_;
   Tick ticks_per_wake_;
@@ -265,10 +338,11 @@ class ThreadedEngine final : public Engine {
   Tap tap_;
   Bench bench_;
   std::deque<Mailbox<OwnedCommand>> mailboxes_;
+  std::deque<ParameterMail> parameter_mail_;
   std::vector<OwnedCommand> sent_;  // the last command put into each mailbox
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
-  std::deque<Answer> answers_;    // of the requests in flight, in order
+  std::deque<Waiting> answers_;   // of the requests in flight, in order
   std::deque<Outcome> outcomes_;  // that have come back, to be answered with the samples of their tick
   std::unique_ptr<Pacer> pacer_;
   LatenessHistogram lateness_;

@@ -23,15 +23,19 @@ TickEdges edges_of(const Bench& bench, std::size_t index) noexcept {
   const int counts_per_revolution = axis.parameters().encoder.counts_per_revolution;
   TickEdges result;
   result.tick = bench.tick() - 1;
-  result.start_count = axis.last_tick_count();
+  const EncoderState& start = axis.last_tick_encoder();
+  result.start_count = start.count;
   double travel_rad = 0.0;
   for (const AngleSegment& segment : axis.last_tick())
     travel_rad += std::abs(segment.end_rad - segment.start_rad);
-  if (!(travel_rad * counts_per_revolution / (2.0 * std::numbers::pi) < kMaxTravelCounts)) {
+  // A fault that comes or goes may make the count jump without travel.
+  const std::int64_t jump = std::abs(axis.state().encoder.count - start.count);
+  if (!(travel_rad * counts_per_revolution / (2.0 * std::numbers::pi) < kMaxTravelCounts) ||
+      jump >= static_cast<std::int64_t>(kMaxTravelCounts)) {
     result.incomplete = true;
     return result;
   }
-  axis.encoder().for_each_edge(axis.last_tick(), axis.last_tick_turn(), axis.last_tick_count(),
+  axis.encoder().for_each_edge(axis.last_tick(), axis.last_tick_turn(), start, axis.injected(),
                                [&](const Edge& edge) {
                                  if (result.size == TickEdges::kMost) {
                                    result.incomplete = true;

@@ -52,6 +52,36 @@ struct WatchOptions {
 };
 int run_watch(const WatchOptions& options);
 
+/// A fault to put into an axis; a value of 0 takes it away.
+struct InjectOptions {
+  LinkChoice link;
+  bool json = false;
+  std::string axis;  ///< number or name
+  std::string fault;
+  double value = 0.0;
+};
+int run_inject(const InjectOptions& options);
+
+/// A parameter to write.
+struct SetOptions {
+  LinkChoice link;
+  bool json = false;
+  std::string axis;  ///< number or name
+  std::string name;
+  std::string value;    ///< a number, or a word of a choice
+  double ramp_s = 0.0;  ///< in the bench's time; 0: a step
+};
+int run_set(const SetOptions& options);
+
+/// A blow on the shaft.
+struct BumpOptions {
+  LinkChoice link;
+  bool json = false;
+  std::string axis;  ///< number or name
+  double impulse_nms = 0.0;
+};
+int run_bump(const BumpOptions& options);
+
 /// A load torque at a time after the start of the trajectory.
 struct LoadAt {
   double load_nm = 0.0;

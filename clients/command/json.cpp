@@ -75,6 +75,14 @@ Json faults_of(const v1::BenchDescription& bench, std::uint64_t faults) {
   return names;
 }
 
+Json injected_of(const v1::BenchDescription& bench, std::uint64_t injected) {
+  Json names = Json::array();
+  for (const v1::InjectableFaultDescription& fault : bench.injectable_faults()) {
+    if ((injected & fault.bit()) != 0) names.push_back(fault.name());
+  }
+  return names;
+}
+
 Json value_as_json(const Signal& signal, const Sample& sample) {
   if (signal.type == SignalType::kUnsigned) return sample.*signal.as_unsigned;
   if (signal.type == SignalType::kSigned) return sample.*signal.as_signed;
@@ -92,6 +100,8 @@ Json parameters_of(const v1::AxisDescription& axis) {
                     {"integer", p.integer()},
                     {"live", p.live()},
                     {"meaning", p.meaning()}});
+    for (const std::string& word : p.words())
+      rows.back()["words"].push_back(word);
   }
   return rows;
 }
@@ -139,8 +149,15 @@ std::string describe_json(const v1::Welcome& welcome) {
               {"seed", bench.seed()},
               {"configuration_hash", fmt::format("{:016x}", bench.configuration_hash())}};
   for (const v1::AxisDescription& axis : bench.axes()) {
-    out["axes"].push_back(
-        {{"name", axis.name()}, {"machine", axis.machine()}, {"parameters", parameters_of(axis)}});
+    out["axes"].push_back({{"name", axis.name()},
+                           {"machine", axis.machine()},
+                           {"machine_kind", axis.machine_kind()},
+                           {"phases", axis.phases()},
+                           {"connection", axis.connection()},
+                           {"field_winding", axis.field_winding()},
+                           {"drive_kind", axis.drive_kind()},
+                           {"shares_shaft_with", axis.shares_shaft_with()},
+                           {"parameters", parameters_of(axis)}});
   }
   for (const v1::SignalDescription& s : bench.signals()) {
     out["signals"].push_back({{"name", s.name()},
@@ -153,6 +170,15 @@ std::string describe_json(const v1::Welcome& welcome) {
   for (const v1::FaultDescription& f : bench.faults()) {
     out["faults"].push_back(
         {{"bit", f.bit()}, {"name", f.name()}, {"latched", f.latched()}, {"meaning", f.meaning()}});
+  }
+  for (const v1::InjectableFaultDescription& f : bench.injectable_faults()) {
+    out["injectable_faults"].push_back({{"bit", f.bit()},
+                                        {"name", f.name()},
+                                        {"unit", f.unit()},
+                                        {"minimum", f.minimum()},
+                                        {"maximum", f.maximum()},
+                                        {"integer", f.integer()},
+                                        {"meaning", f.meaning()}});
   }
   return out.dump(2);
 }
@@ -180,7 +206,9 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
   }
   for (const v1::AxisSample& each : status.axes()) {
     const Sample sample = plain(each.sample());
-    Json axis = {{"axis", each.axis()}, {"faults_set", faults_of(bench, sample.faults)}};
+    Json axis = {{"axis", each.axis()},
+                 {"faults_set", faults_of(bench, sample.faults)},
+                 {"injected_set", injected_of(bench, sample.injected)}};
     for (const Signal& signal : kSignals)
       axis[std::string(signal.name)] = value_as_json(signal, sample);
     out["axes"].push_back(axis);
@@ -194,6 +222,10 @@ std::string sample_json(const Sample& sample, std::uint32_t axis, std::uint64_t 
   for (const Signal* signal : signals)
     out[std::string(signal->name)] = value_as_json(*signal, sample);
   return out.dump();
+}
+
+std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick) {
+  return Json{{"axis", axis}, {"name", name}, {"value", value}, {"tick", tick}}.dump();
 }
 
 std::string presets_json() {

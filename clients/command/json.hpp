@@ -19,6 +19,8 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
 /// One line: axis, dropped and the chosen signals.
 std::string sample_json(const Sample& sample, std::uint32_t axis, std::uint64_t dropped,
                         const std::vector<const Signal*>& signals);
+/// A fault, parameter or bump that was taken, with its tick.
+std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick);
 std::string presets_json();
 std::string control_json(const ControlReport& report);
 std::string export_json(std::string_view out_file, std::string_view axis, std::uint64_t rows,

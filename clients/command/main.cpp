@@ -62,6 +62,9 @@ struct CommandLine {
   StatusOptions status;
   DescribeOptions describe;
   WatchOptions watch;
+  InjectOptions inject;
+  SetOptions set;
+  BumpOptions bump;
   ControlOptions control;
   std::vector<std::string> loads;
   std::vector<std::string> settings;
@@ -82,6 +85,7 @@ struct CommandLine {
     add_serve();
     add_demo();
     add_observers();
+    add_changes();
     add_control();
     add_interfaces();
     add_recordings();
@@ -146,6 +150,38 @@ struct CommandLine {
       watch.link = link;
       watch.json = json;
       action = [this] { return run_watch(watch); };
+    });
+  }
+
+  void add_changes() {
+    CLI::App* sub = add_linked("inject", "put a fault into an axis that nobody controls");
+    sub->add_option("AXIS", inject.axis, "number or name")->required();
+    sub->add_option("FAULT", inject.fault, "name, as describe lists them")->required();
+    sub->add_option("VALUE", inject.value, "0 takes it away")->required();
+    sub->callback([this] {
+      inject.link = link;
+      inject.json = json;
+      action = [this] { return run_inject(inject); };
+    });
+    sub = add_linked("set", "write a parameter of an axis that nobody controls");
+    sub->add_option("AXIS", set.axis, "number or name")->required();
+    sub->add_option("NAME", set.name, "as describe lists them")->required();
+    sub->add_option("VALUE", set.value, "a number, or the word of a choice")->required();
+    sub->add_option("--ramp-s", set.ramp_s, "seconds of the bench's time on the way there")
+        ->check(CLI::Range(0.0, 1e9));
+    sub->callback([this] {
+      if (std::isnan(set.ramp_s)) throw UsageError("--ramp-s nan is not a number");
+      set.link = link;
+      set.json = json;
+      action = [this] { return run_set(set); };
+    });
+    sub = add_linked("bump", "hit the shaft of an axis that nobody controls");
+    sub->add_option("AXIS", bump.axis, "number or name")->required();
+    sub->add_option("IMPULSE", bump.impulse_nms, "[N*m*s], positive like a machine torque")->required();
+    sub->callback([this] {
+      bump.link = link;
+      bump.json = json;
+      action = [this] { return run_bump(bump); };
     });
   }
 

@@ -120,7 +120,7 @@ void let_rest(link::AxisLink& bench, double counts_per_revolution) {
   Sample sample = start;
   while (static_cast<double>(sample.tick - start.tick) < rest_ticks) {
     if (static_cast<double>(sample.tick - start.tick) < rest_ticks / 2) half_way = sample;
-    sample = bench.exchange(sample.tick, v1::GATES_OFF, 0.0, 0.0);
+    sample = bench.exchange({.tick = sample.tick, .gates = v1::GATES_OFF});
   }
   // A count within the second half is 0.13 rad/s.
   const double turned_rad = static_cast<double>(sample.encoder_count - half_way.encoder_count) *
@@ -161,7 +161,8 @@ ServoRun run_servo_move(link::AxisLink& bench, const control::Preset& preset,
       if (!run.failure.empty()) break;
 
       const Clock::time_point asked = Clock::now();
-      sample = &bench.exchange(row.tick, v1::GATES_VOLTAGE, output.u_a_v, output.u_b_v);
+      sample = &bench.exchange(
+          {.tick = row.tick, .gates = v1::GATES_VOLTAGE, .u_a_v = output.u_a_v, .u_b_v = output.u_b_v});
       row.exchange_us = microseconds(Clock::now() - asked);
       if (run.rows.size() == 1 && !loads.empty()) {
         // Only now it is certain which tick was the first.

@@ -15,6 +15,18 @@ namespace {
 
 volatile std::sig_atomic_t interrupt_count = 0;
 
+template <class Descriptions>
+std::string names_of(const Descriptions& descriptions, std::uint64_t bits) {
+  std::string names;
+  for (const auto& each : descriptions) {
+    if ((bits & each.bit()) == 0) continue;
+    bits &= ~each.bit();
+    names += (names.empty() ? "" : " ") + each.name();
+  }
+  if (bits != 0) names += fmt::format("{}{:#x}", names.empty() ? "" : " ", bits);
+  return names.empty() ? "none" : names;
+}
+
 }  // namespace
 
 link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
@@ -79,14 +91,11 @@ const char* name_of_state(std::uint64_t state) noexcept {
 }
 
 std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults) {
-  std::string names;
-  for (const v1::FaultDescription& fault : bench.faults()) {
-    if ((faults & fault.bit()) == 0) continue;
-    faults &= ~fault.bit();
-    names += (names.empty() ? "" : " ") + fault.name();
-  }
-  if (faults != 0) names += fmt::format("{}{:#x}", names.empty() ? "" : " ", faults);
-  return names.empty() ? "none" : names;
+  return names_of(bench.faults(), faults);
+}
+
+std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected) {
+  return names_of(bench.injectable_faults(), injected);
 }
 
 std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults) {

@@ -34,6 +34,8 @@ const char* name_of_state(std::uint64_t state) noexcept;
 
 /// The names of the bits that are set, separated by blanks; "none".
 std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults);
+/// The same of Sample.injected.
+std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected);
 std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
 /// What is latched, for people; empty: nothing. Where the link describes no faults the control state says it.
 std::string latched_text(const v1::BenchDescription& bench, const Sample& sample);

@@ -1,10 +1,29 @@
 #include <fmt/format.h>
 
+#include <string>
+
 #include "clients/command/commands.hpp"
 #include "clients/command/json.hpp"
 #include "clients/command/session.hpp"
 
 namespace drivebench::command {
+namespace {
+
+/// Currents and voltages of the terminals that the machine has.
+std::string terminals_text(const v1::Sample& s, const v1::AxisDescription& axis) {
+  const std::uint32_t phases = axis.phases();
+  std::string text = fmt::format("i_a {:.3f} A, ", s.i_a_a());
+  if (phases >= 2) text += fmt::format("i_b {:.3f} A, ", s.i_b_a());
+  if (phases >= 3) text += fmt::format("i_c {:.3f} A, ", s.i_c_a());
+  if (axis.field_winding()) text += fmt::format("i_f {:.3f} A, ", s.i_f_a());
+  text += fmt::format("u_a {:.2f} V, ", s.u_a_v());
+  if (phases >= 2) text += fmt::format("u_b {:.2f} V, ", s.u_b_v());
+  if (phases >= 3) text += fmt::format("u_c {:.2f} V, ", s.u_c_v());
+  if (axis.field_winding()) text += fmt::format("u_f {:.2f} V, ", s.u_f_v());
+  return text;
+}
+
+}  // namespace
 
 int run_status(const StatusOptions& options) {
   link::Link bench_link = open_link(options.link, "status");
@@ -14,6 +33,9 @@ int run_status(const StatusOptions& options) {
     fmt::print("{}\n", status_json(status, bench));
     return kExitOk;
   }
+  v1::AxisDescription unknown;
+  unknown.set_name("?");
+  unknown.set_phases(3);
   fmt::print("bench {} at {}: {}, tick {} ({:.3f} s), {} session{}\n", bench.name(), bench_link.peer(),
              name_of(status.mode()), status.tick(), static_cast<double>(status.tick()) * bench.period_s(),
              status.sessions(), status.sessions() == 1 ? "" : "s");
@@ -30,13 +52,13 @@ int run_status(const StatusOptions& options) {
   for (const v1::AxisSample& each : status.axes()) {
     const v1::Sample& s = each.sample();
     const auto i = static_cast<int>(each.axis());
-    fmt::print("axis {} ({}): {}, owner {}, faults {}\n", i,
-               i < bench.axes_size() ? bench.axes(i).name() : "?", name_of_state(s.state()),
-               s.owner() == 0 ? "nobody" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()));
-    fmt::print(
-        "  count {}, i_a {:.3f} A, i_b {:.3f} A, u_a {:.2f} V, u_b {:.2f} V, speed {:.3f} rad/s, load {:g} "
-        "N*m\n",
-        s.encoder_count(), s.i_a_a(), s.i_b_a(), s.u_a_v(), s.u_b_v(), s.speed_rad_s(), s.load_nm());
+    const v1::AxisDescription& axis = i < bench.axes_size() ? bench.axes(i) : unknown;
+    fmt::print("axis {} ({}): {}, owner {}, faults {}{}{}\n", i, axis.name(), name_of_state(s.state()),
+               s.owner() == 0 ? "nobody" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()),
+               s.injected() == 0 ? "" : ", injected ",
+               s.injected() == 0 ? "" : injected_names(bench, s.injected()));
+    fmt::print("  count {}, {}speed {:.3f} rad/s, load {:g} N*m\n", s.encoder_count(),
+               terminals_text(s, axis), s.speed_rad_s(), s.load_nm());
     fmt::print("  missed commands {}, refused commands {}\n", s.missed_commands(), s.refused_commands());
   }
   for (const v1::TransportStatus& transport : status.transports()) {

@@ -14,11 +14,22 @@ namespace {
 
 using namespace std::chrono_literals;
 
+/// What is usually looked at: the terminals that the machine has.
+std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
+  std::vector<std::string> names = {"tick", "state", "faults", "injected", "encoder_count", "i_a_a"};
+  if (axis.phases() >= 2) names.emplace_back("i_b_a");
+  if (axis.phases() >= 3) names.emplace_back("i_c_a");
+  names.emplace_back("u_a_v");
+  if (axis.phases() >= 2) names.emplace_back("u_b_v");
+  if (axis.phases() >= 3) names.emplace_back("u_c_v");
+  if (axis.field_winding()) names.insert(names.end(), {"i_f_a", "u_f_v"});
+  names.insert(names.end(), {"angle_rad", "speed_rad_s"});
+  return names;
+}
+
 std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
-  static const std::vector<std::string> kUsual = {"tick",  "state", "faults", "encoder_count", "i_a_a",
-                                                  "i_b_a", "u_a_v", "u_b_v",  "angle_rad",     "speed_rad_s"};
   std::vector<const Signal*> signals;
-  for (const std::string& name : names.empty() ? kUsual : names) {
+  for (const std::string& name : names) {
     const Signal* signal = find_signal(name);
     if (signal == nullptr)
       throw UsageError(fmt::format("no signal '{}'; `drivebench describe` lists them", name));
@@ -30,6 +41,7 @@ std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names)
 std::string value_text(const Signal& signal, const Sample& sample, const v1::BenchDescription& bench) {
   if (signal.name == "state") return name_of_state(sample.state);
   if (signal.name == "faults") return fault_names(bench, sample.faults);
+  if (signal.name == "injected") return injected_names(bench, sample.injected);
   if (signal.type == SignalType::kReal) return fmt::format("{:.6g}", sample.*signal.as_real);
   return fmt::format("{:.0f}", value_of(signal, sample));
 }
@@ -86,10 +98,12 @@ struct View {
 }  // namespace
 
 int run_watch(const WatchOptions& options) {
-  const std::vector<const Signal*> signals = chosen_signals(options.signals);
+  chosen_signals(options.signals);  // a wrong name is told before a bench is looked for
   link::Link bench_link = open_link(options.link, "watch");
   const v1::BenchDescription& bench = bench_link.welcome().bench();
   const std::uint32_t axis = axis_number(bench, options.axis);
+  const std::vector<const Signal*> signals = chosen_signals(
+      options.signals.empty() ? usual_signals(bench.axes(static_cast<int>(axis))) : options.signals);
   const double ticks = std::clamp(std::round(1.0 / (options.rate_hz * bench.period_s())), 1.0, 4e9);
   std::vector<std::string> names = {"tick"};
   for (const Signal* signal : signals)

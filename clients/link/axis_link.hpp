@@ -38,9 +38,10 @@ class AxisLink {
 
   /// The newest sample, at once.
   virtual const Sample& newest() = 0;
-  /// Answers the sample of `tick`. Lockstep: the sample of tick + 1. Real time: the first sample that the
-  /// link brings afterwards.
-  virtual const Sample& exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) = 0;
+  /// Answers the sample of command.tick; command.axis means nothing, the link is about one. Lockstep: the
+  /// sample of tick + 1. Real time: the first sample that the link brings afterwards. A link that has no
+  /// words for one of the setpoints refuses it.
+  virtual const Sample& exchange(const Command& command) = 0;
 
   virtual void write_parameter(std::string_view name, double value) = 0;
   virtual bool can_set_load() const noexcept = 0;

@@ -31,12 +31,20 @@ constexpr auto kMeanings = std::to_array<Meaning>({
     {v1::REFUSAL_STALE, "the tick has been answered"},
     {v1::REFUSAL_BUSY, "the bench has too much to do"},
     {v1::REFUSAL_MALFORMED, "the frame is malformed"},
+    {v1::REFUSAL_MALFORMED, "phase c and the field of its tick are missing"},
+    {v1::REFUSAL_WRONG_DRIVE, "the drive of the axis takes no currents"},
 });
 
 [[noreturn]] void refuse_with(Result result) {
+  const auto number = static_cast<std::size_t>(result);
   const Meaning& meaning =
-      kMeanings[std::min<std::size_t>(static_cast<std::size_t>(result), kMeanings.size() - 1)];
+      kMeanings[number < kMeanings.size() ? number : static_cast<std::size_t>(Result::kMalformed)];
   refuse(meaning.code, meaning.sentence);
+}
+
+/// In the numbers of the profile, where 3 are duties.
+unsigned mode_of(v1::Gates gates) {
+  return gates == v1::GATES_CURRENT ? can::kCurrentMode : static_cast<unsigned>(gates);
 }
 
 constexpr SignalMask signals_of(const can::MessageRow& row) {
@@ -51,11 +59,10 @@ constexpr SignalMask signals_of(const can::MessageRow& row) {
 
 /// What the sensors of every sample and the frames about the state carry, without the speed: the state frame
 /// has it, but not of every sample.
-SignalMask signals_in(bool fd) {
+SignalMask signals_in(const can::Profile& profile) {
   SignalMask mask = 0;
   for (const can::MessageRow& row : can::kMessages) {
-    const bool exists = row.variant == can::Variant::kBoth || (row.variant == can::Variant::kFd) == fd;
-    if (exists && row.sender == can::Sender::kBench) mask |= signals_of(row);
+    if (can::is_on(row, profile) && row.sender == can::Sender::kBench) mask |= signals_of(row);
   }
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     if (kSignals[i].kind == SignalKind::kTruth) mask &= ~(SignalMask{1} << i);
@@ -89,7 +96,7 @@ CanLink::CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::st
       node_(address.node),
       name_(std::move(name)),
       options_(options),
-      known_(signals_in(address.profile.fd)),
+      known_(signals_in(address.profile)),
       controller_(std::random_device{}()) {
   bench_.set_name(name_);
   bench_.add_axes()->set_name("node " + std::to_string(node_));
@@ -153,31 +160,43 @@ const Sample& CanLink::newest() {
   return sample_;
 }
 
-const Sample& CanLink::exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) {
-  const can::MessageRow& row = *can::find_message(Message::kCommand, profile_.fd);
-  can::Values values{};
-  for (std::size_t i = 0; i < row.fields.size(); ++i) {
-    const std::string_view field = row.fields[i].name;
-    values[i] = field == "tick"   ? static_cast<double>(tick)
-                : field == "u_a"  ? u_a_v
-                : field == "u_b"  ? u_b_v
-                : field == "mode" ? static_cast<double>(gates)
-                                  : static_cast<double>(lease_);
+can::CommandFrames CanLink::frames_of(const Command& command) const {
+  const bool wants_more =
+      command.u_c_v != 0.0 || command.u_f_v != 0.0 || command.i_c_a != 0.0 || command.i_f_a != 0.0;
+  if (wants_more && !profile_.wide) {
+    refuse(v1::REFUSAL_OUT_OF_RANGE, "over CAN this axis has neither a phase c nor a field", "command");
   }
-  const can::Frame command = can::encode(row, profile_, node_, values);
+  const bool currents = command.gates == v1::GATES_CURRENT;
+  return can::encode_command(profile_, node_, profile_.wide,
+                             {.tick = command.tick,
+                              .mode = mode_of(command.gates),
+                              .lease = lease_,
+                              .a = currents ? command.i_a_a : command.u_a_v,
+                              .b = currents ? command.i_b_a : command.u_b_v,
+                              .c = currents ? command.i_c_a : command.u_c_v,
+                              .field = currents ? command.i_f_a : command.u_f_v});
+}
+
+const Sample& CanLink::exchange(const Command& command) {
+  const can::CommandFrames frames = frames_of(command);
+  const auto send = [this, &frames] {
+    for (const can::Frame& frame : frames)
+      bus_->send(frame);
+  };
+  const std::uint64_t tick = command.tick;
   commanded_tick_ = tick;
   command_result_.reset();
   asked_ = Request::kCommand;
   reply_.reset();
-  bus_->send(command);
+  send();
   await(
       "sample after tick " + std::to_string(tick),
       [this, tick] {
         check_replies();
         return has_sample_ && sample_.tick > tick;
       },
-      [this, &command] {
-        if (is_lockstep()) bus_->send(command);
+      [this, &send] {
+        if (is_lockstep()) send();
       });
   // In real time a slow controller goes on with the newest sample.
   while (!is_lockstep() && receive(Clock::time_point::min())) {
@@ -190,6 +209,7 @@ void CanLink::check_replies() {
   if (reply_ && reply_->result != Result::kDone) refuse_with(reply_->result);
   if (!command_result_) return;
   const Result result = *std::exchange(command_result_, std::nullopt);
+  if (result == Result::kIncomplete) return;  // one of its two frames was lost; in lockstep both go again
   if (result == Result::kNotOwner) {
     send_request(Request::kRenew);  // it may be about somebody else; the reply to this is about us
   } else if (result != Result::kStale) {
@@ -269,29 +289,25 @@ bool CanLink::receive(Clock::time_point until) {
 
 void CanLink::take(const can::MessageRow& row, const can::Values& values) {
   switch (row.message) {
-    case Message::kHeartbeat: {
-      const unsigned version = as_code(values[index_of(Message::kHeartbeat, true, "profile")]);
-      if (version != can::kProfileVersion) {
-        throw LinkError(name_ + " speaks version " + std::to_string(version) + " of the frame table, this " +
-                        "program version " + std::to_string(can::kProfileVersion));
-      }
-      if (as_code(values[index_of(Message::kHeartbeat, true, "state")]) == kStopped) {
-        throw LinkError(name_ + " has stopped");
-      }
-      bench_.set_period_s(values[index_of(Message::kHeartbeat, true, "period_us")] * 1e-6);
-      return;
-    }
+    case Message::kHeartbeat:
+      return take_heartbeat(values);
     case Message::kReply:
       return take_reply(values);
     case Message::kEncoder:
       can::update_sample(row, values, coming_);
       has_encoder_ = true;
       return;
-    case Message::kCurrents:
+    case Message::kPhases:
       can::update_sample(row, values, coming_);
-      // Without its encoder frame it is no sample: the count would be that of the one before.
-      if (std::exchange(has_encoder_, false)) take_sample();
+      has_phases_ = true;
       return;
+    case Message::kCurrents: {
+      can::update_sample(row, values, coming_);
+      // Without the other frames it is no sample: the count, or a current, would be that of the one before.
+      const bool has_phases = std::exchange(has_phases_, false) || !profile_.wide;
+      if (std::exchange(has_encoder_, false) && has_phases) take_sample();
+      return;
+    }
     case Message::kSensors:
       can::update_sample(row, values, coming_);
       return take_sample();
@@ -303,14 +319,34 @@ void CanLink::take(const can::MessageRow& row, const can::Values& values) {
     default:
       break;
   }
+  // The page of the speed sensors belongs to the sample that is coming.
+  const bool is_part = row.message == Message::kDetails && can::is_paged(row) &&
+                       as_code(values[0]) == static_cast<unsigned>(can::Page::kSpeedSensors);
   has_state_ |= row.message == Message::kState;
   has_counters_ |= row.message == Message::kCounters;
   // A tick in them is the frame's: the sample stays that of its sensors.
   for (Sample* const sample : {&coming_, &sample_}) {
+    if (is_part && sample == &sample_) continue;
     const std::uint64_t tick = sample->tick;
     can::update_sample(row, values, *sample);
     sample->tick = tick;
   }
+}
+
+void CanLink::take_heartbeat(const can::Values& values) {
+  const auto field = [&values](std::string_view name) {
+    return values[index_of(Message::kHeartbeat, true, name)];
+  };
+  const unsigned version = as_code(field("profile"));
+  if (version != can::kProfileVersion && version != can::kWideVersion) {
+    throw LinkError(name_ + " speaks version " + std::to_string(version) +
+                    " of the frame table, this program " + "versions " +
+                    std::to_string(can::kProfileVersion) + " and " + std::to_string(can::kWideVersion));
+  }
+  if (as_code(field("state")) == kStopped) throw LinkError(name_ + " has stopped");
+  profile_.wide = version == can::kWideVersion;
+  known_ = signals_in(profile_);
+  bench_.set_period_s(field("period_us") * 1e-6);
 }
 
 /// The currents frame has 16 bits of the tick, SYNC 32. If they are of one tick, the sample learns the

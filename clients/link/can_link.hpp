@@ -8,7 +8,7 @@
 
 #include "clients/link/axis_link.hpp"
 #include "clients/link/can_bus.hpp"
-#include "protocols/can/codec.hpp"
+#include "protocols/can/command.hpp"
 
 namespace drivebench::link {
 
@@ -37,7 +37,7 @@ class CanLink final : public AxisLink {
   void release() override;
   void clear_faults() override;
   const Sample& newest() override;
-  const Sample& exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) override;
+  const Sample& exchange(const Command& command) override;
   void write_parameter(std::string_view name, double value) override;
   bool can_set_load() const noexcept override { return false; }
   void set_load(const LoadChange& change) override;
@@ -53,8 +53,10 @@ class CanLink final : public AxisLink {
   /// Takes one frame if it comes in time.
   bool receive(Clock::time_point until);
   void take(const can::MessageRow& row, const can::Values& values);
+  void take_heartbeat(const can::Values& values);
   void take_reply(const can::Values& values);
   void take_sample();
+  can::CommandFrames frames_of(const Command& command) const;
   void take_sync_tick(std::uint32_t tick);
   void send_request(can::Request request);
   Reply ask(can::Request request);
@@ -77,6 +79,7 @@ class CanLink final : public AxisLink {
   Sample coming_;  // classic: holds the encoder frame until the currents come
   Sample sample_;
   bool has_encoder_ = false;  // in coming_, and not yet in a sample
+  bool has_phases_ = false;   // the same, of a wide axis
   bool has_sample_ = false;
   bool has_state_ = false;
   bool has_counters_ = false;

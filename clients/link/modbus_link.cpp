@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::string_view kScheme = "modbus:";
 
-/// Of the fixed rows only one has each of these contents.
+/// The first of the fixed rows with this content.
 constexpr const Row& row_of(Content content) {
   for (const Row& row : modbus::map_detail::kFixedRows) {
     if (row.content == content) return row;
@@ -56,7 +56,23 @@ constexpr auto kMeanings = std::to_array<Meaning>({
     {v1::REFUSAL_BUSY, "the bench has too much to do"},
     {v1::REFUSAL_OUT_OF_RANGE, "a value is out of range"},
     {v1::REFUSAL_WRONG_MODE, "the bench runs in another mode"},
+    {v1::REFUSAL_WRONG_DRIVE, "the drive of the axis takes no currents"},
 });
+
+constexpr SignalMask kKnown = [] {
+  SignalMask mask = 0;
+  for (const Row& row : modbus::map_detail::kFixedRows) {
+    const bool is_read = row.address >= modbus::kSampleStart &&
+                         row.end() <= std::size_t{modbus::kSampleStart} + modbus::kSensorsLength;
+    if (is_read && row.content == Content::kSignal) mask |= SignalMask{1} << row.index;
+  }
+  return mask;
+}();
+
+/// In the numbers of the register, where 3 are duties.
+modbus::CommandMode mode_of(v1::Gates gates) {
+  return gates == v1::GATES_CURRENT ? modbus::CommandMode::kCurrent : static_cast<modbus::CommandMode>(gates);
+}
 
 }  // namespace
 
@@ -159,26 +175,40 @@ void ModbusLink::set_load(const LoadChange&) {
   refuse(v1::REFUSAL_READ_ONLY, "the load cannot be set over Modbus", "load");
 }
 
+SignalMask ModbusLink::known() const noexcept {
+  return kKnown;
+}
+
 const Sample& ModbusLink::newest() {
-  std::array<std::uint16_t, modbus::kSampleLength> words{};
+  std::array<std::uint16_t, modbus::kSensorsLength> words{};
   read(modbus::kSampleStart, words);
   sample_ = modbus::read_sample(words);
   return sample_;
 }
 
-const Sample& ModbusLink::exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) {
-  constexpr std::uint16_t kFirst = address_of(Content::kCommandMode);
-  std::array<std::uint16_t, row_of(Content::kVoltageB).end() - kFirst> command{};
-  const auto put = [&command](Content content, std::uint64_t bits) {
-    modbus::put(bits, row_of(content).type, modbus::WordOrder::kAbcd, &command[address_of(content) - kFirst]);
-  };
-  put(Content::kCommandMode, static_cast<std::uint64_t>(gates));
-  put(Content::kCounter, tick);
-  put(Content::kVoltageA, modbus::float_bits(u_a_v));
-  put(Content::kVoltageB, modbus::float_bits(u_b_v));
-  std::array<std::uint16_t, modbus::kSampleLength> words{};
-  check(::modbus_write_and_read_registers(modbus_.get(), kFirst, static_cast<int>(command.size()),
-                                          command.data(), modbus::kSampleStart,
+const Sample& ModbusLink::exchange(const Command& command) {
+  constexpr std::span<const Row> kRows(modbus::map_detail::kMoreCommand);
+  constexpr std::uint16_t kFirst = kRows[2].address;  // behind lease and request
+  static_assert(kRows[2].content == Content::kCommandMode);
+  const bool currents = command.gates == v1::GATES_CURRENT;
+  std::array<std::uint16_t, kRows.back().end() - kFirst> registers{};
+  for (const Row& row : kRows.subspan(2)) {
+    std::uint64_t bits = command.tick;
+    if (row.content == Content::kCommandMode) bits = static_cast<std::uint64_t>(mode_of(command.gates));
+    if (row.content == Content::kSetpointA)
+      bits = modbus::float_bits(currents ? command.i_a_a : command.u_a_v);
+    if (row.content == Content::kSetpointB)
+      bits = modbus::float_bits(currents ? command.i_b_a : command.u_b_v);
+    if (row.content == Content::kSetpointC)
+      bits = modbus::float_bits(currents ? command.i_c_a : command.u_c_v);
+    if (row.content == Content::kSetpointField)
+      bits = modbus::float_bits(currents ? command.i_f_a : command.u_f_v);
+    modbus::put(bits, row.type, modbus::WordOrder::kAbcd, &registers[row.address - kFirst]);
+  }
+  const std::uint64_t tick = command.tick;
+  std::array<std::uint16_t, modbus::kSensorsLength> words{};
+  check(::modbus_write_and_read_registers(modbus_.get(), kFirst, static_cast<int>(registers.size()),
+                                          registers.data(), modbus::kSampleStart,
                                           static_cast<int>(words.size()), words.data()),
         "the sample after tick " + std::to_string(tick));
   sample_ = modbus::read_sample(words);

@@ -26,7 +26,8 @@ bool is_modbus_address(std::string_view text) noexcept;
 ModbusAddress parse_modbus_address(std::string_view text);
 
 /// A controller of one axis by the registers of protocols/modbus/register_map.hpp: one transaction writes the
-/// command and reads the sample, whose real values the wire has rounded to float32.
+/// command and reads the sample, whose real values the wire has rounded to float32. What does not fit into
+/// one transaction, a part of the truth, is not known.
 class ModbusLink final : public AxisLink {
  public:
   /// Connects and reads what the bench says of itself. Throws ConnectError, Refused, LinkError.
@@ -37,13 +38,13 @@ class ModbusLink final : public AxisLink {
 
   const v1::BenchDescription& bench() const noexcept override { return bench_; }
   std::uint32_t axis() const noexcept override { return 0; }
-  SignalMask known() const noexcept override { return kAllSignals; }
+  SignalMask known() const noexcept override;
 
   void acquire() override;
   void release() override;
   void clear_faults() override;
   const Sample& newest() override;
-  const Sample& exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) override;
+  const Sample& exchange(const Command& command) override;
   void write_parameter(std::string_view name, double value) override;
   bool can_set_load() const noexcept override { return false; }
   void set_load(const LoadChange& change) override;

@@ -10,9 +10,10 @@ const Sample& TcpAxis::newest() {
   return keep(link_->exchange({}));
 }
 
-const Sample& TcpAxis::exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) {
-  const Command command = {.axis = axis_, .tick = tick, .gates = gates, .u_a_v = u_a_v, .u_b_v = u_b_v};
-  return keep(link_->exchange(std::span(&command, 1)));
+const Sample& TcpAxis::exchange(const Command& command) {
+  Command ours = command;
+  ours.axis = axis_;
+  return keep(link_->exchange(std::span(&ours, 1)));
 }
 
 const Sample& TcpAxis::keep(const v1::ExchangeReply& reply) {

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <string_view>
 
 #include "clients/link/axis_link.hpp"
 
@@ -20,9 +22,9 @@ class TcpAxis final : public AxisLink {
   void release() override { link_->release(axis_); }
   void clear_faults() override { link_->clear_faults(axis_); }
   const Sample& newest() override;
-  const Sample& exchange(std::uint64_t tick, v1::Gates gates, double u_a_v, double u_b_v) override;
+  const Sample& exchange(const Command& command) override;
   void write_parameter(std::string_view name, double value) override {
-    link_->write_parameter(axis_, name, value);
+    link_->write_parameter(axis_, {.name = std::string(name), .value = value});
   }
   bool can_set_load() const noexcept override { return true; }
   void set_load(const LoadChange& change) override { link_->set_load(axis_, change); }

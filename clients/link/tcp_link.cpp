@@ -83,6 +83,12 @@ const v1::ExchangeReply& Link::exchange(std::span<const Command> commands) {
     to.set_gates(from.gates);
     to.set_u_a_v(from.u_a_v);
     to.set_u_b_v(from.u_b_v);
+    to.set_u_c_v(from.u_c_v);
+    to.set_u_f_v(from.u_f_v);
+    to.set_i_a_a(from.i_a_a);
+    to.set_i_b_a(from.i_b_a);
+    to.set_i_c_a(from.i_c_a);
+    to.set_i_f_a(from.i_f_a);
   }
   return ask(request, Kind::kExchangeReply).exchange_reply();
 }
@@ -114,12 +120,33 @@ const v1::ParameterValues& Link::read_parameters(std::uint32_t axis, std::span<c
   return ask(request, Kind::kParameterValues).parameter_values();
 }
 
-std::uint64_t Link::write_parameter(std::uint32_t axis, std::string_view name, double value) {
+std::uint64_t Link::write_parameter(std::uint32_t axis, const ParameterChange& change) {
   v1::Envelope& request = new_request();
   v1::WriteParameter& write = *request.mutable_write_parameter();
   write.set_axis(axis);
-  write.set_name(name.data(), name.size());
-  write.set_value(value);
+  write.set_name(change.name);
+  write.set_value(change.value);
+  write.set_ramp_ticks(change.ramp_ticks);
+  write.set_at_tick(change.at_tick);
+  return ask(request, Kind::kDone).done().tick();
+}
+
+std::uint64_t Link::inject_fault(std::uint32_t axis, const FaultInjection& fault) {
+  v1::Envelope& request = new_request();
+  v1::InjectFault& inject = *request.mutable_inject_fault();
+  inject.set_axis(axis);
+  inject.set_name(fault.name);
+  inject.set_value(fault.value);
+  inject.set_at_tick(fault.at_tick);
+  return ask(request, Kind::kDone).done().tick();
+}
+
+std::uint64_t Link::bump_shaft(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick) {
+  v1::Envelope& request = new_request();
+  v1::ShaftBump& bump = *request.mutable_shaft_bump();
+  bump.set_axis(axis);
+  bump.set_impulse_nms(impulse_nms);
+  bump.set_at_tick(at_tick);
   return ask(request, Kind::kDone).done().tick();
 }
 

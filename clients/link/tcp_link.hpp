@@ -32,19 +32,41 @@ class Refused : public std::runtime_error {
   std::string field_;
 };
 
-/// What a controller asks of one axis, in answer to the sample of `tick`.
+/// What a controller asks of one axis, in answer to the sample of `tick`: voltages, or with GATES_CURRENT
+/// currents. A machine with fewer terminals ignores the others; `f` is the field winding.
 struct Command {
   std::uint32_t axis = 0;
   std::uint64_t tick = 0;
   v1::Gates gates = v1::GATES_OFF;
   double u_a_v = 0.0;
   double u_b_v = 0.0;
+  double u_c_v = 0.0;
+  double u_f_v = 0.0;
+  double i_a_a = 0.0;
+  double i_b_a = 0.0;
+  double i_c_a = 0.0;
+  double i_f_a = 0.0;
 };
 
 struct LoadChange {
   double load_nm = 0.0;
   std::uint64_t ramp_ticks = 0;  ///< 0: a step
   std::uint64_t at_tick = 0;     ///< 0: as soon as possible
+};
+
+/// A new value of a parameter.
+struct ParameterChange {
+  std::string name{};
+  double value = 0.0;
+  std::uint64_t ramp_ticks = 0;  ///< 0: a step
+  std::uint64_t at_tick = 0;     ///< 0: as soon as possible
+};
+
+/// A fault to put into an axis; a value of 0 takes it away.
+struct FaultInjection {
+  std::string name{};
+  double value = 0.0;
+  std::uint64_t at_tick = 0;  ///< 0: as soon as possible
 };
 
 struct LinkOptions {
@@ -87,7 +109,10 @@ class Link {
   /// All parameters if no names are given.
   const v1::ParameterValues& read_parameters(std::uint32_t axis, std::span<const std::string> names = {});
   // These give the tick at whose start the request was carried out.
-  std::uint64_t write_parameter(std::uint32_t axis, std::string_view name, double value);
+  std::uint64_t write_parameter(std::uint32_t axis, const ParameterChange& change);
+  std::uint64_t inject_fault(std::uint32_t axis, const FaultInjection& fault);
+  /// A blow on the shaft, positive like a machine torque.
+  std::uint64_t bump_shaft(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick = 0);
   std::uint64_t set_load(std::uint32_t axis, const LoadChange& change);
   std::uint64_t clear_faults(std::uint32_t axis);
 

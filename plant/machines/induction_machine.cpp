@@ -1,9 +1,21 @@
 #include "plant/machines/induction_machine.hpp"
 
+#include <cmath>
+
 namespace drivebench {
 
 double leakage_factor(const InductionMachineParameters& p) noexcept {
   return 1.0 - p.mutual_inductance_h * p.mutual_inductance_h / (p.rotor_inductance_h * p.stator_inductance_h);
+}
+
+InductionMachineParameters terminal_equivalent(const InductionMachineTerminals& t) noexcept {
+  return {.pole_pairs = t.pole_pairs,
+          .stator_resistance_ohm = t.stator_resistance_ohm,
+          .rotor_resistance_ohm = t.stator_inductance_h / t.rotor_time_constant_s,
+          .stator_inductance_h = t.stator_inductance_h,
+          .rotor_inductance_h = t.stator_inductance_h,
+          .mutual_inductance_h = t.stator_inductance_h * std::sqrt(1.0 - t.leakage_factor),
+          .star = t.star};
 }
 
 InductionMachineConstants constants_of(const InductionMachineParameters& p) noexcept {
@@ -26,24 +38,58 @@ InductionMachineConstants constants_of(const InductionMachineParameters& p) noex
           .rotor_inductance_h = p.rotor_inductance_h};
 }
 
-TwoPhase open_circuit_voltage_v(const InductionMachineConstants& c, const InductionMachineState& x,
-                                double speed_rad_s) noexcept {
-  const double omega_e = c.pole_pairs * speed_rad_s;
-  const double flux_ratio = c.transient_inductance_h * c.beta_per_h;
-  return {-flux_ratio * (c.eta_per_s * x.psi_a_wb + omega_e * x.psi_b_wb),
-          -flux_ratio * (c.eta_per_s * x.psi_b_wb - omega_e * x.psi_a_wb)};
+InductionMachineState restricted(const InductionMachineConstants&, const InductionMachineState& x,
+                                 const RotorMotion&, const TerminalInput& u) noexcept {
+  const TwoPhase current_a = conducted({x.i_a_a, x.i_b_a}, u);
+  return {.i_a_a = current_a.a, .i_b_a = current_a.b, .psi_a_wb = x.psi_a_wb, .psi_b_wb = x.psi_b_wb};
 }
 
-double stored_energy_j(const InductionMachineConstants& c, const InductionMachineState& x) noexcept {
+WindingValues open_circuit_voltages(const InductionMachineConstants& c, const InductionMachineState& x,
+                                    const RotorMotion& motion) noexcept {
+  const double omega_e = c.pole_pairs * motion.speed_rad_s;
+  const double flux_ratio = c.transient_inductance_h * c.beta_per_h;
+  return {.stator = {-flux_ratio * (c.eta_per_s * x.psi_a_wb + omega_e * x.psi_b_wb),
+                     -flux_ratio * (c.eta_per_s * x.psi_b_wb - omega_e * x.psi_a_wb)}};
+}
+
+TwoPhase rotor_flux_wb(const InductionMachineConstants&, const InductionMachineState& x,
+                       const RotorMotion&) noexcept {
+  return {x.psi_a_wb, x.psi_b_wb};
+}
+
+double stored_energy_j(const InductionMachineConstants& c, const InductionMachineState& x,
+                       const RotorMotion&) noexcept {
   return 0.5 * c.transient_inductance_h * (x.i_a_a * x.i_a_a + x.i_b_a * x.i_b_a) +
          0.5 / c.rotor_inductance_h * (x.psi_a_wb * x.psi_a_wb + x.psi_b_wb * x.psi_b_wb);
 }
 
-double losses_w(const InductionMachineConstants& c, const InductionMachineState& x) noexcept {
+double losses_w(const InductionMachineConstants& c, const InductionMachineState& x,
+                const RotorMotion&) noexcept {
   const double i_ra_a = (x.psi_a_wb - c.mutual_inductance_h * x.i_a_a) / c.rotor_inductance_h;
   const double i_rb_a = (x.psi_b_wb - c.mutual_inductance_h * x.i_b_a) / c.rotor_inductance_h;
   return c.stator_resistance_ohm * (x.i_a_a * x.i_a_a + x.i_b_a * x.i_b_a) +
          c.rotor_resistance_ohm * (i_ra_a * i_ra_a + i_rb_a * i_rb_a);
+}
+
+Connection connection_of(const InductionMachineParameters& p) noexcept {
+  return p.star ? Connection::kStar : Connection::kTwoPhase;
+}
+
+double pole_pairs_of(const InductionMachineParameters&) noexcept {
+  return 0.0;
+}
+
+InductionMachineParameters adjusted(const InductionMachineParameters& p, const Adjustment& a) noexcept {
+  InductionMachineParameters result = p;
+  result.stator_resistance_ohm =
+      p.stator_resistance_ohm * a.stator_resistance_factor + a.series_resistance_ohm;
+  result.rotor_resistance_ohm = p.rotor_resistance_ohm * a.rotor_resistance_factor;
+  result.stator_inductance_h = p.stator_inductance_h + a.series_inductance_h;
+  return result;
+}
+
+double fastest_time_constant_s(const InductionMachineParameters& p) noexcept {
+  return 1.0 / constants_of(p).gamma_per_s;
 }
 
 }  // namespace drivebench

@@ -35,22 +35,34 @@ constexpr std::size_t fd_check_bits(std::size_t size) {
   return bits + 1 + bits / 4;
 }
 
-double rate_of(Message message, const BusUse& use) {
-  const auto axes = static_cast<double>(use.axes);
-  const double ticks_per_s = 1.0 / use.period_s;
-  switch (message) {
+double rate_of(const MessageRow& row, const Profile& profile, const BusUse& use) {
+  const auto wide_axes = static_cast<double>(use.wide_axes);
+  const double narrow_axes = static_cast<double>(use.axes) - wide_axes;
+  const double axes = row.width == Width::kNarrow ? narrow_axes
+                      : row.width == Width::kWide ? wide_axes
+                                                  : narrow_axes + wide_axes;
+  const double samples_per_s = 1.0 / (use.period_s * use.sample_every_ticks);
+  const double states_per_s = 1.0 / (use.period_s * use.state_every_ticks);
+  switch (row.message) {
     case Message::kSync:
-      return ticks_per_s / use.sample_every_ticks;
+      return samples_per_s;
     case Message::kCurrents:
     case Message::kSensors:
     case Message::kCommand:
     case Message::kEncoder:
-      return axes * ticks_per_s / use.sample_every_ticks;
+    case Message::kPhaseCommand:
+    case Message::kPhases:
+      return axes * samples_per_s;
     case Message::kState:
     case Message::kCounters:
-      return axes * ticks_per_s / use.state_every_ticks;
+      return axes * states_per_s;
+    case Message::kDetails: {  // the page of the speed sensors goes with each sample of those who have any
+      const auto sensing_axes = static_cast<double>(use.sensing_axes);
+      return profile.fd ? axes * states_per_s
+                        : axes * double{kPages - 1} * states_per_s + sensing_axes * samples_per_s;
+    }
     case Message::kEdges:
-      return use.edges ? axes * ticks_per_s : 0.0;
+      return use.edges ? axes / use.period_s : 0.0;
     case Message::kControllerHeartbeat:
     case Message::kHeartbeat:
       return use.heartbeat_ms > 0 ? axes * 1e3 / use.heartbeat_ms : 0.0;
@@ -92,12 +104,12 @@ FrameTime frame_time(std::size_t size, bool fd, bool extended, double bit_rate, 
 
 BusLoad bus_load(const Profile& profile, const BusUse& use) {
   BusLoad load;
-  for (const MessageRow* row : rows_of(profile)) {
-    const double rate = rate_of(row->message, use);
+  for (const MessageRow& row : kMessages) {
+    const double rate = is_in(row, profile.fd) ? rate_of(row, profile, use) : 0.0;
     if (rate == 0.0) continue;
     const FrameTime time =
-        frame_time(row->size, profile.fd, profile.extended, use.bit_rate, use.data_bit_rate);
-    load.messages.push_back({row, rate, time, rate * time.least_s, rate * time.most_s});
+        frame_time(row.size, profile.fd, profile.extended, use.bit_rate, use.data_bit_rate);
+    load.messages.push_back({&row, rate, time, rate * time.least_s, rate * time.most_s});
     load.least_share += load.messages.back().least_share;
     load.most_share += load.messages.back().most_share;
   }

@@ -24,6 +24,8 @@ FrameTime frame_time(std::size_t size, bool fd, bool extended, double bit_rate, 
 /// What is sent on a bus when the bench runs in real time.
 struct BusUse {
   std::size_t axes = 1;
+  std::size_t wide_axes = 0;        ///< how many of them are wide,
+  std::size_t sensing_axes = 0;     ///< and have a tachometer or a resolver
   double period_s = 1e-3;           ///< of the bench
   double sample_every_ticks = 1.0;  ///< also of SYNC, and of the commands that answer
   double state_every_ticks = 80.0;

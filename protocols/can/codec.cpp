@@ -19,11 +19,20 @@ constexpr bool can_carry(const Field& field, const Signal& signal) {
   return wraps || (field.encoding == Encoding::kCode && signal.type == SignalType::kUnsigned);
 }
 
+/// Fields are in the order of pages, and within one sorted, disjoint, whole bytes, in the frame.
 constexpr bool is_sound(const MessageRow& row) {
   if (row.fields.size() > kMaxFields || !is_fd_size(row.size)) return false;
   if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() tells them apart by it
+  if (is_paged(row) && (row.fields.front().name != "page" || row.fields.front().start_bit != 0)) return false;
+  unsigned common_end = 0;
   unsigned end = 0;
+  std::uint8_t page = kEveryPage;
   for (const Field& field : row.fields) {
+    if (field.page != page) {
+      if (field.page >= kPages || field.page < (page == kEveryPage ? 0 : page)) return false;
+      page = field.page;
+      end = common_end;
+    }
     if (field.start_bit < end || field.start_bit % 8 != 0) return false;
     if (field.bits != 8 && field.bits != 16 && field.bits != 32) return false;
     if (field.encoding == Encoding::kFloat && field.bits != 32) return false;
@@ -31,24 +40,13 @@ constexpr bool is_sound(const MessageRow& row) {
     if (field.signal.empty() != (signal == nullptr)) return false;
     if (signal != nullptr && !can_carry(field, *signal)) return false;
     end = field.start_bit + field.bits;
-  }
-  return end <= 8U * row.size;
-}
-
-constexpr bool ids_are_sorted_and_disjoint(bool fd) {
-  std::uint32_t end = 0;
-  for (const MessageRow& row : kMessages) {
-    if (!is_in(row, fd)) continue;
-    const IdRange ids = ids_of(row, row.base_id);
-    if (ids.first < end || ids.last > kMaxStandardId) return false;
-    end = ids.last + 1;
+    if (end > 8U * row.size) return false;
+    if (page == kEveryPage) common_end = end;
   }
   return true;
 }
 
-static_assert(std::ranges::all_of(kMessages, is_sound),
-              "fields are sorted, disjoint, whole bytes, in the frame");
-static_assert(ids_are_sorted_and_disjoint(false) && ids_are_sorted_and_disjoint(true));
+static_assert(std::ranges::all_of(kMessages, is_sound));
 static_assert(kFirstEdgeByte + 2 * kEdgesPerFrame == 64);
 static_assert(32767 * kDutyUnit == 1.0, "the full duty is exactly 1");
 
@@ -56,7 +54,9 @@ static_assert(32767 * kDutyUnit == 1.0, "the full duty is exactly 1");
 
 struct Layout {
   std::array<const Signal*, kMaxFields> signals{};
-  std::uint64_t reserved = 0;  ///< bit n: byte n belongs to no field
+  bool paged = false;
+  /// Bit n: byte n belongs to no field of the page; the last is of pages that do not exist.
+  std::array<std::uint64_t, kPages + 1> reserved{};
 };
 
 /// What match() needs of a row, close together: it looks at all of them.
@@ -64,6 +64,9 @@ struct Key {
   Message message;
   bool in_classic;
   bool in_fd;
+  bool wide;
+  std::uint8_t size;
+  std::uint8_t row;
   std::uint8_t first_node;
   std::uint8_t last_node;
 };
@@ -76,25 +79,41 @@ constexpr auto kLayouts = [] {
   std::array<Layout, kMessages.size()> layouts{};
   for (std::size_t i = 0; i < kMessages.size(); ++i) {
     const MessageRow& row = kMessages[i];
-    layouts[i].reserved = bytes_mask(0, row.size);
-    if (row.message == Message::kEdges)
-      layouts[i].reserved &= ~bytes_mask(kFirstEdgeByte, 2 * kEdgesPerFrame);
-    for (std::size_t f = 0; f < row.fields.size(); ++f) {
-      const Field& field = row.fields[f];
-      layouts[i].signals[f] = find_signal(field.signal);
-      layouts[i].reserved &= ~bytes_mask(field.start_bit / 8U, field.bits / 8U);
+    Layout& layout = layouts[i];
+    layout.paged = is_paged(row);
+    for (std::size_t page = 0; page < layout.reserved.size(); ++page) {
+      std::uint64_t& reserved = layout.reserved[page];
+      reserved = bytes_mask(0, row.size);
+      if (row.message == Message::kEdges) reserved &= ~bytes_mask(kFirstEdgeByte, 2 * kEdgesPerFrame);
+      for (std::size_t f = 0; f < row.fields.size(); ++f) {
+        const Field& field = row.fields[f];
+        layout.signals[f] = find_signal(field.signal);
+        if (is_on_page(field, page)) reserved &= ~bytes_mask(field.start_bit / 8U, field.bits / 8U);
+      }
     }
   }
   return layouts;
 }();
 
+/// Those of narrow axes first: where a program knows of no wide axis and has given their identifiers to
+/// others, these count.
 constexpr auto kKeys = [] {
   std::array<Key, kMessages.size()> keys{};
-  for (std::size_t i = 0; i < kMessages.size(); ++i) {
-    const MessageRow& row = kMessages[i];
-    const IdRange nodes = ids_of(row, 0);
-    keys[i] = {row.message, is_in(row, false), is_in(row, true), static_cast<std::uint8_t>(nodes.first),
-               static_cast<std::uint8_t>(nodes.last)};
+  std::size_t n = 0;
+  for (const bool wide : {false, true}) {
+    for (std::size_t i = 0; i < kMessages.size(); ++i) {
+      const MessageRow& row = kMessages[i];
+      if ((row.width == Width::kWide) != wide) continue;
+      const IdRange nodes = ids_of(row, 0);
+      keys[n++] = {.message = row.message,
+                   .in_classic = is_in(row, false),
+                   .in_fd = is_in(row, true),
+                   .wide = wide,
+                   .size = row.size,
+                   .row = static_cast<std::uint8_t>(i),
+                   .first_node = static_cast<std::uint8_t>(nodes.first),
+                   .last_node = static_cast<std::uint8_t>(nodes.last)};
+    }
   }
   return keys;
 }();
@@ -104,6 +123,11 @@ const Layout& layout_of(const MessageRow& row) noexcept {
 }
 
 constexpr std::size_t kCommandMode = index_of(Message::kCommand, false, "mode");
+static_assert(kCommandMode == index_of(Message::kPhaseCommand, false, "mode", true));
+
+constexpr bool is_classic_command(const MessageRow& row, const Profile& profile) noexcept {
+  return !profile.fd && (row.message == Message::kCommand || row.message == Message::kPhaseCommand);
+}
 
 // ---- numbers ----
 
@@ -182,9 +206,13 @@ double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
 }
 
-/// What a count of a field is worth; `duties`: the message is a command in mode 3.
-double unit_of(const Field& field, const Profile& profile, bool duties) noexcept {
-  return duties && field.encoding == Encoding::kScaled ? kDutyUnit : profile.unit_of(field.scale);
+/// What a count of a field is worth; `mode`: of the command in a classic frame, if it is one.
+double unit_of(const Field& field, const Profile& profile, double mode) noexcept {
+  if (field.encoding == Encoding::kScaled) {
+    if (mode == double{kDutyMode}) return kDutyUnit;
+    if (mode == double{kCurrentMode}) return profile.current_unit_a;
+  }
+  return profile.unit_of(field.scale);
 }
 
 // ---- bytes ----
@@ -223,7 +251,9 @@ FrameProblem problem_of(const MessageRow& row, const Profile& profile, const Fra
   if (frame.fd && !profile.fd) return FrameProblem::kWrongKind;
   if (!frame.fd && row.variant == Variant::kFd) return FrameProblem::kWrongKind;
   if (frame.size != row.size) return FrameProblem::kWrongSize;
-  for (std::uint64_t left = layout_of(row).reserved; left != 0; left &= left - 1) {
+  const Layout& layout = layout_of(row);
+  const std::size_t page = layout.paged ? std::min<std::size_t>(frame.data[0], kPages) : 0;
+  for (std::uint64_t left = layout.reserved[page]; left != 0; left &= left - 1) {
     if (frame.data[static_cast<std::size_t>(std::countr_zero(left))] != 0) return FrameProblem::kReserved;
   }
   return FrameProblem::kNone;
@@ -253,22 +283,24 @@ std::uint64_t raw_of(const Field& field, const Signal& signal, const Sample& sam
 Frame encode(const MessageRow& row, const Profile& profile, std::uint32_t node,
              std::span<const double> values) noexcept {
   Frame frame = empty_frame(row, profile, node);
-  const bool duties =
-      row.message == Message::kCommand && !profile.fd && values[kCommandMode] == double{kDutyMode};
+  const double mode = is_classic_command(row, profile) ? values[kCommandMode] : 0.0;
+  const std::uint64_t page = layout_of(row).paged ? raw_of(row.fields[0], values[0], 1.0) : 0;
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
-    put(frame, field, raw_of(field, values[i], unit_of(field, profile, duties)));
+    if (is_on_page(field, page)) put(frame, field, raw_of(field, values[i], unit_of(field, profile, mode)));
   }
   return frame;
 }
 
 Values decode(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept {
   Values values{};
-  const bool duties = row.message == Message::kCommand && !profile.fd &&
-                      frame.data[row.fields[kCommandMode].start_bit / 8U] == kDutyMode;
+  const double mode = is_classic_command(row, profile)
+                          ? static_cast<double>(frame.data[row.fields[kCommandMode].start_bit / 8U])
+                          : 0.0;
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
-    values[i] = value_of(field, get(frame, field), unit_of(field, profile, duties));
+    if (is_on_page(field, frame.data[0]))
+      values[i] = value_of(field, get(frame, field), unit_of(field, profile, mode));
   }
   return values;
 }
@@ -282,13 +314,15 @@ Values values_of(const MessageRow& row, const Sample& sample) noexcept {
   return values;
 }
 
-Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t node,
-                    const Sample& sample) noexcept {
+Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t node, const Sample& sample,
+                    Page page) noexcept {
   Frame frame = empty_frame(row, profile, node);
   const Layout& layout = layout_of(row);
+  if (layout.paged) frame.data[0] = static_cast<std::uint8_t>(page);
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
-    if (layout.signals[i] != nullptr) put(frame, field, raw_of(field, *layout.signals[i], sample, profile));
+    if (layout.signals[i] != nullptr && is_on_page(field, frame.data[0]))
+      put(frame, field, raw_of(field, *layout.signals[i], sample, profile));
   }
   return frame;
 }
@@ -296,9 +330,9 @@ Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t
 void update_sample(const MessageRow& row, std::span<const double> values, Sample& sample) noexcept {
   const Layout& layout = layout_of(row);
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
-    if (layout.signals[i] == nullptr) continue;
-    const Signal& signal = *layout.signals[i];
     const Field& field = row.fields[i];
+    if (layout.signals[i] == nullptr || (layout.paged && !is_on_page(field, wrapped(values[0])))) continue;
+    const Signal& signal = *layout.signals[i];
     const bool wraps = field.encoding == Encoding::kCounter || field.encoding == Encoding::kSigned;
     if (signal.type == SignalType::kReal) {
       sample.*signal.as_real = values[i];
@@ -322,14 +356,19 @@ std::string_view name_of(FrameProblem problem) noexcept {
 
 Match match(const Profile& profile, const Frame& frame) noexcept {
   if (frame.error) return {nullptr, 0, FrameProblem::kError};
-  for (std::size_t i = 0; i < kKeys.size(); ++i) {
-    const Key& key = kKeys[i];
+  const Key* found = nullptr;
+  for (const Key& key : kKeys) {
     const std::uint32_t node = frame.id - profile.base_ids[static_cast<std::size_t>(key.message)];
     if (node < key.first_node || node > key.last_node) continue;
-    if (profile.fd ? key.in_fd : key.in_classic)
-      return {&kMessages[i], node, problem_of(kMessages[i], profile, frame)};
+    if (!(profile.fd ? key.in_fd : key.in_classic) || (key.wide && !profile.wide)) continue;
+    if (found != nullptr && (key.message != found->message || key.size != frame.size)) continue;
+    found = &key;
+    if (!profile.wide || key.size == frame.size) break;
   }
-  return {};
+  if (found == nullptr) return {};
+  const MessageRow& row = kMessages[found->row];
+  return {&row, frame.id - profile.base_ids[static_cast<std::size_t>(row.message)],
+          problem_of(row, profile, frame)};
 }
 
 Edge edge_at(const Frame& frame, std::size_t index) noexcept {
@@ -339,59 +378,6 @@ Edge edge_at(const Frame& frame, std::size_t index) noexcept {
 
 void put_edge(Frame& frame, std::size_t index, Edge edge) noexcept {
   put_bytes<2>(&frame.data[kFirstEdgeByte + 2 * index], (edge.time & 0x7FFFU) | (edge.down ? 0x8000U : 0U));
-}
-
-namespace {
-
-void add_id_problems(const Profile& profile, std::vector<ProfileProblem>& found) {
-  const std::uint32_t limit = profile.extended ? kMaxExtendedId : kMaxStandardId;
-  std::vector<const MessageRow*> seen;
-  for (const MessageRow& row : kMessages) {
-    if (!is_in(row, profile.fd)) continue;
-    const std::string field = "ids." + std::string(row.name);
-    const std::uint32_t base_id = profile.base_ids[static_cast<std::size_t>(row.message)];
-    const std::uint32_t largest = limit - (row.per_node ? kMaxNode : 0);
-    if (base_id > largest) {
-      found.push_back({field, "must be at most " + std::to_string(largest) +
-                                  (row.per_node ? ", as node ids up to 127 are added to it" : "")});
-      continue;
-    }
-    const IdRange ids = ids_of(row, base_id);
-    for (const MessageRow* other : seen) {
-      const IdRange others = ids_of(*other, profile.base_ids[static_cast<std::size_t>(other->message)]);
-      if (ids.first > others.last || others.first > ids.last) continue;
-      found.push_back(
-          {field, "must keep its identifiers apart from those of ids." + std::string(other->name)});
-    }
-    seen.push_back(&row);
-  }
-}
-
-void add_node_problems(std::span<const std::uint32_t> nodes, std::vector<ProfileProblem>& found) {
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const auto before = nodes.first(i);
-    if (nodes[i] < 1 || nodes[i] > kMaxNode)
-      found.push_back({"node", "must be 1 to 127, not " + std::to_string(nodes[i])});
-    else if (std::ranges::find(before, nodes[i]) != before.end())
-      found.push_back({"node", "must differ between axes: " + std::to_string(nodes[i]) + " is taken"});
-  }
-}
-
-}  // namespace
-
-std::vector<ProfileProblem> problems(const Profile& profile, std::span<const std::uint32_t> nodes) {
-  std::vector<ProfileProblem> found;
-  add_id_problems(profile, found);
-  const auto check_unit = [&](const char* field, double unit) {
-    if (!(std::isfinite(unit) && unit > 0)) found.push_back({field, "must be a positive number"});
-  };
-  check_unit("current_unit_a", profile.current_unit_a);
-  check_unit("voltage_unit_v", profile.voltage_unit_v);
-  check_unit("bus_voltage_unit_v", profile.bus_voltage_unit_v);
-  check_unit("speed_unit_rad_s", profile.speed_unit_rad_s);
-  check_unit("edge_time_unit_s", profile.edge_time_unit_s);
-  add_node_problems(nodes, found);
-  return found;
 }
 
 }  // namespace drivebench::can

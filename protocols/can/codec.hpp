@@ -5,9 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "protocols/can/frame.hpp"
 #include "protocols/can/profile.hpp"
@@ -25,35 +23,41 @@ namespace drivebench::can {
 /// One number for each field of a message, in its order; NaN: no value.
 using Values = std::array<double, kMaxFields>;
 
-/// Where a field stands in its message and in Values: index_of(Message::kCommand, false, "lease"). Used in a
-/// constant expression, a name that does not exist does not compile.
-constexpr std::size_t index_of(Message message, bool fd, std::string_view field) {
-  const MessageRow* const row = find_message(message, fd);
-  if (row == nullptr) std::abort();
-  for (std::size_t i = 0; i < row->fields.size(); ++i) {
-    if (row->fields[i].name == field) return i;
+/// Where a field stands in its message and in Values. Used in a constant expression, a name that does not
+/// exist does not compile.
+constexpr std::size_t index_of(const MessageRow& row, std::string_view field) {
+  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+    if (row.fields[i].name == field) return i;
   }
   std::abort();
+}
+/// index_of(Message::kCommand, false, "lease")
+constexpr std::size_t index_of(Message message, bool fd, std::string_view field, bool wide = false) {
+  const MessageRow* const row = find_message(message, fd, wide);
+  if (row == nullptr) std::abort();
+  return index_of(*row, field);
 }
 
 /// In this mode a command gives duties, and one count of a classic frame is worth kDutyUnit.
 inline constexpr unsigned kDutyMode = 3;
 inline constexpr double kDutyUnit = 1.0 / 32767.0;
+/// In this mode it gives currents, and one count is worth what it is in a current.
+inline constexpr unsigned kCurrentMode = 4;
 
 /// The frame with these values, one for each field; bytes of no field are 0. In the FD profile every frame is
-/// an FD frame with bit rate switch.
+/// an FD frame with bit rate switch. Of a message with pages it holds the page that its first value says.
 Frame encode(const MessageRow& row, const Profile& profile, std::uint32_t node,
              std::span<const double> values) noexcept;
 
-/// The values of a frame for which match() found this row.
+/// The values of a frame for which match() found this row; 0 in the fields of other pages.
 Values decode(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept;
 
 /// The values of the fields that carry signals of a sample; the others are 0. Exact for integers below 2^53.
 Values values_of(const MessageRow& row, const Sample& sample) noexcept;
 
 /// encode() of values_of(); exact for all integers.
-Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t node,
-                    const Sample& sample) noexcept;
+Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t node, const Sample& sample,
+                    Page page = Page{}) noexcept;
 
 /// Puts the values of a frame into the signals that they carry. Of a number that wraps, the low bits are
 /// known: the nearest to what the sample held before is taken.
@@ -76,7 +80,7 @@ enum class FrameProblem : std::uint8_t {
   kRemote,       ///< asks for data
   kWrongKind,    ///< an FD frame in the classic profile, or a classic frame with a message of FD only
   kWrongSize,
-  kReserved,  ///< a byte of no field is not 0
+  kReserved,  ///< a byte of no field, or of no field of its page, is not 0
 };
 inline constexpr std::size_t kFrameProblems = static_cast<std::size_t>(FrameProblem::kReserved) + 1;
 
@@ -92,7 +96,8 @@ struct Match {
 };
 
 /// Finds the message that a frame carries and checks its form. In the FD profile the messages that exist in
-/// both variants may also come in classic frames.
+/// both variants may also come in classic frames. On a bus with wide axes the size tells whose sensors and
+/// commands they are.
 Match match(const Profile& profile, const Frame& frame) noexcept;
 
 /// An edge of the encoder in the message `edges`.
@@ -105,13 +110,5 @@ struct Edge {
 /// Reads or writes edge `index` < kEdgesPerFrame of such a frame.
 Edge edge_at(const Frame& frame, std::size_t index) noexcept;
 void put_edge(Frame& frame, std::size_t index, Edge edge) noexcept;
-
-/// One thing wrong with a profile or the nodes on its bus: what, by the names of Profile ("ids.command",
-/// "current_unit_a", "node"), and the rule that it breaks.
-struct ProfileProblem {
-  std::string field;
-  std::string rule;
-};
-std::vector<ProfileProblem> problems(const Profile& profile, std::span<const std::uint32_t> nodes = {});
 
 }  // namespace drivebench::can

@@ -70,13 +70,13 @@ std::vector<Entry> entries_of(const Profile& profile, std::span<const BusAxis> a
     const std::uint32_t id = profile.id_of(row, node) | (profile.extended ? kExtendedFlag : 0);
     entries.push_back({&row, std::to_string(id), std::move(name), axis});
   };
-  for (const MessageRow* row : rows_of(profile)) {
+  for (const MessageRow* row : rows_of(profile, axes)) {
     if (!row->per_node) add(*row, 0, std::string(row->name), "");
   }
   std::set<std::string> taken;
   for (const BusAxis& axis : axes) {
     const std::string symbol = symbol_of(axis, taken);
-    for (const MessageRow* row : rows_of(profile)) {
+    for (const MessageRow* row : rows_of(profile, {&axis, 1})) {
       if (row->per_node) add(*row, axis.node, symbol + "_" + std::string(row->name), axis.name);
     }
   }
@@ -93,13 +93,19 @@ bool is_signed(const Field& field) {
          field.encoding == Encoding::kFloat;
 }
 
-std::string signal_line(const Field& field, const Profile& profile, Sender sender) {
+/// A page is what DBC calls multiplexed.
+std::string page_text(const Field& field, const MessageRow& row) {
+  if (field.page != kEveryPage) return " m" + std::to_string(field.page);
+  return is_paged(row) && &field == &row.fields.front() ? " M" : "";
+}
+
+std::string signal_line(const Field& field, const Profile& profile, const MessageRow& row) {
   const Range range = range_of(field, profile).value_or(Range{0.0, 0.0});  // 0 to 0: not known
-  return " SG_ " + std::string(field.name) + " : " + std::to_string(field.start_bit) + "|" +
-         std::to_string(field.bits) + "@1" + (is_signed(field) ? "-" : "+") + " (" +
+  return " SG_ " + std::string(field.name) + page_text(field, row) + " : " + std::to_string(field.start_bit) +
+         "|" + std::to_string(field.bits) + "@1" + (is_signed(field) ? "-" : "+") + " (" +
          number_text(profile.unit_of(field.scale)) + ",0) [" + number_text(range.minimum, 10) + "|" +
          number_text(range.maximum, 10) + "] " + unit_text(field) +
-         (sender == Sender::kBench ? " Controller\n" : " Bench\n");
+         (row.sender == Sender::kBench ? " Controller\n" : " Bench\n");
 }
 
 std::string no_value_text(const Field& field) {
@@ -158,7 +164,7 @@ std::string attributes(std::string_view bench, const Profile& profile, std::span
 
 std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes) {
   const std::vector<Entry> entries = entries_of(profile, axes);
-  std::string text = "VERSION \"" + std::to_string(kProfileVersion) + "\"\n\nNS_ :\n\nBS_:\n\n";
+  std::string text = "VERSION \"" + std::to_string(version_of(axes)) + "\"\n\nNS_ :\n\nBS_:\n\n";
   text += "BU_: Bench Controller\n\n";
   std::string about;
   std::string values;
@@ -168,7 +174,7 @@ std::string dbc_text(std::string_view bench, const Profile& profile, std::span<c
     text += "BO_ " + entry.id + " " + entry.name + ": " + std::to_string(row.size) +
             (row.sender == Sender::kBench ? " Bench\n" : " Controller\n");
     for (const Field& field : row.fields) {
-      text += signal_line(field, profile, row.sender);
+      text += signal_line(field, profile, row);
       if (field.encoding == Encoding::kFloat)
         singles += "SIG_VALTYPE_ " + entry.id + " " + std::string(field.name) + " : 1;\n";
     }

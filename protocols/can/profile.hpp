@@ -2,13 +2,15 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "protocols/can/table.hpp"
 
 namespace drivebench::can {
 
-inline constexpr std::size_t kMessageCount = static_cast<std::size_t>(Message::kHeartbeat) + 1;
+inline constexpr std::size_t kMessageCount = static_cast<std::size_t>(Message::kDetails) + 1;
 inline constexpr std::uint32_t kMaxNode = 127;
 
 /// Whether a message exists in a variant of the profile.
@@ -29,6 +31,7 @@ constexpr IdRange ids_of(const MessageRow& row, std::uint32_t base_id) noexcept 
 struct Profile {
   bool fd = true;         ///< FD frames with float32; otherwise classic frames with scaled integers
   bool extended = false;  ///< 29-bit identifiers
+  bool wide = false;      ///< wide axes are on the bus: their messages have identifiers, too
   /// By Message; the node id is added to those that have one.
   std::array<std::uint32_t, kMessageCount> base_ids = [] {
     std::array<std::uint32_t, kMessageCount> ids{};
@@ -55,6 +58,10 @@ struct Profile {
         return speed_unit_rad_s;
       case Unit::kEdgeTime:
         return edge_time_unit_s;
+      case Unit::kResolver:
+        return 1e-3;
+      case Unit::kTemperature:
+        return 0.1;
       case Unit::kNone:
         break;
     }
@@ -65,10 +72,29 @@ struct Profile {
   }
 };
 
+/// Whether a message exists on the bus.
+constexpr bool is_on(const MessageRow& row, const Profile& profile) noexcept {
+  return is_in(row, profile.fd) && (row.width != Width::kWide || profile.wide);
+}
+
 /// An axis on a bus.
 struct BusAxis {
   std::string name;
   std::uint32_t node = 1;
+  bool wide = false;
 };
+
+/// Whether an axis has a message of its variant of the profile.
+inline bool has_message(const BusAxis& axis, const MessageRow& row) noexcept {
+  return row.width == Width::kAny || (row.width == Width::kWide) == axis.wide;
+}
+
+/// One thing wrong with a profile or the nodes on its bus: what, by the names of Profile ("ids.command",
+/// "current_unit_a", "node"), and the rule that it breaks.
+struct ProfileProblem {
+  std::string field;
+  std::string rule;
+};
+std::vector<ProfileProblem> problems(const Profile& profile, std::span<const std::uint32_t> nodes = {});
 
 }  // namespace drivebench::can

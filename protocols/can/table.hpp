@@ -6,15 +6,17 @@
 #include <span>
 #include <string_view>
 
-#include "protocols/catalogue.hpp"
+#include "protocols/can/field.hpp"
 
 /// The frames of the native CAN profile, written once: codec, DBC file, documentation and bus budget loop
 /// over this table. Little-endian throughout.
 namespace drivebench::can {
 
-/// Version of the table; the boot-up frame carries it. An identifier or field never changes its meaning
-/// within a version.
+/// Version of the table as a narrow axis speaks it; its heartbeat carries the number. An identifier or field
+/// never changes its meaning within a version.
 inline constexpr std::uint8_t kProfileVersion = 1;
+/// The same of a wide axis.
+inline constexpr std::uint8_t kWideVersion = 2;
 
 enum class Message : std::uint8_t {
   kSync,
@@ -31,37 +33,19 @@ enum class Message : std::uint8_t {
   kEdges,
   kControllerHeartbeat,
   kHeartbeat,
+  kPhaseCommand,
+  kPhases,
+  kDetails,
 };
 
 /// In which of the two variants of the profile a message exists.
 enum class Variant : std::uint8_t { kBoth, kClassic, kFd };
 
+/// Which axes have a message. A wide axis has more than phases a and b and an encoder: a phase c, a field
+/// winding, Hall lines, a tachometer or a resolver.
+enum class Width : std::uint8_t { kAny, kNarrow, kWide };
+
 enum class Sender : std::uint8_t { kBench, kController };
-
-/// Encoding of a field.
-enum class Encoding : std::uint8_t {
-  kCounter,  ///< unsigned; the low bits of a number that wraps around
-  kSigned,   ///< two's complement; the low bits of a number that wraps around
-  kCode,     ///< unsigned enumeration or bits; values that do not fit saturate
-  kUScaled,  ///< unsigned times the unit; all ones: no value or NaN; saturates one below that
-  kScaled,   ///< two's complement times the unit; the lowest number: no value or NaN; saturates at
-             ///< +-(2^(n-1)-1)
-  kFloat,    ///< IEEE 754 single; NaN: no value
-};
-
-/// Which unit a scaled field counts in; the configuration says how much each is.
-enum class Unit : std::uint8_t { kNone, kCurrent, kVoltage, kBusVoltage, kSpeed, kEdgeTime };
-
-struct Field {
-  std::string_view name;
-  std::string_view unit;
-  std::uint16_t start_bit;  ///< of the least significant bit: 8 * byte + bit
-  std::uint8_t bits;
-  Encoding encoding;
-  Unit scale;               ///< of the scaled encodings
-  std::string_view signal;  ///< row of the catalogue that it carries; empty: none
-  std::string_view meaning;
-};
 
 /// The codes of the field `request`; 0 in a reply to a command.
 enum class Request : std::uint8_t { kCommand = 0, kAcquire = 1, kRenew = 2, kRelease = 3, kClearFaults = 4 };
@@ -76,12 +60,15 @@ enum class Result : std::uint8_t {
   kStale = 5,
   kBusy = 6,
   kMalformed = 7,
+  kIncomplete = 8,  ///< setpoints of phase c and of the field did not come with it
+  kWrongDrive = 9,  ///< currents for a drive without a current loop
 };
 
 struct MessageRow {
   Message message;
   std::string_view name;
   Variant variant;
+  Width width;
   Sender sender;
   std::uint32_t base_id;  ///< the node id is added, if the message has one
   bool per_node;
@@ -92,44 +79,21 @@ struct MessageRow {
 
 namespace table_detail {
 
-constexpr Field counter(std::string_view name, std::uint16_t start, std::uint8_t bits,
-                        std::string_view signal, std::string_view meaning) {
-  return {name, "1", start, bits, Encoding::kCounter, Unit::kNone, signal, meaning};
-}
-constexpr Field counts(std::string_view name, std::uint16_t start, std::string_view signal,
-                       std::string_view meaning) {
-  return {name, "counts", start, 32, Encoding::kSigned, Unit::kNone, signal, meaning};
-}
-constexpr Field code(std::string_view name, std::uint16_t start, std::uint8_t bits, std::string_view signal,
-                     std::string_view meaning) {
-  return {name, "1", start, bits, Encoding::kCode, Unit::kNone, signal, meaning};
-}
-/// Of the numbers that the meaning lists: "0 this, 1 that". What follows a colon explains.
-constexpr Field choice(std::string_view name, std::uint16_t start, std::string_view signal,
-                       std::string_view meaning) {
-  return {name, "enum", start, 8, Encoding::kCode, Unit::kNone, signal, meaning};
-}
-constexpr Field flags(std::string_view name, std::uint16_t start, std::uint8_t bits, std::string_view signal,
-                      std::string_view meaning) {
-  return {name, "bits", start, bits, Encoding::kCode, Unit::kNone, signal, meaning};
-}
-constexpr Field scaled(std::string_view name, std::string_view unit, std::uint16_t start, Unit scale,
-                       std::string_view signal, std::string_view meaning) {
-  return {name, unit, start, 16, Encoding::kScaled, scale, signal, meaning};
-}
-constexpr Field unsigned_scaled(std::string_view name, std::string_view unit, std::uint16_t start, Unit scale,
-                                std::string_view signal, std::string_view meaning) {
-  return {name, unit, start, 16, Encoding::kUScaled, scale, signal, meaning};
-}
-constexpr Field real(std::string_view name, std::string_view unit, std::uint16_t start,
-                     std::string_view signal, std::string_view meaning) {
-  return {name, unit, start, 32, Encoding::kFloat, Unit::kNone, signal, meaning};
-}
-
 inline constexpr std::string_view kTickMeaning = "low bits of the tick that the sample was taken at";
 inline constexpr std::string_view kLevelsMeaning =
     "1 A, 2 B, 4 Z, 8 last edge counted down, 16 direction changed, 32 period valid";
 inline constexpr std::string_view kAgeMeaning = "ticks since the tick that the command in force answered";
+
+inline constexpr std::string_view kCurrentC = "measured current of phase c, into the machine";
+inline constexpr std::string_view kCurrentField = "measured current of the field winding";
+inline constexpr std::string_view kHallMeaning = "1 line 1, 2 line 2, 4 line 3";
+inline constexpr std::string_view kTachometer = "voltage of the tachometer";
+inline constexpr std::string_view kSine = "sine winding of the resolver, demodulated";
+inline constexpr std::string_view kCosine = "cosine winding of the resolver, demodulated";
+inline constexpr std::string_view kTemperature = "temperature of the windings";
+inline constexpr std::string_view kFieldVoltage = "voltage at the field winding";
+inline constexpr std::string_view kNeutral = "neutral of the motor against the middle of the DC link";
+inline constexpr std::string_view kInjectedMeaning = "injected faults in force";
 
 inline constexpr auto kSync = std::to_array<Field>({
     counter("tick", 0, 32, "tick", "low bits of the tick that begins; its samples went before"),
@@ -146,6 +110,7 @@ inline constexpr auto kCurrents = std::to_array<Field>({
     flags("encoder_levels", 48, 8, "encoder_levels", kLevelsMeaning),
     code("command_age", 56, 8, "command_age_ticks", kAgeMeaning),
 });
+/// A narrow axis has the first kNarrowSensorFields.
 inline constexpr auto kSensors = std::to_array<Field>({
     counter("tick", 0, 32, "tick", kTickMeaning),
     real("i_a", "A", 32, "i_a_a", "measured current of phase a, into the machine"),
@@ -158,21 +123,57 @@ inline constexpr auto kSensors = std::to_array<Field>({
     flags("encoder_levels", 224, 8, "encoder_levels", kLevelsMeaning),
     choice("state", 232, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault"),
     counter("missed", 240, 16, "missed_commands", "commands that were owed and did not come"),
+    real("i_c", "A", 256, "i_c_a", kCurrentC),
+    real("i_f", "A", 288, "i_f_a", kCurrentField),
+    real("bus_voltage", "V", 320, "bus_voltage_v", "voltage of the DC link"),
+    real("tachometer", "V", 352, "tachometer_v", kTachometer),
+    real("resolver_sin", "V", 384, "resolver_sin_v", kSine),
+    real("resolver_cos", "V", 416, "resolver_cos_v", kCosine),
+    real("temperature", "K", 448, "temperature_k", kTemperature),
+    flags("hall_lines", 480, 8, "hall_lines", kHallMeaning),
 });
+inline constexpr std::size_t kNarrowSensorFields = 10;
+inline constexpr auto kPhases = std::to_array<Field>({
+    scaled("i_c", "A", 0, Unit::kCurrent, "i_c_a", kCurrentC),
+    scaled("i_f", "A", 16, Unit::kCurrent, "i_f_a", kCurrentField),
+    counter("tick", 32, 16, "tick", kTickMeaning),
+    flags("hall_lines", 48, 8, "hall_lines", kHallMeaning),
+});
+inline constexpr std::string_view kModeMeaning =
+    "0 gates off, 1 voltages, 2 zero voltage, 3 duties of the bus voltage, 4 currents";
+inline constexpr std::string_view kSetpointTick = "low bits of the tick of the sample that this answers";
+inline constexpr std::string_view kLeaseMeaning = "lease number that the bench gave";
+
 inline constexpr auto kCommand = std::to_array<Field>({
-    scaled("u_a", "V", 0, Unit::kVoltage, "", "voltage for phase a; in mode 3 the duty in units of 1/32767"),
-    scaled("u_b", "V", 16, Unit::kVoltage, "", "voltage for phase b; in mode 3 the duty in units of 1/32767"),
-    counter("tick", 32, 16, "", "low bits of the tick of the sample that this answers"),
-    choice("mode", 48, "", "0 gates off, 1 voltages, 2 zero voltage, 3 duties of the bus voltage"),
-    code("lease", 56, 8, "", "lease number that the bench gave"),
+    scaled(
+        "u_a", "V", 0, Unit::kVoltage, "",
+        "voltage for phase a; in mode 3 the duty in units of 1/32767, in mode 4 the current as i_a counts"),
+    scaled(
+        "u_b", "V", 16, Unit::kVoltage, "",
+        "voltage for phase b; in mode 3 the duty in units of 1/32767, in mode 4 the current as i_b counts"),
+    counter("tick", 32, 16, "", kSetpointTick),
+    choice("mode", 48, "", kModeMeaning),
+    code("lease", 56, 8, "", kLeaseMeaning),
 });
+inline constexpr auto kPhaseCommand = std::to_array<Field>({
+    scaled("u_c", "V", 0, Unit::kVoltage, "", "voltage for phase c; in modes 3 and 4 as u_a of the command"),
+    scaled("u_f", "V", 16, Unit::kVoltage, "",
+           "voltage for the field winding; in modes 3 and 4 as u_a of the command"),
+    counter("tick", 32, 16, "", "as in the command that follows"),
+    choice("mode", 48, "", kModeMeaning),
+    code("lease", 56, 8, "", kLeaseMeaning),
+});
+/// A narrow axis has the first kNarrowCommandFields.
 inline constexpr auto kCommandFd = std::to_array<Field>({
-    counter("tick", 0, 32, "", "low bits of the tick of the sample that this answers"),
-    real("u_a", "V", 32, "", "voltage for phase a; in mode 3 the duty, -1 to 1"),
-    real("u_b", "V", 64, "", "voltage for phase b; in mode 3 the duty, -1 to 1"),
-    choice("mode", 96, "", "0 gates off, 1 voltages, 2 zero voltage, 3 duties of the bus voltage"),
-    code("lease", 104, 8, "", "lease number that the bench gave"),
+    counter("tick", 0, 32, "", kSetpointTick),
+    real("u_a", "V", 32, "", "voltage for phase a; in mode 3 the duty, -1 to 1, in mode 4 the current [A]"),
+    real("u_b", "V", 64, "", "voltage for phase b; in mode 3 the duty, -1 to 1, in mode 4 the current [A]"),
+    choice("mode", 96, "", kModeMeaning),
+    code("lease", 104, 8, "", kLeaseMeaning),
+    real("u_c", "V", 128, "", "voltage for phase c; in modes 3 and 4 as u_a"),
+    real("u_f", "V", 160, "", "voltage for the field winding; in modes 3 and 4 as u_a"),
 });
+inline constexpr std::size_t kNarrowCommandFields = 5;
 inline constexpr auto kEncoder = std::to_array<Field>({
     counts("encoder_count", 0, "encoder_count", "low bits of floor(theta N/(2 pi)), plus the offset"),
     unsigned_scaled("edge_age", "s", 32, Unit::kEdgeTime, "edge_age_s",
@@ -190,7 +191,8 @@ inline constexpr auto kReply = std::to_array<Field>({
     choice("request", 0, "", "0 a command, 1 acquire, 2 renew, 3 release, 4 clear faults: what this answers"),
     choice(
         "result", 8, "",
-        "0 done, 1 not the owner, 2 owned by another, 3 not finite, 4 latched, 5 stale, 6 busy, 7 malformed"),
+        "0 done, 1 not the owner, 2 owned by another, 3 not finite, 4 latched, 5 stale, 6 busy, 7 malformed, "
+        "8 incomplete, 9 wrong drive"),
     code("controller", 16, 32, "", "the number in the request; 0 for a command"),
     code("lease", 48, 8, "", "lease number to command with, 0: none; of a command, the one that it carried"),
     counter("tick", 56, 8, "",
@@ -241,57 +243,115 @@ inline constexpr auto kHeartbeat = std::to_array<Field>({
     counter("period_us", 32, 32, "", "sample period of the bench [us]"),
 });
 
+inline constexpr auto kDetails = std::to_array<Field>({
+    choice("page", 0, "", "0 phase voltages, 1 field and neutral, 2 speed sensors, 3 injected faults"),
+    counter("tick", 8, 8, "tick", kTickMeaning),
+    on_page(0, scaled("u_a", "V", 16, Unit::kVoltage, "u_a_v", "voltage at phase a during the tick before")),
+    on_page(0, scaled("u_b", "V", 32, Unit::kVoltage, "u_b_v", "voltage at phase b during the tick before")),
+    on_page(0, scaled("u_c", "V", 48, Unit::kVoltage, "u_c_v", "voltage at phase c during the tick before")),
+    on_page(1, scaled("u_f", "V", 16, Unit::kVoltage, "u_f_v", kFieldVoltage)),
+    on_page(1, scaled("u_n", "V", 32, Unit::kVoltage, "u_n_v", kNeutral)),
+    on_page(1, unsigned_scaled("temperature", "K", 48, Unit::kTemperature, "temperature_k", kTemperature)),
+    on_page(2, scaled("tachometer", "V", 16, Unit::kVoltage, "tachometer_v", kTachometer)),
+    on_page(2, scaled("resolver_sin", "V", 32, Unit::kResolver, "resolver_sin_v", kSine)),
+    on_page(2, scaled("resolver_cos", "V", 48, Unit::kResolver, "resolver_cos_v", kCosine)),
+    on_page(3, flags("injected", 16, 32, "injected", kInjectedMeaning)),
+});
+inline constexpr auto kDetailsFd = std::to_array<Field>({
+    counter("tick", 0, 32, "tick", kTickMeaning),
+    real("u_a", "V", 32, "u_a_v", "voltage at phase a during the tick before"),
+    real("u_b", "V", 64, "u_b_v", "voltage at phase b during the tick before"),
+    real("u_c", "V", 96, "u_c_v", "voltage at phase c during the tick before"),
+    real("u_f", "V", 128, "u_f_v", kFieldVoltage),
+    real("u_n", "V", 160, "u_n_v", kNeutral),
+    real("meter_u_rms", "V", 192, "meter_u_rms_v", "power analyser, last whole window: rms voltage"),
+    real("meter_i_rms", "A", 224, "meter_i_rms_a", "power analyser: rms current"),
+    real("meter_p", "W", 256, "meter_p_w", "power analyser: active power"),
+    real("meter_q", "var", 288, "meter_q_var", "power analyser: reactive power"),
+    real("meter_pf", "1", 320, "meter_pf", "power analyser: power factor"),
+    flags("injected", 352, 32, "injected", kInjectedMeaning),
+});
+
 }  // namespace table_detail
 
-inline constexpr std::size_t kMaxFields = 10;
+/// The pages of the classic message `details`.
+enum class Page : std::uint8_t { kVoltages = 0, kField = 1, kSpeedSensors = 2, kInjected = 3 };
+inline constexpr std::size_t kPages = 4;
+
+inline constexpr std::size_t kMaxFields = 18;
 inline constexpr std::size_t kEdgesPerFrame = 26;
 inline constexpr std::size_t kFirstEdgeByte = 12;
 
 /// Sorted by base id. Node ids are 1..127, as in the predefined connection set of CANopen, whose identifiers
-/// for SYNC, emergency, heartbeat and process data these are.
+/// for SYNC, emergency, heartbeat and process data these are; phase_command, phases and details stand where
+/// it has none, or SDO, which nobody here speaks.
 inline constexpr auto kMessages = [] {
   using namespace table_detail;
   using enum Message;
   using enum Sender;
+  using enum Variant;
+  using enum Width;
+  constexpr std::span kAllSensors(table_detail::kSensors);
+  constexpr std::span kWholeCommand(kCommandFd);
   return std::to_array<MessageRow>({
-      {kSync, "sync", Variant::kBoth, kBench, 0x080, false, 5, table_detail::kSync,
+      {kSync, "sync", kBoth, kAny, kBench, 0x080, false, 5, table_detail::kSync,
        "a tick begins; sent after the samples of its start"},
-      {kFault, "fault", Variant::kBoth, kBench, 0x080, true, 8, table_detail::kFault,
+      {kFault, "fault", kBoth, kAny, kBench, 0x080, true, 8, table_detail::kFault,
        "the fault word has changed"},
-      {kCurrents, "currents", Variant::kClassic, kBench, 0x180, true, 8, table_detail::kCurrents,
+      {kPhaseCommand, "phase_command", kClassic, kWide, kController, 0x100, true, 8,
+       table_detail::kPhaseCommand,
+       "setpoints of phase c and of the field; they are kept and take effect with the command of the same "
+       "tick, "
+       "mode and lease, which follows"},
+      {kCurrents, "currents", kClassic, kAny, kBench, 0x180, true, 8, table_detail::kCurrents,
        "phase currents of a sample; follows the encoder frame of the same tick"},
-      {kSensors, "sensors", Variant::kFd, kBench, 0x180, true, 32, table_detail::kSensors,
+      {kSensors, "sensors", kFd, kNarrow, kBench, 0x180, true, 32, kAllSensors.first(kNarrowSensorFields),
        "all sensors of a sample"},
-      {kCommand, "command", Variant::kClassic, kController, 0x200, true, 8, table_detail::kCommand,
+      {kSensors, "sensors", kFd, kWide, kBench, 0x180, true, 64, kAllSensors, "all sensors of a sample"},
+      {kCommand, "command", kClassic, kAny, kController, 0x200, true, 8, table_detail::kCommand,
        "what the amplifier shall do"},
-      {kCommand, "command", Variant::kFd, kController, 0x200, true, 16, table_detail::kCommandFd,
+      {kCommand, "command", kFd, kNarrow, kController, 0x200, true, 16,
+       kWholeCommand.first(kNarrowCommandFields), "what the amplifier shall do"},
+      {kCommand, "command", kFd, kWide, kController, 0x200, true, 24, kWholeCommand,
        "what the amplifier shall do"},
-      {kEncoder, "encoder", Variant::kClassic, kBench, 0x280, true, 8, table_detail::kEncoder,
+      {kEncoder, "encoder", kClassic, kAny, kBench, 0x280, true, 8, table_detail::kEncoder,
        "encoder count and edge times; flags and tick stand in the currents frame that follows"},
-      {kRequest, "request", Variant::kBoth, kController, 0x300, true, 8, table_detail::kRequest,
+      {kRequest, "request", kBoth, kAny, kController, 0x300, true, 8, table_detail::kRequest,
        "takes, renews or gives back the lease, or clears faults"},
-      {kReply, "reply", Variant::kBoth, kBench, 0x380, true, 8, table_detail::kReply,
+      {kReply, "reply", kBoth, kAny, kBench, 0x380, true, 8, table_detail::kReply,
        "the answer to a request, or why a command was refused"},
-      {kState, "state", Variant::kClassic, kBench, 0x400, true, 8, table_detail::kState,
-       "state of the drive"},
-      {kState, "state", Variant::kFd, kBench, 0x400, true, 20, table_detail::kStateFd, "state of the drive"},
-      {kCounters, "counters", Variant::kClassic, kBench, 0x480, true, 8, table_detail::kCounters,
+      {kState, "state", kClassic, kAny, kBench, 0x400, true, 8, table_detail::kState, "state of the drive"},
+      {kState, "state", kFd, kAny, kBench, 0x400, true, 20, table_detail::kStateFd, "state of the drive"},
+      {kCounters, "counters", kClassic, kAny, kBench, 0x480, true, 8, table_detail::kCounters,
        "what became of the commands"},
-      {kIndex, "index", Variant::kBoth, kBench, 0x500, true, 8, table_detail::kIndex, "the index line rose"},
-      {kEdges, "edges", Variant::kFd, kBench, 0x580, true, 64, table_detail::kEdges,
+      {kIndex, "index", kBoth, kAny, kBench, 0x500, true, 8, table_detail::kIndex, "the index line rose"},
+      {kEdges, "edges", kFd, kAny, kBench, 0x580, true, 64, table_detail::kEdges,
        "the edges of the encoder lines A and B within a tick"},
-      {kControllerHeartbeat, "controller_heartbeat", Variant::kBoth, kController, 0x680, true, 1,
+      {kPhases, "phases", kClassic, kWide, kBench, 0x600, true, 8, table_detail::kPhases,
+       "the other currents of a sample and the Hall lines; stands between the encoder frame and the currents "
+       "frame of the same tick"},
+      {kControllerHeartbeat, "controller_heartbeat", kBoth, kAny, kController, 0x680, true, 1,
        table_detail::kControllerHeartbeat, "the controller lives; once seen, it is monitored"},
-      {kHeartbeat, "heartbeat", Variant::kBoth, kBench, 0x700, true, 8, table_detail::kHeartbeat,
+      {kHeartbeat, "heartbeat", kBoth, kAny, kBench, 0x700, true, 8, table_detail::kHeartbeat,
        "the bench lives"},
+      {kDetails, "details", kClassic, kWide, kBench, 0x780, true, 8, table_detail::kDetails,
+       "voltages, temperature, speed sensors and injected faults, a page at a time"},
+      {kDetails, "details", kFd, kWide, kBench, 0x780, true, 48, kDetailsFd,
+       "voltages, power analyser and injected faults"},
   });
 }();
 
-/// The row of a message in a variant of the profile, or null.
-constexpr const MessageRow* find_message(Message message, bool fd) noexcept {
+/// Whether the frames of a message hold one page each, which their first field tells.
+constexpr bool is_paged(const MessageRow& row) noexcept {
+  return row.fields.back().page != kEveryPage;
+}
+
+/// The row of a message in a variant of the profile for an axis, or null.
+constexpr const MessageRow* find_message(Message message, bool fd, bool wide = false) noexcept {
   for (const MessageRow& row : kMessages) {
     if (row.message != message) continue;
-    if (row.variant == Variant::kBoth || (row.variant == Variant::kFd) == fd) return &row;
+    const bool has_variant = row.variant == Variant::kBoth || (row.variant == Variant::kFd) == fd;
+    if (has_variant && (row.width == Width::kAny || (row.width == Width::kWide) == wide)) return &row;
   }
   return nullptr;
 }

@@ -68,21 +68,31 @@ std::string no_value_text(const Field& field) {
   return field.encoding == Encoding::kFloat ? "NaN" : "-";
 }
 
+/// Narrow and wide axes on one bus have different frames of the same name.
+std::string title_of(const MessageRow& row, std::span<const MessageRow* const> rows) {
+  const bool twice = std::ranges::any_of(
+      rows, [&](const MessageRow* other) { return other != &row && other->message == row.message; });
+  const bool is_wide = row.width == Width::kWide;
+  return std::string(row.name) + (!twice ? "" : is_wide ? " (wide axis)" : " (narrow axis)");
+}
+
 std::string field_line(const Field& field, const Profile& profile) {
   const std::optional<Range> range = range_of(field, profile);
   const unsigned first = field.start_bit / 8U;
   const unsigned last = first + field.bits / 8U - 1;
   std::string line = "| " + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
-  line += " | " + std::string(field.name) + " | " + encoding_text(field, profile) + " | ";
+  line += " | " + std::string(field.name) + " | ";
+  if (field.page != kEveryPage) line += "page " + std::to_string(field.page) + ": ";
+  line += encoding_text(field, profile) + " | ";
   line += std::string(field.unit == "1" ? "-" : field.unit) + " | ";
   line += range ? number_text(range->minimum, 10) + " to " + number_text(range->maximum, 10) : "any";
   line += " | " + no_value_text(field) + " | " + std::string(field.meaning) + " |\n";
   return line;
 }
 
-std::string message_text(const MessageRow& row, const Profile& profile) {
+std::string message_text(const MessageRow& row, const Profile& profile, const std::string& title) {
   const std::uint32_t base_id = profile.base_ids[static_cast<std::size_t>(row.message)];
-  std::string text = "### " + std::string(row.name) + "\n\n";
+  std::string text = "### " + title + "\n\n";
   text += id_text(profile, base_id) + (row.per_node ? " + node, " : ", ") + std::to_string(row.size) +
           (row.size == 1 ? " byte" : " bytes") +
           (row.sender == Sender::kBench ? ", from the bench: " : ", from the controller: ") +
@@ -98,7 +108,8 @@ std::string message_text(const MessageRow& row, const Profile& profile) {
   return text + "\n";
 }
 
-std::string identifiers_text(const Profile& profile, std::span<const BusAxis> axes) {
+std::string identifiers_text(const Profile& profile, std::span<const BusAxis> axes,
+                             std::span<const MessageRow* const> rows) {
   std::string text = "## Identifiers\n\n| message | from |";
   std::string rule = "|---|---|";
   for (const BusAxis& axis : axes) {
@@ -106,11 +117,10 @@ std::string identifiers_text(const Profile& profile, std::span<const BusAxis> ax
     rule += "---|";
   }
   text += "\n" + rule + "\n";
-  for (const MessageRow* row : rows_of(profile)) {
-    text +=
-        "| " + std::string(row->name) + (row->sender == Sender::kBench ? " | bench |" : " | controller |");
+  for (const MessageRow* row : rows) {
+    text += "| " + title_of(*row, rows) + (row->sender == Sender::kBench ? " | bench |" : " | controller |");
     for (const BusAxis& axis : axes)
-      text += " " + id_text(profile, profile.id_of(*row, axis.node)) + " |";
+      text += " " + (has_message(axis, *row) ? id_text(profile, profile.id_of(*row, axis.node)) : "-") + " |";
     text += "\n";
   }
   return text + "\n";
@@ -137,6 +147,24 @@ Values example_values(const MessageRow& row) {
   sample.i_b_a = -0.75;
   sample.speed_rad_s = -62.8;
   sample.bus_voltage_v = 320.0;
+  sample.i_c_a = -0.25;
+  sample.i_f_a = 2.0;
+  sample.u_a_v = 12.5;
+  sample.u_b_v = -6.25;
+  sample.u_c_v = 25.0;
+  sample.u_f_v = 48.0;
+  sample.u_n_v = -1.5;
+  sample.hall_lines = 5;
+  sample.tachometer_v = 7.5;
+  sample.resolver_sin_v = 0.5;
+  sample.resolver_cos_v = -0.875;
+  sample.temperature_k = 293.5;
+  sample.meter_u_rms_v = 230.0;
+  sample.meter_i_rms_a = 1.25;
+  sample.meter_p_w = 250.0;
+  sample.meter_q_var = 125.0;
+  sample.meter_pf = 0.875;
+  sample.injected = 0x20;
   Values values = values_of(row, sample);
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
@@ -152,16 +180,21 @@ Values example_values(const MessageRow& row) {
   return values;
 }
 
-std::string example_text(const MessageRow& row, const Profile& profile, std::uint32_t node) {
-  const Frame frame = encode(row, profile, node, example_values(row));
-  const Values values = decode(row, profile, frame);
-  std::string text = "| " + std::string(row.name) + " | `";
+/// A line; `page` means nothing in a message without pages.
+std::string example_text(const MessageRow& row, const Profile& profile, std::uint32_t node,
+                         const std::string& title, std::size_t page) {
+  Values values = example_values(row);
+  if (is_paged(row)) values[0] = static_cast<double>(page);
+  const Frame frame = encode(row, profile, node, values);
+  values = decode(row, profile, frame);
+  std::string text = "| " + title + " | `";
   append_id(text, frame);
   text += frame.fd ? "##1" : "#";
   append_data(text, frame);
   text += "` |";
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
+    if (!is_on_page(field, page)) continue;
     const bool has_unit = field.unit != "1" && field.unit != "bits" && field.unit != "enum";
     text += (i == 0 ? " " : ", ") + std::string(field.name) + " " + number_text(values[i], 7) +
             (has_unit ? " " + std::string(field.unit) : "");
@@ -220,9 +253,24 @@ std::optional<Range> range_of(const Field& field, const Profile& profile) {
 std::vector<const MessageRow*> rows_of(const Profile& profile) {
   std::vector<const MessageRow*> rows;
   for (const MessageRow& row : kMessages) {
-    if (is_in(row, profile.fd)) rows.push_back(&row);
+    if (is_on(row, profile)) rows.push_back(&row);
   }
   return rows;
+}
+
+std::vector<const MessageRow*> rows_of(const Profile& profile, std::span<const BusAxis> axes) {
+  const BusAxis narrow;
+  if (axes.empty()) axes = {&narrow, 1};
+  std::vector<const MessageRow*> rows;
+  for (const MessageRow& row : kMessages) {
+    const bool used = std::ranges::any_of(axes, [&](const BusAxis& axis) { return has_message(axis, row); });
+    if (used && is_in(row, profile.fd)) rows.push_back(&row);
+  }
+  return rows;
+}
+
+unsigned version_of(std::span<const BusAxis> axes) {
+  return std::ranges::any_of(axes, &BusAxis::wide) ? kWideVersion : kProfileVersion;
 }
 
 std::string number_text(double value) {
@@ -238,18 +286,23 @@ std::string number_text(double value, int digits) {
 }
 
 std::string table_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes) {
+  const std::vector<const MessageRow*> rows = rows_of(profile, axes);
   std::string text = "# CAN messages of " + std::string(bench) + "\n\nVersion " +
-                     std::to_string(kProfileVersion) + " of the profile. " + conventions_text(profile);
-  text += identifiers_text(profile, axes);
+                     std::to_string(version_of(axes)) + " of the profile. " + conventions_text(profile);
+  text += identifiers_text(profile, axes, rows);
   text += "## Fields\n\n";
-  for (const MessageRow* row : rows_of(profile))
-    text += message_text(*row, profile);
+  for (const MessageRow* row : rows)
+    text += message_text(*row, profile, title_of(*row, rows));
   text +=
       "## Examples\n\nAs `cansend` takes and `candump -L` prints them, with the values that they carry.\n\n"
       "| message | frame | values |\n|---|---|---|\n";
-  const std::uint32_t node = axes.empty() ? 1 : axes.front().node;
-  for (const MessageRow* row : rows_of(profile))
-    text += example_text(*row, profile, node);
+  for (const MessageRow* row : rows) {
+    const auto axis =
+        std::ranges::find_if(axes, [&](const BusAxis& each) { return has_message(each, *row); });
+    const std::uint32_t node = axis == axes.end() ? 1 : axis->node;
+    for (std::size_t page = 0; page < (is_paged(*row) ? kPages : 1); ++page)
+      text += example_text(*row, profile, node, title_of(*row, rows), page);
+  }
   return text + "\n" + std::string(kHowToDissect);
 }
 

@@ -30,8 +30,12 @@ struct Range {
 /// What a field can carry, in its unit; of a single the usual range of its signal, or nothing.
 std::optional<Range> range_of(const Field& field, const Profile& profile);
 
-/// The rows of the table that this profile uses.
+/// The rows of the table that there are on a bus.
 std::vector<const MessageRow*> rows_of(const Profile& profile);
+/// Those of them that these axes use, one narrow axis if there are none.
+std::vector<const MessageRow*> rows_of(const Profile& profile, std::span<const BusAxis> axes);
+/// The version that is all these axes speak.
+unsigned version_of(std::span<const BusAxis> axes);
 
 /// As short as reads back the same, or rounded to so many digits.
 std::string number_text(double value);

@@ -1,5 +1,6 @@
 #include "protocols/modbus/map_text.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <vector>
@@ -105,7 +106,18 @@ std::vector<Line> input_lines(std::span<const FaultInput> faults) {
     if (fault.address < kFaultInputs) lines.push_back(line_of('1', fault.address, fault.bit, false));
   for (std::size_t i = 0; i < kOtherInputs.size(); ++i)
     lines.push_back(line_of('1', kFaultInputs + i, kOtherInputs[i], false));
+  for (const FaultInput& fault : faults) {
+    if (fault.address >= kFirstInjectedInput && fault.address < kDiscreteInputs)
+      lines.push_back(line_of('1', fault.address, fault.bit, false));
+  }
   return lines;
+}
+
+bool have_the_same_parameters(std::span<const RegisterMap> maps) {
+  return std::all_of(maps.begin(), maps.end(), [&](const RegisterMap& map) {
+    return std::equal(map.rows().begin(), map.rows().end(), maps[0].rows().begin(), maps[0].rows().end(),
+                      [](const Row& a, const Row& b) { return a.name == b.name; });
+  });
 }
 
 /// `table` tells apart what has the same address.
@@ -158,6 +170,7 @@ constexpr std::string_view kRules = R"(
 Functions 1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43/14 (device identification) and 8/0 (echo). Functions 3 and 4 read the same registers.
 Addresses count from 0; the columns 3xxxx and 4xxxx are the traditional notation, which counts from 1. A value of more than one register has
 its most significant word first (ABCD); the column CDAB is where it stands with the words the other way round. One request sees one tick.
+The sample goes on behind its first block: one request may read the 125 registers from 200 on, which hold every sensor.
 
 A value is a register, or registers, times its scaling. Scaled 16-bit values saturate at +-32767 (unsigned: 65534); -32768 (65535) stands for
 "no number". float32 rounds what the bench holds in double precision, in both directions.
@@ -169,15 +182,17 @@ request 2 gives it back.
 
 **Commands.** One write of `command_mode` to `command_b`; writing `command_counter` is what gives the command, so it may not come alone before the
 other registers are right. With function 23 the answer waits for the tick and reads the sample after it: one transaction for each
-tick in lockstep. Function 16 is answered as soon as the bench has accepted the command. A write of the process data is a command as well, for the
+tick in lockstep. The registers from `more_lease_key` on are the same ones with those of phase c and of the field behind them, so that one write
+commands a machine that has these; `terminals` tells what it has, and what it has not is ignored. A duty of 1 is the bus voltage, for a leg of a
+star half of it. Function 16 is answered as soon as the bench has accepted the command. A write of the process data is a command as well, for the
 tick that is newest when it arrives; in real time one that finds this tick answered already waits for the next, so that none is lost.
 
 | exception | meaning |
 |---|---|
 | 1 | function or sub-function not served |
-| 2 | no such register, a read across two blocks, half a value written, or a register that is read-only (all are, unless the configuration allows writes) |
+| 2 | no such register, half a value written, or a register that is read-only (all are, unless the configuration allows writes) |
 | 3 | wrong quantity or byte count; a value that is not finite, out of range or breaks a rule between parameters; contradictory requests in one write |
-| 4 | a latched fault must be cleared first, or the command answers a sample that is too old, answered already or not taken yet; in a free run: no leases |
+| 4 | a latched fault must be cleared first, the drive takes no currents, or the command answers a sample that is too old, answered already or not taken yet; in a free run: no leases |
 | 6 | the lease is not yours, or too many requests; for process data in lockstep also: this tick has its command already |
 | 11 | no axis at this unit id |
 
@@ -186,19 +201,26 @@ Nothing is written when an exception is the answer. `last_refusal` says why the 
 
 }  // namespace
 
-std::string map_csv(const RegisterMap& map, std::span<const FaultInput> faults) {
+std::string map_csv(std::span<const RegisterMap> maps, std::span<const FaultInput> faults) {
   std::string out;
   add_csv(out, "table", Line(kColumns.begin(), kColumns.end()));
-  for (const Row& row : map.rows())
-    add_csv(out, "register", line_of(row, map.writable()));
-  for (const Line& line : coil_lines(map))
+  const bool same = have_the_same_parameters(maps);
+  for (std::size_t i = 0; i < (same ? 1 : maps.size()); ++i) {
+    for (const Row& row : maps[i].rows()) {
+      const bool is_parameter = row.content == Content::kParameter;
+      if (i > 0 && !is_parameter) continue;
+      add_csv(out, same || !is_parameter ? "register" : "register of unit " + std::to_string(i + 1),
+              line_of(row, maps[i].writable()));
+    }
+  }
+  for (const Line& line : coil_lines(maps[0]))
     add_csv(out, "coil", line);
   for (const Line& line : input_lines(faults))
     add_csv(out, "discrete input", line);
   return out;
 }
 
-std::string map_markdown(const RegisterMap& map, std::span<const FaultInput> faults,
+std::string map_markdown(std::span<const RegisterMap> maps, std::span<const FaultInput> faults,
                          std::span<const std::string_view> axes) {
   std::string out = "# Modbus register map, version " + std::to_string(kMapVersion) + "\n\n";
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -206,12 +228,24 @@ std::string map_markdown(const RegisterMap& map, std::span<const FaultInput> fau
            std::to_string(i) + ", " + std::string(axes[i]) + "\n";
   }
   out += kRules;
-  add_table(out, "Header and test registers", lines_between(map, 0, kProcessStart));
-  for (const Block& block : map.blocks())
+  const auto lines_of = [](const RegisterMap& map, const Block& block) {
+    return lines_between(map, block.start, std::size_t{block.start} + block.length);
+  };
+  add_table(out, "Header and test registers", lines_between(maps[0], 0, kProcessStart));
+  std::vector<Block> blocks(maps[0].blocks().begin(), maps[0].blocks().end());
+  std::sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.start < b.start; });
+  const bool same = have_the_same_parameters(maps);
+  for (const Block& block : blocks) {
+    if (block.start == kParameterStart && !same) continue;
     add_table(
         out, std::string(1, static_cast<char>(block.name[0] - 'a' + 'A')) + std::string(block.name.substr(1)),
-        lines_between(map, block.start, std::size_t{block.start} + block.length));
-  add_table(out, "Coils", coil_lines(map));
+        lines_of(maps[0], block));
+  }
+  for (std::size_t i = 0; i < (same ? 0 : maps.size()); ++i) {
+    add_table(out, "Parameters of unit id " + std::to_string(i + 1),
+              lines_between(maps[i], kParameterStart, kMirrorOffset));
+  }
+  add_table(out, "Coils", coil_lines(maps[0]));
   add_table(out, "Discrete inputs", input_lines(faults));
   return out;
 }

@@ -16,9 +16,9 @@ std::uint64_t signal_bits(const Row& row, const Sample& sample) noexcept {
 
 Sample read_sample(std::span<const std::uint16_t> words) noexcept {
   Sample sample;
-  for (std::size_t i = 0; i < kSignals.size(); ++i) {
-    const Row& row = map_detail::kSample[i];
-    const Signal& signal = kSignals[i];
+  for (const Row& row : map_detail::kFixedRows) {
+    if (row.content != Content::kSignal || row.address < kSampleStart) continue;
+    const Signal& signal = kSignals[row.index];
     const std::size_t at = row.address - kSampleStart;
     if (at + row.size() > words.size()) break;
     const std::uint64_t bits = get(row.type, WordOrder::kAbcd, &words[at]);
@@ -55,14 +55,20 @@ RegisterMap::RegisterMap(std::span<const ParameterInfo> parameters, bool writabl
     address = static_cast<std::uint16_t>(rows_.back().end());
   }
   using namespace map_detail;
+  const auto block = [](std::uint16_t id, std::span<const Row> rows, std::string_view name) {
+    return Block{.id = id, .start = rows.front().address, .length = length_of(rows), .name = name};
+  };
   blocks_ = {
-      {.id = 1, .start = kProcessStart, .length = length_of(kProcess), .name = "process data"},
-      {.id = 2, .start = kSampleStart, .length = kSampleLength, .name = "sample"},
-      {.id = 3, .start = kCommandStart, .length = length_of(kCommand), .name = "lease and command"},
+      block(1, kProcess, "process data"),
+      block(2, kSample, "sample"),
+      block(3, kCommand, "lease and command"),
       {.id = 4,
        .start = kParameterStart,
        .length = static_cast<std::uint16_t>(address - kParameterStart),
        .name = "parameters"},
+      block(5, kMoreProcess, "process data of all terminals"),
+      block(6, kMoreSample, "sample, continued"),
+      block(7, kMoreCommand, "lease and command for all terminals"),
   };
 }
 
@@ -71,16 +77,13 @@ std::optional<RegisterMap::Range> RegisterMap::find(std::uint16_t address,
   const bool mirrored = address >= kMirrorOffset;
   const auto first = static_cast<std::uint16_t>(mirrored ? address - kMirrorOffset : address);
   const std::size_t end = std::size_t{first} + count;
-  const auto holds_all = [&](std::size_t start, std::size_t length) {
-    return first >= start && end <= start + length;
-  };
-  const bool exists = holds_all(0, map_detail::length_of(map_detail::kHeader)) ||
-                      std::any_of(blocks_.begin(), blocks_.end(),
-                                  [&](const Block& block) { return holds_all(block.start, block.length); });
-  if (!exists || count == 0) return std::nullopt;
   const auto from =
       std::partition_point(rows_.begin(), rows_.end(), [&](const Row& row) { return row.end() <= first; });
   const auto to = std::partition_point(from, rows_.end(), [&](const Row& row) { return row.address < end; });
+  std::size_t reached = first;  // every register below belongs to one of the rows
+  for (auto row = from; row != to && row->address <= reached; ++row)
+    reached = row->end();
+  if (count == 0 || reached < end) return std::nullopt;
   return Range{.rows = std::span(from, to),
                .order = mirrored ? WordOrder::kCdab : WordOrder::kAbcd,
                .first = first,

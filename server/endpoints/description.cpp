@@ -1,7 +1,12 @@
 #include "server/endpoints/description.hpp"
 
-#include "plant/parameters.hpp"
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "plant/parameters/parameters.hpp"
 #include "protocols/catalogue.hpp"
+#include "server/endpoints/terminals.hpp"
 #include "server/input_codec.hpp"
 
 namespace drivebench {
@@ -19,10 +24,42 @@ v1::SignalDescription::Kind wire_kind(SignalKind kind) noexcept {
   return v1::SignalDescription::KIND_TRUTH;
 }
 
+std::string_view word_of(Connection connection) noexcept {
+  constexpr auto kWords = std::to_array<std::string_view>({"two_phase", "star", "independent", "armature"});
+  return kWords[static_cast<std::size_t>(connection)];
+}
+
+/// The word of a choice that holds; empty if there is no such parameter.
+std::string_view word_of(const AxisParameters& p, std::string_view name) {
+  const Parameter* const row = find_parameter(p, name);
+  return row == nullptr ? std::string_view{} : row->words[static_cast<std::size_t>(row->get(p))];
+}
+
+v1::AxisDescription describe_axis(const Engine& engine, std::size_t axis) {
+  const BenchConfig& config = engine.config();
+  const AxisParameters& p = engine.parameters(axis);
+  const Terminals terminals = terminals_of(p);
+  v1::AxisDescription d;
+  d.set_name(config.axes[axis].name);
+  d.set_machine(config.axes[axis].motor);
+  d.set_machine_kind(std::string(machine_kind(p)));
+  d.set_phases(static_cast<std::uint32_t>(terminal_count(terminals.connection)));
+  d.set_connection(std::string(word_of(terminals.connection)));
+  d.set_field_winding(terminals.field);
+  d.set_drive_kind(std::string(word_of(p, "drive.kind")));
+  if (const auto partner = config.setup.axes[axis].shares_shaft_with) {
+    d.set_shares_shaft_with(config.axes[*partner].name);
+  }
+  for (std::size_t row = 0; row < axis_parameters(p).size(); ++row)
+    *d.add_parameters() = describe_parameter(engine, axis, row);
+  return d;
+}
+
 }  // namespace
 
 v1::ParameterDescription describe_parameter(const Engine& engine, std::size_t axis, std::size_t row) {
-  const Parameter& parameter = axis_parameters()[row];
+  const AxisParameters& p = engine.parameters(axis);
+  const Parameter& parameter = axis_parameters(p)[row];
   v1::ParameterDescription d;
   d.set_name(std::string(parameter.name));
   d.set_unit(std::string(parameter.unit));
@@ -30,8 +67,10 @@ v1::ParameterDescription describe_parameter(const Engine& engine, std::size_t ax
   d.set_maximum(parameter.maximum);
   d.set_integer(parameter.integer);
   d.set_live(parameter.live);
-  d.set_value(parameter.get(engine.parameters(axis)));
+  d.set_value(parameter.get(p));
   d.set_meaning(std::string(parameter.meaning));
+  for (const std::string_view word : parameter.words)
+    d.add_words(std::string(word));
   return d;
 }
 
@@ -46,15 +85,9 @@ v1::BenchDescription describe(const Engine& engine) {
   d.set_watchdog_ticks(static_cast<std::uint32_t>(config.setup.watchdog_ticks));
   d.set_lease_s(static_cast<double>(config.setup.lease_ticks) * d.period_s());
   d.set_seed(config.setup.seed);
-  d.set_configuration_hash(configuration_hash(config));
-  for (std::size_t axis = 0; axis < config.axes.size(); ++axis) {
-    v1::AxisDescription& a = *d.add_axes();
-    a.set_name(config.axes[axis].name);
-    a.set_machine(config.axes[axis].motor);
-    for (std::size_t row = 0; row < axis_parameters().size(); ++row) {
-      *a.add_parameters() = describe_parameter(engine, axis, row);
-    }
-  }
+  d.set_configuration_hash(engine.configuration_hash());
+  for (std::size_t axis = 0; axis < config.axes.size(); ++axis)
+    *d.add_axes() = describe_axis(engine, axis);
   for (const Signal& signal : kSignals) {
     v1::SignalDescription& s = *d.add_signals();
     s.set_name(std::string(signal.name));
@@ -69,6 +102,17 @@ v1::BenchDescription describe(const Engine& engine) {
     f.set_bit(fault.bit);
     f.set_name(std::string(fault.name));
     f.set_latched((fault.bit & kLatchedFaults) != 0);
+    f.set_meaning(std::string(fault.meaning));
+  }
+  for (std::size_t row = 0; row < kInjectableFaultCount; ++row) {
+    const InjectableFault& fault = kInjectableFaults[row];
+    v1::InjectableFaultDescription& f = *d.add_injectable_faults();
+    f.set_bit(std::uint64_t{1} << row);
+    f.set_name(std::string(fault.name));
+    f.set_unit(std::string(fault.unit));
+    f.set_minimum(fault.magnitude ? -fault.maximum : 0.0);
+    f.set_maximum(fault.maximum);
+    f.set_integer(fault.integer);
     f.set_meaning(std::string(fault.meaning));
   }
   return d;

@@ -98,6 +98,12 @@ bool Session::dispatch() {
     case v1::Envelope::kSetLoad:
       set_load(request_.set_load());
       break;
+    case v1::Envelope::kInjectFault:
+      inject_fault(request_.inject_fault());
+      break;
+    case v1::Envelope::kShaftBump:
+      bump_shaft(request_.shaft_bump());
+      break;
     case v1::Envelope::kClearFaults:
       clear_faults(request_.clear_faults());
       break;

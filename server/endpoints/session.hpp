@@ -76,12 +76,16 @@ class Session : public std::enable_shared_from_this<Session> {
   void read_parameters(const v1::ReadParameters& request);
   void write_parameter(const v1::WriteParameter& request);
   void set_load(const v1::SetLoad& request);
+  void inject_fault(const v1::InjectFault& request);
+  void bump_shaft(const v1::ShaftBump& request);
   void clear_faults(const v1::ClearFaults& request);
   void report_status();
 
   /// These refuse the present request if the answer is no.
   bool axis_exists(std::uint32_t axis);
   bool may_change(std::uint32_t axis);
+  bool is_tick(std::uint64_t ticks, const char* field);
+  bool is_within(double value, double bound, std::string_view unit, const char* field);
 
   void request(const Input& input, const char* field, std::function<void()> on_done = nullptr);
   void done(std::uint64_t id, Tick tick);

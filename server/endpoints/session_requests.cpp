@@ -3,7 +3,8 @@
 #include <array>
 #include <cmath>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
+#include "plant/parameters/rows.hpp"
 #include "server/endpoints/description.hpp"
 #include "server/endpoints/session.hpp"
 #include "server/input_codec.hpp"
@@ -26,7 +27,13 @@ v1::RefusalCode code_of(Refused why) noexcept {
     case Refused::kStale:
       return v1::REFUSAL_STALE;
     case Refused::kBusy:
+    case Refused::kTooManyRamps:
       return v1::REFUSAL_BUSY;
+    case Refused::kWrongDrive:
+      return v1::REFUSAL_WRONG_DRIVE;
+    case Refused::kOutOfRange:
+    case Refused::kRuleBroken:
+      return v1::REFUSAL_OUT_OF_RANGE;
     case Refused::kNot:
       break;
   }
@@ -70,6 +77,22 @@ bool Session::may_change(std::uint32_t axis) {
   const Owner owner = engine_.owner(axis);
   if (engine_.config().mode == RunMode::kFree || (owner != 0 && owner == owner_)) return true;
   refuse(request_.id(), Refused::kNotOwner, "axis");
+  return false;
+}
+
+bool Session::is_tick(std::uint64_t ticks, const char* field) {
+  if (ticks <= kMaxTick) return true;
+  refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE,
+         std::string(field) + " is " + std::to_string(ticks) + " but must not exceed 2^53", field);
+  return false;
+}
+
+bool Session::is_within(double value, double bound, std::string_view unit, const char* field) {
+  if (std::abs(value) <= bound) return true;
+  refuse(request_.id(), std::isfinite(value) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
+         std::string(field) + " is " + text(value) + " but must lie between " + text(-bound) + " and " +
+             text(bound) + " " + std::string(unit),
+         field);
   return false;
 }
 
@@ -128,7 +151,7 @@ void Session::exchange(const v1::Exchange& r) {
     }
     if (!decode_command(command)) {
       return refuse(id, v1::REFUSAL_OUT_OF_RANGE,
-                    "gates is " + std::to_string(command.gates()) + " but must be 0 to 2", "commands.gates");
+                    "gates is " + std::to_string(command.gates()) + " but must be 0 to 3", "commands.gates");
     }
     waiting.axes.push_back(command.axis());
   }
@@ -138,7 +161,7 @@ void Session::exchange(const v1::Exchange& r) {
     const Refused why = engine_.command(command.axis(), owner_, *decode_command(command));
     return refuse(id, code_of(why),
                   std::string(sentence_of(why)) + " (axis " + std::to_string(command.axis()) + ")",
-                  "commands");
+                  why == Refused::kWrongDrive ? "commands.gates" : "commands");
   }
   for (const v1::Command& command : r.commands())
     engine_.command(command.axis(), owner_, *decode_command(command));
@@ -174,16 +197,17 @@ void Session::read_parameters(const v1::ReadParameters& r) {
   reply_.Clear();
   reply_.set_id(request_.id());
   v1::ParameterValues& values = *reply_.mutable_parameter_values();
-  const Parameter* const table = axis_parameters().data();
+  const std::span<const Parameter> table = axis_parameters(engine_.parameters(r.axis()));
   for (const std::string& name : r.names()) {
-    const Parameter* row = find_parameter(name);
+    const Parameter* row = find_parameter(engine_.parameters(r.axis()), name);
     if (row == nullptr) {
       return refuse(request_.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
                     "there is no parameter '" + name.substr(0, 100) + "'", "names");
     }
-    *values.add_parameters() = describe_parameter(engine_, r.axis(), static_cast<std::size_t>(row - table));
+    *values.add_parameters() =
+        describe_parameter(engine_, r.axis(), static_cast<std::size_t>(row - table.data()));
   }
-  for (std::size_t row = 0; r.names().empty() && row < axis_parameters().size(); ++row) {
+  for (std::size_t row = 0; r.names().empty() && row < table.size(); ++row) {
     *values.add_parameters() = describe_parameter(engine_, r.axis(), row);
   }
   send(reply_);
@@ -191,7 +215,8 @@ void Session::read_parameters(const v1::ReadParameters& r) {
 
 void Session::write_parameter(const v1::WriteParameter& r) {
   if (!may_change(r.axis())) return;
-  const Parameter* row = find_parameter(r.name());
+  const AxisParameters& p = engine_.parameters(r.axis());
+  const Parameter* row = find_parameter(p, r.name());
   if (row == nullptr) {
     return refuse(request_.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
                   "there is no parameter '" + r.name().substr(0, 100) + "'", "name");
@@ -200,28 +225,65 @@ void Session::write_parameter(const v1::WriteParameter& r) {
     return refuse(request_.id(), v1::REFUSAL_READ_ONLY, r.name() + " cannot be changed while the bench runs",
                   "name");
   }
-  const auto index = static_cast<std::uint32_t>(row - axis_parameters().data());
-  if (const std::string problem = engine_.try_parameter(r.axis(), index, r.value()); !problem.empty()) {
+  if (!is_tick(r.ramp_ticks(), "ramp_ticks") || !is_tick(r.at_tick(), "at_tick")) return;
+  if (row->integer && r.ramp_ticks() != 0) {
+    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                  "ramp_ticks is " + std::to_string(r.ramp_ticks()) + " but must be 0: " + r.name() +
+                      " has no values in between",
+                  "ramp_ticks");
+  }
+  const auto index = static_cast<std::uint32_t>(row - axis_parameters(p).data());
+  const auto at_tick = static_cast<Tick>(r.at_tick());
+  const bool later = at_tick > engine_.tick();
+  if (const std::string problem = later ? engine_.problem_with_value(r.axis(), index, r.value())
+                                        : engine_.try_parameter(r.axis(), index, r.value());
+      !problem.empty()) {
     const bool finite = std::isfinite(r.value());
     return refuse(request_.id(), finite ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
                   r.name() + " " + problem, "value");
   }
-  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = ParameterWrite{index, r.value()}}, "name");
+  const ParameterWrite write{
+      .row = index, .value = r.value(), .ramp_ticks = static_cast<Tick>(r.ramp_ticks())};
+  request({.tick = at_tick, .axis = r.axis(), .owner = owner_, .action = write}, "name");
 }
 
 void Session::set_load(const v1::SetLoad& r) {
   if (!may_change(r.axis())) return;
-  constexpr std::uint64_t kMaxTicks = std::uint64_t{1} << 53;
-  if (!std::isfinite(r.load_nm()) || std::abs(r.load_nm()) > 1e6) {
-    return refuse(request_.id(),
-                  std::isfinite(r.load_nm()) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
-                  "the load must lie between -1e6 and 1e6 N*m", "load_nm");
-  }
-  if (r.ramp_ticks() > kMaxTicks || r.at_tick() > kMaxTicks) {
-    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE, "ticks must lie below 2^53", "ramp_ticks");
-  }
+  if (!is_within(r.load_nm(), kMaxLoadNm, "N*m", "load_nm")) return;
+  if (!is_tick(r.ramp_ticks(), "ramp_ticks") || !is_tick(r.at_tick(), "at_tick")) return;
   const LoadChange change{.load_nm = r.load_nm(), .ramp_ticks = static_cast<Tick>(r.ramp_ticks())};
   request({.tick = static_cast<Tick>(r.at_tick()), .axis = r.axis(), .owner = owner_, .action = change},
+          "at_tick");
+}
+
+void Session::inject_fault(const v1::InjectFault& r) {
+  if (!may_change(r.axis())) return;
+  const std::size_t row = find_injectable_fault(r.name());
+  if (row == kInjectableFaultCount) {
+    return refuse(request_.id(), v1::REFUSAL_UNKNOWN_FAULT,
+                  "there is no fault '" + r.name().substr(0, 100) + "'", "name");
+  }
+  if (const std::string problem = problem_with(kInjectableFaults[row], r.value()); !problem.empty()) {
+    const bool finite = std::isfinite(r.value());
+    return refuse(request_.id(), finite ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
+                  r.name() + " " + problem, "value");
+  }
+  if (!is_tick(r.at_tick(), "at_tick")) return;
+  const InjectFault fault{.row = static_cast<std::uint32_t>(row), .value = r.value()};
+  request({.tick = static_cast<Tick>(r.at_tick()), .axis = r.axis(), .owner = owner_, .action = fault},
+          "at_tick");
+}
+
+void Session::bump_shaft(const v1::ShaftBump& r) {
+  if (!may_change(r.axis())) return;
+  if (!is_within(r.impulse_nms(), kMaxImpulseNms, "N*m*s", "impulse_nms") ||
+      !is_tick(r.at_tick(), "at_tick")) {
+    return;
+  }
+  request({.tick = static_cast<Tick>(r.at_tick()),
+           .axis = r.axis(),
+           .owner = owner_,
+           .action = ShaftBump{r.impulse_nms()}},
           "at_tick");
 }
 

@@ -20,9 +20,9 @@ constexpr std::size_t kRounds = 3;
 
 /// The servo with a load that drives its shaft: there is no controller in free mode. It ends at 125 rad/s.
 void write_turning_bench(const std::filesystem::path& file) {
-  BenchConfig config = servo_config();
+  BenchConfig config = bench_config("servo");
   config.mode = RunMode::kFree;
-  config.axes[0].loads = {{.tick = 0, .change = {.load_nm = -0.0175, .ramp_ticks = 0}}};
+  config.axes[0].events = {{.tick = 0, .action = LoadChange{.load_nm = -0.0175, .ramp_ticks = 0}}};
   if (!(std::ofstream(file) << to_toml(config))) throw std::runtime_error("cannot write " + file.string());
 }
 

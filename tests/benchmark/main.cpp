@@ -19,6 +19,7 @@ struct Measurement {
 
 constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"tick", "a tick against the bare integration", measure_tick},
+    {"machines", "every kind of machine, its sensors, an inverter, a dynamometer", measure_machines},
     {"free", "free mode with recording", measure_free_mode},
     {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
     {"realtime", "lateness of the pacers and of the server", measure_realtime},

@@ -22,7 +22,7 @@ constexpr Tick kTicks = 200'000;  // 10 s
 constexpr Owner kController = 1;
 
 BenchConfig ten_axes() {
-  BenchConfig config = servo_config();
+  BenchConfig config = bench_config("servo");
   config.setup.period_ns = kPeriodNs;
   config.setup.axes.resize(kAxes, config.setup.axes[0]);
   config.axes.resize(kAxes, config.axes[0]);
@@ -44,7 +44,7 @@ void run_in_real_time(Bench& bench) {
       bench.submit({.tick = now,
                     .axis = axis,
                     .owner = kController,
-                    .action = Command{.answers = now, .phases = {Gates::kVoltage, u}}});
+                    .action = Command{.answers = now, .phases = {Gates::kVoltage, {.a = u.a, .b = u.b}}}});
     }
     bench.step();
   }

@@ -18,8 +18,8 @@ std::vector<std::string> command_line(std::vector<std::string> arguments) {
 
 }  // namespace
 
-BenchConfig servo_config() {
-  return load_config(command::find_config("servo"));
+BenchConfig bench_config(const std::string& name) {
+  return load_config(command::find_config(name));
 }
 
 const std::vector<TwoPhase>& line_voltages() {

@@ -12,8 +12,8 @@
 
 namespace drivebench::speed {
 
-/// The bench file of the servo motor.
-BenchConfig servo_config();
+/// A bench file that the product comes with.
+BenchConfig bench_config(const std::string& name);
 
 /// Two-phase voltages of the line start: 80 V at 60 Hz, from which the servo turns with 125.4 rad/s. Sampled
 /// at 8 kHz; three periods, after which it repeats.

@@ -8,7 +8,7 @@
 
 #include "server/bench.hpp"
 #include "server/spsc_ring.hpp"
-#include "tests/benchmark/bare_rk4.hpp"
+#include "tests/benchmark/bare_machines.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"
@@ -55,9 +55,10 @@ class RingTap final : public BenchObserver {
 class Race {
  public:
   explicit Race(bool running)
-      : config_(servo_config()),
+      : config_(bench_config("servo")),
         bench_(config_.setup, &tap_),
-        motor_(config_.setup.axes[0].parameters),
+        motor_(std::get<InductionMachineParameters>(config_.setup.axes[0].parameters.machine),
+               config_.setup.axes[0].parameters.mechanics, 0.0, 0.0),
         substeps_(config_.setup.substeps),
         step_s_(static_cast<double>(config_.setup.period_ns) * 1e-9 / substeps_),
         voltages_(running ? line_voltages() : std::vector<TwoPhase>(1)) {
@@ -83,8 +84,10 @@ class Race {
     const std::int64_t begin = now_ns();
     for (int k = 0; k < kTicksPerBatch; ++k, ++bare_tick_) {
       const TwoPhase u = voltage_at(bare_tick_);
+      motor_.ua = u.a;
+      motor_.ub = u.b;
       for (int n = 0; n < substeps_; ++n)
-        bare_ = bare_step(motor_, bare_, u.a, u.b, step_s_);
+        bare_ = BareInduction::Rk4::step(motor_, bare_, step_s_);
       ::benchmark::DoNotOptimize(bare_);
     }
     return static_cast<double>(now_ns() - begin) / kTicksPerBatch;
@@ -108,10 +111,12 @@ class Race {
   void run_bench(int ticks) noexcept {
     for (int k = 0; k < ticks; ++k) {
       const Tick now = bench_.tick();
-      bench_.submit({.tick = now,
-                     .axis = 0,
-                     .owner = kController,
-                     .action = Command{.answers = now, .phases = {Gates::kVoltage, voltage_at(now)}}});
+      bench_.submit(
+          {.tick = now,
+           .axis = 0,
+           .owner = kController,
+           .action = Command{.answers = now,
+                             .phases = {Gates::kVoltage, {.a = voltage_at(now).a, .b = voltage_at(now).b}}}});
       bench_.step();
       ::benchmark::DoNotOptimize(bench_.sample(0));
     }
@@ -120,11 +125,11 @@ class Race {
   BenchConfig config_;
   RingTap tap_;
   Bench bench_;
-  BareMotor motor_;
+  BareInduction motor_;
   int substeps_;
   double step_s_;
   std::vector<TwoPhase> voltages_;
-  BareState bare_{};
+  BareInduction::State bare_{};
   Tick bare_tick_ = 0;
 };
 
@@ -157,7 +162,7 @@ Row measure(const std::string& name, bool running) {
           .limit = Limit{Limit::Kind::kRatioAtMost, kMaxRatio},
           .gone = rounds.gone,
           .note = fmt::format("{:.1f} rad/s; floor: the bare RK4, {:.1f} ns a step", race.speed_rad_s(),
-                              bare_ns / servo_config().setup.substeps)};
+                              bare_ns / bench_config("servo").setup.substeps)};
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include "plant/axis.hpp"
 #include "tests/plant/servo_axis.hpp"
@@ -19,7 +20,7 @@ constexpr double kLine_rad_s = 377.0;  // 60 Hz, as the book rounds it
 PhaseCommand line_voltage(Tick tick, double peak_v) {
   const double angle_rad = kLine_rad_s * kStep_s * (static_cast<double>(tick) + 0.5);
   return {.gates = Gates::kVoltage,
-          .voltage_v = {peak_v * std::cos(angle_rad), peak_v * std::sin(angle_rad)}};
+          .setpoint = {.a = peak_v * std::cos(angle_rad), .b = peak_v * std::sin(angle_rad)}};
 }
 
 // IMO-07 of the reference: 80 V (two-phase amplitude), 60 Hz, no load. The tolerances are half a unit of the
@@ -55,7 +56,7 @@ TEST(BookInductionModel, ExchangedPhasesTurnTheMotorBackwards) {
   Axis axis(servo_axis(), {.period_s = kStep_s, .substeps = 1}, 1, 0);
   for (Tick tick = 0; tick < 20'000; ++tick) {
     PhaseCommand command = line_voltage(tick, 80.0);
-    std::swap(command.voltage_v.a, command.voltage_v.b);
+    std::swap(command.setpoint.a, command.setpoint.b);
     axis.advance(command, tick);
   }
   EXPECT_NEAR(axis.sample(20'000).speed_rad_s, -125.40, 0.2);
@@ -67,9 +68,10 @@ TEST(BookInductionModel, ExchangedPhasesTurnTheMotorBackwards) {
 TEST(BookInductionModel, MachinesWithScaledRotorsAreIndistinguishableAtTheTerminals) {
   constexpr double kScale = 1.37;
   AxisParameters scaled = servo_axis();
-  scaled.machine.mutual_inductance_h *= kScale;
-  scaled.machine.rotor_inductance_h *= kScale * kScale;
-  scaled.machine.rotor_resistance_ohm *= kScale * kScale;
+  auto& machine = std::get<InductionMachineParameters>(scaled.machine);
+  machine.mutual_inductance_h *= kScale;
+  machine.rotor_inductance_h *= kScale * kScale;
+  machine.rotor_resistance_ohm *= kScale * kScale;
   Axis original(servo_axis(), kServoTiming, 1, 0);
   Axis twin(scaled, kServoTiming, 1, 0);
   for (Tick tick = 0; tick < 4'000; ++tick) {

@@ -62,7 +62,8 @@ class Drive:
             values = {key: value.raw_value if value.signal.is_float else float(value.phys_value)
                       for key, value in frame.decode(bytearray(message.data)).items()}
             self.received.append((name, values, message))
-            self.seen[name] = values
+            # A message with pages tells a part at a time.
+            self.seen[name] = {**self.seen.get(name, {}), **values} if "page" in values else values
             return name
         raise AssertionError("the bench says nothing")
 
@@ -97,17 +98,21 @@ class Drive:
         assert int(currents["tick"]) == tick % 65536, (currents, tick)
         return tick, int(self.seen["encoder"]["encoder_count"]), currents["i_a"], currents["i_b"]
 
-    def command(self, tick, u_a, u_b, mode=1):
-        """Voltages, as the DBC scales them."""
+    def command(self, tick, u_a, u_b, mode=1, u_c=0.0, u_f=0.0):
+        """Voltages, as the DBC scales them; phase c and the field if the axis has a place for them."""
         frame = self.frame("command")
         bits = 32 if self.fd else 16
         factor = 1.0 if self.fd else float(frame.signal_by_name("u_a").factor)
         scaled = (lambda u: u) if self.fd else (lambda u: round(u / factor))
-        self.send("command", tick=tick % (1 << bits), u_a=scaled(u_a), u_b=scaled(u_b), mode=mode, lease=self.lease)
+        common = {"tick": tick % (1 << bits), "mode": mode, "lease": self.lease}
+        others = {"u_c": scaled(u_c), "u_f": scaled(u_f)}
+        if self.matrix.frame_by_name(f"{self.axis}_phase_command") is not None:
+            self.send("phase_command", **common, **others)
+        self.send("command", **common, **others, u_a=scaled(u_a), u_b=scaled(u_b))
 
-    def step(self, tick, u_a, u_b):
+    def step(self, tick, u_a, u_b, **others):
         """One lockstep tick: the sample after it. Sent again if it was lost on the way."""
-        self.command(tick, u_a, u_b)
+        self.command(tick, u_a, u_b, **others)
         sample = self.sample()
         while sample[0] <= tick:
             sample = self.sample()
@@ -121,6 +126,13 @@ def open_loop_voltages(tick, period_s=125e-6):
     angle = 2.0 * math.pi * (0.5 * frequency_hz * time_s if time_s < 0.2 else frequency_hz * (time_s - 0.1))
     amplitude = 10.0 + 40.0 * frequency_hz / 60.0
     return round(amplitude * math.cos(angle), 2), round(amplitude * math.sin(angle), 2)
+
+
+def three_phases(u_a, u_b):
+    """The power-invariant transform: what the terminals of a star get for the same motion."""
+    root = math.sqrt(2.0 / 3.0)
+    u_c = root * (-0.5 * u_a - 0.5 * math.sqrt(3.0) * u_b)
+    return round(root * u_a, 2), round(root * (-0.5 * u_a + 0.5 * math.sqrt(3.0) * u_b), 2), round(u_c, 2)
 
 
 def open_loop_start(drive, ticks):

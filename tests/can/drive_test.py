@@ -11,6 +11,19 @@ from wire_client import BENCHES, PATIENCE_S, REPOSITORY  # noqa: E402, F401
 
 SERVO = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
 
+# The same motor, wound in an isolated star, with Hall lines and a tachometer.
+STAR = SERVO + """
+[axis.machine]
+star = true
+
+[axis.hall]
+enabled = true
+
+[axis.tachometer]
+enabled = true
+gain_vs_per_rad = 0.05
+"""
+
 
 def with_bus(lines, bench=SERVO):
     """The servo bench with a [[can]] section."""

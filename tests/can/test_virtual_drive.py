@@ -7,11 +7,13 @@ import time
 import can
 
 import dbc_drive
-from drive_test import DriveTest, PATIENCE_S, in_own_network, run_all, with_bus
+from drive_test import DriveTest, PATIENCE_S, STAR, in_own_network, run_all, with_bus
+from wire_client import REPOSITORY
 
 GROUP = "239.74.163.2"
 UDP = 'backend = "udp_multicast"'
 TICKS = 1600
+INJECTABLE = re.findall(r'^    \{"([a-z_]+)", "', (REPOSITORY / "plant/injected_faults.hpp").read_text(), re.MULTILINE)
 
 
 class VirtualDrive(DriveTest):
@@ -40,6 +42,56 @@ class VirtualDrive(DriveTest):
             with self.subTest(fd=fd):
                 self.open_loop([UDP],
                                lambda _: can.Bus(interface="udp_multicast", channel=GROUP, fd=True), fd)
+
+    # Catches: a phase c, Hall lines, a tachometer or injected faults that another program, which knows them from the
+    # DBC file alone, commands or reads otherwise than the bench means them.
+    def test_a_motor_in_a_star_starts_over_udp_multicast(self):
+        for fd in (True, False):
+            with self.subTest(fd=fd):
+                self.start_in_a_star(fd)
+
+    def start_in_a_star(self, fd):
+        fault = f'\n[[axis.fault]]\nat_tick = {TICKS}\nname = "hall_stuck_high"\nvalue = 2\n'
+        text = with_bus([UDP, f"fd = {str(fd).lower()}", "state_every_ticks = 4"], STAR + fault)
+        dbc = self.text_of("dbc", text)
+        recording = self.folder / f"star{fd}.mcap"
+        server = self.server("--record", str(recording), text=text)
+        samples = {}
+        with can.Bus(interface="udp_multicast", channel=GROUP, fd=True) as bus:
+            drive = dbc_drive.Drive(bus, dbc, fd=fd)
+            tick, count, *_ = drive.acquire()
+            while tick < TICKS:
+                u_a, u_b, u_c = dbc_drive.three_phases(*dbc_drive.open_loop_voltages(tick))
+                tick, count, *_ = drive.step(tick, u_a, u_b, u_c=u_c)
+                sensors = drive.seen["sensors" if fd else "phases"]
+                speed = drive.seen["sensors" if fd else "details"]["tachometer"]
+                samples[tick] = (count, sensors["i_c"], int(sensors["hall_lines"]), speed)
+                self.assertEqual(int(sensors["tick"]) % 65536, tick % 65536)
+            self.assertEqual(int(drive.seen["details"]["injected"]), 0)
+            drive.step(tick, u_a, u_b, u_c=u_c)
+            self.assertEqual(round(drive.seen["details"]["u_c"], 2), u_c)
+            self.assertEqual(int(drive.seen["details"]["injected"]), 1 << INJECTABLE.index("hall_stuck_high"))
+        self.assertEqual(server.stop(), 0, server.errors())
+        rows = self.recorded(recording)
+        for tick, (count, i_c, hall, speed) in samples.items():
+            row = rows[tick]
+            self.assertEqual((int(row["encoder_count"]), int(row["hall_lines"])), (count, hall), f"tick {tick}")
+            self.assertAlmostEqual(float(row["i_c_a"]), i_c, delta=1e-5 if fd else 0.5001e-3)
+            self.assertAlmostEqual(float(row["tachometer_v"]), speed, delta=1e-5 if fd else 0.5001e-2)
+        self.assertGreater(abs(count), 100, "the motor turns")
+        self.assertIn("equal, bit for bit", self.drivebench("replay", recording).stdout)
+
+    # Catches: a command whose phase c got lost and that the bench carries out all the same.
+    def test_half_a_command_is_refused(self):
+        text = with_bus([UDP, "fd = false"], STAR)
+        server = self.server(text=text)
+        with can.Bus(interface="udp_multicast", channel=GROUP, fd=True) as bus:
+            drive = dbc_drive.Drive(bus, self.text_of("dbc", text), fd=False)
+            tick, *_ = drive.acquire()
+            drive.send("command", tick=tick, u_a=100, mode=1, lease=drive.lease)
+            self.assertEqual(drive.await_message("reply")["result"], 8, "incomplete")
+            self.assertEqual(drive.step(tick, 1.0, 0.0)[0], tick + 1)
+        self.assertEqual(server.stop(), 0)
 
     # Catches: a terminal that python-can's slcan driver cannot talk to.
     def test_open_loop_start_over_slcan(self):

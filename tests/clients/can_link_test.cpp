@@ -18,17 +18,31 @@ using can::Message;
 constexpr std::uint32_t kNode = 3;
 constexpr CanLinkOptions kImpatient = {.deadline = 30ms, .repeat_after = 1ms};
 
-bool is(const can::Frame& frame, const can::Profile& profile, Message message) {
+bool is(const can::Frame& frame, can::Profile profile, Message message) {
+  profile.wide = true;
   const can::Match match = can::match(profile, frame);
   return match.ok() && match.row->message == message;
 }
 
-class CanLinkOf : public testing::TestWithParam<bool> {
+struct Kind {
+  bool fd;
+  bool wide;
+};
+
+/// What a narrow axis has of a command too.
+std::vector<double> narrow(std::vector<double> command) {
+  command.resize(std::min<std::size_t>(command.size(), 4));
+  return command;
+}
+
+class CanLinkOf : public testing::TestWithParam<Kind> {
  protected:
   CanLinkOf() {
     address_.node = kNode;
-    address_.profile.fd = GetParam();
-    auto bus = std::make_unique<FakeCanBench>(address_.profile, kNode);
+    address_.profile.fd = GetParam().fd;
+    can::Profile profile = address_.profile;
+    profile.wide = GetParam().wide;  // which the link learns by itself
+    auto bus = std::make_unique<FakeCanBench>(profile, kNode);
     bench_ = bus.get();
     bus_ = std::move(bus);
   }
@@ -60,11 +74,21 @@ class CanLinkOf : public testing::TestWithParam<bool> {
   std::unique_ptr<CanBus> bus_;
   std::optional<CanLink> link_;
 };
-INSTANTIATE_TEST_SUITE_P(Profiles, CanLinkOf, testing::Bool(),
-                         [](const auto& fd) { return fd.param ? "Fd" : "Classic"; });
+INSTANTIATE_TEST_SUITE_P(Profiles, CanLinkOf,
+                         testing::Values(Kind{false, false}, Kind{true, false}, Kind{false, true},
+                                         Kind{true, true}),
+                         [](const auto& kind) {
+                           return std::string(kind.param.wide ? "Wide" : "") +
+                                  (kind.param.fd ? "Fd" : "Classic");
+                         });
 
 class ClassicCanLink : public CanLinkOf {};
-INSTANTIATE_TEST_SUITE_P(Profile, ClassicCanLink, testing::Values(false));
+INSTANTIATE_TEST_SUITE_P(Profile, ClassicCanLink, testing::Values(Kind{false, false}));
+class WideCanLink : public CanLinkOf {};
+INSTANTIATE_TEST_SUITE_P(Profiles, WideCanLink, testing::Values(Kind{false, true}, Kind{true, true}),
+                         [](const auto& kind) { return kind.param.fd ? "Fd" : "Classic"; });
+class WideClassicCanLink : public CanLinkOf {};
+INSTANTIATE_TEST_SUITE_P(Profile, WideClassicCanLink, testing::Values(Kind{false, true}));
 
 // Catches a mode, period or first sample that is made up rather than received, and the truth that CAN does
 // not carry passed off as known.
@@ -82,17 +106,73 @@ TEST_P(CanLinkOf, LearnsTheBenchFromItsFrames) {
   EXPECT_EQ(sample.state, 2U);
   EXPECT_TRUE(link().knows("encoder_count"));
   EXPECT_TRUE(link().knows("faults"));
-  for (const char* name : {"angle_rad", "speed_rad_s", "load_nm", "u_a_v", "no_signal"}) {
+  for (const char* name : {"angle_rad", "speed_rad_s", "load_nm", "true_i_c_a", "no_signal"}) {
     EXPECT_FALSE(link().knows(name)) << name;
+  }
+  for (const char* name : {"u_a_v", "i_c_a", "hall_lines", "injected"}) {
+    EXPECT_EQ(link().knows(name), GetParam().wide) << name;
   }
 }
 
 // Catches a field of a command in the wrong place, unit or not at all.
 TEST_P(CanLinkOf, SendsEveryFieldOfACommand) {
-  link().exchange(0, v1::GATES_VOLTAGE, 12.5, -3.25);
-  EXPECT_EQ(bench_->command, (std::vector<double>{0.0, 12.5, -3.25, 1.0}));
-  link().exchange(1, v1::GATES_OFF, 0.0, 0.0);
-  EXPECT_EQ(bench_->command, (std::vector<double>{1.0, 0.0, 0.0, 0.0}));
+  link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 12.5, .u_b_v = -3.25});
+  EXPECT_EQ(narrow(bench_->command), (std::vector<double>{0.0, 12.5, -3.25, 1.0}));
+  link().exchange({.tick = 1, .gates = v1::GATES_OFF});
+  EXPECT_EQ(narrow(bench_->command), (std::vector<double>{1.0, 0.0, 0.0, 0.0}));
+  link().exchange({.tick = 2, .gates = v1::GATES_CURRENT, .u_a_v = 9.0, .i_a_a = 1.25, .i_b_a = -2.5});
+  EXPECT_EQ(narrow(bench_->command), (std::vector<double>{2.0, 1.25, -2.5, 4.0}));
+}
+
+// Catches setpoints of phase c or of the field that are left out, are those of another kind, or go to an axis
+// that has neither.
+TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
+  const Command command = {.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_c_v = -2.5, .u_f_v = 24.0};
+  if (!GetParam().wide) {
+    EXPECT_THROW(link().exchange(command), Refused);
+    return;
+  }
+  link().exchange(command);
+  EXPECT_EQ(bench_->command, (std::vector<double>{0.0, 1.0, 0.0, 1.0, -2.5, 24.0}));
+  link().exchange({.tick = 1, .gates = v1::GATES_CURRENT, .u_c_v = 9.0, .i_c_a = 0.5, .i_f_a = -1.5});
+  EXPECT_EQ(bench_->command, (std::vector<double>{1.0, 0.0, 0.0, 4.0, 0.5, -1.5}));
+}
+
+// Catches a signal of a wide axis that its frames carry and that the link drops.
+TEST_P(WideCanLink, LearnsTheRestOfASample) {
+  bench_->sample.i_c_a = -1.5;
+  bench_->sample.i_f_a = 2.5;
+  bench_->sample.hall_lines = 6;
+  bench_->sample.tachometer_v = 7.5;
+  bench_->sample.resolver_cos_v = -0.25;
+  bench_->sample.u_b_v = 12.5;
+  bench_->sample.injected = 0x1234567;
+  const Sample& sample = link().newest();
+  EXPECT_EQ(sample.i_c_a, -1.5);
+  EXPECT_EQ(sample.i_f_a, 2.5);
+  EXPECT_EQ(sample.hall_lines, 6U);
+  EXPECT_EQ(sample.tachometer_v, 7.5);
+  EXPECT_EQ(sample.resolver_cos_v, -0.25);
+  EXPECT_EQ(sample.u_b_v, 12.5);
+  EXPECT_EQ(sample.injected, 0x1234567U);
+}
+
+// Catches currents of phase c, or the voltage of the tachometer, of one tick taken together with the others
+// of another.
+TEST_P(WideClassicCanLink, ASampleNeedsItsPhasesFrame) {
+  link();
+  bench_->sample.tick = 9;
+  bench_->sample.tachometer_v = 3.5;
+  bench_->put(Message::kEncoder);
+  bench_->put(Message::kDetails, can::Page::kSpeedSensors);
+  EXPECT_EQ(link().newest().tachometer_v, 0.0) << "of the sample that is coming";
+  bench_->put(Message::kCurrents);
+  EXPECT_EQ(link().newest().tick, 0U);
+  bench_->put(Message::kEncoder);
+  bench_->put(Message::kPhases);
+  bench_->put(Message::kCurrents);
+  EXPECT_EQ(link().newest().tick, 9U);
+  EXPECT_EQ(link().newest().tachometer_v, 3.5);
 }
 
 // Catches a tick or count that falls back when its low bits start again.
@@ -103,7 +183,7 @@ TEST_P(CanLinkOf, CarriesTicksAndCountsOverTheEndOfTheirBits) {
   std::uint64_t tick = link().newest().tick;
   EXPECT_EQ(tick, first);
   for (int i = 0; i < 5; ++i)
-    tick = link().exchange(tick, v1::GATES_ZERO, 0.0, 0.0).tick;
+    tick = link().exchange({.tick = tick, .gates = v1::GATES_ZERO}).tick;
   EXPECT_EQ(tick, first + 5);
   EXPECT_EQ(link().newest().encoder_count, std::int64_t{std::numeric_limits<std::int32_t>::max()} + 3);
 }
@@ -111,12 +191,15 @@ TEST_P(CanLinkOf, CarriesTicksAndCountsOverTheEndOfTheirBits) {
 // Catches a lockstep that stands still, or runs a tick twice, after a frame was lost on either way.
 TEST_P(CanLinkOf, LockstepSurvivesLostFrames) {
   std::uint64_t tick = link().newest().tick;
-  for (const Message lost : {Message::kCommand, Message::kSensors, Message::kEncoder, Message::kCurrents,
-                             Message::kSync, Message::kReply, Message::kState}) {
+  for (const Message lost :
+       {Message::kCommand, Message::kPhaseCommand, Message::kSensors, Message::kEncoder, Message::kPhases,
+        Message::kCurrents, Message::kSync, Message::kReply, Message::kState}) {
     lose(lost, 2);
-    const Sample& sample = link().exchange(tick, v1::GATES_VOLTAGE, 1.0, 0.0);
+    const Sample& sample =
+        link().exchange({.tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 0.0});
     EXPECT_EQ(sample.tick, tick + 1);
     EXPECT_EQ(sample.encoder_count, static_cast<std::int64_t>(tick + 1));
+    EXPECT_EQ(sample.i_c_a, GetParam().wide ? static_cast<double>(tick + 1) : 0.0) << "of the same tick";
     tick = sample.tick;
   }
   EXPECT_EQ(bench_->sample.tick, tick);
@@ -160,8 +243,9 @@ TEST_P(ClassicCanLink, CurrentsWithoutTheirEncoderFrameAreNoSample) {
 // Catches a refusal that is taken for another, or for a dead link.
 TEST_P(CanLinkOf, RefusalsHaveTheirCodes) {
   const std::vector<std::pair<double, v1::RefusalCode>> codes = {
-      {2.0, v1::REFUSAL_OWNED}, {3.0, v1::REFUSAL_NOT_FINITE}, {4.0, v1::REFUSAL_LATCHED},
-      {6.0, v1::REFUSAL_BUSY},  {7.0, v1::REFUSAL_MALFORMED},  {99.0, v1::REFUSAL_MALFORMED}};
+      {2.0, v1::REFUSAL_OWNED},     {3.0, v1::REFUSAL_NOT_FINITE}, {4.0, v1::REFUSAL_LATCHED},
+      {6.0, v1::REFUSAL_BUSY},      {7.0, v1::REFUSAL_MALFORMED},  {9.0, v1::REFUSAL_WRONG_DRIVE},
+      {99.0, v1::REFUSAL_MALFORMED}};
   link();
   for (const auto& [result, code] : codes) {
     bench_->command_result = bench_->request_result = result;
@@ -170,7 +254,7 @@ TEST_P(CanLinkOf, RefusalsHaveTheirCodes) {
         if (asks) {
           link().clear_faults();
         } else {
-          link().exchange(0, v1::GATES_VOLTAGE, 1.0, 1.0);
+          link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0});
         }
         ADD_FAILURE() << result << " was no refusal";
       } catch (const Refused& refused) {
@@ -185,7 +269,7 @@ TEST_P(CanLinkOf, ALostLeaseIsARefusal) {
   link();
   bench_->lease = 8;
   try {
-    link().exchange(0, v1::GATES_VOLTAGE, 1.0, 1.0);
+    link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0});
     ADD_FAILURE();
   } catch (const Refused& refused) {
     EXPECT_EQ(refused.code(), v1::REFUSAL_NOT_OWNER);
@@ -199,7 +283,7 @@ TEST_P(CanLinkOf, RefusalsOfOthersAreTheirs) {
   bench_->put_reply(1.0, 2.0, 77.0, 0.0, 0.0);  // or asked for it
   bench_->put_reply(2.0, 1.0, 77.0, 0.0, 0.0);
   bench_->put_reply(0.0, 4.0, 0.0, 7.0, 200.0);  // and this is about a tick long gone
-  EXPECT_EQ(link().exchange(0, v1::GATES_VOLTAGE, 1.0, 1.0).tick, 1U);
+  EXPECT_EQ(link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0}).tick, 1U);
 }
 
 // Catches frames of another node, of nobody or about the bus that pass for the bench's.
@@ -227,7 +311,7 @@ TEST_P(CanLinkOf, IgnoresWhatIsNotForIt) {
 TEST_P(CanLinkOf, SilenceIsAnErrorThatNamesWhatWasWaitedFor) {
   link();
   bench_->loses = [](const can::Frame&) { return true; };
-  const std::string what = failure_of([this] { link().exchange(0, v1::GATES_VOLTAGE, 0.0, 0.0); });
+  const std::string what = failure_of([this] { link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE}); });
   EXPECT_NE(what.find("can:test sent no sample after tick 0 of node 3 within 30 ms"), std::string::npos)
       << what;
   bench_->coming.clear();
@@ -254,7 +338,7 @@ TEST_P(CanLinkOf, FramesOfTheOtherProfileAreNamed) {
 // Catches frames that are read by another version's table.
 TEST_P(CanLinkOf, RefusesAnotherVersionOfTheTable) {
   bench_->coming.clear();
-  bench_->version = can::kProfileVersion + 1;
+  bench_->version = can::kWideVersion + 1;
   bench_->heartbeat();
   EXPECT_NE(failure_of([this] { link(); }).find("version"), std::string::npos);
 }
@@ -262,7 +346,7 @@ TEST_P(CanLinkOf, RefusesAnotherVersionOfTheTable) {
 // Catches a bench that ends and is waited for.
 TEST_P(CanLinkOf, ABenchThatStopsEndsTheLink) {
   link();
-  bench_->put(Message::kHeartbeat, {4.0, double{can::kProfileVersion}, 0.0, 0.0, 125.0});
+  bench_->put(Message::kHeartbeat, {4.0, bench_->version, 0.0, 0.0, 125.0});
   EXPECT_NE(failure_of([this] { link().newest(); }).find("stopped"), std::string::npos);
 }
 
@@ -278,7 +362,8 @@ TEST_P(CanLinkOf, RealTimeGoesOnWithTheNewestSample) {
   for (bench_->sample.tick = 111; bench_->sample.tick < 115; ++bench_->sample.tick)
     bench_->put_sample();
   lose(Message::kCommand, 1);
-  EXPECT_EQ(link().exchange(110, v1::GATES_VOLTAGE, 1.0, 1.0).tick, 114U);
+  EXPECT_EQ(link().exchange({.tick = 110, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0}).tick,
+            114U);
 }
 
 // Catches a request that CAN has no frame for and that does nothing.

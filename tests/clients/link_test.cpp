@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <vector>
+
 #include "tests/clients/fake_peer.hpp"
 
 namespace drivebench::link {
@@ -68,24 +71,82 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
       sample.mutable_sample()->set_tick(command.tick() + 1);
       sample.mutable_sample()->set_u_a_v(command.u_a_v());
       sample.mutable_sample()->set_u_b_v(command.u_b_v());
+      sample.mutable_sample()->set_u_c_v(command.u_c_v());
+      sample.mutable_sample()->set_u_f_v(command.u_f_v());
+      sample.mutable_sample()->set_i_a_a(command.i_a_a());
+      sample.mutable_sample()->set_i_b_a(command.i_b_a());
+      sample.mutable_sample()->set_i_c_a(command.i_c_a());
+      sample.mutable_sample()->set_i_f_a(command.i_f_a());
       sample.mutable_sample()->set_state(static_cast<std::uint64_t>(command.gates()));
     }
     return FakePeer::framed(answer);
   }));
   Link link(peer.client_end(), "peer");
   for (std::uint64_t tick = 0; tick < 1000; ++tick) {
-    const Command commands[] = {
-        {.axis = 3, .tick = tick, .gates = v1::GATES_ZERO, .u_a_v = 1.5, .u_b_v = -2.5},
-        {.axis = 4, .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = 4.0}};
+    const Command commands[] = {{.axis = 3,
+                                 .tick = tick,
+                                 .gates = v1::GATES_ZERO,
+                                 .u_a_v = 1.5,
+                                 .u_b_v = -2.5,
+                                 .u_c_v = 3.5,
+                                 .u_f_v = -4.5},
+                                {.axis = 4,
+                                 .tick = tick,
+                                 .gates = v1::GATES_CURRENT,
+                                 .u_a_v = 4.0,
+                                 .i_a_a = 5.0,
+                                 .i_b_a = -6.0,
+                                 .i_c_a = 7.0,
+                                 .i_f_a = -8.0}};
     const v1::ExchangeReply& reply = link.exchange(commands);
     ASSERT_EQ(reply.samples_size(), 2);
     EXPECT_EQ(reply.samples(0).axis(), 3U);
     EXPECT_EQ(reply.samples(0).sample().tick(), tick + 1);
     EXPECT_EQ(reply.samples(0).sample().u_a_v(), 1.5);
     EXPECT_EQ(reply.samples(0).sample().u_b_v(), -2.5);
+    EXPECT_EQ(reply.samples(0).sample().u_c_v(), 3.5);
+    EXPECT_EQ(reply.samples(0).sample().u_f_v(), -4.5);
     EXPECT_EQ(reply.samples(0).sample().state(), 2U);
-    EXPECT_EQ(reply.samples(1).sample().u_a_v(), 4.0);
+    const v1::Sample& second = reply.samples(1).sample();
+    EXPECT_EQ(second.u_a_v(), 4.0);
+    EXPECT_EQ((std::array{second.i_a_a(), second.i_b_a(), second.i_c_a(), second.i_f_a()}),
+              (std::array{5.0, -6.0, 7.0, -8.0}));
+    EXPECT_EQ(second.state(), 3U);
   }
+}
+
+// Catches a field of a change that is not sent, or sent as another one.
+TEST(Link, SendsEveryFieldOfAChange) {
+  std::vector<v1::Envelope> requests;
+  FakePeer peer(welcoming([&requests](const v1::Envelope& request) {
+    requests.push_back(request);
+    v1::Envelope answer = answer_to(request);
+    answer.mutable_done()->set_tick(40 + requests.size());
+    return FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "peer");
+  EXPECT_EQ(link.write_parameter(3, {.name = "x", .value = 5.0, .ramp_ticks = 6, .at_tick = 7}), 41U);
+  EXPECT_EQ(link.inject_fault(4, {.name = "y", .value = -5.0, .at_tick = 8}), 42U);
+  EXPECT_EQ(link.bump_shaft(5, -0.25, 9), 43U);
+  ASSERT_EQ(requests.size(), 3U);
+  v1::WriteParameter write;
+  write.set_axis(3);
+  write.set_name("x");
+  write.set_value(5.0);
+  write.set_ramp_ticks(6);
+  write.set_at_tick(7);
+  EXPECT_EQ(requests[0].write_parameter().DebugString(), write.DebugString());
+  v1::InjectFault fault;
+  fault.set_axis(4);
+  fault.set_name("y");
+  fault.set_value(-5.0);
+  fault.set_at_tick(8);
+  EXPECT_EQ(requests[1].inject_fault().DebugString(), fault.DebugString());
+  v1::ShaftBump bump;
+  bump.set_axis(5);
+  bump.set_impulse_nms(-0.25);
+  bump.set_at_tick(9);
+  EXPECT_EQ(requests[2].shaft_bump().DebugString(), bump.DebugString());
 }
 
 // Catches a refusal that looks like an answer, and a link that gives up after one.
@@ -103,7 +164,7 @@ TEST(Link, ThrowsARefusalWithItsCodeAndFieldAndGoesOn) {
   }));
   Link link(peer.client_end(), "peer");
   try {
-    link.write_parameter(0, "x", 5.0);
+    link.write_parameter(0, {.name = "x", .value = 5.0});
     ADD_FAILURE() << "no refusal";
   } catch (const Refused& refused) {
     EXPECT_EQ(refused.code(), v1::REFUSAL_OUT_OF_RANGE);

@@ -57,6 +57,8 @@ class FakeServer {
   void put_sample() {
     for (const modbus::Row& row : modbus::map_detail::kSample)
       put(row.address, row.type, modbus::signal_bits(row, sample));
+    for (const modbus::Row& row : modbus::map_detail::kMoreSample)
+      put(row.address, row.type, modbus::signal_bits(row, sample));
   }
 
   ModbusAddress address;
@@ -137,17 +139,58 @@ TEST(ModbusLink, ReadsAndCommandsByTheMap) {
   EXPECT_EQ(link.newest().tick, 0x1'0000'0005U);
   EXPECT_EQ(link.newest().encoder_count, -7);
   EXPECT_EQ(link.newest().i_a_a, 1.5);
-  EXPECT_EQ(link.exchange(0x1'0000'0005, v1::GATES_VOLTAGE, 12.5, -0.25).tick, 0x1'0000'0006U);
-  EXPECT_EQ(server.get(402, modbus::Type::kUnsigned16), 1U);
-  EXPECT_EQ(server.get(403, modbus::Type::kUnsigned32), 5U);
-  EXPECT_EQ(server.get(405, modbus::Type::kFloat32), std::bit_cast<std::uint32_t>(12.5F));
-  EXPECT_EQ(server.get(407, modbus::Type::kFloat32), std::bit_cast<std::uint32_t>(-0.25F));
+  EXPECT_EQ(
+      link.exchange({.tick = 0x1'0000'0005, .gates = v1::GATES_VOLTAGE, .u_a_v = 12.5, .u_b_v = -0.25}).tick,
+      0x1'0000'0006U);
+  EXPECT_EQ(server.get(422, modbus::Type::kUnsigned16), 1U);
+  EXPECT_EQ(server.get(423, modbus::Type::kUnsigned32), 5U);
+  EXPECT_EQ(server.get(425, modbus::Type::kFloat32), std::bit_cast<std::uint32_t>(12.5F));
+  EXPECT_EQ(server.get(427, modbus::Type::kFloat32), std::bit_cast<std::uint32_t>(-0.25F));
   link.clear_faults();
   EXPECT_EQ(server.get(401, modbus::Type::kUnsigned16), 1U);
   link.release();
   EXPECT_EQ(server.get(401, modbus::Type::kUnsigned16), 2U);
   EXPECT_TRUE(link.knows("angle_rad"));
   EXPECT_THROW(link.set_load({}), Refused);
+}
+
+// Catches currents sent for voltages or as duties, a phase or the field in another's place, a sensor behind
+// the first block that is not read, truth that is not read and passed off as known.
+TEST(ModbusLink, CommandsEveryTerminalAndReadsEverySensor) {
+  FakeServer server;
+  ModbusLink link(server.address);
+  link.acquire();
+  const auto setpoints = [&server] {
+    std::vector<double> values;
+    for (const std::uint16_t address : std::to_array<std::uint16_t>({425, 427, 429, 431}))
+      values.push_back(
+          modbus::number_of(modbus::Type::kFloat32, server.get(address, modbus::Type::kFloat32)));
+    return values;
+  };
+  server.sample.i_c_a = -1.5;
+  server.sample.hall_lines = 5;
+  server.sample.temperature_k = 350.0;
+  server.sample.injected = 0x8000'0001;
+  const Sample& sample = link.exchange(
+      {.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 2.0, .u_c_v = -3.0, .u_f_v = 24.0});
+  EXPECT_EQ(setpoints(), (std::vector<double>{1.0, 2.0, -3.0, 24.0}));
+  EXPECT_EQ(sample.i_c_a, -1.5);
+  EXPECT_EQ(sample.hall_lines, 5U);
+  EXPECT_EQ(sample.temperature_k, 350.0);
+  EXPECT_EQ(sample.injected, 0x8000'0001U);
+  link.exchange({.tick = 1,
+                 .gates = v1::GATES_CURRENT,
+                 .u_c_v = 9.0,
+                 .i_a_a = 0.5,
+                 .i_b_a = -0.5,
+                 .i_c_a = 0.25,
+                 .i_f_a = 2.0});
+  EXPECT_EQ(setpoints(), (std::vector<double>{0.5, -0.5, 0.25, 2.0}));
+  EXPECT_EQ(server.get(422, modbus::Type::kUnsigned16), 4U);
+  for (const char* name : {"tick", "true_i_a_a", "i_f_a", "meter_pf", "injected"})
+    EXPECT_TRUE(link.knows(name)) << name;
+  for (const char* name : {"load_angle_rad", "load_position_m"})
+    EXPECT_FALSE(link.knows(name)) << name;
 }
 
 // Catches an axis that stays taken by a controller that is gone.
@@ -166,7 +209,7 @@ TEST(ModbusLink, RealTimeWaitsForTheNextTick) {
   FakeServer server;
   ModbusLink link(server.address);
   server.samples_behind = 3;
-  EXPECT_EQ(link.exchange(0, v1::GATES_OFF, 0.0, 0.0).tick, 1U);
+  EXPECT_EQ(link.exchange({.tick = 0, .gates = v1::GATES_OFF}).tick, 1U);
 }
 
 // Catches an exception that is taken for another, or a reason that is not asked for.
@@ -182,11 +225,13 @@ TEST(ModbusLink, ExceptionsHaveTheirMeaning) {
        {Case{6, 3, v1::REFUSAL_OWNED}, Case{6, 2, v1::REFUSAL_NOT_OWNER}, Case{6, 7, v1::REFUSAL_BUSY},
         Case{6, 0, v1::REFUSAL_BUSY}, Case{6, 999, v1::REFUSAL_BUSY}, Case{4, 5, v1::REFUSAL_LATCHED},
         Case{4, 6, v1::REFUSAL_STALE}, Case{4, 9, v1::REFUSAL_WRONG_MODE},
-        Case{3, 0, v1::REFUSAL_OUT_OF_RANGE}, Case{2, 0, v1::REFUSAL_READ_ONLY},
-        Case{1, 0, v1::REFUSAL_MALFORMED}, Case{11, 0, v1::REFUSAL_UNKNOWN_AXIS}}) {
+        Case{4, 10, v1::REFUSAL_WRONG_DRIVE}, Case{3, 0, v1::REFUSAL_OUT_OF_RANGE},
+        Case{2, 0, v1::REFUSAL_READ_ONLY}, Case{1, 0, v1::REFUSAL_MALFORMED},
+        Case{11, 0, v1::REFUSAL_UNKNOWN_AXIS}}) {
     server.put(410, modbus::Type::kUnsigned16, c.last_refusal);
     server.exception = c.exception;
-    EXPECT_EQ(refusal_of([&link] { link.exchange(0, v1::GATES_OFF, 0.0, 0.0); }), c.code) << c.exception;
+    EXPECT_EQ(refusal_of([&link] { link.exchange({.tick = 0, .gates = v1::GATES_OFF}); }), c.code)
+        << c.exception;
     EXPECT_EQ(refusal_of([&link] { link.acquire(); }), c.code) << c.exception << " " << c.last_refusal;
   }
 }

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "plant/trig.hpp"
 #include "server/bench.hpp"
 
@@ -15,18 +15,18 @@ constexpr Owner kController = 7;
 
 AxisParameters noisy_servo() {
   AxisParameters p;
-  p.machine = {.pole_pairs = 3,
-               .stator_resistance_ohm = 1.7,
-               .rotor_resistance_ohm = 3.9,
-               .stator_inductance_h = 0.014,
-               .rotor_inductance_h = 0.014,
-               .mutual_inductance_h = 0.0117};
+  p.machine = InductionMachineParameters{.pole_pairs = 3,
+                                         .stator_resistance_ohm = 1.7,
+                                         .rotor_resistance_ohm = 3.9,
+                                         .stator_inductance_h = 0.014,
+                                         .rotor_inductance_h = 0.014,
+                                         .mutual_inductance_h = 0.0117};
   p.mechanics = {.inertia_kgm2 = 1.1e-4, .viscous_friction_nms = 1.4e-4};
-  p.amplifier = {.voltage_limit_v = 80.0, .gain = 1.01, .offset_a_v = 0.3, .offset_b_v = -0.2};
-  p.amplifier.over_current_a = 9.0;
-  p.amplifier.over_current_trip = false;
-  p.current_sensor = {.bits = 12, .full_scale_a = 20.0, .gain_a = 1.02, .offset_b_a = 0.05};
-  p.current_sensor.noise_rms_a = 0.02;
+  p.drive.amplifier = {.voltage_limit_v = 80.0, .gain = 1.01, .offset_a_v = 0.3, .offset_b_v = -0.2};
+  p.drive.amplifier.over_current_a = 9.0;
+  p.drive.amplifier.over_current_trip = false;
+  p.sensors.current = {.bits = 12, .full_scale_a = 20.0, .gain_a = 1.02, .offset_b_a = 0.05};
+  p.sensors.current.noise_rms_a = 0.02;
   return p;
 }
 
@@ -36,15 +36,16 @@ BenchSetup two_axes() {
   second.parameters.mechanics.coulomb_friction_nm = 0.02;
   second.parameters.mechanics.static_friction_nm = 0.03;
   second.parameters.encoder = {.counts_per_revolution = 4096, .half_count_offset = true};
-  second.parameters.amplifier.over_current_trip = true;
-  second.parameters.current_sensor.bits = 0;
+  second.parameters.drive.amplifier.over_current_trip = true;
+  second.parameters.sensors.current.bits = 0;
   return {.seed = 12345, .axes = {first, second}};
 }
 
 std::uint32_t row_of(const char* name) {
-  const Parameter* row = find_parameter(name);
+  const AxisParameters p = noisy_servo();
+  const Parameter* row = find_parameter(p, name);
   if (row == nullptr) std::abort();
-  return static_cast<std::uint32_t>(row - axis_parameters().data());
+  return static_cast<std::uint32_t>(row - axis_parameters(p).data());
 }
 
 /// A voltage that turns with the measured angle plus a slip, and answers the measured current: what is
@@ -52,9 +53,10 @@ std::uint32_t row_of(const char* name) {
 Command answer(const Sample& s, double amplitude_v, double slip_rad_s) {
   const double electrical_rad = 3.0 * static_cast<double>(s.encoder_count % 2000) * 3.14159e-3;
   const CosSin turning = cos_sin(electrical_rad + slip_rad_s * 125e-6 * static_cast<double>(s.tick));
-  const TwoPhase voltage_v{amplitude_v * turning.cos - 1.3 * s.i_a_a,
-                           amplitude_v * turning.sin - 1.3 * s.i_b_a};
-  return {.answers = static_cast<Tick>(s.tick), .phases = {.gates = Gates::kVoltage, .voltage_v = voltage_v}};
+  return {.answers = static_cast<Tick>(s.tick),
+          .phases = {.gates = Gates::kVoltage,
+                     .setpoint = {.a = amplitude_v * turning.cos - 1.3 * s.i_a_a,
+                                  .b = amplitude_v * turning.sin - 1.3 * s.i_b_a}}};
 }
 
 Command one_of_the_script(const Sample& s) {

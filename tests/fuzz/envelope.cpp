@@ -19,15 +19,33 @@ bool equal(const Input& a, const Input& b) noexcept {
          std::ranges::equal(x.words, y.words);
 }
 
+/// An axis of every kind of machine.
+const ParameterTables& tables() {
+  static const ParameterTables all = [] {
+    ParameterTables result;
+    for (std::size_t kind = 0; kind < machine_kinds().size(); ++kind) {
+      AxisParameters p;
+      p.machine = make_machine(kind);
+      result.push_back(axis_parameters(p));
+    }
+    return result;
+  }();
+  return all;
+}
+
 void check_input(const v1::Input& message) {
-  const std::optional<Input> input = decode_input(message);
+  const std::optional<Input> input = decode_input(message, tables());
   if (!input) return;
   const auto* lease = std::get_if<LeaseAction>(&input->action);
+  const auto* write = std::get_if<ParameterWrite>(&input->action);
+  require(write == nullptr || write->row < tables()[input->axis].size(), "only known parameters are written");
+  const auto* fault = std::get_if<InjectFault>(&input->action);
+  require(fault == nullptr || fault->row < kInjectableFaultCount, "only known faults are injected");
   require(lease == nullptr || v1::LeaseRequest::Action_IsValid(static_cast<int>(*lease)),
           "only known lease actions are taken");
   v1::Input written;
-  encode_input(static_cast<Tick>(message.received_tick()), *input, written);
-  const std::optional<Input> again = decode_input(written);
+  encode_input(static_cast<Tick>(message.received_tick()), *input, tables(), written);
+  const std::optional<Input> again = decode_input(written, tables());
   require(again && equal(*input, *again), "an input survives a recording");
   require(equal(*input, unpack(pack(*input))), "an input survives a saved state");
 }

@@ -32,13 +32,53 @@ def record_a_run(path):
         client.step(0, 10.0, -5.0)
         client.ask(set_load=pb.SetLoad(load_nm=0.1, ramp_ticks=3, at_tick=2))
         client.ask(write_parameter=pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.85))
+        client.ask(write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.5, ramp_ticks=3, at_tick=2))
+        client.ask(inject_fault=pb.InjectFault(name="bus_sag", value=0.25, at_tick=3))
+        client.ask(shaft_bump=pb.ShaftBump(impulse_nms=-1e-5, at_tick=2))
         client.ask(clear_faults=pb.ClearFaults())
         for tick in range(1, 6):
             client.step(tick, 20.0, 3.0, gates=pb.GATES_ZERO if tick == 4 else pb.GATES_VOLTAGE)
         client.exchange(2)  # refused: stale
+        client.exchange(6, gates=pb.GATES_CURRENT)  # refused: no current loop
         client.close()
         if server.stop() != 0:
             raise RuntimeError(server.errors())
+
+
+# Two axes on one shaft, curves, and everything that can happen by itself.
+DYNAMOMETER = """
+[[axis.set]]
+parameter = "machine.rotor_resistance_ohm"
+value = 5.85
+at_s = 0.1
+ramp_s = 0.5
+[[axis.fault]]
+name = "open_phase"
+value = 2
+at_tick = 9
+until_tick = 12
+[[axis.bump]]
+at_tick = 3
+impulse_nms = -1e-3
+[[axis]]
+name = "brake"
+shares_shaft_with = "servo"
+[axis.machine]
+kind = "shunt_dc"
+armature_resistance_ohm = 1
+armature_inductance_h = 0.01
+motor_constant = 1
+field_resistance_ohm = 100
+saturation_curve = [[0, 0], [1, 1],
+  [2, 1.5]]
+[axis.drive]
+kind = "averaged_inverter"
+[axis.amplifier]
+voltage_limit_v = 80
+over_current_a = 6
+[axis.encoder]
+counts_per_revolution = 2000
+"""
 
 
 # ---- recordings, taken apart and put together without what makes them long ----
@@ -125,11 +165,19 @@ def put_together(parts, attachment, chunked, metadata=()):
     return out + indexes + record(FOOTER, struct.pack("<QQI", summary, 0, 0)) + MAGIC
 
 
+def without_defaults(config):
+    """Without the sections of drives and sensors that this bench does not use: mutations shall hit what matters."""
+    used = r"bench|\[axis\]|axis\.(machine|mechanics|drive|amplifier|encoder|current_sensor)"
+    sections = re.split(rb"(?m)^(?=\[)", config)
+    return b"".join(each for each in sections if re.match(rb"\[(" + used.encode() + rb")\]", each))
+
+
 def make_recordings(recording):
     parts = taken_apart(recording)
     attachment = parts[ATTACHMENT][0]
     config = configuration_of(attachment)
     put("config", "recorded.toml", config)
+    config = without_defaults(config)
     put("recording", "chunked.mcap", put_together(parts, with_configuration(attachment, config), True))
     put("recording", "loose.mcap", put_together(parts, with_configuration(attachment, config), False))
     few = {**parts, MESSAGE: parts[MESSAGE][:6]}
@@ -161,10 +209,14 @@ def make_messages():
         "hello": pb.Envelope(id=1, hello=pb.Hello(protocol_min=1, protocol_max=1, client="fuzz", token="secret")),
         "lease": pb.Envelope(id=2, lease=pb.LeaseRequest(axis=1, action=pb.LeaseRequest.ACTION_ACQUIRE)),
         "exchange": pb.Envelope(id=2**64 - 1, exchange=pb.Exchange(commands=[
-            pb.Command(tick=7, gates=pb.GATES_VOLTAGE, u_a_v=-80.0, u_b_v=1e300), pb.Command(axis=1, gates=2)])),
+            pb.Command(tick=7, gates=pb.GATES_VOLTAGE, u_a_v=-80.0, u_b_v=1e300, u_c_v=-0.0, u_f_v=3.0),
+            pb.Command(axis=1, gates=pb.GATES_CURRENT, i_a_a=1.0, i_b_a=-2.0, i_c_a=3.0, i_f_a=-4.0)])),
         "subscribe": pb.Envelope(id=3, subscribe=pb.Subscribe(decimation=8, signals=["i_a_a", "angle_rad"])),
         "load": pb.Envelope(id=4, set_load=pb.SetLoad(load_nm=0.1, ramp_ticks=2**64 - 1, at_tick=5)),
         "parameter": pb.Envelope(id=5, write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.5)),
+        "ramp": pb.Envelope(id=5, write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.5, ramp_ticks=2**53)),
+        "inject": pb.Envelope(id=6, inject_fault=pb.InjectFault(axis=1, name="hall_offset", value=-0.5, at_tick=9)),
+        "bump": pb.Envelope(id=7, shaft_bump=pb.ShaftBump(impulse_nms=-1.0, at_tick=2**64 - 1)),
         "reply": pb.Envelope(id=6, exchange_reply=pb.ExchangeReply(samples=[pb.AxisSample(sample=extreme)])),
     }
     for name, message in requests.items():
@@ -183,10 +235,18 @@ def make_configs():
     inline = inline.replace('motor = "../motors/servo-im.toml"', 'motor_name = "servo"') + motor
     inline += '[[axis.load]]\nat_s = 0.5\nload_nm = 0.1\nramp_s = 0.01\n'
     put("config", "servo-realtime.toml", re.sub(r"[ ]*#.*", "", inline).encode())
+    put("config", "dynamometer.toml", (re.sub(r"[ ]*#.*", "", inline) + DYNAMOMETER).encode())
     put("config", "missing-motor.toml", (BENCHES / "servo.toml").read_bytes())
     put("config", "letters.toml", "ä = 1\nn\u0291me = 2\nwin[\u1200\n".encode())  # once undefined behaviour in toml++
     put("config", "oddities.toml", b'bench.name = "\\u00e9\\n"\nbench.mode = \'lockstep\'\nbench = { period_us = 0x7d }\n'
         b'[tcp]\naddress = "0.0.0.0"\nport = 65536\n[[axis]]\nname = """a\nb"""\nx = [1, 2.5, nan, -inf, 1979-05-27]\n')
+
+
+def make_curves():
+    """A byte whose lowest bit says whether y must rise, then the file."""
+    for name, text in {"plain": "0,0\n0.5,1e-3\n1,2\n", "header": "t [s],M [N*m]\r\n0 , +1\r\n\r\n2,\t-3\r\n",
+                       "mark": "\ufeff-1,-1\n1,1", "falling": "0,1\n1,0\n", "wrong": "0,1\n1;2\nnan,inf\n"}.items():
+        put("curve", name, bytes([name == "plain"]) + text.encode())
 
 
 def make_can_frames():
@@ -239,5 +299,6 @@ if __name__ == "__main__":
         make_recordings(run.read_bytes())
     make_messages()
     make_configs()
+    make_curves()
     make_modbus_streams()
     make_can_frames()

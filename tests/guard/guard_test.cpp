@@ -14,13 +14,16 @@
 #include <chrono>
 #include <csignal>
 #include <cstddef>
+#include <filesystem>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <variant>
 
 #include "server/bench.hpp"
+#include "server/engine.hpp"
 #include "server/mailbox.hpp"
 #include "server/recorder.hpp"
 #include "server/spsc_ring.hpp"
@@ -82,7 +85,7 @@ BenchConfig busy_bench() {
   AxisParameters& second = config.setup.axes[1].parameters;
   second.mechanics.coulomb_friction_nm = 0.01;
   second.mechanics.static_friction_nm = 0.02;
-  second.current_sensor.bits = 12;
+  second.sensors.current.bits = 12;
   return config;
 }
 
@@ -100,7 +103,11 @@ class BusyRun {
       const Tick tick = bench_.tick();
       if (tick % 500 == 0) {  // what comes through the ring of requests
         requests_.push({.tick = tick + 100, .axis = 0, .owner = kOwner, .action = LoadChange{0.01, 50}});
-        requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = ParameterWrite{2, 3.9}});
+        requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = write_});
+        requests_.push({.tick = tick + 7, .axis = 0, .owner = kOwner, .action = ramp_});
+        requests_.push({.tick = tick + 50, .axis = 0, .owner = kOwner, .action = fault_of("bus_sag", 0.1)});
+        requests_.push({.tick = tick + 90, .axis = 0, .owner = kOwner, .action = fault_of("bus_sag", 0.0)});
+        requests_.push({.tick = tick + 60, .axis = 1, .owner = kOwner, .action = ShaftBump{1e-7}});
         requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = ClearFaults{}});
         requests_.push({.tick = 0, .axis = 0, .owner = 99, .action = RefusedCommand{}});
         requests_.push({.tick = 0, .axis = 0, .owner = 0, .action = LateTick{}});
@@ -122,6 +129,8 @@ class BusyRun {
 
  private:
   Bench& bench_;
+  const ParameterWrite write_ = write_of(servo_axis(), "machine.rotor_resistance_ohm", 3.9);
+  const ParameterWrite ramp_ = write_of(servo_axis(), "machine.stator_resistance_ohm", 1.7, 300);
   SpscRing<Input> requests_{256};
   Mailbox<Command> mailbox_;
 };
@@ -151,6 +160,76 @@ TEST(TickGuard, RT_01_AMillionTicksCallNothingThatCouldWait) {
   EXPECT_EQ(recorder.gaps(), 0u);
   EXPECT_EQ(bench.sample(0).refused_commands, static_cast<std::uint64_t>(kTicks) / 500);
   EXPECT_GT(edges, 100u) << "the shaft must move, or the encoder does no work";
+}
+
+/// A run in which every fault comes and goes, and live parameters are on their way to where they are.
+class HostileRun {
+ public:
+  explicit HostileRun(Bench& bench) : bench_(bench) {
+    for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis)
+      submit(axis, LeaseAction::kAcquire);
+  }
+
+  void batch() noexcept {
+    for (Tick n = 0; n < kBatch; ++n) {
+      for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis)
+        disturb(axis);
+      bench_.step();
+    }
+  }
+
+ private:
+  void submit(std::uint32_t axis, const Action& action) noexcept {
+    bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = kOwner, .action = action});
+  }
+
+  void disturb(std::uint32_t axis) noexcept {
+    const Tick tick = bench_.tick();
+    const AxisParameters& p = bench_.axis(axis).parameters();
+    const auto row = static_cast<std::uint32_t>(tick / 20 % static_cast<Tick>(kInjectableFaultCount));
+    const InjectableFault& fault = kInjectableFaults[row];
+    if (tick % 20 == 0)
+      submit(axis, InjectFault{.row = row, .value = fault.integer ? 1.0 : 0.1 * fault.maximum});
+    if (tick % 20 == 15) submit(axis, InjectFault{.row = row, .value = 0.0});
+    if (tick % 20 == 17) submit(axis, ClearFaults{});
+    const std::span<const Parameter> rows = axis_parameters(p);
+    const auto changing = static_cast<std::uint32_t>(tick % static_cast<Tick>(rows.size()));
+    if (rows[changing].live) {
+      submit(axis, ParameterWrite{.row = changing, .value = rows[changing].get(p), .ramp_ticks = tick % 3});
+    }
+    const bool currents = p.drive.kind == DriveKind::kCurrent;
+    const double most = currents ? p.drive.current_loop.limit_a : p.drive.amplifier.voltage_limit_v;
+    const double sign = (tick >> 4 & 1) != 0 ? 0.4 : -0.4;
+    const PhaseValues setpoint{.a = sign * most, .b = -sign * most, .c = 0.3 * most, .field = 0.1};
+    const Gates on = currents ? Gates::kCurrent : Gates::kVoltage;
+    submit(axis, Command{.answers = tick,
+                         .phases = {.gates = tick % 70 > 60 ? Gates::kOff : on, .setpoint = setpoint}});
+  }
+
+  Bench& bench_;
+};
+
+// Catches: a machine, drive, sensor, fault, ramp or shared shaft that allocates, locks or looks at the clock.
+TEST(TickGuard, RT_01_NoBenchCallsAnythingThatCouldWait) {
+  const Guard guard;
+  for (const auto& entry : std::filesystem::directory_iterator(DRIVEBENCH_BENCHES)) {
+    const BenchConfig config = load_config(entry.path());
+    Tap tap(nullptr);
+    Bench bench(config.setup, &tap);
+    schedule_events(config, bench);
+    HostileRun run(bench);
+    bool moved = false;
+    for (Tick done = 0; done < 4000; done += kBatch) {
+      tap.drain();
+      guard.begin();
+      run.batch();
+      guard.end();
+      ASSERT_EQ(guard.hits(), 0u) << guard.first_hit() << " in " << entry.path() << " before tick "
+                                  << bench.tick();
+      moved = moved || bench.sample(0).true_i_a_a != 0.0 || bench.sample(0).true_i_f_a != 0.0;
+    }
+    EXPECT_TRUE(moved) << entry.path();
+  }
 }
 
 /// What a tick must not do, and who can see it: the guard replaces functions, the kernel sees its own calls.

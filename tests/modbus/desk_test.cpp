@@ -1,7 +1,5 @@
 // Writes that are carried out as a whole: what reaches the bench, in which order, and what stays of a
 // refusal.
-#include "plant/parameters.hpp"
-#include "server/endpoints/modbus/map_info.hpp"
 #include "tests/modbus/modbus_bench.hpp"
 
 namespace drivebench::modbus {
@@ -64,15 +62,16 @@ struct Desk {
 
   asio::io_context io;
   SlowEngine engine{config()};
-  std::vector<ParameterInfo> infos = parameter_infos();
+  std::vector<ParameterInfo> infos = parameter_infos(servo_axis());
   RegisterMap map{infos, true};
   AxisDesk axis{io, engine, map, 0};
   Words words;
   std::optional<AxisDesk::Outcome> outcome;
 };
 
-double parameter(const Engine& engine, std::size_t row) {
-  return axis_parameters()[row].get(engine.parameters(0));
+double parameter(const Engine& engine, std::size_t place) {
+  const AxisParameters& p = engine.parameters(0);
+  return axis_parameters(p)[parameter_rows(p)[place]].get(p);
 }
 
 // Catches: a block of parameters that takes a tick for each of them, and is half written in between.
@@ -101,7 +100,7 @@ TEST(ModbusDesk, AParameterThatDidNotGetThroughReadsAsBefore) {
   desk.run();
   ASSERT_TRUE(desk.outcome);
   EXPECT_EQ(desk.outcome->exception, Exception::kBusy);
-  EXPECT_EQ(desk.outcome->refusal, static_cast<std::uint16_t>(Refused::kBusy));
+  EXPECT_EQ(desk.outcome->refusal, Refusal::kBusy);
   EXPECT_EQ(desk.engine.inputs.size(), 1u);
   EXPECT_EQ(parameter(desk.engine, 1), 2.0) << "this one is on its way";
   EXPECT_EQ(parameter(desk.engine, 2), second);

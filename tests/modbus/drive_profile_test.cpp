@@ -81,8 +81,8 @@ TEST(Modbus, ControlWordsBackToBackAreAllCarriedOut) {
 // Catches: a fault that a level instead of an edge resets, or that a write of other registers resets.
 TEST(Modbus, AFaultIsResetByTheRisingBit) {
   BenchConfig config = modbus_bench_config();
-  config.setup.axes[0].parameters.amplifier.over_current_a = 0.01;
-  config.setup.axes[0].parameters.amplifier.over_current_trip = true;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
   ModbusBench bench(config);
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);
@@ -108,8 +108,8 @@ TEST(Modbus, AFaultIsResetByTheRisingBit) {
 // Catches: faults that are cleared by a write whose answer says that nothing was done.
 TEST(Modbus, AFaultResetThatComesTooLateClearsNothing) {
   BenchConfig config = modbus_bench_config(2);
-  config.setup.axes[0].parameters.amplifier.over_current_a = 0.01;
-  config.setup.axes[0].parameters.amplifier.over_current_trip = true;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
   ModbusBench bench(config);
   Client client(bench.port());
   Client other(bench.port());

@@ -32,7 +32,7 @@ TEST(Modbus, MB_11_ABlockIsOfOneTick) {
   BenchConfig config = modbus_bench_config();
   config.mode = RunMode::kRealtime;
   config.setup.command_delay_ticks = 1;
-  config.setup.axes[0].parameters.current_sensor.noise_rms_a = 1.0;  // another current at every tick
+  config.setup.axes[0].parameters.sensors.current.noise_rms_a = 1.0;  // another current at every tick
   ModbusBench bench(config);
   Client client(bench.port());
   int changes = 0;
@@ -61,7 +61,9 @@ TEST(Modbus, MB_11_TheSampleBlockIsTheSample) {
     words = client.exchange(1, tick, 20.0f, -7.5f);
   const Sample expected = bench.newest();
   ASSERT_EQ(words.size(), kSampleLength);
-  const Sample got = read_sample(words);
+  constexpr std::size_t kWhole = map_detail::kMoreSample.back().end() - kSampleStart;
+  const Sample got = read_sample(client.read_all(kSampleStart, kWhole));
+  EXPECT_EQ(client.read_all(kSampleStart + kWhole - 4, 4), client.read_all(kSampleStart, 4)) << "the tick";
   for (const Signal& signal : kSignals) {
     const double value = value_of(signal, expected);
     EXPECT_EQ(value_of(signal, got),

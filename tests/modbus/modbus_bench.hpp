@@ -7,17 +7,21 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <future>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "boost/asio/post.hpp"
 #include "server/asio.hpp"
+#include "server/endpoints/modbus/map_info.hpp"
 #include "server/endpoints/modbus/modbus_server.hpp"
 #include "tests/server/run_config.hpp"
 
@@ -73,6 +77,23 @@ inline Words command_words(std::uint16_t mode, std::uint32_t counter, float a, f
   const auto bits_a = std::bit_cast<std::uint32_t>(a);
   const auto bits_b = std::bit_cast<std::uint32_t>(b);
   return {mode, high(counter), low(counter), high(bits_a), low(bits_a), high(bits_b), low(bits_b)};
+}
+
+/// The same with phase c and the field, from register 422 on.
+inline Words command_words(std::uint16_t mode, std::uint32_t counter, std::array<float, 4> setpoints) {
+  Words words = command_words(mode, counter, setpoints[0], setpoints[1]);
+  const Words others = command_words(mode, counter, setpoints[2], setpoints[3]);
+  words.insert(words.end(), others.begin() + 3, others.end());
+  return words;
+}
+
+/// Registers of an axis of the servo bench at which a parameter stands.
+inline std::size_t address_of(std::string_view parameter) {
+  const std::vector<ParameterInfo> infos = parameter_infos(servo_axis());
+  const auto found = std::find_if(infos.begin(), infos.end(),
+                                  [&](const ParameterInfo& info) { return info.name == parameter; });
+  EXPECT_NE(found, infos.end()) << parameter;
+  return kParameterStart + 2 * static_cast<std::size_t>(found - infos.begin());
 }
 
 /// A blocking client. No answer for half a minute counts as a closed connection and fails the test.
@@ -140,6 +161,16 @@ class Client {
   /// Registers; empty after an exception.
   Words read(std::size_t address, std::size_t count, std::uint8_t unit = 1, std::uint8_t function = 3) {
     return words_in(ask(pdu_of(function, {address, count}), unit));
+  }
+  /// As many requests as it takes.
+  Words read_all(std::size_t address, std::size_t count, std::uint8_t unit = 1) {
+    Words all;
+    for (std::size_t at = 0; at < count; at += 100) {
+      const Words some = read(address + at, std::min<std::size_t>(count - at, 100), unit);
+      EXPECT_FALSE(some.empty()) << address + at;
+      all.insert(all.end(), some.begin(), some.end());
+    }
+    return all;
   }
   std::uint16_t read_one(std::size_t address, std::uint8_t unit = 1) {
     const Words words = read(address, 1, unit);

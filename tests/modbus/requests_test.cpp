@@ -2,7 +2,6 @@
 #include <cmath>
 #include <limits>
 
-#include "plant/parameters.hpp"
 #include "tests/modbus/modbus_bench.hpp"
 
 namespace drivebench::modbus {
@@ -15,11 +14,20 @@ struct Area {
   std::size_t length;
 };
 
-std::vector<Area> areas() {
-  std::vector<Area> all{{0, 30}, {100, 13}, {200, 86}, {400, 11}, {1000, 2 * axis_parameters().size()}};
-  for (std::size_t i = 0; i < 5; ++i)
-    all.push_back({all[i].start + 10'000, all[i].length});
-  return all;
+const std::vector<ParameterInfo>& parameters() {
+  static const std::vector<ParameterInfo> infos = parameter_infos(servo_axis());
+  return infos;
+}
+
+const std::vector<Area>& areas() {
+  static const std::vector<Area> whole = [] {
+    std::vector<Area> all{
+        {0, 43}, {100, 13}, {120, 22}, {200, 136}, {400, 11}, {420, 13}, {1000, 2 * parameters().size()}};
+    for (std::size_t i = 0; i < 7; ++i)
+      all.push_back({all[i].start + 10'000, all[i].length});
+    return all;
+  }();
+  return whole;
 }
 
 bool exists(std::size_t address, std::size_t count) {
@@ -37,16 +45,17 @@ int verdict_of_zeros(std::size_t address, std::size_t count) {
   if (first >= 1000) {
     if (first % 2 != 0 || count % 2 != 0) return 2;  // half a float
     for (std::size_t row = (first - 1000) / 2; row < (end - 1000) / 2; ++row)
-      if (!axis_parameters()[row].live) return 2;
+      if (!parameters()[row].live) return 2;
     for (std::size_t row = (first - 1000) / 2; row < (end - 1000) / 2; ++row)
-      if (axis_parameters()[row].minimum > 0.0) return 3;
+      if (parameters()[row].minimum > 0.0) return 3;
     return 6;
   }
   if (first >= 400) {
-    const auto is_cut = [](std::size_t at) { return at == 404 || at == 406 || at == 408; };
-    return is_cut(first) || is_cut(end) || end > 409 ? 2 : 6;
+    const std::size_t block = first < 420 ? 400 : 420;
+    const auto is_cut = [&](std::size_t at) { return at > block + 3 && at < block + 13 && at % 2 == 0; };
+    return is_cut(first) || is_cut(end) || (block == 400 && end > 409) ? 2 : 6;
   }
-  return first >= 101 && end <= 104 ? 6 : 2;
+  return (first >= 101 && end <= 104) || (first >= 121 && end <= 127) ? 6 : 2;
 }
 
 std::vector<std::size_t> edge_addresses() {
@@ -95,7 +104,7 @@ TEST(Modbus, MB_01_EveryFunctionCodeIsAnswered) {
     EXPECT_EQ(client.ask({code, 0, 0, 0, 1}), exception_pdu(code, 1)) << function;
   }
   EXPECT_EQ(client.ask(pdu_of(1, {0, 2})), (Bytes{1, 1, 0}));
-  EXPECT_EQ(client.ask(pdu_of(2, {0, 27})).size(), 2u + 4u);
+  EXPECT_EQ(client.ask(pdu_of(2, {0, 62})).size(), 2u + 8u);
   EXPECT_EQ(client.ask(pdu_of(3, {0, 2})), (Bytes{3, 4, 'D', 'B', 0, 1}));
   EXPECT_EQ(client.ask(pdu_of(4, {0, 1})), (Bytes{4, 2, 'D', 'B'}));
   EXPECT_EQ(client.ask({8, 0, 0, 0xab, 0xcd}), (Bytes{8, 0, 0, 0xab, 0xcd}));
@@ -163,13 +172,13 @@ TEST(Modbus, MB_02_EveryEdgeOfTheMapHasItsVerdict) {
     expect_verdict(client, pdu_of(6, {address, 0}), verdict_of_zeros(address, 1), count);
     expect_verdict(client, pdu_of(22, {address, 0, 0}), verdict_of_zeros(address, 1), count);
   }
-  for (const std::size_t address : Sizes{0, 1, 2, 26, 27, 65535}) {
-    for (const std::size_t quantity : Sizes{0, 1, 2, 27, 28, 1968, 1969, 2000, 2001, 65535}) {
+  for (const std::size_t address : Sizes{0, 1, 2, 61, 62, 65535}) {
+    for (const std::size_t quantity : Sizes{0, 1, 2, 62, 63, 1968, 1969, 2000, 2001, 65535}) {
       const auto bits_verdict = [&](std::size_t most, std::size_t bits) {
         return !quantity_verdict(quantity, most) ? 3 : address + quantity <= bits ? 0 : 2;
       };
       expect_verdict(client, pdu_of(1, {address, quantity}), bits_verdict(2000, 2), count);
-      expect_verdict(client, pdu_of(2, {address, quantity}), bits_verdict(2000, 27), count);
+      expect_verdict(client, pdu_of(2, {address, quantity}), bits_verdict(2000, 62), count);
       Bytes pdu = pdu_of(15, {address, quantity});
       const std::size_t bytes = std::min<std::size_t>((quantity + 7) / 8, 246);
       pdu.push_back(static_cast<std::uint8_t>(bytes));
@@ -226,14 +235,13 @@ TEST(Modbus, MB_04_AWriteIsWholeOrDoesNotHappen) {
   EXPECT_EQ(client.read(402, 7), (Words{0, 0, 0, 0, 0, 0, 0}));
 
   // Two parameters in one write, of which the second cannot be: R_S 2 ohm, then R_R below its minimum.
-  const Words parameters = client.read(1000, 2 * axis_parameters().size());
+  const std::size_t length = 2 * parameters().size();
+  const Words before = client.read_all(1000, length);
   EXPECT_EQ(client.write(1002, {0x4000, 0, 0, 0}), 3);
   // Coulomb friction above the static friction breaks a rule between two parameters.
-  const auto row =
-      static_cast<std::size_t>(find_parameter("mechanics.coulomb_friction_nm") - axis_parameters().data());
-  const std::size_t address = 1000 + 2 * (row - 1);
+  const std::size_t address = address_of("mechanics.viscous_friction_nms");
   EXPECT_EQ(client.write(address, {0x3a00, 0, 0x4000, 0}), 3) << "viscous friction, then Coulomb friction";
-  EXPECT_EQ(client.read(1000, 2 * axis_parameters().size()), parameters);
+  EXPECT_EQ(client.read_all(1000, length), before);
   EXPECT_EQ(client.write(address, {0x3a00, 0}), 0) << "the first of them alone is fine";
   EXPECT_EQ(client.read(address, 2), (Words{0x3a00, 0}));
 
@@ -281,7 +289,7 @@ TEST(Modbus, MB_12_WhatIsNotAValueIsRefused) {
   EXPECT_TRUE(client.exchange(3, 0, 1.01f, 0.0f).empty()) << "a duty above 1";
   EXPECT_EQ(client.last_exception(), 3);
   ++refused;
-  EXPECT_TRUE(client.exchange(4, 0, 0.0f, 0.0f).empty()) << "a mode that does not exist";
+  EXPECT_TRUE(client.exchange(5, 0, 0.0f, 0.0f).empty()) << "a mode that does not exist";
   ++refused;
   EXPECT_EQ(client.write(401, {4}), 3) << "a request that does not exist";
   EXPECT_EQ(client.write(1002, {0x7fc0, 0}), 3) << "NaN as a resistance";
@@ -301,12 +309,11 @@ TEST(Modbus, MB_12_SwitchesTakeZeroAndOne) {
   ModbusBench bench;
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);
-  const auto row =
-      static_cast<std::size_t>(find_parameter("amplifier.over_current_trip") - axis_parameters().data());
-  EXPECT_EQ(client.write(1000 + 2 * row, {0x3f00, 0}), 3) << "0.5";
-  EXPECT_EQ(client.write(1000 + 2 * row, {0, 0}), 0);
-  EXPECT_EQ(client.write(11000 + 2 * row, {0, 0x3f80}), 0) << "1, in the mirror";
-  EXPECT_EQ(client.read(1000 + 2 * row, 2), (Words{0x3f80, 0}));
+  const std::size_t trip = address_of("amplifier.over_current_trip");
+  EXPECT_EQ(client.write(trip, {0x3f00, 0}), 3) << "0.5";
+  EXPECT_EQ(client.write(trip, {0, 0}), 0);
+  EXPECT_EQ(client.write(trip + 10'000, {0, 0x3f80}), 0) << "1, in the mirror";
+  EXPECT_EQ(client.read(trip, 2), (Words{0x3f80, 0}));
 }
 
 // Catches: writes that get through although the configuration forbids them.

@@ -1,9 +1,10 @@
 // For tests/peers/test_can_dbc.py: what the library says of its CAN messages, and frames with the values that
 // they carry.
 //
-//   can_texts dbc|table|frames classic|fd standard|extended
+//   can_texts dbc|table|frames classic|fd standard|extended narrow|wide
 //
-// A line of `frames`: identifier, data, then NAME=VALUE for each field.
+// With `wide` the first and the last of three axes are wide. A line of `frames`: identifier, data, then
+// NAME=VALUE for each field that is in the frame.
 #include <cstdio>
 #include <cstring>
 #include <random>
@@ -19,19 +20,28 @@ using namespace drivebench::can;
 void print_frames(const Profile& profile, std::span<const BusAxis> axes) {
   constexpr int kFramesOfEach = 200;
   std::mt19937_64 random(3);
-  for (const MessageRow* row : rows_of(profile)) {
+  for (const MessageRow* row : rows_of(profile, axes)) {
     for (int i = 0; i < kFramesOfEach; ++i) {
       Frame frame;
       for (std::size_t byte = 0; byte < row->size; ++byte)
         frame.data[byte] = static_cast<std::uint8_t>(random() % 4 == 0 ? 0xFF : random());
+      if (is_paged(*row)) frame.data[0] %= kPages;
+      for (const Field& field : row->fields) {
+        if (field.name == "mode") frame.data[field.start_bit / 8U] %= kCurrentMode + 2;
+      }
       const Values carried = decode(*row, profile, frame);
-      frame = encode(*row, profile, axes[random() % axes.size()].node, carried);  // without reserved bytes
+      std::size_t axis = random() % axes.size();
+      while (!has_message(axes[axis], *row))
+        axis = (axis + 1) % axes.size();
+      frame = encode(*row, profile, axes[axis].node, carried);  // without reserved bytes
       std::string line;
       append_id(line, frame);
       line += " ";
       append_data(line, frame);
-      for (std::size_t field = 0; field < row->fields.size(); ++field)
+      for (std::size_t field = 0; field < row->fields.size(); ++field) {
+        if (!is_on_page(row->fields[field], frame.data[0])) continue;
         line += " " + std::string(row->fields[field].name) + "=" + number_text(carried[field]);
+      }
       std::puts(line.c_str());
     }
   }
@@ -40,14 +50,16 @@ void print_frames(const Profile& profile, std::span<const BusAxis> axes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 2;
+  if (argc != 5) return 2;
   Profile profile;
   profile.fd = std::strcmp(argv[2], "fd") == 0;
   profile.extended = std::strcmp(argv[3], "extended") == 0;
   if (profile.extended) profile.base_ids[static_cast<std::size_t>(Message::kCommand)] = 0x12340000;
   profile.edge_time_unit_s = 2.5e-7;
-  const std::vector<BusAxis> axes = {
-      {"servo", 1}, {"2nd \"load\" drive with a long name", 2}, {"2nd \"load\" drive too", 127}};
+  profile.wide = std::strcmp(argv[4], "wide") == 0;
+  const std::vector<BusAxis> axes = {{"servo", 1, profile.wide},
+                                     {"2nd \"load\" drive with a long name", 2, false},
+                                     {"2nd \"load\" drive too", 127, profile.wide}};
   if (std::strcmp(argv[1], "dbc") == 0)
     std::fputs(dbc_text("Zwei \"Achsen\" \xC3\xA4", profile, axes).c_str(), stdout);
   else if (std::strcmp(argv[1], "table") == 0)

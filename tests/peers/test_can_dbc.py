@@ -17,7 +17,8 @@ except ImportError as missing:
     sys.exit(77)
 
 BUILT = pathlib.Path(os.environ["DRIVEBENCH_SERVER"]).parent
-VARIANTS = [(kind, ids) for kind in ("classic", "fd") for ids in ("standard", "extended")]
+VARIANTS = [(kind, ids, width) for kind in ("classic", "fd") for ids in ("standard", "extended")
+            for width in ("narrow", "wide")]
 NODES = {"servo": 1, "_2nd__load_": 2, "node127": 127}
 
 
@@ -56,7 +57,7 @@ class Dbc(unittest.TestCase):
     def test_it_is_read_without_complaint(self):
         """Would catch: a line that the reader does not understand; names that are no identifiers, too long or not
         unique; FD or extended frames that are not marked."""
-        for (kind, ids), (matrix, complaints) in self.each():
+        for (kind, ids, width), (matrix, complaints) in self.each():
             self.assertEqual(complaints, [])
             names = [frame.name for frame in matrix.frames]
             self.assertEqual(len(names), len(set(names)))
@@ -66,6 +67,8 @@ class Dbc(unittest.TestCase):
                 self.assertEqual(len({signal.name for signal in frame.signals}), len(frame.signals))
             for node in NODES:
                 self.assertIn(f"{node}_heartbeat", names)
+            self.assertEqual([node for node in NODES if f"{node}_details" in names],
+                             ["servo", "node127"] if width == "wide" else [])
             self.assertEqual([ecu.name for ecu in matrix.ecus], ["Bench", "Controller"])
             self.assertEqual(matrix.frame_by_name("servo_command").transmitters, ["Controller"])
             self.assertEqual(matrix.frame_by_name("servo_command").signals[0].receivers, ["Bench"])
@@ -87,7 +90,9 @@ class Dbc(unittest.TestCase):
         self.assertEqual(len(data), frame.size)
         theirs = frame.decode(data)
         self.assertEqual(set(theirs), set(values))
-        duties = frame.name.endswith("_command") and values["mode"] == "3" and not frame.is_fd
+        # A classic command in mode 3 or 4 holds duties or currents, which a DBC file cannot tell.
+        unit = {"3": 1 / 32767, "4": 1e-3}.get(values.get("mode"))
+        other_unit = unit is not None and frame.name.endswith("_command") and not frame.is_fd
         for name, text in values.items():
             signal, ours = frame.signal_by_name(name), float(text)
             raw, value = theirs[name].raw_value, float(theirs[name].phys_value)
@@ -95,8 +100,8 @@ class Dbc(unittest.TestCase):
                 self.assertTrue(ours == value or (math.isnan(ours) and math.isnan(value)), (frame.name, name))
             elif math.isnan(ours):  # the pattern of "no value"
                 self.assertEqual(raw, -2**(signal.size - 1) if signal.is_signed else 2**signal.size - 1)
-            elif duties and name in ("u_a", "u_b"):
-                self.assertAlmostEqual(ours, raw / 32767, delta=1e-12)
+            elif other_unit and name.startswith("u_"):
+                self.assertAlmostEqual(ours, raw * unit, delta=1e-12)
             else:
                 self.assertTrue(math.isclose(ours, value, rel_tol=1e-12), (frame.name, name, ours, value))
 
@@ -106,12 +111,16 @@ class Dbc(unittest.TestCase):
         for variant, (matrix, _) in self.each():
             table = texts("table", *variant).decode()
             for row in rows(table, "## Identifiers"):
-                name, sender, identifiers = row[0], row[1], row[2:]
+                title, sender, identifiers = row[0], row[1], row[2:]
+                name = title.partition(" (")[0]
                 for (axis, _), identifier in zip(NODES.items(), identifiers):
+                    if identifier == "-":
+                        continue
                     frame = matrix.frame_by_name(name if name == "sync" else f"{axis}_{name}")
                     self.assertEqual(frame.arbitration_id.id, int(identifier, 16))
                     self.assertEqual(frame.transmitters, [sender.capitalize()])
-                fields = rows(table, f"### {name}\n")
+                    last = frame
+                frame, fields = last, rows(table, f"### {title}\n")
                 self.assertEqual([field[1] for field in fields], [signal.name for signal in frame.signals])
                 for field, signal in zip(fields, frame.signals):
                     self.check_field(field, signal)
@@ -121,7 +130,9 @@ class Dbc(unittest.TestCase):
         first, _, last = where.partition("-")
         self.assertEqual((signal.start_bit, signal.size), (8 * int(first), 8 * (int(last or first) - int(first) + 1)))
         self.assertTrue(signal.is_little_endian)
-        kind, bits, factor = re.fullmatch(r"(uint|int|float)(\d+)(?:, wraps| x (.+))?", encoding).groups()
+        page, kind, bits, factor = re.fullmatch(r"(?:page (\d): )?(uint|int|float)(\d+)(?:, wraps| x (.+))?",
+                                                encoding).groups()
+        self.assertEqual(signal.multiplex, "Multiplexor" if signal.name == "page" else page and int(page))
         self.assertEqual((int(bits), kind != "uint", kind == "float"), (signal.size, signal.is_signed, signal.is_float))
         self.assertEqual(float(factor or 1), float(signal.factor))
         self.assertEqual("" if unit in ("-", "bits", "enum") else unit, signal.unit)
@@ -148,8 +159,8 @@ class Dbc(unittest.TestCase):
             self.assertEqual(ran.returncode, 0, ran.stderr)
             lines = ran.stdout.splitlines()
             self.assertEqual(len(lines), len(examples))
-            for line, (name, _, values) in zip(lines, examples):
-                self.assertRegex(line.split()[1], f"(^|_){name}$")
+            for line, (title, _, values) in zip(lines, examples):
+                self.assertRegex(line.split()[1], f"(^|_){title.partition(' (')[0]}$")
                 for field in values.split(", "):
                     label, number = field.split()[:2]
                     found = re.search(f"'{label}': '([^' ]*)", line).group(1)

@@ -1,210 +1,41 @@
-#include "plant/amplifier.hpp"
+#include "plant/drive/amplifier.hpp"
 
 #include <gtest/gtest.h>
-
-#include <cmath>
-
-#include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
 namespace {
 
-constexpr PhaseCommand volts(double a, double b) {
-  return {.gates = Gates::kVoltage, .voltage_v = {a, b}};
-}
-constexpr PhaseCommand kOff{.gates = Gates::kOff, .voltage_v = {}};
-constexpr InductionMachineState kFluxed{.i_a_a = 6.0, .i_b_a = -3.5, .psi_a_wb = 0.04, .psi_b_wb = -0.02};
-
-Axis axis_with_link(double link_v, InductionMachineState machine = {}, double speed_rad_s = 0.0) {
-  AxisParameters p = servo_axis();
-  p.amplifier.voltage_limit_v = link_v;
-  Axis axis(p, kServoTiming, 1, 0);
-  AxisState state = axis.state();
-  state.drive = {.machine = machine, .shaft = {.speed_rad_s = speed_rad_s}};
-  axis.restore(state);
-  return axis;
+// Kills: a gain that reaches the offset, offsets exchanged, a phase or the field forgotten.
+TEST(Amplifier, GainThenTheOffsetOfEachPhase) {
+  const AmplifierParameters p{.gain = 2.0, .offset_a_v = 0.5, .offset_b_v = -1.0, .offset_c_v = 0.25};
+  const PhaseValues out = amplified(p, {.a = 3.0, .b = 4.0, .c = -5.0, .field = 6.0});
+  EXPECT_EQ(out.a, 6.5);
+  EXPECT_EQ(out.b, 7.0);
+  EXPECT_EQ(out.c, -9.75);
+  EXPECT_EQ(out.field, 12.0);
 }
 
-// Kills: gain after the limit, offsets exchanged, a limit on one side only, a flag for the other phase lost.
-TEST(Amplifier, GainThenOffsetThenTheLimitOfEachPhase) {
-  const AmplifierParameters p{
-      .voltage_limit_v = 10.0, .gain = 2.0, .offset_a_v = 0.5, .offset_b_v = -1.0, .over_current_a = 1.0};
-  AmplifierOutput out = amplifier_output(p, volts(3.0, 4.0));
-  EXPECT_EQ(out.voltage_v.a, 6.5);
-  EXPECT_EQ(out.voltage_v.b, 7.0);
-  EXPECT_FALSE(out.saturated);
-  out = amplifier_output(p, volts(4.75, -4.5));  // exactly the limit is not clipped
+// Kills: a limit on one side only, a flag of one phase that another one takes back.
+TEST(Amplifier, TheLimitOfEachPhase) {
+  LimitedVoltages out = clipped({10.0, -10.0, 7.0}, 10.0);  // exactly the limit is not clipped
   EXPECT_EQ(out.voltage_v.a, 10.0);
   EXPECT_EQ(out.voltage_v.b, -10.0);
+  EXPECT_EQ(out.voltage_v.c, 7.0);
   EXPECT_FALSE(out.saturated);
-  out = amplifier_output(p, volts(4.76, 0.0));
-  EXPECT_EQ(out.voltage_v.a, 10.0);
-  EXPECT_TRUE(out.saturated);
-  out = amplifier_output(p, volts(0.0, -1e308));  // overflows on the way
-  EXPECT_EQ(out.voltage_v.a, 0.5);
-  EXPECT_EQ(out.voltage_v.b, -10.0);
-  EXPECT_TRUE(out.saturated);
-}
-
-// Kills: an offset or a stale voltage that appears with the terminals shorted.
-TEST(Amplifier, TheShortCircuitPutsOutExactlyZero) {
-  const AmplifierParameters p{.voltage_limit_v = 10.0, .offset_a_v = 1.0, .offset_b_v = 1.0};
-  const AmplifierOutput out = amplifier_output(p, {.gates = Gates::kZeroVoltage, .voltage_v = {50.0, 50.0}});
-  EXPECT_EQ(out.voltage_v.a, 0.0);
-  EXPECT_EQ(out.voltage_v.b, 0.0);
-  EXPECT_FALSE(out.saturated);
-}
-
-// Kills: a saturation flag that sticks, or is set by the wrong phase's limit.
-TEST(Amplifier, TheSaturationFlagLastsAsLongAsTheClipping) {
-  Axis axis = axis_with_link(20.0);
-  axis.advance(volts(0.0, 25.0), 0);
-  EXPECT_EQ(axis.sample(1).faults, kVoltageSaturated);
-  EXPECT_EQ(axis.sample(1).voltage_v.b, 20.0);
-  axis.advance(volts(0.0, 15.0), 1);
-  EXPECT_EQ(axis.sample(2).faults, 0u);
-  EXPECT_EQ(axis.sample(2).voltage_v.b, 15.0);
-}
-
-// The current rises by 25 us V/(sigma L_S) = 0.59 A per substep of 100 V, so that 1 A is exceeded at the
-// second of five. Masked, it is a flag and clips nothing; unmasked, the diodes empty the phase within the
-// same tick. Kills: a trip that waits for the next tick, a limit that clips, a flag that latches.
-TEST(Amplifier, OverCurrentIsAFlagAndUnmaskedTripsWithinTheTick) {
-  for (const bool trips : {false, true}) {
-    for (const double sign : {1.0, -1.0}) {
-      AxisParameters p = servo_axis();
-      p.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0, .over_current_trip = trips};
-      Axis axis(p, kServoTiming, 1, 0);
-      axis.advance(volts(0.0, sign * 100.0), 0);
-      const AxisSample s = axis.sample(1);
-      EXPECT_EQ(s.faults, trips ? kOverCurrent | kOverCurrentTrip : kOverCurrent);
-      if (trips) {
-        EXPECT_EQ(s.true_current_a.b, 0.0);
-      } else {
-        EXPECT_GT(sign * s.true_current_a.b, 2.5);
-        EXPECT_EQ(s.voltage_v.b, sign * 100.0);
-      }
-      axis.advance(volts(0.0, trips ? sign * 100.0 : -sign * 100.0), 1);
-      EXPECT_EQ(axis.sample(2).faults & kOverCurrentTrip, trips ? kOverCurrentTrip : 0u);
-      if (trips) {
-        EXPECT_EQ(axis.sample(2).faults, kOverCurrentTrip);  // the current is gone, the latch is not
-        EXPECT_EQ(axis.sample(2).true_current_a.b, 0.0);
-        axis.clear_faults();
-        axis.advance(volts(0.0, sign * 10.0), 2);
-        EXPECT_EQ(axis.sample(3).faults, 0u);
-        EXPECT_GT(sign * axis.sample(3).true_current_a.b, 0.2);
-      }
-    }
+  for (const ThreePhase& wanted : {ThreePhase{10.01, 0.0, 0.0}, {0.0, -1e308, 0.0}, {0.0, 0.0, 11.0}}) {
+    out = clipped(wanted, 10.0);
+    EXPECT_EQ(out.voltage_v.a, wanted.a == 0.0 ? 0.0 : 10.0);
+    EXPECT_EQ(out.voltage_v.b, wanted.b == 0.0 ? 0.0 : -10.0);
+    EXPECT_EQ(out.voltage_v.c, wanted.c == 0.0 ? 0.0 : 10.0);
+    EXPECT_TRUE(out.saturated);
   }
 }
 
-// Kills: a trip that looks at phase a only, or at the signed current.
-TEST(Amplifier, ExactlyTheLimitIsNotAnOverCurrent) {
-  AxisParameters p = servo_axis();
-  p.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0};
-  Axis axis(p, kServoTiming, 1, 0);
-  axis.advance(volts(20.0, -20.0), 0);
-  const double reached_a = std::abs(axis.sample(1).true_current_a.b);
-  for (const double limit_a : {reached_a, std::nextafter(reached_a, 0.0)}) {
-    p.amplifier.over_current_a = limit_a;
-    Axis again(p, kServoTiming, 1, 0);
-    again.advance(volts(20.0, -20.0), 0);
-    EXPECT_EQ(again.sample(1).faults, limit_a == reached_a ? 0u : kOverCurrent | kOverCurrentTrip);
-  }
-}
-
-// Kills: currents that ring around zero, pass it, or leave a remainder; a phase that closes again.
-TEST(Amplifier, FreewheelingCurrentsDecayToExactlyZeroAndStayThere) {
-  Axis axis = axis_with_link(40.0, kFluxed);
-  double last_a = 6.0;
-  double last_b = -3.5;
-  for (Tick tick = 0; tick < 400; ++tick) {
-    axis.advance(kOff, tick);
-    const AxisSample s = axis.sample(tick + 1);
-    EXPECT_TRUE(s.true_current_a.a >= 0.0 && s.true_current_a.a <= last_a);
-    EXPECT_TRUE(s.true_current_a.b <= 0.0 && s.true_current_a.b >= last_b);
-    last_a = s.true_current_a.a;
-    last_b = s.true_current_a.b;
-    if (tick == 0) {
-      EXPECT_EQ(s.voltage_v.a, -40.0);  // against the current
-      EXPECT_EQ(s.voltage_v.b, 40.0);
-    }
-  }
-  EXPECT_EQ(last_a, 0.0);
-  EXPECT_EQ(last_b, 0.0);
-}
-
-/// Energy that flows out of the terminals while the gates are off, until the currents are zero.
-struct Freewheel {
-  double into_link_j = 0.0;
-  double lost_j = 0.0;
-  double delivered_j = 0.0;
-  double stored_before_j = 0.0;
-  double stored_after_j = 0.0;
-};
-
-Freewheel freewheel(double link_v) {
-  AxisParameters p = servo_axis();
-  p.amplifier.voltage_limit_v = link_v;
-  constexpr double kStep_s = 1e-7;
-  Axis axis(p, {.period_s = kStep_s, .substeps = 1}, 1, 0);
-  AxisState state = axis.state();
-  state.drive = {.machine = kFluxed, .shaft = {.speed_rad_s = 20.0}};
-  axis.restore(state);
-  const InductionMachineConstants c = constants_of(p.machine);
-  Freewheel f{.stored_before_j = stored_energy_j(c, kFluxed)};
-  for (Tick tick = 0; tick < 20'000; ++tick) {
-    const DriveState before = axis.state().drive;
-    axis.advance(kOff, tick);
-    const DriveState& after = axis.state().drive;
-    const TwoPhase v = axis.state().voltage_v;
-    const auto mean = [](double x, double y) { return 0.5 * (x + y); };
-    f.into_link_j -= kStep_s * (v.a * mean(before.machine.i_a_a, after.machine.i_a_a) +
-                                v.b * mean(before.machine.i_b_a, after.machine.i_b_a));
-    f.lost_j += kStep_s * mean(losses_w(c, before.machine), losses_w(c, after.machine));
-    f.delivered_j += kStep_s * mean(torque_nm(c, before.machine) * before.shaft.speed_rad_s,
-                                    torque_nm(c, after.machine) * after.shaft.speed_rad_s);
-  }
-  f.stored_after_j = stored_energy_j(c, axis.state().drive.machine);
-  return f;
-}
-
-// The stored energy goes to the link, into heat and to the shaft; the closing of the sum is limited by the
-// step at which a phase opens. Kills: diodes with the voltage of the link the wrong way round, energy that
-// vanishes when a phase opens.
-TEST(Amplifier, FreewheelingReturnsEnergyToTheLink) {
-  const Freewheel f = freewheel(40.0);
-  EXPECT_GT(f.into_link_j, 0.25 * f.stored_before_j);
-  EXPECT_NEAR(f.stored_before_j, f.stored_after_j + f.into_link_j + f.lost_j + f.delivered_j,
-              1e-4 * f.stored_before_j);
-}
-
-// Kills: an open machine that conducts below the link voltage, a back-emf that is not shown at the terminals.
-TEST(Amplifier, ABackEmfBelowTheLinkVoltageDrivesNoCurrent) {
-  const InductionMachineState fluxed{.psi_a_wb = 0.05};
-  Axis axis = axis_with_link(40.0, fluxed, 200.0);  // 3 * 200 * 0.05 * M/L_R = 25 V
-  axis.advance(kOff, 0);
-  EXPECT_EQ(axis.sample(1).true_current_a.a, 0.0);
-  EXPECT_EQ(axis.sample(1).true_current_a.b, 0.0);
-  EXPECT_EQ(axis.sample(1).torque_nm, 0.0);
-  EXPECT_NEAR(std::abs(axis.sample(1).voltage_v.b), 25.0, 1.5);
-  for (Tick tick = 1; tick < 100; ++tick)
-    axis.advance(kOff, tick);
-  // Open, the flux decays with the time constant of the rotor.
-  const TwoPhase psi = axis.sample(100).rotor_flux_wb;
-  EXPECT_NEAR(std::hypot(psi.a, psi.b), 0.05 * std::exp(-100 * kServoTick_s * 3.9 / 0.014), 1e-8);
-}
-
-// Kills: diodes that never conduct, or conduct so that they feed the machine.
-TEST(Amplifier, ABackEmfAboveTheLinkVoltageChargesTheLinkAndBrakes) {
-  const InductionMachineState fluxed{.psi_a_wb = 0.05};
-  Axis axis = axis_with_link(15.0, fluxed, 200.0);
-  axis.advance(kOff, 0);
-  const AxisSample s = axis.sample(1);
-  EXPECT_GT(std::abs(s.true_current_a.b), 0.1);
-  EXPECT_LT(s.true_current_a.b * s.voltage_v.b, 0.0);
-  EXPECT_EQ(std::abs(s.voltage_v.b), 15.0);
-  EXPECT_LT(s.torque_nm, 0.0);
+// Kills: a decay applied to the output instead of to its distance from the input.
+TEST(Amplifier, TheFilterGoesTowardsItsInputAndStaysOnIt) {
+  EXPECT_EQ(filtered(2.0, 10.0, 1.0), 2.0);
+  EXPECT_EQ(filtered(2.0, 10.0, 0.5), 6.0);
+  EXPECT_EQ(filtered(0.1, 0.1, 0.3), 0.1);
 }
 
 }  // namespace

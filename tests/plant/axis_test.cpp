@@ -16,7 +16,7 @@ namespace {
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 
 constexpr PhaseCommand volts(double a, double b) {
-  return {.gates = Gates::kVoltage, .voltage_v = {a, b}};
+  return {.gates = Gates::kVoltage, .setpoint = {a, b}};
 }
 
 /// Follows the A/B lines of an axis by their edges alone.
@@ -26,8 +26,8 @@ struct LineDecoder {
 
   void follow(const Axis& axis) {
     double last_s = 0.0;
-    axis.encoder().for_each_edge(axis.last_tick(), axis.last_tick_turn(), axis.last_tick_count(),
-                                 [&](const Edge& edge) {
+    axis.encoder().for_each_edge(axis.last_tick(), axis.last_tick_turn(), axis.last_tick_encoder(),
+                                 axis.injected(), [&](const Edge& edge) {
                                    ASSERT_EQ(edge.count, count + edge.direction);
                                    ASSERT_GE(edge.time_s, last_s - 1e-12);
                                    ASSERT_LE(edge.time_s, kServoTick_s + 1e-12);
@@ -80,7 +80,7 @@ TEST(Axis, TremblingAtTheWrapLosesNoEdge) {
       axis.advance(volts(volts_a, 7.3), tick);
       decoder.follow(axis);
       ASSERT_EQ(decoder.count, axis.state().encoder.count) << "tick " << tick;
-      const double angle_rad = axis.state().drive.shaft.angle_rad;
+      const double angle_rad = axis.state().shaft.angle_rad;
       ASSERT_TRUE(angle_rad >= 0.0 && angle_rad < kTurn_rad);
     }
   }
@@ -97,7 +97,7 @@ TEST(Axis, TheAngleStaysWithinATurnAndTheTurnsAreCounted) {
       axis.advance({}, tick);
     const double angle_rad = 1.0 + speed_rad_s * 1000 * kServoTick_s;
     const AxisState& s = axis.state();
-    EXPECT_TRUE(s.drive.shaft.angle_rad >= 0.0 && s.drive.shaft.angle_rad < kTurn_rad);
+    EXPECT_TRUE(s.shaft.angle_rad >= 0.0 && s.shaft.angle_rad < kTurn_rad);
     EXPECT_EQ(s.turns, static_cast<std::int64_t>(std::floor(angle_rad / kTurn_rad)));
     EXPECT_NEAR(axis.sample(1000).angle_rad, angle_rad, 1e-11 * std::abs(angle_rad));
     EXPECT_EQ(s.encoder.count, static_cast<std::int64_t>(std::floor(angle_rad * 2000 / kTurn_rad)));
@@ -107,9 +107,9 @@ TEST(Axis, TheAngleStaysWithinATurnAndTheTurnsAreCounted) {
 // Kills: NaN that reaches a sample, a divergence that is not latched, a state that goes on after it.
 TEST(Axis, ADivergedStateIsHeldAndLatched) {
   AxisParameters p = servo_axis();
-  p.machine.stator_inductance_h = 1e-5;
-  p.machine.rotor_inductance_h = 1e-5;
-  p.machine.mutual_inductance_h = 0.9e-5;  // far too fast for the step
+  induction(p).stator_inductance_h = 1e-5;
+  induction(p).rotor_inductance_h = 1e-5;
+  induction(p).mutual_inductance_h = 0.9e-5;  // far too fast for the step
   Axis axis(p, kServoTiming, 1, 0);
   Tick tick = 0;
   AxisSample before = axis.sample(0);
@@ -142,7 +142,7 @@ TEST(Axis, AnInfiniteLoadDiverges) {
 // Kills: constants that are derived once and for all, parameters that act a tick late.
 TEST(Axis, ANewParameterHoldsFromTheNextAdvanceOn) {
   AxisParameters hot = servo_axis();
-  hot.machine.rotor_resistance_ohm *= 1.5;
+  induction(hot).rotor_resistance_ohm *= 1.5;
   Axis changed(servo_axis(), kServoTiming, 1, 0);
   Axis same(servo_axis(), kServoTiming, 1, 0);
   for (Axis* axis : {&changed, &same}) {

@@ -1,4 +1,4 @@
-#include "plant/current_sensor.hpp"
+#include "plant/sensors/current_sensor.hpp"
 
 #include <gtest/gtest.h>
 
@@ -60,12 +60,12 @@ TEST(CurrentSensor, TheConverterStopsAtItsEndsAndSaysSo) {
 // Kills: a wrong amplitude, one noise for both phases or all ticks.
 TEST(CurrentSensor, TheNoiseOfAnAxisHasItsRmsAndDiffersBetweenPhasesAndTicks) {
   AxisParameters p = servo_axis();
-  p.current_sensor.noise_rms_a = 0.03;
+  p.sensors.current.noise_rms_a = 0.03;
   const Axis axis(p, kServoTiming, 9, 0);
   constexpr int kDraws = 20'000;
   double sum_a = 0.0, sum_aa = 0.0, sum_bb = 0.0, sum_ab = 0.0, sum_next = 0.0, previous = 0.0;
   for (Tick tick = 0; tick < kDraws; ++tick) {
-    const TwoPhase i = axis.sample(tick).current_a;
+    const PhaseValues i = axis.sample(tick).current_a;
     sum_a += i.a;
     sum_aa += i.a * i.a;
     sum_bb += i.b * i.b;
@@ -83,7 +83,7 @@ TEST(CurrentSensor, TheNoiseOfAnAxisHasItsRmsAndDiffersBetweenPhasesAndTicks) {
 // Kills: noise that depends on the order of calls, axes or seeds that share their noise.
 TEST(CurrentSensor, TheNoiseIsAFunctionOfSeedAxisAndTick) {
   AxisParameters p = servo_axis();
-  p.current_sensor.noise_rms_a = 1.0;
+  p.sensors.current.noise_rms_a = 1.0;
   const Axis axis(p, kServoTiming, 9, 0);
   const double first = axis.sample(5).current_a.a;
   EXPECT_NE(axis.sample(6).current_a.a, first);
@@ -97,19 +97,21 @@ TEST(CurrentSensor, TheNoiseIsAFunctionOfSeedAxisAndTick) {
 // Kills: gains or offsets of the phases exchanged; a saturated converter that the fault word does not show.
 TEST(CurrentSensor, EachPhaseHasItsOwnGainAndOffsetAndSaturationIsAFaultBit) {
   AxisParameters p = servo_axis();
-  p.current_sensor = {
+  p.sensors.current = {
       .bits = 10, .full_scale_a = 8.0, .gain_a = 2.0, .gain_b = 1.0, .offset_a_a = 0.5, .offset_b_a = -1.0};
-  Axis axis(p, kServoTiming, 1, 0);
-  AxisState state = axis.state();
-  state.drive.machine = {.i_a_a = 1.0, .i_b_a = 3.0};
-  axis.restore(state);
-  EXPECT_EQ(axis.sample(0).current_a.a, 2.5);
-  EXPECT_EQ(axis.sample(0).current_a.b, 2.0);
-  EXPECT_EQ(axis.sample(0).faults, 0u);
-  state.drive.machine.i_b_a = 20.0;
-  axis.restore(state);
-  EXPECT_EQ(axis.sample(0).faults, kCurrentSensorSaturated);
-  EXPECT_EQ(axis.state().faults, 0u);
+  const auto measured = [&p](double b_a) {
+    Axis axis(p, {.period_s = 1e-15, .substeps = 1}, 1, 0);  // too short for the currents to change
+    AxisState state = axis.state();
+    set_induction_state(state, {.i_a_a = 1.0, .i_b_a = b_a});
+    axis.restore(state);
+    axis.advance({.gates = Gates::kVoltage}, 0);
+    EXPECT_EQ(axis.state().faults, 0u);
+    return axis.sample(1);
+  };
+  EXPECT_EQ(measured(3.0).current_a.a, 2.5);
+  EXPECT_EQ(measured(3.0).current_a.b, 2.0);
+  EXPECT_EQ(measured(3.0).faults, 0u);
+  EXPECT_EQ(measured(20.0).faults, kCurrentSensorSaturated);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "plant/encoder.hpp"
+#include "plant/sensors/encoder.hpp"
 
 /// Motions with a closed form, and an encoder that follows them through a tick.
 namespace drivebench::encoder_motion {

@@ -8,10 +8,15 @@
 #include <cstddef>
 #include <random>
 
+#include "plant/rk4.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
 namespace {
+
+RotorMotion turning(double speed_rad_s) {
+  return {.angle_rad = 0.0, .speed_rad_s = speed_rad_s, .electrical = {1.0, 0.0}};
+}
 
 struct Point {
   InductionMachineState x;
@@ -34,13 +39,13 @@ double unbalanced(const InductionMachineConstants& c, const Point& p, const Indu
   // The stored energy is quadratic: a central difference along the slope is its exact derivative.
   constexpr double kStep_s = 1e-4;
   const auto moved = [&](double dt) {
-    return stored_energy_j(c, {p.x.i_a_a + dt * slope.i_a_a, p.x.i_b_a + dt * slope.i_b_a,
-                               p.x.psi_a_wb + dt * slope.psi_a_wb, p.x.psi_b_wb + dt * slope.psi_b_wb});
+    return stored_energy_j(c, advanced(p.x, dt, slope), turning(p.speed_rad_s));
   };
   const double storing_w = (moved(kStep_s) - moved(-kStep_s)) / (2.0 * kStep_s);
   const double in_a_w = p.voltage_v.a * p.x.i_a_a;
   const double in_b_w = p.voltage_v.b * p.x.i_b_a;
-  return std::abs(in_a_w + in_b_w - storing_w - losses_w(c, p.x) - torque * p.speed_rad_s) /
+  return std::abs(in_a_w + in_b_w - storing_w - losses_w(c, p.x, turning(p.speed_rad_s)) -
+                  torque * p.speed_rad_s) /
          (std::abs(in_a_w) + std::abs(in_b_w));
 }
 
@@ -86,9 +91,10 @@ TEST(InductionMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
     const InductionMachineConstants c = constants_of(p);
     const Point point = random_point(engine);
     const InductionMachineState slope =
-        derivative(c, point.x, point.speed_rad_s, {.voltage_v = point.voltage_v});
+        derivative(c, point.x, turning(point.speed_rad_s), {.voltage_v = point.voltage_v});
     // Relative to |u_a i_a| + |u_b i_b|, since the phases may cancel.
-    ASSERT_LT(unbalanced(c, point, slope, torque_nm(c, point.x)), 1e-9) << "state " << i;
+    ASSERT_LT(unbalanced(c, point, slope, torque_nm(c, point.x, turning(point.speed_rad_s))), 1e-9)
+        << "state " << i;
   }
 }
 
@@ -132,12 +138,12 @@ TEST(InductionMachine, FlippingAnySignBreaksThePowerBalance) {
       worst = std::max(worst, unbalanced(c, point, model.slope, model.torque_nm));
       if (flipped < kTerms) continue;
       const InductionMachineState slope =
-          derivative(c, point.x, point.speed_rad_s, {.voltage_v = point.voltage_v});
+          derivative(c, point.x, turning(point.speed_rad_s), {.voltage_v = point.voltage_v});
       EXPECT_NEAR(slope.i_a_a, model.slope.i_a_a, 1e-8);
       EXPECT_NEAR(slope.i_b_a, model.slope.i_b_a, 1e-8);
       EXPECT_NEAR(slope.psi_a_wb, model.slope.psi_a_wb, 1e-11);
       EXPECT_NEAR(slope.psi_b_wb, model.slope.psi_b_wb, 1e-11);
-      EXPECT_NEAR(torque_nm(c, point.x), model.torque_nm, 1e-12);
+      EXPECT_NEAR(torque_nm(c, point.x, turning(point.speed_rad_s)), model.torque_nm, 1e-12);
     }
     if (flipped < kTerms) {
       EXPECT_GT(worst, 0.01) << "term " << flipped;
@@ -152,25 +158,56 @@ TEST(InductionMachine, FlippingAnySignBreaksThePowerBalance) {
 // (from a to b) a positive torque. Kills: a wrong pair of signs that leaves the power balance intact.
 TEST(InductionMachine, PositiveVoltageDrivesPositiveCurrentAndCurrentAheadOfTheFluxPositiveTorque) {
   const InductionMachineConstants c = constants_of(kServoMachine);
-  const InductionMachineState slope = derivative(c, {}, 0.0, {.voltage_v = {1.0, 2.0}});
+  const InductionMachineState slope = derivative(c, {}, turning(0.0), {.voltage_v = {1.0, 2.0}});
   EXPECT_NEAR(slope.i_a_a, 1.0 / 4.2221e-3, 0.02);
   EXPECT_NEAR(slope.i_b_a, 2.0 / 4.2221e-3, 0.04);
-  EXPECT_GT(torque_nm(c, {.i_b_a = 1.0, .psi_a_wb = 0.1}), 0.0);
-  EXPECT_LT(torque_nm(c, {.i_a_a = 1.0, .psi_b_wb = 0.1}), 0.0);
+  EXPECT_GT(torque_nm(c, {.i_b_a = 1.0, .psi_a_wb = 0.1}, turning(0.0)), 0.0);
+  EXPECT_LT(torque_nm(c, {.i_a_a = 1.0, .psi_b_wb = 0.1}, turning(0.0)), 0.0);
 }
 
-// Kills: an open phase that drifts, a back-emf of the wrong sign.
+// Kills: an open phase that drifts, a back-emf of the wrong sign, a current that is left where none can flow.
 TEST(InductionMachine, TheOpenCircuitVoltageKeepsTheCurrentAtZeroAndAnOpenPhaseKeepsItsOwn) {
   const InductionMachineConstants c = constants_of(kServoMachine);
   const InductionMachineState x{.psi_a_wb = 0.03, .psi_b_wb = -0.05};
-  const TwoPhase open_v = open_circuit_voltage_v(c, x, 150.0);
-  const InductionMachineState connected = derivative(c, x, 150.0, {.voltage_v = open_v});
+  const WindingValues open_v = open_circuit_voltages(c, x, turning(150.0));
+  const InductionMachineState connected = derivative(c, x, turning(150.0), {.voltage_v = open_v.stator});
   EXPECT_NEAR(connected.i_a_a, 0.0, 1e-10);
   EXPECT_NEAR(connected.i_b_a, 0.0, 1e-10);
-  const InductionMachineState open =
-      derivative(c, x, 150.0, {.voltage_v = {55.0, 55.0}, .conducts = {1.0, 0.0}});
+
+  const TerminalInput line{.voltage_v = {55.0, 55.0}, .conduction = Conduction::kLine, .line = {1.0, 0.0}};
+  const InductionMachineState open = derivative(c, x, turning(150.0), line);
   EXPECT_NE(open.i_a_a, 0.0);
   EXPECT_EQ(open.i_b_a, 0.0);
+  const InductionMachineState left =
+      restricted(c, {.i_a_a = 2.0, .i_b_a = 3.0, .psi_a_wb = 0.03}, turning(150.0), line);
+  EXPECT_EQ(left.i_a_a, 2.0);
+  EXPECT_EQ(left.i_b_a, 0.0);
+  EXPECT_EQ(left.psi_a_wb, 0.03);
+
+  const TerminalInput none{.voltage_v = {55.0, 55.0}, .conduction = Conduction::kNone, .line = {1.0, 0.0}};
+  EXPECT_EQ(derivative(c, x, turning(150.0), none).i_a_a, 0.0);
+  EXPECT_EQ(derivative(c, x, turning(150.0), none).i_b_a, 0.0);
+  EXPECT_NE(derivative(c, x, turning(150.0), none).psi_a_wb, 0.0);
+}
+
+// Kills: a factor that reaches the wrong parameter, series impedance that is lost, an axis that is never told
+// that its machine is a star.
+TEST(InductionMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) {
+  InductionMachineParameters p = adjusted(kServoMachine, {.stator_resistance_factor = 2.0,
+                                                          .rotor_resistance_factor = 3.0,
+                                                          .magnet_factor = 0.1,
+                                                          .series_resistance_ohm = 0.1,
+                                                          .series_inductance_h = 1e-3});
+  EXPECT_DOUBLE_EQ(p.stator_resistance_ohm, 3.5);
+  EXPECT_DOUBLE_EQ(p.rotor_resistance_ohm, 11.7);
+  EXPECT_DOUBLE_EQ(p.stator_inductance_h, 0.015);
+  EXPECT_DOUBLE_EQ(p.rotor_inductance_h, 0.014);
+  EXPECT_DOUBLE_EQ(p.mutual_inductance_h, 0.0117);
+  EXPECT_NEAR(fastest_time_constant_s(kServoMachine), 1.0 / 1047.77, 1e-8);
+  EXPECT_EQ(connection_of(p), Connection::kTwoPhase);
+  p.star = true;
+  EXPECT_EQ(connection_of(p), Connection::kStar);
+  EXPECT_EQ(pole_pairs_of(p), 0.0);  // no angle in the equations
 }
 
 }  // namespace

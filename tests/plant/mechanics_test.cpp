@@ -1,16 +1,17 @@
 // The motor has no flux and its terminals are shorted here, so that the shaft sees load and friction only.
-#include "plant/mechanics.hpp"
+#include "plant/mechanics/shaft.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "plant/mechanics/load.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
 namespace {
 
-constexpr PhaseCommand kShorted{.gates = Gates::kZeroVoltage, .voltage_v = {}};
+constexpr PhaseCommand kShorted{.gates = Gates::kZeroVoltage, .setpoint = {}};
 constexpr double kInertia_kgm2 = 2e-4;
 constexpr double kCoulomb_nm = 0.02;
 constexpr double kStatic_nm = 0.05;
@@ -32,16 +33,19 @@ AxisSample run(Axis& axis, Tick from, Tick to) {
 
 // Kills: friction that pushes, stiction that holds above its limit or lets go below it.
 TEST(Mechanics, TheFrictionBranchFollowsTheMotionAndAtRestTheDrivingTorque) {
-  const ShaftParameters p{
-      .inertia_kgm2 = 1.0, .coulomb_friction_nm = kCoulomb_nm, .static_friction_nm = kStatic_nm};
-  EXPECT_EQ(friction_branch(p, 1e-12, -9.0).direction, 1.0);
-  EXPECT_EQ(friction_branch(p, -1e-12, 9.0).direction, -1.0);
-  EXPECT_EQ(friction_branch(p, 0.0, kStatic_nm).turns, 0.0);
-  EXPECT_EQ(friction_branch(p, -0.0, -kStatic_nm).turns, 0.0);
-  EXPECT_EQ(friction_branch(p, 0.0, 0.0501).turns, 1.0);
-  EXPECT_EQ(friction_branch(p, 0.0, 0.0501).direction, 1.0);
-  EXPECT_EQ(friction_branch(p, 0.0, -0.0501).direction, -1.0);
-  EXPECT_NEAR(derivative(p, {.speed_rad_s = 3.0}, 0.7, 0.2, {.turns = 1.0, .direction = 1.0}).speed_rad_s,
+  const ShaftConstants c = constants_of(MechanicsParameters{
+      .inertia_kgm2 = 1.0, .coulomb_friction_nm = kCoulomb_nm, .static_friction_nm = kStatic_nm});
+  const auto branch = [&c](double speed_rad_s, double torque_nm, double load_nm) {
+    return branch_of(c, ShaftState{.speed_rad_s = speed_rad_s}, torque_nm, load_nm, false);
+  };
+  EXPECT_EQ(branch(1e-12, -9.0, 0.0).direction, 1.0);
+  EXPECT_EQ(branch(-1e-12, 9.0, 0.0).direction, -1.0);
+  EXPECT_EQ(branch(0.0, kStatic_nm, 0.0).turns, 0.0);
+  EXPECT_EQ(branch(-0.0, 0.0, kStatic_nm).turns, 0.0);
+  EXPECT_EQ(branch(0.0, 0.0501, 0.0).turns, 1.0);
+  EXPECT_EQ(branch(0.0, 0.0501, 0.0).direction, 1.0);
+  EXPECT_EQ(branch(0.0, 0.0, 0.0501).direction, -1.0);
+  EXPECT_NEAR(derivative(c, ShaftState{.speed_rad_s = 3.0}, 0.7, 0.2, {.direction = 1.0}).speed_rad_s,
               0.7 - 0.2 - kCoulomb_nm, 1e-15);
 }
 
@@ -102,8 +106,8 @@ TEST(Mechanics, BothFrictionsTogetherStopTheShaftAtExactlyZero) {
   Axis axis = shaft_with(kViscous_nms, kCoulomb_nm, kStatic_nm);
   spin(axis, kSpeed_rad_s);
   Tick tick = 0;
-  while (axis.state().drive.shaft.speed_rad_s != 0.0 && tick < 10'000) {
-    ASSERT_GT(axis.state().drive.shaft.speed_rad_s, 0.0);
+  while (axis.state().shaft.speed_rad_s != 0.0 && tick < 10'000) {
+    ASSERT_GT(axis.state().shaft.speed_rad_s, 0.0);
     axis.advance(kShorted, tick++);
   }
   const double time_constant_s = kInertia_kgm2 / kViscous_nms;

@@ -53,14 +53,23 @@ TEST(Rk4, OneStepIsSimpsonsRuleAndTheFourthTaylorPolynomial) {
   EXPECT_NEAR(end.y, 1.0 + 0.5 + 0.125 + 0.125 / 6.0 + 0.0625 / 24.0, 1e-15);
 }
 
+struct DriveState {
+  InductionMachineState machine;
+  ShaftState shaft;
+};
+
 DriveState after_two_milliseconds(int steps) {
   const InductionMachineConstants machine = constants_of(kServoMachine);
-  const ShaftParameters shaft{.inertia_kgm2 = kServoInertia_kgm2, .viscous_friction_nms = kServoFriction_nms};
+  const MechanicsParameters mechanics{.inertia_kgm2 = kServoInertia_kgm2,
+                                      .viscous_friction_nms = kServoFriction_nms};
+  const ShaftConstants shaft = constants_of(mechanics);
   DriveState x{.machine = {3.0, -2.0, 0.02, 0.03}, .shaft = {.speed_rad_s = 60.0, .angle_rad = 0.5}};
   for (int n = 0; n < steps; ++n) {
     x = rk4_step(x, 2e-3 / steps, [&](const DriveState& s) -> DriveState {
-      return {.machine = derivative(machine, s.machine, s.shaft.speed_rad_s, {.voltage_v = {40.0, -25.0}}),
-              .shaft = derivative(shaft, s.shaft, torque_nm(machine, s.machine), 0.05, FrictionBranch{})};
+      const RotorMotion motion{s.shaft.angle_rad, s.shaft.speed_rad_s, {1.0, 0.0}};
+      return {
+          .machine = derivative(machine, s.machine, motion, {.voltage_v = {40.0, -25.0}}),
+          .shaft = derivative(shaft, s.shaft, torque_nm(machine, s.machine, motion), 0.05, ShaftBranch{})};
     });
   }
   return x;

@@ -7,8 +7,9 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <utility>
 
-#include "protocols/can/text.hpp"
+#include "tests/protocols/can_sample.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -17,18 +18,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMax = std::numeric_limits<double>::max();
 constexpr double kDenormal = std::numeric_limits<double>::denorm_min();
-
-Profile profile_of(bool fd) {
-  Profile profile;
-  profile.fd = fd;
-  return profile;
-}
-
-std::string data_of(const Frame& frame) {
-  std::string text;
-  append_data(text, frame);
-  return text;
-}
 
 /// A frame of the message with one value in one field and 0 in the others.
 Frame frame_with(Message message, bool fd, std::string_view field, double value) {
@@ -53,29 +42,6 @@ std::uint64_t raw_of(Message message, bool fd, std::string_view name, double val
 double back_from(Message message, bool fd, std::string_view name, double value) {
   const Frame frame = frame_with(message, fd, name, value);
   return decode(*find_message(message, fd), profile_of(fd), frame)[index_of(message, fd, name)];
-}
-
-Sample a_sample() {
-  Sample sample;
-  sample.tick = 0x1'2345'6789;
-  sample.command_tick = 0x1'2345'6788;
-  sample.command_age_ticks = 1;
-  sample.missed_commands = 0x1'0002;
-  sample.refused_commands = 0x2'0003;
-  sample.late_ticks = 0x104;
-  sample.state = 2;
-  sample.faults = 0x8000'0010;
-  sample.encoder_count = -2;
-  sample.encoder_levels = 0x23;
-  sample.edge_age_s = 1e-3;
-  sample.edge_period_s = 2e-3;
-  sample.index_count = -256;
-  sample.index_tick = -1;
-  sample.i_a_a = 1.0;
-  sample.i_b_a = -2.0;
-  sample.speed_rad_s = -100.0;
-  sample.bus_voltage_v = 48.0;
-  return sample;
 }
 
 Frame sent(Message message, bool fd) {
@@ -278,17 +244,23 @@ TEST(CanCodec, EveryFrameComesBackAsItWas) {
     const Profile profile = profile_of(row.variant == Variant::kFd);
     for (int round = 0; round < 3000; ++round) {
       Frame frame = encode(row, profile, 9, Values{});
+      const auto page = is_paged(row) ? static_cast<std::uint8_t>(random() % (kPages + 1)) : std::uint8_t{0};
       for (const Field& field : row.fields) {
-        for (unsigned bit = 0; bit < field.bits; bit += 8) {
+        for (unsigned bit = 0; bit < field.bits && is_on_page(field, page); bit += 8) {
           frame.data[(field.start_bit + bit) / 8U] =
               static_cast<std::uint8_t>(random() % 4 == 0 ? 0xFF : random());
         }
       }
+      if (is_paged(row)) frame.data[0] = page;
       const Values values = decode(row, profile, frame);
       const Frame again = encode(row, profile, 9, values);
       for (std::size_t i = 0; i < row.fields.size(); ++i) {
         const Field& field = row.fields[i];
         if (field.encoding == Encoding::kFloat && std::isnan(values[i])) continue;
+        if (!is_on_page(field, page)) {
+          ASSERT_EQ(values[i], 0.0) << row.name << " " << field.name;
+          continue;
+        }
         for (unsigned bit = 0; bit < field.bits; bit += 8) {
           const std::size_t byte = (field.start_bit + bit) / 8U;
           ASSERT_EQ(again.data[byte], frame.data[byte]) << row.name << " " << field.name;
@@ -298,11 +270,12 @@ TEST(CanCodec, EveryFrameComesBackAsItWas) {
   }
 }
 
-// Catches: a signal that goes to another field, or to none; more than half a count of error.
+// Catches: a signal that goes to another field, or to none; more than half a count of error, or half a bit of
+// a single.
 TEST(CanCodec, RandomSamplesComeBack) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  for (const bool fd : {false, true}) {
+  for (const auto& [fd, wide] : {std::pair(false, false), {false, true}, {true, false}, {true, true}}) {
     for (int round = 0; round < 2000; ++round) {
       Sample sample = a_sample();
       sample.tick = random() >> 12;
@@ -316,6 +289,12 @@ TEST(CanCodec, RandomSamplesComeBack) {
       sample.i_a_a = 30.0 * uniform(random);
       sample.edge_age_s = 0.03 + 0.03 * uniform(random);
       sample.speed_rad_s = 3000.0 * uniform(random);
+      sample.i_c_a = 30.0 * uniform(random);
+      sample.u_f_v = 300.0 * uniform(random);
+      sample.resolver_cos_v = 30.0 * uniform(random);
+      sample.temperature_k = 3000.0 + 3000.0 * uniform(random);
+      sample.hall_lines = random() % 8;
+      sample.injected = random() >> 36;
       Sample received = sample;  // what was known a little before
       received.tick -= 50;
       received.command_tick -= 50;
@@ -325,11 +304,15 @@ TEST(CanCodec, RandomSamplesComeBack) {
       received.index_count += 20'000;
       received.index_tick -= 50;
       received.i_a_a = received.edge_age_s = received.speed_rad_s = kNan;
+      received.i_c_a = received.u_f_v = received.resolver_cos_v = received.temperature_k = kNan;
       received.state = received.faults = received.encoder_levels = 99;
+      received.hall_lines = received.injected = 99;
       for (const MessageRow& row : kMessages) {
-        if (find_message(row.message, fd) != &row || row.sender != Sender::kBench) continue;
-        const Frame frame = encode_sample(row, profile_of(fd), 1, sample);
-        update_sample(row, decode(row, profile_of(fd), frame), received);
+        if (find_message(row.message, fd, wide) != &row || row.sender != Sender::kBench) continue;
+        for (std::size_t page = 0; page < (is_paged(row) ? kPages : 1); ++page) {
+          const Frame frame = encode_sample(row, profile_of(fd), 1, sample, static_cast<Page>(page));
+          update_sample(row, decode(row, profile_of(fd), frame), received);
+        }
       }
       const Profile units;
       EXPECT_EQ(received.tick, sample.tick);
@@ -347,6 +330,14 @@ TEST(CanCodec, RandomSamplesComeBack) {
       EXPECT_NEAR(received.edge_age_s, sample.edge_age_s, half * units.edge_time_unit_s + 1e-8);
       EXPECT_NEAR(received.speed_rad_s, sample.speed_rad_s, half * units.speed_unit_rad_s + 2e-4);
       EXPECT_EQ(received.owner, sample.owner) << "in no frame";
+      EXPECT_EQ(std::isnan(received.i_c_a), !wide);
+      if (!wide) continue;
+      EXPECT_NEAR(received.i_c_a, sample.i_c_a, half * units.current_unit_a + 2e-6);
+      EXPECT_NEAR(received.u_f_v, sample.u_f_v, half * units.voltage_unit_v + 2e-5);
+      EXPECT_NEAR(received.resolver_cos_v, sample.resolver_cos_v, half * 1e-3 + 1e-6);
+      EXPECT_NEAR(received.temperature_k, sample.temperature_k, half * 0.1 + 3e-4);
+      EXPECT_EQ(received.hall_lines, sample.hall_lines);
+      EXPECT_EQ(received.injected, sample.injected);
     }
   }
 }

@@ -4,17 +4,12 @@
 #include <array>
 #include <limits>
 #include <random>
+#include <vector>
 
-#include "protocols/can/codec.hpp"
+#include "tests/protocols/can_sample.hpp"
 
 namespace drivebench::can {
 namespace {
-
-Profile profile_of(bool fd) {
-  Profile profile;
-  profile.fd = fd;
-  return profile;
-}
 
 Frame a_frame(Message message, bool fd, std::uint32_t node = 1) {
   return encode(*find_message(message, fd), profile_of(fd), node, Values{});
@@ -114,22 +109,26 @@ TEST(CanMatch, TheFdProfileTakesShortMessagesInBothKinds) {
   EXPECT_EQ(problem_of(profile_of(false), a_frame(Message::kCommand, true)), FrameProblem::kWrongKind);
 }
 
-// Catches: bytes of no field that are let through, and bytes of fields or edges that are not.
+// Catches: bytes of no field that are let through, and bytes of fields or edges that are not; a page that
+// does not exist.
 TEST(CanMatch, BytesOfNoFieldMustBeZero) {
-  for (const bool fd : {false, true}) {
-    for (const MessageRow& row : kMessages) {
-      if (find_message(row.message, fd) != &row) continue;
-      for (std::size_t byte = 0; byte < row.size; ++byte) {
-        Frame frame = a_frame(row.message, fd);
+  for (const MessageRow& row : kMessages) {
+    const bool fd = row.variant == Variant::kFd;
+    for (std::size_t page = 0; page < (is_paged(row) ? kPages + 1 : 1); ++page) {
+      for (std::size_t byte = is_paged(row) ? 1 : 0; byte < row.size; ++byte) {
+        Frame frame = encode(row, profile_of(fd), 1, Values{});
+        if (is_paged(row)) frame.data[0] = static_cast<std::uint8_t>(page);
         frame.data[byte] = 0x80;
         const bool used = std::ranges::any_of(row.fields,
                                               [&](const Field& field) {
-                                                return byte >= field.start_bit / 8U &&
+                                                return is_on_page(field, page) &&
+                                                       byte >= field.start_bit / 8U &&
                                                        byte < (field.start_bit + field.bits) / 8U;
                                               }) ||
                           (row.message == Message::kEdges && byte >= kFirstEdgeByte);
-        EXPECT_EQ(problem_of(profile_of(fd), frame), used ? FrameProblem::kNone : FrameProblem::kReserved)
-            << row.name << " " << byte;
+        EXPECT_EQ(problem_of(with_wide_axes(profile_of(fd)), frame),
+                  used ? FrameProblem::kNone : FrameProblem::kReserved)
+            << row.name << " " << page << " " << byte;
       }
     }
   }
@@ -215,7 +214,7 @@ TEST(CanUnwrap, TheNearestNumberIsTaken) {
 }
 
 /// Sends what a sample says once a second and follows it, as a client does.
-void follow_a_day(bool fd) {
+void follow_a_day(bool fd, bool wide = false) {
   constexpr std::uint64_t kTicksPerSecond = 8000;
   constexpr int kSeconds = 24 * 3600;
   std::mt19937_64 random(9);
@@ -235,7 +234,7 @@ void follow_a_day(bool fd) {
     sample.index_tick = sample.command_tick - 5;
     if (second == 0) received.command_tick = received.index_tick = sample.command_tick;
     for (const MessageRow& row : kMessages) {
-      if (find_message(row.message, fd) != &row || row.sender != Sender::kBench) continue;
+      if (find_message(row.message, fd, wide) != &row || row.sender != Sender::kBench) continue;
       update_sample(row, decode(row, profile_of(fd), encode_sample(row, profile_of(fd), 1, sample)),
                     received);
     }
@@ -259,6 +258,9 @@ TEST(CanUnwrap, ADayOfClassicFramesIsFollowed) {
 }
 TEST(CanUnwrap, ADayOfFdFramesIsFollowed) {
   follow_a_day(true);
+}
+TEST(CanUnwrap, ADayOfAWideAxisIsFollowed) {
+  follow_a_day(false, true);
 }
 
 // Catches: every tick of 16 bits, three times around, in classic frames.

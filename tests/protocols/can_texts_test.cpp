@@ -75,6 +75,11 @@ TEST(CanBudget, TheDocumentedRatesFit) {
   EXPECT_LT(bus_load(profile, {.period_s = 1.0 / 2000}).most_share, 0.6);
   EXPECT_LT(bus_load(profile, {.period_s = 1.0 / 3000, .data_bit_rate = 8e6}).most_share, 0.6);
   EXPECT_GT(bus_load(profile, {.period_s = 1.0 / 8000}).most_share, 1.0);
+  EXPECT_LT(bus_load(profile, {.wide_axes = 1, .period_s = 1.0 / 2000}).most_share, 0.65);
+  EXPECT_LT(bus_load(profile, {.wide_axes = 1, .period_s = 1.0 / 3000, .data_bit_rate = 8e6}).most_share,
+            0.75);
+  profile.fd = false;
+  EXPECT_LT(bus_load(profile, {.wide_axes = 1, .sensing_axes = 1, .period_s = 1.0 / 1000}).most_share, 1.0);
 }
 
 TEST(CanBudget, TheTextHasALineForEachMessageAndTheSum) {

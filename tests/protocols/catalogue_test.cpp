@@ -77,9 +77,12 @@ TEST(Catalogue, EveryRowSaysWhatItIs) {
 // Catches: truth that a controller of a real bench could not know, offered as a sensor; or a sensor hidden.
 TEST(Catalogue, SensorsAreKnownAndTruthIsNot) {
   const auto visible = [](std::string_view name) { return find_signal(name)->kind != SignalKind::kTruth; };
-  for (const char* name : {"tick", "state", "faults", "encoder_count", "edge_period_s", "i_a_a", "u_b_v"})
+  for (const char* name : {"tick", "state", "faults", "injected", "encoder_count", "edge_period_s", "i_a_a",
+                           "u_b_v", "i_c_a", "u_f_v", "u_n_v", "hall_lines", "meter_pf"})
     EXPECT_TRUE(visible(name)) << name;
-  for (const char* name : {"angle_rad", "speed_rad_s", "torque_nm", "load_nm", "true_i_a_a", "psi_b_wb"})
+  for (const char* name :
+       {"angle_rad", "speed_rad_s", "torque_nm", "load_nm", "true_i_a_a", "psi_b_wb", "true_i_c_a",
+        "true_i_f_a", "load_angle_rad", "load_speed_rad_s", "load_position_m"})
     EXPECT_FALSE(visible(name)) << name;
 }
 
@@ -124,6 +127,32 @@ TEST(Catalogue, NumbersOfTheWireStayAsTheyAre) {
             "\x3a\x1a\x0a\x18\x08\x01\x10\x05\x18\x01\x21\x00\x00\x00\x00\x00\x00\xf0\x3f\x29\x00\x00\x00\x00"
             "\x00\x00"
             "\x00\xc0"s);
+
+  v1::Envelope inject;
+  inject.mutable_inject_fault()->set_axis(1);
+  inject.mutable_inject_fault()->set_name("x");
+  inject.mutable_inject_fault()->set_value(1.0);
+  inject.mutable_inject_fault()->set_at_tick(300);
+  EXPECT_EQ(inject.SerializeAsString(),
+            "\x92\x01\x11\x08\x01\x12\x01x\x19\x00\x00\x00\x00\x00\x00\xf0\x3f\x20\xac\x02"s);
+  v1::Envelope bump;
+  bump.mutable_shaft_bump()->set_impulse_nms(-2.0);
+  bump.mutable_shaft_bump()->set_at_tick(1);
+  EXPECT_EQ(bump.SerializeAsString(), "\x9a\x01\x0b\x11\x00\x00\x00\x00\x00\x00\x00\xc0\x18\x01"s);
+  v1::Command currents;
+  currents.set_gates(v1::GATES_CURRENT);
+  currents.set_u_c_v(1.0);
+  currents.set_u_f_v(1.0);
+  currents.set_i_a_a(1.0);
+  currents.set_i_f_a(-2.0);
+  EXPECT_EQ(currents.SerializeAsString(),
+            "\x18\x03\x31\x00\x00\x00\x00\x00\x00\xf0\x3f\x39\x00\x00\x00\x00\x00\x00\xf0\x3f"
+            "\x41\x00\x00\x00\x00\x00\x00\xf0\x3f\x59\x00\x00\x00\x00\x00\x00\x00\xc0"s);
+  v1::Input input;
+  input.mutable_inject();
+  EXPECT_EQ(input.SerializeAsString(), "\x6a\x00"s);
+  input.mutable_bump();
+  EXPECT_EQ(input.SerializeAsString(), "\x72\x00"s);
 
   v1::Envelope welcome;
   welcome.set_id(1);

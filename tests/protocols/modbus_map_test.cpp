@@ -26,6 +26,10 @@ const RegisterMap& map() {
   return whole;
 }
 
+std::span<const RegisterMap> one(const RegisterMap& map) {
+  return {&map, 1};
+}
+
 // Catches: bytes or words in another order than the standard's and the documents' ABCD.
 TEST(ModbusCodec, ValuesLieInRegistersAsTheBooksSay) {
   std::uint16_t words[4] = {};
@@ -84,9 +88,83 @@ TEST(ModbusMap, EverySignalStandsInTheSampleBlockOnce) {
   EXPECT_EQ(address_of("speed_rad_s"), 266);
   EXPECT_EQ(address_of("bus_voltage_v"), 280);
   EXPECT_EQ(address_of("snapshot"), 282);
+  EXPECT_EQ(address_of("i_c_a"), 286);
+  EXPECT_EQ(address_of("hall_lines"), 296);
+  EXPECT_EQ(address_of("temperature_k"), 306);
+  EXPECT_EQ(address_of("meter_pf"), 316);
+  EXPECT_EQ(address_of("injected"), 318);
+  EXPECT_EQ(address_of("true_i_c_a"), 322);
+  EXPECT_EQ(address_of("load_position_m"), 330);
+  EXPECT_EQ(address_of("last_snapshot"), 332);
   EXPECT_EQ(address_of("lease_key"), 400);
   EXPECT_EQ(address_of("command_counter"), 403);
+  EXPECT_EQ(address_of("command_c"), 429);
+  EXPECT_EQ(address_of("command_field"), 431);
   EXPECT_EQ(address_of("machine.b"), 1002);
+}
+
+// Catches: process data of phase c, the field, the Hall lines or the injected faults at another address or
+// scale.
+TEST(ModbusMap, TheProcessDataOfAllTerminalsStandHere) {
+  struct Place {
+    std::uint16_t address;
+    std::string_view name;
+    double scale;
+  };
+  const auto places = std::to_array<Place>({{122, "reference_mode", 1.0},
+                                            {125, "reference_c", 0.01},
+                                            {126, "reference_field", 0.01},
+                                            {131, "i_c_a", 0.01},
+                                            {132, "i_f_a", 0.01},
+                                            {135, "temperature_k", 0.1},
+                                            {136, "hall_lines", 1.0},
+                                            {138, "injected_low", 1.0},
+                                            {141, "more_snapshot", 1.0}});
+  for (const Place& place : places) {
+    const auto row = std::find_if(map().rows().begin(), map().rows().end(),
+                                  [&](const Row& each) { return each.address == place.address; });
+    ASSERT_NE(row, map().rows().end()) << place.name;
+    EXPECT_EQ(row->name, place.name);
+    EXPECT_EQ(row->scale, place.scale) << place.name;
+  }
+}
+
+// Catches: sensors that one request cannot read together with the tick.
+TEST(ModbusMap, OneRequestReadsEverySensor) {
+  EXPECT_LE(kSensorsLength, 125);
+  EXPECT_EQ(kSampleStart + kSensorsLength, 324);
+  EXPECT_TRUE(map().find(kSampleStart, kSensorsLength));
+  for (const Row& row : map().rows()) {
+    if (row.content != Content::kSignal || row.address < kSampleStart) continue;
+    if (kSignals[row.index].kind == SignalKind::kTruth) continue;
+    EXPECT_LE(row.end(), std::size_t{kSampleStart} + kSensorsLength) << row.name;
+  }
+}
+
+// Catches: a block for all terminals that has something else in the place of what the first block has, or
+// less of it: who knows one must know the other.
+TEST(ModbusMap, TheBlocksForAllTerminalsRepeatTheFirstOnes) {
+  const auto row_at = [](std::uint16_t address) {
+    const auto row = std::find_if(map().rows().begin(), map().rows().end(),
+                                  [&](const Row& each) { return each.address == address; });
+    return row == map().rows().end() ? Row{} : *row;
+  };
+  for (std::uint16_t address = 400; address < 409; ++address) {
+    const Row first = row_at(address);
+    const Row again = row_at(static_cast<std::uint16_t>(address + 20));
+    EXPECT_EQ(first.content, again.content) << address;
+    EXPECT_EQ(first.type, again.type) << address;
+    EXPECT_EQ(first.maximum, again.maximum) << address;
+    EXPECT_EQ((first.name.empty() ? "" : "more_") + std::string(first.name), again.name);
+  }
+  for (const Row& row : map_detail::kProcess) {
+    const auto same = [&](const Row& other) {
+      return other.content == row.content && other.index == row.index && other.scale == row.scale &&
+             other.type == row.type && other.writable == row.writable;
+    };
+    EXPECT_TRUE(std::any_of(map_detail::kMoreProcess.begin(), map_detail::kMoreProcess.end(), same))
+        << row.name;
+  }
 }
 
 // Catches: rows that overlap, a block header that does not describe its block, an address above the mirror.
@@ -102,9 +180,31 @@ TEST(ModbusMap, TheBlocksHoldTheRowsWithoutAGap) {
   EXPECT_LE(next, kMirrorOffset);
   for (const Block& block : map().blocks()) {
     EXPECT_TRUE(map().find(block.start, block.length)) << block.name;
-    EXPECT_FALSE(map().find(block.start, static_cast<std::uint16_t>(block.length + 1))) << block.name;
-    EXPECT_FALSE(map().find(static_cast<std::uint16_t>(block.start - 1), 2)) << block.name;
+    // One block alone follows on another.
+    EXPECT_EQ(map().find(block.start, static_cast<std::uint16_t>(block.length + 1)).has_value(),
+              block.id == 2)
+        << block.name;
+    EXPECT_EQ(map().find(static_cast<std::uint16_t>(block.start - 1), 2).has_value(), block.id == 6)
+        << block.name;
   }
+  EXPECT_FALSE(map().find(100, 100)) << "over a gap";
+  EXPECT_FALSE(map().find(12, 60'000)) << "beyond the end";
+}
+
+// Catches: a bit of the encoder, the Hall lines or the injected faults at another's input.
+TEST(ModbusMap, EveryDiscreteInputHasItsBit) {
+  for (std::size_t input = 0; input < kDiscreteInputs; ++input) {
+    Sample sample;
+    sample.state = 99;
+    if (input < 16) sample.faults = std::uint64_t{1} << input;
+    if (input >= 16 && input < 21) sample.state = input - 16;
+    if (input >= 21 && input < 27) sample.encoder_levels = std::uint64_t{1} << (input - 21);
+    if (input >= 27 && input < 30) sample.hall_lines = std::uint64_t{1} << (input - 27);
+    if (input >= 30) sample.injected = std::uint64_t{1} << (input - 30);
+    for (std::size_t other = 0; other < kDiscreteInputs; ++other)
+      EXPECT_EQ(discrete_input(other, sample), other == input) << input << " " << other;
+  }
+  EXPECT_EQ(kDiscreteInputs, 62u);
 }
 
 // Catches: a sample that loses a signal, a sign or the upper half of a counter between the ends of the wire.
@@ -118,10 +218,15 @@ TEST(ModbusMap, ASampleComesBackAsItWasButForFloatRounding) {
     if (signal.type == SignalType::kSigned) sample.*signal.as_signed = std::bit_cast<std::int64_t>(value);
     if (signal.type == SignalType::kReal) sample.*signal.as_real = value;
   }
-  std::vector<std::uint16_t> words(kSampleLength);
+  std::vector<std::uint16_t> words(map_detail::kMoreSample.back().end() - kSampleStart);
   for (const Row& row : map_detail::kSample)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
+  for (const Row& row : map_detail::kMoreSample)
+    put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   const Sample back = read_sample(words);
+  const Sample first = read_sample(std::span(words).first(kSampleLength));
+  EXPECT_EQ(first.bus_voltage_v, back.bus_voltage_v);
+  EXPECT_EQ(first.i_c_a, 0.0) << "not among the words";
   for (const Signal& signal : kSignals) {
     switch (signal.type) {
       case SignalType::kUnsigned:
@@ -215,12 +320,14 @@ TEST(ModbusFraming, ABadHeaderIsKnownByItsSixBytes) {
 
 // Catches: a map for people that differs from the one that is served.
 TEST(ModbusMapText, TheTextsHaveALineForEveryValue) {
-  const auto faults = std::to_array<FaultInput>({{.address = 8, .bit = {"over_current_trip", "latched"}}});
+  const auto faults =
+      std::to_array<FaultInput>({{.address = 8, .bit = {"over_current_trip", "latched"}},
+                                 {.address = kFirstInjectedInput + 5, .bit = {"leg_stuck_off", "injected"}}});
   const auto axes = std::to_array<std::string_view>({"left", "right"});
-  const std::string csv = map_csv(map(), faults);
-  const std::string markdown = map_markdown(map(), faults, axes);
+  const std::string csv = map_csv(one(map()), faults);
+  const std::string markdown = map_markdown(one(map()), faults, axes);
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'),
-            std::ptrdiff_t(1 + map().rows().size() + kCoils.size() + 1 + kOtherInputs.size()));
+            std::ptrdiff_t(1 + map().rows().size() + kCoils.size() + 2 + kOtherInputs.size()));
   EXPECT_NE(csv.find("\nregister,102,0x0066,30103,40103,10102,reference_a,voltage of phase a while operation "
                      "is enabled,int16,rw,V,"
                      "0.01,-327.68 .. 327.67\n"),
@@ -230,12 +337,32 @@ TEST(ModbusMapText, TheTextsHaveALineForEveryValue) {
             std::string::npos);
   EXPECT_NE(csv.find("\ndiscrete input,8,0x0008,10009,,,over_current_trip,latched,bit,r,"),
             std::string::npos);
+  EXPECT_NE(csv.find("\ndiscrete input,35,0x0023,10036,,,leg_stuck_off,injected,bit,r,"), std::string::npos);
   EXPECT_NE(markdown.find("| 1004 | 0x03ec | 31005 | 41005 | 11004 | machine.c | fixed | float32 | r |"),
             std::string::npos);
   EXPECT_NE(markdown.find("two \\| words"), std::string::npos);
   EXPECT_NE(markdown.find("* unit id 2: axis 1, right\n"), std::string::npos);
+  EXPECT_NE(markdown.find("\n## Parameters\n"), std::string::npos);
   const RegisterMap read_only(kParameters, false);
-  EXPECT_EQ(map_csv(read_only, faults).find(",rw,"), std::string::npos);
+  EXPECT_EQ(map_csv(one(read_only), faults).find(",rw,"), std::string::npos);
+}
+
+// Catches: parameters of one kind of machine shown for an axis with another.
+TEST(ModbusMapText, AxesOfDifferentKindsHaveTheirOwnParameters) {
+  constexpr auto kOthers =
+      std::to_array<ParameterInfo>({{"machine.z", "V", 0.0, 9.0, true, "of the other kind"}});
+  const std::array<RegisterMap, 2> maps = {map(), RegisterMap(kOthers, true)};
+  const std::string csv = map_csv(maps, {});
+  EXPECT_NE(csv.find("\nregister,400,"), std::string::npos);
+  EXPECT_EQ(csv.find("\nregister,1000,"), std::string::npos);
+  EXPECT_NE(csv.find("\nregister of unit 1,1004,0x03ec,31005,41005,11004,machine.c,"), std::string::npos);
+  EXPECT_NE(csv.find("\nregister of unit 2,1000,0x03e8,31001,41001,11000,machine.z,"), std::string::npos);
+  EXPECT_EQ(csv.find("\nregister,400,", csv.find("\nregister,400,") + 1), std::string::npos) << "once";
+  const std::string markdown = map_markdown(maps, {}, {});
+  const std::size_t second = markdown.find("\n## Parameters of unit id 2\n");
+  EXPECT_NE(second, std::string::npos);
+  EXPECT_NE(markdown.find("machine.z", second), std::string::npos);
+  EXPECT_LT(markdown.find("machine.c"), second);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ TEST(BenchLease, TheWatchdogActsExactlyItsTicksAfterTheLastCommand) {
       BenchSetup setup = servo_setup(delay);
       setup.watchdog_ticks = 5;
       setup.axes[0].on_link_loss = action;
-      setup.axes[0].parameters.amplifier.voltage_limit_v = 50.0;
+      setup.axes[0].parameters.drive.amplifier.voltage_limit_v = 50.0;
       Bench bench = owned_bench(setup, kOwner);
       step(bench, 9);
       submit_volts(bench, kOwner, 2.0);
@@ -218,7 +218,7 @@ TEST(BenchLease, ALatchedAxisTakesOnlyCommandsWithTheGatesOff) {
   step(bench, 3);
   ASSERT_TRUE(bench.is_latched(0));
   EXPECT_EQ(submit_volts(bench, kOwner, 12.0), Refused::kLatched);
-  const Command off{.answers = bench.tick(), .phases = {.gates = Gates::kOff, .voltage_v = {}}};
+  const Command off{.answers = bench.tick(), .phases = {.gates = Gates::kOff, .setpoint = {}}};
   EXPECT_EQ(bench.submit({.tick = bench.tick(), .axis = 0, .owner = kOwner, .action = off}), Refused::kNot);
   EXPECT_TRUE(bench.has_command(0));
   bench.step();

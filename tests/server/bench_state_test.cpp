@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "tests/server/servo_bench.hpp"
 
 namespace drivebench {
@@ -19,7 +19,7 @@ BenchSetup rich_setup() {
   AxisParameters& p = setup.axes[0].parameters;
   p.mechanics.coulomb_friction_nm = 0.01;
   p.mechanics.static_friction_nm = 0.02;
-  p.current_sensor = {.bits = 12, .full_scale_a = 20.0, .noise_rms_a = 0.02};
+  p.sensors.current = {.bits = 12, .full_scale_a = 20.0, .noise_rms_a = 0.02};
   p.encoder.half_count_offset = true;
   setup.axes.push_back({.parameters = servo_axis(), .on_link_loss = SafeAction::kZeroVoltage});
   return setup;
@@ -61,17 +61,24 @@ bool same_samples(const Bench& a, const Bench& b) {
   return true;
 }
 
-// The tick of the save lies within a load ramp, before a scheduled input and after a live write. Kills: any
-// piece of state that is not saved, and any that depends on the past of the process.
+// The tick of the save lies within a load ramp and a parameter ramp, before scheduled inputs, under a fault
+// and after a live write. Kills: any piece of state that is not saved, and any that depends on the past of
+// the process.
 TEST(BenchState, ARestoredBenchContinuesBitForBitForAMillionTicks) {
   Bench original(rich_setup());
-  const Parameter* row = find_parameter("machine.rotor_resistance_ohm");
   run_to(original, 1200);
   original.submit({.tick = original.tick(),
                    .axis = 0,
                    .owner = 0,
-                   .action = ParameterWrite{.row = static_cast<std::uint32_t>(row - axis_parameters().data()),
-                                            .value = 5.0}});
+                   .action = write_of(servo_axis(), "machine.rotor_resistance_ohm", 5.0)});
+  const auto submit = [&](const Action& action, std::uint32_t axis, Tick tick) {
+    original.submit({.tick = tick, .axis = axis, .owner = 0, .action = action});
+  };
+  submit(write_of(servo_axis(), "machine.stator_resistance_ohm", 2.5, 5000), 0, 2000);
+  submit(write_of(servo_axis(), "mechanics.viscous_friction_nms", 1e-3, 100), 1, 4300);
+  submit(fault_of("current_sensor_gain", -0.1), 0, 2500);
+  submit(fault_of("rotor_resistance_drift", 0.5), 1, 5000);
+  submit(ShaftBump{1e-5}, 1, 4000);
   original.submit({.tick = 4321, .axis = 0, .owner = 0, .action = LoadChange{0.03, 17}});
   original.submit({.tick = 4321, .axis = 1, .owner = 0, .action = LoadChange{0.01, 0}});
   run_to(original, 2600);
@@ -147,7 +154,7 @@ TEST(BenchState, AStateOfAnotherSetupIsRefused) {
   Bench original(rich_setup());
   run_to(original, 300);
   const std::vector<std::byte> saved = original.save();
-  std::vector<BenchSetup> others(9, rich_setup());
+  std::vector<BenchSetup> others(12, rich_setup());
   others[0].period_ns = 100'000;
   others[1].substeps = 4;
   others[2].seed = 2;
@@ -155,8 +162,15 @@ TEST(BenchState, AStateOfAnotherSetupIsRefused) {
   others[4].watchdog_ticks = 21;
   others[5].lease_ticks = 15'999;
   others[6].axes[1].on_link_loss = SafeAction::kFreewheel;
-  others[7].axes[0].parameters.machine.rotor_resistance_ohm = 3.91;
+  induction(others[7].axes[0].parameters).rotor_resistance_ohm = 3.91;
   others[8].axes.push_back(others[8].axes[0]);
+  others[9].axes[1].shares_shaft_with = 0;
+  others[10].axes[0].parameters.mechanics.load_profile = Curve({{0.0, 0.0}, {1.0, 0.1}});
+  others[11].axes[0].parameters.machine = BldcMachineParameters{.pole_pairs = 3,
+                                                                .stator_resistance_ohm = 1.7,
+                                                                .self_inductance_h = 0.014,
+                                                                .mutual_inductance_h = 0.0,
+                                                                .torque_constant_nm_per_a = 0.1};
   for (const BenchSetup& setup : others) {
     Bench bench(setup);
     const std::uint64_t before = bench.state_hash();
@@ -195,7 +209,7 @@ TEST(BenchState, TheHashCoversThePast) {
 TEST(BenchState, TheSeedMattersOnlyWhereThereIsNoise) {
   for (const bool noise : {false, true}) {
     BenchSetup setup = rich_setup();
-    setup.axes[0].parameters.current_sensor.noise_rms_a = noise ? 0.02 : 0.0;
+    setup.axes[0].parameters.sensors.current.noise_rms_a = noise ? 0.02 : 0.0;
     BenchSetup reseeded = setup;
     reseeded.seed = 12'345;
     EXPECT_EQ(hash_at(setup, 500) == hash_at(reseeded, 500), !noise);

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "tests/server/servo_bench.hpp"
 
 namespace drivebench {
@@ -40,7 +40,7 @@ TEST(Bench, TheCommandDelayIsExactlyItsTicks) {
 TEST(Bench, TheSafeActionLastsUntilTheFirstCommandIsInForce) {
   BenchSetup setup = servo_setup(1);
   setup.axes[0].on_link_loss = SafeAction::kZeroVoltage;
-  setup.axes[0].parameters.amplifier.voltage_limit_v = 5.0;
+  setup.axes[0].parameters.drive.amplifier.voltage_limit_v = 5.0;
   Bench bench = owned_bench(setup, kOwner);
   submit_volts(bench, kOwner, 4.0);
   step(bench, 4);  // builds up a current, and holds
@@ -137,7 +137,7 @@ TEST(Bench, AnOverrunLatchesEveryAxis) {
 // Kills: a trip whose state the sample does not show, or that a command undoes.
 TEST(Bench, AnOverCurrentTripIsAFaultUntilCleared) {
   BenchSetup setup = servo_setup();
-  setup.axes[0].parameters.amplifier.over_current_a = 1.0;
+  setup.axes[0].parameters.drive.amplifier.over_current_a = 1.0;
   Bench bench = owned_bench(setup, kOwner);
   submit_volts(bench, kOwner, 100.0);
   bench.step();
@@ -197,13 +197,12 @@ TEST(Bench, TheScheduleIsBoundedAndMakesRoomAgain) {
 // Kills: a parameter write that acts at submission, on another row, or not at all.
 TEST(Bench, AParameterWriteActsAtItsTick) {
   Bench bench(servo_setup());
-  const Parameter* row = find_parameter("machine.rotor_resistance_ohm");
-  const auto index = static_cast<std::uint32_t>(row - axis_parameters().data());
-  bench.submit({.tick = 3, .axis = 0, .owner = 0, .action = ParameterWrite{.row = index, .value = 5.85}});
+  const std::string name = "machine.rotor_resistance_ohm";
+  bench.submit({.tick = 3, .axis = 0, .owner = 0, .action = write_of(servo_axis(), name, 5.85)});
   step(bench, 3);
-  EXPECT_EQ(bench.axis(0).parameters().machine.rotor_resistance_ohm, 3.9);
+  EXPECT_EQ(value_of(bench.axis(0).parameters(), name), 3.9);
   bench.step();
-  EXPECT_EQ(bench.axis(0).parameters().machine.rotor_resistance_ohm, 5.85);
+  EXPECT_EQ(value_of(bench.axis(0).parameters(), name), 5.85);
 }
 
 class Listener final : public BenchObserver {

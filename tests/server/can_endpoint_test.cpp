@@ -79,11 +79,12 @@ TEST(CanEndpoint, EveryRefusedCommandSaysWhyAndIsCounted) {
   expect(Result::kNotFinite, 1, std::numeric_limits<double>::infinity(), lease, 1.0);
   expect(Result::kStale, 0, 1.0, lease, 1.0);  // a duplicate
   expect(Result::kStale, 2, 1.0, lease, 1.0);  // of the future
-  expect(Result::kMalformed, 1, 1.0, lease, 4.0);
+  expect(Result::kMalformed, 1, 1.0, lease, 5.0);
+  expect(Result::kWrongDrive, 1, 1.0, lease, 4.0);  // currents for a voltage amplifier
   bench.command(1, 2.0, 0.0, lease);
   EXPECT_EQ(bench.engine().tick(), 2);
-  EXPECT_EQ(refused() - before, 7u);
-  EXPECT_EQ(bench.count("refused"), 7u);
+  EXPECT_EQ(refused() - before, 8u);
+  EXPECT_EQ(bench.count("refused"), 8u);
 }
 
 // Catches: duties taken as volts, in either variant; a duty beyond 1 that is not clipped by the amplifier.
@@ -145,8 +146,8 @@ TEST(CanEndpoint, LeaseNumbersSkipZeroWhenTheyWrap) {
 // it.
 TEST(CanEndpoint, CMD_04_OnlyTheOwnerClearsALatchedFault) {
   BenchConfig config = servo_bench();
-  config.setup.axes[0].parameters.amplifier.over_current_a = 0.5;
-  config.setup.axes[0].parameters.amplifier.over_current_trip = true;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.5;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
   config.can.emplace_back();
   CanBench bench(config);
   const std::uint8_t lease = bench.acquire();

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "protocols/can/codec.hpp"
+#include "protocols/can/command.hpp"
 #include "server/asio.hpp"
 #include "server/endpoints/can/endpoint.hpp"
 #include "server/endpoints/can/memory_bus.hpp"
@@ -25,25 +25,25 @@ struct Received {
   Values values;
   Frame frame;
 
-  double operator[](std::string_view field) const {
-    return values[index_of(row->message, row->variant == Variant::kFd, field)];
-  }
+  double operator[](std::string_view field) const { return values[index_of(*row, field)]; }
 };
+
+/// A bench whose bus says everything often.
+inline BenchConfig on_bus(BenchConfig bench, Profile profile) {
+  CanConfig can;
+  can.profile = profile;
+  can.edges = profile.fd;
+  can.state_every_ticks = 4;
+  can.heartbeat_ms = 10;
+  can.controller_timeout_ms = 30;
+  bench.can.push_back(can);
+  return bench;
+}
 
 /// A lockstep bench on a bus in memory, and a controller on the same bus that says what it is told to.
 class CanBench {
  public:
-  explicit CanBench(Profile profile = {}, std::size_t axes = 1) {
-    BenchConfig bench = servo_bench(axes);
-    CanConfig can;
-    can.profile = profile;
-    can.edges = profile.fd;
-    can.state_every_ticks = 4;
-    can.heartbeat_ms = 10;
-    can.controller_timeout_ms = 30;
-    bench.can.push_back(can);
-    setup(bench);
-  }
+  explicit CanBench(Profile profile = {}, std::size_t axes = 1) { setup(on_bus(servo_bench(axes), profile)); }
   explicit CanBench(const BenchConfig& bench) { setup(bench); }
 
   /// Lets everything happen that needs no waiting.
@@ -65,7 +65,7 @@ class CanBench {
   }
 
   void send(Message message, std::span<const double> values, std::uint32_t node = 1) {
-    controller_->send(encode(*find_message(message, profile_.fd), profile_, node, values));
+    controller_->send(encode(*find_message(message, profile_.fd, is_wide(node)), profile_, node, values));
     settle();
   }
   void send(const Frame& frame) {
@@ -90,12 +90,18 @@ class CanBench {
   /// `answers` may be any number: its low bits go out.
   void command(double answers, double u_a, double u_b, std::uint8_t lease, double mode = 1.0,
                std::uint32_t node = 1) {
+    command({.tick = static_cast<std::uint64_t>(static_cast<std::int64_t>(answers)),
+             .mode = static_cast<unsigned>(mode),
+             .lease = lease,
+             .a = u_a,
+             .b = u_b},
+            node);
+  }
+  void command(const Setpoints& setpoints, std::uint32_t node = 1) {
     received.clear();
-    if (profile_.fd) {
-      send(Message::kCommand, std::array{answers, u_a, u_b, mode, static_cast<double>(lease)}, node);
-    } else {
-      send(Message::kCommand, std::array{u_a, u_b, answers, mode, static_cast<double>(lease)}, node);
-    }
+    for (const Frame& frame : encode_command(profile_, node, is_wide(node), setpoints))
+      controller_->send(frame);
+    settle();
   }
   std::optional<Received> newest(Message message, std::uint32_t node = 1) const {
     for (auto it = received.rbegin(); it != received.rend(); ++it) {
@@ -116,6 +122,7 @@ class CanBench {
     return 0;
   }
 
+  bool is_wide(std::uint32_t node) const { return terminals_of(engine_->parameters(node - 1)).is_wide(); }
   Engine& engine() { return *engine_; }
   Endpoint& endpoint() { return *endpoint_; }
   MemoryWire& wire() { return wire_; }
@@ -126,14 +133,16 @@ class CanBench {
  private:
   void setup(const BenchConfig& bench) {
     profile_ = bench.can.front().profile;
+    for (const AxisSetup& axis : bench.setup.axes)
+      profile_.wide |= terminals_of(axis.parameters).is_wide();
     controller_ = wire_.connect("controller");
     controller_->on_frame = [this](const Frame& frame, std::int64_t) {
       const Match found = match(profile_, frame);
       ASSERT_TRUE(found.ok()) << name_of(found.problem);
       received.push_back({found.row, found.node, decode(*found.row, profile_, frame), frame});
     };
-    endpoint_ = std::make_unique<Endpoint>(io_, bench.can.front(), wire_.connect("bench"));
     engine_ = make_lockstep_engine(bench, nullptr);
+    endpoint_ = std::make_unique<Endpoint>(io_, bench.can.front(), wire_.connect("bench"));
     endpoint_->serve(*engine_);
     settle();
   }

@@ -18,9 +18,10 @@ TEST(ConfigFiles, BenchFileOverridesTheMotorFile) {
   const std::size_t machine = text.find("pole_pairs");
   text.replace(machine, text.find("[axis.mechanics]") - machine, "rotor_resistance_ohm = 5.85\n");
   const AxisParameters p = parse(text).setup.axes[0].parameters;
-  EXPECT_EQ(p.machine.rotor_resistance_ohm, 5.85);
-  EXPECT_EQ(p.machine.stator_resistance_ohm, 1.7);
-  EXPECT_EQ(p.machine.pole_pairs, 3);
+  const auto& motor = std::get<InductionMachineParameters>(p.machine);
+  EXPECT_EQ(motor.rotor_resistance_ohm, 5.85);
+  EXPECT_EQ(motor.stator_resistance_ohm, 1.7);
+  EXPECT_EQ(motor.pole_pairs, 3);
   EXPECT_EQ(p.mechanics.viscous_friction_nms, 1.4e-4);
 }
 
@@ -43,7 +44,7 @@ TEST(ConfigFiles, ProblemsOfTheMotorFileNameItAndAreToldOnce) {
                 m + ":2: machine.rotor_resistance_ohm is missing\n" +  //
                 m + ":2: machine.stator_inductance_h is missing\n" +   //
                 m + ":4: machine.stator_resistance_ohm is 0 but must lie between 1e-06 and 1e+06 ohm\n" + m +
-                ":5: shaft is not a known key; known here: name, source, machine, mechanics");
+                ":5: shaft is not a known key; known here: name, source, machine, mechanics, thermal");
 }
 
 // Catches a token that everybody may read, an empty one, and one that drags its line end along.

@@ -51,7 +51,7 @@ TEST(ConfigRules, EachRuleIsKept) {
       {"125", "0x7d", ":4: bench.period_us is a number that is not decimal but must be a finite number"},
       {"125", "", ":4: Error"},
       {"125", "2024-01-01", ":4: bench.period_us is a date or time but must be a finite number"},
-      {"125", "125\nsubsteps = 33", ":5: bench.substeps is 33 but must lie between 1 and 32"},
+      {"125", "125\nsubsteps = 65", ":5: bench.substeps is 65 but must lie between 1 and 64"},
       {"125", "125\nsubsteps = 5.0", ":5: bench.substeps is 5 but must be a whole number"},
       {"125", "125\nseed = -1", ":5: bench.seed is -1"},
       {"125", "125\nwatchdog_ticks = 0", ":5: bench.watchdog_ticks is 0"},
@@ -117,14 +117,14 @@ TEST(ConfigRules, EachRuleIsKept) {
 TEST(ConfigRules, StepTooLongForTheMachineIsRefusedWithTheSubstepsItNeeds) {
   const std::string found = problems_of(with("125", "2000\nsubsteps = 4"));
   EXPECT_NE(found.find(":5: bench.substeps comes to steps of 500 us, too long"), std::string::npos) << found;
-  EXPECT_NE(found.find("axis \"x\", 809.3"), std::string::npos) << found;  // 1/1235.6 s, the faster pole
+  EXPECT_NE(found.find("axis \"x\", 954.4"), std::string::npos) << found;  // 1/gamma
   EXPECT_NE(found.find("at least 5 substeps"), std::string::npos) << found;
   EXPECT_EQ(problems_of(with("125", "2000\nsubsteps = 5")), "none");
 
-  const std::string slow = problems_of(with("125", "20000"));
+  const std::string slow = problems_of(with("125", "40000"));
   EXPECT_NE(slow.find(":4: bench.period_us"), std::string::npos) << slow;
   const std::size_t at = slow.find("at most ") + 8;
-  EXPECT_EQ(problems_of(with("125", slow.substr(at) + "\nsubsteps = 32")), "none") << slow;
+  EXPECT_EQ(problems_of(with("125", slow.substr(at) + "\nsubsteps = 64")), "none") << slow;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,7 +14,7 @@
 #include <string>
 #include <system_error>
 
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "server/config.hpp"
 
 namespace drivebench::test {
@@ -131,6 +132,20 @@ inline void expect_equal(const ModbusConfig& x, const ModbusConfig& y) {
   EXPECT_EQ(x.idle_timeout_ms, y.idle_timeout_ms);
 }
 
+inline void expect_equal(const std::vector<CurvePoint>& x, const std::vector<CurvePoint>& y) {
+  ASSERT_EQ(x.size(), y.size());
+  EXPECT_EQ(std::memcmp(x.data(), y.data(), x.size() * sizeof(CurvePoint)), 0);
+}
+
+inline void expect_equal(const std::vector<AxisEvent>& x, const std::vector<AxisEvent>& y) {
+  ASSERT_EQ(x.size(), y.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const PackedInput a = pack({.tick = x[i].tick, .action = x[i].action});
+    const PackedInput b = pack({.tick = y[i].tick, .action = y[i].action});
+    EXPECT_EQ(std::memcmp(&a, &b, sizeof(a)), 0) << "event " << i << " at tick " << x[i].tick;
+  }
+}
+
 /// Everything but token and files, bit for bit.
 inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
   EXPECT_EQ(x.name, y.name);
@@ -160,18 +175,17 @@ inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
     EXPECT_EQ(x.axes[i].motor, y.axes[i].motor);
     EXPECT_EQ(x.axes[i].can_node, y.axes[i].can_node);
     EXPECT_EQ(x.setup.axes[i].on_link_loss, y.setup.axes[i].on_link_loss);
-    for (const Parameter& row : axis_parameters()) {
-      EXPECT_EQ(std::bit_cast<std::uint64_t>(row.get(x.setup.axes[i].parameters)),
-                std::bit_cast<std::uint64_t>(row.get(y.setup.axes[i].parameters)))
+    const AxisParameters& p = x.setup.axes[i].parameters;
+    const AxisParameters& q = y.setup.axes[i].parameters;
+    EXPECT_EQ(x.setup.axes[i].shares_shaft_with, y.setup.axes[i].shares_shaft_with);
+    ASSERT_EQ(p.machine.index(), q.machine.index());
+    for (const CurveParameter& row : axis_curves(p))
+      expect_equal(row.get(p).points(), row.get(q).points());
+    for (const Parameter& row : axis_parameters(p)) {
+      EXPECT_EQ(std::bit_cast<std::uint64_t>(row.get(p)), std::bit_cast<std::uint64_t>(row.get(q)))
           << row.name;
     }
-    ASSERT_EQ(x.axes[i].loads.size(), y.axes[i].loads.size());
-    for (std::size_t j = 0; j < x.axes[i].loads.size(); ++j) {
-      EXPECT_EQ(x.axes[i].loads[j].tick, y.axes[i].loads[j].tick);
-      EXPECT_EQ(x.axes[i].loads[j].change.ramp_ticks, y.axes[i].loads[j].change.ramp_ticks);
-      EXPECT_EQ(std::bit_cast<std::uint64_t>(x.axes[i].loads[j].change.load_nm),
-                std::bit_cast<std::uint64_t>(y.axes[i].loads[j].change.load_nm));
-    }
+    expect_equal(x.axes[i].events, y.axes[i].events);
   }
 }
 

@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "bench.pb.h"
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "protocols/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 #include "server/recording.hpp"
@@ -122,29 +122,49 @@ TEST(Recorder, EveryKindOfInputKeepsItsContents) {
     recorder.on_input(4, {.tick = 4, .axis = 0, .owner = 9, .action = action});
   };
   put(ClearFaults{});
-  put(Command{.answers = 3, .phases = {.gates = Gates::kZeroVoltage, .voltage_v = {-0.0, 5e-324}}});
+  put(Command{.answers = 3,
+              .phases = {.gates = Gates::kZeroVoltage,
+                         .setpoint = {.a = -0.0, .b = 5e-324, .c = 1.0, .field = -2.0}}});
   put(LeaseAction::kLost);
   put(LoadChange{-0.25, 0});
-  put(ParameterWrite{1, 2.5});
+  put(ParameterWrite{.row = 1, .value = 2.5, .ramp_ticks = 77});
   put(LateTick{});
   put(Overrun{});
   put(RefusedCommand{});
+  put(fault_of("hall_offset", -0.25));
+  put(ShaftBump{-0.5});
+  put(Command{
+      .answers = 4,
+      .phases = {.gates = Gates::kCurrent, .setpoint = {.a = 1.0, .b = 2.0, .c = 3.0, .field = 4.0}}});
   recorder.finish({});
 
   const Recording recording(folder / "run.mcap");
-  ASSERT_EQ(recording.inputs.size(), 8u);
+  ASSERT_EQ(recording.inputs.size(), 11u);
   EXPECT_TRUE(recording.inputs[0].clear());
   EXPECT_EQ(recording.inputs[1].command().tick(), 3u);
   EXPECT_EQ(recording.inputs[1].command().gates(), v1::GATES_ZERO);
   EXPECT_TRUE(std::signbit(recording.inputs[1].command().u_a_v()));
   EXPECT_EQ(recording.inputs[1].command().u_b_v(), 5e-324);
+  EXPECT_EQ(recording.inputs[1].command().u_c_v(), 1.0);
+  EXPECT_EQ(recording.inputs[1].command().u_f_v(), -2.0);
   EXPECT_EQ(recording.inputs[2].lease(), v1::LeaseRequest::ACTION_LOST);
   EXPECT_EQ(recording.inputs[3].load().load_nm(), -0.25);
-  EXPECT_EQ(recording.inputs[4].parameter().name(), axis_parameters()[1].name);
+  EXPECT_EQ(recording.inputs[4].parameter().name(), axis_parameters(servo_axis())[1].name);
   EXPECT_EQ(recording.inputs[4].parameter().value(), 2.5);
+  EXPECT_EQ(recording.inputs[4].parameter().ramp_ticks(), 77u);
   EXPECT_EQ(recording.inputs[5].action_case(), v1::Input::kLateTick);
   EXPECT_EQ(recording.inputs[6].action_case(), v1::Input::kOverrun);
   EXPECT_EQ(recording.inputs[7].action_case(), v1::Input::kRefusedCommand);
+  EXPECT_EQ(recording.inputs[8].inject().name(), "hall_offset");
+  EXPECT_EQ(recording.inputs[8].inject().value(), -0.25);
+  EXPECT_EQ(recording.inputs[9].bump().impulse_nms(), -0.5);
+  const v1::Command& currents = recording.inputs[10].command();
+  EXPECT_EQ(currents.gates(), v1::GATES_CURRENT);
+  EXPECT_EQ(currents.u_a_v() + currents.u_b_v() + currents.u_c_v() + currents.u_f_v(), 0.0);
+  EXPECT_EQ(currents.i_a_a(), 1.0);
+  EXPECT_EQ(currents.i_b_a(), 2.0);
+  EXPECT_EQ(currents.i_c_a(), 3.0);
+  EXPECT_EQ(currents.i_f_a(), 4.0);
 }
 
 // Catches: yesterday's recording overwritten; a name that follows a symbolic link elsewhere. REC-07.

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "bench.pb.h"
-#include "plant/parameters.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "protocols/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 #include "server/engine.hpp"
@@ -25,11 +25,11 @@ using Result = ReplayReport::Result;
 using Bytes = std::vector<std::byte>;
 
 /// A lockstep run in which everything happens that a recording can hold: two axes, a lease, commands, loads
-/// from the file and from outside, a parameter write, refused commands, a clear.
+/// from the file and from outside, a parameter write and a ramp, a fault, a bump, refused commands, a clear.
 Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
   const TestFolder folder;
   BenchConfig config = servo_bench(axes);
-  config.axes[1].loads = {{.tick = 5, .change = {.load_nm = 0.02, .ramp_ticks = 3}}};
+  config.axes[1].events = {{.tick = 5, .action = LoadChange{.load_nm = 0.02, .ramp_ticks = 3}}};
   const auto engine = make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config));
   const auto send = [&engine](std::uint32_t axis, const auto& action, Tick tick = 0) {
     engine->request({.tick = tick, .axis = axis, .owner = 1, .action = action}, [](Refused, Tick) {});
@@ -37,7 +37,10 @@ Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes =
   send(0, LeaseAction::kAcquire);
   for (Tick tick = 0; tick < ticks; ++tick) {
     if (tick == 3) send(0, LoadChange{0.05, 0}, 9);
-    if (tick == 6) send(0, ParameterWrite{2, 5.0});  // rotor resistance
+    if (tick == 6) send(0, write_of(servo_axis(), "machine.rotor_resistance_ohm", 5.0));
+    if (tick == 4) send(0, write_of(servo_axis(), "machine.stator_resistance_ohm", 2.5, 9), 5);
+    if (tick == 4) send(1, fault_of("current_sensor_gain", -0.25), 8);
+    if (tick == 4) send(1, ShaftBump{1e-4}, 6);
     if (tick == 7) engine->command(0, 2, voltage(tick, 1.0, 1.0));
     if (tick == 8) engine->command(0, 1, voltage(tick, std::nan(""), 1.0));
     if (tick == 9) send(0, ClearFaults{});
@@ -97,7 +100,7 @@ TEST(Replay, ARunReplaysBitForBit) {
   EXPECT_EQ(report.result, Result::kEqual) << report.problem;
   EXPECT_EQ(report.ticks, 501u);
   EXPECT_EQ(report.samples, 2 * 502u) << "of two axes, with those of tick 0";
-  EXPECT_EQ(report.inputs, 1 + 1 + 1 + 1 + 1 + 1 + 1 + 500u + 1) << "the last one takes the lease back";
+  EXPECT_EQ(report.inputs, 7 + 3 + 500u + 1) << "the last one takes the lease back";
   EXPECT_EQ(report.state_hash, state_hash);
   EXPECT_NE(report.recorded_by.find("drivebench"), std::string::npos);
   EXPECT_FALSE(report.difference);

@@ -11,6 +11,7 @@
 
 #include "server/config.hpp"
 #include "tests/plant/servo_axis.hpp"
+#include "tests/server/parameter_row.hpp"
 
 namespace drivebench {
 
@@ -22,18 +23,18 @@ inline BenchConfig servo_bench(std::size_t axes = 1) {
   config.realtime.priority = 0;
   for (std::size_t i = 0; i < axes; ++i) {
     AxisSetup axis{.parameters = servo_axis()};
-    axis.parameters.current_sensor.noise_rms_a = 0.01;
+    axis.parameters.sensors.current.noise_rms_a = 0.01;
     config.setup.axes.push_back(axis);
     config.axes.push_back({.name = "axis" + std::to_string(i),
                            .motor = "servo",
                            .can_node = static_cast<std::uint32_t>(i + 1),
-                           .loads = {}});
+                           .events = {}});
   }
   return config;
 }
 
 inline Command voltage(Tick answers, double a_v, double b_v) {
-  return {.answers = answers, .phases = {.gates = Gates::kVoltage, .voltage_v = {a_v, b_v}}};
+  return {.answers = answers, .phases = {.gates = Gates::kVoltage, .setpoint = {.a = a_v, .b = b_v}}};
 }
 
 /// A folder that goes away with the test.

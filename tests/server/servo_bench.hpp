@@ -4,6 +4,7 @@
 
 #include "server/bench.hpp"
 #include "tests/plant/servo_axis.hpp"
+#include "tests/server/parameter_row.hpp"
 
 /// A bench with the servo motor of the book, and short ways to say what comes in from outside.
 namespace drivebench {
@@ -20,7 +21,7 @@ inline Refused submit_lease(Bench& bench, LeaseAction action, Owner owner) {
 }
 
 inline Command volts_in_answer_to(Tick answers, double a_v, double b_v = 0.0) {
-  return {.answers = answers, .phases = {.gates = Gates::kVoltage, .voltage_v = {a_v, b_v}}};
+  return {.answers = answers, .phases = {.gates = Gates::kVoltage, .setpoint = {.a = a_v, .b = b_v}}};
 }
 
 /// A command for the present tick.

@@ -77,9 +77,11 @@ class Exchange(WireTest):
             self.assertRefused(client.lease(axis=axis), pb.REFUSAL_UNKNOWN_AXIS, "axis")
             for kind in ({"subscribe": pb.Subscribe(axis=axis, decimation=1)}, {"set_load": pb.SetLoad(axis=axis)},
                          {"read_parameters": pb.ReadParameters(axis=axis)},
-                         {"write_parameter": pb.WriteParameter(axis=axis)}, {"clear_faults": pb.ClearFaults(axis=axis)}):
+                         {"write_parameter": pb.WriteParameter(axis=axis)}, {"clear_faults": pb.ClearFaults(axis=axis)},
+                         {"inject_fault": pb.InjectFault(axis=axis)}, {"shaft_bump": pb.ShaftBump(axis=axis)}):
                 self.assertRefused(client.ask(**kind), pb.REFUSAL_UNKNOWN_AXIS, "axis")
-        self.assertRefused(client.exchange(0, gates=3), pb.REFUSAL_OUT_OF_RANGE, "commands.gates")
+        self.assertRefused(client.exchange(0, gates=4), pb.REFUSAL_OUT_OF_RANGE, "commands.gates")
+        self.assertRefused(client.exchange(0, gates=3), pb.REFUSAL_WRONG_DRIVE, "commands.gates")
         both = pb.Exchange(commands=[pb.Command(tick=0), pb.Command(tick=0)])
         self.assertRefused(client.ask(exchange=both), pb.REFUSAL_OUT_OF_RANGE, "commands.axis")
 

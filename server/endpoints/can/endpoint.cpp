@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/endpoints/can/results.hpp"
+
 namespace drivebench::can {
 namespace {
 
@@ -17,27 +19,6 @@ constexpr auto kTimerPeriod = std::chrono::milliseconds(10);
 constexpr double kBootUp = 0.0;
 constexpr double kStopped = 4.0;
 constexpr double kOperational = 5.0;
-
-Result result_of(Refused why) noexcept {
-  switch (why) {
-    case Refused::kNot:
-      return Result::kDone;
-    case Refused::kOwned:
-      return Result::kOwned;
-    case Refused::kNotFinite:
-      return Result::kNotFinite;
-    case Refused::kLatched:
-      return Result::kLatched;
-    case Refused::kStale:
-      return Result::kStale;
-    case Refused::kBusy:
-      return Result::kBusy;
-    case Refused::kUnknownAxis:
-    case Refused::kNotOwner:
-      break;
-  }
-  return Result::kNotOwner;
-}
 
 std::string_view name_of(BusState state) noexcept {
   switch (state) {
@@ -53,10 +34,6 @@ std::string_view name_of(BusState state) noexcept {
       break;
   }
   return "CAN_ABSENT";
-}
-
-constexpr std::uint64_t unsigned_of(double value) noexcept {
-  return value > 0.0 ? static_cast<std::uint64_t>(value) : 0;
 }
 
 /// The clock of the stamps may be set back at any time.
@@ -78,10 +55,16 @@ void Endpoint::serve(Engine& engine) {
   engine_ = &engine;
   std::vector<std::uint32_t> ids;
   for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
-    nodes_.push_back({.axis = axis, .id = engine.config().axes[axis].can_node});
+    nodes_.push_back({.axis = axis,
+                      .id = engine.config().axes[axis].can_node,
+                      .terminals = terminals_of(engine.parameters(axis))});
+    config_.profile.wide |= nodes_.back().wide();
     nodes_.back().index_tick = engine.newest(axis).index_tick;
+  }
+  for (const Node& node : nodes_) {
     for (const MessageRow& row : kMessages) {
-      const std::uint32_t id = config_.profile.id_of(row, nodes_.back().id);
+      const std::uint32_t id = config_.profile.id_of(row, node.id);
+      if (row.width == Width::kWide && !node.wide()) continue;
       if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
     }
   }
@@ -123,63 +106,24 @@ void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
     ++problems_[static_cast<std::size_t>(found.problem)];
     return;
   }
+  Node* const node = find_node(found.node);
+  if (node != nullptr && !is_for(*node, *found.row)) return;
   if (from_bench(found)) {
-    if (!found.row->per_node || find_node(found.node) != nullptr) note_conflict(frame);
+    if (!found.row->per_node || node != nullptr) note_conflict(frame);
     return;
   }
-  Node* const node = find_node(found.node);
   if (node == nullptr || !transmitting_) return;  // nobody would hear the answer
   const Values values = decode(*found.row, config_.profile, frame);
   switch (found.row->message) {
     case Message::kCommand:
-      return on_command(*node, values);
+      return on_command(*node, *found.row, values);
+    case Message::kPhaseCommand:
+      return on_phase_command(*node, *found.row, values);
     case Message::kRequest:
       return on_request(*node, values);
     default:
       return on_heartbeat(*node, values);
   }
-}
-
-void Endpoint::on_command(Node& node, const Values& values) {
-  const bool fd = config_.profile.fd;
-  const auto value = [&](std::size_t in_classic, std::size_t in_fd) {
-    return values[fd ? in_fd : in_classic];
-  };
-  constexpr auto field = [](bool of_fd, std::string_view name) {
-    return index_of(Message::kCommand, of_fd, name);
-  };
-  ++commands_;
-  const std::uint64_t low_tick = unsigned_of(value(field(false, "tick"), field(true, "tick")));
-  const std::uint64_t mode = unsigned_of(value(field(false, "mode"), field(true, "mode")));
-  const std::uint64_t lease = unsigned_of(value(field(false, "lease"), field(true, "lease")));
-  const Sample& newest = engine_->newest(node.axis);
-  const std::int64_t answers = unwrap(low_tick, fd ? 32 : 16, static_cast<std::int64_t>(newest.tick));
-  if (mode > kDutyMode) return refuse_malformed(node, static_cast<std::uint8_t>(lease), answers);
-
-  const double volts_per_unit = mode == kDutyMode ? newest.bus_voltage_v : 1.0;
-  const Command command{
-      .answers = answers,
-      .phases = {.gates = mode == kDutyMode ? Gates::kVoltage : static_cast<Gates>(mode),
-                 .voltage_v = {.a = value(field(false, "u_a"), field(true, "u_a")) * volts_per_unit,
-                               .b = value(field(false, "u_b"), field(true, "u_b")) * volts_per_unit}}};
-  // Whoever commands without the lease is nobody: the bench counts it and says no.
-  const Owner owner = node.owner != 0 && lease == node.lease ? node.owner : 0;
-  if (owner != 0) node.spoke = true;
-  const Refused why = engine_->command(node.axis, owner, command);
-  if (why != Refused::kNot) {
-    ++refused_;
-    log_refusal(node, "a command", sentence_of(why));
-    return reply(node, Request::kCommand, result_of(why), 0, static_cast<std::uint8_t>(lease), answers);
-  }
-  engine_->advance();
-}
-
-void Endpoint::refuse_malformed(const Node& node, std::uint8_t lease, std::int64_t answers) {
-  ++refused_;
-  engine_->request({.tick = 0, .axis = node.axis, .owner = node.owner, .action = RefusedCommand{}},
-                   [](Refused, Tick) {});
-  log_refusal(node, "a command", "its mode must be 0 to 3");
-  reply(node, Request::kCommand, Result::kMalformed, 0, lease, answers);
 }
 
 void Endpoint::log_refusal(const Node& node, std::string_view what, std::string_view why) {
@@ -237,6 +181,7 @@ void Endpoint::acquire(Node& node, std::uint32_t controller) {
                        if (node.owner == 0)
                          node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
                        node.owner = owner;
+                       node.phases = {};
                        node.monitored = false;
                        node.heard = Clock::now();
                      } else {

@@ -8,10 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "protocols/can/codec.hpp"
+#include "protocols/can/command.hpp"
 #include "server/asio.hpp"
 #include "server/endpoints/can/bus.hpp"
 #include "server/endpoints/log_limit.hpp"
+#include "server/endpoints/terminals.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine.hpp"
 
@@ -34,10 +35,19 @@ class Endpoint {
  private:
   using Clock = std::chrono::steady_clock;
 
+  /// What waits for the command of its tick.
+  struct PhaseSetpoints {
+    Tick answers = -1;
+    unsigned mode = 0;
+    double c = 0.0;
+    double field = 0.0;
+  };
+
   /// An axis as this bus sees it.
   struct Node {
     std::uint32_t axis = 0;
     std::uint32_t id = 0;
+    Terminals terminals{};
     Owner owner = 0;         ///< of the controller on this bus; 0: none
     std::uint8_t lease = 0;  ///< its number; 0: none
     std::uint8_t last_lease = 0;
@@ -46,20 +56,28 @@ class Endpoint {
     bool monitored = false;        ///< its controller sends heartbeats
     bool spoke = false;            ///< it commanded since the timer last looked
     Clock::time_point heard{};     ///< last sign of life of the controller
+    PhaseSetpoints phases{};       ///< of the owner
     std::uint64_t faults = 0;      ///< last sent
+    std::uint64_t injected = 0;    ///< last sent
     std::int64_t index_tick = -1;
     std::int64_t edges_tick = -1;
     std::optional<Sample> due{};  ///< a sample that is to be sent
+
+    bool wide() const noexcept { return terminals.is_wide(); }
   };
 
   void on_frame(const Frame& frame, std::int64_t stamp_ns);
-  void on_command(Node& node, const Values& values);
+  void on_command(Node& node, const MessageRow& row, const Values& values);
+  void on_phase_command(Node& node, const MessageRow& row, const Values& values);
   void on_request(Node& node, const Values& values);
   void on_heartbeat(Node& node, const Values& values);
   void on_state();
   void acquire(Node& node, std::uint32_t controller);
   void act(Node& node, Request request, std::uint32_t controller);
-  void refuse_malformed(const Node& node, std::uint8_t lease, std::int64_t answers);
+  bool is_for(const Node& node, const MessageRow& row);
+  Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
+  /// Turns a command away before it reaches the bench, which counts it.
+  void refuse(const Node& node, Result result, const Setpoints& given, std::string_view why);
   void log_refusal(const Node& node, std::string_view what, std::string_view why);
   void log_loss(const Node& node, std::string_view why);
   void lose(Node& node, const char* why);
@@ -75,6 +93,7 @@ class Endpoint {
   Node* find_node(std::uint32_t id);
   void put(const Frame& frame);
   void send(Message message, const Node& node, std::span<const double> values);
+  void send_sample(Message message, const Node& node, const Sample& sample, Page page = Page{});
   void send_sensors(Node& node, const Sample& sample);
   void send_state(const Node& node, const Sample& sample);
   void send_changes(Node& node, const Sample& sample);

@@ -15,8 +15,13 @@ void Endpoint::put(const Frame& frame) {
 }
 
 void Endpoint::send(Message message, const Node& node, std::span<const double> values) {
-  const MessageRow* const row = find_message(message, config_.profile.fd);
+  const MessageRow* const row = find_message(message, config_.profile.fd, node.wide());
   put(encode(*row, config_.profile, node.id, values));
+}
+
+void Endpoint::send_sample(Message message, const Node& node, const Sample& sample, Page page) {
+  const MessageRow* const row = find_message(message, config_.profile.fd, node.wide());
+  put(encode_sample(*row, config_.profile, node.id, sample, page));
 }
 
 void Endpoint::on_tick() {
@@ -59,28 +64,35 @@ void Endpoint::check_owner(Node& node) {
 }
 
 void Endpoint::send_sensors(Node& node, const Sample& sample) {
-  const auto send_sample = [&](Message message) {
-    put(encode_sample(*find_message(message, config_.profile.fd), config_.profile, node.id, sample));
-  };
-  if (config_.profile.fd) return send_sample(Message::kSensors);
-  send_sample(Message::kEncoder);
-  send_sample(Message::kCurrents);
+  if (config_.profile.fd) return send_sample(Message::kSensors, node, sample);
+  send_sample(Message::kEncoder, node, sample);
+  if (node.terminals.speed_sensors) send_sample(Message::kDetails, node, sample, Page::kSpeedSensors);
+  if (node.wide()) send_sample(Message::kPhases, node, sample);
+  send_sample(Message::kCurrents, node, sample);
 }
 
 void Endpoint::send_state(const Node& node, const Sample& sample) {
-  send(Message::kState, node, values_of(*find_message(Message::kState, config_.profile.fd), sample));
+  send_sample(Message::kState, node, sample);
+  if (!config_.profile.fd) send_sample(Message::kCounters, node, sample);
+  if (!node.wide()) return;
+  send_sample(Message::kDetails, node, sample, Page::kVoltages);
   if (config_.profile.fd) return;
-  send(Message::kCounters, node, values_of(*find_message(Message::kCounters, false), sample));
+  send_sample(Message::kDetails, node, sample, Page::kField);
+  send_sample(Message::kDetails, node, sample, Page::kInjected);
 }
 
 void Endpoint::send_changes(Node& node, const Sample& sample) {
   if (sample.faults != node.faults) {
     node.faults = sample.faults;
-    send(Message::kFault, node, values_of(*find_message(Message::kFault, config_.profile.fd), sample));
+    send_sample(Message::kFault, node, sample);
   }
   if (sample.index_tick != node.index_tick) {
     node.index_tick = sample.index_tick;
-    send(Message::kIndex, node, values_of(*find_message(Message::kIndex, config_.profile.fd), sample));
+    send_sample(Message::kIndex, node, sample);
+  }
+  if (node.wide() && sample.injected != node.injected) {
+    node.injected = sample.injected;
+    send_sample(Message::kDetails, node, sample, Page::kInjected);
   }
 }
 
@@ -115,7 +127,7 @@ void Endpoint::send_sync(std::uint64_t tick) {
 void Endpoint::send_heartbeat(const Node& node, double state) {
   const double period_us = static_cast<double>(engine_->config().setup.period_ns) * 1e-3;
   send(Message::kHeartbeat, node,
-       std::array{state, static_cast<double>(kProfileVersion),
+       std::array{state, static_cast<double>(node.wide() ? kWideVersion : kProfileVersion),
                   static_cast<double>(engine_->newest(node.axis).state), static_cast<double>(node.lease),
                   period_us});
 }

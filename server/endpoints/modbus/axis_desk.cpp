@@ -3,14 +3,38 @@
 #include <spdlog/spdlog.h>
 
 #include "plant/faults.hpp"
-#include "plant/parameters.hpp"
+#include "server/endpoints/modbus/map_info.hpp"
 
 namespace drivebench::modbus {
+
+Refusal refusal_of(Refused why) noexcept {
+  switch (why) {
+    case Refused::kWrongDrive:
+      return Refusal::kWrongDrive;
+    case Refused::kOutOfRange:
+    case Refused::kRuleBroken:
+      return Refusal::kOutOfRange;
+    case Refused::kTooManyRamps:
+      return Refusal::kBusy;
+    default:
+      return static_cast<Refusal>(why);  // the registers count them alike
+  }
+}
+static_assert(static_cast<int>(Refused::kBusy) == static_cast<int>(Refusal::kBusy));
+
+std::string_view sentence_of(Refusal refusal) noexcept {
+  if (refusal == Refusal::kOutOfRange) return "a value is out of range";
+  if (refusal == Refusal::kWrongMode) return "a free run takes no controller";
+  if (refusal == Refusal::kWrongDrive) return drivebench::sentence_of(Refused::kWrongDrive);
+  return drivebench::sentence_of(static_cast<Refused>(refusal));
+}
 
 AxisDesk::AxisDesk(asio::io_context& io, Engine& engine, const RegisterMap& map, std::uint32_t axis)
     : engine_(engine),
       map_(map),
       axis_(axis),
+      terminals_(terminals_of(engine.parameters(axis))),
+      parameter_rows_(parameter_rows(engine.parameters(axis))),
       lease_time_(engine.config().setup.lease_ticks * engine.config().setup.period_ns),
       idle_timeout_(std::chrono::milliseconds(engine.config().modbus.idle_timeout_ms)),
       timer_(io) {}
@@ -31,11 +55,31 @@ void AxisDesk::read(const RegisterMap::Range& range, Visitor who, std::span<std:
 
 std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
   const Sample& sample = engine_.newest(axis_);
-  const BenchConfig& config = engine_.config();
   switch (row.content) {
     case Content::kSignal:
     case Content::kLowBits:
       return signal_bits(row, sample);
+    case Content::kStatusWord:
+      return status_word(drive_state(), {.voltage_present = sample.bus_voltage_v > 0.0,
+                                         .warning = (sample.faults & ~kLatchedFaults) != 0,
+                                         .remote = leased(),
+                                         .limit = (sample.faults & kVoltageSaturated) != 0});
+    case Content::kLeaseKey:
+      return holds(who) ? key_ : 0;
+    case Content::kLeaseStatus:
+      return engine_.owner(axis_) == 0 ? 0 : holds(who) ? 1 : leased() ? 2 : 3;
+    case Content::kLastRefusal:
+      return static_cast<std::uint64_t>(last_refusal_);
+    case Content::kParameter:
+      return float_bits(parameter(row).get(engine_.parameters(axis_)));
+    default:
+      return row.address < kProcessStart ? header_bits(row) : input_bits(row.content);
+  }
+}
+
+std::uint64_t AxisDesk::header_bits(const Row& row) const {
+  const BenchConfig& config = engine_.config();
+  switch (row.content) {
     case Content::kMarkerWord:
       return kMarker;
     case Content::kVersionWord:
@@ -47,7 +91,9 @@ std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
     case Content::kMirror:
       return kMirrorOffset;
     case Content::kBlocks:
-      return map_.blocks().size();
+      return RegisterMap::kFirstBlocks;
+    case Content::kMoreBlocks:
+      return map_.blocks().size() - RegisterMap::kFirstBlocks;
     case Content::kBlockId:
       return map_.blocks()[row.index].id;
     case Content::kBlockStart:
@@ -64,37 +110,48 @@ std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
       return map_.writable() ? 1 : 0;
     case Content::kPeriod:
       return static_cast<std::uint64_t>(config.setup.period_ns);
+    case Content::kMachineKind:
+      return engine_.parameters(axis_).machine.index();
+    case Content::kConnection:
+      return static_cast<std::uint64_t>(terminals_.connection);
+    case Content::kTerminals:
+      return terminals_.bits();
+    default:
+      return 0;
+  }
+}
+
+std::uint64_t AxisDesk::input_bits(Content content) const {
+  const auto word = [](std::int16_t value) { return std::uint64_t{static_cast<std::uint16_t>(value)}; };
+  const auto real = [](float value) { return std::uint64_t{std::bit_cast<std::uint32_t>(value)}; };
+  switch (content) {
     case Content::kControlWord:
       return process_.control_word;
+    case Content::kReferenceMode:
+      return static_cast<std::uint64_t>(process_.mode);
     case Content::kReferenceA:
-      return static_cast<std::uint16_t>(process_.reference_a);
+      return word(process_.a);
     case Content::kReferenceB:
-      return static_cast<std::uint16_t>(process_.reference_b);
-    case Content::kStatusWord:
-      return status_word(drive_state(), {.voltage_present = sample.bus_voltage_v > 0.0,
-                                         .warning = (sample.faults & ~kLatchedFaults) != 0,
-                                         .remote = leased(),
-                                         .limit = (sample.faults & kVoltageSaturated) != 0});
-    case Content::kLeaseKey:
-      return holds(who) ? key_ : 0;
+      return word(process_.b);
+    case Content::kReferenceC:
+      return word(process_.c);
+    case Content::kReferenceField:
+      return word(process_.field);
     case Content::kCommandMode:
       return static_cast<std::uint64_t>(command_.mode);
     case Content::kCounter:
       return command_.counter;
-    case Content::kVoltageA:
-      return std::bit_cast<std::uint32_t>(command_.a);
-    case Content::kVoltageB:
-      return std::bit_cast<std::uint32_t>(command_.b);
-    case Content::kLeaseStatus:
-      return engine_.owner(axis_) == 0 ? 0 : holds(who) ? 1 : leased() ? 2 : 3;
-    case Content::kLastRefusal:
-      return last_refusal_;
-    case Content::kParameter:
-      return float_bits(axis_parameters()[row.index].get(engine_.parameters(axis_)));
-    case Content::kRequest:
-      break;
+    case Content::kSetpointA:
+      return real(command_.a);
+    case Content::kSetpointB:
+      return real(command_.b);
+    case Content::kSetpointC:
+      return real(command_.c);
+    case Content::kSetpointField:
+      return real(command_.field);
+    default:
+      return 0;  // a request reads as none
   }
-  return 0;
 }
 
 bool AxisDesk::coil(std::size_t address, Visitor who) const {

@@ -3,14 +3,19 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
+#include <vector>
 
+#include "plant/parameters/parameters.hpp"
 #include "protocols/modbus/drive_profile.hpp"
 #include "protocols/modbus/pdu.hpp"
 #include "protocols/modbus/register_map.hpp"
 #include "server/asio.hpp"
 #include "server/endpoints/log_limit.hpp"
+#include "server/endpoints/terminals.hpp"
 #include "server/engine.hpp"
 
 namespace drivebench::modbus {
@@ -18,8 +23,22 @@ namespace drivebench::modbus {
 /// Number of a connection; 0 is none.
 using Visitor = std::uint64_t;
 
-/// Why a write was refused, as the register last_refusal shows it: a Refused, or one of these.
-enum class Refusal : std::uint16_t { kNone = 0, kOutOfRange = 8, kWrongMode = 9 };
+/// Why a write was refused, as the register last_refusal shows it.
+enum class Refusal : std::uint16_t {
+  kNone = 0,
+  kUnknownAxis = 1,
+  kNotOwner = 2,
+  kOwned = 3,
+  kNotFinite = 4,
+  kLatched = 5,
+  kStale = 6,
+  kBusy = 7,
+  kOutOfRange = 8,
+  kWrongMode = 9,
+  kWrongDrive = 10,
+};
+Refusal refusal_of(Refused why) noexcept;
+std::string_view sentence_of(Refusal refusal) noexcept;
 
 /// One axis as Modbus sees it: registers and coils, the lease behind its key, and the state machine behind
 /// the control word.
@@ -35,6 +54,7 @@ class AxisDesk {
   std::function<void()> on_lease_change;
 
   std::uint32_t axis() const noexcept { return axis_; }
+  const RegisterMap& map() const noexcept { return map_; }
 
   /// Puts the registers asked for to words[0..count).
   void read(const RegisterMap::Range& range, Visitor who, std::span<std::uint16_t> words) const;
@@ -45,8 +65,8 @@ class AxisDesk {
 
   struct Outcome {
     Exception exception = Exception::kNone;
-    std::uint16_t refusal = 0;  ///< as last_refusal shows it
-    bool commanded = false;     ///< the bench has accepted a command
+    Refusal refusal = Refusal::kNone;
+    bool commanded = false;  ///< the bench has accepted a command
   };
   /// Carries out a write that has been validated: all of it or nothing.
   asio::awaitable<Outcome> write(RegisterMap::Range range, std::span<const std::uint16_t> words, Visitor who);
@@ -79,12 +99,17 @@ class AxisDesk {
     std::uint32_t counter = 0;
     float a = 0.0f;
     float b = 0.0f;
+    float c = 0.0f;
+    float field = 0.0f;
   };
   /// What the writable registers of the process data hold.
   struct ProcessInput {
     std::uint16_t control_word = 0;
-    std::int16_t reference_a = 0;
-    std::int16_t reference_b = 0;
+    ReferenceMode mode = ReferenceMode::kVoltage;
+    std::int16_t a = 0;
+    std::int16_t b = 0;
+    std::int16_t c = 0;
+    std::int16_t field = 0;
   };
   /// Bits of the values in a write.
   struct Written {
@@ -108,6 +133,12 @@ class AxisDesk {
   asio::awaitable<Refused> ask(Input input) { return answer_to(send(input)); }
 
   std::uint64_t bits_of(const Row& row, Visitor who) const;
+  /// Of a register that shows what was written; 0 if it is another one.
+  std::uint64_t input_bits(Content content) const;
+  std::uint64_t header_bits(const Row& row) const;
+  const Parameter& parameter(const Row& row) const {
+    return axis_parameters(engine_.parameters(axis_))[parameter_rows_[row.index]];
+  }
   /// What the bench takes for this tick in any state.
   Command gates_off() const { return {.answers = engine_.tick(), .phases = {}}; }
   Command command_of(const CommandInput& input) const;
@@ -127,6 +158,8 @@ class AxisDesk {
   Engine& engine_;
   const RegisterMap& map_;
   std::uint32_t axis_;
+  Terminals terminals_;
+  std::vector<std::uint32_t> parameter_rows_;  ///< of the table of this kind of machine, by place in the map
   std::chrono::nanoseconds lease_time_;
   std::chrono::nanoseconds idle_timeout_;
 
@@ -140,7 +173,7 @@ class AxisDesk {
   CommandInput command_;
   ProcessInput process_;
   DriveState state_ = DriveState::kSwitchOnDisabled;  ///< never kFault, which the sample tells
-  std::uint16_t last_refusal_ = 0;
+  Refusal last_refusal_ = Refusal::kNone;
   LogLimit lapsed_log_;
 };
 

@@ -2,13 +2,12 @@
 #include <cmath>
 #include <vector>
 
-#include "plant/parameters.hpp"
 #include "server/endpoints/modbus/axis_desk.hpp"
 
 namespace drivebench::modbus {
 namespace {
 
-constexpr double kReferenceUnit = 0.01;  // of the process data [V]
+constexpr double kReferenceUnit = 0.01;  // of the process data [V] or [A]
 
 Exception exception_of(Refused why) noexcept {
   switch (why) {
@@ -17,13 +16,17 @@ Exception exception_of(Refused why) noexcept {
     case Refused::kUnknownAxis:
       return Exception::kNoTarget;
     case Refused::kNotFinite:
+    case Refused::kOutOfRange:
+    case Refused::kRuleBroken:
       return Exception::kIllegalValue;
     case Refused::kLatched:
     case Refused::kStale:
+    case Refused::kWrongDrive:
       return Exception::kFailure;
     case Refused::kNotOwner:
     case Refused::kOwned:
     case Refused::kBusy:
+    case Refused::kTooManyRamps:
       break;
   }
   return Exception::kBusy;
@@ -49,17 +52,17 @@ std::optional<std::uint64_t> AxisDesk::Written::operator[](Content content) cons
 }
 
 AxisDesk::Outcome AxisDesk::refuse(Refused why) {
-  last_refusal_ = static_cast<std::uint16_t>(why);
+  last_refusal_ = refusal_of(why);
   return {.exception = exception_of(why), .refusal = last_refusal_};
 }
 
 AxisDesk::Outcome AxisDesk::refuse(Exception exception, Refusal why) {
-  last_refusal_ = static_cast<std::uint16_t>(why);
+  last_refusal_ = why;
   return {.exception = exception, .refusal = last_refusal_};
 }
 
 void AxisDesk::count_refused(const RegisterMap::Range& range) {
-  last_refusal_ = static_cast<std::uint16_t>(Refusal::kOutOfRange);
+  last_refusal_ = Refusal::kOutOfRange;
   for (const Row& row : range.rows) {
     if (row.content != Content::kCounter) continue;
     engine_.request({.tick = 0, .axis = axis_, .owner = 0, .action = RefusedCommand{}}, [](Refused, Tick) {});
@@ -85,8 +88,12 @@ Command AxisDesk::command_of(const ProcessInput& input, DriveState state) const 
   Command command = gates_off();
   if (state == DriveState::kQuickStopActive) command.phases.gates = Gates::kZeroVoltage;
   if (state != DriveState::kOperationEnabled) return command;
-  command.phases = {.gates = Gates::kVoltage,
-                    .voltage_v = {input.reference_a * kReferenceUnit, input.reference_b * kReferenceUnit}};
+  const bool currents = input.mode == ReferenceMode::kCurrent;
+  command.phases = {.gates = currents ? Gates::kCurrent : Gates::kVoltage,
+                    .setpoint = {.a = input.a * kReferenceUnit,
+                                 .b = input.b * kReferenceUnit,
+                                 .c = input.c * kReferenceUnit,
+                                 .field = input.field * kReferenceUnit}};
   return command;
 }
 
@@ -94,8 +101,11 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
   ProcessInput input = process_;
   if (const auto word = written[Content::kControlWord])
     input.control_word = static_cast<std::uint16_t>(*word);
-  if (const auto bits = written[Content::kReferenceA]) input.reference_a = static_cast<std::int16_t>(*bits);
-  if (const auto bits = written[Content::kReferenceB]) input.reference_b = static_cast<std::int16_t>(*bits);
+  if (const auto mode = written[Content::kReferenceMode]) input.mode = static_cast<ReferenceMode>(*mode);
+  if (const auto bits = written[Content::kReferenceA]) input.a = static_cast<std::int16_t>(*bits);
+  if (const auto bits = written[Content::kReferenceB]) input.b = static_cast<std::int16_t>(*bits);
+  if (const auto bits = written[Content::kReferenceC]) input.c = static_cast<std::int16_t>(*bits);
+  if (const auto bits = written[Content::kReferenceField]) input.field = static_cast<std::int16_t>(*bits);
   // First of all, so that nothing is cleared by a write that the bench then does not take.
   const Owner owner = holds(who) ? owner_ : 0;
   if (const Refused why = engine_.check(axis_, owner, gates_off()); why != Refused::kNot) {
@@ -124,14 +134,18 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
 }
 
 Command AxisDesk::command_of(const CommandInput& input) const {
-  const double unit = input.mode == CommandMode::kDuty ? engine_.newest(axis_).bus_voltage_v : 1.0;
-  Command command{
-      .answers = tick_of(input.counter, engine_.tick()),
-      .phases = {.gates = Gates::kVoltage,
-                 .voltage_v = {unit * static_cast<double>(input.a), unit * static_cast<double>(input.b)}}};
-  if (input.mode == CommandMode::kOff) command.phases = {.gates = Gates::kOff, .voltage_v = {}};
-  if (input.mode == CommandMode::kZeroVoltage)
-    command.phases = {.gates = Gates::kZeroVoltage, .voltage_v = {}};
+  Command command{.answers = tick_of(input.counter, engine_.tick()), .phases = {}};
+  if (input.mode == CommandMode::kZeroVoltage) command.phases.gates = Gates::kZeroVoltage;
+  if (input.mode == CommandMode::kOff || input.mode == CommandMode::kZeroVoltage) return command;
+  const bool duties = input.mode == CommandMode::kDuty;
+  const double bus_voltage_v = engine_.newest(axis_).bus_voltage_v;
+  const double unit = duties ? terminals_.volts_per_duty(bus_voltage_v) : 1.0;
+  const double field_unit = duties ? bus_voltage_v : 1.0;
+  command.phases = {.gates = input.mode == CommandMode::kCurrent ? Gates::kCurrent : Gates::kVoltage,
+                    .setpoint = {.a = unit * static_cast<double>(input.a),
+                                 .b = unit * static_cast<double>(input.b),
+                                 .c = unit * static_cast<double>(input.c),
+                                 .field = field_unit * static_cast<double>(input.field)}};
   return command;
 }
 
@@ -143,9 +157,13 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   CommandInput input = command_;
   if (const auto mode = written[Content::kCommandMode]) input.mode = static_cast<CommandMode>(*mode);
   if (const auto counter = written[Content::kCounter]) input.counter = static_cast<std::uint32_t>(*counter);
-  if (const auto bits = written[Content::kVoltageA]) input.a = as_float(*bits);
-  if (const auto bits = written[Content::kVoltageB]) input.b = as_float(*bits);
-  const bool beyond = std::abs(input.a) > 1.0f || std::abs(input.b) > 1.0f;
+  if (const auto bits = written[Content::kSetpointA]) input.a = as_float(*bits);
+  if (const auto bits = written[Content::kSetpointB]) input.b = as_float(*bits);
+  if (const auto bits = written[Content::kSetpointC]) input.c = as_float(*bits);
+  if (const auto bits = written[Content::kSetpointField]) input.field = as_float(*bits);
+  const auto is_beyond = [](float duty) { return std::abs(duty) > 1.0f; };
+  const bool beyond =
+      is_beyond(input.a) || is_beyond(input.b) || is_beyond(input.c) || is_beyond(input.field);
   const bool asks_more = request != LeaseRequest::kNone && request != LeaseRequest::kRelease;
   if ((input.mode == CommandMode::kDuty && beyond) || (key == 0u && asks_more) ||
       (commands && (gives_back || request == LeaseRequest::kClearFaults))) {
@@ -221,8 +239,8 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, V
   for (const Row& row : written.range.rows) {
     const std::uint64_t bits =
         get(row.type, written.range.order, &written.words[std::size_t{row.address} - written.range.first]);
-    changes.push_back({.row = row.index,
-                       .before = axis_parameters()[row.index].get(engine_.parameters(axis_)),
+    changes.push_back({.row = parameter_rows_[row.index],
+                       .before = parameter(row).get(engine_.parameters(axis_)),
                        .after = number_of(row.type, bits)});
   }
   for (std::size_t i = 0; i < changes.size(); ++i) {

@@ -14,12 +14,6 @@ constexpr std::size_t kMaxQueued = 8 * kMaxAdu;
 // A command that the bench takes pays for itself and for reading its sample: there is at most one a tick.
 constexpr double kPaidByCommand = 2.0;
 
-std::string_view sentence_of_refusal(std::uint16_t refusal) noexcept {
-  if (refusal == static_cast<std::uint16_t>(Refusal::kOutOfRange)) return "a value is out of range";
-  if (refusal == static_cast<std::uint16_t>(Refusal::kWrongMode)) return "a free run takes no controller";
-  return sentence_of(static_cast<Refused>(refusal));
-}
-
 std::string name_of(const asio::ip::tcp::endpoint& peer) {
   return "modbus " + peer.address().to_string() + ":" + std::to_string(peer.port());
 }
@@ -158,13 +152,15 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
     refuse(adu, Exception::kBusy);
     co_return true;
   }
-  const Verdict verdict = validate(adu.subspan(kMbapSize), shared_.map);
+  AxisDesk* const desk = desk_of(adu[6]);
+  // For nobody any map will do: it is only asked whether the frame is one.
+  const Verdict verdict =
+      validate(adu.subspan(kMbapSize), desk != nullptr ? desk->map() : shared_.desks.front()->map());
   if (verdict.action == Verdict::Action::kClose) {
     co_await flush();
     cut("a frame is not as long as its function needs");
     co_return false;
   }
-  AxisDesk* const desk = desk_of(adu[6]);
   if (desk == nullptr) {
     refuse(adu, Exception::kNoTarget);
     co_return true;
@@ -173,7 +169,7 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
   if (verdict.action == Verdict::Action::kRefuse) {
     if (verdict.request.write.count > 0) {
       desk->count_refused(verdict.request.write);
-      note_refused_write(*desk, static_cast<std::uint16_t>(Refusal::kOutOfRange));
+      note_refused_write(*desk, Refusal::kOutOfRange);
     }
     refuse(adu, verdict.exception);
     co_return true;
@@ -237,7 +233,7 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
       words_[0] = static_cast<std::uint16_t>((now & words_[0]) | (words_[1] & ~words_[0]));
       if (!values_fit(request.write, words_)) {
         desk.count_refused(request.write);
-        note_refused_write(desk, static_cast<std::uint16_t>(Refusal::kOutOfRange));
+        note_refused_write(desk, Refusal::kOutOfRange);
         co_return Exception::kIllegalValue;
       }
     }
@@ -254,11 +250,11 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
   co_return Exception::kNone;
 }
 
-void Connection::note_refused_write(const AxisDesk& desk, std::uint16_t refusal) {
+void Connection::note_refused_write(const AxisDesk& desk, Refusal refusal) {
   ++shared_.counts.refused_writes;
   if (!shared_.refused_writes_log.allow()) return;
   spdlog::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_,
-               desk.axis(), sentence_of_refusal(refusal), shared_.refused_writes_log.held_back());
+               desk.axis(), sentence_of(refusal), shared_.refused_writes_log.held_back());
 }
 
 bool Connection::is_peer_gone() {

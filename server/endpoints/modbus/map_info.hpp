@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -8,8 +9,15 @@
 
 namespace drivebench::modbus {
 
-/// The parameters of an axis as the register map wants them.
-std::vector<ParameterInfo> parameter_infos();
+/// Which row of axis_parameters() each parameter in the map of an axis is: the parameters of the first map
+/// keep their places, others follow in the order of the table, which depends on the kind of machine.
+std::vector<std::uint32_t> parameter_rows(const AxisParameters& axis);
+
+/// The parameters of an axis as the register map wants them, in that order.
+std::vector<ParameterInfo> parameter_infos(const AxisParameters& axis);
+
+/// The maps of all axes.
+std::vector<RegisterMap> maps_of(const BenchConfig& config);
 
 /// The register map of this bench, as CSV or as Markdown.
 std::string map_of(const BenchConfig& config, bool csv);

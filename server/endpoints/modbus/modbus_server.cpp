@@ -14,7 +14,6 @@ namespace drivebench {
 namespace {
 
 using asio::ip::tcp;
-using modbus::Connection;
 
 // After an accept that failed for want of descriptors: a pause instead of a spin.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
@@ -34,12 +33,7 @@ void tune(tcp::socket& socket) {
 }  // namespace
 
 ModbusServer::ModbusServer(asio::io_context& io, const ModbusConfig& config)
-    : io_(io),
-      config_(config),
-      acceptor_(io),
-      parameters_(modbus::parameter_infos()),
-      map_(parameters_, config.allow_writes),
-      rate_(config.requests_per_s) {
+    : io_(io), config_(config), acceptor_(io), rate_(config.requests_per_s) {
   const std::string address = config.address == "localhost" ? "127.0.0.1" : config.address;
   try {
     const tcp::endpoint endpoint(asio::ip::make_address(address), config.port);
@@ -69,14 +63,15 @@ void ModbusServer::serve(Engine& engine) {
                  config_.allow_writes ? " and drive its motors" : "");
   }
   identification_.emplace(engine.config().name);
-  shared_.emplace(modbus::Shared{engine, map_, replies_, rate_, *identification_, {}, {}, {}, {}, {}});
+  maps_ = modbus::maps_of(engine.config());
+  shared_.emplace(modbus::Shared{engine, replies_, rate_, *identification_, {}, {}, {}, {}, {}});
   // By index: a connection may be added while another one answers.
   const auto wake_all = [this] {
     for (std::size_t i = 0; i < connections_.size(); ++i)
       connections_[i]->wake();
   };
   for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
-    shared_->desks.push_back(std::make_unique<modbus::AxisDesk>(io_, engine, map_, axis));
+    shared_->desks.push_back(std::make_unique<modbus::AxisDesk>(io_, engine, maps_[axis], axis));
     shared_->desks.back()->on_lease_change = wake_all;
   }
   engine.on_newest.add(wake_all);
@@ -108,7 +103,7 @@ asio::awaitable<void> ModbusServer::accept() {
 
 void ModbusServer::start(tcp::socket socket) {
   tune(socket);
-  auto connection = std::make_shared<Connection>(std::move(socket), ++last_number_, *shared_);
+  auto connection = std::make_shared<modbus::Connection>(std::move(socket), ++last_number_, *shared_);
   if (connections_.size() >= config_.max_connections && !make_room(connection->peer())) {
     ++shared_->counts.turned_away;
     if (shared_->turned_away_log.allow()) {
@@ -130,7 +125,7 @@ bool ModbusServer::make_room(const asio::ip::address& newcomer) {
   const auto longest =
       std::min_element(connections_.begin(), connections_.end(),
                        [](const auto& a, const auto& b) { return a->idle_since() < b->idle_since(); });
-  const auto limit = Connection::Clock::now() - std::chrono::milliseconds(config_.idle_timeout_ms);
+  const auto limit = modbus::Connection::Clock::now() - std::chrono::milliseconds(config_.idle_timeout_ms);
   if (longest != connections_.end() && (*longest)->idle_since() <= limit) {
     (*longest)->cut("the house is full, and it has been idle for long");
     connections_.erase(longest);
@@ -153,7 +148,7 @@ bool ModbusServer::make_room(const asio::ip::address& newcomer) {
   return true;
 }
 
-asio::awaitable<void> ModbusServer::run(std::shared_ptr<Connection> connection) {
+asio::awaitable<void> ModbusServer::run(std::shared_ptr<modbus::Connection> connection) {
   try {
     co_await connection->run();
   } catch (const std::exception& error) {

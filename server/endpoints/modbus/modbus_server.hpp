@@ -40,8 +40,7 @@ class ModbusServer {
   asio::io_context& io_;
   ModbusConfig config_;
   asio::ip::tcp::acceptor acceptor_;
-  std::vector<modbus::ParameterInfo> parameters_;
-  modbus::RegisterMap map_;
+  std::vector<modbus::RegisterMap> maps_;  ///< by axis
   modbus::ReplyBuilder replies_;
   modbus::RateLimit rate_;
   std::optional<modbus::Identification> identification_;

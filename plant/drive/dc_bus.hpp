@@ -1,0 +1,44 @@
+#pragma once
+
+#include "plant/windings.hpp"
+
+namespace drivebench {
+
+/// Section [axis.bus]: the DC link.
+struct BusParameters {
+  double voltage_v = 0.0;       ///< of its supply; 0: amplifier.voltage_limit_v (twice that in a star)
+  double resistance_ohm = 0.0;  ///< of the supply, which cannot take current back
+  double capacitance_f = 0.0;   ///< 0: a stiff link
+  double chopper_on_v = 0.0;    ///< the brake resistor is switched on above this; 0: no chopper
+  double chopper_off_v = 0.0;   ///< and off below this
+  double chopper_ohm = 1.0;
+};
+
+/// Voltage of the supply of the link.
+double supply_voltage_v(const BusParameters& p, double amplifier_limit_v, Connection connection) noexcept;
+
+/// The voltage of the rails: against the middle of the link in a star, across a winding between two legs
+/// else.
+constexpr double rail_voltage_v(double bus_v, Connection connection) noexcept {
+  return connection == Connection::kStar ? 0.5 * bus_v : bus_v;
+}
+
+/// A link with a capacitor after an interval, and where the energy went:
+/// C (voltage_v^2 - before^2)/2 = supplied_j - braked_j - taken.
+struct BusInterval {
+  double voltage_v;
+  double supplied_j;  ///< into the link
+  double braked_j;    ///< into the brake resistor
+};
+
+/// The interval of a link whose terminals take `taken_j` (negative: give back):
+///   C v' = max(U - v, 0)/R - [chopper] v/R_B - p/v
+/// by the implicit midpoint rule, which keeps the energy exactly and is stable for every interval. With R = 0
+/// the supply holds the link at U or above. An interval that takes more than there is empties the link.
+BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, bool chopper, double taken_j,
+                      double duration_s) noexcept;
+
+/// Whether the brake resistor is on at this voltage, if it was on before.
+bool chopper_after(const BusParameters& p, double bus_v, bool on) noexcept;
+
+}  // namespace drivebench

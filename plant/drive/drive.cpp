@@ -1,0 +1,392 @@
+#include "plant/drive/drive.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+#include "plant/drive/phases.hpp"
+#include "plant/exponential.hpp"
+#include "plant/noise.hpp"
+#include "plant/rounding.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kTurnRad = 2.0 * std::numbers::pi;
+
+double mean(double x, double y) noexcept {
+  return 0.5 * (x + y);
+}
+
+}  // namespace
+
+Drive::Drive(const DriveParameters& p, Connection connection, double period_s, std::uint64_t seed,
+             std::uint64_t noise_channel) noexcept
+    : connection_(connection),
+      terminals_(terminal_count(connection)),
+      period_s_(period_s),
+      tolerance_s_(1e-9 * period_s),
+      seed_(seed),
+      noise_channel_(noise_channel) {
+  set_parameters(p);
+}
+
+void Drive::set_parameters(const DriveParameters& p) noexcept {
+  p_ = p;
+  if (terminals_ < 2) p_.amplifier.offset_b_v = 0.0;
+  if (terminals_ < 3) p_.amplifier.offset_c_v = 0.0;
+  kind_ = p.kind;
+  pwm_period_s_ = period_s_ / p.inverter.pwm_periods_per_tick;
+  dead_part_ = p.inverter.dead_time_s / pwm_period_s_;
+  filter_rate_per_s_ = kTurnRad * p.amplifier.filter_hz;
+  source_ = constants_of(p.source, connection_);
+}
+
+DriveMemory Drive::initial() const noexcept {
+  DriveMemory m;
+  if (kind_ == DriveKind::kSource) {
+    m.contactor_closed = p_.source.contactor && !p_.source.choose_angle ? 1.0 : 0.0;
+  } else {
+    m.bus_v = supply_voltage_v(p_.bus, p_.amplifier.voltage_limit_v, connection_);
+  }
+  return m;
+}
+
+void Drive::begin_tick(DriveMemory& m, const PhaseCommand& command, const InjectedFaults& faults,
+                       Tick tick) noexcept {
+  m.switched_off = 0.0;
+  m.saturated = 0.0;
+  take_faults(faults);
+  steady_ = false;
+  if (kind_ == DriveKind::kSource) {
+    source_amplitude_v_ = p_.source.amplitude_v * (1.0 - faults.bus_sag);
+    begin_source(m);
+    return;
+  }
+  supply_v_ = supply_voltage_v(p_.bus, p_.amplifier.voltage_limit_v, connection_) * (1.0 - faults.bus_sag);
+  const bool stiff = p_.bus.capacitance_f == 0.0;
+  if (stiff) m.bus_v = supply_v_;
+  m.commands[static_cast<std::size_t>(tick) % m.commands.size()] =
+      faults.command_corruption > 0.0 ? corrupted(command, faults.command_corruption, tick) : command;
+  take_orders(m, faults, tick);
+  follows_ = !stiff || filter_rate_per_s_ > 0.0 || kind_ == DriveKind::kCurrent;
+  const bool one_order = later_s_ <= tolerance_s_;
+  switches_ = kind_ == DriveKind::kSwitched && orders_[1].gates == Gates::kVoltage && !holds_;
+  if (one_order && !follows_ && (kind_ == DriveKind::kVoltage || switches_)) {
+    steady_output_ = bridge_output(m, 0.0, period_s_, {});
+    steady_ = true;
+  }
+}
+
+void Drive::switch_off(DriveMemory& m) noexcept {
+  m.switched_off = 1.0;
+  m.contactor_closed = 0.0;
+}
+
+void Drive::take_faults(const InjectedFaults& faults) noexcept {
+  hold_ = {};
+  holds_ = false;
+  field_lost_ = faults.field_loss != 0.0;
+  const auto hold = [this](double fault, Hold what) {
+    if (fault == 0.0 || fault > terminals_) return;
+    hold_[static_cast<std::size_t>(fault) - 1] = what;
+    holds_ = true;
+  };
+  if (kind_ != DriveKind::kSource) {
+    hold(faults.leg_stuck_off, Hold::kOff);
+    hold(faults.leg_stuck_low, Hold::kLow);
+    hold(faults.leg_stuck_high, Hold::kHigh);
+  }
+  hold(faults.open_phase, Hold::kOpen);
+}
+
+PhaseCommand Drive::corrupted(const PhaseCommand& command, double probability, Tick tick) const noexcept {
+  const auto noise = [&](std::uint64_t n) {
+    return uniform_noise(seed_, noise_channel_ + n, static_cast<std::uint64_t>(tick));
+  };
+  if (!(noise(0) < probability)) return command;
+  const double full_scale =
+      command.gates == Gates::kCurrent ? p_.current_loop.limit_a : p_.amplifier.voltage_limit_v;
+  const auto value = [&](std::uint64_t n) { return full_scale * (2.0 * noise(n) - 1.0); };
+  return {.gates = command.gates,
+          .setpoint = {.a = value(1), .b = value(2), .c = value(3), .field = value(4)}};
+}
+
+/// With a delay of n + f ticks the command of n ticks ago takes over from the one before it f T into the
+/// tick; in a switched inverter, which loads its comparators once per carrier period, when the next period
+/// begins.
+void Drive::take_orders(DriveMemory& m, const InjectedFaults& faults, Tick tick) noexcept {
+  const double delay_ticks = p_.amplifier.delay_ticks + faults.command_delay;
+  std::int64_t whole = floor_to_integer(delay_ticks);
+  later_s_ = (delay_ticks - static_cast<double>(whole)) * period_s_;
+  if (kind_ == DriveKind::kSwitched) {
+    later_s_ =
+        pwm_period_s_ * -static_cast<double>(floor_to_integer((tolerance_s_ - later_s_) / pwm_period_s_));
+  }
+  if (later_s_ > period_s_ - tolerance_s_) {
+    later_s_ = 0.0;
+    ++whole;
+  }
+  const auto size = static_cast<Tick>(m.commands.size());
+  const auto of_tick = [&](Tick t) -> const PhaseCommand& {
+    return m.commands[static_cast<std::size_t>((t + size) % size)];
+  };
+  const bool changes = later_s_ > tolerance_s_;
+  take_order(orders_[1], of_tick(tick - whole), m);
+  if (changes) take_order(orders_[0], of_tick(tick - whole - 1), m);
+  has_edges_ = changes || kind_ == DriveKind::kSwitched;
+}
+
+void Drive::take_order(Order& order, const PhaseCommand& command, DriveMemory& m) const noexcept {
+  order.gates = Gates::kOff;
+  const ThreePhase phases = existing(phases_of(command.setpoint), terminals_);
+  const PhaseValues setpoint{.a = phases.a, .b = phases.b, .c = phases.c, .field = command.setpoint.field};
+  if (command.gates == Gates::kCurrent && kind_ == DriveKind::kCurrent) {
+    order.gates = Gates::kCurrent;
+    order.setpoint = limited_currents(p_.current_loop, setpoint, connection_);
+  } else if (command.gates == Gates::kVoltage) {
+    order.gates = Gates::kVoltage;
+    order.setpoint = amplified(p_.amplifier, setpoint);
+    if (kind_ == DriveKind::kSwitched) {
+      const LimitedVoltages v = bridge_voltages(connection_, m.bus_v, phases_of(order.setpoint));
+      if (v.saturated) m.saturated = 1.0;
+      order.pattern =
+          SwitchingPattern(v.voltage_v, terminals_, rail_v(m), p_.inverter.dead_time_s, pwm_period_s_);
+    }
+  } else if (command.gates == Gates::kZeroVoltage) {
+    order.gates = Gates::kZeroVoltage;
+  }
+}
+
+void Drive::begin_source(DriveMemory& m) noexcept {
+  const SourceParameters& source = p_.source;
+  const double omega_rad_s = kTurnRad * source.frequency_hz;
+  source_angle_rad_ = m.source_phase_rad + source.phase_rad;
+  m.source_phase_rad = within_turn(m.source_phase_rad + omega_rad_s * period_s_);
+  follows_ = source.start_capacitance_f > 0.0;
+  closing_s_ = 0.0;
+  if (!source.contactor) {
+    m.contactor_closed = 0.0;
+  } else if (m.contactor_closed == 0.0) {
+    const double wait_s =
+        source.choose_angle ? time_until_s(source.closing_angle_rad, source_angle_rad_, omega_rad_s) : 0.0;
+    if (wait_s < period_s_ - tolerance_s_) {
+      m.contactor_closed = 1.0;
+      closing_s_ = wait_s;
+    }
+  }
+  has_edges_ = closing_s_ > tolerance_s_;
+}
+
+const Drive::Order& Drive::order_at(double start_s) const noexcept {
+  return orders_[start_s + tolerance_s_ >= later_s_ ? 1 : 0];
+}
+
+double Drive::pwm_start_s(double start_s) const noexcept {
+  if (p_.inverter.pwm_periods_per_tick == 1) return 0.0;
+  return pwm_period_s_ * static_cast<double>(floor_to_integer((start_s + tolerance_s_) / pwm_period_s_));
+}
+
+double Drive::edge_after(const DriveMemory& m, double start_s) const noexcept {
+  const double instant_s = start_s + tolerance_s_;
+  if (kind_ == DriveKind::kSource) return closing_s_ > instant_s ? closing_s_ : kInfinity;
+  double next_s = later_s_ > instant_s ? later_s_ : kInfinity;
+  if (kind_ == DriveKind::kSwitched) {
+    const double pwm_s = pwm_start_s(start_s);
+    const SwitchingPattern& pattern = order_at(start_s).pattern;
+    const double end_s = pattern.end_s(pattern.segment_at(instant_s - pwm_s, segment_hint(m)));
+    next_s = std::min(next_s, pwm_s + std::min(end_s, pwm_period_s_));
+  }
+  return next_s < period_s_ - tolerance_s_ ? next_s : kInfinity;
+}
+
+TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double duration_s,
+                                   const PhaseValues& current_a) const noexcept {
+  const Order& order = order_at(start_s);
+  const Gates gates = m.switched_off != 0.0 ? Gates::kOff : order.gates;
+  TerminalDrive out;
+  out.rail_v = rail_v(m);
+  if (gates == Gates::kVoltage || gates == Gates::kCurrent) {
+    drive_terminals(m, order, start_s, current_a, out);
+  } else if (gates == Gates::kOff) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k)
+      out.mode[k] = TerminalMode::kDiodes;
+  }
+  if (filter_rate_per_s_ > 0.0 && gates != Gates::kOff) filter(m, duration_s, out);
+  if (holds_) hold_terminals(out);
+  if (field_lost_) {
+    out.field_v = 0.0;
+  } else if (p_.source.field_v != 0.0) {
+    out.field_v = p_.source.field_v;
+  }
+  return out;
+}
+
+double Drive::limit_v(const DriveMemory& m) const noexcept {
+  return std::min(p_.amplifier.voltage_limit_v, rail_v(m));
+}
+
+PhaseValues Drive::loop_voltages(const DriveMemory& m, const PhaseValues& setpoint_a,
+                                 const PhaseValues& current_a) const noexcept {
+  const auto voltage_v = [this](double wanted_a, double is_a, double integral_v) {
+    return loop_voltage_v(p_.current_loop, wanted_a - is_a, integral_v);
+  };
+  return amplified(p_.amplifier, by_terminal(voltage_v, setpoint_a, current_a, m.integral_v));
+}
+
+void Drive::drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
+                            TerminalDrive& out) const noexcept {
+  const PhaseValues wanted_v =
+      order.gates == Gates::kCurrent ? loop_voltages(m, order.setpoint, current_a) : order.setpoint;
+  const bool inverter = kind_ == DriveKind::kAveraged || kind_ == DriveKind::kSwitched;
+  const double field_limit_v = inverter ? m.bus_v : limit_v(m);
+  out.field_v = std::clamp(wanted_v.field, -field_limit_v, field_limit_v);
+  bool saturated = out.field_v != wanted_v.field && p_.source.field_v == 0.0;
+  if (kind_ == DriveKind::kSwitched) {
+    put_switches(m, order, start_s, out);
+  } else {
+    const LimitedVoltages v = inverter ? bridge_voltages(connection_, m.bus_v, phases_of(wanted_v))
+                                       : clipped(phases_of(wanted_v), limit_v(m));
+    saturated = saturated || v.saturated;
+    out.start_v = v.voltage_v;
+    if (inverter) out.start_v = with_dead_time(v.voltage_v, out.rail_v, current_a);
+  }
+  if (saturated) m.saturated = 1.0;
+}
+
+void Drive::put_switches(DriveMemory& m, const Order& order, double start_s,
+                         TerminalDrive& out) const noexcept {
+  const double instant_s = start_s + tolerance_s_ - pwm_start_s(start_s);
+  const std::size_t segment = order.pattern.segment_at(instant_s, segment_hint(m));
+  m.pwm_segment = static_cast<std::int64_t>(segment);
+  order.pattern.put(segment, terminals_, out.rail_v, out);
+}
+
+ThreePhase Drive::with_dead_time(const ThreePhase& voltage_v, double rail_v,
+                                 const PhaseValues& current_a) const noexcept {
+  const auto with = [&](double v, double i) {
+    return averaged_voltage_v(v, rail_v, dead_part_, i, p_.inverter.dead_time_band_a);
+  };
+  return by_phase(with, voltage_v, current_a);
+}
+
+void Drive::filter(DriveMemory& m, double duration_s, TerminalDrive& out) const noexcept {
+  const double half = exponential(-0.5 * filter_rate_per_s_ * duration_s);
+  const auto after = [](double decay) {
+    return [decay](double from, double input) { return filtered(from, input, decay); };
+  };
+  m.filter_input_v = out.start_v;
+  out.constant = false;
+  out.start_v = m.filtered_v;
+  out.middle_v = by_phase(after(half), m.filtered_v, m.filter_input_v);
+  out.end_v = by_phase(after(half * half), m.filtered_v, m.filter_input_v);
+}
+
+void Drive::hold_terminals(TerminalDrive& out) const noexcept {
+  for (int k = 0; k < terminals_; ++k) {
+    const Hold hold = hold_[static_cast<std::size_t>(k)];
+    if (hold == Hold::kNone) continue;
+    TerminalMode& mode = out.mode[static_cast<std::size_t>(k)];
+    mode = hold == Hold::kOpen  ? TerminalMode::kOpen
+           : hold == Hold::kOff ? TerminalMode::kDiodes
+                                : TerminalMode::kDriven;
+    if (mode != TerminalMode::kDriven) continue;
+    const double held_v = hold == Hold::kHigh ? out.rail_v : -out.rail_v;
+    phase(out.start_v, k) = phase(out.middle_v, k) = phase(out.end_v, k) = held_v;
+  }
+}
+
+TerminalDrive Drive::source_output(const DriveMemory& m, double start_s, double duration_s,
+                                   const PhaseValues& current_a) const noexcept {
+  const SourceParameters& source = p_.source;
+  TerminalDrive out;
+  out.rail_v = std::max(p_.amplifier.voltage_limit_v, 2.0 * p_.source.amplitude_v);
+  out.field_v = field_lost_ ? 0.0 : source.field_v;
+  if (m.contactor_closed == 0.0 || start_s + tolerance_s_ < closing_s_) {
+    out.mode.fill(TerminalMode::kOpen);
+    return out;
+  }
+  const auto voltages = [&](double time_s) noexcept {
+    const double angle_rad = source_angle_rad_ + kTurnRad * source.frequency_hz * (start_s + time_s);
+    ThreePhase v = source_voltages(source, source_, source_amplitude_v_, angle_rad);
+    if (source.start_switch) {
+      v.b = 0.0;
+    } else if (source.start_capacitance_f > 0.0) {
+      v.b = v.a - capacitor_drop_v(source, m.start_capacitor, current_a.b, time_s);
+    }
+    return v;
+  };
+  out.start_v = voltages(0.0);
+  out.constant = source.frequency_hz == 0.0 && (source.start_capacitance_f == 0.0 || source.start_switch);
+  if (!out.constant) {
+    out.middle_v = voltages(0.5 * duration_s);
+    out.end_v = voltages(duration_s);
+  }
+  if (holds_) hold_terminals(out);
+  return out;
+}
+
+void Drive::follow(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
+                   const PhaseValues& voltage_v, const PhaseValues& from_a,
+                   const PhaseValues& to_a) const noexcept {
+  if (kind_ == DriveKind::kSource) {
+    m.start_capacitor = applied.mode[1] == TerminalMode::kDriven && !p_.source.start_switch
+                            ? charged(p_.source, m.start_capacitor, from_a.b, to_a.b, duration_s)
+                            : StartCapacitor{.voltage_v = m.start_capacitor.voltage_v};
+    return;
+  }
+  if (filter_rate_per_s_ > 0.0) follow_filter(m, duration_s, applied, voltage_v);
+  if (kind_ == DriveKind::kCurrent) follow_loop(m, start_s, duration_s, from_a, to_a);
+  if (p_.bus.capacitance_f > 0.0) follow_bus(m, duration_s, applied, voltage_v, from_a, to_a);
+}
+
+/// With the gates off the filter follows the terminals, which the machine and the diodes hold.
+void Drive::follow_filter(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                          const PhaseValues& voltage_v) const noexcept {
+  const double decay = exponential(-filter_rate_per_s_ * duration_s);
+  const auto after = [&](double from, double input) { return filtered(from, input, decay); };
+  ThreePhase shaped_v = by_phase(after, m.filtered_v, m.filter_input_v);
+  ThreePhase terminal_v = phases_of(voltage_v);
+  for (int k = 0; k < terminals_; ++k) {
+    const bool diodes = applied.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
+    if (applied.constant || diodes) phase(shaped_v, k) = phase(terminal_v, k);
+  }
+  m.filtered_v = shaped_v;
+}
+
+void Drive::follow_loop(DriveMemory& m, double start_s, double duration_s, const PhaseValues& from_a,
+                        const PhaseValues& to_a) const noexcept {
+  const Order& order = order_at(start_s);
+  if (order.gates != Gates::kCurrent || m.switched_off != 0.0) {
+    m.integral_v = {};
+    return;
+  }
+  const PhaseValues wanted_v = loop_voltages(m, order.setpoint, from_a);
+  const double clip_v = limit_v(m);
+  const auto after = [&](double integral_v, double asked_v, double wanted_a, double i0_a, double i1_a) {
+    const double error_a = wanted_a - mean(i0_a, i1_a);
+    return integral_after(p_.current_loop, integral_v, asked_v, clip_v, error_a, duration_s);
+  };
+  m.integral_v = by_terminal(after, m.integral_v, wanted_v, order.setpoint, from_a, to_a);
+  if (connection_ == Connection::kStar) {
+    const ThreePhase star = without_neutral(phases_of(m.integral_v));
+    m.integral_v = {.a = star.a, .b = star.b, .c = star.c, .field = m.integral_v.field};
+  }
+}
+
+/// The field has a supply of its own; what an arc takes does not come back to the link.
+void Drive::follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                       const PhaseValues& voltage_v, const PhaseValues& from_a,
+                       const PhaseValues& to_a) const noexcept {
+  const auto power = [](double v, double i0_a, double i1_a) { return v * mean(i0_a, i1_a); };
+  ThreePhase power_w = by_phase(power, voltage_v, from_a, to_a);
+  double taken_w = 0.0;
+  for (int k = 0; k < terminals_; ++k) {
+    if (applied.mode[static_cast<std::size_t>(k)] != TerminalMode::kOpen) taken_w += phase(power_w, k);
+  }
+  m.bus_v =
+      bus_after(p_.bus, supply_v_, m.bus_v, m.chopper != 0.0, taken_w * duration_s, duration_s).voltage_v;
+  m.chopper = chopper_after(p_.bus, m.bus_v, m.chopper != 0.0) ? 1.0 : 0.0;
+}
+
+}  // namespace drivebench

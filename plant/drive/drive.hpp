@@ -1,0 +1,205 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "plant/drive/amplifier.hpp"
+#include "plant/drive/command.hpp"
+#include "plant/drive/current_loop.hpp"
+#include "plant/drive/dc_bus.hpp"
+#include "plant/drive/inverter.hpp"
+#include "plant/drive/source.hpp"
+#include "plant/drive/terminal_drive.hpp"
+#include "plant/injected_faults.hpp"
+#include "plant/tick.hpp"
+
+namespace drivebench {
+
+/// What stands between the command and the terminals.
+enum class DriveKind : std::int64_t {
+  kVoltage,   ///< a linear voltage amplifier per phase
+  kCurrent,   ///< the same under an inner current loop at every substep
+  kAveraged,  ///< a bridge as its average over a PWM period
+  kSwitched,  ///< a bridge resolved at its switching instants
+  kSource,    ///< an AC or DC source behind a contactor; takes no commands
+};
+
+struct DriveParameters {
+  DriveKind kind = DriveKind::kVoltage;
+  AmplifierParameters amplifier;
+  CurrentLoopParameters current_loop;
+  InverterParameters inverter;
+  BusParameters bus;
+  SourceParameters source;
+};
+
+inline constexpr int kMaxDelayTicks = 8;           ///< of amplifier.delay_ticks
+inline constexpr int kMaxInjectedDelayTicks = 16;  ///< of the fault command_delay
+
+/// All that a drive remembers between two substeps. 8-byte members only.
+struct DriveMemory {
+  std::array<PhaseCommand, kMaxDelayTicks + kMaxInjectedDelayTicks + 2> commands{};  ///< a ring by tick
+  ThreePhase filter_input_v{};                                                       ///< of the last interval
+  ThreePhase filtered_v{};        ///< behind the output filter
+  PhaseValues integral_v{};       ///< current loop
+  double source_phase_rad = 0.0;  ///< of the source less phase_rad, within a turn, at the next begin_tick()
+  double contactor_closed = 0.0;  ///< 0: open, or waiting for its angle
+  StartCapacitor start_capacitor{};
+  std::int64_t pwm_segment = 0;  ///< where at() has been last
+  double bus_v = 0.0;            ///< 0 with a source
+  double chopper = 0.0;          ///< 1: the brake resistor is on
+  double switched_off = 0.0;     ///< 1: tripped within this tick
+  double saturated = 0.0;        ///< 1: a voltage was clipped in this tick
+};
+
+/// The drive of an axis. Within a tick the order is begin_tick(), then for every interval at() and finish();
+/// an interval ends at a substep, at next_edge_s() or at an event of the machine, whichever comes first. at()
+/// may be asked again for a shorter interval from the same start.
+///
+/// Gates::kOff lets the currents flow through the diodes into the rails; Gates::kZeroVoltage drives every
+/// terminal at 0; Gates::kCurrent without a current loop is Gates::kOff. Commands before tick 0 are
+/// Gates::kOff. The field winding has the voltage source.field_v, if that is not 0, whatever the gates do;
+/// else the command's, which is 0 with the gates off.
+class Drive {
+ public:
+  /// The parameters must be free of problems(). Noise channels from noise_channel to noise_channel + 4 are
+  /// used.
+  Drive(const DriveParameters& p, Connection connection, double period_s, std::uint64_t seed,
+        std::uint64_t noise_channel) noexcept;
+  void set_parameters(const DriveParameters& p) noexcept;
+
+  /// A drive at rest: the bus at its voltage, the contactor as configured.
+  DriveMemory initial() const noexcept;
+
+  void begin_tick(DriveMemory& m, const PhaseCommand& command, const InjectedFaults& faults,
+                  Tick tick) noexcept;
+
+  /// Switches the gates off (a source: opens the contactor) for the rest of the tick: over-current trip. Call
+  /// it after each begin_tick() while the trip lasts: delayed commands and contactors know nothing of it.
+  void switch_off(DriveMemory& m) noexcept;
+
+  /// The next instant after start_s, from the start of the tick, at which the voltages jump; infinity if
+  /// there is none within the tick. Instants closer than a billionth of the tick are one.
+  double next_edge_s(const DriveMemory& m, double start_s) const noexcept {
+    return has_edges_ ? edge_after(m, start_s) : std::numeric_limits<double>::infinity();
+  }
+
+  /// What the terminals see from start_s on for duration_s, which crosses no edge. `current_a` are the
+  /// terminal currents at start_s.
+  TerminalDrive at(DriveMemory& m, double start_s, double duration_s,
+                   const PhaseValues& current_a) const noexcept {
+    if (steady_ && m.switched_off == 0.0) {
+      TerminalDrive out = steady_output_;
+      if (switches_) put_switches(m, orders_[1], start_s, out);
+      return out;
+    }
+    return kind_ == DriveKind::kSource ? source_output(m, start_s, duration_s, current_a)
+                                       : bridge_output(m, start_s, duration_s, current_a);
+  }
+
+  /// An interval has been integrated: energy and charge for bus, filter and capacitor. `voltage_v` are the
+  /// mean terminal voltages, `from_a` and `to_a` the terminal currents at its ends.
+  void finish(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
+              const PhaseValues& voltage_v, const PhaseValues& from_a,
+              const PhaseValues& to_a) const noexcept {
+    if (follows_) follow(m, start_s, duration_s, applied, voltage_v, from_a, to_a);
+  }
+
+  /// Whether at() gives the same during what is left of the tick, whatever the machine does.
+  bool steady(const DriveMemory& m) const noexcept { return steady_ && !switches_ && m.switched_off == 0.0; }
+  /// Whether at() changes during what is left of the tick by the switches alone: see switch_terminals().
+  bool only_switches(const DriveMemory& m) const noexcept {
+    return steady_ && switches_ && m.switched_off == 0.0;
+  }
+  /// Brings an output of at() up to date where only_switches() holds.
+  void switch_terminals(DriveMemory& m, double start_s, TerminalDrive& out) const noexcept {
+    put_switches(m, orders_[1], start_s, out);
+  }
+  /// Whether finish() has something to do in this tick.
+  bool follows() const noexcept { return follows_; }
+
+ private:
+  /// What a command comes to in this tick.
+  struct Order {
+    Gates gates = Gates::kOff;   ///< kCurrent only with a current loop
+    PhaseValues setpoint{};      ///< [V] behind gain and offset, or [A] within the limit
+    SwitchingPattern pattern{};  ///< switched inverter
+  };
+  /// A fault that holds a terminal whatever the command says.
+  enum class Hold { kNone, kHigh, kLow, kOff, kOpen };
+
+  // begin_tick
+  void take_faults(const InjectedFaults& faults) noexcept;
+  PhaseCommand corrupted(const PhaseCommand& command, double probability, Tick tick) const noexcept;
+  void take_orders(DriveMemory& m, const InjectedFaults& faults, Tick tick) noexcept;
+  void take_order(Order& order, const PhaseCommand& command, DriveMemory& m) const noexcept;
+  void begin_source(DriveMemory& m) noexcept;
+
+  // the tick
+  double edge_after(const DriveMemory& m, double start_s) const noexcept;
+  TerminalDrive bridge_output(DriveMemory& m, double start_s, double duration_s,
+                              const PhaseValues& current_a) const noexcept;
+  TerminalDrive source_output(const DriveMemory& m, double start_s, double duration_s,
+                              const PhaseValues& current_a) const noexcept;
+  void follow(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
+              const PhaseValues& voltage_v, const PhaseValues& from_a,
+              const PhaseValues& to_a) const noexcept;
+
+  // their parts
+  const Order& order_at(double start_s) const noexcept;
+  double pwm_start_s(double start_s) const noexcept;
+  static std::size_t segment_hint(const DriveMemory& m) noexcept {
+    return static_cast<std::size_t>(m.pwm_segment);
+  }
+  double rail_v(const DriveMemory& m) const noexcept { return rail_voltage_v(m.bus_v, connection_); }
+  double limit_v(const DriveMemory& m) const noexcept;
+  PhaseValues loop_voltages(const DriveMemory& m, const PhaseValues& setpoint_a,
+                            const PhaseValues& current_a) const noexcept;
+  void drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
+                       TerminalDrive& out) const noexcept;
+  void put_switches(DriveMemory& m, const Order& order, double start_s, TerminalDrive& out) const noexcept;
+  ThreePhase with_dead_time(const ThreePhase& voltage_v, double rail_v,
+                            const PhaseValues& current_a) const noexcept;
+  void filter(DriveMemory& m, double duration_s, TerminalDrive& out) const noexcept;
+  void hold_terminals(TerminalDrive& out) const noexcept;
+  void follow_filter(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                     const PhaseValues& voltage_v) const noexcept;
+  void follow_loop(DriveMemory& m, double start_s, double duration_s, const PhaseValues& from_a,
+                   const PhaseValues& to_a) const noexcept;
+  void follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                  const PhaseValues& voltage_v, const PhaseValues& from_a,
+                  const PhaseValues& to_a) const noexcept;
+
+  DriveParameters p_;
+  Connection connection_;
+  DriveKind kind_;
+  int terminals_;
+  double period_s_;
+  double tolerance_s_;  ///< instants closer than this are one
+  double pwm_period_s_;
+  double dead_part_;  ///< dead time over PWM period
+  double filter_rate_per_s_;
+  SourceConstants source_;
+  std::uint64_t seed_;
+  std::uint64_t noise_channel_;
+
+  // Of the tick that is running; begin_tick() makes all of it anew.
+  std::array<Order, 2> orders_{};  ///< the second takes over at later_s_
+  double later_s_ = 0.0;
+  std::array<Hold, 3> hold_{};
+  bool holds_ = false;  ///< any
+  bool field_lost_ = false;
+  double supply_v_ = 0.0;  ///< of the bus
+  double source_amplitude_v_ = 0.0;
+  double source_angle_rad_ = 0.0;  ///< of phase a, at the start of the tick
+  double closing_s_ = 0.0;         ///< from then on the contactor is closed
+  bool has_edges_ = false;
+  bool follows_ = false;   ///< finish() has something to do
+  bool steady_ = false;    ///< steady_output_ holds during the whole tick
+  bool switches_ = false;  ///< but for the switches of orders_[1]
+  TerminalDrive steady_output_{};
+};
+
+}  // namespace drivebench

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "plant/drive/amplifier.hpp"
+#include "plant/drive/phases.hpp"
+#include "plant/drive/terminal_drive.hpp"
+
+namespace drivebench {
+
+/// Section [axis.inverter]: a bridge with symmetric (centre-aligned) PWM, averaged or switched. A star hangs
+/// on three legs; each winding of the other connections hangs between the two legs of a bridge of its own,
+/// which switch together (bipolar PWM), so that a winding is at plus or minus the whole link.
+struct InverterParameters {
+  int pwm_periods_per_tick = 1;
+  double dead_time_s = 0.0;       ///< at each commutation both switches are open for so long
+  double dead_time_band_a = 0.1;  ///< averaged: within it the dead-time error goes linearly through zero
+};
+
+/// The mean voltages that the bridge can give. A star may have two thirds of the link between a terminal and
+/// its neutral: beyond a line-to-line voltage of the whole link the vector is shortened and keeps its angle
+/// (hexagon limit); then the terminals are shifted in common to the middle of the link (min-max injection).
+/// Other connections: each winding within plus and minus the link.
+LimitedVoltages bridge_voltages(Connection connection, double bus_v, const ThreePhase& wanted_v) noexcept;
+
+/// Part of the period during which a terminal is at the upper rail, for a mean voltage within the rails.
+/// Pulses and gaps that would vanish in the dead time, a part of the period, are left out: 0 or 1.
+constexpr double duty(double voltage_v, double rail_v, double dead_part) noexcept {
+  const double on = rail_v > 0.0 ? 0.5 + 0.5 * (voltage_v / rail_v) : 0.5;
+  const double shortest = dead_part < 0.5 ? dead_part : 0.5;
+  if (on <= shortest) return 0.0;
+  return on >= 1.0 - shortest ? 1.0 : on;
+}
+
+/// Mean over a PWM period of the voltage of a terminal for its mean command. During the dead time the current
+/// flows through the diode of the rail that it comes from:
+///   error = -sign(i) 2 U_rail t_dead/T_pwm        if the terminal switches at all
+/// which is U_bus t_dead/T_pwm for a leg of a star and twice that for a winding between two legs.
+double averaged_voltage_v(double voltage_v, double rail_v, double dead_part, double current_a,
+                          double band_a) noexcept;
+
+/// The commutations of the terminals within one PWM period. Each on-interval and each dead time is centred on
+/// the ideal instant, so that what is at the start of the period is there at its end. A terminal that stays
+/// at the upper rail for a whole period leaves it at the period's end without a dead time.
+class SwitchingPattern {
+ public:
+  SwitchingPattern() = default;
+  /// The voltages are within the rails.
+  SwitchingPattern(const ThreePhase& voltage_v, int terminals, double rail_v, double dead_time_s,
+                   double period_s) noexcept;
+
+  /// The segment between two commutations in which this instant of the period lies. The search starts at
+  /// `hint`, which speeds it up and changes nothing.
+  std::size_t segment_at(double instant_s, std::size_t hint) const noexcept {
+    if (hint >= segments_.size()) hint = 0;
+    hint += segments_[hint].until_s <= instant_s ? 1U : 0U;  // mostly none or one: without a branch
+    while (hint > 0 && segments_[hint - 1].until_s > instant_s)
+      --hint;
+    while (segments_[hint].until_s <= instant_s)
+      ++hint;
+    return hint;
+  }
+
+  /// The commutation that ends a segment; beyond the period after the last one.
+  double end_s(std::size_t segment) const noexcept { return segments_[segment].until_s; }
+
+  /// What the first `terminals` are connected to during a segment.
+  void put(std::size_t segment, int terminals, double rail_v, TerminalDrive& out) const noexcept {
+    const std::uint64_t passed = segments_[segment].passed;
+    for (int k = 0; k < terminals; ++k) {
+      const std::uint64_t of_terminal = passed >> (kBits * static_cast<std::uint64_t>(k)) & 7U;
+      out.mode[static_cast<std::size_t>(k)] = kMode[of_terminal];
+      phase(out.start_v, k) = kLevel[of_terminal] * rail_v;
+    }
+  }
+
+ private:
+  static constexpr double kNever = 1e300;
+  static constexpr std::uint64_t kBits = 3;  ///< for the commutations that a terminal has passed: 0 to 4
+  static constexpr std::uint64_t kHigh = 2;  ///< of them make the upper switch closed
+
+  // What a terminal is connected to after so many commutations: lower switch, dead time, upper switch, dead
+  // time, lower switch.
+  static constexpr std::array<TerminalMode, 8> kMode{TerminalMode::kDriven, TerminalMode::kDiodes,
+                                                     TerminalMode::kDriven, TerminalMode::kDiodes,
+                                                     TerminalMode::kDriven};
+  static constexpr std::array<double, 8> kLevel{-1.0, 0.0, 1.0, 0.0, -1.0};
+
+  struct Segment {
+    double until_s = kNever;
+    std::uint64_t passed = 0;  ///< kBits for each terminal
+  };
+  std::array<Segment, 13> segments_{};  ///< four commutations for each of three terminals
+};
+
+}  // namespace drivebench

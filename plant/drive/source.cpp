@@ -1,0 +1,97 @@
+#include "plant/drive/source.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+
+#include "plant/drive/phases.hpp"
+#include "plant/rounding.hpp"
+#include "plant/trig.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr double kTurnRad = 2.0 * std::numbers::pi;
+
+}  // namespace
+
+double within_turn(double angle_rad) noexcept {
+  const double rest = angle_rad - kTurnRad * static_cast<double>(floor_to_integer(angle_rad / kTurnRad));
+  return rest >= 0.0 && rest < kTurnRad ? rest : 0.0;  // rounding may put it on either end
+}
+
+double trapezoid(double angle_rad) noexcept {
+  constexpr double kQuarter = 0.25 * kTurnRad;
+  // Folded at the quarter turns: rising over [-1/4, 1/4] of a turn, falling over [1/4, 3/4].
+  const double shifted = within_turn(angle_rad + kQuarter);
+  const double folded = shifted <= 2.0 * kQuarter ? shifted - kQuarter : 3.0 * kQuarter - shifted;
+  return std::clamp(6.0 / std::numbers::pi * folded, -1.0, 1.0);
+}
+
+SourceConstants constants_of(const SourceParameters& p, Connection connection) noexcept {
+  const double behind = connection == Connection::kTwoPhase ? kTurnRad / 4.0 : kTurnRad / 3.0;
+  const ThreePhase factor{.a = 1.0, .b = p.amplitude_factor_b, .c = p.amplitude_factor_c};
+  SourceConstants c{
+      .factor = existing(factor, terminal_count(connection)),
+      .offset_rad = {.a = 0.0, .b = p.phase_offset_b_rad - behind, .c = p.phase_offset_c_rad - 2.0 * behind},
+      .cosine = {},
+      .sine = {}};
+  c.cosine = by_phase([](double f, double x) { return f * cosine(x); }, c.factor, c.offset_rad);
+  c.sine = by_phase([](double f, double x) { return f * sine(x); }, c.factor, c.offset_rad);
+  return c;
+}
+
+ThreePhase source_voltages(const SourceParameters& p, const SourceConstants& c, double amplitude_v,
+                           double angle_rad) noexcept {
+  if (p.waveform == Waveform::kSine) {
+    const CosSin a = cos_sin(angle_rad);
+    return by_phase([=](double cos, double sin) { return amplitude_v * (cos * a.cos - sin * a.sin); },
+                    c.cosine, c.sine);
+  }
+  return by_phase(
+      [&](double factor, double offset_rad) {
+        const double angle = angle_rad + offset_rad;
+        const double value = p.waveform == Waveform::kTrapezoid ? trapezoid(angle)
+                                                                : p.table.held(within_turn(angle) / kTurnRad);
+        return amplitude_v * factor * value;
+      },
+      c.factor, c.offset_rad);
+}
+
+double time_until_s(double target_rad, double angle_rad, double omega_rad_s) noexcept {
+  if (omega_rad_s == 0.0) return std::numeric_limits<double>::infinity();
+  constexpr double kReached = 1e-9;  // passed by so little that it is rounding
+  const double way_rad = omega_rad_s > 0.0 ? target_rad - angle_rad : angle_rad - target_rad;
+  const double left_rad = within_turn(way_rad);
+  const double speed_rad_s = omega_rad_s > 0.0 ? omega_rad_s : -omega_rad_s;
+  return left_rad > kTurnRad - kReached ? 0.0 : left_rad / speed_rad_s;
+}
+
+double capacitor_drop_v(const SourceParameters& p, const StartCapacitor& x, double current_a,
+                        double time_s) noexcept {
+  // i = i0 + slope t + bend t (t + h), with h the last interval.
+  const double current = current_a + time_s * (x.slope_a_s + x.bend_a_s2 * (time_s + x.interval_s));
+  const double charge_as =
+      time_s * (current_a + time_s * (0.5 * x.slope_a_s + x.bend_a_s2 * (time_s / 3.0 + 0.5 * x.interval_s)));
+  return x.voltage_v + charge_as / p.start_capacitance_f + p.start_resistance_ohm * current;
+}
+
+StartCapacitor charged(const SourceParameters& p, const StartCapacitor& x, double from_a, double to_a,
+                       double duration_s) noexcept {
+  constexpr double kTooShort = 1e-3;  // of the last interval, to give a slope
+  if (duration_s < kTooShort * x.interval_s) {
+    StartCapacitor result = x;
+    result.voltage_v += 0.5 * duration_s * (from_a + to_a) / p.start_capacitance_f;
+    return result;
+  }
+  const double slope_a_s = (to_a - from_a) / duration_s;
+  const double bend_a_s2 = x.interval_s > 0.0 ? (slope_a_s - x.slope_a_s) / (duration_s + x.interval_s) : 0.0;
+  // The parabola through both ends and the start of the last interval.
+  const double charge_as = duration_s * (0.5 * (from_a + to_a) - bend_a_s2 * duration_s * duration_s / 6.0);
+  return {.voltage_v = x.voltage_v + charge_as / p.start_capacitance_f,
+          .slope_a_s = slope_a_s,
+          .bend_a_s2 = bend_a_s2,
+          .interval_s = duration_s};
+}
+
+}  // namespace drivebench

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <type_traits>
+
+#include "plant/rk4.hpp"
+#include "plant/rotated.hpp"
+#include "plant/train.hpp"
+#include "plant/trig.hpp"
+
+namespace drivebench {
+
+/// Numbers whose passing through zero ends a piece of a tick: at most four of the shaft, three of the
+/// terminals and a corner.
+struct EventValues {
+  std::array<double, 8> value{};
+  int shaft = 0;  ///< how many of them belong to the shaft; the rest follows
+  int count = 0;
+
+  void add(double v) noexcept { value[static_cast<std::size_t>(count++)] = v; }
+};
+
+/// The first of the values that passes zero, going linearly, and the part of the piece after which it does.
+struct Crossing {
+  int event = -1;
+  double fraction = 1.0;
+};
+Crossing first_crossing(const EventValues& from, const EventValues& to) noexcept;
+
+/// One step of the search for a zero between two points by the Illinois method.
+struct Bracket {
+  double low = 0.0;
+  double low_value;
+  double high = 1.0;
+  double high_value;
+  int side = 0;
+
+  double guess() const noexcept { return low + (high - low) * (low_value / (low_value - high_value)); }
+  void narrow(double at, double value) noexcept;
+};
+
+/// A train with a machine of this kind, whose rotor turns a rigid shaft (ShaftState) or one of two masses
+/// (TwoMassState).
+template <class Machine, class Shaft>
+class DriveTrain final : public Train {
+ public:
+  using State = typename Machine::State;
+
+  explicit DriveTrain(const MachineParameters& machine) noexcept { set_machine(machine, {}); }
+
+  std::unique_ptr<Train> clone() const override { return std::make_unique<DriveTrain>(*this); }
+
+  void set_machine(const MachineParameters& machine, const Adjustment& adjustment) noexcept override {
+    const auto p = adjusted(*std::get_if<typename Machine::Parameters>(&machine), adjustment);
+    c_ = constants_of(p);
+    pole_pairs_ = pole_pairs_of(p);
+  }
+
+  void run(AxisCore& core, AxisState& state, double load_nm) noexcept override;
+  MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept override;
+
+  void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
+            const RotorMotion& motion) noexcept override;
+  double stage_torque_nm(const RotorMotion& motion) const noexcept override {
+    return torque_nm(c_, piece_.stage, turned(motion));
+  }
+  void stage(int number, double duration_s, const RotorMotion& motion) noexcept override;
+  double event(const AxisCore& core, const AxisState& state, const RotorMotion& from,
+               const RotorMotion& to) noexcept override;
+  void close(AxisCore& core, AxisState& state, double start_s, double duration_s, const RotorMotion& from,
+             const RotorMotion& to, bool at_event) noexcept override;
+
+ private:
+  /// The continuous state, integrated as one vector.
+  struct Whole {
+    State machine;
+    Shaft shaft;
+  };
+
+  /// What is worked out at the start of a piece.
+  struct Piece {
+    State from{};
+    State stage{};
+    State sum{};
+    TerminalDrive drive{};
+    TerminalCircuit circuit{};
+    int event = -1;
+    bool plain = false;  ///< every terminal is driven by a constant voltage, nothing is shorted
+    bool stays = false;  ///< and the next piece has the same
+  };
+
+  static State machine_of(const AxisState& state) noexcept;
+  static void keep_machine(AxisState& state, const State& x) noexcept;
+  static Shaft shaft_of(const AxisState& state) noexcept;
+  static void keep_shaft(AxisState& state, const Shaft& x) noexcept;
+
+  RotorMotion turned(RotorMotion motion) const noexcept {
+    if constexpr (Machine::kUsesAngle) motion.electrical = cos_sin(pole_pairs_ * motion.angle_rad);
+    return motion;
+  }
+  /// The electrical angle is worked out once for each substep and rotated from there on: a third of the time
+  /// of a cosine and sine, and more exact than carrying them as states.
+  RotorMotion motion_of(const Whole& x) const noexcept {
+    RotorMotion motion{
+        .angle_rad = x.shaft.angle_rad, .speed_rad_s = x.shaft.speed_rad_s, .electrical = {1.0, 0.0}};
+    if constexpr (Machine::kUsesAngle) {
+      motion.electrical = rotated(substep_start_, pole_pairs_ * (x.shaft.angle_rad - substep_start_rad_));
+    }
+    return motion;
+  }
+
+  Whole slope(const AxisCore& core, const Whole& x, const TerminalInput& u, const ShaftBranch& branch,
+              double load_nm) const noexcept;
+  // Left to themselves the compilers call the slope four times, at twice the time.
+  [[gnu::flatten]] Whole stepped(const AxisCore& core, const Whole& x, double duration_s,
+                                 const TerminalCircuit& circuit, const ShaftBranch& branch,
+                                 double load_nm) const noexcept;
+  [[gnu::noinline]] Whole stepped_varying(const AxisCore& core, const Whole& x, double duration_s,
+                                          const TerminalCircuit& circuit, const ShaftBranch& branch,
+                                          double load_nm) const noexcept;
+  void drive_windings(const AxisCore& core) noexcept;
+  void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
+                     const RotorMotion& motion) noexcept;
+  /// The step up to the event that comes first, and which one it is (-1: none comes).
+  Crossing cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
+                        double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
+  EventValues values_at(const AxisCore& core, TerminalSet open, TerminalSet dying, const Whole& x,
+                        const ShaftBranch& branch, double corner) const noexcept;
+  void add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying, const State& x,
+                      const RotorMotion& motion, double corner, EventValues& values) const noexcept;
+  double corner_between(const RotorMotion& from, const RotorMotion& to) const noexcept;
+  void settle_terminals(const AxisCore& core, AxisState& state, State& x, const RotorMotion& motion,
+                        int electrical_event) const noexcept;
+  void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
+                 double load_nm) noexcept;
+  void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
+                    const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
+  void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
+  /// Takes out what the integration lets a blocked current drift.
+  void keep_open(const AxisCore& core, const AxisState& state, State& x,
+                 const RotorMotion& motion) const noexcept;
+  Measurable measurable(const AxisCore& core, const AxisState& state, const State& x,
+                        const RotorMotion& motion, const PhaseValues& voltage_v) const noexcept;
+
+  typename Machine::Constants c_{};
+  double pole_pairs_ = 0.0;
+  Piece piece_{};
+  CosSin substep_start_{1.0, 0.0};  ///< of the electrical angle
+  double substep_start_rad_ = 0.0;  ///< of the rotor
+};
+
+/// A corner that is not within reach.
+inline constexpr double kNoCorner = 1e300;
+
+/// The integer that a corner position passes on its way between two values; kNoCorner if it passes none.
+double corner_on_the_way(double from, double to) noexcept;
+
+/// The n-th terminal of a set, from 0 on.
+int nth_terminal(TerminalSet set, int n) noexcept;
+
+/// The set of open terminals after the current of one has died; in a star the last two die together.
+TerminalSet opened(Connection connection, TerminalSet open, int terminal) noexcept;
+
+/// An interval has passed: drive, analog sensors and terminal voltages follow.
+void follow_piece(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                  const TerminalDrive& drive, const TerminalCircuit& circuit, const Measurable& from,
+                  const Measurable& to) noexcept;
+
+}  // namespace drivebench

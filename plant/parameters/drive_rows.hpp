@@ -1,0 +1,21 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "plant/parameters/parameters.hpp"
+
+namespace drivebench {
+
+/// Sections [axis.drive], [axis.amplifier], [axis.current_loop], [axis.inverter], [axis.bus] and
+/// [axis.source].
+std::span<const Parameter> drive_rows() noexcept;
+std::span<const CurveParameter> drive_curves() noexcept;
+
+/// The rules between the values.
+void add_problems(const DriveParameters& p, std::vector<Problem>& found);
+
+/// The rules that need the sample period.
+void add_period_problems(const DriveParameters& p, double period_s, std::vector<Problem>& found);
+
+}  // namespace drivebench

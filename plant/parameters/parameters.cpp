@@ -1,0 +1,160 @@
+#include "plant/parameters/parameters.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "plant/parameters/bldc_machine_rows.hpp"
+#include "plant/parameters/drive_rows.hpp"
+#include "plant/parameters/induction_machine_rows.hpp"
+#include "plant/parameters/linear_dc_machine_rows.hpp"
+#include "plant/parameters/mechanics_rows.hpp"
+#include "plant/parameters/pm_dc_machine_rows.hpp"
+#include "plant/parameters/pm_machine_rows.hpp"
+#include "plant/parameters/rows.hpp"
+#include "plant/parameters/saturated_induction_machine_rows.hpp"
+#include "plant/parameters/sensor_rows.hpp"
+#include "plant/parameters/separate_dc_machine_rows.hpp"
+#include "plant/parameters/series_dc_machine_rows.hpp"
+#include "plant/parameters/shunt_dc_machine_rows.hpp"
+#include "plant/parameters/wound_rotor_machine_rows.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::size_t kKinds = std::variant_size_v<MachineParameters>;
+
+/// What is written down of a kind of machine; in the order of MachineParameters.
+struct Kind {
+  std::string_view name;
+  std::span<const Parameter> rows;
+  std::span<const CurveParameter> curves;
+};
+
+std::array<Kind, kKinds> all_kinds() noexcept {
+  return {{{InductionMachine::kKind, induction_machine_rows(), {}},
+           {SaturatedInductionMachine::kKind, saturated_induction_machine_rows(),
+            saturated_induction_machine_curves()},
+           {PmMachine::kKind, pm_machine_rows(), {}},
+           {BldcMachine::kKind, bldc_machine_rows(), {}},
+           {WoundRotorMachine::kKind, wound_rotor_machine_rows(), {}},
+           {PmDcMachine::kKind, pm_dc_machine_rows(), {}},
+           {SeparateDcMachine::kKind, separate_dc_machine_rows(), separate_dc_machine_curves()},
+           {ShuntDcMachine::kKind, shunt_dc_machine_rows(), shunt_dc_machine_curves()},
+           {SeriesDcMachine::kKind, series_dc_machine_rows(), series_dc_machine_curves()},
+           {LinearDcMachine::kKind, linear_dc_machine_rows(), {}}}};
+}
+
+/// The whole tables of each kind, put together once.
+struct Tables {
+  std::array<std::string_view, kKinds> names;
+  std::array<std::vector<Parameter>, kKinds> rows;
+  std::array<std::vector<CurveParameter>, kKinds> curves;
+};
+
+Tables make_tables() {
+  Tables tables;
+  const std::array<Kind, kKinds> kinds = all_kinds();
+  for (std::size_t k = 0; k < kKinds; ++k) {
+    tables.names[k] = kinds[k].name;
+    for (const auto part : {kinds[k].rows, mechanics_rows(), drive_rows(), sensor_rows()}) {
+      tables.rows[k].insert(tables.rows[k].end(), part.begin(), part.end());
+    }
+    for (const auto part : {kinds[k].curves, mechanics_curves(), drive_curves()}) {
+      tables.curves[k].insert(tables.curves[k].end(), part.begin(), part.end());
+    }
+  }
+  return tables;
+}
+
+const Tables& tables() noexcept {
+  static const Tables all = make_tables();
+  return all;
+}
+
+template <std::size_t kIndex = 0>
+MachineParameters machine_of_kind(std::size_t kind) {
+  if constexpr (kIndex + 1 < kKinds) {
+    if (kind != kIndex) return machine_of_kind<kIndex + 1>(kind);
+  }
+  return MachineParameters(std::in_place_index<kIndex>);
+}
+
+void add_curve_problems(const AxisParameters& p, std::vector<Problem>& found) {
+  for (const CurveParameter& row : axis_curves(p)) {
+    const Curve& curve = row.get(p);
+    if (curve.empty()) {
+      if (row.required) found.push_back({std::string(row.name), "is missing"});
+      continue;
+    }
+    if (std::string rule = problem_with_points(curve.points(), row.rising); !rule.empty()) {
+      found.push_back({std::string(row.name), std::move(rule)});
+    }
+  }
+}
+
+}  // namespace
+
+std::span<const std::string_view> machine_kinds() noexcept {
+  return tables().names;
+}
+
+std::string_view machine_kind(const AxisParameters& p) noexcept {
+  return tables().names[p.machine.index()];
+}
+
+MachineParameters make_machine(std::size_t kind) {
+  return machine_of_kind(kind);
+}
+
+std::span<const Parameter> axis_parameters(const AxisParameters& p) noexcept {
+  return tables().rows[p.machine.index()];
+}
+
+std::span<const CurveParameter> axis_curves(const AxisParameters& p) noexcept {
+  return tables().curves[p.machine.index()];
+}
+
+const Parameter* find_parameter(const AxisParameters& p, std::string_view name) noexcept {
+  for (const Parameter& row : axis_parameters(p)) {
+    if (row.name == name) return &row;
+  }
+  return nullptr;
+}
+
+std::string text(double value) {
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  return {buffer.data(), end};
+}
+
+std::string problem_with(const Parameter& parameter, double value) {
+  if (!(value >= parameter.minimum && value <= parameter.maximum)) {
+    return "is " + text(value) + " but must lie between " + text(parameter.minimum) + " and " +
+           text(parameter.maximum) + (parameter.unit == "1" ? "" : " " + std::string(parameter.unit));
+  }
+  if (parameter.integer && value != std::trunc(value))
+    return "is " + text(value) + " but must be a whole number";
+  return {};
+}
+
+std::vector<Problem> problems(const AxisParameters& p) {
+  std::vector<Problem> found;
+  for (const Parameter& row : axis_parameters(p)) {
+    if (std::string rule = problem_with(row, row.get(p)); !rule.empty()) {
+      found.push_back({std::string(row.name), std::move(rule)});
+    }
+  }
+  add_curve_problems(p, found);
+  std::visit([&found](const auto& machine) { add_problems(machine, found); }, p.machine);
+  add_problems(p.mechanics, found);
+  add_problems(p.drive, found);
+  add_problems(p.encoder, found);
+  add_problems(p.sensors, found);
+  add_problems(p.thermal, found);
+  return found;
+}
+
+}  // namespace drivebench

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "plant/parameters/parameters.hpp"
+
+namespace drivebench {
+
+/// Section [axis.machine] of this kind.
+std::span<const Parameter> series_dc_machine_rows() noexcept;
+std::span<const CurveParameter> series_dc_machine_curves() noexcept;
+
+/// The rules between the values.
+void add_problems(const SeriesDcMachineParameters& p, std::vector<Problem>& found);
+
+}  // namespace drivebench

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "plant/parameters/parameters.hpp"
+
+namespace drivebench {
+
+/// The parameters of kind WoundRotorMachine.
+std::span<const Parameter> wound_rotor_machine_rows() noexcept;
+
+/// Appends what is wrong between the values, each of which lies within the limits of its row.
+void add_problems(const WoundRotorMachineParameters& p, std::vector<Problem>& found);
+
+}  // namespace drivebench

@@ -1,0 +1,197 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "plant/injected_faults.hpp"
+#include "plant/rounding.hpp"
+#include "plant/tick.hpp"
+
+namespace drivebench {
+
+/// An incremental encoder with index. The count is floor(theta N/(2 pi)), plus one half count if asked for.
+struct EncoderParameters {
+  int counts_per_revolution = 2000;  ///< N, after quadrature; a multiple of 4
+  bool half_count_offset = false;    ///< centres the quantisation error on zero
+  bool swapped = false;              ///< A and B are exchanged: the count falls when the angle rises
+};
+
+/// The shaft between two integration nodes: its angle and speed at both ends. Between them the angle is the
+/// cubic with these end values and slopes, which is exact at constant acceleration.
+struct AngleSegment {
+  double start_s;  ///< from the start of the tick
+  double duration_s;
+  double start_rad;  ///< angle within the turn in which the tick started
+  double end_rad;
+  double start_rad_s;
+  double end_rad_s;
+};
+
+/// One change of the A or B line.
+struct Edge {
+  double time_s;       ///< from the start of the tick
+  std::int64_t count;  ///< the count after the edge
+  int direction;       ///< +1 or -1
+};
+
+/// Everything the encoder remembers from one tick to the next. 8-byte members only.
+struct EncoderState {
+  std::int64_t count = 0;  ///< as a decoder on the lines A and B has it
+  std::int64_t last_edge_tick = 0;
+  double last_edge_s = 0.0;            ///< from the start of last_edge_tick
+  double period_s = 0.0;               ///< between the last two edges; 0 until there were two
+  std::int64_t edges_seen = 0;         ///< 0, 1 or 2 (2: the period is valid)
+  std::int64_t direction = 0;          ///< of the last edge; 0 before the first
+  std::int64_t direction_changed = 0;  ///< 1: the last edge went the other way than the one before it
+  std::int64_t index_tick = -1;        ///< tick in which the index line last rose; -1: never
+  std::int64_t index_count = 0;        ///< latched at that edge
+  std::int64_t ahead = 0;  ///< count of a sound encoder less `count`: what faults have made of it so far
+};
+
+/// Line levels as bits, and the flags that go with them.
+enum EncoderLevel : std::uint32_t {
+  kLevelA = 1u << 0,
+  kLevelB = 1u << 1,
+  kLevelZ = 1u << 2,
+  kReverse = 1u << 3,           ///< the last edge counted down
+  kDirectionChanged = 1u << 4,  ///< the last edge went the other way than the one before it
+  kPeriodValid = 1u << 5,       ///< two edges have been seen
+};
+
+/// Follows a shaft and says what an encoder on it would.
+///
+/// Faults change what the lines do, and the count is what a decoder makes of the lines: at every instant A
+/// and B are those of the last two bits of the count, and it changes by one with each edge. With `swapped`
+/// each edge counts the other way. A lost line stays low, so that the count goes to and fro between two
+/// neighbours; if A and B do not fit to that when the fault comes, the lines fall in at the start of the
+/// tick, one edge after the other. Of lost pulses only every n-th count has no edge, in both directions of
+/// rotation alike. Eccentricity adds its amplitude times sin(theta) to the angle; the edges by which the
+/// count jumps where it comes or goes fall on the start of the tick. A fault that ends leaves the count where
+/// it is, except that eccentricity takes its error with it. Z stays with the disc.
+class Encoder {
+ public:
+  Encoder(const EncoderParameters& p, double period_s) noexcept;
+
+  /// Follows the shaft through one tick, given as consecutive segments, from the count in the state. The cost
+  /// does not depend on the speed: only the last two edges and the index are located. `turn` is the turn in
+  /// which the tick started.
+  void follow(EncoderState& state, std::span<const AngleSegment> segments, Tick tick, std::int64_t turn,
+              const InjectedFaults& faults = kNoFaults) const noexcept;
+
+  /// The count at an angle within a turn.
+  std::int64_t count_at(double angle_rad, std::int64_t turn) const noexcept;
+
+  /// A, B, Z and flags. A leads B when the count rises; Z is high while the count of a sound encoder is a
+  /// multiple of N.
+  std::uint32_t levels(const EncoderState& state, const InjectedFaults& faults = kNoFaults) const noexcept;
+
+  /// Time since the last edge at the start of `tick`; since tick 0 if there was none.
+  double edge_age_s(const EncoderState& state, Tick tick) const noexcept;
+
+  /// Calls visit(Edge) for every edge of the segments in the order of time: those that follow() counts. Not
+  /// for the tick: the number of edges has no bound. `turn`, count and `ahead` of the state are those at the
+  /// start of the tick.
+  template <class Visitor>
+  void for_each_edge(std::span<const AngleSegment> segments, std::int64_t turn, const EncoderState& start,
+                     const InjectedFaults& faults, Visitor visit) const;
+
+  /// The same without faults.
+  template <class Visitor>
+  void for_each_edge(std::span<const AngleSegment> segments, std::int64_t turn, std::int64_t count,
+                     Visitor visit) const {
+    for_each_edge(segments, turn, EncoderState{.count = count}, kNoFaults, visit);
+  }
+
+ private:
+  /// A segment in counts, cut where the shaft reverses, so that the position is monotonic in it.
+  struct Piece {
+    double start_s;
+    double duration_s;
+    double start;  ///< position [counts], with the offset, within the turn
+    double end;
+    double start_slope;  ///< change of position over the piece if the speed stayed [counts]
+    double end_slope;
+  };
+  struct Pieces {
+    std::array<Piece, 3> piece;
+    int size;
+  };
+
+  /// What faults make of a sound encoder.
+  struct View {
+    bool swapped;
+    std::int64_t lost_line;  ///< 1: A, 2: B
+    std::int64_t lost_of;    ///< of every so many counts one is lost; 0: none
+    double eccentricity_rad;
+    bool has_index;
+
+    /// The segment as the disc sees it.
+    AngleSegment seen(const AngleSegment& segment) const noexcept;
+    /// What a decoder makes of the count of a sound encoder, but for a constant. Steps by one at most.
+    std::int64_t shown(std::int64_t count) const noexcept;
+    /// No count has an edge.
+    bool is_still() const noexcept { return lost_of == 1; }
+    /// Steps of the count by which the lines fall in with a lost line: -1 to 2.
+    int step_into(const EncoderState& state) const noexcept;
+  };
+  struct SoundView;
+  struct Newest;
+
+  View view_of(const InjectedFaults& faults) const noexcept;
+  template <class AnyView>
+  void follow_with(const AnyView& view, EncoderState& state, std::span<const AngleSegment> segments,
+                   Tick tick, std::int64_t turn) const noexcept;
+  template <class AnyView, class TimeOf>
+  void search(const AnyView& view, Newest& newest, std::int64_t base, std::int64_t first, std::int64_t end,
+              const TimeOf& time_of) const noexcept;
+  void take(EncoderState& state, const Newest& newest, Tick tick) const noexcept;
+  double position(double angle_rad) const noexcept;
+  bool has_no_edge(const AngleSegment& segment) const noexcept;
+  Pieces monotonic_pieces(const AngleSegment& segment) const noexcept;
+  static Piece part(const Piece& whole, double from, double to) noexcept;
+  static double time_of(const Piece& piece, double boundary) noexcept;
+
+  EncoderParameters p_;
+  double period_s_;
+  double counts_per_rad_;
+  double offset_;
+};
+
+template <class Visitor>
+void Encoder::for_each_edge(std::span<const AngleSegment> segments, std::int64_t turn,
+                            const EncoderState& start, const InjectedFaults& faults, Visitor visit) const {
+  if (segments.empty()) return;
+  const View view = view_of(faults);
+  std::int64_t shown = start.count;
+  const auto step_shown = [&](std::int64_t step, double time_s) {
+    shown += step;
+    visit(Edge{.time_s = time_s, .count = shown, .direction = static_cast<int>(step)});
+  };
+  for (int steps = view.step_into(start); steps != 0; steps += steps > 0 ? -1 : 1)
+    step_shown(steps > 0 ? 1 : -1, 0.0);
+
+  std::int64_t count = start.count + start.ahead;
+  const auto go_to = [&](std::int64_t last, const auto& time_of_boundary) {
+    const int direction = last >= count ? 1 : -1;
+    for (; count != last; count += direction) {
+      const std::int64_t step = view.shown(count + direction) - view.shown(count);
+      if (step != 0) step_shown(step, time_of_boundary(direction > 0 ? count + 1 : count));
+    }
+  };
+  const std::int64_t base = turn * p_.counts_per_revolution;
+  const std::int64_t at_start = base + floor_to_integer(position(view.seen(segments[0]).start_rad));
+  if (at_start - count > 1 || count - at_start > 1) {
+    go_to(at_start, [](std::int64_t) { return 0.0; });
+  }
+  for (const AngleSegment& segment : segments) {
+    const Pieces pieces = monotonic_pieces(view.seen(segment));
+    for (int i = 0; i < pieces.size; ++i) {
+      const Piece& piece = pieces.piece[static_cast<std::size_t>(i)];
+      go_to(base + floor_to_integer(piece.end),
+            [&](std::int64_t boundary) { return time_of(piece, static_cast<double>(boundary - base)); });
+    }
+  }
+}
+
+}  // namespace drivebench

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "plant/axis_parameters.hpp"
+#include "plant/axis_state.hpp"
+
+namespace drivebench {
+
+// A piece of a tick splits at each event (a current or a speed reaching zero, a corner of the emf), at most
+// this often.
+inline constexpr std::size_t kMaxEvents = 6;
+// Edges of the drive in a tick, and the events on the way.
+inline constexpr std::size_t kMaxSegments = kMaxSubsteps * (kMaxEvents + 1) + 256;
+
+/// What an axis has beside its machine and its state.
+struct AxisCore {
+  AxisParameters p;
+  AxisTiming timing;
+  double step_s;
+  Connection connection;
+  double pole_pairs;  ///< electrical over mechanical angle, for the Hall sensors
+  Drive drive;
+  SensorBank sensors;
+  Encoder encoder;
+  ShaftConstants shaft;
+  bool shaft_has_events;
+  bool follows = true;  ///< in this tick drive, sensors or thermal model want to see every piece
+  std::array<AngleSegment, kMaxSegments> segments{};
+  std::size_t segment_count = 0;
+  std::int64_t last_tick_turn = 0;
+  EncoderState last_tick_encoder{};  ///< at its start
+
+  std::span<const AngleSegment> last_tick() const noexcept { return {segments.data(), segment_count}; }
+  void record(const AngleSegment& segment) noexcept {
+    if (segment_count < kMaxSegments) segments[segment_count++] = segment;
+  }
+};
+
+/// What a machine shows at one instant.
+struct MachineTruth {
+  WindingValues current_a{};
+  double torque_nm = 0.0;
+  TwoPhase rotor_flux_wb{};
+  double losses_w = 0.0;
+};
+
+/// The integration of a drive train with one kind of machine. Stateless between ticks.
+class Train {
+ public:
+  Train() = default;
+  Train(const Train&) = default;
+  Train& operator=(const Train&) = default;
+  virtual ~Train() = default;
+  virtual std::unique_ptr<Train> clone() const = 0;
+
+  /// Takes the constants of a machine of the same kind, with heat, faults and series impedance.
+  virtual void set_machine(const MachineParameters& machine, const Adjustment& adjustment) noexcept = 0;
+
+  /// All substeps of a tick. `load_nm` is the active load at the output.
+  virtual void run(AxisCore& core, AxisState& state, double load_nm) noexcept = 0;
+
+  virtual MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
+
+  // Stage by stage, for two machines on one shaft. Order: open(), then for each stage torque_nm() of both and
+  // stage() of both, then event(), then close() or open() again with a shorter duration.
+
+  /// Connects drive and windings for a piece of the tick.
+  virtual void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                    const RotorMotion& motion) noexcept = 0;
+  virtual double stage_torque_nm(const RotorMotion& motion) const noexcept = 0;
+  /// Stage 0 to 3 of a Runge-Kutta step.
+  virtual void stage(int number, double duration_s, const RotorMotion& motion) noexcept = 0;
+  /// The part of the piece after which the first electrical event happens; 1: none.
+  virtual double event(const AxisCore& core, const AxisState& state, const RotorMotion& from,
+                       const RotorMotion& to) noexcept = 0;
+  /// Takes the end of the piece into the state; `at_event`: it ends at the event that event() found.
+  virtual void close(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                     const RotorMotion& from, const RotorMotion& to, bool at_event) noexcept = 0;
+};
+
+/// The train for the kind of machine.
+std::unique_ptr<Train> make_train(const MachineParameters& machine, bool two_masses);
+
+/// Whether the source has an impedance of its own.
+bool has_impedance(const DriveParameters& p) noexcept;
+
+/// Over-current: the fault bits, and with amplifier.over_current_trip the gates off.
+void trip(AxisCore& core, AxisState& state) noexcept;
+
+/// After each substep: over-current faults and the trip. Whether there was one.
+bool check_over_current(AxisCore& core, AxisState& state, const PhaseValues& current_a) noexcept;
+
+}  // namespace drivebench

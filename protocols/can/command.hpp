@@ -1,0 +1,101 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "protocols/can/codec.hpp"
+
+/// What commands say, whichever frames carry them.
+namespace drivebench::can {
+
+/// What a controller asks of an axis: voltages, duties or currents, as the mode says.
+struct Setpoints {
+  std::uint64_t tick = 0;  ///< of the sample that it answers
+  unsigned mode = 0;
+  unsigned lease = 0;
+  double a = 0.0;
+  double b = 0.0;
+  double c = 0.0;      ///< of a wide axis
+  double field = 0.0;  ///< of a wide axis
+};
+
+namespace command_detail {
+
+/// The fields of commands in the order of the members of Setpoints.
+inline constexpr auto kNames =
+    std::to_array<std::string_view>({"tick", "mode", "lease", "u_a", "u_b", "u_c", "u_f"});
+
+using Numbers = std::array<double, kNames.size()>;
+
+/// Where each of them stands in a message; kMaxFields: nowhere.
+using Places = std::array<std::size_t, kNames.size()>;
+inline constexpr auto kPlaces = [] {
+  std::array<Places, kMessages.size()> all{};
+  for (std::size_t row = 0; row < kMessages.size(); ++row) {
+    for (std::size_t i = 0; i < kNames.size(); ++i) {
+      std::size_t place = 0;
+      const auto& fields = kMessages[row].fields;
+      while (place < fields.size() && fields[place].name != kNames[i])
+        ++place;
+      all[row][i] = place < fields.size() ? place : kMaxFields;
+    }
+  }
+  return all;
+}();
+
+inline const Places& places_in(const MessageRow& row) noexcept {
+  return kPlaces[static_cast<std::size_t>(&row - kMessages.data())];
+}
+
+}  // namespace command_detail
+
+/// What the values of a command or of a phase_command say; of the tick its low bits.
+inline Setpoints setpoints_in(const MessageRow& row, const Values& values) noexcept {
+  command_detail::Numbers n{};
+  const command_detail::Places& places = command_detail::places_in(row);
+  for (std::size_t i = 0; i < n.size(); ++i)
+    n[i] = places[i] < kMaxFields ? values[places[i]] : 0.0;
+  return {.tick = static_cast<std::uint64_t>(n[0]),
+          .mode = static_cast<unsigned>(n[1]),
+          .lease = static_cast<unsigned>(n[2]),
+          .a = n[3],
+          .b = n[4],
+          .c = n[5],
+          .field = n[6]};
+}
+
+/// A command as it goes over the bus: in classic frames that of a wide axis is two, in this order.
+struct CommandFrames {
+  std::array<Frame, 2> frame{};
+  std::size_t count = 0;
+
+  const Frame* begin() const noexcept { return frame.data(); }
+  const Frame* end() const noexcept { return frame.data() + count; }
+};
+
+inline CommandFrames encode_command(const Profile& profile, std::uint32_t node, bool wide,
+                                    const Setpoints& s) noexcept {
+  const command_detail::Numbers n = {static_cast<double>(s.tick),
+                                     static_cast<double>(s.mode),
+                                     static_cast<double>(s.lease),
+                                     s.a,
+                                     s.b,
+                                     s.c,
+                                     s.field};
+  CommandFrames frames;
+  for (const Message message : {Message::kPhaseCommand, Message::kCommand}) {
+    const MessageRow* const row = find_message(message, profile.fd, wide);
+    if (row == nullptr) continue;
+    Values values{};
+    const command_detail::Places& places = command_detail::places_in(*row);
+    for (std::size_t i = 0; i < n.size(); ++i) {
+      if (places[i] < kMaxFields) values[places[i]] = n[i];
+    }
+    frames.frame[frames.count++] = encode(*row, profile, node, values);
+  }
+  return frames;
+}
+
+}  // namespace drivebench::can

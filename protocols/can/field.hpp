@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace drivebench::can {
+
+/// Encoding of a field.
+enum class Encoding : std::uint8_t {
+  kCounter,  ///< unsigned; the low bits of a number that wraps around
+  kSigned,   ///< two's complement; the low bits of a number that wraps around
+  kCode,     ///< unsigned enumeration or bits; values that do not fit saturate
+  kUScaled,  ///< unsigned times the unit; all ones: no value or NaN; saturates one below that
+  kScaled,   ///< two's complement times the unit; the lowest number: no value or NaN; saturates at
+             ///< +-(2^(n-1)-1)
+  kFloat,    ///< IEEE 754 single; NaN: no value
+};
+
+/// Which unit a scaled field counts in; the configuration says how much each is.
+enum class Unit : std::uint8_t {
+  kNone,
+  kCurrent,
+  kVoltage,
+  kBusVoltage,
+  kSpeed,
+  kEdgeTime,
+  kResolver,     ///< 1 mV, not to be configured
+  kTemperature,  ///< 0.1 K, not to be configured
+};
+
+/// The page of a field that is in every frame of its message.
+inline constexpr std::uint8_t kEveryPage = 0xFF;
+
+struct Field {
+  std::string_view name;
+  std::string_view unit;
+  std::uint16_t start_bit;  ///< of the least significant bit: 8 * byte + bit
+  std::uint8_t bits;
+  Encoding encoding;
+  Unit scale;               ///< of the scaled encodings
+  std::string_view signal;  ///< row of the catalogue that it carries; empty: none
+  std::string_view meaning;
+  /// Only in frames whose field `page` has this value; kEveryPage: in all.
+  std::uint8_t page = kEveryPage;
+};
+
+/// Whether a field is in the frames with this page.
+constexpr bool is_on_page(const Field& field, std::uint64_t page) noexcept {
+  return field.page == kEveryPage || field.page == page;
+}
+
+namespace table_detail {
+
+constexpr Field counter(std::string_view name, std::uint16_t start, std::uint8_t bits,
+                        std::string_view signal, std::string_view meaning) {
+  return {name, "1", start, bits, Encoding::kCounter, Unit::kNone, signal, meaning};
+}
+constexpr Field counts(std::string_view name, std::uint16_t start, std::string_view signal,
+                       std::string_view meaning) {
+  return {name, "counts", start, 32, Encoding::kSigned, Unit::kNone, signal, meaning};
+}
+constexpr Field code(std::string_view name, std::uint16_t start, std::uint8_t bits, std::string_view signal,
+                     std::string_view meaning) {
+  return {name, "1", start, bits, Encoding::kCode, Unit::kNone, signal, meaning};
+}
+/// Of the numbers that the meaning lists: "0 this, 1 that". What follows a colon explains.
+constexpr Field choice(std::string_view name, std::uint16_t start, std::string_view signal,
+                       std::string_view meaning) {
+  return {name, "enum", start, 8, Encoding::kCode, Unit::kNone, signal, meaning};
+}
+constexpr Field flags(std::string_view name, std::uint16_t start, std::uint8_t bits, std::string_view signal,
+                      std::string_view meaning) {
+  return {name, "bits", start, bits, Encoding::kCode, Unit::kNone, signal, meaning};
+}
+constexpr Field scaled(std::string_view name, std::string_view unit, std::uint16_t start, Unit scale,
+                       std::string_view signal, std::string_view meaning) {
+  return {name, unit, start, 16, Encoding::kScaled, scale, signal, meaning};
+}
+constexpr Field unsigned_scaled(std::string_view name, std::string_view unit, std::uint16_t start, Unit scale,
+                                std::string_view signal, std::string_view meaning) {
+  return {name, unit, start, 16, Encoding::kUScaled, scale, signal, meaning};
+}
+constexpr Field real(std::string_view name, std::string_view unit, std::uint16_t start,
+                     std::string_view signal, std::string_view meaning) {
+  return {name, unit, start, 32, Encoding::kFloat, Unit::kNone, signal, meaning};
+}
+constexpr Field on_page(std::uint8_t page, Field field) {
+  field.page = page;
+  return field;
+}
+
+}  // namespace table_detail
+
+}  // namespace drivebench::can

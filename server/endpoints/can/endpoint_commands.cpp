@@ -1,0 +1,89 @@
+// What the endpoint does with commands.
+#include "server/endpoints/can/endpoint.hpp"
+#include "server/endpoints/can/results.hpp"
+
+namespace drivebench::can {
+namespace {
+
+constexpr unsigned kLastMode = kCurrentMode;
+
+/// Whether a command in this mode says how much.
+constexpr bool has_setpoints(unsigned mode) noexcept {
+  return mode == static_cast<unsigned>(Gates::kVoltage) || mode == kDutyMode || mode == kCurrentMode;
+}
+
+Gates gates_of(unsigned mode) noexcept {
+  if (mode == kCurrentMode) return Gates::kCurrent;
+  return mode == kDutyMode ? Gates::kVoltage : static_cast<Gates>(mode);
+}
+
+}  // namespace
+
+/// On a bus with wide axes match() also finds frames that this one does not have.
+bool Endpoint::is_for(const Node& node, const MessageRow& row) {
+  if (row.width != Width::kWide || node.wide()) return true;
+  const bool has_narrow = find_message(row.message, config_.profile.fd) != nullptr;
+  ++problems_[static_cast<std::size_t>(has_narrow ? FrameProblem::kWrongSize : FrameProblem::kForeign)];
+  return false;
+}
+
+Tick Endpoint::answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const {
+  const Field& tick = row.fields[index_of(row, "tick")];
+  return unwrap(given.tick, tick.bits, static_cast<std::int64_t>(engine_->newest(node.axis).tick));
+}
+
+void Endpoint::on_phase_command(Node& node, const MessageRow& row, const Values& values) {
+  const Setpoints given = setpoints_in(row, values);
+  // Without the lease it is nobody's: the command that follows is turned away, and answered.
+  if (node.owner == 0 || given.lease != node.lease) return;
+  node.spoke = true;
+  node.phases = {
+      .answers = answered_by(node, row, given), .mode = given.mode, .c = given.c, .field = given.field};
+}
+
+void Endpoint::on_command(Node& node, const MessageRow& row, const Values& values) {
+  ++commands_;
+  Setpoints given = setpoints_in(row, values);
+  const Tick answers = answered_by(node, row, given);
+  if (given.mode > kLastMode) return refuse(node, Result::kMalformed, given, "its mode must be 0 to 4");
+
+  // Whoever commands without the lease is nobody: the bench counts it and says no.
+  const Owner owner = node.owner != 0 && given.lease == node.lease ? node.owner : 0;
+  if (owner != 0) node.spoke = true;
+  const bool is_whole = row.width == Width::kWide || !node.terminals.has_more() || !has_setpoints(given.mode);
+  if (!is_whole && node.phases.answers == answers && node.phases.mode == given.mode) {
+    given.c = node.phases.c;
+    given.field = node.phases.field;
+  } else if (!is_whole && owner != 0) {
+    return refuse(node, Result::kIncomplete, given, "phase c and the field of its tick are missing");
+  }
+
+  const double bus_voltage_v = engine_->newest(node.axis).bus_voltage_v;
+  const bool duties = given.mode == kDutyMode;
+  const double unit = duties ? node.terminals.volts_per_duty(bus_voltage_v) : 1.0;
+  const double field_unit = duties ? bus_voltage_v : 1.0;
+  const Command command{.answers = answers,
+                        .phases = {.gates = gates_of(given.mode),
+                                   .setpoint = {.a = given.a * unit,
+                                                .b = given.b * unit,
+                                                .c = given.c * unit,
+                                                .field = given.field * field_unit}}};
+  const Refused why = engine_->command(node.axis, owner, command);
+  if (why != Refused::kNot) {
+    ++refused_;
+    log_refusal(node, "a command", sentence_of(why));
+    return reply(node, Request::kCommand, result_of(why), 0, static_cast<std::uint8_t>(given.lease), answers);
+  }
+  engine_->advance();
+}
+
+void Endpoint::refuse(const Node& node, Result result, const Setpoints& given, std::string_view why) {
+  ++refused_;
+  engine_->request({.tick = 0, .axis = node.axis, .owner = node.owner, .action = RefusedCommand{}},
+                   [](Refused, Tick) {});
+  log_refusal(node, "a command", why);
+  reply(node, Request::kCommand, result, 0, static_cast<std::uint8_t>(given.lease),
+        static_cast<std::int64_t>(given.tick));
+}
+
+}  // namespace drivebench::can

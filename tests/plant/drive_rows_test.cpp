@@ -1,0 +1,116 @@
+#include "plant/parameters/drive_rows.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+namespace drivebench {
+namespace {
+
+std::vector<std::string> fields(const DriveParameters& p) {
+  std::vector<Problem> found;
+  add_problems(p, found);
+  std::vector<std::string> result;
+  for (const Problem& problem : found)
+    result.push_back(problem.field);
+  return result;
+}
+
+using Fields = std::vector<std::string>;
+
+// Kills: two rows of one member or one name, a row that writes elsewhere than it reads, a default out of
+// range.
+TEST(DriveRows, EveryRowHasAMemberOfItsOwn) {
+  std::set<std::string_view> names;
+  const AxisParameters defaults;
+  for (const Parameter& row : drive_rows()) {
+    EXPECT_TRUE(names.insert(row.name).second) << row.name;
+    AxisParameters p;
+    const double value = row.get(p) == row.maximum ? row.minimum : row.maximum;
+    row.set(p, value);
+    EXPECT_EQ(row.get(p), value) << row.name;
+    for (const Parameter& other : drive_rows()) {
+      if (&other == &row) continue;
+      EXPECT_EQ(other.get(p), other.get(defaults)) << row.name << " moves " << other.name;
+    }
+    if (row.required) continue;
+    EXPECT_EQ(problem_with(row, row.get(defaults)), "") << row.name;
+  }
+}
+
+// Kills: words in another order than the kinds.
+TEST(DriveRows, TheWordsAreThoseOfTheKinds) {
+  const auto row = std::find_if(drive_rows().begin(), drive_rows().end(),
+                                [](const Parameter& r) { return r.name == "drive.kind"; });
+  AxisParameters p;
+  p.drive.kind = DriveKind::kSource;
+  EXPECT_EQ(row->words[static_cast<std::size_t>(row->get(p))], "source");
+  p.drive.kind = DriveKind::kAveraged;
+  EXPECT_EQ(row->words[static_cast<std::size_t>(row->get(p))], "averaged_inverter");
+  EXPECT_EQ(row->maximum, 4.0);
+}
+
+// Kills: a rule that holds for every kind of drive, or for none.
+TEST(DriveRows, TheRulesBetweenTheValues) {
+  DriveParameters p;
+  EXPECT_EQ(fields(p), Fields{});
+  p.kind = DriveKind::kCurrent;
+  EXPECT_EQ(fields(p), (Fields{"current_loop.proportional_v_per_a", "current_loop.limit_a"}));
+  p.current_loop = {.proportional_v_per_a = 20.0, .limit_a = 5.0};
+  p.amplifier.filter_hz = 10e3;
+  EXPECT_EQ(fields(p), Fields{});
+  p.kind = DriveKind::kSwitched;
+  EXPECT_EQ(fields(p), Fields{"amplifier.filter_hz"});
+}
+
+// Kills: a chopper that cannot work and is accepted.
+TEST(DriveRows, TheRulesOfTheChopper) {
+  DriveParameters p;
+  p.bus = {.voltage_v = 300.0, .capacitance_f = 1e-3, .chopper_on_v = 400.0, .chopper_off_v = 380.0};
+  EXPECT_EQ(fields(p), Fields{});
+  p.bus.chopper_off_v = 400.0;
+  EXPECT_EQ(fields(p), Fields{"bus.chopper_off_v"});
+  p.bus.chopper_off_v = 300.0;
+  EXPECT_EQ(fields(p), Fields{"bus.chopper_off_v"});
+  p.bus.chopper_off_v = 380.0;
+  p.bus.capacitance_f = 0.0;
+  EXPECT_EQ(fields(p), Fields{"bus.chopper_on_v"});
+}
+
+// Kills: a source without its waveform, a contactor that waits for ever.
+TEST(DriveRows, TheRulesOfTheSource) {
+  DriveParameters p;
+  p.source.choose_angle = true;
+  p.source.waveform = Waveform::kTable;
+  EXPECT_EQ(fields(p), Fields{});  // there is no source
+  p.kind = DriveKind::kSource;
+  EXPECT_EQ(fields(p), (Fields{"source.choose_angle", "source.table"}));
+  p.source.frequency_hz = 50.0;
+  p.source.table = Curve({{0.0, 0.0}, {1.1, 1.0}});
+  EXPECT_EQ(fields(p), Fields{"source.table"});
+  p.source.table = Curve({{0.0, 0.0}, {1.0, 1.0}});
+  EXPECT_EQ(fields(p), Fields{});
+}
+
+// Kills: a dead time that leaves nothing of the carrier period, a rule that forgets the periods in a tick.
+TEST(DriveRows, TheDeadTimeFitsIntoTheCarrierPeriod) {
+  DriveParameters p;
+  p.kind = DriveKind::kAveraged;
+  p.inverter = {.pwm_periods_per_tick = 4, .dead_time_s = 12e-6};
+  std::vector<Problem> found;
+  add_period_problems(p, 100e-6, found);
+  EXPECT_TRUE(found.empty());
+  p.inverter.dead_time_s = 12.5e-6;
+  add_period_problems(p, 100e-6, found);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].field, "inverter.dead_time_s");
+  EXPECT_EQ(found[0].rule, "is 1.25e-05 but must be below half of the carrier period, which is 2.5e-05 s");
+  p.kind = DriveKind::kVoltage;
+  add_period_problems(p, 100e-6, found);
+  EXPECT_EQ(found.size(), 1u);
+}
+
+}  // namespace
+}  // namespace drivebench

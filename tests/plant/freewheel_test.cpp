@@ -1,0 +1,185 @@
+#include "plant/axis.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/plant/servo_axis.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr PhaseCommand volts(double a, double b) {
+  return {.gates = Gates::kVoltage, .setpoint = {a, b}};
+}
+constexpr PhaseCommand kOff{.gates = Gates::kOff};
+constexpr InductionMachineState kFluxed{.i_a_a = 6.0, .i_b_a = -3.5, .psi_a_wb = 0.04, .psi_b_wb = -0.02};
+
+Axis axis_with_link(double link_v, InductionMachineState machine = {}, double speed_rad_s = 0.0) {
+  AxisParameters p = servo_axis();
+  p.drive.amplifier.voltage_limit_v = link_v;
+  Axis axis(p, kServoTiming, 1, 0);
+  AxisState state = axis.state();
+  set_induction_state(state, machine);
+  state.shaft.speed_rad_s = speed_rad_s;
+  axis.restore(state);
+  return axis;
+}
+
+// Kills: a saturation flag that sticks, or is set by the wrong phase's limit.
+TEST(Freewheel, TheSaturationFlagLastsAsLongAsTheClipping) {
+  Axis axis = axis_with_link(20.0);
+  axis.advance(volts(0.0, 25.0), 0);
+  EXPECT_EQ(axis.sample(1).faults, kVoltageSaturated);
+  EXPECT_EQ(axis.sample(1).voltage_v.b, 20.0);
+  axis.advance(volts(0.0, 15.0), 1);
+  EXPECT_EQ(axis.sample(2).faults, 0u);
+  EXPECT_EQ(axis.sample(2).voltage_v.b, 15.0);
+}
+
+// The current rises by 25 us V/(sigma L_S) = 0.59 A per substep of 100 V, so that 1 A is exceeded at the
+// second of five. Masked, it is a flag and clips nothing; unmasked, the diodes empty the phase within the
+// same tick. Kills: a trip that waits for the next tick, a limit that clips, a flag that latches.
+TEST(Freewheel, OverCurrentIsAFlagAndUnmaskedTripsWithinTheTick) {
+  for (const bool trips : {false, true}) {
+    for (const double sign : {1.0, -1.0}) {
+      AxisParameters p = servo_axis();
+      p.drive.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0, .over_current_trip = trips};
+      Axis axis(p, kServoTiming, 1, 0);
+      axis.advance(volts(0.0, sign * 100.0), 0);
+      const AxisSample s = axis.sample(1);
+      EXPECT_EQ(s.faults, trips ? kOverCurrent | kOverCurrentTrip : kOverCurrent);
+      if (trips) {
+        EXPECT_EQ(s.true_current_a.b, 0.0);
+      } else {
+        EXPECT_GT(sign * s.true_current_a.b, 2.5);
+        EXPECT_EQ(s.voltage_v.b, sign * 100.0);
+      }
+      axis.advance(volts(0.0, trips ? sign * 100.0 : -sign * 100.0), 1);
+      EXPECT_EQ(axis.sample(2).faults & kOverCurrentTrip, trips ? kOverCurrentTrip : 0u);
+      if (trips) {
+        EXPECT_EQ(axis.sample(2).faults, kOverCurrentTrip);  // the current is gone, the latch is not
+        EXPECT_EQ(axis.sample(2).true_current_a.b, 0.0);
+        axis.clear_faults();
+        axis.advance(volts(0.0, sign * 10.0), 2);
+        EXPECT_EQ(axis.sample(3).faults, 0u);
+        EXPECT_GT(sign * axis.sample(3).true_current_a.b, 0.2);
+      }
+    }
+  }
+}
+
+// Kills: a trip that looks at phase a only, or at the signed current.
+TEST(Freewheel, ExactlyTheLimitIsNotAnOverCurrent) {
+  AxisParameters p = servo_axis();
+  p.drive.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0};
+  Axis axis(p, kServoTiming, 1, 0);
+  axis.advance(volts(20.0, -20.0), 0);
+  const double reached_a = std::abs(axis.sample(1).true_current_a.b);
+  for (const double limit_a : {reached_a, std::nextafter(reached_a, 0.0)}) {
+    p.drive.amplifier.over_current_a = limit_a;
+    Axis again(p, kServoTiming, 1, 0);
+    again.advance(volts(20.0, -20.0), 0);
+    EXPECT_EQ(again.sample(1).faults, limit_a == reached_a ? 0u : kOverCurrent | kOverCurrentTrip);
+  }
+}
+
+// Kills: currents that ring around zero, pass it, or leave a remainder; a phase that closes again.
+TEST(Freewheel, FreewheelingCurrentsDecayToExactlyZeroAndStayThere) {
+  Axis axis = axis_with_link(40.0, kFluxed);
+  double last_a = 6.0;
+  double last_b = -3.5;
+  for (Tick tick = 0; tick < 400; ++tick) {
+    axis.advance(kOff, tick);
+    const AxisSample s = axis.sample(tick + 1);
+    EXPECT_TRUE(s.true_current_a.a >= 0.0 && s.true_current_a.a <= last_a);
+    EXPECT_TRUE(s.true_current_a.b <= 0.0 && s.true_current_a.b >= last_b);
+    last_a = s.true_current_a.a;
+    last_b = s.true_current_a.b;
+    if (tick == 0) {
+      EXPECT_EQ(s.voltage_v.a, -40.0);  // against the current
+      EXPECT_EQ(s.voltage_v.b, 40.0);
+    }
+  }
+  EXPECT_EQ(last_a, 0.0);
+  EXPECT_EQ(last_b, 0.0);
+}
+
+/// Energy that flows out of the terminals while the gates are off, until the currents are zero.
+struct Freewheel {
+  double into_link_j = 0.0;
+  double lost_j = 0.0;
+  double delivered_j = 0.0;
+  double stored_before_j = 0.0;
+  double stored_after_j = 0.0;
+};
+
+Freewheel freewheel(double link_v) {
+  AxisParameters p = servo_axis();
+  p.drive.amplifier.voltage_limit_v = link_v;
+  constexpr double kStep_s = 1e-7;
+  Axis axis(p, {.period_s = kStep_s, .substeps = 1}, 1, 0);
+  AxisState state = axis.state();
+  set_induction_state(state, kFluxed);
+  state.shaft.speed_rad_s = 20.0;
+  axis.restore(state);
+  const InductionMachineConstants c = constants_of(induction(p));
+  const RotorMotion still{};
+  Freewheel f{.stored_before_j = stored_energy_j(c, kFluxed, still)};
+  for (Tick tick = 0; tick < 20'000; ++tick) {
+    const InductionMachineState before = induction_state(axis.state());
+    const double speed_before = axis.state().shaft.speed_rad_s;
+    axis.advance(kOff, tick);
+    const InductionMachineState after = induction_state(axis.state());
+    const PhaseValues v = axis.state().voltage_v;
+    const auto mean = [](double x, double y) { return 0.5 * (x + y); };
+    f.into_link_j -=
+        kStep_s * (v.a * mean(before.i_a_a, after.i_a_a) + v.b * mean(before.i_b_a, after.i_b_a));
+    f.lost_j += kStep_s * mean(losses_w(c, before, still), losses_w(c, after, still));
+    f.delivered_j += kStep_s * mean(torque_nm(c, before, still) * speed_before,
+                                    torque_nm(c, after, still) * axis.state().shaft.speed_rad_s);
+  }
+  f.stored_after_j = stored_energy_j(c, induction_state(axis.state()), still);
+  return f;
+}
+
+// The stored energy goes to the link, into heat and to the shaft; the closing of the sum is limited by the
+// step at which a phase opens. Kills: diodes with the voltage of the link the wrong way round, energy that
+// vanishes when a phase opens.
+TEST(Freewheel, FreewheelingReturnsEnergyToTheLink) {
+  const Freewheel f = freewheel(40.0);
+  EXPECT_GT(f.into_link_j, 0.25 * f.stored_before_j);
+  EXPECT_NEAR(f.stored_before_j, f.stored_after_j + f.into_link_j + f.lost_j + f.delivered_j,
+              1e-4 * f.stored_before_j);
+}
+
+// Kills: an open machine that conducts below the link voltage, a back-emf that is not shown at the terminals.
+TEST(Freewheel, ABackEmfBelowTheLinkVoltageDrivesNoCurrent) {
+  const InductionMachineState fluxed{.psi_a_wb = 0.05};
+  Axis axis = axis_with_link(40.0, fluxed, 200.0);  // 3 * 200 * 0.05 * M/L_R = 25 V
+  axis.advance(kOff, 0);
+  EXPECT_EQ(axis.sample(1).true_current_a.a, 0.0);
+  EXPECT_EQ(axis.sample(1).true_current_a.b, 0.0);
+  EXPECT_EQ(axis.sample(1).torque_nm, 0.0);
+  EXPECT_NEAR(std::abs(axis.sample(1).voltage_v.b), 25.0, 1.5);
+  for (Tick tick = 1; tick < 100; ++tick)
+    axis.advance(kOff, tick);
+  // Open, the flux decays with the time constant of the rotor.
+  const TwoPhase psi = axis.sample(100).rotor_flux_wb;
+  EXPECT_NEAR(std::hypot(psi.a, psi.b), 0.05 * std::exp(-100 * kServoTick_s * 3.9 / 0.014), 1e-8);
+}
+
+// Kills: diodes that never conduct, or conduct so that they feed the machine.
+TEST(Freewheel, ABackEmfAboveTheLinkVoltageChargesTheLinkAndBrakes) {
+  const InductionMachineState fluxed{.psi_a_wb = 0.05};
+  Axis axis = axis_with_link(15.0, fluxed, 200.0);
+  axis.advance(kOff, 0);
+  const AxisSample s = axis.sample(1);
+  EXPECT_GT(std::abs(s.true_current_a.b), 0.1);
+  EXPECT_LT(s.true_current_a.b * s.voltage_v.b, 0.0);
+  EXPECT_EQ(std::abs(s.voltage_v.b), 15.0);
+  EXPECT_LT(s.torque_nm, 0.0);
+}
+
+}  // namespace
+}  // namespace drivebench

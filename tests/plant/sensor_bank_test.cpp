@@ -1,0 +1,271 @@
+#include "plant/sensors/sensor_bank.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "plant/noise.hpp"
+#include "tests/plant/sensor_point.hpp"
+
+namespace drivebench {
+namespace {
+
+using namespace sensor_point;
+
+// Kills: a channel that shows another one's quantity, is left out, or swallows its gain.
+TEST(SensorBank, EveryIdealChannelShowsItsOwnQuantity) {
+  const SensorBank bank = bank_of(all_on());
+  SensorMemory m;
+  bank.end_tick(m, kPoint, 1);
+  const SensorReadings r = bank.readings(m, {}, 1);
+  EXPECT_EQ(r.current_a.a, 1.0);
+  EXPECT_EQ(r.current_a.b, 2.0);
+  EXPECT_EQ(r.current_a.c, 3.0);
+  EXPECT_EQ(r.current_a.field, 4.0);
+  EXPECT_EQ(r.voltage_v.a, 5.0);
+  EXPECT_EQ(r.voltage_v.b, 6.0);
+  EXPECT_EQ(r.voltage_v.c, 7.0);
+  EXPECT_EQ(r.voltage_v.field, 8.0);
+  EXPECT_EQ(r.bus_v, 9.0);
+  EXPECT_EQ(r.neutral_v, 10.0);
+  EXPECT_EQ(r.temperature_k, 11.0);
+  EXPECT_EQ(r.tachometer_v, 0.1 * 12.0);
+  EXPECT_EQ(r.resolver_sine_v, sine(0.5));
+  EXPECT_EQ(r.resolver_cosine_v, cosine(0.5));
+  EXPECT_FALSE(r.saturated || r.other_saturated);
+}
+
+// Kills: a sensor that is off and still speaks, or one that hides the true voltages of the bench.
+TEST(SensorBank, WhatIsOffReadsZeroButVoltagesAndBusAreTheTrueOnes) {
+  SensorParameters p;
+  p.voltage = {.bits = 3, .gain = 2.0, .offset = 1.0, .noise_rms = 1.0, .delay_ticks = 4.0};
+  p.bus = p.neutral = p.temperature = p.tachometer.analog = p.resolver.analog = p.voltage;
+  p.tachometer.gain_vs_per_rad = 1.0;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m;
+  bank.end_tick(m, kPoint, 1);
+  const SensorReadings r = bank.readings(m, {}, 1);
+  EXPECT_EQ(r.current_a.c, 3.0);
+  EXPECT_EQ(r.voltage_v.a, 5.0);
+  EXPECT_EQ(r.voltage_v.field, 8.0);
+  EXPECT_EQ(r.bus_v, 9.0);
+  EXPECT_EQ(r.neutral_v, 0.0);
+  EXPECT_EQ(r.temperature_k, 0.0);
+  EXPECT_EQ(r.tachometer_v, 0.0);
+  EXPECT_EQ(r.resolver_sine_v, 0.0);
+  EXPECT_EQ(r.resolver_cosine_v, 0.0);
+  EXPECT_FALSE(bank.follows());
+}
+
+// Kills: noise or offset on the wire of a phase that does not exist.
+TEST(SensorBank, TerminalsThatTheMachineDoesNotHaveReadZero) {
+  SensorParameters p = all_on();
+  p.current.noise_rms_a = p.voltage.noise_rms = 1.0;
+  p.current.offset_a_a = p.current.offset_b_a = p.current.offset_c_a = p.voltage.offset = 0.5;
+  for (const Connection connection :
+       {Connection::kArmature, Connection::kTwoPhase, Connection::kIndependent}) {
+    const int terminals = terminal_count(connection);
+    for (const bool has_field : {false, true}) {
+      const SensorBank bank(p, connection, kTick_s, kSeed, 0, 0.0, has_field);
+      const SensorReadings r = bank.readings({}, {}, 3);
+      EXPECT_NE(r.current_a.a, 0.0);
+      EXPECT_EQ(r.current_a.b != 0.0, terminals > 1);
+      EXPECT_EQ(r.current_a.c != 0.0, terminals > 2);
+      EXPECT_EQ(r.voltage_v.b != 0.0, terminals > 1);
+      EXPECT_EQ(r.voltage_v.c != 0.0, terminals > 2);
+      EXPECT_EQ(r.current_a.field != 0.0, has_field);
+      EXPECT_EQ(r.voltage_v.field != 0.0, has_field);
+    }
+  }
+}
+
+// Kills: gains and offsets of the phases or windings exchanged, a first reading that is not defined.
+TEST(SensorBank, BeforeTheFirstTickZerosGoThroughGainsAndOffsets) {
+  SensorParameters p = all_on();
+  p.current.offset_a_a = 0.1;
+  p.current.offset_b_a = 0.2;
+  p.current.offset_c_a = 0.3;
+  p.current.gain_a = 2.0;
+  p.current.gain_b = 3.0;
+  p.current.gain_c = 4.0;
+  p.bus.offset = 0.4;
+  p.resolver.analog.offset = 1.0;
+  p.resolver.sine_offset_v = 0.5;
+  p.resolver.cosine_offset_v = 0.6;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m;
+  SensorReadings r = bank.readings(m, {}, 0);
+  EXPECT_EQ(r.current_a.a, 0.1);
+  EXPECT_EQ(r.current_a.b, 0.2);
+  EXPECT_EQ(r.current_a.c, 0.3);
+  EXPECT_EQ(r.bus_v, 0.4);
+  EXPECT_EQ(r.resolver_sine_v, 1.5);
+  EXPECT_EQ(r.resolver_cosine_v, 1.6);
+  bank.end_tick(m, kPoint, 1);
+  r = bank.readings(m, {}, 1);
+  EXPECT_EQ(r.current_a.a, 2.1);
+  EXPECT_EQ(r.current_a.b, 6.2);
+  EXPECT_EQ(r.current_a.c, 12.3);
+}
+
+// Kills: a ring that is too short, a delay that is one tick off, a delay of one section on another.
+TEST(SensorBank, ADelayOfWholeTicksShowsThatTick) {
+  for (int delay = 0; delay <= kMaxSensorDelayTicks; ++delay) {
+    SensorParameters p = all_on();
+    p.current.delay_ticks = delay;
+    p.bus.delay_ticks = kMaxSensorDelayTicks - delay;
+    const SensorBank bank = bank_of(p);
+    EXPECT_FALSE(bank.follows());
+    SensorMemory m;
+    for (Tick tick = 1; tick < 40; ++tick) {
+      Measurable x = current_point(static_cast<double>(tick));
+      x.bus_v = static_cast<double>(tick);
+      bank.end_tick(m, x, tick);
+      const SensorReadings r = bank.readings(m, {}, tick);
+      EXPECT_EQ(r.current_a.a, static_cast<double>(std::max<Tick>(tick - delay, 0)));
+      EXPECT_EQ(r.bus_v, static_cast<double>(std::max<Tick>(tick - kMaxSensorDelayTicks + delay, 0)));
+    }
+  }
+}
+
+// A plant that has stopped (diverged) holds its last outputs. Kills: old ticks that come round again.
+TEST(SensorBank, WithoutNewTicksTheReadingsStay) {
+  SensorParameters p;
+  p.current.delay_ticks = 2.0;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m;
+  for (Tick tick = 1; tick <= 20; ++tick)
+    bank.end_tick(m, current_point(static_cast<double>(tick)), tick);
+  for (Tick tick = 20; tick < 50; ++tick)
+    EXPECT_EQ(bank.readings(m, {}, tick).current_a.a, 18.0);
+}
+
+// Kills: one noise for two channels, noise that depends on the order of calls, a channel number that moves.
+TEST(SensorBank, TheNoiseIsThatOfSeedChannelAndTick) {
+  SensorParameters p = all_on();
+  p.current.noise_rms_a = 2.0;
+  for (AnalogParameters* analog :
+       {&p.voltage, &p.neutral, &p.bus, &p.temperature, &p.tachometer.analog, &p.resolver.analog})
+    analog->noise_rms = 2.0;
+  const SensorBank bank = bank_of(p);
+  for (const Tick tick : {7, 3, 7}) {
+    const SensorReadings r = bank.readings({}, {}, tick);
+    const std::array<double, kChannelCount> read{r.current_a.a,     r.current_a.b,      r.current_a.c,
+                                                 r.current_a.field, r.voltage_v.a,      r.voltage_v.b,
+                                                 r.voltage_v.c,     r.voltage_v.field,  r.bus_v,
+                                                 r.neutral_v,       r.temperature_k,    r.tachometer_v,
+                                                 r.resolver_sine_v, r.resolver_cosine_v};
+    for (std::size_t n = 0; n < kChannelCount; ++n)
+      EXPECT_EQ(read[n], 2.0 * gaussian_noise(kSeed, kNoiseChannel + n, static_cast<std::uint64_t>(tick)));
+  }
+}
+
+// Kills: a fault on the wrong phase, one that the gain of the sensor scales, an offset on the field current.
+TEST(SensorBank, FaultsOfTheCurrentSensors) {
+  SensorParameters p;
+  p.current.gain_a = 2.0;
+  p.current.offset_b_a = 0.25;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m;
+  bank.end_tick(m, kPoint, 1);
+  SensorReadings r = bank.readings(m, {.current_sensor_gain = -0.5}, 1);
+  EXPECT_EQ(r.current_a.a, 1.0);
+  EXPECT_EQ(r.current_a.b, 1.25);
+  EXPECT_EQ(r.current_a.c, 1.5);
+  EXPECT_EQ(r.current_a.field, 2.0);
+  r = bank.readings(m, {.current_sensor_offset = 3.0}, 1);
+  EXPECT_EQ(r.current_a.a, 5.0);
+  EXPECT_EQ(r.current_a.b, 5.25);
+  EXPECT_EQ(r.current_a.c, 6.0);
+  EXPECT_EQ(r.current_a.field, 4.0);
+  for (int phase = 1; phase <= 3; ++phase) {
+    r = bank.readings(m, {.current_sensor_offset = 3.0, .current_sensor_stuck = static_cast<double>(phase)},
+                      1);
+    EXPECT_EQ(r.current_a.a, phase == 1 ? 0.0 : 5.0);
+    EXPECT_EQ(r.current_a.b, phase == 2 ? 0.0 : 5.25);
+    EXPECT_EQ(r.current_a.c, phase == 3 ? 0.0 : 6.0);
+  }
+}
+
+// Kills: an open winding that takes the other one along or its offset with it.
+TEST(SensorBank, FaultsOfTachometerAndResolver) {
+  SensorParameters p = all_on();
+  p.tachometer.analog.offset = 0.3;
+  p.resolver.sine_offset_v = 0.1;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m;
+  bank.end_tick(m, kPoint, 1);
+  SensorReadings r = bank.readings(m, {.tachometer_loss = 1.0}, 1);
+  EXPECT_EQ(r.tachometer_v, 0.3);
+  EXPECT_EQ(r.resolver_sine_v, sine(0.5) + 0.1);
+  r = bank.readings(m, {.resolver_loss = 1.0}, 1);
+  EXPECT_EQ(r.tachometer_v, 0.1 * 12.0 + 0.3);
+  EXPECT_EQ(r.resolver_sine_v, 0.1);
+  EXPECT_EQ(r.resolver_cosine_v, cosine(0.5));
+  r = bank.readings(m, {.resolver_loss = 2.0}, 1);
+  EXPECT_EQ(r.resolver_sine_v, sine(0.5) + 0.1);
+  EXPECT_EQ(r.resolver_cosine_v, 0.0);
+}
+
+// Kills: a voltage at the end of its converter that is reported as a current, a flag that nobody sets.
+TEST(SensorBank, AConverterAtItsEndIsReportedForCurrentsAndForTheRest) {
+  SensorParameters p = all_on();
+  p.current.bits = p.bus.bits = 8;
+  p.current.full_scale_a = p.bus.full_scale = 100.0;
+  const SensorBank bank = bank_of(p);
+  const auto flags = [&](double field_a, double bus_v) {
+    SensorMemory m;
+    bank.end_tick(m, {.current_a = {.field = field_a}, .bus_v = bus_v}, 1);
+    const SensorReadings r = bank.readings(m, {}, 1);
+    return std::array{r.saturated, r.other_saturated};
+  };
+  EXPECT_EQ(flags(99.0, 99.0), (std::array{false, false}));
+  EXPECT_EQ(flags(101.0, 99.0), (std::array{true, false}));
+  EXPECT_EQ(flags(99.0, -101.0), (std::array{false, true}));
+}
+
+// Kills: a start at which filters and delays still show zeros.
+TEST(SensorBank, ASettledBankReadsAsIfItHadBeenThereForever) {
+  SensorParameters p = all_on();
+  p.bus.filter_hz = 5.0;
+  p.current.delay_ticks = 8.0;
+  p.temperature.delay_ticks = 0.5;
+  p.resolver.analog.filter_hz = 3.0;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m = bank.settled(kPoint, 3);
+  for (Tick tick = 3; tick < 6; ++tick) {
+    const SensorReadings r = bank.readings(m, {}, tick);
+    EXPECT_EQ(r.bus_v, 9.0);
+    EXPECT_EQ(r.current_a.b, 2.0);
+    EXPECT_EQ(r.temperature_k, 11.0);
+    EXPECT_EQ(r.resolver_sine_v, sine(0.5));
+    run_tick(bank, m, tick, even_nodes(10), [](double) { return kPoint; });
+  }
+}
+
+// A window of 3 ticks. Kills: figures that run within the window, a window that is a tick too long, one that
+// carries the last one's sums.
+TEST(SensorBank, TheMeterShowsEachWholeWindowUntilTheNext) {
+  SensorParameters p;
+  p.meter = {.enabled = true, .window_s = 3.0 * kTick_s};
+  const SensorBank bank = bank_of(p, Connection::kArmature);
+  EXPECT_TRUE(bank.follows());
+  SensorMemory m;
+  for (Tick tick = 0; tick < 12; ++tick) {
+    const double volts = static_cast<double>(1 + tick / 3);
+    run_tick(bank, m, tick, even_nodes(4),
+             [&](double) { return Measurable{.current_a = {.a = 2.0}, .voltage_v = {.a = volts}}; });
+    const SensorReadings r = bank.readings(m, {}, tick + 1);
+    const double shown = static_cast<double>((tick + 1) / 3);
+    EXPECT_NEAR(r.meter_voltage_v, shown, 1e-12);
+    EXPECT_NEAR(r.meter_current_a, tick < 2 ? 0.0 : 2.0, 1e-12);
+    EXPECT_NEAR(r.meter_power_w, 2.0 * shown, 1e-12);
+    EXPECT_NEAR(r.meter_reactive_var, 0.0, 1e-6);
+    EXPECT_NEAR(r.meter_power_factor, tick < 2 ? 0.0 : 1.0, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace drivebench

@@ -1,0 +1,134 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "plant/axis.hpp"
+#include "plant/rk4.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr AxisTiming kTiming{.period_s = 1e-4, .substeps = 4};
+
+constexpr PhaseCommand volts(double a) {
+  return {.gates = Gates::kVoltage, .setpoint = {.a = a}};
+}
+
+/// The DC motor DC-A of the book, its inertia and friction doubled for two of them on one shaft.
+AxisParameters dc_axis() {
+  AxisParameters p;
+  p.machine = PmDcMachineParameters{
+      .armature_resistance_ohm = 2.0, .armature_inductance_h = 2e-3, .torque_constant_nm_per_a = 0.07};
+  p.mechanics = {.inertia_kgm2 = 1.2e-4, .viscous_friction_nms = 8e-4};
+  p.drive.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 100.0};
+  return p;
+}
+
+/// Motor and generator written out in one system: i1, i2, w, angle.
+struct PairState {
+  double i1;
+  double i2;
+  double w;
+  double angle;
+};
+
+PairState pair_step(const PairState& x, double u1, double u2, double ratio, double h) {
+  return rk4_step(x, h, [=](const PairState& s) -> PairState {
+    const double torque = 0.07 * s.i1 + 0.07 * s.i2 / ratio;
+    return {(u1 - 2.0 * s.i1 - 0.07 * s.w) / 2e-3, (u2 - 2.0 * s.i2 - 0.07 * s.w / ratio) / 2e-3,
+            (torque - 8e-4 * s.w) / 1.2e-4, s.w};
+  });
+}
+
+// Both are the same Runge-Kutta method on the same equations: what remains is rounding. Kills: a machine that
+// does not see the other's torque or speed, stages that are out of step, a torque counted twice, the gear the
+// wrong way round.
+TEST(SharedShaft, TwoMachinesAreOneSystem) {
+  for (const double ratio : {1.0, 2.5}) {
+    AxisParameters p = dc_axis();
+    p.mechanics.gear_ratio = ratio;
+    Axis first(p, kTiming, 1, 0);
+    Axis second(dc_axis(), kTiming, 1, 1);
+    PairState x{};
+    for (Tick tick = 0; tick < 3000; ++tick) {
+      const double u2 = tick < 1500 ? 0.0 : -15.0;
+      Axis::advance_pair(first, second, volts(20.0), volts(u2), tick);
+      for (int n = 0; n < kTiming.substeps; ++n)
+        x = pair_step(x, 20.0, u2, ratio, kTiming.period_s / kTiming.substeps);
+    }
+    const AxisSample a = first.sample(3000);
+    const AxisSample b = second.sample(3000);
+    EXPECT_NEAR(a.true_current_a.a, x.i1, 1e-9);
+    EXPECT_NEAR(b.true_current_a.a, x.i2, 1e-9);
+    EXPECT_NEAR(a.speed_rad_s, x.w, 1e-9);
+    EXPECT_NEAR(b.speed_rad_s, x.w / ratio, 1e-9);
+    EXPECT_NEAR(a.angle_rad, x.angle, 1e-8);
+    EXPECT_NEAR(b.angle_rad, x.angle / ratio, 1e-8);
+    EXPECT_EQ(b.encoder_count, static_cast<std::int64_t>(std::floor(b.angle_rad * 2000 / (2 * M_PI))));
+  }
+}
+
+/// Energies of a run of motor and load machine behind an elastic coupling with play.
+struct Audit {
+  double supplied_j = 0.0;
+  double lost_j = 0.0;
+  double stored_j = 0.0;
+};
+
+// What both drives supply is lost in the windings and in friction or stored. The sums are trapezoids over
+// 5 us: 1e-4 of the supplied energy. Kills: a coupling that creates or destroys energy.
+TEST(SharedShaft, MotorAndLoadMachineConserveEnergy) {
+  AxisParameters p = dc_axis();
+  p.mechanics = {.inertia_kgm2 = 6e-5,
+                 .viscous_friction_nms = 4e-4,
+                 .load_inertia_kgm2 = 6e-5,
+                 .load_viscous_friction_nms = 4e-4,
+                 .shaft_stiffness_nm = 20.0,
+                 .shaft_damping_nms = 1e-3};
+  constexpr AxisTiming kFine{.period_s = 5e-6, .substeps = 1};
+  Axis first(p, kFine, 1, 0);
+  Axis second(dc_axis(), kFine, 1, 1);
+  const ShaftConstants shaft = constants_of(p.mechanics);
+  Audit audit;
+  AxisSample a = first.sample(0);
+  AxisSample b = second.sample(0);
+  TwoMassState x = first.state().shaft;
+  ShaftBranch touching{.contact = 1.0};
+  for (Tick tick = 0; tick < 40'000; ++tick) {
+    const double u1 = tick < 20'000 ? 20.0 : -10.0;
+    const double u2 = tick < 10'000 ? 0.0 : 5.0;
+    Axis::advance_pair(first, second, volts(u1), volts(u2), tick);
+    const AxisSample a1 = first.sample(tick + 1);
+    const AxisSample b1 = second.sample(tick + 1);
+    const TwoMassState x1 = first.state().shaft;
+    const auto mean = [](double from, double to) { return 0.5 * (from + to) * kFine.period_s; };
+    audit.supplied_j += u1 * mean(a.true_current_a.a, a1.true_current_a.a);
+    audit.supplied_j += u2 * mean(b.true_current_a.a, b1.true_current_a.a);
+    audit.lost_j += 2.0 * mean(std::pow(a.true_current_a.a, 2), std::pow(a1.true_current_a.a, 2));
+    audit.lost_j += 2.0 * mean(std::pow(b.true_current_a.a, 2), std::pow(b1.true_current_a.a, 2));
+    audit.lost_j += mean(losses_w(shaft, x, touching), losses_w(shaft, x1, touching));
+    a = a1;
+    b = b1;
+    x = x1;
+  }
+  audit.stored_j =
+      energy_j(shaft, x) + 1e-3 * (std::pow(a.true_current_a.a, 2) + std::pow(b.true_current_a.a, 2));
+  EXPECT_GT(audit.supplied_j, 1.0);
+  EXPECT_NEAR(audit.supplied_j, audit.lost_j + audit.stored_j, 1e-4 * audit.supplied_j);
+}
+
+// Kills: a pair of which one goes on after the other has diverged.
+TEST(SharedShaft, WhereOneDivergesBothAreHeld) {
+  AxisParameters bad = dc_axis();
+  std::get<PmDcMachineParameters>(bad.machine).armature_inductance_h = 1e-7;  // far too fast for the step
+  Axis first(dc_axis(), kTiming, 1, 0);
+  Axis second(bad, kTiming, 1, 1);
+  for (Tick tick = 0; tick < 20; ++tick)
+    Axis::advance_pair(first, second, volts(20.0), volts(10.0), tick);
+  EXPECT_NE(first.sample(20).faults & kDiverged, 0u);
+  EXPECT_NE(second.sample(20).faults & kDiverged, 0u);
+  EXPECT_TRUE(std::isfinite(first.sample(20).speed_rad_s));
+}
+
+}  // namespace
+}  // namespace drivebench

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <string>
+
+#include "protocols/can/codec.hpp"
+#include "protocols/can/text.hpp"
+
+namespace drivebench::can {
+
+inline Profile profile_of(bool fd) {
+  Profile profile;
+  profile.fd = fd;
+  return profile;
+}
+
+/// The same on a bus that has wide axes as well.
+inline Profile with_wide_axes(Profile profile) {
+  profile.wide = true;
+  return profile;
+}
+
+inline std::string data_of(const Frame& frame) {
+  std::string text;
+  append_data(text, frame);
+  return text;
+}
+
+/// A sample whose signals can be told apart.
+inline Sample a_sample() {
+  Sample sample;
+  sample.tick = 0x1'2345'6789;
+  sample.command_tick = 0x1'2345'6788;
+  sample.command_age_ticks = 1;
+  sample.missed_commands = 0x1'0002;
+  sample.refused_commands = 0x2'0003;
+  sample.late_ticks = 0x104;
+  sample.state = 2;
+  sample.faults = 0x8000'0010;
+  sample.encoder_count = -2;
+  sample.encoder_levels = 0x23;
+  sample.edge_age_s = 1e-3;
+  sample.edge_period_s = 2e-3;
+  sample.index_count = -256;
+  sample.index_tick = -1;
+  sample.i_a_a = 1.0;
+  sample.i_b_a = -2.0;
+  sample.speed_rad_s = -100.0;
+  sample.bus_voltage_v = 48.0;
+  sample.i_c_a = 1.5;
+  sample.i_f_a = -0.5;
+  sample.u_a_v = 10.0;
+  sample.u_b_v = -20.0;
+  sample.u_c_v = 5.0;
+  sample.u_f_v = 24.0;
+  sample.u_n_v = -1.0;
+  sample.hall_lines = 5;
+  sample.tachometer_v = 2.0;
+  sample.resolver_sin_v = 0.5;
+  sample.resolver_cos_v = -0.25;
+  sample.temperature_k = 300.0;
+  sample.meter_u_rms_v = 230.0;
+  sample.meter_i_rms_a = 2.5;
+  sample.meter_p_w = 500.0;
+  sample.meter_q_var = -125.0;
+  sample.meter_pf = 0.75;
+  sample.injected = 0x0800'0001;
+  return sample;
+}
+
+}  // namespace drivebench::can

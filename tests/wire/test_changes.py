@@ -1,0 +1,325 @@
+#!/usr/bin/python3
+"""What changes the world around a controller: parameters on a ramp, injected faults, bumps, current setpoints, as a client
+and as a user of drivebench meet them. Each test names the mistake that it would catch."""
+import math
+import pathlib
+import struct
+import sys
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from command_test import FAILED, SERVO, USAGE, CommandTest, link_of
+from wire_client import REPOSITORY, pb
+from wire_test import WireTest
+
+NAME = "machine.rotor_resistance_ohm"
+SERVO_TEXT = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+
+# A servo on a current amplifier, and a machine with three phases beside it.
+TWO_DRIVES = SERVO_TEXT.replace("substeps = 5", "substeps = 8") + """
+[axis.drive]
+kind = "current_amplifier"
+[axis.current_loop]
+proportional_v_per_a = 50.0
+integral_v_per_as = 50000.0
+limit_a = 6.0
+
+[[axis]]
+name = "bldc"
+[axis.machine]
+kind = "bldc"
+pole_pairs = 4
+stator_resistance_ohm = 0.5
+self_inductance_h = 1e-3
+mutual_inductance_h = 2e-4
+torque_constant_nm_per_a = 0.05
+[axis.mechanics]
+inertia_kgm2 = 1e-4
+[axis.amplifier]
+voltage_limit_v = 24.0
+over_current_a = 20.0
+[axis.encoder]
+counts_per_revolution = 4096
+"""
+
+
+class Ramps(WireTest):
+    def setUp(self):
+        self.owner = self.client(self.server())
+        self.owner.lease()
+        self.owner.step(0)
+
+    def write(self, value, name=NAME, **more):
+        return self.owner.ask(write_parameter=pb.WriteParameter(name=name, value=value, **more))
+
+    def read(self, name=NAME):
+        return self.owner.ask(read_parameters=pb.ReadParameters(names=[name])).parameter_values.parameters[0].value
+
+    def test_a_ramp_is_linear_and_can_be_read_on_its_way(self):
+        """A read-back that shows the target while the plant has another value; a ramp that is a tick early or late."""
+        self.assertDone(self.write(5.9, ramp_ticks=4, at_tick=3))
+        seen = []
+        for tick in range(1, 10):
+            self.owner.step(tick)
+            seen.append(round(self.read(), 12))
+        self.assertEqual(seen, [3.9, 3.9, 3.9, 4.4, 4.9, 5.4, 5.9, 5.9, 5.9])
+
+    def test_the_rules_are_those_of_the_time_when_it_acts(self):
+        """A write that is only checked when it comes in; one whose refusal leaves no trace."""
+        coulomb, static = "mechanics.coulomb_friction_nm", "mechanics.static_friction_nm"
+        self.assertRefused(self.write(0.1, coulomb), pb.REFUSAL_OUT_OF_RANGE, "value")
+        self.assertDone(self.write(0.1, coulomb, at_tick=3))
+        self.assertDone(self.write(0.1, coulomb, at_tick=6))
+        self.assertDone(self.write(0.2, static, at_tick=5))
+        seen = [(self.owner.step(tick).refused_commands, self.read(coulomb)) for tick in range(1, 9)]
+        self.assertEqual(seen, 2 * [(0, 0.0)] + 3 * [(1, 0.0)] + 3 * [(1, 0.1)])
+
+    def test_what_cannot_ramp_is_refused(self):
+        """An integer that goes through a half; a number of ticks that overflows."""
+        self.assertRefused(self.write(0.0, "amplifier.over_current_trip", ramp_ticks=3), pb.REFUSAL_OUT_OF_RANGE, "ramp_ticks")
+        self.assertRefused(self.write(5.0, ramp_ticks=2**53 + 1), pb.REFUSAL_OUT_OF_RANGE, "ramp_ticks")
+        self.assertRefused(self.write(5.0, at_tick=2**64 - 1), pb.REFUSAL_OUT_OF_RANGE, "at_tick")
+        for bad in (math.nan, math.inf):
+            self.assertRefused(self.write(bad, at_tick=9), pb.REFUSAL_NOT_FINITE, "value")
+        self.assertRefused(self.write(-1.0, at_tick=9), pb.REFUSAL_OUT_OF_RANGE, "value")
+
+    def test_sixteen_at_a_time(self):
+        """A seventeenth ramp that is said to be done."""
+        rows = self.owner.ask(read_parameters=pb.ReadParameters()).parameter_values.parameters
+        rows = [row for row in rows if row.live and not row.integer][:17]
+        self.assertEqual(len(rows), 17)
+        for row in rows[:16]:
+            self.assertDone(self.write(row.value, row.name, ramp_ticks=5))
+        refused = self.write(rows[16].value, rows[16].name, ramp_ticks=5)
+        self.assertRefused(refused, pb.REFUSAL_BUSY, "name")
+        self.assertIn("16 parameters", refused.refusal.message)
+
+
+class Faults(WireTest):
+    def inject(self, client, name, value, **more):
+        return client.ask(inject_fault=pb.InjectFault(name=name, value=value, **more))
+
+    def bit(self, client, name):
+        return next(f.bit for f in client.welcome.bench.injectable_faults if f.name == name)
+
+    def test_a_fault_acts_at_its_tick_and_is_seen(self):
+        """A fault that is not said in the sample, comes early, or cannot be taken back."""
+        client = self.client(self.server())
+        client.lease()
+        bit = self.bit(client, "open_phase")
+        self.assertDone(self.inject(client, "open_phase", 1, at_tick=2))
+        self.assertDone(self.inject(client, "open_phase", 0, at_tick=5))
+        samples = [client.step(tick, 20.0, 20.0) for tick in range(7)]
+        self.assertEqual([s.injected for s in samples], [0, 0, bit, bit, bit, 0, 0])
+        self.assertNotEqual(samples[1].true_i_a_a, 0.0)
+        self.assertEqual(samples[4].true_i_a_a, 0.0)
+        self.assertNotEqual(samples[4].true_i_b_a, 0.0)
+
+    def test_refusals_name_the_field(self):
+        """A fault that does not exist, a value that means nothing, a stranger."""
+        server = self.server()
+        owner, viewer = self.client(server), self.client(server)
+        owner.lease()
+        self.assertRefused(self.inject(owner, "open_fase", 1), pb.REFUSAL_UNKNOWN_FAULT, "name")
+        for value in (4, -1, 1.5):
+            self.assertRefused(self.inject(owner, "open_phase", value), pb.REFUSAL_OUT_OF_RANGE, "value")
+        self.assertRefused(self.inject(owner, "bus_sag", math.nan), pb.REFUSAL_NOT_FINITE, "value")
+        self.assertRefused(self.inject(owner, "bus_sag", 1, at_tick=2**60), pb.REFUSAL_OUT_OF_RANGE, "at_tick")
+        self.assertRefused(self.inject(owner, "bus_sag", 1, axis=1), pb.REFUSAL_UNKNOWN_AXIS, "axis")
+        self.assertRefused(self.inject(viewer, "bus_sag", 1), pb.REFUSAL_NOT_OWNER, "axis")
+        for bad, code in ((math.nan, pb.REFUSAL_NOT_FINITE), (-math.inf, pb.REFUSAL_NOT_FINITE), (2e6, pb.REFUSAL_OUT_OF_RANGE)):
+            self.assertRefused(owner.ask(shaft_bump=pb.ShaftBump(impulse_nms=bad)), code, "impulse_nms")
+        self.assertRefused(viewer.ask(shaft_bump=pb.ShaftBump(impulse_nms=1.0)), pb.REFUSAL_NOT_OWNER, "axis")
+        self.assertEqual(owner.step(0).injected, 0)
+
+    def test_every_fault_of_the_description_can_be_injected_and_taken_back(self):
+        """A row that one layer knows and another does not."""
+        client = self.client(self.server())
+        client.lease()
+        for tick, fault in enumerate(client.welcome.bench.injectable_faults):
+            self.assertTrue(fault.meaning and fault.unit and fault.maximum > 0.0, fault.name)
+            self.assertDone(self.inject(client, fault.name, 1 if fault.integer else fault.maximum / 2))
+            self.assertEqual(client.exchange(tick, gates=pb.GATES_OFF).exchange_reply.samples[0].sample.injected, fault.bit)
+            self.assertDone(self.inject(client, fault.name, 0))
+
+    def test_command_loss_is_seen_by_the_watchdog_and_not_by_the_client(self):
+        """A lockstep that stops when commands are lost; a lost command that moves the motor."""
+        client = self.client(self.server())
+        client.lease()
+        client.step(0, 5.0)
+        self.assertDone(self.inject(client, "command_loss", 1))
+        for tick in range(1, 20):
+            sample = client.step(tick, 9.0)
+            self.assertEqual((sample.u_a_v, sample.command_tick, sample.missed_commands), (5.0, 0, tick))
+        self.assertEqual(client.step(20, 9.0).state, 3)
+        self.assertRefused(client.exchange(21, 9.0), pb.REFUSAL_LATCHED)
+
+    def test_a_bump_is_felt_at_its_tick(self):
+        """A bump at once instead of at its tick, or twice."""
+        client = self.client(self.server())
+        client.lease()
+        self.assertDone(client.ask(shaft_bump=pb.ShaftBump(impulse_nms=1.1e-4, at_tick=2)))
+        speeds = [client.step(tick, gates=pb.GATES_OFF).speed_rad_s for tick in range(4)]
+        self.assertEqual(speeds[:2], [0.0, 0.0])
+        self.assertAlmostEqual(speeds[2], 1.0, places=3)
+        self.assertAlmostEqual(speeds[3], 1.0, places=3)
+
+
+class Setpoints(WireTest):
+    def test_currents_are_for_current_amplifiers(self):
+        """Amperes that a voltage amplifier takes for volts; a field that nobody can find."""
+        client = self.client(self.server(text=TWO_DRIVES))
+        client.lease(axis=0)
+        client.lease(axis=1)
+
+        def exchange(tick, **bldc):
+            servo = pb.Command(axis=0, tick=tick, gates=pb.GATES_CURRENT, i_a_a=1.5, i_b_a=-1.0, u_a_v=60.0)
+            return client.ask(exchange=pb.Exchange(commands=[servo, pb.Command(axis=1, tick=tick, **bldc)]))
+
+        self.assertRefused(exchange(0, gates=pb.GATES_CURRENT, i_a_a=1.0), pb.REFUSAL_WRONG_DRIVE, "commands.gates")
+        for field in ("u_a_v", "u_b_v", "u_c_v", "u_f_v"):
+            bad = exchange(0, gates=pb.GATES_VOLTAGE, **{field: math.nan})
+            self.assertRefused(bad, pb.REFUSAL_NOT_FINITE, "commands")
+        for tick in range(60):
+            reply = exchange(tick, gates=pb.GATES_VOLTAGE, u_a_v=1.0, u_b_v=-0.5, u_c_v=-0.25).exchange_reply
+        servo, bldc = (each.sample for each in reply.samples)
+        self.assertAlmostEqual(servo.true_i_a_a, 1.5, places=1)
+        self.assertAlmostEqual(servo.true_i_b_a, -1.0, places=1)
+        self.assertEqual((bldc.u_a_v, bldc.u_b_v, bldc.u_c_v), (1.0, -0.5, -0.25))
+        self.assertNotEqual(bldc.i_c_a, 0.0)
+
+    def test_the_description_tells_kinds_and_phases(self):
+        """A client that must guess what it controls."""
+        axes = self.client(self.server(text=TWO_DRIVES)).welcome.bench.axes
+        found = [(a.machine_kind, a.phases, a.connection, a.drive_kind, a.shares_shaft_with) for a in axes]
+        self.assertEqual(found, [("induction", 2, "two_phase", "current_amplifier", ""),
+                                 ("bldc", 3, "star", "voltage_amplifier", "")])
+        kind = next(p for p in axes[0].parameters if p.name == "drive.kind")
+        self.assertEqual(kind.words[int(kind.value)], "current_amplifier")
+
+    def test_an_axis_on_a_shared_shaft_has_no_mechanics_of_its_own(self):
+        """An inertia that is written and has no effect."""
+        client = self.client(self.server(config=pathlib.Path(REPOSITORY) / "configs/benches/dynamometer.toml"))
+        self.assertEqual(client.welcome.bench.axes[1].shares_shaft_with, client.welcome.bench.axes[0].name)
+        client.lease(axis=1)
+        write = pb.WriteParameter(axis=1, name="mechanics.inertia_kgm2", value=1.0)
+        refused = client.ask(write_parameter=write)
+        self.assertRefused(refused, pb.REFUSAL_OUT_OF_RANGE, "value")
+        self.assertIn("belongs to axis", refused.refusal.message)
+
+
+class Commands(CommandTest):
+    def setUp(self):
+        super().setUp()
+        self.bench = self.server()
+        self.link = link_of(self.bench)
+
+    def status(self):
+        return self.json_of("status", link=self.link)["axes"][0]
+
+    def test_inject_puts_a_fault_in_and_takes_it_back(self):
+        """A fault that the status does not tell, or that goes with the session."""
+        said = self.drivebench("inject", "servo", "bus_sag", "0.25", link=self.link).stdout
+        self.assertEqual(said, "axis 0 (servo): bus_sag = 0.25 from tick 0 on\n")
+        found = self.json_of("inject", "0", "hall_offset", "-0.5", link=self.link)
+        self.assertEqual(found, {"axis": 0, "name": "hall_offset", "value": -0.5, "tick": 0})
+        with self.bench.client() as client:
+            client.lease()
+            client.step(0, gates=pb.GATES_OFF)
+        self.assertEqual(self.status()["injected_set"], ["bus_sag", "hall_offset"])
+        self.assertSays(self.drivebench("status", link=self.link).stdout, "injected bus_sag hall_offset")
+        self.assertSays(self.drivebench("describe", link=self.link).stdout, "machine induction, 2 phases (two_phase)",
+                        "drive voltage_amplifier", "injectable fault", "open_phase")
+
+    def test_set_writes_numbers_and_words_and_ramps(self):
+        """A ramp in ticks of another bench, a word that is taken for 0."""
+        said = self.drivebench("set", "servo", NAME, "5.9", "--ramp-s", "0.5e-3", link=self.link).stdout
+        self.assertEqual(said, f"axis 0 (servo): {NAME} = 5.9 ohm from tick 4 on\n")
+        self.drivebench("set", "servo", "mechanics.motion", "locked", link=self.link)
+        with self.bench.client() as client:
+            client.lease()
+            seen = []
+            for tick in range(5):
+                client.step(tick, gates=pb.GATES_OFF)
+                read = client.ask(read_parameters=pb.ReadParameters(names=[NAME, "mechanics.motion"]))
+                seen.append([round(p.value, 12) for p in read.parameter_values.parameters])
+        self.assertEqual(seen, [[3.9, 1], [4.4, 1], [4.9, 1], [5.4, 1], [5.9, 1]])
+        self.drivebench("bump", "servo", "-0.0001", link=self.link)
+
+    def test_what_cannot_be_done_is_told(self):
+        """A command that ends with 0 and changed nothing."""
+        for arguments, code, fact in (
+                (["inject", "servo", "bus_sagg", "1"], USAGE, "no fault 'bus_sagg'"),
+                (["inject", "brake", "bus_sag", "1"], USAGE, "no axis 'brake'"),
+                (["inject", "servo", "bus_sag", "2"], FAILED, "must lie between 0 and 1"),
+                (["inject", "servo", "bus_sag", "much"], USAGE, "VALUE"),
+                (["inject", "servo", "bus_sag"], USAGE, "VALUE"),
+                (["set", "servo", "machine.rr", "2"], USAGE, "no parameter 'machine.rr'"),
+                (["set", "servo", NAME, "hot"], USAGE, "'hot' is not a number for"),
+                (["set", "servo", "mechanics.motion", "loked"], USAGE, "'loked' is not a value of"),
+                (["set", "servo", NAME, "-2"], FAILED, "must lie between"),
+                (["set", "servo", "machine.pole_pairs", "2"], FAILED, "cannot be changed"),
+                (["set", "servo", NAME, "5", "--ramp-s", "-1"], USAGE, "--ramp-s"),
+                (["set", "servo", NAME, "5", "--ramp-s", "nan"], USAGE, "--ramp-s"),
+                (["bump", "servo", "1e9"], FAILED, "must lie between")):
+            self.assertSays(self.drivebench(*arguments, link=self.link, code=code).stderr, fact)
+        with self.bench.client() as client:
+            client.lease()
+            self.assertSays(self.drivebench("inject", "servo", "bus_sag", "1", link=self.link, code=FAILED).stderr,
+                            "another session holds the lease")
+
+
+class Replays(CommandTest):
+    def test_everything_that_happened_replays_bit_for_bit(self):
+        """A change that is recorded without its ramp, its tick or its sign."""
+        recording = self.folder / "run.mcap"
+        events = """
+[[axis.set]]
+parameter = "machine.stator_resistance_ohm"
+value = 0.7
+at_tick = 30
+ramp_ticks = 50
+[[axis.fault]]
+name = "current_sensor_gain"
+value = -0.1
+at_tick = 40
+until_tick = 60
+[[axis.bump]]
+at_tick = 50
+impulse_nms = 1e-4
+"""
+        server = self.server("--record", str(recording), text=TWO_DRIVES + events)
+        with server.client() as client:
+            for axis in (0, 1):
+                client.lease(axis=axis)
+            for tick in range(120):
+                if tick == 10:
+                    client.ask(inject_fault=pb.InjectFault(axis=1, name="open_phase", value=3, at_tick=70))
+                    client.ask(shaft_bump=pb.ShaftBump(axis=1, impulse_nms=-1e-5))
+                if tick == 20:
+                    client.ask(write_parameter=pb.WriteParameter(axis=0, name="mechanics.viscous_friction_nms", value=1e-3,
+                                                                 ramp_ticks=33, at_tick=22))
+                client.ask(exchange=pb.Exchange(commands=[
+                    pb.Command(axis=0, tick=tick, gates=pb.GATES_CURRENT, i_a_a=1.0 + tick / 100, i_b_a=-0.5),
+                    pb.Command(axis=1, tick=tick, gates=pb.GATES_VOLTAGE, u_a_v=2.0, u_b_v=-1.0, u_c_v=-0.5, u_f_v=-0.0)]))
+            for axis in (0, 1):
+                client.lease(pb.LeaseRequest.ACTION_RELEASE, axis=axis)
+        self.assertEqual(server.stop(), 0)
+        found = self.json_of("replay", recording)
+        self.assertTrue(found["equal"], found)
+        self.assertEqual(found["state_hash"], server.verdict["state_hash"])
+        self.drivebench("export", recording, "--out", "run.csv", "--axis", "bldc", "--signals", "injected,i_c_a,u_c_v")
+        rows = [row.split(",") for row in (self.folder / "run.csv").read_text(encoding="utf-8").splitlines()]
+        self.assertEqual(rows[70][2], "0")
+        self.assertEqual([row[4] for row in rows[2:70]], 68 * ["-0.5"])
+        self.assertNotEqual(rows[72][2], "0")
+        self.assertEqual(struct.pack(">d", float(rows[75][3])), struct.pack(">d", 0.0))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
