@@ -29,6 +29,15 @@ std::byte* put_signal(std::byte* out, std::uint64_t word) noexcept {
   }
 }
 
+/// All signals, or those of the mask.
+template <bool kAll>
+std::byte* put_signals(std::byte* out, const SampleWords& words, SignalMask mask) noexcept {
+  [&]<std::size_t... Row>(std::index_sequence<Row...>) {
+    ((out = kAll || (mask >> Row & 1) != 0 ? put_signal<Row>(out, words[Row]) : out), ...);
+  }(std::make_index_sequence<kSignals.size()>{});
+  return out;
+}
+
 void store(Sample& sample, const Signal& signal, std::uint64_t value) noexcept {
   switch (signal.type) {
     case SignalType::kUnsigned:
@@ -55,10 +64,8 @@ constexpr Sample zero_sample() noexcept {
 
 std::size_t encode_sample(const Sample& sample, SignalMask mask, std::byte* out) noexcept {
   const auto words = std::bit_cast<SampleWords>(sample);
-  std::byte* end = out;
-  [&]<std::size_t... Row>(std::index_sequence<Row...>) {
-    ((end = (mask >> Row & 1) != 0 ? put_signal<Row>(end, words[Row]) : end), ...);
-  }(std::make_index_sequence<kSignals.size()>{});
+  const std::byte* const end =
+      mask == kAllSignals ? put_signals<true>(out, words, mask) : put_signals<false>(out, words, mask);
   return static_cast<std::size_t>(end - out);
 }
 

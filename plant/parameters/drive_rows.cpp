@@ -134,12 +134,12 @@ Problem problem(std::string_view field, double value, const std::string& rule) {
 
 void add_loop_problems(const DriveParameters& p, std::vector<Problem>& found) {
   if (p.kind != DriveKind::kCurrent) return;
-  const std::string rule = "must be above 0 with drive.kind = \"current_amplifier\"";
+  constexpr const char* kRule = "must be above 0 with drive.kind = \"current_amplifier\"";
   if (!(p.current_loop.proportional_v_per_a > 0.0)) {
-    found.push_back(problem("current_loop.proportional_v_per_a", p.current_loop.proportional_v_per_a, rule));
+    found.push_back(problem("current_loop.proportional_v_per_a", p.current_loop.proportional_v_per_a, kRule));
   }
   if (!(p.current_loop.limit_a > 0.0)) {
-    found.push_back(problem("current_loop.limit_a", p.current_loop.limit_a, rule));
+    found.push_back(problem("current_loop.limit_a", p.current_loop.limit_a, kRule));
   }
 }
 

@@ -13,8 +13,8 @@ struct Plan {
 
 /// A whole tick against the bare integration of the same substeps.
 std::vector<Row> measure_tick(const Plan& plan);
-/// A step of each kind of machine against a straight line, their ticks with all sensors, the switched inverter
-/// and a dynamometer.
+/// A step of each kind of machine against a straight line, their ticks with all sensors, the switched
+/// inverter and a dynamometer.
 std::vector<Row> measure_machines(const Plan& plan);
 /// Free mode with recording, on one CPU, against real time.
 std::vector<Row> measure_free_mode(const Plan& plan);

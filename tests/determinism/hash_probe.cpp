@@ -1,12 +1,15 @@
-// Runs a bench through a script that touches every branch of the plant, and prints the state hash every 1000
-// ticks. Built several times with different compilers and options: all must print the same.
+// Runs a bench through a script that touches every branch of the servo, then one with every kind of machine,
+// drive and sensor through every fault, and prints the state hash every 1000 ticks. Built several times with
+// different compilers and options: all must print the same.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 #include "plant/trig.hpp"
 #include "server/bench.hpp"
+#include "tests/determinism/zoo.hpp"
 
 namespace drivebench {
 namespace {
@@ -69,6 +72,76 @@ Command one_of_the_script(const Sample& s) {
   return command;
 }
 
+void print_hash(const Bench& bench) {
+  std::printf("%lld %016llx\n", static_cast<long long>(bench.tick()),
+              static_cast<unsigned long long>(bench.state_hash()));
+}
+
+/// Setpoints that turn and answer the measured currents.
+Command setpoint_of(const Bench& bench, std::size_t axis) {
+  const Sample& s = bench.sample(axis);
+  const DriveParameters& drive = bench.axis(axis).parameters().drive;
+  const bool currents = drive.kind == DriveKind::kCurrent;
+  const double most = 0.7 * (currents ? drive.current_loop.limit_a : drive.amplifier.voltage_limit_v);
+  const double angle_rad = 0.04 * static_cast<double>(s.tick) + 1e-4 * static_cast<double>(s.encoder_count);
+  const auto wave = [&](double lag_rad, double i_a) {
+    return most * cos_sin(angle_rad - lag_rad).cos - 0.3 * i_a;
+  };
+  const Gates on = currents ? Gates::kCurrent : Gates::kVoltage;
+  return {.answers = static_cast<Tick>(s.tick),
+          .phases = {.gates = s.tick % 900 > 800 ? Gates::kOff : on,
+                     .setpoint = {.a = wave(0.0, s.i_a_a),
+                                  .b = wave(2.0944, s.i_b_a),
+                                  .c = wave(4.1888, s.i_c_a),
+                                  .field = 0.1 * most - 0.1 * s.i_f_a}}};
+}
+
+/// Every fault for a while, one after the other; parameters on their way there and back; bumps and loads.
+void disturb(Bench& bench, std::uint32_t axis) {
+  const Tick tick = bench.tick();
+  const auto submit = [&](const Action& action) {
+    bench.submit({.tick = tick, .axis = axis, .owner = kController, .action = action});
+  };
+  const auto row = static_cast<std::uint32_t>((tick / 60 + axis) % static_cast<Tick>(kInjectableFaultCount));
+  const InjectableFault& fault = kInjectableFaults[row];
+  const double value = fault.integer ? (fault.maximum < 2.0 ? 1.0 : 2.0) : 0.05 * fault.maximum;
+  if (tick % 60 == 0 && value < 1e3) submit(InjectFault{.row = row, .value = value});
+  if (tick % 60 == 40) submit(InjectFault{.row = row, .value = 0.0});
+  if (tick % 60 == 50) submit(ClearFaults{});
+  if (tick % 300 == 7) submit(ShaftBump{.impulse_nms = 1e-3});
+  if (tick % 300 == 100) submit(LoadChange{.load_nm = 0.02, .ramp_ticks = 50});
+  const AxisParameters& p = bench.axis(axis).parameters();
+  const auto friction = static_cast<std::uint32_t>(find_parameter(p, "mechanics.viscous_friction_nms") -
+                                                   axis_parameters(p).data());
+  if (tick % 200 == 0) {
+    submit(ParameterWrite{.row = friction, .value = tick % 400 == 0 ? 2e-3 : 1e-3, .ramp_ticks = 150});
+  }
+  submit(setpoint_of(bench, axis));
+}
+
+int run_zoo(Tick ticks) {
+  Bench bench(zoo());
+  std::vector<bool> turned(bench.axis_count());
+  for (std::uint32_t axis = 0; axis < bench.axis_count(); ++axis)
+    bench.submit({.tick = 0, .axis = axis, .owner = kController, .action = LeaseAction::kAcquire});
+  while (bench.tick() < ticks) {
+    for (std::uint32_t axis = 0; axis < bench.axis_count(); ++axis)
+      disturb(bench, axis);
+    bench.step();
+    for (std::size_t axis = 0; axis < turned.size(); ++axis)
+      turned[axis] =
+          turned[axis] || (bench.sample(axis).speed_rad_s != 0.0 && bench.sample(axis).i_a_a != 0.0);
+    if (bench.tick() % 1000 == 0) print_hash(bench);
+  }
+  for (std::size_t axis = 0; axis < turned.size(); ++axis) {
+    const bool diverged = (bench.sample(axis).faults & kDiverged) != 0;
+    if (turned[axis] && !diverged) continue;
+    std::fprintf(stderr, "axis %zu of the zoo %s\n", axis, diverged ? "diverged" : "did not turn");
+    return 1;
+  }
+  return 0;
+}
+
 int run(Tick ticks) {
   Bench bench(two_axes());
   const auto submit = [&bench](std::uint32_t axis, const auto& action, Tick tick = 0) {
@@ -90,10 +163,7 @@ int run(Tick ticks) {
     bench.step();
     for (std::size_t axis = 0; axis < 2; ++axis)
       seen |= bench.sample(axis).faults;
-    if (bench.tick() % 1000 == 0) {
-      std::printf("%lld %016llx\n", static_cast<long long>(bench.tick()),
-                  static_cast<unsigned long long>(bench.state_hash()));
-    }
+    if (bench.tick() % 1000 == 0) print_hash(bench);
   }
   constexpr std::uint64_t kWanted = kVoltageSaturated | kCurrentSensorSaturated | kOverCurrent | kShaftHeld |
                                     kOverCurrentTrip | kCommandTimeout;
@@ -109,5 +179,7 @@ int run(Tick ticks) {
 }  // namespace drivebench
 
 int main(int argc, char** argv) {
-  return drivebench::run(argc > 1 ? std::atoll(argv[1]) : 20'000);
+  const drivebench::Tick ticks = argc > 1 ? std::atoll(argv[1]) : 20'000;
+  const int servo = drivebench::run(ticks);
+  return servo != 0 ? servo : drivebench::run_zoo(ticks / 4);
 }

@@ -202,6 +202,14 @@ class Setpoints(WireTest):
         kind = next(p for p in axes[0].parameters if p.name == "drive.kind")
         self.assertEqual(kind.words[int(kind.value)], "current_amplifier")
 
+    def test_the_description_of_the_largest_bench_fits_its_frame(self):
+        """A bench of 64 axes that no client of ours can connect to: frames may have 1 MiB."""
+        head, axis = SERVO_TEXT.split("[[axis]]")
+        axes = "".join("[[axis]]" + axis.replace('"servo"', f'"{"x" * 60}{n}"') for n in range(64))
+        welcome = self.client(self.server(text=head + axes)).welcome
+        self.assertEqual(len(welcome.bench.axes), 64)
+        self.assertLess(welcome.ByteSize(), 1024 * 1024)
+
     def test_an_axis_on_a_shared_shaft_has_no_mechanics_of_its_own(self):
         """An inertia that is written and has no effect."""
         client = self.client(self.server(config=pathlib.Path(REPOSITORY) / "configs/benches/dynamometer.toml"))

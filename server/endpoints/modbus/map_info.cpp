@@ -27,6 +27,7 @@ constexpr auto kFirstParameters = std::to_array<std::string_view>({
 
 std::vector<FaultInput> fault_inputs() {
   std::vector<FaultInput> faults;
+  faults.reserve(kFaultTable.size() + kInjectableFaultCount);
   for (const FaultInfo& fault : kFaultTable) {
     faults.push_back({.address = static_cast<std::size_t>(std::countr_zero(fault.bit)),
                       .bit = {.name = fault.name, .meaning = fault.meaning}});
