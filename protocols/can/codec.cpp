@@ -206,13 +206,17 @@ double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
 }
 
-/// What a count of a field is worth; `mode`: of the command in a classic frame, if it is one.
-double unit_of(const Field& field, const Profile& profile, double mode) noexcept {
-  if (field.encoding == Encoding::kScaled) {
-    if (mode == double{kDutyMode}) return kDutyUnit;
-    if (mode == double{kCurrentMode}) return profile.current_unit_a;
-  }
-  return profile.unit_of(field.scale);
+/// What a count of a voltage in a classic command is worth in the modes that give something else; otherwise
+/// 0.
+double setpoint_unit(const Profile& profile, double mode) noexcept {
+  if (mode == double{kDutyMode}) return kDutyUnit;
+  return mode == double{kCurrentMode} ? profile.current_unit_a : 0.0;
+}
+
+/// What a count of a field is worth; `setpoint`: setpoint_unit() of the frame, or 0.
+double unit_of(const Field& field, const Profile& profile, double setpoint) noexcept {
+  if (field.scale == Unit::kNone) return 1.0;
+  return setpoint != 0.0 ? setpoint : profile.unit_of(field.scale);
 }
 
 // ---- bytes ----
@@ -283,25 +287,30 @@ std::uint64_t raw_of(const Field& field, const Signal& signal, const Sample& sam
 Frame encode(const MessageRow& row, const Profile& profile, std::uint32_t node,
              std::span<const double> values) noexcept {
   Frame frame = empty_frame(row, profile, node);
-  const double mode = is_classic_command(row, profile) ? values[kCommandMode] : 0.0;
+  const double setpoint =
+      is_classic_command(row, profile) ? setpoint_unit(profile, values[kCommandMode]) : 0.0;
   const std::uint64_t page = layout_of(row).paged ? raw_of(row.fields[0], values[0], 1.0) : 0;
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
-    if (is_on_page(field, page)) put(frame, field, raw_of(field, values[i], unit_of(field, profile, mode)));
+    if (is_on_page(field, page))
+      put(frame, field, raw_of(field, values[i], unit_of(field, profile, setpoint)));
   }
   return frame;
 }
 
 Values decode(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept {
-  Values values{};
-  const double mode = is_classic_command(row, profile)
-                          ? static_cast<double>(frame.data[row.fields[kCommandMode].start_bit / 8U])
-                          : 0.0;
+  Values values;
+  const double setpoint =
+      is_classic_command(row, profile)
+          ? setpoint_unit(profile, static_cast<double>(frame.data[row.fields[kCommandMode].start_bit / 8U]))
+          : 0.0;
+  const std::uint8_t page = frame.data[0];
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
-    if (is_on_page(field, frame.data[0]))
-      values[i] = value_of(field, get(frame, field), unit_of(field, profile, mode));
+    values[i] =
+        is_on_page(field, page) ? value_of(field, get(frame, field), unit_of(field, profile, setpoint)) : 0.0;
   }
+  std::fill(values.begin() + static_cast<std::ptrdiff_t>(row.fields.size()), values.end(), 0.0);
   return values;
 }
 
@@ -318,10 +327,11 @@ Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t
                     Page page) noexcept {
   Frame frame = empty_frame(row, profile, node);
   const Layout& layout = layout_of(row);
-  if (layout.paged) frame.data[0] = static_cast<std::uint8_t>(page);
+  const auto number = static_cast<std::uint8_t>(page);
+  if (layout.paged) frame.data[0] = number;
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     const Field& field = row.fields[i];
-    if (layout.signals[i] != nullptr && is_on_page(field, frame.data[0]))
+    if (layout.signals[i] != nullptr && is_on_page(field, number))
       put(frame, field, raw_of(field, *layout.signals[i], sample, profile));
   }
   return frame;
