@@ -7,6 +7,7 @@
 #include "clients/command/commands.hpp"
 #include "protocols/can/candump.hpp"
 #include "protocols/can/codec.hpp"
+#include "protocols/can/command.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -14,6 +15,8 @@ namespace {
 using can::Message;
 
 constexpr std::uint64_t kStateEveryTicks = 80;  // as a bench does by default
+
+constexpr unsigned kCurrentMode = 4;  // of the native profile
 
 }  // namespace
 
@@ -24,7 +27,10 @@ void CandumpText::add(std::uint32_t axis, const Sample& sample, double time_s) {
   Before& before = before_[axis];
   if (sample.faults != before.faults) put(Message::kFault, axis, sample, time_s);
   if (sample.index_tick != before.index_tick) put(Message::kIndex, axis, sample, time_s);
-  before = {.faults = sample.faults, .index_tick = sample.index_tick};
+  before = {.faults = sample.faults,
+            .index_tick = sample.index_tick,
+            .wide = before.wide || sample.i_c_a != 0.0 || sample.i_f_a != 0.0 || sample.u_c_v != 0.0 ||
+                    sample.u_f_v != 0.0 || sample.hall_lines != 0};
   if (sample.tick % kStateEveryTicks == 0) {
     put(Message::kState, axis, sample, time_s);
     put(Message::kCounters, axis, sample, time_s);
@@ -32,23 +38,26 @@ void CandumpText::add(std::uint32_t axis, const Sample& sample, double time_s) {
   put(Message::kEncoder, axis, sample, time_s);
   put(Message::kCurrents, axis, sample, time_s);
   put(Message::kSensors, axis, sample, time_s);
+  put(Message::kPhases, axis, sample, time_s);
 }
 
 void CandumpText::add(const v1::Input& input, double time_s) {
   if (!input.has_command()) return;
   end_tick();
   const v1::Command& command = input.command();
-  const can::MessageRow& row = *can::find_message(Message::kCommand, address_.profile.fd);
-  can::Values values{};
-  for (std::size_t i = 0; i < row.fields.size(); ++i) {
-    const std::string_view field = row.fields[i].name;
-    values[i] = field == "tick"   ? static_cast<double>(command.tick())
-                : field == "u_a"  ? command.u_a_v()
-                : field == "u_b"  ? command.u_b_v()
-                : field == "mode" ? static_cast<double>(command.gates())
-                                  : static_cast<double>(input.owner() & 0xFF);
+  const bool currents = command.gates() == v1::GATES_CURRENT;
+  const can::Setpoints setpoints{.tick = command.tick(),
+                                 .mode = currents ? kCurrentMode : static_cast<unsigned>(command.gates()),
+                                 .lease = static_cast<unsigned>(input.owner() & 0xFF),
+                                 .a = currents ? command.i_a_a() : command.u_a_v(),
+                                 .b = currents ? command.i_b_a() : command.u_b_v(),
+                                 .c = currents ? command.i_c_a() : command.u_c_v(),
+                                 .field = currents ? command.i_f_a() : command.u_f_v()};
+  bool& wide = before_[input.axis()].wide;
+  wide = wide || setpoints.c != 0.0 || setpoints.field != 0.0;
+  for (const can::Frame& frame : can::encode_command(address_.profile, node(input.axis()), wide, setpoints)) {
+    put(frame, time_s);
   }
-  put(can::encode(row, address_.profile, node(input.axis()), values), time_s);
 }
 
 void CandumpText::finish() {
@@ -71,7 +80,7 @@ std::uint32_t CandumpText::node(std::uint32_t axis) const {
 
 /// Nothing if the profile does not have this message.
 void CandumpText::put(Message message, std::uint32_t axis, const Sample& sample, double time_s) {
-  const can::MessageRow* const row = can::find_message(message, address_.profile.fd);
+  const can::MessageRow* const row = can::find_message(message, address_.profile.fd, before_[axis].wide);
   if (row != nullptr) put(can::encode_sample(*row, address_.profile, node(axis), sample), time_s);
 }
 

@@ -37,6 +37,7 @@ class CandumpText {
   struct Before {
     std::uint64_t faults = 0;
     std::int64_t index_tick = -1;
+    bool wide = false;  ///< it has shown a phase c, a field or Hall lines: from then on its frames carry them
   };
 
   void put(can::Message message, std::uint32_t axis, const Sample& sample, double time_s);
