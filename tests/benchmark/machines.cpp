@@ -120,7 +120,8 @@ std::vector<Row> steps() {
   const AxisParameters pm_dc = axis_of("dc-a");
   AxisParameters separate = axis_of("dc-separate");
   const AxisParameters shunt = axis_of("dc-shunt");
-  const AxisParameters series = axis_of("dc-series");
+  AxisParameters series = axis_of("dc-series");
+  series.mechanics.fan_torque_nms2 = 0.0;
   const AxisParameters linear = axis_of("linear-dc");
   AxisParameters saturated = servo;
   saturated.machine = SaturatedInductionMachineParameters{
