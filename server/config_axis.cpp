@@ -98,7 +98,8 @@ AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, st
                                .shared_mechanics = partner ? &before[*partner].setup.parameters.mechanics
                                                    : shares_shaft ? &none
                                                                   : nullptr};
-  result.parameters_valid = read_parameters(source, problems, p);
+  const bool shaft_valid = partner ? before[*partner].parameters_valid : !shares_shaft;
+  result.parameters_valid = read_parameters(source, problems, p) && shaft_valid;
 
   const auto action = axis.choice("on_link_loss", kSafeActionWords);
   result.setup.on_link_loss = static_cast<SafeAction>(action.value_or(0));

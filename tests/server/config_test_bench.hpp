@@ -134,7 +134,8 @@ inline void expect_equal(const ModbusConfig& x, const ModbusConfig& y) {
 
 inline void expect_equal(const std::vector<CurvePoint>& x, const std::vector<CurvePoint>& y) {
   ASSERT_EQ(x.size(), y.size());
-  EXPECT_EQ(std::memcmp(x.data(), y.data(), x.size() * sizeof(CurvePoint)), 0);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    EXPECT_EQ(std::memcmp(&x[i], &y[i], sizeof(CurvePoint)), 0) << "point " << i;
 }
 
 inline void expect_equal(const std::vector<AxisEvent>& x, const std::vector<AxisEvent>& y) {
