@@ -4,9 +4,35 @@ import unittest
 
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, Server, pb
 
-TWO_AXES = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace(
-    "../motors/", f"{REPOSITORY}/configs/motors/")
-TWO_AXES += TWO_AXES[TWO_AXES.index("[[axis]]"):].replace('name = "servo"', 'name = "second"', 1)
+SERVO_TEXT = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+TWO_AXES = SERVO_TEXT + SERVO_TEXT[SERVO_TEXT.index("[[axis]]"):].replace('name = "servo"', 'name = "second"', 1)
+
+# A servo on a current amplifier, and a machine with three phases beside it.
+TWO_DRIVES = SERVO_TEXT.replace("substeps = 5", "substeps = 8") + """
+[axis.drive]
+kind = "current_amplifier"
+[axis.current_loop]
+proportional_v_per_a = 50.0
+integral_v_per_as = 50000.0
+limit_a = 6.0
+
+[[axis]]
+name = "bldc"
+[axis.machine]
+kind = "bldc"
+pole_pairs = 4
+stator_resistance_ohm = 0.5
+self_inductance_h = 1e-3
+mutual_inductance_h = 2e-4
+torque_constant_nm_per_a = 0.05
+[axis.mechanics]
+inertia_kgm2 = 1e-4
+[axis.amplifier]
+voltage_limit_v = 24.0
+over_current_a = 20.0
+[axis.encoder]
+counts_per_revolution = 4096
+"""
 
 
 def until(condition, what):
