@@ -104,13 +104,15 @@ Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::
       core_.sensors.settled({.bus_v = state_.drive.bus_v, .temperature_k = state_.thermal.temperature_k}, 0);
 }
 
-Axis::Axis(const Axis& other) : core_(other.core_), train_(other.train_->clone()), state_(other.state_) {}
+Axis::Axis(const Axis& other)
+    : core_(other.core_), train_(other.train_->clone()), state_(other.state_), truth_(other.truth_) {}
 
 Axis& Axis::operator=(const Axis& other) {
   if (this != &other) {
     core_ = other.core_;
     train_ = other.train_->clone();
     state_ = other.state_;
+    truth_ = other.truth_;
   }
   return *this;
 }
@@ -132,6 +134,7 @@ void Axis::restore(const AxisState& state) noexcept {
 
 void Axis::bump(double impulse_nms) noexcept {
   state_.shaft = bumped(core_.shaft, state_.shaft, impulse_nms);
+  look_inside();
 }
 
 void Axis::inject(std::size_t row, double value) noexcept {
@@ -149,6 +152,11 @@ void Axis::adjust() noexcept {
     a.series_inductance_h = core_.p.drive.source.inductance_h;
   }
   train_->set_machine(core_.p.machine, a);
+  look_inside();
+}
+
+void Axis::look_inside() noexcept {
+  truth_ = train_->truth(state_, motion_of(state_));
 }
 
 void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
@@ -175,6 +183,7 @@ void Axis::hold(const MotionState& before) noexcept {
   state_.sensors.filtered = {};
   state_.faults |= kDiverged;
   core_.segment_count = 0;
+  look_inside();
 }
 
 void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
@@ -188,11 +197,12 @@ void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
     drivebench::advance(core_.p.thermal, state_.thermal, state_.heat_j, core_.timing.period_s);
     state_.heat_j = 0.0;
     adjust();
+  } else {
+    look_inside();
   }
-  const MachineTruth truth = train_->truth(state_, motion_of(state_));
   core_.sensors.end_tick(
       state_.sensors,
-      {.current_a = terminal_currents(core_.connection, truth.current_a, state_.open_terminals),
+      {.current_a = terminal_currents(core_.connection, truth_.current_a, state_.open_terminals),
        .voltage_v = state_.voltage_v,
        .bus_v = state_.drive.bus_v,
        .neutral_v = state_.neutral_v,
@@ -242,7 +252,6 @@ bool Axis::finite() const noexcept {
 }
 
 AxisSample Axis::sample(Tick tick) const noexcept {
-  const MachineTruth truth = train_->truth(state_, motion_of(state_));
   const SensorReadings r = core_.sensors.readings(state_.sensors, state_.injected, tick);
   const double turns_rad = static_cast<double>(state_.turns) * kTurnRad;
   const LoadSide load = load_side(core_.shaft, state_.shaft, turns_rad);
@@ -272,10 +281,10 @@ AxisSample Axis::sample(Tick tick) const noexcept {
           .injected = injected_bits(state_.injected),
           .angle_rad = turns_rad + state_.shaft.angle_rad,
           .speed_rad_s = state_.shaft.speed_rad_s,
-          .torque_nm = truth.torque_nm,
+          .torque_nm = truth_.torque_nm,
           .load_nm = load_at(tick),
-          .true_current_a = terminal_currents(core_.connection, truth.current_a, state_.open_terminals),
-          .rotor_flux_wb = truth.rotor_flux_wb,
+          .true_current_a = terminal_currents(core_.connection, truth_.current_a, state_.open_terminals),
+          .rotor_flux_wb = truth_.rotor_flux_wb,
           .load_angle_rad = load.angle_rad,
           .load_speed_rad_s = load.speed_rad_s,
           .load_position_m = load.position_m};

@@ -74,11 +74,14 @@ class Axis {
   void hold(const MotionState& before) noexcept;
   double load_at(Tick tick) const noexcept;
   void adjust() noexcept;
+  /// Works out what the machine shows in this state.
+  void look_inside() noexcept;
   bool finite() const noexcept;
 
   AxisCore core_;
   std::unique_ptr<Train> train_;
   AxisState state_;
+  MachineTruth truth_;  ///< follows from the state
 };
 
 /// The number of integration steps for a tick of this length, at most kMaxSubsteps. A step is at most a tenth

@@ -86,9 +86,11 @@ class DriveTrain final : public Train {
     State sum{};
     TerminalDrive drive{};
     TerminalCircuit circuit{};
+    WindingValues emf_v{};  ///< while it is open
     int event = -1;
     bool plain = false;  ///< every terminal is driven by a constant voltage, nothing is shorted
-    bool stays = false;  ///< and the next piece has the same
+    bool open = false;   ///< no terminal is driven, none carries a current
+    bool stays = false;  ///< either of them, and the next piece has the same
   };
 
   static State machine_of(const AxisState& state) noexcept;
@@ -114,13 +116,15 @@ class DriveTrain final : public Train {
   Whole slope(const AxisCore& core, const Whole& x, const TerminalInput& u, const ShaftBranch& branch,
               double load_nm) const noexcept;
   // Left to themselves the compilers call the slope four times, at twice the time.
-  [[gnu::flatten]] Whole stepped(const AxisCore& core, const Whole& x, double duration_s,
-                                 const TerminalCircuit& circuit, const ShaftBranch& branch,
-                                 double load_nm) const noexcept;
-  [[gnu::noinline]] Whole stepped_varying(const AxisCore& core, const Whole& x, double duration_s,
-                                          const TerminalCircuit& circuit, const ShaftBranch& branch,
-                                          double load_nm) const noexcept;
+  [[gnu::flatten]] void step(const AxisCore& core, Whole& x, double duration_s, const ShaftBranch& branch,
+                             double load_nm) const noexcept;
+  [[gnu::noinline]] void step_varying(const AxisCore& core, Whole& x, double duration_s,
+                                      const ShaftBranch& branch, double load_nm) const noexcept;
+  /// A circuit whose voltages stay as they are, of which nothing dies.
+  void hold_constant(const TerminalInput& input) noexcept;
   void drive_windings(const AxisCore& core) noexcept;
+  /// Whether terminals without current stay without.
+  bool leave_open(const AxisCore& core, const State& x, const RotorMotion& motion) noexcept;
   void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
                      const RotorMotion& motion) noexcept;
   /// The step up to the event that comes first, and which one it is (-1: none comes).
@@ -133,6 +137,9 @@ class DriveTrain final : public Train {
   double corner_between(const RotorMotion& from, const RotorMotion& to) const noexcept;
   void settle_terminals(const AxisCore& core, AxisState& state, State& x, const RotorMotion& motion,
                         int electrical_event) const noexcept;
+  void begin_substep(const Shaft& shaft) noexcept;
+  /// A substep without events, edges and anybody who follows it.
+  void run_substep(AxisCore& core, Whole& x, double start_s, double end_s, double load_nm) noexcept;
   void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
                  double load_nm) noexcept;
   void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,

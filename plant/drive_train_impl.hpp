@@ -44,8 +44,7 @@ MachineTruth DriveTrain<Machine, Shaft>::truth(const AxisState& state,
   const RotorMotion now = turned(motion);
   return {.current_a = winding_currents(c_, x, now),
           .torque_nm = torque_nm(c_, x, now),
-          .rotor_flux_wb = rotor_flux_wb(c_, x, now),
-          .losses_w = losses_w(c_, x, now)};
+          .rotor_flux_wb = rotor_flux_wb(c_, x, now)};
 }
 
 template <class Machine, class Shaft>
@@ -59,22 +58,19 @@ auto DriveTrain<Machine, Shaft>::slope(const AxisCore& core, const Whole& x, con
 }
 
 template <class Machine, class Shaft>
-auto DriveTrain<Machine, Shaft>::stepped(const AxisCore& core, const Whole& x, double duration_s,
-                                         const TerminalCircuit& circuit, const ShaftBranch& branch,
-                                         double load_nm) const noexcept -> Whole {
-  if (circuit.constant) {
-    return rk4_step(x, duration_s, [&](const Whole& s) noexcept -> Whole {
-      return slope(core, s, circuit.start, branch, load_nm);
-    });
-  }
-  return stepped_varying(core, x, duration_s, circuit, branch, load_nm);
+void DriveTrain<Machine, Shaft>::step(const AxisCore& core, Whole& x, double duration_s,
+                                      const ShaftBranch& branch, double load_nm) const noexcept {
+  if (!piece_.circuit.constant) return step_varying(core, x, duration_s, branch, load_nm);
+  x = rk4_step(x, duration_s, [&](const Whole& s) noexcept -> Whole {
+    return slope(core, s, piece_.circuit.start, branch, load_nm);
+  });
 }
 
 template <class Machine, class Shaft>
-auto DriveTrain<Machine, Shaft>::stepped_varying(const AxisCore& core, const Whole& x, double duration_s,
-                                                 const TerminalCircuit& circuit, const ShaftBranch& branch,
-                                                 double load_nm) const noexcept -> Whole {
-  return rk4_step(x, duration_s, [&](const Whole& s, StepPoint point) noexcept -> Whole {
+void DriveTrain<Machine, Shaft>::step_varying(const AxisCore& core, Whole& x, double duration_s,
+                                              const ShaftBranch& branch, double load_nm) const noexcept {
+  const TerminalCircuit& circuit = piece_.circuit;
+  x = rk4_step(x, duration_s, [&](const Whole& s, StepPoint point) noexcept -> Whole {
     const TerminalInput& u = point == StepPoint::kStart    ? circuit.start
                              : point == StepPoint::kMiddle ? circuit.middle
                                                            : circuit.end;
@@ -95,10 +91,30 @@ void DriveTrain<Machine, Shaft>::drive_windings(const AxisCore& core) noexcept {
 }
 
 template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::hold_constant(const TerminalInput& input) noexcept {
+  piece_.circuit.start = input;
+  piece_.circuit.constant = true;
+  piece_.circuit.dying = 0;
+  piece_.circuit.short_circuit = false;
+}
+
+template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::leave_open(const AxisCore& core, const State& x,
+                                            const RotorMotion& motion) noexcept {
+  piece_.emf_v = open_circuit_voltages(c_, x, motion);
+  if (!stays_open(core.connection, piece_.drive, piece_.emf_v)) return false;
+  if (core.follows) {
+    piece_.circuit.start_v = open_terminal_voltages(core.connection, piece_.emf_v, piece_.drive.field_v);
+    piece_.circuit.mean_v = piece_.circuit.end_v = piece_.circuit.start_v;
+  }
+  return true;
+}
+
+template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state, double start_s,
                                                double duration_s, const State& x,
                                                const RotorMotion& motion) noexcept {
-  if (piece_.stays) return;
+  if (piece_.stays && (piece_.plain || leave_open(core, x, motion))) return;
   if (piece_.plain && core.drive.only_switches(state.drive)) {
     core.drive.switch_terminals(state.drive, start_s, piece_.drive);
     if (all_driven(core.connection, piece_.drive)) return drive_windings(core);
@@ -106,18 +122,26 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
   const PhaseValues current_a =
       terminal_currents(core.connection, winding_currents(c_, x, motion), state.open_terminals);
   piece_.drive = core.drive.at(state.drive, start_s, duration_s, current_a);
-  const bool shorted = state.injected.phase_short != 0.0 || state.injected.neutral_short != 0.0;
-  piece_.plain = piece_.drive.constant && !shorted && all_driven(core.connection, piece_.drive);
+  const TerminalSet all = all_terminals(core.connection);
+  const bool sound = piece_.drive.constant && state.injected.phase_short == 0.0 &&
+                     state.injected.neutral_short == 0.0;
+  piece_.plain = sound && all_driven(core.connection, piece_.drive);
+  piece_.open = sound && (state.open_terminals & all) == all && leave_open(core, x, motion);
+  piece_.stays = (piece_.plain || piece_.open) && core.drive.steady(state.drive);
   if (piece_.plain) {
-    piece_.circuit = {.start = {.field_v = piece_.drive.field_v}};
+    hold_constant({.field_v = piece_.drive.field_v});
     drive_windings(core);
     state.open_terminals = 0;
-    piece_.stays = core.drive.steady(state.drive);
-    return;
+  } else if (piece_.open) {
+    TerminalInput none = open_input(core.connection, all);
+    none.field_v = piece_.drive.field_v;
+    hold_constant(none);
+    state.open_terminals = all;
+  } else {
+    piece_.circuit = connect(core.connection, piece_.drive, state.injected, current_a,
+                             open_circuit_voltages(c_, x, motion), state.open_terminals);
+    if (piece_.circuit.short_circuit) trip(core, state);
   }
-  piece_.circuit = connect(core.connection, piece_.drive, state.injected, current_a,
-                           open_circuit_voltages(c_, x, motion), state.open_terminals);
-  if (piece_.circuit.short_circuit) trip(core, state);
 }
 
 template <class Machine, class Shaft>
@@ -180,7 +204,8 @@ Crossing DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& sta
     if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
       connect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
     }
-    to = stepped(core, from, shorter_s, piece_.circuit, branch, load_nm);
+    to = from;
+    step(core, to, shorter_s, branch, load_nm);
     const double value = values_at(core, state.open_terminals, dying, to, branch, corner).value[which];
     if (std::abs(value) <= close_enough) break;
     bracket.narrow(crossing.fraction, value);
@@ -207,7 +232,8 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::keep_open(const AxisCore& core, const AxisState& state, State& x,
                                            const RotorMotion& motion) const noexcept {
   if (state.open_terminals == 0) return;
-  x = restricted(c_, x, motion, open_input(core.connection, state.open_terminals));
+  x = restricted(c_, x, motion,
+                 piece_.open ? piece_.circuit.start : open_input(core.connection, state.open_terminals));
 }
 
 template <class Machine, class Shaft>
@@ -263,7 +289,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     if (core.shaft_has_events || blocked) {
       branch = branch_of(core.shaft, from.shaft, torque_nm(c_, from.machine, from_motion), load_nm, blocked);
     }
-    x = stepped(core, from, duration_s, piece_.circuit, branch, load_nm);
+    step(core, x, duration_s, branch, load_nm);
     const bool may_cut = piece_.circuit.dying != 0 || core.shaft_has_events || Machine::kHasCorners;
     Crossing crossing;
     if (may_cut && events < kMaxEvents) {
@@ -279,24 +305,50 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
 }
 
 template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::begin_substep(const Shaft& shaft) noexcept {
+  if constexpr (Machine::kUsesAngle) {
+    substep_start_rad_ = shaft.angle_rad;
+    substep_start_ = cos_sin(pole_pairs_ * substep_start_rad_);
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::run_substep(AxisCore& core, Whole& x, double start_s, double end_s,
+                                             double load_nm) noexcept {
+  const Shaft from = x.shaft;
+  step(core, x, end_s - start_s, ShaftBranch{}, load_nm);
+  core.record({.start_s = start_s,
+               .duration_s = end_s - start_s,
+               .start_rad = from.angle_rad,
+               .end_rad = x.shaft.angle_rad,
+               .start_rad_s = from.speed_rad_s,
+               .end_rad_s = x.shaft.speed_rad_s});
+}
+
+template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double load_nm) noexcept {
   Whole x;
   x.machine = machine_of(state);
   x.shaft = shaft_of(state);
-  piece_.plain = piece_.stays = false;
+  piece_.plain = piece_.open = piece_.stays = false;
+  const bool smooth = !Machine::kHasCorners && !core.shaft_has_events && !core.follows &&
+                      state.injected.blocked_rotor == 0.0 && core.drive.steady(state.drive);
   for (int n = 0; n < core.timing.substeps; ++n) {
-    if constexpr (Machine::kUsesAngle) {
-      substep_start_rad_ = x.shaft.angle_rad;
-      substep_start_ = cos_sin(pole_pairs_ * substep_start_rad_);
-    }
+    begin_substep(x.shaft);
     const double end_s = (n + 1) * core.step_s;
-    for (double start_s = n * core.step_s; start_s < end_s;) {
-      const double stop_s = std::min(end_s, core.drive.next_edge_s(state.drive, start_s));
-      run_piece(core, state, x, start_s, stop_s, load_nm);
-      start_s = stop_s;
+    double start_s = n * core.step_s;
+    if (smooth && piece_.stays && (piece_.plain || leave_open(core, x.machine, motion_of(x)))) {
+      run_substep(core, x, start_s, end_s, load_nm);
+    } else {
+      while (start_s < end_s) {
+        const double stop_s = std::min(end_s, core.drive.next_edge_s(state.drive, start_s));
+        run_piece(core, state, x, start_s, stop_s, load_nm);
+        start_s = stop_s;
+      }
     }
     const RotorMotion motion = motion_of(x);
     keep_open(core, state, x.machine, motion);
+    if (piece_.open) continue;
     const PhaseValues current_a =
         terminal_currents(core.connection, winding_currents(c_, x.machine, motion), state.open_terminals);
     if (check_over_current(core, state, current_a)) piece_.stays = false;
@@ -310,7 +362,10 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::end_run(const AxisCore& core, AxisState& state, const State& x,
                                          const RotorMotion& motion) noexcept {
   if (!has_impedance(core.p.drive)) {
-    state.voltage_v = piece_.plain ? piece_.circuit.start_v : piece_.circuit.end_v;
+    state.voltage_v =
+        piece_.plain  ? piece_.circuit.start_v
+        : piece_.open ? open_terminal_voltages(core.connection, piece_.emf_v, piece_.drive.field_v)
+                      : piece_.circuit.end_v;
   }
   if (core.connection == Connection::kStar) {
     state.neutral_v = measurable(core, state, x, motion, state.voltage_v).neutral_v;
@@ -322,7 +377,7 @@ void DriveTrain<Machine, Shaft>::open(AxisCore& core, AxisState& state, double s
                                       const RotorMotion& motion) noexcept {
   piece_.from = machine_of(state);
   piece_.stage = piece_.from;
-  piece_.plain = piece_.stays = false;
+  piece_.plain = piece_.open = piece_.stays = false;
   connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
 }
 

@@ -1,5 +1,6 @@
 #include "plant/terminals.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace drivebench {
@@ -238,6 +239,27 @@ TerminalInput open_input(Connection connection, TerminalSet open) noexcept {
     u.conduction = Conduction::kNone;
   }
   return u;
+}
+
+PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
+                                   double field_v) noexcept {
+  const Phases v = open_circuit_phases(connection, open_circuit_v);
+  return {.a = v[0], .b = v[1], .c = v[2], .field = field_v};
+}
+
+bool diodes_block(Connection connection, const TerminalDrive& drive,
+                  const WindingValues& open_circuit_v) noexcept {
+  const Phases emf_v = open_circuit_phases(connection, open_circuit_v);
+  double highest_v = -drive.rail_v;
+  double lowest_v = drive.rail_v;
+  for (int k = 0; k < terminal_count(connection); ++k) {
+    if (drive.mode[at(k)] == TerminalMode::kDriven) return false;
+    if (drive.mode[at(k)] == TerminalMode::kOpen) continue;
+    highest_v = std::max(highest_v, emf_v[at(k)]);
+    lowest_v = std::min(lowest_v, emf_v[at(k)]);
+  }
+  if (connection == Connection::kStar) return highest_v - lowest_v <= 2.0 * drive.rail_v;
+  return highest_v <= drive.rail_v && lowest_v >= -drive.rail_v;
 }
 
 TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,

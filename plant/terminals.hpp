@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "plant/drive/terminal_drive.hpp"
@@ -42,6 +43,26 @@ TerminalInput open_input(Connection connection, TerminalSet open) noexcept;
 TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
                         const PhaseValues& current_a, const WindingValues& open_circuit_v,
                         TerminalSet& open) noexcept;
+
+/// The voltages of terminals without current.
+PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
+                                   double field_v) noexcept;
+
+/// No terminal is driven, and no emf opens a diode.
+bool diodes_block(Connection connection, const TerminalDrive& drive,
+                  const WindingValues& open_circuit_v) noexcept;
+
+/// Another common case: whether terminals without current stay without.
+inline bool stays_open(Connection connection, const TerminalDrive& drive,
+                       const WindingValues& open_circuit_v) noexcept {
+  bool driven = false;
+  for (int k = 0; k < terminal_count(connection); ++k)
+    driven = driven || drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven;
+  // No phase has more than the sum of the components.
+  const double most_v = std::abs(open_circuit_v.stator.a) + std::abs(open_circuit_v.stator.b) +
+                        std::abs(open_circuit_v.zero);
+  return (!driven && most_v <= drive.rail_v) || diodes_block(connection, drive, open_circuit_v);
+}
 
 /// The common case of connect(): every terminal is driven and nothing is shorted.
 constexpr bool all_driven(Connection connection, const TerminalDrive& drive) noexcept {

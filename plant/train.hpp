@@ -46,7 +46,6 @@ struct MachineTruth {
   WindingValues current_a{};
   double torque_nm = 0.0;
   TwoPhase rotor_flux_wb{};
-  double losses_w = 0.0;
 };
 
 /// The integration of a drive train with one kind of machine. Stateless between ticks.

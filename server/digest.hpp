@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -13,17 +14,29 @@ class Digest {
  public:
   constexpr void add(std::uint64_t word) noexcept {
     std::uint64_t& lane = lanes_[position_++ & 3u];
-    lane = std::rotl((lane ^ word) * 0x9e37'79b9'7f4a'7c15u, 29);
+    lane = mixed(lane, word);
   }
 
   /// Adds a struct of 8-byte members word by word.
   template <class Block>
   void add_block(const Block& block) noexcept {
     static_assert(std::is_trivially_copyable_v<Block> && sizeof(Block) % 8 == 0);
-    std::uint64_t words[sizeof(Block) / 8];
+    constexpr std::size_t kWords = sizeof(Block) / 8;
+    std::uint64_t words[kWords];
     std::memcpy(words, &block, sizeof(Block));
-    for (const std::uint64_t word : words)
-      add(word);
+    std::size_t next = 0;
+    for (; next < kWords && (position_ & 3u) != 0; ++next)
+      add(words[next]);
+    auto [first, second, third, fourth] = lanes_;  // in registers
+    for (; next + 4 <= kWords; next += 4, position_ += 4) {
+      first = mixed(first, words[next]);
+      second = mixed(second, words[next + 1]);
+      third = mixed(third, words[next + 2]);
+      fourth = mixed(fourth, words[next + 3]);
+    }
+    lanes_ = {first, second, third, fourth};
+    for (; next < kWords; ++next)
+      add(words[next]);
   }
 
   /// Of the words so far, their order and their number.
@@ -35,8 +48,12 @@ class Digest {
   }
 
  private:
-  std::uint64_t lanes_[4] = {0x243f'6a88'85a3'08d3u, 0x1319'8a2e'0370'7344u, 0xa409'3822'299f'31d0u,
-                             0x082e'fa98'ec4e'6c89u};
+  static constexpr std::uint64_t mixed(std::uint64_t lane, std::uint64_t word) noexcept {
+    return std::rotl((lane ^ word) * 0x9e37'79b9'7f4a'7c15u, 29);
+  }
+
+  std::array<std::uint64_t, 4> lanes_{0x243f'6a88'85a3'08d3u, 0x1319'8a2e'0370'7344u,
+                                      0xa409'3822'299f'31d0u, 0x082e'fa98'ec4e'6c89u};
   std::uint64_t position_ = 0;
 };
 

@@ -182,16 +182,16 @@ Recorder::~Recorder() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Recorder::push(const Entry& entry) noexcept {
-  if (!ring_.push(entry)) gaps_.fetch_add(1, std::memory_order_relaxed);
-}
-
 void Recorder::on_input(Tick now, const Input& input) noexcept {
-  push(InputEntry{now, input});
+  count_gap(!ring_.emplace(std::in_place_type<InputEntry>, now, input));
 }
 
 void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
-  push(SampleEntry{axis, sample});
+  count_gap(!ring_.emplace(std::in_place_type<SampleEntry>, axis, sample));
+}
+
+void Recorder::count_gap(bool lost) noexcept {
+  if (lost) gaps_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void Recorder::wait_for_room() noexcept {

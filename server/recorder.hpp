@@ -52,7 +52,7 @@ class Recorder final : public BenchObserver {
   using Entry = std::variant<SampleEntry, InputEntry>;
   class File;
 
-  void push(const Entry& entry) noexcept;
+  void count_gap(bool lost) noexcept;
   void run();
   bool drain() noexcept;
   void count_lost();

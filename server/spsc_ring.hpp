@@ -3,7 +3,9 @@
 #include <atomic>
 #include <bit>
 #include <cstddef>
+#include <memory>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace drivebench {
@@ -18,13 +20,17 @@ class SpscRing {
   explicit SpscRing(std::size_t capacity) : slots_(std::bit_ceil(capacity)) {}
 
   /// Producer: false if the ring is full.
-  bool push(const T& value) noexcept {
+  bool push(const T& value) noexcept { return emplace(value); }
+
+  /// Producer: makes the entry where it will lie; false if the ring is full.
+  template <class... Arguments>
+  bool emplace(Arguments&&... arguments) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - head_seen_ == slots_.size()) {
       head_seen_ = head_.load(std::memory_order_acquire);
       if (tail - head_seen_ == slots_.size()) return false;
     }
-    slots_[tail & (slots_.size() - 1)] = value;
+    std::construct_at(&slots_[tail & (slots_.size() - 1)], std::forward<Arguments>(arguments)...);
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }

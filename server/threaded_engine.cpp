@@ -52,9 +52,9 @@ class Tap final : public BenchObserver {
   }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
     if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
-    if (bench_ != nullptr) events_.push(AxisEdges{axis, edges_of(*bench_, axis)});
-    events_.push(
-        TickedSample{axis, sample});  // a full ring costs the viewers a sample, never the bench its time
+    if (bench_ != nullptr) events_.emplace(std::in_place_type<AxisEdges>, axis, edges_of(*bench_, axis));
+    // A full ring costs the viewers a sample, never the bench its time.
+    events_.emplace(std::in_place_type<TickedSample>, axis, sample);
   }
   /// From now on the encoder edges of each tick go before its samples.
   void send_edges_of(const Bench& bench) noexcept { bench_ = &bench; }
@@ -253,9 +253,8 @@ class ThreadedEngine final : public Engine {
     for (std::size_t n = 0; n < events_.capacity(); ++n) {
       const Event* event = events_.front();
       if (event == nullptr) break;
-      const Event copy = *event;
+      std::visit([this](const auto& e) { handle(e); }, *event);
       events_.pop();
-      std::visit([this](const auto& e) { handle(e); }, copy);
     }
     if (tick() != before) on_newest();
   }

@@ -63,22 +63,18 @@ Encoder::Piece Encoder::part(const Piece& whole, double from, double to) noexcep
           .end_slope = curve.slope(to) * width};
 }
 
-bool Encoder::has_no_edge(const AngleSegment& segment) const noexcept {
-  const double start = position(segment.start_rad);
-  const double end = position(segment.end_rad);
+Encoder::Piece Encoder::piece_of(const AngleSegment& segment) const noexcept {
   const double slope_scale = counts_per_rad_ * segment.duration_s;
-  return floor_to_integer(start) == floor_to_integer(end) &&
-         is_monotonic(end - start, segment.start_rad_s * slope_scale, segment.end_rad_s * slope_scale);
+  return {.start_s = segment.start_s,
+          .duration_s = segment.duration_s,
+          .start = position(segment.start_rad),
+          .end = position(segment.end_rad),
+          .start_slope = segment.start_rad_s * slope_scale,
+          .end_slope = segment.end_rad_s * slope_scale};
 }
 
 Encoder::Pieces Encoder::monotonic_pieces(const AngleSegment& segment) const noexcept {
-  const double slope_scale = counts_per_rad_ * segment.duration_s;
-  const Piece whole{.start_s = segment.start_s,
-                    .duration_s = segment.duration_s,
-                    .start = position(segment.start_rad),
-                    .end = position(segment.end_rad),
-                    .start_slope = segment.start_rad_s * slope_scale,
-                    .end_slope = segment.end_rad_s * slope_scale};
+  const Piece whole = piece_of(segment);
   if (is_monotonic(whole.end - whole.start, whole.start_slope, whole.end_slope)) return {{whole}, 1};
 
   const Hermite curve(whole.start, whole.end, whole.start_slope, whole.end_slope);
@@ -203,6 +199,8 @@ void Encoder::search(const AnyView& view, Newest& newest, std::int64_t base, std
   }
   // The index line rises where the count becomes a multiple of N: from below, or from the count above it.
   const std::int64_t shift = direction > 0 ? 0 : -1;
+  const auto within_turn = [this](std::int64_t count) { return count >= 0 && count < p_.counts_per_revolution; };
+  if (within_turn(first + shift) && within_turn(end + shift)) return;
   const std::int64_t turns_before = floor_divide(first + shift, p_.counts_per_revolution);
   const std::int64_t turns_after = floor_divide(end + shift, p_.counts_per_revolution);
   if (view.has_index && !newest.index_found && turns_before != turns_after) {
@@ -225,14 +223,20 @@ void Encoder::follow_with(const AnyView& view, EncoderState& state, std::span<co
   for (std::size_t n = segments.size(); n-- > 0;) {
     const AngleSegment& segment = view.seen(segments[n]);
     const bool starts_at_count = n > 0 || at_start == first_count;
-    if (starts_at_count && has_no_edge(segment)) continue;
-    const Pieces pieces = monotonic_pieces(segment);
-    for (int i = pieces.size; i-- > 0;) {
-      const Piece& piece = pieces.piece[static_cast<std::size_t>(i)];
-      const std::int64_t first = n == 0 && i == 0 ? first_count : floor_to_integer(piece.start);
+    const auto search_piece = [&](const Piece& piece, bool is_first) {
+      const std::int64_t first = n == 0 && is_first ? first_count : floor_to_integer(piece.start);
       search(view, newest, base, first, floor_to_integer(piece.end),
              [&piece](double boundary) { return time_of(piece, boundary); });
+    };
+    const Piece whole = piece_of(segment);
+    if (is_monotonic(whole.end - whole.start, whole.start_slope, whole.end_slope)) {
+      const bool has_edge = floor_to_integer(whole.start) != floor_to_integer(whole.end);
+      if (has_edge || !starts_at_count) search_piece(whole, true);
+      continue;
     }
+    const Pieces pieces = monotonic_pieces(segment);
+    for (int i = pieces.size; i-- > 0;)
+      search_piece(pieces.piece[static_cast<std::size_t>(i)], i == 0);
   }
   if (jumps) search(view, newest, base, before, at_start, [](double) { return 0.0; });
   const int into = view.step_into(state);

@@ -147,7 +147,7 @@ class Encoder {
               const TimeOf& time_of) const noexcept;
   void take(EncoderState& state, const Newest& newest, Tick tick) const noexcept;
   double position(double angle_rad) const noexcept;
-  bool has_no_edge(const AngleSegment& segment) const noexcept;
+  Piece piece_of(const AngleSegment& segment) const noexcept;
   Pieces monotonic_pieces(const AngleSegment& segment) const noexcept;
   static Piece part(const Piece& whole, double from, double to) noexcept;
   static double time_of(const Piece& piece, double boundary) noexcept;

@@ -29,9 +29,9 @@ constexpr Owner kController = 1;
 /// there. It is emptied between batches, by the recorder's thread in the product.
 class RingTap final : public BenchObserver {
  public:
-  void on_input(Tick now, const Input& input) noexcept override { ring_.push(Received{now, input}); }
+  void on_input(Tick now, const Input& input) noexcept override { ring_.emplace(std::in_place_type<Received>, now, input); }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
-    ring_.push(Taken{axis, sample});
+    ring_.emplace(std::in_place_type<Taken>, axis, sample);
   }
 
   void empty() noexcept {
