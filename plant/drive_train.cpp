@@ -81,15 +81,6 @@ void trip(AxisCore& core, AxisState& state) noexcept {
   core.drive.switch_off(state.drive);  // for what is left of the tick, too
 }
 
-bool check_over_current(AxisCore& core, AxisState& state, const PhaseValues& current_a) noexcept {
-  const double limit_a = core.p.drive.amplifier.over_current_a;
-  if (std::abs(current_a.a) <= limit_a && std::abs(current_a.b) <= limit_a &&
-      std::abs(current_a.c) <= limit_a)
-    return false;
-  trip(core, state);
-  return true;
-}
-
 void follow_piece(AxisCore& core, AxisState& state, double start_s, double duration_s,
                   const TerminalDrive& drive, const TerminalCircuit& circuit, const Measurable& from,
                   const Measurable& to) noexcept {

@@ -86,11 +86,11 @@ class DriveTrain final : public Train {
     State sum{};
     TerminalDrive drive{};
     TerminalCircuit circuit{};
-    WindingValues emf_v{};  ///< while it is open
     int event = -1;
-    bool plain = false;  ///< every terminal is driven by a constant voltage, nothing is shorted
-    bool open = false;   ///< no terminal is driven, none carries a current
-    bool stays = false;  ///< either of them, and the next piece has the same
+    PhaseValues current_a{};  ///< of the terminals, at its start; once it is finished, at its end
+    bool plain = false;       ///< every terminal conducts at a constant voltage, nothing is shorted
+    bool open = false;        ///< no terminal is driven, none carries a current
+    bool stays = false;       ///< either of them, and the next piece has the same
   };
 
   static State machine_of(const AxisState& state) noexcept;
@@ -102,13 +102,13 @@ class DriveTrain final : public Train {
     if constexpr (Machine::kUsesAngle) motion.electrical = cos_sin(pole_pairs_ * motion.angle_rad);
     return motion;
   }
-  /// The electrical angle is worked out once for each substep and rotated from there on: a third of the time
-  /// of a cosine and sine, and more exact than carrying them as states.
+  /// The electrical angle is worked out now and then and rotated from there on: a third of the time of a
+  /// cosine and sine, and more exact than carrying them as states.
   RotorMotion motion_of(const Whole& x) const noexcept {
     RotorMotion motion{
         .angle_rad = x.shaft.angle_rad, .speed_rad_s = x.shaft.speed_rad_s, .electrical = {1.0, 0.0}};
     if constexpr (Machine::kUsesAngle) {
-      motion.electrical = rotated(substep_start_, pole_pairs_ * (x.shaft.angle_rad - substep_start_rad_));
+      motion.electrical = rotated(near_, pole_pairs_ * (x.shaft.angle_rad - near_rad_));
     }
     return motion;
   }
@@ -122,8 +122,10 @@ class DriveTrain final : public Train {
                                       const ShaftBranch& branch, double load_nm) const noexcept;
   /// A circuit whose voltages stay as they are, of which nothing dies.
   void hold_constant(const TerminalInput& input) noexcept;
-  void drive_windings(const AxisCore& core) noexcept;
-  /// Whether terminals without current stay without.
+  void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;
+  /// Whether every terminal conducts; if so, the circuit has its voltage.
+  bool conduct(const AxisCore& core, const AxisState& state) noexcept;
+  /// Whether terminals of which none is driven and none carries a current stay so.
   bool leave_open(const AxisCore& core, const State& x, const RotorMotion& motion) noexcept;
   void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
                      const RotorMotion& motion) noexcept;
@@ -138,24 +140,33 @@ class DriveTrain final : public Train {
   void settle_terminals(const AxisCore& core, AxisState& state, State& x, const RotorMotion& motion,
                         int electrical_event) const noexcept;
   void begin_substep(const Shaft& shaft) noexcept;
-  /// A substep without events, edges and anybody who follows it.
-  void run_substep(AxisCore& core, Whole& x, double start_s, double end_s, double load_nm) noexcept;
+  void look_up_angle(const Shaft& shaft) noexcept;
+  /// Whether the circuit is that of the last piece but for the switches.
+  bool goes_on(AxisCore& core, AxisState& state, double start_s, const Whole& x) noexcept;
+  /// A piece in which nothing happens that anybody follows.
+  void run_smooth(AxisCore& core, const AxisState& state, Whole& x, double start_s, double end_s,
+                  double load_nm) noexcept;
   void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
                  double load_nm) noexcept;
   void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
                     const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
   /// Takes out what the integration lets a blocked current drift.
-  void keep_open(const AxisCore& core, const AxisState& state, State& x,
-                 const RotorMotion& motion) const noexcept;
+  void keep_open(const AxisCore& core, const AxisState& state, State& x, const RotorMotion& motion) noexcept;
+  /// Of the terminals, at the end of the last piece.
+  PhaseValues end_voltages(const AxisCore& core, const AxisState& state, const State& x,
+                           const RotorMotion& motion) const noexcept;
+  PhaseValues currents(const AxisCore& core, const AxisState& state, const State& x,
+                       const RotorMotion& motion) const noexcept;
   Measurable measurable(const AxisCore& core, const AxisState& state, const State& x,
-                        const RotorMotion& motion, const PhaseValues& voltage_v) const noexcept;
+                        const RotorMotion& motion, const PhaseValues& current_a,
+                        const PhaseValues& voltage_v) const noexcept;
 
   typename Machine::Constants c_{};
   double pole_pairs_ = 0.0;
   Piece piece_{};
-  CosSin substep_start_{1.0, 0.0};  ///< of the electrical angle
-  double substep_start_rad_ = 0.0;  ///< of the rotor
+  CosSin near_{1.0, 0.0};  ///< of the electrical angle
+  double near_rad_ = 0.0;  ///< of the rotor
 };
 
 /// A corner that is not within reach.

@@ -79,10 +79,9 @@ void DriveTrain<Machine, Shaft>::step_varying(const AxisCore& core, Whole& x, do
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::drive_windings(const AxisCore& core) noexcept {
-  const ThreePhase& v = piece_.drive.start_v;
-  const TerminalInput u = winding_input(core.connection, v, piece_.drive.field_v);
-  piece_.circuit.start.voltage_v = u.voltage_v;
+void DriveTrain<Machine, Shaft>::drive_windings(const AxisCore& core, const ThreePhase& v) noexcept {
+  const WindingVoltages u = winding_voltages(core.connection, v);
+  piece_.circuit.start.voltage_v = u.stator_v;
   piece_.circuit.start.zero_v = u.zero_v;
   piece_.circuit.start_v = {.a = v.a, .b = v.b, .c = v.c, .field = piece_.drive.field_v};
   if (!core.follows) return;
@@ -99,15 +98,42 @@ void DriveTrain<Machine, Shaft>::hold_constant(const TerminalInput& input) noexc
 }
 
 template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::conduct(const AxisCore& core, const AxisState& state) noexcept {
+  ThreePhase terminal_v;
+  TerminalSet dying;
+  if (!all_conduct(core.connection, piece_.drive, state.open_terminals, piece_.current_a, terminal_v, dying))
+    return false;
+  piece_.circuit.dying = dying;
+  drive_windings(core, terminal_v);
+  return true;
+}
+
+template <class Machine, class Shaft>
 bool DriveTrain<Machine, Shaft>::leave_open(const AxisCore& core, const State& x,
                                             const RotorMotion& motion) noexcept {
-  piece_.emf_v = open_circuit_voltages(c_, x, motion);
-  if (!stays_open(core.connection, piece_.drive, piece_.emf_v)) return false;
+  const WindingValues emf_v = open_circuit_voltages(c_, x, motion);
+  // No phase has more than the sum of the components.
+  const double most_v = std::abs(emf_v.stator.a) + std::abs(emf_v.stator.b) + std::abs(emf_v.zero);
+  if (most_v > piece_.drive.rail_v && !diodes_block(core.connection, piece_.drive, emf_v)) return false;
   if (core.follows) {
-    piece_.circuit.start_v = open_terminal_voltages(core.connection, piece_.emf_v, piece_.drive.field_v);
-    piece_.circuit.mean_v = piece_.circuit.end_v = piece_.circuit.start_v;
+    piece_.circuit.start_v = open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
+    piece_.circuit.mean_v = piece_.circuit.start_v;
   }
   return true;
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const AxisState& state,
+                                                     const State& x,
+                                                     const RotorMotion& motion) const noexcept {
+  if (piece_.plain) return piece_.circuit.start_v;
+  if (state.open_terminals == 0) return piece_.circuit.end_v;
+  const WindingValues emf_v = open_circuit_voltages(c_, x, motion);
+  if (piece_.open) return open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
+  TerminalDrive drive = piece_.drive;
+  if (!drive.constant) drive.start_v = drive.end_v;
+  TerminalSet open = state.open_terminals;
+  return connect(core.connection, drive, state.injected, piece_.current_a, emf_v, open).start_v;
 }
 
 template <class Machine, class Shaft>
@@ -117,20 +143,19 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
   if (piece_.stays && (piece_.plain || leave_open(core, x, motion))) return;
   if (piece_.plain && core.drive.only_switches(state.drive)) {
     core.drive.switch_terminals(state.drive, start_s, piece_.drive);
-    if (all_driven(core.connection, piece_.drive)) return drive_windings(core);
+    if (conduct(core, state)) return;
   }
-  const PhaseValues current_a =
-      terminal_currents(core.connection, winding_currents(c_, x, motion), state.open_terminals);
-  piece_.drive = core.drive.at(state.drive, start_s, duration_s, current_a);
+  piece_.drive = core.drive.at(state.drive, start_s, duration_s, piece_.current_a);
   const TerminalSet all = all_terminals(core.connection);
-  const bool sound = piece_.drive.constant && state.injected.phase_short == 0.0 &&
-                     state.injected.neutral_short == 0.0;
-  piece_.plain = sound && all_driven(core.connection, piece_.drive);
-  piece_.open = sound && (state.open_terminals & all) == all && leave_open(core, x, motion);
-  piece_.stays = (piece_.plain || piece_.open) && core.drive.steady(state.drive);
+  const bool sound =
+      piece_.drive.constant && state.injected.phase_short == 0.0 && state.injected.neutral_short == 0.0;
+  if (sound) hold_constant({.field_v = piece_.drive.field_v});
+  piece_.plain = sound && conduct(core, state);
+  piece_.open = sound && (state.open_terminals & all) == all && !any_driven(core.connection, piece_.drive) &&
+                leave_open(core, x, motion);
+  piece_.stays =
+      (piece_.open || (piece_.plain && piece_.circuit.dying == 0)) && core.drive.steady(state.drive);
   if (piece_.plain) {
-    hold_constant({.field_v = piece_.drive.field_v});
-    drive_windings(core);
     state.open_terminals = 0;
   } else if (piece_.open) {
     TerminalInput none = open_input(core.connection, all);
@@ -138,7 +163,7 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
     hold_constant(none);
     state.open_terminals = all;
   } else {
-    piece_.circuit = connect(core.connection, piece_.drive, state.injected, current_a,
+    piece_.circuit = connect(core.connection, piece_.drive, state.injected, piece_.current_a,
                              open_circuit_voltages(c_, x, motion), state.open_terminals);
     if (piece_.circuit.short_circuit) trip(core, state);
   }
@@ -230,23 +255,30 @@ void DriveTrain<Machine, Shaft>::settle_terminals(const AxisCore& core, AxisStat
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::keep_open(const AxisCore& core, const AxisState& state, State& x,
-                                           const RotorMotion& motion) const noexcept {
+                                           const RotorMotion& motion) noexcept {
   if (state.open_terminals == 0) return;
   x = restricted(c_, x, motion,
                  piece_.open ? piece_.circuit.start : open_input(core.connection, state.open_terminals));
+  piece_.current_a = currents(core, state, x, motion);
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::currents(const AxisCore& core, const AxisState& state, const State& x,
+                                                 const RotorMotion& motion) const noexcept {
+  return terminal_currents(core.connection, winding_currents(c_, x, motion), state.open_terminals);
 }
 
 template <class Machine, class Shaft>
 Measurable DriveTrain<Machine, Shaft>::measurable(const AxisCore& core, const AxisState& state,
                                                   const State& x, const RotorMotion& motion,
+                                                  const PhaseValues& current_a,
                                                   const PhaseValues& voltage_v) const noexcept {
-  Measurable m{
-      .current_a = terminal_currents(core.connection, winding_currents(c_, x, motion), state.open_terminals),
-      .voltage_v = voltage_v,
-      .bus_v = state.drive.bus_v,
-      .temperature_k = state.thermal.temperature_k,
-      .angle_rad = motion.angle_rad,
-      .speed_rad_s = motion.speed_rad_s};
+  Measurable m{.current_a = current_a,
+               .voltage_v = voltage_v,
+               .bus_v = state.drive.bus_v,
+               .temperature_k = state.thermal.temperature_k,
+               .angle_rad = motion.angle_rad,
+               .speed_rad_s = motion.speed_rad_s};
   if (core.connection == Connection::kStar) {
     m.neutral_v = (voltage_v.a + voltage_v.b + voltage_v.c) / 3.0;
     if constexpr (requires { neutral_voltage_v(c_, x, motion, 0.0); }) {
@@ -261,10 +293,15 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state, 
                                               double duration_s, const State& from, const State& to,
                                               const RotorMotion& from_motion,
                                               const RotorMotion& to_motion) noexcept {
+  const PhaseValues from_a = piece_.current_a;
+  piece_.current_a = currents(core, state, to, to_motion);
   if (core.follows) {
-    const Measurable before = measurable(core, state, from, from_motion, piece_.circuit.start_v);
-    const Measurable after = measurable(core, state, to, to_motion, piece_.circuit.end_v);
-    state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
+    const Measurable before = measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v);
+    const Measurable after =
+        measurable(core, state, to, to_motion, piece_.current_a, end_voltages(core, state, to, to_motion));
+    if (core.p.thermal.enabled) {
+      state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
+    }
     follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
   }
   core.record({.start_s = start_s,
@@ -307,22 +344,41 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::begin_substep(const Shaft& shaft) noexcept {
   if constexpr (Machine::kUsesAngle) {
-    substep_start_rad_ = shaft.angle_rad;
-    substep_start_ = cos_sin(pole_pairs_ * substep_start_rad_);
+    constexpr double kNearRad = 0.05;  // rotated() errs by 1e-15 there
+    if (std::abs(pole_pairs_ * (shaft.angle_rad - near_rad_)) > kNearRad) look_up_angle(shaft);
   }
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::run_substep(AxisCore& core, Whole& x, double start_s, double end_s,
-                                             double load_nm) noexcept {
-  const Shaft from = x.shaft;
+void DriveTrain<Machine, Shaft>::look_up_angle(const Shaft& shaft) noexcept {
+  if constexpr (Machine::kUsesAngle) {
+    near_rad_ = shaft.angle_rad;
+    near_ = cos_sin(pole_pairs_ * near_rad_);
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::run_smooth(AxisCore& core, const AxisState& state, Whole& x, double start_s,
+                                            double end_s, double load_nm) noexcept {
+  const double start_rad = x.shaft.angle_rad;
+  const double start_rad_s = x.shaft.speed_rad_s;
   step(core, x, end_s - start_s, ShaftBranch{}, load_nm);
   core.record({.start_s = start_s,
                .duration_s = end_s - start_s,
-               .start_rad = from.angle_rad,
+               .start_rad = start_rad,
                .end_rad = x.shaft.angle_rad,
-               .start_rad_s = from.speed_rad_s,
+               .start_rad_s = start_rad_s,
                .end_rad_s = x.shaft.speed_rad_s});
+  piece_.current_a = currents(core, state, x.machine, motion_of(x));
+}
+
+template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::goes_on(AxisCore& core, AxisState& state, double start_s,
+                                         const Whole& x) noexcept {
+  if (piece_.stays) return piece_.plain || leave_open(core, x.machine, motion_of(x));
+  if (!piece_.plain || !core.drive.only_switches(state.drive)) return false;
+  core.drive.switch_terminals(state.drive, start_s, piece_.drive);
+  return conduct(core, state) && piece_.circuit.dying == 0;
 }
 
 template <class Machine, class Shaft>
@@ -330,29 +386,27 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
   Whole x;
   x.machine = machine_of(state);
   x.shaft = shaft_of(state);
+  look_up_angle(x.shaft);
+  piece_.current_a = currents(core, state, x.machine, motion_of(x));
   piece_.plain = piece_.open = piece_.stays = false;
-  const bool smooth = !Machine::kHasCorners && !core.shaft_has_events && !core.follows &&
-                      state.injected.blocked_rotor == 0.0 && core.drive.steady(state.drive);
+  const bool smooth =
+      !Machine::kHasCorners && !core.shaft_has_events && !core.follows && state.injected.blocked_rotor == 0.0;
   for (int n = 0; n < core.timing.substeps; ++n) {
     begin_substep(x.shaft);
     const double end_s = (n + 1) * core.step_s;
-    double start_s = n * core.step_s;
-    if (smooth && piece_.stays && (piece_.plain || leave_open(core, x.machine, motion_of(x)))) {
-      run_substep(core, x, start_s, end_s, load_nm);
-    } else {
-      while (start_s < end_s) {
-        const double stop_s = std::min(end_s, core.drive.next_edge_s(state.drive, start_s));
+    for (double start_s = n * core.step_s; start_s < end_s;) {
+      const double stop_s = std::min(end_s, core.drive.next_edge_s(state.drive, start_s));
+      if (smooth && goes_on(core, state, start_s, x)) {
+        run_smooth(core, state, x, start_s, stop_s, load_nm);
+      } else {
         run_piece(core, state, x, start_s, stop_s, load_nm);
-        start_s = stop_s;
       }
+      start_s = stop_s;
     }
-    const RotorMotion motion = motion_of(x);
-    keep_open(core, state, x.machine, motion);
-    if (piece_.open) continue;
-    const PhaseValues current_a =
-        terminal_currents(core.connection, winding_currents(c_, x.machine, motion), state.open_terminals);
-    if (check_over_current(core, state, current_a)) piece_.stays = false;
+    if (!piece_.open) keep_open(core, state, x.machine, motion_of(x));
+    if (check_over_current(core, state, piece_.current_a)) piece_.stays = false;
   }
+  if (piece_.open) keep_open(core, state, x.machine, motion_of(x));
   end_run(core, state, x.machine, motion_of(x));
   keep_machine(state, x.machine);
   keep_shaft(state, x.shaft);
@@ -361,14 +415,9 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::end_run(const AxisCore& core, AxisState& state, const State& x,
                                          const RotorMotion& motion) noexcept {
-  if (!has_impedance(core.p.drive)) {
-    state.voltage_v =
-        piece_.plain  ? piece_.circuit.start_v
-        : piece_.open ? open_terminal_voltages(core.connection, piece_.emf_v, piece_.drive.field_v)
-                      : piece_.circuit.end_v;
-  }
+  if (!has_impedance(core.p.drive)) state.voltage_v = end_voltages(core, state, x, motion);
   if (core.connection == Connection::kStar) {
-    state.neutral_v = measurable(core, state, x, motion, state.voltage_v).neutral_v;
+    state.neutral_v = measurable(core, state, x, motion, piece_.current_a, state.voltage_v).neutral_v;
   }
 }
 
@@ -378,6 +427,7 @@ void DriveTrain<Machine, Shaft>::open(AxisCore& core, AxisState& state, double s
   piece_.from = machine_of(state);
   piece_.stage = piece_.from;
   piece_.plain = piece_.open = piece_.stays = false;
+  piece_.current_a = currents(core, state, piece_.from, turned(motion));
   connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
 }
 

@@ -16,11 +16,6 @@ constexpr std::size_t at(int k) noexcept {
   return static_cast<std::size_t>(k);
 }
 
-/// The voltage that drives a current to zero: its diode's rail, or the arc of a broken wire.
-double against(double current_a, double rail_v) noexcept {
-  return current_a > 0.0 ? -rail_v : rail_v;
-}
-
 Phases phases(const ThreePhase& x) noexcept {
   return {x.a, x.b, x.c};
 }
@@ -63,7 +58,7 @@ void sort_terminals(Work& w) noexcept {
       w.voltage_v[at(k)] = start[at(k)];
     } else if (w.conducts(k) && w.current_a[at(k)] != 0.0) {
       w.dying |= bit(k);
-      w.voltage_v[at(k)] = against(w.current_a[at(k)], w.drive.rail_v);
+      w.voltage_v[at(k)] = terminals_detail::against(w.current_a[at(k)], w.drive.rail_v);
     } else {
       w.open |= bit(k);
     }
@@ -196,21 +191,6 @@ bool apply_shorts(const Work& w, const Shorts& shorts, Phases& v) noexcept {
 
 }  // namespace
 
-PhaseValues terminal_currents(Connection connection, const WindingValues& x, TerminalSet open) noexcept {
-  if (connection == Connection::kTwoPhase || connection == Connection::kArmature) {
-    return {.a = (open & 1u) != 0 ? 0.0 : x.stator.a,
-            .b = (open & 2u) != 0 ? 0.0 : x.stator.b,
-            .c = 0.0,
-            .field = x.field};
-  }
-  const ThreePhase plane = two_to_three(x.stator);
-  const double zero = connection == Connection::kIndependent ? frames_detail::kRootThird * x.zero : 0.0;
-  return {.a = (open & 1u) != 0 ? 0.0 : plane.a + zero,
-          .b = (open & 2u) != 0 ? 0.0 : plane.b + zero,
-          .c = (open & 4u) != 0 ? 0.0 : plane.c + zero,
-          .field = x.field};
-}
-
 TerminalInput open_input(Connection connection, TerminalSet open) noexcept {
   TerminalInput u;
   open &= all_terminals(connection);
@@ -253,8 +233,7 @@ bool diodes_block(Connection connection, const TerminalDrive& drive,
   double highest_v = -drive.rail_v;
   double lowest_v = drive.rail_v;
   for (int k = 0; k < terminal_count(connection); ++k) {
-    if (drive.mode[at(k)] == TerminalMode::kDriven) return false;
-    if (drive.mode[at(k)] == TerminalMode::kOpen) continue;
+    if (drive.mode[at(k)] != TerminalMode::kDiodes) continue;
     highest_v = std::max(highest_v, emf_v[at(k)]);
     lowest_v = std::min(lowest_v, emf_v[at(k)]);
   }
@@ -290,10 +269,11 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
       if (w.driven(k)) v[at(k)] = wanted[at(k)];
     }
     circuit.short_circuit = apply_shorts(w, shorts, v) || circuit.short_circuit;
-    TerminalInput u = winding_input(connection, values(v), drive.field_v);
-    u.conduction = conduction.conduction;
-    u.line = conduction.line;
-    u.conducts = conduction.conducts;
+    TerminalInput u = conduction;
+    const WindingVoltages w_v = winding_voltages(connection, values(v));
+    u.voltage_v = w_v.stator_v;
+    u.zero_v = w_v.zero_v;
+    u.field_v = drive.field_v;
     terminal_v = {.a = v[0], .b = v[1], .c = v[2], .field = drive.field_v};
     return u;
   };

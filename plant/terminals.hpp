@@ -31,8 +31,19 @@ struct TerminalCircuit {
 };
 
 /// The currents of the terminals, exactly zero where one is open.
-PhaseValues terminal_currents(Connection connection, const WindingValues& currents,
-                              TerminalSet open) noexcept;
+inline PhaseValues terminal_currents(Connection connection, const WindingValues& x,
+                                     TerminalSet open) noexcept {
+  ThreePhase i{x.stator.a, x.stator.b, 0.0};
+  if (connection == Connection::kStar || connection == Connection::kIndependent) {
+    i = two_to_three(x.stator);
+    const double zero = connection == Connection::kIndependent ? frames_detail::kRootThird * x.zero : 0.0;
+    i = {.a = i.a + zero, .b = i.b + zero, .c = i.c + zero};
+  }
+  return {.a = (open & 1u) != 0 ? 0.0 : i.a,
+          .b = (open & 2u) != 0 ? 0.0 : i.b,
+          .c = (open & 4u) != 0 ? 0.0 : i.c,
+          .field = x.field};
+}
 
 /// The conduction that open terminals leave; voltages zero.
 TerminalInput open_input(Connection connection, TerminalSet open) noexcept;
@@ -48,41 +59,59 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
 PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
                                    double field_v) noexcept;
 
-/// No terminal is driven, and no emf opens a diode.
-bool diodes_block(Connection connection, const TerminalDrive& drive,
-                  const WindingValues& open_circuit_v) noexcept;
-
-/// Another common case: whether terminals without current stay without.
-inline bool stays_open(Connection connection, const TerminalDrive& drive,
-                       const WindingValues& open_circuit_v) noexcept {
+constexpr bool any_driven(Connection connection, const TerminalDrive& drive) noexcept {
   bool driven = false;
   for (int k = 0; k < terminal_count(connection); ++k)
     driven = driven || drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven;
-  // No phase has more than the sum of the components.
-  const double most_v = std::abs(open_circuit_v.stator.a) + std::abs(open_circuit_v.stator.b) +
-                        std::abs(open_circuit_v.zero);
-  return (!driven && most_v <= drive.rail_v) || diodes_block(connection, drive, open_circuit_v);
+  return driven;
 }
 
-/// The common case of connect(): every terminal is driven and nothing is shorted.
-constexpr bool all_driven(Connection connection, const TerminalDrive& drive) noexcept {
-  for (int k = 0; k < terminal_count(connection); ++k) {
-    if (drive.mode[static_cast<std::size_t>(k)] != TerminalMode::kDriven) return false;
-  }
-  return true;
+/// Whether the diodes of terminals of which none is driven block: no emf is beyond them.
+bool diodes_block(Connection connection, const TerminalDrive& drive,
+                  const WindingValues& open_circuit_v) noexcept;
+
+namespace terminals_detail {
+
+/// The voltage that drives a current to zero: its diode's rail, or the arc of a broken wire.
+constexpr double against(double current_a, double rail_v) noexcept {
+  return current_a > 0.0 ? -rail_v : rail_v;
 }
+
+}  // namespace terminals_detail
+
+/// The common case of connect(), where nothing is shorted: every terminal carries what it likes, because it
+/// is driven or because its current goes on through a diode. `terminal_v` are then the voltages, and `dying`
+/// those on a diode.
+constexpr bool all_conduct(Connection connection, const TerminalDrive& drive, TerminalSet open,
+                           const PhaseValues& current_a, ThreePhase& terminal_v,
+                           TerminalSet& dying) noexcept {
+  terminal_v = drive.start_v;
+  dying = 0;
+  const auto conducts = [&](int k, double i, double& v) noexcept {
+    if (drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven) return true;
+    if ((open >> k & 1u) != 0 || i == 0.0) return false;
+    dying |= TerminalSet{1} << k;
+    v = terminals_detail::against(i, drive.rail_v);
+    return true;
+  };
+  const int count = terminal_count(connection);
+  return conducts(0, current_a.a, terminal_v.a) && (count < 2 || conducts(1, current_a.b, terminal_v.b)) &&
+         (count < 3 || conducts(2, current_a.c, terminal_v.c));
+}
+
+struct WindingVoltages {
+  TwoPhase stator_v;
+  double zero_v;
+};
 
 /// Voltages of the windings from those of the terminals.
-constexpr TerminalInput winding_input(Connection connection, const ThreePhase& v, double field_v) noexcept {
-  TerminalInput u;
-  u.field_v = field_v;
+constexpr WindingVoltages winding_voltages(Connection connection, const ThreePhase& v) noexcept {
   if (connection == Connection::kTwoPhase || connection == Connection::kArmature) {
-    u.voltage_v = {.a = v.a, .b = v.b};
-  } else {
-    u.voltage_v = three_to_two(v);
-    u.zero_v = connection == Connection::kIndependent ? frames_detail::kRootThird * (v.a + v.b + v.c) : 0.0;
+    return {.stator_v = {.a = v.a, .b = v.b}, .zero_v = 0.0};
   }
-  return u;
+  return {
+      .stator_v = three_to_two(v),
+      .zero_v = connection == Connection::kIndependent ? frames_detail::kRootThird * (v.a + v.b + v.c) : 0.0};
 }
 
 }  // namespace drivebench

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -92,6 +93,13 @@ bool has_impedance(const DriveParameters& p) noexcept;
 void trip(AxisCore& core, AxisState& state) noexcept;
 
 /// After each substep: over-current faults and the trip. Whether there was one.
-bool check_over_current(AxisCore& core, AxisState& state, const PhaseValues& current_a) noexcept;
+inline bool check_over_current(AxisCore& core, AxisState& state, const PhaseValues& current_a) noexcept {
+  const double limit_a = core.p.drive.amplifier.over_current_a;
+  if (std::abs(current_a.a) <= limit_a && std::abs(current_a.b) <= limit_a &&
+      std::abs(current_a.c) <= limit_a)
+    return false;
+  trip(core, state);
+  return true;
+}
 
 }  // namespace drivebench

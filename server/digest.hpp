@@ -22,21 +22,25 @@ class Digest {
   void add_block(const Block& block) noexcept {
     static_assert(std::is_trivially_copyable_v<Block> && sizeof(Block) % 8 == 0);
     constexpr std::size_t kWords = sizeof(Block) / 8;
-    std::uint64_t words[kWords];
-    std::memcpy(words, &block, sizeof(Block));
+    const auto* const bytes = reinterpret_cast<const unsigned char*>(&block);
+    const auto word = [bytes](std::size_t n) noexcept {
+      std::uint64_t result;
+      std::memcpy(&result, bytes + 8 * n, 8);
+      return result;
+    };
     std::size_t next = 0;
     for (; next < kWords && (position_ & 3u) != 0; ++next)
-      add(words[next]);
+      add(word(next));
     auto [first, second, third, fourth] = lanes_;  // in registers
     for (; next + 4 <= kWords; next += 4, position_ += 4) {
-      first = mixed(first, words[next]);
-      second = mixed(second, words[next + 1]);
-      third = mixed(third, words[next + 2]);
-      fourth = mixed(fourth, words[next + 3]);
+      first = mixed(first, word(next));
+      second = mixed(second, word(next + 1));
+      third = mixed(third, word(next + 2));
+      fourth = mixed(fourth, word(next + 3));
     }
     lanes_ = {first, second, third, fourth};
     for (; next < kWords; ++next)
-      add(words[next]);
+      add(word(next));
   }
 
   /// Of the words so far, their order and their number.
@@ -52,8 +56,8 @@ class Digest {
     return std::rotl((lane ^ word) * 0x9e37'79b9'7f4a'7c15u, 29);
   }
 
-  std::array<std::uint64_t, 4> lanes_{0x243f'6a88'85a3'08d3u, 0x1319'8a2e'0370'7344u,
-                                      0xa409'3822'299f'31d0u, 0x082e'fa98'ec4e'6c89u};
+  std::array<std::uint64_t, 4> lanes_{0x243f'6a88'85a3'08d3u, 0x1319'8a2e'0370'7344u, 0xa409'3822'299f'31d0u,
+                                      0x082e'fa98'ec4e'6c89u};
   std::uint64_t position_ = 0;
 };
 

@@ -176,6 +176,10 @@ void Drive::begin_source(DriveMemory& m) noexcept {
     }
   }
   has_edges_ = closing_s_ > tolerance_s_;
+  if (m.contactor_closed != 0.0 && !has_edges_ && !follows_) {
+    steady_output_ = source_output(m, 0.0, period_s_, {});
+    steady_ = steady_output_.constant;
+  }
 }
 
 const Drive::Order& Drive::order_at(double start_s) const noexcept {

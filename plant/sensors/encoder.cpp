@@ -199,7 +199,9 @@ void Encoder::search(const AnyView& view, Newest& newest, std::int64_t base, std
   }
   // The index line rises where the count becomes a multiple of N: from below, or from the count above it.
   const std::int64_t shift = direction > 0 ? 0 : -1;
-  const auto within_turn = [this](std::int64_t count) { return count >= 0 && count < p_.counts_per_revolution; };
+  const auto within_turn = [this](std::int64_t count) {
+    return count >= 0 && count < p_.counts_per_revolution;
+  };
   if (within_turn(first + shift) && within_turn(end + shift)) return;
   const std::int64_t turns_before = floor_divide(first + shift, p_.counts_per_revolution);
   const std::int64_t turns_after = floor_divide(end + shift, p_.counts_per_revolution);

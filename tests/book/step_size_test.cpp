@@ -96,7 +96,8 @@ struct Reference {
         connection == Connection::kTwoPhase ? std::numbers::pi / 2.0 : 2.0 * std::numbers::pi / 3.0;
     const double phase = 2.0 * std::numbers::pi * study.frequency_hz * t;
     const auto volts = [&](int k) { return study.amplitude_v * std::cos(phase - k * lag); };
-    const TerminalInput u = winding_input(connection, {volts(0), volts(1), volts(2)}, study.field_v);
+    const WindingVoltages v = winding_voltages(connection, {volts(0), volts(1), volts(2)});
+    const TerminalInput u{.voltage_v = v.stator_v, .zero_v = v.zero_v, .field_v = study.field_v};
     const RotorMotion m = motion(x);
     const auto d = std::bit_cast<std::array<double, kWords>>(derivative(c, machine(x), m, u));
     std::copy(d.begin(), d.end(), slope.begin());
