@@ -57,46 +57,6 @@ TEST(BookDcMotor, TheBackwardDifferenceTakesTwoValuesAtConstantSpeed) {
   EXPECT_GT(backward.largest, 125.0);
 }
 
-/// DC-A behind the current amplifier of the bench dc-9-1-4.
-BookBench current_driven(double limit_a) {
-  BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dc-9-1-4.toml");
-  const BenchConfig motor = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dc-a.toml");
-  AxisParameters& p = config.setup.axes[0].parameters;
-  p.machine = motor.setup.axes[0].parameters.machine;
-  p.mechanics = motor.setup.axes[0].parameters.mechanics;
-  p.drive.amplifier.voltage_limit_v = 40.0;
-  p.drive.current_loop = {.proportional_v_per_a = 20.0, .integral_v_per_as = 20000.0, .limit_a = limit_a};
-  return BookBench(config);
-}
-
-// AC-04: 1 A is reached and gives KT i/f = 175 rad/s at 14.25 V. 4 A would need 57 V: the amplifier saturates
-// after 0.159 s and the motor settles where 40 V take it. 0.2 %. Kills: a current loop with a lasting error,
-// one that winds up, a voltage limit that is not kept.
-TEST(BookDcMotor, TheCurrentAmplifierHoldsOneAmpereAndSaturatesAtFour) {
-  for (const double wanted_a : {1.0, 4.0}) {
-    BookBench run = current_driven(5.0);
-    double saturated_s = 0.0;
-    run.control_until(1.5, [&](const Sample& s) -> PhaseCommand {
-      if ((s.faults & kVoltageSaturated) != 0 && saturated_s == 0.0 && run.now_s() > 0.01) {
-        saturated_s = run.now_s();
-      }
-      return {.gates = Gates::kCurrent, .setpoint = {.a = wanted_a}};
-    });
-    const Sample& s = run.sample();
-    if (wanted_a == 1.0) {
-      EXPECT_NEAR(s.speed_rad_s, 175.0, 0.35);
-      EXPECT_NEAR(s.u_a_v, 14.25, 0.03);
-      EXPECT_NEAR(s.i_a_a, 1.0, 2e-3);
-      EXPECT_EQ(saturated_s, 0.0);
-    } else {
-      EXPECT_NEAR(saturated_s, 0.15879, 2e-3);
-      EXPECT_NEAR(s.speed_rad_s, 491.23, 1.0);
-      EXPECT_NEAR(s.i_a_a, 2.807, 0.0056);
-      EXPECT_EQ(s.u_a_v, 40.0);
-    }
-  }
-}
-
 // DC-06: without its field a separately excited motor runs away. Kills: a loss of field without effect.
 TEST(BookDcMotor, WithoutItsFieldASeparatelyExcitedMotorRunsAway) {
   BookBench run("dc-separate");
