@@ -14,22 +14,22 @@
 namespace drivebench::command {
 namespace {
 
-const control::Preset& chosen_preset(const std::string& name) {
-  const control::Preset* preset = control::find_preset(name);
+const control::ServoPreset& chosen_preset(const std::string& name) {
+  const control::ServoPreset* preset = control::find_servo_preset(name);
   if (preset == nullptr) {
     throw UsageError(fmt::format("no preset '{}'; did you mean {}? --list shows all", name,
-                                 control::nearest_preset_name(name)));
+                                 control::nearest_servo_preset_name(name)));
   }
   return *preset;
 }
 
-void check_fit(const v1::BenchDescription& bench, std::uint32_t axis, const control::Preset& preset) {
+void check_fit(const v1::BenchDescription& bench, std::uint32_t axis, const control::ServoPreset& preset) {
   const std::vector<std::string> found = mismatches(bench, axis, preset);
   if (found.empty()) return;
   std::string text = fmt::format("preset {} does not fit this bench:", preset.name);
   for (const std::string& each : found)
     text += "\n  " + each;
-  for (const control::Preset& other : control::presets()) {
+  for (const control::ServoPreset& other : control::servo_presets()) {
     if (mismatches(bench, axis, other).empty()) text += fmt::format("\n  {} would fit", other.name);
   }
   throw UsageError(text);
@@ -112,10 +112,10 @@ void print_report(const ControlReport& r) {
 
 int run_control(const ControlOptions& options) {
   if (options.list) {
-    fmt::print("{}\n", options.json ? presets_json() : control::presets_table());
+    fmt::print("{}\n", options.json ? presets_json() : control::servo_presets_table());
     return kExitOk;
   }
-  const control::Preset& preset = chosen_preset(options.preset);
+  const control::ServoPreset& preset = chosen_preset(options.preset);
   const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
   const v1::BenchDescription& description = axis->bench();
   check_fit(description, axis->axis(), preset);

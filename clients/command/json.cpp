@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/command/session.hpp"
-#include "clients/control/presets.hpp"
+#include "clients/control/servo_presets.hpp"
 
 namespace nlohmann {
 
@@ -230,7 +230,7 @@ std::string change_json(std::uint32_t axis, std::string_view name, double value,
 
 std::string presets_json() {
   Json out = Json::array();
-  for (const control::Preset& preset : control::presets()) {
+  for (const control::ServoPreset& preset : control::servo_presets()) {
     out.push_back({{"name", preset.name},
                    {"source", preset.source},
                    {"expectation", preset.expectation},

@@ -42,7 +42,7 @@ bool differ(double a, double b) noexcept {
 }
 
 /// The tick k of the run is the bench's `first_tick` + k.
-void schedule_loads(link::AxisLink& bench, const control::Preset& preset, const std::vector<LoadAt>& loads,
+void schedule_loads(link::AxisLink& bench, const control::ServoPreset& preset, const std::vector<LoadAt>& loads,
                     std::uint64_t first_tick) {
   for (const LoadAt& load : loads) {
     const double after_s = preset.move.flux_build_up_s + load.after_s;
@@ -89,7 +89,7 @@ std::string obstacle(const link::AxisLink& bench, const Sample& sample, bool is_
 }  // namespace
 
 std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint32_t axis,
-                                    const control::Preset& preset) {
+                                    const control::ServoPreset& preset) {
   std::vector<std::string> found;
   const v1::AxisDescription& there = bench.axes(static_cast<int>(axis));
   const control::ControllerParameters& here = preset.controller;
@@ -133,7 +133,7 @@ void let_rest(link::AxisLink& bench, double counts_per_revolution) {
   }
 }
 
-ServoRun run_servo_move(link::AxisLink& bench, const control::Preset& preset,
+ServoRun run_servo_move(link::AxisLink& bench, const control::ServoPreset& preset,
                         const std::vector<LoadAt>& loads) {
   const double counts_per_rad = preset.controller.counts_per_revolution / (2.0 * std::numbers::pi);
   control::ServoMove move(preset.controller, preset.move);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "clients/command/commands.hpp"
-#include "clients/control/presets.hpp"
+#include "clients/control/servo_presets.hpp"
 #include "clients/link/axis_link.hpp"
 
 namespace drivebench::command {
@@ -73,7 +73,7 @@ struct ServoRun {
 
 /// What keeps this preset from running on this axis, one sentence each; empty when it fits.
 std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint32_t axis,
-                                    const control::Preset& preset);
+                                    const control::ServoPreset& preset);
 
 /// Brings an axis that somebody may have used to rest: gates off for 50 ms of the bench's time, in which the
 /// rotor flux of a servo motor decays to nothing (in lockstep it would otherwise wait there for ever). Does
@@ -81,7 +81,7 @@ std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint
 void let_rest(link::AxisLink& bench, double counts_per_revolution);
 
 /// Runs the move on an axis that is leased and at rest, sample by sample, over the link.
-ServoRun run_servo_move(link::AxisLink& bench, const control::Preset& preset,
+ServoRun run_servo_move(link::AxisLink& bench, const control::ServoPreset& preset,
                         const std::vector<LoadAt>& loads);
 
 /// The numbers of the report that follow from the rows.

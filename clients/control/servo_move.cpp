@@ -47,8 +47,8 @@ const ControlOutput& ServoMove::step(const Measurement& m, std::int64_t periods)
   sample_ = sample_ < 0 ? 0 : sample_ + periods;
   phase_ = phase_at(sample_);
   reference_ = trajectory_at(trajectory_, time_s());
-  output_ = controller_.update(m, reference_, periods);
-  return output_;
+  controller_.update(m, reference_, periods);
+  return controller_.output();
 }
 
 MovePhase ServoMove::phase_at(std::int64_t sample) const noexcept {

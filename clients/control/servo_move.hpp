@@ -39,7 +39,7 @@ class ServoMove {
   MovePhase phase() const noexcept { return phase_; }
   bool done() const noexcept { return phase_ == MovePhase::kDone; }
   const Reference& reference() const noexcept { return reference_; }
-  const ControlOutput& output() const noexcept { return output_; }
+  const ControlOutput& output() const noexcept { return controller_.output(); }
   /// Since the start of the trajectory; negative while the flux builds up.
   double time_s() const noexcept { return static_cast<double>(sample_ - build_up_samples_) * period_s_; }
 
@@ -57,7 +57,6 @@ class ServoMove {
   std::int64_t sample_ = -1;
   MovePhase phase_ = MovePhase::kFluxBuildUp;
   Reference reference_;
-  ControlOutput output_;
 };
 
 }  // namespace drivebench::control

@@ -326,7 +326,7 @@ TEST(ServoRunSummary, SaysWhatItsNumbersRestOn) {
 
 // Catches a preset that is run on a bench it was not made for.
 TEST(ServoRunMismatches, NamesRateCountsAndPolePairs) {
-  const control::Preset& preset = *control::find_preset("book/8.2.2");
+  const control::ServoPreset& preset = *control::find_servo_preset("book/8.2.2");
   v1::BenchDescription bench;
   bench.set_period_s(125e-6);
   v1::AxisDescription& axis = *bench.add_axes();

@@ -1,4 +1,4 @@
-#include "clients/control/presets.hpp"
+#include "clients/control/servo_presets.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,20 +10,20 @@ namespace {
 // Catches a preset that no controller can be built from, and two of the same name.
 TEST(Presets, AreAllUsableAndNamedOnce) {
   std::set<std::string_view> names;
-  for (const Preset& p : presets()) {
+  for (const ServoPreset& p : servo_presets()) {
     EXPECT_TRUE(p.controller.problems().empty()) << p.name;
     EXPECT_TRUE(p.move.problems().empty()) << p.name;
     EXPECT_TRUE(names.insert(p.name).second) << p.name;
-    EXPECT_EQ(find_preset(p.name), &p);
-    EXPECT_NE(presets_table().find(p.name), std::string::npos);
-    EXPECT_NE(presets_table().find(p.expectation), std::string::npos);
+    EXPECT_EQ(find_servo_preset(p.name), &p);
+    EXPECT_NE(servo_presets_table().find(p.name), std::string::npos);
+    EXPECT_NE(servo_presets_table().find(p.expectation), std::string::npos);
   }
 }
 
 // Catches a mistyped gain: the closed-loop polynomials of the book's gains must have the poles of exercise 14
 // (case 2), mechanical −534.24 ± j645.73 and −1.52, flux −5479.75 and −13.68, to 0.2 %.
 TEST(Presets, BookGainsHaveTheClosedLoopPolesOfExercise14) {
-  const Preset* const book = find_preset("book/8.2.2");
+  const ServoPreset* const book = find_servo_preset("book/8.2.2");
   ASSERT_NE(book, nullptr);
   const ControllerParameters& c = book->controller;
   const double pair_sum = 2.0 * 534.24;
@@ -40,15 +40,15 @@ TEST(Presets, BookGainsHaveTheClosedLoopPolesOfExercise14) {
 
 // Catches a suggestion that is not the obvious one, and a lookup that takes it silently.
 TEST(Presets, MisspeltNameFindsNothingButSuggestsTheNearest) {
-  EXPECT_EQ(find_preset("book/8.2.2-4kHz"), nullptr);
-  EXPECT_EQ(nearest_preset_name("book/8.2.2-4kHz"), "book/8.2.2-4khz");
-  EXPECT_EQ(nearest_preset_name("book/822"), "book/8.2.2");
-  EXPECT_EQ(nearest_preset_name("backward-difference"), "book/8.2.2-backward-difference");
+  EXPECT_EQ(find_servo_preset("book/8.2.2-4kHz"), nullptr);
+  EXPECT_EQ(nearest_servo_preset_name("book/8.2.2-4kHz"), "book/8.2.2-4khz");
+  EXPECT_EQ(nearest_servo_preset_name("book/822"), "book/8.2.2");
+  EXPECT_EQ(nearest_servo_preset_name("backward-difference"), "book/8.2.2-backward-difference");
 }
 
 // Catches a check that stops at the first problem.
 TEST(ControllerParameters, NamesEveryProblemAtOnce) {
-  ControllerParameters broken = presets().front().controller;
+  ControllerParameters broken = servo_presets().front().controller;
   broken.machine.inertia_kgm2 = 0.0;
   broken.counts_per_revolution = -1;
   broken.current.integral_v_per_as = -1.0;

@@ -13,7 +13,7 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "clients/control/presets.hpp"
+#include "clients/control/servo_presets.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -90,7 +90,7 @@ double larger(double a, double b) {
 }
 
 Outcome run(const char* preset_name, const Circumstances& c = {}) {
-  const Preset& preset = *find_preset(preset_name);
+  const ServoPreset& preset = *find_servo_preset(preset_name);
   const ControllerParameters& p = preset.controller;
   const Machine machine = {.rotor_resistance_ohm = 3.9 * c.rotor_resistance_factor};
   ServoMove move(p, preset.move);
@@ -234,7 +234,7 @@ TEST(ServoMove, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
 
 // Catches phases that are off by one sample, and a runner that lets go of the machine after the end.
 TEST(ServoMove, PhasesLastWhatTheirParametersSayAndTheEndKeepsHolding) {
-  const Preset& preset = *find_preset("book/8.2.2");
+  const ServoPreset& preset = *find_servo_preset("book/8.2.2");
   ServoMove move(preset.controller, preset.move);
   std::array<int, 4> samples{};
   for (int k = 0; k < 1100; ++k) {
@@ -250,7 +250,7 @@ TEST(ServoMove, PhasesLastWhatTheirParametersSayAndTheEndKeepsHolding) {
 
 // Catches a build-up too short for the claim in the header, judged by the true flux.
 TEST(ServoMove, FluxStandsAtItsRatedValueWhenTheMoveStarts) {
-  const Preset& preset = *find_preset("book/8.2.2");
+  const ServoPreset& preset = *find_servo_preset("book/8.2.2");
   ServoMove move(preset.controller, preset.move);
   State x{};
   const Machine machine;
