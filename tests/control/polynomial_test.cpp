@@ -30,8 +30,8 @@ TEST(Polynomial, RootsMayBeLargeAndFarApart) {
   EXPECT_NEAR(found[1], -7e-5, 7e-5 * 1e-9);
 }
 
-// Catches a division by a root at zero, a zero leading coefficient, and a filter that lets complex roots pass:
-// x²·(x + 1)·(x² + 1) has the real roots -1, 0 and 0.
+// Catches a division by a root at zero, a zero leading coefficient, and a filter that lets complex roots
+// pass: x²·(x + 1)·(x² + 1) has the real roots -1, 0 and 0.
 TEST(Polynomial, RealRootsOnlyWithTheirMultiplicity) {
   const std::vector<double> found = real_roots(std::array{0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0});
   ASSERT_EQ(found.size(), 3U);
