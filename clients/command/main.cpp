@@ -66,8 +66,10 @@ struct CommandLine {
   SetOptions set;
   BumpOptions bump;
   ControlOptions control;
+  CompareOptions compare;
   std::vector<std::string> loads;
   std::vector<std::string> settings;
+  std::vector<std::string> gains;
   PrintOptions print;
   CanCheckOptions can_check;
   bool csv = false;
@@ -190,7 +192,16 @@ struct CommandLine {
                                "tcp:HOST:PORT, unix:PATH, can:BACKEND:CHANNEL?node=N or "
                                "modbus:HOST:PORT?unit=N");
     sub->add_option("--preset", control.preset, "gains and move by name")->capture_default_str();
-    sub->add_flag("--list", control.list, "print the presets and end");
+    sub->add_flag("--list", control.list, "print the presets and end; with --gains all their gains");
+    sub->add_flag("--gains", control.gains, "print the gains of the preset and end");
+    sub->add_option("--gain", gains, "NAME=VALUE: another value for a gain of the preset");
+    sub->add_option("--compare", compare.recording,
+                    "MCAP recording of your controller: what the preset's would have commanded");
+    sub->add_option("--with", compare.other, "--compare: recording of the preset's own run, compared too");
+    sub->add_option("--from", compare.from_tick, "--compare: tick at which the run starts");
+    sub->add_option("--threshold", compare.threshold,
+                    "--compare: [V] or [A]; exit code 1 if a command differs by more")
+        ->check(CLI::NonNegativeNumber);
     sub->add_option("--axis", control.axis, "number or name; CAN and Modbus links name it themselves")
         ->capture_default_str();
     sub->add_option("--csv", control.csv_file, "write every sample to this file");
@@ -206,8 +217,26 @@ struct CommandLine {
         control.loads.push_back(parse_load(load));
       for (const std::string& setting : settings)
         control.settings.push_back(parse_setting(setting));
-      action = [this] { return run_control(control); };
+      for (const std::string& gain : gains) {
+        const ParameterSetting parsed = parse_setting(gain);
+        control.overrides.push_back({parsed.name, parsed.value});
+      }
+      action = [this] { return run_control_or_compare(); };
     });
+  }
+
+  int run_control_or_compare() {
+    if (compare.recording.empty()) {
+      if (!compare.other.empty() || compare.from_tick || compare.threshold) {
+        throw UsageError("--with, --from and --threshold belong to --compare");
+      }
+      return run_control(control);
+    }
+    compare.json = json;
+    compare.preset = control.preset;
+    compare.overrides = control.overrides;
+    compare.axis = control.axis;
+    return run_compare(compare);
   }
 
   void add_print(const std::string& name, const std::string& description, bool has_bus) {

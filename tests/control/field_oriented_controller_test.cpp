@@ -6,13 +6,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/control/servo_presets.hpp"
+#include "clients/control/presets/induction_servo.hpp"
 
 namespace drivebench::control {
 namespace {
 
 const ControllerParameters& book() {
-  return find_servo_preset("book/8.2.2")->controller;
+  return kServoController;
 }
 
 ControlOutput updated(FieldOrientedController& controller, const Measurement& m, const Reference& r,

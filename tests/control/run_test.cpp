@@ -3,7 +3,7 @@
 // wire and the real plant have their own test. Encoder steps make the loop chaotic in the small: moving the
 // start by 1e-7 counts moves the peak error by 0.03 (case 4) to 0.2 counts (delay) and the peak current by up
 // to 0.5 A (load step), which is what the tolerances leave room for.
-#include "clients/control/servo_move.hpp"
+#include "clients/control/run.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,9 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "clients/control/servo_presets.hpp"
+#include "clients/control/field_oriented_controller.hpp"
+#include "clients/control/presets.hpp"
+#include "clients/control/presets/induction_servo.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -90,10 +92,9 @@ double larger(double a, double b) {
 }
 
 Outcome run(const char* preset_name, const Circumstances& c = {}) {
-  const ServoPreset& preset = *find_servo_preset(preset_name);
-  const ControllerParameters& p = preset.controller;
   const Machine machine = {.rotor_resistance_ohm = 3.9 * c.rotor_resistance_factor};
-  ServoMove move(p, preset.move);
+  control::Run move = find_preset(preset_name)->make({});
+  const auto& controller = dynamic_cast<const FieldOrientedController&>(move.controller());
   Outcome seen;
   State x = {c.start_counts * kTurn / 2000.0};
   PhasePair in_force_v = {0.0, 0.0};
@@ -105,13 +106,14 @@ Outcome run(const char* preset_name, const Circumstances& c = {}) {
       ++periods;
     } else {
       const auto count = static_cast<std::int64_t>(std::floor(x[0] * 2000.0 / kTurn));
-      const ControlOutput& out =
+      const Setpoint asked =
           move.step({.encoder_count = count, .i_a_a = x[4], .i_b_a = x[5]}, c.tell_lost ? periods : 1);
+      const ControlOutput& out = controller.output();
       periods = 1;
-      commanded_v = {std::clamp(out.u_a_v, -80.0, 80.0), std::clamp(out.u_b_v, -80.0, 80.0)};
+      commanded_v = {std::clamp(asked.a, -80.0, 80.0), std::clamp(asked.b, -80.0, 80.0)};
       const double bench_time_s =
-          static_cast<double>(seen.samples) * p.period_s() - preset.move.flux_build_up_s;
-      const double wanted_rad = trajectory_at(preset.move.trajectory, bench_time_s).angle_rad;
+          static_cast<double>(seen.samples) * move.period_s() - move.timing().prepare_s;
+      const double wanted_rad = move.trajectory().at(bench_time_s).angle_rad;
       seen.error_at_end_counts = (wanted_rad - x[0]) * 2000.0 / kTurn + c.start_counts;
       seen.peak_error_counts = larger(seen.peak_error_counts, seen.error_at_end_counts);
       if (seen.samples >= move.planned_samples() - 100) {
@@ -124,7 +126,7 @@ Outcome run(const char* preset_name, const Circumstances& c = {}) {
     seen.peak_current_a = larger(larger(seen.peak_current_a, x[4]), x[5]);
     seen.peak_voltage_v = larger(larger(seen.peak_voltage_v, commanded_v.a), commanded_v.b);
     if (!c.delay_one_sample) in_force_v = commanded_v;
-    x = machine.after(x, in_force_v, move.time_s() >= c.load_from_s ? 0.1 : 0.0, p.period_s());
+    x = machine.after(x, in_force_v, move.time_s() >= c.load_from_s ? 0.1 : 0.0, move.period_s());
     in_force_v = commanded_v;
   }
   return seen;
@@ -132,7 +134,7 @@ Outcome run(const char* preset_name, const Circumstances& c = {}) {
 
 // Case 4. Catches any wrong sign, gain, frame or order in the whole controller. The table has 1.49
 // counts, 73.6 rad/s, 5.46 A.
-TEST(ServoMove, BookMoveStaysWithinTwoCounts) {
+TEST(Run, BookMoveStaysWithinTwoCounts) {
   const Outcome seen = run("book/8.2.2");
   EXPECT_LE(seen.peak_error_counts, 2.0);
   EXPECT_NEAR(seen.peak_error_counts, 1.49, 0.15);
@@ -144,7 +146,7 @@ TEST(ServoMove, BookMoveStaysWithinTwoCounts) {
 }
 
 // Case 5. Catches a controller that needs its output in force at once (the table has 1.62 counts, 5.75 A).
-TEST(ServoMove, OneSampleOfDelayStaysWithinTwoCounts) {
+TEST(Run, OneSampleOfDelayStaysWithinTwoCounts) {
   const Outcome seen = run("book/8.2.2", {.delay_one_sample = true});
   EXPECT_LE(seen.peak_error_counts, 2.0);
   EXPECT_LE(seen.final_error_counts, 1.0 + 1e-9);
@@ -152,7 +154,7 @@ TEST(ServoMove, OneSampleOfDelayStaysWithinTwoCounts) {
 }
 
 // Case 5. Catches a gain or an observer that has 8 kHz built in (the table has 1.58 counts, 5.67 A).
-TEST(ServoMove, HalfTheSampleRateStaysWithinTwoCounts) {
+TEST(Run, HalfTheSampleRateStaysWithinTwoCounts) {
   const Outcome seen = run("book/8.2.2-4khz");
   EXPECT_LE(seen.peak_error_counts, 2.0);
   EXPECT_LE(seen.final_error_counts, 1.0 + 1e-9);
@@ -161,7 +163,7 @@ TEST(ServoMove, HalfTheSampleRateStaysWithinTwoCounts) {
 
 // Case 5. Catches a missing K1 or K0 path: a load at the start of the move (the table's 2.22 counts, 6.57 A)
 // and amid it.
-TEST(ServoMove, LoadStepStaysWithinThreeCounts) {
+TEST(Run, LoadStepStaysWithinThreeCounts) {
   const Outcome at_start = run("book/8.2.2", {.load_from_s = 0.0});
   EXPECT_LE(at_start.peak_error_counts, 3.0);
   EXPECT_NEAR(at_start.peak_error_counts, 2.22, 0.3);
@@ -172,7 +174,7 @@ TEST(ServoMove, LoadStepStaysWithinThreeCounts) {
 }
 
 // Case 5. Catches an observer that does not tolerate a warm rotor (the table has 2.56 counts).
-TEST(ServoMove, RotorResistanceOffByHalfStaysWithinThreeAndAHalfCounts) {
+TEST(Run, RotorResistanceOffByHalfStaysWithinThreeAndAHalfCounts) {
   const Outcome seen = run("book/8.2.2", {.rotor_resistance_factor = 1.5});
   EXPECT_LE(seen.peak_error_counts, 3.5);
   EXPECT_NEAR(seen.peak_error_counts, 2.56, 0.2);
@@ -180,7 +182,7 @@ TEST(ServoMove, RotorResistanceOffByHalfStaysWithinThreeAndAHalfCounts) {
 
 // Case 6. Catches a difference over the wrong time (bound one count per period) and an observer without its
 // torque input.
-TEST(ServoMove, ObserverIsTwentyTimesQuieterThanTheBackwardDifference) {
+TEST(Run, ObserverIsTwentyTimesQuieterThanTheBackwardDifference) {
   const Outcome seen = run("book/8.2.2");
   EXPECT_LE(seen.difference_error_rad_s, 25.2);
   EXPECT_GE(seen.difference_error_rad_s, 24.0);
@@ -189,14 +191,14 @@ TEST(ServoMove, ObserverIsTwentyTimesQuieterThanTheBackwardDifference) {
 
 // Case 7, the negative tests. They catch a controller or machine so forgiving that the book's traps do not
 // show.
-TEST(ServoMove, CircularReferenceClipSpoilsTheMove) {
+TEST(Run, CircularReferenceClipSpoilsTheMove) {
   const Outcome seen = run("book/8.2.2-clipped");
   EXPECT_GT(seen.peak_error_counts, 5.0);
   EXPECT_LT(seen.peak_error_counts, 12.0);
   EXPECT_NEAR(seen.peak_current_a, 5.39, 0.3);
 }
 
-TEST(ServoMove, BackwardDifferenceDrivesTheVoltageToItsLimit) {
+TEST(Run, BackwardDifferenceDrivesTheVoltageToItsLimit) {
   const Outcome seen = run("book/8.2.2-backward-difference");
   EXPECT_GT(seen.peak_error_counts, 5.0);
   EXPECT_LT(seen.peak_error_counts, 12.0);
@@ -204,7 +206,7 @@ TEST(ServoMove, BackwardDifferenceDrivesTheVoltageToItsLimit) {
   EXPECT_NEAR(seen.peak_current_a, 6.61, 0.3);
 }
 
-TEST(ServoMove, CircularClipWithBackwardDifferenceRunsAway) {
+TEST(Run, CircularClipWithBackwardDifferenceRunsAway) {
   const Outcome seen = run("book/8.2.2-clipped-backward-difference");
   EXPECT_GT(seen.peak_error_counts, 50.0);
   EXPECT_GT(std::abs(seen.error_at_end_counts),
@@ -213,7 +215,7 @@ TEST(ServoMove, CircularClipWithBackwardDifferenceRunsAway) {
 
 // Catches a result that hangs on where within a count the shaft happens to stand: the true error may change
 // by the count that nobody can see, not by more (1.03 to 2.05 over a fine sweep).
-TEST(ServoMove, StartWithinACountMovesTheErrorByLessThanThatCount) {
+TEST(Run, StartWithinACountMovesTheErrorByLessThanThatCount) {
   for (int tenth = 0; tenth < 10; ++tenth) {
     const Outcome seen = run("book/8.2.2", {.start_counts = -4711.0 + 0.1 * tenth});
     EXPECT_LE(seen.peak_error_counts, 2.2) << tenth;
@@ -225,7 +227,7 @@ TEST(ServoMove, StartWithinACountMovesTheErrorByLessThanThatCount) {
 // Catches a trajectory and observers on the controller's own clock: one sample in forty does not arrive. A
 // controller that is not told falls behind by 25 samples and 39 counts; that half shows that the case is hard
 // enough to mean something.
-TEST(ServoMove, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
+TEST(Run, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
   const Outcome told = run("book/8.2.2", {.lose_every = 40});
   EXPECT_LE(told.peak_error_counts, 2.0);
   EXPECT_LE(told.final_error_counts, 1.0 + 1e-9);
@@ -233,12 +235,11 @@ TEST(ServoMove, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
 }
 
 // Catches phases that are off by one sample, and a runner that lets go of the machine after the end.
-TEST(ServoMove, PhasesLastWhatTheirParametersSayAndTheEndKeepsHolding) {
-  const ServoPreset& preset = *find_servo_preset("book/8.2.2");
-  ServoMove move(preset.controller, preset.move);
+TEST(Run, PhasesLastWhatTheirTimingSaysAndTheEndKeepsHolding) {
+  control::Run move = find_preset("book/8.2.2")->make({});
   std::array<int, 4> samples{};
   for (int k = 0; k < 1100; ++k) {
-    move.step({.encoder_count = 0, .i_a_a = 0.0, .i_b_a = 0.0});
+    move.step({});
     ++samples[static_cast<std::size_t>(move.phase())];
   }
   EXPECT_EQ(samples, (std::array<int, 4>{200, 584, 240, 76}));
@@ -248,18 +249,17 @@ TEST(ServoMove, PhasesLastWhatTheirParametersSayAndTheEndKeepsHolding) {
   EXPECT_NEAR(move.time_s(), 899.0 / 8000.0, 1e-12);
 }
 
-// Catches a build-up too short for the claim in the header, judged by the true flux.
-TEST(ServoMove, FluxStandsAtItsRatedValueWhenTheMoveStarts) {
-  const ServoPreset& preset = *find_servo_preset("book/8.2.2");
-  ServoMove move(preset.controller, preset.move);
+// Catches a build-up too short for the claim in the preset, judged by the true flux.
+TEST(Run, FluxStandsAtItsRatedValueWhenTheMoveStarts) {
+  control::Run move = find_preset("book/8.2.2")->make({});
   State x{};
   const Machine machine;
-  while (move.phase() == MovePhase::kFluxBuildUp) {
-    const ControlOutput& out = move.step({.encoder_count = 0, .i_a_a = x[4], .i_b_a = x[5]});
-    x = machine.after(x, {out.u_a_v, out.u_b_v}, 0.0, preset.controller.period_s());
+  while (move.phase() == RunPhase::kPreparing) {
+    const Setpoint u = move.step({.encoder_count = 0, .i_a_a = x[4], .i_b_a = x[5]});
+    x = machine.after(x, {u.a, u.b}, 0.0, move.period_s());
   }
-  EXPECT_NEAR(std::hypot(x[2], x[3]), preset.controller.rated_flux_wb(),
-              0.001 * preset.controller.rated_flux_wb());
+  const double rated_wb = kServoController.rated_flux_wb();
+  EXPECT_NEAR(std::hypot(x[2], x[3]), rated_wb, 0.001 * rated_wb);
 }
 
 }  // namespace
