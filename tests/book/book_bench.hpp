@@ -1,7 +1,11 @@
 #pragma once
 
+#include <algorithm>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 
+#include "plant/parameters/parameters.hpp"
 #include "server/bench.hpp"
 #include "server/config.hpp"
 #include "server/engine.hpp"
@@ -35,18 +39,22 @@ class BookBench {
     run_until(time_s, [](const Sample&) {});
   }
 
-  /// Takes axis 0 and gives it this command at every tick until the time.
+  /// Takes an axis and gives it a command for the present tick.
+  void command(std::uint32_t axis, const PhaseCommand& phases) {
+    constexpr Owner kController = 1;
+    const Tick now = bench_.tick();
+    bench_.submit({.tick = now, .axis = axis, .owner = kController, .action = LeaseAction::kAcquire});
+    bench_.submit({.tick = now,
+                   .axis = axis,
+                   .owner = kController,
+                   .action = Command{.answers = now, .phases = phases}});
+  }
+
+  /// Commands axis 0 at every tick until the time.
   template <class Controller>
   void control_until(double time_s, Controller command_of) {
-    constexpr Owner kController = 1;
     while (now_s() < time_s - 0.5 * period_s()) {
-      const Tick now = bench_.tick();
-      bench_.submit({.tick = now, .axis = 0, .owner = kController, .action = LeaseAction::kAcquire});
-      const PhaseCommand phases = command_of(sample());
-      bench_.submit({.tick = now,
-                     .axis = 0,
-                     .owner = kController,
-                     .action = Command{.answers = now, .phases = phases}});
+      command(0, command_of(sample()));
       bench_.step();
     }
   }
@@ -55,6 +63,15 @@ class BookBench {
   BenchConfig config_;
   Bench bench_;
 };
+
+/// Number of an axis' parameter in the bench's table.
+inline std::uint32_t row_of(const AxisParameters& p, std::string_view name) {
+  const auto rows = axis_parameters(p);
+  const auto found =
+      std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.name == name; });
+  if (found == rows.end()) throw std::runtime_error(std::string(name) + " is not a parameter");
+  return static_cast<std::uint32_t>(found - rows.begin());
+}
 
 /// Mean, least and largest value of a signal.
 struct Spread {

@@ -4,7 +4,6 @@
 #include <complex>
 #include <numbers>
 
-#include "plant/parameters/parameters.hpp"
 #include "tests/book/book_bench.hpp"
 
 namespace drivebench {
@@ -167,13 +166,9 @@ TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
 
   p.mechanics.motion = ShaftMotion::kImposed;
   p.mechanics.imposed_speed_rad_s = 188.4956;
-  config.axes[0].events = {{.tick = 10'000, .action = ParameterWrite{.row = 0, .value = 0.0}},
+  const std::uint32_t motion = row_of(p, "mechanics.motion");
+  config.axes[0].events = {{.tick = 10'000, .action = ParameterWrite{.row = motion, .value = 0.0}},
                            {.tick = 10'000, .action = LoadChange{.load_nm = 0.8, .ramp_ticks = 0}}};
-  for (std::uint32_t row = 0; row < axis_parameters(p).size(); ++row) {
-    if (axis_parameters(p)[row].name == "mechanics.motion") {
-      std::get<ParameterWrite>(config.axes[0].events[0].action).row = row;
-    }
-  }
   BookBench run(config);
   run.run_until(9.0);
   Spread speed;

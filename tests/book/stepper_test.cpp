@@ -12,9 +12,7 @@ namespace {
 constexpr double kDegree_rad = std::numbers::pi / 180.0;
 
 BenchConfig stepper_config() {
-  BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/pm-stepper.toml");
-  config.setup.substeps = 20;
-  return config;
+  return load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/pm-stepper.toml");
 }
 
 /// Voltages of the n-th half step; every second one has both phases on.
