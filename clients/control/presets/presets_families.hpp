@@ -9,10 +9,20 @@
 namespace drivebench::control {
 
 std::span<const Preset> induction_servo_presets() noexcept;
+std::span<const Preset> induction_input_output_presets() noexcept;
+std::span<const Preset> pm_presets() noexcept;
+std::span<const Preset> stepper_presets() noexcept;
+std::span<const Preset> bldc_presets() noexcept;
+std::span<const Preset> wound_rotor_presets() noexcept;
 
 inline std::vector<std::span<const Preset>> preset_families() {
   return {
       induction_servo_presets(),
+      induction_input_output_presets(),
+      pm_presets(),
+      stepper_presets(),
+      bldc_presets(),
+      wound_rotor_presets(),
   };
 }
 
