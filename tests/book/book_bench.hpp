@@ -1,14 +1,11 @@
 #pragma once
 
-#include <algorithm>
-#include <stdexcept>
 #include <string>
-#include <string_view>
 
-#include "plant/parameters/parameters.hpp"
 #include "server/bench.hpp"
 #include "server/config.hpp"
 #include "server/engine.hpp"
+#include "tests/server/parameter_row.hpp"
 
 namespace drivebench {
 
@@ -63,15 +60,6 @@ class BookBench {
   BenchConfig config_;
   Bench bench_;
 };
-
-/// Number of an axis' parameter in the bench's table.
-inline std::uint32_t row_of(const AxisParameters& p, std::string_view name) {
-  const auto rows = axis_parameters(p);
-  const auto found =
-      std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.name == name; });
-  if (found == rows.end()) throw std::runtime_error(std::string(name) + " is not a parameter");
-  return static_cast<std::uint32_t>(found - rows.begin());
-}
 
 /// Mean, least and largest value of a signal.
 struct Spread {

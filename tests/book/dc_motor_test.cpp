@@ -94,11 +94,7 @@ TEST(BookDcMotor, WithoutItsFieldASeparatelyExcitedMotorRunsAway) {
   EXPECT_NEAR(speed_rad_s, kUnloaded_rad_s, 1e-6 * kUnloaded_rad_s);
   EXPECT_NEAR(run.sample().i_f_a, 1.0, 1e-3);
   run.bench().submit(
-      {.tick = run.bench().tick(),
-       .axis = 0,
-       .owner = 0,
-       .action = InjectFault{.row = static_cast<std::uint32_t>(find_injectable_fault("field_loss")),
-                             .value = 1.0}});
+      {.tick = run.bench().tick(), .axis = 0, .owner = 0, .action = fault_of("field_loss", 1.0)});
   run.run_until(4.5);
   EXPECT_GT(run.sample().speed_rad_s, 2.0 * speed_rad_s);  // on its way: 0.5 s after
   EXPECT_NE(run.sample().injected, 0u);

@@ -166,8 +166,7 @@ TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
 
   p.mechanics.motion = ShaftMotion::kImposed;
   p.mechanics.imposed_speed_rad_s = 188.4956;
-  const std::uint32_t motion = row_of(p, "mechanics.motion");
-  config.axes[0].events = {{.tick = 10'000, .action = ParameterWrite{.row = motion, .value = 0.0}},
+  config.axes[0].events = {{.tick = 10'000, .action = write_of(p, "mechanics.motion", 0.0)},
                            {.tick = 10'000, .action = LoadChange{.load_nm = 0.8, .ramp_ticks = 0}}};
   BookBench run(config);
   run.run_until(9.0);

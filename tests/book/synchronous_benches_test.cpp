@@ -130,8 +130,7 @@ TEST(BookSynchronousBenches, TheWoundRotorOnTheLineFollowsItsPhasorDiagram) {
     BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/wound-rotor.toml");
     AxisParameters& p = config.setup.axes[0].parameters;
     p.drive.source.phase_rad = ahead_rad;
-    config.axes[0].events = {
-        {.tick = 30'000, .action = ParameterWrite{.row = row_of(p, "source.contactor"), .value = 1.0}}};
+    config.axes[0].events = {{.tick = 30'000, .action = write_of(p, "source.contactor", 1.0)}};
     BookBench run(config);
     run.run_until(6.0);  // 50 time constants of the stator
     const Sample& s = run.sample();
