@@ -44,9 +44,12 @@ CoupledObserver::CoupledObserver(const InductionMachineModel& machine, const Spe
       speed_(gains, machine.friction_rate_per_s(), period_s) {}
 
 void CoupledObserver::step(PhasePair current_a, double shaft_angle_rad) noexcept {
-  const DirectQuadrature i = Direction::at(flux_.angle_rad()).to_dq(current_a);
-  const double motor_rad_s2 = acceleration_per_wb_a_ * flux_.magnitude_wb() * i.q;
-  flux_.step(i, speed_.speed_rad_s());
+  step(Direction::at(flux_.angle_rad()).to_dq(current_a), shaft_angle_rad);
+}
+
+void CoupledObserver::step(DirectQuadrature current_a, double shaft_angle_rad) noexcept {
+  const double motor_rad_s2 = acceleration_per_wb_a_ * flux_.magnitude_wb() * current_a.q;
+  flux_.step(current_a, speed_.speed_rad_s());
   speed_.step(shaft_angle_rad, motor_rad_s2);
 }
 

@@ -86,6 +86,8 @@ class CoupledObserver {
   double angle_rad() const noexcept { return speed_.angle_rad(); }
   double speed_rad_s() const noexcept { return speed_.speed_rad_s(); }
   void step(PhasePair current_a, double shaft_angle_rad) noexcept;
+  /// With currents already along ρ̂.
+  void step(DirectQuadrature current_a, double shaft_angle_rad) noexcept;
 
  private:
   double acceleration_per_wb_a_;  // μ
