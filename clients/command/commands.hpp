@@ -122,6 +122,19 @@ struct CompareOptions {
 };
 int run_compare(const CompareOptions& options);
 
+/// A controlled run of a recording as an SVG picture.
+struct PlotOptions {
+  std::string recording{};
+  std::string out_file{};  ///< empty: standard output
+  std::string preset{};    ///< whose trajectory is drawn beside it; empty: none
+  std::vector<control::Gain> overrides{};
+  std::string axis{};                        ///< name; empty: the first in the file
+  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
+  std::vector<std::string> panels{};         ///< empty: a choice of ours
+  std::string title{};                       ///< empty: the preset, or else the file
+};
+int run_plot(const PlotOptions& options);
+
 /// Both replace this process by drivebench-server.
 int run_serve(const std::vector<std::string>& arguments);
 struct ReplayOptions {

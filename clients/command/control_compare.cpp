@@ -1,144 +1,29 @@
 #include "clients/command/control_compare.hpp"
 
-#include <bench.pb.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <system_error>
 
 #include "clients/command/control_axis.hpp"
 #include "clients/command/control_presets.hpp"
 #include "clients/command/control_run.hpp"
 #include "clients/command/json.hpp"
-#include "protocols/mapped_file.hpp"
-#include "protocols/mcap.hpp"
-#include "protocols/sample_codec.hpp"
+#include "clients/command/recorded_run.hpp"
 
 namespace drivebench::command {
 namespace {
 
 constexpr std::array<std::string_view, 4> kTerminalNames = {"a", "b", "c", "field"};
 
-/// What an answered sample said and what the answer was.
-struct Answered {
-  std::uint64_t tick;
-  control::Measurement measurement;
-  double angle_rad;
-  v1::Gates gates;
-  Terminals setpoint;
-};
-
-struct Recorded {
-  std::string axis;
-  double period_s = 0.0;
-  std::vector<Answered> rows;
-};
-
-Terminals setpoint_of(const v1::Command& c) {
+Terminals asked_for(const v1::Command& c) {
   if (c.gates() == v1::GATES_CURRENT) return {c.i_a_a(), c.i_b_a(), c.i_c_a(), c.i_f_a()};
-  return {c.u_a_v(), c.u_b_v(), c.u_c_v(), c.u_f_v()};
+  if (c.gates() == v1::GATES_VOLTAGE) return {c.u_a_v(), c.u_b_v(), c.u_c_v(), c.u_f_v()};
+  return {};
 }
 
-/// Reads the samples of one axis and joins them with the commands that answered them.
-class Reader {
- public:
-  explicit Reader(std::string axis) : wanted_(std::move(axis)) {}
-
-  void take(const McapReader& file, const McapMessage& message) {
-    const std::string_view topic = file.channels().at(message.header.channel).topic;
-    if (topic == "/inputs") {
-      take_input(message);
-    } else if (topic.ends_with("/sample")) {
-      take_sample(topic.substr(1, topic.size() - 8), message);
-    }
-  }
-
-  Recorded joined() const {
-    Recorded out = {.axis = wanted_, .period_s = period_s_, .rows = {}};
-    for (const v1::Command& command : commands_) {
-      const auto sample = std::ranges::lower_bound(samples_, command.tick(), {}, &Sample::tick);
-      if (sample == samples_.end() || sample->tick != command.tick()) continue;
-      if (!out.rows.empty() && out.rows.back().tick >= command.tick()) continue;
-      out.rows.push_back({.tick = command.tick(),
-                          .measurement = measurement_of(*sample, kAllSignals),
-                          .angle_rad = sample->angle_rad,
-                          .gates = command.gates(),
-                          .setpoint = setpoint_of(command)});
-    }
-    return out;
-  }
-  bool has_axis() const noexcept { return number_.has_value(); }
-  const std::string& axes() const noexcept { return axes_; }
-
- private:
-  void take_input(const McapMessage& message) {
-    v1::Input input;
-    if (!input.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()))) return;
-    if (input.action_case() == v1::Input::kCommand && input.axis() == number_) {
-      commands_.push_back(input.command());
-    }
-  }
-  void take_sample(std::string_view axis, const McapMessage& message) {
-    const auto known = numbers_.find(std::string(axis));
-    if (known == numbers_.end()) {
-      const auto number = static_cast<std::uint32_t>(numbers_.size());
-      numbers_.emplace(axis, number);
-      axes_ += fmt::format("{}{}", axes_.empty() ? "" : ", ", axis);
-      if (wanted_.empty() || wanted_ == "0") wanted_ = axis;
-      if (wanted_ == axis) number_ = number;
-    }
-    if (axis != wanted_) return;
-    const std::optional<Sample> sample = decode_sample(message.payload);
-    if (!sample) return;
-    if (!samples_.empty() && sample->tick > samples_.back().tick) {
-      period_s_ = static_cast<double>(message.header.log_time_ns - last_ns_) * 1e-9 /
-                  static_cast<double>(sample->tick - samples_.back().tick);
-    }
-    last_ns_ = message.header.log_time_ns;
-    samples_.push_back(*sample);
-  }
-
-  std::string wanted_;
-  std::string axes_;
-  std::map<std::string, std::uint32_t> numbers_;
-  std::optional<std::uint32_t> number_;
-  std::vector<Sample> samples_;
-  std::vector<v1::Command> commands_;
-  std::uint64_t last_ns_ = 0;
-  double period_s_ = 0.0;
-};
-
-/// From where the run starts: the first command that asks for something, or the tick that was named.
-Recorded read_run(const std::string& path, const std::string& axis, std::optional<std::uint64_t> from_tick) {
-  Reader reader(axis);
-  try {
-    const MappedFile file(path);
-    McapReader mcap(file.bytes());
-    for (McapMessage message; mcap.next(message);)
-      reader.take(mcap, message);
-    if (mcap.problem() && mcap.problem()->kind == McapProblem::Kind::kNotMcap) {
-      throw UsageError(fmt::format("{} is not a recording: {}", path, mcap.problem()->what));
-    }
-  } catch (const std::system_error& error) {
-    throw UsageError(error.what());
-  }
-  if (!reader.has_axis()) {
-    throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}", axis, reader.axes()));
-  }
-  Recorded run = reader.joined();
-  const auto start = std::ranges::find_if(run.rows, [&](const Answered& row) {
-    if (from_tick) return row.tick >= *from_tick;
-    return row.gates == v1::GATES_VOLTAGE || row.gates == v1::GATES_CURRENT;
-  });
-  run.rows.erase(run.rows.begin(), start);
-  if (run.rows.empty()) throw UsageError(fmt::format("{} has no commands for axis {}", path, run.axis));
-  return run;
-}
-
-void check_rate(const Recorded& recorded, const control::Run& run) {
+void check_rate(const RecordedRun& recorded, const control::Run& run) {
   const double rate_hz = run.timing().sample_rate_hz;
   if (std::abs(recorded.period_s * rate_hz - 1.0) > 1e-6) {
     throw UsageError(fmt::format("the recording is sampled at {:g} Hz, the preset at {:g} Hz",
@@ -147,47 +32,51 @@ void check_rate(const Recorded& recorded, const control::Run& run) {
 }
 
 /// The reference controller answers the same samples.
-void compare_commands(const Recorded& recorded, control::Run& run, Comparison& out) {
+void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison& out) {
   out.terminals.clear();
   for (const std::string_view name : kTerminalNames)
     out.terminals.emplace_back(name, Difference());
-  std::uint64_t last_tick = recorded.rows.front().tick;
-  const double start_rad = recorded.rows.front().angle_rad;
+  std::uint64_t last_tick = recorded.rows.front().sample.tick;
+  const double start_rad = recorded.rows.front().sample.angle_rad;
   for (const Answered& row : recorded.rows) {
-    const auto periods = std::max<std::int64_t>(1, static_cast<std::int64_t>(row.tick - last_tick));
-    last_tick = row.tick;
-    const Terminals reference = terminals_of(run.step(row.measurement, periods));
+    const std::uint64_t tick = row.sample.tick;
+    const auto periods = std::max<std::int64_t>(1, static_cast<std::int64_t>(tick - last_tick));
+    last_tick = tick;
+    const Terminals reference = terminals_of(run.step(measurement_of(row.sample, kAllSignals), periods));
     if (run.done()) break;
     ++out.samples;
-    // Gates off or shorted ask for nothing, whatever numbers stand beside it.
-    const bool asks = row.gates == v1::GATES_VOLTAGE || row.gates == v1::GATES_CURRENT;
+    const Terminals there = asked_for(row.command);
     for (std::size_t i = 0; i < reference.size(); ++i) {
-      const double difference = (asks ? row.setpoint[i] : 0.0) - reference[i];
-      out.commands.add(row.tick, difference, out.threshold);
-      out.terminals[i].second.add(row.tick, difference, out.threshold);
+      const double difference = there[i] - reference[i];
+      out.commands.add(tick, difference, out.threshold);
+      out.terminals[i].second.add(tick, difference, out.threshold);
     }
-    out.final_error_rad = run.reference().angle_rad - (row.angle_rad - start_rad);
-    out.tracking_rad.add(row.tick, out.final_error_rad, HUGE_VAL);
+    out.final_error_rad = run.reference().angle_rad - (row.sample.angle_rad - start_rad);
+    out.tracking_rad.add(tick, out.final_error_rad, HUGE_VAL);
   }
   out.whole = run.done() || out.samples == run.planned_samples();
 }
 
 /// Sample by sample at the same time after the start.
-void compare_runs(const Recorded& recorded, const Recorded& other, std::int64_t samples, Comparison& out) {
-  const Answered& first = recorded.rows.front();
-  const Answered& first_there = other.rows.front();
+void compare_runs(const RecordedRun& recorded, const RecordedRun& other, std::int64_t samples,
+                  Comparison& out) {
+  const Sample& first = recorded.rows.front().sample;
+  const Sample& first_there = other.rows.front().sample;
   auto there = other.rows.begin();
   for (const Answered& row : recorded.rows) {
     if (samples-- <= 0) return;
-    const std::uint64_t after = row.tick - first.tick;
-    while (there != other.rows.end() && there->tick - first_there.tick < after)
+    const std::uint64_t tick = row.sample.tick;
+    while (there != other.rows.end() && there->sample.tick - first_there.tick < tick - first.tick)
       ++there;
     if (there == other.rows.end()) return;
-    if (there->tick - first_there.tick != after) continue;
-    for (std::size_t i = 0; i < row.setpoint.size(); ++i)
-      out.other_commands.add(row.tick, row.setpoint[i] - there->setpoint[i], out.threshold);
-    out.other_angle_rad.add(
-        row.tick, (row.angle_rad - first.angle_rad) - (there->angle_rad - first_there.angle_rad), 0.0);
+    if (there->sample.tick - first_there.tick != tick - first.tick) continue;
+    const Terminals asked = asked_for(row.command);
+    const Terminals asked_there = asked_for(there->command);
+    for (std::size_t i = 0; i < asked.size(); ++i)
+      out.other_commands.add(tick, asked[i] - asked_there[i], out.threshold);
+    const double turned_rad = row.sample.angle_rad - first.angle_rad;
+    const double turned_there_rad = there->sample.angle_rad - first_there.angle_rad;
+    out.other_angle_rad.add(tick, turned_rad - turned_there_rad, 0.0);
   }
 }
 
@@ -234,7 +123,7 @@ double Difference::rms() const noexcept {
 int run_compare(const CompareOptions& options) {
   const control::Preset& preset = chosen_preset(options.preset);
   control::Run run = made(preset, options.overrides);
-  const Recorded recorded = read_run(options.recording, options.axis, options.from_tick);
+  const RecordedRun recorded = read_run(options.recording, options.axis, options.from_tick);
   check_rate(recorded, run);
   Comparison out;
   out.recording = options.recording;
@@ -242,7 +131,7 @@ int run_compare(const CompareOptions& options) {
   out.preset = preset.name;
   out.unit = run.controller().quantity() == control::Quantity::kVoltage ? "V" : "A";
   out.threshold = options.threshold.value_or(0.0);
-  out.first_tick = recorded.rows.front().tick;
+  out.first_tick = recorded.rows.front().sample.tick;
   out.counts_per_rad = needs_of(preset, options.overrides).counts_per_revolution / (2.0 * std::numbers::pi);
   compare_commands(recorded, run, out);
   if (!options.other.empty()) {

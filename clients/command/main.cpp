@@ -67,6 +67,7 @@ struct CommandLine {
   BumpOptions bump;
   ControlOptions control;
   CompareOptions compare;
+  PlotOptions plot;
   std::vector<std::string> loads;
   std::vector<std::string> settings;
   std::vector<std::string> gains;
@@ -92,6 +93,7 @@ struct CommandLine {
     add_interfaces();
     add_recordings();
     add_export();
+    add_plot();
   }
 
   bool knows(std::string_view subcommand) const {
@@ -217,12 +219,18 @@ struct CommandLine {
         control.loads.push_back(parse_load(load));
       for (const std::string& setting : settings)
         control.settings.push_back(parse_setting(setting));
-      for (const std::string& gain : gains) {
-        const ParameterSetting parsed = parse_setting(gain);
-        control.overrides.push_back({parsed.name, parsed.value});
-      }
+      control.overrides = parsed_gains();
       action = [this] { return run_control_or_compare(); };
     });
+  }
+
+  std::vector<control::Gain> parsed_gains() const {
+    std::vector<control::Gain> parsed;
+    for (const std::string& gain : gains) {
+      const ParameterSetting setting = parse_setting(gain);
+      parsed.push_back({setting.name, setting.value});
+    }
+    return parsed;
   }
 
   int run_control_or_compare() {
@@ -289,6 +297,24 @@ struct CommandLine {
     sub->callback([this] {
       replay.json = json;
       action = [this] { return run_replay(replay); };
+    });
+  }
+
+  void add_plot() {
+    CLI::App* sub = app.add_subcommand("plot", "a controlled run of a recording as an SVG picture");
+    sub->add_option("FILE", plot.recording, "an MCAP recording")->required();
+    sub->add_option("--out", plot.out_file, "instead of standard output");
+    sub->add_option("--preset", plot.preset, "draws its trajectory and the error too");
+    sub->add_option("--gain", gains, "NAME=VALUE: another value for a gain of the preset");
+    sub->add_option("--axis", plot.axis, "name; default: the first in the file");
+    sub->add_option("--from", plot.from_tick, "tick at which the run starts");
+    sub->add_option("--panels", plot.panels,
+                    "of angle, speed, error, currents, voltages, torque, separated by commas")
+        ->delimiter(',');
+    sub->add_option("--title", plot.title, "default: the preset, or else the file");
+    sub->callback([this] {
+      plot.overrides = parsed_gains();
+      action = [this] { return run_plot(plot); };
     });
   }
 
