@@ -25,7 +25,7 @@ std::span<const GainRow<StepTrainParameters>> StepTrainParameters::gains() noexc
 
 std::vector<std::string> StepTrainParameters::problems() const {
   std::vector<std::string> found = range_problems(*this);
-  if (steps != std::floor(steps)) found.emplace_back("train.steps must be a whole number");
+  if (found.empty() && steps != std::floor(steps)) found.emplace_back("train.steps must be a whole number");
   return found;
 }
 

@@ -68,7 +68,8 @@ std::span<const GainRow<StepperParameters>> StepperParameters::gains() noexcept 
 
 std::vector<std::string> StepperParameters::problems() const {
   std::vector<std::string> found = range_problems(*this);
-  if (microsteps != std::floor(microsteps)) found.emplace_back("microsteps must be a whole number");
+  if (found.empty() && microsteps != std::floor(microsteps))
+    found.emplace_back("microsteps must be a whole number");
   return found;
 }
 
