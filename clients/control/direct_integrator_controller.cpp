@@ -8,10 +8,7 @@ std::span<const GainRow<DirectIntegratorParameters>> DirectIntegratorParameters:
   using P = DirectIntegratorParameters;
   constexpr GainRule kNotNegative = GainRule::kNotNegative;
   static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
-       kNotNegative},
-      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
-       kNotNegative},
+      {"current.pole_per_s", [](P& p) -> double& { return p.current_pole_per_s; }, GainRule::kPositive},
       {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
       {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
        kNotNegative},
@@ -46,7 +43,7 @@ DirectIntegratorController::DirectIntegratorController(
       p_(p),
       feedback_(drive),
       flux_reference_(flux, drive.motor.machine, drive.period_s(), std::move(optimum)),
-      current_loop_(p.current, drive.voltage_limit_v, drive.period_s()) {}
+      current_loop_(drive, p.current_pole_per_s) {}
 
 std::span<const std::string_view> DirectIntegratorController::telemetry_names() const noexcept {
   static constexpr auto kNames = std::to_array<std::string_view>(
@@ -61,36 +58,36 @@ Setpoint DirectIntegratorController::update(const Measurement& m, const Referenc
   const FluxTarget target = flux_reference_.step(r, periods);
   const double eta = machine.flux_decay_per_s();
   const double psi = x.flux_divisor_wb();
-  const double flux_rate_wb_s = eta * (machine.mutual_inductance_h * x.current_a.d - x.flux_wb);
+  const double flux_rate_wb_s = eta * (machine.mutual_inductance_h * i_d_ref_a_ - x.flux_wb);
   const double v_flux = target.second_rate_wb_s2 +
                         p_.flux_derivative_per_s * (target.rate_wb_s - flux_rate_wb_s) +
                         p_.flux_proportional_per_s2 * (target.flux_wb - x.flux_wb);
 
-  SpeedFactor actual = SpeedFactor::at(machine, psi, flux_rate_wb_s, v_flux);
-  SpeedFactor wanted = SpeedFactor::at(machine, target.flux_wb, target.rate_wb_s, target.second_rate_wb_s2);
-  const double distance = actual.c / machine.pole_pairs;
+  SpeedFactor factor = SpeedFactor::at(machine, psi, flux_rate_wb_s, v_flux);
+  const double distance = factor.c / machine.pole_pairs;
   const bool singular = !(distance >= p_.least_distance);
-  if (singular) actual = wanted = {.c = machine.pole_pairs, .c_per_s = 0.0};
+  if (singular) factor = {.c = machine.pole_pairs, .c_per_s = 0.0};
 
   const double angle_error_rad = r.angle_rad - x.angle_rad;
-  const double v_y = wanted.c * r.acceleration_rad_s2 + wanted.c_per_s * r.speed_rad_s +
-                     p_.position.derivative_per_s * (wanted.c * r.speed_rad_s - actual.c * x.speed_rad_s) +
+  const double speed_error_rad_s = r.speed_rad_s - x.speed_rad_s;
+  const double v_y = factor.c * r.acceleration_rad_s2 + factor.c_per_s * r.speed_rad_s +
+                     p_.position.derivative_per_s * factor.c * speed_error_rad_s +
                      machine.pole_pairs * (p_.position.proportional_per_s2 * angle_error_rad +
                                            p_.position.integral_per_s3 * angle_integral_rad_s_);
   const double motor_rad_s2 =
-      (v_y - x.speed_rad_s * actual.c_per_s) / actual.c + machine.friction_rate_per_s() * x.speed_rad_s;
+      (v_y - x.speed_rad_s * factor.c_per_s) / factor.c + machine.friction_rate_per_s() * x.speed_rad_s;
   bool at_limit = false;
   const double i_q_ref_a = clipped(motor_rad_s2 / (machine.acceleration_per_wb_a() * psi),
                                    drive_.quadrature_reference_limit_a, at_limit);
 
+  const double i_d_a_s = (v_flux + eta * flux_rate_wb_s) / (eta * machine.mutual_inductance_h);
   const PhaseCommand command =
-      current_loop_.step({.d = i_d_ref_a_ - x.current_a.d, .q = i_q_ref_a - x.current_a.q}, x.flux);
+      current_loop_.step(x, {.d = i_d_ref_a_, .q = i_q_ref_a}, {.d = i_d_a_s, .q = 0.0});
   saturated_ = command.saturated;
   telemetry_ = {x.current_a.d, x.current_a.q,  i_d_ref_a_, i_q_ref_a,
                 x.flux_wb,     target.flux_wb, distance,   singular ? 1.0 : 0.0};
   if (!saturated_ && !at_limit) angle_integral_rad_s_ += drive_.period_s() * angle_error_rad;
   if (!saturated_) {
-    const double i_d_a_s = (v_flux + eta * flux_rate_wb_s) / (eta * machine.mutual_inductance_h);
     i_d_ref_a_ =
         clipped(i_d_ref_a_ + drive_.period_s() * i_d_a_s, drive_.direct_reference_limit_a(), at_limit);
   }

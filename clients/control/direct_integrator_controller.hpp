@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/control/current_loop.hpp"
+#include "clients/control/decoupled_current_loop.hpp"
 #include "clients/control/field_oriented_controller.hpp"
 #include "clients/control/flux_reference.hpp"
 #include "clients/control/induction_drive.hpp"
@@ -15,7 +15,7 @@
 namespace drivebench::control {
 
 struct DirectIntegratorParameters {
-  CurrentLoopGains current;
+  double current_pole_per_s;
   PositionGains position;
   double flux_proportional_per_s2;  ///< G1
   double flux_derivative_per_s;     ///< G2
@@ -41,12 +41,12 @@ struct SpeedFactor {
 /// through ψ'' = v_ψ with di_d/dt = (v_ψ + η·ψ')/(η·M), and y'' = v_y with i_q = ((v_y − ω·c')/c +
 /// (f/J)·ω)/(μ·ψ):
 ///   v_ψ = ψ_ref'' + G2·(ψ_ref' − ψ') + G1·(ψ_ref − ψ)
-///   v_y = y_ref'' + K2·(y_ref' − y') + n_p·(K1·e + K0·∫e)        e = θ_ref − θ
-/// The angle loop around it is ours; the exercise ends at y. Singular at c = 0: without friction
-/// ψ' = −n_p²·ψ³/(2·J·R_R), −0.988 Wb/s for the servo motor at rated flux, −0.052 Wb/s at 0.017 Wb. While
-/// c/n_p is below least_distance, c of constant flux stands in, which is input-output linearisation, and
-/// `singular` in the telemetry is 1. PI current loops follow. Source: Chiasson 2005, exercise 28 of chapter 8
-/// (IMC-07), derived here.
+///   v_y = y_ref'' + K2·(y_ref' − y') + n_p·(K1·e + K0·∫e)        e = θ_ref − θ,  y_ref' = c·ω_ref
+/// The angle loop is ours, and so is y_ref with the c of the machine: with that of ψ_ref an error of the flux
+/// would be one of the speed. Singular at c = 0: without friction ψ' = −n_p²·ψ³/(2·J·R_R), −0.988 Wb/s for
+/// the servo motor at rated flux, −0.052 Wb/s at 0.017 Wb. While c/n_p is below least_distance, c of constant
+/// flux stands in, which is input-output linearisation, and `singular` in the telemetry is 1. Current loops
+/// that decouple follow. Source: Chiasson 2005, exercise 28 of chapter 8 (IMC-07), derived here.
 class DirectIntegratorController final : public Controller {
  public:
   /// No parameter set may have problems(). `optimum` as in FluxReference.
@@ -68,7 +68,7 @@ class DirectIntegratorController final : public Controller {
   DirectIntegratorParameters p_;
   InductionFeedback feedback_;
   FluxReference flux_reference_;
-  CurrentLoop current_loop_;
+  DecoupledCurrentLoop current_loop_;
   double i_d_ref_a_ = 0.0;  // the integrator
   double angle_integral_rad_s_ = 0.0;
   bool saturated_ = false;

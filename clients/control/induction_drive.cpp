@@ -5,6 +5,12 @@
 #include <numbers>
 
 namespace drivebench::control {
+namespace {
+
+/// A longer gap than this is 8 ms at 8 kHz, two time constants of the flux: nothing is left to carry over.
+constexpr std::int64_t kLongestGap = 64;
+
+}  // namespace
 
 std::span<const GainRow<InductionDriveParameters>> InductionDriveParameters::gains() noexcept {
   using P = InductionDriveParameters;
@@ -55,8 +61,6 @@ const InductionState& InductionFeedback::sample(const Measurement& m, std::int64
     started_ = true;
     start_count_ = m.encoder_count;
   } else {
-    // A longer gap than this is 8 ms at 8 kHz, two time constants of the flux: nothing is left to carry over.
-    constexpr std::int64_t kLongestGap = 64;
     double angle_rad = state_.angle_rad;
     for (std::int64_t i = 0; i < std::min(periods, kLongestGap); ++i) {
       observer_.step(state_.current_a, angle_rad);
@@ -67,6 +71,38 @@ const InductionState& InductionFeedback::sample(const Measurement& m, std::int64
   state_.speed_rad_s = observer_.speed_rad_s();
   state_.flux_wb = observer_.flux_magnitude_wb();
   state_.flux_angle_rad = observer_.flux_angle_rad();
+  state_.flux = Direction::at(state_.flux_angle_rad);
+  state_.current_a = state_.flux.to_dq({.a = m.i_a_a, .b = m.i_b_a});
+  return state_;
+}
+
+LoadedInductionFeedback::LoadedInductionFeedback(const InductionDriveParameters& p,
+                                                 double load_pole_per_s) noexcept
+    : rad_per_count_(2.0 * std::numbers::pi / p.counts_per_revolution),
+      period_s_(p.period_s()),
+      acceleration_per_wb_a_(p.motor.machine.acceleration_per_wb_a()),
+      flux_(p.motor.machine, p.period_s()),
+      motion_(p.motor.machine,
+              LoadObserverGains::placed(load_pole_per_s, load_pole_per_s, load_pole_per_s,
+                                        p.motor.machine.friction_rate_per_s()),
+              p.period_s()) {}
+
+const InductionState& LoadedInductionFeedback::sample(const Measurement& m, std::int64_t periods) noexcept {
+  if (!started_) {
+    started_ = true;
+    start_count_ = m.encoder_count;
+  } else {
+    double angle_rad = state_.angle_rad;
+    for (std::int64_t i = 0; i < std::min(periods, kLongestGap); ++i) {
+      motion_.step(angle_rad, acceleration_per_wb_a_ * flux_.magnitude_wb() * state_.current_a.q);
+      flux_.step(state_.current_a);
+      angle_rad += period_s_ * state_.speed_rad_s;
+    }
+  }
+  state_.angle_rad = rad_per_count_ * static_cast<double>(m.encoder_count - start_count_);
+  state_.speed_rad_s = motion_.speed_rad_s();
+  state_.flux_wb = flux_.magnitude_wb();
+  state_.flux_angle_rad = wrapped(flux_.angle_rad(state_.angle_rad));
   state_.flux = Direction::at(state_.flux_angle_rad);
   state_.current_a = state_.flux.to_dq({.a = m.i_a_a, .b = m.i_b_a});
   return state_;

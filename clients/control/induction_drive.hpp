@@ -63,6 +63,28 @@ class InductionFeedback {
   std::int64_t start_count_ = 0;
 };
 
+/// The same for machines under load, where a speed observer that knows no load is off by (l1/l2)·τ_L/J, 5
+/// rad/s for the servo motor at 0.25 N·m, and turns the flux away: flux from the shaft angle (IMO-08), which
+/// needs no speed, and speed from the load-torque observer (IMO-09) with three poles at load_pole_per_s.
+class LoadedInductionFeedback {
+ public:
+  LoadedInductionFeedback(const InductionDriveParameters& p, double load_pole_per_s) noexcept;
+
+  const InductionState& sample(const Measurement& m, std::int64_t periods) noexcept;
+  const InductionState& state() const noexcept { return state_; }
+  double load_nm() const noexcept { return motion_.load_nm(); }
+
+ private:
+  double rad_per_count_;
+  double period_s_;
+  double acceleration_per_wb_a_;  // μ
+  PositionFluxObserver flux_;
+  LoadTorqueObserver motion_;
+  InductionState state_;
+  bool started_ = false;
+  std::int64_t start_count_ = 0;
+};
+
 /// x within ±limit; notes when that took something off.
 double clipped(double x, double limit, bool& at_limit) noexcept;
 

@@ -1,25 +1,14 @@
 #include "clients/control/quadrature_integrator_controller.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace drivebench::control {
-namespace {
-
-LoadObserverGains load_gains(const InductionMachineModel& m, double pole_per_s) noexcept {
-  return LoadObserverGains::placed(pole_per_s, pole_per_s, pole_per_s, m.friction_rate_per_s());
-}
-
-}  // namespace
 
 std::span<const GainRow<QuadratureIntegratorParameters>> QuadratureIntegratorParameters::gains() noexcept {
   using P = QuadratureIntegratorParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
   static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
-       GainRule::kNotNegative},
-      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
-       GainRule::kNotNegative},
+      {"current.pole_per_s", [](P& p) -> double& { return p.current_pole_per_s; }, GainRule::kPositive},
       {"angle.pole_per_s", [](P& p) -> double& { return p.angle_pole_per_s; }, kPositive},
       {"slip.pole_per_s", [](P& p) -> double& { return p.slip_pole_per_s; }, kPositive},
       {"load_observer.pole_per_s", [](P& p) -> double& { return p.load_pole_per_s; }, kPositive},
@@ -52,10 +41,9 @@ QuadratureIntegratorController::QuadratureIntegratorController(const InductionDr
                                                                const FluxReferenceParameters& flux) noexcept
     : drive_(drive),
       p_(p),
-      feedback_(drive),
+      feedback_(drive, p.load_pole_per_s),
       flux_reference_(flux, drive.motor.machine, drive.period_s()),
-      load_(drive.motor.machine, load_gains(drive.motor.machine, p.load_pole_per_s), drive.period_s()),
-      current_loop_(p.current, drive.voltage_limit_v, drive.period_s()) {}
+      current_loop_(drive, p.current_pole_per_s) {}
 
 std::span<const std::string_view> QuadratureIntegratorController::telemetry_names() const noexcept {
   static constexpr auto kNames = std::to_array<std::string_view>(
@@ -63,18 +51,8 @@ std::span<const std::string_view> QuadratureIntegratorController::telemetry_name
   return kNames;
 }
 
-void QuadratureIntegratorController::observe_load(std::int64_t periods) noexcept {
-  constexpr std::int64_t kLongestGap = 64;
-  const InductionState& x = feedback_.state();  // of the sample before
-  const double motor_rad_s2 = drive_.motor.machine.acceleration_per_wb_a() * x.flux_wb * x.current_a.q;
-  for (std::int64_t i = 0; i < std::min(periods, kLongestGap); ++i)
-    load_.step(x.angle_rad + static_cast<double>(i) * drive_.period_s() * x.speed_rad_s, motor_rad_s2);
-}
-
 Setpoint QuadratureIntegratorController::update(const Measurement& m, const Reference& r,
                                                 std::int64_t periods) noexcept {
-  if (started_) observe_load(periods);
-  started_ = true;
   const InductionMachineModel& machine = drive_.motor.machine;
   const InductionState& x = feedback_.sample(m, periods);
   const FluxTarget target = flux_reference_.step(r, periods);
@@ -83,12 +61,13 @@ Setpoint QuadratureIntegratorController::update(const Measurement& m, const Refe
   const double pole = p_.angle_pole_per_s;
 
   const double wanted_rad_s2 = r.acceleration_rad_s2 + machine.friction_rate_per_s() * r.speed_rad_s +
-                               load_.load_nm() / machine.inertia_kgm2;
+                               feedback_.load_nm() / machine.inertia_kgm2;
   const double wanted_rad_s3 = r.jerk_rad_s3 + machine.friction_rate_per_s() * r.acceleration_rad_s2;
   const double angle_error_rad = r.angle_rad - x.angle_rad;
   const double speed_error_rad_s = r.speed_rad_s - x.speed_rad_s;
   const double slip_per_alpha = eta_m / (mu * target.flux_wb * target.flux_wb);
 
+  double i_q_rate_a_s = 0.0;
   const bool singular = std::abs(x.current_a.q) < p_.least_i_q_a;
   if (singular) {
     const double motor_rad_s2 =
@@ -105,16 +84,16 @@ Setpoint QuadratureIntegratorController::update(const Measurement& m, const Refe
             pole * (3.0 * alpha_error_rad_s2 + pole * (3.0 * speed_error_rad_s + pole * angle_error_rad)),
         slip_per_alpha * wanted_rad_s3 + p_.slip_pole_per_s * slip_error_rad_s);
     reference_a_.d = command.i_d_a;
-    if (!saturated_) reference_a_.q += drive_.period_s() * command.i_q_rate_a_s;
+    i_q_rate_a_s = command.i_q_rate_a_s;
   }
   bool at_limit = false;
   reference_a_ = {.d = clipped(reference_a_.d, drive_.direct_reference_limit_a(), at_limit),
                   .q = clipped(reference_a_.q, drive_.quadrature_reference_limit_a, at_limit)};
-  const PhaseCommand command =
-      current_loop_.step({.d = reference_a_.d - x.current_a.d, .q = reference_a_.q - x.current_a.q}, x.flux);
+  const PhaseCommand command = current_loop_.step(x, reference_a_, {.d = 0.0, .q = i_q_rate_a_s});
   saturated_ = command.saturated;
-  telemetry_ = {x.current_a.d, x.current_a.q,  reference_a_.d,  reference_a_.q,
-                x.flux_wb,     target.flux_wb, load_.load_nm(), singular ? 1.0 : 0.0};
+  telemetry_ = {x.current_a.d, x.current_a.q,  reference_a_.d,      reference_a_.q,
+                x.flux_wb,     target.flux_wb, feedback_.load_nm(), singular ? 1.0 : 0.0};
+  if (!saturated_) reference_a_.q += drive_.period_s() * i_q_rate_a_s;
   return {.a = command.voltage_v.a, .b = command.voltage_v.b};
 }
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/control/current_loop.hpp"
+#include "clients/control/decoupled_current_loop.hpp"
 #include "clients/control/flux_reference.hpp"
 #include "clients/control/induction_drive.hpp"
 
@@ -15,7 +15,7 @@ namespace drivebench::control {
 
 /// Gains of the angle loop (s + r)³ and of the slip loop s + g; see below.
 struct QuadratureIntegratorParameters {
-  CurrentLoopGains current;
+  double current_pole_per_s;
   double angle_pole_per_s;  ///< r
   double slip_pole_per_s;   ///< g
   double load_pole_per_s;   ///< three of the load observer
@@ -46,7 +46,8 @@ QuadratureIntegratorCommand quadrature_integrator(const InductionMachineModel& m
 /// The flux angle is controlled in its rate alone: nobody needs where the flux stands. τ̂_L is that of the
 /// load observer (IMO-09), which takes the place of an integral. Singular at i_q = 0: the machine must hold a
 /// load. While |i_q| is below least_i_q_a input-output linearisation stands in and `singular` in the
-/// telemetry is 1. PI current loops follow. Source: Chiasson 2005, exercises 29 and 30 of chapter 8 (IMC-08).
+/// telemetry is 1. Current loops that decouple follow. Source: Chiasson 2005, exercises 29 and 30 of chapter
+/// 8 (IMC-08).
 class QuadratureIntegratorController final : public Controller {
  public:
   /// No parameter set may have problems().
@@ -64,16 +65,12 @@ class QuadratureIntegratorController final : public Controller {
   std::span<const double> telemetry() const noexcept override { return telemetry_; }
 
  private:
-  void observe_load(std::int64_t periods) noexcept;
-
   InductionDriveParameters drive_;
   QuadratureIntegratorParameters p_;
-  InductionFeedback feedback_;
+  LoadedInductionFeedback feedback_;
   FluxReference flux_reference_;
-  LoadTorqueObserver load_;
-  CurrentLoop current_loop_;
+  DecoupledCurrentLoop current_loop_;
   DirectQuadrature reference_a_{.d = 0.0, .q = 0.0};
-  bool started_ = false;
   bool saturated_ = false;
   std::array<double, 8> telemetry_{};
 };

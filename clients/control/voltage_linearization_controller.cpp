@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "clients/control/decoupled_current_loop.hpp"
+
 namespace drivebench::control {
 
 std::span<const GainRow<VoltageLinearizationParameters>> VoltageLinearizationParameters::gains() noexcept {
@@ -23,22 +25,6 @@ std::span<const GainRow<VoltageLinearizationParameters>> VoltageLinearizationPar
 
 std::vector<std::string> VoltageLinearizationParameters::problems() const {
   return range_problems(*this);
-}
-
-DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
-                                     DirectQuadrature rate_a_s) noexcept {
-  const InductionMachineModel& m = motor.machine;
-  const double eta = m.flux_decay_per_s();
-  const double gamma = motor.current_decay_per_s();
-  const double beta = motor.current_per_wb();
-  const double electrical_rad_s = m.pole_pairs * x.speed_rad_s;
-  const double flux_speed_rad_s =
-      electrical_rad_s + eta * m.mutual_inductance_h * x.current_a.q / x.flux_divisor_wb();
-  const auto [i_d, i_q] = x.current_a;
-  return {.d = motor.leakage_inductance_h() *
-               (gamma * i_d - eta * beta * x.flux_wb - flux_speed_rad_s * i_q + rate_a_s.d),
-          .q = motor.leakage_inductance_h() *
-               (gamma * i_q + beta * electrical_rad_s * x.flux_wb + flux_speed_rad_s * i_d + rate_a_s.q)};
 }
 
 VoltageLinearizationController::VoltageLinearizationController(
@@ -83,17 +69,14 @@ Setpoint VoltageLinearizationController::update(const Measurement& m, const Refe
       decoupled_voltage_v(drive_.motor, x,
                           {.d = flux_rate_wb_s / machine.mutual_inductance_h + w_d / flux_gain,
                            .q = -flux_rate_wb_s * x.current_a.q / psi + w_q / (mu * psi)});
-  const double ahead_rad = 0.5 * drive_.period_s() * machine.pole_pairs * x.speed_rad_s;
-  const PhasePair wanted_v = Direction::at(x.flux_angle_rad + ahead_rad).to_ab(voltage_v);
-  saturated_ = false;
-  const Setpoint given = {.a = clipped(wanted_v.a, drive_.voltage_limit_v, saturated_),
-                          .b = clipped(wanted_v.b, drive_.voltage_limit_v, saturated_)};
+  const PhaseCommand command = held_voltage(drive_, x, voltage_v);
+  saturated_ = command.saturated;
   if (!saturated_) {
     flux_integral_wb_s_ += drive_.period_s() * flux_error_wb;
     angle_integral_rad_s_ += drive_.period_s() * angle_error_rad;
   }
   telemetry_ = {x.current_a.d, x.current_a.q, x.flux_wb, target.flux_wb, x.flux_angle_rad};
-  return given;
+  return {.a = command.voltage_v.a, .b = command.voltage_v.b};
 }
 
 }  // namespace drivebench::control

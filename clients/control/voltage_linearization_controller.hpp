@@ -41,13 +41,6 @@ struct VoltageLinearizationParameters {
   }
 };
 
-/// The rates of both currents, and the voltages that bring them about:
-///   u_d = σ·L_S·(γ·i_d − η·β·ψ − n_p·ω·i_q − η·M·i_q²/ψ + di_d/dt)
-///   u_q = σ·L_S·(γ·i_q + β·n_p·ω·ψ + n_p·ω·i_d + η·M·i_d·i_q/ψ + di_q/dt)
-/// Source: Chiasson 2005, (8.10), (8.11) (IMC-01).
-DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
-                                     DirectQuadrature current_rate_a_s) noexcept;
-
 /// Position control of an induction machine by input-output linearisation with voltage command. The motor's
 /// acceleration α = μ·ψ·i_q and ψ' = η·M·i_d − η·ψ are states, and
 ///   di_d/dt = ψ'/M + w_d/(η·M)        di_q/dt = −ψ'·i_q/ψ + w_q/(μ·ψ)

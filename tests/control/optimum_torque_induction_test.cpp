@@ -207,6 +207,29 @@ TEST(OptimumTorque, TheLimitChangesAtTheBaseSpeeds) {
             TorqueLimit::kVoltage);
 }
 
+/// Time of the fastest way between standstill and 8000 rpm.
+double fastest_s(double friction_nms, TorqueSign sign) {
+  constexpr int kParts = 2000;
+  const OptimumTorqueTable table(kServo, kLimits, rad_s(8000.0));
+  double time_s = 0.0;
+  for (int k = 0; k < kParts; ++k) {
+    const double speed_rad_s = rad_s(8000.0) * (k + 0.5) / kParts;
+    const double torque_nm = table.at(speed_rad_s, sign).torque_nm - friction_nms * speed_rad_s;
+    time_s += kServoMotor.machine.inertia_kgm2 / std::abs(torque_nm) * rad_s(8000.0) / kParts;
+  }
+  return time_s;
+}
+
+// Case 11: 1 %. Catches friction with the wrong sign, and a table that is off where it matters: with the
+// listed friction 0.38 s are out of reach, with 6e-5 just not.
+TEST(OptimumTorqueTable, GivesTheFastestRunUpAndBraking) {
+  EXPECT_NEAR(fastest_s(0.0, TorqueSign::kMotoring), 0.3124, 3.1e-3);
+  EXPECT_NEAR(fastest_s(6e-5, TorqueSign::kMotoring), 0.379, 3.8e-3);
+  EXPECT_NEAR(fastest_s(1.4e-4, TorqueSign::kMotoring), 0.647, 6.5e-3);
+  EXPECT_NEAR(fastest_s(0.0, TorqueSign::kGenerating), 0.1805, 1.8e-3);
+  EXPECT_NEAR(fastest_s(1.4e-4, TorqueSign::kGenerating), 0.1616, 1.6e-3);
+}
+
 // Catches a table read between the wrong rows, or off its end: linear between 512 intervals errs by less than
 // 1e-3 N·m at the kinks, and nothing lies above the end.
 TEST(OptimumTorqueTable, ReadsWhatTheSolverSays) {
