@@ -48,15 +48,15 @@ Setpoint DcController::update(const Measurement& m, const Reference& r, std::int
     }
   }
   integrate(excess);
-  telemetry_ = {asked, r.angle_rad - shaft.angle_rad, shaft.load_rad_s2};
+  telemetry_ = {asked, r.angle_rad - shaft.angle_rad, shaft.speed_rad_s, shaft.load_rad_s2};
   return {.a = given};
 }
 
 std::span<const std::string_view> DcController::telemetry_names() const noexcept {
-  static constexpr std::array<std::string_view, 3> kCurrentNames = {"i_ref_a", "angle_error_rad",
-                                                                    "load_estimate_rad_s2"};
-  static constexpr std::array<std::string_view, 3> kVoltageNames = {"v_ref_v", "angle_error_rad",
-                                                                    "load_estimate_rad_s2"};
+  static constexpr std::array<std::string_view, 4> kCurrentNames = {"i_ref_a", "angle_error_rad",
+                                                                    "speed_rad_s", "load_rad_s2"};
+  static constexpr std::array<std::string_view, 4> kVoltageNames = {"v_ref_v", "angle_error_rad",
+                                                                    "speed_rad_s", "load_rad_s2"};
   return law_ == Law::kCurrent ? kCurrentNames : kVoltageNames;
 }
 

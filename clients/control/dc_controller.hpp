@@ -118,7 +118,7 @@ class DcController : public Controller {
   DcCurrentRegulator regulator_;
   ShaftEstimator shaft_;
   bool saturated_ = false;
-  std::array<double, 3> telemetry_{};
+  std::array<double, 4> telemetry_{};
 };
 
 }  // namespace drivebench::control

@@ -84,6 +84,12 @@ class LinearObserver {
     started_ = true;
   }
 
+  /// Inputs that have been in force since the last sample and were not known then: call it before update().
+  void correct_last(const Inputs& u) noexcept {
+    for (std::size_t k = 0; k < M; ++k)
+      last_[k] = u[k];
+  }
+
   /// What the error is multiplied with from sample to sample.
   const Matrix<N, N>& transition() const noexcept { return transition_; }
   /// Whether the error dies out at this sample rate.
