@@ -11,6 +11,7 @@
 #include "clients/control/pm_speed_controller.hpp"
 #include "clients/control/pm_voltage_controller.hpp"
 #include "clients/control/polynomial.hpp"
+#include "clients/control/presets.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -107,19 +108,33 @@ TEST(PmVoltageController, FreezesItsIntegralAtTheLimit) {
   p.feedback = {.direct_per_s = 0.0,
                 .quadrature_per_s = 0.0,
                 .speed_a_per_rad = 0.0,
-                .angle_a_per_rad_s = 0.0,
+                .angle_a_per_rad_s = 20.0 / (0.1 * kStepper.inductance_h),
                 .integral_a_per_rads2 = 1e9};
   PmVoltageController controller(p);
-  // Each sample adds L·k25·T·e = 15 V.
+  // 20 V for the error, and L·k25·T·e = 15 V more each sample.
   const Reference ahead = {.angle_rad = 0.1};
-  EXPECT_NEAR(controller.update({}, ahead).b, 0.0, 1e-9);
-  EXPECT_NEAR(controller.update({}, ahead).b, 15.0, 1e-9);
-  EXPECT_NEAR(controller.update({}, ahead).b, 30.0, 1e-9);
-  EXPECT_EQ(controller.update({}, ahead).b, 40.0);
-  EXPECT_TRUE(controller.saturated());
-  EXPECT_EQ(controller.update({}, ahead).b, 40.0);
-  controller.update({}, {.angle_rad = -0.1});  // still clipped, and still frozen
-  EXPECT_TRUE(controller.saturated());
+  EXPECT_NEAR(controller.update({}, ahead).b, 20.0, 1e-9);
+  EXPECT_NEAR(controller.update({}, ahead).b, 35.0, 1e-9);
+  for (int k = 0; k < 10; ++k) {
+    EXPECT_EQ(controller.update({}, ahead).b, 40.0);
+    EXPECT_TRUE(controller.saturated());
+  }
+  EXPECT_NEAR(controller.update({}, {.angle_rad = -0.1}).b, 30.0 - 20.0, 1e-9);
+  EXPECT_FALSE(controller.saturated());
+}
+
+/// A gain of a preset as it stands.
+double gain(std::string_view preset, std::string_view name) {
+  const std::vector<Gain> gains = find_preset(preset)->gains();
+  return std::ranges::find(gains, name, &Gain::name)->value;
+}
+
+PmFeedbackGains feedback_of(std::string_view preset) {
+  return {.direct_per_s = gain(preset, "feedback.direct_per_s"),
+          .quadrature_per_s = gain(preset, "feedback.quadrature_per_s"),
+          .speed_a_per_rad = gain(preset, "feedback.speed_a_per_rad"),
+          .angle_a_per_rad_s = gain(preset, "feedback.angle_a_per_rad_s"),
+          .integral_a_per_rads2 = gain(preset, "feedback.integral_a_per_rads2")};
 }
 
 /// Poles of the quadrature axis: (s + R/L + k22)(s + f/J)s² + (K_m/J)((K_m/L + k23)s² + k24·s + k25).
@@ -140,7 +155,8 @@ std::vector<std::complex<double>> quadrature_poles(const PmMachineModel& m, cons
 // Two in a thousand of the largest part of a pole.
 TEST(PmVoltageController, GainsHaveTheirPoles) {
   const double rate = kStepper.resistance_ohm / kStepper.inductance_h;
-  EXPECT_NEAR(rate + kPrinted.direct_per_s, 10967.0, 1.0);
+  const PmFeedbackGains move = feedback_of("book/9.1.4");
+  EXPECT_NEAR(rate + move.direct_per_s, 10967.0, 1.0);
   const auto expect_poles = [](const std::vector<std::complex<double>>& poles, double fast, double slow,
                                double pair_real, double pair_imaginary) {
     EXPECT_NEAR(poles[0].real(), fast, 2e-3 * std::abs(fast));
@@ -152,16 +168,12 @@ TEST(PmVoltageController, GainsHaveTheirPoles) {
     }
     EXPECT_NEAR(imaginary, pair_imaginary, 2e-3 * pair_imaginary);
   };
-  expect_poles(quadrature_poles(kStepper, kPrinted), -18107.0, -2.8, -37.5, 940.0);
-  PmFeedbackGains swapped = kPrinted;
-  std::swap(swapped.direct_per_s, swapped.quadrature_per_s);
-  swapped.integral_a_per_rads2 = 1.07e8;
+  expect_poles(quadrature_poles(kStepper, move), -18107.0, -2.8, -37.5, 940.0);
+  PmFeedbackGains swapped = feedback_of("book/9.1.4-swapped");
+  EXPECT_NEAR(rate + swapped.direct_per_s, 18167.0, 1.0);
+  swapped.integral_a_per_rads2 *= 10.0;
   expect_poles(quadrature_poles(kStepper, swapped), -10920.0, -28.3, -17.9, 1210.0);
-  const PmFeedbackGains run = {.direct_per_s = 2.587e4,
-                               .quadrature_per_s = 2.446e4,
-                               .speed_a_per_rad = 603.1,
-                               .angle_a_per_rad_s = 2.935e6,
-                               .integral_a_per_rads2 = 1.004e7};
+  const PmFeedbackGains run = feedback_of("book/9.7-3000rpm-20khz");
   expect_poles(quadrature_poles(kStepper, run), -24722.0, -3.4, -59.4, 705.0);
   PmMachineModel without_table = kStepper;
   without_table.inertia_kgm2 = 2.8e-5;
@@ -171,10 +183,10 @@ TEST(PmVoltageController, GainsHaveTheirPoles) {
 
 // PMO-01. Catches the observer of another machine: its poles are -2645 +- j313.5, the book has both at -2646.
 TEST(PmVoltageController, TheSpeedObserverHasTheBooksPoles) {
-  const double l1 = kServo.speed_observer.angle_per_s;
+  const double l1 = gain("book/9.1.4", "speed_observer.angle_per_s");
   const double rate = kStepper.friction_rate_per_s();
   const double half = 0.5 * (l1 + rate);
-  const double product = kServo.speed_observer.speed_per_s2 + l1 * rate;
+  const double product = gain("book/9.1.4", "speed_observer.speed_per_s2") + l1 * rate;
   EXPECT_NEAR(half, 2644.9, 0.1);
   EXPECT_NEAR(std::sqrt(product - half * half), 313.5, 1.0);
 }

@@ -34,6 +34,7 @@ TEST(ShaftSensing, CarriesTheSpeedOverAGap) {
   const double speed = 2.0 * 2.0 * std::numbers::pi / 2000.0 * 1e4;
   EXPECT_NEAR(shaft.speed_rad_s(), speed, 1e-6);
   shaft.measure(count += 20, 10, 0.0);
+  shaft.measure(count += 2, 1, 0.0);
   EXPECT_NEAR(shaft.speed_rad_s(), speed, 1e-6);
 }
 
