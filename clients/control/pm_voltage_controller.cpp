@@ -8,7 +8,8 @@ namespace drivebench::control {
 
 PmVoltageController::PmVoltageController(const PmVoltageParameters& p) noexcept
     : p_(p),
-      shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()) {}
+      shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s(),
+             p.speed_from) {}
 
 std::span<const std::string_view> PmVoltageController::telemetry_names() const noexcept {
   static constexpr auto kNames =

@@ -33,6 +33,7 @@ struct PmVoltageParameters {
   SpeedObserverGains speed_observer;
   /// The voltages are turned ahead by the angle of so many samples; half a sample is the mean of a hold.
   double angle_lead_samples = 0.0;
+  SpeedFrom speed_from = SpeedFrom::kObserver;
 
   static std::span<const GainRow<PmVoltageParameters>> gains() noexcept;
   std::vector<std::string> problems() const;

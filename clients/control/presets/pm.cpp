@@ -54,18 +54,22 @@ constexpr PmFeedbackGains kRunReduced = {.direct_per_s = 4000.0,
                                          .integral_a_per_rads2 = 1.48e6};
 
 constexpr PmVoltageParameters stepper_servo(const PmFeedbackGains& feedback, double sample_rate_hz,
-                                            double lead_samples) noexcept {
+                                            double lead_samples,
+                                            SpeedFrom speed_from = SpeedFrom::kObserver) noexcept {
   return {.machine = kStepper,
           .sample_rate_hz = sample_rate_hz,
           .counts_per_revolution = 2000.0,
           .voltage_limit_v = 40.0,
           .feedback = feedback,
           .speed_observer = {.angle_per_s = 5272.0, .speed_per_s2 = 7.0e6},
-          .angle_lead_samples = lead_samples};
+          .angle_lead_samples = lead_samples,
+          .speed_from = speed_from};
 }
 
 constexpr PmVoltageParameters kMoveController = stepper_servo(kMovePrinted, 10e3, 0.0);
 constexpr PmVoltageParameters kSwappedController = stepper_servo(kMoveSwapped, 10e3, 0.0);
+constexpr PmVoltageParameters kDifferenceController =
+    stepper_servo(kMovePrinted, 10e3, 0.0, SpeedFrom::kDifference);
 constexpr PmVoltageParameters kRunController = stepper_servo(kRunReduced, 10e3, 0.5);
 constexpr PmVoltageParameters kNoLeadController = stepper_servo(kRunReduced, 10e3, 0.0);
 constexpr PmVoltageParameters k20KhzController = stepper_servo(kRunPrinted, 20e3, 0.5);
@@ -192,6 +196,10 @@ constexpr auto kPresets = std::to_array<Preset>({
     stepper_preset<kSwappedController, kMove, kMoveAllowance>(
         "book/9.1.4-swapped", "as book/9.1.4 with k11 and k22 exchanged, which gives the printed poles",
         "peak error at most 3 counts, the encoder within 1 count of 900", "pm-stepper"),
+    stepper_preset<kDifferenceController, kMove, kMoveAllowance>(
+        "book/9.1.4-backward-difference",
+        "as book/9.1.4, speed by backward difference, with which the book's motor did not track",
+        "tracks all the same, with three times the clipped samples", "pm-stepper"),
     stepper_preset<kRunController, kRun, kStepperLimits>(
         "book/9.7-3000rpm",
         "Chiasson 2005, problem 9.7: 3000 rpm at 10 kHz, gains reduced to what 10 kHz can sample",
