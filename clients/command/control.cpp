@@ -16,17 +16,22 @@
 namespace drivebench::command {
 namespace {
 
-void check_fit(const v1::BenchDescription& bench, std::uint32_t axis, const control::Preset& preset,
-               const ControlOptions& options, double sample_rate_hz) {
-  const std::vector<std::string> found =
-      mismatches(bench, axis, needs_of(preset, options.overrides), sample_rate_hz);
+void check_fit(const link::AxisLink& axis, const control::Preset& preset, const ControlOptions& options,
+               double sample_rate_hz) {
+  const auto mismatches_with = [&axis](const control::Requirements& needs, double rate_hz) {
+    return mismatches(axis.bench(), axis.axis(), needs, rate_hz, axis.known());
+  };
+  const std::vector<std::string> found = mismatches_with(needs_of(preset, options.overrides), sample_rate_hz);
   if (found.empty()) return;
   std::string text = fmt::format("preset {} does not fit this bench:", preset.name);
   for (const std::string& each : found)
     text += "\n  " + each;
+  const bool is_described =
+      !axis.bench().axes(static_cast<int>(axis.axis())).machine_kind().empty();  // else anything would fit
   for (const control::Preset& other : control::presets()) {
-    const std::optional<double> rate_hz = sample_rate_of(other);
-    if (rate_hz && mismatches(bench, axis, other.needs, *rate_hz).empty()) {
+    if (!is_described) break;
+    const std::optional<control::Run> run = made_as_it_stands(other);
+    if (run && mismatches_with(other.needs, run->timing().sample_rate_hz).empty()) {
       text += fmt::format("\n  {} would fit", other.name);
     }
   }
@@ -124,7 +129,7 @@ int run_control(const ControlOptions& options) {
   control::Run run = made(preset, options.overrides);
   const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
   const v1::BenchDescription& description = axis->bench();
-  check_fit(description, axis->axis(), preset, options, run.timing().sample_rate_hz);
+  check_fit(*axis, preset, options, run.timing().sample_rate_hz);
   if (!options.loads.empty() && !axis->can_set_load()) {
     throw UsageError("--load needs a tcp: or unix: link");
   }

@@ -56,7 +56,8 @@ control::Requirements needs_of(const control::Preset& preset, std::span<const co
 }
 
 std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint32_t axis,
-                                    const control::Requirements& needs, double sample_rate_hz) {
+                                    const control::Requirements& needs, double sample_rate_hz,
+                                    SignalMask known) {
   std::vector<std::string> found;
   const v1::AxisDescription& there = bench.axes(static_cast<int>(axis));
   const auto must_equal = [&](std::string_view what, std::optional<double> value, double expected) {
@@ -75,6 +76,10 @@ std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint
   if (!drive.empty() && (drive == "source" || wants_currents != (drive == "current_amplifier"))) {
     found.push_back(fmt::format("drive.kind is {} on the bench, the preset commands {}", drive,
                                 wants_currents ? "currents" : "voltages"));
+  }
+  const Signal* const signal = find_signal(needs.signal);
+  if (signal != nullptr && (known >> (signal - kSignals.data()) & 1) == 0) {
+    found.push_back(fmt::format("the preset measures {}, which this link does not carry", needs.signal));
   }
   must_equal("the sample rate [Hz]", 1.0 / bench.period_s(), sample_rate_hz);
   if (needs.counts_per_revolution > 0.0) {

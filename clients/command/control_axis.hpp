@@ -17,9 +17,10 @@ namespace drivebench::command {
 /// (counts_per_revolution, machine.pole_pairs, voltage_limit_v) change it.
 control::Requirements needs_of(const control::Preset& preset, std::span<const control::Gain> overrides);
 
-/// What keeps a run from this axis, one sentence each; empty when it fits.
+/// What keeps a run from this axis, one sentence each; empty when it fits. `known` is what the link carries.
 std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint32_t axis,
-                                    const control::Requirements& needs, double sample_rate_hz);
+                                    const control::Requirements& needs, double sample_rate_hz,
+                                    SignalMask known);
 
 /// Counts of the encoder: as the bench describes it, or else as the preset expects it; 0: nobody knows.
 double counts_per_revolution(const v1::BenchDescription& bench, std::uint32_t axis,

@@ -10,9 +10,11 @@
 namespace drivebench::command {
 namespace {
 
-std::string rate_text(const control::Preset& preset) {
-  const std::optional<double> rate_hz = sample_rate_of(preset);
-  return rate_hz ? fmt::format("{:g} kHz", *rate_hz / 1e3) : "refused as it stands";
+std::string run_text(const control::Preset& preset) {
+  const std::optional<control::Run> run = made_as_it_stands(preset);
+  if (!run) return "refused as it stands";
+  return fmt::format("{:g} s at {:g} kHz", static_cast<double>(run->planned_samples()) * run->period_s(),
+                     run->timing().sample_rate_hz / 1e3);
 }
 
 void print_gains(const control::Preset& preset, std::span<const control::Gain> overrides) {
@@ -23,7 +25,7 @@ void print_gains(const control::Preset& preset, std::span<const control::Gain> o
 void print_preset(const control::Preset& preset) {
   const control::Requirements& needs = preset.needs;
   fmt::print("{}\n  source    {}\n  expect    {}\n", preset.name, preset.source, preset.expectation);
-  fmt::print("  axis      {}, {}, {:g} V, commands {}, bench {}\n", needs.machine_kind, rate_text(preset),
+  fmt::print("  axis      {}, {}, {:g} V, commands {}, bench {}\n", needs.machine_kind, run_text(preset),
              needs.voltage_limit_v, needs.quantity == control::Quantity::kVoltage ? "voltages" : "currents",
              preset.bench);
 }
@@ -47,9 +49,9 @@ control::Run made(const control::Preset& preset, std::span<const control::Gain> 
   }
 }
 
-std::optional<double> sample_rate_of(const control::Preset& preset) {
+std::optional<control::Run> made_as_it_stands(const control::Preset& preset) {
   try {
-    return preset.make({}).timing().sample_rate_hz;
+    return preset.make({});
   } catch (const std::invalid_argument&) {
     return std::nullopt;
   }

@@ -17,7 +17,7 @@ const control::Preset& chosen_preset(const std::string& name);
 control::Run made(const control::Preset& preset, std::span<const control::Gain> overrides);
 
 /// With its own gains; nothing for a preset that is there to be refused.
-std::optional<double> sample_rate_of(const control::Preset& preset);
+std::optional<control::Run> made_as_it_stands(const control::Preset& preset);
 
 /// The gains of a preset with the overrides in their place.
 std::vector<control::Gain> gains_with(const control::Preset& preset,

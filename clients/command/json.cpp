@@ -253,16 +253,19 @@ std::string presets_json() {
   Json out = Json::array();
   for (const control::Preset& preset : control::presets()) {
     const control::Requirements& needs = preset.needs;
+    const std::optional<control::Run> run = made_as_it_stands(preset);
     out.push_back({{"name", preset.name},
                    {"source", preset.source},
                    {"expectation", preset.expectation},
                    {"bench", preset.bench},
                    {"machine_kind", needs.machine_kind},
-                   {"sample_rate_hz", optional_json(sample_rate_of(preset))},
+                   {"sample_rate_hz", run ? Json(run->timing().sample_rate_hz) : Json(nullptr)},
+                   {"samples", run ? Json(run->planned_samples()) : Json(nullptr)},
                    {"counts_per_revolution", needs.counts_per_revolution},
                    {"pole_pairs", needs.pole_pairs},
                    {"voltage_limit_v", needs.voltage_limit_v},
                    {"commands", needs.quantity == control::Quantity::kVoltage ? "voltages" : "currents"},
+                   {"signal", needs.signal},
                    {"gains", as_json(preset.gains())}});
   }
   return out.dump(2);

@@ -17,8 +17,11 @@ struct Requirements {
   double pole_pairs;                       ///< 0: the machine has none
   double voltage_limit_v;                  ///< the bench's must not be lower
   Quantity quantity = Quantity::kVoltage;  ///< kCurrent needs a current amplifier
-  std::string_view
-      other_kind{};  ///< a second kind that it fits, if any: the same equations under another name
+  /// A second kind that it fits, if any: the same equations under another name.
+  std::string_view other_kind{};
+  /// What it measures beside counts and the currents of the phases, which not every link carries: "i_f_a",
+  /// "hall_lines", "tachometer_v", "edge_age_s"; empty: nothing.
+  std::string_view signal{};
 };
 
 /// A controller and a run that belong together, with where their numbers come from.
