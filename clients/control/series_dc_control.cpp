@@ -87,6 +87,7 @@ std::vector<std::string> WeakenedSeriesDcParameters::problems() const {
   std::vector<std::string> found =
       wound_dc_problems(*this, Polynomial<2>{speed_proportional_per_s, speed_integral_per_s2},
                         "speed.integral_per_s2 and the gain beside it make the speed loop unstable");
+  if (!found.empty()) return found;
   if (axis.machine.field_shunt_resistance_ohm == 0.0)
     found.emplace_back("machine.field_shunt_resistance_ohm must be positive");
   if (!(most_flux_wb > axis.least_flux_wb)) found.emplace_back("most_flux_wb must be above least_flux_wb");

@@ -208,7 +208,7 @@ TEST(DcControl, HalfATurnWithASampleOfDelay) {
 // The mistake that chapter 2 warns of. Catches a bench whose encoder noise is too kind: steps of 31.4 rad/s
 // in the speed are 7.9 A in the command, which stands at its limit.
 TEST(DcControl, TheBackwardDifferenceDrivesTheCurrentIntoItsLimit) {
-  const Outcome seen = closed_loop("book/2.18-backward-difference");
+  const Outcome seen = closed_loop("book/2.18-raw-speed");
   EXPECT_GT(seen.saturated_samples, 200);
   EXPECT_GT(seen.peak_error_rad, 0.03);
 }

@@ -180,7 +180,7 @@ constexpr auto kPresets = std::to_array<Preset>({
         "book/2.18-edges", "as book/2.18 with the speed from the times of the encoder's edges",
         "peak error at most 0.015 rad, final at most 2 counts"),
     preset<DcStateFeedback, CubicMove, kDifferenceServo, kHalfTurn>(
-        "book/2.18-backward-difference", "as book/2.18 with the speed by backward difference: a mistake",
+        "book/2.18-raw-speed", "as book/2.18 with the speed by backward difference: a mistake",
         "steps of 31.4 rad/s make the current jump by 7.9 A: it stands at its limit"),
     preset<DcOpenLoop, CubicMove, kOpenLoop, kLongMove>(
         "book/2.19-open-loop",
