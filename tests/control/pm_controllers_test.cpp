@@ -191,6 +191,14 @@ TEST(PmVoltageController, TheSpeedObserverHasTheBooksPoles) {
   EXPECT_NEAR(std::sqrt(product - half * half), 313.5, 1.0);
 }
 
+// E17, E18. Catches 25 teeth for 50 and a torque constant of a phase: 3000 rpm are 2500 electrical turns a
+// second (the print has 1.57 kHz), and the emf at 2000 rpm is 39.8 V (the print has 41).
+TEST(PmVoltageController, KnowsTheMachineOfTheBook) {
+  EXPECT_NEAR(gain("book/9.7-3000rpm", "machine.pole_pairs") * 3000.0 / 60.0, 2500.0, 1e-9);
+  EXPECT_NEAR(gain("book/9.1.4", "machine.torque_constant_nm_per_a") * 2000.0 / 60.0 * 2.0 * std::numbers::pi,
+              39.8, 0.05);
+}
+
 // Catches a two-phase vector at the terminals of a star, and a lead of the wrong sign or in mechanical
 // angle: at speed the currents stand n_p·ω·T/2 ahead of the quadrature axis.
 TEST(PmCurrentController, PutsTheCurrentAheadOfTheQuadratureAxis) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "clients/control/speed_steps.hpp"
 #include "clients/control/step_train.hpp"
 
 namespace drivebench::control {
@@ -41,6 +42,18 @@ TEST(StepTrain, TakesItsFirstStepAtOnceAndStopsAtTheLast) {
   EXPECT_NEAR(train.at(5.0).angle_rad, 0.3, 1e-15);
   EXPECT_NEAR(train.duration_s(), 0.3, 1e-15);
   EXPECT_EQ((StepTrainParameters{.step_rad = 0.1, .steps = 2.5, .rate_hz = 1.0}).problems().size(), 1u);
+}
+
+// Catches an angle that jumps where the speed does.
+TEST(SpeedSteps, HaveTheAngleOfTheirSpeeds) {
+  const SpeedSteps steps({.first_rad_s = 100.0, .first_s = 0.5, .second_rad_s = -20.0, .second_s = 1.0});
+  EXPECT_EQ(steps.at(-1e-9).speed_rad_s, 0.0);
+  EXPECT_EQ(steps.at(0.0).speed_rad_s, 100.0);
+  EXPECT_NEAR(steps.at(0.25).angle_rad, 25.0, 1e-12);
+  EXPECT_EQ(steps.at(0.5).speed_rad_s, -20.0);
+  EXPECT_NEAR(steps.at(0.5).angle_rad, 50.0, 1e-12);
+  EXPECT_NEAR(steps.at(1.0).angle_rad, 40.0, 1e-12);
+  EXPECT_NEAR(steps.duration_s(), 1.5, 1e-12);
 }
 
 // Catches a run that throws the rotor to another full step when it begins: 30 counts are 1.5 electrical

@@ -94,10 +94,10 @@ constexpr auto kPresets = std::to_array<Preset>({
     preset<kInverter, kSlowerMove, k200VLimits>(
         "book/10.6-inverter",
         "as book/10.6 up to 350 rad/s behind a switched inverter, PI control of the phase currents",
-        "peak error about 0.11 rad, final below 1 mrad", "bldc-inverter"),
+        "peak error 0.08 rad, final at most 2 counts", "bldc-inverter"),
     preset<kInverterHall, kSlowerMove, k200VLimits>(
         "book/10.6-inverter-hall", "as book/10.6-inverter, sectors from the Hall lines",
-        "peak error about 0.11 rad, final below 2 mrad", "bldc-inverter"),
+        "peak error 0.08 rad, final at most 2 counts", "bldc-inverter"),
 });
 
 }  // namespace

@@ -215,7 +215,7 @@ constexpr auto kPresets = std::to_array<Preset>({
         "peak error at most 2 counts, final at most 1", "pm-stepper-20khz"),
     {.name = "pm/current-servo",
      .source = "Chiasson 2005, (9.49)-(9.52) on the motor of 9.2.3; move and gains are ours",
-     .expectation = "peak error below 25 counts of 8192, final at most 1",
+     .expectation = "peak error at most 30 counts of 8192, final at most 1",
      .bench = "bm500-current",
      .needs = {.machine_kind = "pm_synchronous",
                .counts_per_revolution = 8192.0,
