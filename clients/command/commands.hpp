@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/control/gains.hpp"
 #include "clients/link/address.hpp"
 
 /// The subcommands of `drivebench`: an options struct each and a function that gives the exit code. main.cpp
@@ -96,15 +97,43 @@ struct ParameterSetting {
 struct ControlOptions {
   LinkChoice link;
   bool json = false;
-  bool list = false;
+  bool list = false;   ///< print the presets and end
+  bool gains = false;  ///< print the gains of the preset, with --list of all, and end
   std::string preset = "book/8.2.2";
-  std::string axis = "0";  ///< number or name
-  std::string csv_file;    ///< empty: none
+  std::vector<control::Gain> overrides;  ///< of its gains
+  std::string axis = "0";                ///< number or name
+  std::string csv_file;                  ///< empty: none
   std::vector<LoadAt> loads;
   std::vector<ParameterSetting> settings;
   bool clear_faults = false;
 };
 int run_control(const ControlOptions& options);
+
+/// The preset's controller fed with what a recording says, without a bench.
+struct CompareOptions {
+  std::string recording{};
+  bool json = false;
+  std::string preset = "book/8.2.2";
+  std::vector<control::Gain> overrides{};
+  std::string axis{};                        ///< name; empty or "0": the first in the file
+  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
+  std::string other{};                       ///< recording of the reference's own run; empty: none
+  std::optional<double> threshold{};  ///< [V] or [A]; a command that differs by more makes the exit code 1
+};
+int run_compare(const CompareOptions& options);
+
+/// A controlled run of a recording as an SVG picture.
+struct PlotOptions {
+  std::string recording{};
+  std::string out_file{};  ///< empty: standard output
+  std::string preset{};    ///< whose trajectory is drawn beside it; empty: none
+  std::vector<control::Gain> overrides{};
+  std::string axis{};                        ///< name; empty: the first in the file
+  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
+  std::vector<std::string> panels{};         ///< empty: a choice of ours
+  std::string title{};                       ///< empty: the preset, or else the file
+};
+int run_plot(const PlotOptions& options);
 
 /// Both replace this process by drivebench-server.
 int run_serve(const std::vector<std::string>& arguments);

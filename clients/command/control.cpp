@@ -7,30 +7,33 @@
 #include <utility>
 
 #include "clients/command/commands.hpp"
+#include "clients/command/control_axis.hpp"
+#include "clients/command/control_presets.hpp"
+#include "clients/command/control_run.hpp"
 #include "clients/command/json.hpp"
-#include "clients/command/servo_run.hpp"
 #include "clients/command/session.hpp"
 
 namespace drivebench::command {
 namespace {
 
-const control::Preset& chosen_preset(const std::string& name) {
-  const control::Preset* preset = control::find_preset(name);
-  if (preset == nullptr) {
-    throw UsageError(fmt::format("no preset '{}'; did you mean {}? --list shows all", name,
-                                 control::nearest_preset_name(name)));
-  }
-  return *preset;
-}
-
-void check_fit(const v1::BenchDescription& bench, std::uint32_t axis, const control::Preset& preset) {
-  const std::vector<std::string> found = mismatches(bench, axis, preset);
+void check_fit(const link::AxisLink& axis, const control::Preset& preset, const ControlOptions& options,
+               double sample_rate_hz) {
+  const auto mismatches_with = [&axis](const control::Requirements& needs, double rate_hz) {
+    return mismatches(axis.bench(), axis.axis(), needs, rate_hz, axis.known());
+  };
+  const std::vector<std::string> found = mismatches_with(needs_of(preset, options.overrides), sample_rate_hz);
   if (found.empty()) return;
   std::string text = fmt::format("preset {} does not fit this bench:", preset.name);
   for (const std::string& each : found)
     text += "\n  " + each;
+  const bool is_described =
+      !axis.bench().axes(static_cast<int>(axis.axis())).machine_kind().empty();  // else anything would fit
   for (const control::Preset& other : control::presets()) {
-    if (mismatches(bench, axis, other).empty()) text += fmt::format("\n  {} would fit", other.name);
+    if (!is_described) break;
+    const std::optional<control::Run> run = made_as_it_stands(other);
+    if (run && mismatches_with(other.needs, run->timing().sample_rate_hz).empty()) {
+      text += fmt::format("\n  {} would fit", other.name);
+    }
   }
   throw UsageError(text);
 }
@@ -74,9 +77,9 @@ std::ofstream opened(const std::string& file) {
   return out;
 }
 
-void write_csv(std::ofstream out, const ControlOptions& options, const ServoRun& run) {
+void write_csv(std::ofstream out, const ControlOptions& options, const ControlRun& run) {
   if (options.csv_file.empty()) return;
-  out << to_csv(run.rows);
+  out << to_csv(run);
   out.close();
   if (!out) throw std::runtime_error("cannot write " + options.csv_file);
 }
@@ -86,17 +89,27 @@ void print_report(const ControlReport& r) {
   const auto row = [](std::string_view name, std::string_view format, double value, std::string_view unit) {
     fmt::print("  {:<34}{:>12} {}\n", name, fmt::format(fmt::runtime(format), value), unit);
   };
-  const char* angle = r.angle_source == "truth" ? "peak error (true angle)" : "peak error (encoder)";
-  row(angle, "{:.2f}", r.peak_error_counts, "counts");
-  row("final error (encoder)", "{:.2f}", r.final_error_counts, "counts");
-  if (r.final_true_error_counts) {
-    row("final error (true angle)", "{:.2f}", *r.final_true_error_counts, "counts");
-  }
+  const auto known = [&row](std::string_view name, std::string_view format, std::optional<double> value,
+                            std::string_view unit) {
+    if (value) row(name, format, *value, unit);
+  };
+  const bool is_truth = r.angle_source == "truth";
+  known(is_truth ? "peak error (true angle)" : "peak error (encoder)", "{:.2f}", r.peak_error_counts,
+        "counts");
+  row("peak error", "{:.6f}", r.peak_error_rad, "rad");
+  known("final error (encoder)", "{:.2f}", r.final_error_counts, "counts");
+  known("final error (true angle)", "{:.2f}", r.final_true_error_counts, "counts");
   row(r.speed_source == "truth" ? "peak speed" : "peak speed (observer)", "{:.2f}", r.peak_speed_rad_s,
       "rad/s");
+  row("peak speed error", "{:.2f}", r.peak_speed_error_rad_s, "rad/s");
   row("peak phase current", "{:.2f}", r.peak_current_a, "A");
-  row("peak phase voltage, asked for", "{:.1f}", r.peak_command_voltage_v, "V");
-  if (r.peak_voltage_v) row("peak phase voltage, applied", "{:.1f}", *r.peak_voltage_v, "V");
+  if (r.peak_field_current_a > 0.0) row("peak field current", "{:.2f}", r.peak_field_current_a, "A");
+  known("peak phase voltage, asked for", "{:.1f}", r.peak_command_voltage_v, "V");
+  known("peak phase current, asked for", "{:.2f}", r.peak_command_current_a, "A");
+  known("peak phase voltage, applied", "{:.1f}", r.peak_voltage_v, "V");
+  row("samples at a limit", "{:.0f}", static_cast<double>(r.saturated_samples), "");
+  for (const auto& [name, value] : r.peak_telemetry)
+    row("peak " + name, "{:.4g}", value, "");
   row("duration", "{:.1f}", r.duration_s * 1e3, "ms of the bench's time");
   row("wall time", "{:.1f}", r.wall_s * 1e3, "ms");
   row("samples", "{:.0f}", static_cast<double>(r.samples), "");
@@ -111,33 +124,32 @@ void print_report(const ControlReport& r) {
 }  // namespace
 
 int run_control(const ControlOptions& options) {
-  if (options.list) {
-    fmt::print("{}\n", options.json ? presets_json() : control::presets_table());
-    return kExitOk;
-  }
+  if (options.list || options.gains) return run_list(options);
   const control::Preset& preset = chosen_preset(options.preset);
+  control::Run run = made(preset, options.overrides);
   const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
   const v1::BenchDescription& description = axis->bench();
-  check_fit(description, axis->axis(), preset);
+  check_fit(*axis, preset, options, run.timing().sample_rate_hz);
   if (!options.loads.empty() && !axis->can_set_load()) {
     throw UsageError("--load needs a tcp: or unix: link");
   }
   std::ofstream csv = opened(options.csv_file);
 
   catch_interrupts();
-  prepare(*axis, options, preset.controller.counts_per_revolution);
+  const double counts = counts_per_revolution(description, axis->axis(), needs_of(preset, options.overrides));
+  prepare(*axis, options, counts);
   const double load_before_nm = options.loads.empty() ? 0.0 : axis->newest().load_nm;
-  ServoRun run = run_servo_move(*axis, preset, options.loads);
+  ControlRun done = run_over(*axis, std::move(run), options.loads, counts);
   try {
     if (!options.loads.empty()) axis->set_load({.load_nm = load_before_nm});
     axis->release();
   } catch (const link::Refused&) {
     // The lease may have been what was lost; the report says so.
   } catch (const link::LinkError& error) {
-    if (run.failure.empty()) run.failure = error.what();
+    if (done.failure.empty()) done.failure = error.what();
   }
 
-  ControlReport report = summary_of(run, description.period_s());
+  ControlReport report = summary_of(done, description.period_s());
   report.bench = description.name();
   report.mode = name_of(description.mode());
   report.axis = description.axes(static_cast<int>(axis->axis())).name();
@@ -147,10 +159,10 @@ int run_control(const ControlOptions& options) {
   } else {
     print_report(report);
   }
-  write_csv(std::move(csv), options, run);
+  write_csv(std::move(csv), options, done);
   if (report.failure.empty()) return kExitOk;
   std::fflush(stdout);
-  fmt::print(stderr, "drivebench: the move did not end: {}\n", report.failure);
+  fmt::print(stderr, "drivebench: the run did not end: {}\n", report.failure);
   return kExitFailed;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -105,7 +106,7 @@ DemoReplay replay(const std::string& recording) {
 
 bool keeps_promise(const DemoReport& report) {
   return report.lockstep.failure.empty() && report.realtime.failure.empty() && report.replay.equal &&
-         report.lockstep.control.peak_error_counts <= kPromisedErrorCounts;
+         report.lockstep.control.peak_error_counts.value_or(HUGE_VAL) <= kPromisedErrorCounts;
 }
 
 void print_comparison(const DemoReport& r) {
@@ -122,8 +123,10 @@ void print_comparison(const DemoReport& r) {
   };
   fmt::print("180 degree move of an induction servo, {} ({})\n\n", a.preset, a.bench);
   row("", "lockstep", "real time");
-  numbers("peak error [counts]", "{:.2f}", a.peak_error_counts, b.peak_error_counts);
-  numbers("final error [counts]", "{:.2f}", a.final_error_counts, b.final_error_counts);
+  numbers("peak error [counts]", "{:.2f}", a.peak_error_counts.value_or(0.0),
+          b.peak_error_counts.value_or(0.0));
+  numbers("final error [counts]", "{:.2f}", a.final_error_counts.value_or(0.0),
+          b.final_error_counts.value_or(0.0));
   numbers("duration [ms of bench time]", "{:.1f}", a.duration_s * 1e3, b.duration_s * 1e3);
   numbers("wall time [ms]", "{:.1f}", a.wall_s * 1e3, b.wall_s * 1e3);
   numbers("peak phase current [A]", "{:.2f}", a.peak_current_a, b.peak_current_a);

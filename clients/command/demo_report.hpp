@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "clients/command/servo_run.hpp"
+#include "clients/command/control_run.hpp"
 
 namespace drivebench::command {
 

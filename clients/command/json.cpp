@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "clients/command/control_presets.hpp"
 #include "clients/command/session.hpp"
 #include "clients/control/presets.hpp"
 
@@ -34,8 +35,10 @@ namespace drivebench::command {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ControlReport, bench, mode, axis, preset, failure, samples, missed_ticks,
                                    late_ticks, first_tick, duration_s, wall_s, angle_source, speed_source,
-                                   peak_error_counts, final_error_counts, final_true_error_counts,
-                                   peak_speed_rad_s, peak_current_a, peak_command_voltage_v, peak_voltage_v,
+                                   peak_error_rad, final_error_rad, peak_error_counts, final_error_counts,
+                                   final_true_error_counts, peak_speed_rad_s, peak_speed_error_rad_s,
+                                   peak_current_a, peak_field_current_a, peak_command_voltage_v,
+                                   peak_command_current_a, peak_voltage_v, saturated_samples, peak_telemetry,
                                    exchange_p50_us, exchange_p99_us, exchange_max_us)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerReady, tcp, mode, bench)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerVerdict, ticks, late_ticks, worst_lateness_us, exact, realtime_valid,
@@ -112,9 +115,27 @@ const char* name_of(v1::SignalDescription::Kind kind) {
   return "truth";
 }
 
+Json optional_json(std::optional<double> value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json as_json(const std::vector<control::Gain>& gains) {
+  Json out = Json::object();
+  for (const control::Gain& gain : gains)
+    out[gain.name] = gain.value;
+  return out;
+}
+
+Json as_json(const Difference& d) {
+  return {{"largest", d.largest},
+          {"largest_tick", d.largest_tick},
+          {"rms", d.rms()},
+          {"first_tick_beyond", d.first_tick_beyond ? Json(*d.first_tick_beyond) : Json(nullptr)}};
+}
+
 Json demo_run(const DemoRun& run) {
-  return {{"peak_error_counts", run.control.peak_error_counts},
-          {"final_error_counts", run.control.final_error_counts},
+  return {{"peak_error_counts", optional_json(run.control.peak_error_counts)},
+          {"final_error_counts", optional_json(run.control.final_error_counts)},
           {"peak_current_a", run.control.peak_current_a},
           {"peak_voltage_v", run.control.peak_voltage_v.value_or(0.0)},
           {"duration_s", run.control.duration_s},
@@ -231,11 +252,50 @@ std::string change_json(std::uint32_t axis, std::string_view name, double value,
 std::string presets_json() {
   Json out = Json::array();
   for (const control::Preset& preset : control::presets()) {
+    const control::Requirements& needs = preset.needs;
+    const std::optional<control::Run> run = made_as_it_stands(preset);
     out.push_back({{"name", preset.name},
                    {"source", preset.source},
                    {"expectation", preset.expectation},
-                   {"sample_rate_hz", preset.controller.sample_rate_hz},
-                   {"counts_per_revolution", preset.controller.counts_per_revolution}});
+                   {"bench", preset.bench},
+                   {"machine_kind", needs.machine_kind},
+                   {"sample_rate_hz", run ? Json(run->timing().sample_rate_hz) : Json(nullptr)},
+                   {"samples", run ? Json(run->planned_samples()) : Json(nullptr)},
+                   {"counts_per_revolution", needs.counts_per_revolution},
+                   {"pole_pairs", needs.pole_pairs},
+                   {"voltage_limit_v", needs.voltage_limit_v},
+                   {"commands", needs.quantity == control::Quantity::kVoltage ? "voltages" : "currents"},
+                   {"signal", needs.signal},
+                   {"gains", as_json(preset.gains())}});
+  }
+  return out.dump(2);
+}
+
+std::string gains_json(const std::vector<control::Gain>& gains) {
+  return as_json(gains).dump(2);
+}
+
+std::string comparison_json(const Comparison& c) {
+  const auto in_counts = [&c](double rad) {
+    return c.counts_per_rad > 0.0 ? Json(rad * c.counts_per_rad) : Json(nullptr);
+  };
+  Json out = {
+      {"recording", c.recording},   {"axis", c.axis},       {"preset", c.preset}, {"unit", c.unit},
+      {"first_tick", c.first_tick}, {"samples", c.samples}, {"whole", c.whole},   {"threshold", c.threshold}};
+  out["commands"] = as_json(c.commands);
+  for (const auto& [name, difference] : c.terminals)
+    out["terminals"][name] = as_json(difference);
+  out["tracking"] = {{"peak_error_rad", c.tracking_rad.largest},
+                     {"peak_error_tick", c.tracking_rad.largest_tick},
+                     {"rms_error_rad", c.tracking_rad.rms()},
+                     {"final_error_rad", c.final_error_rad},
+                     {"peak_error_counts", in_counts(c.tracking_rad.largest)},
+                     {"final_error_counts", in_counts(c.final_error_rad)}};
+  out["with"] = nullptr;
+  if (!c.other.empty()) {
+    out["with"] = {{"recording", c.other},
+                   {"commands", as_json(c.other_commands)},
+                   {"angle_rad", as_json(c.other_angle_rad)}};
   }
   return out.dump(2);
 }

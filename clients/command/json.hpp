@@ -7,8 +7,9 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/command/control_compare.hpp"
+#include "clients/command/control_run.hpp"
 #include "clients/command/demo_report.hpp"
-#include "clients/command/servo_run.hpp"
 #include "protocols/catalogue.hpp"
 
 /// All JSON that the command writes and reads, so that one file pays for the parser.
@@ -22,6 +23,8 @@ std::string sample_json(const Sample& sample, std::uint32_t axis, std::uint64_t 
 /// A fault, parameter or bump that was taken, with its tick.
 std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick);
 std::string presets_json();
+std::string gains_json(const std::vector<control::Gain>& gains);
+std::string comparison_json(const Comparison& comparison);
 std::string control_json(const ControlReport& report);
 std::string export_json(std::string_view out_file, std::string_view axis, std::uint64_t rows,
                         std::string_view problem);

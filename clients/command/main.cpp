@@ -66,8 +66,11 @@ struct CommandLine {
   SetOptions set;
   BumpOptions bump;
   ControlOptions control;
+  CompareOptions compare;
+  PlotOptions plot;
   std::vector<std::string> loads;
   std::vector<std::string> settings;
+  std::vector<std::string> gains;
   PrintOptions print;
   CanCheckOptions can_check;
   bool csv = false;
@@ -90,6 +93,7 @@ struct CommandLine {
     add_interfaces();
     add_recordings();
     add_export();
+    add_plot();
   }
 
   bool knows(std::string_view subcommand) const {
@@ -190,7 +194,16 @@ struct CommandLine {
                                "tcp:HOST:PORT, unix:PATH, can:BACKEND:CHANNEL?node=N or "
                                "modbus:HOST:PORT?unit=N");
     sub->add_option("--preset", control.preset, "gains and move by name")->capture_default_str();
-    sub->add_flag("--list", control.list, "print the presets and end");
+    sub->add_flag("--list", control.list, "print the presets and end; with --gains all their gains");
+    sub->add_flag("--gains", control.gains, "print the gains of the preset and end");
+    sub->add_option("--gain", gains, "NAME=VALUE: another value for a gain of the preset");
+    sub->add_option("--compare", compare.recording,
+                    "MCAP recording of your controller: what the preset's would have commanded");
+    sub->add_option("--with", compare.other, "--compare: recording of the preset's own run, compared too");
+    sub->add_option("--from", compare.from_tick, "--compare: tick at which the run starts");
+    sub->add_option("--threshold", compare.threshold,
+                    "--compare: [V] or [A]; exit code 1 if a command differs by more")
+        ->check(CLI::NonNegativeNumber);
     sub->add_option("--axis", control.axis, "number or name; CAN and Modbus links name it themselves")
         ->capture_default_str();
     sub->add_option("--csv", control.csv_file, "write every sample to this file");
@@ -206,8 +219,32 @@ struct CommandLine {
         control.loads.push_back(parse_load(load));
       for (const std::string& setting : settings)
         control.settings.push_back(parse_setting(setting));
-      action = [this] { return run_control(control); };
+      control.overrides = parsed_gains();
+      action = [this] { return run_control_or_compare(); };
     });
+  }
+
+  std::vector<control::Gain> parsed_gains() const {
+    std::vector<control::Gain> parsed;
+    for (const std::string& gain : gains) {
+      const ParameterSetting setting = parse_setting(gain);
+      parsed.push_back({setting.name, setting.value});
+    }
+    return parsed;
+  }
+
+  int run_control_or_compare() {
+    if (compare.recording.empty()) {
+      if (!compare.other.empty() || compare.from_tick || compare.threshold) {
+        throw UsageError("--with, --from and --threshold belong to --compare");
+      }
+      return run_control(control);
+    }
+    compare.json = json;
+    compare.preset = control.preset;
+    compare.overrides = control.overrides;
+    compare.axis = control.axis;
+    return run_compare(compare);
   }
 
   void add_print(const std::string& name, const std::string& description, bool has_bus) {
@@ -260,6 +297,24 @@ struct CommandLine {
     sub->callback([this] {
       replay.json = json;
       action = [this] { return run_replay(replay); };
+    });
+  }
+
+  void add_plot() {
+    CLI::App* sub = app.add_subcommand("plot", "a controlled run of a recording as an SVG picture");
+    sub->add_option("FILE", plot.recording, "an MCAP recording")->required();
+    sub->add_option("--out", plot.out_file, "instead of standard output");
+    sub->add_option("--preset", plot.preset, "draws its trajectory and the error too");
+    sub->add_option("--gain", gains, "NAME=VALUE: another value for a gain of the preset");
+    sub->add_option("--axis", plot.axis, "name; default: the first in the file");
+    sub->add_option("--from", plot.from_tick, "tick at which the run starts");
+    sub->add_option("--panels", plot.panels,
+                    "of angle, speed, error, currents, voltages, torque, separated by commas")
+        ->delimiter(',');
+    sub->add_option("--title", plot.title, "default: the preset, or else the file");
+    sub->callback([this] {
+      plot.overrides = parsed_gains();
+      action = [this] { return run_plot(plot); };
     });
   }
 

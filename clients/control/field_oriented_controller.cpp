@@ -27,8 +27,15 @@ FieldOrientedController::FieldOrientedController(const ControllerParameters& p) 
       speed_(p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()),
       difference_(p.counts_per_revolution, p.period_s()) {}
 
-ControlOutput FieldOrientedController::update(const Measurement& m, const Reference& r,
-                                              std::int64_t periods) noexcept {
+std::span<const std::string_view> FieldOrientedController::telemetry_names() const noexcept {
+  static constexpr auto kNames =
+      std::to_array<std::string_view>({"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "flux_wb",
+                                       "flux_angle_rad", "speed_difference_rad_s", "references_clipped"});
+  return kNames;
+}
+
+Setpoint FieldOrientedController::update(const Measurement& m, const Reference& r,
+                                         std::int64_t periods) noexcept {
   if (started_) {
     carry_observers(periods);
   } else {
@@ -70,7 +77,16 @@ ControlOutput FieldOrientedController::update(const Measurement& m, const Refere
   last_current_a_ = current_a;
   last_angle_rad_ = out.measured_angle_rad;
   last_speed_rad_s_ = out.speed_estimate_rad_s;
-  return out;
+  output_ = out;
+  telemetry_ = {out.i_d_a,
+                out.i_q_a,
+                out.i_d_reference_a,
+                out.i_q_reference_a,
+                out.flux_estimate_wb,
+                out.flux_angle_estimate_rad,
+                out.speed_difference_rad_s,
+                out.references_clipped ? 1.0 : 0.0};
+  return {.a = out.u_a_v, .b = out.u_b_v};
 }
 
 void FieldOrientedController::carry_observers(std::int64_t periods) noexcept {
@@ -104,37 +120,48 @@ double FieldOrientedController::quadrature_reference(const Reference& r, double 
   return clamped(acceleration_rad_s2 * amperes_per_acceleration_, limit_a, clipped);
 }
 
+std::span<const GainRow<ControllerParameters>> ControllerParameters::gains() noexcept {
+  using P = ControllerParameters;
+  constexpr GainRule kPositive = GainRule::kPositive;
+  constexpr GainRule kNotNegative = GainRule::kNotNegative;
+  static constexpr auto kRows = std::to_array<GainRow<P>>({
+      {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
+      {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
+       kPositive},
+      {"machine.rotor_resistance_ohm", [](P& p) -> double& { return p.machine.rotor_resistance_ohm; },
+       kPositive},
+      {"machine.rotor_inductance_h", [](P& p) -> double& { return p.machine.rotor_inductance_h; }, kPositive},
+      {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
+      {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
+      {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
+      {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
+      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
+      {"rated_direct_current_a", [](P& p) -> double& { return p.rated_direct_current_a; }, kPositive},
+      {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
+       kPositive},
+      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
+       kNotNegative},
+      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
+       kNotNegative},
+      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
+      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
+       kNotNegative},
+      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
+       kNotNegative},
+      {"flux.proportional_a_per_wb", [](P& p) -> double& { return p.flux.proportional_a_per_wb; },
+       kNotNegative},
+      {"flux.integral_a_per_wbs", [](P& p) -> double& { return p.flux.integral_a_per_wbs; }, kNotNegative},
+      {"speed_observer.angle_per_s", [](P& p) -> double& { return p.speed_observer.angle_per_s; },
+       kNotNegative},
+      {"speed_observer.speed_per_s2", [](P& p) -> double& { return p.speed_observer.speed_per_s2; },
+       kNotNegative},
+  });
+  return kRows;
+}
+
 std::vector<std::string> ControllerParameters::problems() const {
-  std::vector<std::string> found;
-  const auto positive = [&found](const char* name, double x) {
-    if (!(x > 0.0) || std::isinf(x)) found.push_back(std::string(name) + " must be positive and finite");
-  };
-  const auto not_negative = [&found](const char* name, double x) {
-    if (!(x >= 0.0) || std::isinf(x))
-      found.push_back(std::string(name) + " must not be negative and must be finite");
-  };
-  positive("machine.pole_pairs", machine.pole_pairs);
-  positive("machine.mutual_inductance_h", machine.mutual_inductance_h);
-  positive("machine.rotor_resistance_ohm", machine.rotor_resistance_ohm);
-  positive("machine.rotor_inductance_h", machine.rotor_inductance_h);
-  not_negative("machine.friction_nms", machine.friction_nms);
-  positive("machine.inertia_kgm2", machine.inertia_kgm2);
-  positive("sample_rate_hz", sample_rate_hz);
-  positive("counts_per_revolution", counts_per_revolution);
-  positive("voltage_limit_v", voltage_limit_v);
-  positive("current_limit_a", current_limit_a);
-  positive("rated_direct_current_a", rated_direct_current_a);
-  positive("quadrature_reference_limit_a", quadrature_reference_limit_a);
-  not_negative("current.proportional_v_per_a", current.proportional_v_per_a);
-  not_negative("current.integral_v_per_as", current.integral_v_per_as);
-  not_negative("position.integral_per_s3", position.integral_per_s3);
-  not_negative("position.proportional_per_s2", position.proportional_per_s2);
-  not_negative("position.derivative_per_s", position.derivative_per_s);
-  not_negative("flux.proportional_a_per_wb", flux.proportional_a_per_wb);
-  not_negative("flux.integral_a_per_wbs", flux.integral_a_per_wbs);
-  not_negative("speed_observer.angle_per_s", speed_observer.angle_per_s);
-  not_negative("speed_observer.speed_per_s2", speed_observer.speed_per_s2);
-  return found;
+  return range_problems(*this);
 }
 
 }  // namespace drivebench::control

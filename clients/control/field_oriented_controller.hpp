@@ -1,14 +1,18 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "clients/control/controller.hpp"
 #include "clients/control/current_loop.hpp"
 #include "clients/control/frames.hpp"
+#include "clients/control/gains.hpp"
 #include "clients/control/machine.hpp"
 #include "clients/control/observers.hpp"
-#include "clients/control/trajectory.hpp"
 
 namespace drivebench::control {
 
@@ -36,7 +40,7 @@ enum class QuadratureClip {
 struct ControllerParameters {
   InductionMachineModel machine;
   double sample_rate_hz;
-  std::int32_t counts_per_revolution;
+  double counts_per_revolution;
   double voltage_limit_v;  ///< per phase
   double current_limit_a;  ///< per phase, of the amplifier
   double rated_direct_current_a;
@@ -48,6 +52,7 @@ struct ControllerParameters {
   SpeedSource speed_source = SpeedSource::kObserver;
   QuadratureClip quadrature_clip = QuadratureClip::kFixed;
 
+  static std::span<const GainRow<ControllerParameters>> gains() noexcept;
   /// Everything that is wrong, one sentence each; empty when a controller can be built.
   std::vector<std::string> problems() const;
 
@@ -56,14 +61,6 @@ struct ControllerParameters {
   constexpr double rated_flux_wb() const noexcept {
     return machine.mutual_inductance_h * rated_direct_current_a;
   }
-};
-
-/// What the bench says about tick k. Currents must be finite: a wire on which NaN means "nothing yet" is its
-/// reader's business.
-struct Measurement {
-  std::int64_t encoder_count;
-  double i_a_a;
-  double i_b_a;
 };
 
 /// The voltages for tick k and how they came about.
@@ -92,16 +89,23 @@ struct ControlOutput {
 /// (the print has a minus). A reference at its clip freezes its own integrator; a voltage at its limit
 /// freezes all of them. Source: Chiasson 2005, (8.12), (8.19)-(8.21), (8.37), (8.40) (IMC-02, IMC-03, IMO-02,
 /// IMO-04).
-class FieldOrientedController {
+class FieldOrientedController final : public Controller {
  public:
   /// `p` must have no problems().
   explicit FieldOrientedController(const ControllerParameters& p) noexcept;
 
-  /// One sample. `periods` says how many sample periods have passed since the previous call; more than one
-  /// when samples were lost on the way, and then the observers are carried over the gap (the integrators
-  /// count it as one period). The first call defines angle 0.
-  ControlOutput update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept;
+  /// Over a gap the observers are carried along; the integrators count it as one period.
+  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
 
+  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
+  double angle_rad() const noexcept override { return output_.measured_angle_rad; }
+  double speed_rad_s() const noexcept override { return output_.speed_observer_rad_s; }
+  bool saturated() const noexcept override { return output_.voltage_saturated; }
+  std::span<const std::string_view> telemetry_names() const noexcept override;
+  std::span<const double> telemetry() const noexcept override { return telemetry_; }
+
+  /// Of the last sample.
+  const ControlOutput& output() const noexcept { return output_; }
   const ControllerParameters& parameters() const noexcept { return p_; }
 
  private:
@@ -118,6 +122,8 @@ class FieldOrientedController {
   SpeedObserver speed_;
   BackwardDifference difference_;
 
+  ControlOutput output_;
+  std::array<double, 8> telemetry_{};
   bool started_ = false;
   std::int64_t start_count_ = 0;
   double angle_integral_rad_s_ = 0.0;

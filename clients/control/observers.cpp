@@ -23,7 +23,7 @@ void SpeedObserver::step(double measured_angle_rad, double motor_acceleration_ra
                                gains_.speed_per_s2 * error_rad);
 }
 
-BackwardDifference::BackwardDifference(std::int32_t counts_per_revolution, double period_s) noexcept
+BackwardDifference::BackwardDifference(double counts_per_revolution, double period_s) noexcept
     : rad_s_per_count_(2.0 * std::numbers::pi / counts_per_revolution / period_s) {}
 
 double BackwardDifference::step(std::int64_t count, std::int64_t periods) noexcept {

@@ -70,7 +70,7 @@ class SpeedObserver {
 /// Source: Chiasson 2005, (8.38) (IMO-03).
 class BackwardDifference {
  public:
-  BackwardDifference(std::int32_t counts_per_revolution, double period_s) noexcept;
+  BackwardDifference(double counts_per_revolution, double period_s) noexcept;
 
   /// The speed at this sample; the first one has nothing before it and gives 0.
   double step(std::int64_t count, std::int64_t periods) noexcept;

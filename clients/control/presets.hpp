@@ -1,32 +1,19 @@
 #pragma once
 
-#include <span>
-#include <string>
 #include <string_view>
+#include <vector>
 
-#include "clients/control/field_oriented_controller.hpp"
-#include "clients/control/servo_move.hpp"
+#include "clients/control/preset.hpp"
 
 namespace drivebench::control {
 
-/// A controller and a move that belong together, with where their numbers come from.
-struct Preset {
-  std::string_view name;
-  std::string_view source;
-  std::string_view expectation;  ///< what a run of it must show
-  ControllerParameters controller;
-  MoveParameters move;
-};
-
-std::span<const Preset> presets() noexcept;
+/// All presets of all families, in the order of presets/presets_families.hpp.
+const std::vector<Preset>& presets();
 
 /// nullptr when there is none of that name.
-const Preset* find_preset(std::string_view name) noexcept;
+const Preset* find_preset(std::string_view name);
 
 /// The preset name with the fewest letters to change, for "did you mean".
 std::string_view nearest_preset_name(std::string_view name);
-
-/// All presets for people to read, one paragraph each.
-std::string presets_table();
 
 }  // namespace drivebench::control

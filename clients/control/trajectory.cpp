@@ -1,5 +1,6 @@
 #include "clients/control/trajectory.hpp"
 
+#include <array>
 #include <cmath>
 
 namespace drivebench::control {
@@ -17,19 +18,19 @@ Reference cubic_ramp(double max_speed_rad_s, double ramp_s, double u_s) noexcept
 
 }  // namespace
 
+std::span<const GainRow<TrajectoryParameters>> TrajectoryParameters::gains() noexcept {
+  using P = TrajectoryParameters;
+  static constexpr auto kRows = std::to_array<GainRow<P>>({
+      {"move.distance_rad", [](P& p) -> double& { return p.distance_rad; }},
+      {"move.ramp_up_s", [](P& p) -> double& { return p.ramp_up_s; }, GainRule::kPositive},
+      {"move.cruise_s", [](P& p) -> double& { return p.cruise_s; }, GainRule::kNotNegative},
+      {"move.ramp_down_s", [](P& p) -> double& { return p.ramp_down_s; }, GainRule::kPositive},
+  });
+  return kRows;
+}
+
 std::vector<std::string> TrajectoryParameters::problems() const {
-  std::vector<std::string> found;
-  if (!std::isfinite(distance_rad)) found.emplace_back("distance_rad must be finite");
-  // Written so that NaN fails too.
-  if (!(ramp_up_s > 0.0) || std::isinf(ramp_up_s))
-    found.emplace_back("ramp_up_s must be positive and finite");
-  if (!(cruise_s >= 0.0) || std::isinf(cruise_s)) {
-    found.emplace_back("cruise_s must not be negative and must be finite");
-  }
-  if (!(ramp_down_s > 0.0) || std::isinf(ramp_down_s)) {
-    found.emplace_back("ramp_down_s must be positive and finite");
-  }
-  return found;
+  return range_problems(*this);
 }
 
 double TrajectoryParameters::max_speed_rad_s() const noexcept {

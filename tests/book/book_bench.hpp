@@ -5,6 +5,7 @@
 #include "server/bench.hpp"
 #include "server/config.hpp"
 #include "server/engine.hpp"
+#include "tests/server/parameter_row.hpp"
 
 namespace drivebench {
 
@@ -35,18 +36,22 @@ class BookBench {
     run_until(time_s, [](const Sample&) {});
   }
 
-  /// Takes axis 0 and gives it this command at every tick until the time.
+  /// Takes an axis and gives it a command for the present tick.
+  void command(std::uint32_t axis, const PhaseCommand& phases) {
+    constexpr Owner kController = 1;
+    const Tick now = bench_.tick();
+    bench_.submit({.tick = now, .axis = axis, .owner = kController, .action = LeaseAction::kAcquire});
+    bench_.submit({.tick = now,
+                   .axis = axis,
+                   .owner = kController,
+                   .action = Command{.answers = now, .phases = phases}});
+  }
+
+  /// Commands axis 0 at every tick until the time.
   template <class Controller>
   void control_until(double time_s, Controller command_of) {
-    constexpr Owner kController = 1;
     while (now_s() < time_s - 0.5 * period_s()) {
-      const Tick now = bench_.tick();
-      bench_.submit({.tick = now, .axis = 0, .owner = kController, .action = LeaseAction::kAcquire});
-      const PhaseCommand phases = command_of(sample());
-      bench_.submit({.tick = now,
-                     .axis = 0,
-                     .owner = kController,
-                     .action = Command{.answers = now, .phases = phases}});
+      command(0, command_of(sample()));
       bench_.step();
     }
   }

@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
 
 #include "clients/control/observers.hpp"
+#include "tests/book/steady_induction.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
@@ -14,38 +14,13 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// The servo motor turning steadily with rotor currents of one slip frequency: per volt of the stator.
-struct Steady {
-  double torque_nm;
-  double current_a;
-};
-
-/// Solved from the machine's own derivative(), which is linear in state and voltage: x' = j w_e x.
-Steady per_volt(const InductionMachineConstants& c, double speed_rad_s, double slip_rad_s) {
-  const RotorMotion motion{0.0, speed_rad_s, {1.0, 0.0}};
-  const auto column = [&](const InductionMachineState& x, TwoPhase v) {
-    const InductionMachineState d = derivative(c, x, motion, {.voltage_v = v});
-    return std::array<Complex, 2>{Complex(d.i_a_a, d.i_b_a), Complex(d.psi_a_wb, d.psi_b_wb)};
-  };
-  const auto of_current = column({.i_a_a = 1.0}, {0.0, 0.0});
-  const auto of_flux = column({.psi_a_wb = 1.0}, {0.0, 0.0});
-  const auto of_voltage = column({}, {1.0, 0.0});
-  const Complex rate(0.0, c.pole_pairs * speed_rad_s + slip_rad_s);
-  const Complex a = of_current[0] - rate, b = of_flux[0], d = of_current[1], e = of_flux[1] - rate;
-  const Complex det = a * e - b * d;
-  const Complex i = -of_voltage[0] * e / det;
-  const Complex psi = of_voltage[0] * d / det;
-  const InductionMachineState x{i.real(), i.imag(), psi.real(), psi.imag()};
-  return {torque_nm(c, x, motion), std::abs(i)};
-}
-
 /// The largest torque of the wanted sign within 80 V and 6 A, over all slips.
 double best_torque_nm(const InductionMachineConstants& c, double speed_rad_s, double sign) {
   double best = 0.0;
   for (int k = 1; k <= 4000; ++k) {
     const double slip = sign * 0.5 * k;  // [rad/s], far beyond -T_R n_p w and 1/sigma in this range
-    const Steady s = per_volt(c, speed_rad_s, slip);
-    const double volts = std::min(80.0, 6.0 / s.current_a);
+    const SteadyInduction s = per_volt(c, speed_rad_s, slip);
+    const double volts = std::min(80.0, 6.0 / std::abs(s.current_a));
     best = std::max(best, sign * s.torque_nm * volts * volts);
   }
   return sign * best;

@@ -4,7 +4,6 @@
 #include <complex>
 #include <numbers>
 
-#include "plant/parameters/parameters.hpp"
 #include "tests/book/book_bench.hpp"
 
 namespace drivebench {
@@ -17,14 +16,20 @@ double amplitude(const Sample& s) {
   return std::hypot(s.true_i_a_a, s.true_i_b_a);
 }
 
-// AC-19, the bench im-a with friction-free 0, 0.2 and 0.5 N m: closed form of the equivalent circuit, 0.1 %.
+/// Rotor current of im-a seen from the stator, (psi - M i)/L_R, two-phase.
+double rotor_a(const Sample& s) {
+  return std::hypot(s.psi_a_wb - 0.0117 * s.true_i_a_a, s.psi_b_wb - 0.0117 * s.true_i_b_a) / 0.014;
+}
+
+// AC-19, the bench im-a with friction-free 0, 0.2 and 0.5 N m: closed form of the equivalent circuit, 0.1 %;
+// the rotor current of the first case is 0 to 1e-3 of the stator's.
 // Kills: a two-phase source whose phase b does not follow by a quarter, a load with the wrong sign.
 TEST(BookInductionLine, TheTwoPhaseMotorSettlesWhereItsEquivalentCircuitSays) {
   struct Case {
-    double load_nm, speed_rad_s, current_a;
+    double load_nm, speed_rad_s, current_a, rotor_a;
   };
-  for (const Case& c :
-       {Case{0.0, 125.6637, 10.8207}, Case{0.2, 120.1217, 10.7072}, Case{0.5, 111.232, 10.5982}}) {
+  for (const Case& c : {Case{0.0, 125.6637, 10.8207, 0.0}, Case{0.2, 120.1217, 10.7072, 0.5331},
+                        Case{0.5, 111.232, 10.5982, 1.3602}}) {
     BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/im-a.toml");
     config.axes[0].events = {{.tick = 2500, .action = LoadChange{.load_nm = c.load_nm, .ramp_ticks = 0}}};
     BookBench run(config);
@@ -34,6 +39,7 @@ TEST(BookInductionLine, TheTwoPhaseMotorSettlesWhereItsEquivalentCircuitSays) {
     run.run_until(1.0);
     EXPECT_NEAR(run.sample().speed_rad_s, c.speed_rad_s, 1e-3 * c.speed_rad_s);
     EXPECT_NEAR(amplitude(run.sample()), c.current_a, 1e-3 * c.current_a);
+    EXPECT_NEAR(rotor_a(run.sample()), c.rotor_a, 1e-3 * (c.rotor_a > 0.0 ? c.rotor_a : c.current_a));
     EXPECT_NE(run.sample().faults & kOverCurrent, kOverCurrent);
   }
 }
@@ -75,6 +81,7 @@ TEST(BookInductionLine, TheThreePhaseMotorStartsFromTheLine) {
 struct Reading {
   double voltage_v;
   double current_a;
+  double torque_nm;
   std::complex<double> impedance_ohm;
 };
 
@@ -92,7 +99,8 @@ Reading measured(bool blocked) {
   run.run_until(3.0);
   const Sample& s = run.sample();
   const double size = s.meter_u_rms_v / s.meter_i_rms_a;
-  return {s.meter_u_rms_v, s.meter_i_rms_a, std::polar(size, std::atan2(s.meter_q_var, s.meter_p_w))};
+  return {s.meter_u_rms_v, s.meter_i_rms_a, s.torque_nm,
+          std::polar(size, std::atan2(s.meter_q_var, s.meter_p_w))};
 }
 
 // AC-23: no-load and blocked-rotor test as the book evaluates them. L_S comes out right, R_R 15 % low and
@@ -104,6 +112,7 @@ TEST(BookInductionLine, TheNoLoadAndBlockedRotorTestsGiveTheBooksParameters) {
   EXPECT_NEAR(no_load.voltage_v, 208.0 / std::sqrt(3.0), 0.12);
   EXPECT_NEAR(no_load.current_a, 1.30525, 1.3e-3);
   EXPECT_NEAR(blocked.current_a, 8.41017, 8.4e-3);
+  EXPECT_NEAR(blocked.torque_nm, 3.0137, 6e-3);  // AC-22, as is the peak of 11.894 A: sqrt(2) times the above
   constexpr double kStator_ohm = 1.85;
   const double stator_h = no_load.impedance_ohm.imag() / kLine_rad_s;
   const double rotor_ohm = blocked.impedance_ohm.real() - kStator_ohm;
@@ -115,6 +124,31 @@ TEST(BookInductionLine, TheNoLoadAndBlockedRotorTestsGiveTheBooksParameters) {
   EXPECT_NEAR(percent(rotor_ohm, 2.1), -15.0, 0.3);
   EXPECT_NEAR(percent(mutual_h, 0.225), 0.30, 0.3);
   EXPECT_NEAR(percent(sigma, 0.149674), -3.47, 0.3);
+}
+
+// AC-21, the motor im-b behind three amplifiers, its rotor locked: (100, 0, 0) V lift the neutral to a third,
+// the windings see (66.667, -33.333, -33.333) V, and at rest the currents are in that ratio. Kills: a neutral
+// that stays at zero or follows the vector, a common voltage that drives a current.
+TEST(BookInductionLine, OnePhaseAtHundredVoltsLiftsTheNeutralByAThird) {
+  BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/im-b.toml");
+  AxisParameters& p = config.setup.axes[0].parameters;
+  config.setup.command_delay_ticks = 0;
+  p.mechanics.motion = ShaftMotion::kLocked;
+  p.drive.kind = DriveKind::kVoltage;
+  p.sensors.neutral.enabled = true;
+  p.drive.amplifier.over_current_a = 1000.0;
+  BookBench run(config);
+  run.control_until(5.0, [](const Sample&) -> PhaseCommand {
+    return {.gates = Gates::kVoltage, .setpoint = {.a = 100.0}};
+  });
+  const Sample& s = run.sample();
+  EXPECT_NEAR(s.u_n_v, 100.0 / 3.0, 1e-6 * 33.3);
+  EXPECT_NEAR(s.u_a_v - s.u_n_v, 200.0 / 3.0, 1e-6 * 66.7);
+  EXPECT_NEAR(s.u_b_v - s.u_n_v, -100.0 / 3.0, 1e-6 * 33.3);
+  // Direct current after 5 s, some 20 times the slowest time constant of stator and rotor.
+  EXPECT_NEAR(s.true_i_a_a, 200.0 / 3.0 / 1.85, 1e-6 * 36.0);
+  EXPECT_NEAR(s.true_i_b_a, -100.0 / 3.0 / 1.85, 1e-6 * 36.0);
+  EXPECT_NEAR(s.true_i_c_a, -100.0 / 3.0 / 1.85, 1e-6 * 36.0);
 }
 
 // AC-25: IM-C on one phase, the other shorted, from synchronous speed under 0.8 N m: mean speed by
@@ -132,13 +166,8 @@ TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
 
   p.mechanics.motion = ShaftMotion::kImposed;
   p.mechanics.imposed_speed_rad_s = 188.4956;
-  config.axes[0].events = {{.tick = 10'000, .action = ParameterWrite{.row = 0, .value = 0.0}},
+  config.axes[0].events = {{.tick = 10'000, .action = write_of(p, "mechanics.motion", 0.0)},
                            {.tick = 10'000, .action = LoadChange{.load_nm = 0.8, .ramp_ticks = 0}}};
-  for (std::uint32_t row = 0; row < axis_parameters(p).size(); ++row) {
-    if (axis_parameters(p)[row].name == "mechanics.motion") {
-      std::get<ParameterWrite>(config.axes[0].events[0].action).row = row;
-    }
-  }
   BookBench run(config);
   run.run_until(9.0);
   Spread speed;

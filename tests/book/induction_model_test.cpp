@@ -8,6 +8,8 @@
 #include <variant>
 
 #include "plant/axis.hpp"
+#include "plant/parameters/parameters.hpp"
+#include "server/config.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
@@ -21,6 +23,20 @@ PhaseCommand line_voltage(Tick tick, double peak_v) {
   const double angle_rad = kLine_rad_s * kStep_s * (static_cast<double>(tick) + 0.5);
   return {.gates = Gates::kVoltage,
           .setpoint = {.a = peak_v * std::cos(angle_rad), .b = peak_v * std::sin(angle_rad)}};
+}
+
+// The tests of this motor do not read the files. Kills: a servo bench for one of the transports that has
+// another motor, amplifier or sensor than the one that is tested.
+TEST(BookInductionModel, EveryServoBenchHasTheMotorOfTheseTests) {
+  AxisParameters tested = servo_axis();
+  tested.drive.amplifier = {.voltage_limit_v = 80.0, .over_current_a = 6.0, .over_current_trip = false};
+  for (const char* bench : {"servo", "servo-realtime", "servo-can", "servo-can-realtime", "servo-modbus"}) {
+    const BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/" + bench + ".toml");
+    const AxisParameters& shipped = config.setup.axes.at(0).parameters;
+    ASSERT_EQ(shipped.machine.index(), tested.machine.index()) << bench;
+    for (const Parameter& row : axis_parameters(tested))
+      EXPECT_EQ(row.get(shipped), row.get(tested)) << bench << " " << row.name;
+  }
 }
 
 // IMO-07 of the reference: 80 V (two-phase amplitude), 60 Hz, no load. The tolerances are half a unit of the

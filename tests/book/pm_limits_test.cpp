@@ -20,7 +20,8 @@ PmMachineParameters bm500() {
 /// and q is b. Its own derivative() says what voltages that takes.
 class SteadyPm {
  public:
-  explicit SteadyPm(double speed_rad_s) : p_(bm500()), c_(constants_of(p_)), speed_(speed_rad_s) {}
+  explicit SteadyPm(double speed_rad_s, PmMachineParameters p = bm500())
+      : p_(p), c_(constants_of(p)), speed_(speed_rad_s) {}
 
   Dq voltage_v(Dq i) const {
     // i_ab' = n_p w J i_dq must hold; derivative() is linear in the voltage.
@@ -90,9 +91,9 @@ double crossing(double low, double high, F f) {
 }
 
 /// From this speed on the current limit alone needs more than the voltage limit (i_d = 0, i_q = +-I).
-double first_transition(double limit_a, double sign) {
+double first_transition(double limit_a, double sign, const PmMachineParameters& p = bm500()) {
   return crossing(50.0, 900.0, [&](double w) {
-    const Dq v = SteadyPm(w).voltage_v({0.0, sign * limit_a});
+    const Dq v = SteadyPm(w, p).voltage_v({0.0, sign * limit_a});
     return std::hypot(v.d, v.q) - kVoltage_v;
   });
 }
@@ -114,6 +115,11 @@ TEST(BookPmLimits, TheTransitionSpeedsOfTheBm500) {
   EXPECT_NEAR(first_transition(67.36, -1.0), 317.7, 0.7);
   EXPECT_NEAR(second_transition(67.36, 1.0), 340.8, 0.7);
   EXPECT_NEAR(second_transition(67.36, -1.0), 383.4, 0.8);
+  // With the K_m that the book lists, which is not the one its results come from.
+  PmMachineParameters listed = bm500();
+  listed.torque_constant_nm_per_a = 0.243;
+  EXPECT_NEAR(first_transition(22.05, 1.0, listed), 440.0, 0.9);
+  EXPECT_NEAR(first_transition(22.05, -1.0, listed), 476.0, 1.0);
 }
 
 // Case 30. 0.2 %. Kills: a torque that does not agree with the voltages that it takes.

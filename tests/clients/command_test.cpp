@@ -8,6 +8,8 @@
 #include <sstream>
 
 #include "clients/command/commands.hpp"
+#include "clients/command/control_axis.hpp"
+#include "clients/command/control_run.hpp"
 #include "clients/command/json.hpp"
 #include "clients/command/process.hpp"
 #include "clients/command/session.hpp"
@@ -275,27 +277,36 @@ TEST(Json, ReadsOnlyTheServersOwnLines) {
 }
 
 // Catches a peak taken with its sign, over the wrong samples, or a lost tick that is not counted.
-TEST(ServoRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples) {
-  ServoRun run;
+TEST(ControlRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples) {
+  ControlRun run;
+  run.counts_per_rad = 10.0;
+  run.telemetry_names = {"flux_wb", "load_nm"};
   for (std::uint64_t i = 0; i < 200; ++i) {
-    ServoRow row = {.tick = 50 + i};
+    ControlRow row = {.tick = 50 + i};
     row.exchange_us = static_cast<double>(i + 1);
-    row.measured_error_counts = i == 100 ? -2.0 : i == 99 ? 9.0 : 0.0;
-    row.error_counts = i == 10 ? -3.0 : 1.0;
-    row.i_b_a = i == 20 ? -5.5 : 1.0;
-    row.u_a_v = i == 30 ? -40.0 : 0.0;
-    row.command_b_v = i == 30 ? 41.0 : 0.0;
+    row.measured_error_rad = i == 100 ? -0.5 : i == 99 ? 9.0 : 0.0;
+    row.error_rad = i == 10 ? -0.75 : 0.25;
+    row.current_a = {1.0, i == 20 ? -5.5 : 1.0, i == 21 ? 5.75 : 0.0, -9.0};
+    row.voltage_v = {i == 30 ? -40.0 : 0.0, 0.0, 0.0, 90.0};
+    row.setpoint = {0.0, i == 30 ? 41.0 : 0.0, 0.0, 90.0};
+    row.saturated = i < 3;
     run.rows.push_back(row);
+    run.telemetry.insert(run.telemetry.end(), {0.5, i == 40 ? -2.0 : 1.0});
   }
   run.rows.back().tick += 2;
   run.rows.back().periods = 3;
   const ControlReport report = summary_of(run, 0.001);
-  EXPECT_EQ(report.peak_error_counts, 3.0);
-  EXPECT_EQ(report.final_error_counts, 2.0);
-  EXPECT_EQ(report.final_true_error_counts, 1.0);
-  EXPECT_EQ(report.peak_current_a, 5.5);
+  EXPECT_EQ(report.peak_error_rad, 0.75);
+  EXPECT_EQ(report.peak_error_counts, 7.5);
+  EXPECT_EQ(report.final_error_counts, 5.0);
+  EXPECT_EQ(report.final_true_error_counts, 2.5);
+  EXPECT_EQ(report.peak_current_a, 5.75);
+  EXPECT_EQ(report.peak_field_current_a, 9.0);
+  EXPECT_EQ(report.saturated_samples, 3);
+  EXPECT_EQ(report.peak_telemetry, (std::map<std::string, double>{{"flux_wb", 0.5}, {"load_nm", 2.0}}));
   EXPECT_EQ(report.peak_voltage_v, 40.0);
   EXPECT_EQ(report.peak_command_voltage_v, 41.0);
+  EXPECT_FALSE(report.peak_command_current_a.has_value());
   EXPECT_EQ(report.samples, 200);
   EXPECT_EQ(report.missed_ticks, 2);
   EXPECT_NEAR(report.duration_s, 0.202, 1e-12);
@@ -305,28 +316,35 @@ TEST(ServoRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples) 
 }
 
 // Catches a report that passes off the encoder's angle for the truth, or shows what nobody measured.
-TEST(ServoRunSummary, SaysWhatItsNumbersRestOn) {
-  ServoRun run;
-  run.rows = {{.tick = 1, .error_counts = 2.0, .u_a_v = 9.0}};
+TEST(ControlRunSummary, SaysWhatItsNumbersRestOn) {
+  ControlRun run;
+  run.counts_per_rad = 2.0;
+  run.rows = {
+      {.tick = 1, .error_rad = 1.0, .setpoint = {3.0, 0.0, 0.0, 0.0}, .voltage_v = {9.0, 0.0, 0.0, 0.0}}};
   ControlReport report = summary_of(run, 0.001);
   EXPECT_EQ(report.angle_source + " " + report.speed_source, "truth truth");
   EXPECT_EQ(report.final_true_error_counts, 2.0);
   EXPECT_EQ(report.peak_voltage_v, 9.0);
+  run.quantity = control::Quantity::kCurrent;
   run.knows_angle = run.knows_speed = run.knows_voltage = false;
   report = summary_of(run, 0.001);
   EXPECT_EQ(report.angle_source + " " + report.speed_source, "encoder observer");
   EXPECT_EQ(report.peak_error_counts, 2.0);
   EXPECT_FALSE(report.final_true_error_counts.has_value());
   EXPECT_FALSE(report.peak_voltage_v.has_value());
+  EXPECT_FALSE(report.peak_command_voltage_v.has_value());
+  EXPECT_EQ(report.peak_command_current_a, 3.0);
   const std::string json = control_json(report);
   EXPECT_NE(json.find("\"final_true_error_counts\":null"), std::string::npos) << json;
   ASSERT_TRUE(parse_control(json).has_value());
   EXPECT_FALSE(parse_control(json)->peak_voltage_v.has_value());
+  run.counts_per_rad = 0.0;
+  EXPECT_FALSE(summary_of(run, 0.001).peak_error_counts.has_value());
 }
 
 // Catches a preset that is run on a bench it was not made for.
-TEST(ServoRunMismatches, NamesRateCountsAndPolePairs) {
-  const control::Preset& preset = *control::find_preset("book/8.2.2");
+TEST(Mismatches, NameKindsRateCountsPolePairsAndVoltage) {
+  const control::Requirements& needs = control::find_preset("book/8.2.2")->needs;
   v1::BenchDescription bench;
   bench.set_period_s(125e-6);
   v1::AxisDescription& axis = *bench.add_axes();
@@ -338,11 +356,35 @@ TEST(ServoRunMismatches, NamesRateCountsAndPolePairs) {
   set("encoder.counts_per_revolution", 2000);
   set("machine.pole_pairs", 3);
   set("amplifier.voltage_limit_v", 80);
-  EXPECT_TRUE(mismatches(bench, 0, preset).empty());
+  EXPECT_TRUE(mismatches(bench, 0, needs, 8000.0, kAllSignals).empty());  // a link without kinds
+  axis.set_machine_kind("induction");
+  axis.set_drive_kind("voltage_amplifier");
+  EXPECT_TRUE(mismatches(bench, 0, needs, 8000.0, kAllSignals).empty());
+  control::Requirements field = needs;
+  field.signal = "i_f_a";
+  EXPECT_TRUE(mismatches(bench, 0, field, 8000.0, kAllSignals).empty());
+  EXPECT_EQ(mismatches(bench, 0, field, 8000.0, 0).size(), 1U);
+  control::Requirements currents = needs;
+  currents.quantity = control::Quantity::kCurrent;
+  EXPECT_EQ(mismatches(bench, 0, currents, 8000.0, kAllSignals).size(), 1U);
+  axis.set_machine_kind("pm_dc");
+  axis.set_drive_kind("current_amplifier");
+  EXPECT_EQ(mismatches(bench, 0, needs, 8000.0, kAllSignals).size(), 2U);
   bench.set_period_s(250e-6);
   for (v1::ParameterDescription& row : *axis.mutable_parameters())
     row.set_value(row.value() / 2.0);
-  EXPECT_EQ(mismatches(bench, 0, preset).size(), 4U);
+  EXPECT_EQ(mismatches(bench, 0, needs, 8000.0, kAllSignals).size(), 6U);
+}
+
+// Catches a gain that changes the controller but not what it is checked against.
+TEST(Mismatches, GainsThatDescribeTheAxisChangeWhatIsNeeded) {
+  const control::Preset& preset = *control::find_preset("book/8.2.2");
+  const std::vector<control::Gain> gains = {
+      {"counts_per_revolution", 4000.0}, {"machine.pole_pairs", 2.0}, {"voltage_limit_v", 60.0}};
+  const control::Requirements needs = needs_of(preset, gains);
+  EXPECT_EQ(needs.counts_per_revolution, 4000.0);
+  EXPECT_EQ(needs.pole_pairs, 2.0);
+  EXPECT_EQ(needs.voltage_limit_v, 60.0);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ Profile profile_of(unsigned flags) {
   Profile profile;
   profile.fd = (flags & 1) != 0;
   profile.extended = (flags & 2) != 0;
+  profile.wide = (flags & 64) != 0;
   return profile;
 }
 
@@ -41,6 +42,11 @@ bool is_number(const MessageRow& row, const Values& values) {
   return true;
 }
 
+void require_message(const MessageRow& row, const Profile& profile, const Frame& made) {
+  const Match found = match(profile, made);
+  fuzz::require(found.ok() && found.row == &row, "what is encoded is that message");
+}
+
 void check_message(const MessageRow& row, std::uint32_t node, const Profile& profile, const Frame& frame) {
   const Values values = decode(row, profile, frame);
   Frame again = encode(row, profile, node, values);
@@ -57,8 +63,10 @@ void check_message(const MessageRow& row, std::uint32_t node, const Profile& pro
 
   Sample sample;
   update_sample(row, values, sample);
-  const Frame sampled = encode_sample(row, profile, node, sample);
-  fuzz::require(match(profile, sampled).ok(), "what is encoded is a message");
+  for (std::size_t page = 0; page < (is_paged(row) ? kPages : 1); ++page) {
+    const Frame sampled = encode_sample(row, profile, node, sample, static_cast<Page>(page));
+    require_message(row, profile, sampled);
+  }
 }
 
 }  // namespace
@@ -78,11 +86,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   double value{};
   std::copy_n(data + kHead, sizeof value, reinterpret_cast<std::uint8_t*>(&value));
   for (const MessageRow& row : kMessages) {
-    if (find_message(row.message, profile.fd) != &row) continue;
+    if (!is_on(row, profile)) continue;
     Values values;
     values.fill(value);
     const Frame made = encode(row, profile, 1, values);
-    fuzz::require(match(profile, made).ok(), "what is encoded is a message");
+    require_message(row, profile, made);
     const Frame again = encode(row, profile, 1, decode(row, profile, made));
     fuzz::require(again == made || std::isnan(value), "a number is rounded once");
   }

@@ -251,7 +251,7 @@ def make_curves():
 
 def make_can_frames():
     """Flags, identifier, size, data. Flags: 1 FD profile, 2 extended profile; 4 FD frame, 8 extended, 16 remote,
-    32 error."""
+    32 error, 64 a profile with wide axes."""
     frames = {
         "classic-currents": (0, 0x181, "dc0512fde8032301"),
         "classic-command": (0, 0x201, "d204ffff452301c8"),
@@ -265,6 +265,19 @@ def make_can_frames():
         "extended-heartbeat": (10, 0x701, "050102077d000000"),
         "remote": (16, 0x201, "0000000000000000"),
         "error": (32, 0x201, "0000000000000000"),
+        "wide-phases": (64, 0x605, "dc050cfe89670500"),
+        "wide-phase-command": (64, 0x101, "2efb3200452301c8"),
+        "wide-currents": (64, 0x201, "0600f8ff07000401"),
+        "wide-voltages": (64, 0x785, "0089e80330f8f401"),
+        "wide-field": (64, 0x785, "018960099cffb80b"),
+        "wide-speed-sensors": (64, 0x785, "0289c800f40106ff"),
+        "wide-injected": (64, 0x785, "0389010000080000"),
+        "wide-no-page": (64, 0x785, "0489000000000000"),
+        "wide-fd-sensors": (69, 0x185, "896745230000803f000000c0feffffff0000c07f6f12033b8867452323020200"
+                            "0000c03f000000bf00004042000000400000003f000080be0000964305000000"),
+        "wide-fd-details": (69, 0x785, "89674523000020410000a0c10000a0400000c041000080bf0000664300002040"
+                            "0000fa430000fac20000403f01000008"),
+        "wide-fd-command": (69, 0x201, "452301000000c03f000080be040900000000003f000000c0"),
         "huge": (0, 0x123, "ffffffffffffef7f"),
         "nan": (5, 0x123, "000000000000f87f"),
     }

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -10,8 +9,8 @@
 
 #include "plant/machines/pm_machine.hpp"
 #include "plant/parameters/bldc_machine_rows.hpp"
-#include "plant/rk4.hpp"
 #include "tests/plant/bldc_motor.hpp"
+#include "tests/plant/power_balance.hpp"
 
 namespace drivebench {
 namespace {
@@ -97,23 +96,6 @@ TEST(BldcMachine, SensesAreThoseOfTheBook) {
   EXPECT_LT(torque_nm(c, {.i_a_a = 1.0}, motion(0.5 * kPi)), 0.0);
   EXPECT_NEAR(open_circuit_voltages(c, {}, motion(0.5 * kPi, 100.0)).stator.a,
               -51.28 * std::sqrt(2.0 / 3.0) * 2.0, 1e-9);
-}
-
-/// What of the input power is neither stored, nor lost, nor delivered to the shaft, as a part of what flows.
-double unbalanced(const BldcMachineConstants& c, const BldcMachineState& x, const RotorMotion& now,
-                  const TerminalInput& u) {
-  const BldcMachineState slope = derivative(c, x, now, u);
-  // The stored energy is quadratic: a central difference along the slope is its exact derivative.
-  constexpr double kStep_s = 1e-4;
-  const double storing_w = (stored_energy_j(c, advanced(x, kStep_s, slope), now) -
-                            stored_energy_j(c, advanced(x, -kStep_s, slope), now)) /
-                           (2.0 * kStep_s);
-  const double in_a_w = u.voltage_v.a * x.i_a_a;
-  const double in_b_w = u.voltage_v.b * x.i_b_a;
-  const double in_zero_w = u.zero_v * x.i_zero_a;
-  const double out_w = losses_w(c, x, now) + torque_nm(c, x, now) * now.speed_rad_s;
-  return std::abs(in_a_w + in_b_w + in_zero_w - storing_w - out_w) /
-         (std::abs(in_a_w) + std::abs(in_b_w) + std::abs(in_zero_w) + losses_w(c, x, now));
 }
 
 // BL-08. Kills: any wrong sign or factor, a torque constant that differs from the emf constant, a wrong

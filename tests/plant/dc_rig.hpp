@@ -1,13 +1,11 @@
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include "plant/curve.hpp"
-#include "plant/rk4.hpp"
-#include "plant/windings.hpp"
+#include "tests/plant/power_balance.hpp"
 
-/// A DC machine on a plain shaft, with meters for the energies: what the tests of these machines integrate.
+/// A machine on a plain shaft, with meters for the energies: what tests integrate.
 namespace drivebench {
 
 struct RigShaft {
@@ -16,7 +14,7 @@ struct RigShaft {
 };
 
 struct RigEnergy {
-  double drawn_j = 0.0;   ///< at all terminals
+  double drawn_j = 0.0;   ///< at all windings
   double copper_j = 0.0;  ///< losses of the machine
   double friction_j = 0.0;
 };
@@ -51,38 +49,15 @@ inline TerminalInput open_terminals(double field_v = 0.0) {
   return u;
 }
 
-/// Power into the machine at its terminals.
-template <class Constants, class State>
-double drawn_w(const Constants& c, const State& x, const RotorMotion& motion, const TerminalInput& u) {
-  const WindingValues i = winding_currents(c, x, motion);
-  return u.voltage_v.a * i.stator.a + u.field_v * i.field;
-}
-
-/// What of the power is neither stored, nor lost, nor delivered, over the largest of these. The stored energy
-/// is piecewise quadratic: along the slope a central difference is its exact derivative between two kinks.
-template <class Constants, class State>
-double unbalanced(const Constants& c, const State& x, const RotorMotion& motion, const TerminalInput& u) {
-  constexpr double kStep_s = 1e-7;
-  const State slope = derivative(c, x, motion, u);
-  const double storing_w = (stored_energy_j(c, advanced(x, kStep_s, slope), motion) -
-                            stored_energy_j(c, advanced(x, -kStep_s, slope), motion)) /
-                           (2.0 * kStep_s);
-  const double in_w = drawn_w(c, x, motion, u);
-  const double lost_w = losses_w(c, x, motion);
-  const double out_w = torque_nm(c, x, motion) * motion.speed_rad_s;
-  return std::abs(in_w - storing_w - lost_w - out_w) /
-         std::max({std::abs(in_w), std::abs(storing_w), lost_w, std::abs(out_w)});
-}
-
 template <class Constants, class State>
 void step(Rig<State>& rig, double step_s, const Constants& c, const TerminalInput& u, const RigLoad& load) {
   rig = rk4_step(rig, step_s, [&](const Rig<State>& x) noexcept -> Rig<State> {
-    const RotorMotion motion = motion_of(x.shaft);
+    const RotorMotion motion = motion_at(c, x.shaft.angle_rad, x.shaft.speed_rad_s);
     const double torque = torque_nm(c, x.machine, motion);
     return {.machine = derivative(c, x.machine, motion, u),
             .shaft = {(torque - load.friction_nms * motion.speed_rad_s - load.load_nm) / load.inertia_kgm2,
                       motion.speed_rad_s},
-            .energy = {drawn_w(c, x.machine, motion, u), losses_w(c, x.machine, motion),
+            .energy = {input_w(c, x.machine, motion, u), losses_w(c, x.machine, motion),
                        load.friction_nms * motion.speed_rad_s * motion.speed_rad_s}};
   });
 }
@@ -92,7 +67,7 @@ template <class Constants, class State>
 double unaccounted_j(const Rig<State>& rig, const Constants& c, const RigLoad& load) {
   const double speed_rad_s = rig.shaft.speed_rad_s;
   return rig.energy.drawn_j - rig.energy.copper_j - rig.energy.friction_j -
-         stored_energy_j(c, rig.machine, motion_of(rig.shaft)) -
+         stored_energy_j(c, rig.machine, motion_at(c, rig.shaft.angle_rad, speed_rad_s)) -
          0.5 * load.inertia_kgm2 * speed_rad_s * speed_rad_s;
 }
 

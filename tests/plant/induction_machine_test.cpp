@@ -8,15 +8,14 @@
 #include <cstddef>
 #include <random>
 
-#include "plant/rk4.hpp"
+#include "tests/plant/induction_motors.hpp"
+#include "tests/plant/power_balance.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
 namespace {
 
-RotorMotion turning(double speed_rad_s) {
-  return {.angle_rad = 0.0, .speed_rad_s = speed_rad_s, .electrical = {1.0, 0.0}};
-}
+using induction_motors::turning;
 
 struct Point {
   InductionMachineState x;
@@ -31,22 +30,6 @@ Point random_point(std::mt19937_64& engine) {
   return {.x = {draw(20.0), draw(20.0), draw(0.2), draw(0.2)},
           .speed_rad_s = draw(900.0),
           .voltage_v = {draw(80.0), draw(80.0)}};
-}
-
-/// What of the input power is neither stored, nor lost, nor delivered to the shaft, as a fraction of it.
-double unbalanced(const InductionMachineConstants& c, const Point& p, const InductionMachineState& slope,
-                  double torque) {
-  // The stored energy is quadratic: a central difference along the slope is its exact derivative.
-  constexpr double kStep_s = 1e-4;
-  const auto moved = [&](double dt) {
-    return stored_energy_j(c, advanced(p.x, dt, slope), turning(p.speed_rad_s));
-  };
-  const double storing_w = (moved(kStep_s) - moved(-kStep_s)) / (2.0 * kStep_s);
-  const double in_a_w = p.voltage_v.a * p.x.i_a_a;
-  const double in_b_w = p.voltage_v.b * p.x.i_b_a;
-  return std::abs(in_a_w + in_b_w - storing_w - losses_w(c, p.x, turning(p.speed_rad_s)) -
-                  torque * p.speed_rad_s) /
-         (std::abs(in_a_w) + std::abs(in_b_w));
 }
 
 // Case 1 of the reference table, tolerance 5e-5 relative. Kills: exchanged inductances, a lost square.
@@ -90,10 +73,12 @@ TEST(InductionMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
     p.rotor_inductance_h *= 1.0 + 0.1 * (i % 3);
     const InductionMachineConstants c = constants_of(p);
     const Point point = random_point(engine);
-    const InductionMachineState slope =
-        derivative(c, point.x, turning(point.speed_rad_s), {.voltage_v = point.voltage_v});
+    const RotorMotion motion = turning(point.speed_rad_s);
+    const TerminalInput u{.voltage_v = point.voltage_v};
+    const double kept_w = storing_w(c, point.x, motion, derivative(c, point.x, motion, u)) +
+                          losses_w(c, point.x, motion) + torque_nm(c, point.x, motion) * motion.speed_rad_s;
     // Relative to |u_a i_a| + |u_b i_b|, since the phases may cancel.
-    ASSERT_LT(unbalanced(c, point, slope, torque_nm(c, point.x, turning(point.speed_rad_s))), 1e-9)
+    ASSERT_NEAR(input_w(c, point.x, motion, u), kept_w, 1e-9 * exchanged_w(c, point.x, motion, u))
         << "state " << i;
   }
 }
@@ -135,7 +120,8 @@ TEST(InductionMachine, FlippingAnySignBreaksThePowerBalance) {
     for (int i = 0; i < 100; ++i) {
       const Point point = random_point(engine);
       const TermByTerm model = signed_model(c, point, sign);
-      worst = std::max(worst, unbalanced(c, point, model.slope, model.torque_nm));
+      worst = std::max(worst, unbalanced(c, point.x, turning(point.speed_rad_s),
+                                         {.voltage_v = point.voltage_v}, model.slope, model.torque_nm));
       if (flipped < kTerms) continue;
       const InductionMachineState slope =
           derivative(c, point.x, turning(point.speed_rad_s), {.voltage_v = point.voltage_v});

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "plant/machines/pm_machine.hpp"
-#include "plant/rk4.hpp"
+#include "tests/plant/power_balance.hpp"
 
 /// The PM machine as a hybrid stepping motor, with inertia and friction of its own.
 namespace drivebench {
@@ -21,11 +21,6 @@ constexpr double kStepperInertia_kgm2 = 4.5e-5;
 constexpr double kStepperFriction_nms = 8e-4;
 
 constexpr double kRadPerDegree = std::numbers::pi / 180.0;
-
-RotorMotion motion_at(const PmMachineConstants& c, double angle_rad, double speed_rad_s) {
-  return {
-      .angle_rad = angle_rad, .speed_rad_s = speed_rad_s, .electrical = cos_sin(c.pole_pairs * angle_rad)};
-}
 
 struct Drive {
   PmMachineState machine{};

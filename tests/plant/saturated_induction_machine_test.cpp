@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -305,38 +304,6 @@ TEST(SaturatedInductionMachine, NoLoadCurrentFollowsTheCurve) {
     EXPECT_NEAR(length(stator_a(c, x)), current_a, 1e-6 * current_a);
     EXPECT_NEAR(torque_nm(c, x, motion(0.0)), 0.0, 1e-6);
   }
-}
-
-struct Audit {
-  SaturatedInductionMachineState machine;
-  double speed_rad_s;
-  TwoPhase in_and_lost_j;
-};
-
-// The balance along a start through all segments of the curve. Kills: an energy that jumps at a point of it.
-TEST(SaturatedInductionMachine, EnergyIsKeptAlongAStart) {
-  const SaturatedInductionMachineConstants c = constants_of(saturating());
-  constexpr double kStep_s = 5e-6;
-  constexpr double kInertia_kgm2 = 1.1e-4;
-  Audit x{};
-  double largest_wb = 0.0;
-  for (int n = 0; n < 20'000; ++n) {
-    const double phase = 377.0 * kStep_s * n;
-    const TerminalInput u{.voltage_v = {60.0 * std::cos(phase), 60.0 * std::sin(phase)}};
-    x = rk4_step(x, kStep_s, [&](const Audit& s) noexcept -> Audit {
-      const RotorMotion now = motion(s.speed_rad_s);
-      return {derivative(c, s.machine, now, u),
-              torque_nm(c, s.machine, now) / kInertia_kgm2,
-              {dot(u.voltage_v, stator_a(c, s.machine)), losses_w(c, s.machine, now)}};
-    });
-    largest_wb = std::max(largest_wb, length(magnetising_wb(c, x.machine)));
-  }
-  const double kept_j =
-      stored_energy_j(c, x.machine, motion(0.0)) + 0.5 * kInertia_kgm2 * x.speed_rad_s * x.speed_rad_s;
-  EXPECT_GT(largest_wb, 0.08);
-  EXPECT_GT(x.speed_rad_s, 100.0);
-  // RK4 loses order at the points of the curve.
-  EXPECT_NEAR(x.in_and_lost_j.a, x.in_and_lost_j.b + kept_j, 1e-6 * x.in_and_lost_j.a);
 }
 
 // Kills: a factor that reaches the wrong parameter, a time constant that forgets saturation.

@@ -11,6 +11,7 @@
 #include "plant/machines/induction_machine.hpp"
 #include "plant/rk4.hpp"
 #include "tests/plant/induction_motors.hpp"
+#include "tests/plant/power_balance.hpp"
 
 namespace drivebench {
 namespace {
@@ -264,15 +265,11 @@ TEST(ThreePhaseInduction, ThePowerOfThePhasesIsStoredLostOrDelivered) {
     const InductionMachineState x{draw(20.0), draw(20.0), draw(1.0), draw(1.0)};
     const RotorMotion now = turning(draw(200.0));
     const InductionMachineState slope = derivative(c, x, now, {.voltage_v = plane(u)});
-    // The stored energy is quadratic: a central difference along the slope is its exact derivative.
-    constexpr double kStep_s = 1e-4;
-    const double storing_w = (stored_energy_j(c, advanced(x, kStep_s, slope), now) -
-                              stored_energy_j(c, advanced(x, -kStep_s, slope), now)) /
-                             (2.0 * kStep_s);
     const Phases i = phases({x.i_a_a, x.i_b_a});
     const double in_w = u[0] * i[0] + u[1] * i[1] + u[2] * i[2];
     const double size_w = std::abs(u[0] * i[0]) + std::abs(u[1] * i[1]) + std::abs(u[2] * i[2]);
-    ASSERT_NEAR(in_w, storing_w + losses_w(c, x, now) + torque_nm(c, x, now) * now.speed_rad_s,
+    ASSERT_NEAR(in_w,
+                storing_w(c, x, now, slope) + losses_w(c, x, now) + torque_nm(c, x, now) * now.speed_rad_s,
                 1e-9 * size_w);
   }
 }

@@ -185,7 +185,7 @@ TEST(SeparateDcMachine, FieldCouplingIsTheSawtoothOfTheCommutatorTimesTheChangeO
   const double field_slope = 300.0 - 100.0 * 25.0 / 20.0;
   const double induced_v = 0.03 / 4.0 * commutator_sawtooth(c, 0.3) * field_slope;
   EXPECT_NEAR(derivative(c, x, at(0.3), u).i_a_a - plain, induced_v / 5e-3, 1e-9);
-  EXPECT_NEAR(unbalanced(c, x, at(0.3), u) * drawn_w(c, x, at(0.3), u), std::abs(30.0 * induced_v), 1e-4);
+  EXPECT_NEAR(unbalanced(c, x, at(0.3), u) * input_w(c, x, at(0.3), u), std::abs(30.0 * induced_v), 1e-4);
   double sum = 0.0;
   for (int n = 0; n < 1000; ++n)
     sum += commutator_sawtooth(c, quarter_rad * (n + 0.5) / 1000.0);

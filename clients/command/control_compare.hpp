@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace drivebench::command {
+
+/// How far two series are apart.
+struct Difference {
+  double largest = 0.0;
+  std::uint64_t largest_tick = 0;
+  double sum_of_squares = 0.0;
+  std::int64_t count = 0;
+  std::optional<std::uint64_t> first_tick_beyond;  ///< the threshold
+
+  void add(std::uint64_t tick, double difference, double threshold) noexcept;
+  double rms() const noexcept;
+};
+
+/// A recorded run beside the reference controller that was fed with the same samples.
+struct Comparison {
+  std::string recording;
+  std::string axis;
+  std::string preset;
+  std::string unit;  ///< of the commands
+  double threshold = 0.0;
+  std::uint64_t first_tick = 0;
+  std::int64_t samples = 0;
+  bool whole = false;   ///< the recording reaches the end of the run
+  Difference commands;  ///< recorded - reference, all terminals
+  std::vector<std::pair<std::string, Difference>> terminals;
+  Difference tracking_rad;  ///< reference of the trajectory - recorded angle
+  double final_error_rad = 0.0;
+  double counts_per_rad = 0.0;  ///< 0: not known
+  std::string other;            ///< recording of the reference's own run; empty: none
+  Difference other_commands;    ///< recorded - those of that run, at the same time
+  Difference other_angle_rad;
+};
+
+}  // namespace drivebench::command

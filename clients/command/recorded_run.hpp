@@ -1,0 +1,35 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocols/sample.hpp"
+
+namespace drivebench::command {
+
+/// A sample of a recording that a controller answered, and the answer.
+struct Answered {
+  Sample sample;
+  v1::Command command;
+};
+
+/// What one controller did on one axis.
+struct RecordedRun {
+  std::string axis;
+  double period_s = 0.0;
+  std::vector<Answered> rows;  ///< in the order of their ticks, at least one
+};
+
+/// Whether a command asks for voltages or currents: gates off or shorted ask for nothing.
+bool asks_for_something(const v1::Command& command) noexcept;
+
+/// Reads the run of one axis (empty or "0": the first in the file) from its first command that asks for
+/// something on, or from the tick that is named. Throws UsageError if there is none.
+RecordedRun read_run(const std::string& path, const std::string& axis,
+                     std::optional<std::uint64_t> from_tick);
+
+}  // namespace drivebench::command

@@ -1,0 +1,24 @@
+#pragma once
+
+namespace drivebench::control {
+
+/// What the controller believes about a brushless DC machine with trapezoidal emf, an isolated star:
+///   (L_S + M)·di_k/dt = u_k − v_N − R_S·i_k + e_p·ω·e(n_p·θ − (k−1)·120°)
+///   J·dω/dt = −τ_p·Σ e_k·i_k − f·ω − τ_L        with τ_p = e_p
+/// The emf has the sense of the terminal voltage, so that a motor takes currents of the sign opposite to e.
+/// Source: Chiasson 2005, chapter 10 (BL-01).
+struct BldcMachineModel {
+  double pole_pairs;
+  double resistance_ohm;            ///< per phase
+  double torque_constant_nm_per_a;  ///< τ_p of a phase, also e_p [V·s/rad]
+  double friction_nms;              ///< viscous, f [N·m·s/rad]; for the speed observer alone
+  double inertia_kgm2;
+
+  constexpr double friction_rate_per_s() const noexcept { return friction_nms / inertia_kgm2; }
+  /// 2·τ_p/J: two phases carry the current.
+  constexpr double acceleration_per_a() const noexcept {
+    return 2.0 * torque_constant_nm_per_a / inertia_kgm2;
+  }
+};
+
+}  // namespace drivebench::control

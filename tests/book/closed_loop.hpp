@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/control/presets.hpp"
+#include "clients/control/run.hpp"
+#include "server/bench.hpp"
+#include "server/config.hpp"
+
+namespace drivebench {
+
+/// What is different from the preset's own bench file.
+struct ClosedLoopOptions {
+  std::string bench{};  ///< configs/benches/<bench>.toml; empty: the preset's
+  std::vector<control::Gain>
+      parameters{};              ///< of axis 0, by their names: {"machine.rotor_resistance_ohm", 5.85}
+  int command_delay_ticks = -1;  ///< -1: as the bench file says
+  double sample_rate_hz = 0.0;   ///< 0: as the bench file says; the substep is kept about as long
+};
+
+/// A load torque from a time after the start of the trajectory.
+struct LoadStep {
+  double load_nm;
+  double after_s;
+};
+
+/// One sample of a run.
+struct ClosedLoopRow {
+  double time_s;  ///< since the start of the trajectory
+  control::RunPhase phase;
+  control::Reference reference;
+  Sample sample;               ///< what the bench said, the truth included
+  control::Setpoint setpoint;  ///< what the controller answered
+  double angle_rad;            ///< true, since the first sample of the run
+  double error_rad;            ///< reference - true angle
+  bool saturated;
+  std::vector<double> telemetry;
+};
+
+/// What a run amounted to, from prepare to hold unless it says otherwise.
+struct Outcome {
+  double peak_error_rad = 0.0;  ///< of the true angle
+  double peak_error_counts = 0.0;
+  double final_error_counts = 0.0;  ///< of the true angle, largest of the last 100 samples
+  double final_encoder_error_counts = 0.0;
+  double peak_speed_rad_s = 0.0;        ///< true
+  double peak_speed_error_rad_s = 0.0;  ///< reference - true speed
+  double peak_current_a = 0.0;          ///< measured, of any phase
+  double peak_field_current_a = 0.0;
+  double peak_setpoint = 0.0;          ///< asked for, of any phase [V or A]
+  double peak_voltage_v = 0.0;         ///< at the machine, of any phase
+  std::int64_t saturated_samples = 0;  ///< as the controller has it
+  std::int64_t clipped_samples = 0;    ///< as the bench has it: fault bit voltage_saturated
+  std::int64_t samples = 0;
+  std::uint64_t faults = 0;  ///< of the last sample
+  std::vector<std::string_view> telemetry_names;
+  std::vector<ClosedLoopRow> rows;
+
+  /// A telemetry column by its name.
+  std::size_t column(std::string_view name) const;
+  /// The largest magnitude of a telemetry column.
+  double peak_of(std::string_view telemetry_name) const;
+};
+
+/// A preset's controller on the product's own bench, in process and in lockstep. Runs one after the other
+/// start where the last one stopped, with the time that passes between them under the last command.
+///   ClosedLoop loop("book/8.2.2", {.parameters = {{"machine.rotor_resistance_ohm", 5.85}}});
+///   const Outcome seen = loop.run();
+class ClosedLoop {
+ public:
+  explicit ClosedLoop(std::string_view preset, const ClosedLoopOptions& options = {});
+
+  /// The preset with these gains.
+  Outcome run(std::span<const control::Gain> gains = {}, std::span<const LoadStep> loads = {});
+  Outcome run(std::vector<control::Gain> gains, std::vector<LoadStep> loads = {}) {
+    return run(std::span<const control::Gain>(gains), std::span<const LoadStep>(loads));
+  }
+  /// A run of your own making.
+  Outcome run(control::Run run, std::span<const LoadStep> loads = {});
+  /// Gates off for so long.
+  void rest(double duration_s);
+  /// From now on.
+  void set_load(double load_nm);
+  void set_parameter(std::string_view name, double value);
+
+  Bench& bench() { return bench_; }
+  const Sample& sample() const { return bench_.sample(0); }
+  double period_s() const { return static_cast<double>(config_.setup.period_ns) * 1e-9; }
+  double counts_per_rad() const;
+
+ private:
+  void submit(Tick tick, const Action& action);
+
+  const control::Preset& preset_;
+  BenchConfig config_;
+  Bench bench_;
+};
+
+/// What the sample tells a controller.
+control::Measurement measurement_of(const Sample& sample);
+
+/// Short: one run of a preset on its own bench.
+inline Outcome closed_loop(std::string_view preset, const ClosedLoopOptions& options = {},
+                           std::vector<control::Gain> gains = {}, std::vector<LoadStep> loads = {}) {
+  return ClosedLoop(preset, options).run(std::move(gains), std::move(loads));
+}
+
+}  // namespace drivebench
