@@ -87,7 +87,7 @@ class DriveTrain final : public Train {
     TerminalDrive drive{};
     TerminalCircuit circuit{};
     int event = -1;
-    PhaseValues current_a{};  ///< of the terminals, at its start; once it is finished, at its end
+    PhaseValues current_a{};  ///< of the terminals, at its start; at its end once that is known
     bool plain = false;       ///< every terminal conducts at a constant voltage, nothing is shorted
     bool open = false;        ///< no terminal is driven, none carries a current
     bool stays = false;       ///< either of them, and the next piece has the same
@@ -144,15 +144,15 @@ class DriveTrain final : public Train {
   /// Whether the circuit is that of the last piece but for the switches.
   bool goes_on(AxisCore& core, AxisState& state, double start_s, const Whole& x) noexcept;
   /// A piece in which nothing happens that anybody follows.
-  void run_smooth(AxisCore& core, const AxisState& state, Whole& x, double start_s, double end_s,
-                  double load_nm) noexcept;
+  void run_smooth(AxisCore& core, Whole& x, double start_s, double end_s, double load_nm) noexcept;
   void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
                  double load_nm) noexcept;
   void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
                     const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
   /// Takes out what the integration lets a blocked current drift.
-  void keep_open(const AxisCore& core, const AxisState& state, State& x, const RotorMotion& motion) noexcept;
+  void keep_open(const AxisCore& core, const AxisState& state, State& x,
+                 const RotorMotion& motion) const noexcept;
   /// Of the terminals, at the end of the last piece.
   PhaseValues end_voltages(const AxisCore& core, const AxisState& state, const State& x,
                            const RotorMotion& motion) const noexcept;

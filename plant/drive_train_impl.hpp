@@ -1,6 +1,6 @@
 #pragma once
 
-#include "plant/drive_train.hpp"
+#include "plant/drive_train_terminals.hpp"
 
 namespace drivebench {
 
@@ -79,97 +79,6 @@ void DriveTrain<Machine, Shaft>::step_varying(const AxisCore& core, Whole& x, do
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::drive_windings(const AxisCore& core, const ThreePhase& v) noexcept {
-  const WindingVoltages u = winding_voltages(core.connection, v);
-  piece_.circuit.start.voltage_v = u.stator_v;
-  piece_.circuit.start.zero_v = u.zero_v;
-  piece_.circuit.start_v = {.a = v.a, .b = v.b, .c = v.c, .field = piece_.drive.field_v};
-  if (!core.follows) return;
-  piece_.circuit.mean_v = piece_.circuit.start_v;
-  piece_.circuit.end_v = piece_.circuit.start_v;
-}
-
-template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::hold_constant(const TerminalInput& input) noexcept {
-  piece_.circuit.start = input;
-  piece_.circuit.constant = true;
-  piece_.circuit.dying = 0;
-  piece_.circuit.short_circuit = false;
-}
-
-template <class Machine, class Shaft>
-bool DriveTrain<Machine, Shaft>::conduct(const AxisCore& core, const AxisState& state) noexcept {
-  ThreePhase terminal_v;
-  TerminalSet dying;
-  if (!all_conduct(core.connection, piece_.drive, state.open_terminals, piece_.current_a, terminal_v, dying))
-    return false;
-  piece_.circuit.dying = dying;
-  drive_windings(core, terminal_v);
-  return true;
-}
-
-template <class Machine, class Shaft>
-bool DriveTrain<Machine, Shaft>::leave_open(const AxisCore& core, const State& x,
-                                            const RotorMotion& motion) noexcept {
-  const WindingValues emf_v = open_circuit_voltages(c_, x, motion);
-  // No phase has more than the sum of the components.
-  const double most_v = std::abs(emf_v.stator.a) + std::abs(emf_v.stator.b) + std::abs(emf_v.zero);
-  if (most_v > piece_.drive.rail_v && !diodes_block(core.connection, piece_.drive, emf_v)) return false;
-  if (core.follows) {
-    piece_.circuit.start_v = open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
-    piece_.circuit.mean_v = piece_.circuit.start_v;
-  }
-  return true;
-}
-
-template <class Machine, class Shaft>
-PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const AxisState& state,
-                                                     const State& x,
-                                                     const RotorMotion& motion) const noexcept {
-  if (piece_.plain) return piece_.circuit.start_v;
-  if (state.open_terminals == 0) return piece_.circuit.end_v;
-  const WindingValues emf_v = open_circuit_voltages(c_, x, motion);
-  if (piece_.open) return open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
-  TerminalDrive drive = piece_.drive;
-  if (!drive.constant) drive.start_v = drive.end_v;
-  TerminalSet open = state.open_terminals;
-  return connect(core.connection, drive, state.injected, piece_.current_a, emf_v, open).start_v;
-}
-
-template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state, double start_s,
-                                               double duration_s, const State& x,
-                                               const RotorMotion& motion) noexcept {
-  if (piece_.stays && (piece_.plain || leave_open(core, x, motion))) return;
-  if (piece_.plain && core.drive.only_switches(state.drive)) {
-    core.drive.switch_terminals(state.drive, start_s, piece_.drive);
-    if (conduct(core, state)) return;
-  }
-  piece_.drive = core.drive.at(state.drive, start_s, duration_s, piece_.current_a);
-  const TerminalSet all = all_terminals(core.connection);
-  const bool sound =
-      piece_.drive.constant && state.injected.phase_short == 0.0 && state.injected.neutral_short == 0.0;
-  if (sound) hold_constant({.field_v = piece_.drive.field_v});
-  piece_.plain = sound && conduct(core, state);
-  piece_.open = sound && (state.open_terminals & all) == all && !any_driven(core.connection, piece_.drive) &&
-                leave_open(core, x, motion);
-  piece_.stays =
-      (piece_.open || (piece_.plain && piece_.circuit.dying == 0)) && core.drive.steady(state.drive);
-  if (piece_.plain) {
-    state.open_terminals = 0;
-  } else if (piece_.open) {
-    TerminalInput none = open_input(core.connection, all);
-    none.field_v = piece_.drive.field_v;
-    hold_constant(none);
-    state.open_terminals = all;
-  } else {
-    piece_.circuit = connect(core.connection, piece_.drive, state.injected, piece_.current_a,
-                             open_circuit_voltages(c_, x, motion), state.open_terminals);
-    if (piece_.circuit.short_circuit) trip(core, state);
-  }
-}
-
-template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying,
                                                 const State& x, const RotorMotion& motion, double corner,
                                                 EventValues& values) const noexcept {
@@ -244,58 +153,13 @@ Crossing DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& sta
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::settle_terminals(const AxisCore& core, AxisState& state, State& x,
-                                                  const RotorMotion& motion,
-                                                  int electrical_event) const noexcept {
-  const int terminal = nth_terminal(piece_.circuit.dying, electrical_event);
-  if (terminal < 0) return;  // a corner
-  state.open_terminals = opened(core.connection, state.open_terminals, terminal);
-  x = restricted(c_, x, motion, open_input(core.connection, state.open_terminals));
-}
-
-template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::keep_open(const AxisCore& core, const AxisState& state, State& x,
-                                           const RotorMotion& motion) noexcept {
-  if (state.open_terminals == 0) return;
-  x = restricted(c_, x, motion,
-                 piece_.open ? piece_.circuit.start : open_input(core.connection, state.open_terminals));
-  piece_.current_a = currents(core, state, x, motion);
-}
-
-template <class Machine, class Shaft>
-PhaseValues DriveTrain<Machine, Shaft>::currents(const AxisCore& core, const AxisState& state, const State& x,
-                                                 const RotorMotion& motion) const noexcept {
-  return terminal_currents(core.connection, winding_currents(c_, x, motion), state.open_terminals);
-}
-
-template <class Machine, class Shaft>
-Measurable DriveTrain<Machine, Shaft>::measurable(const AxisCore& core, const AxisState& state,
-                                                  const State& x, const RotorMotion& motion,
-                                                  const PhaseValues& current_a,
-                                                  const PhaseValues& voltage_v) const noexcept {
-  Measurable m{.current_a = current_a,
-               .voltage_v = voltage_v,
-               .bus_v = state.drive.bus_v,
-               .temperature_k = state.thermal.temperature_k,
-               .angle_rad = motion.angle_rad,
-               .speed_rad_s = motion.speed_rad_s};
-  if (core.connection == Connection::kStar) {
-    m.neutral_v = (voltage_v.a + voltage_v.b + voltage_v.c) / 3.0;
-    if constexpr (requires { neutral_voltage_v(c_, x, motion, 0.0); }) {
-      m.neutral_v = neutral_voltage_v(c_, x, motion, m.neutral_v);
-    }
-  }
-  return m;
-}
-
-template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state, double start_s,
                                               double duration_s, const State& from, const State& to,
                                               const RotorMotion& from_motion,
                                               const RotorMotion& to_motion) noexcept {
-  const PhaseValues from_a = piece_.current_a;
-  piece_.current_a = currents(core, state, to, to_motion);
   if (core.follows) {
+    const PhaseValues from_a = piece_.current_a;
+    piece_.current_a = currents(core, state, to, to_motion);
     const Measurable before = measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v);
     const Measurable after =
         measurable(core, state, to, to_motion, piece_.current_a, end_voltages(core, state, to, to_motion));
@@ -321,6 +185,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     if (core.shaft_has_events || blocked) x.shaft = locked(core.shaft, x.shaft, blocked);
     const Whole from = x;
     const RotorMotion from_motion = motion_of(from);
+    piece_.current_a = currents(core, state, from.machine, from_motion);
     connect_piece(core, state, start_s, duration_s, from.machine, from_motion);
     ShaftBranch branch;
     if (core.shaft_has_events || blocked) {
@@ -358,8 +223,8 @@ void DriveTrain<Machine, Shaft>::look_up_angle(const Shaft& shaft) noexcept {
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::run_smooth(AxisCore& core, const AxisState& state, Whole& x, double start_s,
-                                            double end_s, double load_nm) noexcept {
+void DriveTrain<Machine, Shaft>::run_smooth(AxisCore& core, Whole& x, double start_s, double end_s,
+                                            double load_nm) noexcept {
   const double start_rad = x.shaft.angle_rad;
   const double start_rad_s = x.shaft.speed_rad_s;
   step(core, x, end_s - start_s, ShaftBranch{}, load_nm);
@@ -369,7 +234,6 @@ void DriveTrain<Machine, Shaft>::run_smooth(AxisCore& core, const AxisState& sta
                .end_rad = x.shaft.angle_rad,
                .start_rad_s = start_rad_s,
                .end_rad_s = x.shaft.speed_rad_s});
-  piece_.current_a = currents(core, state, x.machine, motion_of(x));
 }
 
 template <class Machine, class Shaft>
@@ -378,7 +242,10 @@ bool DriveTrain<Machine, Shaft>::goes_on(AxisCore& core, AxisState& state, doubl
   if (piece_.stays) return piece_.plain || leave_open(core, x.machine, motion_of(x));
   if (!piece_.plain || !core.drive.only_switches(state.drive)) return false;
   core.drive.switch_terminals(state.drive, start_s, piece_.drive);
-  return conduct(core, state) && piece_.circuit.dying == 0;
+  if (driven_count(core.connection, piece_.drive) != terminal_count(core.connection)) return false;
+  piece_.circuit.dying = 0;
+  drive_windings(core, piece_.drive.start_v);
+  return true;
 }
 
 template <class Machine, class Shaft>
@@ -387,7 +254,6 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
   x.machine = machine_of(state);
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
-  piece_.current_a = currents(core, state, x.machine, motion_of(x));
   piece_.plain = piece_.open = piece_.stays = false;
   const bool smooth =
       !Machine::kHasCorners && !core.shaft_has_events && !core.follows && state.injected.blocked_rotor == 0.0;
@@ -397,16 +263,22 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
     for (double start_s = n * core.step_s; start_s < end_s;) {
       const double stop_s = std::min(end_s, core.drive.next_edge_s(state.drive, start_s));
       if (smooth && goes_on(core, state, start_s, x)) {
-        run_smooth(core, state, x, start_s, stop_s, load_nm);
+        run_smooth(core, x, start_s, stop_s, load_nm);
       } else {
         run_piece(core, state, x, start_s, stop_s, load_nm);
       }
       start_s = stop_s;
     }
-    if (!piece_.open) keep_open(core, state, x.machine, motion_of(x));
+    if (piece_.open) continue;
+    const RotorMotion motion = motion_of(x);
+    keep_open(core, state, x.machine, motion);
+    piece_.current_a = currents(core, state, x.machine, motion);
     if (check_over_current(core, state, piece_.current_a)) piece_.stays = false;
   }
-  if (piece_.open) keep_open(core, state, x.machine, motion_of(x));
+  if (piece_.open) {
+    keep_open(core, state, x.machine, motion_of(x));
+    piece_.current_a = currents(core, state, x.machine, motion_of(x));
+  }
   end_run(core, state, x.machine, motion_of(x));
   keep_machine(state, x.machine);
   keep_shaft(state, x.shaft);
@@ -477,6 +349,7 @@ void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double 
   if (at_event && piece_.event >= 0) settle_terminals(core, state, piece_.stage, end, piece_.event);
   keep_open(core, state, piece_.stage, end);
   finish_piece(core, state, start_s, duration_s, piece_.from, piece_.stage, turned(from), end);
+  piece_.current_a = currents(core, state, piece_.stage, end);
   end_run(core, state, piece_.stage, end);
   keep_machine(state, piece_.stage);
 }

@@ -59,10 +59,10 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
 PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
                                    double field_v) noexcept;
 
-constexpr bool any_driven(Connection connection, const TerminalDrive& drive) noexcept {
-  bool driven = false;
+constexpr int driven_count(Connection connection, const TerminalDrive& drive) noexcept {
+  int driven = 0;
   for (int k = 0; k < terminal_count(connection); ++k)
-    driven = driven || drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven;
+    driven += drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven ? 1 : 0;
   return driven;
 }
 
