@@ -149,6 +149,7 @@ Outcome ClosedLoop::run(control::Run run, std::span<const LoadStep> loads) {
              .angle_rad = angle_rad,
              .error_rad = error_rad,
              .saturated = run.controller().saturated(),
+             .speed_estimate_rad_s = run.controller().speed_rad_s(),
              .telemetry = {telemetry.begin(), telemetry.end()}},
             counts_per_rad());
     if (seen.samples + 100 > run.planned_samples()) {

@@ -40,6 +40,7 @@ struct ClosedLoopRow {
   double angle_rad;            ///< true, since the first sample of the run
   double error_rad;            ///< reference - true angle
   bool saturated;
+  double speed_estimate_rad_s;  ///< the controller's
   std::vector<double> telemetry;
 };
 
