@@ -188,7 +188,8 @@ TEST(OptimumTorque, BaseSpeeds) {
   SteadyInductionModel rounded = kServo;
   rounded.leakage = 1.0 - 0.0117 / 0.014;
   EXPECT_NEAR(rpm(base_speed_rad_s(rounded, kLimits, TorqueSign::kGenerating)), 5409.0, 5.4);
-  // Enough current for 2.1 times the voltage: no speed at which the current alone limits.
+  // With 23 V the voltage limits at standstill already, with 5 V at any speed.
+  EXPECT_EQ(base_speed_rad_s(kServo, {.voltage_v = 23.0, .current_a = 6.0}, TorqueSign::kMotoring), 0.0);
   EXPECT_EQ(base_speed_rad_s(kServo, {.voltage_v = 5.0, .current_a = 6.0}, TorqueSign::kMotoring), 0.0);
 }
 
