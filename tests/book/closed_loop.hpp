@@ -103,9 +103,6 @@ class ClosedLoop {
   Bench bench_;
 };
 
-/// What the sample tells a controller.
-control::Measurement measurement_of(const Sample& sample);
-
 /// Short: one run of a preset on its own bench.
 inline Outcome closed_loop(std::string_view preset, const ClosedLoopOptions& options = {},
                            std::vector<control::Gain> gains = {}, std::vector<LoadStep> loads = {}) {
