@@ -103,9 +103,9 @@ Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& pla
   if (name == "currents") return currents(run);
   if (name == "voltages") return voltages(run);
   if (name == "torque") {
-    return {"torque [N m]",
-            {{"machine", column(run, [](const Answered& row) { return row.sample.torque_nm; })},
-             {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}}};
+    return panel_of("torque [N m]",
+                    {{"machine", column(run, [](const Answered& row) { return row.sample.torque_nm; })},
+                     {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}});
   }
   throw UsageError(
       fmt::format("no panel '{}': angle, speed, error, currents, voltages and torque there are", name));

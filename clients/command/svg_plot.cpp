@@ -18,7 +18,7 @@ constexpr double kTop = 34.0;
 constexpr double kPanelHeight = 120.0;
 constexpr double kGap = 14.0;
 constexpr double kBottom = 40.0;
-constexpr double kPixelsPerPoint = 1.5;  // keeps a file small
+constexpr double kPixelsPerPoint = 2.0;  // keeps a file small
 // Told apart by the colour-blind too (Okabe and Ito).
 constexpr std::array<std::string_view, 6> kColours = {"#0072b2", "#d55e00", "#009e73",
                                                       "#cc79a7", "#e69f00", "#000000"};

@@ -45,7 +45,7 @@ std::span<const GainRow<InductionDriveParameters>> InductionDriveParameters::gai
 
 std::vector<std::string> InductionDriveParameters::problems() const {
   std::vector<std::string> found = range_problems(*this);
-  if (!(motor.leakage() > 0.0)) {
+  if (motor.leakage() <= 0.0) {  // a number that is none has been told already
     found.emplace_back("machine.mutual_inductance_h must be below the root of both inductances' product");
   }
   return found;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -25,13 +26,15 @@ struct Exceeded {
   std::string sentence() const;
 };
 
-/// The first demand above its limit of a move that lasts duration_s, looked at every step_s and at the end;
-/// of several at one instant the one named first. `demands_at(t_s)` gives the demands as a range: the
-/// currents i_ref and voltages u_ref that the trajectory needs of this machine. A demand that is not a number
-/// counts as exceeded. Made for the time before a move: a controller that meets a limit amid one can only
-/// fail.
+/// The first demand above its limit of a move that lasts duration_s (finite), looked at every step_s (but at
+/// most a million times) and at the end; of several at one instant the one named first. `demands_at(t_s)`
+/// gives the demands as a range: the currents i_ref and voltages u_ref that the trajectory needs of this
+/// machine. A demand that is not a number counts as exceeded. Made for the time before a move: a controller
+/// that meets a limit amid one can only fail.
 template <class DemandsAt>
 std::optional<Exceeded> first_exceeded(double duration_s, double step_s, DemandsAt&& demands_at) {
+  constexpr double kMostSteps = 1e6;
+  step_s = std::max(step_s, duration_s / kMostSteps);
   const auto steps = static_cast<std::int64_t>(std::ceil(duration_s / step_s));
   for (std::int64_t k = 0; k <= steps; ++k) {
     const double t_s = k == steps ? duration_s : step_s * static_cast<double>(k);

@@ -22,6 +22,29 @@ Reference StepMove::at(double t_s) const noexcept {
           .speed_rad_s = t_s < p_.duration_s ? p_.speed_rad_s : 0.0};
 }
 
+std::span<const GainRow<SineMoveParameters>> SineMoveParameters::gains() noexcept {
+  using P = SineMoveParameters;
+  static constexpr auto kRows = std::to_array<GainRow<P>>({
+      {"move.amplitude_rad", [](P& p) -> double& { return p.amplitude_rad; }},
+      {"move.angular_frequency_rad_s", [](P& p) -> double& { return p.angular_frequency_rad_s; },
+       GainRule::kPositive},
+      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kPositive},
+  });
+  return kRows;
+}
+
+Reference SineMove::at(double t_s) const noexcept {
+  if (t_s < 0.0) return {};
+  const double w = p_.angular_frequency_rad_s;
+  const double angle_rad = p_.amplitude_rad * std::sin(w * std::min(t_s, p_.duration_s));
+  if (t_s > p_.duration_s) return {.angle_rad = angle_rad};
+  const double speed_rad_s = p_.amplitude_rad * w * std::cos(w * t_s);
+  return {.angle_rad = angle_rad,
+          .speed_rad_s = speed_rad_s,
+          .acceleration_rad_s2 = -w * w * angle_rad,
+          .jerk_rad_s3 = -w * w * speed_rad_s};
+}
+
 std::span<const GainRow<SineTorqueMoveParameters>> SineTorqueMoveParameters::gains() noexcept {
   using P = SineTorqueMoveParameters;
   static constexpr auto kRows = std::to_array<GainRow<P>>({

@@ -26,6 +26,27 @@ class StepMove final : public Trajectory {
   StepMoveParameters p_;
 };
 
+/// The angle of a sine from time 0 on, θ = A·sin(Ωt): its speed jumps there.
+struct SineMoveParameters {
+  double amplitude_rad;
+  double angular_frequency_rad_s;
+  double duration_s;
+
+  static std::span<const GainRow<SineMoveParameters>> gains() noexcept;
+  std::vector<std::string> problems() const { return range_problems(*this); }
+};
+
+class SineMove final : public Trajectory {
+ public:
+  /// `p` must have no problems().
+  explicit SineMove(const SineMoveParameters& p) noexcept : p_(p) {}
+  Reference at(double t_s) const noexcept override;
+  double duration_s() const noexcept override { return p_.duration_s; }
+
+ private:
+  SineMoveParameters p_;
+};
+
 /// The motion that a sinusoidal torque makes of a shaft at rest with friction: α + (f/J)·ω = A·sin(Ωt). A
 /// controller that works out the current of the reference gets the sine back.
 struct SineTorqueMoveParameters {

@@ -20,6 +20,7 @@ struct Measurement {
 constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"tick", "a tick against the bare integration", measure_tick},
     {"machines", "every kind of machine, its sensors, an inverter, a dynamometer", measure_machines},
+    {"control", "updates of the reference controllers, closed loops in process", measure_control},
     {"free", "free mode with recording", measure_free_mode},
     {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
     {"realtime", "lateness of the pacers and of the server", measure_realtime},

@@ -27,6 +27,9 @@ std::vector<Row> measure_recorder(const Plan& plan);
 /// Resident memory of the server with a controller and 32 viewers.
 std::vector<Row> measure_memory(const Plan& plan);
 
+/// Controllers alone, and with their benches in one process.
+std::vector<Row> measure_control(const Plan& plan);
+
 /// Encoding and decoding of one CAN frame.
 std::vector<Row> measure_can_codec(const Plan& plan);
 /// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.

@@ -7,6 +7,7 @@
 
 #include "plant/faults.hpp"
 #include "server/engine.hpp"
+#include "tests/book/measurement_of.hpp"
 #include "tests/server/parameter_row.hpp"
 
 namespace drivebench {
@@ -44,11 +45,6 @@ double larger(double peak, double value) {
   return std::max(peak, std::abs(value));
 }
 
-PhaseCommand command_of(const control::Setpoint& x, control::Quantity quantity) {
-  return {.gates = quantity == control::Quantity::kVoltage ? Gates::kVoltage : Gates::kCurrent,
-          .setpoint = {.a = x.a, .b = x.b, .c = x.c, .field = x.field}};
-}
-
 void add_row(Outcome& seen, ClosedLoopRow row, double counts_per_rad) {
   const Sample& s = row.sample;
   seen.peak_error_rad = larger(seen.peak_error_rad, row.error_rad);
@@ -71,18 +67,6 @@ void add_row(Outcome& seen, ClosedLoopRow row, double counts_per_rad) {
 }
 
 }  // namespace
-
-control::Measurement measurement_of(const Sample& s) {
-  return {.encoder_count = s.encoder_count,
-          .edge_age_s = s.edge_age_s,
-          .edge_period_s = s.edge_period_s,
-          .hall_lines = s.hall_lines,
-          .tachometer_v = s.tachometer_v,
-          .i_a_a = s.i_a_a,
-          .i_b_a = s.i_b_a,
-          .i_c_a = s.i_c_a,
-          .i_f_a = s.i_f_a};
-}
 
 std::size_t Outcome::column(std::string_view name) const {
   const auto found = std::ranges::find(telemetry_names, name);
@@ -149,6 +133,7 @@ Outcome ClosedLoop::run(control::Run run, std::span<const LoadStep> loads) {
              .angle_rad = angle_rad,
              .error_rad = error_rad,
              .saturated = run.controller().saturated(),
+             .speed_estimate_rad_s = run.controller().speed_rad_s(),
              .telemetry = {telemetry.begin(), telemetry.end()}},
             counts_per_rad());
     if (seen.samples + 100 > run.planned_samples()) {

@@ -40,6 +40,7 @@ struct ClosedLoopRow {
   double angle_rad;            ///< true, since the first sample of the run
   double error_rad;            ///< reference - true angle
   bool saturated;
+  double speed_estimate_rad_s;  ///< the controller's
   std::vector<double> telemetry;
 };
 
@@ -101,9 +102,6 @@ class ClosedLoop {
   BenchConfig config_;
   Bench bench_;
 };
-
-/// What the sample tells a controller.
-control::Measurement measurement_of(const Sample& sample);
 
 /// Short: one run of a preset on its own bench.
 inline Outcome closed_loop(std::string_view preset, const ClosedLoopOptions& options = {},

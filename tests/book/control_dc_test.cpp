@@ -377,5 +377,16 @@ TEST(DcControl, TheProportionalLoopFollowsARampBehind) {
   EXPECT_NEAR(seen.rows.back().error_rad, 0.3, 1e-3);
 }
 
+// CTL-07. Catches a compensator that does not contain the sine: its error would stay.
+TEST(DcControl, ASineIsFollowedByALoopThatContainsIt) {
+  const Outcome seen = closed_loop("book/2-sine");
+  EXPECT_NEAR(row_at(seen, 10.0).error_rad, 0.425, 0.005);
+  for (const ClosedLoopRow& row : seen.rows) {
+    if (row.time_s > 38.0) {
+      ASSERT_LT(std::abs(row.error_rad), 0.01) << row.time_s;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace drivebench

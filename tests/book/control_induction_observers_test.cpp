@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <optional>
+#include <numbers>
+#include <string>
 
 #include "clients/control/flux_observers.hpp"
 #include "clients/control/load_observers.hpp"

@@ -5,7 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numbers>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "tests/book/closed_loop.hpp"
 
@@ -64,8 +69,8 @@ TEST(InductionControl, TheMoveTo8000RpmWithASoftFluxLoop) {
 }
 
 // Case 9. Catches a limit cycle that takes the shaft along: the flux loop swings between ±5.9 A and more than
-// a thousand samples are saturated, yet the text's 34 counts are kept. The table has 15 to 18, 1600
-// samples, 9.9 A.
+// a thousand samples are saturated, yet the text's 34 counts are kept: 11 to 31 over inertias that differ by
+// 1e-9. The table has 15 to 18, 1600 samples, 9.9 A.
 TEST(InductionControl, TheMoveTo8000RpmWithTheGainsOfTheText) {
   const Outcome seen = closed_loop("book/8.2.5");
   EXPECT_LE(seen.peak_error_counts, 50.0);
@@ -143,7 +148,7 @@ TEST(InductionControl, HalfATurnWithoutFeedForwardOfTheFlux) {
 // coincidence (12.4 here).
 TEST(InductionControl, FieldWeakeningTo838RadiansPerSecond) {
   const Outcome seen = closed_loop("exercise/8.15b");
-  EXPECT_NEAR(seen.peak_error_counts, 0.81, 0.5);
+  EXPECT_NEAR(seen.peak_error_counts, 0.81, 0.7);  // 0.98 to 1.28 over inertias that differ by 1e-9
   EXPECT_NEAR(seen.peak_current_a, 3.98, 0.1);
   EXPECT_NEAR(seen.peak_speed_rad_s, 838.0, 1.0);
   EXPECT_LE(seen.saturated_samples, 5);  // the first sample of the flux build-up

@@ -9,6 +9,7 @@
 #include "clients/control/dc_current_regulator.hpp"
 #include "clients/control/dc_nested_loops.hpp"
 #include "clients/control/dc_open_loop.hpp"
+#include "clients/control/dc_sine_loop.hpp"
 #include "clients/control/dc_speed_loop.hpp"
 #include "clients/control/dc_state_feedback.hpp"
 #include "clients/control/dc_tachometer_loop.hpp"
@@ -284,6 +285,29 @@ TEST(DcTachometerLoop, AStepOvershootsByAThird) {
            });
   EXPECT_NEAR(peak_rad, 1.3277, 0.0066);
   EXPECT_NEAR(peak_s, 0.221, 0.003);
+}
+
+// CTL-07. Catches a sine that is followed with an error, a compensator of another frequency: the error is a
+// sum of two dying oscillations (the print has 4.7 for 4.458). 1 kHz moves it by a thousandth.
+TEST(DcSineLoop, TheErrorOfAKnownSineDies) {
+  DcSineLoopParameters p = {
+      .axis = kAxis, .loop = {.gain_a_s_per_rad = -0.6, .zero_per_s = -0.25, .angular_frequency_rad_s = 1.0}};
+  p.axis.machine = kUnit;
+  p.axis.sample_rate_hz = 1000.0;
+  EXPECT_TRUE(p.problems().empty());
+  DcSineLoop controller(p);
+  const SineMove sine({.amplitude_rad = 1.0, .angular_frequency_rad_s = 1.0, .duration_s = 100.0});
+  IdealDcShaft shaft = {.torque_constant_nm_per_a = 1.0, .inertia_kgm2 = 1.0, .friction_nms = 1.0};
+  for (int k = 0; k < 60000; ++k) {
+    const double t = 1e-3 * k;
+    const Reference r = sine.at(t);
+    const double expected_rad = 4.458 * std::exp(-0.1670 * t) * std::sin(0.6283 * t + 0.3728) -
+                                4.134 * std::exp(-0.3330 * t) * std::sin(0.4940 * t + 0.4037);
+    ASSERT_NEAR(r.angle_rad - shaft.angle_rad, expected_rad, 3e-3) << t;
+    shaft.step(controller.update({.encoder_count = shaft.count(kFineCounts)}, r, 1).a, 0.0, 1e-3);
+  }
+  p.loop.gain_a_s_per_rad = 0.6;
+  EXPECT_EQ(p.problems().size(), 1u);
 }
 
 // CUR-01. Catches a regulator that winds up: half a second against the limit, then the voltage leaves it at

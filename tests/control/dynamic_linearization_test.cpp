@@ -34,6 +34,31 @@ TEST(VoltageLinearization, GainsPlaceBothLoops) {
     EXPECT_NEAR(std::abs(pole + 300.0), 0.0, 0.05);
 }
 
+// Catches a flux rate that is left out or has the wrong sign: without feedback, a rising flux and i_q
+// flowing, the voltages must bring about the α' and ψ'' that the references ask for by feed-forward.
+TEST(VoltageLinearization, LinearisesWhileTheFluxChanges) {
+  const VoltageLinearizationParameters no_feedback{};
+  InductionDriveParameters drive = kServoDrive;
+  drive.motor.machine.friction_nms = 0.0;
+  VoltageLinearizationController controller(drive, no_feedback,
+                                            {.rated_flux_wb = 0.0455, .base_speed_rad_s = 300.0});
+  magnetise(controller, 3.0);
+  const DirectQuadrature i_a = {.d = 4.0, .q = 2.0};
+  const Setpoint u = controller.update({.i_a_a = i_a.d, .i_b_a = i_a.q}, {.jerk_rad_s3 = 5e4});
+  const double flux_wb = telemetry_of(controller, "flux_wb");
+  EXPECT_NEAR(flux_wb, 0.0117 * 3.0, 1e-6);
+  const double flux_rate_wb_s = kEtaM * i_a.d - kEta * flux_wb;
+  const double slip_rad_s = kEtaM * i_a.q / flux_wb;
+  const double gamma = kServoMotor.current_decay_per_s();
+  const double sigma_ls = kServoMotor.leakage_inductance_h();
+  const double i_d_rate =
+      -gamma * i_a.d + kEta * kServoMotor.current_per_wb() * flux_wb + slip_rad_s * i_a.q + u.a / sigma_ls;
+  const double i_q_rate = -gamma * i_a.q - slip_rad_s * i_a.d + u.b / sigma_ls;
+  EXPECT_FALSE(controller.saturated());
+  EXPECT_NEAR(kMu * (flux_rate_wb_s * i_a.q + flux_wb * i_q_rate), 5e4, 1e-3);
+  EXPECT_NEAR(kEtaM * i_d_rate - kEta * flux_rate_wb_s, 0.0, 1e-6);
+}
+
 // Catches a wrong term in c': against the difference of c along ψ + ψ'·t + ψ''·t²/2.
 TEST(DirectIntegrator, SpeedFactorKnowsItsRate) {
   const double flux_wb = 0.03, rate_wb_s = -0.2, second_wb_s2 = 15.0, h_s = 1e-6;

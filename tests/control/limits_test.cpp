@@ -41,6 +41,16 @@ TEST(Limits, ADemandThatIsNotANumberIsExceeded) {
   EXPECT_EQ(found->time_s, 0.0);
 }
 
+// Catches a check that takes years over a move that a typing error made long.
+TEST(Limits, AVeryLongMoveIsLookedAtAMillionTimes) {
+  int looks = 0;
+  EXPECT_FALSE(first_exceeded(1e12, 1e-4, [&looks](double) {
+    ++looks;
+    return std::array<Demand, 0>{};
+  }));
+  EXPECT_EQ(looks, 1'000'001);
+}
+
 // Catches a refusal that does not say what and when.
 TEST(Limits, ARefusalCarriesTheSentence) {
   EXPECT_NO_THROW(refuse(std::nullopt));

@@ -53,6 +53,8 @@ TEST(Moves, EverySpeedIsTheSlopeOfItsAngleAndSoOn) {
                              .friction_rate_per_s = 6.67,
                              .duration_s = 0.2});
   expect_derivatives(sine, 0.0, 0.2, true);
+  expect_derivatives(SineMove({.amplitude_rad = 2.0, .angular_frequency_rad_s = 30.0, .duration_s = 0.2}),
+                     0.0, 0.2, true);
 }
 
 // Catches a ramp that does not end where the next part begins, and a move that is not at rest outside.

@@ -173,6 +173,13 @@ TEST(OptimumTorque, Example2AsPrintedHasAnotherLeakage) {
   ASSERT_EQ(crossings.size(), 2U);
   EXPECT_NEAR(crossings[0], -116.6, 116.6 * kTableTolerance);
   EXPECT_NEAR(crossings[1], -22.94, 22.94 * kTableTolerance);
+  // The printed torques are two thirds of the formula: -4.4 at the optimum, -4.06 and -0.8 at the crossings.
+  const auto two_thirds_nm = [&](double delta) {
+    return 2.0 / 3.0 * torque_at(rounded, kLimits2, kSpeed2_rad_s, delta).torque_nm;
+  };
+  EXPECT_NEAR(two_thirds_nm(extrema[2]), -4.4, 0.05);
+  EXPECT_NEAR(two_thirds_nm(crossings[1]), -4.06, 0.05);
+  EXPECT_NEAR(two_thirds_nm(crossings[0]), -0.8, 0.05);
 }
 
 // Case 13: 0.1 %, 0.2 %. Catches a wrong sign of the speed term; the text's 2990 and 5410 rpm only hold to
@@ -188,7 +195,8 @@ TEST(OptimumTorque, BaseSpeeds) {
   SteadyInductionModel rounded = kServo;
   rounded.leakage = 1.0 - 0.0117 / 0.014;
   EXPECT_NEAR(rpm(base_speed_rad_s(rounded, kLimits, TorqueSign::kGenerating)), 5409.0, 5.4);
-  // Enough current for 2.1 times the voltage: no speed at which the current alone limits.
+  // With 23 V the voltage limits at standstill already, with 5 V at any speed.
+  EXPECT_EQ(base_speed_rad_s(kServo, {.voltage_v = 23.0, .current_a = 6.0}, TorqueSign::kMotoring), 0.0);
   EXPECT_EQ(base_speed_rad_s(kServo, {.voltage_v = 5.0, .current_a = 6.0}, TorqueSign::kMotoring), 0.0);
 }
 

@@ -22,12 +22,13 @@ TEST(Polynomial, RootsOfACubic) {
   EXPECT_LT(std::abs(sum), 1e-12);
 }
 
-// Catches an iteration without scaling: roots ten decades apart from one, as a flux loop has them.
+// Catches an iteration without scaling, whose squares overflow, and a small root that is lost beside a large
+// one.
 TEST(Polynomial, RootsMayBeLargeAndFarApart) {
-  const std::vector<double> found = real_roots(std::array{3e5 * 7e-5, 3e5 + 7e-5, 1.0});
+  const std::vector<double> found = real_roots(std::array{3e120 * 7e110, 3e120 + 7e110, 1.0});
   ASSERT_EQ(found.size(), 2U);
-  EXPECT_NEAR(found[0], -3e5, 3e5 * 1e-12);
-  EXPECT_NEAR(found[1], -7e-5, 7e-5 * 1e-9);
+  EXPECT_NEAR(found[0], -3e120, 3e120 * 1e-12);
+  EXPECT_NEAR(found[1], -7e110, 7e110 * 1e-9);
 }
 
 // Catches a division by a root at zero, a zero leading coefficient, and a filter that lets complex roots
@@ -40,12 +41,14 @@ TEST(Polynomial, RealRootsOnlyWithTheirMultiplicity) {
   EXPECT_EQ(found[2], 0.0);
 }
 
-// Catches a tolerance that splits double roots into pairs beside the axis: (x - 3)².
+// Catches a tolerance that drops a double root because it was found as a pair beside the axis: (x - 3)²·(x +
+// 1).
 TEST(Polynomial, ADoubleRootStaysReal) {
-  const std::vector<double> found = real_roots(std::array{9.0, -6.0, 1.0});
-  ASSERT_EQ(found.size(), 2U);
-  EXPECT_NEAR(found[0], 3.0, 1e-6);
+  const std::vector<double> found = real_roots(std::array{9.0, 3.0, -5.0, 1.0});
+  ASSERT_EQ(found.size(), 3U);
+  EXPECT_NEAR(found[0], -1.0, 1e-12);
   EXPECT_NEAR(found[1], 3.0, 1e-6);
+  EXPECT_NEAR(found[2], 3.0, 1e-6);
 }
 
 }  // namespace

@@ -67,8 +67,7 @@ constexpr Reference kWanted = {.speed_rad_s = 130.0, .acceleration_rad_s2 = 40.0
 // CTL-08. Catches a term of the decoupling that is missing or has the wrong sign: the book prints one wrong.
 // dω/dt's slope must be v1 and the flux must have its rate, in any state.
 TEST(SeparateDc, BothChainsAreLinear) {
-  const WoundDcModel& m = kSeparate;
-  const SeparateDcParameters p = {.axis = axis_of(m),
+  const SeparateDcParameters p = {.axis = axis_of(kSeparate),
                                   .flux = {.rated_flux_wb = 20.0, .base_speed_rad_s = 100.0},
                                   .flux_per_s = 20.0,
                                   .speed = SpeedChainGains::placed(placed_polynomial<3>({30.0, 40.0, 50.0}))};
@@ -76,8 +75,9 @@ TEST(SeparateDc, BothChainsAreLinear) {
     SeparateDcController controller(p);
     const double i_f = x.flux / 23.0;
     const Setpoint u = controller.update({.tachometer_v = x.w, .i_a_a = x.i_a, .i_f_a = i_f}, kWanted, 1);
-    const auto acceleration = [&m](const State& s) {
-      return (m.motor_constant * s.flux * s.i_a - m.friction_nms * s.w) / m.inertia_kgm2;
+    const auto acceleration = [](const State& s) {
+      return (kSeparate.motor_constant * s.flux * s.i_a - kSeparate.friction_nms * s.w) /
+             kSeparate.inertia_kgm2;
     };
     const State slope = {.i_a = (u.a - 3.0 * x.i_a - 0.05 * x.flux * x.w) / 0.03,
                          .w = acceleration(x),
@@ -94,8 +94,7 @@ TEST(SeparateDc, BothChainsAreLinear) {
 // CTL-08 at the limit of the field supply. Catches an armature that reckons with the field voltage it asked
 // for.
 TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
-  const WoundDcModel& m = kSeparate;
-  SeparateDcParameters p = {.axis = axis_of(m),
+  SeparateDcParameters p = {.axis = axis_of(kSeparate),
                             .flux = {.rated_flux_wb = 20.0, .base_speed_rad_s = 1000.0},
                             .flux_per_s = 50.0,
                             .speed = SpeedChainGains::placed(placed_polynomial<3>({30.0, 40.0, 50.0}))};
@@ -106,8 +105,9 @@ TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
       controller.update({.tachometer_v = x.w, .i_a_a = x.i_a, .i_f_a = 10.0 / 23.0}, kWanted, 1);
   EXPECT_EQ(u.field, 150.0);
   EXPECT_TRUE(controller.saturated());
-  const auto acceleration = [&m](const State& s) {
-    return (m.motor_constant * s.flux * s.i_a - m.friction_nms * s.w) / m.inertia_kgm2;
+  const auto acceleration = [](const State& s) {
+    return (kSeparate.motor_constant * s.flux * s.i_a - kSeparate.friction_nms * s.w) /
+           kSeparate.inertia_kgm2;
   };
   const State slope = {.i_a = (u.a - 3.0 * x.i_a - 0.05 * x.flux * x.w) / 0.03,
                        .w = acceleration(x),
@@ -120,9 +120,8 @@ TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
 // CTL-09. Catches a slip in the third derivative of the energy (the book's second line is misprinted): z3'
 // must be what the energy loop wants.
 TEST(SeparateDc, TheFieldAloneMakesTheEnergyAChainOfThree) {
-  const WoundDcModel& m = kSeparate;
   const double v_a0 = 220.0;
-  const FieldControlDcParameters p = {.axis = axis_of(m),
+  const FieldControlDcParameters p = {.axis = axis_of(kSeparate),
                                       .armature_voltage_v = v_a0,
                                       .rated_flux_wb = 20.0,
                                       .start_speed_rad_s = 100.0,
@@ -222,14 +221,13 @@ State shunt_slope(const WoundDcModel& m, const State& x, double u, double load_n
 // CTL-12. Catches a slip in α or β (the reference gives both): along the reduced machine z1' = z2 − τ_L/J and
 // z2' = α + β·u + (K_m²/(J·R))·λ²·τ_L/J, for any voltage and load.
 TEST(ShuntDc, TheExactChainIsThatOfTheReducedMachine) {
-  const WoundDcModel& m = kSeparate;
   for (const State& x : {State{0.0, 100.0, 8.0}, State{0.0, 40.0, 20.0}, State{0.0, -30.0, 5.0}}) {
     for (const double u : {0.0, 80.0, -120.0}) {
       for (const double load_nm : {0.0, 3.0}) {
-        const State slope = shunt_slope(m, x, u, load_nm);
-        const ShuntDcChain c = ShuntDcChain::at(m, x.flux, x.w);
-        const auto z1 = [&m](const State& s) { return ShuntDcChain::at(m, s.flux, s.w).z1_rad_s; };
-        const auto z2 = [&m](const State& s) { return ShuntDcChain::at(m, s.flux, s.w).z2_rad_s2; };
+        const State slope = shunt_slope(kSeparate, x, u, load_nm);
+        const ShuntDcChain c = ShuntDcChain::at(kSeparate, x.flux, x.w);
+        const auto z1 = [](const State& s) { return ShuntDcChain::at(kSeparate, s.flux, s.w).z1_rad_s; };
+        const auto z2 = [](const State& s) { return ShuntDcChain::at(kSeparate, s.flux, s.w).z2_rad_s2; };
         const double load = load_nm / 0.02;
         EXPECT_NEAR(slope_of(z1, x, slope), c.z2_rad_s2 - load, 1e-4);
         EXPECT_NEAR(slope_of(z2, x, slope),
@@ -238,8 +236,8 @@ TEST(ShuntDc, TheExactChainIsThatOfTheReducedMachine) {
     }
   }
   // At the flux that holds a speed under a load nothing moves at the voltage that holds the flux.
-  const double flux = ShuntDcChain::holding_flux_wb(m, 100.0, 5.0);
-  const State rest = shunt_slope(m, {0.0, 100.0, flux}, 220.0 * flux / 23.0, 5.0);
+  const double flux = ShuntDcChain::holding_flux_wb(kSeparate, 100.0, 5.0);
+  const State rest = shunt_slope(kSeparate, {0.0, 100.0, flux}, 220.0 * flux / 23.0, 5.0);
   EXPECT_NEAR(rest.w, 0.0, 1e-9);
   EXPECT_NEAR(rest.flux, 0.0, 1e-9);
 }

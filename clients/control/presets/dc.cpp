@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "clients/control/dc_nested_loops.hpp"
+#include "clients/control/dc_sine_loop.hpp"
 #include "clients/control/dc_speed_loop.hpp"
 #include "clients/control/dc_tachometer_loop.hpp"
 #include "clients/control/jerk_continuous_move.hpp"
@@ -141,6 +142,11 @@ constexpr DcTachometerLoopParameters kProportional = {
     .axis = kUnitAxis, .loop = {.proportional_a_per_rad = 1.0, .zero_per_s = 0.0, .speed_as_per_rad = 0.0}};
 constexpr StepMoveParameters kRadian = {.distance_rad = 1.0, .speed_rad_s = 0.0, .duration_s = 2.0};
 constexpr StepMoveParameters kSlowTurn = {.distance_rad = 0.0, .speed_rad_s = 0.3, .duration_s = 30.0};
+constexpr DcSineLoopParameters kSineLoop = {
+    .axis = kUnitAxis,
+    .loop = {.gain_a_s_per_rad = -0.6, .zero_per_s = -0.25, .angular_frequency_rad_s = 1.0}};
+constexpr SineMoveParameters kUnitSine = {
+    .amplitude_rad = 1.0, .angular_frequency_rad_s = 1.0, .duration_s = 40.0};
 constexpr RunTiming kUnitTiming = {.sample_rate_hz = 1e3, .prepare_s = 0.0, .hold_s = 0.0};
 
 template <class ControllerType, class Move, const auto& kP, const auto& kPath,
@@ -230,6 +236,10 @@ constexpr auto kPresets = std::to_array<Preset>({
         "book/2-proportional",
         "Chiasson 2005, appendix of chapter 2: K = 1 on 1/(s (s + 1)), turned at 0.3 rad/s", "0.3 rad behind",
         "dc-unit"),
+    preset<DcSineLoop, SineMove, kSineLoop, kUnitSine, kUnitTiming>(
+        "book/2-sine",
+        "Chiasson 2005, appendix of chapter 2: -0.6 (s - 0.25)/(s^2 + 1) on 1/(s (s + 1)) follows sin t",
+        "the error dies with e^(-0.167 t)", "dc-unit"),
 });
 
 }  // namespace

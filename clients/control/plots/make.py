@@ -1,0 +1,70 @@
+#!/usr/bin/python3
+"""Makes the pictures of ../README.md: every preset below on its own bench, recorded by the server and drawn by `drivebench plot`.
+
+    clients/control/plots/make.py [folder of the programs, default build/release/bin]"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+REPOSITORY = HERE.parents[2]
+BENCHES = REPOSITORY / "configs/benches"
+
+SERVO = "speed,error,currents,voltages"
+PLOTS = (  # preset, panels, title
+    ("book/8.2.2", SERVO, "half a turn in 73 ms, field-oriented"),
+    ("book/8.2.2-clipped", SERVO, "the same, i_q reference clipped to the current circle"),
+    ("book/8.2.5-soft-flux", SERVO, "to 8000 rpm and back, input-output linearisation"),
+    ("book/8.2.5-constant-flux", SERVO, "the same with constant flux"),
+    ("exercise/8.15b", SERVO, "838 rad/s with 60 V"),
+    ("exercise/8.28", SERVO, "dynamic linearisation, integrator on the d axis"),
+    ("exercise/8.29", SERVO, "dynamic linearisation, integrator on the q axis, a hoist"),
+    ("book/9.1.4", SERVO, "1.8 mm in 30 ms, PM stepper as a servo"),
+    ("book/9.7-3000rpm", SERVO, "3000 rpm at 10 kHz"),
+    ("book/9.8-22a", "speed,torque,currents,voltages", "run-up at the limits of voltage and current"),
+    ("book/9.4-current", "angle,currents", "a step of 1 A"),
+    ("stepper/train-400", "angle,currents", "400 steps a second are too many for 1.1 V"),
+    ("book/10.6", SERVO, "brushless DC, six-step, 250 V"),
+    ("book/10.6-200v", SERVO, "the same with 200 V"),
+    ("wound-rotor/field-weakening", SERVO, "wound rotor to 350 rad/s"),
+    ("book/2.18", SERVO, "DC servo, half a turn in 65 ms"),
+    ("book/2.25", SERVO, "the same with nested loops"),
+    ("book/2.40", "speed,currents,voltages", "separately excited, to 300 rad/s"),
+    ("book/2.42", "speed,torque,currents,voltages", "series motor with a fan"),
+    ("book/2.46", "speed,torque,currents,voltages", "shunt motor, exact linearisation"),
+)
+
+
+def run(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def make(programs, presets, preset, panels, title):
+    bench = BENCHES / (presets[preset]["bench"] + ".toml")
+    with tempfile.TemporaryDirectory() as folder:
+        recording = pathlib.Path(folder) / "run.mcap"
+        server = subprocess.Popen([programs / "drivebench-server", bench, "--mode", "lockstep", "--port", "0", "--record", recording],
+                                  stdout=subprocess.PIPE, text=True)
+        try:
+            link = "tcp:" + server.stdout.readline().split("tcp=")[1].split()[0]
+            run(programs / "drivebench", "control", "--preset", preset, "--link", link)
+        finally:
+            server.terminate()
+            server.communicate()
+        out = HERE / (preset.replace("/", "-") + ".svg")
+        run(programs / "drivebench", "plot", recording, "--preset", preset, "--panels", panels, "--title", f"{preset}: {title}",
+            "--out", out)
+        print(f"{out.name} {out.stat().st_size // 1024} KiB")
+
+
+def main():
+    programs = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else REPOSITORY / "build/release/bin").resolve()
+    presets = {each["name"]: each for each in json.loads(run(programs / "drivebench", "control", "--list", "--json"))}
+    for plot in PLOTS:
+        make(programs, presets, *plot)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "clients/control/controller.hpp"
+#include "plant/drive/command.hpp"
+#include "protocols/sample.hpp"
+
+namespace drivebench {
+
+/// What a sample tells a controller, with nothing between them.
+inline control::Measurement measurement_of(const Sample& s) {
+  return {.encoder_count = s.encoder_count,
+          .edge_age_s = s.edge_age_s,
+          .edge_period_s = s.edge_period_s,
+          .hall_lines = s.hall_lines,
+          .tachometer_v = s.tachometer_v,
+          .i_a_a = s.i_a_a,
+          .i_b_a = s.i_b_a,
+          .i_c_a = s.i_c_a,
+          .i_f_a = s.i_f_a};
+}
+
+inline PhaseCommand command_of(const control::Setpoint& x, control::Quantity quantity) {
+  return {.gates = quantity == control::Quantity::kVoltage ? Gates::kVoltage : Gates::kCurrent,
+          .setpoint = {.a = x.a, .b = x.b, .c = x.c, .field = x.field}};
+}
+
+}  // namespace drivebench

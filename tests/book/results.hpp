@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// The book's control experiments as drivebench runs them: what RESULTS.md holds.
+namespace drivebench {
+
+/// A number that an experiment gave. Another machine may be off by the tolerance: loops with an encoder in
+/// them are chaotic in their last digits, and no two C libraries round alike.
+struct Measured {
+  std::string what;
+  double value;
+  std::string unit;
+  double tolerance;
+};
+
+/// 2 %.
+inline Measured number(std::string what, double value, std::string unit) {
+  return {std::move(what), value, std::move(unit), 0.02 * std::abs(value) + 1e-9};
+}
+/// Half a count and 5 %: the steps of the encoder.
+inline Measured counts(std::string what, double value) {
+  return {std::move(what), value, "counts", 0.5 + 0.05 * std::abs(value)};
+}
+/// A run that fails does not fail twice in the same way: half.
+inline Measured failing(std::string what, double value, std::string unit) {
+  return {std::move(what), value, std::move(unit), 0.5 * std::abs(value)};
+}
+
+/// A row of the table.
+struct Result {
+  std::string number;  ///< of the case in the acceptance list
+  std::string experiment;
+  std::string book;  ///< what it says; where it says nothing, what was derived from it, and marked so
+  std::vector<Measured> measured;
+  std::string why;  ///< they differ, or "agrees"
+};
+
+struct ResultSection {
+  std::string title;
+  std::vector<Result> results;
+};
+
+ResultSection field_oriented_results();
+ResultSection high_speed_results();
+ResultSection optimum_torque_results();
+ResultSection flux_observer_results();
+ResultSection pm_results();
+ResultSection stepper_results();
+ResultSection other_synchronous_results();
+ResultSection dc_results();
+ResultSection wound_dc_results();
+
+/// All of them; runs every experiment.
+std::vector<ResultSection> all_results();
+
+std::string markdown_of(const std::vector<ResultSection>& sections);
+
+/// Where a text differs from markdown_of(sections) by more than the tolerances, one sentence each.
+std::vector<std::string> differences(const std::string& text, const std::vector<ResultSection>& sections);
+
+}  // namespace drivebench
