@@ -220,7 +220,9 @@ std::vector<Row> ticks() {
     AxisParameters p = axis_of(bench);
     switch_all_sensors_on(p);
     if (p.drive.kind == DriveKind::kSwitched) {  // whose edges have a row of their own
-      p.drive = {.amplifier = p.drive.amplifier};
+      const AmplifierParameters amplifier = p.drive.amplifier;
+      p.drive = {};
+      p.drive.amplifier = amplifier;
     }
     const int substeps = default_substeps(p, kPeriodS);
     Axis axis(p, {.period_s = kPeriodS, .substeps = substeps}, 1, 0);
