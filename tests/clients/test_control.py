@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "wire"))
 try:
@@ -58,6 +59,11 @@ class Gains(ControlTest):
         self.assertIn("machine.inertia_kgm2 = -1 must be positive", both)
         self.assertIn("NAME=VALUE", self.refusal("--gain", "move.ramp_up_s"))
         self.assertIn("not a number", self.refusal("--gain", "move.ramp_up_s=nan"))
+
+    def test_a_move_beyond_the_limits_is_refused_before_anything_is_connected(self):
+        """Would catch: a limit that is met amid the move, a refusal that does not say which and when."""
+        said = self.refusal("--preset", "book/2.18", "--gain", "move.ramp_up_s=0.02", "--gain", "move.ramp_down_s=0.02")
+        self.assertRegex(said, r"armature current of \d\.\d+ A at 0\.0\d+ s is above the limit of 5 A")
 
     def test_gains_are_shown_as_they_would_be_used(self):
         """Would catch: a list of gains that is not that of the preset, or that leaves an override out."""
@@ -151,6 +157,33 @@ class Compare(ControlTest):
                                 (["--compare", __file__], "is not a recording"),
                                 (["--threshold", 1], "belong to --compare")):
             self.assertIn(fact, self.control(*arguments, code=USAGE).stderr)
+
+
+class Plot(ControlTest):
+    def plot(self, *arguments, code=OK):
+        done = subprocess.run([COMMAND, "plot", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done
+
+    def test_a_recording_becomes_a_picture(self):
+        """Would catch: a panel that is not drawn, a picture that is no XML, lines of terminals that the machine does not have."""
+        file, _ = self.recording("own")
+        out = self.folder / "own.svg"
+        self.plot(file, "--preset", "book/8.2.2", "--title", "a & b", "--out", out)
+        picture = xml.etree.ElementTree.parse(out).getroot()
+        texts = [each.text for each in picture.iter() if each.tag.endswith("text")]
+        for text in ("a & b", "speed [rad/s]", "reference", "error [counts]", "i_a", "i_b", "u_b", "time [ms]"):
+            self.assertIn(text, texts)
+        self.assertNotIn("i_c", texts)
+        self.assertEqual(sum(each.tag.endswith("path") for each in picture.iter()), 2 + 1 + 2 + 2)
+        self.assertEqual(self.plot(file, "--panels", "angle").stdout.count("<path"), 1)
+
+    def test_what_cannot_be_drawn_is_refused(self):
+        """Would catch: an empty picture with an exit code of 0."""
+        file, _ = self.recording("own")
+        for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),
+                                ([__file__], "is not a recording"), ([file, "--preset", "book/8"], "did you mean book/8.2.2")):
+            self.assertIn(fact, self.plot(*arguments, code=USAGE).stderr)
 
 
 if __name__ == "__main__":
