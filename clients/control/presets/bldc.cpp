@@ -68,7 +68,8 @@ constexpr Preset preset(std::string_view name, std::string_view source, std::str
                     .counts_per_revolution = kP.counts_per_revolution,
                     .pole_pairs = kP.machine.pole_pairs,
                     .voltage_limit_v = kP.voltage_limit_v,
-                    .quantity = kP.drive},
+                    .quantity = kP.drive,
+                    .signal = kP.commutation == CommutationBy::kHall ? "hall_lines" : ""},
           .gains = [] { return gains_of(kP, kPath, kAllowed, kTiming); },
           .make = [](std::span<const Gain> overrides) -> Run {
             auto [p, path, allowed, timing] = with_gains(std::tuple{kP, kPath, kAllowed, kTiming}, overrides);
