@@ -35,7 +35,7 @@ SeriesDcController::SeriesDcController(const SeriesDcParameters& p) noexcept
     : WoundDcController(p.axis, Terminals::kSeries), p_(p) {
   if (p.source == SeriesDcSpeed::kCurrent) {
     observer_.emplace(p.axis.machine, p.observer, p.least_current_a, p.axis.period_s(),
-                      Discretisation::kExact);
+                      Discretisation::kTrapezoidal);
   }
 }
 

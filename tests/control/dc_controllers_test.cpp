@@ -213,6 +213,22 @@ TEST(DcVoltageFeedback, HasTheGainsOfFourPolesAt300) {
   EXPECT_NE(p.problems()[0].find("unstable"), std::string::npos);
 }
 
+// CTL-03. Catches an error with the wrong sign or in the wrong unit, one at a time; the loop would be stable
+// all the same. v = v_ref + L·(...).
+TEST(DcVoltageFeedback, EveryErrorHasItsOwnVoltage) {
+  const DcVoltageGains gains =
+      DcVoltageGains::placed(placed_polynomial<4>({300.0, 300.0, 300.0, 300.0}), kDcA);
+  const auto voltage = [&gains](const Measurement& m, const Reference& r) {
+    return DcVoltageFeedback({.axis = kAxis, .position = gains}).update(m, r, 1).a;
+  };
+  EXPECT_NEAR(voltage({.i_a_a = 1.0}, {}), -2e-3 * 193.3333, 1e-6);
+  EXPECT_NEAR(voltage({}, {.angle_rad = 0.01}), 2e-3 * 92571.43 * 0.01, 1e-6);
+  // 1 rad/s takes K_b and f/K_T amperes through R, and misses the speed and that current.
+  const double current_a = 4e-4 / 0.07;
+  EXPECT_NEAR(voltage({}, {.speed_rad_s = 1.0}),
+              0.07 + 2.0 * current_a + 2e-3 * (421.0381 + 193.3333 * current_a), 1e-6);
+}
+
 /// G = 1/(s·(s + 1)) of the book's classical loops.
 constexpr DcMachineModel kUnit = {.resistance_ohm = 1.0,
                                   .inductance_h = 1e-3,
@@ -233,6 +249,8 @@ TEST(DcTachometerLoop, IsDesignedAsTheBookDoesIt) {
   EXPECT_TRUE(p.problems().empty());
   DcTachometerLoop controller(p);
   EXPECT_NEAR(controller.update({}, {.angle_rad = 1.0}, 1).a, 400.0, 1e-12);
+  DcTachometerLoop another(p);  // the speed of the reference is no business of it
+  EXPECT_EQ(another.update({}, {.speed_rad_s = 1.0}, 1).a, 0.0);
   p.loop = {.proportional_a_per_rad = 1.0, .zero_per_s = 0.5, .speed_as_per_rad = 0.0};
   EXPECT_TRUE(p.problems().empty());
   p.loop.zero_per_s = 1.0;
@@ -339,6 +357,48 @@ TEST(DcStateFeedback, ItsIntegralStandsStillAtTheLimit) {
   // Nothing has been added: back at the reference nothing is asked for.
   EXPECT_EQ(controller.update({}, {}, 1).a, 0.0);
   EXPECT_FALSE(controller.saturated());
+}
+
+// Catches an integral that runs on while the voltage of the controller's own current loop holds the current
+// back.
+TEST(DcStateFeedback, ItsIntegralStandsStillAtTheVoltageLimit) {
+  DcAxisParameters axis = kAxis;
+  axis.drive = DcDrive::kOwnRegulator;
+  axis.current = {.proportional_v_per_a = 20.0, .integral_v_per_as = 20000.0};
+  axis.voltage_limit_v = 5.0;
+  DcStateFeedback controller({.axis = axis, .position = kTriple});
+  EXPECT_EQ(controller.quantity(), Quantity::kVoltage);
+  for (int k = 0; k < 4000; ++k) {
+    EXPECT_EQ(controller.update({}, {.angle_rad = -1.0}, 1).a, -5.0);
+    EXPECT_TRUE(controller.saturated());
+  }
+  EXPECT_EQ(controller.update({}, {}, 1).a, 0.0);
+}
+
+// Catches an oscillator that is driven on while the current stands at its limit.
+TEST(DcSineLoop, IsNotDrivenBeyondTheLimit) {
+  DcSineLoopParameters p = {
+      .axis = kAxis, .loop = {.gain_a_s_per_rad = -0.6, .zero_per_s = -0.25, .angular_frequency_rad_s = 1.0}};
+  p.axis.machine = kUnit;
+  p.axis.sample_rate_hz = 1000.0;
+  p.axis.current_limit_a = 0.01;
+  DcSineLoop controller(p);
+  for (int k = 0; k < 2000; ++k) {
+    controller.update({}, {.angle_rad = 1.0}, 1);
+    EXPECT_LT(std::abs(controller.telemetry()[0]), 0.03);
+  }
+}
+
+// Catches nested loops that are taken although they cannot work: an integral in front of everything else.
+TEST(DcNestedLoops, UnstableGainsAreReported) {
+  DcNestedLoopsParameters p = {
+      .axis = kAxis, .loops = DcNestedGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kDcA)};
+  EXPECT_TRUE(p.problems().empty());
+  p.loops.speed_integral_a_per_rad = 5.0;
+  EXPECT_TRUE(p.problems().empty());
+  p.loops.angle_integral_per_s2 = 1e5;
+  ASSERT_EQ(p.problems().size(), 1u);
+  EXPECT_NE(p.problems()[0].find("unstable"), std::string::npos);
 }
 
 // Catches a current loop at a sample rate that cannot hold it: K_P·T/L of 2 or more.

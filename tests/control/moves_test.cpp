@@ -53,6 +53,11 @@ TEST(Moves, EverySpeedIsTheSlopeOfItsAngleAndSoOn) {
                              .friction_rate_per_s = 6.67,
                              .duration_s = 0.2});
   expect_derivatives(sine, 0.0, 0.2, true);
+  const SineTorqueMove frictionless({.amplitude_rad_s2 = 1166.7,
+                                     .angular_frequency_rad_s = 96.66,
+                                     .friction_rate_per_s = 0.0,
+                                     .duration_s = 0.2});
+  expect_derivatives(frictionless, 0.0, 0.2, true);
   expect_derivatives(SineMove({.amplitude_rad = 2.0, .angular_frequency_rad_s = 30.0, .duration_s = 0.2}),
                      0.0, 0.2, true);
 }
@@ -99,6 +104,7 @@ TEST(SpeedRamp, KeepsItsSpeed) {
   EXPECT_NEAR(ramp.at(0.1).speed_rad_s, 60.0, 1e-12);
   EXPECT_NEAR(ramp.at(0.3).angle_rad, 120.0 * 0.2, 1e-12);
   EXPECT_EQ(ramp.at(5.0).speed_rad_s, 120.0);
+  EXPECT_NEAR(ramp.at(5.0).angle_rad, 24.0, 1e-12);
 }
 
 // AC-09. Catches v_ref without its inductive part, i_ref without friction: the table of TRJ-01 for DC-A and

@@ -150,6 +150,16 @@ TEST(ShaftObserver, IsHundredsOfTimesQuieterThanTheBackwardDifference) {
   EXPECT_NEAR(rms(ShaftSpeed::kBackwardDifference), 2.78, 0.3);
 }
 
+// Catches an angle that is counted from zero and not from the first sample.
+TEST(ShaftEstimator, TheFirstSampleIsAngleZero) {
+  const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
+  ShaftEstimator estimator(with(ShaftSpeed::kObserver, gains, Discretisation::kEuler, 2000.0), kFriction,
+                           1e-4);
+  EXPECT_EQ(estimator.update({.encoder_count = 54321}, 0.0, 1).angle_rad, 0.0);
+  EXPECT_EQ(estimator.update({.encoder_count = 54321}, 0.0, 1).speed_rad_s, 0.0);
+  EXPECT_NEAR(estimator.update({.encoder_count = 54221}, 0.0, 1).angle_rad, -0.314159, 1e-6);
+}
+
 // Catches a tachometer read with its gain the wrong way up.
 TEST(ShaftEstimator, ReadsATachometer) {
   ShaftEstimatorParameters p = with(ShaftSpeed::kTachometer, {}, Discretisation::kEuler, 2000.0);

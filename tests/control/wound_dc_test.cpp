@@ -210,6 +210,49 @@ TEST(SeriesDc, TheWeakenedMotorGetsItsAcceleration) {
   EXPECT_EQ(p.problems().size(), 1u);
 }
 
+// Catches an integral that goes on while the acceleration or the field voltage stands at its limit: what
+// follows must be what a fresh controller does.
+TEST(SeriesDc, TheWeakenedMotorsIntegralStandsStillAtTheLimitOfItsFlux) {
+  WeakenedSeriesDcParameters p = {.axis = axis_of(kSeries),
+                                  .most_flux_wb = 2.0,
+                                  .speed_proportional_per_s = 10.0,
+                                  .speed_integral_per_s2 = 25.0};
+  p.axis.machine.field_shunt_resistance_ohm = 4.0;
+  p.axis.least_flux_wb = 0.1;
+  const Measurement slow = {.tachometer_v = -400.0, .i_a_a = 5.0, .i_f_a = 4.0};
+  const Measurement right = {.tachometer_v = 130.0, .i_a_a = 5.0, .i_f_a = 4.0};
+  WeakenedSeriesDcController fresh(p);
+  WeakenedSeriesDcController old(p);
+  for (int k = 0; k < 1000; ++k)
+    old.update(slow, kWanted, 1);
+  EXPECT_EQ(old.update(right, kWanted, 1).a, fresh.update(right, kWanted, 1).a);
+}
+
+TEST(SeparateDc, TheEnergyIntegralStandsStillAtTheLimitOfTheField) {
+  FieldControlDcParameters p = {.axis = axis_of(kSeparate),
+                                .armature_voltage_v = 220.0,
+                                .rated_flux_wb = 20.0,
+                                .start_speed_rad_s = 100.0,
+                                .energy_integral_per_s4 = 625.0,
+                                .energy_proportional_per_s3 = 500.0,
+                                .power_per_s2 = 150.0,
+                                .power_slope_per_s = 20.0};
+  p.axis.field_voltage_limit_v = 300.0;
+  const Measurement slow = {.tachometer_v = 20.0, .i_a_a = 5.0, .i_f_a = 0.8};
+  const Measurement right = {.tachometer_v = 215.0, .i_a_a = 3.0, .i_f_a = 0.8};
+  const Reference wanted = {.speed_rad_s = 216.0};
+  FieldControlDcController fresh(p);
+  FieldControlDcController old(p);
+  fresh.update(right, wanted, 1);
+  old.update(slow, wanted, 1);
+  for (int k = 0; k < 1000; ++k) {
+    EXPECT_EQ(old.update(slow, wanted, 1).field, -300.0);
+  }
+  const double field_v = fresh.update(right, wanted, 1).field;
+  EXPECT_LT(std::abs(field_v), 300.0);
+  EXPECT_EQ(old.update(right, wanted, 1).field, field_v);
+}
+
 /// The reduced shunt machine, L = 0: ω' and λ' under a voltage.
 State shunt_slope(const WoundDcModel& m, const State& x, double u, double load_nm) {
   const double i = (u - m.motor_constant * x.flux * x.w) / m.armature_resistance_ohm;
@@ -307,6 +350,21 @@ TEST(SeriesDcObserver, SeesSpeedAndLoadInTheCurrent) {
   motor.voltage_v = 60.0;
   motor.run(observer, 1.0);
   EXPECT_NEAR(observer.load_nm(), 1.2, 0.005);
+}
+
+// Catches a voltage that is taken a sample too late: at 2000 V/s that would be 0.2 V, and 0.16 rad/s.
+TEST(SeriesDcObserver, KnowsTheVoltageOfTheSampleBefore) {
+  SeriesDcObserver observer(kSeries, SeriesDcObserverGains::placed(std::array{40.0, 50.0, 60.0}, kSeries),
+                            0.5, 1e-4, Discretisation::kTrapezoidal);
+  SensorlessRun motor;
+  motor.run(observer, 1.0);
+  double peak_rad_s = 0.0;
+  for (int k = 0; k < 500; ++k) {
+    motor.voltage_v += 0.2;
+    motor.run(observer, 1e-4);
+    peak_rad_s = std::max(peak_rad_s, std::abs(observer.speed_rad_s() - motor.speed_rad_s));
+  }
+  EXPECT_LT(peak_rad_s, 0.1);
 }
 
 // EST-05. Catches a load that an observer without one finds all the same, and a speed that is wrong then.
