@@ -125,10 +125,7 @@ Refused Bench::write_parameter(AxisRuntime& a, const ParameterWrite& write) noex
   const AxisParameters& p = a.axis.parameters();
   const std::span<const Parameter> rows = axis_parameters(p);
   if (!std::isfinite(write.value)) return Refused::kNotFinite;
-  if (write.row >= rows.size() || write.value < rows[write.row].minimum ||
-      write.value > rows[write.row].maximum) {
-    return Refused::kOutOfRange;
-  }
+  if (write.row >= rows.size() || breaks_a_rule(rows[write.row], write.value)) return Refused::kOutOfRange;
   if (write.ramp_ticks <= 0 || rows[write.row].integer) {
     if (!set_parameter(a, write.row, write.value)) return Refused::kRuleBroken;
     a.ramps.forget(write.row);
@@ -147,7 +144,7 @@ Refused Bench::write_parameter(AxisRuntime& a, const ParameterWrite& write) noex
 bool Bench::set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept {
   AxisParameters p = a.axis.parameters();
   axis_parameters(p)[row].set(p, value);
-  if (!problems(p).empty()) return false;
+  if (breaks_a_rule(p)) return false;
   change_parameters(a, p);
   return true;
 }
@@ -157,7 +154,7 @@ void Bench::follow_ramps(AxisRuntime& a) noexcept {
   const std::span<const Parameter> rows = axis_parameters(p);
   for (std::size_t i = 0; i < a.ramps.count; ++i)
     rows[a.ramps.ramp[i].row].set(p, a.ramps.ramp[i].at(tick_));
-  const bool possible = problems(p).empty();
+  const bool possible = !breaks_a_rule(p);
   if (possible) change_parameters(a, p);
   for (std::size_t i = a.ramps.count; i-- > 0;) {
     const ParameterRamp ramp = a.ramps.ramp[i];
@@ -175,8 +172,7 @@ void Bench::change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept 
 
 Refused Bench::inject(AxisRuntime& a, const InjectFault& fault) noexcept {
   if (!std::isfinite(fault.value)) return Refused::kNotFinite;
-  if (fault.row >= kInjectableFaultCount ||
-      !problem_with(kInjectableFaults[fault.row], fault.value).empty()) {
+  if (fault.row >= kInjectableFaultCount || breaks_a_rule(kInjectableFaults[fault.row], fault.value)) {
     return Refused::kOutOfRange;
   }
   a.axis.inject(fault.row, fault.value);

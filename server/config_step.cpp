@@ -58,7 +58,8 @@ void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& 
                           advice(std::ceil(period_s / (kMaxStep * fastest_s)), kMaxStep * fastest_s));
   }
   std::vector<Problem> found;
-  add_period_problems(axis.setup.parameters.drive, period_s, found);
+  Problems rules(found);
+  add_period_problems(axis.setup.parameters.drive, period_s, rules);
   for (const Problem& problem : found) {
     bench.report("period_us",
                  "does not suit axis \"" + axis.config.name + "\": " + problem.field + " " + problem.rule);

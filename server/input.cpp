@@ -107,15 +107,35 @@ bool is_finite(const PhaseCommand& command) noexcept {
   return std::isfinite(x.a) && std::isfinite(x.b) && std::isfinite(x.c) && std::isfinite(x.field);
 }
 
-std::string problem_with(const InjectableFault& fault, double value) {
-  if (!std::isfinite(value)) return "is not a finite number";
+namespace {
+
+void add_problem(const InjectableFault& fault, double value, Problems& found) {
   const double minimum = fault.magnitude ? -fault.maximum : 0.0;
-  if (value < minimum || value > fault.maximum) {
-    return "is " + text(value) + " but must lie between " + text(minimum) + " and " + text(fault.maximum) +
-           " " + std::string(fault.unit);
+  if (!std::isfinite(value)) {
+    found.add(fault.name, "is not a finite number");
+  } else if (value < minimum || value > fault.maximum) {
+    found.add(fault.name, [&] {
+      return "is " + text(value) + " but must lie between " + text(minimum) + " and " + text(fault.maximum) +
+             " " + std::string(fault.unit);
+    });
+  } else if (fault.integer && value != std::floor(value)) {
+    found.add(fault.name, [&] { return "is " + text(value) + " but must be a whole number"; });
   }
-  if (fault.integer && value != std::floor(value)) return "is " + text(value) + " but must be a whole number";
-  return {};
+}
+
+}  // namespace
+
+bool breaks_a_rule(const InjectableFault& fault, double value) noexcept {
+  Problems found;
+  add_problem(fault, value, found);
+  return found.any();
+}
+
+std::string problem_with(const InjectableFault& fault, double value) {
+  std::vector<Problem> sentences;
+  Problems found(sentences);
+  add_problem(fault, value, found);
+  return found.any() ? sentences.front().rule : std::string();
 }
 
 std::string_view sentence_of(Refused why) noexcept {

@@ -113,6 +113,8 @@ constexpr bool suits(DriveKind drive, Gates gates) noexcept {
 /// What is wrong with putting `value` into this fault: empty if nothing is, otherwise a sentence with value
 /// and rule.
 std::string problem_with(const InjectableFault& fault, double value);
+/// Whether problem_with() has something to say; for the tick: no text, no allocation.
+bool breaks_a_rule(const InjectableFault& fault, double value) noexcept;
 
 /// Ticks that clients may name lie up to here: what a double holds exactly.
 inline constexpr std::uint64_t kMaxTick = std::uint64_t{1} << 53;

@@ -32,11 +32,12 @@ std::span<const Parameter> bldc_machine_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const BldcMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const BldcMachineParameters& p, Problems& found) {
   if (!(2.0 * p.mutual_inductance_h < p.self_inductance_h)) {
-    found.push_back({"machine.mutual_inductance_h",
-                     "is " + text(p.mutual_inductance_h) +
-                         " but must be below half of self_inductance_h = " + text(p.self_inductance_h)});
+    found.add("machine.mutual_inductance_h", [&] {
+      return "is " + text(p.mutual_inductance_h) +
+             " but must be below half of self_inductance_h = " + text(p.self_inductance_h);
+    });
   }
 }
 

@@ -128,53 +128,57 @@ constexpr auto kCurves = std::to_array<CurveParameter>({
 });
 
 /// "is <value> but <rule>".
-Problem problem(std::string_view field, double value, const std::string& rule) {
-  return {std::string(field), "is " + text(value) + " but " + rule};
+std::string sentence(double value, const std::string& rule) {
+  return "is " + text(value) + " but " + rule;
 }
 
-void add_loop_problems(const DriveParameters& p, std::vector<Problem>& found) {
+void add_loop_problems(const DriveParameters& p, Problems& found) {
   if (p.kind != DriveKind::kCurrent) return;
   constexpr const char* kRule = "must be above 0 with drive.kind = \"current_amplifier\"";
-  if (!(p.current_loop.proportional_v_per_a > 0.0)) {
-    found.push_back(problem("current_loop.proportional_v_per_a", p.current_loop.proportional_v_per_a, kRule));
-  }
-  if (!(p.current_loop.limit_a > 0.0)) {
-    found.push_back(problem("current_loop.limit_a", p.current_loop.limit_a, kRule));
-  }
+  const auto must_be_positive = [&](const char* field, double value) {
+    if (!(value > 0.0)) found.add(field, [&] { return sentence(value, kRule); });
+  };
+  must_be_positive("current_loop.proportional_v_per_a", p.current_loop.proportional_v_per_a);
+  must_be_positive("current_loop.limit_a", p.current_loop.limit_a);
 }
 
-void add_bus_problems(const DriveParameters& p, std::vector<Problem>& found) {
+void add_bus_problems(const DriveParameters& p, Problems& found) {
   const Bus& b = p.bus;
   if (!(b.chopper_on_v > 0.0)) return;
   if (!(b.capacitance_f > 0.0)) {
-    found.push_back(problem("bus.chopper_on_v", b.chopper_on_v,
-                            "a chopper needs a link that can rise: bus.capacitance_f must be above 0"));
+    found.add("bus.chopper_on_v", [&] {
+      return sentence(b.chopper_on_v,
+                      "a chopper needs a link that can rise: bus.capacitance_f must be above 0");
+    });
   }
   if (!(b.chopper_off_v < b.chopper_on_v)) {
-    found.push_back(problem("bus.chopper_off_v", b.chopper_off_v,
-                            "must be below chopper_on_v = " + text(b.chopper_on_v)));
+    found.add("bus.chopper_off_v", [&] {
+      return sentence(b.chopper_off_v, "must be below chopper_on_v = " + text(b.chopper_on_v));
+    });
   }
   if (!(b.chopper_off_v > b.voltage_v)) {
-    found.push_back(problem("bus.chopper_off_v", b.chopper_off_v,
-                            "must be above the supply, bus.voltage_v = " + text(b.voltage_v) +
-                                ", or the brake resistor would stay on"));
+    found.add("bus.chopper_off_v", [&] {
+      return sentence(b.chopper_off_v, "must be above the supply, bus.voltage_v = " + text(b.voltage_v) +
+                                           ", or the brake resistor would stay on");
+    });
   }
 }
 
-void add_source_problems(const DriveParameters& p, std::vector<Problem>& found) {
+void add_source_problems(const DriveParameters& p, Problems& found) {
   if (p.kind != DriveKind::kSource) return;
   const Source& s = p.source;
   if (s.choose_angle && s.frequency_hz == 0.0) {
-    found.push_back(
-        {"source.choose_angle", "is 1 but a source of frequency_hz = 0 never comes to closing_angle_rad"});
+    found.add("source.choose_angle",
+              "is 1 but a source of frequency_hz = 0 never comes to closing_angle_rad");
   }
   if (s.waveform != Waveform::kTable) return;
   if (s.table.empty()) {
-    found.push_back({"source.table", "is missing but source.waveform is \"table\""});
+    found.add("source.table", "is missing but source.waveform is \"table\"");
   } else if (s.table.points().front().x < 0.0 || s.table.points().back().x > 1.0) {
-    found.push_back({"source.table", "goes from " + text(s.table.points().front().x) + " to " +
-                                         text(s.table.points().back().x) +
-                                         " but must lie between 0 and 1, a whole period"});
+    found.add("source.table", [&] {
+      return "goes from " + text(s.table.points().front().x) + " to " + text(s.table.points().back().x) +
+             " but must lie between 0 and 1, a whole period";
+    });
   }
 }
 
@@ -188,24 +192,26 @@ std::span<const CurveParameter> drive_curves() noexcept {
   return kCurves;
 }
 
-void add_problems(const DriveParameters& p, std::vector<Problem>& found) {
+void add_problems(const DriveParameters& p, Problems& found) {
   add_loop_problems(p, found);
   if (p.kind == DriveKind::kSwitched && p.amplifier.filter_hz > 0.0) {
-    found.push_back(
-        problem("amplifier.filter_hz", p.amplifier.filter_hz,
-                "must be 0 with drive.kind = \"switched_inverter\", whose diodes hold the terminals"));
+    found.add("amplifier.filter_hz", [&] {
+      return sentence(p.amplifier.filter_hz,
+                      "must be 0 with drive.kind = \"switched_inverter\", whose diodes hold the terminals");
+    });
   }
   add_bus_problems(p, found);
   add_source_problems(p, found);
 }
 
-void add_period_problems(const DriveParameters& p, double period_s, std::vector<Problem>& found) {
+void add_period_problems(const DriveParameters& p, double period_s, Problems& found) {
   if (p.kind != DriveKind::kAveraged && p.kind != DriveKind::kSwitched) return;
   const double pwm_period_s = period_s / p.inverter.pwm_periods_per_tick;
   if (!(p.inverter.dead_time_s < 0.5 * pwm_period_s)) {
-    found.push_back(
-        problem("inverter.dead_time_s", p.inverter.dead_time_s,
-                "must be below half of the carrier period, which is " + text(pwm_period_s) + " s"));
+    found.add("inverter.dead_time_s", [&] {
+      return sentence(p.inverter.dead_time_s,
+                      "must be below half of the carrier period, which is " + text(pwm_period_s) + " s");
+    });
   }
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -13,9 +12,9 @@ std::span<const Parameter> drive_rows() noexcept;
 std::span<const CurveParameter> drive_curves() noexcept;
 
 /// The rules between the values.
-void add_problems(const DriveParameters& p, std::vector<Problem>& found);
+void add_problems(const DriveParameters& p, Problems& found);
 
 /// The rules that need the sample period.
-void add_period_problems(const DriveParameters& p, double period_s, std::vector<Problem>& found);
+void add_period_problems(const DriveParameters& p, double period_s, Problems& found);
 
 }  // namespace drivebench

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <vector>
-
 #include "plant/parameters/rows.hpp"
 
 /// What the tables of the DC machines with a field winding have in common.
@@ -56,6 +54,6 @@ constexpr CurveParameter saturation_curve() {
 }
 
 /// One of L_f and saturation curve, and the curve from (0, 0) on.
-void add_problems(double field_inductance_h, const Curve& saturation_curve, std::vector<Problem>& found);
+void add_problems(double field_inductance_h, const Curve& saturation_curve, Problems& found);
 
 }  // namespace drivebench::field_winding_rows

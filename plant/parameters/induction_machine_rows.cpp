@@ -32,11 +32,13 @@ std::span<const Parameter> induction_machine_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const InductionMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const InductionMachineParameters& p, Problems& found) {
   const bool has_inductances = p.rotor_inductance_h > 0.0 && p.stator_inductance_h > 0.0;
   if (const double sigma = has_inductances ? leakage_factor(p) : 1.0; !(sigma > 0.0)) {
-    found.push_back({"machine.mutual_inductance_h", "makes the leakage factor sigma = 1 - M^2/(L_R L_S) = " +
-                                                        text(sigma) + " but it must be above 0"});
+    found.add("machine.mutual_inductance_h", [&] {
+      return "makes the leakage factor sigma = 1 - M^2/(L_R L_S) = " + text(sigma) +
+             " but it must be above 0";
+    });
   }
 }
 

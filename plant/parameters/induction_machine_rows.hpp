@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -11,6 +10,6 @@ namespace drivebench {
 std::span<const Parameter> induction_machine_rows() noexcept;
 
 /// Appends what is wrong between the values.
-void add_problems(const InductionMachineParameters& p, std::vector<Problem>& found);
+void add_problems(const InductionMachineParameters& p, Problems& found);
 
 }  // namespace drivebench

@@ -26,8 +26,8 @@ std::span<const Parameter> linear_dc_machine_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const LinearDcMachineParameters& p, std::vector<Problem>& found) {
-  if (p.flux_density_t == 0.0) found.push_back({"machine.flux_density_t", "is 0 but must not be 0"});
+void add_problems(const LinearDcMachineParameters& p, Problems& found) {
+  if (p.flux_density_t == 0.0) found.add("machine.flux_density_t", "is 0 but must not be 0");
 }
 
 }  // namespace drivebench

@@ -82,25 +82,28 @@ std::span<const CurveParameter> mechanics_curves() noexcept {
   return kCurves;
 }
 
-void add_problems(const MechanicsParameters& p, std::vector<Problem>& found) {
+void add_problems(const MechanicsParameters& p, Problems& found) {
   if (p.static_friction_nm < p.coulomb_friction_nm) {
-    found.push_back({"mechanics.static_friction_nm",
-                     "is " + text(p.static_friction_nm) +
-                         " but must not be below coulomb_friction_nm = " + text(p.coulomb_friction_nm)});
+    found.add("mechanics.static_friction_nm", [&] {
+      return "is " + text(p.static_friction_nm) +
+             " but must not be below coulomb_friction_nm = " + text(p.coulomb_friction_nm);
+    });
   }
   if (has_two_masses(p)) {
     if (p.load_inertia_kgm2 == 0.0) {
-      found.push_back({"mechanics.load_inertia_kgm2",
-                       "is 0 but must be above 0 at the end of an elastic shaft: shaft_stiffness_nm is " +
-                           text(p.shaft_stiffness_nm)});
+      found.add("mechanics.load_inertia_kgm2", [&] {
+        return "is 0 but must be above 0 at the end of an elastic shaft: shaft_stiffness_nm is " +
+               text(p.shaft_stiffness_nm);
+      });
     }
     return;
   }
   const auto needs_stiffness = [&found](const char* field, double value) {
     if (!(value > 0.0)) return;
-    found.push_back(
-        {field, "is " + text(value) +
-                    " but must be 0 on a rigid shaft: an elastic one has shaft_stiffness_nm above 0"});
+    found.add(field, [&] {
+      return "is " + text(value) +
+             " but must be 0 on a rigid shaft: an elastic one has shaft_stiffness_nm above 0";
+    });
   };
   needs_stiffness("mechanics.shaft_damping_nms", p.shaft_damping_nms);
   needs_stiffness("mechanics.backlash_rad", p.backlash_rad);

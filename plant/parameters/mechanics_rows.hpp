@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -12,6 +11,6 @@ std::span<const Parameter> mechanics_rows() noexcept;
 std::span<const CurveParameter> mechanics_curves() noexcept;
 
 /// Appends what is wrong between the values, each of which lies within the limits of its row.
-void add_problems(const MechanicsParameters& p, std::vector<Problem>& found);
+void add_problems(const MechanicsParameters& p, Problems& found);
 
 }  // namespace drivebench

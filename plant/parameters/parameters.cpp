@@ -82,17 +82,36 @@ MachineParameters machine_of_kind(std::size_t kind) {
   return MachineParameters(std::in_place_index<kIndex>);
 }
 
-void add_curve_problems(const AxisParameters& p, std::vector<Problem>& found) {
+void add_problem(const Parameter& row, double value, Problems& found) {
+  if (!(value >= row.minimum && value <= row.maximum)) {
+    found.add(row.name, [&] {
+      return "is " + text(value) + " but must lie between " + text(row.minimum) + " and " +
+             text(row.maximum) + (row.unit == "1" ? "" : " " + std::string(row.unit));
+    });
+  } else if (row.integer && value != std::trunc(value)) {
+    found.add(row.name, [&] { return "is " + text(value) + " but must be a whole number"; });
+  }
+}
+
+void add_curve_problems(const AxisParameters& p, Problems& found) {
   for (const CurveParameter& row : axis_curves(p)) {
     const Curve& curve = row.get(p);
     if (curve.empty()) {
-      if (row.required) found.push_back({std::string(row.name), "is missing"});
-      continue;
-    }
-    if (std::string rule = problem_with_points(curve.points(), row.rising); !rule.empty()) {
-      found.push_back({std::string(row.name), std::move(rule)});
+      if (row.required) found.add(row.name, "is missing");
+    } else if (const std::string rule = problem_with_points(curve.points(), row.rising); !rule.empty()) {
+      found.add(row.name, rule);
     }
   }
+}
+
+/// The rules between values.
+void add_rule_problems(const AxisParameters& p, Problems& found) {
+  std::visit([&found](const auto& machine) { add_problems(machine, found); }, p.machine);
+  add_problems(p.mechanics, found);
+  add_problems(p.drive, found);
+  add_problems(p.encoder, found);
+  add_problems(p.sensors, found);
+  add_problems(p.thermal, found);
 }
 
 }  // namespace
@@ -130,31 +149,33 @@ std::string text(double value) {
   return {buffer.data(), end};
 }
 
+bool breaks_a_rule(const Parameter& parameter, double value) noexcept {
+  Problems found;
+  add_problem(parameter, value, found);
+  return found.any();
+}
+
+bool breaks_a_rule(const AxisParameters& p) noexcept {
+  Problems found;
+  add_rule_problems(p, found);
+  return found.any();
+}
+
 std::string problem_with(const Parameter& parameter, double value) {
-  if (!(value >= parameter.minimum && value <= parameter.maximum)) {
-    return "is " + text(value) + " but must lie between " + text(parameter.minimum) + " and " +
-           text(parameter.maximum) + (parameter.unit == "1" ? "" : " " + std::string(parameter.unit));
-  }
-  if (parameter.integer && value != std::trunc(value))
-    return "is " + text(value) + " but must be a whole number";
-  return {};
+  std::vector<Problem> sentences;
+  Problems found(sentences);
+  add_problem(parameter, value, found);
+  return found.any() ? sentences.front().rule : std::string();
 }
 
 std::vector<Problem> problems(const AxisParameters& p) {
-  std::vector<Problem> found;
-  for (const Parameter& row : axis_parameters(p)) {
-    if (std::string rule = problem_with(row, row.get(p)); !rule.empty()) {
-      found.push_back({std::string(row.name), std::move(rule)});
-    }
-  }
+  std::vector<Problem> sentences;
+  Problems found(sentences);
+  for (const Parameter& row : axis_parameters(p))
+    add_problem(row, row.get(p), found);
   add_curve_problems(p, found);
-  std::visit([&found](const auto& machine) { add_problems(machine, found); }, p.machine);
-  add_problems(p.mechanics, found);
-  add_problems(p.drive, found);
-  add_problems(p.encoder, found);
-  add_problems(p.sensors, found);
-  add_problems(p.thermal, found);
-  return found;
+  add_rule_problems(p, found);
+  return sentences;
 }
 
 }  // namespace drivebench

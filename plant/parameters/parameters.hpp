@@ -57,7 +57,15 @@ const Parameter* find_parameter(const AxisParameters& p, std::string_view name) 
 /// and rule.
 std::string problem_with(const Parameter& parameter, double value);
 
-/// Everything that is wrong with the parameters: each value by its limits, then the rules between them.
+/// Everything that is wrong with the parameters: each value by its limits, the points of the curves, then the
+/// rules between the values.
 std::vector<Problem> problems(const AxisParameters& p);
+
+/// The same questions for the tick, which is told nothing but yes or no: no text, no allocation.
+/// Whether problem_with() has something to say.
+bool breaks_a_rule(const Parameter& parameter, double value) noexcept;
+/// Whether a rule between values is broken. Each value has been asked for before, and curves cannot change
+/// while the bench runs: they are not looked at again.
+bool breaks_a_rule(const AxisParameters& p) noexcept;
 
 }  // namespace drivebench

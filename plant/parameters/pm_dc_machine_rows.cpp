@@ -25,6 +25,6 @@ std::span<const Parameter> pm_dc_machine_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const PmDcMachineParameters&, std::vector<Problem>&) {}
+void add_problems(const PmDcMachineParameters&, Problems&) {}
 
 }  // namespace drivebench

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -11,6 +10,6 @@ namespace drivebench {
 std::span<const Parameter> pm_dc_machine_rows() noexcept;
 
 /// The rules between the values.
-void add_problems(const PmDcMachineParameters& p, std::vector<Problem>& found);
+void add_problems(const PmDcMachineParameters& p, Problems& found);
 
 }  // namespace drivebench

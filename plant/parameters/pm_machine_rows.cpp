@@ -35,11 +35,12 @@ std::span<const Parameter> pm_machine_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const PmMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const PmMachineParameters& p, Problems& found) {
   if (p.torque_constant_nm_per_a == 0.0 && p.inductance_d_h == p.inductance_q_h) {
-    found.push_back({"machine.torque_constant_nm_per_a",
-                     "is 0 but must be above 0 in a machine whose inductance_q_h equals inductance_d_h = " +
-                         text(p.inductance_d_h) + ": no current gives it a torque"});
+    found.add("machine.torque_constant_nm_per_a", [&] {
+      return "is 0 but must be above 0 in a machine whose inductance_q_h equals inductance_d_h = " +
+             text(p.inductance_d_h) + ": no current gives it a torque";
+    });
   }
 }
 

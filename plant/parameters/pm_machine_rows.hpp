@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -11,6 +10,6 @@ namespace drivebench {
 std::span<const Parameter> pm_machine_rows() noexcept;
 
 /// Appends what is wrong between the values, each of which lies within the limits of its row.
-void add_problems(const PmMachineParameters& p, std::vector<Problem>& found);
+void add_problems(const PmMachineParameters& p, Problems& found);
 
 }  // namespace drivebench

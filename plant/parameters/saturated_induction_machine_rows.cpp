@@ -50,19 +50,16 @@ std::span<const CurveParameter> saturated_induction_machine_curves() noexcept {
   return kCurves;
 }
 
-void add_problems(const SaturatedInductionMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const SaturatedInductionMachineParameters& p, Problems& found) {
   constexpr std::string_view kField = "machine.magnetising_curve";
   if (p.magnetising_curve.empty()) {
-    found.push_back({std::string(kField), "has no points but needs two or more"});
+    found.add(kField, "has no points but needs two or more");
     return;
   }
-  const std::vector<CurvePoint>& points = p.magnetising_curve.points();
-  if (std::string rule = problem_with_points(points, true); !rule.empty()) {
-    found.push_back({std::string(kField), std::move(rule)});
-  }
-  if (points.front() != CurvePoint{.x = 0.0, .y = 0.0}) {
-    found.push_back({std::string(kField), "begins at [" + text(points.front().x) + ", " +
-                                              text(points.front().y) + "] but must begin at [0, 0]"});
+  if (const CurvePoint first = p.magnetising_curve.points().front(); first != CurvePoint{0.0, 0.0}) {
+    found.add(kField, [&] {
+      return "begins at [" + text(first.x) + ", " + text(first.y) + "] but must begin at [0, 0]";
+    });
   }
 }
 

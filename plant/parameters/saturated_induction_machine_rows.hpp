@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -12,6 +11,6 @@ std::span<const Parameter> saturated_induction_machine_rows() noexcept;
 std::span<const CurveParameter> saturated_induction_machine_curves() noexcept;
 
 /// The rules between the values.
-void add_problems(const SaturatedInductionMachineParameters& p, std::vector<Problem>& found);
+void add_problems(const SaturatedInductionMachineParameters& p, Problems& found);
 
 }  // namespace drivebench

@@ -237,11 +237,12 @@ constexpr auto kTable =
     joined(kEncoder, kCurrentSensor, kVoltageSensor, kNeutralSensor, kBusSensor, kTemperatureSensor,
            kTachometerChannel, kTachometer, kResolverChannel, kResolver, kOthers);
 
-void add_delay_problem(std::string_view field, double ticks, std::vector<Problem>& found) {
+void add_delay_problem(std::string_view field, double ticks, Problems& found) {
   if (is_sensor_delay(ticks)) return;
-  found.push_back({std::string(field), "is " + text(ticks) +
-                                           " but must be 0, 0.5 or a whole number of ticks up to " +
-                                           text(kMaxSensorDelayTicks)});
+  found.add(field, [&] {
+    return "is " + text(ticks) + " but must be 0, 0.5 or a whole number of ticks up to " +
+           text(kMaxSensorDelayTicks);
+  });
 }
 
 }  // namespace
@@ -250,13 +251,13 @@ std::span<const Parameter> sensor_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const EncoderParameters& p, std::vector<Problem>& found) {
+void add_problems(const EncoderParameters& p, Problems& found) {
   if (p.counts_per_revolution % 4 == 0) return;
-  found.push_back({"encoder.counts_per_revolution",
-                   "is " + std::to_string(p.counts_per_revolution) + " but must be a multiple of 4"});
+  found.add("encoder.counts_per_revolution",
+            [&] { return "is " + std::to_string(p.counts_per_revolution) + " but must be a multiple of 4"; });
 }
 
-void add_problems(const SensorParameters& p, std::vector<Problem>& found) {
+void add_problems(const SensorParameters& p, Problems& found) {
   add_delay_problem("current_sensor.delay_ticks", p.current.delay_ticks, found);
   add_delay_problem("voltage_sensor.delay_ticks", p.voltage.delay_ticks, found);
   add_delay_problem("neutral_sensor.delay_ticks", p.neutral.delay_ticks, found);
@@ -265,22 +266,25 @@ void add_problems(const SensorParameters& p, std::vector<Problem>& found) {
   add_delay_problem("tachometer.delay_ticks", p.tachometer.analog.delay_ticks, found);
   add_delay_problem("resolver.delay_ticks", p.resolver.analog.delay_ticks, found);
   if (p.tachometer.analog.enabled && p.tachometer.gain_vs_per_rad == 0.0) {
-    found.push_back({"tachometer.gain_vs_per_rad",
-                     "is 0 but must not be while tachometer.enabled is 1: it would read nothing"});
+    found.add("tachometer.gain_vs_per_rad",
+              "is 0 but must not be while tachometer.enabled is 1: it would read nothing");
   }
   if (p.tachometer.ripple > 0.0 && p.tachometer.ripple_per_turn == 0) {
-    found.push_back({"tachometer.ripple_per_turn",
-                     "is 0 but must be above it with tachometer.ripple = " + text(p.tachometer.ripple)});
+    found.add("tachometer.ripple_per_turn", [&] {
+      return "is 0 but must be above it with tachometer.ripple = " + text(p.tachometer.ripple);
+    });
   }
 }
 
-void add_problems(const ThermalParameters& p, std::vector<Problem>& found) {
+void add_problems(const ThermalParameters& p, Problems& found) {
   if (!p.enabled) return;
   const auto check = [&](const char* field, double coefficient_per_k) {
     const double factor = 1.0 + coefficient_per_k * (p.ambient_k - p.reference_k);
     if (factor > 0.0) return;
-    found.push_back({field, "is " + text(coefficient_per_k) + " 1/K and makes the resistance at ambient_k " +
-                                text(factor) + " times that at reference_k, but it must stay above 0"});
+    found.add(field, [&] {
+      return "is " + text(coefficient_per_k) + " 1/K and makes the resistance at ambient_k " + text(factor) +
+             " times that at reference_k, but it must stay above 0";
+    });
   };
   check("thermal.stator_coefficient_per_k", p.stator_coefficient_per_k);
   check("thermal.rotor_coefficient_per_k", p.rotor_coefficient_per_k);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -11,8 +10,8 @@ namespace drivebench {
 std::span<const Parameter> sensor_rows() noexcept;
 
 /// Appends what is wrong between the values, each of which lies within the limits of its row.
-void add_problems(const EncoderParameters& p, std::vector<Problem>& found);
-void add_problems(const SensorParameters& p, std::vector<Problem>& found);
-void add_problems(const ThermalParameters& p, std::vector<Problem>& found);
+void add_problems(const EncoderParameters& p, Problems& found);
+void add_problems(const SensorParameters& p, Problems& found);
+void add_problems(const ThermalParameters& p, Problems& found);
 
 }  // namespace drivebench

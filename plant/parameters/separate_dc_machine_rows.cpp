@@ -35,7 +35,7 @@ std::span<const CurveParameter> separate_dc_machine_curves() noexcept {
   return kCurves;
 }
 
-void add_problems(const SeparateDcMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const SeparateDcMachineParameters& p, Problems& found) {
   field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -12,6 +11,6 @@ std::span<const Parameter> separate_dc_machine_rows() noexcept;
 std::span<const CurveParameter> separate_dc_machine_curves() noexcept;
 
 /// The rules between the values.
-void add_problems(const SeparateDcMachineParameters& p, std::vector<Problem>& found);
+void add_problems(const SeparateDcMachineParameters& p, Problems& found);
 
 }  // namespace drivebench

@@ -34,11 +34,11 @@ std::span<const CurveParameter> series_dc_machine_curves() noexcept {
   return kCurves;
 }
 
-void add_problems(const SeriesDcMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const SeriesDcMachineParameters& p, Problems& found) {
   field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
   if (p.field_shunt && p.field_shunt_resistance_ohm == 0.0) {
-    found.push_back({"machine.field_shunt",
-                     "is 1 but must be 0 without a resistor: machine.field_shunt_resistance_ohm is 0"});
+    found.add("machine.field_shunt",
+              "is 1 but must be 0 without a resistor: machine.field_shunt_resistance_ohm is 0");
   }
 }
 

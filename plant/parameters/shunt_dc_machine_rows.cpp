@@ -31,7 +31,7 @@ std::span<const CurveParameter> shunt_dc_machine_curves() noexcept {
   return kCurves;
 }
 
-void add_problems(const ShuntDcMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const ShuntDcMachineParameters& p, Problems& found) {
   field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
 }
 

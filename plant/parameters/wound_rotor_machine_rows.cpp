@@ -33,11 +33,13 @@ std::span<const Parameter> wound_rotor_machine_rows() noexcept {
   return kTable;
 }
 
-void add_problems(const WoundRotorMachineParameters& p, std::vector<Problem>& found) {
+void add_problems(const WoundRotorMachineParameters& p, Problems& found) {
   if (!(p.stator_inductance_h > 0.0 && p.field_inductance_h > 0.0)) return;
   if (const double sigma = leakage_factor(p); !(sigma > 0.0)) {
-    found.push_back({"machine.mutual_inductance_h", "makes the leakage factor sigma = 1 - M^2/(L_S L_F) = " +
-                                                        text(sigma) + " but it must be above 0"});
+    found.add("machine.mutual_inductance_h", [&] {
+      return "makes the leakage factor sigma = 1 - M^2/(L_S L_F) = " + text(sigma) +
+             " but it must be above 0";
+    });
   }
 }
 

@@ -215,11 +215,12 @@ TEST(BldcMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) {
 // Kills: inductances that no windings can have, which make the zero sequence unstable.
 TEST(BldcMachine, MutualInductanceMustStayBelowHalfOfTheSelfInductance) {
   std::vector<Problem> found;
-  add_problems(kMotor, found);
+  Problems rules(found);
+  add_problems(kMotor, rules);
   EXPECT_TRUE(found.empty());
   BldcMachineParameters p = kMotor;
   p.mutual_inductance_h = 0.5 * p.self_inductance_h;
-  add_problems(p, found);
+  add_problems(p, rules);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].field, "machine.mutual_inductance_h");
   EXPECT_EQ(found[0].rule, "is 0.00136 but must be below half of self_inductance_h = 0.00272");

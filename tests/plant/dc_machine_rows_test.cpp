@@ -63,7 +63,8 @@ TEST(DcMachineRows, TheSaturationCurveIsReadAndWritten) {
 template <class Machine>
 std::vector<std::string> sentences(const Machine& p) {
   std::vector<Problem> found;
-  add_problems(p, found);
+  Problems rules(found);
+  add_problems(p, rules);
   std::vector<std::string> result;
   for (const Problem& problem : found)
     result.push_back(problem.field + " " + problem.rule);

@@ -11,7 +11,8 @@ namespace {
 
 std::vector<std::string> fields(const DriveParameters& p) {
   std::vector<Problem> found;
-  add_problems(p, found);
+  Problems rules(found);
+  add_problems(p, rules);
   std::vector<std::string> result;
   for (const Problem& problem : found)
     result.push_back(problem.field);
@@ -100,15 +101,16 @@ TEST(DriveRows, TheDeadTimeFitsIntoTheCarrierPeriod) {
   p.kind = DriveKind::kAveraged;
   p.inverter = {.pwm_periods_per_tick = 4, .dead_time_s = 12e-6};
   std::vector<Problem> found;
-  add_period_problems(p, 100e-6, found);
+  Problems rules(found);
+  add_period_problems(p, 100e-6, rules);
   EXPECT_TRUE(found.empty());
   p.inverter.dead_time_s = 12.5e-6;
-  add_period_problems(p, 100e-6, found);
+  add_period_problems(p, 100e-6, rules);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].field, "inverter.dead_time_s");
   EXPECT_EQ(found[0].rule, "is 1.25e-05 but must be below half of the carrier period, which is 2.5e-05 s");
   p.kind = DriveKind::kVoltage;
-  add_period_problems(p, 100e-6, found);
+  add_period_problems(p, 100e-6, rules);
   EXPECT_EQ(found.size(), 1u);
 }
 

@@ -24,7 +24,8 @@ const Parameter& row_named(std::string_view name) {
 
 std::vector<Problem> problems_of(const MechanicsParameters& p) {
   std::vector<Problem> found;
-  add_problems(p, found);
+  Problems rules(found);
+  add_problems(p, rules);
   return found;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -346,7 +347,8 @@ TEST(SaturatedInductionMachine, TheCurveMustBeginAtTheOriginAndRise) {
     SaturatedInductionMachineParameters p = saturating();
     p.magnetising_curve = std::move(curve);
     std::vector<Problem> found;
-    add_problems(p, found);
+    Problems rules(found);
+    add_problems(p, rules);
     for (const Problem& problem : found)
       EXPECT_EQ(problem.field, "machine.magnetising_curve");
     return found.empty() ? std::string() : found.front().rule;
@@ -354,12 +356,17 @@ TEST(SaturatedInductionMachine, TheCurveMustBeginAtTheOriginAndRise) {
   EXPECT_EQ(rule(saturating().magnetising_curve), "");
   EXPECT_EQ(rule({}), "has no points but needs two or more");
   EXPECT_EQ(rule(Curve({{-1.0, -0.5}, {1.0, 0.5}})), "begins at [-1, -0.5] but must begin at [0, 0]");
-  EXPECT_EQ(rule(Curve({{0.0, 0.0}, {1.0, 0.0}})), "point 2 must have a larger y than the one before");
   const CurveParameter& row = saturated_induction_machine_curves().front();
   AxisParameters axis;
   axis.machine = saturating();
   row.set(axis, Curve({{0.0, 0.0}, {2.0, 1.0}}));
   EXPECT_EQ(row.get(axis).points().back().y, 1.0);
+  row.set(axis, Curve({{0.0, 0.0}, {1.0, 0.0}}));
+  const std::vector<Problem> found = problems(axis);
+  EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const Problem& problem) {
+    return problem.field == "machine.magnetising_curve" &&
+           problem.rule == "point 2 must have a larger y than the one before";
+  }));
 }
 
 }  // namespace

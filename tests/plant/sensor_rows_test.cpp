@@ -27,9 +27,10 @@ const Parameter& row_of(std::string_view name) {
 
 std::vector<Problem> problems_of(const AxisParameters& p) {
   std::vector<Problem> found;
-  add_problems(p.encoder, found);
-  add_problems(p.sensors, found);
-  add_problems(p.thermal, found);
+  Problems rules(found);
+  add_problems(p.encoder, rules);
+  add_problems(p.sensors, rules);
+  add_problems(p.thermal, rules);
   return found;
 }
 

@@ -32,9 +32,10 @@ TEST(SynchronousRows, EachRowHasAMemberOfItsOwn) {
 // Kills: a machine without any torque that is let through, or a reluctance machine that is not.
 TEST(SynchronousRows, AMachineWithoutMagnetMustBeSalient) {
   std::vector<Problem> found;
-  add_problems(PmMachineParameters{.inductance_d_h = 1e-3, .inductance_q_h = 2e-3}, found);
+  Problems rules(found);
+  add_problems(PmMachineParameters{.inductance_d_h = 1e-3, .inductance_q_h = 2e-3}, rules);
   EXPECT_TRUE(found.empty());
-  add_problems(PmMachineParameters{.inductance_d_h = 2e-3, .inductance_q_h = 2e-3}, found);
+  add_problems(PmMachineParameters{.inductance_d_h = 2e-3, .inductance_q_h = 2e-3}, rules);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].field, "machine.torque_constant_nm_per_a");
   EXPECT_NE(found[0].rule.find("0.002"), std::string::npos) << found[0].rule;
@@ -44,15 +45,16 @@ TEST(SynchronousRows, AMachineWithoutMagnetMustBeSalient) {
 // whose own rows complain already.
 TEST(SynchronousRows, TheFieldCannotLinkMoreThanAllOfTheStatorFlux) {
   std::vector<Problem> found;
+  Problems rules(found);
   WoundRotorMachineParameters p{
       .stator_inductance_h = 0.02, .field_inductance_h = 0.9, .mutual_inductance_h = 0.134};
-  add_problems(p, found);
+  add_problems(p, rules);
   EXPECT_TRUE(found.empty());
   p.mutual_inductance_h = 0.135;
-  add_problems(p, found);
+  add_problems(p, rules);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].field, "machine.mutual_inductance_h");
-  add_problems(WoundRotorMachineParameters{}, found);
+  add_problems(WoundRotorMachineParameters{}, rules);
   EXPECT_EQ(found.size(), 1U);
 }
 

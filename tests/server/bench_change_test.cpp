@@ -130,6 +130,7 @@ TEST(BenchRamp, HostileWritesAreRefused) {
   EXPECT_EQ(submit(bench, write(kResistance, -1.0, 5)), Refused::kOutOfRange);
   EXPECT_EQ(submit(bench, ParameterWrite{.row = rows, .value = 1.0}), Refused::kOutOfRange);
   EXPECT_EQ(submit(bench, ParameterWrite{.row = ~0u, .value = 1.0, .ramp_ticks = 1}), Refused::kOutOfRange);
+  EXPECT_EQ(submit(bench, write("amplifier.over_current_trip", 0.5)), Refused::kOutOfRange);
   EXPECT_EQ(submit(bench, write("amplifier.over_current_trip", 0.0, 10)), Refused::kNot);
   bench.step();
   EXPECT_EQ(value_of(bench.axis(0).parameters(), "amplifier.over_current_trip"), 0.0) << "at once";
