@@ -137,6 +137,16 @@ void Axis::bump(double impulse_nms) noexcept {
   look_inside();
 }
 
+void Axis::bump_output(double impulse_nms) noexcept {
+  if (has_two_masses(core_.p.mechanics)) {
+    state_.shaft = output_bumped(core_.shaft, state_.shaft, impulse_nms);
+  } else {
+    const ShaftState x{.speed_rad_s = state_.shaft.speed_rad_s, .angle_rad = state_.shaft.angle_rad};
+    state_.shaft.speed_rad_s = output_bumped(core_.shaft, x, impulse_nms).speed_rad_s;
+  }
+  look_inside();
+}
+
 void Axis::inject(std::size_t row, double value) noexcept {
   state_.injected.*kInjectableFaults[row].member = value;
   adjust();

@@ -46,6 +46,8 @@ class Axis {
   }
   /// A blow on the rotor: its speed jumps.
   void bump(double impulse_nms) noexcept;
+  /// The same on the output of its gear or shaft.
+  void bump_output(double impulse_nms) noexcept;
   /// Puts the fault of this row of kInjectableFaults in force; 0 takes it back.
   void inject(std::size_t row, double value) noexcept;
   const InjectedFaults& injected() const noexcept { return state_.injected; }

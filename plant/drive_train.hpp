@@ -5,41 +5,13 @@
 #include <cmath>
 #include <type_traits>
 
+#include "plant/events.hpp"
 #include "plant/rk4.hpp"
 #include "plant/rotated.hpp"
 #include "plant/train.hpp"
 #include "plant/trig.hpp"
 
 namespace drivebench {
-
-/// Numbers whose passing through zero ends a piece of a tick: at most four of the shaft, three of the
-/// terminals and a corner.
-struct EventValues {
-  std::array<double, 8> value{};
-  int shaft = 0;  ///< how many of them belong to the shaft; the rest follows
-  int count = 0;
-
-  void add(double v) noexcept { value[static_cast<std::size_t>(count++)] = v; }
-};
-
-/// The first of the values that passes zero, going linearly, and the part of the piece after which it does.
-struct Crossing {
-  int event = -1;
-  double fraction = 1.0;
-};
-Crossing first_crossing(const EventValues& from, const EventValues& to) noexcept;
-
-/// One step of the search for a zero between two points by the Illinois method.
-struct Bracket {
-  double low = 0.0;
-  double low_value;
-  double high = 1.0;
-  double high_value;
-  int side = 0;
-
-  double guess() const noexcept { return low + (high - low) * (low_value / (low_value - high_value)); }
-  void narrow(double at, double value) noexcept;
-};
 
 /// A train with a machine of this kind, whose rotor turns a rigid shaft (ShaftState) or one of two masses
 /// (TwoMassState).
@@ -67,10 +39,15 @@ class DriveTrain final : public Train {
     return torque_nm(c_, piece_.stage, turned(motion));
   }
   void stage(int number, double duration_s, const RotorMotion& motion) noexcept override;
-  double event(const AxisCore& core, const AxisState& state, const RotorMotion& from,
-               const RotorMotion& to) noexcept override;
+  void shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
+               const RotorMotion& motion) noexcept override;
+  void find_corner(const RotorMotion& from, const RotorMotion& to) noexcept override {
+    piece_.corner = corner_between(from, to);
+  }
+  void add_events(const AxisCore& core, const AxisState& state, PieceEnd end, const RotorMotion& motion,
+                  EventValues& values) const noexcept override;
   void close(AxisCore& core, AxisState& state, double start_s, double duration_s, const RotorMotion& from,
-             const RotorMotion& to, bool at_event) noexcept override;
+             const RotorMotion& to, int event) noexcept override;
 
  private:
   /// The continuous state, integrated as one vector.
@@ -86,7 +63,7 @@ class DriveTrain final : public Train {
     State sum{};
     TerminalDrive drive{};
     TerminalCircuit circuit{};
-    int event = -1;
+    double corner = 0.0;      ///< the one on the way through the whole piece
     PhaseValues current_a{};  ///< of the terminals, at its start; at its end once that is known
     bool plain = false;       ///< every terminal conducts at a constant voltage, nothing is shorted
     bool open = false;        ///< no terminal is driven, none carries a current

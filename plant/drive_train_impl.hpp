@@ -126,24 +126,16 @@ Crossing DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& sta
   const double corner = corner_between(motion_of(from), motion_of(to));
   const EventValues before = values_at(core, state.open_terminals, dying, from, branch, corner);
   const EventValues after = values_at(core, state.open_terminals, dying, to, branch, corner);
-  Crossing crossing = first_crossing(before, after);
-  if (crossing.event < 0) return crossing;
-  const auto which = static_cast<std::size_t>(crossing.event);
-  Bracket bracket{.low_value = before.value[which], .high_value = after.value[which]};
-  const double close_enough = 1e-13 * (std::abs(bracket.low_value) + std::abs(bracket.high_value));
-  constexpr int kMaxGuesses = 6;
-  for (int guess = 0; guess < kMaxGuesses; ++guess) {
-    crossing.fraction = bracket.guess();
-    const double shorter_s = crossing.fraction * duration_s;
+  Crossing crossing = located_event(before, after, [&](double fraction) noexcept {
+    const double shorter_s = fraction * duration_s;
     if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
       connect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
     }
     to = from;
     step(core, to, shorter_s, branch, load_nm);
-    const double value = values_at(core, state.open_terminals, dying, to, branch, corner).value[which];
-    if (std::abs(value) <= close_enough) break;
-    bracket.narrow(crossing.fraction, value);
-  }
+    return values_at(core, state.open_terminals, dying, to, branch, corner);
+  });
+  if (crossing.event < 0) return crossing;
   if (crossing.event < before.shaft) {
     to.shaft = settled(core.shaft, to.shaft, crossing.event);
   }
@@ -329,24 +321,25 @@ void DriveTrain<Machine, Shaft>::stage(int number, double duration_s, const Roto
 }
 
 template <class Machine, class Shaft>
-double DriveTrain<Machine, Shaft>::event(const AxisCore& core, const AxisState& state,
-                                         const RotorMotion& from, const RotorMotion& to) noexcept {
-  const double corner = corner_between(from, to);
-  EventValues before;
-  EventValues after;
-  add_electrical(core, state.open_terminals, piece_.circuit.dying, piece_.from, turned(from), corner, before);
-  add_electrical(core, state.open_terminals, piece_.circuit.dying, piece_.stage, turned(to), corner, after);
-  const Crossing crossing = first_crossing(before, after);
-  piece_.event = crossing.event;
-  return crossing.fraction;
+void DriveTrain<Machine, Shaft>::shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                                         const RotorMotion& motion) noexcept {
+  piece_.stage = piece_.from;
+  if (piece_.circuit.constant) return;  // its voltages are those of any part of the piece
+  connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::add_events(const AxisCore& core, const AxisState& state, PieceEnd end,
+                                            const RotorMotion& motion, EventValues& values) const noexcept {
+  add_electrical(core, state.open_terminals, piece_.circuit.dying,
+                 end == PieceEnd::kStart ? piece_.from : piece_.stage, turned(motion), piece_.corner, values);
 }
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double start_s, double duration_s,
-                                       const RotorMotion& from, const RotorMotion& to,
-                                       bool at_event) noexcept {
+                                       const RotorMotion& from, const RotorMotion& to, int event) noexcept {
   const RotorMotion end = turned(to);
-  if (at_event && piece_.event >= 0) settle_terminals(core, state, piece_.stage, end, piece_.event);
+  if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
   keep_open(core, state, piece_.stage, end);
   finish_piece(core, state, start_s, duration_s, piece_.from, piece_.stage, turned(from), end);
   piece_.current_a = currents(core, state, piece_.stage, end);

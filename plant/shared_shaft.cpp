@@ -21,17 +21,6 @@ double output_angle_rad(const AxisCore& core, const Shaft& x) noexcept {
   return load_side(core.shaft, x, 0.0).angle_rad;
 }
 
-template <class Shaft>
-EventValues shaft_values(const AxisCore& core, const Shaft& x, const ShaftBranch& branch) noexcept {
-  EventValues values;
-  if (!core.shaft_has_events) return values;
-  std::array<double, 4> shaft{};
-  values.shaft = event_values(core.shaft, x, branch, shaft);
-  for (int k = 0; k < values.shaft; ++k)
-    values.add(shaft[static_cast<std::size_t>(k)]);
-  return values;
-}
-
 }  // namespace
 
 SharedShaft::SharedShaft(AxisCore& first_core, AxisState& first, Train& first_train, AxisCore& second_core,
@@ -67,50 +56,78 @@ Shaft SharedShaft::stepped(const Shaft& from, double duration_s, const ShaftBran
   return advanced(from, duration_s / 6.0, sum);
 }
 
+/// What may end a piece: the shaft, then the first machine, then the second.
+template <class Shaft>
+auto SharedShaft::events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch) const noexcept
+    -> Events {
+  Events events;
+  EventValues& values = events.values;
+  if (first_.core.shaft_has_events) {
+    std::array<double, 4> shaft{};
+    values.shaft = event_values(first_.core.shaft, x, branch, shaft);
+    for (int k = 0; k < values.shaft; ++k)
+      values.add(shaft[static_cast<std::size_t>(k)]);
+  }
+  first_.train.add_events(first_.core, first_.state, end, first_motion(x), values);
+  events.second = values.count;
+  second_.train.add_events(second_.core, second_.state, end, second_motion(x), values);
+  return events;
+}
+
+/// The step up to the event that comes first.
+template <class Shaft>
+auto SharedShaft::cut_at_event(const Shaft& from, Shaft& x, double start_s, double duration_s,
+                               const ShaftBranch& branch, double load_nm) noexcept -> Cut {
+  first_.train.find_corner(first_motion(from), first_motion(x));
+  second_.train.find_corner(second_motion(from), second_motion(x));
+  const Events before = events_at(PieceEnd::kStart, from, branch);
+  const EventValues after = events_at(PieceEnd::kNow, x, branch).values;
+  const Crossing crossing = located_event(before.values, after, [&](double fraction) noexcept {
+    const double shorter_s = fraction * duration_s;
+    first_.train.shorten(first_.core, first_.state, start_s, shorter_s, first_motion(from));
+    second_.train.shorten(second_.core, second_.state, start_s, shorter_s, second_motion(from));
+    x = stepped(from, shorter_s, branch, load_nm);
+    return events_at(PieceEnd::kNow, x, branch).values;
+  });
+  Cut cut{.fraction = crossing.fraction};
+  if (crossing.event >= before.second) {
+    cut.second_event = crossing.event - before.second;
+  } else if (crossing.event >= before.values.shaft) {
+    cut.first_event = crossing.event - before.values.shaft;
+  } else if (crossing.event >= 0) {
+    x = settled(first_.core.shaft, x, crossing.event);
+  }
+  return cut;
+}
+
+/// The branch of the shaft where both trains have opened a piece. The rotor of the second machine is the
+/// output.
+template <class Shaft>
+ShaftBranch SharedShaft::branch_at(const Shaft& x, double load_nm) const noexcept {
+  if (!first_.core.shaft_has_events && !is_blocked(first_) && !is_blocked(second_)) return {};
+  return branch_of(first_.core.shaft, x, first_.train.stage_torque_nm(first_motion(x)),
+                   load_nm - second_.train.stage_torque_nm(second_motion(x)), is_blocked(first_),
+                   is_blocked(second_));
+}
+
 template <class Shaft>
 void SharedShaft::run_piece(Shaft& x, double start_s, double end_s, double load_nm) noexcept {
-  const bool blocked = first_.state.injected.blocked_rotor != 0.0;
   for (std::size_t events = 0; start_s < end_s; ++events) {
-    double duration_s = end_s - start_s;
-    x = locked(first_.core.shaft, x, blocked);
+    const double duration_s = end_s - start_s;
+    x = locked(first_.core.shaft, x, is_blocked(first_), is_blocked(second_));
     const Shaft from = x;
-    const auto open = [&](double s) noexcept {
-      first_.train.open(first_.core, first_.state, start_s, s, first_motion(from));
-      second_.train.open(second_.core, second_.state, start_s, s, second_motion(from));
-    };
-    open(duration_s);
-    const double second_nm = second_.train.stage_torque_nm(second_motion(from));
-    ShaftBranch branch;
-    if (first_.core.shaft_has_events || blocked) {
-      branch = branch_of(first_.core.shaft, from, first_.train.stage_torque_nm(first_motion(from)),
-                         load_nm - second_nm, blocked);
-    }
+    first_.train.open(first_.core, first_.state, start_s, duration_s, first_motion(from));
+    second_.train.open(second_.core, second_.state, start_s, duration_s, second_motion(from));
+    const ShaftBranch branch = branch_at(from, load_nm);
     x = stepped(from, duration_s, branch, load_nm);
-    bool cut = false;
-    Crossing crossing;
-    double first_event = 1.0;
-    double second_event = 1.0;
-    if (events < kMaxEvents) {
-      crossing =
-          first_crossing(shaft_values(first_.core, from, branch), shaft_values(first_.core, x, branch));
-      first_event = first_.train.event(first_.core, first_.state, first_motion(from), first_motion(x));
-      second_event = second_.train.event(second_.core, second_.state, second_motion(from), second_motion(x));
-      const double fraction = std::min({crossing.fraction, first_event, second_event});
-      cut = fraction < 1.0;
-      if (cut) {
-        duration_s *= fraction;
-        open(duration_s);
-        x = stepped(from, duration_s, branch, load_nm);
-        if (crossing.fraction == fraction) x = settled(first_.core.shaft, x, crossing.event);
-        first_event = first_event == fraction ? 0.0 : 1.0;
-        second_event = second_event == fraction ? 0.0 : 1.0;
-      }
-    }
-    first_.train.close(first_.core, first_.state, start_s, duration_s, first_motion(from), first_motion(x),
-                       cut && first_event == 0.0);
-    second_.train.close(second_.core, second_.state, start_s, duration_s, second_motion(from),
-                        second_motion(x), cut && second_event == 0.0);
-    start_s = cut ? start_s + duration_s : end_s;
+    Cut cut;
+    if (events < kMaxEvents) cut = cut_at_event(from, x, start_s, duration_s, branch, load_nm);
+    const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
+    first_.train.close(first_.core, first_.state, start_s, passed_s, first_motion(from), first_motion(x),
+                       cut.first_event);
+    second_.train.close(second_.core, second_.state, start_s, passed_s, second_motion(from), second_motion(x),
+                        cut.second_event);
+    start_s = cut.fraction < 1.0 ? start_s + passed_s : end_s;
   }
 }
 

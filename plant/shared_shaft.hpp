@@ -5,7 +5,8 @@
 namespace drivebench {
 
 /// Two machines on one shaft: the rotor of the second is coupled to the output of the first. The mechanics,
-/// the load and the shaft's faults are those of the first; the shaft of the second's state follows.
+/// the load are those of the first; the shaft of the second's state follows. A rotor that is blocked by a
+/// fault of its axis stands: the second one holds the output.
 class SharedShaft {
  public:
   SharedShaft(AxisCore& first_core, AxisState& first, Train& first_train, AxisCore& second_core,
@@ -20,6 +21,16 @@ class SharedShaft {
     AxisState& state;
     Train& train;
   };
+  struct Events {
+    EventValues values{};
+    int second = 0;  ///< where those of the second machine begin
+  };
+  /// The part of a piece up to its first event, and which one of a machine's it is; negative: none.
+  struct Cut {
+    double fraction = 1.0;
+    int first_event = -1;
+    int second_event = -1;
+  };
   template <class Shaft>
   void run_substeps(double load_nm) noexcept;
   template <class Shaft>
@@ -27,7 +38,15 @@ class SharedShaft {
   template <class Shaft>
   Shaft stepped(const Shaft& from, double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
   template <class Shaft>
+  Events events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch) const noexcept;
+  template <class Shaft>
+  Cut cut_at_event(const Shaft& from, Shaft& x, double start_s, double duration_s, const ShaftBranch& branch,
+                   double load_nm) noexcept;
+  template <class Shaft>
+  ShaftBranch branch_at(const Shaft& x, double load_nm) const noexcept;
+  template <class Shaft>
   RotorMotion second_motion(const Shaft& x) const noexcept;
+  static bool is_blocked(const Side& side) noexcept { return side.state.injected.blocked_rotor != 0.0; }
   static void check_currents(Side& side, const RotorMotion& motion) noexcept;
 
   Side first_;

@@ -9,6 +9,7 @@
 
 #include "plant/axis_parameters.hpp"
 #include "plant/axis_state.hpp"
+#include "plant/events.hpp"
 
 namespace drivebench {
 
@@ -49,6 +50,8 @@ struct MachineTruth {
   TwoPhase rotor_flux_wb{};
 };
 
+enum class PieceEnd { kStart, kNow };  ///< of a piece of a tick: where it began, where its stages have led
+
 /// The integration of a drive train with one kind of machine. Stateless between ticks.
 class Train {
  public:
@@ -66,8 +69,9 @@ class Train {
 
   virtual MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
 
-  // Stage by stage, for two machines on one shaft. Order: open(), then for each stage torque_nm() of both and
-  // stage() of both, then event(), then close() or open() again with a shorter duration.
+  // Stage by stage, for two machines on one shaft. Order: open(), then for each stage stage_torque_nm() of
+  // both and stage() of both, then find_corner() and add_events(); shorten() and the stages again until an
+  // event is found; then close().
 
   /// Connects drive and windings for a piece of the tick.
   virtual void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
@@ -75,12 +79,18 @@ class Train {
   virtual double stage_torque_nm(const RotorMotion& motion) const noexcept = 0;
   /// Stage 0 to 3 of a Runge-Kutta step.
   virtual void stage(int number, double duration_s, const RotorMotion& motion) noexcept = 0;
-  /// The part of the piece after which the first electrical event happens; 1: none.
-  virtual double event(const AxisCore& core, const AxisState& state, const RotorMotion& from,
-                       const RotorMotion& to) noexcept = 0;
-  /// Takes the end of the piece into the state; `at_event`: it ends at the event that event() found.
+  /// Goes back to the start of the piece, of which only so much will be run.
+  virtual void shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                       const RotorMotion& motion) noexcept = 0;
+  /// Looks for a corner of the emf on the way through the whole piece.
+  virtual void find_corner(const RotorMotion& from, const RotorMotion& to) noexcept = 0;
+  /// Appends the values whose passing through zero ends the piece.
+  virtual void add_events(const AxisCore& core, const AxisState& state, PieceEnd end,
+                          const RotorMotion& motion, EventValues& values) const noexcept = 0;
+  /// Takes the end of the piece into the state; `event` is the one of add_events() that ends it, negative if
+  /// none of this train does.
   virtual void close(AxisCore& core, AxisState& state, double start_s, double duration_s,
-                     const RotorMotion& from, const RotorMotion& to, bool at_event) noexcept = 0;
+                     const RotorMotion& from, const RotorMotion& to, int event) noexcept = 0;
 };
 
 /// The train for the kind of machine.

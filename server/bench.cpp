@@ -107,7 +107,12 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
     return inject(a, *fault);
   } else if (const auto* bump = std::get_if<ShaftBump>(&input.action)) {
     if (!std::isfinite(bump->impulse_nms)) return Refused::kNotFinite;
-    axes_[a.shaft].axis.bump(bump->impulse_nms);
+    Axis& shaft = axes_[a.shaft].axis;
+    if (&shaft == &a.axis) {
+      shaft.bump(bump->impulse_nms);
+    } else {
+      shaft.bump_output(bump->impulse_nms);
+    }
   } else if (std::holds_alternative<RefusedCommand>(input.action)) {
     ++a.control.refused;
   } else {

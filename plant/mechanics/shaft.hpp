@@ -140,10 +140,16 @@ inline double ending_speed_rad_s(const ShaftConstants& c) noexcept {
 }  // namespace shaft_detail
 
 /// A locked or blocked rotor stands from now on, where it is; its kinetic energy is lost in the lock. To be
-/// applied before branch_of() whenever the lock may have closed.
-template <class State>
-constexpr State locked(const ShaftConstants& c, State x, bool blocked) noexcept {
+/// applied before branch_of() whenever the lock may have closed. A blocked output stands likewise.
+constexpr ShaftState locked(const ShaftConstants& c, ShaftState x, bool blocked,
+                            bool output_blocked = false) noexcept {
+  if (blocked || output_blocked || c.motion == ShaftMotion::kLocked) x.speed_rad_s = 0.0;
+  return x;
+}
+constexpr TwoMassState locked(const ShaftConstants& c, TwoMassState x, bool blocked,
+                              bool output_blocked = false) noexcept {
   if (blocked || c.motion == ShaftMotion::kLocked) x.speed_rad_s = 0.0;
+  if (output_blocked) x.load_speed_rad_s = 0.0;
   return x;
 }
 
@@ -154,10 +160,21 @@ constexpr State bumped(const ShaftConstants& c, State x, double impulse_nms) noe
   return x;
 }
 
+/// An impulse on the output: a rigid shaft feels it through the gear, the load of an elastic one alone.
+constexpr ShaftState output_bumped(const ShaftConstants& c, const ShaftState& x,
+                                   double impulse_nms) noexcept {
+  return bumped(c, x, c.per_ratio * impulse_nms);
+}
+constexpr TwoMassState output_bumped(const ShaftConstants& c, TwoMassState x, double impulse_nms) noexcept {
+  x.load_speed_rad_s += impulse_nms * c.load_per_inertia;
+  return x;
+}
+
 /// The branch of a rigid shaft under the torque of the machine and the active load at the output.
 inline ShaftBranch branch_of(const ShaftConstants& c, const ShaftState& x, double driving_nm, double load_nm,
-                             bool blocked) noexcept {
-  return shaft_detail::rotor_branch(c, x.speed_rad_s, driving_nm - c.per_ratio * load_nm, blocked);
+                             bool blocked, bool output_blocked = false) noexcept {
+  return shaft_detail::rotor_branch(c, x.speed_rad_s, driving_nm - c.per_ratio * load_nm,
+                                    blocked || output_blocked);
 }
 
 /// A gear train without play on a rigid shaft, with n turns of the motor for one of the output:
@@ -208,7 +225,7 @@ inline double shaft_torque_nm(const ShaftConstants& c, const TwoMassState& x,
 /// the backlash, or sooner where the shaft has not yet sprung back. A stuck mass is looked at anew each time
 /// this is called.
 ShaftBranch branch_of(const ShaftConstants& c, const TwoMassState& x, double driving_nm, double load_nm,
-                      bool blocked) noexcept;
+                      bool blocked, bool output_blocked = false) noexcept;
 
 /// Rotor and load on an elastic shaft behind the gear, in motor convention:
 ///   J1 w1' = tau - f1 w1 - tau_C sign(w1) - tau_s/n

@@ -37,13 +37,15 @@ double pressure_nm(const ShaftConstants& c, const TwoMassState& x) noexcept {
 
 /// Rotor and load under the torque of the shaft: whether they turn, and which way friction acts.
 ShaftBranch with_friction(const ShaftConstants& c, const TwoMassState& x, double driving_nm, double load_nm,
-                          bool blocked, double contact_rad, double contact) noexcept {
+                          bool blocked, bool output_blocked, double contact_rad, double contact) noexcept {
   ShaftBranch branch{.contact_rad = contact_rad, .contact = contact};
   const double shaft_nm = shaft_torque_nm(c, x, branch);
   branch = shaft_detail::rotor_branch(c, x.speed_rad_s, driving_nm - c.per_ratio * shaft_nm, blocked);
   branch.contact_rad = contact_rad;
   branch.contact = contact;
-  if (c.load_dry_nm > 0.0) {
+  if (output_blocked) {
+    branch.load_turns = 0.0;
+  } else if (c.load_dry_nm > 0.0) {
     const double output_nm = shaft_nm - load_nm;
     const double towards = x.load_speed_rad_s != 0.0 ? x.load_speed_rad_s : output_nm;
     const bool stands = x.load_speed_rad_s == 0.0 && std::abs(output_nm) <= c.load_dry_nm;
@@ -56,9 +58,9 @@ ShaftBranch with_friction(const ShaftConstants& c, const TwoMassState& x, double
 }  // namespace
 
 ShaftBranch branch_of(const ShaftConstants& c, const TwoMassState& x, double driving_nm, double load_nm,
-                      bool blocked) noexcept {
+                      bool blocked, bool output_blocked) noexcept {
   const auto with = [&](double contact_rad, double contact) {
-    return with_friction(c, x, driving_nm, load_nm, blocked, contact_rad, contact);
+    return with_friction(c, x, driving_nm, load_nm, blocked, output_blocked, contact_rad, contact);
   };
   if (c.half_backlash_rad == 0.0) return with(0.0, 1.0);
   const double beyond = beyond_rad(c, x);

@@ -117,6 +117,131 @@ TEST(SharedShaft, MotorAndLoadMachineConserveEnergy) {
   EXPECT_NEAR(audit.supplied_j, audit.lost_j + audit.stored_j, 1e-4 * audit.supplied_j);
 }
 
+/// A brushless motor whose run has every kind of event: its emf has corners, its currents die in the diodes
+/// of a low link, and dry friction stops it.
+AxisParameters eventful_axis() {
+  AxisParameters p;
+  p.machine = BldcMachineParameters{.pole_pairs = 2,
+                                    .stator_resistance_ohm = 0.7,
+                                    .self_inductance_h = 2.72e-3,
+                                    .mutual_inductance_h = 0.15e-3,
+                                    .torque_constant_nm_per_a = 0.5128,
+                                    .star = true};
+  p.mechanics = {.inertia_kgm2 = 2e-4,
+                 .viscous_friction_nms = 0.002,
+                 .coulomb_friction_nm = 0.1,
+                 .static_friction_nm = 0.2};
+  p.drive.amplifier = {.voltage_limit_v = 60.0, .over_current_a = 1000.0};
+  return p;
+}
+
+PhaseCommand eventful_command(Tick tick) {
+  if (tick % 500 < 60) return {.gates = Gates::kVoltage, .setpoint = {.a = -40.0, .b = 10.0, .c = 30.0}};
+  return {.gates = Gates::kOff};
+}
+
+/// A machine that neither drives nor brakes what it hangs on.
+AxisParameters idle_axis() {
+  AxisParameters p = dc_axis();
+  std::get<PmDcMachineParameters>(p.machine).torque_constant_nm_per_a = 1e-12;
+  return p;
+}
+
+// A machine alone on its shaft and one with an idle partner take the same steps and search for the same
+// events: what remains is rounding, which the corners pass on. Kills: an event that is cut where a straight
+// line has it, one of the second machine that is settled in the first, a shaft whose dry friction is looked
+// at before the events of the machines.
+TEST(SharedShaft, AnIdlePartnerChangesNothing) {
+  Axis alone(eventful_axis(), kTiming, 1, 0);
+  Axis first(eventful_axis(), kTiming, 1, 0);
+  Axis idle_second(idle_axis(), kTiming, 1, 1);
+  AxisParameters shaft = idle_axis();
+  shaft.mechanics = eventful_axis().mechanics;
+  Axis idle_first(shaft, kTiming, 1, 0);
+  Axis second(eventful_axis(), kTiming, 1, 1);
+  int stood = 0;
+  int freewheeled = 0;
+  for (Tick tick = 0; tick < 1500; ++tick) {
+    const PhaseCommand command = eventful_command(tick);
+    alone.advance(command, tick);
+    Axis::advance_pair(first, idle_second, command, volts(0.0), tick);
+    Axis::advance_pair(idle_first, second, volts(0.0), command, tick);
+    const AxisSample expected = alone.sample(tick + 1);
+    for (const AxisSample& s : {first.sample(tick + 1), second.sample(tick + 1)}) {
+      ASSERT_NEAR(s.true_current_a.a, expected.true_current_a.a, 1e-9) << tick;
+      ASSERT_NEAR(s.true_current_a.b, expected.true_current_a.b, 1e-9) << tick;
+      ASSERT_NEAR(s.speed_rad_s, expected.speed_rad_s, 1e-9) << tick;
+      ASSERT_NEAR(s.angle_rad, expected.angle_rad, 1e-9) << tick;
+    }
+    if (expected.speed_rad_s == 0.0) ++stood;
+    if (command.gates == Gates::kOff && expected.true_current_a.a != 0.0) ++freewheeled;
+  }
+  EXPECT_GT(stood, 10);
+  EXPECT_GT(freewheeled, 10);
+}
+
+std::size_t row_of_fault(const char* name) {
+  return find_injectable_fault(name);
+}
+
+/// Motor and load machine, ratio 2, on an elastic shaft or a rigid one.
+AxisParameters geared_axis(bool elastic) {
+  AxisParameters p = dc_axis();
+  p.mechanics.gear_ratio = 2.0;
+  p.mechanics.load_inertia_kgm2 = 3e-4;
+  if (!elastic) return p;
+  p.mechanics.shaft_stiffness_nm = 20.0;
+  p.mechanics.shaft_damping_nms = 0.05;
+  return p;
+}
+
+// The rotor that is blocked stands; the other one stands with it on a rigid shaft, and on an elastic one
+// winds it up by n tau/K, with the stall torque of 10 A. Kills: a fault of the second axis that nobody looks
+// at, one that stops the rotor of the first, one that outlives its fault.
+TEST(SharedShaft, EitherRotorCanBeBlocked) {
+  for (const bool elastic : {false, true}) {
+    Axis first(geared_axis(elastic), kTiming, 1, 0);
+    Axis second(dc_axis(), kTiming, 1, 1);
+    Tick tick = 0;
+    const auto run = [&](int ticks) {
+      for (const Tick end = tick + ticks; tick < end; ++tick)
+        Axis::advance_pair(first, second, volts(20.0), volts(0.0), tick);
+    };
+    run(500);
+    EXPECT_GT(second.sample(tick).speed_rad_s, 20.0);
+    second.inject(row_of_fault("blocked_rotor"), 1.0);
+    run(1);
+    const double held_rad = second.sample(tick).angle_rad;
+    const double rotor_rad = first.sample(tick).angle_rad;
+    run(5000);
+    EXPECT_EQ(second.sample(tick).speed_rad_s, 0.0);
+    EXPECT_NEAR(second.sample(tick).angle_rad, held_rad, 1e-12);
+    EXPECT_NEAR(first.sample(tick).speed_rad_s, 0.0, 1e-9);
+    EXPECT_NEAR(first.sample(tick).true_current_a.a, 10.0, 1e-9);
+    if (elastic) {
+      EXPECT_NEAR(first.state().shaft.twist_rad, 2.0 * 0.7 / 20.0, 1e-9);
+    } else {
+      EXPECT_NEAR(first.sample(tick).angle_rad, rotor_rad, 1e-12);
+    }
+    second.inject(row_of_fault("blocked_rotor"), 0.0);
+    run(500);
+    EXPECT_GT(second.sample(tick).speed_rad_s, 20.0);
+  }
+}
+
+// An impulse on the second rotor: on a rigid shaft it is one of 1/n on the first, of J1 + J2/n^2; on an
+// elastic one the load alone takes it. Kills: a blow that lands on the rotor of the first, one without the
+// ratio.
+TEST(SharedShaft, ABlowOnTheOutputActsThere) {
+  Axis rigid(geared_axis(false), kTiming, 1, 0);
+  rigid.bump_output(0.003);
+  EXPECT_NEAR(rigid.sample(0).speed_rad_s, 0.5 * 0.003 / (1.2e-4 + 3e-4 / 4.0), 1e-12);
+  Axis elastic(geared_axis(true), kTiming, 1, 0);
+  elastic.bump_output(0.003);
+  EXPECT_EQ(elastic.sample(0).speed_rad_s, 0.0);
+  EXPECT_NEAR(elastic.sample(0).load_speed_rad_s, 0.003 / 3e-4, 1e-12);
+}
+
 // Kills: a pair of which one goes on after the other has diverged.
 TEST(SharedShaft, WhereOneDivergesBothAreHeld) {
   AxisParameters bad = dc_axis();

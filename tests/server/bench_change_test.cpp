@@ -330,6 +330,23 @@ TEST(BenchSharedShaft, BothAxesTurnAsOne) {
   EXPECT_LT(bench.sample(0).speed_rad_s, loaded);
 }
 
+// The second rotor turns with the output of a gear of ratio 4, whose inertia is 16 times that of the rotor.
+// Kills: a blow on the second axis that lands on the rotor of the first, a blocked rotor there that turns.
+TEST(BenchSharedShaft, ABlowAndALockOnTheSecondAxisActAtTheOutput) {
+  BenchSetup setup = dynamometer();
+  setup.axes[0].parameters.mechanics.gear_ratio = 4.0;
+  setup.axes[0].parameters.mechanics.viscous_friction_nms = 0.0;
+  Bench bench(setup);
+  submit(bench, ShaftBump{64.0 * kServoInertia_kgm2}, 0, 1);
+  bench.step();
+  EXPECT_NEAR(bench.sample(0).speed_rad_s, 64.0 / 4.0 / 2.0, 1e-9);
+  EXPECT_NEAR(bench.sample(1).speed_rad_s, 64.0 / 4.0 / 4.0 / 2.0, 1e-9);
+  submit(bench, fault_of("blocked_rotor", 1.0), 0, 1);
+  bench.step();
+  EXPECT_EQ(bench.sample(0).speed_rad_s, 0.0);
+  EXPECT_EQ(bench.sample(1).speed_rad_s, 0.0);
+}
+
 // Kills: a state of the pair that is not saved, a state of two free axes that is taken for it.
 TEST(BenchSharedShaft, IsSavedAndRestored) {
   Bench original(dynamometer());
