@@ -42,10 +42,13 @@ class Recorder final : public BenchObserver {
 
  private:
   struct SampleEntry {
+    SampleEntry() noexcept : axis(0), sample() {}
+    SampleEntry(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
     std::uint32_t axis;
     Sample sample;
   };
   struct InputEntry {
+    InputEntry(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
     Tick received;
     Input input;
   };

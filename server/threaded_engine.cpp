@@ -24,6 +24,8 @@ constexpr std::size_t kRequestCapacity = 256;
 
 /// From the tick thread to the I/O thread.
 struct TickedSample {
+  TickedSample() noexcept : axis(0), sample() {}
+  TickedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
   std::uint32_t axis;
   Sample sample;
 };
@@ -32,6 +34,7 @@ struct Outcome {
   Tick tick;
 };
 struct AxisEdges {
+  AxisEdges(std::uint32_t of, const TickEdges& seen) noexcept : axis(of), edges(seen) {}
   std::uint32_t axis;
   TickEdges edges;
 };

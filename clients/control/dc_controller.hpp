@@ -81,8 +81,8 @@ std::vector<std::string> dc_problems(const P& p) {
   return p.axis.problems();
 }
 
-/// A controller of a DC motor with permanent magnets: what is left to the law is one number a sample. Over lost
-/// samples its observers are carried on; its integrals count a gap as one period.
+/// A controller of a DC motor with permanent magnets: what is left to the law is one number a sample. Over
+/// lost samples its observers are carried on; its integrals count a gap as one period.
 class DcController : public Controller {
  public:
   Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept final;

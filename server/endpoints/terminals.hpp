@@ -11,6 +11,7 @@ namespace drivebench {
 struct Terminals {
   Connection connection = Connection::kTwoPhase;
   bool field = false;          ///< a field winding with terminals of its own
+  bool field_current = false;  ///< a field winding, whose current is measured
   bool speed_sensors = false;  ///< a tachometer or a resolver
   bool hall = false;
 
@@ -19,7 +20,7 @@ struct Terminals {
   /// Whether there is more to command than phases a and b.
   bool has_more() const noexcept { return has_c() || field; }
   /// Whether there is more to command or to measure than phases a and b, and an encoder.
-  bool is_wide() const noexcept { return has_more() || speed_sensors || hall; }
+  bool is_wide() const noexcept { return has_more() || field_current || speed_sensors || hall; }
   /// 1 a, 2 b, 4 c, 8 field.
   std::uint64_t bits() const noexcept {
     return 1u | (has_b() ? 2u : 0u) | (has_c() ? 4u : 0u) | (field ? 8u : 0u);
@@ -34,9 +35,12 @@ struct Terminals {
 
 inline Terminals terminals_of(const AxisParameters& p) {
   const SensorParameters& sensors = p.sensors;
+  const bool field = std::holds_alternative<WoundRotorMachineParameters>(p.machine) ||
+                     std::holds_alternative<SeparateDcMachineParameters>(p.machine);
   return {.connection = std::visit([](const auto& machine) { return connection_of(machine); }, p.machine),
-          .field = std::holds_alternative<WoundRotorMachineParameters>(p.machine) ||
-                   std::holds_alternative<SeparateDcMachineParameters>(p.machine),
+          .field = field,
+          .field_current = field || std::holds_alternative<ShuntDcMachineParameters>(p.machine) ||
+                           std::holds_alternative<SeriesDcMachineParameters>(p.machine),
           .speed_sensors = sensors.tachometer.analog.enabled || sensors.resolver.analog.enabled,
           .hall = sensors.hall.enabled};
 }

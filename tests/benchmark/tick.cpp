@@ -29,7 +29,9 @@ constexpr Owner kController = 1;
 /// there. It is emptied between batches, by the recorder's thread in the product.
 class RingTap final : public BenchObserver {
  public:
-  void on_input(Tick now, const Input& input) noexcept override { ring_.emplace(std::in_place_type<Received>, now, input); }
+  void on_input(Tick now, const Input& input) noexcept override {
+    ring_.emplace(std::in_place_type<Received>, now, input);
+  }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
     ring_.emplace(std::in_place_type<Taken>, axis, sample);
   }
@@ -41,10 +43,13 @@ class RingTap final : public BenchObserver {
 
  private:
   struct Taken {
+    Taken() noexcept : axis(0), sample() {}
+    Taken(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
     std::uint32_t axis;
     Sample sample;
   };
   struct Received {
+    Received(Tick at, const Input& taken) noexcept : now(at), input(taken) {}
     Tick now;
     Input input;
   };
