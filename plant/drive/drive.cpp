@@ -175,15 +175,12 @@ void Drive::begin_source(DriveMemory& m) noexcept {
       closing_s_ = wait_s;
     }
   }
-  has_edges_ = closing_s_ > tolerance_s_;
+  has_corners_ = has_corners(source, period_s_);
+  has_edges_ = closing_s_ > tolerance_s_ || has_corners_;
   if (m.contactor_closed != 0.0 && !has_edges_ && !follows_) {
     steady_output_ = source_output(m, 0.0, period_s_, {});
     steady_ = steady_output_.constant;
   }
-}
-
-const Drive::Order& Drive::order_at(double start_s) const noexcept {
-  return orders_[start_s + tolerance_s_ >= later_s_ ? 1 : 0];
 }
 
 double Drive::pwm_start_s(double start_s) const noexcept {
@@ -193,8 +190,15 @@ double Drive::pwm_start_s(double start_s) const noexcept {
 
 double Drive::edge_after(const DriveMemory& m, double start_s) const noexcept {
   const double instant_s = start_s + tolerance_s_;
-  if (kind_ == DriveKind::kSource) return closing_s_ > instant_s ? closing_s_ : kInfinity;
-  double next_s = later_s_ > instant_s ? later_s_ : kInfinity;
+  double next_s = kInfinity;
+  if (kind_ == DriveKind::kSource) {
+    if (closing_s_ > instant_s) next_s = closing_s_;
+    if (has_corners_) {
+      next_s = std::min(next_s, instant_s + time_to_corner_s(p_.source, source_, source_angle_at(instant_s)));
+    }
+    return next_s < period_s_ - tolerance_s_ ? next_s : kInfinity;
+  }
+  if (later_s_ > instant_s) next_s = later_s_;
   if (kind_ == DriveKind::kSwitched) {
     const double pwm_s = pwm_start_s(start_s);
     const SwitchingPattern& pattern = order_at(start_s).pattern;
@@ -224,10 +228,6 @@ TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double durati
     out.field_v = p_.source.field_v;
   }
   return out;
-}
-
-double Drive::limit_v(const DriveMemory& m) const noexcept {
-  return std::min(p_.amplifier.voltage_limit_v, rail_v(m));
 }
 
 PhaseValues Drive::loop_voltages(const DriveMemory& m, const PhaseValues& setpoint_a,
@@ -310,9 +310,12 @@ TerminalDrive Drive::source_output(const DriveMemory& m, double start_s, double 
     out.mode.fill(TerminalMode::kOpen);
     return out;
   }
+  // A table may jump at either end of the interval: its values there are those within.
+  const double inside_s =
+      source.waveform == Waveform::kTable ? std::min(tolerance_s_, 0.5 * duration_s) : 0.0;
   const auto voltages = [&](double time_s) noexcept {
-    const double angle_rad = source_angle_rad_ + kTurnRad * source.frequency_hz * (start_s + time_s);
-    ThreePhase v = source_voltages(source, source_, source_amplitude_v_, angle_rad);
+    const double within_s = std::clamp(time_s, inside_s, duration_s - inside_s);
+    ThreePhase v = source_voltages(source, source_, source_amplitude_v_, source_angle_at(start_s + within_s));
     if (source.start_switch) {
       v.b = 0.0;
     } else if (source.start_capacitance_f > 0.0) {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #include "plant/drive/amplifier.hpp"
 #include "plant/drive/command.hpp"
@@ -80,8 +82,8 @@ class Drive {
   /// it after each begin_tick() while the trip lasts: delayed commands and contactors know nothing of it.
   void switch_off(DriveMemory& m) noexcept;
 
-  /// The next instant after start_s, from the start of the tick, at which the voltages jump; infinity if
-  /// there is none within the tick. Instants closer than a billionth of the tick are one.
+  /// The next instant after start_s, from the start of the tick, at which the voltages jump or bend; infinity
+  /// if there is none within the tick. Instants closer than a billionth of the tick are one.
   double next_edge_s(const DriveMemory& m, double start_s) const noexcept {
     return has_edges_ ? edge_after(m, start_s) : std::numeric_limits<double>::infinity();
   }
@@ -148,13 +150,20 @@ class Drive {
               const PhaseValues& to_a) const noexcept;
 
   // their parts
-  const Order& order_at(double start_s) const noexcept;
+  const Order& order_at(double start_s) const noexcept {
+    return orders_[start_s + tolerance_s_ >= later_s_ ? 1 : 0];
+  }
   double pwm_start_s(double start_s) const noexcept;
+  double source_angle_at(double time_s) const noexcept {
+    return source_angle_rad_ + 2.0 * std::numbers::pi * p_.source.frequency_hz * time_s;
+  }
   static std::size_t segment_hint(const DriveMemory& m) noexcept {
     return static_cast<std::size_t>(m.pwm_segment);
   }
   double rail_v(const DriveMemory& m) const noexcept { return rail_voltage_v(m.bus_v, connection_); }
-  double limit_v(const DriveMemory& m) const noexcept;
+  double limit_v(const DriveMemory& m) const noexcept {
+    return std::min(p_.amplifier.voltage_limit_v, rail_v(m));
+  }
   PhaseValues loop_voltages(const DriveMemory& m, const PhaseValues& setpoint_a,
                             const PhaseValues& current_a) const noexcept;
   void drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
@@ -195,6 +204,7 @@ class Drive {
   double source_amplitude_v_ = 0.0;
   double source_angle_rad_ = 0.0;  ///< of phase a, at the start of the tick
   double closing_s_ = 0.0;         ///< from then on the contactor is closed
+  bool has_corners_ = false;       ///< of the source, which are edges
   bool has_edges_ = false;
   bool follows_ = false;   ///< finish() has something to do
   bool steady_ = false;    ///< steady_output_ holds during the whole tick

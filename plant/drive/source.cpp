@@ -1,8 +1,11 @@
 #include "plant/drive/source.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "plant/drive/phases.hpp"
 #include "plant/rounding.hpp"
@@ -12,6 +15,25 @@ namespace drivebench {
 namespace {
 
 constexpr double kTurnRad = 2.0 * std::numbers::pi;
+constexpr std::size_t kMaxCorners = 64;  // of a table; the pieces of a tick have to be recorded
+
+constexpr std::array<CurvePoint, 4> kTrapezoid{
+    {{1.0 / 12.0, 1.0}, {5.0 / 12.0, 1.0}, {7.0 / 12.0, -1.0}, {11.0 / 12.0, -1.0}}};
+
+/// The way from this part of a period to the next of the corners, or to the start of a period if `wraps`.
+double way_onwards(std::span<const CurvePoint> corners, double part, bool wraps) noexcept {
+  const auto next = std::upper_bound(corners.begin(), corners.end(), part,
+                                     [](double at, const CurvePoint& p) { return at < p.x; });
+  const double corner = next != corners.end() ? next->x : 1.0 + corners.front().x;
+  return (wraps ? std::min(corner, 1.0) : corner) - part;
+}
+
+double way_back(std::span<const CurvePoint> corners, double part, bool wraps) noexcept {
+  const auto passed = std::lower_bound(corners.begin(), corners.end(), part,
+                                       [](const CurvePoint& p, double at) { return p.x < at; });
+  const double corner = passed != corners.begin() ? (passed - 1)->x : corners.back().x - 1.0;
+  return part - (wraps && part > 0.0 ? std::max(corner, 0.0) : corner);
+}
 
 }  // namespace
 
@@ -56,6 +78,24 @@ ThreePhase source_voltages(const SourceParameters& p, const SourceConstants& c, 
         return amplitude_v * factor * value;
       },
       c.factor, c.offset_rad);
+}
+
+bool has_corners(const SourceParameters& p, double period_s) noexcept {
+  const bool turns = p.frequency_hz != 0.0 && std::abs(p.frequency_hz) * period_s <= 1.0;
+  if (p.waveform == Waveform::kTable) return turns && p.table.points().size() <= kMaxCorners;
+  return turns && p.waveform == Waveform::kTrapezoid;
+}
+
+double time_to_corner_s(const SourceParameters& p, const SourceConstants& c, double angle_rad) noexcept {
+  const bool table = p.waveform == Waveform::kTable;
+  const std::span<const CurvePoint> corners = table ? std::span(p.table.points()) : std::span(kTrapezoid);
+  const auto way = [&](double factor, double offset_rad) {
+    if (factor == 0.0) return 2.0;
+    const double part = within_turn(angle_rad + offset_rad) / kTurnRad;
+    return p.frequency_hz > 0.0 ? way_onwards(corners, part, table) : way_back(corners, part, table);
+  };
+  const ThreePhase ways = by_phase(way, c.factor, c.offset_rad);
+  return std::min({ways.a, ways.b, ways.c}) / std::abs(p.frequency_hz);
 }
 
 double time_until_s(double target_rad, double angle_rad, double omega_rad_s) noexcept {

@@ -43,15 +43,20 @@ struct SourceConstants {
 };
 SourceConstants constants_of(const SourceParameters& p, Connection connection) noexcept;
 
-/// The voltages at the instant at which phase a is at this angle, for this amplitude. The corners of
-/// trapezoid and table are no edges: in the interval h of a corner the voltage-time area is off by up to
-/// h^2/24 times the change of slope, 1e-7 V·s at 10 us for 200 V and 10 Hz.
+/// The voltages at the instant at which phase a is at this angle, for this amplitude.
 ThreePhase source_voltages(const SourceParameters& p, const SourceConstants& c, double amplitude_v,
                            double angle_rad) noexcept;
 
 /// The trapezoid e: 0 at angle 0, rising over 60 degrees to a flat top of 120 degrees. Source: Chiasson 2005,
 /// (10.7)-(10.8); tag BL-02.
 double trapezoid(double angle_rad) noexcept;
+
+/// Whether the corners of the waveform are edges of the drive, so that the steps of a machine end there: in
+/// trapezoids and tables of up to 64 points, unless a tick is longer than a period.
+bool has_corners(const SourceParameters& p, double period_s) noexcept;
+
+/// Time until the next corner of a phase that exists, of a source for which has_corners() holds.
+double time_to_corner_s(const SourceParameters& p, const SourceConstants& c, double angle_rad) noexcept;
 
 /// The angle within [0, 2 pi).
 double within_turn(double angle_rad) noexcept;
