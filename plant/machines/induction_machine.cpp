@@ -89,7 +89,11 @@ InductionMachineParameters adjusted(const InductionMachineParameters& p, const A
 }
 
 double fastest_time_constant_s(const InductionMachineParameters& p) noexcept {
-  return 1.0 / constants_of(p).gamma_per_s;
+  // The larger root of s^2 - (gamma + eta) s + eta R_S/(sigma L_S) = 0: current and flux along one axis.
+  const InductionMachineConstants c = constants_of(p);
+  const double half = 0.5 * (c.gamma_per_s + c.eta_per_s);
+  const double product = c.eta_per_s * c.stator_resistance_ohm * c.transient_reluctance_per_h;
+  return 1.0 / (half + std::sqrt(half * half - product));
 }
 
 }  // namespace drivebench

@@ -119,7 +119,7 @@ Connection connection_of(const InductionMachineParameters& p) noexcept;
 /// Turns of the electrical angle for one of the shaft; 0 where the equations do not know the angle.
 double pole_pairs_of(const InductionMachineParameters& p) noexcept;
 InductionMachineParameters adjusted(const InductionMachineParameters& p, const Adjustment& a) noexcept;
-/// The fastest electrical time constant, 1/gamma: sets the substep.
+/// The fastest electrical time constant at standstill: sets the substep.
 double fastest_time_constant_s(const InductionMachineParameters& p) noexcept;
 
 /// What the drive train needs to know of this kind of machine.

@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include "plant/machines/induction_machine.hpp"
+
 namespace drivebench {
 namespace {
 
@@ -111,6 +113,14 @@ WindingValues open_circuit_voltages(const Constants& c, const State& x, const Ro
   return {.stator = {.a = slope.stator_a_wb, .b = slope.stator_b_wb}};
 }
 
+WindingValues winding_voltages(const Constants& c, const State& x, const RotorMotion& motion,
+                               const TerminalInput& u) noexcept {
+  const State slope = derivative(c, x, motion, u);
+  const TwoPhase stator_a = saturation_detail::stator_current_a(c, x);
+  return {.stator = {.a = c.stator_resistance_ohm * stator_a.a + slope.stator_a_wb,
+                     .b = c.stator_resistance_ohm * stator_a.b + slope.stator_b_wb}};
+}
+
 TwoPhase rotor_flux_wb(const Constants&, const State& x, const RotorMotion&) noexcept {
   return rotor_wb(x);
 }
@@ -147,24 +157,18 @@ SaturatedInductionMachineParameters adjusted(const SaturatedInductionMachinePara
   return result;
 }
 
-/// The current of the stator fades with gamma = (R_S + k^2 R_R)/(l_s + k l_r), k = M/(M + l_r), the flux of
-/// the rotor with R_R/(M + l_r). Both are fastest at the least or the largest slope M of the curve.
+/// With the least slope M of the curve every mode decays fastest: the inductances are smallest.
 double fastest_time_constant_s(const SaturatedInductionMachineParameters& p) noexcept {
   double least_h = std::numeric_limits<double>::infinity();
-  double largest_h = 0.0;
   const std::vector<CurvePoint>& points = p.magnetising_curve.points();
-  for (std::size_t n = 1; n < points.size(); ++n) {
-    const double slope_h = (points[n].y - points[n - 1].y) / (points[n].x - points[n - 1].x);
-    least_h = std::min(least_h, slope_h);
-    largest_h = std::max(largest_h, slope_h);
-  }
-  const auto gamma_per_s = [&p](double mutual_h) noexcept {
-    const double k = mutual_h / (mutual_h + p.rotor_leakage_h);
-    return (p.stator_resistance_ohm + k * k * p.rotor_resistance_ohm) /
-           (p.stator_leakage_h + k * p.rotor_leakage_h);
-  };
-  return 1.0 / std::max({gamma_per_s(least_h), gamma_per_s(largest_h),
-                         p.rotor_resistance_ohm / (least_h + p.rotor_leakage_h)});
+  for (std::size_t n = 1; n < points.size(); ++n)
+    least_h = std::min(least_h, (points[n].y - points[n - 1].y) / (points[n].x - points[n - 1].x));
+  return fastest_time_constant_s(
+      InductionMachineParameters{.stator_resistance_ohm = p.stator_resistance_ohm,
+                                 .rotor_resistance_ohm = p.rotor_resistance_ohm,
+                                 .stator_inductance_h = p.stator_leakage_h + least_h,
+                                 .rotor_inductance_h = p.rotor_leakage_h + least_h,
+                                 .mutual_inductance_h = least_h});
 }
 
 }  // namespace drivebench

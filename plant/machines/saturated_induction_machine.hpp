@@ -144,6 +144,19 @@ WindingValues open_circuit_voltages(const SaturatedInductionMachineConstants& c,
                                     const SaturatedInductionMachineState& x,
                                     const RotorMotion& motion) noexcept;
 
+/// Voltages of the windings with the currents that `u` lets flow: R_S i_S + lambda_S'. Saturation couples an
+/// open phase with the others.
+WindingValues winding_voltages(const SaturatedInductionMachineConstants& c,
+                               const SaturatedInductionMachineState& x, const RotorMotion& motion,
+                               const TerminalInput& u) noexcept;
+
+/// What open windings show while the others carry the currents that `u` lets flow.
+inline WindingValues floating_voltages(const SaturatedInductionMachineConstants& c,
+                                       const SaturatedInductionMachineState& x, const RotorMotion& motion,
+                                       const TerminalInput& u) noexcept {
+  return winding_voltages(c, x, motion, u);
+}
+
 /// Rotor flux linkage in the stator frame.
 TwoPhase rotor_flux_wb(const SaturatedInductionMachineConstants& c, const SaturatedInductionMachineState& x,
                        const RotorMotion& motion) noexcept;

@@ -189,11 +189,24 @@ TEST(InductionMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) 
   EXPECT_DOUBLE_EQ(p.stator_inductance_h, 0.015);
   EXPECT_DOUBLE_EQ(p.rotor_inductance_h, 0.014);
   EXPECT_DOUBLE_EQ(p.mutual_inductance_h, 0.0117);
-  EXPECT_NEAR(fastest_time_constant_s(kServoMachine), 1.0 / 1047.77, 1e-8);
+  EXPECT_NEAR(fastest_time_constant_s(kServoMachine), 809e-6, 1e-6) << "1/gamma is 954e-6";
   EXPECT_EQ(connection_of(p), Connection::kTwoPhase);
   p.star = true;
   EXPECT_EQ(connection_of(p), Connection::kStar);
   EXPECT_EQ(pole_pairs_of(p), 0.0);  // no angle in the equations
+}
+
+// At standstill current and flux along one axis have a matrix of slopes; -1/tau is an eigenvalue of it, and
+// the one farther from zero. Kills: a time constant from the current alone, or the slower of the two.
+TEST(InductionMachine, TheFastestTimeConstantIsThatOfCurrentAndFluxTogether) {
+  const InductionMachineConstants c = constants_of(kServoMachine);
+  const RotorMotion still{.angle_rad = 0.0, .speed_rad_s = 0.0, .electrical = {1.0, 0.0}};
+  const InductionMachineState of_current = derivative(c, {.i_a_a = 1.0}, still, {});
+  const InductionMachineState of_flux = derivative(c, {.psi_a_wb = 1.0}, still, {});
+  const double rate = -1.0 / fastest_time_constant_s(kServoMachine);
+  EXPECT_NEAR((of_current.i_a_a - rate) * (of_flux.psi_a_wb - rate) - of_current.psi_a_wb * of_flux.i_a_a,
+              0.0, 1e-9 * rate * rate);
+  EXPECT_LT(rate, 0.5 * (of_current.i_a_a + of_flux.psi_a_wb));
 }
 
 }  // namespace
