@@ -102,6 +102,11 @@ class DriveTrain final : public Train {
   void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;
   /// Whether every terminal conducts; if so, the circuit has its voltage.
   bool conduct(const AxisCore& core, const AxisState& state) noexcept;
+  /// What open windings show where `u` lets the others carry current: of most machines what they would show
+  /// without any, else the machine has floating_voltages().
+  WindingValues floating_v(const State& x, const RotorMotion& motion, const TerminalInput& u) const noexcept;
+  /// The same with all terminals open.
+  WindingValues open_v(const State& x, const RotorMotion& motion) const noexcept;
   /// Whether terminals of which none is driven and none carries a current stay so.
   bool leave_open(const AxisCore& core, const State& x, const RotorMotion& motion) noexcept;
   void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,

@@ -36,9 +36,28 @@ bool DriveTrain<Machine, Shaft>::conduct(const AxisCore& core, const AxisState& 
 }
 
 template <class Machine, class Shaft>
+WindingValues DriveTrain<Machine, Shaft>::floating_v(const State& x, const RotorMotion& motion,
+                                                     const TerminalInput& u) const noexcept {
+  if constexpr (requires { floating_voltages(c_, x, motion, u); }) {
+    return floating_voltages(c_, x, motion, u);
+  } else {
+    return open_circuit_voltages(c_, x, motion);
+  }
+}
+
+template <class Machine, class Shaft>
+WindingValues DriveTrain<Machine, Shaft>::open_v(const State& x, const RotorMotion& motion) const noexcept {
+  if constexpr (requires { open_circuit_voltages(c_, x, motion, piece_.drive.field_v); }) {
+    return open_circuit_voltages(c_, x, motion, piece_.drive.field_v);
+  } else {
+    return open_circuit_voltages(c_, x, motion);
+  }
+}
+
+template <class Machine, class Shaft>
 bool DriveTrain<Machine, Shaft>::leave_open(const AxisCore& core, const State& x,
                                             const RotorMotion& motion) noexcept {
-  const WindingValues emf_v = open_circuit_voltages(c_, x, motion);
+  const WindingValues emf_v = open_v(x, motion);
   // No phase has more than the sum of the components.
   const double most_v = std::abs(emf_v.stator.a) + std::abs(emf_v.stator.b) + std::abs(emf_v.zero);
   if (most_v > piece_.drive.rail_v && !diodes_block(core.connection, piece_.drive, emf_v)) return false;
@@ -55,12 +74,15 @@ PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const
                                                      const RotorMotion& motion) const noexcept {
   if (piece_.plain) return piece_.circuit.start_v;
   if (state.open_terminals == 0) return piece_.circuit.end_v;
-  const WindingValues emf_v = open_circuit_voltages(c_, x, motion);
-  if (piece_.open) return open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
+  if (piece_.open) {
+    return open_terminal_voltages(core.connection, open_v(x, motion), piece_.drive.field_v);
+  }
   TerminalDrive drive = piece_.drive;
   if (!drive.constant) drive.start_v = drive.end_v;
   TerminalSet open = state.open_terminals;
-  return connect(core.connection, drive, state.injected, piece_.current_a, emf_v, open).start_v;
+  const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
+  return connect(core.connection, drive, state.injected, piece_.current_a, WindingVoltagesOf(ask), open)
+      .start_v;
 }
 
 template <class Machine, class Shaft>
@@ -90,8 +112,9 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
     hold_constant(none);
     state.open_terminals = all;
   } else {
+    const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
     piece_.circuit = connect(core.connection, piece_.drive, state.injected, piece_.current_a,
-                             open_circuit_voltages(c_, x, motion), state.open_terminals);
+                             WindingVoltagesOf(ask), state.open_terminals);
     if (piece_.circuit.short_circuit) trip(core, state);
   }
 }

@@ -9,8 +9,8 @@ namespace drivebench {
 /// Numbers whose passing through zero ends a piece of a tick: at most four of the shaft, and of each machine
 /// on it three of the terminals and a corner.
 struct EventValues {
-  std::array<double, 12> value{};
-  int shaft = 0;  ///< how many of them belong to the shaft; the rest follows
+  std::array<double, 12> value;  ///< the first `count` of them
+  int shaft = 0;                 ///< how many of them belong to the shaft; the rest follows
   int count = 0;
 
   void add(double v) noexcept { value[static_cast<std::size_t>(count++)] = v; }

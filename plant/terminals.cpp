@@ -24,7 +24,7 @@ ThreePhase values(const Phases& x) noexcept {
   return {.a = x[0], .b = x[1], .c = x[2]};
 }
 
-Phases open_circuit_phases(Connection connection, const WindingValues& x) noexcept {
+Phases winding_phases(Connection connection, const WindingValues& x) noexcept {
   if (connection == Connection::kTwoPhase || connection == Connection::kArmature) {
     return {x.stator.a, x.stator.b, 0.0};
   }
@@ -38,7 +38,7 @@ struct Work {
   Connection connection;
   const TerminalDrive& drive;
   Phases current_a;
-  Phases emf_v;  ///< of the winding without current
+  WindingVoltagesOf ask;
   Phases voltage_v{};
   TerminalSet open = 0;
   TerminalSet dying = 0;
@@ -72,61 +72,74 @@ void clamp_terminal(Work& w, int k, double side) noexcept {
   w.voltage_v[at(k)] = side * w.drive.rail_v;
 }
 
-void float_bridges(Work& w) noexcept {
-  for (int k = 0; k < w.count; ++k) {
-    if (w.conducts(k)) continue;
-    const double emf_v = w.emf_v[at(k)];
-    w.voltage_v[at(k)] = emf_v;
-    if (w.has_diodes(k) && std::abs(emf_v) > w.drive.rail_v) clamp_terminal(w, k, emf_v > 0.0 ? 1.0 : -1.0);
-  }
-}
-
 int conducting_count(const Work& w) noexcept {
   return (w.conducts(0) ? 1 : 0) + (w.conducts(1) ? 1 : 0) + (w.conducts(2) ? 1 : 0);
 }
 
-/// Neutral of a star from the terminals that conduct; with equal windings in series their drops cancel.
-double neutral_from_conducting(const Work& w, int conducting) noexcept {
+/// What the circuit, as it is known so far, does to the windings.
+TerminalInput circuit_input(const Work& w, const Phases& v) noexcept {
+  TerminalInput u = open_input(w.connection, w.open);
+  const WindingVoltages across = winding_voltages(w.connection, values(v));
+  u.voltage_v = across.stator_v;
+  u.zero_v = across.zero_v;
+  u.field_v = w.drive.field_v;
+  return u;
+}
+
+/// Neutral of a star from the terminals that conduct: each is at its winding's voltage above it.
+double neutral_from_conducting(const Work& w, const Phases& winding_v) noexcept {
   double sum_v = 0.0;
   for (int k = 0; k < 3; ++k) {
-    if (w.conducts(k)) sum_v += w.voltage_v[at(k)] - w.emf_v[at(k)];
+    if (w.conducts(k)) sum_v += w.voltage_v[at(k)] - winding_v[at(k)];
   }
+  const int conducting = conducting_count(w);
   return conducting > 0 ? sum_v / conducting : 0.0;
 }
 
-/// No terminal conducts: two diodes do if the emf between their terminals is beyond the whole link.
-void start_rectifier(Work& w) noexcept {
+/// No terminal of a star conducts: two diodes do if the voltage between their terminals is beyond the whole
+/// link.
+bool start_rectifier(Work& w, const Phases& winding_v) noexcept {
   int high = -1;
   int low = -1;
   for (int k = 0; k < 3; ++k) {
     if (!w.has_diodes(k)) continue;
-    if (high < 0 || w.emf_v[at(k)] > w.emf_v[at(high)]) high = k;
-    if (low < 0 || w.emf_v[at(k)] < w.emf_v[at(low)]) low = k;
+    if (high < 0 || winding_v[at(k)] > winding_v[at(high)]) high = k;
+    if (low < 0 || winding_v[at(k)] < winding_v[at(low)]) low = k;
   }
-  if (high < 0 || high == low || w.emf_v[at(high)] - w.emf_v[at(low)] <= 2.0 * w.drive.rail_v) return;
+  if (high < 0 || high == low || winding_v[at(high)] - winding_v[at(low)] <= 2.0 * w.drive.rail_v)
+    return false;
   clamp_terminal(w, high, 1.0);
   clamp_terminal(w, low, -1.0);
+  return true;
 }
 
-void float_star(Work& w) noexcept {
-  if (conducting_count(w) == 0) start_rectifier(w);
-  // Each pass lets one more terminal conduct at most.
-  for (int pass = 0; pass < 3; ++pass) {
-    const int conducting = conducting_count(w);
-    const double neutral_v = neutral_from_conducting(w, conducting);
-    bool clamped = false;
-    for (int k = 0; k < 3 && !clamped; ++k) {
-      if (w.conducts(k)) continue;
-      const double floating_v = neutral_v + w.emf_v[at(k)];
-      w.voltage_v[at(k)] = floating_v;
-      clamped = conducting > 0 && w.has_diodes(k) && std::abs(floating_v) > w.drive.rail_v;
-      if (clamped) clamp_terminal(w, k, floating_v > 0.0 ? 1.0 : -1.0);
-    }
-    if (!clamped) break;
+/// Puts the open terminals where the machine has them, and lets the first diode conduct beyond whose rail
+/// that is. Whether there was one: the others must be asked again then.
+bool float_once(Work& w) noexcept {
+  const bool star = w.connection == Connection::kStar;
+  const Phases winding_v = winding_phases(w.connection, w.ask(circuit_input(w, w.voltage_v)));
+  const bool alone = star && conducting_count(w) == 0;
+  if (alone && start_rectifier(w, winding_v)) return true;
+  const double neutral_v = star ? neutral_from_conducting(w, winding_v) : 0.0;
+  for (int k = 0; k < w.count; ++k) {
+    if (w.conducts(k)) continue;
+    const double floating_v = neutral_v + winding_v[at(k)];
+    w.voltage_v[at(k)] = floating_v;
+    if (!w.has_diodes(k) || alone || std::abs(floating_v) <= w.drive.rail_v) continue;
+    clamp_terminal(w, k, floating_v > 0.0 ? 1.0 : -1.0);
+    return true;
   }
-  // One terminal alone carries nothing.
-  if (conducting_count(w) == 1) {
-    w.open = bit(0) | bit(1) | bit(2);
+  return false;
+}
+
+void float_terminals(Work& w) noexcept {
+  // Each pass lets at least one more terminal conduct.
+  for (int pass = 0; pass < 3 && (w.open & all_terminals(w.connection)) != 0; ++pass) {
+    if (!float_once(w)) break;
+  }
+  // One terminal of a star alone carries nothing.
+  if (w.connection == Connection::kStar && conducting_count(w) == 1) {
+    w.open = all_terminals(w.connection);
     w.dying = 0;
   }
 }
@@ -223,13 +236,13 @@ TerminalInput open_input(Connection connection, TerminalSet open) noexcept {
 
 PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
                                    double field_v) noexcept {
-  const Phases v = open_circuit_phases(connection, open_circuit_v);
+  const Phases v = winding_phases(connection, open_circuit_v);
   return {.a = v[0], .b = v[1], .c = v[2], .field = field_v};
 }
 
 bool diodes_block(Connection connection, const TerminalDrive& drive,
                   const WindingValues& open_circuit_v) noexcept {
-  const Phases emf_v = open_circuit_phases(connection, open_circuit_v);
+  const Phases emf_v = winding_phases(connection, open_circuit_v);
   double highest_v = -drive.rail_v;
   double lowest_v = drive.rail_v;
   for (int k = 0; k < terminal_count(connection); ++k) {
@@ -242,26 +255,21 @@ bool diodes_block(Connection connection, const TerminalDrive& drive,
 }
 
 TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
-                        const PhaseValues& current_a, const WindingValues& open_circuit_v,
+                        const PhaseValues& current_a, WindingVoltagesOf winding_v,
                         TerminalSet& open) noexcept {
   Work w{.connection = connection,
          .drive = drive,
          .current_a = {current_a.a, current_a.b, current_a.c},
-         .emf_v = open_circuit_phases(connection, open_circuit_v),
+         .ask = winding_v,
          .open = open & all_terminals(connection),
          .count = terminal_count(connection)};
   sort_terminals(w);
   const Shorts shorts = shorts_of(faults, w.count);
   close_shorted(w, shorts);
-  if (connection == Connection::kStar) {
-    float_star(w);
-  } else {
-    float_bridges(w);
-  }
+  float_terminals(w);
   close_shorted(w, shorts);
 
   TerminalCircuit circuit{.constant = drive.constant, .dying = w.dying};
-  const TerminalInput conduction = open_input(connection, w.open);
   const auto input = [&](const ThreePhase& driven_v, PhaseValues& terminal_v) noexcept {
     Phases v = w.voltage_v;
     const Phases wanted = phases(driven_v);
@@ -269,13 +277,8 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
       if (w.driven(k)) v[at(k)] = wanted[at(k)];
     }
     circuit.short_circuit = apply_shorts(w, shorts, v) || circuit.short_circuit;
-    TerminalInput u = conduction;
-    const WindingVoltages w_v = winding_voltages(connection, values(v));
-    u.voltage_v = w_v.stator_v;
-    u.zero_v = w_v.zero_v;
-    u.field_v = drive.field_v;
     terminal_v = {.a = v[0], .b = v[1], .c = v[2], .field = drive.field_v};
-    return u;
+    return circuit_input(w, v);
   };
   circuit.start = input(drive.start_v, circuit.start_v);
   if (drive.constant) {

@@ -30,6 +30,23 @@ struct TerminalCircuit {
   bool short_circuit = false;  ///< a short lies between two driven terminals of different voltage
 };
 
+/// Asks a machine for the voltages of its windings, R i + d(flux)/dt, where the circuit lets the currents of
+/// this TerminalInput flow. Refers to what it is made of.
+class WindingVoltagesOf {
+ public:
+  template <class Ask>
+  explicit WindingVoltagesOf(const Ask& ask) noexcept
+      : asked_(&ask), call_([](const void* asked, const TerminalInput& u) noexcept {
+          return (*static_cast<const Ask*>(asked))(u);
+        }) {}
+
+  WindingValues operator()(const TerminalInput& u) const noexcept { return call_(asked_, u); }
+
+ private:
+  const void* asked_;
+  WindingValues (*call_)(const void*, const TerminalInput&) noexcept;
+};
+
 /// The currents of the terminals, exactly zero where one is open.
 inline PhaseValues terminal_currents(Connection connection, const WindingValues& x,
                                      TerminalSet open) noexcept {
@@ -49,10 +66,10 @@ inline PhaseValues terminal_currents(Connection connection, const WindingValues&
 TerminalInput open_input(Connection connection, TerminalSet open) noexcept;
 
 /// Connects drive and windings. `open` are the terminals that carry no current because a diode blocks or a
-/// wire is broken; the function takes out those that are driven again or whose diodes begin to conduct (the
-/// emf `open_circuit_v` is beyond a rail), and puts in those without current.
+/// wire is broken; the function takes out those that are driven again or whose diodes begin to conduct (what
+/// the machine induces there is beyond a rail), and puts in those without current.
 TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
-                        const PhaseValues& current_a, const WindingValues& open_circuit_v,
+                        const PhaseValues& current_a, WindingVoltagesOf winding_v,
                         TerminalSet& open) noexcept;
 
 /// The voltages of terminals without current.

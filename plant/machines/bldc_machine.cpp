@@ -86,6 +86,18 @@ WindingValues open_circuit_voltages(const BldcMachineConstants& c, const BldcMac
           .zero = c.star ? 0.0 : -emf_v * bldc_detail::zero_sequence(e)};
 }
 
+WindingValues winding_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
+                               const RotorMotion& motion, const TerminalInput& u) noexcept {
+  const WindingValues emf_v = open_circuit_voltages(c, x, motion);
+  const BldcMachineState slope = derivative(c, x, motion, u);
+  const auto dropped_v = [&](double inductance_h, double i_a, double slope_a_s) {
+    return c.stator_resistance_ohm * i_a + inductance_h * slope_a_s;
+  };
+  return {.stator = {.a = emf_v.stator.a + dropped_v(c.inductance_h, x.i_a_a, slope.i_a_a),
+                     .b = emf_v.stator.b + dropped_v(c.inductance_h, x.i_b_a, slope.i_b_a)},
+          .zero = emf_v.zero + dropped_v(c.zero_inductance_h, x.i_zero_a, slope.i_zero_a)};
+}
+
 TwoPhase rotor_flux_wb(const BldcMachineConstants& c, const BldcMachineState&,
                        const RotorMotion& motion) noexcept {
   const double turns = c.turns_per_rad * motion.angle_rad - 0.25;

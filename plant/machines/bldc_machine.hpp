@@ -134,6 +134,18 @@ BldcMachineState restricted(const BldcMachineConstants& c, const BldcMachineStat
 WindingValues open_circuit_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
                                     const RotorMotion& motion) noexcept;
 
+/// Voltages of the windings with the currents that `u` lets flow: R i + d(flux)/dt. What an open phase of
+/// independent ones shows while the others carry current.
+WindingValues winding_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
+                               const RotorMotion& motion, const TerminalInput& u) noexcept;
+
+/// What open windings show while the others carry the currents that `u` lets flow: in a star their currents
+/// cancel there.
+inline WindingValues floating_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
+                                       const RotorMotion& motion, const TerminalInput& u) noexcept {
+  return c.star ? open_circuit_voltages(c, x, motion) : winding_voltages(c, x, motion, u);
+}
+
 /// Flux linkage that the magnet gives the stator: that of phase a peaks at angle 0.
 TwoPhase rotor_flux_wb(const BldcMachineConstants& c, const BldcMachineState& x,
                        const RotorMotion& motion) noexcept;

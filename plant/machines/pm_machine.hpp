@@ -124,6 +124,13 @@ WindingValues open_circuit_voltages(const PmMachineConstants& c, const PmMachine
 WindingValues winding_voltages(const PmMachineConstants& c, const PmMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
+/// What open windings show while the others carry the currents that `u` lets flow: those of a round machine
+/// do not notice.
+inline WindingValues floating_voltages(const PmMachineConstants& c, const PmMachineState& x,
+                                       const RotorMotion& motion, const TerminalInput& u) noexcept {
+  return c.saliency_h != 0.0 ? winding_voltages(c, x, motion, u) : open_circuit_voltages(c, x, motion);
+}
+
 /// Flux of the magnet in the stator windings, in the stator frame.
 TwoPhase rotor_flux_wb(const PmMachineConstants& c, const PmMachineState& x,
                        const RotorMotion& motion) noexcept;

@@ -36,6 +36,17 @@ WindingValues open_circuit_voltages(const WoundRotorMachineConstants& c, const W
           .field = c.field_resistance_ohm * x.i_field_a};
 }
 
+WindingValues open_circuit_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
+                                    const RotorMotion& motion, double field_v) noexcept {
+  WindingValues v = open_circuit_voltages(c, x, motion);
+  const double induced_v =
+      c.mutual_inductance_h / c.field_inductance_h * (field_v - c.field_resistance_ohm * x.i_field_a);
+  v.stator.a += induced_v * motion.electrical.cos;
+  v.stator.b += induced_v * motion.electrical.sin;
+  v.field = field_v;
+  return v;
+}
+
 WindingValues winding_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept {
   const WoundRotorMachineState slope = derivative(c, x, motion, u);

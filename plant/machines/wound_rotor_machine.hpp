@@ -94,10 +94,20 @@ WoundRotorMachineState restricted(const WoundRotorMachineConstants& c, const Wou
 WindingValues open_circuit_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                                     const RotorMotion& motion) noexcept;
 
+/// The same while the field has this voltage: what the slope of its current induces comes on top.
+WindingValues open_circuit_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
+                                    const RotorMotion& motion, double field_v) noexcept;
+
 /// Voltages of the windings with the currents that `u` lets flow: R i + d(flux)/dt. Where the stator is open
 /// this holds what a changing field current induces as well.
 WindingValues winding_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
+
+/// What open windings show while the others carry the currents that `u` lets flow.
+inline WindingValues floating_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
+                                       const RotorMotion& motion, const TerminalInput& u) noexcept {
+  return winding_voltages(c, x, motion, u);
+}
 
 /// Flux of the field in the stator windings, M i_F e, in the stator frame.
 TwoPhase rotor_flux_wb(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,

@@ -22,11 +22,18 @@ WindingValues star_values(double a, double b, double c) {
   return {.stator = three_to_two({a, b, c})};
 }
 
+/// connect() with a machine whose open windings have these voltages whatever the others do.
+TerminalCircuit connected(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
+                          const PhaseValues& current_a, const WindingValues& emf_v, TerminalSet& open) {
+  const auto ask = [&emf_v](const TerminalInput&) noexcept { return emf_v; };
+  return connect(connection, drive, faults, current_a, WindingVoltagesOf(ask), open);
+}
+
 // Kills: a common voltage of the terminals that reaches the windings of a star.
 TEST(Terminals, ACommonVoltageDoesNothingToAStar) {
   TerminalSet open = 0;
-  const TerminalCircuit x = connect(Connection::kStar, driven(60.0, -20.0, -40.0), {}, {}, {}, open);
-  const TerminalCircuit y = connect(Connection::kStar, driven(90.0, 10.0, -10.0), {}, {}, {}, open);
+  const TerminalCircuit x = connected(Connection::kStar, driven(60.0, -20.0, -40.0), {}, {}, {}, open);
+  const TerminalCircuit y = connected(Connection::kStar, driven(90.0, 10.0, -10.0), {}, {}, {}, open);
   EXPECT_NEAR(x.start.voltage_v.a, y.start.voltage_v.a, 1e-12);
   EXPECT_NEAR(x.start.voltage_v.b, y.start.voltage_v.b, 1e-12);
   EXPECT_EQ(x.start.conduction, Conduction::kFull);
@@ -41,7 +48,7 @@ TEST(Terminals, AnOpenPhaseLeavesTheLineBetweenTheOtherTwo) {
     TerminalDrive drive = driven(kV[0], kV[1], kV[2]);
     drive.mode[static_cast<std::size_t>(k)] = TerminalMode::kOpen;
     TerminalSet open = 0;
-    const TerminalCircuit circuit = connect(Connection::kStar, drive, {}, {}, {}, open);
+    const TerminalCircuit circuit = connected(Connection::kStar, drive, {}, {}, {}, open);
     EXPECT_EQ(open, TerminalSet{1} << k);
     ASSERT_EQ(circuit.start.conduction, Conduction::kLine);
     const TerminalInput& u = circuit.start;
@@ -59,7 +66,7 @@ TEST(Terminals, AnOpenPhaseLeavesTheLineBetweenTheOtherTwo) {
 TEST(Terminals, CurrentsFlowThroughTheDiodesAgainstTheRails) {
   TerminalSet open = 0;
   const PhaseValues current{.a = 3.0, .b = -2.0, .c = -1.0};
-  const TerminalCircuit circuit = connect(Connection::kStar, gates_off(), {}, current, {}, open);
+  const TerminalCircuit circuit = connected(Connection::kStar, gates_off(), {}, current, {}, open);
   EXPECT_EQ(circuit.start_v.a, -kRail_v);
   EXPECT_EQ(circuit.start_v.b, kRail_v);
   EXPECT_EQ(circuit.start_v.c, kRail_v);
@@ -73,7 +80,7 @@ TEST(Terminals, AStarRectifiesOnceTheEmfBetweenTwoTerminalsExceedsTheLink) {
   for (const double peak : {99.0, 101.0}) {
     TerminalSet open = 7;
     const WindingValues emf = star_values(peak, -peak, 0.0);
-    const TerminalCircuit circuit = connect(Connection::kStar, gates_off(), {}, {}, emf, open);
+    const TerminalCircuit circuit = connected(Connection::kStar, gates_off(), {}, {}, emf, open);
     if (peak < kRail_v) {
       EXPECT_EQ(open, 7u);
       EXPECT_EQ(circuit.start.conduction, Conduction::kNone);
@@ -93,7 +100,7 @@ TEST(Terminals, TheThirdDiodeOfAStarConductsWhenItsTerminalPassesARail) {
     TerminalSet open = 4;
     const PhaseValues current{.a = 2.0, .b = -2.0};
     const WindingValues emf = star_values(-emf_c / 2, -emf_c / 2, emf_c);
-    const TerminalCircuit circuit = connect(Connection::kStar, gates_off(), {}, current, emf, open);
+    const TerminalCircuit circuit = connected(Connection::kStar, gates_off(), {}, current, emf, open);
     // The neutral is at the mean of (-100 + emf_c/2) and (100 + emf_c/2).
     const bool conducts = 1.5 * emf_c > kRail_v;
     EXPECT_EQ(open, conducts ? 0u : 4u) << emf_c;
@@ -106,15 +113,15 @@ TEST(Terminals, AShortPutsBothTerminalsAtOneVoltage) {
   InjectedFaults faults;
   faults.phase_short = 2.0;  // b - c
   TerminalSet open = 0;
-  TerminalCircuit circuit = connect(Connection::kStar, driven(10.0, 40.0, -20.0), faults, {}, {}, open);
+  TerminalCircuit circuit = connected(Connection::kStar, driven(10.0, 40.0, -20.0), faults, {}, {}, open);
   EXPECT_EQ(circuit.start_v.b, 10.0);
   EXPECT_EQ(circuit.start_v.c, 10.0);
   EXPECT_TRUE(circuit.short_circuit);
-  circuit = connect(Connection::kStar, driven(10.0, 5.0, 5.0), faults, {}, {}, open);
+  circuit = connected(Connection::kStar, driven(10.0, 5.0, 5.0), faults, {}, {}, open);
   EXPECT_FALSE(circuit.short_circuit);
   faults = {};
   faults.neutral_short = 1.0;
-  circuit = connect(Connection::kTwoPhase, driven(10.0, 5.0, 0.0), faults, {}, {}, open);
+  circuit = connected(Connection::kTwoPhase, driven(10.0, 5.0, 0.0), faults, {}, {}, open);
   EXPECT_EQ(circuit.start.voltage_v.a, 0.0);
   EXPECT_EQ(circuit.start.voltage_v.b, 5.0);
 }
@@ -125,7 +132,7 @@ TEST(Terminals, TerminalsThatDoNotExistAreNotOpen) {
     TerminalSet open = 7;  // as at the start
     TerminalDrive drive = driven(10.0, 5.0, 0.0);
     drive.constant = false;
-    const TerminalCircuit circuit = connect(connection, drive, {}, {}, {}, open);
+    const TerminalCircuit circuit = connected(connection, drive, {}, {}, {}, open);
     EXPECT_EQ(open, 0u);
     EXPECT_EQ(circuit.start.conduction, Conduction::kFull);
   }
@@ -135,7 +142,7 @@ TEST(Terminals, TerminalsThatDoNotExistAreNotOpen) {
 TEST(Terminals, EachBridgeOfItsOwnFloatsByItself) {
   TerminalSet open = 3;
   const WindingValues emf{.stator = {120.0, 80.0}};
-  const TerminalCircuit circuit = connect(Connection::kTwoPhase, gates_off(), {}, {}, emf, open);
+  const TerminalCircuit circuit = connected(Connection::kTwoPhase, gates_off(), {}, {}, emf, open);
   EXPECT_EQ(open, 2u);
   EXPECT_EQ(circuit.start_v.a, kRail_v);
   EXPECT_EQ(circuit.start_v.b, 80.0);

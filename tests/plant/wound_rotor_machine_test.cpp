@@ -139,6 +139,10 @@ TEST(WoundRotorMachine, WithAnOpenStatorTheFieldIsACoilAndItsFluxGivesTheVoltage
   EXPECT_NEAR(v.stator.a, (after.a - before.a) / (2.0 * kStep_s), 1e-6);
   EXPECT_NEAR(v.stator.b, (after.b - before.b) / (2.0 * kStep_s), 1e-6);
   EXPECT_EQ(v.field, 30.0);
+  const WindingValues open = open_circuit_voltages(c, x, motion, 30.0);
+  EXPECT_NEAR(open.stator.a, v.stator.a, 1e-12);
+  EXPECT_NEAR(open.stator.b, v.stator.b, 1e-12);
+  EXPECT_EQ(open.field, 30.0);
 
   // With a field current that does not change both are the same.
   const TerminalInput steady{.field_v = 10.0, .conduction = Conduction::kNone};
