@@ -8,7 +8,7 @@ namespace drivebench {
 /// series. Error |by|^8/40320: 9e-12 for 0.16 rad, 1e-7 for 0.5 rad, well below that of the Runge-Kutta step
 /// whose stages need it.
 ///
-/// With it each stage sees the electrical angle of its own, at the price of one cos_sin() for a step. Cosine
+/// With it each stage sees the electrical angle of its own, at the price of a cos_sin() now and then. Cosine
 /// and sine carried as states of the step (c' = -n_p w s, s' = n_p w c) cost more and leave 20 to 140 times
 /// the error: the step shrinks them and turns them a little too slowly.
 constexpr CosSin rotated(CosSin start, double by_rad) noexcept {

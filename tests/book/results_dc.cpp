@@ -202,7 +202,8 @@ ResultSection dc_results() {
         "agrees"},
        {"AC-14", "half a turn in 65 ms, `book/2.18`",
         "below 5 A and 40 V, within 70 ms; simulated 0.009 rad, 4.26 A", half_turn("book/2.18"),
-        "the sampling of the observer; a program of its own with these settings gives 0.0044"},
+        "not the reference's program, whose settings are not all told: an independent one with these gives "
+        "0.0044"},
        {"AC-14", "the same with a current loop of its own, `book/2.18-own-current-loop`", "as above",
         half_turn("book/2.18-own-current-loop"), "agrees"},
        {"2.17", "half a turn with a continuous jerk, `book/2.17`", "nothing", half_turn("book/2.17"),

@@ -196,7 +196,8 @@ ResultSection high_speed_results() {
             "agrees: it fails"},
            {"10", "the same with field weakening from 313 rad/s on, `book/8.2.5-field-weakening`",
             "nothing; simulated 1148 counts", move_of(weakened),
-            "references that fit the weakened flux make it follow, but braking takes more than 6 A"},
+            "it follows, but braking takes more than the 6 A of the amplifier; the law behind the simulated "
+            "number is not told"},
            {"11",
             "the move with the listed friction, `book/8.2.5-friction`",
             "nothing; derived: impossible",
@@ -223,7 +224,8 @@ ResultSection high_speed_results() {
             "an exercise; no numbers", move_of(closed_loop("exercise/8.28")), "nothing to compare with"},
            {"29", "dynamic linearisation, integrator on the q axis, with a hanging load, `exercise/8.29`",
             "an exercise; no numbers", move_of(closed_loop("exercise/8.29")),
-            "nothing to compare with; the peak is the load that drops before there is torque"}}};
+            "nothing to compare with; the peak comes from the load put on before the move, while the law is "
+            "singular"}}};
 }
 
 ResultSection optimum_torque_results() {
