@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/identification/series.hpp"
+
+namespace drivebench::identification {
+
+/// One measured signal.
+struct Column {
+  std::string name;  ///< as the signal catalogue has it: i_a_a, u_a_v, encoder_count, ...
+  std::string unit;  ///< SI; empty if nobody said
+  Series values;
+};
+
+/// What was measured, wherever it comes from: equidistant, all columns of one length.
+struct MeasuredData {
+  double period_s = 0.0;
+  std::vector<Column> columns;
+
+  std::size_t samples() const noexcept { return columns.empty() ? 0 : columns[0].values.size(); }
+  /// The column of this name, or null.
+  const Column* find(std::string_view name) const noexcept;
+  /// The same; throws IdentificationError, which lists what there is.
+  SeriesView at(std::string_view name) const;
+};
+
+/// A column of somebody else's file.
+struct ColumnMap {
+  std::string name;     ///< of the signal here
+  std::string header;   ///< of the column there, with or without its "[unit]"
+  double factor = 1.0;  ///< SI value = factor x number in the file + offset
+  double offset = 0.0;
+};
+
+struct CsvOptions {
+  /// Columns to take; empty: all, under their own names.
+  std::vector<ColumnMap> columns{};
+  /// The time between two rows. 0: from the column of the name or header `time`, whose steps must be equal to
+  /// 1 %.
+  double period_s = 0.0;
+  std::string time = "time_s";
+};
+
+/// Reads comma- or semicolon-separated numbers under a header line; "name [unit]" is split. As `drivebench
+/// export` writes it, or from a real motor. Throws IdentificationError, "source:line: column: rule", at the
+/// first line that is not as it should be; `source` stands for the text in messages.
+MeasuredData parse_csv(std::string_view text, const std::string& source, const CsvOptions& options = {});
+
+/// The same from a file of at most 2 GiB.
+MeasuredData read_csv(const std::filesystem::path& file, const CsvOptions& options = {});
+
+}  // namespace drivebench::identification

@@ -1,0 +1,167 @@
+#include "clients/identification/result.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace drivebench::identification {
+namespace {
+
+bool is_unseen(const Result& result, const std::string& name) {
+  const auto& unseen = result.excitation.unseen;
+  return std::find(unseen.begin(), unseen.end(), name) != unseen.end();
+}
+
+std::string percent(double part, double of) {
+  const double value = 100.0 * part / std::abs(of);
+  if (!std::isfinite(value)) return "-";
+  return std::abs(value) >= 1e4 ? fmt::format("{:.1e} %", value) : fmt::format("{:.3g} %", value);
+}
+
+nlohmann::json number(double x) {
+  return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(nullptr);
+}
+
+/// A key of a motor file with the estimate that it takes.
+struct Row {
+  const char* key;
+  double value;
+  bool may_be_zero;
+};
+
+std::vector<Row> machine_rows(const Result& r) {
+  if (r.kind == "induction") {
+    const double inductance = r.at("L_S");
+    return {{"stator_resistance_ohm", r.at("R_S"), false},
+            {"rotor_resistance_ohm", r.at("R_R"), false},
+            {"stator_inductance_h", inductance, false},
+            {"rotor_inductance_h", inductance, false},
+            {"mutual_inductance_h", r.at("M"), false}};
+  }
+  if (r.kind == "pm_synchronous") {
+    return {{"stator_resistance_ohm", r.at("R_S"), false},
+            {"inductance_d_h", r.at("L_S"), false},
+            {"inductance_q_h", r.at("L_S"), false},
+            {"torque_constant_nm_per_a", r.at("K_m"), false}};
+  }
+  if (r.kind == "bldc") {
+    // The star shows L + M only; the whole of it as self-inductance has the same currents.
+    return {{"stator_resistance_ohm", r.at("R_S"), false},
+            {"self_inductance_h", r.at("L+M"), false},
+            {"mutual_inductance_h", 0.0, true},
+            {"torque_constant_nm_per_a", r.at("tau_p"), false}};
+  }
+  return {{"armature_resistance_ohm", r.at("R"), false},
+          {"armature_inductance_h", r.at("L"), false},
+          {"torque_constant_nm_per_a", r.at("K_T"), false}};
+}
+
+std::string toml_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      out += fmt::format("\\u{:04X}", static_cast<unsigned char>(c));
+      continue;
+    }
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
+}
+
+std::string line_of(const Row& row) {
+  if (!std::isfinite(row.value) || row.value < 0.0 || (row.value == 0.0 && !row.may_be_zero))
+    throw IdentificationError(
+        fmt::format("no motor file: {} = {} is no value for a motor", row.key, row.value));
+  std::string text = fmt::format("{}", row.value);
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";  // TOML tells integers from reals
+  return fmt::format("{} = {}\n", row.key, text);
+}
+
+}  // namespace
+
+const Estimate* Result::find(std::string_view name) const noexcept {
+  const auto found =
+      std::find_if(parameters.begin(), parameters.end(), [&](const Estimate& e) { return e.name == name; });
+  return found == parameters.end() ? nullptr : &*found;
+}
+
+double Result::at(std::string_view name) const {
+  if (const Estimate* estimate = find(name)) return estimate->value;
+  throw IdentificationError(fmt::format("the result has no parameter {}", name));
+}
+
+void Result::compare(const std::map<std::string, double, std::less<>>& truth) {
+  for (Estimate& e : parameters) {
+    const auto known = truth.find(e.name);
+    if (known != truth.end()) e.truth = known->second;
+  }
+}
+
+std::string to_markdown(const Result& r) {
+  std::string text = fmt::format("{}, {} samples\n\n", r.method, r.samples);
+  text += fmt::format(
+      "| parameter | unit | estimate | index (x{}) | truth | error |\n|---|---|---|---|---|---|\n",
+      r.index_factor);
+  for (const Estimate& e : r.parameters) {
+    const bool hidden = is_unseen(r, e.name);
+    text +=
+        fmt::format("| {} | {} | {} | {} | {} | {} |\n", e.name, e.unit,
+                    hidden ? "not seen" : fmt::format("{:.6g}", e.value),
+                    hidden ? "-" : percent(e.index, e.value), e.truth ? fmt::format("{:.6g}", *e.truth) : "-",
+                    e.truth && !hidden ? percent(e.value - *e.truth, *e.truth) : "-");
+  }
+  text += fmt::format("\nError index {:.4g}", r.error_index);
+  if (r.mechanical_error_index) text += fmt::format(", mechanical {:.4g}", *r.mechanical_error_index);
+  text += fmt::format(", condition {:.3g}. Verdict: {}.\n", r.condition, r.excitation.verdict);
+  for (const std::string& note : r.notes)
+    text += "\n" + note + "\n";
+  return text;
+}
+
+std::string to_json(const Result& r) {
+  nlohmann::json parameters = nlohmann::json::object();
+  for (const Estimate& e : r.parameters) {
+    nlohmann::json row = {{"estimate", is_unseen(r, e.name) ? nlohmann::json(nullptr) : number(e.value)},
+                          {"unit", e.unit},
+                          {"index", number(e.index)}};
+    row["truth"] = e.truth ? number(*e.truth) : nlohmann::json(nullptr);
+    parameters[e.name] = row;
+  }
+  nlohmann::json all = {{"kind", r.kind},
+                        {"method", r.method},
+                        {"parameters", parameters},
+                        {"index_factor", r.index_factor},
+                        {"error_index", number(r.error_index)},
+                        {"condition", number(r.condition)},
+                        {"samples", r.samples},
+                        {"identifiable", r.excitation.sufficient},
+                        {"unseen", r.excitation.unseen},
+                        {"verdict", r.excitation.verdict},
+                        {"notes", r.notes}};
+  if (r.mechanical_error_index) all["mechanical_error_index"] = number(*r.mechanical_error_index);
+  return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string to_motor_toml(const Result& r, const MotorFile& file) {
+  if (!r.excitation.sufficient) throw IdentificationError("no motor file: " + r.excitation.verdict);
+  std::string text = fmt::format("name = {}\nsource = {}\n\n[machine]\nkind = {}\n", toml_string(file.name),
+                                 toml_string(file.source), toml_string(r.kind));
+  if (r.kind == "induction" || r.kind == "bldc") text += fmt::format("star = {}\n", file.star);
+  if (r.kind != "pm_dc") text += fmt::format("pole_pairs = {}\n", file.pole_pairs);
+  for (const Row& row : machine_rows(r))
+    text += line_of(row);
+  if (r.find("J") == nullptr) return text;
+  text += "\n[mechanics]\n" + line_of({"inertia_kgm2", r.at("J"), false});
+  // Friction that comes out negative is noise about nothing.
+  if (r.find("f") != nullptr) text += line_of({"viscous_friction_nms", std::max(0.0, r.at("f")), true});
+  if (r.find("f_c") != nullptr) {
+    const double coulomb = std::max(0.0, r.at("f_c"));
+    text += line_of({"coulomb_friction_nm", coulomb, true}) + line_of({"static_friction_nm", coulomb, true});
+  }
+  return text;
+}
+
+}  // namespace drivebench::identification

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/identification/least_squares.hpp"
+
+namespace drivebench::identification {
+
+/// One parameter as the data say it is.
+struct Estimate {
+  std::string name;  ///< the book's: R_S, T_R, L_S, sigma, ...
+  std::string unit;
+  double value = 0.0;
+  double index = 0.0;           ///< parametric error index: E^2 grows by Result::index_factor within it
+  std::optional<double> truth;  ///< where somebody knows it
+};
+
+/// What became of one experiment.
+struct Result {
+  std::string kind;    ///< of machine, as motor files have it: induction, pm_synchronous, pm_dc, bldc
+  std::string method;  ///< one line for people
+  std::vector<Estimate> parameters{};
+  double index_factor = 2.0;  ///< 2 or 1.25
+  double error_index = 0.0;   ///< sqrt(E^2/R_y) of the electrical equations, or of all in one stage
+  std::optional<double> mechanical_error_index{};
+  double condition =
+      0.0;  ///< of the regressor with columns of unit length, or of the Hessian scaled to a unit diagonal
+  double normal_condition = 0.0;  ///< DC motor: of R_W as in the book, unscaled
+  std::size_t samples = 0;
+  Excitation excitation{};
+  std::vector<std::string> notes{};
+
+  /// The estimate of this name, or null.
+  const Estimate* find(std::string_view name) const noexcept;
+  /// Its value; throws IdentificationError if there is none.
+  double at(std::string_view name) const;
+  /// Puts the truth beside the estimates of these names.
+  void compare(const std::map<std::string, double, std::less<>>& truth);
+};
+
+/// A table: parameter, unit, estimate, index in percent, truth, error in percent; verdict and notes below it.
+/// If the excitation was not sufficient, unseen parameters show no number.
+std::string to_markdown(const Result& result);
+
+/// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, index, truth}}, ...}; a
+/// number that is not finite and the estimate of an unseen parameter are null.
+std::string to_json(const Result& result);
+
+/// What a motor file needs beside the estimates.
+struct MotorFile {
+  std::string name{};
+  std::string source{};
+  int pole_pairs = 1;
+  bool star = true;
+};
+
+/// A file for configs/motors. An induction motor gets equal leakages, L_R = L_S, which its terminals cannot
+/// tell from any other split. Throws IdentificationError if the data did not see every parameter or an
+/// estimate is no value for a motor.
+std::string to_motor_toml(const Result& result, const MotorFile& file);
+
+}  // namespace drivebench::identification
