@@ -233,7 +233,7 @@ bool DriveTrain<Machine, Shaft>::goes_on(AxisCore& core, AxisState& state, doubl
                                          const Whole& x) noexcept {
   if (piece_.stays) return piece_.plain || leave_open(core, x.machine, motion_of(x));
   if (!piece_.plain || !core.drive.only_switches(state.drive)) return false;
-  core.drive.switch_terminals(state.drive, start_s, piece_.drive);
+  if (!core.drive.switch_terminals(state.drive, start_s, piece_.drive)) return piece_.circuit.dying == 0;
   if (driven_count(core.connection, piece_.drive) != terminal_count(core.connection)) return false;
   piece_.circuit.dying = 0;
   drive_windings(core, piece_.drive.start_v);

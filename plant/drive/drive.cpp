@@ -14,10 +14,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTurnRad = 2.0 * std::numbers::pi;
 
-double mean(double x, double y) noexcept {
-  return 0.5 * (x + y);
-}
-
 }  // namespace
 
 Drive::Drive(const DriveParameters& p, Connection connection, double period_s, std::uint64_t seed,
@@ -258,12 +254,23 @@ void Drive::drive_terminals(DriveMemory& m, const Order& order, double start_s, 
   if (saturated) m.saturated = 1.0;
 }
 
+void Drive::find_segment(DriveMemory& m, const Order& order, double start_s) const noexcept {
+  const double instant_s = start_s + tolerance_s_ - pwm_start_s(start_s);
+  m.pwm_segment = static_cast<std::int64_t>(order.pattern.segment_at(instant_s, segment_hint(m)));
+}
+
 void Drive::put_switches(DriveMemory& m, const Order& order, double start_s,
                          TerminalDrive& out) const noexcept {
-  const double instant_s = start_s + tolerance_s_ - pwm_start_s(start_s);
-  const std::size_t segment = order.pattern.segment_at(instant_s, segment_hint(m));
-  m.pwm_segment = static_cast<std::int64_t>(segment);
-  order.pattern.put(segment, terminals_, out.rail_v, out);
+  find_segment(m, order, start_s);
+  order.pattern.put(segment_hint(m), terminals_, out.rail_v, out);
+}
+
+bool Drive::switch_terminals(DriveMemory& m, double start_s, TerminalDrive& out) const noexcept {
+  const std::int64_t before = m.pwm_segment;
+  find_segment(m, orders_[1], start_s);
+  if (m.pwm_segment == before) return false;
+  orders_[1].pattern.put(segment_hint(m), terminals_, out.rail_v, out);
+  return true;
 }
 
 ThreePhase Drive::with_dead_time(const ThreePhase& voltage_v, double rail_v,
@@ -331,69 +338,6 @@ TerminalDrive Drive::source_output(const DriveMemory& m, double start_s, double 
   }
   if (holds_) hold_terminals(out);
   return out;
-}
-
-void Drive::follow(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
-                   const PhaseValues& voltage_v, const PhaseValues& from_a,
-                   const PhaseValues& to_a) const noexcept {
-  if (kind_ == DriveKind::kSource) {
-    m.start_capacitor = applied.mode[1] == TerminalMode::kDriven && !p_.source.start_switch
-                            ? charged(p_.source, m.start_capacitor, from_a.b, to_a.b, duration_s)
-                            : StartCapacitor{.voltage_v = m.start_capacitor.voltage_v};
-    return;
-  }
-  if (filter_rate_per_s_ > 0.0) follow_filter(m, duration_s, applied, voltage_v);
-  if (kind_ == DriveKind::kCurrent) follow_loop(m, start_s, duration_s, from_a, to_a);
-  if (p_.bus.capacitance_f > 0.0) follow_bus(m, duration_s, applied, voltage_v, from_a, to_a);
-}
-
-/// With the gates off the filter follows the terminals, which the machine and the diodes hold.
-void Drive::follow_filter(DriveMemory& m, double duration_s, const TerminalDrive& applied,
-                          const PhaseValues& voltage_v) const noexcept {
-  const double decay = exponential(-filter_rate_per_s_ * duration_s);
-  const auto after = [&](double from, double input) { return filtered(from, input, decay); };
-  ThreePhase shaped_v = by_phase(after, m.filtered_v, m.filter_input_v);
-  ThreePhase terminal_v = phases_of(voltage_v);
-  for (int k = 0; k < terminals_; ++k) {
-    const bool diodes = applied.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
-    if (applied.constant || diodes) phase(shaped_v, k) = phase(terminal_v, k);
-  }
-  m.filtered_v = shaped_v;
-}
-
-void Drive::follow_loop(DriveMemory& m, double start_s, double duration_s, const PhaseValues& from_a,
-                        const PhaseValues& to_a) const noexcept {
-  const Order& order = order_at(start_s);
-  if (order.gates != Gates::kCurrent || m.switched_off != 0.0) {
-    m.integral_v = {};
-    return;
-  }
-  const PhaseValues wanted_v = loop_voltages(m, order.setpoint, from_a);
-  const double clip_v = limit_v(m);
-  const auto after = [&](double integral_v, double asked_v, double wanted_a, double i0_a, double i1_a) {
-    const double error_a = wanted_a - mean(i0_a, i1_a);
-    return integral_after(p_.current_loop, integral_v, asked_v, clip_v, error_a, duration_s);
-  };
-  m.integral_v = by_terminal(after, m.integral_v, wanted_v, order.setpoint, from_a, to_a);
-  if (connection_ == Connection::kStar) {
-    const ThreePhase star = without_neutral(phases_of(m.integral_v));
-    m.integral_v = {.a = star.a, .b = star.b, .c = star.c, .field = m.integral_v.field};
-  }
-}
-
-/// The field has a supply of its own; what an arc takes does not come back to the link.
-void Drive::follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& applied,
-                       const PhaseValues& voltage_v, const PhaseValues& from_a,
-                       const PhaseValues& to_a) const noexcept {
-  const auto power = [](double v, double i0_a, double i1_a) { return v * mean(i0_a, i1_a); };
-  ThreePhase power_w = by_phase(power, voltage_v, from_a, to_a);
-  double taken_w = 0.0;
-  for (int k = 0; k < terminals_; ++k) {
-    if (applied.mode[static_cast<std::size_t>(k)] != TerminalMode::kOpen) taken_w += phase(power_w, k);
-  }
-  m.bus_v =
-      bus_after(p_.bus, supply_v_, m.bus_v, m.chopper != 0.0, taken_w * duration_s, duration_s).voltage_v;
-  m.chopper = chopper_after(p_.bus, m.bus_v, m.chopper != 0.0) ? 1.0 : 0.0;
 }
 
 }  // namespace drivebench

@@ -115,10 +115,8 @@ class Drive {
   bool only_switches(const DriveMemory& m) const noexcept {
     return steady_ && switches_ && m.switched_off == 0.0;
   }
-  /// Brings an output of at() up to date where only_switches() holds.
-  void switch_terminals(DriveMemory& m, double start_s, TerminalDrive& out) const noexcept {
-    put_switches(m, orders_[1], start_s, out);
-  }
+  /// Brings an output of at() up to date where only_switches() holds. Whether anything has switched.
+  bool switch_terminals(DriveMemory& m, double start_s, TerminalDrive& out) const noexcept;
   /// Whether finish() has something to do in this tick.
   bool follows() const noexcept { return follows_; }
 
@@ -168,6 +166,7 @@ class Drive {
                             const PhaseValues& current_a) const noexcept;
   void drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
                        TerminalDrive& out) const noexcept;
+  void find_segment(DriveMemory& m, const Order& order, double start_s) const noexcept;
   void put_switches(DriveMemory& m, const Order& order, double start_s, TerminalDrive& out) const noexcept;
   ThreePhase with_dead_time(const ThreePhase& voltage_v, double rail_v,
                             const PhaseValues& current_a) const noexcept;

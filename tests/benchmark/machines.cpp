@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
+#include <vector>
 
 #include "plant/axis.hpp"
 #include "plant/rk4.hpp"
@@ -249,16 +251,21 @@ Row switched_period() {
   p.sensors.resolver.analog.enabled = false;
   p.mechanics.viscous_friction_nms = 0.01;
   Axis axis(p, {.period_s = kPeriodS, .substeps = 10}, 1, 0);
+  std::vector<PhaseCommand> turn(628);  // at 100 rad/s
+  for (std::size_t k = 0; k < turn.size(); ++k) {
+    const double phase = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(turn.size());
+    turn[k] = {.gates = Gates::kVoltage,
+               .setpoint = {.a = 5.0 * std::cos(phase),
+                            .b = 5.0 * std::cos(phase - 2.0944),
+                            .c = 5.0 * std::cos(phase + 2.0944)}};
+  }
   drivebench::Tick now = 0;
+  std::size_t next = 0;
   const Row row = timed(
       "", kPeriodS, 0.0,
       [&] {
-        const double phase = 100.0 * kPeriodS * static_cast<double>(now);
-        axis.advance({.gates = Gates::kVoltage,
-                      .setpoint = {.a = 5.0 * std::cos(phase),
-                                   .b = 5.0 * std::cos(phase - 2.0944),
-                                   .c = 5.0 * std::cos(phase + 2.0944)}},
-                     now++);
+        axis.advance(turn[next], now++);
+        if (++next == turn.size()) next = 0;
       },
       "");
   return {.name = "PWM period, switched inverter",

@@ -1,0 +1,78 @@
+// What an interval leaves behind in the drive: filter, current loop, link and starting capacitor.
+#include "plant/drive/drive.hpp"
+#include "plant/drive/phases.hpp"
+#include "plant/exponential.hpp"
+
+namespace drivebench {
+namespace {
+
+double mean(double x, double y) noexcept {
+  return 0.5 * (x + y);
+}
+
+}  // namespace
+
+void Drive::follow(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
+                   const PhaseValues& voltage_v, const PhaseValues& from_a,
+                   const PhaseValues& to_a) const noexcept {
+  if (kind_ == DriveKind::kSource) {
+    m.start_capacitor = applied.mode[1] == TerminalMode::kDriven && !p_.source.start_switch
+                            ? charged(p_.source, m.start_capacitor, from_a.b, to_a.b, duration_s)
+                            : StartCapacitor{.voltage_v = m.start_capacitor.voltage_v};
+    return;
+  }
+  if (filter_rate_per_s_ > 0.0) follow_filter(m, duration_s, applied, voltage_v);
+  if (kind_ == DriveKind::kCurrent) follow_loop(m, start_s, duration_s, from_a, to_a);
+  if (p_.bus.capacitance_f > 0.0) follow_bus(m, duration_s, applied, voltage_v, from_a, to_a);
+}
+
+/// With the gates off the filter follows the terminals, which the machine and the diodes hold.
+void Drive::follow_filter(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                          const PhaseValues& voltage_v) const noexcept {
+  const double decay = exponential(-filter_rate_per_s_ * duration_s);
+  const auto after = [&](double from, double input) { return filtered(from, input, decay); };
+  ThreePhase shaped_v = by_phase(after, m.filtered_v, m.filter_input_v);
+  ThreePhase terminal_v = phases_of(voltage_v);
+  for (int k = 0; k < terminals_; ++k) {
+    const bool diodes = applied.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
+    if (applied.constant || diodes) phase(shaped_v, k) = phase(terminal_v, k);
+  }
+  m.filtered_v = shaped_v;
+}
+
+void Drive::follow_loop(DriveMemory& m, double start_s, double duration_s, const PhaseValues& from_a,
+                        const PhaseValues& to_a) const noexcept {
+  const Order& order = order_at(start_s);
+  if (order.gates != Gates::kCurrent || m.switched_off != 0.0) {
+    m.integral_v = {};
+    return;
+  }
+  const PhaseValues wanted_v = loop_voltages(m, order.setpoint, from_a);
+  const double clip_v = limit_v(m);
+  const auto after = [&](double integral_v, double asked_v, double wanted_a, double i0_a, double i1_a) {
+    const double error_a = wanted_a - mean(i0_a, i1_a);
+    return integral_after(p_.current_loop, integral_v, asked_v, clip_v, error_a, duration_s);
+  };
+  m.integral_v = by_terminal(after, m.integral_v, wanted_v, order.setpoint, from_a, to_a);
+  if (connection_ == Connection::kStar) {
+    const ThreePhase star = without_neutral(phases_of(m.integral_v));
+    m.integral_v = {.a = star.a, .b = star.b, .c = star.c, .field = m.integral_v.field};
+  }
+}
+
+/// The field has a supply of its own; what an arc takes does not come back to the link.
+void Drive::follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                       const PhaseValues& voltage_v, const PhaseValues& from_a,
+                       const PhaseValues& to_a) const noexcept {
+  const auto power = [](double v, double i0_a, double i1_a) { return v * mean(i0_a, i1_a); };
+  ThreePhase power_w = by_phase(power, voltage_v, from_a, to_a);
+  double taken_w = 0.0;
+  for (int k = 0; k < terminals_; ++k) {
+    if (applied.mode[static_cast<std::size_t>(k)] != TerminalMode::kOpen) taken_w += phase(power_w, k);
+  }
+  m.bus_v =
+      bus_after(p_.bus, supply_v_, m.bus_v, m.chopper != 0.0, taken_w * duration_s, duration_s).voltage_v;
+  m.chopper = chopper_after(p_.bus, m.bus_v, m.chopper != 0.0) ? 1.0 : 0.0;
+}
+
+}  // namespace drivebench
