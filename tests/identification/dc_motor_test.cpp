@@ -124,10 +124,11 @@ TEST(DcMotor, DataThatCannotBeUsedAreRefused) {
                     .columns = {{"i_a_a", "A", Series(80, 0.0)}, {"u_a_v", "V", Series(80, 0.0)}}};
   EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // 40 samples are left
   data.columns[0].values.resize(200);
-  EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);
   data.columns[1].values.resize(200);
   EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // no encoder
-  data.columns.push_back({"encoder_count", "counts", Series(200, 0.0)});
+  data.columns.push_back({"encoder_count", "counts", Series(199, 0.0)});
+  EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // one count is missing
+  data.columns[2].values.resize(200);
   const Result r = identify(data, dc_experiment());
   EXPECT_EQ(r.excitation.unseen.size(), 5U);
   data.period_s = 0.0;

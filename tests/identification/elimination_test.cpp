@@ -95,6 +95,9 @@ TEST(RealRoots, WilkinsonsPolynomial) {
 // Kills: a double root that is taken for none or for one without a word.
 TEST(RealRoots, ADoubleRootIsConfessed) {
   EXPECT_FALSE(positive_roots(with_roots({3, 3})).complete);
+  const WholePolynomial third(
+      std::vector<Whole>{Whole(-1), Whole(3)});  // 1/3 is never the middle of an interval
+  EXPECT_FALSE(positive_roots(third * third).complete);
   EXPECT_TRUE(positive_roots(with_roots({-3, -3})).complete);
 }
 

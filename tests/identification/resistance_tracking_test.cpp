@@ -75,6 +75,9 @@ TEST(Resistances, WithoutLoadTheRotorIsNotIdentifiable) {
     EXPECT_FALSE(excitation.sufficient);
     ASSERT_FALSE(excitation.unseen.empty());
     EXPECT_EQ(excitation.unseen.back(), "T_R");
+    if (ideal) {
+      EXPECT_NE(excitation.verdict.find("no slip"), std::string::npos) << excitation.verdict;
+    }
   }
 }
 

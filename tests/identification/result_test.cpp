@@ -62,6 +62,8 @@ TEST(IdentificationResult, TheBenchReadsTheMotorFile) {
       bench_of(some_result(), {.name = "a \"motor\"\n", .source = "C:\\x", .pole_pairs = 2});
   const auto& machine = std::get<InductionMachineParameters>(im.setup.axes[0].parameters.machine);
   EXPECT_EQ(machine.rotor_inductance_h, 0.67);
+  EXPECT_TRUE(to_motor_toml(some_result(), {.name = "a \"motor\"\n", .source = "C:\\x"})
+                  .starts_with("name = \"a \\\"motor\\\"\\u000A\"\nsource = \"C:\\\\x\"\n"));
   EXPECT_EQ(machine.rotor_resistance_ohm, 8.0);
   EXPECT_EQ(machine.pole_pairs, 2);
   Result dc = {.kind = "pm_dc", .method = "m"};
