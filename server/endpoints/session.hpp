@@ -81,6 +81,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::size_t row_bytes;             ///< 1 for a recording
     std::unique_ptr<FileReader> file;  ///< opened when there is something to read
     std::chrono::steady_clock::time_point last_info;
+    int send_buffer_bytes;  ///< of the socket, before and after
   };
 
   bool handle(std::span<const std::byte> frame);
@@ -108,6 +109,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void with_experiments(Action action);
   void send_experiment();
   bool send_rows(std::size_t& budget);
+  void end_fetch();
   void send_info(std::uint64_t id, const Experiment& experiment);
 
   /// These refuse the present request if the answer is no.

@@ -12,10 +12,13 @@ namespace {
 
 using google::protobuf::io::CodedOutputStream;
 
-/// Of rows or of the recording in one message.
-constexpr std::size_t kChunkBytes = std::size_t{128} * 1024;
+/// Of rows or of the recording in one message; small enough that a client's memory comes from its heap.
+constexpr std::size_t kChunkBytes = std::size_t{64} * 1024;
 /// What a session sends before others have their turn.
-constexpr std::size_t kTurnBytes = 4 * kChunkBytes;
+constexpr std::size_t kTurnBytes = 8 * kChunkBytes;
+/// What the kernel keeps on its way to a fetching client, if it is allowed to: while this is read the next is
+/// made.
+constexpr int kFetchBufferBytes = 512 * 1024;
 constexpr auto kInfoInterval = std::chrono::milliseconds(200);
 constexpr std::size_t kMaxTables = 64;
 constexpr std::uint32_t kLengthDelimited = 2;
@@ -186,7 +189,13 @@ void Session::fetch_experiment(const v1::FetchExperiment& r) {
                    .next = r.from() / step,
                    .row_bytes = r.recording() ? 1 : 8 * static_cast<std::size_t>(info.signals_size()),
                    .file = nullptr,
-                   .last_info = std::chrono::steady_clock::now()};
+                   .last_info = std::chrono::steady_clock::now(),
+                   .send_buffer_bytes = 0};
+    boost::system::error_code ignored;
+    asio::socket_base::send_buffer_size size;
+    socket_.get_option(size, ignored);
+    fetch_->send_buffer_bytes = size.value() / 2;  // Linux tells twice what was asked for
+    socket_.set_option(asio::socket_base::send_buffer_size(kFetchBufferBytes), ignored);
     send_info(request_.id(), *experiment);
     send_experiment();
   });
@@ -204,9 +213,15 @@ void Session::send_experiment() {
     }
   } catch (const std::exception& error) {
     const std::uint64_t id = fetch_->id;
-    fetch_.reset();
+    end_fetch();
     refuse(id, v1::REFUSAL_NOT_AVAILABLE, error.what(), "id");
   }
+}
+
+void Session::end_fetch() {
+  boost::system::error_code ignored;
+  socket_.set_option(asio::socket_base::send_buffer_size(fetch_->send_buffer_bytes), ignored);
+  fetch_.reset();
 }
 
 /// One message; false when there is nothing to send now.
@@ -240,7 +255,7 @@ bool Session::send_rows(std::size_t& budget) {
   f.last_info = now;
   const std::uint64_t id = f.id;
   const std::shared_ptr<const Experiment> experiment = f.experiment;
-  if (ended) fetch_.reset();
+  if (ended) end_fetch();
   send_info(id, *experiment);
   return false;
 }
