@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Experiments on the real server, over the wire. Each test names the mistake that it would catch."""
 import json
+import math
 import os
 import pathlib
 import random
@@ -59,6 +60,13 @@ class Experiments(WireTest):
         self.kept = tempfile.TemporaryDirectory(prefix="drivebench-experiments-")
         self.addCleanup(self.kept.cleanup)
 
+    def assertSameRows(self, rows, expected):
+        """Without the difference in words, which takes minutes for long lists."""
+        self.assertEqual(len(rows), len(expected))
+        wrong = next((k for k, (row, other) in enumerate(zip(rows, expected)) if row != other), None)
+        if wrong is not None:
+            self.fail(f"row {wrong}: {rows[wrong]} instead of {expected[wrong]}")
+
     def start(self, *options, **more):
         return self.server("--experiments", self.kept.name, *options, **more)
 
@@ -116,7 +124,9 @@ class Experiments(WireTest):
                 sample = client.step(tick, later[0], later[1])
         self.assertEqual(rows[0], (0.0,) * 5 + (-1.0, 0.0, 0.0))
         # At tick 0 nobody had the lease yet when the sample was taken; the newest one was taken then too.
-        self.assertEqual(rows[:300], lockstep[:300])
+        self.assertSameRows(rows[:300], lockstep[:300])
+        for tick in (1, 100, 298):  # the command of tick k is in force in tick k + 1, which sample k + 2 shows
+            self.assertAlmostEqual(rows[tick + 2][0], 40.0 * math.cos(2.0 * math.pi * 60.0 * tick * 125e-6), 9)
         self.assertNotEqual(rows[-1][3], 0.0)
 
     def test_the_live_bench_does_not_notice(self):
@@ -179,7 +189,7 @@ class Experiments(WireTest):
         shape = pb.Shape(channel=pb.CHANNEL_A, table=pb.Shape.Table(id=table))
         wanted = request(2999, signals=["u_a_v"], input=pb.ExperimentInput(kind=pb.INPUT_KIND_PHASE_VOLTAGES, shapes=[shape]))
         rows = [row[0] for row in self.whole(client, wanted).rows(1)]
-        self.assertEqual(rows[1:], values[:2999])
+        self.assertSameRows(rows[1:], values[:2999])
         other = self.client(server)
         self.assertRefused(other.ask(run_experiment=wanted), pb.REFUSAL_UNKNOWN_TABLE, "input.shapes[0].table.id")
         for wrong, field in ((dict(table=table, first=5), "first"), (dict(table=99), "table"),
@@ -354,7 +364,7 @@ class Experiments(WireTest):
             whole = reference.get(n % 4)
             if whole is None:
                 whole = reference[n % 4] = self.whole(client, request(30_000, amplitude=20.0 + n % 4)).rows(len(SIGNALS))
-            self.assertEqual(rows, tuple(v for row in whole[:ticks + 1:decimation] for v in row))
+            self.assertSameRows(rows, tuple(v for row in whole[:ticks + 1:decimation] for v in row))
         listed = client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments
         self.assertEqual(max(e.id for e in listed), 104)  # none ran twice
         self.assertGreater(halfway, 50)
