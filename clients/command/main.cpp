@@ -9,6 +9,7 @@
 
 #include "clients/command/can_check.hpp"
 #include "clients/command/commands.hpp"
+#include "clients/command/experiment_line.hpp"
 #include "clients/command/json.hpp"
 #include "clients/link/tcp_link.hpp"
 
@@ -95,7 +96,8 @@ struct CommandLine {
     add_recordings();
     add_export();
     add_plot();
-    add_experiments();
+    add_experiment_commands(app, link, json, experiment,
+                            [this](auto run_it) { action = [this, run_it] { return run_it(experiment); }; });
   }
 
   bool knows(std::string_view subcommand) const {
@@ -300,49 +302,6 @@ struct CommandLine {
       replay.json = json;
       action = [this] { return run_replay(replay); };
     });
-  }
-
-  CLI::App* add_experiment(CLI::App* parent, const std::string& name, const std::string& description,
-                           int (*run_it)(const ExperimentOptions&)) {
-    CLI::App* sub = parent->add_subcommand(name, description);
-    sub->add_flag("--json", json, "print JSON");
-    sub->add_option("--link", link.address, "tcp:HOST:PORT or unix:PATH; else from DRIVEBENCH_LINK")
-        ->capture_default_str();
-    sub->add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
-    sub->add_option("--owner", experiment.owner,
-                    "the secret that opens the data; else from DRIVEBENCH_OWNER, else this user's own");
-    sub->callback([this, run_it] {
-      experiment.json = json;
-      experiment.link = link;
-      action = [this, run_it] { return run_it(experiment); };
-    });
-    return sub;
-  }
-
-  void add_experiments() {
-    CLI::App* parent = app.add_subcommand("experiment", "what the server runs on a bench of its own");
-    parent->require_subcommand(1);
-    if (const char* owner = std::getenv("DRIVEBENCH_OWNER"); owner != nullptr) experiment.owner = owner;
-    if (const char* user = std::getenv("USER"); user != nullptr) experiment.user = user;
-    CLI::App* sub =
-        add_experiment(parent, "run", "queue an experiment and fetch its data", run_experiment_run);
-    sub->add_option("FILE", experiment.file, "what to do, in TOML")->required();
-    sub->add_option("--out", experiment.out_file, "CSV, or the recording if it ends with .mcap");
-    sub->add_option("--user", experiment.user, "a name that everybody sees; default: USER");
-    sub->add_flag("--detach", experiment.detach, "do not wait for its end");
-    sub->add_option("--patience", experiment.patience_s, "seconds that a broken link may stay broken")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    add_experiment(parent, "list", "what waits, runs and is kept", run_experiment_list);
-    sub = add_experiment(parent, "fetch", "the data of an experiment", run_experiment_fetch);
-    sub->add_option("ID", experiment.id, "its number")->required()->check(not_negative());
-    sub->add_option("--out", experiment.out_file,
-                    "CSV, or the recording if it ends with .mcap; else standard output");
-    sub->add_option("--patience", experiment.patience_s, "seconds that a broken link may stay broken")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    sub = add_experiment(parent, "cancel", "end an experiment", run_experiment_cancel);
-    sub->add_option("ID", experiment.id, "its number")->required()->check(not_negative());
   }
 
   void add_plot() {
