@@ -53,6 +53,7 @@ TableView::TableView(const SignalTable& table) {
   const std::size_t bytes = table.size() * sizeof(SignalTable::Row);
   mapping_ = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, table.descriptor_, 0);
   if (mapping_ == MAP_FAILED) fail("cannot map a table");
+  ::munlock(mapping_, bytes);  // a real-time server locks all its memory; this is a file's, and large
   rows_ = {static_cast<const SignalTable::Row*>(mapping_), table.size()};
 }
 
