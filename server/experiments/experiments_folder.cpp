@@ -46,7 +46,9 @@ std::filesystem::path Experiments::file_of(std::uint64_t id, const char* ending)
 
 void Experiments::lock_folder() {
   std::error_code error;
-  std::filesystem::create_directories(folder_, error);
+  if (std::filesystem::create_directories(folder_, error)) {
+    std::filesystem::permissions(folder_, std::filesystem::perms::owner_all, error);
+  }
   const std::string file = (folder_ / "lock").string();
   lock_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {
