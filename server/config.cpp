@@ -4,24 +4,10 @@
 
 #include <utility>
 
-#include "server/config_document.hpp"
+#include "protocols/document.hpp"
 #include "server/config_words.hpp"
 
 namespace drivebench {
-namespace {
-
-std::string listed(const std::vector<ConfigProblem>& problems) {
-  std::string text;
-  for (const ConfigProblem& p : problems) {
-    if (!text.empty()) text += '\n';
-    text += p.file + (p.line > 0 ? ":" + std::to_string(p.line) : "") + ": " + p.key +
-            (p.key.empty() ? "" : " ") + p.rule;
-  }
-  return text;
-}
-
-}  // namespace
-
 std::string in_quotes(std::string_view text) {
   std::string result = "\"";
   for (const char c : text) {
@@ -35,9 +21,6 @@ std::string real_text(double value) {
   std::string text = shortest(value);
   return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
 }
-
-ConfigError::ConfigError(std::vector<ConfigProblem> problems)
-    : std::runtime_error(listed(problems)), problems_(std::move(problems)) {}
 
 std::string_view name_of(RunMode mode) noexcept {
   return kRunModeWords[static_cast<std::size_t>(mode)];

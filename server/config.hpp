@@ -3,12 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "protocols/can/profile.hpp"
+#include "protocols/document.hpp"
 #include "server/bench.hpp"
 
 namespace drivebench {
@@ -77,6 +77,15 @@ struct ModbusConfig {
   std::int64_t idle_timeout_ms = 10'000;  ///< an owner that says nothing for so long loses its lease
 };
 
+/// Section [experiments]: what users may run on benches of their own.
+struct ExperimentsConfig {
+  std::filesystem::path folder;     ///< where they are kept; empty: there are none
+  std::uint32_t queue_length = 32;  ///< waiting ones
+  double longest_s = 120.0;         ///< of plant time
+  std::uint64_t table_rows = 10'000'000;
+  std::uint32_t kept = 50;  ///< ended ones; the oldest goes first
+};
+
 /// Something that happens to an axis by itself: a load, a new parameter value, a fault, a bump.
 struct AxisEvent {
   Tick tick = 0;
@@ -101,25 +110,7 @@ struct BenchConfig {
   TcpConfig tcp;
   std::vector<CanConfig> can;
   ModbusConfig modbus;
-};
-
-/// One thing wrong with a configuration, with the place it was found at.
-struct ConfigProblem {
-  std::string file;
-  int line = 0;
-  std::string key;  ///< full path of the key, for example "axis.machine.rotor_resistance_ohm"
-  std::string rule;
-};
-
-/// All that is wrong with a configuration, at once; what() is the list as a user reads it, "file:line: key
-/// rule" lines.
-class ConfigError : public std::runtime_error {
- public:
-  explicit ConfigError(std::vector<ConfigProblem> problems);
-  const std::vector<ConfigProblem>& problems() const noexcept { return problems_; }
-
- private:
-  std::vector<ConfigProblem> problems_;
+  ExperimentsConfig experiments;
 };
 
 /// Reads a bench file and the motor files that it names (relative to it). Throws ConfigError.
@@ -130,7 +121,7 @@ BenchConfig load_config(const std::filesystem::path& file);
 BenchConfig parse_config(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
 /// The configuration as one TOML text that needs no other file and reads back equal, bit for bit; all but the
-/// token, which it does not hold, and an address that would need one.
+/// token, which it does not hold, an address that would need one, and the experiments.
 std::string to_toml(const BenchConfig& config);
 
 /// The part of to_toml() that the samples depend on: timing, seed, watchdog and lease, and of each axis its

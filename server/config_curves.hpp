@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "plant/parameters/parameters.hpp"
-#include "server/config_document.hpp"
+#include "protocols/document.hpp"
 #include "server/strict_table.hpp"
 
 namespace drivebench {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "plant/parameters/parameters.hpp"
-#include "server/config_document.hpp"
+#include "protocols/document.hpp"
 #include "server/strict_table.hpp"
 
 namespace drivebench {

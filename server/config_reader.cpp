@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "plant/parameters/parameters.hpp"
+#include "protocols/document.hpp"
 #include "server/config.hpp"
 #include "server/config_axis.hpp"
 #include "server/config_can.hpp"
-#include "server/config_document.hpp"
 #include "server/config_step.hpp"
 #include "server/config_words.hpp"
 #include "server/endpoints/terminals.hpp"
@@ -155,6 +155,26 @@ void read_modbus(StrictTable table, ModbusConfig& modbus) {
   table.finish();
 }
 
+void read_experiments(StrictTable table, const std::filesystem::path& folder,
+                      ExperimentsConfig& experiments) {
+  if (table.exists()) table.require("folder");
+  if (const auto name = table.text("folder", 800)) {
+    if (folder.empty()) {
+      table.report("folder", std::string(kNoOtherFiles));
+    } else {
+      experiments.folder = (folder / *name).lexically_normal();
+    }
+  }
+  experiments.queue_length =
+      static_cast<std::uint32_t>(table.integer("queue_length", 1, 10'000).value_or(experiments.queue_length));
+  experiments.longest_s = table.real("longest_s", 1e-6, 86'400.0).value_or(experiments.longest_s);
+  experiments.table_rows =
+      static_cast<std::uint64_t>(table.integer("table_rows", 0, 100'000'000)
+                                     .value_or(static_cast<std::int64_t>(experiments.table_rows)));
+  experiments.kept = static_cast<std::uint32_t>(table.integer("kept", 1, 100'000).value_or(experiments.kept));
+  table.finish();
+}
+
 std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::path& folder,
                                    ProblemList& problems, const BenchConfig& config) {
   root.require("axis");
@@ -214,6 +234,7 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
     });
     config.can = read_can(root, wide);
     read_modbus(root.table("modbus"), config.modbus);
+    read_experiments(root.table("experiments"), folder, config.experiments);
     root.finish();
   }
   problems.throw_if_any();

@@ -4,10 +4,10 @@
 #include <string_view>
 #include <vector>
 
+#include "protocols/document.hpp"
 #include "server/config.hpp"
 #include "server/config_can.hpp"
 #include "server/config_curves.hpp"
-#include "server/config_document.hpp"
 #include "server/config_events.hpp"
 #include "server/config_parameters.hpp"
 #include "server/config_words.hpp"

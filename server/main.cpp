@@ -36,6 +36,7 @@ struct Options {
   bool json = false;
   bool check_config = false;
   bool allow_overload = false;
+  std::string experiments;
   std::string print;  ///< a description of an interface, instead of a run
   std::size_t bus = 1;
 };
@@ -57,6 +58,7 @@ BenchConfig configure(const Options& o) {
   }
   if (o.port >= 0) config.tcp.port = static_cast<std::uint16_t>(o.port);
   if (!o.unix_path.empty()) config.tcp.unix_path = o.unix_path;
+  if (!o.experiments.empty()) config.experiments.folder = o.experiments;
   if (o.command_delay_ticks >= 0) config.setup.command_delay_ticks = o.command_delay_ticks;
   // Written so that NaN is refused, which CLI11 lets pass.
   if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
@@ -187,8 +189,11 @@ int serve(const Options& o) {
   // First: a port in use must not leave a recording behind.
   StreamServer server(io, config.tcp);
   Transports transports(io, config);
+  std::unique_ptr<Experiments> experiments;
+  if (!config.experiments.folder.empty()) experiments = std::make_unique<Experiments>(io, config);
   const std::unique_ptr<Engine> engine = make_engine(o, config, io);
-  server.serve(*engine, [&transports] { return transports.reports(); });
+  server.serve(
+      *engine, [&transports] { return transports.reports(); }, experiments.get());
   transports.serve(*engine);
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
@@ -207,6 +212,7 @@ int serve(const Options& o) {
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   signals.clear();  // from here on a second signal ends the program at once
   const Verdict verdict = engine->stop();
+  experiments.reset();
   transports.close();
   server.close();
   print_verdict(o, verdict);
@@ -288,6 +294,7 @@ int run(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_flag("--json", o.json, "print JSON lines");
   app.add_flag("--check-config", o.check_config, "only check the bench file");
+  app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");
   app.add_option("--print", o.print, "only print a description of an interface")

@@ -49,7 +49,8 @@ std::span<const std::byte> bytes_of(std::string_view text) {
 /// then and every later entry count as lost.
 class Recorder::File {
  public:
-  File(const std::filesystem::path& path, const BenchConfig& config)
+  File(const std::filesystem::path& path, const BenchConfig& config,
+       std::initializer_list<RecordingAttachment> attachments)
       : tables_(parameter_tables(config.setup)),
         period_ns_(config.setup.period_ns),
         flush_ticks_(static_cast<std::uint64_t>(
@@ -63,6 +64,8 @@ class Recorder::File {
                                     .library = "drivebench " + std::string(build_id())});
     const std::string toml = to_toml(config);
     mcap_->add_attachment(kConfigurationAttachment, "application/toml", 0, bytes_of(toml));
+    for (const RecordingAttachment& attachment : attachments)
+      mcap_->add_attachment(attachment.name, attachment.media_type, 0, bytes_of(attachment.data));
     const std::string descriptors = bench_descriptor_set();
     const auto schema = [&](const char* name) {
       return mcap_->add_schema(name, "protobuf", bytes_of(descriptors));
@@ -170,11 +173,12 @@ class Recorder::File {
   v1::Input input_;
 };
 
-Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config)
+Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
+                   std::initializer_list<RecordingAttachment> attachments)
     : file_(file.string()),
       ring_(ring_capacity(config)),
       room_for_tick_(config.axes.size() + 512),
-      writer_(std::make_unique<File>(file, config)),
+      writer_(std::make_unique<File>(file, config, attachments)),
       thread_([this] { run(); }) {}
 
 Recorder::~Recorder() {

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <thread>
@@ -10,6 +11,7 @@
 
 #include "server/bench.hpp"
 #include "server/config.hpp"
+#include "server/recording.hpp"
 #include "server/spsc_ring.hpp"
 #include "server/verdict.hpp"
 
@@ -22,7 +24,8 @@ namespace drivebench {
 class Recorder final : public BenchObserver {
  public:
   /// Creates the file; throws std::system_error if it exists or cannot be made.
-  Recorder(const std::filesystem::path& file, const BenchConfig& config);
+  Recorder(const std::filesystem::path& file, const BenchConfig& config,
+           std::initializer_list<RecordingAttachment> attachments = {});
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;

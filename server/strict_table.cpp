@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "server/config.hpp"
+
 namespace drivebench {
 namespace {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/config_document.hpp"
+#include "protocols/document.hpp"
 
 namespace drivebench {
 

@@ -175,6 +175,24 @@ struct ExportOptions {
 };
 int run_export(const ExportOptions& options);
 
+/// Experiments on the server; what each subcommand needs of it.
+struct ExperimentOptions {
+  LinkChoice link;
+  bool json = false;
+  std::string owner{};  ///< the secret; empty: that of this user, kept in a file
+  std::string user{};   ///< a name that everybody sees
+  std::string file{};   ///< run: what to do
+  std::uint64_t id = 0;
+  std::string
+      out_file{};  ///< CSV, or the recording if it ends with .mcap; empty: fetch writes to standard output
+  bool detach = false;       ///< run: do not wait for its end
+  double patience_s = 30.0;  ///< so long a broken link may stay broken
+};
+int run_experiment_run(const ExperimentOptions& options);
+int run_experiment_list(const ExperimentOptions& options);
+int run_experiment_fetch(const ExperimentOptions& options);
+int run_experiment_cancel(const ExperimentOptions& options);
+
 struct DemoOptions {
   bool json = false;
   std::string folder = "recordings";

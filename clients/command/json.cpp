@@ -309,6 +309,49 @@ std::string export_json(std::string_view out_file, std::string_view axis, std::u
   return Json{{"out", out_file}, {"axis", axis}, {"rows", rows}, {"problem", problem}}.dump();
 }
 
+namespace {
+
+Json as_json(const v1::ExperimentInfo& info) {
+  Json out{{"id", info.id()},
+           {"state", word_of(info.state())},
+           {"position", info.position()},
+           {"user", info.user()}};
+  if (info.period_s() == 0.0) return out;  // somebody else's
+  out["label"] = info.label();
+  out["shared"] = info.shared();
+  out["mode"] = info.mode() == v1::MODE_REALTIME ? "realtime" : "free";
+  out["ticks"] = info.ticks();
+  out["tick"] = info.tick();
+  out["rows"] = info.rows();
+  out["decimation"] = info.decimation();
+  out["period_s"] = info.period_s();
+  out["signals"] = std::vector<std::string>(info.signals().begin(), info.signals().end());
+  out["reason"] = info.reason();
+  if (info.has_verdict()) {
+    out["state_hash"] = fmt::format("{:016x}", info.verdict().state_hash());
+    out["late_ticks"] = info.verdict().late_ticks();
+    out["sentence"] = info.verdict().sentence();
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string experiment_json(const v1::ExperimentInfo& info, std::string_view out_file,
+                            std::uint64_t resumed) {
+  Json out = as_json(info);
+  out["out"] = out_file;
+  out["resumed"] = resumed;
+  return out.dump();
+}
+
+std::string experiments_json(const v1::ExperimentList& list) {
+  Json out = Json::array();
+  for (const v1::ExperimentInfo& info : list.experiments())
+    out.push_back(as_json(info));
+  return Json{{"experiments", out}}.dump(2);
+}
+
 std::string demo_json(const DemoReport& report) {
   return Json{{"lockstep", demo_run(report.lockstep)},
               {"realtime", demo_run(report.realtime)},

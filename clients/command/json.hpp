@@ -10,6 +10,7 @@
 #include "clients/command/control_compare.hpp"
 #include "clients/command/control_run.hpp"
 #include "clients/command/demo_report.hpp"
+#include "clients/command/experiment_file.hpp"
 #include "protocols/catalogue.hpp"
 
 /// All JSON that the command writes and reads, so that one file pays for the parser.
@@ -28,6 +29,9 @@ std::string comparison_json(const Comparison& comparison);
 std::string control_json(const ControlReport& report);
 std::string export_json(std::string_view out_file, std::string_view axis, std::uint64_t rows,
                         std::string_view problem);
+/// `resumed`: how often a broken link was made anew.
+std::string experiment_json(const v1::ExperimentInfo& info, std::string_view out_file, std::uint64_t resumed);
+std::string experiments_json(const v1::ExperimentList& list);
 std::string demo_json(const DemoReport& report);
 std::string error_json(std::string_view kind, std::string_view message, std::string_view field);
 

@@ -9,6 +9,7 @@
 
 #include "clients/command/can_check.hpp"
 #include "clients/command/commands.hpp"
+#include "clients/command/experiment_line.hpp"
 #include "clients/command/json.hpp"
 #include "clients/link/tcp_link.hpp"
 
@@ -78,6 +79,7 @@ struct CommandLine {
   ReplayOptions replay;
   ExportOptions export_;
   DemoOptions demo;
+  ExperimentOptions experiment;
 
   CommandLine() {
     // Not CLI11's envname(): it lets the options of subcommands that were not named overwrite ours.
@@ -94,6 +96,8 @@ struct CommandLine {
     add_recordings();
     add_export();
     add_plot();
+    add_experiment_commands(app, link, json, experiment,
+                            [this](auto run_it) { action = [this, run_it] { return run_it(experiment); }; });
   }
 
   bool knows(std::string_view subcommand) const {

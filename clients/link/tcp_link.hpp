@@ -123,6 +123,17 @@ class Link {
   /// The oldest samples that were sent and not yet taken; nothing if none come within `wait`.
   std::optional<v1::Samples> next_samples(std::chrono::milliseconds wait);
 
+  // ---- experiments: see bench.proto ----
+  v1::ExperimentInfo run_experiment(const v1::RunExperiment& wanted);
+  v1::TableInfo upload_table(const v1::UploadTable& rows);
+  v1::ExperimentList list_experiments(const std::string& owner);
+  v1::ExperimentInfo cancel_experiment(std::uint64_t id, const std::string& owner);
+  /// Begins to receive; until the last ExperimentInfo, which says that the experiment has ended, there may be
+  /// no other request.
+  v1::ExperimentInfo begin_fetch(const v1::FetchExperiment& wanted);
+  /// The next message, an ExperimentData or an ExperimentInfo.
+  const v1::Envelope& next_of_fetch();
+
   /// Samples kept for next_samples() at most; beyond it the oldest messages go, and are counted as dropped.
   static constexpr std::size_t kMaxKeptSamples = 65536;
 

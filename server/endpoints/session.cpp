@@ -11,15 +11,6 @@ namespace {
 
 constexpr std::uint32_t kProtocolVersion = 1;
 
-/// Compares without telling by its duration where the first difference is.
-bool same_token(std::string_view a, std::string_view b) noexcept {
-  unsigned difference = a.size() == b.size() ? 0 : 1;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    difference |= static_cast<unsigned>(a[i]) ^ static_cast<unsigned>(b.empty() ? '\0' : b[i % b.size()]);
-  }
-  return difference == 0;
-}
-
 }  // namespace
 
 Session::Session(Outbox::Socket socket, std::string peer, SessionContext& context)
@@ -32,7 +23,10 @@ Session::Session(Outbox::Socket socket, std::string peer, SessionContext& contex
       leased_(context.engine.config().axes.size()) {
   reader_.set_max_payload(kMaxFrameBeforeHello);
   socket_.non_blocking(true);
-  outbox_.on_idle = [this] { send_samples(); };
+  outbox_.on_idle = [this] {
+    send_samples();
+    send_experiment();
+  };
 }
 
 asio::awaitable<void> Session::run() {
@@ -110,6 +104,21 @@ bool Session::dispatch() {
     case v1::Envelope::kStatusRequest:
       report_status();
       break;
+    case v1::Envelope::kRunExperiment:
+      run_experiment(request_.run_experiment());
+      break;
+    case v1::Envelope::kUploadTable:
+      upload_table(request_.upload_table());
+      break;
+    case v1::Envelope::kListExperiments:
+      list_experiments(request_.list_experiments());
+      break;
+    case v1::Envelope::kFetchExperiment:
+      fetch_experiment(request_.fetch_experiment());
+      break;
+    case v1::Envelope::kCancelExperiment:
+      cancel_experiment(request_.cancel_experiment());
+      break;
     default:
       refuse(request_.id(), v1::REFUSAL_MALFORMED, "not a request", "kind");
       break;
@@ -130,7 +139,7 @@ bool Session::greet(const v1::Hello& hello) {
     refuse(id, v1::REFUSAL_OUT_OF_RANGE, "the client's name is longer than 100 bytes", "client");
     return false;
   }
-  if (!context_.token.empty() && !same_token(hello.token(), context_.token)) {
+  if (!context_.token.empty() && !same_secret(hello.token(), context_.token)) {
     spdlog::warn("{}: wrong or no token", peer_);
     refuse(id, v1::REFUSAL_UNAUTHENTICATED, "wrong or no token", "token");
     return false;
@@ -215,6 +224,8 @@ void Session::send(const v1::Envelope& envelope) {
 
 void Session::give_leases_back() {
   over_ = true;
+  fetch_.reset();
+  tables_.clear();
   for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
     if (!leased_[axis]) continue;
     leased_[axis] = false;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,8 @@
 #include "server/endpoints/outbox.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine.hpp"
+#include "server/experiments/experiments.hpp"
+#include "server/experiments/row_file.hpp"
 
 namespace drivebench {
 
@@ -24,6 +27,7 @@ struct SessionContext {
   std::string token;  ///< what Hello must carry; empty: nothing
   std::function<std::size_t()> session_count;
   std::function<std::vector<TransportReport>()> transports;  ///< the other ways in
+  Experiments* experiments;                                  ///< null: this bench keeps none
 };
 
 /// One client on a stream socket: Hello first, then requests. Every request gets an answer with its id; what
@@ -40,6 +44,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_tick();
   /// When newest() of the engine is up to date: answers a waiting exchange.
   void on_newest();
+  /// When an experiment may have gone on: serves a fetch.
+  void on_experiments();
   bool greeted() const noexcept { return greeted_; }
 
   /// Refuses the connection itself, before anything was read.
@@ -66,6 +72,18 @@ class Session : public std::enable_shared_from_this<Session> {
     std::vector<std::uint32_t> axes;
   };
 
+  /// A fetch that is going on.
+  struct Fetch {
+    std::uint64_t id;  ///< of the request
+    std::shared_ptr<const Experiment> experiment;
+    bool recording;
+    std::uint64_t next;                ///< row, or byte of the recording
+    std::size_t row_bytes;             ///< 1 for a recording
+    std::unique_ptr<FileReader> file;  ///< opened when there is something to read
+    std::chrono::steady_clock::time_point last_info;
+    int send_buffer_bytes;  ///< of the socket, before and after
+  };
+
   bool handle(std::span<const std::byte> frame);
   bool dispatch();
   bool greet(const v1::Hello& hello);
@@ -80,6 +98,19 @@ class Session : public std::enable_shared_from_this<Session> {
   void bump_shaft(const v1::ShaftBump& request);
   void clear_faults(const v1::ClearFaults& request);
   void report_status();
+  void run_experiment(const v1::RunExperiment& request);
+  void upload_table(const v1::UploadTable& request);
+  void list_experiments(const v1::ListExperiments& request);
+  void fetch_experiment(const v1::FetchExperiment& request);
+  void cancel_experiment(const v1::CancelExperiment& request);
+
+  /// Carries out a request about experiments; what it throws becomes a refusal.
+  template <class Action>
+  void with_experiments(Action action);
+  void send_experiment();
+  bool send_rows(std::size_t& budget);
+  void end_fetch();
+  void send_info(std::uint64_t id, const Experiment& experiment);
 
   /// These refuse the present request if the answer is no.
   bool axis_exists(std::uint32_t axis);
@@ -113,6 +144,9 @@ class Session : public std::enable_shared_from_this<Session> {
   std::vector<bool> leased_;  // by axis
   std::optional<WaitingExchange> waiting_;
   std::vector<Subscription> subscriptions_;
+  std::optional<Fetch> fetch_;
+  std::map<std::uint64_t, std::shared_ptr<SignalTable>> tables_;  // by number
+  std::uint64_t last_table_ = 0;
 };
 
 }  // namespace drivebench

@@ -91,9 +91,16 @@ StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config)
   }
 }
 
-void StreamServer::serve(Engine& engine, std::function<std::vector<TransportReport>()> transports) {
-  context_.emplace(
-      SessionContext{engine, config_.token, [this] { return sessions_.size(); }, std::move(transports)});
+void StreamServer::serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
+                         Experiments* experiments) {
+  context_.emplace(SessionContext{engine, config_.token, [this] { return sessions_.size(); },
+                                  std::move(transports), experiments});
+  if (experiments != nullptr) {
+    experiments->on_change = [this] {
+      for (std::size_t i = 0; i < sessions_.size(); ++i)
+        sessions_[i]->on_experiments();
+    };
+  }
   // By index: a session may be added while another one answers; none is removed.
   engine.on_tick.add([this] {
     for (std::size_t i = 0; i < sessions_.size(); ++i)

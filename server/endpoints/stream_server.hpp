@@ -23,7 +23,9 @@ class StreamServer {
 
   /// Starts accepting clients of this run and telling them about its ticks.
   /// `transports` tells of the other ways in.
-  void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports);
+  /// `experiments` may be null.
+  void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
+             Experiments* experiments);
 
   /// Stops accepting and ends every session; what was queued is lost.
   void close();

@@ -30,6 +30,9 @@ std::vector<Row> measure_memory(const Plan& plan);
 /// Controllers alone, and with their benches in one process.
 std::vector<Row> measure_control(const Plan& plan);
 
+/// The data of an experiment on their way to a client against a copy of as many bytes.
+std::vector<Row> measure_experiment(const Plan& plan);
+
 /// Encoding and decoding of one CAN frame.
 std::vector<Row> measure_can_codec(const Plan& plan);
 /// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.

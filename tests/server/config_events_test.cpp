@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/config.hpp"
-#include "server/config_document.hpp"
+#include "protocols/document.hpp"
 #include "tests/server/config_test_bench.hpp"
 #include "tests/server/parameter_row.hpp"
 

@@ -4,14 +4,32 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
-#include "server/config.hpp"
-
 namespace drivebench {
+
+/// One thing wrong with a configuration, with the place it was found at.
+struct ConfigProblem {
+  std::string file;
+  int line = 0;
+  std::string key;  ///< full path of the key, for example "axis.machine.rotor_resistance_ohm"
+  std::string rule;
+};
+
+/// All that is wrong with a configuration, at once; what() is the list as a user reads it, "file:line: key
+/// rule" lines.
+class ConfigError : public std::runtime_error {
+ public:
+  explicit ConfigError(std::vector<ConfigProblem> problems);
+  const std::vector<ConfigProblem>& problems() const noexcept { return problems_; }
+
+ private:
+  std::vector<ConfigProblem> problems_;
+};
 
 /// Collects problems; beyond a hundred it only counts, so that a file of garbage costs no time.
 class ProblemList {

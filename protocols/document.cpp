@@ -1,4 +1,4 @@
-#include "server/config_document.hpp"
+#include "protocols/document.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -43,6 +43,16 @@ constexpr void check_parser(bool holds) {
 
 namespace drivebench {
 namespace {
+
+std::string listed(const std::vector<ConfigProblem>& problems) {
+  std::string text;
+  for (const ConfigProblem& p : problems) {
+    if (!text.empty()) text += '\n';
+    text += p.file + (p.line > 0 ? ":" + std::to_string(p.line) : "") + ": " + p.key +
+            (p.key.empty() ? "" : " ") + p.rule;
+  }
+  return text;
+}
 
 // A dotted key nests a table per dot. Short lines keep that, and the recursion over it, from filling the
 // stack.
@@ -144,6 +154,9 @@ std::string reason(int error) {
 }
 
 }  // namespace
+
+ConfigError::ConfigError(std::vector<ConfigProblem> problems)
+    : std::runtime_error(listed(problems)), problems_(std::move(problems)) {}
 
 void ProblemList::add(const std::string& file, int line, std::string key, std::string rule) {
   if (problems_.size() < kMost) {

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+
+/// Experiments as TOML files. The keys are the fields of RunExperiment in bench.proto, read from its
+/// description, so that there is no second list of them.
+namespace drivebench::command {
+
+struct ExperimentFile {
+  v1::RunExperiment request;  ///< without owner, request_key, axis and the numbers of tables
+  std::string axis = "0";     ///< number or name
+};
+
+/// Throws ConfigError with everything wrong and its lines.
+ExperimentFile parse_experiment(std::string_view text, const std::string& name);
+ExperimentFile load_experiment(const std::filesystem::path& file);
+
+/// Hands the rows of a CSV file, time and value, to `take`, as many at a time as fit into a request. Throws
+/// ConfigError with the line of the first row that is none.
+void read_table(const std::filesystem::path& file, const std::function<void(v1::UploadTable&)>& take);
+
+/// The word of a state, as files and printouts have it.
+std::string word_of(v1::ExperimentState state);
+
+}  // namespace drivebench::command

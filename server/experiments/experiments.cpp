@@ -1,0 +1,303 @@
+#include "server/experiments/experiments.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "server/input_codec.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr auto kWatchInterval = std::chrono::milliseconds(250);
+/// Below everybody who has to meet a deadline.
+constexpr int kWorkerNice = 10;
+
+}  // namespace
+
+bool same_secret(std::string_view a, std::string_view b) noexcept {
+  unsigned difference = a.size() == b.size() ? 0 : 1;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    difference |= static_cast<unsigned>(a[i]) ^ static_cast<unsigned>(b.empty() ? '\0' : b[i % b.size()]);
+  }
+  return difference == 0;
+}
+
+Experiments::Experiments(asio::io_context& io, const BenchConfig& config)
+    : io_(io), config_(config), folder_(config.experiments.folder), timer_(io) {
+  lock_folder();
+  load();
+  worker_ = std::thread([this] { work(); });
+}
+
+Experiments::~Experiments() {
+  *alive_ = false;
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+    if (running_) running_->progress.cancel.store(true);
+  }
+  changed_.notify_all();
+  worker_.join();
+  ::close(lock_);
+}
+
+// ---- requests ----
+
+Experiments::Pointer Experiments::known(const v1::RunExperiment& request) const {
+  if (request.request_key().empty()) return nullptr;
+  for (const auto& [id, experiment] : all_) {
+    const v1::RunExperiment& other = experiment->request;
+    if (other.request_key() != request.request_key() || !same_secret(request.owner(), other.owner()))
+      continue;
+    // Table numbers belong to a session, which may be another one by now.
+    const auto without_tables = [](v1::RunExperiment r) {
+      for (v1::Shape& shape : *r.mutable_input()->mutable_shapes()) {
+        if (shape.has_table()) shape.mutable_table()->clear_id();
+      }
+      return r.SerializeAsString();
+    };
+    if (without_tables(other) == without_tables(request)) return experiment;
+    throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, "request_key",
+                     fmt::format("request_key is that of experiment {}, which is another one", id));
+  }
+  return nullptr;
+}
+
+void Experiments::check_room() const {
+  const auto waiting = std::count_if(all_.begin(), all_.end(), [](const auto& each) {
+    return each.second->info.state() == v1::EXPERIMENT_STATE_QUEUED;
+  });
+  if (waiting < static_cast<std::ptrdiff_t>(config_.experiments.queue_length)) return;
+  throw BadRequest(v1::REFUSAL_BUSY, "queue",
+                   fmt::format("{} experiments are waiting, as many as may", waiting));
+}
+
+std::uint64_t Experiments::round_for(const std::string& owner) const {
+  std::uint64_t round = round_;
+  for (const auto& [id, experiment] : all_) {
+    if (!has_ended(experiment->info.state()) && experiment->request.owner() == owner) {
+      round = std::max(round, experiment->round + 1);
+    }
+  }
+  return round;
+}
+
+std::shared_ptr<const Experiment> Experiments::submit(const v1::RunExperiment& request,
+                                                      const TableLookup& tables) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (const Pointer same = known(request)) return same;
+    check_room();
+  }
+  auto experiment = std::make_shared<Experiment>();
+  experiment->plan = make_plan(request, config_, tables);
+  experiment->request = request;
+  v1::ExperimentInfo& info = experiment->info;
+  info.set_state(v1::EXPERIMENT_STATE_QUEUED);
+  info.set_user(request.user());
+  info.set_label(request.label());
+  info.set_shared(request.shared());
+  info.set_mode(request.mode());
+  info.set_axis(request.axis());
+  info.set_ticks(static_cast<std::uint64_t>(experiment->plan.ticks));
+  info.set_decimation(static_cast<std::uint32_t>(experiment->plan.decimation));
+  info.set_period_s(experiment->plan.period_s());
+  *info.mutable_signals() = request.signals();
+  {
+    const std::lock_guard lock(mutex_);
+    experiment->id = last_id_ + 1;
+    info.set_id(experiment->id);
+    experiment->round = round_for(request.owner());
+    try {
+      store(*experiment);
+    } catch (const std::exception& error) {
+      remove(experiment->id);
+      throw BadRequest(v1::REFUSAL_NOT_AVAILABLE, "experiments", error.what());
+    }
+    last_id_ = experiment->id;
+    all_[experiment->id] = experiment;
+  }
+  changed_.notify_all();
+  watch();
+  return experiment;
+}
+
+Experiments::Pointer Experiments::at(std::uint64_t id) const {
+  const auto found = all_.find(id);
+  if (found != all_.end()) return found->second;
+  throw BadRequest(v1::REFUSAL_UNKNOWN_EXPERIMENT, "id", fmt::format("there is no experiment {}", id));
+}
+
+std::shared_ptr<const Experiment> Experiments::find(std::uint64_t id, const std::string& owner) const {
+  const std::lock_guard lock(mutex_);
+  Pointer experiment = at(id);
+  if (experiment->request.shared() || same_secret(owner, experiment->request.owner())) return experiment;
+  throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner", fmt::format("experiment {} belongs to somebody else", id));
+}
+
+void Experiments::cancel(std::uint64_t id, const std::string& owner) {
+  {
+    const std::lock_guard lock(mutex_);
+    const Pointer experiment = at(id);
+    if (!same_secret(owner, experiment->request.owner())) {
+      throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner",
+                       fmt::format("experiment {} belongs to somebody else", id));
+    }
+    experiment->progress.cancel.store(true);
+    if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED) return;
+    experiment->info.set_state(v1::EXPERIMENT_STATE_CANCELLED);
+    experiment->info.set_reason("cancelled before it began");
+    experiment->plan = {};
+    store(*experiment);
+    forget_oldest();
+  }
+  on_change();
+}
+
+v1::ExperimentInfo Experiments::info_of(const Experiment& experiment) const {
+  const std::lock_guard lock(mutex_);
+  v1::ExperimentInfo info = experiment.info;
+  info.set_tick(experiment.progress.tick.load(std::memory_order_relaxed));
+  info.set_rows(experiment.progress.rows.load(std::memory_order_acquire));
+  if (info.state() == v1::EXPERIMENT_STATE_QUEUED) {
+    const auto before = std::count_if(all_.begin(), all_.end(), [&](const auto& each) {
+      const Experiment& other = *each.second;
+      return other.info.state() == v1::EXPERIMENT_STATE_QUEUED &&
+             std::pair(other.round, other.id) < std::pair(experiment.round, experiment.id);
+    });
+    info.set_position(static_cast<std::uint32_t>(before) + 1);
+  }
+  return info;
+}
+
+v1::ExperimentList Experiments::list(const std::string& owner) const {
+  std::vector<Pointer> experiments;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [id, experiment] : all_)
+      experiments.push_back(experiment);
+  }
+  v1::ExperimentList result;
+  for (const Pointer& experiment : experiments) {
+    const v1::ExperimentInfo info = info_of(*experiment);
+    v1::ExperimentInfo& out = *result.add_experiments();
+    if (experiment->request.shared() || same_secret(owner, experiment->request.owner())) {
+      out = info;
+    } else {
+      out.set_id(info.id());
+      out.set_state(info.state());
+      out.set_position(info.position());
+      out.set_user(info.user());
+    }
+  }
+  return result;
+}
+
+std::shared_ptr<SignalTable> Experiments::new_table() {
+  std::erase_if(tables_, [](const auto& table) { return table.expired(); });
+  auto table = std::make_shared<SignalTable>(folder_);
+  tables_.push_back(table);
+  return table;
+}
+
+void Experiments::check_rows(std::uint64_t more) const {
+  std::uint64_t rows = more;
+  for (const auto& each : tables_) {
+    if (const auto table = each.lock()) rows += table->size();
+  }
+  if (rows <= kSharesOfTables * config_.experiments.table_rows) return;
+  throw BadRequest(v1::REFUSAL_BUSY, "times_s", "the tables of all sessions are as large as they may be");
+}
+
+/// While anything is under way, whoever follows it hears of it, also when there are no new rows.
+void Experiments::watch() {
+  timer_.expires_after(kWatchInterval);
+  timer_.async_wait([this, alive = alive_](const boost::system::error_code& error) {
+    if (error || !*alive) return;
+    on_change();
+    const std::lock_guard lock(mutex_);
+    const bool busy = std::any_of(all_.begin(), all_.end(),
+                                  [](const auto& each) { return !has_ended(each.second->info.state()); });
+    if (busy) watch();
+  });
+}
+
+// ---- the worker ----
+
+void Experiments::notify() {
+  if (notified_.exchange(true)) return;
+  asio::post(io_, [this, alive = alive_] {
+    if (!*alive) return;
+    notified_.store(false);
+    on_change();
+  });
+}
+
+Experiments::Pointer Experiments::next() const {
+  Pointer first;
+  for (const auto& [id, experiment] : all_) {
+    if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED) continue;
+    if (!first || experiment->round < first->round) first = experiment;
+  }
+  return first;
+}
+
+void Experiments::work() {
+  // Of this thread alone, as Linux has it.
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kWorkerNice);
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return stop_ || next() != nullptr; });
+    if (stop_) return;
+    running_ = next();
+    running_->info.set_state(v1::EXPERIMENT_STATE_RUNNING);
+    round_ = running_->round;
+    const Pointer experiment = running_;
+    lock.unlock();
+    notify();
+    run(experiment);
+    lock.lock();
+  }
+}
+
+void Experiments::run(const Pointer& experiment) {
+  v1::RunExperiment request = experiment->request;
+  request.clear_owner();  // the recording may go to others
+  RunOutcome outcome;
+  try {
+    outcome = run_experiment(experiment->plan,
+                             {.recording = recording_file(experiment->id), .rows = rows_file(experiment->id)},
+                             request.SerializeAsString(), experiment->progress, [this] { notify(); });
+  } catch (const std::exception& error) {
+    outcome = {.state = v1::EXPERIMENT_STATE_FAILED, .reason = error.what(), .verdict = {}};
+  }
+  end(experiment, outcome);
+  notify();
+}
+
+void Experiments::end(const Pointer& experiment, const RunOutcome& outcome) {
+  std::error_code ignored;
+  const std::uintmax_t bytes = std::filesystem::file_size(recording_file(experiment->id), ignored);
+  const std::lock_guard lock(mutex_);
+  v1::ExperimentInfo& info = experiment->info;
+  info.set_state(outcome.state);
+  info.set_reason(outcome.state == v1::EXPERIMENT_STATE_CANCELLED && stop_ ? "the server ended"
+                                                                           : outcome.reason);
+  encode_verdict(outcome.verdict, *info.mutable_verdict());
+  info.set_recording_bytes(ignored ? 0 : bytes);
+  experiment->plan = {};
+  running_.reset();
+  try {
+    store(*experiment);
+    forget_oldest();
+  } catch (const std::exception& error) {
+    spdlog::error("experiment {}: {}", experiment->id, error.what());
+  }
+}
+
+}  // namespace drivebench

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bench.pb.h"
+#include "server/asio.hpp"
+#include "server/config.hpp"
+#include "server/experiments/plan.hpp"
+#include "server/experiments/run.hpp"
+
+namespace drivebench {
+
+/// One experiment, from its request to its end.
+struct Experiment {
+  std::uint64_t id = 0;
+  v1::RunExperiment request;
+  ExperimentPlan plan;      ///< until it has ended
+  std::uint64_t round = 0;  ///< the experiments of one round come before those of the next
+  RunProgress progress;
+  v1::ExperimentInfo info;  ///< without what progress and queue say
+};
+
+/// The experiments of a server: a queue, one thread that runs them one after the other on benches of their
+/// own, and a folder that keeps them. All methods are called on the I/O thread.
+///
+/// The queue is fair: in each round every owner has one turn, and within a round the one who came first goes
+/// first.
+class Experiments {
+ public:
+  /// Takes over what the folder holds. Throws std::runtime_error if it cannot be had or another server has
+  /// it.
+  Experiments(asio::io_context& io, const BenchConfig& config);
+  /// Ends the running one with safe action, and the queue.
+  ~Experiments();
+  Experiments(const Experiments&) = delete;
+  Experiments& operator=(const Experiments&) = delete;
+
+  /// Called when an experiment may have gone on.
+  std::function<void()> on_change;
+
+  // These throw BadRequest.
+  std::shared_ptr<const Experiment> submit(const v1::RunExperiment& request, const TableLookup& tables);
+  /// The experiment with this id, if the owner may see its data.
+  std::shared_ptr<const Experiment> find(std::uint64_t id, const std::string& owner) const;
+  void cancel(std::uint64_t id, const std::string& owner);
+
+  v1::ExperimentInfo info_of(const Experiment& experiment) const;
+  v1::ExperimentList list(const std::string& owner) const;
+
+  std::filesystem::path rows_file(std::uint64_t id) const { return file_of(id, ".rows"); }
+  std::filesystem::path recording_file(std::uint64_t id) const { return file_of(id, ".mcap"); }
+
+  /// A new table for a session. Throws std::system_error.
+  std::shared_ptr<SignalTable> new_table();
+  /// Of all tables of a session.
+  std::uint64_t max_table_rows() const { return config_.experiments.table_rows; }
+  /// Throws BadRequest if so many more rows were too many for all sessions together.
+  void check_rows(std::uint64_t more) const;
+
+  static bool has_ended(v1::ExperimentState state) noexcept { return state > v1::EXPERIMENT_STATE_RUNNING; }
+
+ private:
+  using Pointer = std::shared_ptr<Experiment>;
+
+  /// So many sessions may have the largest tables at a time.
+  static constexpr std::uint64_t kSharesOfTables = 4;
+
+  std::filesystem::path file_of(std::uint64_t id, const char* ending) const;
+  void lock_folder();
+  void load();
+  void load_one(const std::filesystem::path& file);
+  void store(const Experiment& experiment) const;
+  Pointer known(const v1::RunExperiment& request) const;
+  Pointer at(std::uint64_t id) const;
+  std::uint64_t round_for(const std::string& owner) const;
+  void check_room() const;
+  void forget_oldest();
+  void remove(std::uint64_t id);
+  void watch();
+
+  void work();
+  Pointer next() const;
+  void run(const Pointer& experiment);
+  void end(const Pointer& experiment, const RunOutcome& outcome);
+  void notify();
+
+  asio::io_context& io_;
+  BenchConfig config_;
+  std::filesystem::path folder_;
+  int lock_ = -1;
+  asio::steady_timer timer_;
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  // for what is posted; I/O thread only
+  std::atomic<bool> notified_{false};
+  std::vector<std::weak_ptr<SignalTable>> tables_;  // of all sessions
+
+  mutable std::mutex mutex_;  // of everything below; never taken in a tick of the live bench
+  std::condition_variable changed_;
+  std::map<std::uint64_t, Pointer> all_;
+  std::uint64_t last_id_ = 0;
+  std::uint64_t round_ = 0;
+  Pointer running_;
+  bool stop_ = false;
+  std::thread worker_;
+};
+
+/// Compares without telling by its duration where the first difference is.
+bool same_secret(std::string_view a, std::string_view b) noexcept;
+
+}  // namespace drivebench

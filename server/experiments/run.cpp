@@ -1,0 +1,156 @@
+#include "server/experiments/run.hpp"
+
+#include <chrono>
+#include <memory>
+
+#include "server/engine.hpp"
+#include "server/experiments/row_file.hpp"
+#include "server/pacer.hpp"
+#include "server/recorder.hpp"
+#include "server/recording.hpp"
+
+namespace drivebench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr Owner kExperimenter = 1;
+/// How long a row may wait for others before viewers see it, looked at every so many ticks.
+constexpr auto kMaxRowWait = std::chrono::milliseconds(50);
+constexpr Tick kLookTicks = 256;
+
+/// One run, from its first tick to its verdict.
+class ExperimentRun {
+ public:
+  ExperimentRun(const ExperimentPlan& plan, const RunFiles& files, const std::string& request,
+                RunProgress& progress, const std::function<void()>& published)
+      : plan_(plan),
+        progress_(progress),
+        published_(published),
+        rows_(files.rows, plan.signals, progress.rows),
+        recorder_(files.recording, plan.config,
+                  {RecordingAttachment{kExperimentAttachment, "application/protobuf", request}}),
+        bench_(plan.config.setup, &recorder_),
+        pacer_(plan.mode == RunMode::kRealtime
+                   ? make_realtime_pacer(PacerKind::kSleep, plan.config.setup.period_ns)
+                   : make_free_pacer()) {}
+
+  RunOutcome run() {
+    schedule_events(plan_.config, bench_);
+    if (plan_.has_commands()) {
+      bench_.submit({.tick = 0, .axis = plan_.axis, .owner = kExperimenter, .action = LeaseAction::kAcquire});
+    }
+    while (keep_row() && may_go_on()) {
+      look_at_the_clock();
+      submit_events();
+      if (plan_.has_commands()) submit_command();
+      recorder_.wait_for_room();
+      bench_.step();
+    }
+    if (!rows_.flush()) fail("the disk takes no more data");
+    return finish();
+  }
+
+ private:
+  const Sample& sample() const { return bench_.sample(plan_.axis); }
+
+  bool keep_row() {
+    const Tick tick = bench_.tick();
+    if (tick % plan_.decimation == 0 && !rows_.append(sample())) return fail("the disk takes no more data");
+    // In real time a tick may be long; in free mode the clock is looked at now and then only.
+    if (plan_.mode == RunMode::kFree && tick % kLookTicks != 0) return true;
+    progress_.tick.store(static_cast<std::uint64_t>(tick), std::memory_order_relaxed);
+    const Clock::time_point now = Clock::now();
+    if (now - last_flush_ < kMaxRowWait) return true;
+    last_flush_ = now;
+    if (!rows_.flush()) return fail("the disk takes no more data");
+    published_();
+    return true;
+  }
+
+  bool may_go_on() {
+    if (is_beyond(plan_.stop, sample())) {
+      outcome_.state = v1::EXPERIMENT_STATE_STOPPED;
+      outcome_.reason = broken_limit(plan_.stop, sample());
+      return false;
+    }
+    if (bench_.tick() == plan_.ticks) return false;
+    if (!progress_.cancel.load(std::memory_order_relaxed)) return true;
+    outcome_.state = v1::EXPERIMENT_STATE_CANCELLED;
+    outcome_.reason = "cancelled";
+    return false;
+  }
+
+  bool fail(const char* why) {
+    outcome_.state = v1::EXPERIMENT_STATE_FAILED;
+    outcome_.reason = why;
+    return false;
+  }
+
+  /// As the engine of the live bench does it.
+  void look_at_the_clock() {
+    const std::int64_t lateness_ns = pacer_->wait();
+    if (plan_.mode != RunMode::kRealtime) return;
+    lateness_.add(lateness_ns);
+    if (lateness_ns > plan_.config.realtime.max_lateness_ns) {
+      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = Overrun{}});
+      pacer_->resynchronise();
+    } else if (lateness_ns >= plan_.config.setup.period_ns) {
+      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = LateTick{}});
+    }
+  }
+
+  void submit_events() {
+    for (; next_event_ < plan_.events.size() && plan_.events[next_event_].tick == bench_.tick();
+         ++next_event_) {
+      const PlannedEvent& event = plan_.events[next_event_];
+      bench_.submit({.tick = event.tick, .axis = event.axis, .owner = 0, .action = event.action});
+    }
+  }
+
+  void submit_command() {
+    PhaseCommand phases = command_of(plan_, sample(), bench_.tick());
+    if (bench_.is_latched(plan_.axis)) phases = {};  // what a latched bench takes: the lease stays
+    bench_.submit({.tick = bench_.tick(),
+                   .axis = plan_.axis,
+                   .owner = kExperimenter,
+                   .action = Command{.answers = bench_.tick(), .phases = phases}});
+  }
+
+  RunOutcome finish() {
+    progress_.tick.store(static_cast<std::uint64_t>(bench_.tick()));
+    bench_.dismiss_controllers();
+    outcome_.verdict = {.mode = plan_.mode,
+                        .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                        .late_ticks = bench_.sample(0).late_ticks,
+                        .lateness = lateness_,
+                        .state_hash = bench_.state_hash()};
+    recorder_.finish(outcome_.verdict);
+    outcome_.verdict.gaps = recorder_.gaps();
+    if (outcome_.verdict.gaps > 0 && outcome_.state != v1::EXPERIMENT_STATE_FAILED) {
+      fail("the recording lost entries");
+    }
+    return std::move(outcome_);
+  }
+
+  const ExperimentPlan& plan_;
+  RunProgress& progress_;
+  const std::function<void()>& published_;
+  RowWriter rows_;
+  Recorder recorder_;
+  Bench bench_;
+  std::unique_ptr<Pacer> pacer_;
+  LatenessHistogram lateness_;
+  std::size_t next_event_ = 0;
+  Clock::time_point last_flush_ = Clock::now();
+  RunOutcome outcome_;
+};
+
+}  // namespace
+
+RunOutcome run_experiment(const ExperimentPlan& plan, const RunFiles& files, const std::string& request,
+                          RunProgress& progress, const std::function<void()>& published) {
+  return ExperimentRun(plan, files, request, progress, published).run();
+}
+
+}  // namespace drivebench

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "server/experiments/plan.hpp"
+#include "server/verdict.hpp"
+
+namespace drivebench {
+
+/// What others see of a run while it lasts.
+struct RunProgress {
+  std::atomic<std::uint64_t> tick{0};
+  std::atomic<std::uint64_t> rows{0};  ///< in the data file
+  std::atomic<bool> cancel{false};     ///< set by others: end now
+};
+
+struct RunFiles {
+  std::filesystem::path recording;
+  std::filesystem::path rows;
+};
+
+struct RunOutcome {
+  v1::ExperimentState state = v1::EXPERIMENT_STATE_COMPLETED;
+  std::string reason;  ///< a sentence; empty: it ran to its end
+  Verdict verdict;
+};
+
+/// Runs an experiment on a bench of its own, on the calling thread, into two new files; the request goes into
+/// the recording. `published` is called when there are new rows. Throws std::system_error if a file cannot be
+/// made.
+RunOutcome run_experiment(const ExperimentPlan& plan, const RunFiles& files, const std::string& request,
+                          RunProgress& progress, const std::function<void()>& published);
+
+}  // namespace drivebench

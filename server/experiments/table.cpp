@@ -1,0 +1,78 @@
+#include "server/experiments/table.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
+
+namespace drivebench {
+namespace {
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::system_error(errno, std::generic_category(), what);
+}
+
+/// A file that nobody else finds. Not O_TMPFILE, which some file systems do not know.
+int nameless_file(const std::filesystem::path& folder) {
+  std::string name = (folder / "table-XXXXXX").string();
+  const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor < 0) fail("cannot keep a table in " + folder.string());
+  ::unlink(name.c_str());
+  return descriptor;
+}
+
+}  // namespace
+
+SignalTable::SignalTable(const std::filesystem::path& folder) : descriptor_(nameless_file(folder)) {}
+
+SignalTable::~SignalTable() {
+  ::close(descriptor_);
+}
+
+void SignalTable::append(std::span<const Row> rows) {
+  std::span<const std::byte> left = std::as_bytes(rows);
+  auto offset = static_cast<off_t>(size_ * sizeof(Row));
+  while (!left.empty()) {
+    const ssize_t written = ::pwrite(descriptor_, left.data(), left.size(), offset);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) fail("cannot keep the rows of a table");
+    left = left.subspan(static_cast<std::size_t>(written));
+    offset += written;
+  }
+  size_ += rows.size();
+  if (!rows.empty()) last_time_s_ = rows.back().time_s;
+}
+
+TableView::TableView(const SignalTable& table) {
+  if (table.size() == 0) return;
+  const std::size_t bytes = table.size() * sizeof(SignalTable::Row);
+  mapping_ = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, table.descriptor_, 0);
+  if (mapping_ == MAP_FAILED) fail("cannot map a table");
+  ::munlock(mapping_, bytes);  // a real-time server locks all its memory; this is a file's, and large
+  rows_ = {static_cast<const SignalTable::Row*>(mapping_), table.size()};
+}
+
+TableView::TableView(TableView&& other) noexcept
+    : rows_(other.rows_), mapping_(std::exchange(other.mapping_, nullptr)) {}
+
+TableView::~TableView() {
+  if (mapping_ != nullptr) ::munmap(mapping_, rows_.size_bytes());
+}
+
+double TableView::at(double time_s, bool interpolate) const noexcept {
+  const auto later =
+      std::upper_bound(rows_.begin(), rows_.end(), time_s,
+                       [](double time, const SignalTable::Row& row) { return time < row.time_s; });
+  if (later == rows_.begin()) return 0.0;
+  const SignalTable::Row& before = *(later - 1);
+  if (!interpolate || later == rows_.end()) return before.value;
+  const double part = (time_s - before.time_s) / (later->time_s - before.time_s);
+  return before.value + part * (later->value - before.value);
+}
+
+}  // namespace drivebench
