@@ -39,6 +39,7 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
                      .on_link_loss = axis.on_link_loss,
                      .shaft = axis.shares_shaft_with.value_or(i)});
     if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
+    axis_parameters(axis.parameters);  // their table is made on first use, which must not be a tick
     take_sample(i);
   }
 }
