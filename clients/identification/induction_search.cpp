@@ -38,7 +38,7 @@ std::vector<std::array<WholePolynomial, 4>> columns_of(const Triangle& factor) {
     for (std::size_t j = 0; j < kInductionParameters; ++j) {
       const auto [which, power] = kInductionMonomials[j];
       const std::size_t column = column_of(which);
-      c[column][static_cast<std::size_t>(power + (column == 3 ? 1 : 0))] += entries[i][j];
+      c[column][static_cast<std::size_t>(power) + (column == 3 ? 1U : 0U)] += entries[i][j];
     }
     c[3][1] -= entries[i][kLast];
     for (std::size_t k = 0; k < 4; ++k)

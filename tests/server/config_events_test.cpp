@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/config.hpp"
 #include "protocols/document.hpp"
+#include "server/config.hpp"
 #include "tests/server/config_test_bench.hpp"
 #include "tests/server/parameter_row.hpp"
 
