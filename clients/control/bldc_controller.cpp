@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "clients/control/gain_rows.hpp"
 #include "clients/control/three_phase.hpp"
 
 namespace drivebench::control {
@@ -72,32 +73,23 @@ std::span<const GainRow<BldcParameters>> BldcParameters::gains() noexcept {
   using P = BldcParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
   constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
-      {"machine.resistance_ohm", [](P& p) -> double& { return p.machine.resistance_ohm; }, kNotNegative},
-      {"machine.torque_constant_nm_per_a", [](P& p) -> double& { return p.machine.torque_constant_nm_per_a; },
-       kPositive},
-      {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-      {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-      {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-      {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
-      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
-       kNotNegative},
-      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-       kNotNegative},
-      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
-       kNotNegative},
-      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
-       kNotNegative},
-      {"speed_observer.angle_per_s", [](P& p) -> double& { return p.speed_observer.angle_per_s; },
-       kNotNegative},
-      {"speed_observer.speed_per_s2", [](P& p) -> double& { return p.speed_observer.speed_per_s2; },
-       kNotNegative},
-      {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
-  });
+  static constexpr auto kRows = joined(
+      std::to_array<GainRow<P>>({
+          {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
+          {"machine.resistance_ohm", [](P& p) -> double& { return p.machine.resistance_ohm; }, kNotNegative},
+          {"machine.torque_constant_nm_per_a",
+           [](P& p) -> double& { return p.machine.torque_constant_nm_per_a; }, kPositive},
+          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
+          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
+          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
+          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
+          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
+      }),
+      position_rows<P>(), current_rows<P>(), speed_observer_rows<P>(),
+      std::to_array<GainRow<P>>({
+          {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
+      }));
   return kRows;
 }
 

@@ -2,22 +2,24 @@
 
 #include <utility>
 
+#include "clients/control/gain_rows.hpp"
+
 namespace drivebench::control {
 
 std::span<const GainRow<DirectIntegratorParameters>> DirectIntegratorParameters::gains() noexcept {
   using P = DirectIntegratorParameters;
   constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"current.pole_per_s", [](P& p) -> double& { return p.current_pole_per_s; }, GainRule::kPositive},
-      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
-      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
-       kNotNegative},
-      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-       kNotNegative},
-      {"flux.proportional_per_s2", [](P& p) -> double& { return p.flux_proportional_per_s2; }, kNotNegative},
-      {"flux.derivative_per_s", [](P& p) -> double& { return p.flux_derivative_per_s; }, kNotNegative},
-      {"least_distance", [](P& p) -> double& { return p.least_distance; }, GainRule::kPositive},
-  });
+  static constexpr auto kRows = joined(
+      std::to_array<GainRow<P>>({
+          {"current.pole_per_s", [](P& p) -> double& { return p.current_pole_per_s; }, GainRule::kPositive},
+      }),
+      position_rows<P>(),
+      std::to_array<GainRow<P>>({
+          {"flux.proportional_per_s2", [](P& p) -> double& { return p.flux_proportional_per_s2; },
+           kNotNegative},
+          {"flux.derivative_per_s", [](P& p) -> double& { return p.flux_derivative_per_s; }, kNotNegative},
+          {"least_distance", [](P& p) -> double& { return p.least_distance; }, GainRule::kPositive},
+      }));
   return kRows;
 }
 

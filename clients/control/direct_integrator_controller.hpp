@@ -16,7 +16,7 @@ namespace drivebench::control {
 
 struct DirectIntegratorParameters {
   double current_pole_per_s;
-  PositionGains position;
+  ServoGains position;
   double flux_proportional_per_s2;  ///< G1
   double flux_derivative_per_s;     ///< G2
   double least_distance;            ///< to the singularity, of 1

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "clients/control/gain_rows.hpp"
+
 namespace drivebench::control {
 namespace {
 
@@ -124,39 +126,26 @@ std::span<const GainRow<ControllerParameters>> ControllerParameters::gains() noe
   using P = ControllerParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
   constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
-      {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
-       kPositive},
-      {"machine.rotor_resistance_ohm", [](P& p) -> double& { return p.machine.rotor_resistance_ohm; },
-       kPositive},
-      {"machine.rotor_inductance_h", [](P& p) -> double& { return p.machine.rotor_inductance_h; }, kPositive},
-      {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-      {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-      {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-      {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-      {"rated_direct_current_a", [](P& p) -> double& { return p.rated_direct_current_a; }, kPositive},
-      {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
-       kPositive},
-      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
-       kNotNegative},
-      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
-       kNotNegative},
-      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
-      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
-       kNotNegative},
-      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-       kNotNegative},
-      {"flux.proportional_a_per_wb", [](P& p) -> double& { return p.flux.proportional_a_per_wb; },
-       kNotNegative},
-      {"flux.integral_a_per_wbs", [](P& p) -> double& { return p.flux.integral_a_per_wbs; }, kNotNegative},
-      {"speed_observer.angle_per_s", [](P& p) -> double& { return p.speed_observer.angle_per_s; },
-       kNotNegative},
-      {"speed_observer.speed_per_s2", [](P& p) -> double& { return p.speed_observer.speed_per_s2; },
-       kNotNegative},
-  });
+  static constexpr auto kRows = joined(
+      std::to_array<GainRow<P>>({
+          {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
+          {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
+           kPositive},
+          {"machine.rotor_resistance_ohm", [](P& p) -> double& { return p.machine.rotor_resistance_ohm; },
+           kPositive},
+          {"machine.rotor_inductance_h", [](P& p) -> double& { return p.machine.rotor_inductance_h; },
+           kPositive},
+          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
+          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
+          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
+          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
+          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
+          {"rated_direct_current_a", [](P& p) -> double& { return p.rated_direct_current_a; }, kPositive},
+          {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
+           kPositive},
+      }),
+      current_rows<P>(), position_rows<P>(), flux_rows<P>(), speed_observer_rows<P>());
   return kRows;
 }
 

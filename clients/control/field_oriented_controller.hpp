@@ -13,14 +13,9 @@
 #include "clients/control/gains.hpp"
 #include "clients/control/machine.hpp"
 #include "clients/control/observers.hpp"
+#include "clients/control/servo_loop.hpp"
 
 namespace drivebench::control {
-
-struct PositionGains {
-  double integral_per_s3;      ///< K0
-  double proportional_per_s2;  ///< K1
-  double derivative_per_s;     ///< K2
-};
 
 struct FluxGains {
   double proportional_a_per_wb;
@@ -46,7 +41,7 @@ struct ControllerParameters {
   double rated_direct_current_a;
   double quadrature_reference_limit_a;
   CurrentLoopGains current;
-  PositionGains position;
+  ServoGains position;
   FluxGains flux;
   SpeedObserverGains speed_observer;
   SpeedSource speed_source = SpeedSource::kObserver;

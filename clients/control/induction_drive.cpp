@@ -4,6 +4,8 @@
 #include <array>
 #include <numbers>
 
+#include "clients/control/gain_rows.hpp"
+
 namespace drivebench::control {
 namespace {
 
@@ -16,30 +18,30 @@ std::span<const GainRow<InductionDriveParameters>> InductionDriveParameters::gai
   using P = InductionDriveParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
   constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"machine.pole_pairs", [](P& p) -> double& { return p.motor.machine.pole_pairs; }, kPositive},
-      {"machine.mutual_inductance_h", [](P& p) -> double& { return p.motor.machine.mutual_inductance_h; },
-       kPositive},
-      {"machine.rotor_resistance_ohm", [](P& p) -> double& { return p.motor.machine.rotor_resistance_ohm; },
-       kPositive},
-      {"machine.rotor_inductance_h", [](P& p) -> double& { return p.motor.machine.rotor_inductance_h; },
-       kPositive},
-      {"machine.stator_resistance_ohm", [](P& p) -> double& { return p.motor.stator_resistance_ohm; },
-       kPositive},
-      {"machine.stator_inductance_h", [](P& p) -> double& { return p.motor.stator_inductance_h; }, kPositive},
-      {"machine.friction_nms", [](P& p) -> double& { return p.motor.machine.friction_nms; }, kNotNegative},
-      {"machine.inertia_kgm2", [](P& p) -> double& { return p.motor.machine.inertia_kgm2; }, kPositive},
-      {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-      {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-      {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
-       kPositive},
-      {"speed_observer.angle_per_s", [](P& p) -> double& { return p.speed_observer.angle_per_s; },
-       kNotNegative},
-      {"speed_observer.speed_per_s2", [](P& p) -> double& { return p.speed_observer.speed_per_s2; },
-       kNotNegative},
-  });
+  static constexpr auto kRows = joined(
+      std::to_array<GainRow<P>>({
+          {"machine.pole_pairs", [](P& p) -> double& { return p.motor.machine.pole_pairs; }, kPositive},
+          {"machine.mutual_inductance_h", [](P& p) -> double& { return p.motor.machine.mutual_inductance_h; },
+           kPositive},
+          {"machine.rotor_resistance_ohm",
+           [](P& p) -> double& { return p.motor.machine.rotor_resistance_ohm; }, kPositive},
+          {"machine.rotor_inductance_h", [](P& p) -> double& { return p.motor.machine.rotor_inductance_h; },
+           kPositive},
+          {"machine.stator_resistance_ohm", [](P& p) -> double& { return p.motor.stator_resistance_ohm; },
+           kPositive},
+          {"machine.stator_inductance_h", [](P& p) -> double& { return p.motor.stator_inductance_h; },
+           kPositive},
+          {"machine.friction_nms", [](P& p) -> double& { return p.motor.machine.friction_nms; },
+           kNotNegative},
+          {"machine.inertia_kgm2", [](P& p) -> double& { return p.motor.machine.inertia_kgm2; }, kPositive},
+          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
+          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
+          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
+          {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
+           kPositive},
+      }),
+      speed_observer_rows<P>());
   return kRows;
 }
 

@@ -6,7 +6,7 @@
 
 namespace drivebench::control {
 
-std::vector<std::complex<double>> mechanical_poles(const PositionGains& gains) {
+std::vector<std::complex<double>> mechanical_poles(const ServoGains& gains) {
   return roots(std::array{gains.integral_per_s3, gains.proportional_per_s2, gains.derivative_per_s, 1.0});
 }
 

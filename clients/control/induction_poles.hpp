@@ -11,7 +11,7 @@
 namespace drivebench::control {
 
 /// s³ + K2·s² + K1·s + K0: angle, its friction compensated.
-std::vector<std::complex<double>> mechanical_poles(const PositionGains& gains);
+std::vector<std::complex<double>> mechanical_poles(const ServoGains& gains);
 
 /// s² + (η + η·M·K_ψP)·s + η·M·K_ψI
 std::vector<std::complex<double>> flux_poles(const InductionMachineModel& machine, const FluxGains& gains);

@@ -2,25 +2,13 @@
 
 #include <utility>
 
+#include "clients/control/gain_rows.hpp"
+
 namespace drivebench::control {
 
 std::span<const GainRow<InputOutputParameters>> InputOutputParameters::gains() noexcept {
   using P = InputOutputParameters;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
-       kNotNegative},
-      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
-       kNotNegative},
-      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
-      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
-       kNotNegative},
-      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-       kNotNegative},
-      {"flux.proportional_a_per_wb", [](P& p) -> double& { return p.flux.proportional_a_per_wb; },
-       kNotNegative},
-      {"flux.integral_a_per_wbs", [](P& p) -> double& { return p.flux.integral_a_per_wbs; }, kNotNegative},
-  });
+  static constexpr auto kRows = joined(current_rows<P>(), position_rows<P>(), flux_rows<P>());
   return kRows;
 }
 

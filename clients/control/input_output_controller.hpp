@@ -22,7 +22,7 @@ enum class TorqueDivisor {
 
 struct InputOutputParameters {
   CurrentLoopGains current;
-  PositionGains position;
+  ServoGains position;
   FluxGains flux;
   TorqueDivisor divisor = TorqueDivisor::kEstimatedFlux;
 

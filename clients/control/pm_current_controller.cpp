@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/control/gain_rows.hpp"
 #include "clients/control/optimum_torque_pm.hpp"
 #include "clients/control/pm_machine_rows.hpp"
 #include "clients/control/three_phase.hpp"
@@ -47,16 +48,13 @@ Setpoint PmCurrentController::update(const Measurement& m, const Reference& r,
 
 std::span<const GainRow<PmCurrentParameters>> PmCurrentParameters::gains() noexcept {
   using P = PmCurrentParameters;
-  static constexpr auto kRows = with_pm_machine_rows(std::to_array<GainRow<P>>({
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, GainRule::kPositive},
-      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, GainRule::kPositive},
-      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; },
-       GainRule::kNotNegative},
-      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
-       GainRule::kNotNegative},
-      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-       GainRule::kNotNegative},
-  }));
+  static constexpr auto kRows =
+      joined(pm_machine_rows<P>(),
+             std::to_array<GainRow<P>>({
+                 {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, GainRule::kPositive},
+                 {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, GainRule::kPositive},
+             }),
+             position_rows<P>());
   return kRows;
 }
 

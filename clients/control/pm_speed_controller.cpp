@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "clients/control/gain_rows.hpp"
 #include "clients/control/pm_machine_rows.hpp"
 #include "clients/control/three_phase.hpp"
 
@@ -57,16 +58,15 @@ DirectQuadrature PmSpeedController::wanted_current_a(const Reference& r) const n
 std::span<const GainRow<PmSpeedParameters>> PmSpeedParameters::gains() noexcept {
   using P = PmSpeedParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
-  static constexpr auto kRows = with_pm_machine_rows(std::to_array<GainRow<P>>({
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-      {"speed_gain_per_s", [](P& p) -> double& { return p.speed_gain_per_s; }, kPositive},
-      {"max_speed_rad_s", [](P& p) -> double& { return p.max_speed_rad_s; }, kPositive},
-      {"current.proportional_v_per_a", [](P& p) -> double& { return p.current.proportional_v_per_a; },
-       GainRule::kNotNegative},
-      {"current.integral_v_per_as", [](P& p) -> double& { return p.current.integral_v_per_as; },
-       GainRule::kNotNegative},
-  }));
+  static constexpr auto kRows =
+      joined(pm_machine_rows<P>(),
+             std::to_array<GainRow<P>>({
+                 {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
+                 {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
+                 {"speed_gain_per_s", [](P& p) -> double& { return p.speed_gain_per_s; }, kPositive},
+                 {"max_speed_rad_s", [](P& p) -> double& { return p.max_speed_rad_s; }, kPositive},
+             }),
+             current_rows<P>());
   return kRows;
 }
 

@@ -53,14 +53,16 @@ DirectQuadrature PmVoltageController::wanted_voltage_v(const Reference& r, Direc
 
 std::span<const GainRow<PmVoltageParameters>> PmVoltageParameters::gains() noexcept {
   using P = PmVoltageParameters;
-  static constexpr auto kRows = with_pm_machine_rows(std::to_array<GainRow<P>>({
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, GainRule::kPositive},
-      {"feedback.direct_per_s", [](P& p) -> double& { return p.feedback.direct_per_s; }},
-      {"feedback.quadrature_per_s", [](P& p) -> double& { return p.feedback.quadrature_per_s; }},
-      {"feedback.speed_a_per_rad", [](P& p) -> double& { return p.feedback.speed_a_per_rad; }},
-      {"feedback.angle_a_per_rad_s", [](P& p) -> double& { return p.feedback.angle_a_per_rad_s; }},
-      {"feedback.integral_a_per_rads2", [](P& p) -> double& { return p.feedback.integral_a_per_rads2; }},
-  }));
+  static constexpr auto kRows = joined(
+      pm_machine_rows<P>(),
+      std::to_array<GainRow<P>>({
+          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, GainRule::kPositive},
+          {"feedback.direct_per_s", [](P& p) -> double& { return p.feedback.direct_per_s; }},
+          {"feedback.quadrature_per_s", [](P& p) -> double& { return p.feedback.quadrature_per_s; }},
+          {"feedback.speed_a_per_rad", [](P& p) -> double& { return p.feedback.speed_a_per_rad; }},
+          {"feedback.angle_a_per_rad_s", [](P& p) -> double& { return p.feedback.angle_a_per_rad_s; }},
+          {"feedback.integral_a_per_rads2", [](P& p) -> double& { return p.feedback.integral_a_per_rads2; }},
+      }));
   return kRows;
 }
 

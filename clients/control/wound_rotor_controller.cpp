@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "clients/control/gain_rows.hpp"
 #include "clients/control/three_phase.hpp"
 
 namespace drivebench::control {
@@ -96,40 +97,36 @@ std::span<const GainRow<WoundRotorParameters>> WoundRotorParameters::gains() noe
   using P = WoundRotorParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
   constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
-      {"machine.stator_resistance_ohm", [](P& p) -> double& { return p.machine.stator_resistance_ohm; },
-       kPositive},
-      {"machine.stator_inductance_h", [](P& p) -> double& { return p.machine.stator_inductance_h; },
-       kPositive},
-      {"machine.field_resistance_ohm", [](P& p) -> double& { return p.machine.field_resistance_ohm; },
-       kPositive},
-      {"machine.field_inductance_h", [](P& p) -> double& { return p.machine.field_inductance_h; }, kPositive},
-      {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
-       kPositive},
-      {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-      {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-      {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-      {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
-      {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-      {"field_voltage_limit_v", [](P& p) -> double& { return p.field_voltage_limit_v; }, kPositive},
-      {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-      {"field_current_a", [](P& p) -> double& { return p.field_current_a; }, kPositive},
-      {"base_speed_rad_s", [](P& p) -> double& { return p.base_speed_rad_s; }, kPositive},
-      {"current.bandwidth_per_s", [](P& p) -> double& { return p.current.bandwidth_per_s; }, kPositive},
-      {"current.integral_rate_per_s", [](P& p) -> double& { return p.current.integral_rate_per_s; },
-       kNotNegative},
-      {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; }, kNotNegative},
-      {"position.proportional_per_s2", [](P& p) -> double& { return p.position.proportional_per_s2; },
-       kNotNegative},
-      {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-       kNotNegative},
-      {"speed_observer.angle_per_s", [](P& p) -> double& { return p.speed_observer.angle_per_s; },
-       kNotNegative},
-      {"speed_observer.speed_per_s2", [](P& p) -> double& { return p.speed_observer.speed_per_s2; },
-       kNotNegative},
-      {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
-  });
+  static constexpr auto kRows = joined(
+      std::to_array<GainRow<P>>({
+          {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
+          {"machine.stator_resistance_ohm", [](P& p) -> double& { return p.machine.stator_resistance_ohm; },
+           kPositive},
+          {"machine.stator_inductance_h", [](P& p) -> double& { return p.machine.stator_inductance_h; },
+           kPositive},
+          {"machine.field_resistance_ohm", [](P& p) -> double& { return p.machine.field_resistance_ohm; },
+           kPositive},
+          {"machine.field_inductance_h", [](P& p) -> double& { return p.machine.field_inductance_h; },
+           kPositive},
+          {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
+           kPositive},
+          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
+          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
+          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
+          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
+          {"field_voltage_limit_v", [](P& p) -> double& { return p.field_voltage_limit_v; }, kPositive},
+          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
+          {"field_current_a", [](P& p) -> double& { return p.field_current_a; }, kPositive},
+          {"base_speed_rad_s", [](P& p) -> double& { return p.base_speed_rad_s; }, kPositive},
+          {"current.bandwidth_per_s", [](P& p) -> double& { return p.current.bandwidth_per_s; }, kPositive},
+          {"current.integral_rate_per_s", [](P& p) -> double& { return p.current.integral_rate_per_s; },
+           kNotNegative},
+      }),
+      position_rows<P>(), speed_observer_rows<P>(),
+      std::to_array<GainRow<P>>({
+          {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
+      }));
   return kRows;
 }
 
