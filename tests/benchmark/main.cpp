@@ -24,6 +24,7 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"free", "free mode with recording", measure_free_mode},
     {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
     {"experiment", "data of an experiment against a copy of the same bytes", measure_experiment},
+    {"identification", "an induction motor, 600 random motors", measure_identification},
     {"realtime", "lateness of the pacers and of the server", measure_realtime},
     {"recorder", "ten axes at 20 kHz into the recorder", measure_recorder},
     {"can", "encoding and decoding of a CAN frame", measure_can_codec},
@@ -43,7 +44,7 @@ int run(int argc, char** argv) {
   std::string list;
   for (const Measurement& m : kMeasurements) {
     names.emplace_back(m.name);
-    list += fmt::format("  {:<10} {}\n", m.name, m.what);
+    list += fmt::format("  {:<14} {}\n", m.name, m.what);
   }
   std::vector<std::string> only;
   bool json = false;

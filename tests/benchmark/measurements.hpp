@@ -33,6 +33,9 @@ std::vector<Row> measure_control(const Plan& plan);
 /// The data of an experiment on their way to a client against a copy of as many bytes.
 std::vector<Row> measure_experiment(const Plan& plan);
 
+/// The identification of an induction motor, and of 600 random motors with their experiments.
+std::vector<Row> measure_identification(const Plan& plan);
+
 /// Encoding and decoding of one CAN frame.
 std::vector<Row> measure_can_codec(const Plan& plan);
 /// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.

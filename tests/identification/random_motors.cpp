@@ -97,12 +97,6 @@ void put_sensors(AxisParameters& p, double current_a, double voltage_v) {
   p.sensors.voltage.noise_rms = voltage_v / kSteps;
 }
 
-/// What an experiment gives and how it is looked at.
-struct Recorded {
-  MeasuredData data;
-  Experiment how;
-};
-
 /// The bench files, read once.
 const BenchConfig& base_of(const MotorDraw& draw) {
   static const std::map<std::string_view, BenchConfig> bases = [] {
@@ -241,23 +235,6 @@ Recorded run_bldc(BenchConfig config, const std::vector<double>& motor) {
   return {std::move(record.data()), e};
 }
 
-Recorded run_experiment(const MotorDraw& draw, int number, int noise) {
-  BenchConfig config = base_of(draw);
-  config.setup.seed = 1000 * static_cast<std::uint64_t>(number) + static_cast<std::uint64_t>(noise);
-  const std::vector<double> motor = draw_motor(draw, number);
-  switch (draw.kind) {
-    case MotorKind::kDc:
-      return run_dc(std::move(config), motor);
-    case MotorKind::kInduction:
-      return run_induction(std::move(config), motor, draw.longest_s);
-    case MotorKind::kPmSynchronous:
-      return run_pm(std::move(config), motor);
-    case MotorKind::kBldc:
-      break;
-  }
-  return run_bldc(std::move(config), motor);
-}
-
 }  // namespace
 
 std::span<const MotorDraw> motor_draws() noexcept {
@@ -275,6 +252,23 @@ std::vector<double> draw_motor(const MotorDraw& draw, int number) {
   return values;
 }
 
+Recorded record_motor(const MotorDraw& draw, int number, int noise) {
+  BenchConfig config = base_of(draw);
+  config.setup.seed = 1000 * static_cast<std::uint64_t>(number) + static_cast<std::uint64_t>(noise);
+  const std::vector<double> motor = draw_motor(draw, number);
+  switch (draw.kind) {
+    case MotorKind::kDc:
+      return run_dc(std::move(config), motor);
+    case MotorKind::kInduction:
+      return run_induction(std::move(config), motor, draw.longest_s);
+    case MotorKind::kPmSynchronous:
+      return run_pm(std::move(config), motor);
+    case MotorKind::kBldc:
+      break;
+  }
+  return run_bldc(std::move(config), motor);
+}
+
 bool Finding::covered() const noexcept {
   return std::abs(estimate - truth) <= index;
 }
@@ -285,7 +279,7 @@ std::vector<Finding> identify_motor(const MotorDraw& draw, int number, int noise
   for (std::size_t k = 0; k < draw.identified.size(); ++k)
     findings.push_back({.truth = motor[k], .estimate = 0.0, .index = 0.0, .stated = false});
   try {
-    const Recorded run = run_experiment(draw, number, noise);
+    const Recorded run = record_motor(draw, number, noise);
     const Result found = identify(run.data, run.how);
     for (std::size_t k = 0; k < findings.size(); ++k) {
       const std::string name(draw.identified[k].name);

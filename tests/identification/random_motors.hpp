@@ -46,8 +46,17 @@ struct Finding {
   bool covered() const noexcept;
 };
 
-/// The experiment on such a motor, on the product's bench with a noise of this number; a finding for each of
-/// draw.identified. Data that identify() refuses state nothing. May run on many threads at once.
+/// What an experiment gave, and how to look at it.
+struct Recorded {
+  MeasuredData data;
+  Experiment how;
+};
+
+/// The experiment on such a motor, on the product's bench with a noise of this number.
+Recorded record_motor(const MotorDraw& draw, int number, int noise);
+
+/// The same with its identification: a finding for each of draw.identified. Data that identify() refuses
+/// state nothing. May run on many threads at once.
 std::vector<Finding> identify_motor(const MotorDraw& draw, int number, int noise);
 
 }  // namespace drivebench::identification
