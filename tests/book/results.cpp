@@ -9,7 +9,7 @@ namespace drivebench {
 namespace {
 
 constexpr std::string_view kHead =
-    "# The control experiments of the book\n"
+    "# The control and identification experiments of the book\n"
     "\n"
     "Made by `drivebench-results > tests/book/RESULTS.md` from runs of the presets of `clients/control` on "
     "the benches of\n"
@@ -88,7 +88,8 @@ std::string difference(const std::string& line, const Result& r) {
 std::vector<ResultSection> all_results() {
   return {field_oriented_results(),    high_speed_results(), optimum_torque_results(),
           flux_observer_results(),     pm_results(),         stepper_results(),
-          other_synchronous_results(), dc_results(),         wound_dc_results()};
+          other_synchronous_results(), dc_results(),         wound_dc_results(),
+          identification_results()};
 }
 
 std::string markdown_of(const std::vector<ResultSection>& sections) {

@@ -132,6 +132,17 @@ std::vector<Measured> tachometer_step() {
           number("at", peak->time_s, "s")};
 }
 
+/// What is left of the error after 10 s and from 38 s on.
+std::vector<Measured> sine() {
+  const Outcome seen = closed_loop("book/2-sine");
+  double left = 0.0;
+  for (const ClosedLoopRow& row : seen.rows) {
+    if (row.time_s > 38.0) left = std::max(left, std::abs(row.error_rad));
+  }
+  return {number("after 10 s", row_at(seen, 10.0).error_rad, "rad"),
+          {"after 38 s at most", left, "rad", 0.1 * left}};
+}
+
 std::vector<Measured> offset() {
   const Outcome seen = closed_loop("book/2.19-offset");
   const auto beyond = std::ranges::max_element(seen.rows, {}, &ClosedLoopRow::error_rad);
@@ -169,6 +180,11 @@ ResultSection dc_results() {
         response("book/2.9"), "agrees"},
        {"AC-05", "the same without its integral, `book/2.9-p`", "derived 0.90631 at 1.68°",
         response("book/2.9-p"), "agrees"},
+       {"SPD-01",
+        "proportional speed loop, a step to 50 rad/s, `book/2.10`",
+        "derived 3.125 rad/s missed",
+        {number("", 50.0 - closed_loop("book/2.10").rows.back().sample.speed_rad_s, "rad/s")},
+        "agrees"},
        {"AC-06",
         "bias of the two-state observer under 0.035 N m, poles at −500",
         "derived 2.3178 rad/s",
@@ -213,7 +229,14 @@ ResultSection dc_results() {
        {"2.25", "r = 500, `book/2.25-500`", "simulated 0.0378, −0.0175 rad, 4.5 A", nested("book/2.25-500"),
         "agrees: too slow"},
        {"AC-18", "classical loop with tachometer, one radian at once, `book/2-tachometer`",
-        "derived 400 A, 1.3277 rad at 0.221 s", tachometer_step(), "sampled at 1 kHz"}}};
+        "derived 400 A, 1.3277 rad at 0.221 s", tachometer_step(), "sampled at 1 kHz"},
+       {"AC-18",
+        "proportional loop, K = 1, turned at 0.3 rad/s, `book/2-proportional`",
+        "derived 0.3 rad behind",
+        {number("", closed_loop("book/2-proportional").rows.back().error_rad, "rad")},
+        "agrees"},
+       {"CTL-07", "a loop that contains the sine follows sin t, `book/2-sine`",
+        "roots −0.17 ± j0.63, −0.33 ± j0.49: the error dies", sine(), "agrees"}}};
 }
 
 ResultSection wound_dc_results() {
