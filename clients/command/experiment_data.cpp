@@ -20,12 +20,8 @@ double little_endian(const char* bytes) {
 
 }  // namespace
 
-DataWriter::DataWriter(const std::string& file, bool standard_output) {
-  if (!file.empty() || standard_output) out_ = std::make_unique<Output>(file);
-}
-
-void DataWriter::describe(const v1::ExperimentInfo& info) {
-  if (!signals_.empty()) return;
+bool ExperimentRows::describe(const v1::ExperimentInfo& info) {
+  if (!signals_.empty()) return false;
   for (const std::string& name : info.signals()) {
     const Signal* const signal = find_signal(name);
     if (signal == nullptr) throw std::runtime_error("the server sends an unknown signal, " + name);
@@ -36,13 +32,11 @@ void DataWriter::describe(const v1::ExperimentInfo& info) {
   }
   decimation_ = info.decimation();
   period_ns_ = static_cast<std::uint64_t>(std::llround(info.period_s() * 1e9));
-  text_ = "tick,time_s";
-  for (const Signal* signal : signals_)
-    text_ += fmt::format(",{} [{}]", signal->name, signal->unit);
-  text_ += '\n';
+  values_.resize(signals_.size());
+  return true;
 }
 
-void DataWriter::take(const v1::ExperimentData& data) {
+void ExperimentRows::take(const v1::ExperimentData& data, const OnRow& on_row) {
   const std::size_t width = 8 * signals_.size();
   if (width == 0 || data.data().size() % width != 0 || data.first() % decimation_ != 0) {
     throw std::runtime_error("the server sent a piece of a row");
@@ -51,22 +45,42 @@ void DataWriter::take(const v1::ExperimentData& data) {
   const std::uint64_t end = first + data.data().size() / width;
   if (first > rows_) throw std::runtime_error(fmt::format("the server left out rows from {} on", rows_));
   for (; rows_ < end; ++rows_) {
-    if (out_ != nullptr) write_row(data.data().data() + (rows_ - first) * width);
+    if (!on_row) continue;
+    const char* const row = data.data().data() + (rows_ - first) * width;
+    for (std::size_t i = 0; i < values_.size(); ++i)
+      values_[i] = little_endian(row + 8 * i);
+    on_row(next_tick(), values_);
   }
-  if (out_ != nullptr && text_.size() > kPiece) flush();
 }
 
-void DataWriter::write_row(const char* values) {
-  const std::uint64_t tick = rows_ * decimation_;
-  const std::uint64_t time_ns = tick * period_ns_;
+DataWriter::DataWriter(const std::string& file, bool standard_output) {
+  if (!file.empty() || standard_output) out_ = std::make_unique<Output>(file);
+}
+
+void DataWriter::describe(const v1::ExperimentInfo& info) {
+  if (!rows_.describe(info)) return;
+  text_ = "tick,time_s";
+  for (const Signal* signal : rows_.signals())
+    text_ += fmt::format(",{} [{}]", signal->name, signal->unit);
+  text_ += '\n';
+}
+
+void DataWriter::take(const v1::ExperimentData& data) {
+  if (out_ == nullptr) return rows_.take(data, {});
+  rows_.take(data,
+             [this](std::uint64_t tick, const std::vector<double>& values) { write_row(tick, values); });
+  if (text_.size() > kPiece) flush();
+}
+
+void DataWriter::write_row(std::uint64_t tick, const std::vector<double>& values) {
+  const std::uint64_t time_ns = tick * rows_.tick_ns();
   auto out = std::back_inserter(text_);
   fmt::format_to(out, "{},{}.{:09}", tick, time_ns / 1'000'000'000, time_ns % 1'000'000'000);
-  for (std::size_t i = 0; i < signals_.size(); ++i) {
-    const double value = little_endian(values + 8 * i);
-    if (signals_[i]->type == SignalType::kReal) {
-      fmt::format_to(out, ",{}", value);  // the shortest text that reads back equal
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (rows_.signals()[i]->type == SignalType::kReal) {
+      fmt::format_to(out, ",{}", values[i]);  // the shortest text that reads back equal
     } else {
-      fmt::format_to(out, ",{:.0f}", value);
+      fmt::format_to(out, ",{:.0f}", values[i]);
     }
   }
   text_ += '\n';

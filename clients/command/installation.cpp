@@ -18,7 +18,10 @@ fs::path server_executable() {
   return server;
 }
 
-fs::path find_config(std::string_view choice) {
+namespace {
+
+/// A TOML file by its path, or else by its name in this folder of any `configs`.
+fs::path find_in(std::string_view folder_of_configs, std::string_view what, std::string_view choice) {
   std::error_code ignored;
   if (fs::is_regular_file(choice, ignored)) return choice;
 
@@ -34,12 +37,22 @@ fs::path find_config(std::string_view choice) {
   fs::path file(choice);
   if (file.extension() != ".toml") file += ".toml";
   for (const fs::path& folder : folders) {
-    fs::path found = folder / "benches" / file;
+    fs::path found = folder / folder_of_configs / file;
     if (fs::is_regular_file(found, ignored)) return found;
     looked_at += "\n  " + found.string();
   }
-  throw UsageError("no bench file '" + std::string(choice) + "'; looked for\n  " + std::string(choice) +
-                   looked_at);
+  throw UsageError("no " + std::string(what) + " '" + std::string(choice) + "'; looked for\n  " +
+                   std::string(choice) + looked_at);
+}
+
+}  // namespace
+
+fs::path find_config(std::string_view choice) {
+  return find_in("benches", "bench file", choice);
+}
+
+fs::path find_experiment_file(std::string_view choice) {
+  return find_in("experiments", "experiment file", choice);
 }
 
 }  // namespace drivebench::command

@@ -16,5 +16,7 @@ std::filesystem::path server_executable();
 /// the folder DRIVEBENCH_CONFIGS, of `configs` here or of `configs` in a folder above the program. Throws
 /// UsageError with all places looked at.
 std::filesystem::path find_config(std::string_view choice);
+/// The same for experiments, in `experiments/` of these folders.
+std::filesystem::path find_experiment_file(std::string_view choice);
 
 }  // namespace drivebench::command

@@ -11,6 +11,7 @@
 #include "clients/command/control_run.hpp"
 #include "clients/command/demo_report.hpp"
 #include "clients/command/experiment_file.hpp"
+#include "clients/command/identify_report.hpp"
 #include "protocols/catalogue.hpp"
 
 /// All JSON that the command writes and reads, so that one file pays for the parser.
@@ -32,6 +33,9 @@ std::string export_json(std::string_view out_file, std::string_view axis, std::u
 /// `resumed`: how often a broken link was made anew.
 std::string experiment_json(const v1::ExperimentInfo& info, std::string_view out_file, std::uint64_t resumed);
 std::string experiments_json(const v1::ExperimentList& list);
+/// What identification::to_json says, and experiment, settings and validation.
+std::string identify_json(const IdentifyReport& report);
+std::string named_experiments_json();
 std::string demo_json(const DemoReport& report);
 std::string error_json(std::string_view kind, std::string_view message, std::string_view field);
 

@@ -10,6 +10,7 @@
 #include "clients/command/can_check.hpp"
 #include "clients/command/commands.hpp"
 #include "clients/command/experiment_line.hpp"
+#include "clients/command/identify_line.hpp"
 #include "clients/command/json.hpp"
 #include "clients/link/tcp_link.hpp"
 
@@ -80,6 +81,7 @@ struct CommandLine {
   ExportOptions export_;
   DemoOptions demo;
   ExperimentOptions experiment;
+  IdentifyOptions identify;
 
   CommandLine() {
     // Not CLI11's envname(): it lets the options of subcommands that were not named overwrite ours.
@@ -98,6 +100,8 @@ struct CommandLine {
     add_plot();
     add_experiment_commands(app, link, json, experiment,
                             [this](auto run_it) { action = [this, run_it] { return run_it(experiment); }; });
+    add_identify_command(app, link, json, identify,
+                         [this] { action = [this] { return run_identify(identify); }; });
   }
 
   bool knows(std::string_view subcommand) const {

@@ -201,6 +201,8 @@ MeasuredData parse_csv(std::string_view text, const std::string& source, const C
   if (options.period_s == 0.0) time = find_header(headers, options.time, cursor);
   if (!time && !(options.period_s > 0.0 && std::isfinite(options.period_s)))
     cursor.fail({}, "the period must be positive");
+  if (!(options.time_factor > 0.0 && std::isfinite(options.time_factor)))
+    cursor.fail(options.time, "the factor of the time must be positive");
 
   std::optional<std::size_t> blank;
   while (const auto line = next_line(text, cursor)) {
@@ -216,7 +218,7 @@ MeasuredData parse_csv(std::string_view text, const std::string& source, const C
     if (cells.size() != headers.size())
       cursor.fail(
           {}, fmt::format("{} values where the first line names {} columns", cells.size(), headers.size()));
-    if (time) time_s.push_back(number_of(cells[*time], headers[*time].name, cursor));
+    if (time) time_s.push_back(options.time_factor * number_of(cells[*time], headers[*time].name, cursor));
     for (Taken& t : taken)
       t.column.values.push_back(t.factor * number_of(cells[t.at], headers[t.at].name, cursor) + t.offset);
   }

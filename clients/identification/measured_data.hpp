@@ -45,6 +45,7 @@ struct CsvOptions {
   /// 1 %.
   double period_s = 0.0;
   std::string time = "time_s";
+  double time_factor = 1.0;  ///< seconds in a unit of that column
 };
 
 /// Reads comma- or semicolon-separated numbers under a header line; "name [unit]" is split. As `drivebench

@@ -9,15 +9,15 @@
 namespace drivebench::identification {
 namespace {
 
-bool is_unseen(const Result& result, const std::string& name) {
-  const auto& unseen = result.excitation.unseen;
-  return std::find(unseen.begin(), unseen.end(), name) != unseen.end();
-}
-
 std::string percent(double part, double of) {
   const double value = 100.0 * part / std::abs(of);
   if (!std::isfinite(value)) return "-";
   return std::abs(value) >= 1e4 ? fmt::format("{:.1e} %", value) : fmt::format("{:.3g} %", value);
+}
+
+const char* inside_text(const Result& result, const Estimate& e) {
+  const std::optional<bool> inside = is_inside(result, e);
+  return !inside ? "-" : *inside ? "yes" : "no";
 }
 
 nlohmann::json number(double x) {
@@ -93,6 +93,15 @@ double Result::at(std::string_view name) const {
   throw IdentificationError(fmt::format("the result has no parameter {}", name));
 }
 
+bool Result::is_unseen(std::string_view name) const noexcept {
+  return std::find(excitation.unseen.begin(), excitation.unseen.end(), name) != excitation.unseen.end();
+}
+
+std::optional<bool> is_inside(const Result& result, const Estimate& e) noexcept {
+  if (!e.truth || result.is_unseen(e.name)) return std::nullopt;
+  return std::abs(e.value - *e.truth) <= e.index;
+}
+
 void Result::compare(const std::map<std::string, double, std::less<>>& truth) {
   for (Estimate& e : parameters) {
     const auto known = truth.find(e.name);
@@ -103,15 +112,16 @@ void Result::compare(const std::map<std::string, double, std::less<>>& truth) {
 std::string to_markdown(const Result& r) {
   std::string text = fmt::format("{}, {} samples\n\n", r.method, r.samples);
   text += fmt::format(
-      "| parameter | unit | estimate | index (x{}) | truth | error |\n|---|---|---|---|---|---|\n",
+      "| parameter | unit | estimate | index (x{}) | truth | error | inside index "
+      "|\n|---|---|---|---|---|---|---|\n",
       r.index_factor);
   for (const Estimate& e : r.parameters) {
-    const bool hidden = is_unseen(r, e.name);
+    const bool hidden = r.is_unseen(e.name);
     text +=
-        fmt::format("| {} | {} | {} | {} | {} | {} |\n", e.name, e.unit,
+        fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", e.name, e.unit,
                     hidden ? "not seen" : fmt::format("{:.6g}", e.value),
                     hidden ? "-" : percent(e.index, e.value), e.truth ? fmt::format("{:.6g}", *e.truth) : "-",
-                    e.truth && !hidden ? percent(e.value - *e.truth, *e.truth) : "-");
+                    e.truth && !hidden ? percent(e.value - *e.truth, *e.truth) : "-", inside_text(r, e));
   }
   text += fmt::format("\nError index {:.4g}", r.error_index);
   if (r.mechanical_error_index) text += fmt::format(", mechanical {:.4g}", *r.mechanical_error_index);
@@ -124,10 +134,12 @@ std::string to_markdown(const Result& r) {
 std::string to_json(const Result& r) {
   nlohmann::json parameters = nlohmann::json::object();
   for (const Estimate& e : r.parameters) {
-    nlohmann::json row = {{"estimate", is_unseen(r, e.name) ? nlohmann::json(nullptr) : number(e.value)},
+    nlohmann::json row = {{"estimate", r.is_unseen(e.name) ? nlohmann::json(nullptr) : number(e.value)},
                           {"unit", e.unit},
                           {"index", number(e.index)}};
     row["truth"] = e.truth ? number(*e.truth) : nlohmann::json(nullptr);
+    const std::optional<bool> inside = is_inside(r, e);
+    row["inside"] = inside ? nlohmann::json(*inside) : nlohmann::json(nullptr);
     parameters[e.name] = row;
   }
   nlohmann::json all = {{"kind", r.kind},

@@ -40,16 +40,23 @@ struct Result {
   const Estimate* find(std::string_view name) const noexcept;
   /// Its value; throws IdentificationError if there is none.
   double at(std::string_view name) const;
+  /// The data do not hold this parameter.
+  bool is_unseen(std::string_view name) const noexcept;
   /// Puts the truth beside the estimates of these names.
   void compare(const std::map<std::string, double, std::less<>>& truth);
 };
 
-/// A table: parameter, unit, estimate, index in percent, truth, error in percent; verdict and notes below it.
+/// Whether the truth lies within the index of the estimate: what the index promised. Nothing if the truth is
+/// not known or the parameter was not seen.
+std::optional<bool> is_inside(const Result& result, const Estimate& estimate) noexcept;
+
+/// A table: parameter, unit, estimate, index in percent, truth, error in percent, whether the index held the
+/// truth; verdict and notes below it.
 /// If the excitation was not sufficient, unseen parameters show no number.
 std::string to_markdown(const Result& result);
 
-/// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, index, truth}}, ...}; a
-/// number that is not finite and the estimate of an unseen parameter are null.
+/// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, index, truth, inside}},
+/// ...}; a number that is not finite and the estimate of an unseen parameter are null.
 std::string to_json(const Result& result);
 
 /// What a motor file needs beside the estimates.

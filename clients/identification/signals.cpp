@@ -15,6 +15,29 @@ void need(SeriesView x, std::size_t samples) {
                               " samples, there are " + std::to_string(x.size()));
 }
 
+/// The cubic through the four samples around a place that lies so many samples after another one.
+class Cubic {
+ public:
+  explicit Cubic(double samples) noexcept : whole_(static_cast<std::ptrdiff_t>(std::floor(samples))) {
+    const double t = samples - std::floor(samples);
+    weight_ = {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+               -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0};
+  }
+  double at(SeriesView x, std::ptrdiff_t sample) const noexcept {
+    const auto last = static_cast<std::ptrdiff_t>(x.size()) - 1;
+    double sum = 0.0;
+    for (std::ptrdiff_t j = 0; j < 4; ++j) {
+      const std::ptrdiff_t place = std::clamp(sample + whole_ + j - 1, std::ptrdiff_t{0}, last);
+      sum += weight_[static_cast<std::size_t>(j)] * x[static_cast<std::size_t>(place)];
+    }
+    return sum;
+  }
+
+ private:
+  std::ptrdiff_t whole_;
+  std::array<double, 4> weight_{};
+};
+
 }  // namespace
 
 Series central_difference(SeriesView x, double period_s) {
@@ -59,23 +82,16 @@ Series midpoints(SeriesView x) {
 
 Series advanced(SeriesView x, double samples) {
   if (samples == 0.0 || x.empty()) return {x.begin(), x.end()};
-  const double whole = std::floor(samples);
-  const double t = samples - whole;
-  const std::array<double, 4> weight = {-t * (t - 1.0) * (t - 2.0) / 6.0,
-                                        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-                                        -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0};
-  const auto last = static_cast<std::ptrdiff_t>(x.size()) - 1;
+  const Cubic cubic(samples);
   Series y(x.size());
-  for (std::ptrdiff_t k = 0; k <= last; ++k) {
-    double sum = 0.0;
-    for (std::ptrdiff_t j = 0; j < 4; ++j) {
-      const std::ptrdiff_t at =
-          std::clamp(k + static_cast<std::ptrdiff_t>(whole) + j - 1, std::ptrdiff_t{0}, last);
-      sum += weight[static_cast<std::size_t>(j)] * x[static_cast<std::size_t>(at)];
-    }
-    y[static_cast<std::size_t>(k)] = sum;
-  }
+  for (std::size_t k = 0; k < x.size(); ++k)
+    y[k] = cubic.at(x, static_cast<std::ptrdiff_t>(k));
   return y;
+}
+
+double value_at(SeriesView x, double position) noexcept {
+  const double place = std::clamp(position, 0.0, static_cast<double>(x.size() - 1));
+  return Cubic(place).at(x, 0);
 }
 
 TwoPhaseSeries two_phase(SeriesView a, SeriesView b, SeriesView c) {

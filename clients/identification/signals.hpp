@@ -20,6 +20,10 @@ Series midpoints(SeriesView x);
 /// was commanded and reaches the terminals 1.6 periods later: advanced(u, -1.6 - 0.5).
 Series advanced(SeriesView x, double samples);
 
+/// The value at a place between samples, by the same cubic; beyond its ends the record stays at its last
+/// value. The series must not be empty.
+double value_at(SeriesView x, double position) noexcept;
+
 /// Two-phase quantities in some frame.
 struct TwoPhaseSeries {
   Series a;

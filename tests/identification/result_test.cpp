@@ -13,7 +13,7 @@ namespace {
 Result some_result() {
   Result r = {.kind = "induction", .method = "a method"};
   r.parameters = {{"R_S", "ohm", 9.7, 0.1, {}},    {"L_S", "H", 0.67, 0.01, {}},
-                  {"M", "H", 0.64, 0.01, {}},      {"R_R", "ohm", 8.0, INFINITY, {}},
+                  {"M", "H", 0.64, 0.01, {}},      {"R_R", "ohm", 8.0, HUGE_VAL, {}},
                   {"J", "kg*m^2", 0.011, 0.0, {}}, {"f", "N*m*s/rad", -1e-5, 0.0, {}}};
   r.excitation.verdict = "the data see every parameter";
   return r;
@@ -30,6 +30,23 @@ TEST(IdentificationResult, AsJson) {
   EXPECT_TRUE(json["parameters"]["L_S"]["truth"].is_null());
   EXPECT_TRUE(json["parameters"]["R_R"]["index"].is_null());
   EXPECT_EQ(json["identifiable"], true);
+}
+
+// An index that held the truth says so, one that did not too. Kills: a comparison of the relative with the
+// absolute, a verdict without truth.
+TEST(IdentificationResult, TellsWhetherTheIndexHeldTheTruth) {
+  Result r = some_result();
+  r.compare({{"R_S", 9.79}, {"L_S", 0.69}});
+  EXPECT_EQ(is_inside(r, *r.find("R_S")), true);
+  EXPECT_EQ(is_inside(r, *r.find("L_S")), false);
+  EXPECT_EQ(is_inside(r, *r.find("M")), std::nullopt);
+  const nlohmann::json json = nlohmann::json::parse(to_json(r));
+  EXPECT_EQ(json["parameters"]["R_S"]["inside"], true);
+  EXPECT_EQ(json["parameters"]["L_S"]["inside"], false);
+  EXPECT_TRUE(json["parameters"]["M"]["inside"].is_null());
+  EXPECT_NE(to_markdown(r).find("| L_S | H | 0.67 | 1.49 % | 0.69 | -2.9 % | no |"), std::string::npos);
+  r.excitation.unseen = {"R_S"};
+  EXPECT_EQ(is_inside(r, *r.find("R_S")), std::nullopt);
 }
 
 // Kills: a number in the table that the data do not hold.

@@ -1,0 +1,235 @@
+#include "clients/identification/resimulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "clients/identification/induction_regressor.hpp"
+#include "clients/identification/motor_models.hpp"
+#include "clients/identification/motors.hpp"
+
+namespace drivebench::identification {
+namespace {
+
+constexpr double kStepOfRate = 0.2;
+constexpr int kMostSteps = 1000;
+constexpr double kBeyondAllBounds = 1e9;  // [A] or [rad/s]
+
+/// The measured signals that drive a model and stand beside it.
+struct Measured {
+  std::vector<Series> u;
+  std::vector<SeriesView> i;
+  ShaftSignals shaft;
+  double voltage_shift;
+  double pole_pairs;
+
+  Measured(const MeasuredData& data, const Experiment& e)
+      : shaft(shaft_signals(data, e)), voltage_shift(e.processing.voltage_shift), pole_pairs(e.pole_pairs) {
+    const std::size_t phases = e.kind == MotorKind::kDc                      ? 1
+                               : e.kind == MotorKind::kBldc || e.three_phase ? 3
+                                                                             : 2;
+    for (std::size_t k = 0; k < phases; ++k) {
+      const char phase = static_cast<char>('a' + k);
+      const SeriesView voltage = data.at(fmt::format("u_{}_v", phase));
+      u.emplace_back(voltage.begin(), voltage.end());
+      i.push_back(data.at(fmt::format("i_{}_a", phase)));
+    }
+    continue_to_begin();
+  }
+
+  MotorInput input(double position) const noexcept {
+    MotorInput in{.u = {}, .electrical_rad = pole_pairs * value_at(shaft.angle, position)};
+    for (std::size_t k = 0; k < u.size(); ++k)
+      in.u[k] = value_at(u[k], position + voltage_shift);
+    return in;
+  }
+  std::array<double, 3> currents(std::size_t sample) const noexcept {
+    std::array<double, 3> values{};
+    for (std::size_t k = 0; k < i.size(); ++k)
+      values[k] = i[k][sample];
+    return values;
+  }
+
+ private:
+  /// Before the first tick of a bench there was no voltage, so that sample 0 shows none: the next two tell
+  /// what it would have been.
+  void continue_to_begin() {
+    if (std::ranges::any_of(u, [](const Series& x) { return x[0] != 0.0; })) return;
+    for (Series& x : u)
+      x[0] = 2.0 * x[1] - x[2];
+  }
+};
+
+double largest(SeriesView x) {
+  double most = 0.0;
+  for (const double value : x)
+    most = std::max(most, std::abs(value));
+  return most;
+}
+
+/// The first samples have neither speed nor current worth mentioning.
+bool begins_at_rest(const Measured& m) {
+  constexpr double kNoCurrent = 0.01;
+  constexpr double kNoSpeed = 0.05;  // the filter sees a start some samples early
+  if (std::abs(m.shaft.speed[0]) > kNoSpeed * largest(m.shaft.speed)) return false;
+  return std::ranges::all_of(m.i, [&](SeriesView i) { return std::abs(i[0]) <= kNoCurrent * largest(i); });
+}
+
+template <class State>
+State sum(const State& x, double factor, const State& slope) {
+  State y = x;
+  for (std::size_t k = 0; k < y.size(); ++k)
+    y[k] += factor * slope[k];
+  return y;
+}
+
+/// One classical Runge-Kutta step; `begin` and `length` in samples.
+template <class Model>
+typename Model::State stepped(const Model& model, const Measured& m, const typename Model::State& x,
+                              double begin, double length, double period_s) {
+  const double h = length * period_s;
+  const MotorInput middle = m.input(begin + 0.5 * length);
+  const auto k1 = model.slope(x, m.input(begin));
+  const auto k2 = model.slope(sum(x, 0.5 * h, k1), middle);
+  const auto k3 = model.slope(sum(x, 0.5 * h, k2), middle);
+  const auto k4 = model.slope(sum(x, h, k3), m.input(begin + length));
+  auto y = x;
+  for (std::size_t k = 0; k < y.size(); ++k)
+    y[k] += h / 6.0 * (k1[k] + 2.0 * k2[k] + 2.0 * k3[k] + k4[k]);
+  model.settle(y, x);
+  return y;
+}
+
+/// Measured signals of the window, with room for the simulated ones.
+Resimulation prepared(const Measured& m, const MeasuredData& data, const SampleRange& range) {
+  Resimulation out;
+  out.period_s = data.period_s;
+  out.start_s = data.period_s * static_cast<double>(range.first);
+  const auto add = [&](std::string name, std::string unit, SeriesView values) {
+    const SeriesView window = values.subspan(range.first, range.count());
+    out.signals.push_back({std::move(name), std::move(unit), {window.begin(), window.end()}, {}});
+    out.signals.back().simulated.reserve(range.count());
+  };
+  for (std::size_t k = 0; k < m.i.size(); ++k)
+    add(fmt::format("i_{}_a", static_cast<char>('a' + k)), "A", m.i[k]);
+  add("speed_rad_s", "rad/s", m.shaft.speed);
+  return out;
+}
+
+void rate(Resimulated& s) {
+  double mean = 0.0;
+  for (const double value : s.measured)
+    mean += value;
+  mean /= static_cast<double>(s.measured.size());
+  double errors = 0.0;
+  double variation = 0.0;
+  for (std::size_t k = 0; k < s.measured.size(); ++k) {
+    errors += (s.simulated[k] - s.measured[k]) * (s.simulated[k] - s.measured[k]);
+    variation += (s.measured[k] - mean) * (s.measured[k] - mean);
+  }
+  s.rms_error = std::sqrt(errors / static_cast<double>(s.measured.size()));
+  s.normalised = variation > 0.0 ? std::sqrt(errors / variation) : std::numeric_limits<double>::quiet_NaN();
+}
+
+template <class Model>
+Resimulation run(const Model& model, typename Model::State x, const Measured& m, const MeasuredData& data,
+                 const SampleRange& range, bool from_rest) {
+  Resimulation out = prepared(m, data, range);
+  out.from_rest = from_rest;
+  const double rate_of_model = model.fastest_rate(largest(m.shaft.speed));
+  const double steps = std::ceil(data.period_s * rate_of_model / kStepOfRate);
+  if (!(steps <= kMostSteps))
+    throw IdentificationError("no re-simulation: the motor found is too fast for the period of the data");
+  const int substeps = std::max(1, static_cast<int>(steps));
+  const double length = 1.0 / substeps;
+  for (std::size_t k = from_rest ? 0 : range.first; k < range.end; ++k) {
+    const auto at = static_cast<double>(k);
+    if (k >= range.first) {
+      const std::array<double, 3> i = model.currents(x, m.input(at));
+      for (std::size_t phase = 0; phase < m.i.size(); ++phase)
+        out.signals[phase].simulated.push_back(i[phase]);
+      out.signals.back().simulated.push_back(x[Model::kSpeed]);
+    }
+    for (int n = 0; n < substeps; ++n)
+      x = stepped(model, m, x, at + n * length, length, data.period_s);
+    for (const double value : x) {
+      if (!(std::abs(value) < kBeyondAllBounds))
+        throw IdentificationError("no re-simulation: the motor found leaves all bounds on these voltages");
+    }
+  }
+  for (Resimulated& signal : out.signals)
+    rate(signal);
+  return out;
+}
+
+template <class Model>
+Resimulation run_from_measured(const Model& model, const Measured& m, const MeasuredData& data,
+                               const SampleRange& range) {
+  const bool rest = begins_at_rest(m);
+  const std::size_t start = rest ? 0 : range.first;
+  auto x = model.state_of(m.currents(start), m.shaft.speed[start], m.input(static_cast<double>(start)));
+  if (rest) x = {};
+  return run(model, x, m, data, range, rest);
+}
+
+/// phi of an instant from the voltage equation, in the stator's frame: Chiasson 2005, (8.123).
+std::complex<double> flux_of(const InductionModel& model, const InductionInstant& s, double electrical_rad) {
+  const std::complex<double> i(s.i_x, s.i_y);
+  const std::complex<double> slope(s.slope_x, s.slope_y);
+  const std::complex<double> u(s.u_x, s.u_y);
+  const double omega_e = model.pole_pairs * s.speed;
+  const std::complex<double> phi =
+      (model.transient_h * (slope + std::complex<double>(model.gamma, omega_e) * i) - u) /
+      std::complex<double>(model.rotor_rate, -omega_e);
+  return phi * std::polar(1.0, electrical_rad);
+}
+
+Resimulation run_induction(const InductionModel& model, const Measured& m, const MeasuredData& data,
+                           const Experiment& e, const SampleRange& range) {
+  if (begins_at_rest(m)) return run(model, {}, m, data, range, true);
+  const std::size_t start = range.first;
+  const MotorInput in = m.input(static_cast<double>(start));
+  auto x = model.state_of(m.currents(start), m.shaft.speed[start], in);
+  const std::complex<double> phi = flux_of(model, induction_instants(data, e)[start], in.electrical_rad);
+  x[2] = phi.real();
+  x[3] = phi.imag();
+  return run(model, x, m, data, range, false);
+}
+
+/// What has to be positive for the equations to be those of a motor.
+void check(const Result& result) {
+  if (!result.excitation.sufficient)
+    throw IdentificationError("no re-simulation: " + result.excitation.verdict);
+  for (const char* name : {"R", "L", "K_T", "R_S", "L_S", "T_R", "sigma", "K_m", "L+M", "tau_p", "J"}) {
+    const Estimate* const e = result.find(name);
+    if (e != nullptr && !(e->value > 0.0 && std::isfinite(e->value)))
+      throw IdentificationError(
+          fmt::format("no re-simulation: {} = {} is no value for a motor", name, e->value));
+  }
+}
+
+}  // namespace
+
+Resimulation resimulate(const MeasuredData& data, const Experiment& e, const Result& result) {
+  check(result);
+  const SampleRange range = window_of(data, e.processing);
+  const Measured m(data, e);
+  switch (e.kind) {
+    case MotorKind::kDc:
+      return run_from_measured(DcModel(result), m, data, range);
+    case MotorKind::kInduction:
+      return run_induction(InductionModel(result, e), m, data, e, range);
+    case MotorKind::kPmSynchronous:
+      return run_from_measured(PmModel(result, e), m, data, range);
+    case MotorKind::kBldc:
+      break;
+  }
+  return run_from_measured(BldcModel(result), m, data, range);
+}
+
+}  // namespace drivebench::identification
