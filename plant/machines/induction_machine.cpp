@@ -44,14 +44,6 @@ InductionMachineState restricted(const InductionMachineConstants&, const Inducti
   return {.i_a_a = current_a.a, .i_b_a = current_a.b, .psi_a_wb = x.psi_a_wb, .psi_b_wb = x.psi_b_wb};
 }
 
-WindingValues open_circuit_voltages(const InductionMachineConstants& c, const InductionMachineState& x,
-                                    const RotorMotion& motion) noexcept {
-  const double omega_e = c.pole_pairs * motion.speed_rad_s;
-  const double flux_ratio = c.transient_inductance_h * c.beta_per_h;
-  return {.stator = {-flux_ratio * (c.eta_per_s * x.psi_a_wb + omega_e * x.psi_b_wb),
-                     -flux_ratio * (c.eta_per_s * x.psi_b_wb - omega_e * x.psi_a_wb)}};
-}
-
 TwoPhase rotor_flux_wb(const InductionMachineConstants&, const InductionMachineState& x,
                        const RotorMotion&) noexcept {
   return {x.psi_a_wb, x.psi_b_wb};

@@ -100,8 +100,13 @@ InductionMachineState restricted(const InductionMachineConstants& c, const Induc
                                  const RotorMotion& motion, const TerminalInput& u) noexcept;
 
 /// Voltages of the windings where no current flows and none changes.
-WindingValues open_circuit_voltages(const InductionMachineConstants& c, const InductionMachineState& x,
-                                    const RotorMotion& motion) noexcept;
+inline WindingValues open_circuit_voltages(const InductionMachineConstants& c, const InductionMachineState& x,
+                                           const RotorMotion& motion) noexcept {
+  const double omega_e = c.pole_pairs * motion.speed_rad_s;
+  const double flux_ratio = c.transient_inductance_h * c.beta_per_h;
+  return {.stator = {-flux_ratio * (c.eta_per_s * x.psi_a_wb + omega_e * x.psi_b_wb),
+                     -flux_ratio * (c.eta_per_s * x.psi_b_wb - omega_e * x.psi_a_wb)}};
+}
 
 /// Rotor flux linkage in the stator frame.
 TwoPhase rotor_flux_wb(const InductionMachineConstants& c, const InductionMachineState& x,

@@ -38,9 +38,9 @@ struct ShuntDcMachineState {
 /// The slopes with open terminals. Armature and field are one loop then, i = -i_f, and drive each other; with
 /// little resistance and enough speed the machine excites itself until the iron saturates:
 ///   (lambda_f - L i)' = K_m lambda_f w - (R + R_F) i_f
-/// There is no remanence: it needs some field current to begin with.
-ShuntDcMachineState open_derivative(const ShuntDcMachineConstants& c, ShuntDcMachineState x,
-                                    double speed_rad_s) noexcept;
+/// There is no remanence: it needs some field current to begin with. Cold: see SeriesDcMachine.
+[[gnu::cold]] ShuntDcMachineState open_derivative(const ShuntDcMachineConstants& c, ShuntDcMachineState x,
+                                                  double speed_rad_s) noexcept;
 
 ///   L i'      = -R i - K_m lambda_f w + u
 ///   lambda_f' = -R_F i_f + u,           i_f = f^-1(lambda_f),  R_F = R_f + R_adj
