@@ -307,7 +307,7 @@ class ThreadedEngine final : public Engine {
   }
 
   // In free mode a wake-up costs more than several ticks; the ring holds what comes in between.
-  static constexpr std::size_t kEventsPerWake = 256;
+  static constexpr std::size_t kEventsPerWake = 1024;
 
   static constexpr std::size_t kMaxParameters = 256;
   using ParameterValues = std::array<double, kMaxParameters>;
