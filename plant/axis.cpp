@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "plant/drive/phases.hpp"
 #include "plant/rounding.hpp"
 #include "plant/shared_shaft.hpp"
 
@@ -79,17 +80,13 @@ void wrap_angle(AxisState& state) noexcept {
 /// for it.
 void forget_negligible(AxisState& state) noexcept {
   constexpr double kNegligible = 1e-200;
-  for (double& word : state.machine) {
-    if (std::abs(word) < kNegligible) word = 0.0;
-  }
-  for (double& value : state.sensors.filtered) {
-    if (std::abs(value) < kNegligible) value = 0.0;
-  }
-  for (double* const value :
-       {&state.drive.filtered_v.a, &state.drive.filtered_v.b, &state.drive.filtered_v.c}) {
-    if (std::abs(*value) < kNegligible) *value = 0.0;
-  }
-  if (std::abs(state.shaft.speed_rad_s) < kNegligible) state.shaft.speed_rad_s = 0.0;
+  const auto kept = [](double x) { return std::abs(x) < kNegligible ? 0.0 : x; };
+  for (double& word : state.machine)
+    word = kept(word);
+  for (double& value : state.sensors.filtered)
+    value = kept(value);
+  state.drive.filtered_v = by_phase(kept, state.drive.filtered_v);
+  state.shaft.speed_rad_s = kept(state.shaft.speed_rad_s);
 }
 
 }  // namespace
