@@ -113,21 +113,20 @@ void take_facts(const BenchParameters& bench, std::string_view drive, int subste
   facts.voltage_held_ticks = 1.0;
   facts.note.clear();
   const double delay_ticks = read.or_else("amplifier.delay_ticks", 0.0);
-  if (drive == "source") {
+  const bool filtered = drive != "current_amplifier" && drive != "switched_inverter" &&
+                        read.or_else("amplifier.filter_hz", 0.0) > 0.0;
+  if (drive == "source" || filtered) {
     facts.voltage_held_ticks = 0.0;
   } else if (drive == "current_amplifier") {
     facts.voltage_held_ticks = 1.0 / std::max(1, substeps);
     if (substeps > 1)
       facts.note =
           "the current amplifier moves its voltage within a tick, of which the data show the end: "
-          "inductances are "
-          "too small unless a tick is one step";
+          "inductances "
+          "are too small unless a tick is one step";
   } else if (drive == "switched_inverter") {
     facts.note =
-        "the voltages are those of the switches at the end of each tick, not means: do not trust these "
-        "numbers";
-  } else if (read.or_else("amplifier.filter_hz", 0.0) > 0.0) {
-    facts.voltage_held_ticks = 0.0;
+        "the voltages are those of the switches at the end of a tick, not means: do not trust these numbers";
   } else if (delay_ticks != std::floor(delay_ticks)) {
     facts.note =
         "commands take hold within a tick, of which the data show the end: voltages are up to a tick early";
