@@ -13,8 +13,8 @@ namespace drivebench {
 class Digest {
  public:
   constexpr void add(std::uint64_t word) noexcept {
-    std::uint64_t& lane = lanes_[position_++ & 3u];
-    lane = mixed(lane, word);
+    lane_at(0) = mixed(lane_at(0), word);
+    ++position_;
   }
 
   /// Adds a struct of 8-byte members word by word.
@@ -28,19 +28,25 @@ class Digest {
       std::memcpy(&result, bytes + 8 * n, 8);
       return result;
     };
-    std::size_t next = 0;
-    for (; next < kWords && (position_ & 3u) != 0; ++next)
-      add(word(next));
-    auto [first, second, third, fourth] = lanes_;  // in registers
-    for (; next + 4 <= kWords; next += 4, position_ += 4) {
+    constexpr std::size_t kInFours = kWords - kWords % 4;
+    std::uint64_t first = lane_at(0);  // all four in registers
+    std::uint64_t second = lane_at(1);
+    std::uint64_t third = lane_at(2);
+    std::uint64_t fourth = lane_at(3);
+    for (std::size_t next = 0; next < kInFours; next += 4) {
       first = mixed(first, word(next));
       second = mixed(second, word(next + 1));
       third = mixed(third, word(next + 2));
       fourth = mixed(fourth, word(next + 3));
     }
-    lanes_ = {first, second, third, fourth};
-    for (; next < kWords; ++next)
-      add(word(next));
+    if constexpr (kWords % 4 > 0) first = mixed(first, word(kInFours));
+    if constexpr (kWords % 4 > 1) second = mixed(second, word(kInFours + 1));
+    if constexpr (kWords % 4 > 2) third = mixed(third, word(kInFours + 2));
+    lane_at(0) = first;
+    lane_at(1) = second;
+    lane_at(2) = third;
+    lane_at(3) = fourth;
+    position_ += kWords;
   }
 
   /// Of the words so far, their order and their number.
@@ -52,6 +58,9 @@ class Digest {
   }
 
  private:
+  /// The lane of the n-th word from here.
+  constexpr std::uint64_t& lane_at(std::size_t n) noexcept { return lanes_[(position_ + n) & 3u]; }
+
   static constexpr std::uint64_t mixed(std::uint64_t lane, std::uint64_t word) noexcept {
     return std::rotl((lane ^ word) * 0x9e37'79b9'7f4a'7c15u, 29);
   }

@@ -17,7 +17,7 @@ class SpscRing {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  explicit SpscRing(std::size_t capacity) : slots_(std::bit_ceil(capacity)) {}
+  explicit SpscRing(std::size_t capacity) : slots_(std::bit_ceil(capacity)), mask_(slots_.size() - 1) {}
 
   /// Producer: false if the ring is full.
   bool push(const T& value) noexcept { return emplace(value); }
@@ -26,11 +26,11 @@ class SpscRing {
   template <class... Arguments>
   bool emplace(Arguments&&... arguments) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
-    if (tail - head_seen_ == slots_.size()) {
+    if (tail - head_seen_ > mask_) {
       head_seen_ = head_.load(std::memory_order_acquire);
-      if (tail - head_seen_ == slots_.size()) return false;
+      if (tail - head_seen_ > mask_) return false;
     }
-    std::construct_at(&slots_[tail & (slots_.size() - 1)], std::forward<Arguments>(arguments)...);
+    std::construct_at(&slots_[tail & mask_], std::forward<Arguments>(arguments)...);
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }
@@ -38,7 +38,7 @@ class SpscRing {
   /// Producer: how many more would fit now.
   std::size_t room() noexcept {
     head_seen_ = head_.load(std::memory_order_acquire);
-    return slots_.size() - (tail_.load(std::memory_order_relaxed) - head_seen_);
+    return mask_ + 1 - (tail_.load(std::memory_order_relaxed) - head_seen_);
   }
 
   /// Consumer: the oldest entry, or null. It stays valid until pop().
@@ -48,16 +48,17 @@ class SpscRing {
       tail_seen_ = tail_.load(std::memory_order_acquire);
       if (head == tail_seen_) return nullptr;
     }
-    return &slots_[head & (slots_.size() - 1)];
+    return &slots_[head & mask_];
   }
   void pop() noexcept { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
-  std::size_t capacity() const noexcept { return slots_.size(); }
+  std::size_t capacity() const noexcept { return mask_ + 1; }
 
  private:
   static constexpr std::size_t kCacheLine = 64;
 
   std::vector<T> slots_;
+  std::size_t mask_;  // of an index into them
   alignas(kCacheLine) std::atomic<std::size_t> head_{0};
   std::size_t tail_seen_ = 0;  // of the consumer
   alignas(kCacheLine) std::atomic<std::size_t> tail_{0};
