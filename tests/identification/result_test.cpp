@@ -45,6 +45,8 @@ TEST(IdentificationResult, TellsWhetherTheIndexHeldTheTruth) {
   EXPECT_EQ(json["parameters"]["L_S"]["inside"], false);
   EXPECT_TRUE(json["parameters"]["M"]["inside"].is_null());
   EXPECT_NE(to_markdown(r).find("| L_S | H | 0.67 | 1.49 % | 0.69 | -2.9 % | no |"), std::string::npos);
+  r.compare({{"R_S", 10.0}});  // 3 % away, with an index of 0.1 ohm
+  EXPECT_EQ(is_inside(r, *r.find("R_S")), false);
   r.excitation.unseen = {"R_S"};
   EXPECT_EQ(is_inside(r, *r.find("R_S")), std::nullopt);
 }
