@@ -118,7 +118,7 @@ TEST(Modbus, MB_08_PipelinedRequestsAreAnsweredInOrder) {
 
 // Catches: a peer that floods and starves the others, or is served for ever; a limit that an honest owner
 // meets.
-TEST(Modbus, MB_09_AFloodIsRefusedAndThenCut) {
+TEST(Modbus, MB_09_LIMIT_06_AFloodIsRefusedAndThenCut) {
   BenchConfig config = modbus_bench_config();
   config.modbus.requests_per_s = 100;
   ModbusBench bench(config);
@@ -154,7 +154,7 @@ TEST(Modbus, MB_09_AFloodIsRefusedAndThenCut) {
 }
 
 // Catches: a time-out that every byte starts anew, one that meets another connection, or none.
-TEST(Modbus, MB_10_AFrameThatDripsIsCutOff) {
+TEST(Modbus, MB_10_LIMIT_06_AFrameThatDripsIsCutOff) {
   BenchConfig config = modbus_bench_config();
   config.modbus.frame_timeout_ms = 50;
   ModbusBench bench(config);

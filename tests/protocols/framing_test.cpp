@@ -53,7 +53,7 @@ TEST(Framing, LengthIsFourBytesBigEndian) {
 }
 
 // Catches: an off-by-one at either end of what is allowed. TCP-01.
-TEST(Framing, TCP_01_OneAndMaxPassZeroAndMaxPlusOneDoNot) {
+TEST(Framing, TCP_01_LIMIT_01_OneAndMaxPassZeroAndMaxPlusOneDoNot) {
   for (const std::size_t good : {std::size_t{1}, std::size_t{2}, std::size_t{100}}) {
     Stream stream(100);
     stream.feed(frame(good));

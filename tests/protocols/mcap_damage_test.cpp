@@ -33,7 +33,7 @@ Bytes without_checksums(Bytes file) {
 }
 
 // Catches: a read past the end, a message made of a torn record, a torn file that passes for whole.
-TEST(McapReader, FileCutAtAnyByteGivesItsFirstMessagesAndSaysTruncated) {
+TEST(McapReader, REC_01_REC_09_FileCutAtAnyByteGivesItsFirstMessagesAndSaysTruncated) {
   std::vector<Kept> written;
   const Bytes file = small_file(written);
   std::size_t last_count = 0;
@@ -50,7 +50,7 @@ TEST(McapReader, FileCutAtAnyByteGivesItsFirstMessagesAndSaysTruncated) {
 }
 
 // Catches: a part of the file that no checksum and no rule covers.
-TEST(McapReader, EverySingleFlippedBitIsNoticed) {
+TEST(McapReader, REC_09_EverySingleFlippedBitIsNoticed) {
   std::vector<Kept> written;
   for (Bytes file : {tiny_file(), small_file(written)}) {
     ASSERT_FALSE(read_all(file).problem);
@@ -81,7 +81,7 @@ TEST(McapReader, DamagedChunkDeliversNoMessage) {
 
 // Catches: any length, id or count that is trusted once the checksums do not stand in front of it (a forger
 // sets them right). Nothing may crash or run on; the sanitizers watch.
-TEST(McapReader, HostileFilesWithoutChecksumsNeverCrash) {
+TEST(McapReader, REC_09_HostileFilesWithoutChecksumsNeverCrash) {
   std::vector<Kept> written;
   const std::array<Bytes, 2> files{without_checksums(tiny_file()), without_checksums(small_file(written))};
   constexpr auto kNasty = std::to_array<std::uint64_t>(

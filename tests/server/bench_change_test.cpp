@@ -204,7 +204,7 @@ TEST(BenchBump, ChangesTheSpeedByItsImpulse) {
 // The answers go on, so that a controller in lockstep is not stopped; only the drive gets nothing. Kills: a
 // lost command that feeds the watchdog or reaches the plant, a lease that runs out although its holder talks,
 // a bench that stops.
-TEST(BenchFault, CommandLossKeepsCommandsFromTheDriveAndTheWatchdogSeesIt) {
+TEST(BenchFault, CMD_02_CommandLossKeepsCommandsFromTheDriveAndTheWatchdogSeesIt) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 10;
   setup.lease_ticks = 15;

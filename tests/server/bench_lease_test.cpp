@@ -13,7 +13,7 @@ constexpr Owner kOther = 8;
 
 // Last command in tick 10, watchdog of 5: held in ticks 11 to 14, safe from tick 15 on. Kills: an off-by-one,
 // a fault that clears itself, a hold at zero volts.
-TEST(BenchLease, TheWatchdogActsExactlyItsTicksAfterTheLastCommand) {
+TEST(BenchLease, CMD_02_LIMIT_07_TheWatchdogActsExactlyItsTicksAfterTheLastCommand) {
   for (const SafeAction action : {SafeAction::kFreewheel, SafeAction::kZeroVoltage}) {
     for (const int delay : {0, 1}) {
       BenchSetup setup = servo_setup(delay);
@@ -44,7 +44,7 @@ TEST(BenchLease, TheWatchdogActsExactlyItsTicksAfterTheLastCommand) {
 }
 
 // Kills: a latch that commands, other clients or time can undo; a clear that leaves the old voltage in force.
-TEST(BenchLease, ATimeoutIsLatchedUntilItsOwnerClearsIt) {
+TEST(BenchLease, CMD_03_CMD_04_ATimeoutIsLatchedUntilItsOwnerClearsIt) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 3;
   Bench bench = owned_bench(setup, kOwner);
@@ -69,7 +69,7 @@ TEST(BenchLease, ATimeoutIsLatchedUntilItsOwnerClearsIt) {
 }
 
 // Kills: late ticks that starve the watchdog, or that reset it.
-TEST(BenchLease, LateTicksNeitherFeedNorStarveTheWatchdog) {
+TEST(BenchLease, OS_05_LateTicksNeitherFeedNorStarveTheWatchdog) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 4;
   Bench bench = owned_bench(setup, kOwner);
@@ -99,7 +99,7 @@ TEST(BenchLease, AnOwnerWhoNeverCommandedIsIdleNotTimedOut) {
 }
 
 // Kills: a second writer, commands without a lease, a lease for nobody.
-TEST(BenchLease, OnlyTheOwnerCommands) {
+TEST(BenchLease, OWN_01_OWN_02_OnlyTheOwnerCommands) {
   Bench bench(servo_setup());
   EXPECT_EQ(submit_volts(bench, kOwner, 1.0), Refused::kNotOwner);
   EXPECT_EQ(submit_volts(bench, 0, 1.0), Refused::kNotOwner);
@@ -121,7 +121,7 @@ TEST(BenchLease, OnlyTheOwnerCommands) {
 
 // Acquired at tick 0, renewed at 60, lease of 100: the owner of tick 159, not of 160. Kills: an off-by-one, a
 // renewal that is ignored, an expiry without its fault.
-TEST(BenchLease, ALeaseExpiresExactlyItsTicksAfterItsLastRenewal) {
+TEST(BenchLease, OWN_03_LIMIT_08_ALeaseExpiresExactlyItsTicksAfterItsLastRenewal) {
   for (const bool by_command : {false, true}) {
     BenchSetup setup = servo_setup();
     setup.lease_ticks = 100;

@@ -64,7 +64,7 @@ bool same_samples(const Bench& a, const Bench& b) {
 // The tick of the save lies within a load ramp and a parameter ramp, before scheduled inputs, under a fault
 // and after a live write. Kills: any piece of state that is not saved, and any that depends on the past of
 // the process.
-TEST(BenchState, ARestoredBenchContinuesBitForBitForAMillionTicks) {
+TEST(BenchState, DET_05_ARestoredBenchContinuesBitForBitForAMillionTicks) {
   Bench original(rich_setup());
   run_to(original, 1200);
   original.submit({.tick = original.tick(),
@@ -104,7 +104,7 @@ TEST(BenchState, ARestoredBenchContinuesBitForBitForAMillionTicks) {
 }
 
 // Kills: a latched fault, a held command or a half-spent watchdog that a restore forgets.
-TEST(BenchState, SilenceAndFaultsAreRestoredToo) {
+TEST(BenchState, DET_05_SilenceAndFaultsAreRestoredToo) {
   BenchSetup setup = servo_setup(1);
   setup.watchdog_ticks = 10;
   setup.lease_ticks = 40;

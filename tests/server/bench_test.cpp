@@ -59,7 +59,7 @@ TEST(Bench, TheSafeActionLastsUntilTheFirstCommandIsInForce) {
 
 // Kills: the newest answer overtaken by an older one, a tick whose command can be replaced, answers from the
 // future.
-TEST(Bench, StaleDuplicateAndFutureAnswersAreRefusedAndCounted) {
+TEST(Bench, CMD_06_CMD_07_StaleDuplicateAndFutureAnswersAreRefusedAndCounted) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   step(bench, 10);
   const auto submit = [&](Tick answers) {
@@ -78,7 +78,7 @@ TEST(Bench, StaleDuplicateAndFutureAnswersAreRefusedAndCounted) {
 }
 
 // Kills: NaN in the plant, a refusal that is not counted or that feeds the watchdog or the lease.
-TEST(Bench, ACommandThatIsNotFiniteNeverReachesThePlant) {
+TEST(Bench, CMD_11_CMD_12_ACommandThatIsNotFiniteNeverReachesThePlant) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   Bench silent = owned_bench(servo_setup(), kOwner);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

@@ -48,7 +48,7 @@ TEST(ConfigFiles, ProblemsOfTheMotorFileNameItAndAreToldOnce) {
 }
 
 // Catches a token that everybody may read, an empty one, and one that drags its line end along.
-TEST(ConfigFiles, TokenComesFromAFileThatOnlyItsOwnerReads) {
+TEST(ConfigFiles, CFG_07_SEC_04_TokenComesFromAFileThatOnlyItsOwnerReads) {
   const Folder folder;
   const std::string text = kBench + "[tcp]\naddress = \"0.0.0.0\"\ntoken_file = \"token\"\n";
   EXPECT_NE(problems_of(text, folder.path()).find(":23: tcp.token_file names"), std::string::npos);
@@ -67,7 +67,7 @@ TEST(ConfigFiles, TokenComesFromAFileThatOnlyItsOwnerReads) {
 }
 
 // Catches a reader that crashes, hangs or fills the terminal on a file that is no configuration.
-TEST(ConfigFiles, HostileFilesAreRefusedInFewWords) {
+TEST(ConfigFiles, CFG_06_HostileFilesAreRefusedInFewWords) {
   const Folder folder;
   const auto refused = [&](const std::string& text) {
     const std::string found = problems_of(text, folder.path());
@@ -105,7 +105,7 @@ TEST(ConfigFiles, HostileFilesAreRefusedInFewWords) {
 }
 
 // Catches a reader that only takes the line ends of its own system.
-TEST(ConfigFiles, ByteOrderMarkAndCarriageReturnsAreTaken) {
+TEST(ConfigFiles, CFG_06_ByteOrderMarkAndCarriageReturnsAreTaken) {
   std::string text = "\xef\xbb\xbf";
   for (const char c : kBench)
     text += c == '\n' ? std::string("\r\n") : std::string(1, c);
@@ -113,7 +113,7 @@ TEST(ConfigFiles, ByteOrderMarkAndCarriageReturnsAreTaken) {
 }
 
 // Catches a crash, or an exception that the program does not expect, on any damaged byte.
-TEST(ConfigFiles, OneDamagedByteEitherLoadsOrGivesAConfigError) {
+TEST(ConfigFiles, CFG_08_OneDamagedByteEitherLoadsOrGivesAConfigError) {
   const Folder folder;
   fs::create_directories(folder.path() / "benches");
   fs::create_directories(folder.path() / "motors");

@@ -12,7 +12,7 @@ namespace drivebench::test {
 namespace {
 
 // Catches a reader that stops at the first problem, or names the wrong line.
-TEST(ConfigRules, AllProblemsAreToldAtOnceWithTheirLines) {
+TEST(ConfigRules, CFG_01_AllProblemsAreToldAtOnceWithTheirLines) {
   std::string text = kBench;
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
            {"period_us = 125", "peroid_us = 125"},
@@ -32,7 +32,7 @@ TEST(ConfigRules, AllProblemsAreToldAtOnceWithTheirLines) {
 }
 
 // Catches, one by one, a rule that is not kept: each line is an edit of a good bench and what must be said.
-TEST(ConfigRules, EachRuleIsKept) {
+TEST(ConfigRules, CFG_01_CFG_02_CFG_03_CFG_04_SEC_02_EachRuleIsKept) {
   struct Case {
     std::string from, to, said;
   };
@@ -114,7 +114,7 @@ TEST(ConfigRules, EachRuleIsKept) {
 }
 
 // Catches a step that RK4 cannot take, or advice that does not help.
-TEST(ConfigRules, StepTooLongForTheMachineIsRefusedWithTheSubstepsItNeeds) {
+TEST(ConfigRules, CFG_05_StepTooLongForTheMachineIsRefusedWithTheSubstepsItNeeds) {
   const std::string found = problems_of(with("125", "2000\nsubsteps = 4"));
   EXPECT_NE(found.find(":5: bench.substeps comes to steps of 500 us, too long"), std::string::npos) << found;
   EXPECT_NE(found.find("axis \"x\", 809.3"), std::string::npos) << found;  // its fastest pole

@@ -107,7 +107,7 @@ BenchConfig free_bench() {
 
 // Catches: a thread, a ring or a recorder that changes the run by a bit; an end that comes early, late or
 // never.
-TEST(ThreadedEngine, AFreeRunIsTheDirectRunBitForBit) {
+TEST(ThreadedEngine, DET_01_AFreeRunIsTheDirectRunBitForBit) {
   constexpr Tick kTicks = 5000;
   const BenchConfig config = free_bench();
   const DirectRun direct(config, kTicks);
@@ -251,7 +251,7 @@ TEST(ThreadedEngine, BadCommandsAreRefusedAtOnceAndCountedByTheBench) {
 
 // Catches: an overrun that is only counted. The first tick is due at once; the next one comes after the limit
 // because the I/O thread cannot delay it, so the limit is set to nothing.
-TEST(ThreadedEngine, LatenessBeyondTheLimitIsALatchedFault) {
+TEST(ThreadedEngine, OS_03_LatenessBeyondTheLimitIsALatchedFault) {
   BenchConfig config = servo_bench();
   config.mode = RunMode::kRealtime;
   config.realtime.pacer = PacerKind::kSleep;

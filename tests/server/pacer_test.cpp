@@ -74,7 +74,7 @@ TEST_P(RealtimePacer, ShortlyBeforeItsTimeATickIsStillWaitedFor) {
 }
 
 // Catches: late ticks that are skipped, or an afterwards that is shifted by the delay.
-TEST_P(RealtimePacer, LateTicksAreCaughtUpOneByOne) {
+TEST_P(RealtimePacer, OS_05_LateTicksAreCaughtUpOneByOne) {
   const Due first = wait(*pacer_);
   stall(20 * kPeriodNs);
   for (std::int64_t tick = 1; tick <= 40; ++tick) {
@@ -140,7 +140,7 @@ TEST(LatenessHistogram, EveryLatenessHasABucket) {
 }
 
 // Catches: a wish that the machine does not grant and nobody is told of.
-TEST(EnterRealtime, SaysWhatWasNotGranted) {
+TEST(EnterRealtime, OS_07_SaysWhatWasNotGranted) {
   std::vector<std::string> notes;
   std::thread([&notes] { notes = enter_realtime({.cpu = 1023, .priority = 1000}); }).join();
   const auto said = [&notes](const std::string& text) {

@@ -93,7 +93,7 @@ ReplayReport replayed(const Bytes& recording) {
 }
 
 // Catches: an input that is recorded or applied differently from how it acted in the run.
-TEST(Replay, ARunReplaysBitForBit) {
+TEST(Replay, REC_12_ARunReplaysBitForBit) {
   std::uint64_t state_hash = 0;
   const Bytes recording = record(500, &state_hash);
   const ReplayReport report = replayed(recording);
@@ -146,7 +146,7 @@ TEST(Replay, OneFlippedBitOfASampleIsFoundAndNamed) {
 }
 
 // Catches: a byte of the file that nobody looks at.
-TEST(Replay, OneFlippedBitAnywhereIsNeverEqual) {
+TEST(Replay, REC_09_OneFlippedBitAnywhereIsNeverEqual) {
   const Bytes recording = record(12);
   ASSERT_EQ(replayed(recording).result, Result::kEqual);
   std::mt19937 random(6);
@@ -162,7 +162,7 @@ TEST(Replay, OneFlippedBitAnywhereIsNeverEqual) {
 }
 
 // Catches: a recording that ends early and counts as equal as far as it goes.
-TEST(Replay, ATruncatedRecordingIsUnusable) {
+TEST(Replay, REC_09_ATruncatedRecordingIsUnusable) {
   const Bytes recording = record(12);
   std::mt19937 random(7);
   for (std::size_t size = 0; size < recording.size(); size += 1 + random() % 50) {

@@ -40,7 +40,7 @@ class Exchange(WireTest):
         """The delay of a digital controller that is left out or doubled."""
         self.delay_test(1, 1)
 
-    def test_stale_duplicate_and_future_commands_are_refused_and_counted(self):
+    def test_cmd_06_cmd_07_stale_duplicate_and_future_commands_are_refused_and_counted(self):
         """A command that is applied twice, or moves time."""
         client = self.client(self.server())
         client.lease()
@@ -53,7 +53,7 @@ class Exchange(WireTest):
         self.assertEqual(sample.refused_commands, 8)
         self.assertEqual(sample.u_a_v, 2.0)
 
-    def test_cmd_11_values_that_are_not_finite_never_arrive(self):
+    def test_cmd_11_tcp_09_values_that_are_not_finite_never_arrive(self):
         """NaN through a limiter is full voltage."""
         client = self.client(self.server())
         client.lease()

@@ -118,7 +118,7 @@ class Recordings(CommandTest):
         self.assertEqual(found["rows"], 1025)
         self.assertNotEqual(found["problem"], "")
 
-    def test_a_killed_server_leaves_a_recording_that_can_be_exported(self):
+    def test_rec_01_a_killed_server_leaves_a_recording_that_can_be_exported(self):
         """Samples that wait in memory for an end that does not come."""
         bench = self.server("--record", str(self.folder / "killed.mcap"))
         self.drivebench("control", link=link_of(bench))
@@ -177,7 +177,7 @@ class Serving(CommandTest):
         self.assertSays(self.end(serving), "recorded in r.mcap")
         self.drivebench("replay", "r.mcap")
 
-    def test_a_second_server_on_the_same_place_is_2(self):
+    def test_os_13_a_second_server_on_the_same_place_is_2(self):
         """Two servers that share a port or a socket file; a recording that is overwritten."""
         bench = self.server(unix=True)
         port = bench.address[1]
@@ -196,7 +196,7 @@ class Serving(CommandTest):
         self.assertSays(said, "no problems", "bench servo", "lockstep mode")
         self.assertFalse((self.folder / "r.mcap").exists())
 
-    def test_a_wrong_bench_file_is_told_with_place_and_nearest_key(self):
+    def test_cfg_01_a_wrong_bench_file_is_told_with_place_and_nearest_key(self):
         """One problem at a time, or one without its line."""
         text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         text = text.replace("watchdog_ticks", "watchdog_tick").replace("period_us = 125", "period_us = 0")
@@ -243,7 +243,7 @@ class Serving(CommandTest):
         said = self.drivebench_server(SERVO, "--mode", "free", "--duration", "0.25", "--port", "0").stdout
         self.assertSays(said, "ready tcp=", "free run exact: 2000 ticks; state hash ")
 
-    def test_fail_on_late_is_3(self):
+    def test_os_05_fail_on_late_is_3(self):
         """An exit code of 0 after a run that was not in real time."""
         for allowed, code in (("0", TOO_LATE), ("1000000", OK)):
             bench = self.server("--mode", "realtime", "--fail-on-late", allowed)

@@ -65,7 +65,7 @@ class Hello(WireTest):
             self.assertTrue(client.is_closed(), length)
         self.still_serves()
 
-    def test_tcp_01_the_cap_grows_with_hello_and_holds(self):
+    def test_tcp_01_limit_01_the_cap_grows_with_hello_and_holds(self):
         """An off-by-one in a cap, or a cap that hello does not raise."""
         before = self.client(self.shared, hello=False)
         hello = pb.Envelope(id=9, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()
@@ -147,7 +147,7 @@ class Hello(WireTest):
         self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED)
         self.assertTrue(client.is_closed())
 
-    def test_silent_connection_is_closed(self):
+    def test_limit_05_silent_connection_is_closed(self):
         """Connections that never say hello and stay for ever."""
         client = self.client(self.shared, hello=False)
         self.assertTrue(client.is_closed())
@@ -160,7 +160,7 @@ class Hello(WireTest):
 
 
 class Lease(WireTest):
-    def test_one_owner_at_a_time(self):
+    def test_own_01_own_02_one_owner_at_a_time(self):
         """Two controllers on one axis; a lease that outlives its holder."""
         server = self.server()
         first, second = self.client(server), self.client(server)
@@ -176,7 +176,7 @@ class Lease(WireTest):
         self.assertDone(second.lease())
         self.assertNotEqual(first.owner, second.owner)
 
-    def test_a_lease_ends_with_its_connection(self):
+    def test_tcp_15_a_lease_ends_with_its_connection(self):
         """An axis that nobody can take because its owner is dead: after close, half-close and reset."""
         server = self.server()
         for end in ("close", "half", "reset"):
@@ -199,7 +199,7 @@ class Lease(WireTest):
             heir.lease(pb.LeaseRequest.ACTION_RELEASE)
             heir.close()
 
-    def test_a_controller_that_vanishes_leaves_a_latched_fault(self):
+    def test_cmd_03_a_controller_that_vanishes_leaves_a_latched_fault(self):
         """Taking over a moving axis as if nothing had happened."""
         server = self.server()
         owner = self.client(server)

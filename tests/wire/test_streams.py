@@ -62,7 +62,7 @@ class Subscriptions(WireTest):
         viewer.newest()
         self.assertEqual(len(viewer.samples), 1)
 
-    def test_tcp_10_a_slow_reader_loses_samples_and_is_told_how_many(self):
+    def test_tcp_10_limit_03_a_slow_reader_loses_samples_and_is_told_how_many(self):
         """A queue that grows for a slow client, or a loss that nobody tells of."""
         server = self.server()
         owner = self.client(server)
@@ -88,7 +88,7 @@ class Subscriptions(WireTest):
         self.assertEqual(seen + dropped, ticks)
         self.assertGreater(dropped, 0)
 
-    def test_tcp_10_a_reader_that_stops_is_cut_and_the_others_go_on(self):
+    def test_tcp_10_tcp_11_limit_04_a_reader_that_stops_is_cut_and_the_others_go_on(self):
         """A dead viewer that is fed for ever, or one that stops the bench."""
         server = self.server(unix=True)
         owner, viewer = self.client(server), self.client(server)
@@ -110,7 +110,7 @@ class Subscriptions(WireTest):
         for client in stopped:
             self.assertTrue(client.is_closed())
 
-    def test_a_reader_that_never_reads_its_answers_is_cut(self):
+    def test_limit_03_a_reader_that_never_reads_its_answers_is_cut(self):
         """Answers queued without bound for a client that only asks."""
         server = self.server()
         greedy, other = self.client(server, receive_buffer=4096), self.client(server)
@@ -188,7 +188,7 @@ class Ending(WireTest):
                               timeout=PATIENCE_S, check=False)
         return done.returncode, done.stdout
 
-    def test_rec_10_a_signal_ends_it_and_the_recording_replays(self):
+    def test_rec_10_os_01_a_signal_ends_it_and_the_recording_replays(self):
         """A recording without its end; a server that outlives its signal."""
         for mode in ("lockstep", "realtime", "free"):
             for number in (signal.SIGTERM, signal.SIGINT):
@@ -212,7 +212,7 @@ class Ending(WireTest):
                     self.assertEqual(code, 0, out)
                     self.assertIn(f'"state_hash":"{server.verdict["state_hash"]}"', out)
 
-    def test_rec_04_a_full_disk_costs_the_recording_and_nothing_else(self):
+    def test_rec_03_rec_04_os_02_a_full_disk_costs_the_recording_and_nothing_else(self):
         """A bench that dies with its disk, or a recording that is called whole although it is not."""
         folder = self.server().folder
         file = folder / "cut.mcap"
@@ -261,7 +261,7 @@ class Ending(WireTest):
         if trace.exists():
             self.assertNotIn("socket(", trace.read_text(encoding="utf-8"))
 
-    def test_a_port_that_is_taken_is_said(self):
+    def test_os_13_a_port_that_is_taken_is_said(self):
         """A second server that seems to run and serves nobody."""
         server = self.server()
         done = subprocess.run([str(SERVER), str(BENCHES / "servo.toml"), "--port", str(server.address[1])],
@@ -269,7 +269,7 @@ class Ending(WireTest):
         self.assertEqual(done.returncode, 2)
         self.assertIn(str(server.address[1]), done.stderr)
 
-    def test_tcp_16_sessions_beyond_the_cap_are_turned_away_with_a_reason(self):
+    def test_tcp_16_limit_02_sessions_beyond_the_cap_are_turned_away_with_a_reason(self):
         """One client that takes all descriptors from the others."""
         text = TWO_AXES.replace("[tcp]", "[tcp]\nmax_sessions = 3")
         server = self.server(text=text)
@@ -287,7 +287,7 @@ class Ending(WireTest):
                 return False
         until(one_more, "room for another")
 
-    def test_tcp_15_sigpipe_does_not_end_it(self):
+    def test_tcp_15_os_02_sigpipe_does_not_end_it(self):
         """A client that closes while samples are on their way."""
         server = self.server()
         owner = self.client(server)
