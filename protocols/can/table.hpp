@@ -246,9 +246,12 @@ inline constexpr auto kHeartbeat = std::to_array<Field>({
 inline constexpr auto kDetails = std::to_array<Field>({
     choice("page", 0, "", "0 phase voltages, 1 field and neutral, 2 speed sensors, 3 injected faults"),
     counter("tick", 8, 8, "tick", kTickMeaning),
-    on_page(0, scaled("u_a", "V", 16, Unit::kVoltage, "u_a_v", "voltage at phase a during the tick before")),
-    on_page(0, scaled("u_b", "V", 32, Unit::kVoltage, "u_b_v", "voltage at phase b during the tick before")),
-    on_page(0, scaled("u_c", "V", 48, Unit::kVoltage, "u_c_v", "voltage at phase c during the tick before")),
+    on_page(0, scaled("u_a", "V", 16, Unit::kVoltage, "u_a_v",
+                      "voltage at phase a at the end of the tick before")),
+    on_page(0, scaled("u_b", "V", 32, Unit::kVoltage, "u_b_v",
+                      "voltage at phase b at the end of the tick before")),
+    on_page(0, scaled("u_c", "V", 48, Unit::kVoltage, "u_c_v",
+                      "voltage at phase c at the end of the tick before")),
     on_page(1, scaled("u_f", "V", 16, Unit::kVoltage, "u_f_v", kFieldVoltage)),
     on_page(1, scaled("u_n", "V", 32, Unit::kVoltage, "u_n_v", kNeutral)),
     on_page(1, unsigned_scaled("temperature", "K", 48, Unit::kTemperature, "temperature_k", kTemperature)),
@@ -259,9 +262,9 @@ inline constexpr auto kDetails = std::to_array<Field>({
 });
 inline constexpr auto kDetailsFd = std::to_array<Field>({
     counter("tick", 0, 32, "tick", kTickMeaning),
-    real("u_a", "V", 32, "u_a_v", "voltage at phase a during the tick before"),
-    real("u_b", "V", 64, "u_b_v", "voltage at phase b during the tick before"),
-    real("u_c", "V", 96, "u_c_v", "voltage at phase c during the tick before"),
+    real("u_a", "V", 32, "u_a_v", "voltage at phase a at the end of the tick before"),
+    real("u_b", "V", 64, "u_b_v", "voltage at phase b at the end of the tick before"),
+    real("u_c", "V", 96, "u_c_v", "voltage at phase c at the end of the tick before"),
     real("u_f", "V", 128, "u_f_v", kFieldVoltage),
     real("u_n", "V", 160, "u_n_v", kNeutral),
     real("meter_u_rms", "V", 192, "meter_u_rms_v", "power analyser, last whole window: rms voltage"),
