@@ -17,6 +17,7 @@
 #include "server/engine.hpp"
 #include "server/interface_text.hpp"
 #include "server/replay.hpp"
+#include "server/service_notification.hpp"
 
 namespace drivebench {
 namespace {
@@ -199,6 +200,8 @@ int serve(const Options& o) {
   for (const std::string& note : engine->notes())
     spdlog::warn("{}", note);
   print_ready(o, config, server, transports);
+  if (!notify_service_manager("READY=1"))
+    spdlog::warn("the service manager cannot be told that this is ready");
   if (o.duration_s > 0.0 && ::isatty(STDERR_FILENO) != 0) {
     asio::co_spawn(io, show_progress(*engine, o.duration_s), asio::detached);
   }
@@ -211,6 +214,7 @@ int serve(const Options& o) {
   }
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   signals.clear();  // from here on a second signal ends the program at once
+  notify_service_manager("STOPPING=1");
   const Verdict verdict = engine->stop();
   experiments.reset();
   transports.close();

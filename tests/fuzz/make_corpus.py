@@ -305,6 +305,50 @@ def make_modbus_streams():
     put("modbus", "protocol", b"\x00" + bytes([0, 1, 0, 1, 0, 6, 1, 3, 0, 0, 0, 1]))
 
 
+def make_sessions():
+    """Programs of session.cpp: action x 4 + peer, then what the action takes."""
+    hello, newest, status, lease, command, both, clear, load, write, inject, bump = 0, 1, 2, 3, 5, 8, 9, 10, 11, 12, 13
+    subscribe, read, go_on, reconnect, half_close, experiment, frame_of, stream = 14, 15, 16, 17, 18, 19, 20, 21
+    loss = [f.name for f in injectable_faults()].index("command_loss")
+
+    def do(peer, action, *more):
+        return bytes([action * 4 + peer, *more])
+
+    axis_0, axis_1, release = 0, 4, 8 * 21  # 8 x 21: action 3, axis 0
+    ticks = lambda axis, count: count * 8 + axis  # noqa: E731
+    programs = {
+        "run": do(0, lease, axis_0) + do(0, go_on, ticks(0, 20)) + do(1, subscribe, 8) + do(0, go_on, ticks(0, 10))
+        + do(0, status) + do(0, lease, release),
+        "one-by-one": do(0, lease, axis_0) + b"".join(do(0, command, axis_0, 0, 3, 4) for _ in range(8)) + do(0, newest),
+        "two-axes": do(0, lease, axis_0) + do(1, lease, axis_1) + b"".join(
+            do(0, command, axis_0, 0, 3, 4) + do(1, command, axis_1, 0, 3, 4) for _ in range(6)) + do(1, reconnect, 1),
+        "both-at-once": do(2, lease, axis_0) + do(2, lease, axis_1) + do(2, both, 0, 0, 3, 4, 0, 3, 4) * 5 + do(2, half_close, 0),
+        "watchdog": do(0, lease, axis_0) + do(0, go_on, ticks(0, 3)) + do(0, inject, axis_0, loss, 1)
+        + do(0, go_on, ticks(0, 8)) + do(1, clear, axis_0) + do(0, inject, axis_0, loss, 0) + do(0, clear, axis_0)
+        + do(0, go_on, ticks(0, 3)),
+        "expiry": do(0, lease, axis_0) + do(1, lease, axis_1) + do(0, go_on, ticks(0, 1)) + do(1, inject, axis_1, loss, 1)
+        + do(1, go_on, ticks(4, 30)) + do(0, go_on, ticks(0, 30)) + do(2, lease, axis_1),
+        "takeover": do(0, lease, axis_0) + do(0, go_on, ticks(0, 5)) + do(1, lease, axis_0) + do(0, reconnect, 1)
+        + do(1, lease, axis_0) + do(1, command, axis_0, 0, 3, 4) + do(1, clear, axis_0) + do(1, go_on, ticks(0, 5)),
+        "world": do(0, lease, axis_0) + do(0, load, axis_0, 1) + do(0, write, 128, 2, 8) + do(0, bump, 130, 7)
+        + do(0, load, 140, 5) + do(0, go_on, ticks(0, 20)) + do(0, read, axis_0),
+        "not-numbers": do(0, lease, axis_0) + b"".join(do(0, command, axis_0, 1, n, n) for n in (11, 12, 13, 14, 15)),
+        "abandoned": do(0, lease, axis_0) + do(0, lease, axis_1) + do(0, command, axis_0, 0, 3, 4) + do(0, command, axis_0, 0, 3, 4)
+        + do(0, lease, release) + do(0, newest),
+        "strangers": do(3, newest) + do(3, reconnect, 0) + do(3, lease, axis_0) + do(3, reconnect, 0) + do(3, hello)
+        + do(3, experiment, 0) + do(3, 22, 0),
+        "bytes": do(1, frame_of, 4) + pb.Envelope(id=1, status_request=pb.StatusRequest()).SerializeToString()[:4]
+        + do(2, stream, 6) + frame(b"\x08\x01") + do(2, stream, 3) + b"\0\0\0",
+    }
+    for name, program in programs.items():
+        put("session", name, program)
+
+
+def injectable_faults():
+    with Server() as server, server.client() as client:
+        return client.welcome.bench.injectable_faults
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         run = pathlib.Path(folder) / "run.mcap"
@@ -315,3 +359,4 @@ if __name__ == "__main__":
     make_curves()
     make_modbus_streams()
     make_can_frames()
+    make_sessions()

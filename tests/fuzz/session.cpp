@@ -1,0 +1,384 @@
+// Sequences of messages: four clients, each with a session of the server, and a bench of two axes in
+// lockstep. The bytes are a program of theirs; whatever it is, an axis has at most one owner, who is there,
+// time goes on only with commands, the plant stays finite, only an owner clears what is latched, and every
+// request has one answer.
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+
+#include "plant/injected_faults.hpp"
+#include "server/asio.hpp"
+#include "server/endpoints/session.hpp"
+#include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/session_program.hpp"
+#include "tests/server/run_config.hpp"
+
+namespace drivebench::fuzz {
+namespace {
+
+constexpr std::size_t kPeers = 4;
+constexpr std::size_t kMaxSteps = 400;
+
+/// The client side of a session.
+struct Peer {
+  int socket = -1;
+  std::weak_ptr<Session> session;
+  std::string received;
+  std::uint64_t last_id = 0;
+  struct Asked {
+    v1::Envelope::KindCase kind;
+    std::uint32_t cleared_axis;
+  };
+  std::map<std::uint64_t, Asked> asked;  ///< not answered yet, by id
+  bool raw = false;                      ///< it sent bytes that are no requests of this program
+  bool greeted = false;
+  Owner owner = 0;
+
+  bool is_there() const { return socket >= 0 && !session.expired(); }
+};
+
+BenchConfig two_axes() {
+  BenchConfig config = servo_bench(2);
+  config.setup.command_delay_ticks = 1;
+  config.setup.watchdog_ticks = 5;
+  config.setup.lease_ticks = 20;
+  return config;
+}
+
+class World {
+ public:
+  World()
+      : engine_(make_lockstep_engine(config(), nullptr)),
+        context_{*engine_, "", [] { return kPeers; }, [] { return std::vector<TransportReport>{}; },
+                 nullptr} {
+    engine_->on_tick.add([this] { each_session(&Session::on_tick); });
+    engine_->on_newest.add([this] { each_session(&Session::on_newest); });
+    for (Peer& peer : peers_)
+      connect(peer, &peer != &peers_.back());  // the last one begins with whatever it likes
+    settle();
+  }
+
+  ~World() {
+    for (Peer& peer : peers_)
+      disconnect(peer);
+    settle();
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      require(engine_->owner(axis) == 0, "when all are gone nobody owns an axis");
+    engine_->stop();
+  }
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  void step(Program& program) {
+    const unsigned byte = program.next();
+    Peer& peer = peers_[byte % kPeers];
+    const std::int64_t before = engine_->tick();
+    const std::array<std::uint64_t, 2> latched{latched_of(0), latched_of(1)};
+    steps_allowed_ = 2;  // a session that ends gives both axes back, and each may have been waited for
+    act(peer, byte / kPeers, program);
+    settle();
+    require(engine_->tick() >= before && engine_->tick() <= before + steps_allowed_,
+            "time goes on tick by tick, and only with commands");
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      check_axis(axis);
+      require((latched[axis] & ~latched_of(axis)) == 0 || cleared_[axis],
+              "only the owner clears what is latched");
+      const auto state = static_cast<ControlState>(engine_->newest(axis).state);
+      require((latched[axis] & latched_of(axis)) == 0 || cleared_[axis] || engine_->tick() == before ||
+                  state == ControlState::kTimeout || state == ControlState::kFault,
+              "a latched axis is not commanded");
+      if (engine_->tick() > before) cleared_[axis] = false;  // samples show it from the next tick on
+    }
+  }
+
+ private:
+  static const BenchConfig& config() {
+    static const BenchConfig result = two_axes();
+    return result;
+  }
+
+  std::uint64_t latched_of(std::size_t axis) const { return engine_->newest(axis).faults & kLatchedFaults; }
+
+  void each_session(void (Session::*call)()) {
+    for (Peer& peer : peers_) {
+      if (const auto session = peer.session.lock()) (*session.*call)();
+    }
+  }
+
+  void connect(Peer& peer, bool greets) {
+    std::array<int, 2> ends{};
+    require(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends.data()) == 0,
+            "there are sockets");
+    peer = Peer{};
+    peer.socket = ends[0];
+    auto session = std::make_shared<Session>(
+        Outbox::Socket(asio::local::stream_protocol::socket(io_, asio::local::stream_protocol(), ends[1])),
+        "peer", context_);
+    peer.session = session;
+    asio::co_spawn(
+        io_, [session]() { return session->run(); }, asio::detached);
+    if (greets) greet(peer);
+  }
+
+  void disconnect(Peer& peer) {
+    if (peer.socket >= 0) ::close(peer.socket);
+    peer.socket = -1;
+  }
+
+  /// Until nothing is left to do; what the sessions said is then in the hands of the peers.
+  void settle() {
+    for (std::size_t handled = 1; handled != 0;) {
+      io_.restart();
+      handled = io_.poll();
+      for (Peer& peer : peers_)
+        handled += receive(peer);
+    }
+  }
+
+  std::size_t receive(Peer& peer) {
+    if (peer.socket < 0) return 0;
+    std::array<char, 65536> buffer;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled by recv
+    std::size_t total = 0;
+    for (;;) {
+      const ssize_t count = ::recv(peer.socket, buffer.data(), buffer.size(), MSG_DONTWAIT);
+      if (count <= 0) break;
+      peer.received.append(buffer.data(), static_cast<std::size_t>(count));
+      total += static_cast<std::size_t>(count);
+    }
+    while (read_answer(peer)) {
+    }
+    return total;
+  }
+
+  bool read_answer(Peer& peer) {
+    if (peer.received.size() < kFrameHeaderSize) return false;
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < kFrameHeaderSize; ++i)
+      size = size << 8 | static_cast<std::uint8_t>(peer.received[i]);
+    require(size > 0 && size <= kMaxReplyFrame, "an answer keeps to its limit");
+    if (peer.received.size() < kFrameHeaderSize + size) return false;
+    v1::Envelope answer;
+    require(answer.ParseFromArray(peer.received.data() + kFrameHeaderSize, static_cast<int>(size)),
+            "an answer is an Envelope");
+    peer.received.erase(0, kFrameHeaderSize + size);
+    check_answer(peer, answer);
+    return true;
+  }
+
+  void check_answer(Peer& peer, const v1::Envelope& answer) {
+    if (answer.kind_case() == v1::Envelope::kRefusal) {
+      require(!answer.refusal().message().empty() && answer.refusal().code() != v1::REFUSAL_UNSPECIFIED,
+              "a refusal says why");
+    }
+    if (peer.raw) cleared_ = {true, true};  // nobody knows what it asked for
+    if (answer.id() == 0 || peer.raw) return;
+    const auto found = peer.asked.find(answer.id());
+    require(found != peer.asked.end(), "an answer belongs to a request that had none");
+    const Peer::Asked asked = found->second;
+    peer.asked.erase(found);
+    if (answer.kind_case() == v1::Envelope::kWelcome) peer.greeted = true;
+    if (answer.kind_case() != v1::Envelope::kDone) return;
+    require(peer.greeted, "nothing is done for a stranger");
+    if (asked.kind == v1::Envelope::kLease) peer.owner = answer.done().owner();
+    if (asked.kind != v1::Envelope::kClearFaults) return;
+    require(peer.owner != 0 && engine_->owner(asked.cleared_axis) == peer.owner, "who clears is the owner");
+    cleared_[asked.cleared_axis] = true;
+  }
+
+  void check_axis(std::size_t axis) const {
+    const Sample& s = engine_->newest(axis);
+    for (const double number : {s.u_a_v, s.u_b_v, s.i_a_a, s.i_b_a, s.true_i_a_a, s.speed_rad_s, s.torque_nm})
+      require(std::isfinite(number), "the plant stays finite");
+    const Owner owner = engine_->owner(axis);
+    if (owner == 0) return;
+    require(std::ranges::any_of(
+                peers_,
+                [owner](const Peer& peer) { return peer.is_there() && (peer.owner == owner || peer.raw); }),
+            "an owner is there");
+    for (const Peer& peer : peers_)
+      require(&peer == &peers_[0] || peer.owner == 0 || peer.owner != peers_[0].owner,
+              "owners have numbers of their own");
+  }
+
+  void send(Peer& peer, const std::string& bytes) const {
+    if (peer.socket >= 0) static_cast<void>(!::send(peer.socket, bytes.data(), bytes.size(), MSG_NOSIGNAL));
+  }
+
+  static std::string framed(const std::string& payload) {
+    const auto header = frame_header(static_cast<std::uint32_t>(payload.size()));
+    return std::string(reinterpret_cast<const char*>(header.data()), header.size()) + payload;
+  }
+
+  void ask(Peer& peer, v1::Envelope& request) const {
+    request.set_id(++peer.last_id);
+    if (peer.is_there()) peer.asked[request.id()] = {request.kind_case(), request.clear_faults().axis()};
+    send(peer, framed(request.SerializeAsString()));
+  }
+
+  void greet(Peer& peer) const {
+    v1::Envelope request;
+    request.mutable_hello()->set_protocol_min(1);
+    request.mutable_hello()->set_protocol_max(1);
+    ask(peer, request);
+  }
+
+  void command(v1::Envelope& request, std::uint32_t axis, Program& program) const {
+    v1::Command& c = *request.mutable_exchange()->add_commands();
+    const unsigned how = program.next();
+    const std::int64_t tick =
+        engine_->tick() + static_cast<std::int64_t>(how % 8 < 5 ? 0 : how % 8) - (how % 8 == 7 ? 9 : 0);
+    c.set_axis(axis);
+    c.set_tick(static_cast<std::uint64_t>(tick));
+    c.set_gates(static_cast<v1::Gates>(how / 8 < 20 ? 1 : how / 8 % 5));
+    c.set_u_a_v(program.value());
+    c.set_u_b_v(how % 3 == 0 ? 1.0 : program.value());
+  }
+
+  /// The numbers stand in the corpus: only append.
+  void act(Peer& peer, unsigned action, Program& program) {
+    v1::Envelope request;
+    const unsigned which = action % 24 < 3 ? 0 : program.next();
+    const std::uint32_t axis = which % 8 < 4 ? 0 : which % 8 < 7 ? 1 : 2;
+    const std::uint64_t at_tick = which < 128 ? 0 : static_cast<std::uint64_t>(engine_->tick()) + which % 32;
+    switch (action % 24) {
+      case 0:
+        if (peer.greeted && program.next() % 4 != 0) return;  // once more costs much and finds little
+        return greet(peer);
+      case 1:
+        request.mutable_exchange();
+        break;
+      case 2:
+        request.mutable_status_request();
+        break;
+      case 3:
+      case 4:
+        request.mutable_lease()->set_axis(axis);
+        request.mutable_lease()->set_action(
+            static_cast<v1::LeaseRequest::Action>(which / 8 < 20 ? 1 : which / 8 % 6));
+        break;
+      case 5:
+      case 6:
+      case 7:
+        command(request, axis, program);
+        break;
+      case 8:
+        command(request, 0, program);
+        command(request, 1, program);
+        break;
+      case 9:
+        request.mutable_clear_faults()->set_axis(axis);
+        break;
+      case 10:
+        request.mutable_set_load()->set_axis(axis);
+        request.mutable_set_load()->set_load_nm(program.value());
+        request.mutable_set_load()->set_at_tick(at_tick);
+        request.mutable_set_load()->set_ramp_ticks(which % 3);
+        break;
+      case 11: {
+        const auto rows = axis_parameters(engine_->parameters(0));
+        request.mutable_write_parameter()->set_axis(axis);
+        request.mutable_write_parameter()->set_name(std::string(rows[program.next() % rows.size()].name));
+        request.mutable_write_parameter()->set_value(program.value());
+        request.mutable_write_parameter()->set_at_tick(at_tick);
+        break;
+      }
+      case 12:
+        request.mutable_inject_fault()->set_axis(axis);
+        request.mutable_inject_fault()->set_name(
+            std::string(kInjectableFaults[program.next() % kInjectableFaultCount].name));
+        request.mutable_inject_fault()->set_value(program.value());
+        request.mutable_inject_fault()->set_at_tick(at_tick);
+        break;
+      case 13:
+        request.mutable_shaft_bump()->set_axis(axis);
+        request.mutable_shaft_bump()->set_impulse_nms(program.value());
+        request.mutable_shaft_bump()->set_at_tick(at_tick);
+        break;
+      case 14:
+        request.mutable_subscribe()->set_axis(axis);
+        request.mutable_subscribe()->set_decimation(which / 8);
+        break;
+      case 15:
+        request.mutable_read_parameters()->set_axis(axis);
+        break;
+      case 16:
+        return go_on(peer, axis, which);
+      case 17:
+        disconnect(peer);
+        settle();
+        return connect(peer, which % 4 != 0);
+      case 18:
+        if (peer.socket >= 0) ::shutdown(peer.socket, SHUT_WR);
+        return;
+      case 19:
+        request.mutable_run_experiment();
+        break;
+      case 20:
+        peer.raw = true;
+        return send(peer, framed(program.next_bytes()));
+      case 21:
+        peer.raw = true;
+        steps_allowed_ = 64;
+        return send(peer, program.next_bytes());
+      default:
+        break;  // an Envelope of nothing
+    }
+    ask(peer, request);
+  }
+
+  /// Some ticks with commands of this peer, as a healthy controller sends them.
+  void go_on(Peer& peer, std::uint32_t axis, unsigned ticks) {
+    steps_allowed_ = 2 + static_cast<std::int64_t>(ticks / 8);
+    for (unsigned i = 0; i < ticks / 8 && peer.is_there(); ++i) {
+      v1::Envelope request;
+      v1::Command& c = *request.mutable_exchange()->add_commands();
+      c.set_axis(axis);
+      c.set_tick(static_cast<std::uint64_t>(engine_->tick()));
+      c.set_gates(latched_of(axis % 2) != 0 ? v1::GATES_OFF : v1::GATES_VOLTAGE);
+      c.set_u_a_v(2.0);
+      ask(peer, request);
+      settle();
+    }
+  }
+
+ public:
+  /// An exchange may wait for the other axis; nothing else may go without its answer.
+  void check_that_all_was_answered() const {
+    for (const Peer& peer : peers_) {
+      if (!peer.is_there() || peer.raw) continue;
+      std::size_t waiting = 0;
+      for (const auto& [id, asked] : peer.asked) {
+        require(asked.kind == v1::Envelope::kExchange, "a request has an answer");
+        ++waiting;
+      }
+      require(waiting <= 1, "of a session one exchange waits");
+    }
+  }
+
+ private:
+  asio::io_context io_{1};
+  std::unique_ptr<Engine> engine_;
+  SessionContext context_;
+  std::array<Peer, kPeers> peers_;
+  std::array<bool, 2> cleared_{};
+  std::int64_t steps_allowed_ = 0;
+};
+
+}  // namespace
+}  // namespace drivebench::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace drivebench::fuzz;
+  World world;
+  Program program(std::span(data, size));
+  for (std::size_t steps = 0; !program.over() && steps < kMaxSteps; ++steps)
+    world.step(program);
+  world.check_that_all_was_answered();
+  return 0;
+}

@@ -1,0 +1,398 @@
+#!/usr/bin/python3
+"""Abuse of the network and of the process: tests/FAULTS.md. Each test names the mistake that it would catch."""
+import os
+import pathlib
+import random
+import resource
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, Closed, frame, pb
+from wire_test import SERVO_TEXT, TWO_AXES, WireTest, until
+
+OVERRUN = 1 << 11  # in the fault word
+
+
+def varint(number):
+    out = b""
+    while number > 0x7F:
+        out, number = out + bytes([number & 0x7F | 0x80]), number >> 7
+    return out + bytes([number])
+
+
+def field(number, content):
+    return varint(number << 3 | 2) + varint(len(content)) + content
+
+
+def number_of(kind):
+    return pb.Envelope.DESCRIPTOR.fields_by_name[kind].number
+
+
+class Messages(WireTest):
+    def test_tcp_05_thousands_of_empty_parts_cost_their_session_only(self):
+        """Two bytes on the wire that become hundreds in memory, and stay there."""
+        server = self.server()
+        owner, abuser = self.client(server), self.client(server)
+        owner.lease()
+        owner.step(0)
+        parts = 32_000
+        before = self.memory_kib(server)
+        for n in range(30):
+            kind = ("exchange", "read_parameters", "subscribe")[n % 3]
+            inner = {"exchange": field(1, b""), "read_parameters": field(2, b""), "subscribe": field(3, b"")}[kind] * parts
+            abuser.send_bytes(frame(b"\x08\x07" + field(number_of(kind), inner)))
+            self.assertEqual(abuser.answer_to(7).WhichOneof("kind"), "refusal", kind)
+        owner.step(1)
+        if self.memory_kib(server, "VmSize") < 1 << 30:  # a sanitizer keeps what is freed
+            self.assertLess(self.memory_kib(server) - before, 8 * 1024)
+
+    @staticmethod
+    def memory_kib(server, which="VmHWM"):
+        status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text(encoding="utf-8")
+        return int(next(line for line in status.splitlines() if line.startswith(which)).split()[1])
+
+    def test_tcp_06_nesting_without_end_is_refused(self):
+        """A parser that calls itself as often as a stranger wants."""
+        server = self.server()
+        opening, closing = varint(2000 << 3 | 3), varint(2000 << 3 | 4)  # an unknown group
+        request = pb.Envelope(id=4, status_request=pb.StatusRequest()).SerializeToString()
+        client = self.client(server)
+        client.send_bytes(frame(request + opening * 16 + closing * 16))
+        self.assertEqual(client.answer_to(4).WhichOneof("kind"), "status")
+        for depth in (1000, 16_000):
+            client = self.client(server)
+            client.send_bytes(frame(request + opening * depth + closing * depth))
+            self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED)
+            self.assertTrue(client.is_closed())
+        self.assertEqual(self.client(server).status().sessions, 2)  # the first one is still there
+
+
+class Readers(WireTest):
+    @staticmethod
+    def read_until(client, tick, seen):
+        """Takes samples up to this tick; what was seen and lost so far, which must add up."""
+        while seen["newest"] < tick:
+            envelope = client.receive()
+            if envelope.WhichOneof("kind") != "samples":
+                continue
+            seen["lost"] += envelope.samples.dropped
+            for sample in envelope.samples.samples:
+                seen["count"] += 1
+                seen["newest"] = sample.tick
+                if seen["count"] + seen["lost"] != sample.tick:
+                    raise AssertionError(f"gaps do not add up at tick {sample.tick}: {seen}")
+
+    def test_tcp_12_tcp_20_readers_that_rest_catch_up_and_know_what_they_missed(self):
+        """A gap that is told twice or never; a reader that stays behind for ever; one that holds up the others."""
+        server = self.server()
+        owner = self.client(server)
+        owner.lease()
+        readers = [self.client(server, receive_buffer=4096) for _ in range(8)]
+        seen = [{"count": 0, "lost": 0, "newest": 0} for _ in readers]
+        for reader in readers:
+            reader.ask(subscribe=pb.Subscribe(decimation=1))
+        local = random.Random(7)
+        tick, resting = 0, set()
+        for _ in range(6):
+            resting = set(local.sample(range(8), len(resting) + 2 if len(resting) < 6 else 1))
+            for _ in range(500):
+                owner.step(tick, 1.0)
+                tick += 1
+                if tick % 50 == 0:
+                    for n in set(range(8)) - resting:
+                        self.read_until(readers[n], tick, seen[n])
+        for n, reader in enumerate(readers):
+            reader.send(status_request=pb.StatusRequest())
+            self.read_until(reader, tick, seen[n])
+        self.assertEqual({each["count"] + each["lost"] for each in seen}, {tick})
+        self.assertEqual(owner.status().sessions, 9)
+
+
+class Connections(WireTest):
+    def descriptors(self, server):
+        return len(os.listdir(f"/proc/{server.process.pid}/fd"))
+
+    def test_tcp_13_limit_02_strangers_that_drip_are_few_and_closed(self):
+        """Silent or dripping connections that take the places of all others."""
+        server = self.server()
+        inside = self.client(server)
+        strangers = [self.client(server, hello=False) for _ in range(33)]
+        for stranger in strangers[:32]:
+            stranger.send_bytes(b"\0")
+        self.assertRefused(strangers[32].receive(), pb.REFUSAL_BUSY, "session")
+        self.assertTrue(strangers[32].is_closed())
+        self.assertEqual(inside.status().sessions, 33)
+        for stranger in strangers[:32]:
+            self.assertTrue(stranger.is_closed())
+        until(lambda: inside.status().sessions == 1, "all strangers are gone")
+        self.client(server)
+
+    def test_tcp_16_limit_02_as_many_sessions_as_are_allowed(self):
+        """A cap that is one too low or too high."""
+        server = self.server()
+        inside = [self.client(server) for _ in range(256)]
+        self.assertEqual(inside[255].status().sessions, 256)
+        self.assertRefused(self.client(server, hello=False).receive(), pb.REFUSAL_BUSY, "session")
+        self.assertEqual(inside[0].status().sessions, 256)
+
+    def test_tcp_17_coming_and_going_leaves_nothing_behind(self):
+        """A descriptor that is lost with each client."""
+        server = self.server()
+        inside = self.client(server)
+        inside.status()
+        before = self.descriptors(server)
+        for n in range(600):
+            guest = server.raw()
+            if n % 3 == 0:
+                guest.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            elif n % 3 == 1:
+                guest.send(b"\0\0")
+            guest.close()
+        until(lambda: inside.status().sessions == 1, "all guests are gone")
+        self.assertEqual(self.descriptors(server), before)
+
+    def test_tcp_17_tcp_18_without_descriptors_those_inside_go_on(self):
+        """A server that ends, spins or loses its recording when it may open no more files."""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        server = self.server("--record", str(folder / "run.mcap"),
+                             before=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)))
+        owner = self.client(server)
+        owner.lease()
+        crowd = []
+        while self.descriptors(server) < 64:
+            crowd.append(self.client(server))
+        waiting = [server.raw() for _ in range(20)]
+        until(lambda: "cannot accept" in server.errors(), "it has run out")
+        started = time.monotonic()
+        for tick in range(500):
+            owner.step(tick, 1.0)
+        # One line in each pause of 100 ms, and one more at either end.
+        self.assertLessEqual(server.errors().count("cannot accept"), 10 * (time.monotonic() - started) + 20)
+        for each in crowd + waiting:
+            each.close()
+
+        def served():
+            try:
+                return self.client(server).welcome is not None
+            except (Closed, AssertionError, OSError):
+                return False
+        until(served, "there is room again")
+        self.assertEqual(server.stop(), 0)
+        self.assertEqual(server.verdict["gaps"], 0)
+
+    def test_tcp_22_own_05_an_old_session_commands_no_more(self):
+        """A controller whose connection hangs, comes back, and drives together with its successor."""
+        server = self.server("--mode", "realtime", text=SERVO_TEXT.replace("lease_s = 2.0", "lease_ticks = 400"))
+        old = self.client(server)
+        self.assertDone(old.lease())
+        old.exchange(old.newest().tick, 1.0)
+        new = self.client(server)  # by the same name
+        until(lambda: new.lease().WhichOneof("kind") == "done", "the lease of the silent one ends")
+        self.assertNotEqual(new.owner, old.owner)
+        self.assertRefused(old.exchange(old.newest().tick, 5.0), pb.REFUSAL_NOT_OWNER)
+        self.assertRefused(old.lease(pb.LeaseRequest.ACTION_RENEW), pb.REFUSAL_NOT_OWNER)
+        self.assertRefused(old.ask(clear_faults=pb.ClearFaults()), pb.REFUSAL_NOT_OWNER)
+
+    def test_own_01_of_two_at_once_one_gets_it(self):
+        """Two owners, or none, when both ask in the same moment."""
+        for mode, races in (("lockstep", 300), ("realtime", 60)):
+            server = self.server("--mode", mode)
+            both = [self.client(server), self.client(server)]
+            for n in range(races):
+                order = both if n % 2 else both[::-1]
+                ids = [each.send(lease=pb.LeaseRequest(action=pb.LeaseRequest.ACTION_ACQUIRE)) for each in order]
+                kinds = [each.answer_to(i).WhichOneof("kind") for each, i in zip(order, ids)]
+                self.assertEqual(sorted(kinds), ["done", "refusal"])
+                self.assertDone(order[kinds.index("done")].lease(pb.LeaseRequest.ACTION_RELEASE))
+
+    def test_tcp_19_a_port_scan_changes_nothing(self):
+        """A probe that ends the server, holds up its ticks or keeps a session."""
+        nmap = shutil.which("nmap")
+        if nmap is None:
+            self.skipTest("nmap is not installed")
+        server = self.server()
+        owner = self.client(server)
+        owner.lease()
+        scan = subprocess.Popen([nmap, "-n", "-Pn", "-sT", "-sV", "--version-intensity", "9", "--host-timeout", "4s", "-p",
+                                 str(server.address[1]), "127.0.0.1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        tick = 0
+        while scan.poll() is None:
+            owner.step(tick, 1.0)
+            tick += 1
+            time.sleep(0.001)
+        until(lambda: owner.status().sessions == 1, "the scanner is gone")
+        self.assertEqual(owner.newest().tick, tick)
+
+
+class Secrets(WireTest):
+    def listeners(self, server):
+        """Local addresses of the TCP sockets on which this process listens."""
+        mine = set()
+        for each in os.listdir(f"/proc/{server.process.pid}/fd"):
+            target = os.readlink(f"/proc/{server.process.pid}/fd/{each}")
+            if target.startswith("socket:["):
+                mine.add(target[8:-1])
+        found = []
+        for table in ("tcp", "tcp6"):
+            for line in pathlib.Path(f"/proc/net/{table}").read_text(encoding="utf-8").splitlines()[1:]:
+                words = line.split()
+                if words[3] == "0A" and words[9] in mine:
+                    found.append(words[1].split(":")[0])
+        return found
+
+    def test_sec_01_every_listening_socket_is_on_loopback(self):
+        """A second way in that the whole network can use."""
+        for bench in ("servo.toml", "servo-modbus.toml"):
+            text = (BENCHES / bench).read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+            server = self.server(text=text.replace("port = 1502", "port = 0"))
+            found = self.listeners(server)
+            self.assertEqual(set(found), {"0100007F"})
+            self.assertEqual(len(found), 2 if "modbus" in bench else 1)
+
+    def refused(self, address):
+        with tempfile.TemporaryDirectory() as folder:
+            bench = pathlib.Path(folder) / "bench.toml"
+            bench.write_text(SERVO_TEXT.replace('"127.0.0.1"', f'"{address}"'), encoding="utf-8")
+            done = subprocess.run([SERVER, bench, "--port", "0"], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), address)
+            return done.stderr
+
+    def test_sec_02_an_open_address_without_a_token_does_not_start(self):
+        """A bench that the whole network drives because somebody wanted to reach it from his desk."""
+        for address in ("0.0.0.0", "::", "192.0.2.1"):
+            self.assertIn("token", self.refused(address))
+        for odd in ("0x7f000001", "0", "127.1", "2130706433", "local", ""):
+            self.assertIn("tcp.address", self.refused(odd))
+
+    def test_sec_04_no_token_but_the_right_one_and_it_stands_nowhere(self):
+        """A token that is compared up to its shorter end, that a guess cuts off for others, or that the log keeps."""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        token = "correct-horse-battery-staple"
+        (folder / "token").write_text(token + "\n", encoding="utf-8")
+        (folder / "token").chmod(0o600)
+        text = SERVO_TEXT.replace("[tcp]", f'[tcp]\ntoken_file = "{folder}/token"')
+        server = self.server("--record", str(folder / "run.mcap"), text=text)
+
+        def answer(guess):
+            with server.client(hello=False) as client:
+                return client.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="guess", token=guess))
+
+        one_bit = [token[:n] + chr(ord(token[n]) ^ 1) + token[n + 1:] for n in range(len(token))]
+        for guess in ["", token[:-1], token + "x", token + "\0", token.upper(), *one_bit, *[f"guess {n}" for n in range(200)]]:
+            self.assertRefused(answer(guess), pb.REFUSAL_UNAUTHENTICATED, "token")
+        self.assertEqual(answer(token).WhichOneof("kind"), "welcome")
+        self.assertNotIn(token.encode(), pathlib.Path(f"/proc/{server.process.pid}/cmdline").read_bytes())
+        self.assertEqual(server.stop(), 0)
+        self.assertNotIn(token, server.errors())
+        self.assertNotIn(token.encode(), (folder / "run.mcap").read_bytes())
+
+
+class Process(WireTest):
+    def test_os_01_a_hangup_ends_it_like_the_others(self):
+        """A terminal that closes and leaves a recording without its end."""
+        server = self.server()
+        self.assertEqual(server.stop(signal.SIGHUP), 0)
+        self.assertIsNotNone(server.verdict)
+
+    def test_os_02_signals_of_others_are_nothing(self):
+        """A server that a signal ends which is not meant for it."""
+        server = self.server()
+        client = self.client(server)
+        for number in (signal.SIGPIPE, signal.SIGXFSZ, signal.SIGCHLD, signal.SIGWINCH, signal.SIGURG):
+            server.process.send_signal(number)
+            self.assertEqual(client.status().sessions, 1)
+
+    def test_os_03_a_pause_longer_than_the_limit_is_a_latched_fault(self):
+        """A bench that was stopped with its host and goes on as if its controller had been there all the time."""
+        server = self.server("--mode", "realtime")
+        owner = self.client(server)
+        owner.lease()
+        owner.exchange(owner.newest().tick, 5.0)
+        before = owner.newest()
+        server.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.3)
+        server.process.send_signal(signal.SIGCONT)
+        until(lambda: owner.newest().faults & OVERRUN, "the overrun is said")
+        self.assertGreater(owner.newest().late_ticks, before.late_ticks)
+        self.assertRefused(owner.exchange(owner.newest().tick, 5.0), pb.REFUSAL_LATCHED)
+        self.assertDone(owner.ask(clear_faults=pb.ClearFaults()))
+        until(lambda: not owner.newest().faults & OVERRUN, "it is cleared")
+        self.assertEqual(server.stop(), 0)
+        self.assertFalse(server.verdict["realtime_valid"])
+
+    def test_os_14_a_crash_leaves_no_whole_recording_and_the_next_start_is_idle(self):
+        """Half a recording that replays as equal; a bench that comes up running."""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        server = self.server("--record", str(folder / "run.mcap"),
+                             before=lambda: resource.setrlimit(resource.RLIMIT_CORE, (0, 0)))
+        owner = self.client(server)
+        owner.lease()
+        for tick in range(200):
+            owner.step(tick, 5.0)
+        server.process.send_signal(signal.SIGSEGV)
+        server.process.wait(timeout=PATIENCE_S)
+        done = subprocess.run([SERVER, "--replay", folder / "run.mcap"], capture_output=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, 2)
+        again = self.client(self.server("--mode", "realtime")).newest()
+        self.assertEqual((again.state, again.faults, again.owner), (0, 0, 0))
+
+    def hash_of_a_run(self, prefix=(), **environment):
+        old = {name: os.environ.get(name) for name in environment}
+        os.environ.update(environment)
+        try:
+            server = self.server(text=TWO_AXES)
+        finally:
+            for name, value in old.items():
+                os.environ.pop(name) if value is None else os.environ.update({name: value})
+        owner = self.client(server)
+        owner.lease()
+        owner.ask(write_parameter=pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.85))
+        for tick in range(200):
+            owner.step(tick, 12.5, -0.25)
+        return f"{owner.status().state_hash:016x}"
+
+    def test_det_04_locale_and_time_zone_have_no_effect(self):
+        """0,25 that is read as 0 where the comma is the point."""
+        reference = self.hash_of_a_run(LC_ALL="C", TZ="UTC")
+        self.assertEqual(self.hash_of_a_run(LC_ALL="C", TZ="Pacific/Kiritimati"), reference)
+        folder = tempfile.mkdtemp(prefix="drivebench-abuse-")
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        made = shutil.which("localedef") and subprocess.run(
+            ["localedef", "-i", "de_DE", "-f", "UTF-8", f"{folder}/de_DE.UTF-8"], capture_output=True, check=False)
+        if not made or not pathlib.Path(f"{folder}/de_DE.UTF-8").exists():
+            self.skipTest("no localedef, or no sources of locales, to make one with a decimal comma")
+        self.assertEqual(self.hash_of_a_run(LC_ALL="de_DE.UTF-8", LOCPATH=folder), reference)
+
+    def test_sec_08_the_binary_is_hardened(self):
+        """A build without the flags that make a memory error hard to use."""
+        if shutil.which("readelf") is None:
+            self.skipTest("readelf is not installed")
+
+        def readelf(option):
+            return subprocess.run(["readelf", "-W", option, SERVER], capture_output=True, text=True, check=True).stdout
+        header, segments, dynamic = readelf("-h"), readelf("-l"), readelf("-d")
+        self.assertIn("DYN (Position-Independent Executable", header)
+        self.assertIn("GNU_RELRO", segments)
+        self.assertNotRegex(segments, r"GNU_STACK.*E")
+        self.assertRegex(dynamic, r"BIND_NOW|Flags:.*NOW")
+        self.assertIn("__stack_chk_fail", readelf("--dyn-syms"))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

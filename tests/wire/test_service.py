@@ -1,0 +1,160 @@
+#!/usr/bin/python3
+"""The server as a service: what it tells the service manager, its unit, its privileges. Each test names the mistake that it would catch."""
+import os
+import pathlib
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from wire_client import PATIENCE_S, REPOSITORY, SERVER
+from wire_test import SERVO_TEXT, WireTest
+
+UNIT = REPOSITORY / "configs/systemd/drivebench-server.service"
+
+
+class Notification(WireTest):
+    def manager(self, name):
+        """A socket as systemd's; the server's environment names it."""
+        manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.addCleanup(manager.close)
+        manager.settimeout(PATIENCE_S)
+        manager.bind(name.replace("@", "\0", 1) if name.startswith("@") else name)
+        return manager
+
+    def started(self, notify_socket, *options):
+        os.environ["NOTIFY_SOCKET"] = notify_socket
+        self.addCleanup(os.environ.pop, "NOTIFY_SOCKET", None)
+        return self.server(*options)
+
+    def folder(self):
+        folder = tempfile.mkdtemp(prefix="drivebench-service-")
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        return folder
+
+    def test_ready_when_clients_may_come_and_stopping_when_told_to_end(self):
+        """A service that others wait for in vain, or that is called ready before it is; abstract names taken for files."""
+        for name in (self.folder() + "/notify", f"@drivebench-test-{os.getpid()}"):
+            for mode in ("lockstep", "realtime"):
+                with self.subTest(name=name, mode=mode):
+                    manager = self.manager(name)
+                    server = self.started(name, "--mode", mode)
+                    self.assertEqual(manager.recv(1000), b"READY=1")
+                    with server.client() as client:
+                        self.assertEqual(client.status().sessions, 1)
+                    self.assertEqual(server.stop(signal.SIGTERM), 0)
+                    self.assertEqual(manager.recv(1000), b"STOPPING=1")
+                    manager.close()
+                    pathlib.Path(name).unlink(missing_ok=True)
+
+    def test_a_manager_that_is_not_there_costs_a_line_and_nothing_else(self):
+        """A bench that dies because nobody listens, or a name longer than an address that runs over its end."""
+        for name in (self.folder() + "/nobody", "@" + "x" * 300, "/" + "x" * 107, "relative", "vsock:2:1"):
+            with self.subTest(name=name):
+                server = self.started(name)
+                with server.client() as client:
+                    self.assertEqual(client.status().sessions, 1)
+                self.assertEqual(server.stop(), 0)
+                self.assertEqual(server.errors().count("service manager"), 1)
+        server = self.started("")
+        self.assertEqual(server.stop(), 0)
+        self.assertNotIn("service manager", server.errors())
+
+    def test_what_does_not_serve_says_nothing(self):
+        """A check of a file that tells the manager of the running service that it is ready, or stopping."""
+        name = self.folder() + "/notify"
+        manager = self.manager(name)
+        manager.settimeout(0)
+        done = subprocess.run([SERVER, REPOSITORY / "configs/benches/servo.toml", "--check-config"], check=False,
+                              capture_output=True, env={**os.environ, "NOTIFY_SOCKET": name}, timeout=PATIENCE_S)
+        self.assertEqual(done.returncode, 0)
+        with self.assertRaises(BlockingIOError):
+            manager.recv(1000)
+
+
+class Unit(WireTest):
+    def keys(self):
+        lines = [line.partition("=")[::2] for line in UNIT.read_text(encoding="utf-8").splitlines() if re.match(r"\w+=", line)]
+        return {key: [value for other, value in lines if other == key] for key, _ in lines}
+
+    def test_sec_06_the_unit_gives_what_real_time_needs_and_nothing_else(self):
+        """A service with more rights than it needs, or one that is started again and again with a wrong bench file."""
+        keys = self.keys()
+        for key in ("CapabilityBoundingSet", "AmbientCapabilities"):
+            self.assertEqual(set(keys[key][0].split()), {"CAP_SYS_NICE", "CAP_IPC_LOCK"}, key)
+        for key, value in {"Type": "notify", "NoNewPrivileges": "yes", "ProtectSystem": "strict", "PrivateTmp": "yes",
+                           "LimitMEMLOCK": "infinity", "Restart": "on-failure", "RestartPreventExitStatus": "2"}.items():
+            self.assertEqual(keys[key], [value], key)
+        self.assertNotIn(keys["User"][0], ("", "root"))
+        self.assertNotIn("RestrictRealtime", keys)
+        self.assertGreaterEqual(int(keys["LimitRTPRIO"][0]), 80)
+
+    def test_sec_06_systemd_finds_nothing_wrong_with_the_unit(self):
+        """A key that systemd does not know and leaves out in silence."""
+        tool = shutil.which("systemd-analyze")
+        if tool is None:
+            self.skipTest("systemd-analyze is not installed")
+        with tempfile.TemporaryDirectory() as folder:
+            unit = pathlib.Path(folder) / UNIT.name
+            text = UNIT.read_text(encoding="utf-8")
+            unit.write_text(re.sub(r"(?m)^ExecStart=\S+", f"ExecStart={SERVER.resolve()}", text), encoding="utf-8")
+            done = subprocess.run([tool, "verify", "--man=no", unit], capture_output=True, text=True, timeout=PATIENCE_S,
+                                  check=False)
+            self.assertEqual((done.returncode, done.stdout + done.stderr), (0, ""))
+            # In tenths of systemd's points, of which a service without any protection has 96.
+            done = subprocess.run([tool, "security", "--offline=true", "--no-pager", "--threshold=25", unit],
+                                  capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+            self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr)
+
+    def run_without(self, rights, memory):
+        """A short run in real time as an ordinary user with these rights; what it said, and whether memory could be set."""
+        if os.geteuid() != 0 or shutil.which("setpriv") is None:
+            self.skipTest("needs root and setpriv, to give rights away")
+        drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", f"--inh-caps={rights}",
+                f"--ambient-caps={rights}", f"--bounding-set={rights}", "--no-new-privs"]
+        if subprocess.run([*drop, "true"], capture_output=True, check=False).returncode != 0:
+            self.skipTest("this root has not even these rights")
+        motor = REPOSITORY / "configs/motors/servo-im.toml"
+        if subprocess.run([*drop, "sh", "-c", f"test -r {motor} && test -x {SERVER}"], check=False).returncode != 0:
+            self.skipTest("the tree is not readable for other users")
+        limit = ["prlimit", f"--memlock={memory}"]
+        limited = subprocess.run([*limit, "true"], capture_output=True, check=False).returncode == 0
+        with tempfile.TemporaryDirectory() as folder:
+            os.chmod(folder, 0o755)
+            bench = pathlib.Path(folder) / "bench.toml"
+            bench.write_text(SERVO_TEXT, encoding="utf-8")
+            bench.chmod(0o644)
+            done = subprocess.run([*(limit if limited else []), *drop, SERVER, bench, "--port", "0", "--mode", "realtime",
+                                   "--duration", "0.05"], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("ready", done.stdout)
+        return done.stderr, limited
+
+    def test_sec_06_two_capabilities_are_enough_for_real_time(self):
+        """A server that needs root after all."""
+        said, limited = self.run_without("-all,+sys_nice,+ipc_lock", "unlimited")
+        if limited:
+            self.assertNotIn("memory not locked", said)
+        if subprocess.run(["chrt", "-f", "1", "true"], check=False, stderr=subprocess.DEVNULL).returncode == 0:
+            self.assertNotIn("no real-time scheduling", said)
+
+    def test_os_07_os_09_what_is_not_granted_is_said_once(self):
+        """A bench that calls itself real time without being it, or that does not start for want of a right."""
+        said, limited = self.run_without("-all", "65536:65536")
+        self.assertEqual(said.count("no real-time scheduling"), 1, said)
+        if limited:
+            self.assertEqual(said.count("memory not locked: RLIMIT_MEMLOCK is 64 KiB"), 1, said)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
