@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "plant/drive/phases.hpp"
 #include "plant/rounding.hpp"
 #include "plant/shared_shaft.hpp"
+#include "plant/trig.hpp"
 
 namespace drivebench {
 namespace {
-
-constexpr double kTurnRad = 2.0 * std::numbers::pi;
 
 // Far outside of every machine of this bench; a state beyond it has diverged.
 constexpr double kEnvelope = 1e9;

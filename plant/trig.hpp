@@ -4,6 +4,7 @@
 #include <cfloat>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #if defined(__FAST_MATH__) || FLT_EVAL_METHOD != 0
 #error "trig.hpp needs plain IEEE double arithmetic: no -ffast-math, no x87"
@@ -20,6 +21,8 @@
 /// Errors against long double, measured by tests/plant/trig_test.cpp: sine and cosine below 0.8 ulp,
 /// arctangent2 below 1.5 ulp, logarithm below 1 ulp.
 namespace drivebench {
+
+constexpr double kTurnRad = 2.0 * std::numbers::pi;
 
 /// Cosine and sine of one angle. A rotation by that angle takes (1, 0) to (cos, sin).
 struct CosSin {

@@ -14,7 +14,6 @@
 namespace drivebench {
 namespace {
 
-constexpr double kTurnRad = 2.0 * std::numbers::pi;
 constexpr std::size_t kMaxCorners = 64;  // of a table; the pieces of a tick have to be recorded
 
 constexpr std::array<CurvePoint, 4> kTrapezoid{
