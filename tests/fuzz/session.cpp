@@ -34,6 +34,8 @@ struct Peer {
   struct Asked {
     v1::Envelope::KindCase kind;
     std::uint32_t cleared_axis;
+    std::vector<std::uint32_t> commanded_axes;
+    bool possible;  ///< all its numbers are finite
   };
   std::map<std::uint64_t, Asked> asked;  ///< not answered yet, by id
   bool raw = false;                      ///< it sent bytes that are no requests of this program
@@ -81,6 +83,7 @@ class World {
     const std::int64_t before = engine_->tick();
     const std::array<std::uint64_t, 2> latched{latched_of(0), latched_of(1)};
     steps_allowed_ = 2;  // a session that ends gives both axes back, and each may have been waited for
+    program.all_finite();
     act(peer, byte / kPeers, program);
     settle();
     require(engine_->tick() >= before && engine_->tick() <= before + steps_allowed_,
@@ -182,6 +185,7 @@ class World {
     require(found != peer.asked.end(), "an answer belongs to a request that had none");
     const Peer::Asked asked = found->second;
     peer.asked.erase(found);
+    require(asked.possible || answer.kind_case() == v1::Envelope::kRefusal, "what is no number is refused");
     if (answer.kind_case() == v1::Envelope::kWelcome) peer.greeted = true;
     if (answer.kind_case() != v1::Envelope::kDone) return;
     require(peer.greeted, "nothing is done for a stranger");
@@ -215,9 +219,14 @@ class World {
     return std::string(reinterpret_cast<const char*>(header.data()), header.size()) + payload;
   }
 
-  void ask(Peer& peer, v1::Envelope& request) const {
+  void ask(Peer& peer, v1::Envelope& request, bool possible = true) const {
     request.set_id(++peer.last_id);
-    if (peer.is_there()) peer.asked[request.id()] = {request.kind_case(), request.clear_faults().axis()};
+    if (peer.is_there()) {
+      Peer::Asked& asked = peer.asked[request.id()];
+      asked = {request.kind_case(), request.clear_faults().axis(), {}, possible};
+      for (const v1::Command& command : request.exchange().commands())
+        asked.commanded_axes.push_back(command.axis());
+    }
     send(peer, framed(request.SerializeAsString()));
   }
 
@@ -329,7 +338,7 @@ class World {
       default:
         break;  // an Envelope of nothing
     }
-    ask(peer, request);
+    ask(peer, request, program.all_finite());
   }
 
   /// Some ticks with commands of this peer, as a healthy controller sends them.
@@ -355,6 +364,8 @@ class World {
       std::size_t waiting = 0;
       for (const auto& [id, asked] : peer.asked) {
         require(asked.kind == v1::Envelope::kExchange, "a request has an answer");
+        for (const std::uint32_t axis : asked.commanded_axes)
+          require(engine_->owner(axis) == peer.owner, "who waits for a tick of an axis owns it");
         ++waiting;
       }
       require(waiting <= 1, "of a session one exchange waits");

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
 
 namespace drivebench::fuzz {
 
@@ -27,7 +29,13 @@ class Program {
     bytes_ = bytes_.subspan(1);
     return byte;
   }
-  double value() { return kValues[next() % kValues.size()]; }
+  double value() {
+    const double result = kValues[next() % kValues.size()];
+    all_finite_ = all_finite_ && std::isfinite(result);
+    return result;
+  }
+  /// Whether all values since the last call were numbers.
+  bool all_finite() { return std::exchange(all_finite_, true); }
   std::string next_bytes() {
     const std::size_t count = std::min<std::size_t>(next(), bytes_.size());
     const std::string result(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(count));
@@ -37,6 +45,7 @@ class Program {
 
  private:
   std::span<const std::uint8_t> bytes_;
+  bool all_finite_ = true;
 };
 
 }  // namespace drivebench::fuzz

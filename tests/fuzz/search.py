@@ -1,0 +1,91 @@
+#!/usr/bin/python3
+"""Searches for bytes that break a promise: every libFuzzer program of a build, as many at a time as there are CPUs.
+
+    tests/fuzz/search.py BUILD-FOLDER MINUTES [TARGET...]
+
+What it finds lies in BUILD-FOLDER/fuzz/TARGET/findings, what reached new code in .../found, which the next search starts
+from. Exit 1 if anything was found, 2 if there is nothing to run."""
+import concurrent.futures
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+CORPUS = pathlib.Path(__file__).resolve().parent / "corpus"
+HANGS_AFTER_S = 10  # a second without a sanitizer on an idle machine
+MEMORY_MIB = 1024  # 256 without a sanitizer
+
+OPTIONS = {"ASAN_OPTIONS": "quarantine_size_mb=16:allocator_may_return_null=1", "UBSAN_OPTIONS": "print_stacktrace=1"}
+
+
+class Search:
+    """One program and what came of it."""
+
+    def __init__(self, program, folder, seconds):
+        self.target = program.name.removeprefix("fuzz_").removesuffix("_search")
+        self.folder = folder / self.target
+        self.program, self.seconds = program, seconds
+        self.findings, self.code, self.stats = [], None, {}
+
+    def run(self):
+        findings, found = self.folder / "findings", self.folder / "found"
+        findings.mkdir(parents=True, exist_ok=True)
+        found.mkdir(exist_ok=True)
+        before = set(findings.iterdir())
+        with open(self.folder / "log", "w+", encoding="utf-8", errors="replace") as log:
+            self.code = subprocess.run(
+                [self.program, found, CORPUS / self.target, f"-max_total_time={self.seconds:.0f}", "-print_final_stats=1",
+                 f"-timeout={HANGS_AFTER_S}", f"-rss_limit_mb={MEMORY_MIB}", "-max_len=65536",
+                 f"-artifact_prefix={findings}/"],
+                stdout=log, stderr=subprocess.STDOUT, env={**os.environ, **OPTIONS}, check=False).returncode
+            log.seek(0)
+            text = log.read()
+        self.findings = sorted(set(findings.iterdir()) - before)
+        self.stats = {name: int(value) for name, value in re.findall(r"stat::(\w+):\s+(\d+)", text)}
+        self.stats["coverage"] = int((re.findall(r" cov: (\d+)", text) or ["0"])[-1])
+        return self
+
+    def failed(self):
+        return bool(self.findings) or self.code != 0
+
+    def line(self):
+        runs = self.stats.get("number_of_executed_units", 0)
+        said = "nothing found"
+        if self.failed():
+            said = f"{len(self.findings)} found" if self.findings else f"ended with {self.code}, see {self.folder}/log"
+        return (f"{self.target:14} {runs:12,} runs {runs / self.seconds:10,.0f} 1/s {self.stats['coverage']:7,} edges "
+                f"{self.stats.get('new_units_added', 0):6,} new inputs  {said}")
+
+
+def main():
+    try:
+        build, minutes, chosen = pathlib.Path(sys.argv[1]).resolve(), float(sys.argv[2]), set(sys.argv[3:])
+        if not 0.0 < minutes <= 100_000.0:
+            raise ValueError
+    except (IndexError, ValueError):
+        print(__doc__, file=sys.stderr)
+        return 2
+    searches = [Search(program, build / "fuzz", 60.0 * minutes) for program in sorted((build / "bin").glob("fuzz_*_search"))]
+    unknown = chosen - {search.target for search in searches}
+    searches = [search for search in searches if not chosen or search.target in chosen]
+    if unknown or not searches:
+        print(f"no such target in {build}/bin: {', '.join(sorted(unknown)) or 'none at all'}", file=sys.stderr)
+        return 2
+    workers = os.cpu_count() or 1
+    rounds = -(-len(searches) // workers)
+    print(f"{len(searches)} targets, {minutes:g} min each, {workers} at a time: {rounds * minutes:g} min", flush=True)
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        for search in pool.map(Search.run, searches):
+            print(search.line(), flush=True)
+    found = [finding for search in searches for finding in search.findings]
+    for search in searches:
+        for finding in search.findings:
+            print(f"\n{finding}\n  what it does: {search.folder}/log\n  again: build/release/bin/fuzz_{search.target} {finding}")
+    failed = sum(search.failed() for search in searches)
+    print(f"\n{len(found)} finding{'' if len(found) == 1 else 's'}; {len(searches) - failed} of {len(searches)} targets without one")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
