@@ -335,6 +335,20 @@ class Process(WireTest):
         self.assertEqual(server.stop(), 0)
         self.assertFalse(server.verdict["realtime_valid"])
 
+    def test_os_08_ticks_leave_time_to_others(self):
+        """A thread that never sleeps, which the kernel then holds up for 50 ms of each second, or which starves all others."""
+        server = self.server("--mode", "realtime")
+        client = self.client(server)
+
+        def used():
+            tasks = pathlib.Path(f"/proc/{server.process.pid}/task")
+            return max(int((task / "schedstat").read_text(encoding="utf-8").split()[0]) for task in tasks.iterdir()) * 1e-9
+        first, started = client.newest().tick, used()
+        until(lambda: client.newest().tick > first + 4000, "half a second of ticks")
+        ticks, busy = client.newest().tick - first, used() - started
+        self.assertGreater(busy, 0.0)
+        self.assertLess(busy, 0.8 * ticks * 125e-6)
+
     def test_os_14_a_crash_leaves_no_whole_recording_and_the_next_start_is_idle(self):
         """Half a recording that replays as equal; a bench that comes up running."""
         folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
