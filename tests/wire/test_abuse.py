@@ -227,7 +227,7 @@ class Connections(WireTest):
         server = self.server()
         owner = self.client(server)
         owner.lease()
-        scan = subprocess.Popen([nmap, "-n", "-Pn", "-sT", "-sV", "--version-intensity", "9", "--host-timeout", "4s", "-p",
+        scan = subprocess.Popen([nmap, "-n", "-Pn", "-sT", "-sV", "--version-intensity", "9", "--host-timeout", "2s", "-p",
                                  str(server.address[1]), "127.0.0.1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         tick = 0
         while scan.poll() is None:
