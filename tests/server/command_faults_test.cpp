@@ -86,6 +86,17 @@ TEST(CommandFaults, CMD_06_CMD_08_ARepeatedCommandFeedsNoWatchdog) {
   EXPECT_EQ(bench.sample(0).refused_commands, static_cast<std::uint64_t>(kWatchdog));
 }
 
+// Kills: a controller that holds its voltage and is taken for dead.
+TEST(CommandFaults, CMD_08_ASteadyVoltageWithARunningCounterIsACommand) {
+  Bench bench = owned_bench(watched_setup(), kOwner);
+  for (Tick i = 0; i < 10 * kWatchdog; ++i) {
+    ASSERT_EQ(submit_volts(bench, kOwner, 1.0), Refused::kNot);
+    bench.step();
+    ASSERT_EQ(state_of(bench), ControlState::kRun);
+  }
+  EXPECT_EQ(bench.sample(0).missed_commands, 0u);
+}
+
 // Kills: an old command that undoes a newer one, however far it was overtaken.
 TEST(CommandFaults, CMD_07_OvertakenCommandsAreDroppedAndCounted) {
   for (Tick distance = 1; distance <= 8; ++distance) {
