@@ -79,10 +79,9 @@ std::span<const GainRow<BldcParameters>> BldcParameters::gains() noexcept {
           {"machine.resistance_ohm", [](P& p) -> double& { return p.machine.resistance_ohm; }, kNotNegative},
           {"machine.torque_constant_nm_per_a",
            [](P& p) -> double& { return p.machine.torque_constant_nm_per_a; }, kPositive},
-          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+      }),
+      shaft_and_sampling_rows<P>(),
+      std::to_array<GainRow<P>>({
           {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
           {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
       }),

@@ -125,7 +125,6 @@ double FieldOrientedController::quadrature_reference(const Reference& r, double 
 std::span<const GainRow<ControllerParameters>> ControllerParameters::gains() noexcept {
   using P = ControllerParameters;
   constexpr GainRule kPositive = GainRule::kPositive;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
   static constexpr auto kRows = joined(
       std::to_array<GainRow<P>>({
           {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
@@ -135,10 +134,9 @@ std::span<const GainRow<ControllerParameters>> ControllerParameters::gains() noe
            kPositive},
           {"machine.rotor_inductance_h", [](P& p) -> double& { return p.machine.rotor_inductance_h; },
            kPositive},
-          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+      }),
+      shaft_and_sampling_rows<P>(),
+      std::to_array<GainRow<P>>({
           {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
           {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
           {"rated_direct_current_a", [](P& p) -> double& { return p.rated_direct_current_a; }, kPositive},

@@ -21,6 +21,17 @@ constexpr auto joined(const std::array<GainRow<P>, kRows>&... parts) {
   return all;
 }
 
+/// Of P.machine's shaft, and of what P is sampled with.
+template <class P>
+constexpr std::array<GainRow<P>, 4> shaft_and_sampling_rows() {
+  constexpr GainRule kPositive = GainRule::kPositive;
+  return {{{"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; },
+            GainRule::kNotNegative},
+           {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
+           {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
+           {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive}}};
+}
+
 /// Of P.position, ServoGains.
 template <class P>
 constexpr std::array<GainRow<P>, 3> position_rows() {

@@ -10,7 +10,6 @@ namespace drivebench::control {
 template <class P>
 constexpr auto pm_machine_rows() {
   constexpr GainRule kPositive = GainRule::kPositive;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
   return joined(
       std::to_array<GainRow<P>>({
           {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
@@ -18,14 +17,11 @@ constexpr auto pm_machine_rows() {
           {"machine.inductance_h", [](P& p) -> double& { return p.machine.inductance_h; }, kPositive},
           {"machine.torque_constant_nm_per_a",
            [](P& p) -> double& { return p.machine.torque_constant_nm_per_a; }, kPositive},
-          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
       }),
-      speed_observer_rows<P>(),
+      shaft_and_sampling_rows<P>(), speed_observer_rows<P>(),
       std::to_array<GainRow<P>>({
-          {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
+          {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; },
+           GainRule::kNotNegative},
       }));
 }
 

@@ -110,10 +110,9 @@ std::span<const GainRow<WoundRotorParameters>> WoundRotorParameters::gains() noe
            kPositive},
           {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
            kPositive},
-          {"machine.friction_nms", [](P& p) -> double& { return p.machine.friction_nms; }, kNotNegative},
-          {"machine.inertia_kgm2", [](P& p) -> double& { return p.machine.inertia_kgm2; }, kPositive},
-          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
+      }),
+      shaft_and_sampling_rows<P>(),
+      std::to_array<GainRow<P>>({
           {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
           {"field_voltage_limit_v", [](P& p) -> double& { return p.field_voltage_limit_v; }, kPositive},
           {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
