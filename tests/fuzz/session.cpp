@@ -40,6 +40,7 @@ struct Peer {
   std::map<std::uint64_t, Asked> asked;  ///< not answered yet, by id
   bool raw = false;                      ///< it sent bytes that are no requests of this program
   bool greeted = false;
+  bool came = false;
   Owner owner = 0;
 
   bool is_there() const { return socket >= 0 && !session.expired(); }
@@ -61,9 +62,6 @@ class World {
                  nullptr} {
     engine_->on_tick.add([this] { each_session(&Session::on_tick); });
     engine_->on_newest.add([this] { each_session(&Session::on_newest); });
-    for (Peer& peer : peers_)
-      connect(peer, &peer != &peers_.back());  // the last one begins with whatever it likes
-    settle();
   }
 
   ~World() {
@@ -80,6 +78,10 @@ class World {
   void step(Program& program) {
     const unsigned byte = program.next();
     Peer& peer = peers_[byte % kPeers];
+    if (!peer.came) {
+      connect(peer, &peer != &peers_.back());  // the last one begins with whatever it likes
+      settle();
+    }
     const std::int64_t before = engine_->tick();
     const std::array<std::uint64_t, 2> latched{latched_of(0), latched_of(1)};
     steps_allowed_ = 2;  // a session that ends gives both axes back, and each may have been waited for
@@ -119,6 +121,7 @@ class World {
     require(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends.data()) == 0,
             "there are sockets");
     peer = Peer{};
+    peer.came = true;
     peer.socket = ends[0];
     auto session = std::make_shared<Session>(
         Outbox::Socket(asio::local::stream_protocol::socket(io_, asio::local::stream_protocol(), ends[1])),
