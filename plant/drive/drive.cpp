@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kNoEdge = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -186,13 +186,13 @@ double Drive::pwm_start_s(double start_s) const noexcept {
 
 double Drive::edge_after(const DriveMemory& m, double start_s) const noexcept {
   const double instant_s = start_s + tolerance_s_;
-  double next_s = kNever;
+  double next_s = kNoEdge;
   if (kind_ == DriveKind::kSource) {
     if (closing_s_ > instant_s) next_s = closing_s_;
     if (has_corners_) {
       next_s = std::min(next_s, instant_s + time_to_corner_s(p_.source, source_, source_angle_at(instant_s)));
     }
-    return next_s < period_s_ - tolerance_s_ ? next_s : kNever;
+    return next_s < period_s_ - tolerance_s_ ? next_s : kNoEdge;
   }
   if (later_s_ > instant_s) next_s = later_s_;
   if (kind_ == DriveKind::kSwitched) {
@@ -201,7 +201,7 @@ double Drive::edge_after(const DriveMemory& m, double start_s) const noexcept {
     const double end_s = pattern.end_s(pattern.segment_at(instant_s - pwm_s, segment_hint(m)));
     next_s = std::min(next_s, pwm_s + std::min(end_s, pwm_period_s_));
   }
-  return next_s < period_s_ - tolerance_s_ ? next_s : kNever;
+  return next_s < period_s_ - tolerance_s_ ? next_s : kNoEdge;
 }
 
 TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double duration_s,
