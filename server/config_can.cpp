@@ -21,7 +21,7 @@ constexpr std::uint32_t kMaxBaud = 4'000'000;
 constexpr std::int64_t kMinBitRate = 10'000;
 constexpr std::int64_t kMaxBitRate = 1'000'000;
 constexpr std::int64_t kMaxDataBitRate = 8'000'000;
-constexpr std::int64_t kMaxTicks = 1'000'000;
+constexpr std::int64_t kMaxEveryTicks = 1'000'000;
 constexpr std::int64_t kMinTimeMs = 10;
 constexpr std::int64_t kMaxTimeMs = 60'000;
 constexpr std::int64_t kMinIdleMs = 100;
@@ -123,8 +123,8 @@ void read_rates(StrictTable& table, CanConfig& bus) {
                  "is " + std::to_string(bus.data_bit_rate) +
                      " but must not be lower than bit_rate = " + std::to_string(bus.bit_rate));
   }
-  bus.sample_every_ticks = table.integer("sample_every_ticks", 1, kMaxTicks).value_or(bus.sample_every_ticks);
-  bus.state_every_ticks = table.integer("state_every_ticks", 1, kMaxTicks).value_or(bus.state_every_ticks);
+  bus.sample_every_ticks = table.integer("sample_every_ticks", 1, kMaxEveryTicks).value_or(bus.sample_every_ticks);
+  bus.state_every_ticks = table.integer("state_every_ticks", 1, kMaxEveryTicks).value_or(bus.state_every_ticks);
 }
 
 /// A time of at least `minimum`, or 0 for none.

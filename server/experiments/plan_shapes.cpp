@@ -12,7 +12,6 @@
 namespace drivebench {
 namespace {
 
-constexpr double kTwoPi = 0x1.921fb54442d18p+2;
 constexpr double kMaxPhaseRad = 1e3;
 constexpr double kMaxShapeS = 1e6;
 
@@ -205,7 +204,7 @@ void read_angle(const v1::ExperimentInput& input, ExperimentPlan& plan) {
   }
   plan.dq.is_measured = input.angle() == v1::ANGLE_SOURCE_MEASURED;
   plan.dq.pole_pairs = pole_pairs->get(p);
-  plan.dq.rad_per_count = kTwoPi / static_cast<double>(p.encoder.counts_per_revolution);
+  plan.dq.rad_per_count = kTurnRad / static_cast<double>(p.encoder.counts_per_revolution);
   plan.dq.offset_counts = p.encoder.half_count_offset ? 0.0 : 0.5;
   plan.dq.back_emf_vs = input.back_emf_vs();
   if (!(std::abs(input.back_emf_vs()) <= kMaxInputValue)) {

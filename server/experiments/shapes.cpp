@@ -7,12 +7,11 @@
 namespace drivebench {
 namespace {
 
-constexpr double kTwoPi = 0x1.921fb54442d18p+2;
 constexpr double kPi = 0x1.921fb54442d18p+1;
 
 /// The angle of so many turns, within one turn: the cosine is exact to the last bits however long it runs.
 double angle_of(double turns) noexcept {
-  return kTwoPi * (turns - std::floor(turns));
+  return kTurnRad * (turns - std::floor(turns));
 }
 
 /// What a shape is at a time after its start; `ticks` is the same in ticks, `length_s` how long it lasts.
@@ -63,7 +62,7 @@ void add_three_phase(const ThreePhaseShape& s, const Moment& m, Connection conne
                      InputValues& values) noexcept {
   const double rise = m.tau_s < s.rise_s ? m.tau_s / s.rise_s : 1.0;
   const double angle = angle_of(s.frequency_hz * m.tau_s) + s.phase_rad;
-  const double lag = connection == Connection::kTwoPhase ? 0.5 * kPi : kTwoPi / 3.0;
+  const double lag = connection == Connection::kTwoPhase ? 0.5 * kPi : kTurnRad / 3.0;
   for (int phase = 0; phase < terminal_count(connection); ++phase)
     values[static_cast<std::size_t>(phase)] += rise * s.amplitude * cosine(angle - phase * lag);
 }

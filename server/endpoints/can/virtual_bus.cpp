@@ -12,7 +12,7 @@
 namespace drivebench::can {
 namespace {
 
-constexpr auto kRetryPeriod = std::chrono::milliseconds(500);
+constexpr auto kReopenPeriod = std::chrono::milliseconds(500);
 
 }  // namespace
 
@@ -30,7 +30,7 @@ void VirtualBus::lost(const std::string& why) {
 }
 
 void VirtualBus::try_later() {
-  retry_.expires_after(kRetryPeriod);
+  retry_.expires_after(kReopenPeriod);
   retry_.async_wait([this, alive = alive()](const boost::system::error_code& error) {
     if (alive.expired() || error) return;
     if (!open().empty()) return try_later();
