@@ -123,8 +123,10 @@ void read_rates(StrictTable& table, CanConfig& bus) {
                  "is " + std::to_string(bus.data_bit_rate) +
                      " but must not be lower than bit_rate = " + std::to_string(bus.bit_rate));
   }
-  bus.sample_every_ticks = table.integer("sample_every_ticks", 1, kMaxEveryTicks).value_or(bus.sample_every_ticks);
-  bus.state_every_ticks = table.integer("state_every_ticks", 1, kMaxEveryTicks).value_or(bus.state_every_ticks);
+  bus.sample_every_ticks =
+      table.integer("sample_every_ticks", 1, kMaxEveryTicks).value_or(bus.sample_every_ticks);
+  bus.state_every_ticks =
+      table.integer("state_every_ticks", 1, kMaxEveryTicks).value_or(bus.state_every_ticks);
 }
 
 /// A time of at least `minimum`, or 0 for none.
