@@ -41,6 +41,16 @@ def number_of(kind):
     return pb.Envelope.DESCRIPTOR.fields_by_name[kind].number
 
 
+class RecordingTest(WireTest):
+    def recording_server(self, resource_kind, limit):
+        """A server that records to run.mcap in a folder of its own, with a limit set on it; both."""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        server = self.server("--record", str(folder / "run.mcap"),
+                             before=lambda: resource.setrlimit(resource_kind, (limit, limit)))
+        return server, folder
+
+
 class Messages(WireTest):
     def test_tcp_05_thousands_of_empty_parts_cost_their_session_only(self):
         """Two bytes on the wire that become hundreds in memory, and stay there."""
@@ -121,7 +131,7 @@ class Readers(WireTest):
         self.assertEqual(owner.status().sessions, 9)
 
 
-class Connections(WireTest):
+class Connections(RecordingTest):
     def descriptors(self, server):
         return len(os.listdir(f"/proc/{server.process.pid}/fd"))
 
@@ -166,10 +176,7 @@ class Connections(WireTest):
 
     def test_tcp_17_tcp_18_without_descriptors_those_inside_go_on(self):
         """A server that ends, spins or loses its recording when it may open no more files."""
-        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
-        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
-        server = self.server("--record", str(folder / "run.mcap"),
-                             before=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)))
+        server, folder = self.recording_server(resource.RLIMIT_NOFILE, 64)
         owner = self.client(server)
         owner.lease()
         crowd = []
@@ -302,7 +309,7 @@ class Secrets(WireTest):
         self.assertNotIn(token.encode(), (folder / "run.mcap").read_bytes())
 
 
-class Process(WireTest):
+class Process(RecordingTest):
     def test_os_01_a_hangup_ends_it_like_the_others(self):
         """A terminal that closes and leaves a recording without its end."""
         server = self.server()
@@ -351,10 +358,7 @@ class Process(WireTest):
 
     def test_os_14_a_crash_leaves_no_whole_recording_and_the_next_start_is_idle(self):
         """Half a recording that replays as equal; a bench that comes up running."""
-        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
-        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
-        server = self.server("--record", str(folder / "run.mcap"),
-                             before=lambda: resource.setrlimit(resource.RLIMIT_CORE, (0, 0)))
+        server, folder = self.recording_server(resource.RLIMIT_CORE, 0)
         owner = self.client(server)
         owner.lease()
         for tick in range(200):
