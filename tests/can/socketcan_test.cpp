@@ -21,7 +21,7 @@ TEST_F(SocketCan, FramesOfEveryKindCrossUnchanged) {
   const std::vector<Frame> sent = {data_frame(0x7FF, 0xA5), {.id = 0x123, .remote = true, .size = 4}, fd};
   for (const Frame& frame : sent)
     bus_->send(frame);
-  EXPECT_EQ(peer.receive_all(), sent);
+  EXPECT_EQ(peer.receive_all(sent.size()), sent);
   EXPECT_EQ(bus_->status().sent, 3u);
 
   peer.send(0x7FF, {0xA5, 0, 0, 0, 0, 0, 0, 0});
@@ -89,7 +89,7 @@ TEST_F(SocketCan, CAN_02_CAN_03_ALinkThatGoesDownAndUpAgain) {
   peer.send(0x55, {9});
   ASSERT_TRUE(run_until_heard(1));
   bus_->send(data_frame(0x101, 2));
-  const std::vector<Frame> sent = peer.receive_all();
+  const std::vector<Frame> sent = peer.receive_all(1);
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(sent[0].data[0], 2);
   EXPECT_EQ(states_, (std::vector{BusState::kDown, BusState::kUp}));
@@ -122,7 +122,7 @@ TEST_F(SocketCan, CAN_04_AnInterfaceThatIsMadeAgainIsOpenedAgain) {
     ASSERT_TRUE(run_until_heard(static_cast<std::size_t>(round)));
     EXPECT_EQ(heard_.back().id, 0x55u);
     bus_->send(data_frame(0x101));
-    EXPECT_EQ(peer.receive_all().size(), 1u);
+    EXPECT_EQ(peer.receive_all(1).size(), 1u);
   }
 }
 

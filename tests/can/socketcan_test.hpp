@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "protocols/can/kernel_frame.hpp"
@@ -57,14 +58,20 @@ class Peer {
     const auto size = fd ? CANFD_MTU : CAN_MTU;
     ASSERT_EQ(::send(fd_, &raw, size, 0), static_cast<ssize_t>(size));
   }
-  std::vector<Frame> receive_all() const {
+  /// What has come; waits until it is at least so many frames, as the kernel may deliver them later.
+  std::vector<Frame> receive_all(std::size_t at_least = 0) const {
+    const auto give_up = std::chrono::steady_clock::now() + kPatience;
     std::vector<Frame> frames;
     canfd_frame raw{};
-    while (const ssize_t size = ::recv(fd_, &raw, sizeof raw, 0)) {
-      if (size < 0) break;
-      frames.push_back(frame_of(raw, size == static_cast<ssize_t>(CANFD_MTU)));
+    for (;;) {
+      const ssize_t size = ::recv(fd_, &raw, sizeof raw, 0);
+      if (size > 0) {
+        frames.push_back(frame_of(raw, size == static_cast<ssize_t>(CANFD_MTU)));
+        continue;
+      }
+      if (frames.size() >= at_least || std::chrono::steady_clock::now() > give_up) return frames;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    return frames;
   }
 
  private:
