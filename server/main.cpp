@@ -149,7 +149,7 @@ std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config,
 
 /// Shows how far a run of known length is, twice a second, if somebody watches.
 asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
-  asio::steady_timer timer(co_await asio::this_coro::executor);
+  ServerTimer timer(co_await asio::this_coro::executor);
   const double period_s = static_cast<double>(engine.config().setup.period_ns) * 1e-9;
   for (;;) {
     timer.expires_after(std::chrono::milliseconds(500));

@@ -3,6 +3,8 @@
 #include <chrono>
 #include <cstdint>
 
+#include "server/clock.hpp"
+
 namespace drivebench {
 
 /// At most one log line per 10 s from one source; counts what it kept back.
@@ -10,7 +12,7 @@ class LogLimit {
  public:
   /// Whether to log now. Then held_back() says how many lines since the last one were not.
   bool allow() noexcept {
-    const auto now = std::chrono::steady_clock::now();
+    const auto now = ServerClock::now();
     if (last_ != Time{} && now - last_ < std::chrono::seconds(10)) {
       ++pending_;
       return false;
@@ -23,7 +25,7 @@ class LogLimit {
   std::uint64_t held_back() const noexcept { return held_back_; }
 
  private:
-  using Time = std::chrono::steady_clock::time_point;
+  using Time = ServerClock::time_point;
   Time last_{};
   std::uint64_t pending_ = 0;
   std::uint64_t held_back_ = 0;

@@ -41,7 +41,7 @@ class Outbox {
   void arm_timer(const std::shared_ptr<void>& owner);
 
   Socket& socket_;
-  asio::steady_timer timer_;
+  ServerTimer timer_;
   std::vector<std::byte> queued_;
   std::vector<std::byte> in_flight_;
   std::size_t sent_ = 0;  // of in_flight_

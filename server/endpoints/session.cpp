@@ -31,7 +31,7 @@ Session::Session(Outbox::Socket socket, std::string peer, SessionContext& contex
 
 asio::awaitable<void> Session::run() {
   const std::shared_ptr<Session> self = shared_from_this();
-  asio::steady_timer hello_timer(socket_.get_executor(), kHelloLimit);
+  ServerTimer hello_timer(socket_.get_executor(), kHelloLimit);
   hello_timer.async_wait([self](const boost::system::error_code& error) {
     if (!error && !self->greeted_) self->close();
   });

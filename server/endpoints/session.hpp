@@ -80,7 +80,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::uint64_t next;                ///< row, or byte of the recording
     std::size_t row_bytes;             ///< 1 for a recording
     std::unique_ptr<FileReader> file;  ///< opened when there is something to read
-    std::chrono::steady_clock::time_point last_info;
+    ServerClock::time_point last_info;
     int send_buffer_bytes;  ///< of the socket, before and after
   };
 

@@ -189,7 +189,7 @@ void Session::fetch_experiment(const v1::FetchExperiment& r) {
                    .next = r.from() / step,
                    .row_bytes = r.recording() ? 1 : 8 * static_cast<std::size_t>(info.signals_size()),
                    .file = nullptr,
-                   .last_info = std::chrono::steady_clock::now(),
+                   .last_info = ServerClock::now(),
                    .send_buffer_bytes = 0};
     boost::system::error_code ignored;
     asio::socket_base::send_buffer_size size;
@@ -249,7 +249,7 @@ bool Session::send_rows(std::size_t& budget) {
     outbox_.send(scratch_, shared_from_this());
     return true;
   }
-  const auto now = std::chrono::steady_clock::now();
+  const auto now = ServerClock::now();
   const bool ended = Experiments::has_ended(info.state());
   if (!ended && now - f.last_info < kInfoInterval) return false;
   f.last_info = now;

@@ -133,7 +133,7 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
     if (error == asio::error::operation_aborted) co_return;
     if (error) {
       spdlog::warn("cannot accept a client: {}", error.message());
-      asio::steady_timer pause(io_, kAcceptPause);
+      ServerTimer pause(io_, kAcceptPause);
       co_await pause.async_wait(asio::use_awaitable);
       continue;
     }

@@ -97,7 +97,7 @@ class Experiments {
   BenchConfig config_;
   std::filesystem::path folder_;
   int lock_ = -1;
-  asio::steady_timer timer_;
+  ServerTimer timer_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  // for what is posted; I/O thread only
   std::atomic<bool> notified_{false};
   std::vector<std::weak_ptr<SignalTable>> tables_;  // of all sessions

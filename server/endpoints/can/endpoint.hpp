@@ -33,7 +33,7 @@ class Endpoint {
   void close();
 
  private:
-  using Clock = std::chrono::steady_clock;
+  using Clock = ServerClock;
 
   /// What waits for the command of its tick.
   struct PhaseSetpoints {
@@ -103,7 +103,7 @@ class Endpoint {
   void reply(const Node& node, Request request, Result result, std::uint32_t controller, std::uint8_t lease,
              std::int64_t tick);
 
-  asio::steady_timer timer_;
+  ServerTimer timer_;
   CanConfig config_;
   std::unique_ptr<Bus> bus_;
   Engine* engine_ = nullptr;

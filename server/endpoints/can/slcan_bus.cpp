@@ -26,7 +26,7 @@ constexpr std::string_view kPty = "pty:";
 
 /// Milliseconds that begin anew each minute, as the adapters count them.
 std::uint16_t stamp_ms() {
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  const auto now = ServerClock::now().time_since_epoch();
   return static_cast<std::uint16_t>(std::chrono::duration_cast<std::chrono::milliseconds>(now).count() %
                                     60'000);
 }

@@ -20,7 +20,7 @@
 namespace drivebench::can {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = ServerClock;
 
 // An adapter may refuse to close a channel that is not open.
 constexpr auto kHandshake = std::chrono::milliseconds(500);

@@ -62,8 +62,8 @@ class SocketCanBus final : public Bus {
   bool confirm_virtual_;
   BusStatus status_;
   asio::posix::stream_descriptor stream_;
-  asio::steady_timer retry_;
-  asio::steady_timer probe_;
+  ServerTimer retry_;
+  ServerTimer probe_;
   SendQueue pending_;  ///< what the interface had no room for
   std::vector<can_filter> filter_;
   bool filtered_ = false;

@@ -49,7 +49,7 @@ struct Client : std::enable_shared_from_this<Client> {
   Mode mode = Mode::kNoBus;
   SocketcandReader reader;
   TextPeer peer;
-  asio::steady_timer statistics;
+  ServerTimer statistics;
 };
 
 class SocketcandBus final : public VirtualBus {

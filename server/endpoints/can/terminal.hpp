@@ -31,7 +31,7 @@ class Terminal {
   bool renew();
   void poll_later();
 
-  asio::steady_timer poll_;
+  ServerTimer poll_;
   int fd_ = -1;
   std::string device_;
   std::string link_;

@@ -38,7 +38,7 @@ class TextListener {
   void take(asio::ip::tcp::socket socket);
 
   asio::ip::tcp::acceptor acceptor_;
-  asio::steady_timer pause_;
+  ServerTimer pause_;
   std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
 };
 

@@ -54,7 +54,7 @@ class TextPeer {
   void reset();
 
   asio::posix::stream_descriptor stream_;
-  asio::steady_timer timer_;
+  ServerTimer timer_;
   BusStatus& status_;
   Encode encode_;
   std::string unsent_;  ///< text that the kernel had no room for; frames wait behind it

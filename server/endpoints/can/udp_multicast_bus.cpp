@@ -23,7 +23,7 @@
 namespace drivebench::can {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = ServerClock;
 
 // A receiver that left its buffer as the kernel made it has room for 160 datagrams.
 constexpr double kBurst = 64;
@@ -142,7 +142,7 @@ class UdpMulticastBus final : public VirtualBus {
   asio::posix::stream_descriptor out_;
 
   SendQueue pending_;
-  asio::steady_timer retry_;
+  ServerTimer retry_;
   double allowance_ = kBurst;  ///< frames that may be sent now
   Clock::time_point allowed_at_ = Clock::now();
 

@@ -41,7 +41,7 @@ class VirtualBus : public Bus {
   void try_later();
   void set_state(BusState state);
 
-  asio::steady_timer retry_;
+  ServerTimer retry_;
   bool filtered_ = false;
   std::vector<std::uint32_t> filter_;  // sorted
   std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();

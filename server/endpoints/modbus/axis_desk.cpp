@@ -228,7 +228,7 @@ std::shared_ptr<AxisDesk::Asked> AxisDesk::send(const Input& input) {
 
 asio::awaitable<Refused> AxisDesk::answer_to(std::shared_ptr<Asked> asked) {
   if (!asked->answer) {
-    asio::steady_timer timer(timer_.get_executor(), Clock::time_point::max());
+    ServerTimer timer(timer_.get_executor(), Clock::time_point::max());
     asked->waiting = &timer;
     boost::system::error_code cancelled;
     co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));

@@ -91,7 +91,7 @@ class AxisDesk {
   void connection_ended(Visitor who);
 
  private:
-  using Clock = std::chrono::steady_clock;
+  using Clock = ServerClock;
 
   /// What the registers of the command block hold.
   struct CommandInput {
@@ -126,7 +126,7 @@ class AxisDesk {
   /// An input on its way to the bench.
   struct Asked {
     std::optional<Refused> answer;
-    asio::steady_timer* waiting = nullptr;
+    ServerTimer* waiting = nullptr;
   };
   std::shared_ptr<Asked> send(const Input& input);
   asio::awaitable<Refused> answer_to(std::shared_ptr<Asked> asked);
@@ -168,7 +168,7 @@ class AxisDesk {
   Visitor holder_ = 0;  ///< 0: the connection has ended, the key still counts
   bool waiting_ = false;
   Clock::time_point last_word_{};
-  asio::steady_timer timer_;
+  ServerTimer timer_;
 
   CommandInput command_;
   ProcessInput process_;

@@ -42,7 +42,7 @@ struct Shared {
 /// One client. Requests are answered in the order they came; an error ends this connection and nothing else.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = ServerClock;
 
   Connection(asio::ip::tcp::socket socket, Visitor number, Shared& shared);
 
@@ -95,8 +95,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   MbapReader reader_;
   std::vector<std::uint8_t> out_;
   std::array<std::uint16_t, kMaxReadRegisters> words_{};  ///< of the write under way
-  asio::steady_timer waker_;
-  asio::steady_timer timer_;
+  ServerTimer waker_;
+  ServerTimer timer_;
   std::uint64_t timer_run_ = 0;
   bool timing_ = false;
   bool waiting_ = false;

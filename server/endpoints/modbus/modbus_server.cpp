@@ -89,7 +89,7 @@ asio::awaitable<void> ModbusServer::accept() {
         spdlog::warn("cannot accept a Modbus client: {} ({} more since the last such line)", error.message(),
                      log.held_back());
       }
-      asio::steady_timer pause(io_, kAcceptPause);
+      ServerTimer pause(io_, kAcceptPause);
       co_await pause.async_wait(asio::use_awaitable);
       continue;
     }

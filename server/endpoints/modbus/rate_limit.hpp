@@ -12,7 +12,7 @@ namespace drivebench::modbus {
 /// A bucket of tokens for each peer address, refilled at a steady rate up to one second's worth.
 class RateLimit {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = ServerClock;
   enum class Answer : std::uint8_t { kServe, kRefuse, kCut };
 
   /// 0: no limit.
