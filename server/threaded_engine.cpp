@@ -16,6 +16,7 @@
 #include "server/engine.hpp"
 #include "server/mailbox.hpp"
 #include "server/pacer.hpp"
+#include "server/stepped_engine.hpp"
 
 namespace drivebench {
 namespace {
@@ -71,9 +72,8 @@ class Tap final : public BenchObserver {
 class ThreadedEngine final : public Engine {
  public:
   ThreadedEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context& io,
-                 std::optional<Tick> max_ticks)
+                 std::unique_ptr<Pacer> pacer)
       : Engine(config, std::move(recorder)),
-        max_ticks_(max_ticks),
         ticks_per_wake_(
             config_.mode == RunMode::kRealtime
                 ? 1
@@ -86,9 +86,7 @@ class ThreadedEngine final : public Engine {
         parameter_mail_(config_.axes.size()),
         sent_(config_.axes.size()),
         wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
-        pacer_(config_.mode == RunMode::kRealtime
-                   ? make_realtime_pacer(config_.realtime.pacer, config_.setup.period_ns)
-                   : make_free_pacer()) {
+        pacer_(std::move(pacer)) {
     schedule_events(config_, bench_);
     for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
       parameters_[i] = bench_.axis(i).parameters();
@@ -99,6 +97,11 @@ class ThreadedEngine final : public Engine {
     for (std::size_t i = 0; i < newest_.size(); ++i)
       newest_[i] = bench_.sample(i);
     await_wake();
+  }
+
+  /// Gives the ticks a thread of their own.
+  void start(std::optional<Tick> max_ticks) {
+    max_ticks_ = max_ticks;
     std::atomic<bool> ready{false};
     thread_ = std::thread([this, &ready] { run(ready); });
     while (!ready.load())
@@ -147,7 +150,7 @@ class ThreadedEngine final : public Engine {
 
   Verdict stop() override {
     stop_.store(true);
-    thread_.join();
+    if (thread_.joinable()) thread_.join();
     bench_.dismiss_controllers();
     Verdict verdict{.mode = config_.mode,
                     .ticks = static_cast<std::uint64_t>(bench_.tick()),
@@ -166,20 +169,24 @@ class ThreadedEngine final : public Engine {
     return worst_lateness_ns_.load(std::memory_order_relaxed);
   }
 
- private:
   // ---- tick thread ----
 
+  /// One tick, with all that belongs to it.
+  void run_tick() noexcept {
+    look_at_the_clock();
+    take_requests();
+    send_parameters();
+    if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
+    bench_.step();
+    if (bench_.tick() % ticks_per_wake_ == 0) notify();
+  }
+
+ private:
   void run(std::atomic<bool>& ready) {
     if (config_.mode == RunMode::kRealtime) notes_ = enter_realtime(config_.realtime);
     ready.store(true);
-    while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_)) {
-      look_at_the_clock();
-      take_requests();
-      send_parameters();
-      if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
-      bench_.step();
-      if (bench_.tick() % ticks_per_wake_ == 0) notify();
-    }
+    while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_))
+      run_tick();
     send_parameters();
     while (!events_.push(Ended{}) && !stop_.load()) {
       notify();
@@ -357,7 +364,19 @@ class ThreadedEngine final : public Engine {
 
 std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
                                              asio::io_context& io, std::optional<Tick> max_ticks) {
-  return std::make_unique<ThreadedEngine>(config, std::move(recorder), io, max_ticks);
+  std::unique_ptr<Pacer> pacer = config.mode == RunMode::kRealtime
+                                     ? make_realtime_pacer(config.realtime.pacer, config.setup.period_ns)
+                                     : make_free_pacer();
+  auto engine = std::make_unique<ThreadedEngine>(config, std::move(recorder), io, std::move(pacer));
+  engine->start(max_ticks);
+  return engine;
+}
+
+SteppedEngine make_stepped_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                  asio::io_context& io, std::unique_ptr<Pacer> pacer) {
+  auto engine = std::make_unique<ThreadedEngine>(config, std::move(recorder), io, std::move(pacer));
+  ThreadedEngine* const stepped = engine.get();
+  return {.engine = std::move(engine), .tick = [stepped] { stepped->run_tick(); }};
 }
 
 }  // namespace drivebench

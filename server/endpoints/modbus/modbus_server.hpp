@@ -26,6 +26,9 @@ class ModbusServer {
   /// Starts accepting clients of this run.
   void serve(Engine& engine);
 
+  /// Serves a client whose socket is there already.
+  void start(asio::ip::tcp::socket socket);
+
   /// Stops accepting and ends every connection.
   void close();
 
@@ -33,7 +36,6 @@ class ModbusServer {
 
  private:
   asio::awaitable<void> accept();
-  void start(asio::ip::tcp::socket socket);
   bool make_room(const asio::ip::address& newcomer);
   asio::awaitable<void> run(std::shared_ptr<modbus::Connection> connection);
 
