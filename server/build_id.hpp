@@ -1,10 +1,16 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 
 namespace drivebench {
 
 /// The commit that this program was built from.
 std::string_view build_id() noexcept;
+
+/// How a recording says who made it.
+inline std::string recorder_name() {
+  return "drivebench " + std::string(build_id());
+}
 
 }  // namespace drivebench

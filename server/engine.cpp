@@ -8,6 +8,7 @@ namespace drivebench {
 
 Engine::Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder)
     : config_(config),
+      watch_(config.setup.period_ns),
       recorder_(std::move(recorder)),
       newest_(config.axes.size()),
       configuration_hash_(drivebench::configuration_hash(config)) {

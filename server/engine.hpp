@@ -12,6 +12,7 @@
 #include "server/recorder.hpp"
 #include "server/tick_edges.hpp"
 #include "server/verdict.hpp"
+#include "server/watch.hpp"
 
 namespace boost::asio {
 class io_context;
@@ -76,6 +77,9 @@ class Engine {
   /// What the machine did not grant, for people.
   const std::vector<std::string>& notes() const { return notes_; }
 
+  /// How ticks go on, for whoever looks after that from another thread.
+  Watch& watch() noexcept { return watch_; }
+
   /// The parameters in force at newest(), with those writes whose answer is still to come.
   const AxisParameters& parameters(std::size_t axis) const { return parameters_[axis]; }
   /// What is wrong with a write that acts at once: empty, and then it counts as done; the caller sends the
@@ -93,6 +97,7 @@ class Engine {
   Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder);
 
   BenchConfig config_;
+  Watch watch_;
   std::unique_ptr<Recorder> recorder_;
   std::vector<Sample> newest_;
   std::vector<TickEdges> edges_;  ///< empty: nobody wants them

@@ -31,6 +31,7 @@ class LockstepEngine final : public Engine {
     }
     if (!commanded) return;  // without a controller a lockstep bench stands still
     if (recorder_) recorder_->wait_for_room();
+    watch_.beat();
     bench_.step();
     for (std::size_t i = 0; i < edges_.size(); ++i)
       edges_[i] = edges_of(bench_, i);

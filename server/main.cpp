@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <nlohmann/json.hpp>
+#include <thread>
 
-#include "protocols/mapped_file.hpp"
 #include "server/asio.hpp"
 #include "server/build_id.hpp"
 #include "server/config.hpp"
@@ -16,8 +16,9 @@
 #include "server/endpoints/transports.hpp"
 #include "server/engine.hpp"
 #include "server/interface_text.hpp"
-#include "server/replay.hpp"
+#include "server/replay_command.hpp"
 #include "server/service_notification.hpp"
+#include "server/supervisor.hpp"
 
 namespace drivebench {
 namespace {
@@ -38,6 +39,9 @@ struct Options {
   bool check_config = false;
   bool allow_overload = false;
   std::string experiments;
+  double file_s = 0.0;         ///< of plant time in each file of a recording; 0: all
+  std::uint64_t file_mib = 0;  ///< of each file of a recording; 0: any
+  bool require_realtime = false;
   std::string print;  ///< a description of an interface, instead of a run
   std::size_t bus = 1;
 };
@@ -136,9 +140,30 @@ void print_verdict(const Options& o, const Verdict& v) {
   if (!o.record.empty()) print_line(fmt::format("recorded in {}", o.record));
 }
 
+RecordingOptions recording_options(const Options& o, const BenchConfig& config) {
+  const double ticks = o.file_s * 1e9 / static_cast<double>(config.setup.period_ns);
+  return {
+      .file_ticks = o.file_s > 0.0 ? std::max<std::uint64_t>(static_cast<std::uint64_t>(ticks + 0.5), 1) : 0,
+      .file_bytes = o.file_mib << 20,
+      .continues_after_errors = true};
+}
+
+/// Refuses a host that grants less than real time needs.
+void require_realtime(const BenchConfig& config) {
+  if (config.mode != RunMode::kRealtime)
+    throw std::runtime_error("--require-rt: this run is not in real time");
+  std::vector<std::string> notes;
+  std::thread([&] { notes = enter_realtime(config.realtime); }).join();
+  if (config.realtime.priority <= 0) notes.emplace_back("the bench file asks for no priority");
+  if (!notes.empty()) throw std::runtime_error("--require-rt: " + notes.front());
+}
+
 std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config, asio::io_context& io) {
   std::unique_ptr<Recorder> recorder;
-  if (!o.record.empty()) recorder = std::make_unique<Recorder>(o.record, config);
+  if (!o.record.empty()) {
+    recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
+                                          recording_options(o, config));
+  }
   if (config.mode == RunMode::kLockstep) return make_lockstep_engine(config, std::move(recorder));
   std::optional<Tick> max_ticks;
   if (o.duration_s > 0.0) {
@@ -187,6 +212,7 @@ int serve(const Options& o) {
     if (!error) io.stop();
   });
   check_bus_loads(o, config);
+  if (o.require_realtime) require_realtime(config);
   // First: a port in use must not leave a recording behind.
   StreamServer server(io, config.tcp);
   Transports transports(io, config);
@@ -205,6 +231,8 @@ int serve(const Options& o) {
   if (o.duration_s > 0.0 && ::isatty(STDERR_FILENO) != 0) {
     asio::co_spawn(io, show_progress(*engine, o.duration_s), asio::detached);
   }
+  std::optional<Supervisor> supervisor;
+  supervisor.emplace(io, engine->watch(), config.mode == RunMode::kRealtime);
   bool broken = false;
   try {
     io.run();
@@ -215,6 +243,7 @@ int serve(const Options& o) {
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   signals.clear();  // from here on a second signal ends the program at once
   notify_service_manager("STOPPING=1");
+  supervisor.reset();  // what stands still from here on shall
   const Verdict verdict = engine->stop();
   experiments.reset();
   transports.close();
@@ -224,55 +253,6 @@ int serve(const Options& o) {
   const bool too_late =
       o.fail_on_late >= 0 && verdict.late_ticks > static_cast<std::uint64_t>(o.fail_on_late);
   return too_late ? kTooLate : kOk;
-}
-
-nlohmann::json as_json(const ReplayReport& report) {
-  using Result = ReplayReport::Result;
-  nlohmann::json json{{"equal", report.result == Result::kEqual},
-                      {"usable", report.result != Result::kUnusable},
-                      {"ticks", report.ticks},
-                      {"samples", report.samples},
-                      {"inputs", report.inputs},
-                      {"state_hash", fmt::format("{:016x}", report.state_hash)},
-                      {"recorded_by", report.recorded_by},
-                      {"problem", report.problem}};
-  if (report.difference) {
-    json["first_difference"] = {{"tick", report.difference->tick},
-                                {"axis", report.difference->axis},
-                                {"signal", report.difference->signal},
-                                {"recorded", report.difference->recorded},
-                                {"replayed", report.difference->replayed}};
-  }
-  return json;
-}
-
-int replay_file(const Options& o) {
-  const MappedFile file(o.replay);
-  const bool terminal = ::isatty(STDERR_FILENO) != 0;
-  const ReplayReport report = replay(
-      file.bytes(),
-      terminal ? +[](double share) { fmt::print(stderr, "\rreplaying {:3.0f} %", 100.0 * share); } : nullptr);
-  if (terminal) fmt::print(stderr, "\r                \r");
-  if (o.json) {
-    print_line(as_json(report).dump());
-  } else {
-    const char* const verdict = report.result == ReplayReport::Result::kEqual       ? "equal, bit for bit"
-                                : report.result == ReplayReport::Result::kDifferent ? "DIFFERENT"
-                                                                                    : "cannot be replayed";
-    print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {})",
-                           o.replay, verdict, report.ticks, report.samples, report.inputs, report.state_hash,
-                           report.recorded_by.empty() ? "nobody" : report.recorded_by));
-    if (!report.problem.empty()) print_line("  " + report.problem);
-  }
-  switch (report.result) {
-    case ReplayReport::Result::kEqual:
-      return kOk;
-    case ReplayReport::Result::kDifferent:
-      return kFailed;
-    case ReplayReport::Result::kUnusable:
-      break;
-  }
-  return kUnusable;
 }
 
 int run(int argc, char** argv) {
@@ -290,6 +270,13 @@ int run(int argc, char** argv) {
   app.add_option("--port", o.port, "TCP port; 0: chosen by the system")->check(CLI::Range(0, 65535));
   app.add_option("--unix", o.unix_path, "also listen on this unix socket");
   app.add_option("--record", o.record, "write an MCAP recording to this new file");
+  app.add_option("--record-file-s", o.file_s,
+                 "a new file after this much plant time [s]: FILE.mcap, FILE.2.mcap ...")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--record-file-mib", o.file_mib, "a new file after this many MiB")
+      ->check(CLI::PositiveNumber);
+  app.add_flag("--require-rt", o.require_realtime,
+               "do not start without real-time scheduling and locked memory");
   app.add_option("--duration", o.duration_s, "stop after this much plant time [s] (realtime and free)")
       ->check(CLI::PositiveNumber);
   app.add_option("--command-delay-ticks", o.command_delay_ticks, "0 or 1, instead of the bench file's")
@@ -313,7 +300,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "a bench file is needed, for example configs/benches/servo.toml; see --help\n");
     return kUnusable;
   }
-  return o.replay.empty() ? serve(o) : replay_file(o);
+  return o.replay.empty() ? serve(o) : replay_command(o.replay, o.json);
 }
 
 }  // namespace
@@ -323,6 +310,9 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_logger_mt("drivebench"));
   google::protobuf::SetLogHandler(nullptr);  // a peer could fill the log with text that is not UTF-8
   try {
+    if (drivebench::force_arithmetic()) {
+      spdlog::warn("a library has changed how this program rounds; set back");
+    }
     return drivebench::run(argc, argv);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());

@@ -12,12 +12,40 @@
 #include "server/bench.hpp"
 #include "server/config.hpp"
 #include "server/recording.hpp"
+#include "server/recording_file.hpp"
 #include "server/spsc_ring.hpp"
 #include "server/verdict.hpp"
 
 namespace drivebench {
 
-/// Writes every sample and every input of a run to an MCAP file, on a thread of its own behind a bounded
+class RecordingWriter;
+
+struct RecordedSample {
+  RecordedSample() noexcept : axis(0), sample() {}
+  RecordedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
+  std::uint32_t axis;
+  Sample sample;
+};
+struct RecordedInput {
+  RecordedInput(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
+  Tick received;
+  Input input;
+};
+using RecordedEntry = std::variant<RecordedSample, RecordedInput>;
+
+/// One file, and the end of the recording when its disk refuses something, unless more is asked for.
+struct RecordingOptions {
+  std::uint64_t file_ticks = 0;         ///< a new file begins after so many; 0: never
+  std::uint64_t file_bytes = 0;         ///< a new file begins with the chunk that brings it there; 0: never
+  bool continues_after_errors = false;  ///< in a new file, unless the disk is full
+  CreateRecordingFile create{};         ///< empty: create_recording_file
+};
+
+/// Entries of the ring between tick and recorder: two seconds, a sample and a command in each tick for each
+/// axis, as far as 256 MiB hold them.
+std::size_t recorder_ring_entries(const BenchConfig& config) noexcept;
+
+/// Writes every sample and every input of a run to MCAP files, on a thread of its own behind a bounded
 /// ring. The tick only copies into the ring; when the ring is full the entry is lost and counted. What has
 /// come is handed to the system after every 100 ms of plant time (1 s in free mode) and synced to the disk
 /// every second.
@@ -25,7 +53,7 @@ class Recorder final : public BenchObserver {
  public:
   /// Creates the file; throws std::system_error if it exists or cannot be made.
   Recorder(const std::filesystem::path& file, const BenchConfig& config,
-           std::initializer_list<RecordingAttachment> attachments = {});
+           std::initializer_list<RecordingAttachment> attachments = {}, const RecordingOptions& options = {});
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
@@ -44,29 +72,15 @@ class Recorder final : public BenchObserver {
   void finish(const Verdict& verdict);
 
  private:
-  struct SampleEntry {
-    SampleEntry() noexcept : axis(0), sample() {}
-    SampleEntry(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
-    std::uint32_t axis;
-    Sample sample;
-  };
-  struct InputEntry {
-    InputEntry(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
-    Tick received;
-    Input input;
-  };
-  using Entry = std::variant<SampleEntry, InputEntry>;
-  class File;
-
   void count_gap(bool lost) noexcept;
   void run();
-  bool drain() noexcept;
+  bool drain(std::size_t most) noexcept;
   void count_lost();
 
   std::string file_;
-  SpscRing<Entry> ring_;
+  SpscRing<RecordedEntry> ring_;
   std::size_t room_for_tick_;
-  std::unique_ptr<File> writer_;
+  std::unique_ptr<RecordingWriter> writer_;
   std::atomic<std::uint64_t> gaps_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;

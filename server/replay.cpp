@@ -6,9 +6,10 @@
 #include <map>
 
 #include "bench.pb.h"
-#include "protocols/mcap.hpp"
+#include "protocols/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
 #include "server/bench.hpp"
+#include "server/build_id.hpp"
 #include "server/config.hpp"
 #include "server/input_codec.hpp"
 #include "server/recording.hpp"
@@ -43,13 +44,17 @@ bool same_bits(const Signal& signal, const Sample& a, const Sample& b) noexcept 
 /// Follows one recording. Each step returns false when there is no point in going on.
 class Replayer {
  public:
-  explicit Replayer(std::span<const std::byte> recording) : recording_(recording), reader_(recording) {}
+  explicit Replayer(const std::vector<std::span<const std::byte>>& segments) : series_(segments) {
+    for (const std::span<const std::byte> segment : segments)
+      bytes_ += segment.size();
+  }
 
   ReplayReport run(void (*on_progress)(double)) {
     bool more = true;
-    for (McapMessage message; more && reader_.next(message);) {
+    for (McapMessage message; more && series_.next(message);) {
+      if (series_.problem()) break;  // of a file before this one
       if (!bench_ && !build_bench()) break;
-      const std::string_view topic = reader_.channels().at(message.header.channel).topic;
+      const std::string_view topic = reader().channels().at(message.header.channel).topic;
       if (has_verdict_) {
         more = unusable("something follows its verdict");
       } else if (topic == kInputTopic) {
@@ -59,19 +64,28 @@ class Replayer {
       } else if (const auto axis = axes_.find(topic); axis != axes_.end()) {
         more = compare(axis->second, message.payload);
       }
+      seen_ += message.payload.size() + kMessageRecordBytes;
       if ((++messages_ & 0xffff) == 0 && on_progress != nullptr) {
-        on_progress(static_cast<double>(message.payload.data() - recording_.data()) /
-                    static_cast<double>(recording_.size()));
+        on_progress(static_cast<double>(seen_) / static_cast<double>(bytes_));
       }
     }
     conclude();
+    if (!report_.problem.empty() && bench_ && !report_.same_build) {
+      report_.problem +=
+          fmt::format("; it was recorded by {}, this is {}", report_.recorded_by, recorder_name());
+    }
     return std::move(report_);
   }
 
  private:
   bool build_bench() {
-    report_.recorded_by = reader_.library();
-    for (const McapAttachment& attachment : reader_.attachments()) {
+    report_.recorded_by = reader().library();
+    report_.same_build = report_.recorded_by == recorder_name();
+    if (series_.first_number() != 1) {
+      return unusable(
+          fmt::format("it is file {} of a recording; the first one is needed", series_.first_number()));
+    }
+    for (const McapAttachment& attachment : reader().attachments()) {
       if (attachment.name != kConfigurationAttachment) continue;
       try {
         const std::string_view text(reinterpret_cast<const char*>(attachment.data.data()),
@@ -162,8 +176,8 @@ class Replayer {
       report_.state_hash = bench_->state_hash();
     }
     if (stopped_) return;
-    if (reader_.problem()) {
-      unusable(reader_.problem()->what);
+    if (series_.problem()) {
+      unusable(series_.problem()->what);
     } else if (!bench_) {
       unusable("it holds no samples");
     } else if (!has_verdict_) {
@@ -180,8 +194,13 @@ class Replayer {
     }
   }
 
-  std::span<const std::byte> recording_;
-  McapReader reader_;
+  static constexpr std::uint64_t kMessageRecordBytes = 31;  // around a payload, for the progress only
+
+  const McapReader& reader() const { return series_.reader(); }
+
+  McapSeries series_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t seen_ = 0;
   BenchConfig config_;
   ParameterTables tables_;
   std::optional<Bench> bench_;
@@ -196,7 +215,11 @@ class Replayer {
 }  // namespace
 
 ReplayReport replay(std::span<const std::byte> recording, void (*on_progress)(double)) {
-  return Replayer(recording).run(on_progress);
+  return Replayer({recording}).run(on_progress);
+}
+
+ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, void (*on_progress)(double)) {
+  return Replayer(segments).run(on_progress);
 }
 
 }  // namespace drivebench

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace drivebench {
 
@@ -30,6 +31,7 @@ struct ReplayReport {
   std::uint64_t inputs = 0;
   std::uint64_t state_hash = 0;
   std::string recorded_by;  ///< program and build
+  bool same_build = true;   ///< as this one; else bits may differ though nothing is wrong
   std::optional<ReplayDifference> difference;
   std::string problem;  ///< a sentence; empty if there is none
 };
@@ -37,5 +39,7 @@ struct ReplayReport {
 /// Builds the bench from the configuration in the recording, feeds it the recorded inputs at their ticks and
 /// compares every sample. `on_progress` is called now and then with the share done, 0 to 1.
 ReplayReport replay(std::span<const std::byte> recording, void (*on_progress)(double));
+/// The same for a recording in several files.
+ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, void (*on_progress)(double));
 
 }  // namespace drivebench

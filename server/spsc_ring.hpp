@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <bit>
 #include <cstddef>
 #include <memory>
 #include <type_traits>
@@ -10,14 +9,14 @@
 
 namespace drivebench {
 
-/// A bounded queue between one producer thread and one consumer thread, wait-free on both sides. The capacity
-/// is rounded up to a power of two; all memory is taken and touched at construction.
+/// A bounded queue between one producer thread and one consumer thread, wait-free on both sides. All memory
+/// is taken and touched at construction.
 template <class T>
 class SpscRing {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  explicit SpscRing(std::size_t capacity) : slots_(std::bit_ceil(capacity)), mask_(slots_.size() - 1) {}
+  explicit SpscRing(std::size_t capacity) : slots_(capacity) {}
 
   /// Producer: false if the ring is full.
   bool push(const T& value) noexcept { return emplace(value); }
@@ -26,11 +25,12 @@ class SpscRing {
   template <class... Arguments>
   bool emplace(Arguments&&... arguments) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
-    if (tail - head_seen_ > mask_) {
+    if (tail - head_seen_ >= slots_.size()) {
       head_seen_ = head_.load(std::memory_order_acquire);
-      if (tail - head_seen_ > mask_) return false;
+      if (tail - head_seen_ >= slots_.size()) return false;
     }
-    std::construct_at(&slots_[tail & mask_], std::forward<Arguments>(arguments)...);
+    std::construct_at(&slots_[tail_slot_], std::forward<Arguments>(arguments)...);
+    tail_slot_ = after(tail_slot_);
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }
@@ -38,7 +38,7 @@ class SpscRing {
   /// Producer: how many more would fit now.
   std::size_t room() noexcept {
     head_seen_ = head_.load(std::memory_order_acquire);
-    return mask_ + 1 - (tail_.load(std::memory_order_relaxed) - head_seen_);
+    return slots_.size() - (tail_.load(std::memory_order_relaxed) - head_seen_);
   }
 
   /// Consumer: the oldest entry, or null. It stays valid until pop().
@@ -48,21 +48,27 @@ class SpscRing {
       tail_seen_ = tail_.load(std::memory_order_acquire);
       if (head == tail_seen_) return nullptr;
     }
-    return &slots_[head & mask_];
+    return &slots_[head_slot_];
   }
-  void pop() noexcept { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+  void pop() noexcept {
+    head_slot_ = after(head_slot_);
+    head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  }
 
-  std::size_t capacity() const noexcept { return mask_ + 1; }
+  std::size_t capacity() const noexcept { return slots_.size(); }
 
  private:
+  std::size_t after(std::size_t slot) const noexcept { return slot + 1 == slots_.size() ? 0 : slot + 1; }
+
   static constexpr std::size_t kCacheLine = 64;
 
   std::vector<T> slots_;
-  std::size_t mask_;  // of an index into them
   alignas(kCacheLine) std::atomic<std::size_t> head_{0};
-  std::size_t tail_seen_ = 0;  // of the consumer
+  std::size_t head_slot_ = 0;  // of the consumer, as the next one
+  std::size_t tail_seen_ = 0;
   alignas(kCacheLine) std::atomic<std::size_t> tail_{0};
-  std::size_t head_seen_ = 0;  // of the producer
+  std::size_t tail_slot_ = 0;  // of the producer, as the next one
+  std::size_t head_seen_ = 0;
 };
 
 }  // namespace drivebench

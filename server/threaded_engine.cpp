@@ -1,3 +1,4 @@
+#include <pthread.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -174,7 +175,9 @@ class ThreadedEngine final : public Engine {
   /// One tick, with all that belongs to it.
   void run_tick() noexcept {
     look_at_the_clock();
+    watch_.beat();
     take_requests();
+    if (watch_.take_abandoned()) abandon();
     send_parameters();
     if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
     bench_.step();
@@ -183,6 +186,7 @@ class ThreadedEngine final : public Engine {
 
  private:
   void run(std::atomic<bool>& ready) {
+    pthread_setname_np(pthread_self(), "ticks");
     if (config_.mode == RunMode::kRealtime) notes_ = enter_realtime(config_.realtime);
     ready.store(true);
     while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_))
@@ -193,6 +197,15 @@ class ThreadedEngine final : public Engine {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     notify();
+  }
+
+  /// All who hold an axis lose it.
+  void abandon() noexcept {
+    for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis) {
+      if (bench_.owner(axis) == 0) continue;
+      bench_.submit(
+          {.tick = bench_.tick(), .axis = axis, .owner = bench_.owner(axis), .action = LeaseAction::kLost});
+    }
   }
 
   void look_at_the_clock() noexcept {

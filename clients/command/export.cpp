@@ -17,16 +17,15 @@
 #include "clients/command/output.hpp"
 #include "clients/command/session.hpp"
 #include "protocols/catalogue.hpp"
-#include "protocols/mapped_file.hpp"
-#include "protocols/mcap.hpp"
+#include "protocols/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
 
 namespace drivebench::command {
 namespace {
 
-MappedFile opened(const std::string& path) {
+MappedSeries opened(const std::string& path) {
   try {
-    return MappedFile(path);
+    return MappedSeries(path);
   } catch (const std::system_error& error) {
     throw UsageError(error.what());
   }
@@ -89,7 +88,7 @@ struct Exported {
 };
 
 /// Refuses what would cost the output file what it held, or the recording itself.
-void check_files(const McapReader& reader, const ExportOptions& options) {
+void check_files(const McapSeries& reader, const ExportOptions& options) {
   if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap) {
     throw UsageError(fmt::format("{} is not a recording: {}", options.recording, reader.problem()->what));
   }
@@ -131,7 +130,7 @@ class AxisChannels {
 
 /// Hands every message that can be read to `take`, and what `take` has left in `text` to the file.
 template <class Take>
-void for_each_message(McapReader& reader, const ExportOptions& options, std::size_t file_size,
+void for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
                       std::string& text, Output& out, Take take) {
   constexpr std::size_t kPiece = 1U << 16;
   Progress progress("export");
@@ -147,13 +146,13 @@ void for_each_message(McapReader& reader, const ExportOptions& options, std::siz
 }
 
 /// Everything that can be read, row by row.
-Exported export_rows(McapReader& reader, const ExportOptions& options,
-                     const std::vector<const Signal*>& signals, std::size_t file_size, Output& out) {
+Exported export_rows(McapSeries& reader, const ExportOptions& options,
+                     const std::vector<const Signal*>& signals, std::uint64_t file_size, Output& out) {
   Exported done;
   AxisChannels channels(options.axis);
   std::string text;
   for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
-    if (!channels.find(reader, message.header.channel).is_wanted) return;
+    if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
     if (!done.has_header) text += header_of(signals);  // when there is something to head
     done.has_header = true;
     const std::optional<Sample> sample = decode_sample(message.payload);
@@ -169,11 +168,11 @@ Exported export_rows(McapReader& reader, const ExportOptions& options,
 }
 
 /// Whether the recording ends with the verdict of a lockstep run.
-bool is_lockstep(std::span<const std::byte> file) {
-  McapReader reader(file);
+bool is_lockstep(const MappedSeries& files) {
+  McapSeries reader(files.segments());
   v1::Verdict verdict;
   for (McapMessage message; reader.next(message);) {
-    if (reader.channels().at(message.header.channel).topic != "/verdict") continue;
+    if (reader.reader().channels().at(message.header.channel).topic != "/verdict") continue;
     verdict.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()));
   }
   return verdict.mode() == v1::MODE_LOCKSTEP;
@@ -187,14 +186,14 @@ link::CanAddress can_address_of(const ExportOptions& options) {
 }
 
 /// The frames of all axes, or of the one that was named.
-Exported export_frames(McapReader& reader, const ExportOptions& options, std::span<const std::byte> file,
+Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files,
                        Output& out) {
   Exported done;
-  CandumpText frames(can_address_of(options), is_lockstep(file));
+  CandumpText frames(can_address_of(options), is_lockstep(files));
   AxisChannels channels(options.axis);
   std::optional<std::uint32_t> only;  // the axis that was named, once a sample of it came
-  for_each_message(reader, options, file.size(), frames.text(), out, [&](const McapMessage& message) {
-    const auto& place = channels.find(reader, message.header.channel);
+  for_each_message(reader, options, files.size(), frames.text(), out, [&](const McapMessage& message) {
+    const auto& place = channels.find(reader.reader(), message.header.channel);
     const double time_s = static_cast<double>(message.header.log_time_ns) * 1e-9;
     if (place.is_sample) {
       if (!options.axis.empty() && !place.is_wanted) return;
@@ -202,7 +201,7 @@ Exported export_frames(McapReader& reader, const ExportOptions& options, std::sp
       const std::optional<Sample> sample = decode_sample(message.payload);
       if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
       frames.add(place.number, *sample, time_s);
-    } else if (reader.channels().at(message.header.channel).topic == "/inputs") {
+    } else if (reader.reader().channels().at(message.header.channel).topic == "/inputs") {
       v1::Input input;
       if (!input.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()))) return;
       const std::uint64_t tick = input.received_tick();
@@ -224,15 +223,15 @@ Exported export_frames(McapReader& reader, const ExportOptions& options, std::sp
 
 int run_export(const ExportOptions& options) {
   const bool is_csv = options.format == "csv";
-  const MappedFile file = opened(options.recording);
-  McapReader reader(file.bytes());
+  const MappedSeries files = opened(options.recording);
+  McapSeries reader(files.segments());
   const std::vector<const Signal*> signals = chosen_signals(options.signals);
   if (!is_csv) can_address_of(options);  // refuses what is wrong before the file is made
   if (!is_csv && !options.signals.empty()) throw UsageError("--signals chooses columns of CSV");
   check_files(reader, options);
   Output out(options.out_file);
-  const Exported done = is_csv ? export_rows(reader, options, signals, file.bytes().size(), out)
-                               : export_frames(reader, options, file.bytes(), out);
+  const Exported done = is_csv ? export_rows(reader, options, signals, files.size(), out)
+                               : export_frames(reader, options, files, out);
 
   const std::string problem = reader.problem() ? reader.problem()->what : "";
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data

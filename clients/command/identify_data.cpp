@@ -13,8 +13,7 @@
 #include "clients/command/identify_map.hpp"
 #include "protocols/catalogue.hpp"
 #include "protocols/document.hpp"
-#include "protocols/mapped_file.hpp"
-#include "protocols/mcap.hpp"
+#include "protocols/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
 
 namespace drivebench::command {
@@ -188,13 +187,13 @@ void take_configuration(std::string_view toml, const std::string& axis, Measurem
 Measurement read_recording(const std::string& path, const std::string& axis) {
   Measurement m;
   try {
-    const MappedFile file(path);
-    McapReader reader(file.bytes());
+    const MappedSeries files(path);
+    McapSeries reader(files.segments());
     if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap)
       throw UsageError(fmt::format("{} is not a recording: {}", path, reader.problem()->what));
     AxisColumns columns(axis);
     for (McapMessage message; reader.next(message);)
-      columns.take(reader, message);
+      columns.take(reader.reader(), message);
     if (!columns.hole().empty())
       throw UsageError(
           fmt::format("{}: axis {}: {}; every tick is needed", path, columns.axis(), columns.hole()));
@@ -206,7 +205,7 @@ Measurement read_recording(const std::string& path, const std::string& axis) {
     if (reader.problem())
       fmt::print(stderr, "identify: the recording is not whole: {}; what is there is used\n",
                  reader.problem()->what);
-    read_configuration(reader, columns.axis(), m);
+    read_configuration(reader.reader(), columns.axis(), m);
     m.source = fmt::format("recording {}, axis {}", path, columns.axis());
   } catch (const std::system_error& error) {
     throw UsageError(error.what());

@@ -9,8 +9,7 @@
 #include <utility>
 
 #include "clients/command/commands.hpp"
-#include "protocols/mapped_file.hpp"
-#include "protocols/mcap.hpp"
+#include "protocols/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
 
 namespace drivebench::command {
@@ -92,10 +91,10 @@ RecordedRun read_run(const std::string& path, const std::string& axis,
                      std::optional<std::uint64_t> from_tick) {
   Reader reader(axis);
   try {
-    const MappedFile file(path);
-    McapReader mcap(file.bytes());
+    const MappedSeries files(path);
+    McapSeries mcap(files.segments());
     for (McapMessage message; mcap.next(message);)
-      reader.take(mcap, message);
+      reader.take(mcap.reader(), message);
     if (mcap.problem() && mcap.problem()->kind == McapProblem::Kind::kNotMcap) {
       throw UsageError(fmt::format("{} is not a recording: {}", path, mcap.problem()->what));
     }

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "server/holder.hpp"
+
 namespace drivebench {
 namespace {
 
@@ -78,7 +80,7 @@ StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config)
     tcp_.listen();
   } catch (const boost::system::system_error& error) {
     throw std::runtime_error("cannot listen on " + config.address + ":" + std::to_string(config.port) + ": " +
-                             error.code().message());
+                             error.code().message() + holder_of_port(config.port));
   }
   if (config.unix_path.empty()) return;
   make_way(io_, config.unix_path);

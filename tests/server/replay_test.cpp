@@ -14,6 +14,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "protocols/mcap.hpp"
 #include "protocols/sample_codec.hpp"
+#include "server/build_id.hpp"
 #include "server/engine.hpp"
 #include "server/recording.hpp"
 #include "tests/server/run_config.hpp"
@@ -106,6 +107,21 @@ TEST(Replay, REC_12_ARunReplaysBitForBit) {
   EXPECT_FALSE(report.difference);
   // The rewriting of the tests below is itself without a trace.
   EXPECT_EQ(replayed(rewritten(recording, [](Entry&) { return true; })).result, Result::kEqual);
+}
+
+// Catches: a recording of another build that is refused though it is right, or one that differs with nobody
+// saying why it may.
+TEST(Replay, REC_12_ARecordingOfAnotherBuildIsTold) {
+  const Bytes recording = record(60);
+  EXPECT_TRUE(replayed(recording).same_build);
+  const ReplayReport other = replayed(rewritten(recording, [](Entry&) { return true; }));
+  EXPECT_EQ(other.result, Result::kEqual);
+  EXPECT_FALSE(other.same_build);
+  EXPECT_EQ(other.recorded_by, "test");
+  const ReplayReport changed =
+      replayed(rewritten(recording, [](Entry& e) { return e.topic != kVerdictTopic; }));
+  EXPECT_NE(changed.problem.find("recorded by test, this is " + recorder_name()), std::string::npos)
+      << changed.problem;
 }
 
 // Catches: a comparison with a tolerance, of some signals only, or one that names the wrong place. Checksums

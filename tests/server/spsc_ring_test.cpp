@@ -8,11 +8,15 @@
 namespace drivebench {
 namespace {
 
-// Catches: a capacity that the mask of the index does not fit.
-TEST(SpscRing, CapacityIsRoundedUpToAPowerOfTwo) {
-  EXPECT_EQ(SpscRing<int>(1).capacity(), 1u);
-  EXPECT_EQ(SpscRing<int>(5).capacity(), 8u);
-  EXPECT_EQ(SpscRing<int>(8).capacity(), 8u);
+// Catches: a capacity that is more, or less, than what was asked for.
+TEST(SpscRing, CapacityIsWhatWasAskedFor) {
+  for (const std::size_t capacity : {1u, 5u, 8u}) {
+    SpscRing<int> ring(capacity);
+    EXPECT_EQ(ring.capacity(), capacity);
+    for (std::size_t n = 0; n < capacity; ++n)
+      EXPECT_TRUE(ring.push(1));
+    EXPECT_FALSE(ring.push(1));
+  }
 }
 
 // Catches: a slot that is lost or used twice at the full and the empty end.
@@ -37,10 +41,10 @@ TEST(SpscRing, FillsToItsCapacityAndEmptiesToNothing) {
 
 // Catches: an index that goes wrong where it passes the end of the slots, at every fill level.
 TEST(SpscRing, KeepsOrderAroundTheWrap) {
-  SpscRing<int> ring(8);
+  SpscRing<int> ring(7);
   int next_in = 0;
   int next_out = 0;
-  for (int level = 1; level <= 8; ++level) {
+  for (int level = 1; level <= 7; ++level) {
     for (int round = 0; round < 40; ++round) {
       while (next_in - next_out < level)
         ASSERT_TRUE(ring.push(next_in++));

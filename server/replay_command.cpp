@@ -1,0 +1,74 @@
+#include "server/replay_command.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "protocols/mcap_series.hpp"
+#include "server/replay.hpp"
+
+namespace drivebench {
+namespace {
+
+void print_line(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+nlohmann::json as_json(const ReplayReport& report) {
+  using Result = ReplayReport::Result;
+  nlohmann::json json{{"equal", report.result == Result::kEqual},
+                      {"usable", report.result != Result::kUnusable},
+                      {"ticks", report.ticks},
+                      {"samples", report.samples},
+                      {"inputs", report.inputs},
+                      {"state_hash", fmt::format("{:016x}", report.state_hash)},
+                      {"recorded_by", report.recorded_by},
+                      {"same_build", report.same_build},
+                      {"problem", report.problem}};
+  if (report.difference) {
+    json["first_difference"] = {{"tick", report.difference->tick},
+                                {"axis", report.difference->axis},
+                                {"signal", report.difference->signal},
+                                {"recorded", report.difference->recorded},
+                                {"replayed", report.difference->replayed}};
+  }
+  return json;
+}
+
+}  // namespace
+
+int replay_command(const std::string& file, bool json) {
+  const MappedSeries series(file);
+  const bool terminal = ::isatty(STDERR_FILENO) != 0;
+  const ReplayReport report = replay(
+      series.segments(),
+      terminal ? +[](double share) { fmt::print(stderr, "\rreplaying {:3.0f} %", 100.0 * share); } : nullptr);
+  if (terminal) fmt::print(stderr, "\r                \r");
+  if (json) {
+    print_line(as_json(report).dump());
+  } else {
+    const char* const verdict = report.result == ReplayReport::Result::kEqual       ? "equal, bit for bit"
+                                : report.result == ReplayReport::Result::kDifferent ? "DIFFERENT"
+                                                                                    : "cannot be replayed";
+    print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {})",
+                           file, verdict, report.ticks, report.samples, report.inputs, report.state_hash,
+                           report.recorded_by.empty() ? "nobody"
+                           : report.same_build        ? report.recorded_by
+                                                      : report.recorded_by + ", not by this build"));
+    if (!report.problem.empty()) print_line("  " + report.problem);
+  }
+  switch (report.result) {
+    case ReplayReport::Result::kEqual:
+      return 0;
+    case ReplayReport::Result::kDifferent:
+      return 1;
+    case ReplayReport::Result::kUnusable:
+      break;
+  }
+  return 2;
+}
+
+}  // namespace drivebench
