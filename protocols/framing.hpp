@@ -38,6 +38,9 @@ class FrameReader {
   /// there yet, or if the stream is bad.
   std::optional<std::span<const std::byte>> next() noexcept;
 
+  /// Whether a frame has begun that is not whole yet. To be asked when next() has nothing more.
+  bool in_a_frame() const noexcept { return begin_ != end_; }
+
   /// Not empty once a length of zero or above the cap has been seen: the stream cannot be followed any
   /// further.
   std::string_view error() const noexcept { return error_; }

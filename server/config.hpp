@@ -10,6 +10,7 @@
 #include "protocols/can/profile.hpp"
 #include "protocols/document.hpp"
 #include "server/bench.hpp"
+#include "server/grants.hpp"
 
 namespace drivebench {
 
@@ -31,9 +32,10 @@ struct RealtimeConfig {
 /// Section [tcp]: where clients connect.
 struct TcpConfig {
   std::string address = "127.0.0.1";
-  std::uint16_t port = 7300;  ///< 0: chosen by the system
-  std::string unix_path;      ///< empty: no unix socket
-  std::string token;          ///< what Hello must carry, read from a file of its own; empty: none
+  std::uint16_t port = 7300;    ///< 0: chosen by the system
+  std::string unix_path;        ///< empty: no unix socket
+  bool asks_for_token = false;  ///< Hello must carry one of the tokens in the tokens file
+  std::vector<Grant> grants;    ///< what the tokens file says
   std::uint32_t max_sessions = 256;
 };
 
@@ -86,6 +88,21 @@ struct ExperimentsConfig {
   std::uint32_t kept = 50;  ///< ended ones; the oldest goes first
 };
 
+/// What happens when the audit log cannot be written.
+enum class AuditFailure {
+  kContinue,  ///< the run goes on, what is missing is counted
+  kSafe,      ///< every controller loses its axis, which goes to its safe action
+};
+
+/// Section [audit]: who did what, as JSON lines.
+struct AuditConfig {
+  std::filesystem::path file;  ///< empty: none is kept
+  AuditFailure on_failure = AuditFailure::kContinue;
+};
+
+/// Section [log]: what goes to standard error.
+enum class LogLevel { kDebug, kInfo, kWarn, kError, kOff };
+
 /// Something that happens to an axis by itself: a load, a new parameter value, a fault, a bump.
 struct AxisEvent {
   Tick tick = 0;
@@ -111,6 +128,8 @@ struct BenchConfig {
   std::vector<CanConfig> can;
   ModbusConfig modbus;
   ExperimentsConfig experiments;
+  AuditConfig audit;
+  LogLevel log_level = LogLevel::kInfo;
 };
 
 /// Reads a bench file and the motor files that it names (relative to it). Throws ConfigError.
@@ -121,7 +140,7 @@ BenchConfig load_config(const std::filesystem::path& file);
 BenchConfig parse_config(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
 /// The configuration as one TOML text that needs no other file and reads back equal, bit for bit; all but the
-/// token, which it does not hold, an address that would need one, and the experiments.
+/// tokens, which it does not hold, an address that would need them, experiments, audit and log.
 std::string to_toml(const BenchConfig& config);
 
 /// The part of to_toml() that the samples depend on: timing, seed, watchdog and lease, and of each axis its

@@ -11,6 +11,7 @@
 #include "server/config.hpp"
 #include "server/config_axis.hpp"
 #include "server/config_can.hpp"
+#include "server/config_service.hpp"
 #include "server/config_step.hpp"
 #include "server/config_words.hpp"
 #include "server/endpoints/terminals.hpp"
@@ -22,8 +23,6 @@ namespace {
 constexpr std::int64_t kMaxSeed = INT64_MAX;  // the largest integer of TOML
 constexpr double kDefaultLeaseS = 2.0;
 constexpr int kLastCpu = 1023;
-constexpr std::size_t kMaxUnixPath = 107;  // sockaddr_un
-constexpr std::size_t kMaxToken = 200;
 
 /// A duration in units of `ns_per_unit`, which must come to whole nanoseconds.
 std::optional<std::int64_t> read_ns(StrictTable& table, std::string_view key, double ns_per_unit,
@@ -93,45 +92,6 @@ void read_realtime(StrictTable table, RealtimeConfig& realtime) {
       read_ns(table, "max_lateness_ms", 1e6, 1e-3, 1e6).value_or(realtime.max_lateness_ns);
   realtime.cpu = static_cast<int>(table.integer("cpu", -1, kLastCpu).value_or(realtime.cpu));
   realtime.priority = static_cast<int>(table.integer("priority", 0, 99).value_or(realtime.priority));
-  table.finish();
-}
-
-std::string read_token(StrictTable& tcp, const std::filesystem::path& folder) {
-  const auto name = tcp.text("token_file", 800);
-  if (!name) return {};
-  if (folder.empty()) {
-    tcp.report("token_file", std::string(kNoOtherFiles));
-    return {};
-  }
-  const std::string path = (folder / *name).lexically_normal().string();
-  const FileText file = read_file(path, 4096);
-  std::string token = file.text.substr(0, file.text.find('\n'));
-  if (token.ends_with('\r')) token.pop_back();
-  const bool printable_only =
-      std::all_of(token.begin(), token.end(), [](char c) { return c >= ' ' && c <= '~'; });
-  if (!file.why_not.empty()) {
-    tcp.report("token_file", "names " + path + ", which " + file.why_not);
-  } else if (file.others_may_read) {
-    tcp.report("token_file", "names " + path + ", which others may read: chmod 600 it");
-  } else if (token.empty() || token.size() > kMaxToken || !printable_only) {
-    tcp.report("token_file", "names " + path + ", whose first line must be 1 to " +
-                                 std::to_string(kMaxToken) + " printable ASCII characters");
-  } else {
-    return token;
-  }
-  return {};
-}
-
-void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig& tcp) {
-  tcp.address = table.address("address").value_or(tcp.address);
-  if (!is_loopback(tcp.address) && !table.has("token_file")) {
-    table.report("address", "is " + tcp.address + ", which other computers can reach: name a token_file");
-  }
-  tcp.port = static_cast<std::uint16_t>(table.integer("port", 0, 65535).value_or(tcp.port));
-  tcp.unix_path = table.text("unix_path", kMaxUnixPath).value_or("");
-  tcp.token = read_token(table, folder);
-  tcp.max_sessions =
-      static_cast<std::uint32_t>(table.integer("max_sessions", 1, 10'000).value_or(tcp.max_sessions));
   table.finish();
 }
 
@@ -235,6 +195,8 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
     config.can = read_can(root, wide);
     read_modbus(root.table("modbus"), config.modbus);
     read_experiments(root.table("experiments"), folder, config.experiments);
+    read_audit(root.table("audit"), folder, config.audit);
+    config.log_level = read_log_level(root.table("log"));
     root.finish();
   }
   problems.throw_if_any();

@@ -12,6 +12,9 @@ inline constexpr std::array<std::string_view, 2> kPacerWords{"sleep", "sleep+spi
 inline constexpr std::array<std::string_view, 2> kSafeActionWords{"freewheel", "zero_voltage"};
 inline constexpr std::array<std::string_view, 4> kCanBackendWords{"socketcan", "udp_multicast", "slcan",
                                                                   "socketcand"};
+inline constexpr std::array<std::string_view, 3> kRoleWords{"viewer", "operator", "admin"};
+inline constexpr std::array<std::string_view, 2> kAuditFailureWords{"continue", "safe"};
+inline constexpr std::array<std::string_view, 5> kLogLevelWords{"debug", "info", "warn", "error", "off"};
 
 /// The rule for a text without a folder, such as the one in a recording, which may be anybody's.
 inline constexpr std::string_view kNoOtherFiles = "names another file, but this text must stand for itself";

@@ -66,7 +66,7 @@ void append_service(std::string& text, const RealtimeConfig& realtime, const Tcp
   append(text, "cpu", std::to_string(realtime.cpu));
   append(text, "priority", std::to_string(realtime.priority));
   text += "\n[tcp]\n";
-  // Without the token, which stays secret, an address that others can reach would be refused.
+  // Without the tokens, which stay secret, an address that others can reach would be refused.
   if (is_loopback(tcp.address)) append(text, "address", in_quotes(tcp.address));
   append(text, "port", std::to_string(tcp.port));
   if (!tcp.unix_path.empty()) append(text, "unix_path", in_quotes(tcp.unix_path));

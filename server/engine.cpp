@@ -19,6 +19,32 @@ Engine::Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder)
   if (wanted) edges_.resize(config.axes.size());
 }
 
+void Engine::request(const Input& input, Answer answer, const Client* from) {
+  if (!on_answered || std::holds_alternative<RefusedCommand>(input.action)) {
+    return submit(input, std::move(answer));
+  }
+  const Client* known = from != nullptr ? from : client(input.owner);
+  submit(input, [this, input, who = known != nullptr ? std::optional(*known) : std::nullopt,
+                 answer = std::move(answer)](Refused refused, Tick tick) {
+    on_answered(input, who ? &*who : nullptr, refused, tick);
+    answer(refused, tick);
+  });
+}
+
+void Engine::take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) {
+  const Owner before = owner(axis);
+  if (before != 0 && before != by) {
+    request({.tick = 0, .axis = axis, .owner = before, .action = LeaseAction::kLost},
+            [this, taken = Taken{axis, before, by, reason}](Refused refused, Tick) {
+              if (refused != Refused::kNot) return;  // he has just left
+              for (const auto& listener : on_taken)
+                listener(taken);
+            });
+  }
+  // Behind the other in the same queue: nobody comes in between, but somebody may have come before both.
+  request({.tick = 0, .axis = axis, .owner = by, .action = LeaseAction::kAcquire}, std::move(answer));
+}
+
 std::string Engine::problem_with_value(std::size_t axis, std::uint32_t row, double value) const {
   const Parameter& parameter = axis_parameters(parameters_[axis])[row];
   const std::optional<std::size_t> partner = config_.setup.axes[axis].shares_shaft_with;

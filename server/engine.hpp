@@ -9,6 +9,7 @@
 
 #include "server/bench.hpp"
 #include "server/config.hpp"
+#include "server/owners.hpp"
 #include "server/recorder.hpp"
 #include "server/tick_edges.hpp"
 #include "server/verdict.hpp"
@@ -36,8 +37,12 @@ class Engine {
   /// Lockstep: runs the present tick if the commands of all controlled axes are there. Otherwise time goes on
   /// by itself.
   virtual void advance() = 0;
-  /// Any other input; the answer comes when the bench has taken it.
-  virtual void request(const Input& input, Answer answer) = 0;
+  /// Any other input; the answer comes when the bench has taken it. `from` is who asks, if it is not the
+  /// client behind input.owner.
+  void request(const Input& input, Answer answer, const Client* from = nullptr);
+  /// Gives the axis to `by`, even if somebody holds it: he loses it as if his session had ended, and only
+  /// then, in the same tick, does `by` get it. Told to on_taken.
+  void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer);
   /// Ends the run: safe action, recording closed.
   virtual Verdict stop() = 0;
   /// Hash of the present state; 0 while another thread is changing it.
@@ -64,6 +69,10 @@ class Engine {
   Listeners on_newest;
   /// Called once, when a run that has an end has reached it.
   std::function<void()> on_end;
+  /// Called with every answer to a request before whoever asked has it; `from` may be null.
+  std::function<void(const Input& input, const Client* from, Refused refused, Tick tick)> on_answered;
+  /// Called when take() has taken the lease of an axis from an owner.
+  std::vector<std::function<void(const Taken&)>> on_taken;
 
   /// Who holds the lease of the axis, as far as the I/O thread knows.
   virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
@@ -90,11 +99,16 @@ class Engine {
   /// Hash of the configuration, as configuration_hash() has it.
   std::uint64_t configuration_hash() const { return configuration_hash_; }
 
-  /// A number for the next controller.
-  Owner new_owner() { return ++owners_; }
+  /// A number for the next controller, and who that is.
+  Owner new_owner(Client who) { return owners_.add(std::move(who), newest_); }
+  /// Who stands behind the number; null if that is long ago.
+  const Client* client(Owner owner) const { return owners_.find(owner); }
 
  protected:
   Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder);
+
+  /// request() without those who look on.
+  virtual void submit(const Input& input, Answer answer) = 0;
 
   BenchConfig config_;
   Watch watch_;
@@ -106,7 +120,7 @@ class Engine {
 
  private:
   std::uint64_t configuration_hash_;
-  Owner owners_ = 0;
+  Owners owners_;
 };
 
 /// Ticks run on the I/O thread, in the call that brings the last command.

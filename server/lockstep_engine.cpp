@@ -40,7 +40,7 @@ class LockstepEngine final : public Engine {
     on_newest();
   }
 
-  void request(const Input& input, Answer answer) override {
+  void submit(const Input& input, Answer answer) override {
     const Refused refused = bench_.submit(input);
     if (std::holds_alternative<ParameterWrite>(input.action) && input.axis < parameters_.size()) {
       parameters_[input.axis] = bench_.axis(input.axis).parameters();  // even if it was refused

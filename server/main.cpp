@@ -5,11 +5,13 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "server/asio.hpp"
+#include "server/audit.hpp"
 #include "server/build_id.hpp"
 #include "server/config.hpp"
 #include "server/endpoints/stream_server.hpp"
@@ -39,6 +41,7 @@ struct Options {
   bool check_config = false;
   bool allow_overload = false;
   std::string experiments;
+  std::string audit;
   double file_s = 0.0;         ///< of plant time in each file of a recording; 0: all
   std::uint64_t file_mib = 0;  ///< of each file of a recording; 0: any
   bool require_realtime = false;
@@ -64,6 +67,7 @@ BenchConfig configure(const Options& o) {
   if (o.port >= 0) config.tcp.port = static_cast<std::uint16_t>(o.port);
   if (!o.unix_path.empty()) config.tcp.unix_path = o.unix_path;
   if (!o.experiments.empty()) config.experiments.folder = o.experiments;
+  if (!o.audit.empty()) config.audit.file = o.audit;
   if (o.command_delay_ticks >= 0) config.setup.command_delay_ticks = o.command_delay_ticks;
   // Written so that NaN is refused, which CLI11 lets pass.
   if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
@@ -184,6 +188,52 @@ asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
   }
 }
 
+void set_log_level(LogLevel level) {
+  constexpr std::array kLevels{spdlog::level::debug, spdlog::level::info, spdlog::level::warn,
+                               spdlog::level::err, spdlog::level::off};
+  spdlog::set_level(kLevels[static_cast<std::size_t>(level)]);
+}
+
+/// At each SIGHUP the bench file is read again; of what it says only the tokens and the log level are taken.
+/// The audit log goes on in a new file if somebody has moved the old one.
+asio::awaitable<void> reload_on_hangup(const Options& o, StreamServer& server, Audit* audit) {
+  asio::signal_set hangups(co_await asio::this_coro::executor, SIGHUP);
+  for (;;) {
+    co_await hangups.async_wait(asio::use_awaitable);
+    try {
+      BenchConfig now = configure(o);
+      set_log_level(now.log_level);
+      server.replace_grants(std::move(now.tcp));
+      spdlog::info("SIGHUP: tokens and log level are those of {} now", o.config);
+    } catch (const std::exception& error) {
+      spdlog::error("SIGHUP: everything stays as it is: {}", error.what());
+    }
+    if (audit == nullptr) continue;
+    if (!audit->reopen()) spdlog::error("SIGHUP: the audit log cannot be opened again and stays the old one");
+    audit->note({.name = "reload"});
+  }
+}
+
+void note_start(Audit& audit, const Engine& engine) {
+  const BenchConfig& config = engine.config();
+  audit.note({.name = "start",
+              .details = {{"bench", config.name},
+                          {"mode", std::string(name_of(config.mode))},
+                          {"configuration_hash", fmt::format("{:016x}", engine.configuration_hash())},
+                          {"build_id", std::string(build_id())}}});
+  if (engine.recorder() != nullptr) {
+    audit.note({.name = "recording_started", .details = {{"file", engine.recorder()->file()}}});
+  }
+}
+
+void note_end(Audit& audit, const Engine& engine, const Verdict& verdict) {
+  if (engine.recorder() != nullptr) {
+    audit.note({.name = "recording_stopped",
+                .details = {{"file", engine.recorder()->file()}, {"gaps", verdict.gaps}}});
+  }
+  audit.note({.name = "stop", .details = {{"ticks", verdict.ticks}, {"late_ticks", verdict.late_ticks}}});
+}
+
 int serve(const Options& o) {
   const BenchConfig config = configure(o);
   if (!o.print.empty()) {
@@ -204,10 +254,11 @@ int serve(const Options& o) {
     }
     return kOk;
   }
+  set_log_level(config.log_level);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   asio::io_context io(1);
-  asio::signal_set signals(io, SIGINT, SIGTERM, SIGHUP);
+  asio::signal_set signals(io, SIGINT, SIGTERM);
   signals.async_wait([&io](const boost::system::error_code& error, int) {
     if (!error) io.stop();
   });
@@ -216,11 +267,16 @@ int serve(const Options& o) {
   // First: a port in use must not leave a recording behind.
   StreamServer server(io, config.tcp);
   Transports transports(io, config);
+  std::unique_ptr<Audit> audit;
+  if (!config.audit.file.empty()) audit = std::make_unique<Audit>(config.audit);
   std::unique_ptr<Experiments> experiments;
   if (!config.experiments.folder.empty()) experiments = std::make_unique<Experiments>(io, config);
   const std::unique_ptr<Engine> engine = make_engine(o, config, io);
+  if (audit) audit->watch(*engine);
+  if (audit) note_start(*audit, *engine);
   server.serve(
-      *engine, [&transports] { return transports.reports(); }, experiments.get());
+      *engine, [&transports] { return transports.reports(); }, experiments.get(), audit.get());
+  asio::co_spawn(io, reload_on_hangup(o, server, audit.get()), asio::detached);
   transports.serve(*engine);
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
@@ -248,6 +304,7 @@ int serve(const Options& o) {
   experiments.reset();
   transports.close();
   server.close();
+  if (audit) note_end(*audit, *engine, verdict);
   print_verdict(o, verdict);
   if (broken || verdict.gaps > 0) return kFailed;
   const bool too_late =
@@ -286,6 +343,7 @@ int run(int argc, char** argv) {
   app.add_flag("--json", o.json, "print JSON lines");
   app.add_flag("--check-config", o.check_config, "only check the bench file");
   app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
+  app.add_option("--audit", o.audit, "append who did what to this file, as JSON lines");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");
   app.add_option("--print", o.print, "only print a description of an interface")

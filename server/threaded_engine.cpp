@@ -130,7 +130,7 @@ class ThreadedEngine final : public Engine {
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = check(axis, owner, command);
     if (why != Refused::kNot) {
-      request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
+      submit({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
       return why;
     }
     sent_[axis] = {.owner = owner, .command = command};
@@ -140,7 +140,7 @@ class ThreadedEngine final : public Engine {
 
   void advance() override {}
 
-  void request(const Input& input, Answer answer) override {
+  void submit(const Input& input, Answer answer) override {
     const bool writes = std::holds_alternative<ParameterWrite>(input.action);
     const bool taken = requests_.push(input);
     if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;

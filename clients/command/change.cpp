@@ -104,6 +104,26 @@ int run_set(const SetOptions& options) {
   return kExitOk;
 }
 
+int run_take(const TakeOptions& options) {
+  if (!options.force) {
+    throw UsageError(
+        "take needs --force: whoever holds the axis loses it, and the axis goes to its safe action");
+  }
+  link::Link link = open_link(options.link, "take");
+  const std::uint32_t axis = axis_number(link.welcome().bench(), options.axis);
+  const std::uint64_t owner = link.take(axis, options.reason);
+  const std::uint64_t tick = link.status().tick();
+  link.release(axis);
+  if (options.json) {
+    fmt::print("{}\n", change_json(axis, "take", static_cast<double>(owner), tick));
+  } else {
+    fmt::print(
+        "axis {} ({}): taken and free again since tick {}; who drives it next may have to clear a fault\n",
+        axis, link.welcome().bench().axes(static_cast<int>(axis)).name(), tick);
+  }
+  return kExitOk;
+}
+
 int run_bump(const BumpOptions& options) {
   HeldAxis axis(options.link, options.axis, "bump");
   const std::uint64_t tick = axis.link().bump_shaft(axis.number(), options.impulse_nms);

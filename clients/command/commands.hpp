@@ -83,6 +83,16 @@ struct BumpOptions {
 };
 int run_bump(const BumpOptions& options);
 
+/// An axis that somebody holds and is to hold no longer.
+struct TakeOptions {
+  LinkChoice link;
+  bool json = false;
+  std::string axis = "0";  ///< number or name
+  bool force = false;
+  std::string reason;  ///< told to whoever held it, and kept in the server's audit log
+};
+int run_take(const TakeOptions& options);
+
 /// A load torque at a time after the start of the trajectory.
 struct LoadAt {
   double load_nm = 0.0;

@@ -67,6 +67,7 @@ struct CommandLine {
   InjectOptions inject;
   SetOptions set;
   BumpOptions bump;
+  TakeOptions take;
   ControlOptions control;
   CompareOptions compare;
   PlotOptions plot;
@@ -93,6 +94,7 @@ struct CommandLine {
     add_demo();
     add_observers();
     add_changes();
+    add_take();
     add_control();
     add_interfaces();
     add_recordings();
@@ -194,6 +196,19 @@ struct CommandLine {
       bump.link = link;
       bump.json = json;
       action = [this] { return run_bump(bump); };
+    });
+  }
+
+  void add_take() {
+    CLI::App* sub =
+        add_linked("take", "take an axis from whoever holds it and leave it free; for administrators");
+    sub->add_option("--axis", take.axis, "number or name")->capture_default_str();
+    sub->add_flag("--force", take.force, "he loses it at once, and the axis goes to its safe action");
+    sub->add_option("--reason", take.reason, "what he is told, and what the audit log keeps")->required();
+    sub->callback([this] {
+      take.link = link;
+      take.json = json;
+      action = [this] { return run_take(take); };
     });
   }
 

@@ -112,6 +112,14 @@ void Link::release(std::uint32_t axis) {
   lease(axis, v1::LeaseRequest::ACTION_RELEASE);
 }
 
+std::uint64_t Link::take(std::uint32_t axis, const std::string& reason) {
+  v1::Envelope& request = new_request();
+  request.mutable_lease()->set_axis(axis);
+  request.mutable_lease()->set_action(v1::LeaseRequest::ACTION_TAKE);
+  request.mutable_lease()->set_reason(reason);
+  return ask(request, Kind::kDone).done().owner();
+}
+
 const v1::ParameterValues& Link::read_parameters(std::uint32_t axis, std::span<const std::string> names) {
   v1::Envelope& request = new_request();
   request.mutable_read_parameters()->set_axis(axis);
@@ -188,6 +196,10 @@ std::optional<v1::Samples> Link::next_samples(std::chrono::milliseconds wait) {
   while (kept_.empty()) {
     if (const v1::Envelope* envelope = next_envelope()) {
       if (envelope->kind_case() == Kind::kRefusal) throw Refused(envelope->refusal());
+      if (envelope->kind_case() == Kind::kNotice) {
+        keep(envelope->notice());
+        continue;
+      }
       if (envelope->kind_case() != Kind::kSamples) {
         fail("sent " + name_of(envelope->kind_case()) + " where nothing was asked");
       }
@@ -220,6 +232,12 @@ void Link::keep(const v1::Samples& samples) {
     kept_samples_ -= lost;
     kept_.pop_front();
   }
+}
+
+void Link::keep(const v1::Notice& notice) {
+  constexpr std::size_t kMost = 100;
+  if (notices_.size() < kMost) notices_.push_back(notice);
+  if (notice.kind() == v1::Notice::KIND_SESSION_ENDED) fail("ended the session: " + notice.message());
 }
 
 v1::Envelope& Link::new_request() {
@@ -266,6 +284,8 @@ const v1::Envelope& Link::await_answer() {
     while (const v1::Envelope* envelope = next_envelope()) {
       if (envelope->kind_case() == Kind::kSamples) {
         keep(envelope->samples());
+      } else if (envelope->kind_case() == Kind::kNotice) {
+        keep(envelope->notice());
       } else if (envelope->id() == last_id_ ||
                  (envelope->id() == 0 && envelope->kind_case() == Kind::kRefusal)) {
         return *envelope;

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "clients/link/address.hpp"
@@ -105,6 +106,12 @@ class Link {
   std::uint64_t acquire(std::uint32_t axis);
   void renew(std::uint32_t axis);
   void release(std::uint32_t axis);
+  /// Acquires the axis even if somebody holds it, which needs the role of an administrator; he is told the
+  /// reason.
+  std::uint64_t take(std::uint32_t axis, const std::string& reason);
+  /// What the bench has said unasked since the last call: that somebody took an axis from this session, or
+  /// that its token holds no more.
+  std::vector<v1::Notice> take_notices() { return std::exchange(notices_, {}); }
 
   /// All parameters if no names are given.
   const v1::ParameterValues& read_parameters(std::uint32_t axis, std::span<const std::string> names = {});
@@ -147,6 +154,7 @@ class Link {
   void receive_some();
   std::uint64_t lease(std::uint32_t axis, v1::LeaseRequest::Action action);
   void keep(const v1::Samples& samples);
+  void keep(const v1::Notice& notice);
   [[noreturn]] void fail(const std::string& what);
 
   FileDescriptor socket_;
@@ -160,6 +168,7 @@ class Link {
   google::protobuf::Arena arena_;  // holds one request and its answer
   std::deque<v1::Samples> kept_;
   std::size_t kept_samples_ = 0;
+  std::vector<v1::Notice> notices_;
   std::uint64_t dropped_ = 0;  // samples lost from kept_ since the last one taken
 };
 

@@ -11,7 +11,7 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
     bytes = bytes.subspan(error ? 0 : written);
     if (bytes.empty()) return;
   }
-  if (queued_.size() + bytes.size() > kMaxQueued) return close();
+  if (queued_.size() + bytes.size() > kMaxQueued) return cut("too much waits for it");
   queued_.insert(queued_.end(), bytes.begin(), bytes.end());
   if (!writing_) {
     writing_ = true;
@@ -44,8 +44,13 @@ void Outbox::write_more(const std::shared_ptr<void>& owner) {
 void Outbox::arm_timer(const std::shared_ptr<void>& owner) {
   timer_.expires_after(kNoProgressLimit);
   timer_.async_wait([this, owner](const boost::system::error_code& error) {
-    if (!error) close();
+    if (!error) cut("it took nothing for 2 s");
   });
+}
+
+void Outbox::cut(std::string_view why) {
+  if (on_cut && socket_.is_open()) on_cut(why);
+  close();
 }
 
 void Outbox::close() noexcept {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "server/asio.hpp"
@@ -30,6 +31,8 @@ class Outbox {
   /// Whether everything so far has gone to the kernel.
   bool idle() const noexcept { return !writing_; }
 
+  /// Called when the peer is cut off, with the reason.
+  std::function<void(std::string_view)> on_cut;
   /// Called when the queue has become empty again.
   std::function<void()> on_idle;
 
@@ -39,6 +42,7 @@ class Outbox {
  private:
   void write_more(const std::shared_ptr<void>& owner);
   void arm_timer(const std::shared_ptr<void>& owner);
+  void cut(std::string_view why);
 
   Socket& socket_;
   ServerTimer timer_;

@@ -1,6 +1,6 @@
 #include "server/endpoints/session.hpp"
 
-#include <spdlog/spdlog.h>
+#include <algorithm>
 
 #include "protocols/descriptor_set.hpp"
 #include "server/build_id.hpp"
@@ -13,28 +13,34 @@ constexpr std::uint32_t kProtocolVersion = 1;
 
 }  // namespace
 
-Session::Session(Outbox::Socket socket, std::string peer, SessionContext& context)
+Session::Session(Outbox::Socket socket, Client who, SessionContext& context)
     : socket_(std::move(socket)),
       outbox_(socket_),
-      peer_(std::move(peer)),
+      client_(std::move(who)),
       context_(context),
       engine_(context.engine),
       reader_(kMaxRequestFrame),
-      leased_(context.engine.config().axes.size()) {
+      slot_timer_(socket_.get_executor()),
+      silence_timer_(socket_.get_executor()),
+      leased_(context.engine.config().axes.size()),
+      taken_(context.engine.config().axes.size()) {
   reader_.set_max_payload(kMaxFrameBeforeHello);
   socket_.non_blocking(true);
   outbox_.on_idle = [this] {
     send_samples();
     send_experiment();
   };
+  outbox_.on_cut = [this](std::string_view why) {
+    ++context_.counts.cut;
+    why_ended_ = why;
+    audit("limit", why, {});
+  };
 }
 
 asio::awaitable<void> Session::run() {
   const std::shared_ptr<Session> self = shared_from_this();
-  ServerTimer hello_timer(socket_.get_executor(), kHelloLimit);
-  hello_timer.async_wait([self](const boost::system::error_code& error) {
-    if (!error && !self->greeted_) self->close();
-  });
+  ServerTimer timer(socket_.get_executor());
+  end_unless_greeted(timer);
   boost::system::error_code error;
   bool open = true;
   while (open && !error) {
@@ -42,16 +48,81 @@ asio::awaitable<void> Session::run() {
     const std::size_t count = co_await socket_.async_read_some(
         asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
     reader_.received(count);
-    while (const auto frame = open ? reader_.next() : std::nullopt)
-      open = handle(*frame);
-    if (!reader_.error().empty()) {
-      refuse(0, v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
-      open = false;
-    }
+    open = handle_all();
+    watch_for_silence();
+    const ServerClock::duration pause = throttle();
+    if (!open || pause == ServerClock::duration::zero()) continue;
+    timer.expires_after(pause);
+    boost::system::error_code cancelled;
+    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
   }
-  hello_timer.cancel();
+  timer.cancel();
+  if (greeted_) audit("session_ended", "done", {{"reason", why_ended_}});
   give_leases_back();
   close();
+}
+
+void Session::end_unless_greeted(ServerTimer& timer) {
+  timer.expires_after(kHelloLimit);
+  timer.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
+    if (!error && !self->greeted_) self->close();
+  });
+}
+
+/// Everything that is there; false when the session is over.
+bool Session::handle_all() {
+  while (const auto frame = reader_.next()) {
+    if (!handle(*frame)) return false;
+  }
+  if (reader_.error().empty()) return true;
+  why_ended_ = reader_.error();
+  refuse(0, v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
+  return false;
+}
+
+/// A peer that stops within a frame is gone, or never meant to send the rest.
+void Session::watch_for_silence() {
+  if (!reader_.in_a_frame() || !greeted_) {
+    if (std::exchange(waits_for_frame_, false)) silence_timer_.cancel();
+    return;
+  }
+  waits_for_frame_ = true;
+  silence_timer_.expires_after(kFrameLimit);
+  silence_timer_.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
+    if (error || !self->waits_for_frame_) return;
+    ++self->context_.counts.cut;
+    self->why_ended_ = "silent within a frame";
+    self->audit("limit", "silent within a frame", {});
+    self->close();
+  });
+}
+
+/// In real time a session has commands that no tick can use.
+void Session::charge_excess(int commands) {
+  if (engine_.config().mode != RunMode::kRealtime) return;
+  refill_excess();
+  context_.counts.excess_commands += static_cast<std::uint64_t>(commands);
+  excess_left_ -= commands;
+}
+
+void Session::refill_excess() {
+  const ServerClock::time_point now = ServerClock::now();
+  const auto elapsed = now - std::exchange(excess_refilled_, now);
+  const auto ticks =
+      static_cast<double>(elapsed.count()) / static_cast<double>(engine_.config().setup.period_ns);
+  excess_left_ = std::min(excess_left_ + ticks, kExcessAtOnce);
+}
+
+/// How long this session is not to be read, so that it sends about twice as many commands as there are ticks
+/// at most.
+ServerClock::duration Session::throttle() {
+  if (excess_left_ >= 0.0) return {};
+  refill_excess();
+  if (excess_left_ >= 0.0) return {};
+  if (context_.counts.throttled++ % 1000 == 0) audit("limit", "too many commands: throttled", {});
+  const double pause_ns = -excess_left_ * static_cast<double>(engine_.config().setup.period_ns);
+  return std::min<ServerClock::duration>(std::chrono::nanoseconds(static_cast<std::int64_t>(pause_ns)),
+                                         kLongestThrottle);
 }
 
 bool Session::handle(std::span<const std::byte> frame) {
@@ -60,6 +131,7 @@ bool Session::handle(std::span<const std::byte> frame) {
     request_ = v1::Envelope();  // it keeps the memory of the largest frame so far
   last_frame_ = frame.size();
   if (!request_.ParseFromArray(frame.data(), static_cast<int>(frame.size()))) {
+    why_ended_ = "a frame was not an Envelope";
     refuse(0, v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
     return false;
   }
@@ -67,6 +139,7 @@ bool Session::handle(std::span<const std::byte> frame) {
     refuse(request_.id(), v1::REFUSAL_UNAUTHENTICATED, "the first message must be hello", "kind");
     return false;
   }
+  if (greeted_ && !may_ask()) return true;
   return dispatch();
 }
 
@@ -139,13 +212,15 @@ bool Session::greet(const v1::Hello& hello) {
     refuse(id, v1::REFUSAL_OUT_OF_RANGE, "the client's name is longer than 100 bytes", "client");
     return false;
   }
-  if (!context_.token.empty() && !same_secret(hello.token(), context_.token)) {
-    spdlog::warn("{}: wrong or no token", peer_);
-    refuse(id, v1::REFUSAL_UNAUTHENTICATED, "wrong or no token", "token");
-    return false;
+  if (greeted_) {
+    refuse(id, v1::REFUSAL_MALFORMED, "hello has been said already", "kind");
+    return true;
   }
+  if (!is_admitted(hello)) return false;
   greeted_ = true;
   reader_.set_max_payload(kMaxRequestFrame);
+  watch_slot();
+  audit("session_opened", "done", {{"client", hello.client()}, {"role", std::string(name_of(grant_.role))}});
   reply_.Clear();
   reply_.set_id(id);
   v1::Welcome& welcome = *reply_.mutable_welcome();
@@ -153,8 +228,30 @@ bool Session::greet(const v1::Hello& hello) {
   welcome.set_build_id(std::string(build_id()));
   *welcome.mutable_bench() = describe(engine_);
   welcome.set_descriptor_set(bench_descriptor_set());
+  welcome.set_role(static_cast<v1::Role>(grant_.role));
+  welcome.set_subject(grant_.name);
   send(reply_);
   return true;
+}
+
+void Session::close() {
+  slot_timer_.cancel();
+  silence_timer_.cancel();
+  outbox_.close();
+}
+
+void Session::notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis) {
+  reply_.Clear();
+  v1::Notice& notice = *reply_.mutable_notice();
+  notice.set_kind(kind);
+  notice.set_message(sentence);
+  notice.set_axis(axis);
+  send(reply_);
+}
+
+void Session::audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details) {
+  if (context_.audit == nullptr) return;
+  context_.audit->note({.name = event, .client = &client_, .result = result, .details = std::move(details)});
 }
 
 void Session::turn_away(std::string_view sentence) {
@@ -229,8 +326,9 @@ void Session::give_leases_back() {
   for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
     if (!leased_[axis]) continue;
     leased_[axis] = false;
-    engine_.request({.tick = 0, .axis = axis, .owner = owner_, .action = LeaseAction::kLost},
-                    [](Refused, Tick) {});
+    engine_.request(
+        {.tick = 0, .axis = axis, .owner = owner_, .action = LeaseAction::kLost}, [](Refused, Tick) {},
+        &client_);
   }
 }
 

@@ -13,6 +13,9 @@
 #include "protocols/catalogue.hpp"
 #include "protocols/framing.hpp"
 #include "protocols/sample_codec.hpp"
+#include "server/audit.hpp"
+#include "server/endpoints/admission.hpp"
+#include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/outbox.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine.hpp"
@@ -24,10 +27,20 @@ namespace drivebench {
 /// What all sessions share.
 struct SessionContext {
   Engine& engine;
-  std::string token;  ///< what Hello must carry; empty: nothing
+  Admission admission;
   std::function<std::size_t()> session_count;
-  std::function<std::vector<TransportReport>()> transports;  ///< the other ways in
+  std::function<std::vector<TransportReport>()> transports;  ///< all ways in
   Experiments* experiments;                                  ///< null: this bench keeps none
+  Audit* audit = nullptr;                                    ///< null: no audit log is kept
+
+  struct Counts {
+    std::uint64_t turned_away = 0;      ///< connections, by a limit
+    std::uint64_t wrong_tokens = 0;     ///< hellos
+    std::uint64_t excess_commands = 0;  ///< in real time: more than one for a tick
+    std::uint64_t throttled = 0;        ///< times that a session was not read for a while
+    std::uint64_t cut = 0;              ///< sessions that took or said nothing
+  } counts{};
+  LogLimit wrong_token_log{};
 };
 
 /// One client on a stream socket: Hello first, then requests. Every request gets an answer with its id; what
@@ -35,7 +48,8 @@ struct SessionContext {
 /// else.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(Outbox::Socket socket, std::string peer, SessionContext& context);
+  /// `who` without a subject, which hello tells.
+  Session(Outbox::Socket socket, Client who, SessionContext& context);
 
   /// Reads and answers until the peer or an error ends the session, then gives its leases back.
   asio::awaitable<void> run();
@@ -46,14 +60,22 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_newest();
   /// When an experiment may have gone on: serves a fetch.
   void on_experiments();
+  /// When an administrator has taken an axis from somebody: tells the session if it was this one.
+  void on_taken(const Taken& taken);
+  /// When other tokens hold: ends the session if its own does not.
+  void on_new_grants();
   bool greeted() const noexcept { return greeted_; }
 
   /// Refuses the connection itself, before anything was read.
   void turn_away(std::string_view sentence);
-  void close() { outbox_.close(); }
+  void close();
 
  private:
   static constexpr auto kHelloLimit = std::chrono::seconds(2);
+  static constexpr auto kFrameLimit = std::chrono::seconds(2);  ///< of silence within a frame
+  /// So many commands may come at once that no tick can use, and one more with every tick.
+  static constexpr double kExcessAtOnce = 1000.0;
+  static constexpr auto kLongestThrottle = std::chrono::seconds(1);
   static constexpr std::size_t kSubscriptionDepth = 256;
   static constexpr std::size_t kSamplesPerMessage = 32;
 
@@ -84,12 +106,25 @@ class Session : public std::enable_shared_from_this<Session> {
     int send_buffer_bytes;  ///< of the socket, before and after
   };
 
+  bool handle_all();
   bool handle(std::span<const std::byte> frame);
   bool dispatch();
+  bool may_ask();
+  void end_unless_greeted(ServerTimer& timer);
+  void watch_for_silence();
+  void charge_excess(int commands);
+  void refill_excess();
+  ServerClock::duration throttle();
+  void watch_slot();
+  void end(const std::string& sentence);
+  void audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details);
   bool greet(const v1::Hello& hello);
+  bool is_admitted(const v1::Hello& hello);
+  void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);
   void lease(const v1::LeaseRequest& request);
   void exchange(const v1::Exchange& request);
   void abandon_exchange(std::uint32_t axis);
+  std::string not_owner_of(std::uint32_t axis) const;
   void subscribe(const v1::Subscribe& request);
   void read_parameters(const v1::ReadParameters& request);
   void write_parameter(const v1::WriteParameter& request);
@@ -118,7 +153,10 @@ class Session : public std::enable_shared_from_this<Session> {
   bool is_tick(std::uint64_t ticks, const char* field);
   bool is_within(double value, double bound, std::string_view unit, const char* field);
 
+  void take(const v1::LeaseRequest& request, const std::function<void()>& on_done);
   void request(const Input& input, const char* field, std::function<void()> on_done = nullptr);
+  Engine::Answer answer_for(const char* field, std::function<void()> on_done, std::uint32_t axis);
+  void refuse_owned(std::uint64_t id, std::uint32_t axis);
   void done(std::uint64_t id, Tick tick);
   void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
   void refuse(std::uint64_t id, Refused why, const char* field);
@@ -129,7 +167,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   Outbox::Socket socket_;
   Outbox outbox_;
-  std::string peer_;
+  Client client_;
   SessionContext& context_;
   Engine& engine_;
   FrameReader reader_;
@@ -140,8 +178,16 @@ class Session : public std::enable_shared_from_this<Session> {
   std::vector<AxisSampleView> views_;
   bool greeted_ = false;
   bool over_ = false;  ///< the peer is gone
+  Grant grant_;
+  ServerTimer slot_timer_;     // runs to the end of the grant
+  ServerTimer silence_timer_;  // runs while a frame is not whole
+  bool waits_for_frame_ = false;
+  std::string why_ended_ = "the peer left";
+  double excess_left_ = kExcessAtOnce;
+  ServerClock::time_point excess_refilled_ = ServerClock::now();
   Owner owner_ = 0;
-  std::vector<bool> leased_;  // by axis
+  std::vector<bool> leased_;        // by axis
+  std::vector<std::string> taken_;  // by axis: who took it from this session, and why
   std::optional<WaitingExchange> waiting_;
   std::vector<Subscription> subscriptions_;
   std::optional<Fetch> fetch_;

@@ -83,7 +83,9 @@ void Session::run_experiment(const v1::RunExperiment& r) {
       const auto found = tables_.find(number);
       return found == tables_.end() ? nullptr : found->second;
     };
-    send_info(request_.id(), *experiments.submit(r, table));
+    const std::shared_ptr<const Experiment> experiment = experiments.submit(r, table);
+    audit("experiment", "done", {{"id", experiment->id}, {"user", r.user()}, {"label", r.label()}});
+    send_info(request_.id(), *experiment);
   });
 }
 
@@ -164,6 +166,7 @@ void Session::list_experiments(const v1::ListExperiments& r) {
 void Session::cancel_experiment(const v1::CancelExperiment& r) {
   with_experiments([&](Experiments& experiments) {
     experiments.cancel(r.id(), r.owner());
+    audit("experiment_cancelled", "done", {{"id", r.id()}});
     send_info(request_.id(), *experiments.find(r.id(), r.owner()));
   });
 }

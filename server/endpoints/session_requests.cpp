@@ -97,31 +97,57 @@ bool Session::is_within(double value, double bound, std::string_view unit, const
 }
 
 void Session::request(const Input& input, const char* field, std::function<void()> on_done) {
-  engine_.request(
-      input, [self = shared_from_this(), id = request_.id(), field, on_done](Refused refused, Tick tick) {
-        if (refused != Refused::kNot) return self->refuse(id, refused, field);
-        if (on_done) on_done();
-        self->done(id, tick);
-      });
+  engine_.request(input, answer_for(field, std::move(on_done), input.axis), &client_);
+}
+
+Engine::Answer Session::answer_for(const char* field, std::function<void()> on_done, std::uint32_t axis) {
+  return [self = shared_from_this(), id = request_.id(), field, axis, on_done = std::move(on_done)](
+             Refused refused, Tick tick) {
+    if (refused == Refused::kOwned) return self->refuse_owned(id, axis);
+    if (refused != Refused::kNot) return self->refuse(id, refused, field);
+    if (on_done) on_done();
+    self->done(id, tick);
+  };
+}
+
+/// Says who holds the axis. A renewal this tick, which nobody could know of yet, is the latest there can be.
+void Session::refuse_owned(std::uint64_t id, std::uint32_t axis) {
+  const Client* const holder = engine_.client(engine_.owner(axis));
+  const std::string name = holder == nullptr ? "somebody" : name_of(*holder);
+  const Tick end = engine_.tick() + engine_.config().setup.lease_ticks;
+  reply_.Clear();
+  reply_.set_id(id);
+  v1::Refusal& refusal = *reply_.mutable_refusal();
+  refusal.set_code(v1::REFUSAL_OWNED);
+  refusal.set_message(std::string(sentence_of(Refused::kOwned)) + ": " + name + ", until tick " +
+                      std::to_string(end) + " at the latest unless it is renewed");
+  refusal.set_field("axis");
+  refusal.set_holder(name);
+  refusal.set_lease_end_tick(static_cast<std::uint64_t>(end));
+  send(reply_);
 }
 
 void Session::lease(const v1::LeaseRequest& r) {
   if (!axis_exists(r.axis())) return;
-  if (r.action() < v1::LeaseRequest::ACTION_ACQUIRE || r.action() > v1::LeaseRequest::ACTION_RELEASE) {
-    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE, "the action must be acquire, renew or release",
-                  "action");
+  const bool takes = r.action() == v1::LeaseRequest::ACTION_TAKE;
+  if (!takes &&
+      (r.action() < v1::LeaseRequest::ACTION_ACQUIRE || r.action() > v1::LeaseRequest::ACTION_RELEASE)) {
+    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                  "the action must be acquire, renew, release or take", "action");
   }
   if (engine_.config().mode == RunMode::kFree) {
     return refuse(request_.id(), v1::REFUSAL_WRONG_MODE, "a free run takes no controller", "action");
   }
-  if (owner_ == 0) owner_ = engine_.new_owner();
-  const auto action = static_cast<LeaseAction>(r.action());
-  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, "axis",
-          [this, axis = r.axis(), action] {
-            leased_[axis] = action != LeaseAction::kRelease;
-            if (!leased_[axis]) abandon_exchange(axis);
-            if (over_) give_leases_back();  // the peer left before the bench answered
-          });
+  const auto action = takes ? LeaseAction::kAcquire : static_cast<LeaseAction>(r.action());
+  const auto on_done = [this, axis = r.axis(), action] {
+    leased_[axis] = action != LeaseAction::kRelease;
+    taken_[axis].clear();
+    if (!leased_[axis]) abandon_exchange(axis);
+    if (over_) give_leases_back();  // the peer left before the bench answered
+  };
+  if (takes) return take(r, on_done);
+  if (owner_ == 0) owner_ = engine_.new_owner(client_);
+  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, "axis", on_done);
 }
 
 /// An exchange that waits for a tick of an axis that has just been released would wait for ever.
@@ -130,14 +156,21 @@ void Session::abandon_exchange(std::uint32_t axis) {
     return;
   const std::uint64_t id = waiting_->id;
   waiting_.reset();
-  refuse(id, Refused::kNotOwner, "commands");
+  refuse(id, v1::REFUSAL_NOT_OWNER, not_owner_of(axis), "commands");
+}
+
+std::string Session::not_owner_of(std::uint32_t axis) const {
+  const std::string sentence(sentence_of(Refused::kNotOwner));
+  return taken_[axis].empty() ? sentence : sentence + ": " + taken_[axis];
 }
 
 void Session::exchange(const v1::Exchange& r) {
   const std::uint64_t id = request_.id();
-  if (waiting_)
+  if (waiting_) {
+    charge_excess(r.commands_size());
     return refuse(id, v1::REFUSAL_BUSY, "an exchange of this session is still waiting for its tick",
                   "commands");
+  }
   WaitingExchange waiting{.id = id, .axes = {}};
   if (r.commands().empty()) {
     for (std::uint32_t axis = 0; axis < leased_.size(); ++axis)
@@ -159,8 +192,9 @@ void Session::exchange(const v1::Exchange& r) {
   for (const v1::Command& command : r.commands()) {
     if (engine_.check(command.axis(), owner_, *decode_command(command)) == Refused::kNot) continue;
     const Refused why = engine_.command(command.axis(), owner_, *decode_command(command));
-    return refuse(id, code_of(why),
-                  std::string(sentence_of(why)) + " (axis " + std::to_string(command.axis()) + ")",
+    const std::string sentence =
+        why == Refused::kNotOwner ? not_owner_of(command.axis()) : std::string(sentence_of(why));
+    return refuse(id, code_of(why), sentence + " (axis " + std::to_string(command.axis()) + ")",
                   why == Refused::kWrongDrive ? "commands.gates" : "commands");
   }
   for (const v1::Command& command : r.commands())

@@ -28,14 +28,21 @@ tcp::endpoint endpoint_of(const TcpConfig& config) {
   return {asio::ip::make_address(address), config.port};
 }
 
-std::string peer_name(const tcp::socket& socket) {
+Client peer_of(const tcp::socket& socket) {
   boost::system::error_code error;
   const tcp::endpoint remote = socket.remote_endpoint(error);
-  return error ? "tcp peer" : remote.address().to_string() + ":" + std::to_string(remote.port());
+  return {.transport = "tcp",
+          .peer = error ? "gone" : remote.address().to_string() + ":" + std::to_string(remote.port()),
+          .subject = {}};
 }
 
-std::string peer_name(const UnixProtocol::socket&) {
-  return "unix peer";
+Client peer_of(UnixProtocol::socket& socket) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  const bool known = ::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return {.transport = "unix",
+          .peer = known ? "process " + std::to_string(peer.pid) + " of user " + std::to_string(peer.uid) : "",
+          .subject = {}};
 }
 
 void tune(tcp::socket& socket) {
@@ -94,9 +101,18 @@ StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config)
 }
 
 void StreamServer::serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
-                         Experiments* experiments) {
-  context_.emplace(SessionContext{engine, config_.token, [this] { return sessions_.size(); },
-                                  std::move(transports), experiments});
+                         Experiments* experiments, Audit* audit) {
+  const auto all_reports = [this, others = std::move(transports)] {
+    std::vector<TransportReport> reports = others();
+    reports.push_back(report());
+    return reports;
+  };
+  context_.emplace(SessionContext{.engine = engine,
+                                  .admission = Admission(config_.asks_for_token, config_.grants),
+                                  .session_count = [this] { return sessions_.size(); },
+                                  .transports = all_reports,
+                                  .experiments = experiments,
+                                  .audit = audit});
   if (experiments != nullptr) {
     experiments->on_change = [this] {
       for (std::size_t i = 0; i < sessions_.size(); ++i)
@@ -111,6 +127,10 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
   engine.on_newest.add([this] {
     for (std::size_t i = 0; i < sessions_.size(); ++i)
       sessions_[i]->on_newest();
+  });
+  engine.on_taken.push_back([this](const Taken& taken) {
+    for (std::size_t i = 0; i < sessions_.size(); ++i)
+      sessions_[i]->on_taken(taken);
   });
   asio::co_spawn(io_, accept_from(tcp_), asio::detached);
   if (unix_.is_open()) asio::co_spawn(io_, accept_from(unix_), asio::detached);
@@ -141,16 +161,37 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
     }
     try {
       tune(socket);
-      std::string peer = peer_name(socket);
-      start(Socket(std::move(socket)), std::move(peer));
+      Client who = peer_of(socket);
+      start(Socket(std::move(socket)), std::move(who));
     } catch (const std::exception& problem) {
       spdlog::error("a client could not be taken: {}", problem.what());
     }
   }
 }
 
-void StreamServer::start(Socket socket, std::string peer) {
-  auto session = std::make_shared<Session>(std::move(socket), std::move(peer), *context_);
+TransportReport StreamServer::report() const {
+  const SessionContext::Counts& counts = context_->counts;
+  return {.name = "tcp " + tcp_address(),
+          .state = "up",
+          .counts = {{"sessions", sessions_.size()},
+                     {"turned_away", counts.turned_away},
+                     {"wrong_tokens", counts.wrong_tokens},
+                     {"excess_commands", counts.excess_commands},
+                     {"throttled", counts.throttled},
+                     {"cut", counts.cut}}};
+}
+
+void StreamServer::replace_grants(TcpConfig now) {
+  if (now.asks_for_token != config_.asks_for_token) {
+    throw std::runtime_error("whether tokens are asked for changes with a new start only");
+  }
+  context_->admission.replace(std::move(now.grants));
+  for (std::size_t i = 0; i < sessions_.size(); ++i)
+    sessions_[i]->on_new_grants();
+}
+
+void StreamServer::start(Socket socket, Client who) {
+  auto session = std::make_shared<Session>(std::move(socket), who, *context_);
   const auto silent =
       std::count_if(sessions_.begin(), sessions_.end(), [](const auto& other) { return !other->greeted(); });
   std::string why_not;
@@ -160,6 +201,10 @@ void StreamServer::start(Socket socket, std::string peer) {
     why_not = "too many sessions have not said hello yet";
   }
   if (!why_not.empty()) {
+    ++context_->counts.turned_away;
+    if (context_->audit != nullptr) {
+      context_->audit->note({.name = "limit", .client = &who, .result = why_not});
+    }
     session->turn_away(why_not);
     session->close();
     return;

@@ -24,8 +24,13 @@ class StreamServer {
   /// Starts accepting clients of this run and telling them about its ticks.
   /// `transports` tells of the other ways in.
   /// `experiments` may be null.
+  /// `audit` may be null too.
   void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
-             Experiments* experiments);
+             Experiments* experiments, Audit* audit);
+
+  /// What the tokens file says now: ends the sessions of tokens that hold no more. Throws std::runtime_error
+  /// if tokens are asked for now and were not before, or the other way round.
+  void replace_grants(TcpConfig now);
 
   /// Stops accepting and ends every session; what was queued is lost.
   void close();
@@ -35,7 +40,8 @@ class StreamServer {
 
   template <class Acceptor>
   asio::awaitable<void> accept_from(Acceptor& acceptor);
-  void start(Socket socket, std::string peer);
+  void start(Socket socket, Client who);
+  TransportReport report() const;
   asio::awaitable<void> run(std::shared_ptr<Session> session);
 
   asio::io_context& io_;

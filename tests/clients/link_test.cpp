@@ -195,6 +195,27 @@ TEST(Link, KeepsSamplesThatComeBeforeAnAnswer) {
   EXPECT_FALSE(link.next_samples(0ms).has_value());
 }
 
+// Catches: a notice that is taken for the answer or lost, and a link that goes on when its session has ended.
+TEST(Link, OWN_04_KeepsWhatItIsToldUnasked) {
+  FakePeer peer(welcoming([](const v1::Envelope& request) {
+    v1::Envelope notice;
+    notice.mutable_notice()->set_kind(request.id() == 2 ? v1::Notice::KIND_LEASE_TAKEN
+                                                        : v1::Notice::KIND_SESSION_ENDED);
+    notice.mutable_notice()->set_message("smoke");
+    notice.mutable_notice()->set_axis(3);
+    v1::Envelope answer = answer_to(request);
+    answer.mutable_status()->set_tick(9);
+    return FakePeer::framed(notice) + FakePeer::framed(answer);
+  }));
+  Link link(peer.client_end(), "the bench");
+  EXPECT_EQ(link.status().tick(), 9U);
+  const std::vector<v1::Notice> told = link.take_notices();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].axis(), 3U);
+  EXPECT_TRUE(link.take_notices().empty());
+  EXPECT_EQ(message_of([&] { link.status(); }), "the bench ended the session: smoke");
+}
+
 // Catches a queue without bound, and losses that nobody is told about.
 TEST(Link, DropsTheOldestSamplesAndCountsThem) {
   constexpr int kPerMessage = 1024;

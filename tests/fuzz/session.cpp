@@ -58,8 +58,11 @@ class World {
  public:
   World()
       : engine_(make_lockstep_engine(config(), nullptr)),
-        context_{*engine_, "", [] { return kPeers; }, [] { return std::vector<TransportReport>{}; },
-                 nullptr} {
+        context_{.engine = *engine_,
+                 .admission = Admission(false, {}),
+                 .session_count = [] { return kPeers; },
+                 .transports = [] { return std::vector<TransportReport>{}; },
+                 .experiments = nullptr} {
     engine_->on_tick.add([this] { each_session(&Session::on_tick); });
     engine_->on_newest.add([this] { each_session(&Session::on_newest); });
   }
@@ -125,7 +128,7 @@ class World {
     peer.socket = ends[0];
     auto session = std::make_shared<Session>(
         Outbox::Socket(asio::local::stream_protocol::socket(io_, asio::local::stream_protocol(), ends[1])),
-        "peer", context_);
+        Client{"unix", "peer", ""}, context_);
     peer.session = session;
     asio::co_spawn(
         io_, [session]() { return session->run(); }, asio::detached);

@@ -25,7 +25,7 @@ class SlowEngine final : public Engine {
   Refused check(std::uint32_t, Owner, const Command&) const override { return Refused::kNot; }
   Refused command(std::uint32_t, Owner, const Command&) override { return Refused::kNot; }
   void advance() override {}
-  void request(const Input& input, Answer answer) override {
+  void submit(const Input& input, Answer answer) override {
     if (inputs.size() >= room) return answer(Refused::kBusy, tick());
     inputs.push_back(input);
     answers_.push_back(std::move(answer));

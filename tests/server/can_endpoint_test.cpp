@@ -289,11 +289,11 @@ TEST(CanEndpoint, CAN_11_AnotherBenchWithOurIdentifiersSilencesUs) {
   EXPECT_EQ(bench.endpoint().report().state, "ID_CONFLICT");
   EXPECT_EQ(bench.count("conflicts"), 1u);
   EXPECT_EQ(bench.engine().owner(0), 0u);
-  const Owner before = bench.engine().new_owner();
+  const Owner before = bench.engine().new_owner({});
   EXPECT_EQ(bench.acquire(), 0);
   EXPECT_TRUE(bench.received.empty());
   EXPECT_EQ(bench.engine().owner(0), 0u);
-  EXPECT_EQ(bench.engine().new_owner(), before + 1) << "the bench was asked for the axis all the same";
+  EXPECT_EQ(bench.engine().new_owner({}), before + 1) << "the bench was asked for the axis all the same";
 }
 
 // Catches: a bench that does not come back with its link.

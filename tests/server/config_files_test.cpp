@@ -47,23 +47,42 @@ TEST(ConfigFiles, ProblemsOfTheMotorFileNameItAndAreToldOnce) {
                 ":5: shaft is not a known key; known here: name, source, machine, mechanics, thermal");
 }
 
-// Catches a token that everybody may read, an empty one, and one that drags its line end along.
-TEST(ConfigFiles, CFG_07_SEC_04_TokenComesFromAFileThatOnlyItsOwnerReads) {
+// Catches: an address for everybody without tokens, and a tokens file whose problems are not told with the
+// others.
+TEST(ConfigFiles, CFG_07_SEC_04_TokensComeFromAFileThatOnlyItsOwnerReads) {
   const Folder folder;
-  const std::string text = kBench + "[tcp]\naddress = \"0.0.0.0\"\ntoken_file = \"token\"\n";
-  EXPECT_NE(problems_of(text, folder.path()).find(":23: tcp.token_file names"), std::string::npos);
-  const fs::path file = folder.write("token", "open sesame\r\nnote\n");
+  const std::string text = kBench + "[tcp]\naddress = \"0.0.0.0\"\ntokens_file = \"tokens.toml\"\n";
+  EXPECT_NE(problems_of(text, folder.path()).find(":23: tcp.tokens_file names"), std::string::npos);
+  const fs::path file =
+      folder.write("tokens.toml", "[[token]]\nname = 'anna'\nrole = 'operator'\ntoken = 'open sesame'\n");
   ASSERT_EQ(::chmod(file.c_str(), 0640), 0);
-  EXPECT_NE(problems_of(text, folder.path()).find("others may read"), std::string::npos);
+  EXPECT_NE(problems_of(text, folder.path()).find("read by others"), std::string::npos);
   ASSERT_EQ(::chmod(file.c_str(), 0600), 0);
   const BenchConfig config = parse_config(text, "b.toml", folder.path());
-  EXPECT_EQ(config.tcp.token, "open sesame");
+  EXPECT_TRUE(config.tcp.asks_for_token);
+  ASSERT_EQ(config.tcp.grants.size(), 1u);
+  EXPECT_EQ(config.tcp.grants[0].hash, hash_of_token("open sesame"));
   EXPECT_EQ(config.tcp.address, "0.0.0.0");
-  for (const std::string& bad :
-       {std::string(), std::string("\nx"), std::string("a\tb"), std::string(201, 'x')}) {
-    folder.write("token", bad);
-    EXPECT_NE(problems_of(text, folder.path()).find("first line must be"), std::string::npos) << bad;
-  }
+  folder.write("tokens.toml", "[[token]]\nname = 'anna'\nrole = 'king'\n");
+  const std::string found = problems_of(text, folder.path());
+  EXPECT_NE(found.find("token.role is \"king\""), std::string::npos) << found;
+  EXPECT_NE(found.find("in line 1 token.token or sha256"), std::string::npos) << found;
+}
+
+// Catches: an audit log beside the wrong folder, and words that are taken for others.
+TEST(ConfigFiles, AuditAndLogAreRead) {
+  const Folder folder;
+  const auto with_audit = [&](const std::string& more) { return problems_of(kBench + more, folder.path()); };
+  const BenchConfig config =
+      parse_config(kBench + "[audit]\nfile = 'logs/a.jsonl'\non_failure = 'safe'\n[log]\nlevel = 'warn'\n",
+                   "b.toml", folder.path());
+  EXPECT_EQ(config.audit.file, folder.path() / "logs/a.jsonl");
+  EXPECT_EQ(config.audit.on_failure, AuditFailure::kSafe);
+  EXPECT_EQ(config.log_level, LogLevel::kWarn);
+  EXPECT_NE(with_audit("[audit]\non_failure = 'safe'\n").find("audit.file is missing"), std::string::npos);
+  EXPECT_NE(with_audit("[audit]\nfile = 'a'\non_failure = 'stop'\n").find("continue"), std::string::npos);
+  EXPECT_NE(with_audit("[log]\nlevel = 'loud'\n").find("debug"), std::string::npos);
+  EXPECT_TRUE(parse_config(kBench, "b.toml", folder.path()).audit.file.empty());
 }
 
 // Catches a reader that crashes, hangs or fills the terminal on a file that is no configuration.
@@ -155,12 +174,12 @@ TEST(ConfigFiles, CFG_08_OneDamagedByteEitherLoadsOrGivesAConfigError) {
 // Catches: a recording from a stranger whose configuration makes the replay open files of this machine.
 TEST(ConfigFiles, ATextWithoutAFolderMayNameNoOtherFile) {
   try {
-    parse_config("[tcp]\ntoken_file = 'secret'\n[[axis]]\nname = 'a'\nmotor = 'motor.toml'\n", "bench.toml",
+    parse_config("[tcp]\ntokens_file = 'secret'\n[[axis]]\nname = 'a'\nmotor = 'motor.toml'\n", "bench.toml",
                  {});
     FAIL() << "accepted";
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("motor names another file"), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("token_file names another file"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("tokens_file names another file"), std::string::npos)
         << error.what();
   }
 }

@@ -83,7 +83,7 @@ TEST(Config, CanonicalTextReadsBackBitForBit) {
   config.setup.lease_ticks = 8'001;
   config.realtime = {.pacer = PacerKind::kSleep, .max_lateness_ns = 1'234'567, .cpu = 3, .priority = 0};
   config.tcp = {
-      .address = "::1", .port = 0, .unix_path = "/run/a \"b\" \\c", .token = "secret", .max_sessions = 2};
+      .address = "::1", .port = 0, .unix_path = "/run/a \"b\" \\c", .grants = {}, .max_sessions = 2};
   config.axes[0].motor = "mötor \"x\"";
   config.axes[0].events = {
       {.tick = 3, .action = LoadChange{.load_nm = -0.1, .ramp_ticks = 0}},
@@ -107,7 +107,8 @@ TEST(Config, CanonicalTextReadsBackBitForBit) {
 // Catches a secret that ends in recordings, and an address that would open without it.
 TEST(Config, CanonicalTextHoldsNeitherTokenNorAnAddressThatNeedsIt) {
   BenchConfig config = parse(kBench);
-  config.tcp.token = "open-sesame";
+  config.tcp.asks_for_token = true;
+  config.tcp.grants = {{.name = "anna-sesame", .role = Role::kAdmin, .hash = hash_of_token("open")}};
   config.tcp.address = "192.0.2.1";
   EXPECT_EQ(to_toml(config).find("sesame"), std::string::npos);
   EXPECT_EQ(parse(to_toml(config)).tcp.address, "127.0.0.1");

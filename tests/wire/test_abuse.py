@@ -285,36 +285,28 @@ class Secrets(WireTest):
         for odd in ("0x7f000001", "0", "127.1", "2130706433", "local", ""):
             self.assertIn("tcp.address", self.refused(odd))
 
-    def test_sec_04_no_token_but_the_right_one_and_it_stands_nowhere(self):
-        """A token that is compared up to its shorter end, that a guess cuts off for others, or that the log keeps."""
-        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-abuse-"))
-        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
-        token = "correct-horse-battery-staple"
-        (folder / "token").write_text(token + "\n", encoding="utf-8")
-        (folder / "token").chmod(0o600)
-        text = SERVO_TEXT.replace("[tcp]", f'[tcp]\ntoken_file = "{folder}/token"')
-        server = self.server("--record", str(folder / "run.mcap"), text=text)
-
-        def answer(guess):
-            with server.client(hello=False) as client:
-                return client.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="guess", token=guess))
-
-        one_bit = [token[:n] + chr(ord(token[n]) ^ 1) + token[n + 1:] for n in range(len(token))]
-        for guess in ["", token[:-1], token + "x", token + "\0", token.upper(), *one_bit, *[f"guess {n}" for n in range(200)]]:
-            self.assertRefused(answer(guess), pb.REFUSAL_UNAUTHENTICATED, "token")
-        self.assertEqual(answer(token).WhichOneof("kind"), "welcome")
-        self.assertNotIn(token.encode(), pathlib.Path(f"/proc/{server.process.pid}/cmdline").read_bytes())
-        self.assertEqual(server.stop(), 0)
-        self.assertNotIn(token, server.errors())
-        self.assertNotIn(token.encode(), (folder / "run.mcap").read_bytes())
-
 
 class Process(RecordingTest):
-    def test_os_01_a_hangup_ends_it_like_the_others(self):
-        """A terminal that closes and leaves a recording without its end."""
-        server = self.server()
-        self.assertEqual(server.stop(signal.SIGHUP), 0)
-        self.assertIsNotNone(server.verdict)
+    def test_os_01_a_hangup_reads_the_log_level_again_and_the_run_goes_on(self):
+        """A run that a closing terminal ends, and a file that is read half when it has become wrong meanwhile."""
+        server = self.server(text=SERVO_TEXT + '[log]\nlevel = "off"\n')
+        client = self.client(server)
+        client.lease()
+        client.step(0)
+        bench = server.folder / "bench.toml"
+        bench.write_text(SERVO_TEXT + '[log]\nlevel = "loud"\n', encoding="utf-8")
+        server.process.send_signal(signal.SIGHUP)
+        client.step(1)
+        bench.write_text(SERVO_TEXT.replace("port = 7300", "port = 7301") + '[log]\nlevel = "info"\n', encoding="utf-8")
+        server.process.send_signal(signal.SIGHUP)
+        until(lambda: "SIGHUP: tokens" in server.errors(), "the level holds")
+        self.assertNotIn("stays as it is", server.errors(), "the level was off")
+        client.step(2)
+        bench.write_text("no bench", encoding="utf-8")
+        server.process.send_signal(signal.SIGHUP)
+        until(lambda: "everything stays as it is" in server.errors(), "the reason is told")
+        client.step(3)
+        self.assertEqual(server.stop(), 0)
 
     def test_os_02_signals_of_others_are_nothing(self):
         """A server that a signal ends which is not meant for it."""

@@ -56,6 +56,21 @@ class Commands(CommandTest):
         self.assertEqual(seen, [[3.9, 1], [4.4, 1], [4.9, 1], [5.4, 1], [5.9, 1]])
         self.drivebench("bump", "servo", "-0.0001", link=self.link)
 
+    def test_own_04_take_puts_the_owner_out_and_leaves_the_axis_free(self):
+        """A command that takes an axis and keeps it, or takes it without being asked twice."""
+        with self.bench.client() as owner:
+            owner.lease()
+            for tick in range(3):
+                owner.step(tick, 10.0)
+            self.assertSays(self.drivebench("take", "--reason", "x", link=self.link, code=USAGE).stderr, "--force")
+            self.drivebench("take", "--force", link=self.link, code=USAGE)
+            said = self.drivebench("take", "--force", "--reason", "smoke", link=self.link).stdout
+            self.assertSays(said, "axis 0 (servo): taken and free again since tick 3")
+            self.assertSays(owner.exchange(3, 10.0).refusal.message, "smoke")
+            found = self.json_of("take", "--axis", "servo", "--force", "--reason", "smoke", link=self.link)
+            self.assertEqual((found["axis"], found["name"], found["tick"]), (0, "take", 3))
+            self.assertEqual(self.status()["owner"], 0)
+
     def test_what_cannot_be_done_is_told(self):
         """A command that ends with 0 and changed nothing."""
         for arguments, code, fact in (

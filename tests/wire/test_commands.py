@@ -6,6 +6,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 import unittest
 
 try:
@@ -116,12 +117,13 @@ class Observing(CommandTest):
 
     def test_a_token_is_asked_for_and_taken(self):
         """A token that is not sent, or a refusal that looks like a failed run."""
-        (self.folder / "token").write_text("secret\n", encoding="utf-8")
-        (self.folder / "token").chmod(0o600)
+        (self.folder / "tokens").write_text('[[token]]\nname = "anna"\nrole = "viewer"\ntoken = "secret"\n', encoding="utf-8")
+        (self.folder / "tokens").chmod(0o600)
         text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
-        bench = self.server(text=text.replace("[tcp]", f'[tcp]\ntoken_file = "{self.folder}/token"'))
+        bench = self.server(text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{self.folder}/tokens"'))
         self.assertSays(self.drivebench("status", link=link_of(bench), code=NO_CONNECT).stderr, "does not let us in")
         self.drivebench("status", "--token", "wrong", link=link_of(bench), code=NO_CONNECT)
+        time.sleep(1.1)  # after two wrong ones
         self.drivebench("status", "--token", "secret", link=link_of(bench))
 
     def watch_a_move(self, *options):

@@ -156,6 +156,26 @@ class Transports(DriveTest):
         self.assertEqual(set().union(*volts_of_owner.values()), set(VOLTS.values()))
 
 
+    # OWN-04. Catches: an owner on a bus who cannot be put out, or one who keeps the axis because his bus does not tell him.
+    def test_own_04_an_administrator_takes_an_axis_from_any_transport(self):
+        text = with_bus([UDP]) + MODBUS
+        dbc = self.text_of("dbc", text)
+        server = self.server(text=text)
+        admin = server.client()
+        self.addCleanup(admin.close)
+        for rival in (CanRival(self, dbc), ModbusRival(self, server.ready["modbus"]), TcpRival(self, server)):
+            self.assertTrue(rival.acquire())
+            rival.drive(5.0)
+            taken = admin.ask(lease=pb.LeaseRequest(action=pb.LeaseRequest.ACTION_TAKE, reason="test"))
+            self.assertEqual(taken.WhichOneof("kind"), "done", taken)
+            newest = admin.newest()
+            self.assertEqual(admin.exchange(newest.tick, 5.0).refusal.code, pb.REFUSAL_LATCHED)
+            self.assertEqual(admin.step(newest.tick, gates=pb.GATES_OFF).owner, taken.done.owner)
+            self.assertFalse(rival.acquire())
+            admin.ask(clear_faults=pb.ClearFaults())
+            admin.step(admin.newest().tick, 1.0)
+            admin.lease(pb.LeaseRequest.ACTION_RELEASE)
+
     # Catches: a transport that rounds, delays or reorders what it hands to the bench, or leaves traces of its own.
     def test_the_same_commands_give_the_same_recording_over_each_transport(self):
         text = with_bus([UDP]) + MODBUS

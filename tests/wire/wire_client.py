@@ -96,22 +96,23 @@ class Server:
             s.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return s
 
-    def client(self, hello=True, **options):
-        return Client(self.raw(**options), hello)
+    def client(self, hello=True, token="", **options):
+        return Client(self.raw(**options), hello, token)
 
 
 class Client:
-    """One connection. Samples that come unasked are kept in `samples`."""
+    """One connection. What comes unasked is kept in `samples` and `notices`."""
 
-    def __init__(self, sock, hello=True):
+    def __init__(self, sock, hello=True, token=""):
         self.socket = sock
         self.samples = []
+        self.notices = []
         self.last_id = 0
         self.owner = 0
         self.welcome = None
         self.buffer = b""
         if hello:
-            self.welcome = self.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="wire test")).welcome
+            self.welcome = self.hello(token).welcome
 
     def __enter__(self):
         return self
@@ -121,6 +122,9 @@ class Client:
 
     def close(self):
         self.socket.close()
+
+    def hello(self, token="", name="wire test"):
+        return self.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client=name, token=token))
 
     def send_bytes(self, data):
         self.socket.sendall(data)
@@ -151,6 +155,8 @@ class Client:
             envelope = self.receive()
             if envelope.WhichOneof("kind") == "samples":
                 self.samples.append(envelope.samples)
+            elif envelope.WhichOneof("kind") == "notice":
+                self.notices.append(envelope.notice)
             elif envelope.id == number:
                 return envelope
             else:
@@ -160,10 +166,12 @@ class Client:
         return self.answer_to(self.send(**kind))
 
     def is_closed(self):
-        """Waits for the end of the connection, whatever comes before."""
+        """Waits for the end of the connection, whatever comes before; notices are kept."""
         try:
             while True:
-                self.receive()
+                envelope = self.receive()
+                if envelope.WhichOneof("kind") == "notice":
+                    self.notices.append(envelope.notice)
         except Closed:
             return True
         except socket.timeout:

@@ -153,6 +153,10 @@ void Endpoint::on_request(Node& node, const Values& values) {
   act(node, request, controller);
 }
 
+Client Endpoint::client_of(std::uint32_t controller) const {
+  return {.transport = "can", .peer = bus_->name() + " controller " + std::to_string(controller), .subject = {}};
+}
+
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
   const bool known = node.controller == controller && (node.owner != 0 || node.acquiring);
   if (engine_->config().mode == RunMode::kFree || (node.acquiring && !known)) {
@@ -167,7 +171,7 @@ void Endpoint::acquire(Node& node, std::uint32_t controller) {
     log_refusal(node, "the lease", sentence_of(Refused::kOwned));
     return reply(node, Request::kAcquire, Result::kOwned, controller, 0, 0);
   }
-  const Owner owner = node.owner != 0 ? node.owner : engine_->new_owner();
+  const Owner owner = node.owner != 0 ? node.owner : engine_->new_owner(client_of(controller));
   node.acquiring = true;
   node.controller = controller;
   engine_->request({.tick = 0, .axis = node.axis, .owner = owner, .action = LeaseAction::kAcquire},

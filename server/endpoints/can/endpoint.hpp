@@ -72,6 +72,7 @@ class Endpoint {
   void on_request(Node& node, const Values& values);
   void on_heartbeat(Node& node, const Values& values);
   void on_state();
+  Client client_of(std::uint32_t controller) const;
   void acquire(Node& node, std::uint32_t controller);
   void act(Node& node, Request request, std::uint32_t controller);
   bool is_for(const Node& node, const MessageRow& row);

@@ -7,6 +7,13 @@
 
 namespace drivebench::modbus {
 
+namespace {
+
+/// Who writes in a free run, which has no owners.
+const Client kSomebody{.transport = "modbus", .peer = {}, .subject = {}};
+
+}  // namespace
+
 Refusal refusal_of(Refused why) noexcept {
   switch (why) {
     case Refused::kWrongDrive:
@@ -219,10 +226,13 @@ void AxisDesk::forget() {
 /// The engine may answer at once or with a later tick.
 std::shared_ptr<AxisDesk::Asked> AxisDesk::send(const Input& input) {
   auto asked = std::make_shared<Asked>();
-  engine_.request(input, [asked](Refused refused, Tick) {
-    asked->answer = refused;
-    if (asked->waiting != nullptr) asked->waiting->cancel();
-  });
+  engine_.request(
+      input,
+      [asked](Refused refused, Tick) {
+        asked->answer = refused;
+        if (asked->waiting != nullptr) asked->waiting->cancel();
+      },
+      input.owner == 0 ? &kSomebody : nullptr);
   return asked;
 }
 
@@ -241,7 +251,7 @@ asio::awaitable<Refused> AxisDesk::take_lease(std::uint16_t key, bool renew, Vis
   if (owner_ != 0 && !leased()) forget();
   Input input{.tick = 0, .axis = axis_, .owner = owner_, .action = LeaseAction::kRenew};
   if (owner_ == 0) {
-    input.owner = engine_.new_owner();
+    input.owner = engine_.new_owner({"modbus", name_of_visitor ? name_of_visitor(who) : "", ""});
     input.action = LeaseAction::kAcquire;
     const Refused why = co_await ask(input);
     if (why != Refused::kNot) co_return why;

@@ -52,6 +52,8 @@ class AxisDesk {
 
   /// Called when the lease has changed hands or is gone, so that nobody waits for it.
   std::function<void()> on_lease_change;
+  /// Address and port of a connection, for the audit log; may be empty.
+  std::function<std::string(Visitor)> name_of_visitor;
 
   std::uint32_t axis() const noexcept { return axis_; }
   const RegisterMap& map() const noexcept { return map_; }

@@ -60,6 +60,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void cut(std::string_view why);
 
   const asio::ip::address& peer() const noexcept { return peer_; }
+  Visitor number() const noexcept { return number_; }
+  /// Address and port.
+  std::string peer_name() const { return name_.substr(name_.find(' ') + 1); }
   bool has_lease() const noexcept;
   /// Since when it has said nothing.
   Clock::time_point idle_since() const noexcept { return waiting_ ? Clock::now() : last_request_; }

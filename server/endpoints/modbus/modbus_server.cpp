@@ -73,9 +73,16 @@ void ModbusServer::serve(Engine& engine) {
   for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
     shared_->desks.push_back(std::make_unique<modbus::AxisDesk>(io_, engine, maps_[axis], axis));
     shared_->desks.back()->on_lease_change = wake_all;
+    shared_->desks.back()->name_of_visitor = [this](modbus::Visitor who) { return name_of(who); };
   }
   engine.on_newest.add(wake_all);
   asio::co_spawn(io_, accept(), asio::detached);
+}
+
+std::string ModbusServer::name_of(modbus::Visitor who) const {
+  const auto found = std::find_if(connections_.begin(), connections_.end(),
+                                  [who](const auto& connection) { return connection->number() == who; });
+  return found == connections_.end() ? std::string() : (*found)->peer_name();
 }
 
 asio::awaitable<void> ModbusServer::accept() {

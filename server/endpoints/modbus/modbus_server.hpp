@@ -36,6 +36,7 @@ class ModbusServer {
 
  private:
   asio::awaitable<void> accept();
+  std::string name_of(modbus::Visitor who) const;
   bool make_room(const asio::ip::address& newcomer);
   asio::awaitable<void> run(std::shared_ptr<modbus::Connection> connection);
 

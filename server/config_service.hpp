@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+
+#include "server/config.hpp"
+#include "server/strict_table.hpp"
+
+/// Who may come in, and what is written about it.
+namespace drivebench {
+
+void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig& tcp);
+void read_audit(StrictTable table, const std::filesystem::path& folder, AuditConfig& audit);
+LogLevel read_log_level(StrictTable table);
+
+}  // namespace drivebench

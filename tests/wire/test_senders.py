@@ -1,0 +1,81 @@
+#!/usr/bin/python3
+"""Senders that send too much, too little or in pieces. Each test names the mistake that it would catch."""
+import struct
+import sys
+import time
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from wire_client import frame, pb
+from wire_test import WireTest, until
+
+
+def counts_of(client):
+    return {c.name: c.value for t in client.status().transports if t.name.startswith("tcp") for c in t.counts}
+
+
+class Senders(WireTest):
+    def test_cmd_10_commands_that_no_tick_can_use_are_counted_and_throttled(self):
+        """A flood that takes the time of all others, drives the axis by its last word, or is not noticed at all."""
+        server = self.server("--mode", "realtime")
+        owner, watcher = self.client(server), self.client(server)
+        owner.lease()
+        before = watcher.newest().refused_commands
+
+        def burst(count):
+            """So many commands at once, of which one tick can use one; how many were refused."""
+            tick = watcher.newest().tick
+            ids = [owner.last_id + 1 + n for n in range(count)]
+            owner.last_id = ids[-1]
+            owner.send_bytes(b"".join(
+                frame(pb.Envelope(id=i, exchange=pb.Exchange(commands=[pb.Command(tick=tick, gates=pb.GATES_VOLTAGE,
+                                                                                   u_a_v=1.0)])).SerializeToString())
+                for i in ids))
+            refused = 0
+            answered = set()
+            while len(answered) < count:
+                answer = owner.receive()
+                answered.add(answer.id)
+                if answer.WhichOneof("kind") == "refusal":
+                    refused += answer.refusal.code == pb.REFUSAL_BUSY
+            return refused
+
+        refused = burst(10)
+        self.assertGreaterEqual(refused, 1)
+        self.assertEqual(counts_of(watcher)["excess_commands"], refused)
+        self.assertEqual(counts_of(watcher)["throttled"], 0, "ten at once are forgiven")
+        for _ in range(3):
+            refused += burst(1500)
+        until(lambda: counts_of(watcher)["throttled"] > 0, "the flood is throttled")
+        counts = counts_of(watcher)
+        self.assertEqual(counts["excess_commands"], refused)
+        self.assertEqual(watcher.newest().refused_commands - before, 0, "they never reached the bench")
+        started = watcher.newest().tick
+        until(lambda: watcher.newest().tick > started + 100, "others and the ticks go on")
+
+    def test_tcp_02_silence_within_a_frame_ends_the_session(self):
+        """A peer that sends half a request and keeps its place, and the axis, for ever."""
+        server = self.server()
+        watcher, slow, quiet = self.client(server), self.client(server), self.client(server)
+        request = frame(pb.Envelope(id=9, status_request=pb.StatusRequest()).SerializeToString())
+        self.assertDone(quiet.lease())
+        for piece in (request[:2], request[2:-1]):
+            slow.send_bytes(piece)
+            time.sleep(0.3)
+        slow.send_bytes(request[-1:])
+        self.assertEqual(slow.answer_to(9).WhichOneof("kind"), "status")
+        quiet.send_bytes(struct.pack(">I", 100) + b"half")
+        self.assertTrue(quiet.is_closed())
+        until(lambda: watcher.status().sessions == 2, "it is gone, and the slow one is not")
+        self.assertDone(watcher.lease())
+        self.assertEqual(counts_of(watcher)["cut"], 1)
+        self.assertEqual(slow.status().sessions, 2)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
