@@ -12,6 +12,7 @@ inline constexpr std::uint64_t kCurrentSensorSaturated = 1u << 1;
 inline constexpr std::uint64_t kOverCurrent = 1u << 2;
 inline constexpr std::uint64_t kShaftHeld = 1u << 3;
 inline constexpr std::uint64_t kSensorSaturated = 1u << 4;
+inline constexpr std::uint64_t kCommandSlewLimited = 1u << 5;
 inline constexpr std::uint64_t kOverCurrentTrip = 1u << 8;
 inline constexpr std::uint64_t kCommandTimeout = 1u << 9;
 inline constexpr std::uint64_t kLeaseLost = 1u << 10;
@@ -34,6 +35,7 @@ inline constexpr auto kFaultTable = std::to_array<FaultInfo>({
     {kOverCurrent, "over_current", "a phase current exceeded amplifier.over_current_a in this tick"},
     {kShaftHeld, "shaft_held", "stiction or a lock held the shaft at the end of this tick"},
     {kSensorSaturated, "sensor_saturated", "the converter of another sensor was at the end of its range"},
+    {kCommandSlewLimited, "command_slew_limited", "a set-point moved faster than slew_per_s and was slowed"},
     {kOverCurrentTrip, "over_current_trip", "latched: over-current switched the gates off"},
     {kCommandTimeout, "command_timeout",
      "latched: no command for watchdog_ticks ticks, safe action in force"},

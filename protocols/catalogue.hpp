@@ -82,7 +82,7 @@ inline constexpr auto kSignals = [] {
              "commands that were turned away, and scheduled inputs that could not be carried out"),
       status("late_ticks", "1", &Sample::late_ticks, kAnyTick,
              "ticks of the bench that started after their time"),
-      status("state", "enum", &Sample::state, 4, "0 idle, 1 run, 2 hold, 3 timeout, 4 fault"),
+      status("state", "enum", &Sample::state, 5, "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
       status("faults", "bits", &Sample::faults, kAnyTick, "fault word; the description lists the bits"),
       status("owner", "1", &Sample::owner, kAnyTick, "session that holds the lease; 0: nobody"),
       sensor("encoder_count", "counts", &Sample::encoder_count, kAnyTick,

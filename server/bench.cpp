@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -24,6 +25,15 @@ AxisTiming timing_of(const BenchSetup& setup) {
   return {.period_s = static_cast<double>(setup.period_ns) * 1e-9, .substeps = setup.substeps};
 }
 
+double step_of(const CommandRules& rules, std::int64_t period_ns) noexcept {
+  return rules.slew_per_s > 0.0 ? rules.slew_per_s * static_cast<double>(period_ns) * 1e-9
+                                : std::numeric_limits<double>::infinity();
+}
+
+constexpr bool expects_commands(ControlState state) noexcept {
+  return state == ControlState::kReady || state == ControlState::kRun || state == ControlState::kHold;
+}
+
 bool concerns_all_axes(const Input& input) noexcept {
   return std::holds_alternative<LateTick>(input.action) || std::holds_alternative<Overrun>(input.action);
 }
@@ -37,6 +47,9 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
     const AxisSetup& axis = setup.axes[i];
     axes_.push_back({.axis = Axis(axis.parameters, timing_of(setup), setup.seed, i),
                      .on_link_loss = axis.on_link_loss,
+                     .quick_stop_ticks = axis.quick_stop_ticks,
+                     .rules = axis.rules,
+                     .command_step = step_of(axis.rules, setup.period_ns),
                      .shaft = axis.shares_shaft_with.value_or(i)});
     if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
     axis_parameters(axis.parameters);  // their table is made on first use, which must not be a tick
@@ -95,6 +108,9 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
   if (const auto* command = std::get_if<Command>(&input.action)) {
     const Refused refused = accept(input.axis, *command, input.owner);
     if (refused != Refused::kNot) ++a.control.refused;
+    if (refused != Refused::kNot && refused != Refused::kNotOwner) {
+      count_bad_command(a.control, are_bad_values(refused));
+    }
     return refused;
   }
   if (const auto* lease = std::get_if<LeaseAction>(&input.action))
@@ -114,16 +130,33 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
     } else {
       shaft.bump_output(bump->impulse_nms);
     }
-  } else if (std::holds_alternative<RefusedCommand>(input.action)) {
+  } else if (const auto* refused = std::get_if<RefusedCommand>(&input.action)) {
     ++a.control.refused;
+    if (input.owner != 0 && input.owner == a.control.owner) count_bad_command(a.control, refused->bad_values);
   } else {
-    if (input.owner == 0 || input.owner != a.control.owner) return Refused::kNotOwner;
-    if ((a.axis.state().faults & kLatchedFaults) == 0) return Refused::kNot;
-    a.axis.clear_faults();
-    a.control.state = ControlState::kIdle;
-    a.control.in_force = {};
-    a.control.silent_ticks = 0;
+    return clear_faults(a, input.owner);
   }
+  return Refused::kNot;
+}
+
+void Bench::count_bad_command(Control& c, bool bad_values) noexcept {
+  c.good_commands = 0;
+  if (bad_values) c.bad_values = 1;
+}
+
+Refused Bench::clear_faults(AxisRuntime& a, Owner owner) noexcept {
+  Control& c = a.control;
+  if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
+  const std::uint64_t faults = a.axis.state().faults;
+  if ((faults & kLatchedFaults) == 0) return Refused::kNot;
+  const bool over_current = (faults & kOverCurrentTrip) != 0 && (faults & kOverCurrent) != 0;
+  if (over_current || c.bad_values != 0 || a.axis.injected().command_loss != 0.0) return Refused::kCauseLasts;
+  a.axis.clear_faults();
+  c.state = ControlState::kIdle;
+  c.in_force = {};
+  c.silent_ticks = 0;
+  c.good_commands = 0;
+  c.last = {};
   return Refused::kNot;
 }
 
@@ -189,8 +222,14 @@ Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& comman
   const AxisRuntime& a = axes_[axis];
   const Control& c = a.control;
   if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
-  if (!is_finite(command.phases)) return Refused::kNotFinite;
-  if (!suits(a.axis.parameters().drive.kind, command.phases.gates)) return Refused::kWrongDrive;
+  const Refused values = check_values(command.phases, a.rules, a.axis.parameters().drive);
+  if (values != Refused::kNot) return values;
+  if (a.rules.on_excess == OnExcess::kRefuse) {
+    const Tick ticks = c.in_force.answers < 0 ? 1 : tick_ - c.in_force.answers;
+    if (is_steeper(c.last.command, command.phases, static_cast<double>(ticks) * a.command_step)) {
+      return Refused::kBeyondDrive;
+    }
+  }
   if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
   return is_latched(axis) && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
 }
@@ -204,6 +243,7 @@ Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noe
   if (why != Refused::kNot) return why;
   c.newest = command;
   c.fresh = 1;
+  c.bad_values = 0;
   return Refused::kNot;
 }
 
@@ -212,7 +252,9 @@ Refused Bench::change_lease(std::size_t axis, LeaseAction action, Owner owner) n
   if (owner == 0) return Refused::kNotOwner;
   if (action == LeaseAction::kAcquire) {
     if (c.owner != 0 && c.owner != owner) return Refused::kOwned;
-    if (c.owner == 0) c = {.owner = owner, .renewed = tick_, .missed = c.missed, .refused = c.refused};
+    if (c.owner == 0) {
+      c = {.owner = owner, .renewed = tick_, .last = c.last, .missed = c.missed, .refused = c.refused};
+    }
     c.renewed = tick_;
     return Refused::kNot;
   }
@@ -228,7 +270,7 @@ void Bench::lose_controller(std::size_t axis, std::uint64_t fault) noexcept {
   forget_scheduled(axis, a.control.owner);
   const bool was_active = a.control.state == ControlState::kRun || a.control.state == ControlState::kHold;
   if (was_active) a.axis.latch(fault);
-  a.control = {.missed = a.control.missed, .refused = a.control.refused};
+  a.control = {.last = a.control.last, .missed = a.control.missed, .refused = a.control.refused};
 }
 
 void Bench::forget_scheduled(std::size_t axis, Owner owner) noexcept {
@@ -250,25 +292,54 @@ void Bench::dismiss_controllers() noexcept {
   if (dismissed) step();
 }
 
-PhaseCommand Bench::safe_command(const AxisRuntime& a) const noexcept {
-  return {.gates = a.on_link_loss == SafeAction::kFreewheel ? Gates::kOff : Gates::kZeroVoltage,
-          .setpoint = {}};
+PhaseCommand Bench::safe_command(AxisRuntime& a) noexcept {
+  return act_safely(a.control.last, a.on_link_loss, a.control.state == ControlState::kFault,
+                    a.axis.connection(), a.quick_stop_ticks);
+}
+
+PhaseCommand Bench::drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept {
+  Control& c = a.control;
+  const bool steep = is_steeper(c.last.command, command, a.command_step);
+  const PhaseCommand limited = steep ? slewed(c.last.command, command, a.command_step) : command;
+  if (steep) c.flags = kCommandSlewLimited;
+  follow(c.last, limited, a.axis.connection(), a.on_link_loss == SafeAction::kQuickStop);
+  return limited;
+}
+
+void Bench::take_command(Control& c) noexcept {
+  c.silent_ticks = 0;
+  if (c.state == ControlState::kIdle || c.state == ControlState::kReady) {
+    c.state = ++c.good_commands < setup_.arming_commands ? ControlState::kReady : ControlState::kRun;
+  } else {
+    c.state = ControlState::kRun;
+  }
+  if (setup_.command_delay_ticks == 0 && c.state == ControlState::kRun) c.in_force = c.newest;
+}
+
+void Bench::miss_command(AxisRuntime& a) noexcept {
+  Control& c = a.control;
+  ++c.silent_ticks;
+  if (c.state == ControlState::kReady) {
+    if (c.silent_ticks < setup_.watchdog_ticks) return;
+    c.state = ControlState::kIdle;
+    c.good_commands = 0;
+    return;
+  }
+  ++c.missed;
+  c.state = ControlState::kHold;
+  if (c.silent_ticks >= setup_.watchdog_ticks) a.axis.latch(kCommandTimeout);
 }
 
 PhaseCommand Bench::supervise(std::size_t axis) noexcept {
   AxisRuntime& a = axes_[axis];
   Control& c = a.control;
+  c.flags = 0;
   if (c.owner != 0 && tick_ - c.renewed >= setup_.lease_ticks) lose_controller(axis, kLeaseLost);
   if (a.axis.injected().command_loss != 0.0) c.fresh = 0;  // taken on the wire, lost on the way to the drive
   if (c.fresh != 0) {
-    c.silent_ticks = 0;
-    c.state = ControlState::kRun;
-    if (setup_.command_delay_ticks == 0) c.in_force = c.newest;
-  } else if (late_now_ == 0 && (c.state == ControlState::kRun || c.state == ControlState::kHold)) {
-    ++c.missed;
-    ++c.silent_ticks;
-    c.state = ControlState::kHold;
-    if (c.silent_ticks >= setup_.watchdog_ticks) a.axis.latch(kCommandTimeout);
+    take_command(c);
+  } else if (late_now_ == 0 && expects_commands(c.state)) {
+    miss_command(a);
   }
   const std::uint64_t latched = a.axis.state().faults & kLatchedFaults;
   if (latched != 0) {
@@ -276,10 +347,12 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
         (latched & ~(kCommandTimeout | kLeaseLost)) != 0 ? ControlState::kFault : ControlState::kTimeout;
     c.in_force = {};
     c.fresh = 0;
+    c.good_commands = 0;
     return safe_command(a);
   }
   // With a delay the first command is accepted a tick before it is in force.
-  return c.state == ControlState::kIdle || c.in_force.answers < 0 ? safe_command(a) : c.in_force.phases;
+  const bool driven = c.state == ControlState::kRun || c.state == ControlState::kHold;
+  return driven && c.in_force.answers >= 0 ? drive_with(a, c.in_force.phases) : safe_command(a);
 }
 
 void Bench::step() noexcept {
@@ -303,7 +376,8 @@ void Bench::step() noexcept {
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     take_sample(i);
     Control& c = axes_[i].control;
-    if (c.fresh != 0) c.in_force = c.newest;  // what a delay of one tick has been holding back
+    // What a delay of one tick has been holding back.
+    if (c.fresh != 0 && c.state == ControlState::kRun) c.in_force = c.newest;
     c.fresh = 0;
   }
 }
@@ -320,7 +394,7 @@ void Bench::take_sample(std::size_t index) noexcept {
               .refused_commands = c.refused,
               .late_ticks = late_ticks_,
               .state = static_cast<std::uint64_t>(c.state),
-              .faults = s.faults,
+              .faults = s.faults | c.flags,
               .owner = c.owner,
               .encoder_count = s.encoder_count,
               .encoder_levels = s.encoder_levels,

@@ -10,19 +10,20 @@
 
 #include "plant/axis.hpp"
 #include "protocols/sample.hpp"
+#include "server/command_rules.hpp"
 #include "server/digest.hpp"
 #include "server/input.hpp"
 #include "server/ramps.hpp"
+#include "server/safe_action.hpp"
 
 namespace drivebench {
 
-/// What the bench does to an axis whose controller is gone.
-enum class SafeAction : std::uint32_t { kFreewheel, kZeroVoltage };
-
-/// State of the control of an axis, as Sample.state shows it.
+/// State of the control of an axis, as Sample.state shows it: idle, ready, run, hold and back; timeout and
+/// fault end only when the owner clears them, and lead to idle.
 enum class ControlState : std::uint64_t {
   kIdle = 0,     ///< nobody commands it: safe action
-  kRun = 1,      ///< commands arrive
+  kReady = 5,    ///< the first commands arrive, fewer than arming_commands: still safe action
+  kRun = 1,      ///< commands arrive and drive the axis
   kHold = 2,     ///< commands are missing, the last one holds
   kTimeout = 3,  ///< latched: too many were missing, or the controller left; safe action
   kFault = 4,    ///< latched: trip, overrun or divergence; safe action
@@ -32,6 +33,8 @@ enum class ControlState : std::uint64_t {
 struct AxisSetup {
   AxisParameters parameters;
   SafeAction on_link_loss = SafeAction::kFreewheel;
+  Tick quick_stop_ticks = 4000;  ///< length of the ramp of SafeAction::kQuickStop, at most kMaxQuickStop
+  CommandRules rules{};
   /// Number of the axis, before this one and with a shaft of its own, whose shaft this one turns: a
   /// dynamometer. Its mechanics are those of both.
   std::optional<std::size_t> shares_shaft_with{};
@@ -43,10 +46,15 @@ struct BenchSetup {
   int substeps = 5;
   std::uint64_t seed = 1;
   int command_delay_ticks = 1;  ///< 0: command(k) holds from tick k; 1: from tick k+1
+  /// So many good commands in a row arm an axis: from the last of them on it is driven. A command that is
+  /// refused, or silence for watchdog_ticks, begins a new row.
+  std::int64_t arming_commands = 1;
   Tick watchdog_ticks = 20;
   Tick lease_ticks = 16'000;
   std::vector<AxisSetup> axes;
 };
+
+inline constexpr Tick kMaxQuickStop = 1'000'000;  ///< [ticks], so that the angle of the ramp has a cosine
 
 /// Sees everything that happens, in order, inside the tick: must neither wait, allocate, lock nor throw.
 class BenchObserver {
@@ -112,13 +120,20 @@ class Bench {
     std::int64_t fresh = 0;  ///< 1: a command came in for this tick
     Command newest{};        ///< the last command accepted
     Command in_force{};
-    std::int64_t silent_ticks = 0;  ///< ticks without a command, late ones not counted
+    std::int64_t silent_ticks = 0;   ///< ticks without a command, late ones not counted
+    std::int64_t good_commands = 0;  ///< in a row, until the axis is armed
+    std::int64_t bad_values = 0;     ///< 1: the last command of the owner was refused for its values
+    std::uint64_t flags = 0;         ///< fault bits of the command that is in force
+    LastCommands last{};
     std::uint64_t missed = 0;
     std::uint64_t refused = 0;
   };
   struct AxisRuntime {
     Axis axis;
     SafeAction on_link_loss;
+    Tick quick_stop_ticks;
+    CommandRules rules;
+    double command_step;          ///< largest change of a set-point in a tick [V or A]; infinity: any
     std::size_t shaft;            ///< the axis whose shaft this one turns: itself, or its partner before it
     std::size_t shares_with = 0;  ///< the other axis on this shaft; 0: none
     Control control{};
@@ -131,6 +146,9 @@ class Bench {
   Refused apply(const Input& input) noexcept;
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
   Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
+  /// A command of the owner was turned away.
+  void count_bad_command(Control& c, bool bad_values) noexcept;
+  Refused clear_faults(AxisRuntime& a, Owner owner) noexcept;
   Refused write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept;
   /// Sets a parameter unless that would break a rule between values.
   bool set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept;
@@ -142,8 +160,11 @@ class Bench {
   void apply_due() noexcept;
   void forget_scheduled(std::size_t axis, Owner owner) noexcept;
   PhaseCommand supervise(std::size_t axis) noexcept;
+  void take_command(Control& c) noexcept;
+  void miss_command(AxisRuntime& a) noexcept;
+  PhaseCommand drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept;
   void take_sample(std::size_t index) noexcept;
-  PhaseCommand safe_command(const AxisRuntime& a) const noexcept;
+  PhaseCommand safe_command(AxisRuntime& a) noexcept;
 
   /// Calls visit(block) for every piece of the state, each a struct of 8-byte members.
   template <class Self, class Visitor>

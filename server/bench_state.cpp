@@ -11,7 +11,7 @@
 namespace drivebench {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3274'6174'7362'7264u;  // "drbstat2"
+constexpr std::uint64_t kMagic = 0x3374'6174'7362'7264u;  // "drbstat3"
 
 std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
   Digest digest;
@@ -19,10 +19,14 @@ std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
   digest.add(static_cast<std::uint64_t>(setup.substeps));
   digest.add(setup.seed);
   digest.add(static_cast<std::uint64_t>(setup.command_delay_ticks));
+  digest.add(static_cast<std::uint64_t>(setup.arming_commands));
   digest.add(static_cast<std::uint64_t>(setup.watchdog_ticks));
   digest.add(static_cast<std::uint64_t>(setup.lease_ticks));
   for (const AxisSetup& axis : setup.axes) {
     digest.add(static_cast<std::uint64_t>(axis.on_link_loss));
+    digest.add(static_cast<std::uint64_t>(axis.quick_stop_ticks));
+    digest.add(static_cast<std::uint64_t>(axis.rules.on_excess));
+    digest.add(std::bit_cast<std::uint64_t>(axis.rules.slew_per_s));
     digest.add(axis.shares_shaft_with ? *axis.shares_shaft_with + 1 : 0);
     digest.add(axis.parameters.machine.index());
     for (const Parameter& row : axis_parameters(axis.parameters))

@@ -30,6 +30,15 @@ std::string_view name_of(PacerKind pacer) noexcept {
   return kPacerWords[static_cast<std::size_t>(pacer)];
 }
 
+void change_mode(BenchConfig& config, RunMode mode) noexcept {
+  BenchSetup& setup = config.setup;
+  if (setup.arming_commands == default_arming_commands(config.mode)) {
+    setup.arming_commands = default_arming_commands(mode);
+  }
+  if (mode == RunMode::kRealtime) setup.command_delay_ticks = 1;
+  config.mode = mode;
+}
+
 std::string_view name_of(SafeAction action) noexcept {
   return kSafeActionWords[static_cast<std::size_t>(action)];
 }

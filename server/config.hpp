@@ -139,6 +139,15 @@ BenchConfig load_config(const std::filesystem::path& file);
 /// are looked for. Without a folder it may name none.
 BenchConfig parse_config(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
+/// Good commands in a row that arm an axis, unless the bench file says otherwise: 10 in real time; 1 where
+/// every tick has its command.
+constexpr std::int64_t default_arming_commands(RunMode mode) noexcept {
+  return mode == RunMode::kRealtime ? 10 : 1;
+}
+
+/// Runs the bench in another mode than its file says; what has a default by mode gets the new one.
+void change_mode(BenchConfig& config, RunMode mode) noexcept;
+
 /// The configuration as one TOML text that needs no other file and reads back equal, bit for bit; all but the
 /// tokens, which it does not hold, an address that would need them, experiments, audit and log.
 std::string to_toml(const BenchConfig& config);

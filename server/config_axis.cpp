@@ -13,6 +13,8 @@ namespace {
 
 constexpr std::int64_t kMaxTicks = 1'000'000'000'000'000;
 constexpr double kMaxSeconds = 1e9;
+constexpr double kQuickStopS = 0.5;
+constexpr double kMaxSlewPerS = 1e9;
 
 void read_motor_file(StrictTable& axis, const std::string& motor, const std::filesystem::path& folder,
                      ProblemList& problems, MotorFile& result) {
@@ -71,6 +73,21 @@ std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key,
   return std::llround(*seconds * 1e9 / static_cast<double>(period_ns));
 }
 
+namespace {
+
+Tick read_quick_stop(StrictTable& axis, std::int64_t period_ns) {
+  const Tick by_default = std::llround(kQuickStopS * 1e9 / static_cast<double>(period_ns));
+  const Tick ticks = read_ticks(axis, "quick_stop_s", "quick_stop_ticks", period_ns)
+                         .value_or(std::clamp(by_default, Tick{1}, kMaxQuickStop));
+  if (ticks >= 1 && ticks <= kMaxQuickStop) return ticks;
+  axis.report(
+      axis.has("quick_stop_s") ? "quick_stop_s" : "quick_stop_ticks",
+      "comes to " + std::to_string(ticks) + " ticks but must come to 1 to " + std::to_string(kMaxQuickStop));
+  return 1;
+}
+
+}  // namespace
+
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
                       std::span<const AxisReading> before, ProblemList& problems) {
   AxisReading result;
@@ -103,6 +120,10 @@ AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, st
 
   const auto action = axis.choice("on_link_loss", kSafeActionWords);
   result.setup.on_link_loss = static_cast<SafeAction>(action.value_or(0));
+  result.setup.quick_stop_ticks = read_quick_stop(axis, period_ns);
+  const auto excess = axis.choice("on_excess", kOnExcessWords);
+  result.setup.rules = {.on_excess = static_cast<OnExcess>(excess.value_or(0)),
+                        .slew_per_s = axis.real("slew_per_s", 0.0, kMaxSlewPerS).value_or(0.0)};
   const auto node = axis.integer("can_node", 1, can::kMaxNode);
   result.config.can_node =
       static_cast<std::uint32_t>(node.value_or(static_cast<std::int64_t>(before.size()) + 1));

@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::int64_t kMaxSeed = INT64_MAX;  // the largest integer of TOML
 constexpr double kDefaultLeaseS = 2.0;
+constexpr std::int64_t kMaxArmingCommands = 1000;
 constexpr int kLastCpu = 1023;
 
 /// A duration in units of `ns_per_unit`, which must come to whole nanoseconds.
@@ -76,6 +77,8 @@ bool read_bench(StrictTable& bench, BenchConfig& config) {
   const bool realtime = config.mode == RunMode::kRealtime;
   setup.command_delay_ticks =
       static_cast<int>(bench.integer("command_delay_ticks", 0, 1).value_or(realtime ? 1 : 0));
+  setup.arming_commands =
+      bench.integer("arming_commands", 1, kMaxArmingCommands).value_or(default_arming_commands(config.mode));
   if (mode && realtime && setup.command_delay_ticks == 0) {
     bench.report(
         "command_delay_ticks",

@@ -9,7 +9,9 @@ namespace drivebench {
 // The words of the configuration, in the order of their enumerations.
 inline constexpr std::array<std::string_view, 3> kRunModeWords{"realtime", "lockstep", "free"};
 inline constexpr std::array<std::string_view, 2> kPacerWords{"sleep", "sleep+spin"};
-inline constexpr std::array<std::string_view, 2> kSafeActionWords{"freewheel", "zero_voltage"};
+inline constexpr std::array<std::string_view, 4> kSafeActionWords{"freewheel", "zero_voltage", "hold",
+                                                                  "quick_stop"};
+inline constexpr std::array<std::string_view, 2> kOnExcessWords{"saturate", "refuse"};
 inline constexpr std::array<std::string_view, 4> kCanBackendWords{"socketcan", "udp_multicast", "slcan",
                                                                   "socketcand"};
 inline constexpr std::array<std::string_view, 3> kRoleWords{"viewer", "operator", "admin"};

@@ -29,6 +29,7 @@ void append_timing(std::string& text, const BenchSetup& setup) {
   append(text, "substeps", std::to_string(setup.substeps));
   append(text, "seed", std::to_string(setup.seed));
   append(text, "command_delay_ticks", std::to_string(setup.command_delay_ticks));
+  append(text, "arming_commands", std::to_string(setup.arming_commands));
   append(text, "watchdog_ticks", std::to_string(setup.watchdog_ticks));
   append(text, "lease_ticks", std::to_string(setup.lease_ticks));
 }
@@ -55,6 +56,9 @@ void append_parameters(std::string& text, const AxisParameters& p, bool shares_s
 
 void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config) {
   append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
+  append(text, "quick_stop_ticks", std::to_string(setup.quick_stop_ticks));
+  append(text, "on_excess", in_quotes(kOnExcessWords[static_cast<std::size_t>(setup.rules.on_excess)]));
+  append(text, "slew_per_s", real_text(setup.rules.slew_per_s));
   append_parameters(text, setup.parameters, setup.shares_shaft_with.has_value());
   text += events_text(config.events, setup.parameters);
 }

@@ -71,6 +71,13 @@ void get(const Words& w, ShaftBump& bump) noexcept {
   bump.impulse_nms = std::bit_cast<double>(w[0]);
 }
 
+void put(Words& w, const RefusedCommand& refused) noexcept {
+  w[0] = refused.bad_values ? 1 : 0;
+}
+void get(const Words& w, RefusedCommand& refused) noexcept {
+  refused.bad_values = w[0] != 0;
+}
+
 template <class Empty>
 void put(Words&, const Empty&) noexcept {}
 template <class Empty>
@@ -156,6 +163,12 @@ std::string_view sentence_of(Refused why) noexcept {
       return "too many requests are waiting for the bench";
     case Refused::kWrongDrive:
       return "GATES_CURRENT needs a drive of kind \"current_amplifier\"; the drive of the axis is another";
+    case Refused::kBeyondDrive:
+      return "a set-point is beyond what the drive of the axis can give, or moves faster than it may";
+    case Refused::kCauseLasts:
+      return "what caused the latched fault is still there: over-current, a lossy command link, or a "
+             "controller "
+             "whose last command was refused for its values";
     case Refused::kOutOfRange:
       return "a value is outside of its limits";
     case Refused::kRuleBroken:

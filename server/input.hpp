@@ -54,10 +54,13 @@ struct ShaftBump {
   double impulse_nms;  ///< positive like a machine torque
 };
 
-struct ClearFaults {};     ///< by the owner only
-struct LateTick {};        ///< the tick of this input started late; concerns the whole bench
-struct Overrun {};         ///< late beyond the limit: safe action on every axis
-struct RefusedCommand {};  ///< a command for this axis was turned away before it reached the bench
+struct ClearFaults {};  ///< by the owner only
+struct LateTick {};     ///< the tick of this input started late; concerns the whole bench
+struct Overrun {};      ///< late beyond the limit: safe action on every axis
+/// A command for this axis was turned away before it reached the bench.
+struct RefusedCommand {
+  bool bad_values = false;  ///< for what it asked, not for when or by whom
+};
 
 using Action = std::variant<ClearFaults, Command, LeaseAction, LoadChange, ParameterWrite, LateTick, Overrun,
                             RefusedCommand, InjectFault, ShaftBump>;
@@ -96,10 +99,17 @@ enum class Refused : std::uint32_t {
   kStale,
   kBusy,
   kWrongDrive,    ///< the drive of the axis does not take such a setpoint
+  kBeyondDrive,   ///< a setpoint is beyond what the drive can give
+  kCauseLasts,    ///< what a latched fault came from is still there
   kOutOfRange,    ///< the value is outside of what it is about
   kRuleBroken,    ///< a parameter would break a rule between values
   kTooManyRamps,  ///< as many parameters as possible are on their way already
 };
+
+/// Whether a command was refused for its values.
+constexpr bool are_bad_values(Refused why) noexcept {
+  return why == Refused::kNotFinite || why == Refused::kWrongDrive || why == Refused::kBeyondDrive;
+}
 
 /// Whether all setpoints are finite numbers.
 bool is_finite(const PhaseCommand& command) noexcept;

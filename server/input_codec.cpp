@@ -55,7 +55,7 @@ struct ActionWriter {
   void operator()(const ClearFaults&) const { message.set_clear(true); }
   void operator()(const LateTick&) const { message.set_late_tick(true); }
   void operator()(const Overrun&) const { message.set_overrun(true); }
-  void operator()(const RefusedCommand&) const { message.set_refused_command(true); }
+  void operator()(const RefusedCommand& refused) const { message.set_refused_command(refused.bad_values); }
 };
 
 std::optional<ParameterWrite> decode_write(const v1::WriteParameter& message,
@@ -158,7 +158,7 @@ std::optional<Input> decode_input(const v1::Input& message, const ParameterTable
       input.action = Overrun{};
       return input;
     case v1::Input::kRefusedCommand:
-      input.action = RefusedCommand{};
+      input.action = RefusedCommand{.bad_values = message.refused_command()};
       return input;
     case v1::Input::ACTION_NOT_SET:
       break;

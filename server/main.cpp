@@ -58,11 +58,9 @@ void print_line(const std::string& line) {
 BenchConfig configure(const Options& o) {
   BenchConfig config = load_config(o.config);
   if (!o.mode.empty()) {
-    config.mode = o.mode == "realtime" ? RunMode::kRealtime
-                  : o.mode == "free"   ? RunMode::kFree
-                                       : RunMode::kLockstep;
-    config.setup.command_delay_ticks =
-        config.mode == RunMode::kRealtime ? 1 : config.setup.command_delay_ticks;
+    change_mode(config, o.mode == "realtime" ? RunMode::kRealtime
+                        : o.mode == "free"   ? RunMode::kFree
+                                             : RunMode::kLockstep);
   }
   if (o.port >= 0) config.tcp.port = static_cast<std::uint16_t>(o.port);
   if (!o.unix_path.empty()) config.tcp.unix_path = o.unix_path;

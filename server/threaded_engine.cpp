@@ -117,8 +117,9 @@ class ThreadedEngine final : public Engine {
   Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
     const Sample& newest = newest_[axis];
     if (owner == 0 || newest.owner != owner) return Refused::kNotOwner;
-    if (!is_finite(command.phases)) return Refused::kNotFinite;
-    if (!suits(parameters(axis).drive.kind, command.phases.gates)) return Refused::kWrongDrive;
+    const Refused values =
+        check_values(command.phases, config_.setup.axes[axis].rules, parameters(axis).drive);
+    if (values != Refused::kNot) return values;
     const bool repeated = sent_[axis].owner == owner && command.answers <= sent_[axis].command.answers;
     if (repeated || command.answers < 0 || command.answers > static_cast<Tick>(newest.tick)) {
       return Refused::kStale;
@@ -130,7 +131,8 @@ class ThreadedEngine final : public Engine {
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = check(axis, owner, command);
     if (why != Refused::kNot) {
-      submit({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{}}, [](Refused, Tick) {});
+      request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{are_bad_values(why)}},
+              [](Refused, Tick) {});
       return why;
     }
     sent_[axis] = {.owner = owner, .command = command};

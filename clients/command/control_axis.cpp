@@ -24,14 +24,22 @@ bool differ(double a, double b) noexcept {
   return std::abs(a - b) > 1e-9 * std::abs(b);
 }
 
-/// Gates off for so long; the speed at the end, the mean one of the second half if the link does not carry
-/// it.
+/// Whether the bench obeys the commands: an axis that is idle or ready has too few of them.
+bool is_armed(const link::AxisLink& bench, const Sample& sample) {
+  constexpr std::uint64_t kIdle = 0;
+  constexpr std::uint64_t kReady = 5;
+  return !bench.knows("state") || (sample.state != kIdle && sample.state != kReady);
+}
+
+/// Gates off for so long, and until the axis is armed; the speed at the end, the mean one of the second half
+/// if the link does not carry it.
 double speed_after_rest(link::AxisLink& bench, double duration_s, double counts_per_revolution) {
   const Sample start = bench.newest();
   const double rest_ticks = duration_s / bench.bench().period_s();
   Sample half_way = start;
   Sample sample = start;
-  while (static_cast<double>(sample.tick - start.tick) < rest_ticks) {
+  while (static_cast<double>(sample.tick - start.tick) < rest_ticks || !is_armed(bench, sample)) {
+    if (interrupted()) break;
     if (static_cast<double>(sample.tick - start.tick) < rest_ticks / 2) half_way = sample;
     sample = bench.exchange({.tick = sample.tick, .gates = v1::GATES_OFF});
   }
@@ -106,7 +114,7 @@ double counts_per_revolution(const v1::BenchDescription& bench, std::uint32_t ax
 void let_rest(link::AxisLink& bench, double counts_per_revolution) {
   constexpr double kRest_s = 0.050;
   constexpr int kMostRests = 100;
-  if (bench.newest().tick == 0) return;
+  if (bench.newest().tick == 0 && bench.bench().arming_commands() <= 1) return;
   double speed_rad_s = 0.0;
   for (int rest = 0; rest < kMostRests && !interrupted(); ++rest) {
     speed_rad_s = speed_after_rest(bench, kRest_s, counts_per_revolution);

@@ -26,9 +26,10 @@ std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint
 double counts_per_revolution(const v1::BenchDescription& bench, std::uint32_t axis,
                              const control::Requirements& needs);
 
-/// Brings an axis that somebody may have used to rest: gates off for 50 ms of the bench's time, in which the
-/// rotor flux of a servo motor decays to nothing (in lockstep it would otherwise wait there for ever), and
-/// longer while the shaft runs out. Does nothing at tick 0. Throws UsageError if it still turns after 5 s.
+/// Arms an axis and brings it to rest, as somebody may have used it: gates off for 50 ms of the bench's time,
+/// in which the rotor flux of a servo motor decays to nothing (in lockstep it would otherwise wait there for
+/// ever), and longer while the shaft runs out. Does nothing at tick 0 of a bench whose first command arms.
+/// Throws UsageError if it still turns after 5 s.
 void let_rest(link::AxisLink& bench, double counts_per_revolution);
 
 }  // namespace drivebench::command

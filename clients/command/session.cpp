@@ -86,7 +86,7 @@ const char* name_of(v1::Mode mode) noexcept {
 }
 
 const char* name_of_state(std::uint64_t state) noexcept {
-  constexpr std::array kNames = {"idle", "run", "hold", "timeout", "fault"};
+  constexpr std::array kNames = {"idle", "run", "hold", "timeout", "fault", "ready"};
   return state < kNames.size() ? kNames[state] : "unknown";
 }
 
@@ -112,7 +112,8 @@ std::string latched_text(const v1::BenchDescription& bench, const Sample& sample
     return latched == 0 ? "" : fault_names(bench, latched);
   }
   constexpr std::uint64_t kTimeout = 3;
-  if (sample.state < kTimeout) return {};
+  constexpr std::uint64_t kFault = 4;
+  if (sample.state != kTimeout && sample.state != kFault) return {};
   return fmt::format("{}, fault word {:#x}", name_of_state(sample.state), sample.faults);
 }
 

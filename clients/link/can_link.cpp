@@ -33,6 +33,8 @@ constexpr auto kMeanings = std::to_array<Meaning>({
     {v1::REFUSAL_MALFORMED, "the frame is malformed"},
     {v1::REFUSAL_MALFORMED, "phase c and the field of its tick are missing"},
     {v1::REFUSAL_WRONG_DRIVE, "the drive of the axis takes no currents"},
+    {v1::REFUSAL_OUT_OF_RANGE, "a setpoint is beyond what the drive can give"},
+    {v1::REFUSAL_CAUSE_LASTS, "what caused the latched fault is still there"},
 });
 
 [[noreturn]] void refuse_with(Result result) {

@@ -57,6 +57,7 @@ constexpr auto kMeanings = std::to_array<Meaning>({
     {v1::REFUSAL_OUT_OF_RANGE, "a value is out of range"},
     {v1::REFUSAL_WRONG_MODE, "the bench runs in another mode"},
     {v1::REFUSAL_WRONG_DRIVE, "the drive of the axis takes no currents"},
+    {v1::REFUSAL_CAUSE_LASTS, "what caused the latched fault is still there"},
 });
 
 constexpr SignalMask kKnown = [] {

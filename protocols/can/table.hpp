@@ -60,8 +60,10 @@ enum class Result : std::uint8_t {
   kStale = 5,
   kBusy = 6,
   kMalformed = 7,
-  kIncomplete = 8,  ///< setpoints of phase c and of the field did not come with it
-  kWrongDrive = 9,  ///< currents for a drive without a current loop
+  kIncomplete = 8,    ///< setpoints of phase c and of the field did not come with it
+  kWrongDrive = 9,    ///< currents for a drive without a current loop
+  kBeyondDrive = 10,  ///< a setpoint beyond what the drive can give
+  kCauseLasts = 11,   ///< what the latched fault came from is still there
 };
 
 struct MessageRow {
@@ -121,7 +123,7 @@ inline constexpr auto kSensors = std::to_array<Field>({
     counter("command_tick", 192, 32, "command_tick",
             "low bits of the tick that the command in force answered; all ones in state 0: none yet"),
     flags("encoder_levels", 224, 8, "encoder_levels", kLevelsMeaning),
-    choice("state", 232, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault"),
+    choice("state", 232, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
     counter("missed", 240, 16, "missed_commands", "commands that were owed and did not come"),
     real("i_c", "A", 256, "i_c_a", kCurrentC),
     real("i_f", "A", 288, "i_f_a", kCurrentField),
@@ -192,7 +194,7 @@ inline constexpr auto kReply = std::to_array<Field>({
     choice(
         "result", 8, "",
         "0 done, 1 not the owner, 2 owned by another, 3 not finite, 4 latched, 5 stale, 6 busy, 7 malformed, "
-        "8 incomplete, 9 wrong drive"),
+        "8 incomplete, 9 wrong drive, 10 beyond drive, 11 cause lasts"),
     code("controller", 16, 32, "", "the number in the request; 0 for a command"),
     code("lease", 48, 8, "", "lease number to command with, 0: none; of a command, the one that it carried"),
     counter("tick", 56, 8, "",
@@ -217,7 +219,7 @@ inline constexpr auto kCounters = std::to_array<Field>({
     counter("missed", 16, 16, "missed_commands", "commands that were owed and did not come"),
     counter("refused", 32, 16, "refused_commands", "commands that were turned away"),
     counter("late_ticks", 48, 8, "late_ticks", "ticks of the bench that started after their time"),
-    choice("state", 56, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault"),
+    choice("state", 56, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
 });
 inline constexpr auto kIndex = std::to_array<Field>({
     counts("index_count", 0, "index_count", "low bits of the count latched when Z last rose"),
@@ -238,7 +240,7 @@ inline constexpr auto kControllerHeartbeat = std::to_array<Field>({
 inline constexpr auto kHeartbeat = std::to_array<Field>({
     choice("state", 0, "", "0 boot-up, 4 stopped, 5 operational"),
     code("profile", 8, 8, "", "version of the frame table"),
-    choice("control", 16, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault"),
+    choice("control", 16, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
     code("lease", 24, 8, "", "lease number in force on this bus; 0: nobody on this bus commands the axis"),
     counter("period_us", 32, 32, "", "sample period of the bench [us]"),
 });

@@ -60,7 +60,7 @@ inline constexpr auto kCoils = std::to_array<Bit>({
 /// Discrete inputs: the low bits of the fault word, then these, one bit of the control state each, the levels
 /// of the encoder and the Hall lines.
 inline constexpr std::size_t kFaultInputs = 16;
-inline constexpr std::size_t kStateInputs = 5;
+inline constexpr std::size_t kStateInputs = 6;
 inline constexpr std::size_t kEncoderInputs = 6;
 inline constexpr auto kOtherInputs = std::to_array<Bit>({
     {"state_idle", "nobody commands the axis"},
@@ -68,6 +68,7 @@ inline constexpr auto kOtherInputs = std::to_array<Bit>({
     {"state_hold", "commands are missing, the last one holds"},
     {"state_timeout", "latched: the controller left or fell silent"},
     {"state_fault", "latched: a fault"},
+    {"state_ready", "the first commands arrive, the axis is not armed yet"},
     {"encoder_a", "level of track A"},
     {"encoder_b", "level of track B"},
     {"encoder_z", "level of the index"},

@@ -309,7 +309,7 @@ inline constexpr auto kCommand = std::to_array<Row>({
         410, kUnsigned16, kLastRefusal, "last_refusal", "enum",
         "why the last write here was refused: 0 none yet, 2 not the owner, 3 owned by another, 4 not finite, "
         "5 latched fault, 6 stale or answered already, 7 busy, 8 out of range, 9 wrong mode, "
-        "10 currents for a drive that takes none"),
+        "10 currents for a drive that takes none, 11 the cause of the latched fault is still there"),
 });
 
 /// The same registers for every terminal that there is, so that one request writes them all.

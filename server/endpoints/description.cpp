@@ -82,6 +82,7 @@ v1::BenchDescription describe(const Engine& engine) {
   d.set_period_s(static_cast<double>(config.setup.period_ns) * 1e-9);
   d.set_substeps(static_cast<std::uint32_t>(config.setup.substeps));
   d.set_command_delay_ticks(static_cast<std::uint32_t>(config.setup.command_delay_ticks));
+  d.set_arming_commands(static_cast<std::uint32_t>(config.setup.arming_commands));
   d.set_watchdog_ticks(static_cast<std::uint32_t>(config.setup.watchdog_ticks));
   d.set_lease_s(static_cast<double>(config.setup.lease_ticks) * d.period_s());
   d.set_seed(config.setup.seed);

@@ -31,6 +31,9 @@ v1::RefusalCode code_of(Refused why) noexcept {
       return v1::REFUSAL_BUSY;
     case Refused::kWrongDrive:
       return v1::REFUSAL_WRONG_DRIVE;
+    case Refused::kCauseLasts:
+      return v1::REFUSAL_CAUSE_LASTS;
+    case Refused::kBeyondDrive:
     case Refused::kOutOfRange:
     case Refused::kRuleBroken:
       return v1::REFUSAL_OUT_OF_RANGE;

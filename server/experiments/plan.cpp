@@ -96,6 +96,7 @@ std::uint32_t row_of(const v1::NamedValue& wanted, const BenchConfig& config, st
 /// The configuration with the settings; read back as a replay will read it, so that it keeps all rules.
 BenchConfig with_settings(const v1::RunExperiment& r, BenchConfig config) {
   config.mode = RunMode::kFree;
+  config.setup.arming_commands = 1;  // its commands cross no link
   if (r.settings().empty()) return config;
   if (r.settings_size() > kMaxPlannedEvents) {
     throw BadRequest(

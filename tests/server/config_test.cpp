@@ -93,7 +93,10 @@ TEST(Config, CanonicalTextReadsBackBitForBit) {
   config.axes[1].motor = "";
   config.axes[1].can_node = 127;
   config.setup.axes.push_back(config.setup.axes[0]);
-  config.setup.axes[1].on_link_loss = SafeAction::kZeroVoltage;
+  config.setup.arming_commands = 7;
+  config.setup.axes[1].on_link_loss = SafeAction::kQuickStop;
+  config.setup.axes[1].quick_stop_ticks = 123;
+  config.setup.axes[1].rules = {.on_excess = OnExcess::kRefuse, .slew_per_s = 1.0 / 3.0};
   AxisParameters& p = config.setup.axes[1].parameters;
   std::get<InductionMachineParameters>(p.machine).rotor_resistance_ohm = 3.9 * 1.5;
   p.drive.amplifier.offset_a_v = -0.0;
@@ -174,7 +177,11 @@ TEST(Config, HashFollowsThePhysicsAndNothingElse) {
   EXPECT_TRUE(changed([](BenchConfig& c) { ++c.setup.seed; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { c.setup.command_delay_ticks = 1; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { ++c.setup.lease_ticks; }));
+  EXPECT_TRUE(changed([](BenchConfig& c) { ++c.setup.arming_commands; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { c.setup.axes[0].on_link_loss = SafeAction::kZeroVoltage; }));
+  EXPECT_TRUE(changed([](BenchConfig& c) { ++c.setup.axes[0].quick_stop_ticks; }));
+  EXPECT_TRUE(changed([](BenchConfig& c) { c.setup.axes[0].rules.on_excess = OnExcess::kRefuse; }));
+  EXPECT_TRUE(changed([](BenchConfig& c) { c.setup.axes[0].rules.slew_per_s = 1e6; }));
   EXPECT_TRUE(changed([](BenchConfig& c) { c.axes[0].events.push_back({1, LoadChange{1.0, 0}}); }));
   EXPECT_TRUE(changed([](BenchConfig& c) {
     std::get<InductionMachineParameters>(c.setup.axes[0].parameters.machine).rotor_resistance_ohm *=
@@ -188,6 +195,22 @@ TEST(Config, CommandsWaitATickByDefaultInRealTimeOnly) {
   EXPECT_EQ(parse(with("lockstep", "free")).setup.command_delay_ticks, 0);
   EXPECT_EQ(parse(with("lockstep", "realtime")).setup.command_delay_ticks, 1);
   EXPECT_EQ(parse(with("125", "125\ncommand_delay_ticks = 1")).setup.command_delay_ticks, 1);
+}
+
+// Catches a lockstep run that loses its first commands to arming, and a mode from the command line that keeps
+// the defaults of another.
+TEST(Config, TheFirstCommandArmsUnlessTimeIsReal) {
+  EXPECT_EQ(parse(kBench).setup.arming_commands, 1);
+  BenchConfig config = parse(with("lockstep", "realtime"));
+  EXPECT_EQ(config.setup.arming_commands, 10);
+  change_mode(config, RunMode::kLockstep);
+  EXPECT_EQ(config.setup.arming_commands, 1);
+  change_mode(config, RunMode::kRealtime);
+  EXPECT_EQ(config.setup.arming_commands, 10);
+  EXPECT_EQ(config.setup.command_delay_ticks, 1);
+  config = parse(with("125", "125\narming_commands = 3"));
+  change_mode(config, RunMode::kRealtime);
+  EXPECT_EQ(config.setup.arming_commands, 3) << "what the file says stays";
 }
 
 // Catches a period that is cut to whole microseconds, and a lease shorter than the watchdog by default.

@@ -155,6 +155,7 @@ inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
   EXPECT_EQ(x.setup.substeps, y.setup.substeps);
   EXPECT_EQ(x.setup.seed, y.setup.seed);
   EXPECT_EQ(x.setup.command_delay_ticks, y.setup.command_delay_ticks);
+  EXPECT_EQ(x.setup.arming_commands, y.setup.arming_commands);
   EXPECT_EQ(x.setup.watchdog_ticks, y.setup.watchdog_ticks);
   EXPECT_EQ(x.setup.lease_ticks, y.setup.lease_ticks);
   EXPECT_EQ(x.realtime.pacer, y.realtime.pacer);
@@ -176,6 +177,9 @@ inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
     EXPECT_EQ(x.axes[i].motor, y.axes[i].motor);
     EXPECT_EQ(x.axes[i].can_node, y.axes[i].can_node);
     EXPECT_EQ(x.setup.axes[i].on_link_loss, y.setup.axes[i].on_link_loss);
+    EXPECT_EQ(x.setup.axes[i].quick_stop_ticks, y.setup.axes[i].quick_stop_ticks);
+    EXPECT_EQ(x.setup.axes[i].rules.on_excess, y.setup.axes[i].rules.on_excess);
+    EXPECT_EQ(x.setup.axes[i].rules.slew_per_s, y.setup.axes[i].rules.slew_per_s);
     const AxisParameters& p = x.setup.axes[i].parameters;
     const AxisParameters& q = y.setup.axes[i].parameters;
     EXPECT_EQ(x.setup.axes[i].shares_shaft_with, y.setup.axes[i].shares_shaft_with);

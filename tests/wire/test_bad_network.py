@@ -44,7 +44,7 @@ class BadNetwork(WireTest):
         server = self.server("--mode", "realtime", unix=True)
         here, owner = self.client(server, unix=True), self.client(server)
         self.assertDone(owner.lease())
-        owner.exchange(owner.newest().tick, 3.0)
+        self.drive(owner, 3.0)
         network("down")
         number = owner.send(exchange=pb.Exchange())
         until(lambda: here.newest().faults & TIMEOUT, "the watchdog acts")

@@ -217,14 +217,26 @@ class Parameters(WireTest):
 
 
 class Realtime(WireTest):
-    def owner_at_work(self, server, ticks=20):
+    def owner_at_work(self, server):
         """A controller that has sent commands and stopped; real time goes on without it."""
         owner = self.client(server)
         self.assertDone(owner.lease())
-        for _ in range(ticks):
-            answer = owner.exchange(owner.newest().tick, 5.0)
-            self.assertIn(answer.WhichOneof("kind"), ("exchange_reply", "refusal"))
+        self.drive(owner, 5.0)
         return owner
+
+    def test_state_01_the_first_commands_do_not_drive_the_axis(self):
+        """An axis that moves with the first frame of a controller that is only starting."""
+        server = self.server("--mode", "realtime")
+        owner = self.client(server)
+        self.assertEqual(owner.welcome.bench.arming_commands, 10)
+        self.assertDone(owner.lease())
+        for _ in range(9):
+            owner.exchange(owner.newest().tick, 5.0)
+        sample = owner.newest()
+        self.assertIn(sample.state, (0, 5))  # idle, if the row broke off in a silence of 2.5 ms
+        self.assertEqual((sample.true_i_a_a, sample.missed_commands), (0.0, 0))
+        self.drive(owner, 5.0)
+        self.assertGreater(owner.newest().true_i_a_a, 0.0)
 
     def test_cmd_02_silence_is_a_latched_timeout(self):
         """A plant that goes on with the last command of a controller that hangs."""

@@ -63,5 +63,12 @@ class WireTest(unittest.TestCase):
         if field is not None:
             self.assertEqual(answer.refusal.field, field)
 
+    def drive(self, owner, *setpoints):
+        """Commands in real time, without a pause, until they drive the axis."""
+        end = time.monotonic() + PATIENCE_S
+        while owner.newest().state in (0, 5):  # idle, ready
+            self.assertLess(time.monotonic(), end, "never armed")
+            owner.exchange(owner.newest().tick, *setpoints)
+
     def assertDone(self, answer):
         self.assertEqual(answer.WhichOneof("kind"), "done", answer)

@@ -79,7 +79,7 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
 
 void Endpoint::refuse(const Node& node, Result result, const Setpoints& given, std::string_view why) {
   ++refused_;
-  engine_->request({.tick = 0, .axis = node.axis, .owner = node.owner, .action = RefusedCommand{}},
+  engine_->request({.tick = 0, .axis = node.axis, .owner = node.owner, .action = RefusedCommand{true}},
                    [](Refused, Tick) {});
   log_refusal(node, "a command", why);
   reply(node, Request::kCommand, result, 0, static_cast<std::uint8_t>(given.lease),

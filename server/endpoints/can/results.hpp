@@ -23,6 +23,10 @@ constexpr Result result_of(Refused why) noexcept {
       return Result::kBusy;
     case Refused::kWrongDrive:
       return Result::kWrongDrive;
+    case Refused::kBeyondDrive:
+      return Result::kBeyondDrive;
+    case Refused::kCauseLasts:
+      return Result::kCauseLasts;
     case Refused::kOutOfRange:
     case Refused::kRuleBroken:
       return Result::kMalformed;

@@ -18,6 +18,9 @@ Refusal refusal_of(Refused why) noexcept {
   switch (why) {
     case Refused::kWrongDrive:
       return Refusal::kWrongDrive;
+    case Refused::kCauseLasts:
+      return Refusal::kCauseLasts;
+    case Refused::kBeyondDrive:
     case Refused::kOutOfRange:
     case Refused::kRuleBroken:
       return Refusal::kOutOfRange;
@@ -33,6 +36,7 @@ std::string_view sentence_of(Refusal refusal) noexcept {
   if (refusal == Refusal::kOutOfRange) return "a value is out of range";
   if (refusal == Refusal::kWrongMode) return "a free run takes no controller";
   if (refusal == Refusal::kWrongDrive) return drivebench::sentence_of(Refused::kWrongDrive);
+  if (refusal == Refusal::kCauseLasts) return drivebench::sentence_of(Refused::kCauseLasts);
   return drivebench::sentence_of(static_cast<Refused>(refusal));
 }
 

@@ -36,6 +36,7 @@ enum class Refusal : std::uint16_t {
   kOutOfRange = 8,
   kWrongMode = 9,
   kWrongDrive = 10,
+  kCauseLasts = 11,
 };
 Refusal refusal_of(Refused why) noexcept;
 std::string_view sentence_of(Refusal refusal) noexcept;

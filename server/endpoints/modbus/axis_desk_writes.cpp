@@ -16,12 +16,14 @@ Exception exception_of(Refused why) noexcept {
     case Refused::kUnknownAxis:
       return Exception::kNoTarget;
     case Refused::kNotFinite:
+    case Refused::kBeyondDrive:
     case Refused::kOutOfRange:
     case Refused::kRuleBroken:
       return Exception::kIllegalValue;
     case Refused::kLatched:
     case Refused::kStale:
     case Refused::kWrongDrive:
+    case Refused::kCauseLasts:
       return Exception::kFailure;
     case Refused::kNotOwner:
     case Refused::kOwned:
