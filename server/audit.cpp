@@ -170,8 +170,10 @@ void Audit::note(Event event) {
   line["subject"] = client.subject;
   line["result"] = event.result;
   line["details"] = nlohmann::ordered_json::object();
-  for (const auto& [name, value] : event.details)
-    std::visit([&](const auto& each) { line["details"][std::string(name)] = each; }, value);
+  for (const AuditDetail& detail : event.details) {
+    const std::string name(detail.first);
+    std::visit([&](const auto& value) { line["details"][name] = value; }, detail.second);
+  }
   if (left_out_ > 0) line["details"]["left_out_before"] = left_out_;
   if (lost_ > 0) line["details"]["lost_before"] = lost_;
   // All but ASCII is escaped: whatever a client calls itself, a line is a line and does nothing to a

@@ -12,7 +12,7 @@ namespace {
 /// which is what one computer has. All unix sockets are one place.
 std::string address_of(const Client& client) {
   if (client.transport != "tcp") return client.transport;
-  const std::string address = client.peer.substr(0, client.peer.rfind(':'));
+  std::string address = client.peer.substr(0, client.peer.rfind(':'));
   boost::system::error_code error;
   const asio::ip::address_v6 v6 = asio::ip::make_address_v6(address, error);
   if (error) return address;

@@ -26,7 +26,7 @@ class StreamServer {
   /// `experiments` may be null.
   /// `audit` may be null too.
   void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
-             Experiments* experiments, Audit* audit);
+             Experiments* experiments, Audit* audit = nullptr);
 
   /// What the tokens file says now: ends the sessions of tokens that hold no more. Throws std::runtime_error
   /// if tokens are asked for now and were not before, or the other way round.

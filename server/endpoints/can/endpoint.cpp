@@ -154,7 +154,8 @@ void Endpoint::on_request(Node& node, const Values& values) {
 }
 
 Client Endpoint::client_of(std::uint32_t controller) const {
-  return {.transport = "can", .peer = bus_->name() + " controller " + std::to_string(controller), .subject = {}};
+  return {
+      .transport = "can", .peer = bus_->name() + " controller " + std::to_string(controller), .subject = {}};
 }
 
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
