@@ -30,8 +30,9 @@ Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
     : file_(file.string()),
       ring_(recorder_ring_entries(config)),
       room_for_tick_(config.axes.size() + 512),
-      writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)),
-      thread_([this] { run(); }) {}
+      writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)) {
+  if (options.own_thread) thread_ = std::thread([this] { run(); });
+}
 
 Recorder::~Recorder() {
   stop_.store(true);
@@ -51,8 +52,13 @@ void Recorder::count_gap(bool lost) noexcept {
 }
 
 void Recorder::wait_for_room() noexcept {
-  while (ring_.room() < room_for_tick_)
-    std::this_thread::sleep_for(std::chrono::microseconds(50));
+  while (ring_.room() < room_for_tick_) {
+    if (!thread_.joinable()) {
+      work();
+    } else {
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  }
 }
 
 bool Recorder::drain(std::size_t most) noexcept {
@@ -67,10 +73,14 @@ bool Recorder::drain(std::size_t most) noexcept {
 
 void Recorder::run() {
   pthread_setname_np(pthread_self(), "recorder");
-  while (!stop_.load()) {
-    if (!drain(kEntriesPerLook)) std::this_thread::sleep_for(kIdleSleep);
-    writer_->sync_if_due(RecordingWriter::Clock::now());
-  }
+  while (!stop_.load())
+    if (!work()) std::this_thread::sleep_for(kIdleSleep);
+}
+
+bool Recorder::work() noexcept {
+  const bool any = drain(kEntriesPerLook);
+  writer_->sync_if_due(RecordingWriter::Clock::now());
+  return any;
 }
 
 void Recorder::count_lost() {
@@ -79,7 +89,7 @@ void Recorder::count_lost() {
 
 void Recorder::finish(const Verdict& verdict) {
   stop_.store(true);
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
   drain(ring_.capacity());
   Verdict final_verdict = verdict;
   final_verdict.gaps = gaps();

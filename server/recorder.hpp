@@ -39,6 +39,7 @@ struct RecordingOptions {
   std::uint64_t file_bytes = 0;         ///< a new file begins with the chunk that brings it there; 0: never
   bool continues_after_errors = false;  ///< in a new file, unless the disk is full
   CreateRecordingFile create{};         ///< empty: create_recording_file
+  bool own_thread = true;               ///< false: whoever has the recorder calls work() now and then
 };
 
 /// Entries of the ring between tick and recorder: two seconds, a sample and a command in each tick for each
@@ -63,6 +64,9 @@ class Recorder final : public BenchObserver {
 
   /// Outside the tick, where wall time does not matter: returns when the ring has room for a tick.
   void wait_for_room() noexcept;
+
+  /// Writes some of what has come, and syncs when it is time; false: nothing had come.
+  bool work() noexcept;
 
   /// Entries lost because the ring was full or the disk refused them.
   std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <initializer_list>
@@ -13,6 +12,7 @@
 
 #include "bench.pb.h"
 #include "protocols/mcap.hpp"
+#include "server/clock.hpp"
 #include "server/config.hpp"
 #include "server/input_codec.hpp"
 #include "server/recorder.hpp"
@@ -26,7 +26,7 @@ namespace drivebench {
 /// as lost.
 class RecordingWriter {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = ServerClock;
 
   /// Begins the first file; throws std::system_error if one of its names is taken or it cannot be made.
   RecordingWriter(const std::filesystem::path& file, const BenchConfig& config,
