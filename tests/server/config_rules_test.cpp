@@ -91,7 +91,7 @@ TEST(ConfigRules, CFG_01_CFG_02_CFG_03_CFG_04_SEC_02_EachRuleIsKept) {
        ":7: axis.on_excess is \"ignore\" but must be"},
       {"name = \"x\"", "name = \"x\"\nslew_per_s = -1.0", ":7: axis.slew_per_s is -1 but must lie between 0"},
       {"period_us = 125", "period_us = 125\narming_commands = 0",
-       ":4: bench.arming_commands is 0 but must lie between 1 and 1000"},
+       ":5: bench.arming_commands is 0 but must lie between 1 and 1000"},
       {"name = \"x\"", "name = \"x\"\nmotor = \"m.toml\"",
        ":7: axis.motor names /nonexistent/m.toml, which cannot"},
       {"name = \"x\"", "name = \"x\"\nmotor = \"/dev/zero\"",

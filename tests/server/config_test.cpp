@@ -65,7 +65,9 @@ TEST(Config, RealtimeBenchDiffersFromTheLockstepBenchInTimeOnly) {
   EXPECT_EQ(realtime.mode, RunMode::kRealtime);
   EXPECT_EQ(realtime.setup.command_delay_ticks, 1);
   EXPECT_NE(configuration_hash(realtime), configuration_hash(lockstep));
+  EXPECT_EQ(realtime.setup.arming_commands, 10);
   realtime.setup.command_delay_ticks = 0;
+  realtime.setup.arming_commands = 1;
   EXPECT_EQ(physics_toml(realtime), physics_toml(lockstep));
 }
 

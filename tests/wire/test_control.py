@@ -64,7 +64,8 @@ class Exchange(WireTest):
         self.assertEqual(client.newest().tick, 1)
         sample = client.step(1, -0.0, 5e-324)
         self.assertEqual((sample.u_a_v, sample.u_b_v), (0.0, 5e-324))
-        sample = client.step(2, 1e308, -1e308)
+        self.assertRefused(client.exchange(2, 1e308, 0.0), pb.REFUSAL_OUT_OF_RANGE)
+        sample = client.step(2, 1e6, -1e6)
         self.assertEqual((sample.u_a_v, sample.u_b_v), (80.0, -80.0))
         self.assertTrue(sample.faults & 1, "saturation is said")
 

@@ -18,7 +18,7 @@
 namespace drivebench::can {
 namespace {
 
-constexpr std::size_t kMaxClients = 64;
+constexpr std::size_t kMaxSocketcandClients = 64;
 constexpr std::size_t kMaxNameLength = 16;
 constexpr auto kStallLimit = std::chrono::seconds(2);
 constexpr std::string_view kOk = "< ok >";
@@ -37,8 +37,8 @@ void append_with_blank(std::string& out, const Frame& frame) {
   append_socketcand_frame(out, frame, realtime_s());
 }
 
-struct Client : std::enable_shared_from_this<Client> {
-  Client(asio::io_context& io, int fd, BusStatus& status)
+struct SocketcandClient : std::enable_shared_from_this<SocketcandClient> {
+  SocketcandClient(asio::io_context& io, int fd, BusStatus& status)
       : peer(io, fd, status, append_with_blank), statistics(io) {}
 
   /// One that does not read its answers is cut off.
@@ -68,16 +68,16 @@ class SocketcandBus final : public VirtualBus {
  private:
   std::string open() override;
   void welcome(int fd);
-  void broadcast(const Frame& frame, const Client* except);
-  void take(Client& client, const SocketcandReader::Element& element);
-  void take_before_open(Client& client, std::string_view word, std::string_view rest);
-  bool change_mode(Client& client, std::string_view word);
-  void take_frame(Client& client, std::string_view element);
-  void start_statistics(Client& client, std::string_view period);
-  void send_statistics(Client& client, std::chrono::milliseconds period);
+  void broadcast(const Frame& frame, const SocketcandClient* except);
+  void take(SocketcandClient& client, const SocketcandReader::Element& element);
+  void take_before_open(SocketcandClient& client, std::string_view word, std::string_view rest);
+  bool change_mode(SocketcandClient& client, std::string_view word);
+  void take_frame(SocketcandClient& client, std::string_view element);
+  void start_statistics(SocketcandClient& client, std::string_view period);
+  void send_statistics(SocketcandClient& client, std::chrono::milliseconds period);
 
   TextListener listener_;
-  std::vector<std::shared_ptr<Client>> clients_;
+  std::vector<std::shared_ptr<SocketcandClient>> clients_;
   std::uint64_t bytes_received_ = 0;  ///< of frames
   std::uint64_t bytes_sent_ = 0;
   std::uint64_t frames_sent_ = 0;
@@ -91,12 +91,12 @@ std::string SocketcandBus::open() {
 }
 
 void SocketcandBus::welcome(int fd) {
-  if (clients_.size() == kMaxClients) {
+  if (clients_.size() == kMaxSocketcandClients) {
     ::close(fd);
     return;
   }
-  clients_.push_back(std::make_shared<Client>(io_, fd, status_));
-  Client* client = clients_.back().get();
+  clients_.push_back(std::make_shared<SocketcandClient>(io_, fd, status_));
+  SocketcandClient* client = clients_.back().get();
   client->peer.set_stall_limit(kStallLimit);
   client->peer.on_bytes = [this, client](std::string_view bytes) {
     for (const char byte : bytes) {
@@ -110,7 +110,7 @@ void SocketcandBus::welcome(int fd) {
   client->answer("< hi >");
 }
 
-void SocketcandBus::broadcast(const Frame& frame, const Client* except) {
+void SocketcandBus::broadcast(const Frame& frame, const SocketcandClient* except) {
   for (const auto& client : clients_) {
     if (client->mode == Mode::kRaw && client.get() != except) client->peer.send(frame);
   }
@@ -119,7 +119,7 @@ void SocketcandBus::broadcast(const Frame& frame, const Client* except) {
   bytes_sent_ += data_size(frame);
 }
 
-void SocketcandBus::take(Client& client, const SocketcandReader::Element& element) {
+void SocketcandBus::take(SocketcandClient& client, const SocketcandReader::Element& element) {
   std::string_view rest = element.text;
   const std::string_view word = take_word(rest);
   const auto refuse = [&] {
@@ -142,7 +142,7 @@ void SocketcandBus::take(Client& client, const SocketcandReader::Element& elemen
   }
 }
 
-void SocketcandBus::take_before_open(Client& client, std::string_view word, std::string_view rest) {
+void SocketcandBus::take_before_open(SocketcandClient& client, std::string_view word, std::string_view rest) {
   const std::string_view bus = take_word(rest);
   if (word == "open" && !bus.empty() && bus.size() <= kMaxNameLength && take_word(rest).empty()) {
     client.mode = Mode::kOpen;
@@ -154,7 +154,7 @@ void SocketcandBus::take_before_open(Client& client, std::string_view word, std:
   }
 }
 
-bool SocketcandBus::change_mode(Client& client, std::string_view word) {
+bool SocketcandBus::change_mode(SocketcandClient& client, std::string_view word) {
   Mode mode{};
   if (word == "rawmode") {
     mode = Mode::kRaw;
@@ -171,7 +171,7 @@ bool SocketcandBus::change_mode(Client& client, std::string_view word) {
   return true;
 }
 
-void SocketcandBus::take_frame(Client& client, std::string_view element) {
+void SocketcandBus::take_frame(SocketcandClient& client, std::string_view element) {
   const auto frame = parse_socketcand_send(element);
   if (!frame) {
     ++status_.malformed;
@@ -182,14 +182,14 @@ void SocketcandBus::take_frame(Client& client, std::string_view element) {
   deliver(*frame, 0);
 }
 
-void SocketcandBus::start_statistics(Client& client, std::string_view period) {
+void SocketcandBus::start_statistics(SocketcandClient& client, std::string_view period) {
   const auto period_ms = parse_number(period, 10);
   client.statistics.cancel();
   if (!period_ms) return client.answer("< error unknown command >");
   if (*period_ms != 0) send_statistics(client, std::chrono::milliseconds(std::max(*period_ms, 10u)));
 }
 
-void SocketcandBus::send_statistics(Client& client, std::chrono::milliseconds period) {
+void SocketcandBus::send_statistics(SocketcandClient& client, std::chrono::milliseconds period) {
   client.answer("< stat " + std::to_string(bytes_received_) + " " + std::to_string(status_.received) + " " +
                 std::to_string(bytes_sent_) + " " + std::to_string(frames_sent_) + " >");
   client.statistics.expires_after(period);
