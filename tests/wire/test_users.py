@@ -19,7 +19,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from wire_client import Closed, pb
+from wire_client import PATIENCE_S, Closed, pb
 from wire_test import SERVO_TEXT, WireTest, until
 
 TAKE = pb.LeaseRequest.ACTION_TAKE
@@ -239,7 +239,8 @@ class Tokens(UsersTest):
         otto.lease()
         self.assertRefused(olga.lease(), pb.REFUSAL_OWNED)
         with self.assertRaises((Closed, BrokenPipeError, ConnectionResetError)):
-            while True:
+            end = time.monotonic() + PATIENCE_S
+            while time.monotonic() < end:
                 otto.step(otto.newest().tick, 5.0)
         until(lambda: olga.lease().WhichOneof("kind") == "done", "the next one gets it")
         self.assertTrue(olga.step(olga.newest().tick, gates=pb.GATES_OFF).faults & LEASE_LOST)
