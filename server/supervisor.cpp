@@ -61,10 +61,10 @@ void Supervisor::run() {
     }
     const std::uint64_t now = signs_.load(std::memory_order_relaxed);
     if (signs.look(now)) {
-      watch_.abandon();
       io_stands = true;
       seen_signs = now;
-      spdlog::critical("the I/O thread stands still: all leases are lost");
+      if (ticks_by_itself_) watch_.abandon();
+      spdlog::critical("the I/O thread stands still{}", ticks_by_itself_ ? ": all leases are lost" : "");
     } else if (io_stands && now != seen_signs) {
       io_stands = false;
       spdlog::warn("the I/O thread goes on");

@@ -231,6 +231,8 @@ bool Session::greet(const v1::Hello& hello) {
   welcome.set_role(static_cast<v1::Role>(grant_.role));
   welcome.set_subject(grant_.name);
   send(reply_);
+  v1::Envelope().Swap(&reply_);  // tens of KiB that nothing needs again
+  scratch_ = {};
   return true;
 }
 

@@ -149,17 +149,17 @@ std::string StreamServer::tcp_address() const {
 template <class Acceptor>
 asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
   while (acceptor.is_open()) {
-    boost::system::error_code error;
-    typename Acceptor::protocol_type::socket socket =
-        co_await acceptor.async_accept(asio::redirect_error(asio::use_awaitable, error));
-    if (error == asio::error::operation_aborted) co_return;
-    if (error) {
-      spdlog::warn("cannot accept a client: {}", error.message());
-      ServerTimer pause(io_, kAcceptPause);
-      co_await pause.async_wait(asio::use_awaitable);
-      continue;
-    }
     try {
+      boost::system::error_code error;
+      typename Acceptor::protocol_type::socket socket =
+          co_await acceptor.async_accept(asio::redirect_error(asio::use_awaitable, error));
+      if (error == asio::error::operation_aborted) co_return;
+      if (error) {
+        spdlog::warn("cannot accept a client: {}", error.message());
+        ServerTimer pause(io_, kAcceptPause);
+        co_await pause.async_wait(asio::use_awaitable);
+        continue;
+      }
       tune(socket);
       Client who = peer_of(socket);
       start(Socket(std::move(socket)), std::move(who));

@@ -1,0 +1,42 @@
+#include "server/memory.hpp"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <new>
+#include <string_view>
+
+namespace drivebench {
+namespace {
+
+constexpr std::size_t kStackBytes = std::size_t{1} << 20;
+
+int exit_code_without_memory = 0;
+
+[[noreturn]] void end_without_memory() noexcept {
+  constexpr std::string_view kWhy = "drivebench-server: no memory\n";
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kWhy.data(), kWhy.size());
+  ::_exit(exit_code_without_memory);
+}
+
+}  // namespace
+
+NoStartWithoutMemory::NoStartWithoutMemory(int exit_code) noexcept {
+  exit_code_without_memory = exit_code;
+  std::set_new_handler(end_without_memory);
+}
+
+NoStartWithoutMemory::~NoStartWithoutMemory() {
+  std::set_new_handler(nullptr);
+}
+
+void use_small_stacks() noexcept {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  pthread_attr_setstacksize(&attributes, kStackBytes);
+  pthread_setattr_default_np(&attributes);  // else they are larger than need be
+  pthread_attr_destroy(&attributes);
+}
+
+}  // namespace drivebench
