@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/bench.hpp"
+
+namespace drivebench::simulator {
+
+/// What the simulator knows of an axis by itself, against which every sample is held.
+class AxisAccount {
+ public:
+  using Report = std::function<void(const std::string&)>;
+
+  /// `broken` is told of every promise that does not hold.
+  AxisAccount(const BenchSetup& setup, std::size_t axis, bool lockstep, Report broken)
+      : setup_(setup), axis_(axis), lockstep_(lockstep), broken_(std::move(broken)) {}
+
+  /// After each tick. `late_ticks`: so many started late until now.
+  void see(const Sample& s, std::uint64_t late_ticks);
+  /// After the I/O had its turn, with the owner that it knows.
+  void io_done(Owner owner);
+  /// When everything has settled and nobody is connected any more.
+  void see_end(const Sample& s);
+
+  // ---- told by clients ----
+
+  /// This owner has, or had, the lease, which was renewed at this tick; `is_there` says whether it could
+  /// still speak.
+  void granted(Owner owner, Tick tick, std::function<bool()> is_there);
+  /// It has asked for its lease to end.
+  void may_go(Owner owner);
+  /// It is gone without a word: the axis must be free soon.
+  void gone(Owner owner);
+  /// Nobody will hear of this owner again.
+  void forget(Owner owner) { leases_.erase(owner); }
+  void command_sent() { ++commands_; }
+  void command_refused() { ++refusals_told_; }
+  /// A request to clear was sent; carried out by that owner at that tick; or will never have an answer.
+  void clear_done(Owner owner, Tick tick);
+  void clear_unanswered() { ++clears_unknown_; }
+  /// An input for later, which may be refused then.
+  void scheduled() { ++scheduled_; }
+
+ private:
+  struct Lease {
+    Tick renewed = 0;  ///< at this tick or later
+    bool may_go = false;
+    std::function<bool()> is_there;
+  };
+
+  void require(bool holds, const char* promise);
+  void check_numbers(const Sample& s);
+  void check_counters(const Sample& s);
+  void check_state(const Sample& s);
+  void check_owner(const Sample& s);
+
+  BenchSetup setup_;
+  std::size_t axis_;
+  bool lockstep_;
+  Report broken_;
+  bool seen_ = false;
+  Sample before_{};
+  std::uint64_t late_before_ = 0;
+  bool late_now_ = false;
+  std::int64_t silent_ = 0;  ///< ticks in a row without a command
+  std::map<Owner, Lease> leases_;
+  struct Leaving {
+    Owner owner;
+    Tick deadline;  ///< -1: the I/O has not seen it yet
+  };
+  std::vector<Leaving> leaving_;
+  std::vector<Tick> clearings_;  ///< when latched faults were cleared, not yet known to be asked for
+  std::set<Tick> clears_done_;   ///< of which no sample tells yet
+  std::uint64_t commands_ = 0;
+  std::uint64_t refusals_told_ = 0;
+  std::uint64_t clears_unknown_ = 0;
+  std::uint64_t scheduled_ = 0;
+};
+
+}  // namespace drivebench::simulator

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/engine.hpp"
+#include "tests/simulator/account.hpp"
+#include "tests/simulator/random.hpp"
+#include "tests/simulator/schedule.hpp"
+#include "tests/simulator/trace.hpp"
+
+namespace drivebench::simulator {
+
+/// What all who play a part share.
+struct Scene {
+  explicit Scene(std::uint64_t seed, bool prints) : random(seed), trace(prints) {}
+
+  /// The first promise that did not hold, if any.
+  struct Failure {
+    Time time = 0;
+    std::string promise;
+  };
+
+  void note(const char* what, std::uint64_t who = 0, std::uint64_t a = 0, std::uint64_t b = 0) {
+    trace.add(schedule.now(), what, who, a, b);
+  }
+  void require(bool holds, const std::string& promise) {
+    if (!holds && failure.promise.empty()) failure = {.time = schedule.now(), .promise = promise};
+  }
+
+  Random random;
+  Schedule schedule;
+  Trace trace;
+  Engine* engine = nullptr;
+  std::string unix_path;
+  std::vector<AxisAccount> axes;
+  Time stalled_until = 0;  ///< the last time that the host stood still, or the I/O did
+  bool ending = false;     ///< everybody finishes what is under way
+  Failure failure;
+};
+
+/// Somebody outside of the server.
+class Player {
+ public:
+  virtual ~Player() = default;
+  /// From now on it acts by itself.
+  virtual void start() = 0;
+  /// It begins nothing new, and its network is a good one.
+  virtual void finish() = 0;
+  /// After a second of that: what it was promised must be there.
+  virtual void check_end() = 0;
+  virtual void leave() = 0;
+};
+
+}  // namespace drivebench::simulator
