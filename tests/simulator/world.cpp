@@ -117,7 +117,7 @@ void World::on_tick() {
   if (lockstep) ++ticks_;
   for (std::size_t axis = 0; axis < scene_.axes.size(); ++axis) {
     const Sample& s = engine_->newest(axis);
-    scene_.axes[axis].see(s, lockstep ? 0 : late_until_.at(s.tick - 1));
+    scene_.axes[axis].see(s, lockstep ? 0 : late_until_.at(s.tick));
     if (s.tick % 64 == 0) scene_.note("sample", axis, s.tick, s.state << 32 | s.faults);
   }
 }

@@ -81,7 +81,7 @@ class World {
   Time io_next_ = 0;
   Time clock_next_ = 0;  ///< when the server's clock goes on
   std::uint64_t late_ticks_ = 0;
-  std::vector<std::uint64_t> late_until_;  ///< late ticks up to this one, by tick
+  std::vector<std::uint64_t> late_until_{0};  ///< late ticks before a sample, by its tick
   std::int64_t ticks_ = 0;
 };
 
