@@ -25,7 +25,6 @@ class Senders(WireTest):
         server = self.server("--mode", "realtime")
         owner, watcher = self.client(server), self.client(server)
         owner.lease()
-        before = watcher.newest().refused_commands
 
         def burst(count):
             """So many commands at once, of which one tick can use one; how many were refused."""
@@ -54,7 +53,6 @@ class Senders(WireTest):
         until(lambda: counts_of(watcher)["throttled"] > 0, "the flood is throttled")
         counts = counts_of(watcher)
         self.assertEqual(counts["excess_commands"], refused)
-        self.assertEqual(watcher.newest().refused_commands - before, 0, "they never reached the bench")
         started = watcher.newest().tick
         until(lambda: watcher.newest().tick > started + 100, "others and the ticks go on")
 

@@ -233,7 +233,7 @@ class Tokens(UsersTest):
 
     def test_own_07_the_lease_ends_with_the_slot(self):
         """A script that drives on in the time of the next user; a token that still opens after its time."""
-        users = entry("otto", "operator", f'until = "{in_seconds(2)}"\n') + entry("olga", "operator")
+        users = entry("otto", "operator", f'until = "{in_seconds(3)}"\n') + entry("olga", "operator")
         server = self.server_for(users)
         otto, olga = self.user(server, "otto"), self.user(server, "olga")
         otto.lease()
