@@ -56,7 +56,8 @@ class Recordings(CommandTest):
         """A replay that compares nothing."""
         self.assertSays(self.drivebench("replay", self.whole).stdout, "equal, bit for bit (1024 ticks, 1025 samples", self.hash)
         found = self.json_of("replay", self.whole)
-        self.assertKeys(found, "equal", "usable", "ticks", "samples", "inputs", "state_hash", "recorded_by", "problem")
+        self.assertKeys(found, "equal", "usable", "ticks", "samples", "inputs", "state_hash", "recorded_by", "same_build",
+                        "problem")
         self.assertEqual((found["equal"], found["ticks"], found["state_hash"]), (True, 1024, self.hash))
 
     def test_replay_of_a_flipped_bit_is_1_and_names_the_tick(self):

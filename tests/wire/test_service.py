@@ -1,11 +1,14 @@
 #!/usr/bin/python3
 """The server as a service: what it tells the service manager, its unit, its privileges. Each test names the mistake that it would catch."""
+import ctypes
 import os
 import pathlib
+import platform
 import re
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -17,7 +20,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from wire_client import PATIENCE_S, REPOSITORY, SERVER
+from wire_client import PATIENCE_S, REPOSITORY, SERVER, pb
 from wire_test import SERVO_TEXT, WireTest
 
 UNIT = REPOSITORY / "configs/systemd/drivebench-server.service"
@@ -116,7 +119,7 @@ class Unit(WireTest):
                                   capture_output=True, text=True, timeout=PATIENCE_S, check=False)
             self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr)
 
-    def run_without(self, rights, memory):
+    def run_without(self, rights, memory, *options, code=0):
         """A short run in real time as an ordinary user with these rights; what it said, and whether memory could be set."""
         if os.geteuid() != 0 or shutil.which("setpriv") is None:
             self.skipTest("needs root and setpriv, to give rights away")
@@ -135,9 +138,9 @@ class Unit(WireTest):
             bench.write_text(SERVO_TEXT, encoding="utf-8")
             bench.chmod(0o644)
             done = subprocess.run([*(limit if limited else []), *drop, SERVER, bench, "--port", "0", "--mode", "realtime",
-                                   "--duration", "0.05"], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        self.assertIn("ready", done.stdout)
+                                   "--duration", "0.05", *options], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        self.assertEqual("ready" in done.stdout, code == 0)
         return done.stderr, limited
 
     def test_sec_06_two_capabilities_are_enough_for_real_time(self):
@@ -148,12 +151,93 @@ class Unit(WireTest):
         if subprocess.run(["chrt", "-f", "1", "true"], check=False, stderr=subprocess.DEVNULL).returncode == 0:
             self.assertNotIn("no real-time scheduling", said)
 
+    def test_os_07_require_rt_does_not_start_without_it(self):
+        """A measurement that needs real time and runs without."""
+        said, _ = self.run_without("-all", "65536:65536", "--require-rt", code=2)
+        self.assertRegex(said, "--require-rt: (no real-time scheduling|memory not locked)")
+
+    def test_os_09_more_than_may_be_locked_is_not_locked(self):
+        """MCL_FUTURE under a limit: each allocation beyond it fails, in the middle of a run."""
+        for limit in ("8388608:8388608", "unlimited"):
+            said, limited = self.run_without("-all", limit)
+            if limited:
+                self.assertEqual("memory not locked" in said, limit != "unlimited", said)
+
     def test_os_07_os_09_what_is_not_granted_is_said_once(self):
         """A bench that calls itself real time without being it, or that does not start for want of a right."""
         said, limited = self.run_without("-all", "65536:65536")
         self.assertEqual(said.count("no real-time scheduling"), 1, said)
         if limited:
             self.assertEqual(said.count("memory not locked: RLIMIT_MEMLOCK is 64 KiB"), 1, said)
+
+
+class Filter(WireTest):
+    """The unit's SystemCallFilter, put in force by hand where no systemd runs."""
+    ALLOW, ERRNO_EPERM = 0x7FFF0000, 0x00050001
+    LOAD, EQUAL, RETURN = 0x20, 0x15, 0x06  # of a classic BPF program: a word, a jump, the end
+
+    def members(self, group):
+        """The names of a group of systemd's, with those of the groups in it."""
+        said = subprocess.run(["systemd-analyze", "syscall-filter", "--no-pager", group], capture_output=True, text=True, check=True)
+        names = set()
+        for word in (line.strip() for line in said.stdout.splitlines()[1:]):
+            if word.startswith("@"):
+                names |= self.members(word)
+            elif word and not word.startswith("#"):
+                names.add(word)
+        return names
+
+    def allowed(self):
+        """As systemd reads the lines: what they name is added, or taken away."""
+        names = set()
+        for line in UNIT.read_text(encoding="utf-8").splitlines():
+            key, _, value = line.partition("=")
+            if key != "SystemCallFilter":
+                continue
+            groups = set().union(*(self.members(group) for group in value.lstrip("~").split()))
+            names = names - groups if value.startswith("~") else names | groups
+        return names | self.members("@default")
+
+    def program(self):
+        numbers = {}
+        for header in pathlib.Path("/usr/include").glob("*/asm/unistd_64.h"):
+            numbers = dict(re.findall(r"#define __NR_(\w+) (\d+)", header.read_text(encoding="utf-8")))
+        if not numbers:
+            self.skipTest("no table of system calls: linux-libc-dev is not installed")
+        rows = [(self.LOAD, 0, 0, 0)]
+        for name in sorted(self.allowed() & set(numbers)):
+            rows += [(self.EQUAL, 0, 1, int(numbers[name])), (self.RETURN, 0, 0, self.ALLOW)]
+        rows.append((self.RETURN, 0, 0, self.ERRNO_EPERM))
+        return b"".join(struct.pack("<HBBI", *row) for row in rows), len(rows)
+
+    def test_sec_06_the_server_works_under_the_filter_of_its_unit(self):
+        """A filter that forbids what the server needs, or that forbids nothing."""
+        if shutil.which("systemd-analyze") is None or platform.machine() != "x86_64":
+            self.skipTest("needs systemd-analyze, and an x86-64")
+        rows, count = self.program()
+        code = ctypes.create_string_buffer(rows, len(rows))
+        program = ctypes.create_string_buffer(struct.pack("<HxxxxxxQ", count, ctypes.addressof(code)))
+        prctl = ctypes.CDLL(None, use_errno=True).prctl
+
+        def confine():
+            no_new_privileges, seccomp, mode_filter = 38, 22, 2
+            if prctl(no_new_privileges, 1, 0, 0, 0) != 0 or prctl(seccomp, mode_filter, program, 0, 0) != 0:
+                os._exit(99)
+        forbidden = subprocess.run(["mount", "-t", "tmpfs", "none", "/mnt"], preexec_fn=confine, capture_output=True, check=False)
+        self.assertNotEqual(forbidden.returncode, 0, "the filter filters")
+        self.assertNotEqual(forbidden.returncode, 99, "the filter is in force")
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-service-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        server = self.server("--mode", "realtime", "--record", str(folder / "run.mcap"), "--experiments", str(folder / "kept"),
+                             unix=True, before=confine)
+        for unix in (False, True):
+            client = self.client(server, unix=unix)
+            self.assertDone(client.lease())
+            client.exchange(client.newest().tick, 1.0)
+            self.assertDone(client.lease(pb.LeaseRequest.ACTION_RELEASE))
+        self.assertEqual(server.stop(), 0)
+        self.assertEqual(server.verdict["gaps"], 0)
+        self.assertNotIn("Operation not permitted", server.errors())
 
 
 if __name__ == "__main__":

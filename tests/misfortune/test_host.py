@@ -1,0 +1,201 @@
+#!/usr/bin/python3
+"""A host that fails the server: memory, threads, clocks, arithmetic. Each test names the mistake that it would catch."""
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from misfortune import Misfortune, signal_thread, thread_of
+from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, pb
+from wire_test import SERVO_TEXT, WireTest, until
+
+# A controller that is silent for long keeps its axis, so that what takes it away is something else.
+PATIENT_TEXT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 400000").replace("lease_s = 2.0", "lease_s = 60.0")
+FLUSH_DENORMALS = 0x9FC0  # what -Ofast sets, for the whole process
+FAKETIME = next(pathlib.Path("/usr/lib").glob("*/faketime/libfaketime.so.1"), None)
+
+
+class HostTest(WireTest):
+    def folder(self):
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-host-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        return folder
+
+    def unlucky_server(self, misfortune, *options, **more):
+        """A server that the library is preloaded into."""
+        self.addCleanup(misfortune.leave)
+        misfortune.enter()
+        try:
+            return self.server(*options, before=lambda: resource.setrlimit(resource.RLIMIT_CORE, (0, 0)), **more)
+        finally:
+            misfortune.leave()
+
+
+class Memory(HostTest):
+    def run_of(self, misfortune):
+        with tempfile.TemporaryDirectory(prefix="drivebench-host-") as folder:
+            return subprocess.run(
+                [SERVER, BENCHES / "servo.toml", "--port", "0", "--mode", "free", "--duration", "0.01", "--record",
+                 f"{folder}/run.mcap"], capture_output=True, text=True, env=misfortune.environment(), timeout=PATIENCE_S, check=False)
+
+    def test_os_10_no_memory_at_the_start_is_a_clean_error(self):
+        """A start that crashes, hangs, or goes on without what it could not have."""
+        good = Misfortune()
+        self.assertEqual(self.run_of(good).returncode, 0)
+        self.assertGreater(good.allocations, 1000)
+        failed = 0
+        for number in range(40):
+            at = 1 + number * good.allocations // 40
+            done = self.run_of(Misfortune(fail_in=at))
+            self.assertIn(done.returncode, (0, 1, 2), f"allocation {at}: {done.stderr[-300:]}")
+            if done.returncode != 0:
+                self.assertTrue(done.stderr.strip(), f"allocation {at}: says nothing")
+                failed += 1
+        self.assertGreater(failed, 20)
+
+
+class Threads(HostTest):
+    def test_os_12_a_bench_that_stands_still_ends_the_program(self):
+        """A bench that looks alive, answers, and shows the same sample for ever."""
+        misfortune = Misfortune(sleep_ms=60_000)
+        server = self.unlucky_server(misfortune, "--mode", "realtime")
+        self.client(server).status()
+        signal_thread(server.process.pid, thread_of(server.process.pid, "ticks"), signal.SIGUSR2)
+        self.assertEqual(server.process.wait(timeout=PATIENCE_S), -signal.SIGABRT)
+        self.assertIn("no tick for a second", server.errors())
+
+    def test_os_12_a_server_that_cannot_listen_gives_its_axes_up(self):
+        """A motor that runs on while nobody could stop it."""
+        misfortune = Misfortune(sleep_ms=2500)
+        server = self.unlucky_server(misfortune, "--mode", "realtime", text=PATIENT_TEXT)
+        owner = self.client(server)
+        owner.lease()
+        owner.exchange(owner.newest().tick, 5.0)
+        self.assertNotEqual(owner.newest().owner, 0)
+        signal_thread(server.process.pid, server.process.pid, signal.SIGUSR2)
+        until(lambda: "the I/O thread stands still" in server.errors(), "it is said")
+        until(lambda: owner.newest().owner == 0, "its axis is nobody's")
+        sample = owner.newest()
+        self.assertEqual((sample.u_a_v, sample.u_b_v), (0.0, 0.0))
+        self.assertRefused(owner.exchange(sample.tick, 5.0), pb.REFUSAL_NOT_OWNER)
+        until(lambda: "goes on" in server.errors(), "that is said as well")
+        self.assertEqual(server.stop(), 0)
+
+    def test_os_12_a_pause_of_all_or_a_controller_that_thinks_is_no_standstill(self):
+        """A supervisor that ends a bench because its host slept, or because lockstep waits for a command."""
+        paused, waiting = self.server("--mode", "realtime"), self.server()
+        owner = self.client(waiting)
+        owner.lease()
+        paused.process.send_signal(signal.SIGSTOP)
+        time.sleep(1.5)
+        paused.process.send_signal(signal.SIGCONT)
+        first = self.client(paused).newest().tick
+        until(lambda: self.client(paused).newest().tick > first + 2000, "it goes on")
+        owner.step(0, 1.0)
+        for server in (paused, waiting):
+            self.assertNotIn("stands still", server.errors())
+            self.assertEqual(server.stop(), 0)
+
+    def test_rec_06_a_recorder_that_stands_still_for_a_second_loses_nothing(self):
+        """A ring that is too small for the server's own bench, or a tick that waits for the disk."""
+        misfortune = Misfortune(sleep_ms=1200)
+        file = self.folder() / "run.mcap"
+        server = self.unlucky_server(misfortune, "--mode", "realtime", "--record", str(file))
+        client = self.client(server)
+        signal_thread(server.process.pid, thread_of(server.process.pid, "recorder"), signal.SIGUSR2)
+        first = client.newest().tick
+        until(lambda: client.newest().tick > first + 12_000, "ticks go on meanwhile")
+        self.assertEqual(server.stop(), 0)
+        self.assertEqual(server.verdict["gaps"], 0)
+        done = subprocess.run([SERVER, "--replay", file], capture_output=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+
+class Arithmetic(HostTest):
+    def hash_of_a_run(self, misfortune):
+        server = self.unlucky_server(misfortune)
+        owner = self.client(server)
+        owner.lease()
+        for tick in range(300):
+            owner.step(tick, 1e-300 if tick < 200 else 3.0)
+        return f"{owner.status().state_hash:016x}", server.errors()
+
+    def test_det_03_a_library_that_changed_the_rounding_changes_no_bit(self):
+        """Results that depend on which libraries were loaded."""
+        reference, said = self.hash_of_a_run(Misfortune())
+        self.assertNotIn("rounds", said)
+        changed, said = self.hash_of_a_run(Misfortune(mxcsr_at_start=FLUSH_DENORMALS))
+        self.assertEqual(changed, reference)
+        self.assertIn("how this program rounds", said)
+
+    def test_det_03_a_change_in_the_run_is_set_back_and_said(self):
+        """Half a run with other bits, and nobody knows."""
+        misfortune = Misfortune(mxcsr=FLUSH_DENORMALS)
+        server = self.unlucky_server(misfortune, "--mode", "realtime")
+        self.client(server).status()
+        for count in (1, 2):
+            signal_thread(server.process.pid, thread_of(server.process.pid, "ticks"), signal.SIGUSR1)
+            until(lambda: f"{count} times so far" in server.errors(), "it is found within a second of ticks")
+
+
+class Clock(HostTest):
+    def test_os_04_a_wall_clock_that_jumps_moves_nothing(self):
+        """A lease, a time-out or a tick that follows the time of day."""
+        if FAKETIME is None:
+            self.skipTest("faketime is not installed")
+        folder = self.folder()
+        offset = folder / "offset"
+        offset.write_text("+0", encoding="utf-8")
+        fake = {"LD_PRELOAD": str(FAKETIME), "FAKETIME_DONT_FAKE_MONOTONIC": "1", "FAKETIME_NO_CACHE": "1",
+                "FAKETIME_TIMESTAMP_FILE": str(offset)}
+        os.environ.update(fake)
+        try:
+            server = self.server("--mode", "realtime", "--record", str(folder / "run.mcap"), text=PATIENT_TEXT)
+        finally:
+            for name in fake:
+                del os.environ[name]
+        owner = self.client(server)
+        owner.lease()
+        holder = owner.newest().owner
+        for jump in ("+1h", "-1h", "+10y", "-1s", "+1s"):
+            before = owner.newest()
+            offset.write_text(jump, encoding="utf-8")
+            until(lambda: owner.newest().tick > before.tick + 800, "ticks go on")
+            now = owner.newest()
+            self.assertEqual(now.owner, holder, jump)
+            self.assertEqual(now.faults, 0, jump)
+            self.assertLess(now.tick, before.tick + 8000 * PATIENCE_S, jump)
+        self.assertEqual(server.stop(), 0)
+        done = subprocess.run([SERVER, "--replay", folder / "run.mcap"], capture_output=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+
+class House(HostTest):
+    def test_os_11_a_full_house_stays_below_64_mib(self):
+        """Memory that grows with clients which do not read, or with the length of a recording."""
+        server = self.server("--mode", "realtime", "--record", str(self.folder() / "run.mcap"))
+        guests = [self.client(server, receive_buffer=4096) for _ in range(150)]
+        for guest in guests[:16]:
+            guest.send(subscribe=pb.Subscribe(decimation=1))
+        first = guests[-1].newest().tick
+        until(lambda: guests[-1].newest().tick > first + 12_000, "a second and a half of samples for readers that never read")
+        status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text(encoding="utf-8")
+        resident_kib = int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1])
+        self.assertLess(resident_kib, 64 * 1024)
+        self.assertEqual(server.stop(), 0)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
