@@ -195,6 +195,7 @@ void Session::exchange(const v1::Exchange& r) {
   for (const v1::Command& command : r.commands()) {
     if (engine_.check(command.axis(), owner_, *decode_command(command)) == Refused::kNot) continue;
     const Refused why = engine_.command(command.axis(), owner_, *decode_command(command));
+    if (why == Refused::kStale) charge_excess(r.commands_size());
     const std::string sentence =
         why == Refused::kNotOwner ? not_owner_of(command.axis()) : std::string(sentence_of(why));
     return refuse(id, code_of(why), sentence + " (axis " + std::to_string(command.axis()) + ")",

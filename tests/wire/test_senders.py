@@ -41,7 +41,7 @@ class Senders(WireTest):
                 answer = owner.receive()
                 answered.add(answer.id)
                 if answer.WhichOneof("kind") == "refusal":
-                    refused += answer.refusal.code == pb.REFUSAL_BUSY
+                    refused += answer.refusal.code in (pb.REFUSAL_BUSY, pb.REFUSAL_STALE)
             return refused
 
         refused = burst(10)
