@@ -105,7 +105,9 @@ void AxisAccount::check_state(const Sample& s) {
   require(!hold || (silent_ < setup_.watchdog_ticks), "the watchdog comes in time");
   const bool timed_out = (latched & ~latched_before & kCommandTimeout) != 0;
   require(!timed_out || silent_ >= setup_.watchdog_ticks, "the watchdog does not come too early");
-  require(!is(s, ControlState::kIdle) || !same_owner || cleared || is(before_, ControlState::kIdle) ||
+  const auto lease = leases_.find(s.owner);  // given back and taken again within a tick it begins anew
+  const bool stays = same_owner && (lease == leases_.end() || !lease->second.gave_back);
+  require(!is(s, ControlState::kIdle) || !stays || cleared || is(before_, ControlState::kIdle) ||
               is(before_, ControlState::kReady) || s.owner == 0,
           "an owned axis does not become idle by itself");
 }
@@ -140,12 +142,14 @@ void AxisAccount::io_done(Owner owner) {
 
 void AxisAccount::granted(Owner owner, Tick tick, std::function<bool()> is_there) {
   Lease& lease = leases_[owner];
-  lease = {.renewed = std::max(lease.renewed, tick), .may_go = false, .is_there = std::move(is_there)};
+  lease.renewed = std::max(lease.renewed, tick);
+  lease.may_go = false;
+  lease.is_there = std::move(is_there);
 }
 
 void AxisAccount::may_go(Owner owner) {
   const auto lease = leases_.find(owner);
-  if (lease != leases_.end()) lease->second.may_go = true;
+  if (lease != leases_.end()) lease->second.may_go = lease->second.gave_back = true;
 }
 
 void AxisAccount::gone(Owner owner) {

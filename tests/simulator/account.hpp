@@ -50,6 +50,7 @@ class AxisAccount {
   struct Lease {
     Tick renewed = 0;  ///< at this tick or later
     bool may_go = false;
+    bool gave_back = false;  ///< at some time
     std::function<bool()> is_there;
   };
 

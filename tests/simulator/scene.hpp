@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,8 +36,9 @@ struct Scene {
   Engine* engine = nullptr;
   std::string unix_path;
   std::vector<AxisAccount> axes;
-  Time stalled_until = 0;  ///< the last time that the host stood still, or the I/O did
-  bool ending = false;     ///< everybody finishes what is under way
+  Time stalled_until = 0;                  ///< the last time that the host stood still, or the I/O did
+  std::function<std::size_t()> connected;  ///< stream clients that the server has not left
+  bool ending = false;                     ///< everybody finishes what is under way
   Failure failure;
 };
 
@@ -51,6 +53,8 @@ class Player {
   /// After a second of that: what it was promised must be there.
   virtual void check_end() = 0;
   virtual void leave() = 0;
+  /// Whether it is on the stream socket, and the server's end is still there.
+  virtual bool has_session() const { return false; }
 };
 
 }  // namespace drivebench::simulator

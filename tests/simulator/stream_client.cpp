@@ -11,6 +11,8 @@ constexpr std::size_t kReadCapacity = std::size_t{256} * 1024;
 /// The server ends a session that does not say hello within 2 s.
 constexpr Time kHelloLimit = 2 * kSecond;
 constexpr Time kSlack = 50 * kMillisecond;
+/// Until then the server has seen who is gone.
+constexpr Time kSettled = 500 * kMillisecond;
 /// What came later may not have been read at the end.
 constexpr std::uint64_t kLastWords = 20 * kMillisecond;
 
@@ -171,6 +173,8 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
       if (manners_.controls) control_later();
       return;
     case v1::Envelope::kStatus:
+      scene_.require(answer_.id() != last_look_ || answer_.status().sessions() == scene_.connected(),
+                     "the server keeps the sessions that there are, and no others");
       for (const v1::AxisSample& each : answer_.status().axes())
         see(each.axis(), each.sample());
       return;
@@ -253,6 +257,11 @@ void StreamClient::finish() {
   wire_->heal();
   ++connection_;  // what it meant to do later
   read();
+  scene_.schedule.after(kSettled, [this] {
+    v1::Envelope request;
+    request.mutable_status_request();
+    if (wire_->is_open() && greeted_ && !raw_) last_look_ = ask(request);
+  });
 }
 
 void StreamClient::check_end() {

@@ -49,6 +49,7 @@ class StreamClient final : public Player {
   void finish() override;
   void check_end() override;
   void leave() override { disconnect("leaves"); }
+  bool has_session() const override { return wire_ && wire_->is_connected(); }
 
  private:
   struct Asked {
@@ -109,6 +110,7 @@ class StreamClient final : public Player {
   std::vector<Subscription> samples_;  ///< by axis
   std::map<std::uint64_t, Asked> asked_;
   std::uint64_t last_id_ = 0;
+  std::uint64_t last_look_ = 0;  ///< the status asked for at the end
   v1::Envelope answer_;
 };
 

@@ -112,6 +112,7 @@ class Week {
         silent_until_ = tick + random_.between(1, 60);  // the watchdog is at 20
         return;
       case 1:
+        account_.may_go(owner_);
         submit(random_.chance(0.5) ? LeaseAction::kLost : LeaseAction::kRelease);
         return;
       case 2:

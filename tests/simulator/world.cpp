@@ -51,6 +51,10 @@ World::World(std::uint64_t seed, bool prints, const std::string& folder)
     scene_.axes.emplace_back(config_.setup, axis, config_.mode == RunMode::kLockstep,
                              [this](const std::string& promise) { scene_.require(false, promise); });
   }
+  scene_.connected = [this] {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(players_, [](const auto& player) { return player->has_session(); }));
+  };
   engine_->on_tick.add([this] { on_tick(); });
   server_->serve(
       *engine_, [] { return std::vector<TransportReport>(); }, nullptr);
