@@ -30,6 +30,10 @@ double step_of(const CommandRules& rules, std::int64_t period_ns) noexcept {
                                 : std::numeric_limits<double>::infinity();
 }
 
+double largest_phase_current_a(const Sample& s) noexcept {
+  return std::max({std::abs(s.true_i_a_a), std::abs(s.true_i_b_a), std::abs(s.true_i_c_a)});
+}
+
 constexpr bool expects_commands(ControlState state) noexcept {
   return state == ControlState::kReady || state == ControlState::kRun || state == ControlState::kHold;
 }
@@ -147,9 +151,10 @@ void Bench::count_bad_command(Control& c, bool bad_values) noexcept {
 Refused Bench::clear_faults(AxisRuntime& a, Owner owner) noexcept {
   Control& c = a.control;
   if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
-  const std::uint64_t faults = a.axis.state().faults;
-  if ((faults & kLatchedFaults) == 0) return Refused::kNot;
-  const bool over_current = (faults & kOverCurrentTrip) != 0 && (faults & kOverCurrent) != 0;
+  const std::uint64_t faults = a.axis.state().faults & kLatchedFaults;
+  if (faults == 0) return Refused::kNot;
+  const double limit_a = a.axis.parameters().drive.amplifier.over_current_a;
+  const bool over_current = (faults & kOverCurrentTrip) != 0 && largest_phase_current_a(a.sample) > limit_a;
   if (over_current || c.bad_values != 0 || a.axis.injected().command_loss != 0.0) return Refused::kCauseLasts;
   a.axis.clear_faults();
   c.state = ControlState::kIdle;

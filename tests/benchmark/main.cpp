@@ -32,6 +32,7 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"socketcan", "lockstep over the kernel's CAN against a ping-pong", measure_socketcan},
     {"modbus", "lockstep over Modbus against plain libmodbus", measure_modbus},
     {"abuse", "a polite Modbus client beside three that are not", measure_abuse},
+    {"crowd", "a healthy client beside 1,000 idle ones, 32 viewers and 50 that never read", measure_crowd},
     {"memory", "memory of the server with 32 viewers", measure_memory},
 });
 

@@ -44,6 +44,8 @@ std::vector<Row> measure_multicast(const Plan& plan);
 std::vector<Row> measure_socketcan(const Plan& plan);
 /// A lockstep exchange by Modbus function 23 against plain libmodbus.
 std::vector<Row> measure_modbus(const Plan& plan);
+/// What a healthy client notices of 1,000 idle ones, 32 viewers, and 50 that never read.
+std::vector<Row> measure_crowd(const Plan& plan);
 /// What a polite Modbus client notices of others that are not, beside plain libmodbus.
 std::vector<Row> measure_abuse(const Plan& plan);
 

@@ -104,7 +104,7 @@ TEST(Modbus, MB_01_EveryFunctionCodeIsAnswered) {
     EXPECT_EQ(client.ask({code, 0, 0, 0, 1}), exception_pdu(code, 1)) << function;
   }
   EXPECT_EQ(client.ask(pdu_of(1, {0, 2})), (Bytes{1, 1, 0}));
-  EXPECT_EQ(client.ask(pdu_of(2, {0, 62})).size(), 2u + 8u);
+  EXPECT_EQ(client.ask(pdu_of(2, {0, 63})).size(), 2u + 8u);
   EXPECT_EQ(client.ask(pdu_of(3, {0, 2})), (Bytes{3, 4, 'D', 'B', 0, 1}));
   EXPECT_EQ(client.ask(pdu_of(4, {0, 1})), (Bytes{4, 2, 'D', 'B'}));
   EXPECT_EQ(client.ask({8, 0, 0, 0xab, 0xcd}), (Bytes{8, 0, 0, 0xab, 0xcd}));
@@ -172,13 +172,13 @@ TEST(Modbus, MB_02_EveryEdgeOfTheMapHasItsVerdict) {
     expect_verdict(client, pdu_of(6, {address, 0}), verdict_of_zeros(address, 1), count);
     expect_verdict(client, pdu_of(22, {address, 0, 0}), verdict_of_zeros(address, 1), count);
   }
-  for (const std::size_t address : Sizes{0, 1, 2, 61, 62, 65535}) {
-    for (const std::size_t quantity : Sizes{0, 1, 2, 62, 63, 1968, 1969, 2000, 2001, 65535}) {
+  for (const std::size_t address : Sizes{0, 1, 2, 62, 63, 65535}) {
+    for (const std::size_t quantity : Sizes{0, 1, 2, 63, 64, 1968, 1969, 2000, 2001, 65535}) {
       const auto bits_verdict = [&](std::size_t most, std::size_t bits) {
         return !quantity_verdict(quantity, most) ? 3 : address + quantity <= bits ? 0 : 2;
       };
       expect_verdict(client, pdu_of(1, {address, quantity}), bits_verdict(2000, 2), count);
-      expect_verdict(client, pdu_of(2, {address, quantity}), bits_verdict(2000, 62), count);
+      expect_verdict(client, pdu_of(2, {address, quantity}), bits_verdict(2000, 63), count);
       Bytes pdu = pdu_of(15, {address, quantity});
       const std::size_t bytes = std::min<std::size_t>((quantity + 7) / 8, 246);
       pdu.push_back(static_cast<std::uint8_t>(bytes));

@@ -187,7 +187,7 @@ TEST(ModbusTerminals, HallLinesAndInjectedFaultsAreDiscreteInputs) {
   ModbusBench bench(star_config());
   Client client(bench.port());
   const auto inputs = [&] {
-    const Bytes bytes = client.ask(pdu_of(2, {27, 35}));
+    const Bytes bytes = client.ask(pdu_of(2, {28, 35}));
     std::uint64_t bits = 0;
     for (std::size_t i = 2; i < bytes.size(); ++i)
       bits |= std::uint64_t{bytes[i]} << 8 * (i - 2);

@@ -125,7 +125,7 @@ class Pymodbus(ModbusTest):
         mirror = self.read(client, MIRROR + 18, 4)
         self.assertEqual(mirror[1::-1] + mirror[:1:-1], header[18:22])
         self.assertEqual(client.read_input_registers(0, 30, slave=1).registers, header)
-        self.assertEqual(client.read_discrete_inputs(0, 27, slave=1).bits[16:21], [True] + 4 * [False])
+        self.assertEqual(client.read_discrete_inputs(0, 28, slave=1).bits[16:22], [True] + 5 * [False])
 
         self.exception(client.write_registers(STATOR_RESISTANCE, words("f", 2.0), slave=1), 6)
         self.written(client.write_register(LEASE, KEY, slave=1))
@@ -269,11 +269,11 @@ class Mbpoll(ModbusTest):
         command = [KEY, 0] + words("HIffff", 1, 0, 10.0, -5.0, -2.5, 0.0)
         self.mbpoll(server, *command, first=MORE_LEASE)
         self.assertEqual(self.values(self.mbpoll(server, kind="4:float", first=290, count=1, big=True)), {290: "-2.5"})
-        self.assertEqual(self.values(self.mbpoll(server, kind="1", first=30, count=2)), {30: "0", 31: "0"})
+        self.assertEqual(self.values(self.mbpoll(server, kind="1", first=31, count=2)), {31: "0", 32: "0"})
         command = [KEY, 0] + words("HIffff", 1, 1, 10.0, -5.0, -2.5, 0.0)
         self.mbpoll(server, *command, first=MORE_LEASE)
-        self.assertEqual(self.values(self.mbpoll(server, kind="1", first=30, count=2)), {30: "1", 31: "0"})
-        hall = [self.values(self.mbpoll(server, kind="1", first=27, count=3))[at] for at in (27, 28, 29)]
+        self.assertEqual(self.values(self.mbpoll(server, kind="1", first=31, count=2)), {31: "1", 32: "0"})
+        hall = [self.values(self.mbpoll(server, kind="1", first=28, count=3))[at] for at in (28, 29, 30)]
         self.assertEqual(self.values(self.mbpoll(server, first=136, count=1)),
                          {136: str(sum(int(line) << bit for bit, line in enumerate(hall)))})
 

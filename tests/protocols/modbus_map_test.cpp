@@ -197,14 +197,14 @@ TEST(ModbusMap, EveryDiscreteInputHasItsBit) {
     Sample sample;
     sample.state = 99;
     if (input < 16) sample.faults = std::uint64_t{1} << input;
-    if (input >= 16 && input < 21) sample.state = input - 16;
-    if (input >= 21 && input < 27) sample.encoder_levels = std::uint64_t{1} << (input - 21);
-    if (input >= 27 && input < 30) sample.hall_lines = std::uint64_t{1} << (input - 27);
-    if (input >= 30) sample.injected = std::uint64_t{1} << (input - 30);
+    if (input >= 16 && input < 22) sample.state = input - 16;
+    if (input >= 22 && input < 28) sample.encoder_levels = std::uint64_t{1} << (input - 22);
+    if (input >= 28 && input < 31) sample.hall_lines = std::uint64_t{1} << (input - 28);
+    if (input >= 31) sample.injected = std::uint64_t{1} << (input - 31);
     for (std::size_t other = 0; other < kDiscreteInputs; ++other)
       EXPECT_EQ(discrete_input(other, sample), other == input) << input << " " << other;
   }
-  EXPECT_EQ(kDiscreteInputs, 62u);
+  EXPECT_EQ(kDiscreteInputs, 63u);
 }
 
 // Catches: a sample that loses a signal, a sign or the upper half of a counter between the ends of the wire.
@@ -337,7 +337,7 @@ TEST(ModbusMapText, TheTextsHaveALineForEveryValue) {
             std::string::npos);
   EXPECT_NE(csv.find("\ndiscrete input,8,0x0008,10009,,,over_current_trip,latched,bit,r,"),
             std::string::npos);
-  EXPECT_NE(csv.find("\ndiscrete input,35,0x0023,10036,,,leg_stuck_off,injected,bit,r,"), std::string::npos);
+  EXPECT_NE(csv.find("\ndiscrete input,36,0x0024,10037,,,leg_stuck_off,injected,bit,r,"), std::string::npos);
   EXPECT_NE(markdown.find("| 1004 | 0x03ec | 31005 | 41005 | 11004 | machine.c | fixed | float32 | r |"),
             std::string::npos);
   EXPECT_NE(markdown.find("two \\| words"), std::string::npos);

@@ -1,0 +1,203 @@
+#include <fmt/core.h>
+#include <sys/resource.h>
+
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "clients/link/tcp_link.hpp"
+#include "tests/benchmark/canary.hpp"
+#include "tests/benchmark/measurements.hpp"
+#include "tests/benchmark/server.hpp"
+#include "tests/benchmark/statistics.hpp"
+#include "tests/benchmark/viewers.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kIdle = 1000;
+constexpr int kSubscribers = 32;
+constexpr std::uint32_t kEighth = 8;  // 1 kHz
+constexpr std::size_t kDeaf = 50;
+constexpr double kMaxP99Ratio = 2.0;
+constexpr double kMaxGrowthMiB = 60.0;
+constexpr double kMaxCut_s = 3.0;
+constexpr auto kWindow = 2s;
+constexpr int kRounds = 3;  // of windows without and with, in turn
+
+/// What one healthy client noticed that asks for the newest sample 500 times a second, and how late the bench
+/// was meanwhile.
+struct Window {
+  double p99_us = 0.0;
+  double ticks = 0.0;
+  double late_ticks = 0.0;
+};
+
+Window watch(link::Link& client) {
+  const auto newest = [&client] { return client.exchange({}).samples(0).sample(); };
+  const v1::Sample first = newest();
+  std::vector<double> us;
+  const auto end = std::chrono::steady_clock::now() + kWindow;
+  while (std::chrono::steady_clock::now() < end) {
+    const std::int64_t begin = now_ns();
+    newest();
+    us.push_back(static_cast<double>(now_ns() - begin) * 1e-3);
+    std::this_thread::sleep_for(2ms);
+  }
+  const v1::Sample last = newest();
+  return {.p99_us = percentile(us, 0.99),
+          .ticks = static_cast<double>(last.tick() - first.tick()),
+          .late_ticks = static_cast<double>(last.late_ticks() - first.late_ticks())};
+}
+
+double late_per_10000(const std::vector<Window>& windows) {
+  double ticks = 0.0;
+  double late = 0.0;
+  for (const Window& each : windows) {
+    ticks += each.ticks;
+    late += each.late_ticks;
+  }
+  return 1e4 * late / ticks;
+}
+
+/// Clients that have said hello and then nothing.
+using Idlers = std::vector<std::unique_ptr<link::Link>>;
+
+Idlers idlers(const std::string& address, std::size_t count) {
+  Idlers all;
+  while (all.size() < count)
+    all.push_back(std::make_unique<link::Link>(address));
+  return all;
+}
+
+/// Clients that ask for every sample and read none.
+Idlers deaf(const std::string& address) {
+  Idlers all = idlers(address, kDeaf);
+  for (const auto& each : all)
+    each->subscribe(0, 1);
+  return all;
+}
+
+/// Windows without and with what `come` makes, in turn.
+template <class Come>
+std::array<std::vector<Window>, 2> in_turn(link::Link& client, Come come) {
+  std::array<std::vector<Window>, 2> windows;
+  for (int round = 0; round < kRounds; ++round) {
+    windows[0].push_back(watch(client));
+    const auto company = come();
+    windows[1].push_back(watch(client));
+  }
+  return windows;
+}
+
+void add_rows(std::vector<Row>& rows, const std::string& beside,
+              const std::array<std::vector<Window>, 2>& windows, double gone) {
+  rows.push_back({.name = "p99 of a healthy client beside " + beside,
+                  .unit = "us",
+                  .measured = median(windows[1], &Window::p99_us),
+                  .floor = median(windows[0], &Window::p99_us),
+                  .limit = Limit{Limit::Kind::kRatioAtMost, kMaxP99Ratio},
+                  .gone = gone,
+                  .note = "floor: alone, in windows in turn"});
+  rows.push_back({.name = "late ticks per 10,000 beside " + beside,
+                  .measured = late_per_10000(windows[1]),
+                  .floor = late_per_10000(windows[0]),
+                  .gone = gone,
+                  .note = "floor: alone, in windows in turn"});
+}
+
+/// Both ends of all connections are ours or our child's.
+void allow_descriptors(rlim_t count) {
+  rlimit limit{};
+  check(::getrlimit(RLIMIT_NOFILE, &limit) == 0, "getrlimit");
+  limit.rlim_cur = std::min(std::max(limit.rlim_cur, count), limit.rlim_max);
+  check(::setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
+}
+
+void expect_full(const std::string& address) {
+  try {
+    const link::Link one_more(address);
+  } catch (const link::Refused& refused) {
+    return;  // turned away with a reason
+  }
+  throw std::runtime_error("a session beyond max_sessions was taken");
+}
+
+/// How long it takes until the server has cut those off that do not read, and its memory meanwhile.
+struct Cut {
+  double elapsed_s = 0.0;
+  double growth_mib = 0.0;
+};
+
+Cut cut_deaf(link::Link& client, const std::string& address, pid_t server) {
+  const std::uint32_t before = client.status().sessions();
+  Cut cut;
+  const double baseline_mib = resident_mib(server);
+  const Idlers company = deaf(address);
+  const std::int64_t begin = now_ns();
+  while (client.status().sessions() > before && cut.elapsed_s < 30.0) {
+    cut.growth_mib = std::max(cut.growth_mib, resident_mib(server) - baseline_mib);
+    std::this_thread::sleep_for(20ms);
+    cut.elapsed_s = static_cast<double>(now_ns() - begin) * 1e-9;
+  }
+  return cut;
+}
+
+}  // namespace
+
+std::vector<Row> measure_crowd(const Plan&) {
+  allow_descriptors(4096);
+  const ScratchFolder folder;
+  BenchConfig config = bench_config("servo-realtime");
+  config.tcp.max_sessions = kIdle + kSubscribers + 1;
+  config.tcp.unix_path = folder / "bench.socket";
+  const std::filesystem::path bench = folder / "bench.toml";
+  if (!(std::ofstream(bench) << to_toml(config))) throw std::runtime_error("cannot write " + bench.string());
+
+  GapCanary canary;
+  const CpuPair cpu = cpu_pair();
+  canary.look(std::array{cpu.near, cpu.far});
+  Server server({bench.string()});
+  const pid_t pid = listener_of(config.tcp.unix_path);
+  auto client = std::make_unique<link::Link>(server.address());
+
+  struct Crowd {
+    Idlers idle;
+    std::unique_ptr<Viewers> subscribers;
+  };
+  const auto crowded = in_turn(*client, [&] {
+    Crowd crowd{.idle = idlers(server.address(), kIdle),
+                .subscribers = std::make_unique<Viewers>(server.address(), kSubscribers, kEighth)};
+    expect_full(server.address());
+    return crowd;
+  });
+  std::this_thread::sleep_for(500ms);  // until the server has seen them go
+  const auto unheard = in_turn(*client, [&] { return deaf(server.address()); });
+  std::this_thread::sleep_for(500ms);
+  const Cut cut = cut_deaf(*client, server.address(), pid);
+  client.reset();
+  server.stop();
+  canary.look(std::array{cpu.near, cpu.far});
+
+  std::vector<Row> rows;
+  add_rows(rows, "1,000 idle ones and 32 viewers at 1 kHz", crowded, canary.gone());
+  add_rows(rows, "50 that never read", unheard, canary.gone());
+  rows.push_back({.name = "until 50 that never read are cut off",
+                  .unit = "s",
+                  .measured = cut.elapsed_s,
+                  .limit = Limit{Limit::Kind::kAtMost, kMaxCut_s},
+                  .gone = canary.gone()});
+  rows.push_back({.name = "memory that they cost",
+                  .unit = "MiB",
+                  .measured = cut.growth_mib,
+                  .limit = Limit{Limit::Kind::kAtMost, kMaxGrowthMiB}});
+  return rows;
+}
+
+}  // namespace drivebench::speed
