@@ -233,23 +233,7 @@ void note_end(Audit& audit, const Engine& engine, const Verdict& verdict) {
   audit.note({.name = "stop", .details = {{"ticks", verdict.ticks}, {"late_ticks", verdict.late_ticks}}});
 }
 
-/// Serves clients until the run ends; false: by an exception. Without memory a client loses its session,
-/// which has said so in the log, or a handler its turn.
-bool serve_clients(asio::io_context& io) {
-  for (;;) {
-    try {
-      io.run();
-      return true;
-    } catch (const std::bad_alloc&) {
-      spdlog::error("no memory: something that was asked for is not done");
-    } catch (const std::exception& error) {
-      spdlog::critical("the run ends: {}", error.what());
-      return false;
-    }
-  }
-}
-
-int serve(const Options& o, std::optional<NoStartWithoutMemory>& starting) {
+int serve(const Options& o) {
   const BenchConfig config = configure(o);
   if (!o.print.empty()) {
     fmt::print("{}", interface_text(config, o.print, o.bus));
@@ -304,9 +288,14 @@ int serve(const Options& o, std::optional<NoStartWithoutMemory>& starting) {
   }
   std::optional<Supervisor> supervisor;
   supervisor.emplace(io, engine->watch(), config.mode == RunMode::kRealtime);
-  starting.reset();
-  const bool broken = !serve_clients(io);
-  starting.emplace(kFailed);
+  end_without_memory(kFailed);
+  bool broken = false;
+  try {
+    io.run();
+  } catch (const std::exception& error) {
+    spdlog::critical("the run ends: {}", error.what());
+    broken = true;
+  }
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   signals.clear();  // from here on a second signal ends the program at once
   notify_service_manager("STOPPING=1");
@@ -323,7 +312,7 @@ int serve(const Options& o, std::optional<NoStartWithoutMemory>& starting) {
   return too_late ? kTooLate : kOk;
 }
 
-int run(int argc, char** argv, std::optional<NoStartWithoutMemory>& starting) {
+int run(int argc, char** argv) {
   Options o;
   CLI::App app(
       "drivebench-server: emulates electric drives in deterministic real time and serves them to "
@@ -369,14 +358,14 @@ int run(int argc, char** argv, std::optional<NoStartWithoutMemory>& starting) {
     fmt::print(stderr, "a bench file is needed, for example configs/benches/servo.toml; see --help\n");
     return kUnusable;
   }
-  return o.replay.empty() ? serve(o, starting) : replay_command(o.replay, o.json);
+  return o.replay.empty() ? serve(o) : replay_command(o.replay, o.json);
 }
 
 }  // namespace
 }  // namespace drivebench
 
 int main(int argc, char** argv) {
-  std::optional<drivebench::NoStartWithoutMemory> starting(std::in_place, drivebench::kUnusable);
+  drivebench::end_without_memory(drivebench::kUnusable);
   drivebench::use_small_stacks();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("drivebench"));
   google::protobuf::SetLogHandler(nullptr);  // a peer could fill the log with text that is not UTF-8
@@ -384,7 +373,7 @@ int main(int argc, char** argv) {
     if (drivebench::force_arithmetic()) {
       spdlog::warn("a library has changed how this program rounds; set back");
     }
-    return drivebench::run(argc, argv, starting);
+    return drivebench::run(argc, argv);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());
     return drivebench::kUnusable;

@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cstddef>
 #include <new>
 #include <string_view>
@@ -12,23 +13,19 @@ namespace {
 
 constexpr std::size_t kStackBytes = std::size_t{1} << 20;
 
-int exit_code_without_memory = 0;
+std::atomic<int> exit_code_without_memory{0};
 
-[[noreturn]] void end_without_memory() noexcept {
+[[noreturn]] void say_and_end() noexcept {
   constexpr std::string_view kWhy = "drivebench-server: no memory\n";
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kWhy.data(), kWhy.size());
-  ::_exit(exit_code_without_memory);
+  ::_exit(exit_code_without_memory.load());
 }
 
 }  // namespace
 
-NoStartWithoutMemory::NoStartWithoutMemory(int exit_code) noexcept {
-  exit_code_without_memory = exit_code;
-  std::set_new_handler(end_without_memory);
-}
-
-NoStartWithoutMemory::~NoStartWithoutMemory() {
-  std::set_new_handler(nullptr);
+void end_without_memory(int exit_code) noexcept {
+  exit_code_without_memory.store(exit_code);
+  std::set_new_handler(say_and_end);
 }
 
 void use_small_stacks() noexcept {

@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cstdlib>
 #include <deque>
-#include <new>
 #include <span>
 #include <thread>
 #include <utility>
@@ -267,12 +266,7 @@ class ThreadedEngine final : public Engine {
           [[maybe_unused]] const ssize_t got = ::read(wake_.native_handle(), &count, sizeof(count));
           wake_pending_.exchange(
               false);  // not a plain store: it must see what was pushed before the flag was set
-          try {
-            drain_events();
-          } catch (const std::bad_alloc&) {
-            await_wake();  // what is left comes with the next tick
-            throw;
-          }
+          drain_events();
           await_wake();
         });
   }

@@ -17,7 +17,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from misfortune import Misfortune, signal_thread, thread_of
+from misfortune import Misfortune, Recording, signal_thread, thread_of
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, pb
 from wire_test import SERVO_TEXT, WireTest, until
 
@@ -64,6 +64,26 @@ class Memory(HostTest):
                 self.assertTrue(done.stderr.strip(), f"allocation {at}: says nothing")
                 failed += 1
         self.assertGreater(failed, 20)
+
+    def test_os_10_no_memory_in_a_run_is_said_and_the_recording_is_kept(self):
+        """A crash somewhere else, or a program that goes on with half a message."""
+        for at in (1, 2, 5, 20):
+            misfortune = Misfortune()
+            file = self.folder() / "run.mcap"
+            server = self.unlucky_server(misfortune, "--record", str(file))
+            client = self.client(server)
+            client.lease()
+            for tick in range(900):  # 100 ms are written
+                client.step(tick, 1.0)
+            misfortune.fail_in = at
+            try:
+                for _ in range(30):
+                    client.ask(read_parameters=pb.ReadParameters())
+            except (Closed, ConnectionError):
+                pass
+            self.assertEqual(server.process.wait(timeout=PATIENCE_S), 1, server.errors())
+            self.assertIn("no memory", server.errors())
+            self.assertGreaterEqual(Recording(file.read_bytes()).messages["/servo/sample"], 800)
 
 
 class Threads(HostTest):
