@@ -1,13 +1,18 @@
 // drivebench-simulator: the server against seeded adversity, in virtual time.
+#include <malloc.h>
+
 #include <google/protobuf/stubs/logging.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -91,7 +96,32 @@ void print_failure(const Outcome& outcome, const Options& o) {
       static_cast<unsigned long long>(outcome.seed), static_cast<long long>(o.duration / kSecond));
 }
 
+std::ptrdiff_t open_files() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
+                       std::filesystem::directory_iterator());
+}
+
+/// What a seed leaves behind in this process.
+class Leftovers {
+ public:
+  std::string problem() {
+    const std::size_t memory = ::mallinfo2().uordblks;
+    if (++seeds_ <= kWarmUp) most_memory_ = std::max(most_memory_, memory);
+    if (open_files() != files_) return "every descriptor is closed";
+    return memory > most_memory_ + kSlackBytes ? "memory stays flat from seed to seed" : "";
+  }
+
+ private:
+  static constexpr std::uint64_t kWarmUp = 10;  ///< tables are made on first use
+  static constexpr std::size_t kSlackBytes = std::size_t{4} << 20;
+
+  std::ptrdiff_t files_ = open_files();
+  std::uint64_t seeds_ = 0;
+  std::size_t most_memory_ = 0;
+};
+
 int run(const Options& o) {
+  Leftovers leftovers;
   std::uint64_t failed = 0;
   std::uint64_t ticks = 0;
   std::uint64_t events = 0;
@@ -107,6 +137,8 @@ int run(const Options& o) {
                   static_cast<unsigned long long>(outcome.events),
                   static_cast<unsigned long long>(outcome.hash));
     }
+    const std::string left = leftovers.problem();
+    if (outcome.failure.promise.empty()) outcome.failure.promise = left;
     ticks += outcome.ticks;
     events += outcome.events;
     if (!outcome.failure.promise.empty()) {
