@@ -156,7 +156,7 @@ std::vector<Row> measure_crowd(const Plan&) {
   const ScratchFolder folder;
   BenchConfig config = bench_config("servo-realtime");
   config.tcp.max_sessions = kIdle + kSubscribers + 1;
-  config.tcp.unix_path = folder / "bench.socket";
+  config.tcp.unix_path = (folder / "bench.socket").string();
   const std::filesystem::path bench = folder / "bench.toml";
   if (!(std::ofstream(bench) << to_toml(config))) throw std::runtime_error("cannot write " + bench.string());
 
@@ -167,6 +167,7 @@ std::vector<Row> measure_crowd(const Plan&) {
   const pid_t pid = listener_of(config.tcp.unix_path);
   auto client = std::make_unique<link::Link>(server.address());
 
+  const Cut cut = cut_deaf(*client, server.address(), pid);
   struct Crowd {
     Idlers idle;
     std::unique_ptr<Viewers> subscribers;
@@ -179,8 +180,6 @@ std::vector<Row> measure_crowd(const Plan&) {
   });
   std::this_thread::sleep_for(500ms);  // until the server has seen them go
   const auto unheard = in_turn(*client, [&] { return deaf(server.address()); });
-  std::this_thread::sleep_for(500ms);
-  const Cut cut = cut_deaf(*client, server.address(), pid);
   client.reset();
   server.stop();
   canary.look(std::array{cpu.near, cpu.far});

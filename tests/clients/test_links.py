@@ -150,7 +150,7 @@ class Links(unittest.TestCase):
         with Server(text=text) as server:
             self.control(link_of(server))
             link = "tcp:%s:%d" % server.address
-            tcp, can, modbus_ = json.loads(run("status", "--json", "--link", link).stdout)["transports"]
+            can, modbus_, tcp = json.loads(run("status", "--json", "--link", link).stdout)["transports"]
             self.assertEqual((tcp["name"], tcp["state"]), ("tcp", "up"))
             self.assertEqual((can["name"], can["state"]), ("can " + server.ready["can"][0], "up"))
             self.assertGreaterEqual(can["counts"]["commands"], 1024)
