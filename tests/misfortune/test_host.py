@@ -75,6 +75,7 @@ class Memory(HostTest):
             client.lease()
             for tick in range(900):  # 100 ms are written
                 client.step(tick, 1.0)
+            until(lambda: Recording(file.read_bytes()).messages.get("/servo/sample", 0) >= 800, "the recorder has written them")
             misfortune.fail_in = at
             try:
                 for _ in range(30):
