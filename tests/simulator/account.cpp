@@ -38,12 +38,17 @@ void AxisAccount::require(bool holds, const char* promise) {
   if (!holds) broken_("axis " + std::to_string(axis_) + ": " + promise);
 }
 
-void AxisAccount::see(const Sample& s, std::uint64_t late_ticks) {
+void AxisAccount::see(const Sample& s, std::uint64_t late_ticks, bool stalled) {
   // In lockstep they are counted before they are told.
   require(!lockstep_ || s.refused_commands >= refusals_told_, "every refused command is counted at once");
-  if (seen_) {
+  const bool whole = s.tick == before_.tick + 1;
+  if (seen_ && stalled && !whole) {
+    require(s.tick >= before_.tick, "samples come in order");
+    silent_ = 0;
+    skipped_ = true;
+  } else if (seen_) {
     late_now_ = late_ticks != late_before_;
-    require(s.tick == before_.tick + 1, "every tick has one sample");
+    require(whole, "every tick has one sample");
     require(s.late_ticks == late_ticks, "late ticks are counted, all of them and no others");
     check_numbers(s);
     check_counters(s);
@@ -104,7 +109,7 @@ void AxisAccount::check_state(const Sample& s) {
   require((!is(s, ControlState::kRun) && !hold) || s.owner != 0, "a driven axis has an owner");
   require(!hold || (silent_ < setup_.watchdog_ticks), "the watchdog comes in time");
   const bool timed_out = (latched & ~latched_before & kCommandTimeout) != 0;
-  require(!timed_out || silent_ >= setup_.watchdog_ticks, "the watchdog does not come too early");
+  require(!timed_out || skipped_ || silent_ >= setup_.watchdog_ticks, "the watchdog does not come too early");
   const auto lease = leases_.find(s.owner);  // given back and taken again within a tick it begins anew
   const bool stays = same_owner && (lease == leases_.end() || !lease->second.gave_back);
   require(!is(s, ControlState::kIdle) || !stays || cleared || is(before_, ControlState::kIdle) ||
@@ -166,7 +171,7 @@ void AxisAccount::clear_done(Owner owner, Tick tick) {
 void AxisAccount::see_end(const Sample& s) {
   require(s.owner == 0, "when all are gone nobody owns an axis");
   require(lockstep_ || s.refused_commands >= refusals_told_, "every refused command is counted");
-  require(clearings_.size() <= clears_unknown_, "only the owner clears what is latched");
+  require(skipped_ || clearings_.size() <= clears_unknown_, "only the owner clears what is latched");
 }
 
 }  // namespace drivebench::simulator

@@ -20,8 +20,9 @@ class AxisAccount {
   AxisAccount(const BenchSetup& setup, std::size_t axis, bool lockstep, Report broken)
       : setup_(setup), axis_(axis), lockstep_(lockstep), broken_(std::move(broken)) {}
 
-  /// After each tick. `late_ticks`: so many started late until now.
-  void see(const Sample& s, std::uint64_t late_ticks);
+  /// After each tick. `late_ticks`: so many started late until now; `stalled`: the I/O stood still, which may
+  /// cost it samples when the ring is full.
+  void see(const Sample& s, std::uint64_t late_ticks, bool stalled = false);
   /// After the I/O had its turn, with the owner that it knows.
   void io_done(Owner owner);
   /// When everything has settled and nobody is connected any more.
@@ -68,6 +69,7 @@ class AxisAccount {
   Sample before_{};
   std::uint64_t late_before_ = 0;
   bool late_now_ = false;
+  bool skipped_ = false;     ///< some samples were never seen
   std::int64_t silent_ = 0;  ///< ticks in a row without a command
   std::map<Owner, Lease> leases_;
   struct Leaving {
