@@ -229,13 +229,14 @@ void RecordingWriter::fail(Step step, int error) noexcept {
   // What was written whole before stays readable if a write failed; if a sync did, nobody knows.
   const bool is_unsure = step == Step::kSync || step == Step::kClose;
   const std::uint64_t lost = unwritten_ + (is_unsure ? unsynced_ : 0);
-  lost_ += std::max<std::uint64_t>(lost, is_ending_ ? 1 : 0);  // without its end it does not replay
+  is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
+             (number_ > 1 && !was_synced_);
+  // A file without its end, or its beginning, does not replay even if no entry is missing.
+  lost_ += std::max<std::uint64_t>(lost, is_ending_ || !is_over_ ? 1 : 0);
   if (step == Step::kWrite)
     file_->truncate(whole_bytes_);  // or the torn chunk stays: readers find its end missing
   unwritten_ = unsynced_ = 0;
   is_ending_ = false;
-  is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
-             (number_ > 1 && !was_synced_);
   try {
     spdlog::error("recording {}: {}: {}; {}", segment_path(first_, number_),
                   kStepNames[static_cast<std::size_t>(step)], std::strerror(error),

@@ -402,6 +402,8 @@ class Process(RecordingTest):
         self.assertNotRegex(segments, r"GNU_STACK.*E")
         self.assertRegex(dynamic, r"BIND_NOW|Flags:.*NOW")
         self.assertIn("__stack_chk_fail", readelf("--dyn-syms"))
+        self.assertRegex(readelf("--dyn-syms"), r"__\w+_chk@")  # fortified
+        self.assertGreater(pathlib.Path(SERVER).read_bytes().count(b"\xf3\x0f\x1e\xfa"), 1000, "endbr64, where calls may land")
 
 
 if __name__ == "__main__":
