@@ -151,7 +151,7 @@ class Links(unittest.TestCase):
             self.control(link_of(server))
             link = "tcp:%s:%d" % server.address
             can, modbus_, tcp = json.loads(run("status", "--json", "--link", link).stdout)["transports"]
-            self.assertEqual((tcp["name"], tcp["state"]), ("tcp", "up"))
+            self.assertEqual((tcp["name"], tcp["state"]), ("tcp %s:%d" % server.address, "up"))
             self.assertEqual((can["name"], can["state"]), ("can " + server.ready["can"][0], "up"))
             self.assertGreaterEqual(can["counts"]["commands"], 1024)
             self.assertEqual((modbus_["name"], modbus_["state"]), ("modbus " + server.ready["modbus"], "up"))
