@@ -88,6 +88,14 @@ struct ExperimentsConfig {
   std::uint32_t kept = 50;  ///< ended ones; the oldest goes first
 };
 
+/// Section [tls]: clients on TCP speak TLS.
+struct TlsConfig {
+  std::filesystem::path certificate;  ///< chain in PEM; empty: they speak plainly
+  std::filesystem::path key;          ///< that nobody but its owner may read
+  std::filesystem::path client_ca;    ///< who signs the certificates of clients; empty: they need none
+  std::filesystem::path client_crl;   ///< those of them that hold no more; empty: none
+};
+
 /// What happens when the audit log cannot be written.
 enum class AuditFailure {
   kContinue,  ///< the run goes on, what is missing is counted
@@ -128,6 +136,7 @@ struct BenchConfig {
   std::vector<CanConfig> can;
   ModbusConfig modbus;
   ExperimentsConfig experiments;
+  TlsConfig tls;
   AuditConfig audit;
   LogLevel log_level = LogLevel::kInfo;
 };

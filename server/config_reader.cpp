@@ -185,6 +185,7 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
     const bool timing_valid = bench.exists() && read_bench(bench, config);
     read_realtime(root.table("realtime"), config.realtime);
     read_tcp(root.table("tcp"), folder, config.tcp);
+    read_tls(root.table("tls"), folder, config.tls);
     const std::vector<AxisReading> axes = read_axes(root, folder, problems, config);
     if (!bench.has("substeps")) config.setup.substeps = automatic_substeps(axes, config.setup.period_ns);
     for (const AxisReading& axis : axes) {

@@ -1,5 +1,7 @@
 #include "server/config_service.hpp"
 
+#include <system_error>
+
 #include "server/config_words.hpp"
 
 namespace drivebench {
@@ -46,6 +48,31 @@ void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig&
   tcp.grants = read_grants(table, folder);
   tcp.max_sessions =
       static_cast<std::uint32_t>(table.integer("max_sessions", 1, 10'000).value_or(tcp.max_sessions));
+  table.finish();
+}
+
+void read_tls(StrictTable table, const std::filesystem::path& folder, TlsConfig& tls) {
+  if (table.exists()) {
+    table.require("certificate");
+    table.require("key");
+  }
+  tls.certificate = read_path(table, "certificate", folder);
+  tls.key = read_path(table, "key", folder);
+  tls.client_ca = read_path(table, "client_ca", folder);
+  tls.client_crl = read_path(table, "client_crl", folder);
+  if (!tls.key.empty()) {
+    std::error_code error;
+    const auto permissions = std::filesystem::status(tls.key, error).permissions();
+    constexpr auto kOthers = std::filesystem::perms::group_all | std::filesystem::perms::others_all;
+    if (error) {
+      table.report("key", "names " + tls.key.string() + ", which cannot be used: " + error.message());
+    } else if ((permissions & kOthers) != std::filesystem::perms::none) {
+      table.report("key", "names " + tls.key.string() + ", which others may read: chmod 600 it");
+    }
+  }
+  if (!tls.client_crl.empty() && tls.client_ca.empty()) {
+    table.report("client_crl", "cannot stand without client_ca");
+  }
   table.finish();
 }
 

@@ -264,7 +264,7 @@ int serve(const Options& o) {
   check_bus_loads(o, config);
   if (o.require_realtime) require_realtime(config);
   // First: a port in use must not leave a recording behind.
-  StreamServer server(io, config.tcp);
+  StreamServer server(io, config.tcp, config.tls);
   Transports transports(io, config);
   std::unique_ptr<Audit> audit;
   if (!config.audit.file.empty()) audit = std::make_unique<Audit>(config.audit);

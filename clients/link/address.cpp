@@ -8,10 +8,12 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <memory>
 #include <system_error>
+#include <utility>
 
 namespace drivebench::link {
 namespace {
@@ -24,6 +26,30 @@ bool is_port(std::string_view text) {
   unsigned value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc{} && end == text.data() + text.size() && value >= 1 && value <= 65535;
+}
+
+/// What stands behind the question mark of a tls: address.
+TlsFiles files_in(std::string_view text, std::string_view query) {
+  TlsFiles files;
+  while (!query.empty()) {
+    const std::size_t end = std::min(query.find('&'), query.size());
+    const std::string_view part = query.substr(0, end);
+    const std::size_t equals = std::min(part.find('='), part.size());
+    const std::string_view name = part.substr(0, equals);
+    std::string* const file = name == "ca"            ? &files.ca
+                              : name == "certificate" ? &files.certificate
+                              : name == "key"         ? &files.key
+                                                      : nullptr;
+    if (file == nullptr || equals + 1 >= part.size()) {
+      bad_address(text, "behind the ? stand ca=FILE, certificate=FILE and key=FILE, with & between them");
+    }
+    *file = part.substr(equals + 1);
+    query = query.substr(std::min(end + 1, query.size()));
+  }
+  if (files.certificate.empty() != files.key.empty()) {
+    bad_address(text, "certificate and key are given together or not at all");
+  }
+  return files;
 }
 
 std::string reason(int error) {
@@ -96,7 +122,13 @@ Address parse_address(std::string_view text) {
     }
     return {.host = {}, .port = {}, .path = std::string(path)};
   }
-  const std::string_view place = text.starts_with(kTcp) ? text.substr(kTcp.size()) : text;
+  constexpr std::string_view kTls = "tls:";
+  Address address{.host = {}, .port = {}, .path = {}, .tls = text.starts_with(kTls), .files = {}};
+  std::string_view place = text.starts_with(kTcp) || address.tls ? text.substr(kTcp.size()) : text;
+  if (const std::size_t mark = place.find('?'); address.tls && mark != std::string_view::npos) {
+    address.files = files_in(text, place.substr(mark + 1));
+    place = place.substr(0, mark);
+  }
   std::string_view host = place;
   std::string_view port = "7300";
   const std::size_t colon = place.rfind(':');
@@ -109,18 +141,25 @@ Address parse_address(std::string_view text) {
   if (host.find('/') != std::string_view::npos) {
     bad_address(text, "a host has no '/'; a unix socket is written unix:PATH");
   }
+  if (place.find('?') != std::string_view::npos) bad_address(text, "files behind a ? are for tls: addresses");
   if (!is_port(port)) bad_address(text, "the port must be a number from 1 to 65535");
-  return {.host = std::string(host), .port = std::string(port), .path = {}};
+  address.host = host;
+  address.port = port;
+  return address;
 }
 
 std::string to_string(const Address& address) {
   if (!address.path.empty()) return "unix:" + address.path;
   const bool is_ipv6 = address.host.find(':') != std::string::npos;
-  return "tcp:" + (is_ipv6 ? "[" + address.host + "]" : address.host) + ":" + address.port;
+  return (address.tls ? "tls:" : "tcp:") + (is_ipv6 ? "[" + address.host + "]" : address.host) + ":" +
+         address.port;
 }
 
 FileDescriptor connect_to(const Address& address, std::chrono::milliseconds deadline) {
-  return address.path.empty() ? connect_tcp(address, deadline) : connect_unix(address, deadline);
+  if (!address.path.empty()) return connect_unix(address, deadline);
+  FileDescriptor socket = connect_tcp(address, deadline);
+  if (!address.tls) return socket;
+  return tunnel_through_tls(std::move(socket), address.host, address.files, deadline);
 }
 
 }  // namespace drivebench::link

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "clients/link/file_descriptor.hpp"
+#include "clients/link/tls_tunnel.hpp"
 
 namespace drivebench::link {
 
@@ -29,21 +30,24 @@ class AddressError : public std::invalid_argument {
 
 inline constexpr std::string_view kDefaultAddress = "tcp:127.0.0.1:7300";
 
-/// Where a bench listens: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300) or
-/// `unix:PATH`.
+/// Where a bench listens: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300),
+/// `tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE` (each file may be left out) or `unix:PATH`.
 struct Address {
   std::string host;
   std::string port;
   std::string path;  ///< of a unix socket; then host and port are empty
+  bool tls = false;
+  TlsFiles files{};
 };
 
 /// Throws AddressError.
 Address parse_address(std::string_view text);
 
-/// `tcp:HOST:PORT` or `unix:PATH`.
+/// `tcp:HOST:PORT`, `tls:HOST:PORT` without the files, or `unix:PATH`.
 std::string to_string(const Address& address);
 
-/// A connected, blocking stream socket, without Nagle's delay. Throws ConnectError.
+/// A connected, blocking stream socket, without Nagle's delay; of a tls: address, one that leads through a
+/// tunnel. Throws ConnectError.
 FileDescriptor connect_to(const Address& address, std::chrono::milliseconds deadline);
 
 }  // namespace drivebench::link

@@ -61,7 +61,7 @@ bool Session::is_admitted(const v1::Hello& hello) {
       hello.token(), address_of(client_), ServerClock::now(), std::chrono::system_clock::now());
   if (decision.admitted) {
     grant_ = decision.grant;
-    client_.subject = grant_.name;
+    if (!grant_.name.empty()) client_.subject = grant_.name;  // else what his certificate says
     return true;
   }
   ++context_.counts.wrong_tokens;

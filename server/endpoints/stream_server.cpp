@@ -77,8 +77,9 @@ void make_way(asio::io_context& io, const std::string& path) {
 
 }  // namespace
 
-StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config)
+StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config, const TlsConfig& tls)
     : io_(io), config_(config), tcp_(io), unix_(io) {
+  if (!tls.certificate.empty()) door_.emplace(io, tls);
   try {
     const tcp::endpoint endpoint = endpoint_of(config);
     tcp_.open(endpoint.protocol());
@@ -161,12 +162,25 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
         continue;
       }
       tune(socket);
-      Client who = peer_of(socket);
-      start(Socket(std::move(socket)), std::move(who));
+      receive(std::move(socket));
     } catch (const std::exception& problem) {
       spdlog::error("a client could not be taken: {}", problem.what());
     }
   }
+}
+
+void StreamServer::receive(tcp::socket socket) {
+  Client who = peer_of(socket);
+  if (!door_) return start(Socket(std::move(socket)), std::move(who));
+  const std::string peer = who.peer;
+  door_->receive(std::move(socket), peer, [this, who](Socket plain, const std::string& subject) {
+    start(std::move(plain), {.transport = who.transport, .peer = who.peer, .subject = subject});
+  });
+}
+
+void StreamServer::receive(UnixProtocol::socket socket) {
+  Client who = peer_of(socket);
+  start(Socket(std::move(socket)), std::move(who));
 }
 
 TransportReport StreamServer::report() const {

@@ -8,14 +8,16 @@
 
 #include "server/asio.hpp"
 #include "server/endpoints/session.hpp"
+#include "server/endpoints/tls_door.hpp"
 
 namespace drivebench {
 
-/// Accepts clients on TCP and on a unix socket, and tells them about every tick.
+/// Accepts clients on TCP, with TLS if it is configured, and on a unix socket, and tells them about every
+/// tick.
 class StreamServer {
  public:
   /// Listens at once; throws std::runtime_error that names the address if that fails.
-  StreamServer(asio::io_context& io, const TcpConfig& config);
+  StreamServer(asio::io_context& io, const TcpConfig& config, const TlsConfig& tls = {});
   ~StreamServer();
 
   /// Address and port that the system gave, "127.0.0.1:7300".
@@ -40,6 +42,8 @@ class StreamServer {
 
   template <class Acceptor>
   asio::awaitable<void> accept_from(Acceptor& acceptor);
+  void receive(asio::ip::tcp::socket socket);
+  void receive(asio::local::stream_protocol::socket socket);
   void start(Socket socket, Client who);
   TransportReport report() const;
   asio::awaitable<void> run(std::shared_ptr<Session> session);
@@ -49,6 +53,7 @@ class StreamServer {
   std::optional<SessionContext> context_;
   asio::ip::tcp::acceptor tcp_;
   asio::local::stream_protocol::acceptor unix_;
+  std::optional<TlsDoor> door_;
   std::vector<std::shared_ptr<Session>> sessions_;
 };
 

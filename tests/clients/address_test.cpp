@@ -25,12 +25,20 @@ TEST(Address, ReadsEveryForm) {
   EXPECT_EQ(round_trip("[::1]:81"), "tcp:[::1]:81");
   EXPECT_EQ(round_trip("tcp:[::1]"), "tcp:[::1]:7300");
   EXPECT_EQ(round_trip("unix:/run/a:b"), "unix:/run/a:b");
+  EXPECT_EQ(round_trip("tls:bench"), "tls:bench:7300");
+  const Address secure = parse_address("tls:[::1]:81?ca=/a b/ca.pem&certificate=c.pem&key=k.pem");
+  EXPECT_EQ(to_string(secure), "tls:[::1]:81");
+  EXPECT_EQ(secure.files.ca, "/a b/ca.pem");
+  EXPECT_EQ(secure.files.certificate, "c.pem");
+  EXPECT_EQ(secure.files.key, "k.pem");
+  EXPECT_FALSE(parse_address("tcp:bench").tls);
 }
 
 // Catches an address that would connect somewhere else than written, or a path that is cut off.
 TEST(Address, RefusesWhatIsNone) {
   for (const std::string text : {"", "tcp:", ":7300", "host:", "host:0", "host:65536", "host:12x",
-                                 "unix:", "/run/bench.sock", "http://host:80"}) {
+                                 "unix:", "/run/bench.sock", "http://host:80", "tls:", "tls:a?ca=",
+                                 "tls:a?b=c", "tls:a?key=k", "tls:a?certificate=c&ca=d", "tcp:a?ca=b"}) {
     EXPECT_THROW(parse_address(text), AddressError) << text;
   }
   EXPECT_THROW(parse_address("unix:/" + std::string(107, 'a')), AddressError);

@@ -228,6 +228,30 @@ def make_messages():
     put("frame_reader", "empty-frame", bytes([255, 2, 9, 2]) + stream + bytes(4))
 
 
+def make_experiments():
+    shape, channel = pb.Shape, pb.CHANNEL_A
+    shapes = {
+        "constant": shape(channel=channel, constant=shape.Constant(value=3.0)),
+        "ramp": shape(channel=channel, start_s=0.001, end_s=0.01, ramp=getattr(shape, "Ramp")(**{"from": -1.0, "to": 4.0})),
+        "sine": shape(channel=channel, sine=shape.Sine(amplitude=5.0, frequency_hz=60.0, phase_rad=0.3, offset=1.0)),
+        "three-phase": shape(three_phase=shape.ThreePhase(amplitude=80.0, frequency_hz=60.0, rise_s=0.01)),
+        "chirp": shape(channel=channel, end_s=0.04, chirp=shape.Chirp(amplitude=2.0, from_hz=1.0, to_hz=500.0)),
+        "prbs": shape(channel=channel, prbs=shape.Prbs(amplitude=2.0, order=7, bit_ticks=3, seed=9)),
+        "multisine": shape(channel=channel, multisine=shape.Multisine(amplitude=0.5, base_hz=10.0, harmonics=[1, 2, 3, 7])),
+        "table": shape(channel=channel, table=shape.Table(id=1, interpolate=True)),
+    }
+    for name, each in shapes.items():
+        put("experiment", name, pb.RunExperiment(
+            owner="somebody's secret", user="fuzz", label=name, mode=pb.MODE_FREE, ticks=400, decimation=2,
+            signals=["i_a_a", "speed_rad_s"], settings=[pb.NamedValue(name="machine.rotor_resistance_ohm", value=5.0)],
+            initial=pb.InitialState(speed_rad_s=10.0), stop=pb.StopLimits(current_a=20.0),
+            input=pb.ExperimentInput(kind=pb.INPUT_KIND_PHASE_VOLTAGES, shapes=[each])).SerializeToString())
+    put("experiment", "dq", pb.RunExperiment(
+        owner="somebody's secret", mode=pb.MODE_REALTIME, duration_s=0.05, signals=["i_a_a"],
+        input=pb.ExperimentInput(kind=pb.INPUT_KIND_DQ_VOLTAGES, angle=pb.ANGLE_SOURCE_MEASURED, back_emf_vs=0.1, shapes=[
+            shape(channel=pb.CHANNEL_Q, constant=shape.Constant(value=3.0))])).SerializeToString())
+
+
 def make_configs():
     inline = (BENCHES / "servo-realtime.toml").read_text(encoding="utf-8")
     motor = (BENCHES.parent / "motors/servo-im.toml").read_text(encoding="utf-8")
@@ -355,6 +379,7 @@ if __name__ == "__main__":
         record_a_run(run)
         make_recordings(run.read_bytes())
     make_messages()
+    make_experiments()
     make_configs()
     make_curves()
     make_modbus_streams()

@@ -153,6 +153,20 @@ TEST(Modbus, MB_09_LIMIT_06_AFloodIsRefusedAndThenCut) {
   EXPECT_EQ(bench.newest().tick, 500u);
 }
 
+// Catches: a time-out that is not the configured one.
+TEST(Modbus, LIMIT_06_AFrameInTwoPiecesIsAnsweredWithinItsTime) {
+  BenchConfig config = modbus_bench_config();
+  config.modbus.frame_timeout_ms = 5000;
+  ModbusBench bench(config);
+  Client slow(bench.port());
+  const Bytes adu = adu_of(3, 1, pdu_of(3, {0, 1}));
+  slow.send(Bytes(adu.begin(), adu.begin() + 5));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  slow.send(Bytes(adu.begin() + 5, adu.end()));
+  EXPECT_FALSE(slow.receive_adu().empty());
+  EXPECT_EQ(bench.count("cut"), 0u);
+}
+
 // Catches: a time-out that every byte starts anew, one that meets another connection, or none.
 TEST(Modbus, MB_10_LIMIT_06_AFrameThatDripsIsCutOff) {
   BenchConfig config = modbus_bench_config();

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "server/asio.hpp"
@@ -142,6 +144,33 @@ TEST(ThreadedEngine, DET_01_AFreeRunIsTheDirectRunBitForBit) {
     EXPECT_EQ(verdict.state_hash, direct.bench.state_hash());
     EXPECT_TRUE(verdict.exact());
   }
+}
+
+// Catches: a result that depends on when threads run. Four others take the CPUs meanwhile.
+TEST(ThreadedEngine, DET_01_AHundredRunsBesideOtherWorkAreOneRun) {
+  constexpr Tick kTicks = 500;
+  const BenchConfig config = free_bench();
+  const std::uint64_t expected = DirectRun(config, kTicks).bench.state_hash();
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> busy;
+  for (int i = 0; i < 4; ++i) {
+    busy.emplace_back([&stop] {
+      while (!stop.load()) {
+      }
+    });
+  }
+  std::size_t different = 0;
+  for (int run = 0; run < 100; ++run) {
+    asio::io_context io(1);
+    const auto engine = make_threaded_engine(config, nullptr, io, kTicks);
+    engine->on_end = [&] { io.stop(); };
+    io.run();
+    if (engine->stop().state_hash != expected) ++different;
+  }
+  stop.store(true);
+  for (std::thread& each : busy)
+    each.join();
+  EXPECT_EQ(different, 0u);
 }
 
 // Catches: answers that are lost, doubled, out of order, or come before the sample of their tick.

@@ -4,6 +4,7 @@ import os
 import socket
 import struct
 import sys
+import time
 import unittest
 
 try:
@@ -150,7 +151,11 @@ class Hello(WireTest):
     def test_limit_05_silent_connection_is_closed(self):
         """Connections that never say hello and stay for ever."""
         client = self.client(self.shared, hello=False)
+        patient = self.client(self.shared, hello=False)
+        time.sleep(1.0)  # half of what is allowed
+        self.assertEqual(patient.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="slow")).WhichOneof("kind"), "welcome")
         self.assertTrue(client.is_closed())
+        self.assertEqual(patient.newest().tick, self.client(self.shared).newest().tick)
 
     def test_long_client_name_is_refused(self):
         """A log that a client fills."""

@@ -110,6 +110,19 @@ class Subscriptions(WireTest):
         for client in stopped:
             self.assertTrue(client.is_closed())
 
+    def test_limit_04_a_reader_that_rests_for_a_second_stays(self):
+        """A viewer that is cut off because it drew a picture."""
+        server = self.server()
+        owner, viewer = self.client(server), self.client(server, receive_buffer=4096)
+        owner.lease()
+        viewer.ask(subscribe=pb.Subscribe(decimation=1))
+        for tick in range(3000):
+            owner.step(tick, 1.0)
+        time.sleep(1.0)  # of 2 s without progress
+        self.assertEqual(viewer.newest().tick, 3000)
+        self.assertGreater(sum(message.dropped for message in viewer.samples), 0, "more than the queues hold was sent")
+        self.assertEqual(owner.status().sessions, 2)
+
     def test_limit_03_a_reader_that_never_reads_its_answers_is_cut(self):
         """Answers queued without bound for a client that only asks."""
         server = self.server()

@@ -1,0 +1,251 @@
+#!/usr/bin/python3
+"""TLS on the TCP port: who gets in, who does not, and what a stream behind it is like. Each test names the mistake that it
+would catch. Certificates are made here by openssl."""
+import json
+import pathlib
+import shutil
+import ssl
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import warnings
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+from command_test import DRIVEBENCH
+from wire_client import PATIENCE_S, Client, Closed, pb
+from wire_test import SERVO_TEXT, WireTest, until
+
+AUTHORITY = """
+[ca]
+default_ca = here
+[here]
+database = index.txt
+crlnumber = crlnumber
+default_md = sha256
+default_crl_days = 3650
+certificate = ca.pem
+private_key = ca.key
+"""
+
+
+class Certificates:
+    """A folder with an authority, a server, and clients of all sorts."""
+
+    def __init__(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-tls-"))
+        for authority in ("ca", "stranger"):
+            self.openssl("req", "-x509", *self.key(f"{authority}.key"), "-subj", f"/CN={authority}", "-days", "3650",
+                         "-out", f"{authority}.pem")
+        self.issue("server", extensions="subjectAltName=IP:127.0.0.1\nextendedKeyUsage=serverAuth")
+        self.issue("anna")
+        self.issue("foreign", authority="stranger")
+        self.issue("old", at="2020-01-01")
+        self.issue("early", at="2035-01-01")
+        self.issue("machine", extensions="extendedKeyUsage=serverAuth")
+        self.issue("gone")
+        (self.folder / "index.txt").touch()
+        (self.folder / "crlnumber").write_text("01\n", encoding="utf-8")
+        (self.folder / "ca.cnf").write_text(AUTHORITY, encoding="utf-8")
+        self.openssl("ca", "-config", "ca.cnf", "-revoke", "gone.pem")
+        self.openssl("ca", "-config", "ca.cnf", "-gencrl", "-out", "crl.pem")
+
+    @staticmethod
+    def key(name):
+        return "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", name
+
+    def openssl(self, *arguments, at=None):
+        pretend = ["faketime", at] if at else []
+        subprocess.run([*pretend, "openssl", *arguments], cwd=self.folder, check=True, capture_output=True)
+
+    def issue(self, name, authority="ca", extensions="extendedKeyUsage=clientAuth", at=None):
+        (self.folder / "extensions").write_text(extensions, encoding="utf-8")
+        self.openssl("req", *self.key(f"{name}.key"), "-subj", f"/CN={name}", "-out", "request")
+        self.openssl("x509", "-req", "-in", "request", "-CA", f"{authority}.pem", "-CAkey", f"{authority}.key", "-CAcreateserial",
+                     "-days", "3000" if at is None else "30", "-extfile", "extensions", "-out", f"{name}.pem", at=at)
+        (self.folder / f"{name}.key").chmod(0o600)
+
+
+class TlsTest(WireTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.made = Certificates()
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.made.folder, ignore_errors=True)
+
+    def tls_server(self, more="", *options):
+        folder = self.made.folder
+        section = f'\n[tls]\ncertificate = "{folder}/server.pem"\nkey = "{folder}/server.key"\n{more}'
+        return self.server(*options, text=SERVO_TEXT + section)
+
+    def mutual_server(self):
+        folder = self.made.folder
+        return self.tls_server(f'client_ca = "{folder}/ca.pem"\nclient_crl = "{folder}/crl.pem"\n')
+
+    def context(self, name=None, authority="ca"):
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        context.load_verify_locations(self.made.folder / f"{authority}.pem")
+        if name:
+            context.load_cert_chain(self.made.folder / f"{name}.pem", self.made.folder / f"{name}.key")
+        return context
+
+    def tls_client(self, server, context, **options):
+        wrapped = context.wrap_socket(server.raw(**options), server_hostname="127.0.0.1")
+        client = Client(wrapped)
+        self.addCleanup(client.close)
+        return client
+
+    def assertTurnedAway(self, server, context, why=None):
+        # With TLS 1.3 a client learns what the server thinks of its certificate when it reads.
+        with self.assertRaises((ssl.SSLError, ConnectionError, Closed)):
+            self.tls_client(server, context)
+        if why:
+            until(lambda: why in server.errors(), why)
+
+
+class Plain(TlsTest):
+    def test_sec_03_a_run_behind_tls_is_the_same_run(self):
+        """Bytes that are lost, doubled or overtake each other behind the door; an old protocol."""
+        plain, door = self.server(), self.tls_server()
+        expected, client = self.client(plain), self.tls_client(door, self.context())
+        self.assertEqual(client.socket.version(), "TLSv1.3")
+        for each in (expected, client):
+            self.assertDone(each.lease())
+            self.assertDone(each.ask(subscribe=pb.Subscribe(decimation=1)))
+            for tick in range(500):
+                each.step(tick, 5.0, -3.0)
+        self.assertEqual(client.status().state_hash, expected.status().state_hash)
+        seen = [s.tick for message in client.samples for s in message.samples]
+        self.assertEqual(len(seen) + sum(message.dropped for message in client.samples), 500)
+        client.close()
+        until(lambda: self.tls_client(door, self.context()).lease().WhichOneof("kind") == "done", "the lease ends with the connection")
+        self.assertEqual(door.stop(), 0)
+
+    def test_sec_03_older_protocols_are_refused(self):
+        """A door that opens for what was broken long ago."""
+        server = self.tls_server()
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for version in (ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_1):
+            context = self.context()
+            context.minimum_version = ssl.TLSVersion.TLSv1
+            context.maximum_version = version
+            context.set_ciphers("ALL:@SECLEVEL=0")
+            self.assertTurnedAway(server, context)
+        self.tls_client(server, self.context())
+
+    def test_tcp_04_strangers_at_the_door_are_closed(self):
+        """Plain text, other protocols or an SSLv2 hello that get through, or a line in the log for each."""
+        server = self.tls_server()
+        hello = pb.Envelope(id=1, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()
+        for said in (len(hello).to_bytes(4, "big") + hello, b"GET / HTTP/1.1\r\n\r\n", b"\x80\x2e\x01\x00\x02" + bytes(41), b"SSH-2.0-x\r\n"):
+            with server.raw() as stranger:
+                stranger.sendall(said)
+                try:
+                    while stranger.recv(4096):  # at most an alert
+                        pass
+                except ConnectionResetError:
+                    pass
+        self.assertLessEqual(server.errors().count("no TLS"), 1)
+        self.tls_client(server, self.context())
+
+    def test_sec_05_limit_05_silent_handshakes_are_few_and_short(self):
+        """Peers that begin to shake hands and take the places of all others for ever."""
+        server = self.tls_server()
+        silent = [server.raw() for _ in range(40)]
+        for each in silent:
+            self.addCleanup(each.close)
+        end = time.monotonic() + PATIENCE_S
+        while True:  # the first 32 have 2 s
+            try:
+                self.tls_client(server, self.context())
+                break
+            except (ssl.SSLError, ConnectionError, OSError):
+                self.assertLess(time.monotonic(), end, "nobody gets in any more")
+                time.sleep(0.1)
+        for each in silent:
+            self.assertEqual(each.recv(1), b"")
+
+    def test_tcp_10_a_reader_that_stops_is_cut_behind_tls_too(self):
+        """A stream behind the door that is fed for ever."""
+        server = self.tls_server()
+        owner, deaf = self.tls_client(server, self.context()), self.tls_client(server, self.context(), receive_buffer=4096)
+        owner.lease()
+        deaf.ask(subscribe=pb.Subscribe(decimation=1))
+        tick, end = 0, time.monotonic() + PATIENCE_S
+        while owner.status().sessions > 1:
+            self.assertLess(time.monotonic(), end, "nobody was cut")
+            for _ in range(200):
+                owner.step(tick, 1.0)
+                tick += 1
+
+    def test_cfg_07_files_that_cannot_be_used_are_refused(self):
+        """A server that starts without the encryption that was asked for, or with a key that everybody knows."""
+        folder = self.made.folder
+        shutil.copy(folder / "server.key", folder / "open.key")
+        (folder / "open.key").chmod(0o644)
+        for more, said in ((f'certificate = "{folder}/server.pem"\nkey = "{folder}/open.key"', "others may read"),
+                           (f'certificate = "{folder}/none.pem"\nkey = "{folder}/server.key"', "none.pem"),
+                           (f'certificate = "{folder}/server.pem"\nkey = "{folder}/anna.key"', "anna.key"),
+                           (f'certificate = "{folder}/server.pem"', "key"),
+                           (f'certificate = "{folder}/server.pem"\nkey = "{folder}/server.key"\nclient_crl = "{folder}/crl.pem"', "client_ca")):
+            with self.assertRaises(RuntimeError) as raised:
+                self.server(text=SERVO_TEXT + "\n[tls]\n" + more + "\n")
+            self.assertIn(said, str(raised.exception))
+
+
+class Mutual(TlsTest):
+    def test_sec_03_only_certificates_that_hold_get_in(self):
+        """A client without a certificate, or with one that is foreign, too old, too new, not for clients, or revoked."""
+        server = self.mutual_server()
+        self.tls_client(server, self.context("anna"))
+        for name in (None, "foreign", "old", "early", "machine", "gone"):
+            with self.subTest(certificate=name):
+                self.assertTurnedAway(server, self.context(name))
+        self.assertIn("no TLS", server.errors())
+        self.assertDone(self.tls_client(server, self.context("anna")).lease())
+
+    def test_sec_03_who_is_turned_away_stands_in_the_log(self):
+        """A log that does not say whose certificate it was, and what is wrong with it."""
+        for name, why in (("gone", "certificate revoked"), ("old", "certificate has expired")):
+            server = self.mutual_server()
+            self.assertTurnedAway(server, self.context(name), why)
+            self.assertIn(f"certificate of {name}", server.errors())
+
+    def test_the_command_speaks_tls(self):
+        """A client of ours that needs a tunnel of somebody else's, or that talks to any server, or goes without a certificate."""
+        folder, server = self.made.folder, self.mutual_server()
+        place = "tls:127.0.0.1:%d" % server.address[1]
+        ours = f"{place}?ca={folder}/ca.pem&certificate={folder}/anna.pem&key={folder}/anna.key"
+
+        def drivebench(*arguments):
+            return subprocess.run([DRIVEBENCH, *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        moved = drivebench("control", "--json", "--link", ours)
+        self.assertEqual(moved.returncode, 0, moved.stderr)
+        self.assertLess(json.loads(moved.stdout)["peak_error_counts"], 2.0)
+        for link, code in ((f"{place}?ca={folder}/stranger.pem", 3), (place, 3), (f"{place}?ca={folder}/none.pem", 3),
+                           (f"{place}?ca={folder}/ca.pem", 1)):  # where only the answer to hello fails to come
+            refused = drivebench("status", "--link", link)
+            self.assertEqual(refused.returncode, code, link)
+            self.assertTrue(refused.stderr, link)
+
+    def test_a_server_that_is_not_ours_is_noticed(self):
+        """A client that talks to anybody."""
+        server = self.tls_server()
+        with self.assertRaises(ssl.SSLCertVerificationError):
+            self.tls_client(server, self.context(authority="stranger"))
+
+
+if __name__ == "__main__":
+    for program in ("openssl", "faketime"):
+        if shutil.which(program) is None:
+            print(f"SKIPPED: {program} is not installed")
+            sys.exit(77)
+    unittest.main(verbosity=2)
