@@ -20,7 +20,7 @@ namespace {
 using Stream = asio::ssl::stream<asio::ip::tcp::socket>;
 
 constexpr std::size_t kBlock = 16 * 1024;
-constexpr int kSendBufferBytes = 64 * 1024;
+constexpr int kPairBufferBytes = 64 * 1024;
 constexpr auto kFarewellLimit = std::chrono::milliseconds(500);
 
 /// What went wrong with a file, as OpenSSL or the system says it.
@@ -60,7 +60,7 @@ std::array<asio::local::stream_protocol::socket, 2> socket_pair(asio::io_context
                                                            asio::local::stream_protocol::socket(io)};
   asio::local::connect_pair(pair[0], pair[1]);
   for (auto& each : pair)
-    each.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes));
+    each.set_option(asio::socket_base::send_buffer_size(kPairBufferBytes));
   return pair;
 }
 
