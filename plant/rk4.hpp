@@ -64,10 +64,14 @@ constexpr State advanced(const State& x, double factor, const State& slope) noex
 /// Where in a step a stage of Runge-Kutta stands, for inputs that change within it.
 enum class StepPoint { kStart, kMiddle, kEnd };
 
+template <class F, class State>
+concept TimedDerivative = std::is_invocable_v<const F&, const State&, StepPoint>;
+template <class F, class State>
+concept SteadyDerivative = std::is_invocable_v<const F&, const State&>;
+
 /// One classical fourth-order Runge-Kutta step of x' = derivative(x, point) over step_s. A state is a plain
 /// struct of doubles or of such structs.
-template <class State, class Derivative>
-  requires std::is_invocable_v<const Derivative&, const State&, StepPoint>
+template <class State, TimedDerivative<State> Derivative>
 constexpr State rk4_step(const State& x, double step_s, const Derivative& derivative) noexcept {
   const State k1 = derivative(x, StepPoint::kStart);
   const State k2 = derivative(advanced(x, 0.5 * step_s, k1), StepPoint::kMiddle);
@@ -79,8 +83,7 @@ constexpr State rk4_step(const State& x, double step_s, const Derivative& deriva
 }
 
 /// The same for x' = derivative(x).
-template <class State, class Derivative>
-  requires std::is_invocable_v<const Derivative&, const State&>
+template <class State, SteadyDerivative<State> Derivative>
 constexpr State rk4_step(const State& x, double step_s, const Derivative& derivative) noexcept {
   return rk4_step(x, step_s,
                   [&derivative](const State& s, StepPoint) noexcept -> State { return derivative(s); });

@@ -49,16 +49,18 @@ inline constexpr std::size_t kFooterSize = 8 + 8 + 4;
 // Unrolled at compile time, so that compilers merge the bytes into one move: this runs six times per message.
 template <std::unsigned_integral T>
 void store(std::byte* at, T value) noexcept {
-  [&]<std::size_t... kByte>(std::index_sequence<kByte...>) {
+  const auto store_all = [&]<std::size_t... kByte>(std::index_sequence<kByte...>) {
     ((at[kByte] = static_cast<std::byte>(value >> (8 * kByte))), ...);
-  }(std::make_index_sequence<sizeof(T)>{});
+  };
+  store_all(std::make_index_sequence<sizeof(T)>{});
 }
 
 template <std::unsigned_integral T>
 T load(const std::byte* at) noexcept {
-  return [&]<std::size_t... kByte>(std::index_sequence<kByte...>) {
+  const auto load_all = [&]<std::size_t... kByte>(std::index_sequence<kByte...>) {
     return static_cast<T>(((std::to_integer<std::uint64_t>(at[kByte]) << (8 * kByte)) | ...));
-  }(std::make_index_sequence<sizeof(T)>{});
+  };
+  return load_all(std::make_index_sequence<sizeof(T)>{});
 }
 
 /// CRC32 (the one of zlib and Ethernet) of what `crc` covers followed by `bytes`; 0 is the CRC of nothing.

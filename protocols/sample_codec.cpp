@@ -32,9 +32,10 @@ std::byte* put_signal(std::byte* out, std::uint64_t word) noexcept {
 /// All signals, or those of the mask.
 template <bool kAll>
 std::byte* put_signals(std::byte* out, const SampleWords& words, SignalMask mask) noexcept {
-  [&]<std::size_t... Row>(std::index_sequence<Row...>) {
+  const auto put_all = [&]<std::size_t... Row>(std::index_sequence<Row...>) {
     ((out = kAll || (mask >> Row & 1) != 0 ? put_signal<Row>(out, words[Row]) : out), ...);
-  }(std::make_index_sequence<kSignals.size()>{});
+  };
+  put_all(std::make_index_sequence<kSignals.size()>{});
   return out;
 }
 

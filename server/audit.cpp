@@ -63,8 +63,7 @@ class Description {
 };
 
 bool is_driven(std::uint64_t state) noexcept {
-  return state == static_cast<std::uint64_t>(ControlState::kRun) ||
-         state == static_cast<std::uint64_t>(ControlState::kHold);
+  return drivebench::is_driven(static_cast<ControlState>(state));
 }
 
 }  // namespace

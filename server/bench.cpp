@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -25,17 +24,12 @@ AxisTiming timing_of(const BenchSetup& setup) {
   return {.period_s = static_cast<double>(setup.period_ns) * 1e-9, .substeps = setup.substeps};
 }
 
-double step_of(const CommandRules& rules, std::int64_t period_ns) noexcept {
-  return rules.slew_per_s > 0.0 ? rules.slew_per_s * static_cast<double>(period_ns) * 1e-9
-                                : std::numeric_limits<double>::infinity();
-}
-
 double largest_phase_current_a(const Sample& s) noexcept {
   return std::max({std::abs(s.true_i_a_a), std::abs(s.true_i_b_a), std::abs(s.true_i_c_a)});
 }
 
 constexpr bool expects_commands(ControlState state) noexcept {
-  return state == ControlState::kReady || state == ControlState::kRun || state == ControlState::kHold;
+  return state == ControlState::kReady || is_driven(state);
 }
 
 bool concerns_all_axes(const Input& input) noexcept {
@@ -53,7 +47,7 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
                      .on_link_loss = axis.on_link_loss,
                      .quick_stop_ticks = axis.quick_stop_ticks,
                      .rules = axis.rules,
-                     .command_step = step_of(axis.rules, setup.period_ns),
+                     .command_step = axis.rules.slew_per_s * timing_of(setup).period_s,
                      .shaft = axis.shares_shaft_with.value_or(i)});
     if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
     axis_parameters(axis.parameters);  // their table is made on first use, which must not be a tick
@@ -229,13 +223,13 @@ Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& comman
   if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
   const Refused values = check_values(command.phases, a.rules, a.axis.parameters().drive);
   if (values != Refused::kNot) return values;
-  if (a.rules.on_excess == OnExcess::kRefuse) {
-    const Tick ticks = c.in_force.answers < 0 ? 1 : tick_ - c.in_force.answers;
-    if (is_steeper(c.last.command, command.phases, static_cast<double>(ticks) * a.command_step)) {
+  if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
+  if (a.rules.on_excess == OnExcess::kRefuse && a.command_step > 0.0) {
+    const Tick ticks = c.newest.answers < 0 ? 1 : command.answers - c.newest.answers;
+    if (is_steeper(c.newest.phases, command.phases, static_cast<double>(ticks) * a.command_step)) {
       return Refused::kBeyondDrive;
     }
   }
-  if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
   return is_latched(axis) && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
 }
 
@@ -273,8 +267,7 @@ Refused Bench::change_lease(std::size_t axis, LeaseAction action, Owner owner) n
 void Bench::lose_controller(std::size_t axis, std::uint64_t fault) noexcept {
   AxisRuntime& a = axes_[axis];
   forget_scheduled(axis, a.control.owner);
-  const bool was_active = a.control.state == ControlState::kRun || a.control.state == ControlState::kHold;
-  if (was_active) a.axis.latch(fault);
+  if (is_driven(a.control.state)) a.axis.latch(fault);
   a.control = {.last = a.control.last, .missed = a.control.missed, .refused = a.control.refused};
 }
 
@@ -304,7 +297,8 @@ PhaseCommand Bench::safe_command(AxisRuntime& a) noexcept {
 
 PhaseCommand Bench::drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept {
   Control& c = a.control;
-  const bool steep = is_steeper(c.last.command, command, a.command_step);
+  const bool slows = a.command_step > 0.0 && a.rules.on_excess == OnExcess::kSaturate;
+  const bool steep = slows && is_steeper(c.last.command, command, a.command_step);
   const PhaseCommand limited = steep ? slewed(c.last.command, command, a.command_step) : command;
   if (steep) c.flags = kCommandSlewLimited;
   follow(c.last, limited, a.axis.connection(), a.on_link_loss == SafeAction::kQuickStop);
@@ -313,11 +307,8 @@ PhaseCommand Bench::drive_with(AxisRuntime& a, const PhaseCommand& command) noex
 
 void Bench::take_command(Control& c) noexcept {
   c.silent_ticks = 0;
-  if (c.state == ControlState::kIdle || c.state == ControlState::kReady) {
-    c.state = ++c.good_commands < setup_.arming_commands ? ControlState::kReady : ControlState::kRun;
-  } else {
-    c.state = ControlState::kRun;
-  }
+  const bool arming = c.state == ControlState::kIdle || c.state == ControlState::kReady;
+  c.state = arming && ++c.good_commands < setup_.arming_commands ? ControlState::kReady : ControlState::kRun;
   if (setup_.command_delay_ticks == 0 && c.state == ControlState::kRun) c.in_force = c.newest;
 }
 
@@ -356,8 +347,7 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
     return safe_command(a);
   }
   // With a delay the first command is accepted a tick before it is in force.
-  const bool driven = c.state == ControlState::kRun || c.state == ControlState::kHold;
-  return driven && c.in_force.answers >= 0 ? drive_with(a, c.in_force.phases) : safe_command(a);
+  return is_driven(c.state) && c.in_force.answers >= 0 ? drive_with(a, c.in_force.phases) : safe_command(a);
 }
 
 void Bench::step() noexcept {

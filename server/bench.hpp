@@ -29,6 +29,11 @@ enum class ControlState : std::uint64_t {
   kFault = 4,    ///< latched: trip, overrun or divergence; safe action
 };
 
+/// Whether commands drive the axis: the last one, if one is missing.
+constexpr bool is_driven(ControlState state) noexcept {
+  return state == ControlState::kRun || state == ControlState::kHold;
+}
+
 /// What the bench needs to know of one axis.
 struct AxisSetup {
   AxisParameters parameters;
@@ -55,6 +60,14 @@ struct BenchSetup {
 };
 
 inline constexpr Tick kMaxQuickStop = 1'000'000;  ///< [ticks], so that the angle of the ramp has a cosine
+
+/// A sample on its way through a ring.
+struct TickedSample {
+  TickedSample() noexcept : axis(0), sample() {}
+  TickedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
+  std::uint32_t axis;
+  Sample sample;
+};
 
 /// Sees everything that happens, in order, inside the tick: must neither wait, allocate, lock nor throw.
 class BenchObserver {
@@ -133,7 +146,7 @@ class Bench {
     SafeAction on_link_loss;
     Tick quick_stop_ticks;
     CommandRules rules;
-    double command_step;          ///< largest change of a set-point in a tick [V or A]; infinity: any
+    double command_step;          ///< largest change of a set-point in a tick [V or A]; 0: any
     std::size_t shaft;            ///< the axis whose shaft this one turns: itself, or its partner before it
     std::size_t shares_with = 0;  ///< the other axis on this shaft; 0: none
     Control control{};
@@ -147,7 +160,7 @@ class Bench {
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
   Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
   /// A command of the owner was turned away.
-  void count_bad_command(Control& c, bool bad_values) noexcept;
+  static void count_bad_command(Control& c, bool bad_values) noexcept;
   Refused clear_faults(AxisRuntime& a, Owner owner) noexcept;
   Refused write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept;
   /// Sets a parameter unless that would break a rule between values.

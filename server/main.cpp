@@ -19,6 +19,7 @@
 #include "server/engine.hpp"
 #include "server/interface_text.hpp"
 #include "server/memory.hpp"
+#include "server/print_line.hpp"
 #include "server/replay_command.hpp"
 #include "server/service_notification.hpp"
 #include "server/supervisor.hpp"
@@ -49,11 +50,6 @@ struct Options {
   std::string print;  ///< a description of an interface, instead of a run
   std::size_t bus = 1;
 };
-
-void print_line(const std::string& line) {
-  fmt::print("{}\n", line);
-  std::fflush(stdout);
-}
 
 /// The configuration of the file with what the command line changes.
 BenchConfig configure(const Options& o) {

@@ -40,11 +40,11 @@ Recorder::~Recorder() {
 }
 
 void Recorder::on_input(Tick now, const Input& input) noexcept {
-  count_gap(!ring_.emplace(std::in_place_type<RecordedInput>, now, input));
+  count_gap(!ring_.emplace(std::in_place_type<ReceivedInput>, now, input));
 }
 
 void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
-  count_gap(!ring_.emplace(std::in_place_type<RecordedSample>, axis, sample));
+  count_gap(!ring_.emplace(std::in_place_type<TickedSample>, axis, sample));
 }
 
 void Recorder::count_gap(bool lost) noexcept {

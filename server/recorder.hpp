@@ -20,18 +20,13 @@ namespace drivebench {
 
 class RecordingWriter;
 
-struct RecordedSample {
-  RecordedSample() noexcept : axis(0), sample() {}
-  RecordedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
-  std::uint32_t axis;
-  Sample sample;
-};
-struct RecordedInput {
-  RecordedInput(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
+/// An input on its way through the ring.
+struct ReceivedInput {
+  ReceivedInput(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
   Tick received;
   Input input;
 };
-using RecordedEntry = std::variant<RecordedSample, RecordedInput>;
+using RecordedEntry = std::variant<TickedSample, ReceivedInput>;
 
 /// One file, and the end of the recording when its disk refuses something, unless more is asked for.
 struct RecordingOptions {

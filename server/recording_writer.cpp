@@ -117,7 +117,7 @@ void RecordingWriter::begin_next() {
 }
 
 void RecordingWriter::write(const RecordedEntry& entry) noexcept {
-  const auto* const sample = std::get_if<RecordedSample>(&entry);
+  const auto* const sample = std::get_if<TickedSample>(&entry);
   if (!is_over_ && sample != nullptr && sample->axis == 0 && sample->sample.tick % flush_ticks_ == 0) {
     attempt([this] { mcap_->flush(); });
   }
@@ -133,7 +133,7 @@ void RecordingWriter::write(const RecordedEntry& entry) noexcept {
   });
 }
 
-void RecordingWriter::put(const RecordedSample& entry) {
+void RecordingWriter::put(const TickedSample& entry) {
   ++unwritten_;
   const auto room = mcap_->begin_message(
       header(samples_[entry.axis], sequences_[entry.axis]++, entry.sample.tick), kMaxSampleBytes);
@@ -141,7 +141,7 @@ void RecordingWriter::put(const RecordedSample& entry) {
   if (entry.axis == 0) ++segment_samples_;
 }
 
-void RecordingWriter::put(const RecordedInput& entry) {
+void RecordingWriter::put(const ReceivedInput& entry) {
   ++unwritten_;
   encode_input(entry.received, entry.input, tables_, input_);
   add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
@@ -170,7 +170,7 @@ McapMessageHeader RecordingWriter::header(std::uint16_t channel, std::uint32_t s
 
 /// A file ends behind the last sample of a tick, so that each holds whole ticks.
 bool RecordingWriter::is_full(const RecordedEntry& last) const {
-  const auto* const sample = std::get_if<RecordedSample>(&last);
+  const auto* const sample = std::get_if<TickedSample>(&last);
   if (sample == nullptr || sample->axis + 1 < samples_.size()) return false;
   if (options_.file_ticks > 0 && segment_samples_ >= options_.file_ticks) return true;
   return options_.file_bytes > 0 && mcap_->bytes_written() >= options_.file_bytes;

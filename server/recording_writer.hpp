@@ -59,8 +59,8 @@ class RecordingWriter {
   struct DiskError;
 
   void begin(std::unique_ptr<RecordingFile> file);
-  void put(const RecordedSample& entry);
-  void put(const RecordedInput& entry);
+  void put(const TickedSample& entry);
+  void put(const ReceivedInput& entry);
   void put(const Verdict& verdict);
   void add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick,
            const google::protobuf::Message& message);

@@ -3,19 +3,14 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "protocols/mcap_series.hpp"
+#include "server/print_line.hpp"
 #include "server/replay.hpp"
 
 namespace drivebench {
 namespace {
-
-void print_line(const std::string& line) {
-  fmt::print("{}\n", line);
-  std::fflush(stdout);
-}
 
 nlohmann::json as_json(const ReplayReport& report) {
   using Result = ReplayReport::Result;

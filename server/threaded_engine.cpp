@@ -24,13 +24,7 @@ namespace {
 
 constexpr std::size_t kRequestCapacity = 256;
 
-/// From the tick thread to the I/O thread.
-struct TickedSample {
-  TickedSample() noexcept : axis(0), sample() {}
-  TickedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
-  std::uint32_t axis;
-  Sample sample;
-};
+// From the tick thread to the I/O thread, with TickedSample.
 struct Outcome {
   Refused refused;
   Tick tick;

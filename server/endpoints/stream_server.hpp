@@ -23,10 +23,8 @@ class StreamServer {
   /// Address and port that the system gave, "127.0.0.1:7300".
   std::string tcp_address() const;
 
-  /// Starts accepting clients of this run and telling them about its ticks.
-  /// `transports` tells of the other ways in.
-  /// `experiments` may be null.
-  /// `audit` may be null too.
+  /// Starts accepting clients of this run and telling them about its ticks. `transports` tells of the other
+  /// ways in; `experiments` and `audit` may be null.
   void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
              Experiments* experiments, Audit* audit = nullptr);
 

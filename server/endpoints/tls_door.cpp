@@ -171,10 +171,9 @@ void TlsDoor::receive(asio::ip::tcp::socket socket, const std::string& peer, Let
   if (handshakes_ >= kMaxHandshakes) {
     return turn_away(peer, std::to_string(kMaxHandshakes) + " others are shaking hands");
   }
+  auto passage = std::make_shared<Passage>(std::move(socket), *context_);
   ++handshakes_;
-  asio::co_spawn(
-      io_, shake_hands(std::make_shared<Passage>(std::move(socket), *context_), peer, std::move(let_in)),
-      asio::detached);
+  asio::co_spawn(io_, shake_hands(std::move(passage), peer, std::move(let_in)), asio::detached);
 }
 
 asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std::string peer, LetIn let_in) {

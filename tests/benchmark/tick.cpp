@@ -30,10 +30,10 @@ constexpr Owner kController = 1;
 class RingTap final : public BenchObserver {
  public:
   void on_input(Tick now, const Input& input) noexcept override {
-    ring_.emplace(std::in_place_type<Received>, now, input);
+    ring_.emplace(std::in_place_type<ReceivedInput>, now, input);
   }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
-    ring_.emplace(std::in_place_type<Taken>, axis, sample);
+    ring_.emplace(std::in_place_type<TickedSample>, axis, sample);
   }
 
   void empty() noexcept {
@@ -42,18 +42,7 @@ class RingTap final : public BenchObserver {
   }
 
  private:
-  struct Taken {
-    Taken() noexcept : axis(0), sample() {}
-    Taken(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
-    std::uint32_t axis;
-    Sample sample;
-  };
-  struct Received {
-    Received(Tick at, const Input& taken) noexcept : now(at), input(taken) {}
-    Tick now;
-    Input input;
-  };
-  SpscRing<std::variant<Taken, Received>> ring_{17'024};
+  SpscRing<RecordedEntry> ring_{17'024};
 };
 
 /// The bench under command, and the bare motor at the same voltages.

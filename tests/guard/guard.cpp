@@ -9,15 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#define EXPORT extern "C" __attribute__((visibility("default")))
-
-extern "C" {
-void* __libc_malloc(std::size_t) noexcept;
-void* __libc_calloc(std::size_t, std::size_t) noexcept;
-void* __libc_realloc(void*, std::size_t) noexcept;
-void* __libc_memalign(std::size_t, std::size_t) noexcept;
-void __libc_free(void*) noexcept;
-}
+#include "tests/guard/system_allocators.hpp"
 
 namespace {
 

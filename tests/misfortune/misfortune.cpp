@@ -20,14 +20,7 @@
 
 #include <dlfcn.h>
 
-#define EXPORT extern "C" __attribute__((visibility("default")))
-
-extern "C" {
-void* __libc_malloc(std::size_t) noexcept;
-void* __libc_calloc(std::size_t, std::size_t) noexcept;
-void* __libc_realloc(void*, std::size_t) noexcept;
-void* __libc_memalign(std::size_t, std::size_t) noexcept;
-}
+#include "tests/guard/system_allocators.hpp"
 
 namespace {
 

@@ -71,6 +71,19 @@ TEST(CommandRules, CMD_13_AStepBeyondTheSlewRateIsSlowedOrRefusedAsConfigured) {
   step(refusing, 3);  // the command of the first of them holds in the other two
   EXPECT_EQ(submit_volts(refusing, kOwner, 4.5), Refused::kBeyondDrive);
   EXPECT_EQ(submit_volts(refusing, kOwner, 3.8), Refused::kNot) << "three ticks, 3 V";
+  refusing.step();
+  EXPECT_EQ(refusing.sample(0).u_a_v, 3.8) << "what is taken is not slowed as well";
+  EXPECT_EQ(refusing.sample(0).faults, 0u);
+
+  BenchSetup arming = limited_setup(OnExcess::kRefuse, 8000.0);
+  arming.arming_commands = 5;
+  Bench ramped = owned_bench(arming, kOwner);
+  for (int i = 1; i <= 10; ++i) {
+    EXPECT_EQ(submit_volts(ramped, kOwner, i), Refused::kNot)
+        << "a ramp that begins before the axis is armed";
+    ramped.step();
+  }
+  EXPECT_EQ(ramped.sample(0).u_a_v, 10.0);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ using Clock = RecordingWriter::Clock;
 constexpr std::uint64_t kTicksOf100Ms = 800;  // at 8 kHz
 
 RecordedEntry sample_at(std::uint64_t tick) {
-  return RecordedSample(0, {.tick = tick, .i_a_a = 1.0 / static_cast<double>(tick + 1)});
+  return TickedSample(0, {.tick = tick, .i_a_a = 1.0 / static_cast<double>(tick + 1)});
 }
 
 /// The ticks whose samples can be read, and whether the file is whole.
