@@ -173,14 +173,19 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
       if (manners_.controls) control_later();
       return;
     case v1::Envelope::kStatus:
-      scene_.require(answer_.id() != last_look_ || answer_.status().sessions() == scene_.connected(),
-                     "the server keeps the sessions that there are, and no others");
+      if (answer_.id() == last_look_) on_last_look(answer_.status().sessions());
       for (const v1::AxisSample& each : answer_.status().axes())
         see(each.axis(), each.sample());
       return;
     default:
       return;
   }
+}
+
+/// Nobody comes any more; who was sent away between the question and now may have been counted or not.
+void StreamClient::on_last_look(std::uint64_t sessions) {
+  scene_.require(sessions <= sessions_when_asked_ && sessions >= scene_.connected(),
+                 "the server keeps the sessions that there are, and no others");
 }
 
 void StreamClient::on_done(const Asked& asked, const v1::Done& done) {
@@ -260,7 +265,9 @@ void StreamClient::finish() {
   scene_.schedule.after(kSettled, [this] {
     v1::Envelope request;
     request.mutable_status_request();
-    if (wire_->is_open() && greeted_ && !raw_) last_look_ = ask(request);
+    if (!wire_->is_open() || !greeted_ || raw_) return;
+    sessions_when_asked_ = scene_.connected();
+    last_look_ = ask(request);
   });
 }
 

@@ -71,6 +71,7 @@ class StreamClient final : public Player {
   void forget();
   void read();
   void on_frame(std::span<const std::byte> frame);
+  void on_last_look(std::uint64_t sessions);
   void on_done(const Asked& asked, const v1::Done& done);
   void on_refusal(const Asked& asked, const v1::Refusal& refusal);
   void on_samples(const v1::Samples& samples);
@@ -111,6 +112,7 @@ class StreamClient final : public Player {
   std::map<std::uint64_t, Asked> asked_;
   std::uint64_t last_id_ = 0;
   std::uint64_t last_look_ = 0;  ///< the status asked for at the end
+  std::size_t sessions_when_asked_ = 0;
   v1::Envelope answer_;
 };
 

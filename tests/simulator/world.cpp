@@ -21,6 +21,9 @@ constexpr auto kEpoch = std::chrono::hours(1);
 /// Long enough for everything that is under way, and for a stall that has just begun.
 constexpr Time kTimeToSettle = 600 * kMillisecond;
 
+/// The server's clock goes on in such steps.
+constexpr Time kClockStep = 5 * kMillisecond;
+
 void set_clock(Time now) {
   ServerClock::simulate(ServerClock::time_point(kEpoch + std::chrono::nanoseconds(now)));
 }
@@ -161,8 +164,7 @@ void World::disturb() {
 /// The server's clock goes on, in steps. Asio asks the kernel when its timers are due, which knows nothing of
 /// virtual time: a timer that has been due for ever makes it look, as soon as the kernel has told it.
 void World::turn_clock() {
-  constexpr Time kStep = 5 * kMillisecond;
-  clock_next_ = scene_.schedule.now() / kStep * kStep + kStep;
+  clock_next_ = scene_.schedule.now() / kClockStep * kClockStep + kClockStep;
   set_clock(scene_.schedule.now());
   bool woken = false;
   waker_->expires_at(ServerClock::time_point::min());
@@ -183,7 +185,13 @@ void World::poll() {
     scene_.axes[axis].io_done(engine_->owner(axis));
 }
 
+/// The I/O gets its turns also when nobody outside does anything, and a last one at the end of a stretch.
+void World::pulse() {
+  scene_.schedule.after(kClockStep, [this] { pulse(); });
+}
+
 void World::play_until(Time end) {
+  scene_.schedule.at(end, [] {});
   while (scene_.failure.promise.empty() && scene_.schedule.next() <= end) {
     scene_.schedule.run_next();
     poll();
@@ -192,6 +200,7 @@ void World::play_until(Time end) {
 
 Outcome World::run(Time duration) {
   if (tick_) scene_.schedule.at(due_, [this] { tick(); });
+  pulse();
   disturb();
   for (const auto& player : players_) {
     scene_.schedule.after(scene_.random.between(0, 200) * kMillisecond, [&player] { player->start(); });

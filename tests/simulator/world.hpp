@@ -54,6 +54,7 @@ class World {
   void disturb();
   void turn_clock();
   void poll();
+  void pulse();
   void play_until(Time end);
   void finish();
 
