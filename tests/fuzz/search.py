@@ -11,6 +11,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import time
 
 CORPUS = pathlib.Path(__file__).resolve().parent / "corpus"
 HANGS_AFTER_S = 10  # a second without a sanitizer on an idle machine
@@ -29,22 +30,42 @@ class Search:
         self.findings, self.code, self.stats = [], None, {}
 
     def run(self):
+        """Goes on after a halt of the machine, which libFuzzer's clock takes for a hang."""
+        (self.folder / "findings").mkdir(parents=True, exist_ok=True)
+        (self.folder / "found").mkdir(exist_ok=True)
+        end = time.monotonic() + self.seconds
+        while True:
+            found = self.run_once(max(1.0, end - time.monotonic()))
+            waited = {finding for finding in found if finding.name.startswith("timeout-") and not self.hangs(finding)}
+            for finding in waited:
+                finding.unlink()
+            self.findings = sorted(found - waited)
+            if not waited or self.findings:
+                return self
+            self.code = 0
+            if time.monotonic() >= end:
+                return self
+
+    def run_once(self, seconds):
         findings, found = self.folder / "findings", self.folder / "found"
-        findings.mkdir(parents=True, exist_ok=True)
-        found.mkdir(exist_ok=True)
         before = set(findings.iterdir())
         with open(self.folder / "log", "w+", encoding="utf-8", errors="replace") as log:
             self.code = subprocess.run(
-                [self.program, found, CORPUS / self.target, f"-max_total_time={self.seconds:.0f}", "-print_final_stats=1",
+                [self.program, found, CORPUS / self.target, f"-max_total_time={seconds:.0f}", "-print_final_stats=1",
                  f"-timeout={HANGS_AFTER_S}", f"-rss_limit_mb={MEMORY_MIB}", "-max_len=65536",
                  f"-artifact_prefix={findings}/"],
                 stdout=log, stderr=subprocess.STDOUT, env={**os.environ, **OPTIONS}, check=False).returncode
             log.seek(0)
             text = log.read()
-        self.findings = sorted(set(findings.iterdir()) - before)
-        self.stats = {name: int(value) for name, value in re.findall(r"stat::(\w+):\s+(\d+)", text)}
+        for name, value in re.findall(r"stat::(\w+):\s+(\d+)", text):
+            self.stats[name] = self.stats.get(name, 0) + int(value)
         self.stats["coverage"] = int((re.findall(r" cov: (\d+)", text) or ["0"])[-1])
-        return self
+        return set(findings.iterdir()) - before
+
+    def hangs(self, finding):
+        """Whether these bytes alone take that much time of a CPU."""
+        return subprocess.run(["prlimit", f"--cpu={HANGS_AFTER_S}", self.program, finding], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL, check=False).returncode != 0
 
     def failed(self):
         return bool(self.findings) or self.code != 0

@@ -16,6 +16,17 @@ BROKEN = """#!/bin/sh
 for word; do case $word in -artifact_prefix=*) echo bytes > "${word#-artifact_prefix=}crash-1";; esac; done
 exit 77
 """
+# The first search ends with a timeout; these bytes alone then need no time (HALTED) or too much of it (HANGING).
+HALTED = """#!/bin/sh
+if test -f "$1"; then exit 0; fi
+for word; do case $word in -artifact_prefix=*) prefix=${word#-artifact_prefix=};; esac; done
+echo "stat::number_of_executed_units: 600"
+if test -f "$prefix../halted"; then exit 0; fi
+echo bytes > "$prefix../halted"
+echo bytes > "${prefix}timeout-1"
+exit 70
+"""
+HANGING = HALTED.replace('exit 0', 'kill -XCPU $$', 1)
 NO_START = "#!/bin/sh\nexit 3\n"
 
 
@@ -46,6 +57,15 @@ class Search(unittest.TestCase):
         self.assertEqual(code, 1)
         self.assertRegex(said, r"again: build/release/bin/fuzz_curve .*/fuzz/curve/findings/crash-1")
         self.assertIn("1 finding; 1 of 2 targets without one", said)
+
+    def test_a_halt_of_the_machine_is_no_finding(self):
+        """A busy machine that looks like a hang, or a search that ends there with time left; a hang that passes for a halt."""
+        code, said = self.search({"curve": HALTED})
+        self.assertEqual(code, 0, said)
+        self.assertRegex(said, r"curve +1,200 runs .* nothing found")
+        code, said = self.search({"curve": HANGING})
+        self.assertEqual(code, 1, said)
+        self.assertRegex(said, r"again: .*/fuzz/curve/findings/timeout-1")
 
     def test_a_program_that_does_not_start_is_1(self):
         """A search that never ran and found nothing."""
