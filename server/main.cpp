@@ -272,7 +272,7 @@ int serve(const Options& o) {
   server.serve(
       *engine, [&transports] { return transports.reports(); }, experiments.get(), audit.get());
   asio::co_spawn(io, reload_on_hangup(o, server, audit.get()), asio::detached);
-  transports.serve(*engine);
+  transports.serve(*engine, audit.get());
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
     spdlog::warn("{}", note);

@@ -8,10 +8,10 @@ Transports::Transports(asio::io_context& io, const BenchConfig& config) {
   if (config.modbus.enabled) modbus_ = std::make_unique<ModbusServer>(io, config.modbus);
 }
 
-void Transports::serve(Engine& engine) {
+void Transports::serve(Engine& engine, Audit* audit) {
   for (const auto& bus : can_)
-    bus->serve(engine);
-  if (modbus_) modbus_->serve(engine);
+    bus->serve(engine, audit);
+  if (modbus_) modbus_->serve(engine, audit);
 }
 
 std::vector<TransportReport> Transports::reports() const {

@@ -16,7 +16,8 @@ class Transports {
   /// Opens them; throws std::runtime_error that names what cannot be had.
   Transports(asio::io_context& io, const BenchConfig& config);
 
-  void serve(Engine& engine);
+  /// `audit` may be null.
+  void serve(Engine& engine, Audit* audit = nullptr);
   std::vector<TransportReport> reports() const;
   void close();
 

@@ -2,11 +2,17 @@
 #include "server/endpoints/can/endpoint.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "tests/server/can_endpoint_test.hpp"
 
@@ -130,6 +136,36 @@ TEST(CanEndpoint, OWN_01_OneControllerAtATimeHoldsAnAxis) {
   ASSERT_EQ(elsewhere, Refused::kNot);
   EXPECT_EQ(bench.acquire(3), 0);
   EXPECT_EQ(bench.result(), static_cast<double>(Result::kOwned));
+}
+
+// Catches: a controller that is turned away, or one that asks without a lease, of which only a counter knows.
+TEST(CanEndpoint, SEC_07_WhoIsTurnedAwayStandsInTheAuditLog) {
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("drivebench-can-audit-" + std::to_string(::getpid()));
+  std::filesystem::remove(file);
+  {
+    Audit audit(AuditConfig{.file = file, .on_failure = AuditFailure::kContinue});
+    CanBench bench(on_bus(servo_bench(), {}), &audit);
+    const std::uint8_t lease = bench.acquire(1);
+    bench.acquire(2);
+    bench.request(Request::kClearFaults, static_cast<std::uint8_t>(lease + 1), 2);
+    bench.request(static_cast<Request>(9), lease, 3);
+  }
+  std::vector<std::array<std::string, 4>> said;
+  std::ifstream in(file);
+  for (std::string text; std::getline(in, text);) {
+    const auto line = nlohmann::json::parse(text);
+    said.push_back({line["event"], line["peer"], line["result"],
+                    line["details"].value("request", 0) == 0 ? "" : line["details"]["request"].dump()});
+  }
+  std::filesystem::remove(file);
+  const std::string owned(sentence_of(Refused::kOwned));
+  const std::string not_owner(sentence_of(Refused::kNotOwner));
+  EXPECT_EQ(said, (std::vector<std::array<std::string, 4>>{
+                      {"acquire", "memory:bench controller 1", "done", ""},
+                      {"acquire", "memory:bench controller 2", owned, ""},
+                      {"forbidden", "memory:bench controller 2", not_owner, "4"},
+                      {"forbidden", "memory:bench controller 3", "its code must be 1 to 4", "9"}}));
 }
 
 // Catches: a lease number 0, which means none, after 255 leases.

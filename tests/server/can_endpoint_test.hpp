@@ -44,7 +44,7 @@ inline BenchConfig on_bus(BenchConfig bench, Profile profile) {
 class CanBench {
  public:
   explicit CanBench(Profile profile = {}, std::size_t axes = 1) { setup(on_bus(servo_bench(axes), profile)); }
-  explicit CanBench(const BenchConfig& bench) { setup(bench); }
+  explicit CanBench(const BenchConfig& bench, Audit* audit = nullptr) { setup(bench, audit); }
 
   /// Lets everything happen that needs no waiting.
   void settle() {
@@ -131,7 +131,7 @@ class CanBench {
   std::vector<Received> received;
 
  private:
-  void setup(const BenchConfig& bench) {
+  void setup(const BenchConfig& bench, Audit* audit = nullptr) {
     profile_ = bench.can.front().profile;
     for (const AxisSetup& axis : bench.setup.axes)
       profile_.wide |= terminals_of(axis.parameters).is_wide();
@@ -142,8 +142,9 @@ class CanBench {
       received.push_back({found.row, found.node, decode(*found.row, profile_, frame), frame});
     };
     engine_ = make_lockstep_engine(bench, nullptr);
+    if (audit != nullptr) audit->watch(*engine_);
     endpoint_ = std::make_unique<Endpoint>(io_, bench.can.front(), wire_.connect("bench"));
-    endpoint_->serve(*engine_);
+    endpoint_->serve(*engine_, audit);
     settle();
   }
 

@@ -4,9 +4,11 @@ import datetime
 import json
 import os
 import pathlib
+import re
 import resource
 import shutil
 import signal
+import socket
 import stat
 import sys
 import tempfile
@@ -37,6 +39,16 @@ USERS = entry("vera", "viewer") + entry("otto", "operator") + entry("olga", "ope
 def in_seconds(seconds):
     time_of_end = datetime.datetime.now(datetime.timezone.utc) + datetime.timedelta(seconds=seconds)
     return time_of_end.replace(microsecond=0).isoformat()
+
+
+def at_end(host, port, said=b""):
+    """What a connection gives until its other end closes it."""
+    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as line:
+        line.sendall(said)
+        try:
+            return line.recv(100)
+        except ConnectionResetError:
+            return b""
 
 
 class UsersTest(WireTest):
@@ -330,6 +342,54 @@ class AuditLog(UsersTest):
         self.assertEqual(server.stop(), 0)
         said = [(line["event"], line["transport"]) for line in self.lines(folder / "audit")]
         self.assertEqual([line for line in said if line[1] == "modbus"], [("acquire", "modbus"), ("lease_lost", "modbus")])
+
+    def test_sec_07_who_is_turned_away_by_modbus_stands_there(self):
+        """A stranger at the door, or at an axis of another, of whom only a counter knows."""
+        from pymodbus.client import ModbusTcpClient
+        folder = self.folder_with(USERS)
+        server = self.server("--audit", str(folder / "audit"),
+                             text=SERVO_TEXT + '\n[modbus]\nport = 0\nallow_writes = true\nmax_connections = 2\n')
+        host, port = server.ready["modbus"].rsplit(":", 1)
+        owner, stranger = (ModbusTcpClient(host, port=int(port)) for _ in range(2))
+        for modbus in (owner, stranger):
+            self.addCleanup(modbus.close)
+            self.assertTrue(modbus.connect())
+        self.assertFalse(owner.write_register(400, 4242, slave=1).isError())
+        self.assertTrue(stranger.write_register(400, 4243, slave=1).isError(), "another has the key")
+        self.assertTrue(stranger.write_registers(402, [1, 0, 0], slave=1).isError(), "and no command is taken")
+        self.assertEqual(at_end(host, port), b"", "the house is full")
+        stranger.close()
+        until(lambda: at_end(host, port, b"\0\0\0\0\0\1\1") == b"", "a frame that cannot be ends its connection")
+        self.assertFalse(owner.read_holding_registers(400, 1, slave=1).isError(), "the owner has noticed nothing")
+        self.assertEqual(server.stop(), 0)
+        said = [line for line in self.lines(folder / "audit") if line["transport"] == "modbus" and line["result"] != "done"]
+        self.assertEqual([(line["event"], line["axis"]) for line in said[:3]],
+                         [("forbidden", "servo"), ("forbidden", "servo"), ("limit", None)])
+        self.assertEqual(said[-1]["event"], "limit")
+        self.assertEqual(len({line["result"] for line in said}), 4, "each with its reason")
+        for line in said:
+            self.assertRegex(line["peer"], r"^127\.0\.0\.1:\d+$")
+
+    def test_sec_07_who_is_turned_away_by_a_can_bus_stands_there(self):
+        """A program that is one too many on the bus, of which nobody hears."""
+        folder = self.folder_with(USERS)
+        server = self.server("--audit", str(folder / "audit"),
+                             text=SERVO_TEXT + '\n[[can]]\nbackend = "slcan"\nchannel = "tcp:127.0.0.1:0"\n')
+        bus = server.ready["can"][0]
+        clients = []
+        for number in range(16):
+            clients.append(socket.create_connection(("127.0.0.1", bus.rsplit(":", 1)[1]), timeout=PATIENCE_S))
+            self.addCleanup(clients[-1].close)
+            clients[-1].sendall(b"V\r")
+            self.assertEqual(clients[-1].recv(100), b"V0101\r", number)
+        self.assertEqual(at_end("127.0.0.1", bus.rsplit(":", 1)[1]), b"")
+        clients[0].sendall(b"V\r")
+        self.assertEqual(clients[0].recv(100), b"V0101\r", "the others have noticed nothing")
+        self.assertEqual(server.stop(), 0)
+        said = [line for line in self.lines(folder / "audit") if line["transport"] == "can"]
+        self.assertEqual([line["event"] for line in said], ["limit"])
+        self.assertIn("as many clients as this bus serves", said[0]["result"])
+        self.assertRegex(said[0]["peer"], "^" + re.escape(bus) + r" 127\.0\.0\.1:\d+$")
 
     def test_sec_07_a_log_that_cannot_be_written(self):
         """A bench that drives on unwatched although that was ruled out, or stops although it was not."""

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocols/can/frame.hpp"
@@ -55,6 +56,8 @@ class Bus {
   std::function<void(const Frame& frame, std::int64_t stamp_ns)> on_frame;
   /// After status().state has changed.
   std::function<void()> on_state;
+  /// A client of ours was turned away or cut off: its address, and why. Some back ends have clients.
+  std::function<void(const std::string& peer, std::string_view why)> on_refused;
 };
 
 /// Opens the bus that the configuration names. Throws std::runtime_error that names the interface if it

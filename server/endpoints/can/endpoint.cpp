@@ -51,8 +51,9 @@ bool from_bench(const Match& match) noexcept {
 Endpoint::Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus)
     : timer_(io), config_(config), bus_(std::move(bus)) {}
 
-void Endpoint::serve(Engine& engine) {
+void Endpoint::serve(Engine& engine, Audit* audit) {
   engine_ = &engine;
+  audit_ = audit;
   std::vector<std::uint32_t> ids;
   for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
     nodes_.push_back({.axis = axis,
@@ -70,6 +71,7 @@ void Endpoint::serve(Engine& engine) {
   }
   bus_->on_frame = [this](const Frame& frame, std::int64_t stamp_ns) { on_frame(frame, stamp_ns); };
   bus_->on_state = [this] { on_state(); };
+  bus_->on_refused = [this](const std::string& peer, std::string_view why) { note_client(peer, why); };
   bus_->set_filter(ids);
   last_state_ = bus_->status().state;
   engine.on_tick.add([this] { on_tick(); });
@@ -139,15 +141,11 @@ void Endpoint::on_request(Node& node, const Values& values) {
   const auto controller = static_cast<std::uint32_t>(unsigned_of(values[field("controller")]));
   const auto request = static_cast<Request>(code);
   if (code == 0 || code > static_cast<std::uint64_t>(Request::kClearFaults)) {
-    ++refused_;
-    log_refusal(node, "a request", "its code must be 1 to 4");
-    return reply(node, request, Result::kMalformed, controller, 0, 0);
+    return turn_away(node, request, controller, Result::kMalformed, "its code must be 1 to 4");
   }
   if (request == Request::kAcquire) return acquire(node, controller);
   if (node.owner == 0 || lease != node.lease) {
-    ++refused_;
-    log_refusal(node, "a request", sentence_of(Refused::kNotOwner));
-    return reply(node, request, Result::kNotOwner, controller, 0, 0);
+    return turn_away(node, request, controller, Result::kNotOwner, sentence_of(Refused::kNotOwner));
   }
   node.heard = Clock::now();
   act(node, request, controller);
@@ -158,19 +156,37 @@ Client Endpoint::client_of(std::uint32_t controller) const {
       .transport = "can", .peer = bus_->name() + " controller " + std::to_string(controller), .subject = {}};
 }
 
+void Endpoint::turn_away(const Node& node, Request request, std::uint32_t controller, Result result,
+                         std::string_view why) {
+  ++refused_;
+  const bool acquires = request == Request::kAcquire;
+  log_refusal(node, acquires ? "the lease" : "a request", why);
+  if (audit_ != nullptr) {
+    const Client who = client_of(controller);
+    Audit::Event event{
+        .name = acquires ? "acquire" : "forbidden", .axis = node.axis, .client = &who, .result = why};
+    if (!acquires) event.details = {{"request", static_cast<std::uint64_t>(request)}};
+    audit_->note(std::move(event));
+  }
+  reply(node, request, result, controller, 0, 0);
+}
+
+void Endpoint::note_client(const std::string& peer, std::string_view why) {
+  ++turned_away_;
+  if (audit_ == nullptr) return;
+  const Client who{.transport = "can", .peer = bus_->name() + " " + peer, .subject = {}};
+  audit_->note({.name = "limit", .client = &who, .result = why});
+}
+
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
   const bool known = node.controller == controller && (node.owner != 0 || node.acquiring);
   if (engine_->config().mode == RunMode::kFree || (node.acquiring && !known)) {
-    ++refused_;
-    log_refusal(node, "the lease",
-                node.acquiring ? "another controller asks for it" : "a free run takes no controller");
-    return reply(node, Request::kAcquire, Result::kBusy, controller, 0, 0);
+    return turn_away(node, Request::kAcquire, controller, Result::kBusy,
+                     node.acquiring ? "another controller asks for it" : "a free run takes no controller");
   }
   if (node.acquiring) return;  // asked again before the answer came
   if (node.owner != 0 && !known) {
-    ++refused_;
-    log_refusal(node, "the lease", sentence_of(Refused::kOwned));
-    return reply(node, Request::kAcquire, Result::kOwned, controller, 0, 0);
+    return turn_away(node, Request::kAcquire, controller, Result::kOwned, sentence_of(Refused::kOwned));
   }
   const Owner owner = node.owner != 0 ? node.owner : engine_->new_owner(client_of(controller));
   node.acquiring = true;
@@ -316,6 +332,7 @@ TransportReport Endpoint::report() const {
                                     {"malformed", status.malformed},
                                     {"commands", commands_},
                                     {"refused", refused_},
+                                    {"turned_away", turned_away_},
                                     {"conflicts", conflicts_},
                                     {"heartbeats_lost", heartbeats_lost_},
                                     {"receive_latency_ns", not_negative(latency_ns_)},

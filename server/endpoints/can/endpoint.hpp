@@ -10,6 +10,7 @@
 
 #include "protocols/can/command.hpp"
 #include "server/asio.hpp"
+#include "server/audit.hpp"
 #include "server/endpoints/can/bus.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/terminals.hpp"
@@ -25,8 +26,8 @@ class Endpoint {
  public:
   Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus);
 
-  /// Starts to listen and to send: boot-up first.
-  void serve(Engine& engine);
+  /// Starts to listen and to send: boot-up first. `audit` may be null.
+  void serve(Engine& engine, Audit* audit = nullptr);
   TransportReport report() const;
   std::string name() const { return bus_->name(); }
   /// Says that it stops, and falls silent. The engine takes the leases back.
@@ -79,6 +80,10 @@ class Endpoint {
   Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
   /// Turns a command away before it reaches the bench, which counts it.
   void refuse(const Node& node, Result result, const Setpoints& given, std::string_view why);
+  /// Turns a request away before it reaches the bench.
+  void turn_away(const Node& node, Request request, std::uint32_t controller, Result result,
+                 std::string_view why);
+  void note_client(const std::string& peer, std::string_view why);
   void log_refusal(const Node& node, std::string_view what, std::string_view why);
   void log_loss(const Node& node, std::string_view why);
   void lose(Node& node, const char* why);
@@ -108,6 +113,7 @@ class Endpoint {
   CanConfig config_;
   std::unique_ptr<Bus> bus_;
   Engine* engine_ = nullptr;
+  Audit* audit_ = nullptr;
   std::vector<Node> nodes_;
   std::vector<Frame> together_;  ///< frames of one tick, to be sent in one go
   bool collecting_ = false;
@@ -119,6 +125,7 @@ class Endpoint {
   std::array<std::uint64_t, kFrameProblems> problems_{};
   std::uint64_t commands_ = 0;
   std::uint64_t refused_ = 0;
+  std::uint64_t turned_away_ = 0;  ///< clients of the bus, and those cut off
   std::uint64_t conflicts_ = 0;
   std::uint64_t heartbeats_lost_ = 0;
   bool measure_latency_ = false;  ///< of the next frame that has a stamp

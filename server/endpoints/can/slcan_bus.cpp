@@ -85,6 +85,7 @@ std::string SlcanBus::open() {
 
 void SlcanBus::welcome(int fd) {
   if (clients_.size() == kMaxClients) {
+    refused(peer_of(fd), "there are as many clients as this bus serves");
     ::close(fd);
     return;
   }

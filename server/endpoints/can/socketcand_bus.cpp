@@ -43,7 +43,9 @@ struct SocketcandClient : std::enable_shared_from_this<SocketcandClient> {
 
   /// One that does not read its answers is cut off.
   void answer(std::string_view text) {
-    if (!peer.answer(text)) peer.end();
+    if (peer.answer(text)) return;
+    peer.on_stall();
+    peer.end();
   }
 
   Mode mode = Mode::kNoBus;
@@ -92,6 +94,7 @@ std::string SocketcandBus::open() {
 
 void SocketcandBus::welcome(int fd) {
   if (clients_.size() == kMaxSocketcandClients) {
+    refused(peer_of(fd), "there are as many clients as this bus serves");
     ::close(fd);
     return;
   }
@@ -103,6 +106,7 @@ void SocketcandBus::welcome(int fd) {
       if (const auto element = client->reader.push(byte)) take(*client, *element);
     }
   };
+  client->peer.on_stall = [this, who = peer_of(fd)] { refused(who, "it does not read what it is sent"); };
   client->peer.on_end = [this, client] {
     std::erase_if(clients_, [client](const auto& each) { return each.get() == client; });
   };

@@ -1,6 +1,7 @@
 #include "server/endpoints/can/text_listener.hpp"
 
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <chrono>
@@ -32,6 +33,14 @@ std::string parse_host_port(const std::string& text, HostPort& out) {
     return "\"" + text + "\" is not ADDRESS:PORT, such as 127.0.0.1:3333 or [::1]:3333";
   out.port = *port;
   return {};
+}
+
+std::string peer_of(int fd) {
+  asio::ip::tcp::endpoint peer;
+  socklen_t size = static_cast<socklen_t>(peer.capacity());
+  if (::getpeername(fd, peer.data(), &size) != 0) return {};
+  peer.resize(size);
+  return peer.address().to_string() + ":" + std::to_string(peer.port());
 }
 
 std::string TextListener::open(const HostPort& where) {

@@ -17,6 +17,9 @@ struct HostPort {
 /// Takes "127.0.0.1:3333" or "[::1]:3333" apart; what is wrong with it, or nothing.
 std::string parse_host_port(const std::string& text, HostPort& out);
 
+/// Address and port of the other end of a socket; for one that has gone, nothing.
+std::string peer_of(int fd);
+
 /// Accepts TCP clients of a bus from this computer.
 class TextListener {
  public:

@@ -91,6 +91,7 @@ void TextPeer::watch_for_stall() {
 void TextPeer::reset() {
   const linger at_once{.l_onoff = 1, .l_linger = 0};
   if (!ended_) ::setsockopt(stream_.native_handle(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+  if (!ended_ && on_stall) on_stall();
   end();
 }
 

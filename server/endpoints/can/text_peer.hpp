@@ -29,6 +29,8 @@ class TextPeer {
   /// Called once, from the io_context and never from inside another call, when the peer has gone or was
   /// ended. It may destroy the peer.
   std::function<void()> on_end;
+  /// Called before that if the peer did not read, so that nothing could be sent to it.
+  std::function<void()> on_stall;
 
   /// Starts to read.
   void start() { wait_readable(); }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/asio.hpp"
@@ -29,6 +30,10 @@ class VirtualBus : public Bus {
   void lost(const std::string& why);
   /// Counts a frame from the transport and passes it on.
   void deliver(const Frame& frame, std::int64_t stamp_ns);
+  /// To be called when a client of the bus is turned away or cut off.
+  void refused(const std::string& peer, std::string_view why) const {
+    if (on_refused) on_refused(peer, why);
+  }
   bool is_up() const noexcept { return status_.state == BusState::kUp; }
   /// For handlers, which may run when the bus is gone.
   std::weak_ptr<const bool> alive() const { return alive_; }

@@ -47,7 +47,15 @@ void Connection::cut(std::string_view why) {
     spdlog::warn("{}: cut off: {} ({} more since the last such line)", name_, why,
                  shared_.cut_log.held_back());
   }
+  audit("limit", why);
   close();
+}
+
+void Connection::audit(std::string_view event, std::string_view why_not,
+                       std::optional<std::uint32_t> axis) const {
+  if (shared_.audit == nullptr) return;
+  const drivebench::Client who{.transport = "modbus", .peer = peer_name(), .subject = {}};
+  shared_.audit->note({.name = event, .axis = axis, .client = &who, .result = why_not});
 }
 
 bool Connection::has_lease() const noexcept {
@@ -148,7 +156,7 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
     co_return false;
   }
   if (rate == RateLimit::Answer::kRefuse) {
-    ++shared_.counts.throttled;
+    if (shared_.counts.throttled++ % 1000 == 0) audit("limit", "too many requests: refused");
     refuse(adu, Exception::kBusy);
     co_return true;
   }
@@ -252,6 +260,9 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
 
 void Connection::note_refused_write(const AxisDesk& desk, Refusal refusal) {
   ++shared_.counts.refused_writes;
+  // That another has the axis; what else may be wrong with a write is between the bench and its owner.
+  const bool is_foreign = refusal == Refusal::kNotOwner || refusal == Refusal::kOwned;
+  if (is_foreign) audit("forbidden", sentence_of(refusal), desk.axis());
   if (!shared_.refused_writes_log.allow()) return;
   spdlog::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_,
                desk.axis(), sentence_of(refusal), shared_.refused_writes_log.held_back());

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "protocols/modbus/mbap.hpp"
 #include "protocols/modbus/pdu.hpp"
 #include "server/asio.hpp"
+#include "server/audit.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/modbus/axis_desk.hpp"
 #include "server/endpoints/modbus/identification.hpp"
@@ -24,6 +26,7 @@ struct Shared {
   ReplyBuilder& replies;
   RateLimit& rate;
   const Identification& identification;
+  Audit* audit;                                  ///< null: no audit log is kept
   std::vector<std::unique_ptr<AxisDesk>> desks;  ///< by axis
 
   struct Counts {
@@ -61,6 +64,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   const asio::ip::address& peer() const noexcept { return peer_; }
   Visitor number() const noexcept { return number_; }
+  /// A line in the audit log, if one is kept.
+  void audit(std::string_view event, std::string_view why_not, std::optional<std::uint32_t> axis = {}) const;
   /// Address and port.
   std::string peer_name() const { return name_.substr(name_.find(' ') + 1); }
   bool has_lease() const noexcept;

@@ -57,14 +57,14 @@ std::string ModbusServer::address() const {
   return (endpoint.address().is_v6() ? "[" + address + "]" : address) + ":" + std::to_string(endpoint.port());
 }
 
-void ModbusServer::serve(Engine& engine) {
+void ModbusServer::serve(Engine& engine, Audit* audit) {
   if (!is_loopback(config_.address)) {
     spdlog::warn("Modbus knows no passwords: whoever reaches {} can read this bench{}", address(),
                  config_.allow_writes ? " and drive its motors" : "");
   }
   identification_.emplace(engine.config().name);
   maps_ = modbus::maps_of(engine.config());
-  shared_.emplace(modbus::Shared{engine, replies_, rate_, *identification_, {}, {}, {}, {}, {}});
+  shared_.emplace(modbus::Shared{engine, replies_, rate_, *identification_, audit, {}, {}, {}, {}, {}});
   // By index: a connection may be added while another one answers.
   const auto wake_all = [this] {
     for (std::size_t i = 0; i < connections_.size(); ++i)
@@ -119,6 +119,7 @@ void ModbusServer::start(tcp::socket socket) {
           "such line)",
           connection->peer().to_string(), config_.max_connections, shared_->turned_away_log.held_back());
     }
+    connection->audit("limit", "there are as many connections as there may be");
     return connection->close();
   }
   connections_.push_back(connection);

@@ -23,8 +23,8 @@ class ModbusServer {
   /// Address and port that the system gave, "127.0.0.1:1502".
   std::string address() const;
 
-  /// Starts accepting clients of this run.
-  void serve(Engine& engine);
+  /// Starts accepting clients of this run. `audit` may be null.
+  void serve(Engine& engine, Audit* audit = nullptr);
 
   /// Serves a client whose socket is there already.
   void start(asio::ip::tcp::socket socket);
