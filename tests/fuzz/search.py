@@ -36,11 +36,13 @@ class Search:
         end = time.monotonic() + self.seconds
         while True:
             found = self.run_once(max(1.0, end - time.monotonic()))
-            waited = {finding for finding in found if finding.name.startswith("timeout-") and not self.hangs(finding)}
+            waited = {finding for finding in found
+                      if finding.name.startswith(("timeout-", "slow-unit-")) and not self.hangs(finding)}
             for finding in waited:
                 finding.unlink()
             self.findings = sorted(found - waited)
-            if not waited or self.findings:
+            halted = any(finding.name.startswith("timeout-") for finding in waited)
+            if self.findings or not halted:
                 return self
             self.code = 0
             if time.monotonic() >= end:

@@ -24,6 +24,7 @@ echo "stat::number_of_executed_units: 600"
 if test -f "$prefix../halted"; then exit 0; fi
 echo bytes > "$prefix../halted"
 echo bytes > "${prefix}timeout-1"
+echo bytes > "${prefix}slow-unit-1"
 exit 70
 """
 HANGING = HALTED.replace('exit 0', 'kill -XCPU $$', 1)
