@@ -267,42 +267,23 @@ void Session::on_newest() {
   reply_exchange(waiting.id, waiting.axes);
 }
 
-void Session::on_tick() {
-  if (subscriptions_.empty()) return;
+bool Session::send_samples() {
+  bool sent = false;
   for (Subscription& s : subscriptions_) {
-    const Sample& newest = engine_.newest(s.axis);
-    if (newest.tick == s.last_tick) continue;
-    const bool is_due = newest.tick % s.decimation == 0;
-    // A bench that runs faster than this thread skips ticks here; they count as lost.
-    s.dropped += newest.tick / s.decimation - s.last_tick / s.decimation - (is_due ? 1 : 0);
-    s.last_tick = newest.tick;
-    if (!is_due) continue;
-    if (s.size == s.ring.size()) {
-      s.begin = (s.begin + 1) % s.ring.size();
-      --s.size;
-      ++s.dropped;
-    }
-    s.ring[(s.begin + s.size++) % s.ring.size()] = newest;
-  }
-  send_samples();
-}
-
-void Session::send_samples() {
-  for (Subscription& s : subscriptions_) {
-    while (s.size > 0 && outbox_.idle() && socket_.is_open()) {
-      // What lies in one piece of the ring goes into one message.
-      const std::size_t count = std::min({s.size, kSamplesPerMessage, s.ring.size() - s.begin});
+    while (outbox_.idle() && socket_.is_open()) {
+      const std::span<const Sample> samples = s.feed->read(s.reader, kSamplesPerMessage);
+      if (samples.empty()) break;
       scratch_.clear();
-      append_samples(scratch_, s.axis, s.dropped, std::span(s.ring).subspan(s.begin, count), s.mask);
-      s.begin = (s.begin + count) % s.ring.size();
-      s.size -= count;
-      s.dropped = 0;
+      append_samples(scratch_, s.axis, std::exchange(s.reader.dropped, 0), samples, s.mask);
       outbox_.send(scratch_, shared_from_this());
+      sent = true;
     }
   }
+  return sent;
 }
 
 void Session::reply_exchange(std::uint64_t id, std::span<const std::uint32_t> axes) {
+  send_samples();  // those of a tick come before the answer that tells of it
   views_.clear();
   for (const std::uint32_t axis : axes)
     views_.push_back({axis, &engine_.newest(axis)});

@@ -15,6 +15,7 @@
 #include "protocols/sample_codec.hpp"
 #include "server/audit.hpp"
 #include "server/endpoints/admission.hpp"
+#include "server/endpoints/audience.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/outbox.hpp"
 #include "server/endpoints/transport_report.hpp"
@@ -28,6 +29,7 @@ namespace drivebench {
 struct SessionContext {
   Engine& engine;
   Admission admission;
+  Audience& audience;
   std::function<std::size_t()> session_count;
   std::function<std::vector<TransportReport>()> transports;  ///< all ways in
   Experiments* experiments;                                  ///< null: this bench keeps none
@@ -54,10 +56,10 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Reads and answers until the peer or an error ends the session, then gives its leases back.
   asio::awaitable<void> run();
 
-  /// After each tick: serves subscriptions.
-  void on_tick();
   /// When newest() of the engine is up to date: answers a waiting exchange.
   void on_newest();
+  /// Sends the samples that wait; false if there are none, or the peer takes nothing now.
+  bool send_samples();
   /// When an experiment may have gone on: serves a fetch.
   void on_experiments();
   /// When an administrator has taken an axis from somebody: tells the session if it was this one.
@@ -76,18 +78,13 @@ class Session : public std::enable_shared_from_this<Session> {
   /// So many commands may come at once that no tick can use, and one more with every tick.
   static constexpr double kExcessAtOnce = 1000.0;
   static constexpr auto kLongestThrottle = std::chrono::seconds(1);
-  static constexpr std::size_t kSubscriptionDepth = 256;
   static constexpr std::size_t kSamplesPerMessage = 32;
 
   struct Subscription {
-    std::uint32_t axis = 0;
-    std::uint32_t decimation = 0;
-    SignalMask mask = kAllSignals;
-    std::vector<Sample> ring;
-    std::size_t begin = 0;
-    std::size_t size = 0;
-    std::uint64_t last_tick = 0;  ///< seen
-    std::uint64_t dropped = 0;
+    std::uint32_t axis;
+    SignalMask mask;
+    std::shared_ptr<const SampleFeed> feed;
+    SampleFeed::Reader reader;
   };
   struct WaitingExchange {
     std::uint64_t id;
@@ -161,7 +158,6 @@ class Session : public std::enable_shared_from_this<Session> {
   void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
   void refuse(std::uint64_t id, Refused why, const char* field);
   void reply_exchange(std::uint64_t id, std::span<const std::uint32_t> axes);
-  void send_samples();
   void send(const v1::Envelope& envelope);
   void give_leases_back();
 

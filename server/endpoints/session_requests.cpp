@@ -204,28 +204,31 @@ void Session::exchange(const v1::Exchange& r) {
   for (const v1::Command& command : r.commands())
     engine_.command(command.axis(), owner_, *decode_command(command));
   waiting_ = std::move(waiting);
+  context_.audience.add_waiting(*this);
   engine_.advance();
 }
 
 void Session::subscribe(const v1::Subscribe& r) {
   if (!axis_exists(r.axis())) return;
-  Subscription wanted;
-  wanted.axis = r.axis();
-  wanted.decimation = r.decimation();
-  wanted.last_tick = engine_.newest(r.axis()).tick;
-  if (r.signals_size() > 0) wanted.mask = 0;
+  SignalMask mask = r.signals().empty() ? kAllSignals : 0;
   for (const std::string& name : r.signals()) {
     const Signal* signal = find_signal(name);
     if (signal == nullptr) {
       return refuse(request_.id(), v1::REFUSAL_UNKNOWN_SIGNAL,
                     "there is no signal '" + name.substr(0, 100) + "'", "signals");
     }
-    wanted.mask |= SignalMask{1} << (signal - kSignals.data());
+    mask |= SignalMask{1} << (signal - kSignals.data());
   }
   std::erase_if(subscriptions_, [&](const Subscription& s) { return s.axis == r.axis(); });
-  if (wanted.decimation > 0) {
-    wanted.ring.resize(kSubscriptionDepth);
-    subscriptions_.push_back(std::move(wanted));
+  if (r.decimation() > 0) {
+    std::shared_ptr<const SampleFeed> feed = context_.audience.feed(r.axis(), r.decimation());
+    const SampleFeed::Reader reader = feed->reader();
+    subscriptions_.push_back({.axis = r.axis(), .mask = mask, .feed = std::move(feed), .reader = reader});
+  }
+  if (subscriptions_.empty()) {
+    context_.audience.remove_subscriber(*this);
+  } else {
+    context_.audience.add_subscriber(*this);
   }
   done(request_.id(), engine_.tick());
 }

@@ -108,27 +108,23 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
     reports.push_back(report());
     return reports;
   };
+  audience_.emplace(io_, engine);
   context_.emplace(SessionContext{.engine = engine,
                                   .admission = Admission(config_.asks_for_token, config_.grants),
+                                  .audience = *audience_,
                                   .session_count = [this] { return sessions_.size(); },
                                   .transports = all_reports,
                                   .experiments = experiments,
                                   .audit = audit});
+  // By index: a session may be added while another one answers; none is removed.
   if (experiments != nullptr) {
     experiments->on_change = [this] {
       for (std::size_t i = 0; i < sessions_.size(); ++i)
         sessions_[i]->on_experiments();
     };
   }
-  // By index: a session may be added while another one answers; none is removed.
-  engine.on_tick.add([this] {
-    for (std::size_t i = 0; i < sessions_.size(); ++i)
-      sessions_[i]->on_tick();
-  });
-  engine.on_newest.add([this] {
-    for (std::size_t i = 0; i < sessions_.size(); ++i)
-      sessions_[i]->on_newest();
-  });
+  engine.on_tick.add([this] { audience_->on_tick(); });
+  engine.on_newest.add([this] { audience_->on_newest(); });
   engine.on_taken.push_back([this](const Taken& taken) {
     for (std::size_t i = 0; i < sessions_.size(); ++i)
       sessions_[i]->on_taken(taken);
@@ -234,6 +230,7 @@ asio::awaitable<void> StreamServer::run(std::shared_ptr<Session> session) {
     spdlog::error("a session ended: {}", error.what());
     session->close();
   }
+  audience_->remove(*session);
   std::erase(sessions_, session);
 }
 
@@ -245,6 +242,7 @@ void StreamServer::close() {
     std::error_code gone_already;
     std::filesystem::remove(config_.unix_path, gone_already);
   }
+  if (audience_) audience_->send_all();
   for (const auto& session : sessions_)
     session->close();
 }

@@ -32,7 +32,7 @@ class StreamServer {
   /// if tokens are asked for now and were not before, or the other way round.
   void replace_grants(TcpConfig now);
 
-  /// Stops accepting and ends every session; what was queued is lost.
+  /// Stops accepting and ends every session; what a peer did not take at once is lost.
   void close();
 
  private:
@@ -48,6 +48,7 @@ class StreamServer {
 
   asio::io_context& io_;
   TcpConfig config_;
+  std::optional<Audience> audience_;
   std::optional<SessionContext> context_;
   asio::ip::tcp::acceptor tcp_;
   asio::local::stream_protocol::acceptor unix_;

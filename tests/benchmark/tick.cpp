@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "server/bench.hpp"
+#include "server/recorder.hpp"
 #include "server/spsc_ring.hpp"
 #include "tests/benchmark/bare_machines.hpp"
 #include "tests/benchmark/canary.hpp"

@@ -50,6 +50,26 @@ class Subscriptions(WireTest):
         viewer.newest()
         self.assertEqual(len(viewer.samples), count)
 
+    def test_many_subscribers_have_every_sample(self):
+        """A turn that never comes, one that passes somebody over, an answer that overtakes the samples of its tick."""
+        server = self.server()
+        owner = self.client(server)
+        viewers = [self.client(server) for _ in range(11)]
+        owner.lease()
+        for viewer in [*viewers, owner]:
+            self.assertDone(viewer.ask(subscribe=pb.Subscribe(decimation=1, signals=["tick"])))
+        viewers.pop(5).close()
+        for tick in range(200):
+            owner.step(tick, 5.0, 6.0)
+            self.assertEqual(owner.samples[-1].samples[-1].tick, tick + 1)
+        for viewer in viewers:
+            ticks = []
+            while len(ticks) < 200:
+                samples = viewer.receive().samples
+                self.assertEqual(samples.dropped, 0)
+                ticks += [s.tick for s in samples.samples]
+            self.assertEqual(ticks, list(range(1, 201)))
+
     def test_unknown_signal_changes_nothing(self):
         """A misspelt name that is left out in silence, or a refusal that ends what was running."""
         server = self.server()
@@ -87,6 +107,26 @@ class Subscriptions(WireTest):
                 newest = sample.tick
         self.assertEqual(seen + dropped, ticks)
         self.assertGreater(dropped, 0)
+
+    def test_limit_03_the_newest_256_samples_wait_for_a_reader(self):
+        """A ring of another size, and a count of losses that is one off."""
+        server = self.server(unix=True)
+        owner, slow = self.client(server), self.client(server, unix=True)
+        owner.lease()
+        slow.ask(subscribe=pb.Subscribe(decimation=1))
+        ticks = 2000  # more than kernel and ring hold; a unix socket that is not read takes nothing any more
+        for tick in range(ticks):
+            owner.step(tick, 1.0)
+        seen, gaps = [], []
+        while not seen or seen[-1] < ticks:
+            samples = slow.receive().samples
+            if samples.dropped:
+                gaps.append((len(seen), samples.dropped))
+            seen += [sample.tick for sample in samples.samples]
+        (before, dropped), = gaps
+        self.assertEqual(seen[:before], list(range(1, before + 1)))
+        self.assertEqual(seen[before:], list(range(ticks - 255, ticks + 1)))
+        self.assertEqual(dropped, ticks - 256 - before)
 
     def test_tcp_10_tcp_11_limit_04_a_reader_that_stops_is_cut_and_the_others_go_on(self):
         """A dead viewer that is fed for ever, or one that stops the bench."""
