@@ -57,6 +57,7 @@ void AxisAccount::see(const Sample& s, std::uint64_t late_ticks, bool stalled) {
   }
   seen_ = true;
   before_ = s;
+  history_.add(s);
   late_before_ = late_ticks;
 }
 
@@ -120,8 +121,12 @@ void AxisAccount::check_state(const Sample& s) {
 void AxisAccount::check_owner(const Sample& s) {
   if (s.command_tick != before_.command_tick && is(s, ControlState::kRun)) {
     const auto lease = leases_.find(s.owner);
-    if (lease != leases_.end())
+    if (lease != leases_.end()) {
+      std::set<Tick>& answered = lease->second.answered;
       lease->second.renewed = std::max(lease->second.renewed, static_cast<Tick>(s.tick) - 3);
+      require(s.command_tick < 0 || answered.contains(s.command_tick), "the owner has sent what is in force");
+      answered.erase(answered.begin(), answered.lower_bound(s.command_tick));
+    }
   }
   for (const Leaving& each : leaving_) {
     require(each.deadline < 0 || static_cast<Tick>(s.tick) < each.deadline || s.owner != each.owner,
@@ -140,7 +145,9 @@ void AxisAccount::check_owner(const Sample& s) {
 void AxisAccount::io_done(Owner owner) {
   for (Leaving& each : leaving_) {
     if (each.deadline >= 0) continue;
-    each.deadline = static_cast<Tick>(before_.tick) + kTicksToGo;
+    const auto now = static_cast<Tick>(before_.tick);
+    if (each.seen < 0) each.seen = now;
+    if (!each.asks || now > each.seen) each.deadline = now + kTicksToGo;
     require(!lockstep_ || owner != each.owner, "in lockstep the lease of who is gone is given back at once");
   }
 }
@@ -157,9 +164,15 @@ void AxisAccount::may_go(Owner owner) {
   if (lease != leases_.end()) lease->second.may_go = lease->second.gave_back = true;
 }
 
-void AxisAccount::gone(Owner owner) {
+void AxisAccount::gone(Owner owner, bool asks) {
   leases_.erase(owner);
-  leaving_.push_back({.owner = owner, .deadline = -1});
+  leaving_.push_back({.owner = owner, .asks = asks});
+}
+
+void AxisAccount::command_sent(Owner owner, Tick answers) {
+  ++commands_;
+  const auto lease = leases_.find(owner);
+  if (lease != leases_.end()) lease->second.answered.insert(answers);
 }
 
 void AxisAccount::clear_done(Owner owner, Tick tick) {

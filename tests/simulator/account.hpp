@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/bench.hpp"
+#include "tests/simulator/history.hpp"
 
 namespace drivebench::simulator {
 
@@ -35,11 +36,18 @@ class AxisAccount {
   void granted(Owner owner, Tick tick, std::function<bool()> is_there);
   /// It has asked for its lease to end.
   void may_go(Owner owner);
-  /// It is gone without a word: the axis must be free soon.
-  void gone(Owner owner);
+  /// It is gone without a word: the axis must be free soon. `asks`: with a request for the lease that has no
+  /// answer yet.
+  void gone(Owner owner, bool asks);
   /// Nobody will hear of this owner again.
   void forget(Owner owner) { leases_.erase(owner); }
   void command_sent() { ++commands_; }
+  /// By an owner, as the answer to this tick.
+  void command_sent(Owner owner, Tick answers);
+  /// It was sent this sample.
+  void told(const v1::Sample& sample, bool in_status) {
+    require(history_.agrees(sample, in_status), "who is told of a sample is told what it says");
+  }
   void command_refused() { ++refusals_told_; }
   /// A request to clear was sent; carried out by that owner at that tick; or will never have an answer.
   void clear_done(Owner owner, Tick tick);
@@ -51,7 +59,8 @@ class AxisAccount {
   struct Lease {
     Tick renewed = 0;  ///< at this tick or later
     bool may_go = false;
-    bool gave_back = false;  ///< at some time
+    bool gave_back = false;   ///< at some time
+    std::set<Tick> answered;  ///< by its commands, from that in force on
     std::function<bool()> is_there;
   };
 
@@ -67,6 +76,7 @@ class AxisAccount {
   Report broken_;
   bool seen_ = false;
   Sample before_{};
+  History history_;
   std::uint64_t late_before_ = 0;
   bool late_now_ = false;
   bool skipped_ = false;     ///< some samples were never seen
@@ -74,7 +84,9 @@ class AxisAccount {
   std::map<Owner, Lease> leases_;
   struct Leaving {
     Owner owner;
-    Tick deadline;  ///< -1: the I/O has not seen it yet
+    bool asks;           ///< the bench may only be giving it the lease
+    Tick seen = -1;      ///< by the I/O, before this tick
+    Tick deadline = -1;  ///< -1: the I/O does not know yet that there is a lease to give back
   };
   std::vector<Leaving> leaving_;
   std::vector<Tick> clearings_;  ///< when latched faults were cleared, not yet known to be asked for

@@ -109,9 +109,15 @@ void StreamClient::disconnect(const char* how) {
   if (!wire_ || !wire_->is_open()) return;
   scene_.note(how, number_);
   wire_->cut();
-  for (AxisAccount& axis : scene_.axes)
-    if (owner_ != 0) axis.gone(owner_);
+  for (std::uint32_t axis = 0; owner_ != 0 && axis < axis_count(); ++axis)
+    scene_.axes[axis].gone(owner_, asks_for_lease(axis));
   forget();
+}
+
+bool StreamClient::asks_for_lease(std::uint32_t axis) const {
+  return std::ranges::any_of(asked_, [axis](const auto& each) {
+    return each.second.kind == v1::Envelope::kLease && each.second.axis == axis;
+  });
 }
 
 void StreamClient::read() {
@@ -168,14 +174,17 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
     case v1::Envelope::kRefusal:
       return on_refusal(asked, answer_.refusal());
     case v1::Envelope::kExchangeReply:
-      for (const v1::AxisSample& each : answer_.exchange_reply().samples())
-        see(each.axis(), each.sample());
+      for (const v1::AxisSample& each : answer_.exchange_reply().samples()) {
+        scene_.require(!asked.counts || (each.axis() == asked.axis && each.sample().tick() > asked.tick),
+                       "an exchange is answered with what came after its command");
+        is_told(each.axis(), each.sample());
+      }
       if (manners_.controls) control_later();
       return;
     case v1::Envelope::kStatus:
       if (answer_.id() == last_look_) on_last_look(answer_.status().sessions());
       for (const v1::AxisSample& each : answer_.status().axes())
-        see(each.axis(), each.sample());
+        is_told(each.axis(), each.sample(), true);
       return;
     default:
       return;
@@ -244,8 +253,15 @@ void StreamClient::on_samples(const v1::Samples& samples) {
                    "what a viewer has lost is what it is told");
     s.last = sample.tick();
     skipped = 0;
-    see(samples.axis(), sample);
+    // Of the first and the last of a message the whole is looked at, which takes its time.
+    const bool at_end = &sample == &*samples.samples().begin() || &sample == &*samples.samples().rbegin();
+    at_end ? is_told(samples.axis(), sample) : see(samples.axis(), sample);
   }
+}
+
+void StreamClient::is_told(std::uint32_t axis, const v1::Sample& sample, bool in_status) {
+  scene_.axes[axis].told(sample, in_status);
+  see(axis, sample);
 }
 
 void StreamClient::see(std::uint32_t axis, const v1::Sample& sample) {

@@ -56,7 +56,8 @@ class StreamClient final : public Player {
     v1::Envelope::KindCase kind;
     std::uint32_t axis;  ///< commanded, leased or cleared
     v1::LeaseRequest::Action action;
-    bool counts;  ///< a command for one axis, that is counted if it is refused
+    bool counts;         ///< a command for one axis, that is counted if it is refused
+    std::uint64_t tick;  ///< that a command answers
   };
   struct Subscription {
     std::uint32_t every = 0;
@@ -76,6 +77,7 @@ class StreamClient final : public Player {
   void on_refusal(const Asked& asked, const v1::Refusal& refusal);
   void on_samples(const v1::Samples& samples);
   void see(std::uint32_t axis, const v1::Sample& sample);
+  void is_told(std::uint32_t axis, const v1::Sample& sample, bool in_status = false);
 
   void control();
   void control_later();
@@ -86,6 +88,7 @@ class StreamClient final : public Player {
   void clear(std::uint32_t axis);
   void babble();
   std::uint64_t ask(v1::Envelope& request, std::uint32_t axis = 0, bool counts = false);
+  bool asks_for_lease(std::uint32_t axis) const;
   void send(const v1::Envelope& request);
   double value(double usual);
   std::uint32_t some_axis() { return static_cast<std::uint32_t>(random_.below(scene_.axes.size())); }

@@ -27,7 +27,8 @@ double StreamClient::value(double usual) {
 
 std::uint64_t StreamClient::ask(v1::Envelope& request, std::uint32_t axis, bool counts) {
   request.set_id(++last_id_);
-  asked_[last_id_] = {request.kind_case(), axis, request.lease().action(), counts};
+  const std::uint64_t tick = counts ? request.exchange().commands(0).tick() : 0;
+  asked_[last_id_] = {request.kind_case(), axis, request.lease().action(), counts, tick};
   send(request);
   return last_id_;
 }
@@ -78,7 +79,7 @@ void StreamClient::command(std::uint32_t axis) {
   c.set_u_b_v(value(10.0));
   c.set_i_a_a(value(1.0));
   c.set_i_b_a(value(1.0));
-  scene_.axes[axis].command_sent();
+  scene_.axes[axis].command_sent(owner_, static_cast<Tick>(c.tick()));
   ask(request, axis, true);
 }
 

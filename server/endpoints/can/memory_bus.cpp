@@ -92,6 +92,7 @@ std::unique_ptr<Bus> MemoryWire::connect(std::string name) {
 
 void MemoryWire::set_link(BusState state) {
   link_ = state;
+  if (state == BusState::kUp) to_lose_ = 0;
   if (is_off(state)) under_way_.clear();
   for (MemoryBus* port : ports_)
     port->set_state(state);
