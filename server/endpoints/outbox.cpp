@@ -11,7 +11,8 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
     bytes = bytes.subspan(error ? 0 : written);
     if (bytes.empty()) return;
   }
-  if (queued_.size() + bytes.size() > kMaxQueued) return cut("too much waits for it");
+  const std::size_t waiting = queued_.size() + in_flight_.size() - sent_;
+  if (waiting + bytes.size() > kMaxQueued) return cut("too much waits for it");
   queued_.insert(queued_.end(), bytes.begin(), bytes.end());
   if (!writing_) {
     writing_ = true;

@@ -19,7 +19,7 @@ class Outbox {
  public:
   using Socket = asio::generic::stream_protocol::socket;
 
-  /// Queued bytes above which the peer is cut off.
+  /// Bytes in all that may wait; above them the peer is cut off.
   static constexpr std::size_t kMaxQueued = std::size_t{1024} * 1024;
   static constexpr auto kNoProgressLimit = std::chrono::seconds(2);
 
@@ -46,7 +46,7 @@ class Outbox {
 
   Socket& socket_;
   ServerTimer timer_;
-  std::vector<std::byte> queued_;
+  std::vector<std::byte> queued_;  // behind in_flight_
   std::vector<std::byte> in_flight_;
   std::size_t sent_ = 0;  // of in_flight_
   bool writing_ = false;

@@ -97,5 +97,45 @@ TEST(Modbus, ARateOfOneRefusesBeforeItCuts) {
   }
 }
 
+// Catches: a rate that is refused before it is reached, a second's worth of requests that may not come at
+// once, and a bucket that is filled a little too fast or too slowly, which only time shows.
+TEST(Modbus, LIMIT_06_JustBelowTheRateEverythingIsAnswered) {
+  using Answer = RateLimit::Answer;
+  constexpr std::uint32_t kRate = 2000;
+  const auto peer = asio::ip::make_address("127.0.0.1");
+  // Requests that are served one after the other, evenly spread in virtual time.
+  const auto served = [&](std::uint32_t requests_per_s, std::uint32_t most) {
+    RateLimit limit(kRate);
+    std::uint32_t count = 0;
+    for (; count < most; ++count) {
+      const RateLimit::Clock::time_point now{
+          std::chrono::nanoseconds(1'000'000'000LL * count / requests_per_s)};
+      if (limit.charge(peer, now) != Answer::kServe) break;
+    }
+    return count;
+  };
+  constexpr std::uint32_t kHour = 3600 * kRate;
+  EXPECT_EQ(served(kRate - 1, kHour), kHour);
+  EXPECT_EQ(served(kRate, kHour), kHour);
+  // Request n comes after (n - 1)/2100 s: 2000 + (n - 1) 2000/2100 >= n up to n = 41980; one less by
+  // rounding.
+  EXPECT_NEAR(served(kRate + 100, kHour), 41'980, 1);
+  RateLimit limit(kRate);
+  for (int second = 0; second < 60; ++second) {
+    const RateLimit::Clock::time_point now{std::chrono::seconds(second)};
+    for (std::uint32_t i = 0; i < kRate; ++i)
+      ASSERT_EQ(limit.charge(peer, now), Answer::kServe) << i << " at once after " << second << " s";
+    EXPECT_EQ(limit.charge(peer, now), Answer::kRefuse);
+    limit.refund(peer, 1.0);  // so that each second begins with an empty bucket
+  }
+  BenchConfig config = modbus_bench_config();
+  config.modbus.requests_per_s = 50;
+  ModbusBench bench(config);
+  Client client(bench.port());
+  for (int i = 0; i < 50; ++i)
+    ASSERT_EQ(client.read_one(0), kMarker) << "the bucket has held them all along, " << i;
+  EXPECT_EQ(bench.count("throttled"), 0u);
+}
+
 }  // namespace
 }  // namespace drivebench::modbus

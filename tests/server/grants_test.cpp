@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "protocols/document.hpp"
 #include "server/wall_time.hpp"
 #include "tests/server/config_test_bench.hpp"
+#include "tests/server/instruction_path.hpp"
 
 namespace drivebench::test {
 namespace {
@@ -86,6 +89,52 @@ TEST(Grants, SEC_04_ATokenThatIsNearlyRightIsWrong) {
   EXPECT_EQ(find_grant(grants, token + '\0'), nullptr);
   const TokenHash& hash = grants[0].hash;
   EXPECT_EQ(find_grant(grants, {reinterpret_cast<const char*>(hash.data()), hash.size()}), nullptr);
+}
+
+// Catches: a comparison whose time tells a guesser how much of a token is right, or which entry it comes
+// close to. Time is not measured: instruction by instruction, the program goes the same way.
+TEST(Grants, SEC_04_AWrongTokenTakesTheSameWayHoweverMuchOfItIsRight) {
+  const std::string token = "correct-horse-battery-staple";
+  const TokenHash hash = hash_of_token(token);
+  TokenHash far = hash;
+  for (unsigned char& byte : far)
+    byte = static_cast<unsigned char>(byte ^ 0xff);
+  volatile bool sink = find_grant({}, token) != nullptr;  // what is bound on its first call is bound now
+  std::vector<Grant> grants(3, Grant{.name = "anna", .hash = far});
+  const auto path = [&] { return instruction_path([&] { sink = find_grant(grants, token) != nullptr; }); };
+  const auto expected = path();
+  if (!expected) GTEST_SKIP() << "no single steps here";
+  EXPECT_EQ(path(), expected) << "the measure itself varies";
+  for (const std::size_t right : {0u, 1u, 15u, 31u}) {
+    TokenHash near = far;  // its first bytes are right
+    std::copy_n(hash.begin(), right, near.begin());
+    grants[right % 3].hash = near;
+    EXPECT_EQ(path(), expected) << right << " bytes are right";
+    near = hash;  // one bit is wrong
+    near[right] = static_cast<unsigned char>(near[right] ^ 1u << right % 8);
+    grants[right % 3].hash = near;
+    EXPECT_EQ(path(), expected) << "but for a bit in byte " << right;
+    grants[right % 3].hash = far;
+  }
+  // A right one ends no search early.
+  grants[0].hash = hash;
+  const auto first = path();
+  grants[0].hash = far;
+  grants[2].hash = hash;
+  EXPECT_EQ(path()->count, first->count);
+
+  // The measure sees a comparison that stops at the first wrong byte.
+  const auto naive = [&](std::size_t right) {
+    TokenHash near = far;
+    std::copy_n(hash.begin(), right, near.begin());
+    return instruction_path([&] {
+      std::size_t same = 0;
+      while (same < hash.size() && near[same] == hash[same])
+        ++same;
+      sink = same == hash.size();
+    });
+  };
+  EXPECT_LT(naive(3)->count, naive(30)->count);
 }
 
 // Catches: a file of tokens that everybody reads, and a message that tells the token.

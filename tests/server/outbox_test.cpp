@@ -1,0 +1,108 @@
+#include "server/endpoints/outbox.hpp"
+
+#include <gtest/gtest.h>
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace drivebench {
+namespace {
+
+/// An outbox and its peer, who reads when told to.
+class Pair {
+ public:
+  Pair() : socket_(io_, asio::generic::stream_protocol(AF_UNIX, 0)) {
+    boost::system::error_code ignored;
+    socket_.close(ignored);
+    std::array<int, 2> ends{};
+    EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()), 0);
+    socket_.assign(asio::generic::stream_protocol(AF_UNIX, 0), ends[0]);
+    socket_.non_blocking(true);
+    peer_ = ends[1];
+    outbox.on_cut = [this](std::string_view why) { cut = why; };
+  }
+  ~Pair() {
+    outbox.close();
+    io_.poll();
+    ::close(peer_);
+  }
+  Pair(const Pair&) = delete;
+  Pair& operator=(const Pair&) = delete;
+
+  void send(std::size_t count) {
+    std::vector<std::byte> bytes(count);
+    for (std::byte& byte : bytes)
+      byte = static_cast<std::byte>(sent_++ % 251);
+    outbox.send(bytes, owner_);
+    settle();
+  }
+  /// Bytes that neither the peer nor the kernel has.
+  std::size_t waiting() const {
+    int in_kernel = 0;
+    ::ioctl(peer_, SIOCINQ, &in_kernel);
+    return sent_ - received_ - static_cast<std::size_t>(in_kernel);
+  }
+  /// What the peer gets until nothing comes; whether it is what was sent.
+  bool read_all() {
+    std::array<unsigned char, 65'536> bytes;
+    for (;;) {
+      const ssize_t count = ::recv(peer_, bytes.data(), bytes.size(), MSG_DONTWAIT);
+      if (count <= 0) return true;
+      for (ssize_t i = 0; i < count; ++i) {
+        if (bytes[static_cast<std::size_t>(i)] != received_++ % 251) return false;
+      }
+      settle();
+    }
+  }
+
+  asio::io_context io_{1};
+  Outbox::Socket socket_;
+  Outbox outbox{socket_};
+  std::string cut;
+
+ private:
+  void settle() {
+    io_.restart();
+    io_.poll();
+  }
+
+  int peer_ = -1;
+  std::size_t sent_ = 0;
+  std::size_t received_ = 0;
+  std::shared_ptr<void> owner_ = std::make_shared<int>();
+};
+
+// Catches: a limit that counts only what came after the piece under way, so that twice as much waits; one
+// that cuts a byte too early; one that tears the order of what waited.
+TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
+  for (const bool one_too_many : {false, true}) {
+    Pair pair;
+    pair.send(700'000);  // more than the kernel takes
+    ASSERT_GT(pair.waiting(), 0u);
+    while (Outbox::kMaxQueued - pair.waiting() > 100'000)
+      pair.send(100'000);
+    ASSERT_EQ(pair.cut, "");
+    pair.send(Outbox::kMaxQueued - pair.waiting());
+    EXPECT_EQ(pair.waiting(), Outbox::kMaxQueued);
+    EXPECT_EQ(pair.cut, "") << "a mebibyte may wait";
+    if (one_too_many) {
+      pair.send(1);
+      EXPECT_EQ(pair.cut, "too much waits for it");
+      EXPECT_FALSE(pair.socket_.is_open());
+    } else {
+      EXPECT_FALSE(pair.outbox.idle());
+      EXPECT_TRUE(pair.read_all());
+      EXPECT_EQ(pair.waiting(), 0u);
+      EXPECT_TRUE(pair.outbox.idle());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace drivebench
