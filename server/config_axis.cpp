@@ -89,7 +89,8 @@ Tick read_quick_stop(StrictTable& axis, std::int64_t period_ns) {
 }  // namespace
 
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
-                      std::span<const AxisReading> before, ProblemList& problems) {
+                      std::span<const AxisReading> before, ProblemList& problems,
+                      std::vector<ConfigProblem>& odd) {
   AxisReading result;
   axis.require("name");
   result.config.name = axis.identifier("name").value_or("");
@@ -112,6 +113,7 @@ AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, st
                                .motor = motor,
                                .motor_missing = axis.has("motor") && !motor.table,
                                .folder = folder,
+                               .odd = odd,
                                .shared_mechanics = partner ? &before[*partner].setup.parameters.mechanics
                                                    : shares_shaft ? &none
                                                                   : nullptr};

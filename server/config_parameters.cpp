@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/config_curves.hpp"
+#include "server/config_plausible.hpp"
 #include "server/config_words.hpp"
 
 namespace drivebench {
@@ -84,15 +85,30 @@ void read_entry(Section& section, std::string_view key, bool required, bool moto
   if (!excused) (section.motor ? *section.motor : section.bench).require(key);
 }
 
+/// The table that gives this value; null if not all of its section is there.
+StrictTable* table_of(std::vector<Section>& sections, std::string_view field) {
+  const auto section = std::find_if(sections.begin(), sections.end(),
+                                    [&](const Section& s) { return s.name == section_of(field); });
+  if (section == sections.end() || section->incomplete) return nullptr;
+  const std::string_view key = key_of(field);
+  const bool in_motor = section->motor && section->motor->has(key) && !section->bench.has(key);
+  return in_motor ? &*section->motor : &section->bench;
+}
+
 void report_rules(std::vector<Section>& sections, const AxisParameters& p, bool& right) {
   for (Problem& problem : problems(p)) {
-    const auto section = std::find_if(sections.begin(), sections.end(),
-                                      [&](const Section& s) { return s.name == section_of(problem.field); });
-    if (section == sections.end() || section->incomplete) continue;
+    StrictTable* const table = table_of(sections, problem.field);
+    if (table == nullptr) continue;
     right = false;
-    const std::string_view key = key_of(problem.field);
-    const bool in_motor = section->motor && section->motor->has(key) && !section->bench.has(key);
-    (in_motor ? *section->motor : section->bench).report(key, std::move(problem.rule));
+    table->report(key_of(problem.field), std::move(problem.rule));
+  }
+}
+
+void report_oddities(std::vector<Section>& sections, const AxisParameters& p,
+                     std::vector<ConfigProblem>& odd) {
+  for (Problem& problem : oddities(p)) {
+    const StrictTable* const table = table_of(sections, problem.field);
+    if (table != nullptr) odd.push_back(table->problem(key_of(problem.field), std::move(problem.rule)));
   }
 }
 
@@ -146,6 +162,7 @@ bool read_parameters(const ParameterSource& source, ProblemList& problems, AxisP
   }
   if (source.motor.table) source.motor.table->finish();
   report_rules(sections.all(), p, right);
+  if (right) report_oddities(sections.all(), p, source.odd);
   return right;
 }
 

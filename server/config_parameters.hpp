@@ -24,8 +24,9 @@ struct MotorFile {
 struct ParameterSource {
   StrictTable& axis;
   MotorFile& motor;
-  bool motor_missing;            ///< it is named but cannot be read
-  std::filesystem::path folder;  ///< of the bench file; empty: it may name no other files
+  bool motor_missing;               ///< it is named but cannot be read
+  std::filesystem::path folder;     ///< of the bench file; empty: it may name no other files
+  std::vector<ConfigProblem>& odd;  ///< takes what is right and yet hardly meant
   const MechanicsParameters* shared_mechanics = nullptr;  ///< of the axis whose shaft this one shares
 };
 

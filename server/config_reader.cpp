@@ -11,6 +11,7 @@
 #include "server/config.hpp"
 #include "server/config_axis.hpp"
 #include "server/config_can.hpp"
+#include "server/config_plausible.hpp"
 #include "server/config_service.hpp"
 #include "server/config_step.hpp"
 #include "server/config_words.hpp"
@@ -139,13 +140,14 @@ void read_experiments(StrictTable table, const std::filesystem::path& folder,
 }
 
 std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::path& folder,
-                                   ProblemList& problems, const BenchConfig& config) {
+                                   ProblemList& problems, std::vector<ConfigProblem>& odd,
+                                   const BenchConfig& config) {
   root.require("axis");
   std::vector<AxisReading> axes;
   std::size_t events = 0;
   std::size_t points = 0;
   for (StrictTable& table : root.tables("axis", kMaxAxes)) {
-    AxisReading axis = read_axis(table, folder, config.setup.period_ns, axes, problems);
+    AxisReading axis = read_axis(table, folder, config.setup.period_ns, axes, problems, odd);
     const std::string& name = axis.config.name;
     const std::uint32_t node = axis.config.can_node;
     const auto another = [&](auto same) { return std::any_of(axes.begin(), axes.end(), same); };
@@ -171,10 +173,20 @@ std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::pat
   return axes;
 }
 
-}  // namespace
+/// What is odd may be why something else is wrong.
+void throw_if_any(ProblemList& problems, const std::vector<ConfigProblem>& odd) {
+  try {
+    problems.throw_if_any();
+  } catch (const ConfigError& error) {
+    std::vector<ConfigProblem> all = error.problems();
+    all.insert(all.end(), odd.begin(), odd.end());
+    throw ConfigError(std::move(all));
+  }
+}
 
-BenchConfig parse_config(std::string_view text, const std::string& name,
-                         const std::filesystem::path& folder) {
+BenchConfig parse(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+                  std::vector<ConfigProblem>* odd_values) {
+  std::vector<ConfigProblem> odd;
   ProblemList problems;
   BenchConfig config;
   const std::size_t limit = folder.empty() ? kMaxRecordedConfigBytes : kMaxConfigBytes;
@@ -186,7 +198,7 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
     read_realtime(root.table("realtime"), config.realtime);
     read_tcp(root.table("tcp"), folder, config.tcp);
     read_tls(root.table("tls"), folder, config.tls);
-    const std::vector<AxisReading> axes = read_axes(root, folder, problems, config);
+    const std::vector<AxisReading> axes = read_axes(root, folder, problems, odd, config);
     if (!bench.has("substeps")) config.setup.substeps = automatic_substeps(axes, config.setup.period_ns);
     for (const AxisReading& axis : axes) {
       if (timing_valid && axis.parameters_valid) check_step(bench, config.setup, axis);
@@ -203,14 +215,31 @@ BenchConfig parse_config(std::string_view text, const std::string& name,
     config.log_level = read_log_level(root.table("log"));
     root.finish();
   }
-  problems.throw_if_any();
+  if (odd_values == nullptr) odd.clear();
+  throw_if_any(problems, odd);
+  if (odd_values != nullptr) *odd_values = std::move(odd);
   return config;
 }
 
-BenchConfig load_config(const std::filesystem::path& file) {
+BenchConfig load(const std::filesystem::path& file, std::vector<ConfigProblem>* odd) {
   const FileText read = read_file(file, kMaxConfigBytes);
   if (!read.why_not.empty()) throw ConfigError({{file.string(), 0, {}, read.why_not}});
-  return parse_config(read.text, file.string(), std::filesystem::absolute(file).parent_path());
+  return parse(read.text, file.string(), std::filesystem::absolute(file).parent_path(), odd);
+}
+
+}  // namespace
+
+BenchConfig parse_config(std::string_view text, const std::string& name,
+                         const std::filesystem::path& folder) {
+  return parse(text, name, folder, nullptr);
+}
+
+BenchConfig load_config(const std::filesystem::path& file) {
+  return load(file, nullptr);
+}
+
+BenchConfig load_config(const std::filesystem::path& file, std::vector<ConfigProblem>& odd) {
+  return load(file, &odd);
 }
 
 }  // namespace drivebench

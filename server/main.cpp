@@ -14,6 +14,7 @@
 #include "server/audit.hpp"
 #include "server/build_id.hpp"
 #include "server/config.hpp"
+#include "server/config_plausible.hpp"
 #include "server/endpoints/stream_server.hpp"
 #include "server/endpoints/transports.hpp"
 #include "server/engine.hpp"
@@ -42,6 +43,7 @@ struct Options {
   bool json = false;
   bool check_config = false;
   bool allow_overload = false;
+  bool allow_odd = false;
   std::string experiments;
   std::string audit;
   double file_s = 0.0;         ///< of plant time in each file of a recording; 0: all
@@ -51,9 +53,20 @@ struct Options {
   std::size_t bus = 1;
 };
 
+/// The file, if everything in it is as one would expect, or odd values are taken all the same.
+BenchConfig load_plausible(const Options& o) {
+  std::vector<ConfigProblem> odd;
+  BenchConfig config = load_config(o.config, odd);
+  if (odd.empty()) return config;
+  const ConfigError oddities(std::move(odd));
+  if (!o.allow_odd) throw oddities;
+  spdlog::warn("{}", oddities.what());
+  return config;
+}
+
 /// The configuration of the file with what the command line changes.
 BenchConfig configure(const Options& o) {
-  BenchConfig config = load_config(o.config);
+  BenchConfig config = load_plausible(o);
   if (!o.mode.empty()) {
     change_mode(config, o.mode == "realtime" ? RunMode::kRealtime
                         : o.mode == "free"   ? RunMode::kFree
@@ -340,6 +353,7 @@ int run(int argc, char** argv) {
   app.add_flag("--check-config", o.check_config, "only check the bench file");
   app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
   app.add_option("--audit", o.audit, "append who did what to this file, as JSON lines");
+  app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");
   app.add_option("--print", o.print, "only print a description of an interface")

@@ -52,6 +52,10 @@ class StrictTable {
   int line_of(std::string_view key) const;
   /// Adds a problem with this key, at its line.
   void report(std::string_view key, std::string rule) { report_at(line_of(key), key, std::move(rule)); }
+  /// What report() would add.
+  ConfigProblem problem(std::string_view key, std::string rule) const {
+    return {*file_, line_of(key), path_of(key), std::move(rule)};
+  }
   /// The same at another line, of something within its value.
   void report_at(int line, std::string_view key, std::string rule);
 

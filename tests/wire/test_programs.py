@@ -211,6 +211,21 @@ class Serving(CommandTest):
                 self.assertSays(done.stderr, f"bad.toml:{line}: bench.{key}")
             self.assertSays(done.stderr, "watchdog_ticks")
 
+    def test_cfg_02_odd_values_are_refused_or_taken_with_a_word(self):
+        """A motor of 14 H that was meant to have 14 mH; a prototype that nobody may try."""
+        text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        text += "\n[axis.machine]\nstator_inductance_h = 14.0\n"
+        (self.folder / "odd.toml").write_text(text, encoding="utf-8")
+        line = len(text.splitlines())
+        for program in ((SERVER, "odd.toml"), (DRIVEBENCH, "serve", "odd.toml")):
+            done = self.run_program(*program, "--check-config")
+            self.assertEqual((done.returncode, done.stdout), (USAGE, ""))
+            self.assertSays(done.stderr, f"odd.toml:{line}: axis.machine.stator_inductance_h is 14 H, which is odd",
+                            "1e-04 to 3 H; --allow-odd takes it")
+            done = self.run_program(*program, "--check-config", "--allow-odd")
+            self.assertEqual(done.returncode, 0)
+            self.assertSays(done.stderr, "warning", f"odd.toml:{line}: axis.machine.stator_inductance_h")
+
     def test_a_wrong_command_line_of_the_server_is_2(self):
         """An option that is ignored, and a run other than the one asked for."""
         for arguments, fact in (
