@@ -24,6 +24,7 @@ from wire_test import SERVO_TEXT, WireTest, until
 # A controller that is silent for long keeps its axis, so that what takes it away is something else.
 PATIENT_TEXT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 400000").replace("lease_s = 2.0", "lease_s = 60.0")
 FLUSH_DENORMALS = 0x9FC0  # what -Ofast sets, for the whole process
+OVERRUN = 1 << 11  # in the fault word
 FAKETIME = next(pathlib.Path("/usr/lib").glob("*/faketime/libfaketime.so.1"), None)
 
 
@@ -85,6 +86,45 @@ class Memory(HostTest):
             self.assertEqual(server.process.wait(timeout=PATIENCE_S), 1, server.errors())
             self.assertIn("no memory", server.errors())
             self.assertGreaterEqual(Recording(file.read_bytes()).messages["/servo/sample"], 800)
+
+
+class Stops(HostTest):
+    PERIOD_S = 128e-6  # an edge of the histogram of latenesses, which then tells late ticks from others
+
+    def test_os_03_after_stops_every_late_tick_is_counted_and_done(self):
+        """Ticks that are skipped, done without being counted, or done as if they had been in time, after a sleep of the host."""
+        text = SERVO_TEXT.replace("period_us = 125", "period_us = 128")
+        patient = self.server("--mode", "realtime", text=text + "\n[realtime]\nmax_lateness_ms = 60000\n")
+        strict = self.server("--mode", "realtime", text=text)  # 100 ms
+        clients = [self.client(server) for server in (patient, strict)]
+        first = [client.newest().tick for client in clients]
+        since = time.monotonic()
+        stops = (0.1, 1.0, 10.0)
+        late = [[client.newest().late_ticks for client in clients]]
+        for stop_s in stops:
+            for server in (patient, strict):
+                server.process.send_signal(signal.SIGSTOP)
+            time.sleep(stop_s)
+            for server in (patient, strict):
+                server.process.send_signal(signal.SIGCONT)
+            due = first[0] + (time.monotonic() - since) / self.PERIOD_S - 1
+            until(lambda due=due: clients[0].newest().tick >= due, "it has caught up")
+            late.append([client.newest().late_ticks for client in clients])
+            # Of the ticks of a stop all but the last are late by a period or more; a few may pass before it begins.
+            self.assertGreaterEqual(late[-1][0] - late[-2][0], int(stop_s / self.PERIOD_S) - 8)
+        self.assertFalse(clients[0].newest().faults & OVERRUN, "that late was allowed")
+        self.assertTrue(clients[1].newest().faults & OVERRUN)
+        lost = sum(stop_s for stop_s in stops if stop_s >= 1.0)
+        # When `first` was read its tick may have been late itself: for that, a second.
+        self.assertLess(clients[1].newest().tick, first[1] + (time.monotonic() - since - lost + 1.0) / self.PERIOD_S,
+                        "what was too late is given up")
+        for server in (patient, strict):
+            self.assertEqual(server.stop(), 0)
+            verdict = server.verdict
+            self.assertFalse(verdict["realtime_valid"])
+            self.assertEqual(sum(count for _, count in verdict["lateness_histogram"]), verdict["ticks"])
+            late_by_the_clock = sum(count for edge_us, count in verdict["lateness_histogram"] if edge_us > self.PERIOD_S * 1e6 * 1.5)
+            self.assertEqual(late_by_the_clock, verdict["late_ticks"])
 
 
 class Threads(HostTest):

@@ -1,15 +1,9 @@
 #!/usr/bin/python3
-"""Several users: tokens, roles, taking by force, slots, the audit log. Each test names the mistake that it would catch."""
+"""Several users: tokens, roles, taking by force, slots. Each test names the mistake that it would catch."""
 import datetime
-import json
-import os
 import pathlib
-import re
-import resource
 import shutil
 import signal
-import socket
-import stat
 import sys
 import tempfile
 import time
@@ -39,16 +33,6 @@ USERS = entry("vera", "viewer") + entry("otto", "operator") + entry("olga", "ope
 def in_seconds(seconds):
     time_of_end = datetime.datetime.now(datetime.timezone.utc) + datetime.timedelta(seconds=seconds)
     return time_of_end.replace(microsecond=0).isoformat()
-
-
-def at_end(host, port, said=b""):
-    """What a connection gives until its other end closes it."""
-    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as line:
-        line.sendall(said)
-        try:
-            return line.recv(100)
-        except ConnectionResetError:
-            return b""
 
 
 class UsersTest(WireTest):
@@ -259,163 +243,6 @@ class Tokens(UsersTest):
         answer = self.guess(server, "otto-secret")
         self.assertRefused(answer, pb.REFUSAL_UNAUTHENTICATED, "token")
         self.assertIn("over", answer.refusal.message)
-
-
-class AuditLog(UsersTest):
-    def lines(self, file):
-        return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
-
-    def test_sec_07_own_04_everything_that_counts_stands_in_the_log(self):
-        """An event without a line; a line without a name; a log that others read."""
-        folder = self.folder_with(USERS)
-        text = SERVO_TEXT.replace("[tcp]", f'[tcp]\ntokens_file = "{folder}/tokens"')
-        log = folder / "audit.jsonl"
-        server = self.server("--record", str(folder / "run.mcap"), "--audit", str(log), "--experiments", str(folder / "kept"),
-                             text=text + '\n[modbus]\nport = 0\nallow_writes = true\n')
-        self.assertEqual(stat.S_IMODE(os.stat(log).st_mode), 0o600)
-        self.guess(server, "wrong")
-        time.sleep(0.6)
-        evil = self.client(server, hello=False)
-        self.assertEqual(evil.hello("otto-secret", "otto\n\x1b[2J{}").WhichOneof("kind"), "welcome")
-        otto, adam, vera = evil, self.user(server, "adam"), self.user(server, "vera")
-        otto.lease()
-        otto.step(0, 5.0)
-        otto.ask(set_load=pb.SetLoad(load_nm=0.1))
-        otto.ask(write_parameter=pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.0))
-        otto.ask(inject_fault=pb.InjectFault(name="open_phase", value=1))
-        otto.ask(inject_fault=pb.InjectFault(name="open_phase", value=0))
-        otto.ask(shaft_bump=pb.ShaftBump(impulse_nms=1e-4))
-        vera.ask(clear_faults=pb.ClearFaults())
-        vera.lease()
-        adam.ask(lease=pb.LeaseRequest(action=TAKE, reason="test \x1b[31m\n"))
-        adam.ask(clear_faults=pb.ClearFaults())
-        adam.lease(pb.LeaseRequest.ACTION_RELEASE)
-        run = adam.ask(run_experiment=pb.RunExperiment(
-            owner="adam-owner", user="adam", label="idle", mode=pb.MODE_FREE, ticks=10, signals=["i_a_a"],
-            input=pb.ExperimentInput(kind=pb.INPUT_KIND_NONE)))
-        self.assertEqual(run.WhichOneof("kind"), "experiment_info", run)
-        otto.close()
-        until(lambda: '"session_ended"' in log.read_text(encoding="utf-8"), "otto is gone")
-        server.process.send_signal(signal.SIGHUP)
-        until(lambda: '"reload"' in log.read_text(encoding="utf-8"), "it is reloaded")
-        self.assertEqual(server.stop(), 0)
-        raw = log.read_bytes()
-        self.assertTrue(all(byte == 10 or 32 <= byte < 127 for byte in raw), "nothing that moves a terminal")
-        said = self.lines(log)
-        self.assertEqual([(line["event"], line["subject"], line["result"] == "done") for line in said], [
-            ("start", "", True), ("recording_started", "", True), ("authentication", "", False),
-            ("session_opened", "otto", True), ("session_opened", "adam", True), ("session_opened", "vera", True),
-            ("acquire", "otto", True), ("armed", "otto", True), ("load", "otto", True), ("parameter", "otto", True),
-            ("inject", "otto", True), ("inject", "otto", True), ("bump", "otto", True), ("forbidden", "vera", False),
-            ("forbidden", "vera", False), ("lease_lost", "otto", True), ("take", "adam", True), ("acquire", "adam", True),
-            ("clear", "adam", True), ("release", "adam", True), ("experiment", "adam", True), ("session_ended", "otto", True),
-            ("reload", "", True), ("recording_stopped", "", True), ("stop", "", True)])
-        by_name = {line["event"]: line for line in said}
-        self.assertRegex(by_name["start"]["details"]["configuration_hash"], "^[0-9a-f]{16}$")
-        self.assertEqual(by_name["take"]["details"]["reason"], "test \x1b[31m\n")
-        self.assertRegex(by_name["take"]["details"]["from"], r"^otto \(tcp 127")
-        self.assertEqual(by_name["armed"]["details"]["state"], "run")
-        self.assertEqual(by_name["parameter"]["details"]["name"], "machine.rotor_resistance_ohm")
-        self.assertEqual(said[3]["details"]["client"], "otto\n\x1b[2J{}")
-        self.assertEqual(by_name["load"]["transport"], "tcp")
-        ticks = [line["monotonic_ns"] for line in said]
-        self.assertEqual(ticks, sorted(ticks))
-        for line in said:
-            self.assertRegex(line["time"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")
-
-    def test_sec_07_modbus_writes_stand_there_too(self):
-        """A way in that nobody looks at."""
-        from pymodbus.client import ModbusTcpClient
-        folder = self.folder_with(USERS)
-        server = self.server("--audit", str(folder / "audit"), text=SERVO_TEXT + '\n[modbus]\nport = 0\nallow_writes = true\n')
-        host, port = server.ready["modbus"].rsplit(":", 1)
-        modbus = ModbusTcpClient(host, port=int(port))
-        self.addCleanup(modbus.close)
-        self.assertTrue(modbus.connect())
-        self.assertFalse(modbus.write_register(400, 4242, slave=1).isError())
-        adam = self.client(server)
-        answer = adam.lease()
-        self.assertRegex(answer.refusal.holder, r"^modbus 127\.0\.0\.1:\d+$")
-        self.assertDone(adam.ask(lease=pb.LeaseRequest(action=TAKE, reason="the PLC is mad")))
-        adam.step(adam.newest().tick)
-        self.assertNotEqual(modbus.read_holding_registers(400, 1, slave=1).registers, [4242], "its key holds no more")
-        self.assertEqual(server.stop(), 0)
-        said = [(line["event"], line["transport"]) for line in self.lines(folder / "audit")]
-        self.assertEqual([line for line in said if line[1] == "modbus"], [("acquire", "modbus"), ("lease_lost", "modbus")])
-
-    def test_sec_07_who_is_turned_away_by_modbus_stands_there(self):
-        """A stranger at the door, or at an axis of another, of whom only a counter knows."""
-        from pymodbus.client import ModbusTcpClient
-        folder = self.folder_with(USERS)
-        server = self.server("--audit", str(folder / "audit"),
-                             text=SERVO_TEXT + '\n[modbus]\nport = 0\nallow_writes = true\nmax_connections = 2\n')
-        host, port = server.ready["modbus"].rsplit(":", 1)
-        owner, stranger = (ModbusTcpClient(host, port=int(port)) for _ in range(2))
-        for modbus in (owner, stranger):
-            self.addCleanup(modbus.close)
-            self.assertTrue(modbus.connect())
-        self.assertFalse(owner.write_register(400, 4242, slave=1).isError())
-        self.assertTrue(stranger.write_register(400, 4243, slave=1).isError(), "another has the key")
-        self.assertTrue(stranger.write_registers(402, [1, 0, 0], slave=1).isError(), "and no command is taken")
-        self.assertEqual(at_end(host, port), b"", "the house is full")
-        stranger.close()
-        until(lambda: at_end(host, port, b"\0\0\0\0\0\1\1") == b"", "a frame that cannot be ends its connection")
-        self.assertFalse(owner.read_holding_registers(400, 1, slave=1).isError(), "the owner has noticed nothing")
-        self.assertEqual(server.stop(), 0)
-        said = [line for line in self.lines(folder / "audit") if line["transport"] == "modbus" and line["result"] != "done"]
-        self.assertEqual([(line["event"], line["axis"]) for line in said[:3]],
-                         [("forbidden", "servo"), ("forbidden", "servo"), ("limit", None)])
-        self.assertEqual(said[-1]["event"], "limit")
-        self.assertEqual(len({line["result"] for line in said}), 4, "each with its reason")
-        for line in said:
-            self.assertRegex(line["peer"], r"^127\.0\.0\.1:\d+$")
-
-    def test_sec_07_who_is_turned_away_by_a_can_bus_stands_there(self):
-        """A program that is one too many on the bus, of which nobody hears."""
-        folder = self.folder_with(USERS)
-        server = self.server("--audit", str(folder / "audit"),
-                             text=SERVO_TEXT + '\n[[can]]\nbackend = "slcan"\nchannel = "tcp:127.0.0.1:0"\n')
-        bus = server.ready["can"][0]
-        clients = []
-        for number in range(16):
-            clients.append(socket.create_connection(("127.0.0.1", bus.rsplit(":", 1)[1]), timeout=PATIENCE_S))
-            self.addCleanup(clients[-1].close)
-            clients[-1].sendall(b"V\r")
-            self.assertEqual(clients[-1].recv(100), b"V0101\r", number)
-        self.assertEqual(at_end("127.0.0.1", bus.rsplit(":", 1)[1]), b"")
-        clients[0].sendall(b"V\r")
-        self.assertEqual(clients[0].recv(100), b"V0101\r", "the others have noticed nothing")
-        self.assertEqual(server.stop(), 0)
-        said = [line for line in self.lines(folder / "audit") if line["transport"] == "can"]
-        self.assertEqual([line["event"] for line in said], ["limit"])
-        self.assertIn("as many clients as this bus serves", said[0]["result"])
-        self.assertRegex(said[0]["peer"], "^" + re.escape(bus) + r" 127\.0\.0\.1:\d+$")
-
-    def test_sec_07_a_log_that_cannot_be_written(self):
-        """A bench that drives on unwatched although that was ruled out, or stops although it was not."""
-        for policy in ("continue", "safe"):
-            folder = self.folder_with(USERS)
-            server = self.server(text=SERVO_TEXT + f'[audit]\nfile = "{folder}/audit"\non_failure = "{policy}"\n',
-                                 before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)))
-            owner = self.client(server)
-            owner.lease()
-            owner.step(0, 1.0)
-            for _ in range(20):
-                owner.ask(set_load=pb.SetLoad(load_nm=0.1))
-            answer = owner.exchange(1, 1.0)
-            if policy == "continue":
-                self.assertEqual(answer.WhichOneof("kind"), "exchange_reply")
-            else:
-                self.assertRefused(answer, pb.REFUSAL_NOT_OWNER)
-                self.assertEqual(owner.status().axes[0].sample.owner, 0)
-            self.assertEqual(server.errors().count("the audit log cannot be written"), 1)
-            self.assertLessEqual((folder / "audit").stat().st_size, 2000)
-            self.assertEqual(server.stop(), 0)
-
-    def test_sec_07_a_log_that_cannot_be_had_is_an_error_at_once(self):
-        """A bench that believes it is watched."""
-        with self.assertRaisesRegex(RuntimeError, "not a regular file"):
-            self.server("--audit", "/dev/null")
 
 
 if __name__ == "__main__":
