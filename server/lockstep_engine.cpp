@@ -1,6 +1,7 @@
 #include <utility>
 
 #include "server/engine.hpp"
+#include "server/tick_mark.hpp"
 
 namespace drivebench {
 namespace {
@@ -32,7 +33,10 @@ class LockstepEngine final : public Engine {
     if (!commanded) return;  // without a controller a lockstep bench stands still
     if (recorder_) recorder_->wait_for_room();
     watch_.beat();
-    bench_.step();
+    {
+      const TickMark mark;
+      bench_.step();
+    }
     for (std::size_t i = 0; i < edges_.size(); ++i)
       edges_[i] = edges_of(bench_, i);
     show();

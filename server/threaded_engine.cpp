@@ -18,6 +18,7 @@
 #include "server/mailbox.hpp"
 #include "server/pacer.hpp"
 #include "server/stepped_engine.hpp"
+#include "server/tick_mark.hpp"
 
 namespace drivebench {
 namespace {
@@ -171,12 +172,18 @@ class ThreadedEngine final : public Engine {
   /// One tick, with all that belongs to it.
   void run_tick() noexcept {
     look_at_the_clock();
-    watch_.beat();
-    take_requests();
-    if (watch_.take_abandoned()) abandon();
-    send_parameters();
+    {
+      const TickMark mark;
+      watch_.beat();
+      take_requests();
+      if (watch_.take_abandoned()) abandon();
+      send_parameters();
+    }
     if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
-    bench_.step();
+    {
+      const TickMark mark;
+      bench_.step();
+    }
     if (bench_.tick() % ticks_per_wake_ == 0) notify();
   }
 

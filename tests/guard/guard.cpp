@@ -1,13 +1,17 @@
 // Preloaded: counts what a thread calls that could wait, allocate or enter the kernel, from guard_begin() to
-// guard_end().
+// guard_end(); and ends the program if an engine does so in a tick.
 #include <dlfcn.h>
 #include <pthread.h>
+#include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <initializer_list>
 
 #include "tests/guard/system_allocators.hpp"
 
@@ -17,9 +21,21 @@ namespace {
 __attribute__((tls_model("initial-exec"))) thread_local bool inside = false;
 __attribute__((tls_model("initial-exec"))) thread_local std::uint64_t hits = 0;
 __attribute__((tls_model("initial-exec"))) thread_local const char* first_hit = nullptr;
+__attribute__((tls_model("initial-exec"))) thread_local bool in_tick = false;  // of an engine
+__attribute__((tls_model("initial-exec"))) thread_local bool was_inside = false;
+
+[[noreturn]] void end_program(const char* what) noexcept {
+  for (const char* const piece : {"tick guard: ", what, " in a tick\n"})
+    syscall(SYS_write, STDERR_FILENO, piece, std::strlen(piece));
+  std::abort();
+}
 
 void hit(const char* what) noexcept {
   if (!inside) return;
+  if (in_tick) {
+    in_tick = inside = false;
+    end_program(what);
+  }
   if (hits++ == 0) first_hit = what;
 }
 
@@ -44,6 +60,18 @@ EXPORT std::uint64_t guard_hits() {
 }
 EXPORT const char* guard_first_hit() {
   return first_hit == nullptr ? "nothing" : first_hit;
+}
+
+// For the engines: server/tick_mark.hpp. With DRIVEBENCH_MISDEED a tick does once what it must not.
+EXPORT void drivebench_tick_begins() noexcept {
+  was_inside = inside;
+  inside = in_tick = true;
+  static const bool misdeed = std::getenv("DRIVEBENCH_MISDEED") != nullptr;
+  if (misdeed) free(malloc(1));
+}
+EXPORT void drivebench_tick_ends() noexcept {
+  in_tick = false;
+  inside = was_inside;
 }
 
 EXPORT void* malloc(std::size_t size) noexcept {

@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 import unittest
 
-from wire_client import BENCHES, PATIENCE_S, SERVER, Server
+from wire_client import BENCHES, PATIENCE_S, SERVER, Server, guarded
 from wire_test import until  # noqa: F401
 
 DRIVEBENCH = SERVER.parent / "drivebench"
@@ -19,7 +19,7 @@ OK, FAILED, USAGE, NO_CONNECT, CUT_SHORT, TOO_LATE = 0, 1, 2, 3, 3, 3
 def environment(link=NOBODY):
     """Without what the user of this machine may have set."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")}
-    return {**clean, "DRIVEBENCH_LINK": link}
+    return {**guarded(clean), "DRIVEBENCH_LINK": link}
 
 
 def link_of(server):

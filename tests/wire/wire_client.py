@@ -31,6 +31,12 @@ def _generated():
 pb = _generated()
 
 
+def guarded(environment):
+    """For a program whose ticks may do nothing that could wait, or it ends (tests/guard)."""
+    guard = os.environ.get("DRIVEBENCH_GUARD")
+    return {"LD_PRELOAD": guard, **environment} if guard else environment
+
+
 class Closed(Exception):
     """The server ended the connection."""
 
@@ -53,7 +59,8 @@ class Server:
         if unix:
             command += ["--unix", self.unix_path]
         self.log = open(self.folder / "stderr", "w+", encoding="utf-8")
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True, preexec_fn=before)
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True, preexec_fn=before,
+                                        env=guarded(os.environ))
         line = self.process.stdout.readline()
         if not line:
             self.process.wait()
