@@ -158,7 +158,7 @@ class Unit(WireTest):
 
     def test_os_09_more_than_may_be_locked_is_not_locked(self):
         """MCL_FUTURE under a limit: each allocation beyond it fails, in the middle of a run."""
-        for limit in ("8388608:8388608", "unlimited"):
+        for limit in ("8388608:8388608", "1073741824:1073741824", "unlimited"):
             said, limited = self.run_without("-all", limit)
             if limited:
                 self.assertEqual("memory not locked" in said, limit != "unlimited", said)
