@@ -17,7 +17,7 @@ using asio::ip::tcp;
 
 // After an accept that failed for want of descriptors: a pause instead of a spin.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-// A peer that vanished without a word is noticed after this time when something is on its way to it.
+// A peer that vanished without a word is given up after this time: the kernel asks an idle one every second.
 constexpr int kUserTimeoutMs = 3000;
 
 void tune(tcp::socket& socket) {
