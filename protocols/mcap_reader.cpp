@@ -14,6 +14,9 @@ using mcap::Opcode;
 
 namespace {
 
+/// Of one message; more than any of ours, and less than what overflows an int, in which protobuf counts.
+constexpr std::uint64_t kMaxMessageBytes = std::uint64_t{64} << 20;
+
 std::string name_of(Opcode opcode) {
   static constexpr auto kNames = std::to_array<std::string_view>(
       {"zero", "header", "footer", "schema", "channel", "message", "chunk", "message index", "chunk index",
@@ -163,6 +166,7 @@ bool McapReader::read_channel(const Record& record) {
 
 bool McapReader::read_message(const Record& record, McapMessage& message) {
   if (record.end - record.content < mcap::kMessageHead) return damaged(record, "it is too short");
+  if (record.end - record.content > kMaxMessageBytes) return damaged(record, "it is longer than 64 MiB");
   const std::byte* at = file_.data() + record.content;
   const auto channel = mcap::load<std::uint16_t>(at);
   if (channel >= seen_.size() || !seen_[channel].known) {

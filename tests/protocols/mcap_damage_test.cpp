@@ -164,6 +164,23 @@ TEST(McapReader, BytesBehindTheEndMarkAreNoticed) {
   EXPECT_EQ(contents.problem->kind, Kind::kDamaged);
 }
 
+// Catches: a message whose length overflows the int that protobuf takes, which ends the program.
+TEST(McapReader, REC_09_AMessageMayHave64MiBAndNoMore) {
+  constexpr std::size_t kMost = (std::size_t{64} << 20) - mcap::kMessageHead;
+  for (const std::size_t size : {kMost, kMost + 1}) {
+    Bytes file;
+    McapWriter writer(append_to(file), {.profile = "", .library = ""});
+    writer.add_message({.channel = writer.add_channel("t", 0, "")}, Bytes(size));
+    writer.finish();
+    McapReader reader(file);
+    McapMessage message;
+    EXPECT_EQ(reader.next(message), size == kMost) << size;
+    EXPECT_EQ(reader.problem().has_value(), size != kMost) << size;
+    if (!reader.problem()) continue;
+    EXPECT_TRUE(reader.problem()->what.ends_with("it is longer than 64 MiB")) << reader.problem()->what;
+  }
+}
+
 // Catches: compressed bytes taken for records.
 TEST(McapReader, CompressedChunkIsRefusedByName) {
   mcap::Buffer file;
