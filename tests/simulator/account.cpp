@@ -135,7 +135,7 @@ void AxisAccount::check_owner(const Sample& s) {
   std::erase_if(leaving_, [&](const Leaving& each) {
     return each.deadline >= 0 && static_cast<Tick>(s.tick) >= each.deadline;
   });
-  if (s.owner == before_.owner || before_.owner == 0) return;
+  if (s.owner == before_.owner || before_.owner == 0 || by_force_.erase(s.owner) > 0) return;
   const auto lost = leases_.find(before_.owner);
   if (lost == leases_.end() || lost->second.may_go || !lost->second.is_there()) return;
   require(static_cast<Tick>(s.tick) - lost->second.renewed >= setup_.lease_ticks,
@@ -155,13 +155,29 @@ void AxisAccount::io_done(Owner owner) {
 void AxisAccount::granted(Owner owner, Tick tick, std::function<bool()> is_there) {
   Lease& lease = leases_[owner];
   lease.renewed = std::max(lease.renewed, tick);
-  lease.may_go = false;
+  lease.may_go = forces_ > 0;
+  lease.gave_back = lease.gave_back || forces_ > 0;
   lease.is_there = std::move(is_there);
 }
 
 void AxisAccount::may_go(Owner owner) {
   const auto lease = leases_.find(owner);
   if (lease != leases_.end()) lease->second.may_go = lease->second.gave_back = true;
+}
+
+void AxisAccount::force_begins() {
+  ++forces_;
+  for (auto& [owner, lease] : leases_)
+    lease.may_go = lease.gave_back = true;
+}
+
+void AxisAccount::may_keep(const std::string& transport, Time until) {
+  Time& kept_until = kept_until_[transport];
+  kept_until = std::max(kept_until, until);
+}
+
+void AxisAccount::check_quiet(const std::string& transport, Time awake) {
+  require(awake <= kept_until_[transport], "who has nothing to say any more does not keep an axis");
 }
 
 void AxisAccount::gone(Owner owner, bool asks) {

@@ -9,6 +9,7 @@
 
 #include "server/bench.hpp"
 #include "tests/simulator/history.hpp"
+#include "tests/simulator/schedule.hpp"
 
 namespace drivebench::simulator {
 
@@ -41,6 +42,13 @@ class AxisAccount {
   void gone(Owner owner, bool asks);
   /// Nobody will hear of this owner again.
   void forget(Owner owner) { leases_.erase(owner); }
+  /// An administrator asks for the axis, whoever has it, until `force_ends`.
+  void force_begins();
+  void force_ends() { --forces_; }
+  /// It has the lease, which it has taken by force; in lockstep the sample that shows it is still to come.
+  void came_by_force(Owner owner) {
+    if (before_.owner != owner) by_force_.insert(owner);
+  }
   void command_sent() { ++commands_; }
   /// By an owner, as the answer to this tick.
   void command_sent(Owner owner, Tick answers);
@@ -49,6 +57,11 @@ class AxisAccount {
     require(history_.agrees(sample, in_status), "who is told of a sample is told what it says");
   }
   void command_refused() { ++refusals_told_; }
+  /// Somebody on a transport that tells of no owners has spoken: he may keep the axis until then, in times of
+  /// Scene::awake().
+  void may_keep(const std::string& transport, Time until);
+  /// The axis is owned by somebody on this transport.
+  void check_quiet(const std::string& transport, Time awake);
   /// A request to clear was sent; carried out by that owner at that tick; or will never have an answer.
   void clear_done(Owner owner, Tick tick);
   void clear_unanswered() { ++clears_unknown_; }
@@ -91,6 +104,9 @@ class AxisAccount {
   std::vector<Leaving> leaving_;
   std::vector<Tick> clearings_;  ///< when latched faults were cleared, not yet known to be asked for
   std::set<Tick> clears_done_;   ///< of which no sample tells yet
+  std::set<Owner> by_force_;
+  int forces_ = 0;                          ///< under way
+  std::map<std::string, Time> kept_until_;  ///< by transport, at the latest
   std::uint64_t commands_ = 0;
   std::uint64_t refusals_told_ = 0;
   std::uint64_t clears_unknown_ = 0;

@@ -1,5 +1,6 @@
 #include "tests/simulator/can_drive.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "plant/faults.hpp"
@@ -13,6 +14,9 @@ constexpr std::uint32_t kController = 77;
 constexpr double kStopped = 4.0;
 constexpr double kOperational = 5.0;
 constexpr Time kTurn = 10 * kMillisecond;
+constexpr std::uint64_t kMostLost = 50;
+constexpr Time kHeartbeatLimit = 200 * kMillisecond;  // controller_timeout_ms of draw_bench()
+constexpr Time kIdle = 500 * kMillisecond;            // idle_timeout_ms
 
 }  // namespace
 
@@ -35,6 +39,11 @@ void CanDrive::take_turn() {
   if (scene_.ending) return;
   scene_.schedule.after(kTurn, [this] { take_turn(); });
   const Time now = scene_.schedule.now();
+  if (now < dead_until_) return;
+  if (random_.chance(0.002)) {
+    dead_until_ = now + random_.between(100, 4000) * kMillisecond;
+    return scene_.note("board dies", axis_, static_cast<std::uint64_t>(dead_until_));
+  }
   if (now >= sick_until_) heartbeat(kOperational);
   if (random_.chance(0.003)) sick_until_ = now + random_.between(100, 3000) * kMillisecond;
   if (lease_ == 0 && random_.chance(0.3)) return request(can::Request::kAcquire);
@@ -48,9 +57,10 @@ void CanDrive::disturb() {
   const std::uint64_t what = random_.below(6);
   const Time length = random_.between(1, 100) * kMillisecond;
   scene_.note("bus is disturbed", axis_, what);
+  heartbeats_ = 0;
   switch (what) {
     case 0:
-      return wire_.lose(1 + random_.below(50));
+      return wire_.lose(1 + random_.below(kMostLost));
     case 1:
       wire_.set_full(true);
       return scene_.schedule.after(length, [this] { wire_.set_full(false); });
@@ -89,7 +99,8 @@ void CanDrive::on_frame(const can::Frame& frame) {
     latched_ = (static_cast<std::uint64_t>(field("faults")) & kLatchedFaults) != 0;
   if (found.row->message == can::Message::kHeartbeat && static_cast<unsigned>(field("lease")) != lease_)
     lease_ = 0;
-  if (found.row->message == can::Message::kSync && lease_ != 0 && !scene_.ending && random_.chance(commands_))
+  const bool is_dead = scene_.ending || scene_.schedule.now() < dead_until_;
+  if (found.row->message == can::Message::kSync && lease_ != 0 && !is_dead && random_.chance(commands_))
     command(static_cast<std::uint64_t>(field("tick")));
 }
 
@@ -103,6 +114,7 @@ void CanDrive::on_reply(const can::MessageRow& row, const can::Values& values) {
   if (request == can::Request::kAcquire && done) {
     lease_ = static_cast<std::uint8_t>(field("lease"));
     scene_.require(lease_ != 0, "a lease on the bus has a number");
+    heartbeats_ = 0;
   }
   if (request == can::Request::kRelease && done) lease_ = 0;
   if (request == can::Request::kClearFaults && done) latched_ = false;
@@ -120,6 +132,7 @@ void CanDrive::command(std::uint64_t tick) {
          .a = random_.real(-10.0, 10.0),
          .b = random_.real(-10.0, 10.0)});
     scene_.axes[axis_].command_sent();
+    keep();
     for (const can::Frame& frame : frames)
       if (!random_.chance(0.01)) bus_->send(frame);
   };
@@ -135,12 +148,21 @@ void CanDrive::request(can::Request request) {
                   static_cast<double>(kController)});
 }
 
+/// Whose heartbeats the bench has heard, loses the lease soon after the last of them.
+void CanDrive::keep() {
+  const bool is_monitored = heartbeats_ > kMostLost;
+  const Time keeps = is_monitored ? kHeartbeatLimit : std::max(scene_.lease(), kIdle);
+  scene_.axes[axis_].may_keep("can", scene_.awake() + keeps + Scene::kSlack);
+}
+
 void CanDrive::heartbeat(double state) {
+  ++heartbeats_;
   send(can::Message::kControllerHeartbeat, std::array{state});
 }
 
 void CanDrive::send(can::Message message, std::span<const double> values) {
   scene_.note("board sends", axis_, static_cast<std::uint64_t>(message));
+  keep();
   bus_->send(can::encode(*can::find_message(message, profile_.fd, wide_), profile_, node_, values));
 }
 

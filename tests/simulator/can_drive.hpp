@@ -26,6 +26,7 @@ class CanDrive final : public Player {
   void on_reply(const can::MessageRow& row, const can::Values& values);
   void command(std::uint64_t tick);
   void request(can::Request request);
+  void keep();
   void heartbeat(double state);
   void send(can::Message message, std::span<const double> values);
 
@@ -37,8 +38,10 @@ class CanDrive final : public Player {
   std::uint32_t axis_;
   std::uint32_t node_;
   bool wide_;
-  double commands_ = 0.0;  ///< share of the ticks that it answers
-  Time sick_until_ = 0;    ///< no heartbeat
+  double commands_ = 0.0;         ///< share of the ticks that it answers
+  Time sick_until_ = 0;           ///< no heartbeat
+  std::uint64_t heartbeats_ = 0;  ///< since it got the lease, or the bus was disturbed
+  Time dead_until_ = 0;           ///< sends nothing at all
   std::uint8_t lease_ = 0;
   bool latched_ = false;
   bool answered_ = false;  ///< since it began to finish

@@ -64,6 +64,8 @@ Manners fighter() {
           .turn = 5 * kMillisecond,
           .takes = 0.5,
           .gives = 0.1,
+          .forces = 0.01,
+          .steals = 0.1,
           .clears = 0.2,
           .changes = 0.2,
           .wild = 0.1,

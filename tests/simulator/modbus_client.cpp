@@ -1,5 +1,6 @@
 #include "tests/simulator/modbus_client.hpp"
 
+#include <algorithm>
 #include <bit>
 
 namespace drivebench::simulator {
@@ -9,6 +10,8 @@ constexpr std::size_t kMbapSize = 7;
 constexpr std::size_t kLeaseKey = 400;
 constexpr std::size_t kRequest = 401;
 constexpr std::size_t kCommandMode = 402;
+constexpr Time kLookedAfter = 500 * kMillisecond;  // frame_timeout_ms
+constexpr Time kIdle = 500 * kMillisecond;         // idle_timeout_ms of draw_bench()
 constexpr std::uint16_t kClear = 1;
 constexpr std::uint16_t kRelease = 2;
 
@@ -29,6 +32,13 @@ ModbusClient::ModbusClient(Scene& scene, std::uint64_t number, std::function<int
 void ModbusClient::take_turn() {
   if (scene_.ending) return;
   scene_.schedule.after(random_.between(1, 12) * kMillisecond, [this] { take_turn(); });
+  const bool is_quiet = scene_.schedule.now() < quiet_until_;
+  // A client that waits for its tick is looked after twice a second, and its key keeps the lease.
+  if (!is_quiet || may_be_heard()) {
+    const Time keeps = kLookedAfter + std::max(scene_.lease(), kIdle) + Scene::kSlack;
+    scene_.axes[axis_].may_keep("modbus", scene_.awake() + keeps);
+  }
+  if (is_quiet) return;
   if (wire_ && wire_->is_open()) return act();
   scene_.note("modbus connects", number_);
   ++connection_;
@@ -42,7 +52,18 @@ void ModbusClient::take_turn() {
   read();
 }
 
+/// Although it says nothing: something is on its way, or waits for a tick that others delay.
+bool ModbusClient::may_be_heard() const {
+  const bool lockstep = scene_.engine->config().mode == RunMode::kLockstep;
+  return wire_ && wire_->is_open() && (wire_->has_under_way() || (lockstep && !asked_.empty()));
+}
+
 void ModbusClient::act() {
+  if (random_.chance(0.003)) {
+    quiet_until_ = scene_.schedule.now() + random_.between(100, 5000) * kMillisecond;
+    scene_.note("modbus falls silent", number_, static_cast<std::uint64_t>(quiet_until_));
+    return random_.chance(0.5) ? leave() : void();
+  }
   if (asked_.size() > 8) return;
   const std::uint64_t what = random_.below(1000);
   if (what < 5) return leave();
@@ -127,7 +148,7 @@ void ModbusClient::on_bytes(std::span<const std::byte> bytes) {
 void ModbusClient::finish() {
   if (!wire_ || !wire_->is_open()) return;
   wire_->heal();
-  if (!raw_) write(kRequest, {kRelease});
+  if (!raw_ && random_.chance(0.5)) write(kRequest, {kRelease});
 }
 
 void ModbusClient::check_end() {

@@ -27,6 +27,7 @@ class ModbusClient final : public Player {
 
   void take_turn();
   void act();
+  bool may_be_heard() const;
   void read();
   void on_bytes(std::span<const std::byte> bytes);
   void ask(std::uint8_t function, std::initializer_list<std::size_t> words, const Words& data = {});
@@ -44,6 +45,7 @@ class ModbusClient final : public Player {
   std::deque<std::uint16_t> asked_;  ///< transactions without an answer, in order
   std::vector<std::uint8_t> received_;
   bool raw_ = false;
+  Time quiet_until_ = 0;  ///< says nothing
 };
 
 }  // namespace drivebench::simulator

@@ -36,7 +36,17 @@ struct Scene {
   Engine* engine = nullptr;
   std::string unix_path;
   std::vector<AxisAccount> axes;
+  /// Time in which neither the host nor the I/O stood still; a stall counts from its beginning.
+  Time awake() const { return schedule.now() - stalled; }
+  Time lease() const {
+    const BenchSetup& setup = engine->config().setup;
+    return setup.lease_ticks * setup.period_ns;
+  }
+  /// For stalls that end in the middle of something.
+  static constexpr Time kSlack = 400 * kMillisecond;
+
   Time stalled_until = 0;                  ///< the last time that the host stood still, or the I/O did
+  Time stalled = 0;                        ///< for so long all in all
   std::function<std::size_t()> connected;  ///< stream clients that the server has not left
   bool ending = false;                     ///< everybody finishes what is under way
   Failure failure;

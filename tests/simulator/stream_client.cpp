@@ -36,6 +36,8 @@ void StreamClient::forget() {
   samples_.assign(axis_count(), {});
   for (const auto& [id, asked] : asked_) {
     if (asked.kind == v1::Envelope::kClearFaults) scene_.axes[asked.axis].clear_unanswered();
+    if (asked.action == v1::LeaseRequest::ACTION_TAKE)
+      scene_.schedule.after(kSecond, [&axis = scene_.axes[asked.axis]] { axis.force_ends(); });
   }
   asked_.clear();
 }
@@ -78,6 +80,8 @@ void StreamClient::nag() {
   const std::uint32_t axis = some_axis();
   if (random_.chance(manners_.takes)) lease(axis, v1::LeaseRequest::ACTION_ACQUIRE);
   if (random_.chance(manners_.gives)) lease(axis, v1::LeaseRequest::ACTION_RELEASE);
+  if (random_.chance(manners_.forces)) lease(axis, v1::LeaseRequest::ACTION_TAKE);
+  if (random_.chance(manners_.steals) && !asks_for_lease(axis)) command(axis);
   if (random_.chance(manners_.clears)) clear(axis);
   if (random_.chance(manners_.changes)) change(axis);
   if (random_.chance(manners_.asks)) ask_something(axis);
@@ -149,8 +153,9 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
   scene_.note("hears", number_, static_cast<std::uint64_t>(answer_.kind_case()), answer_.id());
   if (answer_.kind_case() == v1::Envelope::kSamples) return on_samples(answer_.samples());
   if (answer_.id() == 0) {
-    return scene_.require(answer_.kind_case() == v1::Envelope::kRefusal,
-                          "unasked come samples and refusals only");
+    return scene_.require(
+        answer_.kind_case() == v1::Envelope::kRefusal || answer_.kind_case() == v1::Envelope::kNotice,
+        "unasked come samples, refusals and notices only");
   }
   const auto found = asked_.find(answer_.id());
   if (raw_ && found == asked_.end()) return;
@@ -158,6 +163,7 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
   if (found == asked_.end()) return;
   const Asked asked = found->second;
   asked_.erase(found);
+  if (asked.action == v1::LeaseRequest::ACTION_TAKE) scene_.axes[asked.axis].force_ends();
   switch (answer_.kind_case()) {
     case v1::Envelope::kWelcome:
       greeted_ = true;
@@ -208,6 +214,7 @@ void StreamClient::on_done(const Asked& asked, const v1::Done& done) {
     if (manners_.controls) control_later();
   } else if (asked.kind == v1::Envelope::kLease) {
     owner_ = done.owner();
+    if (asked.action == v1::LeaseRequest::ACTION_TAKE) account.came_by_force(owner_);
     leased_[asked.axis] = asked.action != v1::LeaseRequest::ACTION_RELEASE;
     if (!leased_[asked.axis]) return;
     account.granted(owner_, tick, [wire = std::weak_ptr(wire_)] {
@@ -231,7 +238,9 @@ void StreamClient::on_refusal(const Asked& asked, const v1::Refusal& refusal) {
   if (refusal.code() == v1::REFUSAL_LATCHED) latched_[asked.axis] = true;
   const bool counted = refusal.code() == v1::REFUSAL_NOT_OWNER || refusal.code() == v1::REFUSAL_LATCHED ||
                        refusal.code() == v1::REFUSAL_STALE || refusal.code() == v1::REFUSAL_NOT_FINITE;
-  if (asked.counts && counted) scene_.axes[asked.axis].command_refused();
+  // An exchange that waited was good when it came.
+  const bool robbed = refusal.message().find("was taken by") != std::string::npos;
+  if (asked.counts && counted && !robbed) scene_.axes[asked.axis].command_refused();
   if (asked.kind == v1::Envelope::kExchange && manners_.controls) {
     v1::Envelope request;
     request.mutable_exchange();  // what is the newest tick?

@@ -25,6 +25,8 @@ struct Manners {
   bool controls = false;  ///< wants an axis and commands it
   double takes = 0.0;     ///< asks for some axis
   double gives = 0.0;     ///< releases what it has
+  double forces = 0.0;    ///< takes some axis, whoever has it
+  double steals = 0.0;    ///< commands some axis, whoever has it
   double clears = 0.0;
   double changes = 0.0;  ///< load, parameter, fault, blow
   double asks = 0.0;     ///< status, parameters, newest samples

@@ -88,6 +88,10 @@ void StreamClient::lease(std::uint32_t axis, v1::LeaseRequest::Action action) {
   request.mutable_lease()->set_axis(axis);
   request.mutable_lease()->set_action(action);
   if (action == v1::LeaseRequest::ACTION_RELEASE) scene_.axes[axis].may_go(owner_);
+  if (action == v1::LeaseRequest::ACTION_TAKE) {
+    request.mutable_lease()->set_reason("it was my turn");
+    scene_.axes[axis].force_begins();
+  }
   // An exchange that waits for a tick of this axis is then refused without being counted.
   if (action == v1::LeaseRequest::ACTION_RELEASE) {
     for (auto& [id, asked] : asked_)

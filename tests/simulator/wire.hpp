@@ -33,6 +33,8 @@ class Wire : public std::enable_shared_from_this<Wire> {
   /// Whether the server's end is still there, whatever of its words has not arrived.
   bool is_connected() const;
   void send(std::string bytes);
+  /// Whether something sent has not arrived yet.
+  bool has_under_way() const noexcept { return !under_way_.empty(); }
   /// What has arrived, at most `most` bytes; closes the wire when the server has.
   std::span<const std::byte> receive(std::size_t most);
   /// Nothing passes in either direction until then.

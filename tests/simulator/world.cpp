@@ -155,7 +155,8 @@ void World::disturb() {
     scene_.note("host stalls", whom, static_cast<std::uint64_t>(length));
     if (whom != 1) host_free_at_ = now + length;
     if (whom != 0) io_free_at_ = now + length;
-    scene_.stalled_until = now + length;
+    scene_.stalled += std::max<Time>(now + length - std::max(now, scene_.stalled_until), 0);
+    scene_.stalled_until = std::max(scene_.stalled_until, now + length);
     if (whom != 0) scene_.schedule.at(io_free_at_, [] {});
   }
   scene_.schedule.after(scene_.random.between(50, 2000) * kMillisecond, [this] { disturb(); });
@@ -188,6 +189,11 @@ void World::poll() {
 /// The I/O gets its turns also when nobody outside does anything, and a last one at the end of a stretch.
 void World::pulse() {
   scene_.schedule.after(kClockStep, [this] { pulse(); });
+  for (std::uint32_t axis = 0; axis < scene_.axes.size() && !scene_.ending; ++axis) {
+    const Client* const owner = engine_->client(engine_->owner(axis));
+    if (owner == nullptr || (owner->transport != "can" && owner->transport != "modbus")) continue;
+    scene_.axes[axis].check_quiet(owner->transport, scene_.awake());
+  }
 }
 
 void World::play_until(Time end) {
@@ -229,8 +235,7 @@ void World::finish() {
   for (const auto& player : players_)
     player->leave();
   // A Modbus client that is gone keeps its lease for its key.
-  const Time lease = config_.setup.lease_ticks * config_.setup.period_ns;
-  play_until(scene_.schedule.now() + 100 * kMillisecond + (modbus_ ? std::max(lease, kSecond) : 0));
+  play_until(scene_.schedule.now() + 100 * kMillisecond + (modbus_ ? kSecond + scene_.lease() : 0));
   if (!scene_.failure.promise.empty()) return;
   for (std::size_t axis = 0; axis < scene_.axes.size(); ++axis) {
     Sample last = engine_->newest(axis);
