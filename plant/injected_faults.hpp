@@ -38,6 +38,9 @@ struct InjectedFaults {
   double command_loss = 0.0;
   double command_delay = 0.0;
   double command_corruption = 0.0;
+  double encoder_extra_pulses = 0.0;
+  double current_sensor_noise = 0.0;
+  double command_duplication = 0.0;
 };
 
 inline constexpr InjectedFaults kNoFaults{};
@@ -53,6 +56,7 @@ struct InjectableFault {
   std::string_view meaning;
 };
 
+// New rows stand at the end: their numbers are bits on the wires.
 inline constexpr auto kInjectableFaults = std::to_array<InjectableFault>({
     {"open_phase", "phase", 3, true, false, &InjectedFaults::open_phase,
      "the wire of phase 1 (a), 2 (b) or 3 (c) breaks; its current dies in an arc at the link voltage"},
@@ -109,6 +113,12 @@ inline constexpr auto kInjectableFaults = std::to_array<InjectableFault>({
      "commands reach the drive so many ticks later"},
     {"command_corruption", "1", 1, false, false, &InjectedFaults::command_corruption,
      "probability that a command of a tick is replaced by noise of the drive's full scale"},
+    {"encoder_extra_pulses", "counts", 1e6, true, false, &InjectedFaults::encoder_extra_pulses,
+     "of every so many counts one comes twice"},
+    {"current_sensor_noise", "A", 1e6, false, false, &InjectedFaults::current_sensor_noise,
+     "added to the rms of the noise of every measured phase current"},
+    {"command_duplication", "1", 16, true, false, &InjectedFaults::command_duplication,
+     "each command comes so many times more: copies are refused and counted, and feed no watchdog"},
 });
 
 inline constexpr std::size_t kInjectableFaultCount = kInjectableFaults.size();

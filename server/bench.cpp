@@ -312,6 +312,14 @@ void Bench::take_command(Control& c) noexcept {
   if (setup_.command_delay_ticks == 0 && c.state == ControlState::kRun) c.in_force = c.newest;
 }
 
+/// Copies that the link makes of a command answer what has been answered.
+void Bench::refuse_copies(AxisRuntime& a) noexcept {
+  const double copies = a.axis.injected().command_duplication;
+  if (copies == 0.0) return;
+  a.control.refused += static_cast<std::uint64_t>(copies);
+  count_bad_command(a.control, false);
+}
+
 void Bench::miss_command(AxisRuntime& a) noexcept {
   Control& c = a.control;
   ++c.silent_ticks;
@@ -334,6 +342,7 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
   if (a.axis.injected().command_loss != 0.0) c.fresh = 0;  // taken on the wire, lost on the way to the drive
   if (c.fresh != 0) {
     take_command(c);
+    refuse_copies(a);
   } else if (late_now_ == 0 && expects_commands(c.state)) {
     miss_command(a);
   }

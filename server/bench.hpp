@@ -174,6 +174,7 @@ class Bench {
   void forget_scheduled(std::size_t axis, Owner owner) noexcept;
   PhaseCommand supervise(std::size_t axis) noexcept;
   void take_command(Control& c) noexcept;
+  static void refuse_copies(AxisRuntime& a) noexcept;
   void miss_command(AxisRuntime& a) noexcept;
   PhaseCommand drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept;
   void take_sample(std::size_t index) noexcept;

@@ -138,6 +138,7 @@ AngleSegment Encoder::View::seen(const AngleSegment& segment) const noexcept {
 
 std::int64_t Encoder::View::shown(std::int64_t count) const noexcept {
   if (lost_of > 0) count -= floor_divide(count, lost_of);
+  if (extra_of > 0) count += floor_divide(count, extra_of);
   if (swapped) count = -count;
   // The lines of counts 0, 1, 2, 3 are A = 0110, B = 0011. Without A the decoder sees 0, 0, 3, 3, without B
   // 0, 1, 1, 0.
@@ -156,6 +157,7 @@ Encoder::View Encoder::view_of(const InjectedFaults& faults) const noexcept {
   return {.swapped = p_.swapped != (faults.encoder_swapped != 0.0),
           .lost_line = static_cast<std::int64_t>(faults.encoder_lost_line),
           .lost_of = static_cast<std::int64_t>(faults.encoder_lost_pulses),
+          .extra_of = static_cast<std::int64_t>(faults.encoder_extra_pulses),
           .eccentricity_rad = faults.encoder_eccentricity,
           .has_index = faults.encoder_index_missing == 0.0};
 }
@@ -192,9 +194,9 @@ void Encoder::search(const AnyView& view, Newest& newest, std::int64_t base, std
   const int direction = end > first ? 1 : -1;
   if (!view.is_still()) {
     for (std::int64_t count = end; count != first && !newest.complete(); count -= direction) {
-      const std::int64_t step = view.shown(base + count) - view.shown(base + count - direction);
-      if (step == 0) continue;
-      newest.add(time_of_boundary(static_cast<double>(direction > 0 ? count : count + 1)), step);
+      std::int64_t steps = view.shown(base + count) - view.shown(base + count - direction);
+      for (const int step = steps > 0 ? 1 : -1; steps != 0 && !newest.complete(); steps -= step)
+        newest.add(time_of_boundary(static_cast<double>(direction > 0 ? count : count + 1)), step);
     }
   }
   // The index line rises where the count becomes a multiple of N: from below, or from the count above it.
@@ -275,7 +277,8 @@ void Encoder::follow(EncoderState& state, std::span<const AngleSegment> segments
                      std::int64_t turn, const InjectedFaults& faults) const noexcept {
   if (segments.empty()) return;
   const double size = faults.encoder_swapped + faults.encoder_lost_line + faults.encoder_lost_pulses +
-                      faults.encoder_index_missing + faults.encoder_eccentricity;
+                      faults.encoder_extra_pulses + faults.encoder_index_missing +
+                      faults.encoder_eccentricity;
   if (size == 0.0 && !p_.swapped) {
     follow_with(SoundView{}, state, segments, tick, turn);
   } else {

@@ -66,9 +66,10 @@ enum EncoderLevel : std::uint32_t {
 /// each edge counts the other way. A lost line stays low, so that the count goes to and fro between two
 /// neighbours; if A and B do not fit to that when the fault comes, the lines fall in at the start of the
 /// tick, one edge after the other. Of lost pulses only every n-th count has no edge, in both directions of
-/// rotation alike. Eccentricity adds its amplitude times sin(theta) to the angle; the edges by which the
-/// count jumps where it comes or goes fall on the start of the tick. A fault that ends leaves the count where
-/// it is, except that eccentricity takes its error with it. Z stays with the disc.
+/// rotation alike; of extra pulses every n-th has two, at one instant. Eccentricity adds its amplitude times
+/// sin(theta) to the angle; the edges by which the count jumps where it comes or goes fall on the start of
+/// the tick. A fault that ends leaves the count where it is, except that eccentricity takes its error with
+/// it. Z stays with the disc.
 class Encoder {
  public:
   Encoder(const EncoderParameters& p, double period_s) noexcept;
@@ -123,12 +124,13 @@ class Encoder {
     bool swapped;
     std::int64_t lost_line;  ///< 1: A, 2: B
     std::int64_t lost_of;    ///< of every so many counts one is lost; 0: none
+    std::int64_t extra_of;   ///< of every so many counts that are left one comes twice; 0: none
     double eccentricity_rad;
     bool has_index;
 
     /// The segment as the disc sees it.
     AngleSegment seen(const AngleSegment& segment) const noexcept;
-    /// What a decoder makes of the count of a sound encoder, but for a constant. Steps by one at most.
+    /// What a decoder makes of the count of a sound encoder, but for a constant. Steps by two at most.
     std::int64_t shown(std::int64_t count) const noexcept;
     /// No count has an edge.
     bool is_still() const noexcept { return lost_of == 1; }
@@ -175,8 +177,9 @@ void Encoder::for_each_edge(std::span<const AngleSegment> segments, std::int64_t
   const auto go_to = [&](std::int64_t last, const auto& time_of_boundary) {
     const int direction = last >= count ? 1 : -1;
     for (; count != last; count += direction) {
-      const std::int64_t step = view.shown(count + direction) - view.shown(count);
-      if (step != 0) step_shown(step, time_of_boundary(direction > 0 ? count + 1 : count));
+      std::int64_t steps = view.shown(count + direction) - view.shown(count);
+      for (const int step = steps > 0 ? 1 : -1; steps != 0; steps -= step)
+        step_shown(step, time_of_boundary(direction > 0 ? count + 1 : count));
     }
   };
   const std::int64_t base = turn * p_.counts_per_revolution;

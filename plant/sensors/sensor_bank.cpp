@@ -256,39 +256,44 @@ void SensorBank::end_tick(SensorMemory& m, const Measurable& now, Tick tick) con
   m.meter.sums = {};
 }
 
-AnalogReading SensorBank::read(const SensorMemory& m, Channel c, double gain, double offset,
+AnalogReading SensorBank::read(const SensorMemory& m, Channel c, const Errors& errors,
                                Tick tick) const noexcept {
   const std::size_t n = at(c);
   const AnalogParameters& p = channels_[n];
   const Tick sampled = m.tick - static_cast<Tick>(p.delay_ticks);
   const double x = p.delay_ticks == 0.5 ? m.half_tick[n] : m.history[slot_of(sampled)][n];
   double noise = 0.0;
-  if (p.noise_rms > 0.0) noise = gaussian_noise(seed_, noise_channel_ + n, static_cast<std::uint64_t>(tick));
-  return converted(gain * x + offset + p.noise_rms * noise, p.bits, p.full_scale);
+  if (errors.noise_rms > 0.0) {
+    noise = gaussian_noise(seed_, noise_channel_ + n, static_cast<std::uint64_t>(tick));
+  }
+  return converted(errors.gain * x + errors.offset + errors.noise_rms * noise, p.bits, p.full_scale);
 }
 
 SensorReadings SensorBank::readings(const SensorMemory& m, const InjectedFaults& faults,
                                     Tick tick) const noexcept {
   SensorReadings r;
-  const auto current = [&](Channel c, double phase, double offset_a) {
+  const auto current = [&](Channel c, double phase) {
     const AnalogParameters& p = channels_[at(c)];
     if (!p.enabled || faults.current_sensor_stuck == phase) return 0.0;
-    const AnalogReading reading =
-        read(m, c, p.gain * (1.0 + faults.current_sensor_gain), p.offset + offset_a, tick);
+    const bool is_phase = c != Channel::kCurrentField;
+    const Errors errors{.gain = p.gain * (1.0 + faults.current_sensor_gain),
+                        .offset = p.offset + (is_phase ? faults.current_sensor_offset : 0.0),
+                        .noise_rms = p.noise_rms + (is_phase ? faults.current_sensor_noise : 0.0)};
+    const AnalogReading reading = read(m, c, errors, tick);
     r.saturated = r.saturated || reading.saturated;
     return reading.value;
   };
   const auto other = [&](Channel c, bool lost = false) {
     const AnalogParameters& p = channels_[at(c)];
     if (!p.enabled) return 0.0;
-    const AnalogReading reading = read(m, c, lost ? 0.0 : p.gain, p.offset, tick);
+    const AnalogReading reading = read(m, c, {lost ? 0.0 : p.gain, p.offset, p.noise_rms}, tick);
     r.other_saturated = r.other_saturated || reading.saturated;
     return reading.value;
   };
-  r.current_a = {.a = current(Channel::kCurrentA, 1.0, faults.current_sensor_offset),
-                 .b = current(Channel::kCurrentB, 2.0, faults.current_sensor_offset),
-                 .c = current(Channel::kCurrentC, 3.0, faults.current_sensor_offset),
-                 .field = current(Channel::kCurrentField, 4.0, 0.0)};
+  r.current_a = {.a = current(Channel::kCurrentA, 1.0),
+                 .b = current(Channel::kCurrentB, 2.0),
+                 .c = current(Channel::kCurrentC, 3.0),
+                 .field = current(Channel::kCurrentField, 4.0)};
   const AnalogValues& now = m.history[slot_of(m.tick)];
   if (p_.voltage.enabled) {
     r.voltage_v = {.a = other(Channel::kVoltageA),

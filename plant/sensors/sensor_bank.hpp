@@ -122,7 +122,12 @@ class SensorBank {
   void filter_shaft(SensorMemory& m, double start_s, FilterSteps& steps, const Measurable& from,
                     const Measurable& to) const noexcept;
   void keep_middle(SensorMemory& m, const Measurable& middle) const noexcept;
-  AnalogReading read(const SensorMemory& m, Channel c, double gain, double offset, Tick tick) const noexcept;
+  struct Errors {
+    double gain;
+    double offset;
+    double noise_rms;
+  };
+  AnalogReading read(const SensorMemory& m, Channel c, const Errors& errors, Tick tick) const noexcept;
 
   SensorParameters p_;
   Connection connection_;

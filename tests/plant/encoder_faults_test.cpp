@@ -103,7 +103,8 @@ TEST(EncoderFaults, TheListOfEdgesAddsUpToTheCountWhateverIsInjected) {
                         .encoder_lost_line = one_of(3) == 0 ? 1.0 + one_of(2) : 0.0,
                         .encoder_lost_pulses = one_of(3) == 0 ? 1.0 + one_of(7) : 0.0,
                         .encoder_index_missing = one_of(3) == 0 ? 1.0 : 0.0,
-                        .encoder_eccentricity = one_of(3) == 0 ? 0.1 * std::abs(draw(1.0)) : 0.0};
+                        .encoder_eccentricity = one_of(3) == 0 ? 0.1 * std::abs(draw(1.0)) : 0.0,
+                        .encoder_extra_pulses = one_of(3) == 0 ? 1.0 + one_of(7) : 0.0};
       }
       const double acceleration = draw(n % 3 == 0 ? 1e7 : 1e5);
       shaft.move(speed_rad_s, acceleration);
@@ -249,6 +250,28 @@ TEST(EncoderFaults, OfLostPulsesEveryNthCountIsMissing) {
       shaft.move_counts(-7.0);
       const double lost = std::floor(7.0 * n / every);
       ASSERT_EQ(shaft.state.count, static_cast<std::int64_t>(7.0 * n - lost)) << n;
+      ASSERT_EQ(shaft.z(), 7 * n % kCounts == 0) << n;
+    }
+  }
+}
+
+// Kills: an extra count that has no edge of its own, that depends on the ticks, or that is kept on the way
+// back.
+TEST(EncoderFaults, OfExtraPulsesEveryNthCountComesTwice) {
+  for (const int every : {1, 5, 100}) {
+    Shaft shaft(0.5 * kQuantum_rad);
+    shaft.faults.encoder_extra_pulses = every;
+    for (int n = 1; n <= 300; ++n) {
+      shaft.move_counts(7.0);
+      ASSERT_EQ(shaft.state.count, 7 * n + 7 * n / every);
+      ASSERT_EQ(shaft.edges.size(), 7u + static_cast<std::size_t>(7 * n / every - 7 * (n - 1) / every));
+      expect_list_and_state_agree(shaft);
+    }
+    EXPECT_EQ(shaft.state.index_count, 2000 + 2000 / every);
+    for (int n = 299; n >= -300; --n) {
+      shaft.move_counts(-7.0);
+      const double extra = std::floor(7.0 * n / every);
+      ASSERT_EQ(shaft.state.count, static_cast<std::int64_t>(7.0 * n + extra)) << n;
       ASSERT_EQ(shaft.z(), 7 * n % kCounts == 0) << n;
     }
   }

@@ -189,6 +189,23 @@ TEST(SensorBank, FaultsOfTheCurrentSensors) {
   }
 }
 
+// Kills: a burst that replaces the noise of the sensor, that reaches the field current, or that stays.
+TEST(SensorBank, ANoiseBurstAddsToTheNoiseOfThePhases) {
+  SensorParameters p;
+  p.current.noise_rms_a = 0.5;
+  const SensorBank bank = bank_of(p);
+  SensorMemory m;
+  bank.end_tick(m, kPoint, 1);
+  const SensorReadings before = bank.readings(m, {}, 1);
+  const SensorReadings r = bank.readings(m, {.current_sensor_noise = 2.0}, 1);
+  const auto noise = [](std::uint64_t channel) { return gaussian_noise(kSeed, kNoiseChannel + channel, 1); };
+  EXPECT_DOUBLE_EQ(r.current_a.a, kPoint.current_a.a + 2.5 * noise(0));
+  EXPECT_DOUBLE_EQ(r.current_a.b, kPoint.current_a.b + 2.5 * noise(1));
+  EXPECT_DOUBLE_EQ(r.current_a.c, kPoint.current_a.c + 2.5 * noise(2));
+  EXPECT_EQ(r.current_a.field, before.current_a.field);
+  EXPECT_EQ(bank.readings(m, {}, 1).current_a.a, before.current_a.a);
+}
+
 // Kills: an open winding that takes the other one along or its offset with it.
 TEST(SensorBank, FaultsOfTachometerAndResolver) {
   SensorParameters p = all_on();

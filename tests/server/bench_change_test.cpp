@@ -233,6 +233,40 @@ TEST(BenchFault, CMD_02_CommandLossKeepsCommandsFromTheDriveAndTheWatchdogSeesIt
   EXPECT_EQ(bench.sample(0).u_a_v, 9.0);
 }
 
+// Kills: a copy that feeds the watchdog, that reaches the drive after a newer command, or that nobody counts;
+// an axis that is armed by a link which says everything twice.
+TEST(BenchFault, CMD_06_CopiesThatTheLinkMakesAreRefusedAndCounted) {
+  BenchSetup setup = servo_setup();
+  setup.watchdog_ticks = 3;
+  Bench bench = owned_bench(setup, kOwner);
+  submit(bench, fault_of("command_duplication", 2.0));
+  for (std::uint64_t i = 1; i <= 5; ++i) {
+    ASSERT_EQ(submit_volts(bench, kOwner, static_cast<double>(i)), Refused::kNot);
+    bench.step();
+    EXPECT_EQ(bench.sample(0).u_a_v, static_cast<double>(i));
+    EXPECT_EQ(bench.sample(0).refused_commands, 2 * i);
+    EXPECT_NE(bench.sample(0).injected, 0u);
+  }
+  step(bench, 3);
+  EXPECT_EQ(bench.sample(0).faults, kCommandTimeout);
+  EXPECT_EQ(bench.sample(0).refused_commands, 10u);
+
+  setup.arming_commands = 2;
+  Bench arming = owned_bench(setup, kOwner);
+  submit(arming, fault_of("command_duplication", 1.0));
+  for (int i = 0; i < 5; ++i) {
+    submit_volts(arming, kOwner, 5.0);
+    arming.step();
+    EXPECT_EQ(state_of(arming), ControlState::kReady);
+  }
+  submit(arming, fault_of("command_duplication", 0.0));
+  for (int i = 0; i < 2; ++i) {
+    submit_volts(arming, kOwner, 5.0);
+    arming.step();
+  }
+  EXPECT_EQ(state_of(arming), ControlState::kRun);
+}
+
 // ---- setpoints ----
 
 BenchSetup current_setup() {
