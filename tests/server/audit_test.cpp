@@ -203,9 +203,11 @@ TEST_F(AuditTest, SEC_07_RefusalsAreBoundedAndCounted) {
   EXPECT_GE(said.size(), 100u);
   EXPECT_LE(said.size(), 400u) << "100 at once and 10 a second: the test would have taken half a minute";
   act(anna, LeaseAction::kAcquire);
-  const json last = lines().back();
-  EXPECT_EQ(last["event"], "acquire");
-  EXPECT_EQ(last["details"].value("left_out_before", std::size_t{0}), 5000 - said.size());
+  EXPECT_EQ(lines().back()["event"], "acquire");
+  std::size_t left_out = 0;  // also before those that came in time on a slow machine
+  for (const json& line : lines())
+    left_out += line.value("details", json::object()).value("left_out_before", std::size_t{0});
+  EXPECT_EQ(left_out, 5000 - said.size());
 }
 
 // Catches: a bench that is driven on with nobody writing down who does it, although that was asked for.

@@ -55,6 +55,23 @@ TEST(ConfigModbus, TheSectionAloneTurnsItOn) {
   expect_equal(parse(with_modbus("")).modbus, modbus);
 }
 
+// Catches: a server that starts without what it needs for TLS, or with a key that everybody can read.
+TEST(ConfigTls, EachRuleIsKept) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"certificate = \"c.pem\"\n", "tls.key is missing"},
+      {"key = \"/nonexistent-folder/key.pem\"\n", "tls.certificate is missing"},
+      {"certificate = \"c.pem\"\nkey = \"/nonexistent-folder/key.pem\"\n",
+       "tls.key names /nonexistent-folder/key.pem, which cannot be used: No such file or directory"},
+      {"certificate = \"c.pem\"\nkey = \"/etc/passwd\"\n",
+       "tls.key names /etc/passwd, which others may read: chmod 600 it"},
+      {"client_crl = \"crl.pem\"\n", "tls.client_crl cannot stand without client_ca"},
+  };
+  for (const auto& [lines, said] : cases) {
+    const std::string found = problems_of(kBench + "[tls]\n" + lines);
+    EXPECT_NE(found.find(said), std::string::npos) << lines << "  gave: " << found;
+  }
+}
+
 /// A configuration in which no value of a bus or of Modbus is the default.
 BenchConfig busy_bench() {
   BenchConfig config = parse(kBench);
