@@ -26,7 +26,7 @@ class Audience {
   void remove_subscriber(const Session& session);
   /// Until the next on_newest().
   void add_waiting(Session& session);
-  /// When the session is over.
+  /// Whatever it was.
   void remove(const Session& session);
   /// Samples from now on, kept as long as somebody holds them.
   std::shared_ptr<const SampleFeed> feed(std::uint32_t axis, std::uint32_t decimation);

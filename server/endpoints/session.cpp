@@ -237,6 +237,7 @@ bool Session::greet(const v1::Hello& hello) {
 }
 
 void Session::close() {
+  context_.audience.remove(*this);
   slot_timer_.cancel();
   silence_timer_.cancel();
   outbox_.close();

@@ -230,7 +230,6 @@ asio::awaitable<void> StreamServer::run(std::shared_ptr<Session> session) {
     spdlog::error("a session ended: {}", error.what());
     session->close();
   }
-  audience_->remove(*session);
   std::erase(sessions_, session);
 }
 

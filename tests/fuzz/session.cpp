@@ -58,13 +58,15 @@ class World {
  public:
   World()
       : engine_(make_lockstep_engine(config(), nullptr)),
+        audience_(io_, *engine_),
         context_{.engine = *engine_,
                  .admission = Admission(false, {}),
+                 .audience = audience_,
                  .session_count = [] { return kPeers; },
                  .transports = [] { return std::vector<TransportReport>{}; },
                  .experiments = nullptr} {
-    engine_->on_tick.add([this] { each_session(&Session::on_tick); });
-    engine_->on_newest.add([this] { each_session(&Session::on_newest); });
+    engine_->on_tick.add([this] { audience_.on_tick(); });
+    engine_->on_newest.add([this] { audience_.on_newest(); });
   }
 
   ~World() {
@@ -112,12 +114,6 @@ class World {
   }
 
   std::uint64_t latched_of(std::size_t axis) const { return engine_->newest(axis).faults & kLatchedFaults; }
-
-  void each_session(void (Session::*call)()) {
-    for (Peer& peer : peers_) {
-      if (const auto session = peer.session.lock()) (*session.*call)();
-    }
-  }
 
   void connect(Peer& peer, bool greets) {
     std::array<int, 2> ends{};
@@ -381,6 +377,7 @@ class World {
  private:
   asio::io_context io_{1};
   std::unique_ptr<Engine> engine_;
+  Audience audience_;
   SessionContext context_;
   std::array<Peer, kPeers> peers_;
   std::array<bool, 2> cleared_{};
