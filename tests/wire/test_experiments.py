@@ -389,7 +389,7 @@ class Experiments(WireTest):
         signals = [s.name for s in pb.Sample.DESCRIPTOR.fields if s.name.endswith(("_a", "_v", "_nm", "_s"))][:12]
         self.assertEqual(len(signals), 12)
         slow = self.client(server, receive_buffer=4096)
-        before = self.peak_kib(server)
+        before = self.kib(server, "VmHWM")
         number = self.run_it(slow, request(200_000, signals=signals)).id
         slow.send(fetch_experiment=pb.FetchExperiment(id=number, owner=OWNER))  # and does not read
         fast = self.client(server)
@@ -397,11 +397,12 @@ class Experiments(WireTest):
         self.assertEqual(len(fetched.data), 200_001 * 12 * 8)
         self.assertEqual(len(self.whole(fast, request(100)).rows(3)), 101)
         # The ring of the recorder (2 s of samples, 16 MB) and its chunks: 28 MB. The data alone would be 19 MB more.
-        self.assertLess(self.peak_kib(server) - before, 36_000)
+        if self.kib(server, "VmSize") < 1 << 30:  # a sanitizer maps terabytes, and keeps what is freed
+            self.assertLess(self.kib(server, "VmHWM") - before, 36_000)
 
-    def peak_kib(self, server):
+    def kib(self, server, which):
         status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text(encoding="utf-8")
-        return int(re.search(r"VmHWM:\s+(\d+)", status).group(1))
+        return int(re.search(which + r":\s+(\d+)", status).group(1))
 
 
 if __name__ == "__main__":
