@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plant/faults.hpp"
+#include "plant/injected_faults.hpp"
 #include "protocols/catalogue.hpp"
 
 namespace drivebench::simulator {
@@ -77,7 +78,12 @@ void AxisAccount::check_counters(const Sample& s) {
   require(s.refused_commands >= before_.refused_commands, "refused commands are never taken back");
   require(s.missed_commands == before_.missed_commands || s.missed_commands == before_.missed_commands + 1,
           "a tick misses one command at most");
-  require(s.refused_commands <= commands_ + scheduled_, "nothing is refused that was not asked for");
+  constexpr std::size_t kRow = find_injectable_fault("command_duplication");
+  if (skipped_ || ((s.injected | before_.injected) >> kRow & 1) != 0) {
+    copies_ += (s.tick - before_.tick) * static_cast<std::uint64_t>(kInjectableFaults[kRow].maximum);
+  }
+  require(s.refused_commands <= commands_ + copies_ + scheduled_,
+          "nothing is refused that was not asked for");
   const bool missed = s.missed_commands != before_.missed_commands;
   require(!missed || !late_now_, "a late tick misses no command");
   require(!missed || is(before_, ControlState::kRun) || is(before_, ControlState::kHold) ||

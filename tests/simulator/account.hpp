@@ -108,6 +108,7 @@ class AxisAccount {
   int forces_ = 0;                          ///< under way
   std::map<std::string, Time> kept_until_;  ///< by transport, at the latest
   std::uint64_t commands_ = 0;
+  std::uint64_t copies_ = 0;  ///< of commands, that the injected fault may have made
   std::uint64_t refusals_told_ = 0;
   std::uint64_t clears_unknown_ = 0;
   std::uint64_t scheduled_ = 0;

@@ -100,8 +100,13 @@ class Week {
     if (bench_.is_latched(0) && submit(ClearFaults{}) == Refused::kNot) account_.clear_done(owner_, tick);
     Command c = turn_[static_cast<std::size_t>(tick) % kAngles];
     c.answers = tick;
-    account_.command_sent();
+    account_.command_sent(owner_, tick);
     bench_.submit({.tick = tick, .axis = 0, .owner = owner_, .action = c});
+  }
+
+  void submit_zero_voltage(Tick answers) {
+    account_.command_sent(owner_, answers);
+    submit(Command{.answers = answers, .phases = {.gates = Gates::kZeroVoltage}});
   }
 
   void something_happens(Tick tick) {
@@ -146,9 +151,7 @@ class Week {
         submit(ShaftBump{.impulse_nms = random_.real(-1e-4, 1e-4)});
         return;
       case 8:
-        account_.command_sent();
-        submit(Command{.answers = tick + random_.between(-5, 5), .phases = {.gates = Gates::kZeroVoltage}});
-        return;
+        return submit_zero_voltage(tick + random_.between(-5, 5));
       default:
         account_.forget(owner_++);
         silent_until_ = tick + random_.between(0, 30'000);  // beyond the lease
