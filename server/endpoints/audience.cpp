@@ -68,7 +68,10 @@ void Audience::take_turn() {
   }
   if (served < kSessionsPerTurn) return;
   turn_to_come_ = true;
-  asio::post(io_, [this] { take_turn(); });
+  next_turn_.expires_after(kPause);
+  next_turn_.async_wait([this](const boost::system::error_code& error) {
+    if (!error) take_turn();
+  });
 }
 
 }  // namespace drivebench

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -14,12 +15,11 @@ namespace drivebench {
 class Session;
 
 /// The sessions that a tick concerns, so that all others cost it nothing: those whose exchange waits for it,
-/// which are answered first, and those with subscriptions. Of these a few are served in a turn, and what else
-/// the I/O thread has to do comes between turns: many viewers get more samples in a message, instead of
-/// making a controller wait.
+/// which are answered first, and those with subscriptions. Of these a few are served in a turn, and there is
+/// a pause between turns: many viewers get more samples in a message, instead of making a controller wait.
 class Audience {
  public:
-  Audience(asio::io_context& io, Engine& engine) : io_(io), engine_(engine) {}
+  Audience(asio::io_context& io, Engine& engine) : engine_(engine), next_turn_(io) {}
 
   /// Until remove_subscriber().
   void add_subscriber(Session& session);
@@ -40,11 +40,11 @@ class Audience {
 
  private:
   static constexpr int kSessionsPerTurn = 4;
+  static constexpr auto kPause = std::chrono::microseconds(500);
   static constexpr std::size_t kTicksBehind = 32;  ///< with no time for turns: then all are served
 
   void take_turn();
 
-  asio::io_context& io_;
   Engine& engine_;
   std::vector<std::shared_ptr<SampleFeed>> feeds_;
   std::vector<Session*> subscribers_;
@@ -52,6 +52,7 @@ class Audience {
   std::vector<Session*> answered_;  // of which on_newest() takes care just now
   std::size_t ticks_behind_ = 0;    // since on_newest()
   std::size_t next_ = 0;            // of subscribers_, in the next turn
+  ServerTimer next_turn_;
   bool turn_to_come_ = false;
 };
 
