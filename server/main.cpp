@@ -58,9 +58,8 @@ BenchConfig load_plausible(const Options& o) {
   std::vector<ConfigProblem> odd;
   BenchConfig config = load_config(o.config, odd);
   if (odd.empty()) return config;
-  const ConfigError oddities(std::move(odd));
-  if (!o.allow_odd) throw oddities;
-  spdlog::warn("{}", oddities.what());
+  if (!o.allow_odd) throw ConfigError(std::move(odd));
+  spdlog::warn("{}", ConfigError(std::move(odd)).what());
   return config;
 }
 
