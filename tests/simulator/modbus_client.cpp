@@ -10,8 +10,8 @@ constexpr std::size_t kMbapSize = 7;
 constexpr std::size_t kLeaseKey = 400;
 constexpr std::size_t kRequest = 401;
 constexpr std::size_t kCommandMode = 402;
-constexpr Time kLookedAfter = 500 * kMillisecond;  // frame_timeout_ms
-constexpr Time kIdle = 500 * kMillisecond;         // idle_timeout_ms of draw_bench()
+constexpr Time kLookedAfter = 500 * kMillisecond;     // frame_timeout_ms
+constexpr Time kConnectionIdle = 500 * kMillisecond;  // idle_timeout_ms of draw_bench()
 constexpr std::uint16_t kClear = 1;
 constexpr std::uint16_t kRelease = 2;
 
@@ -35,7 +35,7 @@ void ModbusClient::take_turn() {
   const bool is_quiet = scene_.schedule.now() < quiet_until_;
   // A client that waits for its tick is looked after twice a second, and its key keeps the lease.
   if (!is_quiet || may_be_heard()) {
-    const Time keeps = kLookedAfter + std::max(scene_.lease(), kIdle) + Scene::kSlack;
+    const Time keeps = kLookedAfter + std::max(scene_.lease(), kConnectionIdle) + Scene::kSlack;
     scene_.axes[axis_].may_keep("modbus", scene_.awake() + keeps);
   }
   if (is_quiet) return;
