@@ -75,7 +75,11 @@ class Server:
 
     def __exit__(self, *_):
         if self.process.poll() is None:
-            self.process.kill()
+            if "DRIVEBENCH_COVERAGE" in os.environ:  # counts are written at the end of a program
+                self.process.terminate()
+                self.process.stdout.read()
+            else:
+                self.process.kill()
             self.process.wait()
         self.process.stdout.close()
         self.log.close()
