@@ -1,6 +1,7 @@
 // Requests for experiments: what is right, what is wrong and how that is told; one run in process.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <fstream>
 #include <limits>
@@ -146,6 +147,26 @@ TEST(ExperimentPlan, TellsWhatIsWrongWithARequest) {
          r.add_events()->mutable_fault()->set_name("open_phase");
          r.mutable_events(0)->mutable_fault()->set_value(4.0);
        }},
+      {"events[0].bump_nms", [](v1::RunExperiment& r) { r.add_events()->set_bump_nms(-1e9); }},
+      {"events[0].parameter.name",
+       [](v1::RunExperiment& r) {
+         r.add_events()->mutable_parameter()->set_name("machine.pole_pairs");
+         r.mutable_events(0)->mutable_parameter()->set_value(2.0);
+       }},
+      {"events[0].parameter.name",
+       [](v1::RunExperiment& r) { r.add_events()->mutable_parameter()->set_name("machine.colour"); }},
+      {"input.shapes",
+       [](v1::RunExperiment& r) {
+         for (int i = 0; i < 1000; ++i)
+           *r.mutable_input()->add_shapes() = r.input().shapes(0);
+       }},
+      {"input.angle", [](v1::RunExperiment& r) { r.mutable_input()->set_kind(v1::INPUT_KIND_DQ_VOLTAGES); }},
+      {"input.back_emf_vs",
+       [](v1::RunExperiment& r) {
+         r.mutable_input()->set_kind(v1::INPUT_KIND_DQ_VOLTAGES);
+         r.mutable_input()->set_angle(v1::ANGLE_SOURCE_MEASURED);
+         r.mutable_input()->set_back_emf_vs(HUGE_VAL);
+       }},
       {"initial.speed_rad_s", [](v1::RunExperiment& r) { r.mutable_initial()->set_speed_rad_s(1e6); }},
       {"stop.current_a", [](v1::RunExperiment& r) { r.mutable_stop()->set_current_a(-1.0); }},
   };
@@ -154,6 +175,42 @@ TEST(ExperimentPlan, TellsWhatIsWrongWithARequest) {
     bad.change(r);
     EXPECT_EQ(field_of(r), bad.field) << r.ShortDebugString();
   }
+}
+
+v1::RunExperiment on_channel(v1::Channel channel, v1::InputKind kind) {
+  v1::RunExperiment r = good();
+  r.mutable_input()->set_kind(kind);
+  if (kind == v1::INPUT_KIND_DQ_VOLTAGES) r.mutable_input()->set_angle(v1::ANGLE_SOURCE_TRUE);
+  r.mutable_input()->clear_shapes();
+  v1::Shape& shape = *r.mutable_input()->add_shapes();
+  shape.set_channel(channel);
+  shape.mutable_constant()->set_value(1.0);
+  return r;
+}
+
+// Catches: a voltage for a terminal that the machine has not, and one that it has and that is refused.
+TEST(ExperimentPlan, AShapeDrivesTheTerminalsThatThereAre) {
+  struct Terminals {
+    const char* bench;
+    v1::InputKind kind;
+    std::vector<v1::Channel> there;
+  };
+  const std::vector<Terminals> rows = {
+      {"servo", v1::INPUT_KIND_PHASE_VOLTAGES, {v1::CHANNEL_A, v1::CHANNEL_B}},
+      {"bldc-servo", v1::INPUT_KIND_PHASE_VOLTAGES, {v1::CHANNEL_A, v1::CHANNEL_B, v1::CHANNEL_C}},
+      {"dc-separate-servo", v1::INPUT_KIND_PHASE_VOLTAGES, {v1::CHANNEL_A, v1::CHANNEL_F}},
+      {"servo", v1::INPUT_KIND_DQ_VOLTAGES, {v1::CHANNEL_D, v1::CHANNEL_Q}},
+  };
+  for (const Terminals& row : rows) {
+    for (const v1::Channel channel :
+         {v1::CHANNEL_A, v1::CHANNEL_B, v1::CHANNEL_C, v1::CHANNEL_F, v1::CHANNEL_D, v1::CHANNEL_Q}) {
+      const bool there = std::find(row.there.begin(), row.there.end(), channel) != row.there.end();
+      EXPECT_EQ(field_of(on_channel(channel, row.kind), row.bench),
+                there ? "nothing" : "input.shapes[0].channel")
+          << row.bench << " " << v1::Channel_Name(channel);
+    }
+  }
+  EXPECT_EQ(field_of(on_channel(v1::CHANNEL_D, v1::INPUT_KIND_DQ_VOLTAGES), "dc-a"), "input.kind");
 }
 
 // Catches: a setting that breaks a rule between values and is found out by a replay only.
