@@ -31,14 +31,19 @@ void Audience::remove(const Session& session) {
 }
 
 std::shared_ptr<const SampleFeed> Audience::feed(std::uint32_t axis, std::uint32_t decimation) {
-  std::erase_if(feeds_, [](const auto& feed) { return feed.use_count() == 1; });
+  drop_unread_feeds();
   for (const auto& feed : feeds_) {
     if (feed->axis() == axis && feed->decimation() == decimation) return feed;
   }
   return feeds_.emplace_back(std::make_shared<SampleFeed>(axis, decimation, engine_.newest(axis).tick));
 }
 
+void Audience::drop_unread_feeds() {
+  std::erase_if(feeds_, [](const auto& feed) { return feed.use_count() == 1; });
+}
+
 void Audience::on_tick() {
+  drop_unread_feeds();
   for (const auto& feed : feeds_)
     feed->take(engine_.newest(feed->axis()));
   if (++ticks_behind_ % kTicksBehind == 0) send_all();

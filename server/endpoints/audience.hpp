@@ -43,6 +43,7 @@ class Audience {
   static constexpr auto kPause = std::chrono::microseconds(500);
   static constexpr std::size_t kTicksBehind = 32;  ///< with no time for turns: then all are served
 
+  void drop_unread_feeds();
   void take_turn();
 
   Engine& engine_;
