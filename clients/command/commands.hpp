@@ -26,6 +26,9 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What --link takes, for its help.
+inline constexpr const char* kStreamLinks = "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE or unix:PATH";
+
 struct LinkChoice {
   std::string address{link::kDefaultAddress};
   std::string token;

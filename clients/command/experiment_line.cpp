@@ -34,8 +34,7 @@ void add_experiment_commands(CLI::App& app, LinkChoice& link, bool& json, Experi
   const auto add = [&, choose](const std::string& name, const std::string& description, Run run) {
     CLI::App* const sub = parent->add_subcommand(name, description);
     sub->add_flag("--json", json, "print JSON");
-    sub->add_option("--link", link.address,
-                    "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE or unix:PATH; else from DRIVEBENCH_LINK")
+    sub->add_option("--link", link.address, std::string(kStreamLinks) + "; else from DRIVEBENCH_LINK")
         ->capture_default_str();
     sub->add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
     sub->add_option("--owner", options.owner,

@@ -12,9 +12,9 @@ void add_measurement(CLI::App& sub, LinkChoice& link, IdentifyOptions& o) {
   sub.add_flag("--list", o.list, "print motors and experiments and end");
   sub.add_option("--bench", o.bench, "start a server on this bench, file or name, for the experiment");
   sub.add_option("--link", link.address,
-                 "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE or unix:PATH of a server that has the bench; without "
-                 "it one that is there, or "
-                 "else one that is started");
+                 std::string(kStreamLinks) +
+                     " of a server that has the bench; without it one that is there, "
+                     "or else one that is started");
   sub.add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
   sub.add_option("--owner", o.server.owner,
                  "the secret that opens the data; else from DRIVEBENCH_OWNER, else this user's own");

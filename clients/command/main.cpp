@@ -118,7 +118,7 @@ struct CommandLine {
   }
 
   CLI::App* add_linked(const std::string& name, const std::string& description,
-                       const std::string& links = "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE or unix:PATH") {
+                       const std::string& links = kStreamLinks) {
     CLI::App* sub = add(name, description);
     sub->add_option("--link", link.address, links + "; else from DRIVEBENCH_LINK")->capture_default_str();
     sub->add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");

@@ -1,13 +1,13 @@
 // Messages of the wire and of recordings: every command and input that is taken can be written down and read
 // back.
 #include <bench.pb.h>
-#include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
 #include <bit>
 
 #include "server/input_codec.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/quiet_protobuf.hpp"
 
 namespace drivebench::fuzz {
 namespace {
@@ -66,8 +66,7 @@ void check_commands(const v1::Exchange& exchange) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace drivebench;
-  // Protobuf would print a line for each text that is not UTF-8.
-  [[maybe_unused]] static const auto kPrinter = google::protobuf::SetLogHandler(nullptr);
+  fuzz::silence_protobuf();
   v1::Envelope envelope;
   if (envelope.ParseFromArray(data, static_cast<int>(size))) fuzz::check_commands(envelope.exchange());
   v1::Input input;

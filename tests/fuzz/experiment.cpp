@@ -1,7 +1,6 @@
 // Requests of experiments: whatever is asked for, there is a refusal that names a field, or a plan that keeps
 // its bounds and commands numbers.
 #include <bench.pb.h>
-#include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +8,7 @@
 
 #include "server/experiments/plan.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/quiet_protobuf.hpp"
 #include "tests/server/run_config.hpp"
 
 namespace drivebench::fuzz {
@@ -41,7 +41,7 @@ void check_plan(const ExperimentPlan& plan) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace drivebench;
-  [[maybe_unused]] static const auto kPrinter = google::protobuf::SetLogHandler(nullptr);
+  fuzz::silence_protobuf();
   v1::RunExperiment request;
   if (!request.ParseFromArray(data, static_cast<int>(size))) return 0;
   try {

@@ -41,8 +41,7 @@ TEST(ConfigPlausible, CFG_02_AWrongUnitIsToldWithItsWindow) {
   for (const Case& c : std::vector<Case>{
            {"0.014\nrotor", "14.0\nrotor",
             ":11: axis.machine.stator_inductance_h is 14 H, which is odd: a machine of kind \"induction\" "
-            "has 1e-04 "
-            "to 3 H; --allow-odd takes it all the same"},
+            "has 1e-04 to 3 H; --allow-odd takes it all the same"},
            // The step is too long for such a machine, and this is why.
            {"stator_resistance_ohm = 1.7", "stator_resistance_ohm = 1700.0",
             ":9: axis.machine.stator_resistance_ohm is 1700 ohm, which is odd: "},

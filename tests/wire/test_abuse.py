@@ -237,11 +237,7 @@ class Connections(RecordingTest):
         owner.lease()
         scan = subprocess.Popen([nmap, "-n", "-Pn", "-sT", "-sV", "--version-intensity", "9", "--host-timeout", "2s", "-p",
                                  str(server.address[1]), "127.0.0.1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        tick = 0
-        while scan.poll() is None:
-            owner.step(tick, 1.0)
-            tick += 1
-            time.sleep(0.001)
+        tick = self.step_beside(owner, scan)
         until(lambda: owner.status().sessions == 1, "the scanner is gone")
         self.assertEqual(owner.newest().tick, tick)
 

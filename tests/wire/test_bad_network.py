@@ -100,10 +100,7 @@ class BadNetwork(WireTest):
             port = str(server.address[1])
             scan = subprocess.Popen([nmap, "-n", "-Pn", "--privileged", kind, "-p", port, "127.0.0.1"], stdout=subprocess.PIPE,
                                     stderr=subprocess.STDOUT, text=True)
-            while scan.poll() is None:
-                owner.step(tick, 1.0)
-                tick += 1
-                time.sleep(0.001)
+            tick = self.step_beside(owner, scan, tick)
             self.assertRegex(scan.stdout.read(), rf"(?m)^{port}/tcp +{re.escape(answer)} ", "it was scanned")
             scan.stdout.close()
         until(lambda: owner.status().sessions == 1, "nobody else is there")

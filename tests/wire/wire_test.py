@@ -70,5 +70,13 @@ class WireTest(unittest.TestCase):
             self.assertLess(time.monotonic(), end, "never armed")
             owner.exchange(owner.newest().tick, *setpoints)
 
+    def step_beside(self, owner, program, tick=0):
+        """Commands in lockstep until the program has ended: the next tick."""
+        while program.poll() is None:
+            owner.step(tick, 1.0)
+            tick += 1
+            time.sleep(0.001)
+        return tick
+
     def assertDone(self, answer):
         self.assertEqual(answer.WhichOneof("kind"), "done", answer)
