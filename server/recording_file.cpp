@@ -36,15 +36,6 @@ class SystemFile final : public RecordingFile {
   int descriptor_;
 };
 
-/// A file whose folder is not synced may be gone after a power cut, however often it was synced itself.
-void sync_folder_of(const std::filesystem::path& path) noexcept {
-  const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  [[maybe_unused]] const int done = ::fsync(descriptor);  // some file systems cannot
-  ::close(descriptor);
-}
-
 }  // namespace
 
 std::unique_ptr<RecordingFile> create_recording_file(const std::filesystem::path& path) {
@@ -56,6 +47,14 @@ std::unique_ptr<RecordingFile> create_recording_file(const std::filesystem::path
   }
   sync_folder_of(path);
   return std::make_unique<SystemFile>(descriptor);
+}
+
+void sync_folder_of(const std::filesystem::path& path) noexcept {
+  const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  [[maybe_unused]] const int done = ::fsync(descriptor);  // some file systems cannot
+  ::close(descriptor);
 }
 
 }  // namespace drivebench

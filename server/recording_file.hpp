@@ -29,4 +29,7 @@ using CreateRecordingFile = std::function<std::unique_ptr<RecordingFile>(const s
 /// exists or cannot be made.
 std::unique_ptr<RecordingFile> create_recording_file(const std::filesystem::path& path);
 
+/// A file whose folder is not synced may be gone after a power cut, however often it was synced itself.
+void sync_folder_of(const std::filesystem::path& path) noexcept;
+
 }  // namespace drivebench

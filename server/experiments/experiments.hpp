@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -74,7 +75,7 @@ class Experiments {
   /// So many sessions may have the largest tables at a time.
   static constexpr std::uint64_t kSharesOfTables = 4;
 
-  std::filesystem::path file_of(std::uint64_t id, const char* ending) const;
+  std::filesystem::path file_of(std::uint64_t id, std::string_view ending) const;
   void lock_folder();
   void load();
   void load_one(const std::filesystem::path& file);

@@ -7,41 +7,65 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <fstream>
 #include <set>
+#include <system_error>
 
 #include "server/experiments/experiments.hpp"
+#include "server/experiments/row_file.hpp"
+#include "server/holder.hpp"
+#include "server/recording_file.hpp"
 
 namespace drivebench {
 namespace {
 
 constexpr std::size_t kMaxStoredBytes = std::size_t{4} * 1024 * 1024;
 
+constexpr auto kEndings =
+    std::to_array<std::string_view>({".experiment", ".rows", ".mcap", ".experiment.new"});
+
 /// The id in the name of a file of ours, 0 if it is none.
 std::uint64_t id_of(const std::filesystem::path& file) {
-  const std::string stem = file.stem().string();
+  const std::string name = file.filename().string();
   std::uint64_t id = 0;
-  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), id);
-  return error == std::errc{} && end == stem.data() + stem.size() ? id : 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
+  const std::string_view ending(end, name.data() + name.size());
+  return error == std::errc{} && std::ranges::find(kEndings, ending) != kEndings.end() ? id : 0;
 }
 
+/// All of it or nothing, whatever the power does; from its first byte on only the server's user may read it.
 void write_whole(const std::filesystem::path& file, const std::string& bytes) {
-  const std::filesystem::path draft = file.string() + ".new";
-  {
-    std::ofstream out(draft, std::ios::binary | std::ios::trunc);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    if (!out) throw std::runtime_error("cannot write " + draft.string());
+  const std::string draft = file.string() + ".new";
+  ::unlink(draft.c_str());  // whose it is and who has it open is not known
+  const int descriptor = ::open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  bool done =
+      descriptor >= 0 && write_all(descriptor, std::as_bytes(std::span(bytes))) && ::fsync(descriptor) == 0;
+  int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (done && ::rename(draft.c_str(), file.c_str()) != 0) {
+    done = false;
+    error = errno;
   }
-  std::filesystem::permissions(draft,
-                               std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
-  std::filesystem::rename(draft, file);
+  if (!done) throw std::system_error(error, std::generic_category(), "cannot write " + draft);
+  sync_folder_of(file);
+}
+
+/// The rule that a file of this number breaks: what others go by when they divide, or find whose it is.
+std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_t id) {
+  const v1::ExperimentInfo& info = stored.info();
+  if (info.id() != id) return "its id must be the number in its name";
+  if (stored.request().owner().empty()) return "it must have an owner";
+  if (info.decimation() == 0) return "its decimation must be 1 at least";
+  const auto signals = static_cast<std::size_t>(info.signals_size());
+  if (signals == 0 || signals > kSignals.size()) return "it must have a signal, and none twice";
+  return {};
 }
 
 }  // namespace
 
-std::filesystem::path Experiments::file_of(std::uint64_t id, const char* ending) const {
-  return folder_ / (std::to_string(id) + ending);
+std::filesystem::path Experiments::file_of(std::uint64_t id, std::string_view ending) const {
+  return folder_ / std::to_string(id).append(ending);
 }
 
 void Experiments::lock_folder() {
@@ -57,7 +81,8 @@ void Experiments::lock_folder() {
   }
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     ::close(lock_);
-    throw std::runtime_error("cannot keep experiments in " + folder_.string() + ": another server does");
+    throw std::runtime_error("cannot keep experiments in " + folder_.string() + ": another server does" +
+                             holder_of_file(file));
   }
 }
 
@@ -72,6 +97,8 @@ void Experiments::load() {
     if (!std::filesystem::exists(file_of(id, ".experiment"))) {
       remove(id);  // what a crash left before there was anything to know about it
     } else {
+      std::error_code ignored;
+      std::filesystem::remove(file_of(id, ".experiment.new"), ignored);
       load_one(file_of(id, ".experiment"));
     }
   }
@@ -82,8 +109,11 @@ void Experiments::load_one(const std::filesystem::path& file) {
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   v1::StoredExperiment stored;
   std::ifstream in(file, std::ios::binary);
-  if (error || size > kMaxStoredBytes || !stored.ParseFromIstream(&in)) {
-    spdlog::warn("{} is not an experiment", file.string());
+  const bool is_read = !error && size <= kMaxStoredBytes && stored.ParseFromIstream(&in);
+  const std::string_view rule =
+      is_read ? rule_broken_by(stored, id_of(file)) : "it must be a StoredExperiment of 4 MiB at most";
+  if (!rule.empty()) {
+    spdlog::warn("{} is not an experiment: {}", file.string(), rule);
     return;
   }
   auto experiment = std::make_shared<Experiment>();
@@ -109,7 +139,7 @@ void Experiments::store(const Experiment& experiment) const {
 }
 
 void Experiments::remove(std::uint64_t id) {
-  for (const char* const ending : {".experiment", ".rows", ".mcap", ".experiment.new"}) {
+  for (const std::string_view ending : kEndings) {
     std::error_code ignored;
     std::filesystem::remove(file_of(id, ending), ignored);
   }

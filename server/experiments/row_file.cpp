@@ -13,6 +13,16 @@ namespace drivebench {
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they stand in memory");
 
+bool write_all(int descriptor, std::span<const std::byte> bytes) noexcept {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
 RowWriter::RowWriter(const std::filesystem::path& file, std::vector<const Signal*> signals,
                      std::atomic<std::uint64_t>& published)
     : signals_(std::move(signals)),
@@ -36,13 +46,7 @@ bool RowWriter::append(const Sample& sample) noexcept {
 }
 
 bool RowWriter::flush() noexcept {
-  std::span<const std::byte> left = std::as_bytes(std::span(buffer_));
-  while (!left.empty()) {
-    const ssize_t written = ::write(descriptor_, left.data(), left.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    left = left.subspan(static_cast<std::size_t>(written));
-  }
+  if (!write_all(descriptor_, std::as_bytes(std::span(buffer_)))) return false;
   published_.fetch_add(buffer_.size() / signals_.size(), std::memory_order_release);
   buffer_.clear();
   return true;

@@ -12,6 +12,9 @@
 
 namespace drivebench {
 
+/// All of it, however the system cuts it up; false, with errno, when the disk takes no more.
+bool write_all(int descriptor, std::span<const std::byte> bytes) noexcept;
+
 /// The data of an experiment: rows of little-endian float64, one for each signal. One thread appends; others
 /// read what published() says.
 class RowWriter {

@@ -324,6 +324,56 @@ class Experiments(WireTest):
         self.assertEqual({int(f.split(".")[0]) for f in os.listdir(self.kept.name) if f[0].isdigit()}, {3, 4, 5})
         self.assertEqual(self.run_it(client, request()).id, 6)
 
+    def test_a_file_that_is_no_experiment_is_told_of_and_left_alone(self):
+        """A file that a power cut left empty: the server divides by its decimation of 0, which ends it, or gives its
+        data to whoever names no owner."""
+        folder = pathlib.Path(self.kept.name)
+        server = self.start()
+        self.whole(self.client(server), request(100))
+        self.assertEqual(server.stop(), 0)
+        whole = (folder / "1.experiment").read_bytes()
+
+        def broken(number, change):
+            stored = pb.StoredExperiment.FromString(whole)
+            stored.info.id = number
+            change(stored)
+            return stored.SerializeToString()
+        files = {7: (b"", "its id"), 8: (b"\xff" * 20, "a StoredExperiment"), 9: (whole, "its id"),
+                 10: (broken(10, lambda s: s.request.ClearField("owner")), "an owner"),
+                 11: (broken(11, lambda s: s.info.ClearField("decimation")), "its decimation"),
+                 12: (broken(12, lambda s: s.info.ClearField("signals")), "a signal"),
+                 13: (broken(13, lambda s: s.info.signals.extend(["i_a_a"] * 9999)), "a signal")}
+        for number, (data, _) in files.items():
+            (folder / f"{number}.experiment").write_bytes(data)
+        (folder / "14.experiment.new").write_bytes(whole)  # the power failed before it had its name
+        server = self.start()
+        client = self.client(server)
+        listed = client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments
+        for number, (data, rule) in files.items():
+            for owner in ("", OWNER):
+                for recording in (False, True):
+                    asked = pb.FetchExperiment(id=number, owner=owner, recording=recording)
+                    self.assertRefused(client.ask(fetch_experiment=asked), pb.REFUSAL_UNKNOWN_EXPERIMENT, "id")
+            self.assertRegex(server.errors(), f"/{number}.experiment is not an experiment: .*{rule}")
+            self.assertEqual((folder / f"{number}.experiment").read_bytes(), data)
+        self.assertEqual([e.id for e in listed], [1])
+        self.assertFalse((folder / "14.experiment.new").exists())
+        self.assertEqual(self.whole(client, request(100)).info.id, 15)
+
+    def test_the_secret_is_for_nobody_else_to_read(self):
+        """A file that is made for all to read, or in one that somebody has open, before its rights are set."""
+        folder = pathlib.Path(self.kept.name)
+        server = self.start(before=lambda: os.umask(0))
+        draft = folder / "1.experiment.new"
+        draft.touch()
+        draft.chmod(0o666)
+        with open(draft, "rb") as eavesdropper:
+            self.whole(self.client(server), request(100))
+            self.assertEqual(eavesdropper.read(), b"")
+        self.assertIn(OWNER.encode(), (folder / "1.experiment").read_bytes())
+        for name in ("1.experiment", "1.rows"):
+            self.assertEqual((folder / name).stat().st_mode & 0o777, 0o600, name)
+
     def test_connections_that_break_lose_and_double_nothing(self):
         """A fetch that begins anew elsewhere than it ended, 100 times at random."""
         server = self.start()
