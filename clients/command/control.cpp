@@ -131,7 +131,7 @@ int run_control(const ControlOptions& options) {
   const v1::BenchDescription& description = axis->bench();
   check_fit(*axis, preset, options, run.timing().sample_rate_hz);
   if (!options.loads.empty() && !axis->can_set_load()) {
-    throw UsageError("--load needs a tcp: or unix: link");
+    throw UsageError("--load needs a tcp:, tls: or unix: link");
   }
   std::ofstream csv = opened(options.csv_file);
 

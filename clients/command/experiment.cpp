@@ -1,6 +1,8 @@
 // drivebench experiment: what the server runs on a bench of its own.
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "clients/command/commands.hpp"
 #include "clients/command/experiment_client.hpp"
 #include "clients/command/experiment_data.hpp"
@@ -11,7 +13,7 @@
 namespace drivebench::command {
 namespace {
 
-constexpr const char* kName = "drivebench experiment";
+constexpr const char* kName = "experiment";
 
 bool is_recording(const std::string& file) {
   return file.ends_with(".mcap");
@@ -29,11 +31,12 @@ v1::ExperimentInfo fetch_into(ExperimentClient& client, const ExperimentOptions&
       },
       [&] { return data.next_tick(); });
   data.flush();
-  if (!recording || info.recording_bytes() == 0) return info;
+  if (!recording || info.recording_bytes() == 0 || client.gave_up()) return info;
   RecordingWriter out(options.out_file);
   info = client.fetch(
       id, true,
       [&](const v1::ExperimentInfo&, const v1::ExperimentData* piece) {
+        out.describe();
         if (piece != nullptr) out.take(*piece);
       },
       [&] { return out.bytes(); });
@@ -105,6 +108,10 @@ int run_experiment_fetch(const ExperimentOptions& options) {
   ExperimentClient client(options, kName);
   catch_interrupts();
   const v1::ExperimentInfo info = fetch_into(client, options, options.id, true);
+  if (client.gave_up()) {
+    throw std::runtime_error(
+        fmt::format("interrupted; what came is written, and experiment {} is not cancelled", options.id));
+  }
   return tell(options, info, client.resumed());
 }
 

@@ -22,15 +22,18 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kRetryPause = std::chrono::milliseconds(200);
 
+/// A folder that the environment names; empty if it does not.
+std::filesystem::path folder_in(const char* variable) {
+  const char* const folder = std::getenv(variable);
+  return folder == nullptr ? "" : folder;
+}
+
 /// The secret of this user: made once, kept where only he can read it.
 std::string own_secret() {
-  const char* const base = std::getenv("XDG_CONFIG_HOME");
-  const char* const home = std::getenv("HOME");
-  if (base == nullptr && home == nullptr)
-    throw UsageError("--owner is needed: there is no HOME to keep it in");
-  const std::filesystem::path folder =
-      (base != nullptr ? std::filesystem::path(base) : std::filesystem::path(home) / ".config") /
-      "drivebench";
+  const std::filesystem::path base = folder_in("XDG_CONFIG_HOME");
+  const std::filesystem::path home = folder_in("HOME");
+  if (base.empty() && home.empty()) throw UsageError("--owner is needed: there is no HOME to keep it in");
+  const std::filesystem::path folder = (base.empty() ? home / ".config" : base) / "drivebench";
   const std::filesystem::path file = folder / "owner";
   std::string secret;
   std::ifstream(file) >> secret;
@@ -87,14 +90,10 @@ bool has_ended(v1::ExperimentState state) {
   return state > v1::EXPERIMENT_STATE_RUNNING;
 }
 
-ExperimentClient::ExperimentClient(const ExperimentOptions& options, std::string name)
+ExperimentClient::ExperimentClient(const ExperimentOptions& options, std::string subcommand)
     : options_(options),
-      name_(std::move(name)),
+      subcommand_(std::move(subcommand)),
       owner_(options.owner.empty() ? own_secret() : options.owner) {}
-
-link::LinkOptions ExperimentClient::link_options() const {
-  return {.client = name_, .token = options_.link.token};
-}
 
 bool ExperimentClient::patience_is_over(Clock::time_point since) const {
   return std::chrono::duration<double>(Clock::now() - since).count() > options_.patience_s || interrupted();
@@ -104,10 +103,12 @@ void ExperimentClient::with_link(const std::function<void(link::Link&)>& action)
   std::optional<Clock::time_point> broken;
   for (;;) {
     try {
-      if (!link_) link_.emplace(options_.link.address, link_options());
+      if (!link_) link_.reset(new link::Link(open_link(options_.link, subcommand_)));  // it does not move
       if (broken) ++resumed_;
       broken.reset();
       return action(*link_);
+    } catch (const NotLetIn&) {
+      throw;  // a wrong token does not become right, and each one makes others at this address wait
     } catch (const link::LinkError& error) {
       link_.reset();
       const bool nobody_there = dynamic_cast<const link::ConnectError*>(&error) != nullptr;
@@ -134,6 +135,7 @@ v1::ExperimentInfo ExperimentClient::run(ExperimentFile file) {
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
+  queued_ = info.id();
   return info;
 }
 
@@ -156,7 +158,7 @@ v1::ExperimentInfo ExperimentClient::fetch(std::uint64_t id, bool recording, con
     };
     take(info, nullptr);
     // The server ends with one more word, also if everything was there at once.
-    for (bool last = false; !last;) {
+    for (bool last = false; !last && !gave_up_; gave_up_ = !last && interrupted() && queued_ != id) {
       const v1::Envelope& message = link.next_of_fetch();
       if (message.has_experiment_data()) {
         take(info, &message.experiment_data());
@@ -167,7 +169,7 @@ v1::ExperimentInfo ExperimentClient::fetch(std::uint64_t id, bool recording, con
       last = is_whole();
       if (!last && interrupted() && !cancelled) {
         cancelled = true;
-        link::Link(options_.link.address, link_options()).cancel_experiment(id, owner_);
+        open_link(options_.link, subcommand_).cancel_experiment(id, owner_);
       }
     }
   });

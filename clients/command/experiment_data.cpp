@@ -53,12 +53,9 @@ void ExperimentRows::take(const v1::ExperimentData& data, const OnRow& on_row) {
   }
 }
 
-DataWriter::DataWriter(const std::string& file, bool standard_output) {
-  if (!file.empty() || standard_output) out_ = std::make_unique<Output>(file);
-}
-
 void DataWriter::describe(const v1::ExperimentInfo& info) {
   if (!rows_.describe(info)) return;
+  if (is_wanted_) out_.emplace(file_);
   text_ = "tick,time_s";
   for (const Signal* signal : rows_.signals())
     text_ += fmt::format(",{} [{}]", signal->name, signal->unit);
@@ -66,7 +63,7 @@ void DataWriter::describe(const v1::ExperimentInfo& info) {
 }
 
 void DataWriter::take(const v1::ExperimentData& data) {
-  if (out_ == nullptr) return rows_.take(data, {});
+  if (!out_) return rows_.take(data, {});
   rows_.take(data,
              [this](std::uint64_t tick, const std::vector<double>& values) { write_row(tick, values); });
   if (text_.size() > kPiece) flush();
@@ -87,7 +84,7 @@ void DataWriter::write_row(std::uint64_t tick, const std::vector<double>& values
 }
 
 void DataWriter::flush() {
-  if (out_ == nullptr) return;
+  if (!out_) return;
   out_->write(text_);
   text_.clear();
   out_->flush();
@@ -97,7 +94,7 @@ void RecordingWriter::take(const v1::ExperimentData& data) {
   if (data.first() > bytes_) throw std::runtime_error("the server left out a piece of the recording");
   const std::uint64_t known = bytes_ - data.first();
   if (known >= data.data().size()) return;
-  out_.write(std::string_view(data.data()).substr(known));
+  out_->write(std::string_view(data.data()).substr(known));
   bytes_ = data.first() + data.data().size();
 }
 

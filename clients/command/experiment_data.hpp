@@ -4,9 +4,10 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "clients/command/output.hpp"
@@ -45,8 +46,10 @@ class ExperimentRows {
 class DataWriter {
  public:
   /// Without a file and without standard output the rows are only counted.
-  DataWriter(const std::string& file, bool standard_output);
+  DataWriter(std::string file, bool standard_output)
+      : file_(std::move(file)), is_wanted_(!file_.empty() || standard_output) {}
 
+  /// The first description makes the file: until there is one, whatever the file held is left alone.
   void describe(const v1::ExperimentInfo& info);
   void take(const v1::ExperimentData& data);
   void flush();
@@ -58,7 +61,9 @@ class DataWriter {
  private:
   void write_row(std::uint64_t tick, const std::vector<double>& values);
 
-  std::unique_ptr<Output> out_;
+  std::string file_;
+  bool is_wanted_;
+  std::optional<Output> out_;
   ExperimentRows rows_;
   std::string text_;
 };
@@ -66,13 +71,18 @@ class DataWriter {
 /// The same for the bytes of a recording.
 class RecordingWriter {
  public:
-  explicit RecordingWriter(const std::string& file) : out_(file) {}
+  explicit RecordingWriter(std::string file) : file_(std::move(file)) {}
+  /// Before the first of them: makes the file.
+  void describe() {
+    if (!out_) out_.emplace(file_);
+  }
   void take(const v1::ExperimentData& data);
-  void flush() { out_.flush(); }
+  void flush() { out_->flush(); }
   std::uint64_t bytes() const noexcept { return bytes_; }
 
  private:
-  Output out_;
+  std::string file_;
+  std::optional<Output> out_;
   std::uint64_t bytes_ = 0;
 };
 

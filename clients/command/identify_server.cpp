@@ -56,6 +56,9 @@ class OwnServer {
       address_ = ready->tcp;
       return;
     }
+    if (process_.wait(Process::in(1s)) == kExitUsage) {  // it has said why
+      throw UsageError(fmt::format("the server does not take the bench {}", bench));
+    }
     throw std::runtime_error(fmt::format("the server for the bench {} did not start", bench));
   }
   OwnServer(const OwnServer&) = delete;
@@ -84,11 +87,10 @@ const v1::AxisDescription* find_axis(const v1::BenchDescription& bench, std::str
   return nullptr;
 }
 
-/// Why the bench behind a link will not do; empty: it will.
+/// Why the bench behind a link will not do; empty: it will. One that was named must, or else this throws.
 std::string why_not(const IdentifyOptions& options, const WantedExperiment& wanted) {
   try {
-    const link::Link link(options.server.link.address,
-                          {.client = "drivebench identify", .token = options.server.link.token});
+    link::Link link = open_link(options.server.link, "identify");
     const v1::BenchDescription& bench = link.welcome().bench();
     const v1::AxisDescription* const axis = find_axis(bench, wanted.file.axis);
     if (axis == nullptr) {
@@ -101,9 +103,11 @@ std::string why_not(const IdentifyOptions& options, const WantedExperiment& want
     if (axis->machine_kind() != wanted.machine)
       return fmt::format("axis {} of the bench {} is of kind {}, not {}", axis->name(), bench.name(),
                          axis->machine_kind(), wanted.machine);
-  } catch (const link::ConnectError& error) {
+    link.list_experiments("");  // nobody's: a bench that keeps none says so
+  } catch (const std::runtime_error& error) {
+    // Nobody answers, or somebody else, or who does will not have us.
     if (options.link_was_named) throw;
-    return fmt::format("nothing answers at {}", options.server.link.address);
+    return error.what();
   }
   return {};
 }
@@ -147,7 +151,7 @@ class Columns {
 
 Measurement run_on(const IdentifyOptions& options, const ExperimentOptions& server, WantedExperiment wanted) {
   Measurement m;
-  ExperimentClient client(server, "drivebench identify");
+  ExperimentClient client(server, "identify");
   v1::RunExperiment& request = wanted.file.request;
   std::string bench;
   // The description is read first: the request needs signals that fit the machine.

@@ -31,14 +31,14 @@ std::string names_of(const Descriptions& descriptions, std::uint64_t bits) {
 
 link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
   if (link::is_can_address(choice.address) || link::is_modbus_address(choice.address)) {
-    throw UsageError(
-        fmt::format("{} needs a tcp: or unix: link; over CAN and Modbus there is only control", subcommand));
+    throw UsageError(fmt::format(
+        "{} needs a tcp:, tls: or unix: link; over CAN and Modbus there is only control", subcommand));
   }
   try {
     return link::Link(choice.address,
                       {.client = fmt::format("drivebench {}", subcommand), .token = choice.token});
   } catch (const link::Refused& refused) {
-    throw link::ConnectError(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
+    throw NotLetIn(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
   }
 }
 
@@ -57,7 +57,7 @@ std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_
     if (is_can) return std::make_unique<link::CanLink>(link::parse_can_address(choice.address));
     return std::make_unique<link::ModbusLink>(link::parse_modbus_address(choice.address));
   } catch (const link::Refused& refused) {
-    throw link::ConnectError(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
+    throw NotLetIn(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
   }
 }
 

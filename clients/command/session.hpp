@@ -16,7 +16,13 @@
 /// What the subcommands that talk to a bench share.
 namespace drivebench::command {
 
-/// Connects as `drivebench SUBCOMMAND`. A bench that does not let us in is a ConnectError too.
+/// Somebody answers and does not let us in: for whoever wants to connect, the same as nobody.
+class NotLetIn : public link::ConnectError {
+ public:
+  using ConnectError::ConnectError;
+};
+
+/// Connects as `drivebench SUBCOMMAND`. Throws NotLetIn, and UsageError for a can: or modbus: link.
 link::Link open_link(const LinkChoice& choice, std::string_view subcommand);
 
 /// The axis with this number or name. Throws UsageError with the axes there are.

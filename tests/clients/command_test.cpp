@@ -213,6 +213,11 @@ TEST(Links, OnlyControlGoesOverCanAndModbus) {
     EXPECT_THROW(run_describe({.link = {.address = address, .token = {}}}), UsageError);
     EXPECT_THROW(run_watch({.link = {.address = address, .token = {}}, .signals = {}}), UsageError);
     EXPECT_THROW(open_axis({.address = address, .token = {}}, "1", "control"), UsageError);
+    const ExperimentOptions experiment = {.link = {.address = address, .token = {}}, .owner = "o", .id = 1};
+    EXPECT_THROW(run_experiment_list(experiment), UsageError);
+    EXPECT_THROW(run_experiment_fetch(experiment), UsageError);
+    EXPECT_THROW(run_experiment_cancel(experiment), UsageError);
+    EXPECT_THROW(run_identify({.server = experiment, .link_was_named = true, .motor = "im"}), UsageError);
   }
   EXPECT_THROW(run_can_log({.address = "tcp:127.0.0.1:7300", .out_file = {}}), UsageError);
 }

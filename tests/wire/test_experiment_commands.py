@@ -3,6 +3,8 @@
 import json
 import os
 import pathlib
+import re
+import signal
 import socket
 import subprocess
 import sys
@@ -17,7 +19,7 @@ except ImportError:
     sys.exit(77)
 
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER
-from wire_test import WireTest
+from wire_test import WireTest, until
 
 OWNER = "the secret of a test"
 
@@ -35,12 +37,19 @@ class Commands(WireTest):
         self.link = f"tcp:{server.ready['tcp']}"
         return server
 
-    def drivebench(self, *words, owner=OWNER):
-        environment = dict(os.environ, DRIVEBENCH_LINK=self.link, XDG_CONFIG_HOME=self.folder.name)
+    def popen(self, *words, owner=OWNER, **variables):
+        environment = dict(os.environ, DRIVEBENCH_LINK=self.link, XDG_CONFIG_HOME=self.folder.name) | variables
         environment.pop("DRIVEBENCH_OWNER", None)
         more = ["--owner", owner] if owner else []
-        return subprocess.run([str(SERVER.parent / "drivebench"), "experiment", *words, *more], capture_output=True,
-                              text=True, timeout=PATIENCE_S * 2, env=environment)
+        process = subprocess.Popen([str(SERVER.parent / "drivebench"), "experiment", *words, *more], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True, env=environment, cwd=self.path)
+        self.addCleanup(process.kill)
+        return process
+
+    def drivebench(self, *words, **more):
+        process = self.popen(*words, **more)
+        out, err = process.communicate(timeout=PATIENCE_S * 2)
+        return subprocess.CompletedProcess(words, process.returncode, out, err)
 
     def test_the_examples_run(self):
         """An example that its bench refuses, or whose numbers are not those that it is about."""
@@ -85,6 +94,50 @@ class Commands(WireTest):
         self.assertEqual(self.drivebench("cancel", str(detached["id"])).returncode, 0)
         self.assertEqual(self.drivebench("fetch", str(detached["id"])).returncode, 1)
 
+    def test_a_fetch_that_fails_leaves_the_file_alone(self):
+        """Yesterday's data that are emptied because the server is not there, or does not know the number."""
+        server = self.start("servo")
+        old = {self.path / name: b"precious" for name in ("old.csv", "old.mcap")}
+        for path, data in old.items():
+            path.write_bytes(data)
+            self.assertEqual(self.drivebench("fetch", "7", "--out", str(path)).returncode, 1)
+        server.stop()
+        for path in old:
+            self.assertEqual(self.drivebench("fetch", "1", "--out", str(path), "--patience", "0").returncode, 3)
+        self.assertEqual({path: path.read_bytes() for path in old}, old)
+
+    def test_an_interrupted_fetch_ends_and_the_experiment_goes_on(self):
+        """Ctrl-C of somebody who only looks, and ends what another terminal waits for."""
+        self.start("servo")
+        toml = self.path / "e.toml"
+        toml.write_text('mode = "realtime"\nduration_s = 110.0\nsignals = ["u_a_v"]\n[input]\nkind = "none"\n', encoding="utf-8")
+        number = str(json.loads(self.drivebench("run", str(toml), "--json", "--detach").stdout)["id"])
+        for name in ("part.csv", "part.mcap"):
+            fetching = self.popen("fetch", number, "--out", name)
+            until(lambda: catches(signal.SIGINT, fetching), "it would not die of the signal")
+            until(lambda: (self.path / "part.csv").exists(), "rows come")  # a recording comes at the end only
+            fetching.send_signal(signal.SIGINT)
+            _, said = fetching.communicate(timeout=PATIENCE_S)
+            self.assertEqual(fetching.returncode, 1, said)
+            self.assertIn(f"experiment {number} is not cancelled", said)
+        self.assertEqual([e["state"] for e in json.loads(self.drivebench("list", "--json").stdout)["experiments"]], ["running"])
+        lines = (self.path / "part.csv").read_text(encoding="utf-8").splitlines()
+        self.assertEqual([int(line.split(",")[0]) for line in lines[1:]], list(range(len(lines) - 1)))
+        self.assertEqual(self.drivebench("cancel", number).returncode, 0)
+
+    def test_the_secret_of_a_user_stands_in_the_folder_of_his_settings(self):
+        """An empty variable that puts the secret into whatever folder one happens to be in."""
+        self.start("servo")
+        for variables, place in (({"XDG_CONFIG_HOME": "", "HOME": f"{self.path}/home"}, "home/.config/drivebench/owner"),
+                                 ({"XDG_CONFIG_HOME": f"{self.path}/xdg", "HOME": ""}, "xdg/drivebench/owner")):
+            self.assertEqual(self.drivebench("list", owner=None, **variables).returncode, 0)
+            self.assertRegex((self.path / place).read_text(encoding="utf-8"), r"^[0-9a-f]{32}\n$")
+            self.assertEqual((self.path / place).stat().st_mode & 0o777, 0o600)
+        refused = self.drivebench("list", owner=None, XDG_CONFIG_HOME="", HOME="")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("--owner is needed", refused.stderr)
+        self.assertFalse((self.path / "drivebench").exists() or (self.path / ".config").exists())
+
     def test_wrong_files_are_told_with_their_lines(self):
         """A wrong file that is sent all the same."""
         self.start("servo")
@@ -113,6 +166,11 @@ class Commands(WireTest):
         self.assertGreater(json.loads(ran.stdout)["resumed"], 1)
         lines = out.read_text(encoding="utf-8").splitlines()[1:]
         self.assertEqual([int(line.split(",")[0]) for line in lines], list(range(20001)))
+
+
+def catches(number, process):
+    caught = re.search(r"^SigCgt:\s*([0-9a-f]+)$", pathlib.Path(f"/proc/{process.pid}/status").read_text(), re.M)
+    return int(caught[1], 16) >> (number - 1) & 1 == 1
 
 
 class Proxy:

@@ -5,9 +5,11 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
 try:
@@ -16,7 +18,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER
+from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
 from wire_test import WireTest, until
 
 PROGRAM = str(SERVER.parent / "drivebench")
@@ -29,7 +31,7 @@ class Identify(WireTest):
         folder = tempfile.TemporaryDirectory(prefix="drivebench-identify-test-")
         self.addCleanup(folder.cleanup)
         self.path = pathlib.Path(folder.name)
-        self.environment = {name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")}
+        self.environment = guarded({name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")})
         # Nothing listens there, so that a server of somebody else's is not found by chance.
         self.environment.update(DRIVEBENCH_LINK=f"unix:{self.path}/nothing", XDG_CONFIG_HOME=str(self.path),
                                 TMPDIR=str(self.path))
@@ -147,6 +149,36 @@ class Identify(WireTest):
         self.environment["DRIVEBENCH_LINK"] = "tcp:127.0.0.1:1"
         self.identify("--motor", "dc", "--link", "tcp:127.0.0.1:1", code=3)
 
+    def test_a_server_found_by_chance_that_will_not_do_is_passed_over(self):
+        """A user who must stop somebody else's server first: one that keeps no experiments, one that asks for a token, something
+        that speaks another language, a link that only `control` understands."""
+        text = (BENCHES / "dc-a-voltage.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        (self.path / "tokens").write_text('[[token]]\nname = "a"\nrole = "viewer"\ntoken = "secret"\n', encoding="utf-8")
+        (self.path / "tokens").chmod(0o600)
+        bare = f"tcp:{self.server(text=text).ready['tcp']}"
+        asking = text + f'\n[tcp]\ntokens_file = "{self.path}/tokens"\n'
+        closed = f"tcp:{self.server(text=asking).ready['tcp']}"
+        stranger = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(stranger.close)
+        threading.Thread(target=answer_in_http, args=(stranger,), daemon=True).start()
+        for link, why, code in ((bare, "keeps no experiments", 1), (closed, "does not let us in", 3),
+                                ("tcp:%s:%d" % stranger.getsockname(), "does not speak", 1), ("can:socketcan:can0", "over CAN", 2),
+                                ("modbus:127.0.0.1:1", "over CAN and Modbus", 2)):
+            with self.subTest(link):
+                self.environment["DRIVEBENCH_LINK"] = link
+                passed = self.identify("--motor", "dc")
+                self.assertIn(why, passed.stderr)
+                self.assertIn("starting a server on dc-a-voltage", passed.stderr)
+                self.assertIn(why, self.identify("--motor", "dc", "--link", link, code=code).stderr)
+
+    def test_a_bench_that_cannot_be_is_2(self):
+        """A mistake in a configuration that a script takes for a failed experiment."""
+        broken = self.path / "broken.toml"
+        broken.write_text("[bench]\nperiod_us = 0\n", encoding="utf-8")
+        ran = self.identify("--motor", "dc", "--bench", broken, code=2)
+        self.assertIn("broken.toml:2: bench.period_us", ran.stderr)
+        self.assertIn("does not take the bench", ran.stderr)
+
     def test_what_the_data_do_not_hold_is_no_success(self):
         """An exit code of 0, a number or a motor file for a motor that nobody could see."""
         toml = self.path / "constant.toml"
@@ -234,6 +266,16 @@ class Identify(WireTest):
         lines = out.read_text(encoding="utf-8").splitlines()
         self.assertEqual(len(lines), told["rows"] + 1)
         self.assertTrue(all(re.fullmatch(r"\d+,[\d.]+,[-\d.e]+", line) for line in lines[1:]))
+
+
+def answer_in_http(listener):
+    while True:
+        try:
+            client, _ = listener.accept()
+        except OSError:
+            return
+        with client:
+            client.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
 
 
 if __name__ == "__main__":
