@@ -87,17 +87,6 @@ struct Exported {
   std::string other_axes;
 };
 
-/// Refuses what would cost the output file what it held, or the recording itself.
-void check_files(const McapSeries& reader, const ExportOptions& options) {
-  if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap) {
-    throw UsageError(fmt::format("{} is not a recording: {}", options.recording, reader.problem()->what));
-  }
-  std::error_code ignored;
-  if (std::filesystem::equivalent(options.recording, options.out_file, ignored)) {
-    throw UsageError(fmt::format("--out {} is the recording itself", options.out_file));
-  }
-}
-
 /// Where the messages of an axis are found, by channel.
 class AxisChannels {
  public:
@@ -127,6 +116,32 @@ class AxisChannels {
   std::uint32_t count_ = 0;
   std::map<std::uint16_t, Place> places_;
 };
+
+/// Refuses an axis of which there is no sample.
+void check_axis(const MappedSeries& files, const std::string& axis) {
+  if (axis.empty()) return;
+  McapSeries reader(files.segments());
+  AxisChannels channels(axis);
+  for (McapMessage message; reader.next(message);) {
+    if (channels.find(reader.reader(), message.header.channel).is_wanted)
+      return;  // as a rule the first tick has it
+  }
+  throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}{}", axis,
+                               channels.others().empty() ? "none" : channels.others(),
+                               reader.problem() ? ", and is not whole: " + reader.problem()->what : ""));
+}
+
+/// Refuses what would cost the output file what it held, or the recording itself.
+void check_files(const McapSeries& reader, const MappedSeries& files, const ExportOptions& options) {
+  if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap) {
+    throw UsageError(fmt::format("{} is not a recording: {}", options.recording, reader.problem()->what));
+  }
+  check_axis(files, options.axis);
+  std::error_code ignored;
+  if (std::filesystem::equivalent(options.recording, options.out_file, ignored)) {
+    throw UsageError(fmt::format("--out {} is the recording itself", options.out_file));
+  }
+}
 
 /// Hands every message that can be read to `take`, and what `take` has left in `text` to the file.
 template <class Take>
@@ -228,7 +243,10 @@ int run_export(const ExportOptions& options) {
   const std::vector<const Signal*> signals = chosen_signals(options.signals);
   if (!is_csv) can_address_of(options);  // refuses what is wrong before the file is made
   if (!is_csv && !options.signals.empty()) throw UsageError("--signals chooses columns of CSV");
-  check_files(reader, options);
+  if (options.from_tick > options.to_tick) {
+    throw UsageError(fmt::format("--from {} is behind --to {}", options.from_tick, options.to_tick));
+  }
+  check_files(reader, files, options);
   Output out(options.out_file);
   const Exported done = is_csv ? export_rows(reader, options, signals, files.size(), out)
                                : export_frames(reader, options, files, out);
@@ -244,10 +262,6 @@ int run_export(const ExportOptions& options) {
   if (!problem.empty()) {
     fmt::print(stderr, "drivebench: the recording is not whole: {}\n", problem);
     return kExitCutShort;
-  }
-  if (done.rows == 0 && !done.other_axes.empty()) {
-    throw UsageError(
-        fmt::format("no samples of axis '{}'; the recording has {}", done.axis, done.other_axes));
   }
   if (is_csv && !done.other_axes.empty() && options.axis.empty()) {
     fmt::print(stderr, "export: the recording also has {}; --axis chooses\n", done.other_axes);

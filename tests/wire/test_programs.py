@@ -130,7 +130,7 @@ class Recordings(CommandTest):
         self.drivebench("replay", "killed.mcap", code=USAGE)
 
     def test_export_refuses_before_it_overwrites(self):
-        """A file that is emptied by a mistake on the command line: once, the recording itself."""
+        """A file that is emptied by a mistake on the command line: once, the recording itself. A range that holds nothing."""
         copy = self.written("copy.mcap", self.whole.read_bytes())
         self.written("precious.csv", b"tick\n")
         self.written("text", b"tick,time\n")
@@ -138,11 +138,13 @@ class Recordings(CommandTest):
                                 ((copy, "--out", f"./{copy}"), "the recording itself"),
                                 (("text", "--out", "precious.csv"), "is not a recording"),
                                 ((copy, "--out", "precious.csv", "--signals", "volts"), "no signal 'volts'"),
+                                ((copy, "--out", "precious.csv", "--axis", "second"), "the recording has servo"),
+                                ((copy, "--out", "precious.csv", "--format", "candump", "--axis", "second"), "has servo"),
+                                ((copy, "--out", "precious.csv", "--from", "10", "--to", "5"), "--from 10 is behind --to 5"),
                                 ((copy, "--out", "none/out.csv"), "cannot write")):
             self.assertSays(self.json_of("export", *arguments, code=USAGE)["error"]["message"], fact)
         self.assertEqual((self.folder / copy).read_bytes(), self.whole.read_bytes())
         self.assertEqual((self.folder / "precious.csv").read_bytes(), b"tick\n")
-        self.assertSays(self.drivebench("export", copy, "--axis", "second", code=USAGE).stderr, "the recording has servo")
 
 
 class Serving(CommandTest):
