@@ -19,8 +19,9 @@ import sys
 import tempfile
 import time
 
-from misfortune import Misfortune, Recording
-from wire_client import BENCHES, PATIENCE_S, SERVER
+from misfortune import Misfortune
+from recording import Recording
+from wire_client import BENCHES, PATIENCE_S, SERVER, guarded
 
 
 def kill_one(local, number):
@@ -30,7 +31,8 @@ def kill_one(local, number):
         file = pathlib.Path(folder) / "run.mcap"
         misfortune = Misfortune()
         command = [SERVER, BENCHES / "servo.toml", "--port", "0", "--mode", mode, "--record", file]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=misfortune.environment())
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                                   env=guarded(misfortune.environment()))
         if not process.stdout.readline():
             raise AssertionError("the server did not start")
         time.sleep(local.uniform(0.0, 0.4) if mode == "realtime" else local.uniform(0.0, 0.06))

@@ -19,7 +19,7 @@ except ImportError:
     sys.exit(77)
 
 from own_network import in_own_network
-from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER
+from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
 
 READMES = ("README.md", "server/README.md", "clients/README.md", "protocols/can/README.md", "protocols/modbus/README.md")
 PROGRAMS = ("drivebench", "drivebench-server")
@@ -65,7 +65,7 @@ class Bench:
     def __init__(self, folder):
         self.folder = folder
         (folder / "configs").symlink_to(REPOSITORY / "configs")
-        self.environment = {name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")}
+        self.environment = guarded({name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")})
         self.server = None
         self.moved = False
 

@@ -2,6 +2,7 @@
 """Recordings in several files, on the command line. Each test names the mistake that it would catch."""
 import csv
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -14,7 +15,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from wire_client import BENCHES, PATIENCE_S, SERVER
+from wire_client import BENCHES, PATIENCE_S, SERVER, guarded
 from wire_test import WireTest
 
 DRIVEBENCH = SERVER.with_name("drivebench")
@@ -27,7 +28,8 @@ class Series(WireTest):
         self.folder = pathlib.Path(folder.name)
 
     def run_of(self, *command):
-        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, cwd=self.folder, check=False)
+        return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, cwd=self.folder, env=guarded(os.environ),
+                              check=False)
 
     def recorded(self, *options, duration_s=1.5):
         """A free run; the names of its files."""

@@ -20,7 +20,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from wire_client import PATIENCE_S, REPOSITORY, SERVER, pb
+from wire_client import PATIENCE_S, REPOSITORY, SERVER, guarded, pb
 from wire_test import SERVO_TEXT, WireTest
 
 UNIT = REPOSITORY / "configs/systemd/drivebench-server.service"
@@ -138,7 +138,8 @@ class Unit(WireTest):
             bench.write_text(SERVO_TEXT, encoding="utf-8")
             bench.chmod(0o644)
             done = subprocess.run([*(limit if limited else []), *drop, SERVER, bench, "--port", "0", "--mode", "realtime",
-                                   "--duration", "0.05", *options], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+                                   "--duration", "0.05", *options], capture_output=True, text=True, env=guarded(os.environ),
+                                  timeout=PATIENCE_S, check=False)
         self.assertEqual(done.returncode, code, done.stdout + done.stderr)
         self.assertEqual("ready" in done.stdout, code == 0)
         return done.stderr, limited

@@ -32,9 +32,12 @@ pb = _generated()
 
 
 def guarded(environment):
-    """For a program whose ticks may do nothing that could wait, or it ends (tests/guard)."""
+    """For a program whose ticks may do nothing that could wait, or it ends (tests/guard); beside what else is preloaded."""
     guard = os.environ.get("DRIVEBENCH_GUARD")
-    return {"LD_PRELOAD": guard, **environment} if guard else environment
+    if not guard:
+        return environment
+    others = environment.get("LD_PRELOAD")
+    return {**environment, "LD_PRELOAD": f"{guard}:{others}" if others else guard}
 
 
 class Closed(Exception):
@@ -212,3 +215,7 @@ class Client:
 
     def status(self):
         return self.ask(status_request=pb.StatusRequest()).status
+
+    def tcp_counts(self):
+        """What the server has counted on TCP, by its names."""
+        return {c.name: c.value for t in self.status().transports if t.name.startswith("tcp") for c in t.counts}
