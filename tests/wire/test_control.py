@@ -1,7 +1,10 @@
 #!/usr/bin/python3
 """Control over the wire: exchanges, parameters, loads, real time. Each test names the mistake that it would catch."""
 import math
+import pathlib
+import struct
 import sys
+import tempfile
 import unittest
 
 try:
@@ -10,6 +13,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
+from recording import Recording
 from wire_client import PATIENCE_S, pb
 from wire_test import TWO_AXES, WireTest, until
 
@@ -68,6 +72,21 @@ class Exchange(WireTest):
         sample = client.step(2, 1e6, -1e6)
         self.assertEqual((sample.u_a_v, sample.u_b_v), (80.0, -80.0))
         self.assertTrue(sample.faults & 1, "saturation is said")
+
+    def test_cmd_11_what_is_legal_is_kept_to_the_bit(self):
+        """-0.0 that becomes 0.0 on its way, or a denormal that becomes 0."""
+        with tempfile.TemporaryDirectory(prefix="drivebench-control-") as folder:
+            file = pathlib.Path(folder) / "run.mcap"
+            server = self.server("--record", str(file))
+            client = self.client(server)
+            client.lease()
+            given = ((-0.0, 5e-324), (-1e-310, -0.0), (3.0, 0.1))
+            for tick, (u_a_v, u_b_v) in enumerate(given):
+                client.step(tick, u_a_v, u_b_v)
+            self.assertEqual(server.stop(), 0)
+            inputs = [pb.Input.FromString(content) for content in Recording(file.read_bytes()).contents["/inputs"]]
+        taken = [each.command for each in inputs if each.WhichOneof("action") == "command"]
+        self.assertEqual([struct.pack("<2d", each.u_a_v, each.u_b_v) for each in taken], [struct.pack("<2d", *each) for each in given])
 
     def test_unknown_axes_and_gates_are_refused(self):
         """An index that is used before it is checked."""

@@ -112,15 +112,23 @@ class Hello(WireTest):
             self.assertEqual(client.answer_to(i).parameter_values.parameters[0].name, "amplifier.gain")
 
     def test_tcp_04_strangers_are_closed(self):
-        """Foreign protocols that keep a session open or take the server down."""
-        for greeting in (b"GET / HTTP/1.1\r\nHost: bench\r\n\r\n", b"SSH-2.0-OpenSSH_9.2p1\r\n",
-                         bytes.fromhex("16030100c8010000c40303") + os.urandom(192),  # TLS client hello
-                         b"\x00\x00\x00\x06\xff\xff\xff\xff\xff\xff", b"\x00\x00\x00\x02\x08"):
-            client = self.client(self.shared, hello=False)
-            client.send_bytes(greeting)
-            client.socket.shutdown(socket.SHUT_WR)
-            self.assertTrue(client.is_closed(), greeting)
-        self.still_serves()
+        """Foreign protocols that keep a session open or take the server down, or whose peers fill its log."""
+        server = self.server()
+        began = time.monotonic()
+        for n in range(20):
+            for greeting in (b"GET / HTTP/1.1\r\nHost: bench\r\n\r\n", b"SSH-2.0-OpenSSH_9.2p1\r\n",
+                             bytes.fromhex("16030100c8010000c40303") + os.urandom(192),  # TLS client hello
+                             b"\x00\x00\x00\x06\xff\xff\xff\xff\xff\xff"):
+                client = self.client(server, hello=False)
+                client.send_bytes(greeting)
+                self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED, "frame")
+                self.assertTrue(client.is_closed(), greeting)
+            half = self.client(server, hello=False)
+            half.send_bytes(b"\x00\x00\x00\x02\x08")
+            half.socket.shutdown(socket.SHUT_WR)
+            self.assertTrue(half.is_closed())
+        self.assertEqual(self.client(server).status().sessions, 1)
+        self.assertLessEqual(len(server.errors().splitlines()), 1 + (time.monotonic() - began) // 10, "a line in 10 s")
 
     def test_tcp_07_unknown_fields_are_ignored_and_the_last_scalar_counts(self):
         """A server that refuses what a newer client adds, or takes the first of two values."""
@@ -128,6 +136,18 @@ class Hello(WireTest):
         twice = b"\x08\x63" + b"\x82\x01\x00" + b"\x08\x07" + b"\xa0\x7f\x01"  # id 99, status_request, id 7, unknown
         client.send_bytes(frame(twice))
         self.assertEqual(client.answer_to(7).WhichOneof("kind"), "status")
+
+    def test_tcp_07_of_two_kinds_the_last_holds(self):
+        """A request that is carried out although another has taken its place, or two answers to one."""
+        client, other = self.client(self.shared), self.client(self.shared)
+        lease = b"\x32\x02\x10\x01"  # lease { action = ACQUIRE }
+        status = b"\x82\x01\x00"  # status_request {}
+        for kinds, answer, free in ((lease + status, "status", True), (status + lease, "done", False)):
+            client.send_bytes(frame(b"\x08\x63" + kinds))  # id 99
+            self.assertEqual(client.answer_to(99).WhichOneof("kind"), answer)
+            self.assertEqual(client.status().axes[0].sample.owner == 0, free)
+        self.assertRefused(other.lease(), pb.REFUSAL_OWNED)
+        self.assertDone(client.lease(pb.LeaseRequest.ACTION_RELEASE))
 
     def test_tcp_07_answers_are_no_requests(self):
         """A server that obeys a message which only servers send."""
@@ -149,12 +169,14 @@ class Hello(WireTest):
         self.assertTrue(client.is_closed())
 
     def test_limit_05_silent_connection_is_closed(self):
-        """Connections that never say hello and stay for ever."""
+        """Connections that never say hello and stay for ever, or long enough to take the places of others."""
+        since = time.monotonic()
         client = self.client(self.shared, hello=False)
         patient = self.client(self.shared, hello=False)
         time.sleep(1.0)  # half of what is allowed
         self.assertEqual(patient.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="slow")).WhichOneof("kind"), "welcome")
         self.assertTrue(client.is_closed())
+        self.assertLimitOf2s(since)
         self.assertEqual(patient.newest().tick, self.client(self.shared).newest().tick)
 
     def test_long_client_name_is_refused(self):

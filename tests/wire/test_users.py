@@ -195,8 +195,7 @@ class Tokens(UsersTest):
             return self.guess(server, "adam-secret").WhichOneof("kind") == "welcome"
         until(right, "whoever has waited is let in")
         self.assertTrue(right(), "and nobody waits any more")
-        counts = {c.name: c.value for t in inside.status().transports if t.name.startswith("tcp") for c in t.counts}
-        self.assertGreaterEqual(counts["wrong_tokens"], guesses)
+        self.assertGreaterEqual(inside.tcp_counts()["wrong_tokens"], guesses)
         self.assertEqual(server.stop(), 0)
         command_line = " ".join(server.process.args)
         for place in (server.errors(), command_line, (folder / "audit").read_text(encoding="utf-8"),
