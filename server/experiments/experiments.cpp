@@ -31,6 +31,7 @@ Experiments::Experiments(asio::io_context& io, const BenchConfig& config)
     : io_(io), config_(config), folder_(config.experiments.folder), timer_(io) {
   lock_folder();
   load();
+  maximum_length_sequence(kMaxPrbsOrder);  // now, not when a request comes and the live bench runs
   worker_ = std::thread([this] { work(); });
 }
 

@@ -154,11 +154,11 @@ class ShapeReader {
   PrbsShape prbs(const v1::Shape::Prbs& s) const {
     const auto order =
         static_cast<std::uint32_t>(within(s.order(), kMinPrbsOrder, kMaxPrbsOrder, "bits", "prbs.order"));
-    const auto bits = std::make_shared<const std::vector<bool>>(maximum_length_sequence(order));
+    const std::vector<bool>& bits = maximum_length_sequence(order);
     return {.amplitude = value(s.amplitude(), "prbs.amplitude"),
             .bit_ticks = std::max(static_cast<Tick>(s.bit_ticks()), Tick{1}),
-            .first_bit = s.seed() % bits->size(),
-            .bits = bits};
+            .first_bit = s.seed() % bits.size(),
+            .bits = &bits};
   }
 
   MultisineShape multisine(const v1::Shape::Multisine& s) const {

@@ -67,14 +67,14 @@ void add_three_phase(const ThreePhaseShape& s, const Moment& m, Connection conne
     values[static_cast<std::size_t>(phase)] += rise * s.amplitude * cosine(angle - phase * lag);
 }
 
+constexpr std::size_t kPrbsOrders = kMaxPrbsOrder - kMinPrbsOrder + 1;
+
 /// Feedback taps of primitive polynomials, as bit masks of the register; by order from 3 on.
-constexpr std::array<std::uint32_t, 18> kTaps = {0x6,    0xC,    0x14,    0x30,    0x60,    0xB8,
-                                                 0x110,  0x240,  0x500,   0xE08,   0x1C80,  0x3802,
-                                                 0x6000, 0xD008, 0x12000, 0x20400, 0x72000, 0x90000};
+constexpr std::array<std::uint32_t, kPrbsOrders> kTaps = {0x6,    0xC,    0x14,    0x30,    0x60,    0xB8,
+                                                          0x110,  0x240,  0x500,   0xE08,   0x1C80,  0x3802,
+                                                          0x6000, 0xD008, 0x12000, 0x20400, 0x72000, 0x90000};
 
-}  // namespace
-
-std::vector<bool> maximum_length_sequence(std::uint32_t order) {
+std::vector<bool> run_register(std::uint32_t order) {
   const std::uint32_t taps = kTaps[order - kMinPrbsOrder];
   std::vector<bool> bits((std::size_t{1} << order) - 1);
   std::uint32_t state = 1;
@@ -85,6 +85,20 @@ std::vector<bool> maximum_length_sequence(std::uint32_t order) {
     if (out) state ^= taps;
   }
   return bits;
+}
+
+std::array<std::vector<bool>, kPrbsOrders> run_all_registers() {
+  std::array<std::vector<bool>, kPrbsOrders> sequences;
+  for (std::uint32_t order = kMinPrbsOrder; order <= kMaxPrbsOrder; ++order)
+    sequences[order - kMinPrbsOrder] = run_register(order);
+  return sequences;
+}
+
+}  // namespace
+
+const std::vector<bool>& maximum_length_sequence(std::uint32_t order) {
+  static const auto sequences = run_all_registers();
+  return sequences[order - kMinPrbsOrder];
 }
 
 void add_shape(const InputShape& input, Tick tick, double period_s, Connection connection,

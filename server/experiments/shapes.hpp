@@ -42,7 +42,7 @@ struct PrbsShape {
   double amplitude;
   Tick bit_ticks;
   std::uint64_t first_bit;
-  std::shared_ptr<const std::vector<bool>> bits;  ///< one period
+  const std::vector<bool>* bits;  ///< one period, of maximum_length_sequence()
 };
 struct MultisineShape {
   double amplitude;
@@ -75,8 +75,10 @@ void add_shape(const InputShape& shape, Tick tick, double period_s, Connection c
                InputValues& values) noexcept;
 
 /// One period of a maximum-length sequence: 2^order - 1 bits, 2^(order-1) of them set. `order` is 3 to 20.
+/// The first call makes those of all orders, in some milliseconds and 256 KiB, for as long as the program
+/// runs.
 inline constexpr std::uint32_t kMinPrbsOrder = 3;
 inline constexpr std::uint32_t kMaxPrbsOrder = 20;
-std::vector<bool> maximum_length_sequence(std::uint32_t order);
+const std::vector<bool>& maximum_length_sequence(std::uint32_t order);
 
 }  // namespace drivebench

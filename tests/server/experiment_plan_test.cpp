@@ -257,6 +257,27 @@ TEST(ExperimentPlan, TurnsDqVoltagesByTheElectricalAngle) {
   EXPECT_NEAR(command.setpoint.a, -3.0 * std::sin(0.31415926535897931), 1e-14);
 }
 
+// Catches: a register that is shifted through 2^20 bits for each shape while the I/O thread waits (2 ms), and
+// bits that each plan in the queue has of its own (128 KiB).
+TEST(ExperimentPlan, AllRequestsShareTheSequencesOfBits) {
+  v1::RunExperiment r = good();
+  r.mutable_input()->clear_shapes();
+  for (int i = 0; i < kMaxShapes; ++i) {
+    v1::Shape& shape = *r.mutable_input()->add_shapes();
+    shape.set_channel(v1::CHANNEL_A);
+    shape.mutable_prbs()->set_amplitude(0.5);
+    shape.mutable_prbs()->set_order(kMaxPrbsOrder);
+    shape.mutable_prbs()->set_seed((1u << kMaxPrbsOrder) + static_cast<std::uint32_t>(i));
+  }
+  const std::vector<ExperimentPlan> plans = {plan_of(r), plan_of(r)};
+  const auto& first = std::get<PrbsShape>(plans[0].shapes[0].shape);
+  EXPECT_EQ(first.first_bit, 1u);  // the seed, which goes once round
+  for (const ExperimentPlan& plan : plans) {
+    for (const InputShape& shape : plan.shapes)
+      ASSERT_EQ(std::get<PrbsShape>(shape.shape).bits, first.bits);
+  }
+}
+
 struct Ran {
   RunOutcome outcome;
   std::vector<double> rows;

@@ -98,7 +98,7 @@ TEST(ExperimentShapes, ChirpIsTheSineOfTheIntegralOfItsFrequency) {
 // one that is not white.
 TEST(ExperimentShapes, PrbsHasMaximumLength) {
   for (std::uint32_t order = kMinPrbsOrder; order <= kMaxPrbsOrder; ++order) {
-    const std::vector<bool> bits = maximum_length_sequence(order);
+    const std::vector<bool>& bits = maximum_length_sequence(order);
     ASSERT_EQ(bits.size(), (std::size_t{1} << order) - 1);
     EXPECT_EQ(std::accumulate(bits.begin(), bits.end(), std::size_t{0}), std::size_t{1} << (order - 1));
     // The autocorrelation of a maximum-length sequence is -1 for every shift but 0.
@@ -111,14 +111,31 @@ TEST(ExperimentShapes, PrbsHasMaximumLength) {
   }
 }
 
+// Catches: other bits than those of the recordings that there are: other taps, another register to begin
+// with.
+TEST(ExperimentShapes, PrbsHasTheSameBitsForEver) {
+  constexpr auto kHashes =
+      std::to_array<std::uint32_t>({0x4736DB29, 0x0E602A71, 0xBD65B135, 0x0B151A79, 0xDC55ACE9, 0x66250AD9,
+                                    0x669BCFED, 0xBF706629, 0xC35530C5, 0x34DD7B91, 0xA5AF58D5, 0x89961A91,
+                                    0xFEA336D1, 0x9DC3F08D, 0x9E5404B1, 0xBBCC83B1, 0x6C84A22D, 0x645D8311});
+  for (std::uint32_t order = kMinPrbsOrder; order <= kMaxPrbsOrder; ++order) {
+    std::uint32_t hash = 2166136261u;  // FNV-1a over the bits
+    for (const bool bit : maximum_length_sequence(order))
+      hash = (hash ^ (bit ? 1u : 0u)) * 16777619u;
+    EXPECT_EQ(hash, kHashes[order - kMinPrbsOrder]) << order;
+  }
+  const std::vector<bool> three_bits = {true, false, true, true, true, false, false};
+  EXPECT_EQ(maximum_length_sequence(3), three_bits);
+}
+
 // Catches: bits that last a tick whatever bit_ticks says, a seed that changes nothing.
 TEST(ExperimentShapes, PrbsHoldsItsBitsAndBeginsWhereTheSeedSays) {
-  const auto bits = std::make_shared<const std::vector<bool>>(maximum_length_sequence(5));
+  const std::vector<bool>& bits = maximum_length_sequence(5);
   const InputShape shape =
-      on_a(PrbsShape{.amplitude = 4.0, .bit_ticks = 3, .first_bit = 2, .bits = bits}, 6, 1000);
+      on_a(PrbsShape{.amplitude = 4.0, .bit_ticks = 3, .first_bit = 2, .bits = &bits}, 6, 1000);
   for (Tick tick = 6; tick < 200; ++tick) {
     const std::size_t bit = (2 + static_cast<std::size_t>(tick - 6) / 3) % 31;
-    EXPECT_EQ(at(shape, tick), (*bits)[bit] ? 4.0 : -4.0) << tick;
+    EXPECT_EQ(at(shape, tick), bits[bit] ? 4.0 : -4.0) << tick;
   }
 }
 
