@@ -3,6 +3,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "clients/command/line_values.hpp"
+
 namespace drivebench::command {
 namespace {
 
@@ -11,16 +13,12 @@ using Run = int (*)(const ExperimentOptions&);
 void add_file_options(CLI::App& sub, ExperimentOptions& options) {
   sub.add_option("--out", options.out_file, "CSV, or the recording if it ends with .mcap");
   sub.add_option("--patience", options.patience_s, "seconds that a broken link may stay broken")
-      ->check(CLI::NonNegativeNumber)
+      ->check(finite_between(0.0, kMost_s))
       ->capture_default_str();
 }
 
 void add_id(CLI::App& sub, ExperimentOptions& options) {
-  sub.add_option("ID", options.id, "its number")
-      ->required()
-      ->check(CLI::Validator(
-          [](std::string& text) { return text.starts_with('-') ? text + " is negative" : std::string(); },
-          ""));
+  sub.add_option("ID", options.id, "its number")->required()->check(not_negative());
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <cstdlib>
 
+#include "clients/command/line_values.hpp"
+
 namespace drivebench::command {
 namespace {
 
@@ -25,7 +27,7 @@ void add_measurement(CLI::App& sub, LinkChoice& link, IdentifyOptions& o) {
   sub.add_option("--time", o.time, "--from CSV: header of the time [s]; default: time_s");
   sub.add_option("--period", o.period_s,
                  "--from CSV: seconds between two rows, if there is no column of time")
-      ->check(CLI::PositiveNumber);
+      ->check(finite_between(1e-12, kMost_s));
 }
 
 void add_settings(CLI::App& sub, IdentifyOptions& o) {
@@ -33,7 +35,7 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
       "How data become equations (default: what bench, recording and experiment say)";
   sub.add_option("--pole-pairs", o.pole_pairs, "of the motor")->check(CLI::Range(1, 1000))->group(kGroup);
   sub.add_option("--counts", o.counts_per_revolution, "of encoder_count in a revolution; 0: angle_rad counts")
-      ->check(CLI::Range(0.0, 1e9))
+      ->check(finite_between(0.0, 1e9))
       ->group(kGroup);
   sub.add_option("--phases", o.phases, "3 in a star, or the 2 of a two-phase machine")
       ->check(CLI::IsMember({2, 3}))
@@ -44,14 +46,14 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
       ->group(kGroup);
   sub.add_option("--voltage-shift", o.voltage_shift,
                  "advance voltages by so many periods; mean is 0.5, instant 0")
-      ->check(CLI::Range(-100.0, 100.0))
+      ->check(finite_between(-100.0, 100.0))
       ->group(kGroup);
   sub.add_option("--window", o.window, "FROM:TO [s], the part of the record that counts")->group(kGroup);
   sub.add_option("--current-hz", o.current_hz, "corner of the zero-phase filter; 0: none")
-      ->check(CLI::Range(0.0, 1e9))
+      ->check(finite_between(0.0, 1e9))
       ->group(kGroup);
-  sub.add_option("--voltage-hz", o.voltage_hz, "the same")->check(CLI::Range(0.0, 1e9))->group(kGroup);
-  sub.add_option("--shaft-hz", o.shaft_hz, "the same")->check(CLI::Range(0.0, 1e9))->group(kGroup);
+  sub.add_option("--voltage-hz", o.voltage_hz, "the same")->check(finite_between(0.0, 1e9))->group(kGroup);
+  sub.add_option("--shaft-hz", o.shaft_hz, "the same")->check(finite_between(0.0, 1e9))->group(kGroup);
   sub.add_option("--order", o.order, "of these filters")->check(CLI::Range(1, 10))->group(kGroup);
   sub.add_option("--load", o.load, "im: viscous friction or a constant load torque")
       ->check(CLI::IsMember({"viscous", "constant"}))

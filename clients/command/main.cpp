@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -12,48 +10,11 @@
 #include "clients/command/experiment_line.hpp"
 #include "clients/command/identify_line.hpp"
 #include "clients/command/json.hpp"
+#include "clients/command/line_values.hpp"
 #include "clients/link/tcp_link.hpp"
 
 namespace drivebench::command {
 namespace {
-
-double number(std::string_view text, std::string_view whole) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw UsageError(fmt::format("'{}' in '{}' is not a number", text, whole));
-  }
-  return value;
-}
-
-std::pair<std::string_view, std::string_view> split(std::string_view text, char at, std::string_view form) {
-  const std::size_t place = text.find(at);
-  if (place == std::string_view::npos) throw UsageError(fmt::format("'{}' should be {}", text, form));
-  return {text.substr(0, place), text.substr(place + 1)};
-}
-
-/// `0.1@0.0365`: N·m at seconds after the start of the trajectory.
-LoadAt parse_load(std::string_view text) {
-  const auto [load, after] = split(text, '@', "NM@SECONDS, for example 0.1@0.0365");
-  const LoadAt parsed = {.load_nm = number(load, text), .after_s = number(after, text)};
-  constexpr double kLatest_s = 3600.0;
-  if (parsed.after_s < 0.0 || parsed.after_s > kLatest_s) {
-    throw UsageError(fmt::format("'{}': the time must lie between 0 and {:g} s", text, kLatest_s));
-  }
-  return parsed;
-}
-
-/// `machine.rotor_resistance_ohm=5.85`
-ParameterSetting parse_setting(std::string_view text) {
-  const auto [name, value] = split(text, '=', "NAME=VALUE");
-  return {.name = std::string(name), .value = number(value, text)};
-}
-
-/// For unsigned options: without it -1 is 2^64 - 1.
-CLI::Validator not_negative() {
-  return {[](std::string& text) { return text.starts_with('-') ? text + " is negative" : std::string(); },
-          ""};
-}
 
 /// Everything the command line can say, and what to do about it.
 struct CommandLine {
@@ -153,14 +114,13 @@ struct CommandLine {
     CLI::App* sub = add_linked("watch", "live values of an axis");
     sub->add_option("--axis", watch.axis, "number or name")->capture_default_str();
     sub->add_option("--signals", watch.signals, "names, separated by commas")->delimiter(',');
-    sub->add_option("--rate", watch.rate_hz, "samples per second of the bench's time")->capture_default_str();
+    sub->add_option("--rate", watch.rate_hz, "samples per second of the bench's time")
+        ->check(finite_between(1e-6, kMost))
+        ->capture_default_str();
     sub->add_option("--count", watch.count, "end after so many samples; 0: never")
         ->check(not_negative())
         ->capture_default_str();
     sub->callback([this] {
-      if (!std::isfinite(watch.rate_hz) || watch.rate_hz <= 0.0) {
-        throw UsageError(fmt::format("--rate {} is not a number above 0", watch.rate_hz));
-      }
       watch.link = link;
       watch.json = json;
       action = [this] { return run_watch(watch); };
@@ -171,7 +131,9 @@ struct CommandLine {
     CLI::App* sub = add_linked("inject", "put a fault into an axis that nobody controls");
     sub->add_option("AXIS", inject.axis, "number or name")->required();
     sub->add_option("FAULT", inject.fault, "name, as describe lists them")->required();
-    sub->add_option("VALUE", inject.value, "0 takes it away")->required();
+    sub->add_option("VALUE", inject.value, "0 takes it away")
+        ->required()
+        ->check(finite_between(-kMost, kMost));
     sub->callback([this] {
       inject.link = link;
       inject.json = json;
@@ -182,16 +144,17 @@ struct CommandLine {
     sub->add_option("NAME", set.name, "as describe lists them")->required();
     sub->add_option("VALUE", set.value, "a number, or the word of a choice")->required();
     sub->add_option("--ramp-s", set.ramp_s, "seconds of the bench's time on the way there")
-        ->check(CLI::Range(0.0, 1e9));
+        ->check(finite_between(0.0, kMost_s));
     sub->callback([this] {
-      if (std::isnan(set.ramp_s)) throw UsageError("--ramp-s nan is not a number");
       set.link = link;
       set.json = json;
       action = [this] { return run_set(set); };
     });
     sub = add_linked("bump", "hit the shaft of an axis that nobody controls");
     sub->add_option("AXIS", bump.axis, "number or name")->required();
-    sub->add_option("IMPULSE", bump.impulse_nms, "[N*m*s], positive like a machine torque")->required();
+    sub->add_option("IMPULSE", bump.impulse_nms, "[N*m*s], positive like a machine torque")
+        ->required()
+        ->check(finite_between(-kMost, kMost));
     sub->callback([this] {
       bump.link = link;
       bump.json = json;
@@ -213,9 +176,9 @@ struct CommandLine {
   }
 
   void add_control() {
-    CLI::App* sub = add_linked("control", "run the reference controller on a move",
-                               "tcp:HOST:PORT, unix:PATH, can:BACKEND:CHANNEL?node=N or "
-                               "modbus:HOST:PORT?unit=N");
+    CLI::App* sub =
+        add_linked("control", "run the reference controller on a move",
+                   std::string(kStreamLinks) + ", can:BACKEND:CHANNEL?node=N, modbus:HOST:PORT?unit=N");
     sub->add_option("--preset", control.preset, "gains and move by name")->capture_default_str();
     sub->add_flag("--list", control.list, "print the presets and end; with --gains all their gains");
     sub->add_flag("--gains", control.gains, "print the gains of the preset and end");
@@ -223,10 +186,12 @@ struct CommandLine {
     sub->add_option("--compare", compare.recording,
                     "MCAP recording of your controller: what the preset's would have commanded");
     sub->add_option("--with", compare.other, "--compare: recording of the preset's own run, compared too");
-    sub->add_option("--from", compare.from_tick, "--compare: tick at which the run starts");
+    sub->add_option("--from", compare.from_tick, "--compare: tick at which the run starts")
+        ->check(not_negative());
     sub->add_option("--threshold", compare.threshold,
-                    "--compare: [V] or [A]; exit code 1 if a command differs by more")
-        ->check(CLI::NonNegativeNumber);
+                    "--compare: [V] or [A]; exit code 1 if a command differs by more, or the recording does "
+                    "not hold the whole run")
+        ->check(finite_between(0.0, kMost));
     sub->add_option("--axis", control.axis, "number or name; CAN and Modbus links name it themselves")
         ->capture_default_str();
     sub->add_option("--csv", control.csv_file, "write every sample to this file");
@@ -309,7 +274,7 @@ struct CommandLine {
         ->check(not_negative())
         ->capture_default_str();
     sub->add_option("--duration", can_log.duration_s, "end after so many seconds; 0: never")
-        ->check(CLI::NonNegativeNumber)
+        ->check(finite_between(0.0, kMost_s))
         ->capture_default_str();
     sub->callback([this] { action = [this] { return run_can_log(can_log); }; });
   }
@@ -330,7 +295,7 @@ struct CommandLine {
     sub->add_option("--preset", plot.preset, "draws its trajectory and the error too");
     sub->add_option("--gain", gains, "NAME=VALUE: another value for a gain of the preset");
     sub->add_option("--axis", plot.axis, "name; default: the first in the file");
-    sub->add_option("--from", plot.from_tick, "tick at which the run starts");
+    sub->add_option("--from", plot.from_tick, "tick at which the run starts")->check(not_negative());
     sub->add_option("--panels", plot.panels,
                     "of angle, speed, error, currents, voltages, torque, separated by commas")
         ->delimiter(',');

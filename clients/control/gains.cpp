@@ -21,8 +21,12 @@ std::string text_of(double value) {
 std::string problem_with_gain(std::string_view name, double value, GainRule rule) {
   const std::string start(name);
   if (!std::isfinite(value)) return start + " must be finite";
-  if (rule == GainRule::kPositive && value <= 0.0) return start + " must be positive";
-  if (rule == GainRule::kNotNegative && value < 0.0) return start + " must not be negative";
+  const bool is_time = rule == GainRule::kDuration || rule == GainRule::kPause;
+  if (is_time && value > kLongestRun_s) return start + " must be at most " + text_of(kLongestRun_s) + " s";
+  if ((rule == GainRule::kPositive || rule == GainRule::kDuration) && value <= 0.0) {
+    return start + " must be positive";
+  }
+  if (rule != GainRule::kAny && value < 0.0) return start + " must not be negative";
   return {};
 }
 

@@ -14,8 +14,12 @@ struct Gain {
   double value;
 };
 
-/// What a gain must be, beside finite.
-enum class GainRule { kAny, kPositive, kNotNegative };
+/// What a run may last, with all that stands before and after its move.
+inline constexpr double kLongestRun_s = 3600.0;
+
+/// What a gain must be, beside finite. A duration is positive and a pause may be 0; neither is longer than
+/// the longest run.
+enum class GainRule { kAny, kPositive, kNotNegative, kDuration, kPause };
 
 /// One row of the gain table of a parameter struct P: how to reach the number, and its rule. Every parameter
 /// struct has `static std::span<const GainRow<P>> gains() noexcept` and `std::vector<std::string> problems()

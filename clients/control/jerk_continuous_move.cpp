@@ -39,8 +39,8 @@ std::span<const GainRow<SpeedRampParameters>> SpeedRampParameters::gains() noexc
   using P = SpeedRampParameters;
   static constexpr auto kRows = std::to_array<GainRow<P>>({
       {"move.speed_rad_s", [](P& p) -> double& { return p.speed_rad_s; }},
-      {"move.ramp_s", [](P& p) -> double& { return p.ramp_s; }, GainRule::kPositive},
-      {"move.cruise_s", [](P& p) -> double& { return p.cruise_s; }, GainRule::kNotNegative},
+      {"move.ramp_s", [](P& p) -> double& { return p.ramp_s; }, GainRule::kDuration},
+      {"move.cruise_s", [](P& p) -> double& { return p.cruise_s; }, GainRule::kPause},
   });
   return kRows;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 namespace drivebench::control {
@@ -11,12 +12,27 @@ std::int64_t samples_in(double duration_s, double rate_hz) noexcept {
   return std::llround(duration_s * rate_hz);
 }
 
+/// Of the whole run.
+std::int64_t checked_samples(double duration_s, double rate_hz) {
+  constexpr double kMostSamples = 1e9;
+  if (!(duration_s <= kLongestRun_s)) {
+    throw std::invalid_argument("prepare, move and hold must together last at most " +
+                                std::to_string(std::lround(kLongestRun_s)) + " s");
+  }
+  if (!(duration_s * rate_hz <= kMostSamples)) {
+    throw std::invalid_argument("the run would have more than 1e9 samples");
+  }
+  const std::int64_t samples = samples_in(duration_s, rate_hz);
+  if (samples < 1) throw std::invalid_argument("the run would be over before its first sample");
+  return samples;
+}
+
 }  // namespace
 
 std::span<const GainRow<RunTiming>> RunTiming::gains() noexcept {
   static constexpr auto kRows = std::to_array<GainRow<RunTiming>>({
-      {"run.prepare_s", [](RunTiming& t) -> double& { return t.prepare_s; }, GainRule::kNotNegative},
-      {"run.hold_s", [](RunTiming& t) -> double& { return t.hold_s; }, GainRule::kNotNegative},
+      {"run.prepare_s", [](RunTiming& t) -> double& { return t.prepare_s; }, GainRule::kPause},
+      {"run.hold_s", [](RunTiming& t) -> double& { return t.hold_s; }, GainRule::kPause},
   });
   return kRows;
 }
@@ -40,14 +56,14 @@ const char* name_of(RunPhase phase) noexcept {
 }
 
 Run::Run(std::unique_ptr<Controller> controller, std::shared_ptr<const Trajectory> trajectory,
-         const RunTiming& timing) noexcept
+         const RunTiming& timing)
     : controller_(std::move(controller)),
       trajectory_(std::move(trajectory)),
       timing_(timing),
       period_s_(1.0 / timing.sample_rate_hz),
       prepare_samples_(samples_in(timing.prepare_s, timing.sample_rate_hz)),
-      planned_samples_(
-          samples_in(timing.prepare_s + trajectory_->duration_s() + timing.hold_s, timing.sample_rate_hz)) {}
+      planned_samples_(checked_samples(timing.prepare_s + trajectory_->duration_s() + timing.hold_s,
+                                       timing.sample_rate_hz)) {}
 
 Setpoint Run::step(const Measurement& m, std::int64_t periods) noexcept {
   sample_ = sample_ < 0 ? 0 : sample_ + periods;

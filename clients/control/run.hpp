@@ -32,9 +32,10 @@ const char* name_of(RunPhase phase) noexcept;
 ///   while (!run.done()) send(run.step(receive()));
 class Run {
  public:
-  /// `timing` must have no problems().
+  /// `timing` must have no problems(). Throws std::invalid_argument if all of it is longer than a run may be,
+  /// or shorter than a sample.
   Run(std::unique_ptr<Controller> controller, std::shared_ptr<const Trajectory> trajectory,
-      const RunTiming& timing) noexcept;
+      const RunTiming& timing);
 
   /// The set-point for this sample; `periods` as in Controller::update, so that the trajectory keeps to the
   /// bench's time when samples are lost. After the end it keeps holding.

@@ -15,9 +15,9 @@ std::span<const GainRow<SpeedStepsParameters>> SpeedStepsParameters::gains() noe
   using P = SpeedStepsParameters;
   static constexpr auto kRows = std::to_array<GainRow<P>>({
       {"steps.first_rad_s", [](P& p) -> double& { return p.first_rad_s; }},
-      {"steps.first_s", [](P& p) -> double& { return p.first_s; }, GainRule::kPositive},
+      {"steps.first_s", [](P& p) -> double& { return p.first_s; }, GainRule::kDuration},
       {"steps.second_rad_s", [](P& p) -> double& { return p.second_rad_s; }},
-      {"steps.second_s", [](P& p) -> double& { return p.second_s; }, GainRule::kPositive},
+      {"steps.second_s", [](P& p) -> double& { return p.second_s; }, GainRule::kDuration},
   });
   return kRows;
 }

@@ -11,7 +11,7 @@ std::span<const GainRow<StepMoveParameters>> StepMoveParameters::gains() noexcep
   static constexpr auto kRows = std::to_array<GainRow<P>>({
       {"move.distance_rad", [](P& p) -> double& { return p.distance_rad; }},
       {"move.speed_rad_s", [](P& p) -> double& { return p.speed_rad_s; }},
-      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kPositive},
+      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kDuration},
   });
   return kRows;
 }
@@ -28,7 +28,7 @@ std::span<const GainRow<SineMoveParameters>> SineMoveParameters::gains() noexcep
       {"move.amplitude_rad", [](P& p) -> double& { return p.amplitude_rad; }},
       {"move.angular_frequency_rad_s", [](P& p) -> double& { return p.angular_frequency_rad_s; },
        GainRule::kPositive},
-      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kPositive},
+      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kDuration},
   });
   return kRows;
 }
@@ -53,7 +53,7 @@ std::span<const GainRow<SineTorqueMoveParameters>> SineTorqueMoveParameters::gai
        GainRule::kPositive},
       {"move.friction_rate_per_s", [](P& p) -> double& { return p.friction_rate_per_s; },
        GainRule::kNotNegative},
-      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kPositive},
+      {"move.duration_s", [](P& p) -> double& { return p.duration_s; }, GainRule::kDuration},
   });
   return kRows;
 }

@@ -108,12 +108,11 @@ Reference between(const Reference& a, const Reference& b, double h_s, double x) 
 
 std::span<const GainRow<TorqueMoveParameters>> TorqueMoveParameters::gains() noexcept {
   using P = TorqueMoveParameters;
-  constexpr GainRule kPositive = GainRule::kPositive;
   static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"move.top_speed_rad_s", [](P& p) -> double& { return p.top_speed_rad_s; }, kPositive},
-      {"move.run_up_s", [](P& p) -> double& { return p.run_up_s; }, kPositive},
-      {"move.run_down_s", [](P& p) -> double& { return p.run_down_s; }, kPositive},
-      {"move.torque_ramp_s", [](P& p) -> double& { return p.torque_ramp_s; }, kPositive},
+      {"move.top_speed_rad_s", [](P& p) -> double& { return p.top_speed_rad_s; }, GainRule::kPositive},
+      {"move.run_up_s", [](P& p) -> double& { return p.run_up_s; }, GainRule::kDuration},
+      {"move.run_down_s", [](P& p) -> double& { return p.run_down_s; }, GainRule::kDuration},
+      {"move.torque_ramp_s", [](P& p) -> double& { return p.torque_ramp_s; }, GainRule::kDuration},
   });
   return kRows;
 }

@@ -22,9 +22,9 @@ std::span<const GainRow<TrajectoryParameters>> TrajectoryParameters::gains() noe
   using P = TrajectoryParameters;
   static constexpr auto kRows = std::to_array<GainRow<P>>({
       {"move.distance_rad", [](P& p) -> double& { return p.distance_rad; }},
-      {"move.ramp_up_s", [](P& p) -> double& { return p.ramp_up_s; }, GainRule::kPositive},
-      {"move.cruise_s", [](P& p) -> double& { return p.cruise_s; }, GainRule::kNotNegative},
-      {"move.ramp_down_s", [](P& p) -> double& { return p.ramp_down_s; }, GainRule::kPositive},
+      {"move.ramp_up_s", [](P& p) -> double& { return p.ramp_up_s; }, GainRule::kDuration},
+      {"move.cruise_s", [](P& p) -> double& { return p.cruise_s; }, GainRule::kPause},
+      {"move.ramp_down_s", [](P& p) -> double& { return p.ramp_down_s; }, GainRule::kDuration},
   });
   return kRows;
 }

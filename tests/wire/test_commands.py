@@ -41,6 +41,8 @@ class WithoutABench(CommandTest):
                 (["control", "--set", "machine"], "NAME=VALUE"), (["control", "--set", "a=1,5"], "not a number"),
                 (["watch", "--rate", "0"], "--rate"), (["watch", "--rate", "nan"], "--rate"),
                 (["watch", "--count", "-1"], "negative"), (["watch", "--signals", "volts"], "no signal 'volts'"),
+                (["control", "--compare", "none.mcap", "--from", "-1"], "negative"), (["plot", "none.mcap", "--from", "-1"], "negative"),
+                (["experiment", "fetch", "-1"], "negative"), (["status", "--link", "can:socketcan:can0"], "tcp:, tls: or unix:"),
                 (["status", "--link", "tcp:host:port"], "not an address"), (["replay"], "FILE"), (["export"], "FILE"),
                 (["export", "none.mcap"], "none.mcap"), (["replay", "none.mcap"], "none.mcap"),
                 (["serve", "none"], "no bench file 'none'"), (["serve", "servo", "--nope"], "--nope"),
@@ -49,12 +51,43 @@ class WithoutABench(CommandTest):
             self.assertSays(done.stderr, fact)
             self.assertEqual(done.stdout, "")
 
+    def test_a_real_number_is_finite_and_has_an_end(self):
+        """NaN that passes a range because no comparison with it is true, seconds that overflow the clock."""
+        for arguments, option, high in (
+                (["watch"], "--rate", "1e+15"), (["set", "servo", "a", "1"], "--ramp-s", "1e+09"),
+                (["control", "--compare", "none.mcap"], "--threshold", "1e+15"),
+                (["can-log", "can:slcan:tcp:127.0.0.1:1"], "--duration", "1e+09"),
+                (["experiment", "fetch", "1"], "--patience", "1e+09"), (["identify", "--motor", "dc"], "--period", "1e+09"),
+                (["identify", "--motor", "dc"], "--counts", "1e+09"), (["identify", "--motor", "dc"], "--voltage-shift", "100"),
+                (["identify", "--motor", "dc"], "--current-hz", "1e+09"), (["identify", "--motor", "dc"], "--voltage-hz", "1e+09"),
+                (["identify", "--motor", "dc"], "--shaft-hz", "1e+09")):
+            for value in ("nan", "inf", "1e300", "1e999", "-1e3", "1x"):
+                with self.subTest(f"{option} {value}"):
+                    said = self.drivebench(*arguments, f"{option}={value}", code=USAGE).stderr
+                    self.assertSays(said, option, f"{value} is not a number from ", f" to {high}")
+        self.assertSays(self.drivebench("inject", "servo", "bus_sag", "nan", code=USAGE).stderr, "VALUE: nan is not a number")
+        self.assertSays(self.drivebench("bump", "servo", "inf", code=USAGE).stderr, "IMPULSE: inf is not a number")
+
+    def test_a_run_without_an_end_or_a_beginning_is_2(self):
+        """A gain that takes all memory, or whose samples overflow, on an axis that is held for it; a picture of no samples."""
+        for gains, fact in (("run.hold_s=1e300", "run.hold_s = 1e+300 must be at most 3600 s"),
+                            ("run.prepare_s=3601", "run.prepare_s = 3601 must be at most 3600 s"),
+                            ("move.ramp_up_s=1e300", "move.ramp_up_s = 1e+300 must be at most 3600 s"),
+                            ("run.hold_s=3600", "must together last at most 3600 s"),
+                            ("sample_rate_hz=1e300", "more than 1e9 samples"),
+                            ("run.prepare_s=0 run.hold_s=0 move.ramp_up_s=1e-9 move.cruise_s=0 move.ramp_down_s=1e-9",
+                             "over before its first sample")):
+            options = [word for gain in gains.split() for word in ("--gain", gain)]
+            self.assertSays(self.drivebench("control", *options, code=USAGE).stderr, fact)
+
     def test_help_names_every_subcommand_and_the_exit_codes(self):
-        """A subcommand that nobody finds."""
+        """A subcommand that nobody finds, a way to a bench that nobody is told."""
         said = self.drivebench("--help").stdout
         self.assertSays(said, "serve", "demo", "describe", "status", "watch", "control", "replay", "export", "Exit codes: 0 ok")
         for command in ("demo", "describe", "status", "watch", "control", "replay", "export"):
             self.assertSays(self.drivebench(command, "--help").stdout, "--json")
+        for command in (["describe"], ["control"], ["experiment", "run"], ["identify"]):
+            self.assertSays(self.drivebench(*command, "--help").stdout, "tcp:HOST:PORT", "tls:HOST:PORT", "unix:PATH")
 
     def test_presets_are_listed(self):
         """A preset that cannot be found, or that does not say where it comes from."""
@@ -125,6 +158,9 @@ class Observing(CommandTest):
         self.drivebench("status", "--token", "wrong", link=link_of(bench), code=NO_CONNECT)
         time.sleep(1.1)  # after two wrong ones
         self.drivebench("status", "--token", "secret", link=link_of(bench))
+        for command in (["experiment", "list"], ["identify", "--motor", "im", "--link", link_of(bench)]):
+            said = self.drivebench(*command, "--owner", "anna", link=link_of(bench), code=NO_CONNECT).stderr
+            self.assertSays(said, "does not let us in")
 
     def watch_a_move(self, *options):
         watching = self.start(DRIVEBENCH, "watch", *options, link=self.link)
@@ -278,16 +314,13 @@ class Controlling(CommandTest):
 
     def test_an_interrupted_move_is_a_failed_run(self):
         """An exit code of 0 after half a move."""
-        bench = self.server("--mode", "realtime")
-        moving = self.start(DRIVEBENCH, "control", "--json", link=link_of(bench))
-        until(lambda: self.json_of("status", link=link_of(bench))["axes"][0]["owner"] != 0 or moving.poll() is not None,
-              "the move begins")
+        moving = self.start(DRIVEBENCH, "control", "--json", "--gain", "run.hold_s=60", link=self.link)
+        until(lambda: self.json_of("status", link=self.link)["axes"][0]["owner"] != 0, "the move begins")
         moving.send_signal(signal.SIGINT)
         out, _ = moving.communicate(timeout=PATIENCE_S)
-        if moving.returncode != OK:  # it was not over before the signal came
-            self.assertEqual(moving.returncode, FAILED)
-            report = json.loads(out)
-            self.assertTrue(report.get("failure") or report["error"]["message"])
+        self.assertEqual(moving.returncode, FAILED)
+        report = json.loads(out)
+        self.assertTrue(report.get("failure") or report["error"]["message"])
 
 
 if __name__ == "__main__":
