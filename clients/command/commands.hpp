@@ -131,7 +131,8 @@ struct CompareOptions {
   std::string axis{};                        ///< name; empty or "0": the first in the file
   std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
   std::string other{};                       ///< recording of the reference's own run; empty: none
-  std::optional<double> threshold{};  ///< [V] or [A]; a command that differs by more makes the exit code 1
+  /// [V] or [A]; the exit code is 1 if a command differs by more or some of the run is missing.
+  std::optional<double> threshold{};
 };
 int run_compare(const CompareOptions& options);
 
@@ -148,8 +149,9 @@ struct PlotOptions {
 };
 int run_plot(const PlotOptions& options);
 
-/// Both replace this process by drivebench-server.
+/// This, run_replay() and run_print() replace this process by drivebench-server.
 int run_serve(const std::vector<std::string>& arguments);
+
 struct ReplayOptions {
   std::string recording;
   bool json = false;

@@ -54,7 +54,8 @@ void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison
     out.final_error_rad = run.reference().angle_rad - (row.sample.angle_rad - start_rad);
     out.tracking_rad.add(tick, out.final_error_rad, HUGE_VAL);
   }
-  out.whole = run.done() || out.samples == run.planned_samples();
+  // A controller may have missed samples on the way to the end; a damaged file may hide them.
+  out.whole = (run.done() && recorded.is_whole) || out.samples == run.planned_samples();
 }
 
 /// Sample by sample at the same time after the start.
@@ -87,7 +88,7 @@ void print_difference(std::string_view name, const Difference& d, std::string_vi
 
 void print_comparison(const Comparison& c) {
   fmt::print("{} on axis {}, {} samples from tick {} on, against {}{}\n", c.recording, c.axis, c.samples,
-             c.first_tick, c.preset, c.whole ? "" : " (the recording ends before the run does)");
+             c.first_tick, c.preset, c.whole ? "" : " (the recording does not hold the whole run)");
   print_difference("command - reference controller's", c.commands, c.unit);
   for (const auto& [name, difference] : c.terminals) {
     if (difference.largest > 0.0) print_difference("  terminal " + name, difference, c.unit);
@@ -143,7 +144,8 @@ int run_compare(const CompareOptions& options) {
   } else {
     print_comparison(out);
   }
-  return options.threshold && out.commands.first_tick_beyond ? kExitFailed : kExitOk;
+  const bool is_judged = options.threshold.has_value();
+  return is_judged && (out.commands.first_tick_beyond || !out.whole) ? kExitFailed : kExitOk;
 }
 
 }  // namespace drivebench::command

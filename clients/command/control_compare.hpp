@@ -30,7 +30,7 @@ struct Comparison {
   double threshold = 0.0;
   std::uint64_t first_tick = 0;
   std::int64_t samples = 0;
-  bool whole = false;   ///< the recording reaches the end of the run
+  bool whole = false;   ///< the recording holds the run to its end
   Difference commands;  ///< recorded - reference, all terminals
   std::vector<std::pair<std::string, Difference>> terminals;
   Difference tracking_rad;  ///< reference of the trajectory - recorded angle

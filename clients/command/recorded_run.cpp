@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 #include <string_view>
 #include <system_error>
@@ -90,6 +91,7 @@ bool asks_for_something(const v1::Command& command) noexcept {
 RecordedRun read_run(const std::string& path, const std::string& axis,
                      std::optional<std::uint64_t> from_tick) {
   Reader reader(axis);
+  bool is_whole = true;
   try {
     const MappedSeries files(path);
     McapSeries mcap(files.segments());
@@ -98,13 +100,17 @@ RecordedRun read_run(const std::string& path, const std::string& axis,
     if (mcap.problem() && mcap.problem()->kind == McapProblem::Kind::kNotMcap) {
       throw UsageError(fmt::format("{} is not a recording: {}", path, mcap.problem()->what));
     }
+    is_whole = !mcap.problem();
+    if (!is_whole) fmt::print(stderr, "drivebench: {} is not whole: {}\n", path, mcap.problem()->what);
   } catch (const std::system_error& error) {
     throw UsageError(error.what());
   }
   if (!reader.has_axis()) {
-    throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}", axis, reader.axes()));
+    throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}", axis,
+                                 reader.axes().empty() ? "none" : reader.axes()));
   }
   RecordedRun run = reader.joined();
+  run.is_whole = is_whole;
   const auto start = std::ranges::find_if(run.rows, [&](const Answered& row) {
     return from_tick ? row.sample.tick >= *from_tick : asks_for_something(row.command);
   });

@@ -134,7 +134,28 @@ class Compare(ControlTest):
         self.assertEqual(seen["terminals"]["a"]["largest"], 90.0)
         # Standing still: what is left of the trajectory is all of it, 15 ms after its start.
         self.assertGreater(seen["tracking"]["peak_error_rad"], 0.1)
-        self.assertIn("the recording ends before the run does", self.control("--compare", file).stdout)
+        self.assertIn("the recording does not hold the whole run", self.control("--compare", file).stdout)
+        self.json_of("--compare", file, "--threshold", 1000, code=FAILED)
+
+    def test_a_recording_that_lost_its_end_is_not_as_good_as_a_whole_one(self):
+        """Would catch: a regression run that passes because the bench died in it. What is there differs by nothing."""
+        held = ("--gain", "run.hold_s=0.5")
+        file, _ = self.recording("own", *held)
+        cut = self.folder / "cut.mcap"
+        whole = file.read_bytes()
+        cut.write_bytes(whole[:len(whole) * 6 // 10])
+        done = self.control("--json", "--compare", cut, "--threshold", 0, *held, code=FAILED)
+        seen = json.loads(done.stdout)
+        self.assertEqual((seen["whole"], seen["commands"]["largest"]), (False, 0.0))
+        self.assertRegex(done.stderr, "cut.mcap is not whole: .*the file ends")
+        self.assertIn("not whole", self.control("--compare", file, "--with", cut, "--threshold", 0, *held).stderr)
+        drawn = subprocess.run([COMMAND, "plot", cut], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual((drawn.returncode, "<path" in drawn.stdout), (OK, True))
+        self.assertIn("not whole", drawn.stderr)
+        # Every sample of the run is there: what the file lost came after it.
+        cut.write_bytes(whole[:-100])
+        done = self.control("--json", "--compare", cut, "--threshold", 0, *held)
+        self.assertEqual((json.loads(done.stdout)["whole"], "not whole" in done.stderr), (True, True))
 
     def test_two_recordings_beside_each_other(self):
         """Would catch: runs that are laid beside each other at the wrong tick; the load comes 25 + 36.5 ms after the start."""
@@ -182,7 +203,8 @@ class Plot(ControlTest):
         """Would catch: an empty picture with an exit code of 0."""
         file, _ = self.recording("own")
         for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),
-                                ([__file__], "is not a recording"), ([file, "--preset", "book/8"], "did you mean book/8.2.2")):
+                                ([__file__], "is not a recording"), ([file, "--preset", "book/8"], "did you mean book/8.2.2"),
+                                ([file, "--preset", "book/8.2.2", "--gain", "run.hold_s=1e300"], "at most 3600 s")):
             self.assertIn(fact, self.plot(*arguments, code=USAGE).stderr)
 
 
