@@ -21,8 +21,8 @@ using namespace std::chrono_literals;
 
 constexpr double kPromisedErrorCounts = 2.0;
 
-/// Local time, so that recordings of several demos stand side by side in order.
-/// The time and the process, so that no two demos want the same file.
+/// Local time, so that recordings of several demos stand side by side in order, and the process, so that no
+/// two demos want the same file.
 std::string time_stamp() {
   const std::time_t now = std::time(nullptr);
   std::tm local = {};

@@ -16,8 +16,6 @@ using can::Message;
 
 constexpr std::uint64_t kStateEveryTicks = 80;  // as a bench does by default
 
-constexpr unsigned kCurrentMode = 4;  // of the native profile
-
 }  // namespace
 
 void CandumpText::add(std::uint32_t axis, const Sample& sample, double time_s) {
@@ -46,13 +44,14 @@ void CandumpText::add(const v1::Input& input, double time_s) {
   end_tick();
   const v1::Command& command = input.command();
   const bool currents = command.gates() == v1::GATES_CURRENT;
-  const can::Setpoints setpoints{.tick = command.tick(),
-                                 .mode = currents ? kCurrentMode : static_cast<unsigned>(command.gates()),
-                                 .lease = static_cast<unsigned>(input.owner() & 0xFF),
-                                 .a = currents ? command.i_a_a() : command.u_a_v(),
-                                 .b = currents ? command.i_b_a() : command.u_b_v(),
-                                 .c = currents ? command.i_c_a() : command.u_c_v(),
-                                 .field = currents ? command.i_f_a() : command.u_f_v()};
+  const can::Setpoints setpoints{
+      .tick = command.tick(),
+      .mode = currents ? can::kCurrentMode : static_cast<unsigned>(command.gates()),
+      .lease = static_cast<unsigned>(input.owner() & 0xFF),
+      .a = currents ? command.i_a_a() : command.u_a_v(),
+      .b = currents ? command.i_b_a() : command.u_b_v(),
+      .c = currents ? command.i_c_a() : command.u_c_v(),
+      .field = currents ? command.i_f_a() : command.u_f_v()};
   bool& wide = before_[input.axis()].wide;
   wide = wide || setpoints.c != 0.0 || setpoints.field != 0.0;
   for (const can::Frame& frame : can::encode_command(address_.profile, node(input.axis()), wide, setpoints)) {
