@@ -158,7 +158,7 @@ constexpr std::int64_t default_arming_commands(RunMode mode) noexcept {
 void change_mode(BenchConfig& config, RunMode mode) noexcept;
 
 /// The configuration as one TOML text that needs no other file and reads back equal, bit for bit; all but the
-/// tokens, which it does not hold, an address that would need them, experiments, audit and log.
+/// tokens, which it does not hold, an address that would need them, tls, experiments, audit and log.
 std::string to_toml(const BenchConfig& config);
 
 /// The part of to_toml() that the samples depend on: timing, seed, watchdog and lease, and of each axis its

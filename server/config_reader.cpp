@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::int64_t kMaxSeed = INT64_MAX;  // the largest integer of TOML
 constexpr double kDefaultLeaseS = 2.0;
+constexpr double kLongestLeaseS = 1e9;  // so that its nanoseconds, and those of now, can be added
 constexpr std::int64_t kMaxArmingCommands = 1000;
 constexpr int kLastCpu = 1023;
 
@@ -54,6 +55,12 @@ void read_lease(StrictTable& bench, bool period_valid, BenchSetup& setup) {
         bench.has("lease_s") ? "lease_s" : "lease_ticks",
         "comes to " + std::to_string(setup.lease_ticks) +
             " ticks but must not be shorter than watchdog_ticks = " + std::to_string(setup.watchdog_ticks));
+  }
+  const Tick longest = std::llround(kLongestLeaseS * 1e9 / static_cast<double>(setup.period_ns));
+  if (period_valid && setup.lease_ticks > longest) {
+    bench.report("lease_ticks", "comes to " + std::to_string(setup.lease_ticks) +
+                                    " ticks but must not be longer than " + shortest(kLongestLeaseS) +
+                                    " s, " + std::to_string(longest) + " ticks");
   }
 }
 

@@ -56,6 +56,14 @@ TEST(ConfigRules, CFG_01_CFG_02_CFG_03_CFG_04_SEC_02_EachRuleIsKept) {
       {"125", "125\nseed = -1", ":5: bench.seed is -1"},
       {"125", "125\nwatchdog_ticks = 0", ":5: bench.watchdog_ticks is 0"},
       {"125", "125\nlease_s = 0.002", ":5: bench.lease_s comes to 16 ticks but must not be shorter than"},
+      {"125", "125\nlease_ticks = 8000000000001",
+       ":5: bench.lease_ticks comes to 8000000000001 ticks but must not be longer than 1e+09 s, "
+       "8000000000000 "
+       "ticks"},
+      {"period_us = 125", "period_us = 1e6\nlease_ticks = 1000000000000000",
+       ":5: bench.lease_ticks comes to 1000000000000000 ticks but must not be longer than 1e+09 s, "
+       "1000000000 "
+       "ticks"},
       {"125", "125\nlease_s = 2\nlease_ticks = 9", ":6: bench.lease_ticks cannot stand beside lease_s"},
       {"125", "125\ncommand_delay_ticks = 2", ":5: bench.command_delay_ticks is 2"},
       {"\"lockstep\"", "\"realtime\"\ncommand_delay_ticks = 0",
@@ -119,6 +127,14 @@ TEST(ConfigRules, CFG_01_CFG_02_CFG_03_CFG_04_SEC_02_EachRuleIsKept) {
     const std::string found = problems_of(with(c.from, c.to));
     EXPECT_NE(found.find("b.toml" + c.said), std::string::npos) << c.to << "\n  gave: " << found;
   }
+}
+
+// Catches a longest lease that is refused although it can be counted in nanoseconds.
+TEST(ConfigRules, TheLongestLeaseIsTaken) {
+  EXPECT_EQ(problems_of(with("125", "125\nlease_ticks = 8000000000000")), "none");
+  const BenchConfig config = parse(with("125", "33.333\nlease_s = 1e9"));
+  EXPECT_EQ(config.setup.lease_ticks, 30'000'300'003'000) << "to the nearest tick";
+  EXPECT_EQ(problems_of(to_toml(config)), "none");
 }
 
 // Catches a step that RK4 cannot take, or advice that does not help.
