@@ -1,5 +1,8 @@
 // Writes that are carried out as a whole: what reaches the bench, in which order, and what stays of a
 // refusal.
+#include <cmath>
+
+#include "plant/faults.hpp"
 #include "tests/modbus/modbus_bench.hpp"
 
 namespace drivebench::modbus {
@@ -126,6 +129,63 @@ TEST(ModbusDesk, ARefusedCommandDoesNotProlongALeaseThatLapses) {
   EXPECT_EQ(other.write(400, all), 4);
   EXPECT_NE(other.read_one(409), 1) << "the lease did not change hands";
   bench.until([&] { return bench.owner() == 0; });
+}
+
+// Catches: a malformed command that counts for nobody, so that its sender may clear a fault whose cause
+// lasts; one that counts against the owner although a stranger sent it.
+TEST(ModbusDesk, AMalformedCommandIsThatOfItsSender) {
+  BenchConfig config = modbus_bench_config();
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
+  ModbusBench bench(config);
+  Client owner(bench.port());
+  Client other(bench.port());
+  ASSERT_EQ(owner.write(400, {7}), 0);
+  std::uint32_t tick = 0;
+  while (tick < 50 && (bench.newest().faults & kOverCurrentTrip) == 0)
+    ASSERT_FALSE(owner.exchange(1, tick++, 80.0f, 0.0f).empty());
+  const auto command_well = [&] { ASSERT_FALSE(owner.exchange(0, tick++, 0.0f, 0.0f).empty()); };
+  for (int i = 0; i < 400; ++i)  // until the current has decayed
+    command_well();
+  ASSERT_NE(bench.newest().faults & kLatchedFaults, 0u);
+  const Words malformed = command_words(1, tick, std::nanf(""), 0.0f);
+  Words with_key{7, 0};
+  with_key.insert(with_key.end(), malformed.begin(), malformed.end());
+  const auto clear_is_refused = [&] { return owner.write(401, {1}) == 4 && owner.read_one(410) == 11; };
+
+  EXPECT_EQ(owner.write(402, malformed), 3);
+  EXPECT_TRUE(clear_is_refused()) << "his last command was malformed";
+  command_well();
+  EXPECT_EQ(owner.write(402, command_words(3, tick, 1.5f, 0.0f)), 3);
+  EXPECT_TRUE(clear_is_refused()) << "a duty that there is not";
+  command_well();
+  EXPECT_EQ(other.write(400, with_key), 3);
+  EXPECT_TRUE(clear_is_refused()) << "the key is his";
+  command_well();
+  EXPECT_EQ(other.write(402, malformed), 3);
+  with_key[0] = 8;
+  EXPECT_EQ(other.write(400, with_key), 3);
+  EXPECT_EQ(owner.write(401, {1}), 0) << "these are a stranger's";
+  command_well();
+  EXPECT_EQ(bench.newest().faults & kLatchedFaults, 0u);
+  EXPECT_EQ(bench.newest().refused_commands, 5u);
+}
+
+// Catches: an owner who reads why a stranger was refused when he asks why he was.
+TEST(ModbusDesk, LastRefusalTellsTheOwnerWhyHisOwnWriteWasRefused) {
+  ModbusBench bench;
+  Client owner(bench.port());
+  Client other(bench.port());
+  ASSERT_EQ(owner.write(400, {7}), 0);
+  EXPECT_TRUE(owner.exchange(1, 77, 0.0f, 0.0f).empty());
+  EXPECT_EQ(other.write(400, {8}), 6);
+  EXPECT_EQ(other.read_one(410), 3) << "owned by another";
+  EXPECT_EQ(owner.read_one(410), 6) << "stale";
+  EXPECT_EQ(owner.write(402, {9}), 3);
+  EXPECT_EQ(owner.read_one(410), 8);
+  ASSERT_EQ(owner.write(400, {0}), 0);
+  ASSERT_EQ(other.write(400, {8}), 0);
+  EXPECT_EQ(other.read_one(410), 0) << "nothing that the new owner wrote";
 }
 
 // Catches: a key that is given back with a request that nobody carries out, and no word of it.

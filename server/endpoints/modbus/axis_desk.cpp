@@ -80,7 +80,7 @@ std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
     case Content::kLeaseStatus:
       return engine_.owner(axis_) == 0 ? 0 : holds(who) ? 1 : leased() ? 2 : 3;
     case Content::kLastRefusal:
-      return static_cast<std::uint64_t>(last_refusal_);
+      return static_cast<std::uint64_t>(holds(who) ? holders_refusal_ : last_refusal_);
     case Content::kParameter:
       return float_bits(parameter(row).get(engine_.parameters(axis_)));
     default:
@@ -224,6 +224,7 @@ void AxisDesk::forget() {
   command_ = {};
   process_ = {};
   state_ = DriveState::kSwitchOnDisabled;
+  holders_refusal_ = Refusal::kNone;
   on_lease_change();
 }
 

@@ -76,8 +76,10 @@ class AxisDesk {
   asio::awaitable<Outcome> write_coils(std::size_t address, std::size_t count, std::uint8_t bits,
                                        Visitor who);
 
-  /// A write of these registers was turned away for its values: a command among them counts as refused.
-  void count_refused(const RegisterMap::Range& range);
+  /// A write was turned away for its values: a command in it counts as refused.
+  void count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words, Visitor who);
+  /// A write was refused, as last_refusal is to say.
+  void note_refusal(Visitor who, Refusal why) noexcept;
 
   /// Whether this connection holds the lease.
   bool holds(Visitor who) const noexcept;
@@ -147,8 +149,7 @@ class AxisDesk {
   Command command_of(const CommandInput& input) const;
   Command command_of(const ProcessInput& input, DriveState state) const;
   Outcome command(const Command& command);
-  Outcome refuse(Refused why);
-  Outcome refuse(Exception exception, Refusal why);
+  static Outcome refuse(Refused why) noexcept;
 
   bool latched() const noexcept;
   DriveState drive_state() const noexcept;
@@ -177,6 +178,7 @@ class AxisDesk {
   ProcessInput process_;
   DriveState state_ = DriveState::kSwitchOnDisabled;  ///< never kFault, which the sample tells
   Refusal last_refusal_ = Refusal::kNone;
+  Refusal holders_refusal_ = Refusal::kNone;  ///< the last one of whoever holds the lease
   LogLimit lapsed_log_;
 };
 

@@ -53,22 +53,23 @@ std::optional<std::uint64_t> AxisDesk::Written::operator[](Content content) cons
   return std::nullopt;
 }
 
-AxisDesk::Outcome AxisDesk::refuse(Refused why) {
-  last_refusal_ = refusal_of(why);
-  return {.exception = exception_of(why), .refusal = last_refusal_};
+AxisDesk::Outcome AxisDesk::refuse(Refused why) noexcept {
+  return {.exception = exception_of(why), .refusal = refusal_of(why)};
 }
 
-AxisDesk::Outcome AxisDesk::refuse(Exception exception, Refusal why) {
+void AxisDesk::note_refusal(Visitor who, Refusal why) noexcept {
   last_refusal_ = why;
-  return {.exception = exception, .refusal = last_refusal_};
+  if (holds(who)) holders_refusal_ = why;
 }
 
-void AxisDesk::count_refused(const RegisterMap::Range& range) {
-  last_refusal_ = Refusal::kOutOfRange;
-  for (const Row& row : range.rows) {
-    if (row.content != Content::kCounter) continue;
-    engine_.request({.tick = 0, .axis = axis_, .owner = 0, .action = RefusedCommand{}}, [](Refused, Tick) {});
-  }
+void AxisDesk::count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words,
+                             Visitor who) {
+  const Written written{range, words};
+  if (!written[Content::kCounter]) return;
+  const bool has_key = leased() && written[Content::kLeaseKey] == key_;
+  const Owner sender = has_key || holds(who) ? owner_ : 0;
+  engine_.request({.tick = 0, .axis = axis_, .owner = sender, .action = RefusedCommand{true}},
+                  [](Refused, Tick) {});
 }
 
 asio::awaitable<AxisDesk::Outcome> AxisDesk::write(RegisterMap::Range range,
@@ -169,13 +170,15 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   const bool asks_more = request != LeaseRequest::kNone && request != LeaseRequest::kRelease;
   if ((input.mode == CommandMode::kDuty && beyond) || (key == 0u && asks_more) ||
       (commands && (gives_back || request == LeaseRequest::kClearFaults))) {
-    count_refused(written.range);
-    co_return refuse(Exception::kIllegalValue, Refusal::kOutOfRange);
+    count_refused(written.range, written.words, who);
+    co_return refuse(Refused::kOutOfRange);
   }
 
   const bool had_lease = leased();
   if (key.value_or(0) != 0) {
-    if (engine_.config().mode == RunMode::kFree) co_return refuse(Exception::kFailure, Refusal::kWrongMode);
+    if (engine_.config().mode == RunMode::kFree) {
+      co_return Outcome{.exception = Exception::kFailure, .refusal = Refusal::kWrongMode};
+    }
     // All or nothing: with a command that is refused the lease does not change hands either.
     if (commands && had_lease && key == key_ &&
         engine_.check(axis_, owner_, command_of(input)) != Refused::kNot) {
@@ -249,7 +252,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, V
     if (engine_.try_parameter(axis_, changes[i].row, changes[i].after).empty()) continue;
     while (i-- > 0)  // back the way they came
       engine_.try_parameter(axis_, changes[i].row, changes[i].before);
-    co_return refuse(Exception::kIllegalValue, Refusal::kOutOfRange);
+    co_return refuse(Refused::kOutOfRange);
   }
   // All on their way before any is waited for: the bench takes them together, in one tick.
   const Owner owner = holds(who) ? owner_ : 0;

@@ -176,7 +176,8 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
   desk->spoke(number_);
   if (verdict.action == Verdict::Action::kRefuse) {
     if (verdict.request.write.count > 0) {
-      desk->count_refused(verdict.request.write);
+      words_ = words_from(verdict.request.data);
+      desk->count_refused(verdict.request.write, words_, number_);
       note_refused_write(*desk, Refusal::kOutOfRange);
     }
     refuse(adu, verdict.exception);
@@ -240,7 +241,7 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
       desk.read(request.write, number_, {&now, 1});
       words_[0] = static_cast<std::uint16_t>((now & words_[0]) | (words_[1] & ~words_[0]));
       if (!values_fit(request.write, words_)) {
-        desk.count_refused(request.write);
+        desk.count_refused(request.write, words_, number_);
         note_refused_write(desk, Refusal::kOutOfRange);
         co_return Exception::kIllegalValue;
       }
@@ -258,8 +259,9 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
   co_return Exception::kNone;
 }
 
-void Connection::note_refused_write(const AxisDesk& desk, Refusal refusal) {
+void Connection::note_refused_write(AxisDesk& desk, Refusal refusal) {
   ++shared_.counts.refused_writes;
+  desk.note_refusal(number_, refusal);
   // That another has the axis; what else may be wrong with a write is between the bench and its owner.
   const bool is_foreign = refusal == Refusal::kNotOwner || refusal == Refusal::kOwned;
   if (is_foreign) audit("forbidden", sentence_of(refusal), desk.axis());
