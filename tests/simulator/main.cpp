@@ -55,8 +55,10 @@ bool read_seeds(std::string_view text, Options& o) {
          o.first <= o.last;
 }
 
-bool read_options(int argc, char** argv, Options& o) {
+/// What is wrong with the command line; empty: nothing.
+std::string read_options(int argc, char** argv, Options& o) {
   bool seeds = false;
+  bool for_seeds_only = false;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
     const std::string_view next = i + 1 < argc ? argv[i + 1] : "";
@@ -66,20 +68,25 @@ bool read_options(int argc, char** argv, Options& o) {
       ++i;
     } else if (word == "--seconds" && read_number(next, seconds) && seconds > 0 && seconds < 100'000) {
       o.duration = static_cast<Time>(seconds) * kSecond;
+      for_seeds_only = true;
       ++i;
     } else if (word == "--minutes" && read_number(next, o.minutes) && o.minutes > 0 && o.minutes < 100'000) {
       ++i;
     } else if (word == "--week") {
       o.minutes = 7 * 24 * 60;
     } else if (word == "--twice") {
-      o.twice = true;
+      o.twice = for_seeds_only = true;
     } else if (word == "--trace") {
-      o.trace = true;
+      o.trace = for_seeds_only = true;
+    } else if (word == "--seeds" || word == "--seconds" || word == "--minutes") {
+      return std::string(word) + " does not take '" + std::string(next) + "'";
     } else {
-      return false;
+      return "'" + std::string(word) + "' is no option";
     }
   }
-  return seeds != (o.minutes > 0);
+  if (seeds == (o.minutes > 0)) return "either --seeds, or --week or --minutes";
+  if (!seeds && for_seeds_only) return "--seconds, --twice and --trace belong to --seeds";
+  return "";
 }
 
 Outcome run_seed(std::uint64_t seed, const Options& o) {
@@ -88,12 +95,16 @@ Outcome run_seed(std::uint64_t seed, const Options& o) {
   return world.run(o.duration);
 }
 
-void print_failure(const Outcome& outcome, const Options& o) {
+/// `first`: the seed from which on all are needed to see it again.
+void print_failure(const Outcome& outcome, std::uint64_t first, const Options& o) {
+  const std::string range = first == outcome.seed ? "" : std::to_string(first) + "..";
   std::printf(
-      "seed %llu (%s; %s): broken at %.6f s: %s\n%s  again: ./bench simulate --seeds %llu --seconds %lld\n",
+      "seed %llu (%s; %s): broken at %.6f s: %s\n%s  again: ./bench simulate --seeds %s%llu --seconds "
+      "%lld%s\n",
       static_cast<unsigned long long>(outcome.seed), outcome.bench.c_str(), outcome.players.c_str(),
       static_cast<double>(outcome.failure.time) * 1e-9, outcome.failure.promise.c_str(), outcome.tail.c_str(),
-      static_cast<unsigned long long>(outcome.seed), static_cast<long long>(o.duration / kSecond));
+      range.c_str(), static_cast<unsigned long long>(outcome.seed),
+      static_cast<long long>(o.duration / kSecond), o.twice ? " --twice" : "");
 }
 
 std::ptrdiff_t open_files() {
@@ -138,12 +149,13 @@ int run(const Options& o) {
                   static_cast<unsigned long long>(outcome.hash));
     }
     const std::string left = leftovers.problem();
-    if (outcome.failure.promise.empty()) outcome.failure.promise = left;
+    const bool by_itself = !outcome.failure.promise.empty() || left.empty();
+    if (!by_itself) outcome.failure.promise = left;  // of this seed, or of those before it
     ticks += outcome.ticks;
     events += outcome.events;
     if (!outcome.failure.promise.empty()) {
       ++failed;
-      print_failure(outcome, o);
+      print_failure(outcome, by_itself ? seed : o.first, o);
     }
     std::fflush(stdout);
   }
@@ -160,8 +172,8 @@ int run(const Options& o) {
 
 int main(int argc, char** argv) {
   drivebench::simulator::Options options;
-  if (!drivebench::simulator::read_options(argc, argv, options)) {
-    std::fputs(drivebench::simulator::kUsage, stderr);
+  if (const std::string wrong = drivebench::simulator::read_options(argc, argv, options); !wrong.empty()) {
+    std::fprintf(stderr, "drivebench-simulator: %s\n%s", wrong.c_str(), drivebench::simulator::kUsage);
     return 2;
   }
   std::signal(SIGPIPE, SIG_IGN);

@@ -3,6 +3,7 @@
 
 #include <malloc.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <ctime>
@@ -43,6 +44,7 @@ class Week {
     const auto per_second = static_cast<Tick>(1'000'000'000 / config_.setup.period_ns);
     const Tick end = static_cast<Tick>(seconds) * per_second;
     const Tick hour = 3600 * per_second;
+    const Tick check = std::min(hour, end / 3);  // a short run is looked at as well
     std::size_t memory_before = 0;
     while (bench_.tick() < end && problem_.empty()) {
       const Tick tick = bench_.tick();
@@ -51,12 +53,12 @@ class Week {
       bench_.step();
       ++steps_;
       account_.see(bench_.sample(0), late_);
-      if (bench_.tick() % hour != 0) continue;
+      if (bench_.tick() % check != 0) continue;
       if (!pass_through_bytes()) problem_ = "a saved state is a state";
       const std::size_t memory = ::mallinfo2().uordblks;
       if (memory_before != 0 && memory > memory_before + 65536) problem_ = "memory stays flat";
       if (memory_before == 0) memory_before = memory;
-      tell(bench_.tick() / hour, memory);
+      tell(static_cast<double>(bench_.tick()) / static_cast<double>(hour), memory);
     }
     if (problem_.empty() && bench_.tick() != end) problem_ = "every step is counted";
     if (problem_.empty() && steps_ != static_cast<std::uint64_t>(end))
@@ -65,14 +67,13 @@ class Week {
   }
 
   const std::string& problem() const { return problem_; }
-  void tell(Tick hours, std::size_t memory) const {
+  void tell(double hours, std::size_t memory) const {
     const Sample& s = bench_.sample(0);
     std::printf(
-        "%lld h: %llu ticks, state hash %016llx, %llu events, %llu missed, %llu refused, %llu late, "
+        "%.4g h: %llu ticks, state hash %016llx, %llu events, %llu missed, %llu refused, %llu late, "
         "%zu bytes in use, %.0f s of CPU\n",
-        static_cast<long long>(hours), static_cast<unsigned long long>(steps_),
-        static_cast<unsigned long long>(bench_.state_hash()), static_cast<unsigned long long>(events_),
-        static_cast<unsigned long long>(s.missed_commands),
+        hours, static_cast<unsigned long long>(steps_), static_cast<unsigned long long>(bench_.state_hash()),
+        static_cast<unsigned long long>(events_), static_cast<unsigned long long>(s.missed_commands),
         static_cast<unsigned long long>(s.refused_commands), static_cast<unsigned long long>(s.late_ticks),
         memory, static_cast<double>(std::clock()) / CLOCKS_PER_SEC);
     std::fflush(stdout);
@@ -190,7 +191,7 @@ int run_long(std::uint64_t seconds, std::uint64_t seed) {
     std::printf("broken: %s\n", week.problem().c_str());
     return 1;
   }
-  week.tell(static_cast<Tick>(seconds / 3600), ::mallinfo2().uordblks);
+  week.tell(static_cast<double>(seconds) / 3600.0, ::mallinfo2().uordblks);
   return 0;
 }
 

@@ -278,6 +278,33 @@ class Serving(CommandTest):
         self.assertEqual(self.json_of("describe", link=link_of(self.server()))["build_id"], version)
 
 
+class Simulating(CommandTest):
+    def simulate(self, *arguments, code=OK, files=None):
+        limit = () if files is None else ("prlimit", f"--nofile={files}:{files}")
+        done = subprocess.run([*limit, SERVER.parent / "drivebench-simulator", *arguments], capture_output=True, text=True,
+                              cwd=self.folder, timeout=4 * PATIENCE_S, check=False)
+        if code is not None:
+            self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done
+
+    def test_a_wrong_command_line_names_the_word(self):
+        """An option that is ignored, a usage that leaves its reader to find the mistake."""
+        for arguments, fact in (("--nope", "'--nope' is no option"), ("--seeds 5..1", "--seeds does not take '5..1'"),
+                                ("--seeds", "--seeds does not take ''"), ("--seeds 1 --seconds 0", "--seconds does not take '0'"),
+                                ("", "either --seeds, or"), ("--seeds 1 --week", "either --seeds, or"),
+                                ("--week --seconds 5", "belong to --seeds"), ("--minutes 1 --twice", "belong to --seeds"),
+                                ("--trace --minutes 1", "belong to --seeds")):
+            self.assertSays(self.simulate(*arguments.split(), code=USAGE).stderr, "drivebench-simulator: ", fact, "usage: ")
+
+    def test_a_broken_promise_comes_with_the_command_that_breaks_it_again(self):
+        """A command that leaves out --twice, and passes. With so few descriptors that a seed runs out of them."""
+        for files in range(12, 40):
+            said = self.simulate("--seeds", "1..3", "--seconds", "1", "--twice", code=None, files=files).stdout
+            if "again: " in said:
+                break
+        self.assertRegex(said, r"again: ./bench simulate --seeds [123] --seconds 1 --twice\n")
+
+
 class Demo(CommandTest):
     # Real time on a busy machine may fail, which the demo then says; only lockstep is judged here.
 
