@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """What the READMEs tell a user to type works, what they link to exists, and every bench file loads."""
+import json
 import os
 import pathlib
 import re
@@ -21,7 +22,8 @@ except ImportError:
 from own_network import in_own_network
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
 
-READMES = ("README.md", "server/README.md", "clients/README.md", "protocols/can/README.md", "protocols/modbus/README.md")
+READMES = ("README.md", "server/README.md", "clients/README.md", "clients/control/README.md", "protocols/can/README.md",
+           "protocols/modbus/README.md")
 PROGRAMS = ("drivebench", "drivebench-server")
 
 # Lines that are not run, and why.
@@ -131,7 +133,7 @@ class Bench:
         words = shlex.split(line, comments=True)
         if words[:2] == ["drivebench", "serve"] or words[0] == "drivebench-server":
             self.start(words)
-        elif words[1] in ("replay", "export"):
+        elif words[1] in ("replay", "export", "plot") or "--compare" in words:
             if self.server is not None and not self.moved:
                 self.move()  # something to read
             self.stop()  # a recording is whole when its server has ended
@@ -176,6 +178,35 @@ class Readmes(unittest.TestCase):
             bench.move()
             self.assertIn(f"state hash {shown[1]}\n", bench.run(["drivebench", "status"]))
             bench.stop()
+
+    def test_every_option_of_a_command_is_told(self):
+        """An option that only its --help knows."""
+        told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
+        commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "take", "control", "plot", "replay",
+                          "export", "identify", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
+                          "dbc", "can-table", "modbus-map", "can-log", "can check")
+        names = re.findall(r"^  ([a-z-]+) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
+                                                          check=True).stdout, re.M)
+        self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))
+        for command in commands_there:
+            text = subprocess.run([SERVER.parent / "drivebench", *command.split(), "--help"], capture_output=True, text=True,
+                                  check=True).stdout
+            for option in re.findall(r"^  (--[a-z-]+)", text, re.M):
+                with self.subTest(f"{command} {option}"):
+                    self.assertRegex(told, re.escape(option) + "(?![a-z-])")
+        for variable in ("DRIVEBENCH_LINK", "DRIVEBENCH_TOKEN", "DRIVEBENCH_OWNER", "DRIVEBENCH_CONFIGS"):
+            self.assertIn(variable, told)
+
+    def test_what_can_be_built_and_where_tests_are_is_told_whole(self):
+        """A preset or a folder of tests that nobody finds."""
+        presets = json.loads((REPOSITORY / "CMakePresets.json").read_text(encoding="utf-8"))["buildPresets"]
+        told = re.search(r"`./bench build \[([a-z|]+)\]`", (REPOSITORY / "README.md").read_text(encoding="utf-8"))
+        self.assertEqual(set(told[1].split("|")), {preset["name"] for preset in presets})
+        told = (REPOSITORY / "tests/README.md").read_text(encoding="utf-8")
+        mirrored = {"plant", "protocols", "server", "clients", "control", "identification", "can", "modbus"}
+        for folder in (REPOSITORY / "tests").iterdir():
+            if folder.is_dir() and folder.name not in mirrored | {"__pycache__"}:
+                self.assertIn(f"`{folder.name}/`", told)
 
     def test_every_relative_link_points_at_something(self):
         """A file that was moved or renamed."""
