@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -301,6 +302,91 @@ TEST(CanEndpoint, AHeartbeatIsMissedByABenchThatSendsNone) {
     bench.wait();
   EXPECT_EQ(bench.count("heartbeats_lost"), 1u);
   EXPECT_FALSE(bench.newest(Message::kHeartbeat));
+}
+
+// Catches: a stranger whose malformed commands begin the row of the owner anew, or bar his clear.
+TEST(CanEndpoint, AStrangersMalformedCommandIsNotTheOwners) {
+  BenchConfig config = servo_bench();
+  config.setup.arming_commands = 3;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.5;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
+  config.can.emplace_back();
+  CanBench bench(config);
+  const std::uint8_t lease = bench.acquire();
+  const auto tick = [&] { return static_cast<double>(bench.engine().tick()); };
+  const auto send_malformed = [&](std::uint8_t with) {
+    bench.command(tick(), 0.0, 0.0, with, 9.0);
+    EXPECT_EQ(bench.result(), static_cast<double>(Result::kMalformed));
+  };
+  for (int i = 0; i < 3; ++i) {
+    send_malformed(0);
+    bench.command(tick(), 60.0, 0.0, lease);
+  }
+  EXPECT_EQ(bench.engine().newest(0).state, static_cast<std::uint64_t>(ControlState::kRun));
+  EXPECT_EQ(bench.engine().newest(0).refused_commands, 3u) << "but counted";
+  while (bench.result() != static_cast<double>(Result::kLatched) && tick() < 1000)
+    bench.command(tick(), 60.0, 0.0, lease);
+  ASSERT_EQ(bench.result(), static_cast<double>(Result::kLatched));
+  send_malformed(lease);
+  bench.request(Request::kClearFaults, lease);
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kCauseLasts)) << "his own is";
+  bench.command(tick(), 0.0, 0.0, lease, 0.0);
+  send_malformed(static_cast<std::uint8_t>(lease + 1));
+  bench.request(Request::kClearFaults, lease);
+  EXPECT_EQ(bench.result(), 0.0);
+}
+
+// Catches: a controller that waits for the command of another axis and is called silent; one that is called
+// so at once when its tick has come, or never; one that is taken for the one before, who had commanded.
+TEST(CanEndpoint, WhoWaitsForOthersIsNotSilent) {
+  constexpr Owner kOther = 1000;
+  constexpr auto kPatience = std::chrono::milliseconds(50);
+  using Clock = std::chrono::steady_clock;
+  BenchConfig config = servo_bench(2);
+  config.can.emplace_back();
+  config.can.front().idle_timeout_ms = kPatience.count();
+  CanBench bench(config);
+  bench.engine().request({.tick = 0, .axis = 1, .owner = kOther, .action = LeaseAction::kAcquire},
+                         [](Refused refused, Tick) { EXPECT_EQ(refused, Refused::kNot); });
+  bench.command(0, 1.0, 0.0, bench.acquire());
+  for (const auto end = Clock::now() + 3 * kPatience; Clock::now() < end;)
+    bench.wait();
+  ASSERT_EQ(bench.engine().tick(), 0);
+  EXPECT_NE(bench.engine().owner(0), 0u);
+  const auto began = Clock::now();
+  bench.engine().command(1, kOther, voltage(0, 0.0, 0.0));
+  bench.engine().advance();
+  ASSERT_EQ(bench.engine().tick(), 1);
+  while (bench.engine().owner(0) != 0)
+    bench.wait();
+  EXPECT_GE(Clock::now() - began, kPatience);
+
+  const std::uint8_t lease = bench.acquire(1);
+  bench.command(1, 1.0, 0.0, lease);
+  bench.request(Request::kRelease, lease, 1);
+  ASSERT_NE(bench.acquire(2), 0);
+  while (bench.engine().owner(0) != 0)
+    bench.wait();
+  EXPECT_EQ(bench.engine().tick(), 1);
+}
+
+// Catches: an axis that nobody on this bus can have because the controller there has lost it, while there is
+// no tick that would show it.
+TEST(CanEndpoint, AnAxisThatWasTakenAwayIsFreeAtOnce) {
+  CanBench bench;
+  const auto take_away = [&] {
+    bench.engine().request(
+        {.tick = 0, .axis = 0, .owner = bench.engine().owner(0), .action = LeaseAction::kLost},
+        [](Refused refused, Tick) { EXPECT_EQ(refused, Refused::kNot); });
+  };
+  ASSERT_NE(bench.acquire(1), 0);
+  take_away();
+  EXPECT_NE(bench.acquire(2), 0);
+  EXPECT_EQ(bench.result(), 0.0);
+  take_away();
+  bench.received.clear();
+  EXPECT_EQ(bench.wait_for(Message::kHeartbeat)["lease"], 0.0);
+  EXPECT_EQ(bench.engine().tick(), 0);
 }
 
 // Catches: a peer that fills the log by taking the axis and saying that it has stopped, again and again.

@@ -14,7 +14,6 @@ constexpr std::uint32_t kController = 77;
 constexpr double kStopped = 4.0;
 constexpr double kOperational = 5.0;
 constexpr Time kTurn = 10 * kMillisecond;
-constexpr std::uint64_t kMostLost = 50;
 constexpr Time kHeartbeatLimit = 200 * kMillisecond;  // controller_timeout_ms of draw_bench()
 constexpr Time kIdle = 500 * kMillisecond;            // idle_timeout_ms
 
@@ -39,6 +38,10 @@ void CanDrive::take_turn() {
   if (scene_.ending) return;
   scene_.schedule.after(kTurn, [this] { take_turn(); });
   const Time now = scene_.schedule.now();
+  // In lockstep who has commanded the tick may be silent until the others have, unless it sends heartbeats.
+  const bool waits =
+      scene_.engine->config().mode == RunMode::kLockstep && commanded_ == scene_.engine->tick();
+  if (waits && !is_monitored()) keep();
   if (now < dead_until_) return;
   if (random_.chance(0.002)) {
     dead_until_ = now + random_.between(100, 4000) * kMillisecond;
@@ -132,6 +135,7 @@ void CanDrive::command(std::uint64_t tick) {
          .a = random_.real(-10.0, 10.0),
          .b = random_.real(-10.0, 10.0)});
     scene_.axes[axis_].command_sent();
+    commanded_ = scene_.engine->tick();
     keep();
     for (const can::Frame& frame : frames)
       if (!random_.chance(0.01)) bus_->send(frame);
@@ -150,8 +154,7 @@ void CanDrive::request(can::Request request) {
 
 /// Whose heartbeats the bench has heard, loses the lease soon after the last of them.
 void CanDrive::keep() {
-  const bool is_monitored = heartbeats_ > kMostLost;
-  const Time keeps = is_monitored ? kHeartbeatLimit : std::max(scene_.lease(), kIdle);
+  const Time keeps = is_monitored() ? kHeartbeatLimit : std::max(scene_.lease(), kIdle);
   scene_.axes[axis_].may_keep("can", scene_.awake() + keeps + Scene::kSlack);
 }
 

@@ -20,6 +20,8 @@ class CanDrive final : public Player {
   void leave() override;
 
  private:
+  static constexpr std::uint64_t kMostLost = 50;
+
   void take_turn();
   void disturb();
   void on_frame(const can::Frame& frame);
@@ -27,6 +29,7 @@ class CanDrive final : public Player {
   void command(std::uint64_t tick);
   void request(can::Request request);
   void keep();
+  bool is_monitored() const { return heartbeats_ > kMostLost; }
   void heartbeat(double state);
   void send(can::Message message, std::span<const double> values);
 
@@ -42,6 +45,7 @@ class CanDrive final : public Player {
   Time sick_until_ = 0;           ///< no heartbeat
   std::uint64_t heartbeats_ = 0;  ///< since it got the lease, or the bus was disturbed
   Time dead_until_ = 0;           ///< sends nothing at all
+  Tick commanded_ = -1;           ///< tick of its last command
   std::uint8_t lease_ = 0;
   bool latched_ = false;
   bool answered_ = false;  ///< since it began to finish

@@ -179,6 +179,7 @@ void Endpoint::note_client(const std::string& peer, std::string_view why) {
 }
 
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
+  check_owner(node);  // in lockstep there may have been no tick that told of a loss
   const bool known = node.controller == controller && (node.owner != 0 || node.acquiring);
   if (engine_->config().mode == RunMode::kFree || (node.acquiring && !known)) {
     return turn_away(node, Request::kAcquire, controller, Result::kBusy,
@@ -199,8 +200,10 @@ void Endpoint::acquire(Node& node, std::uint32_t controller) {
                        return lose(node, "another bench has its identifiers");
                      }
                      if (refused == Refused::kNot) {
-                       if (node.owner == 0)
+                       if (node.owner == 0) {
                          node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
+                         node.commanded_at = -1;
+                       }
                        node.owner = owner;
                        node.phases = {};
                        node.monitored = false;
@@ -301,22 +304,35 @@ void Endpoint::arm_timer() {
 void Endpoint::on_timer() {
   const Clock::time_point now = Clock::now();
   if (!transmitting_ && now - conflict_ > kConflictPause) transmitting_ = true;
-  const std::chrono::milliseconds heartbeat_limit(config_.controller_timeout_ms);
-  const std::chrono::milliseconds idle_limit(config_.idle_timeout_ms);
   measure_latency_ = true;
+  // All of them first: one that loses its lease may begin the next tick for the others.
+  const Tick tick = engine_->tick();
   for (Node& node : nodes_) {
+    check_owner(node);
     if (std::exchange(node.spoke, false)) node.heard = now;
-    if (node.owner != 0 && node.monitored && now - node.heard > heartbeat_limit) {
-      ++heartbeats_lost_;
-      lose(node, "its heartbeat stays away");
-    } else if (node.owner != 0 && lockstep() && idle_limit.count() > 0 && now - node.heard > idle_limit) {
-      lose(node, "it has been silent for too long");
-    }
+    const bool waits = node.commanded_at == tick;
+    if (std::exchange(node.waits, waits) || waits) node.waited = now;
   }
+  for (Node& node : nodes_)
+    look_after(node, now);
   if (config_.heartbeat_ms == 0 || now < next_heartbeat_) return;
   next_heartbeat_ = std::max(next_heartbeat_ + std::chrono::milliseconds(config_.heartbeat_ms), now);
   for (const Node& node : nodes_)
     send_heartbeat(node, kOperational);
+}
+
+/// Takes the lease from a controller that is gone. In lockstep one that has commanded the present tick may be
+/// silent: it waits for the others.
+void Endpoint::look_after(Node& node, Clock::time_point now) {
+  if (node.owner == 0) return;
+  const std::chrono::milliseconds heartbeat_limit(config_.controller_timeout_ms);
+  const std::chrono::milliseconds idle_limit(config_.idle_timeout_ms);
+  if (node.monitored && now - node.heard > heartbeat_limit) {
+    ++heartbeats_lost_;
+    lose(node, "its heartbeat stays away");
+  } else if (lockstep() && idle_limit.count() > 0 && now - std::max(node.heard, node.waited) > idle_limit) {
+    lose(node, "it has been silent for too long");
+  }
 }
 
 TransportReport Endpoint::report() const {

@@ -57,6 +57,9 @@ class Endpoint {
     bool monitored = false;        ///< its controller sends heartbeats
     bool spoke = false;            ///< it commanded since the timer last looked
     Clock::time_point heard{};     ///< last sign of life of the controller
+    Tick commanded_at = -1;        ///< tick in which the bench took its newest command
+    bool waits = false;            ///< it had commanded the present tick when the timer last looked
+    Clock::time_point waited{};    ///< until when, as the timer saw it
     PhaseSetpoints phases{};       ///< of the owner
     std::uint64_t faults = 0;      ///< last sent
     std::uint64_t injected = 0;    ///< last sent
@@ -79,7 +82,7 @@ class Endpoint {
   bool is_for(const Node& node, const MessageRow& row);
   Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
   /// Turns a command away before it reaches the bench, which counts it.
-  void refuse(const Node& node, Result result, const Setpoints& given, std::string_view why);
+  void refuse(const Node& node, Owner sender, Result result, const Setpoints& given, std::string_view why);
   /// Turns a request away before it reaches the bench.
   void turn_away(const Node& node, Request request, std::uint32_t controller, Result result,
                  std::string_view why);
@@ -93,6 +96,7 @@ class Endpoint {
   void on_newest();
   void on_timer();
   void arm_timer();
+  void look_after(Node& node, Clock::time_point now);
   void check_owner(Node& node);
 
   bool lockstep() const { return engine_->config().mode == RunMode::kLockstep; }

@@ -45,17 +45,18 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   ++commands_;
   Setpoints given = setpoints_in(row, values);
   const Tick answers = answered_by(node, row, given);
-  if (given.mode > kLastMode) return refuse(node, Result::kMalformed, given, "its mode must be 0 to 4");
-
   // Whoever commands without the lease is nobody: the bench counts it and says no.
   const Owner owner = node.owner != 0 && given.lease == node.lease ? node.owner : 0;
   if (owner != 0) node.spoke = true;
+  if (given.mode > kLastMode) {
+    return refuse(node, owner, Result::kMalformed, given, "its mode must be 0 to 4");
+  }
   const bool is_whole = row.width == Width::kWide || !node.terminals.has_more() || !has_setpoints(given.mode);
   if (!is_whole && node.phases.answers == answers && node.phases.mode == given.mode) {
     given.c = node.phases.c;
     given.field = node.phases.field;
   } else if (!is_whole && owner != 0) {
-    return refuse(node, Result::kIncomplete, given, "phase c and the field of its tick are missing");
+    return refuse(node, owner, Result::kIncomplete, given, "phase c and the field of its tick are missing");
   }
 
   const double bus_voltage_v = engine_->newest(node.axis).bus_voltage_v;
@@ -74,12 +75,14 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
     log_refusal(node, "a command", sentence_of(why));
     return reply(node, Request::kCommand, result_of(why), 0, static_cast<std::uint8_t>(given.lease), answers);
   }
+  node.commanded_at = engine_->tick();
   engine_->advance();
 }
 
-void Endpoint::refuse(const Node& node, Result result, const Setpoints& given, std::string_view why) {
+void Endpoint::refuse(const Node& node, Owner sender, Result result, const Setpoints& given,
+                      std::string_view why) {
   ++refused_;
-  engine_->request({.tick = 0, .axis = node.axis, .owner = node.owner, .action = RefusedCommand{true}},
+  engine_->request({.tick = 0, .axis = node.axis, .owner = sender, .action = RefusedCommand{true}},
                    [](Refused, Tick) {});
   log_refusal(node, "a command", why);
   reply(node, Request::kCommand, result, 0, static_cast<std::uint8_t>(given.lease),

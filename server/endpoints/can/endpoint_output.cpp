@@ -55,10 +55,11 @@ void Endpoint::on_newest() {
   together_.clear();
 }
 
-/// The lease may have run out, or gone to nobody with an overrun.
+/// The lease may have run out, or been taken: by an administrator, or together with all others when this
+/// thread stood still or the audit log could not be written.
 void Endpoint::check_owner(Node& node) {
   if (node.owner == 0 || node.acquiring || engine_->owner(node.axis) == node.owner) return;
-  log_loss(node, "its lease has run out");
+  log_loss(node, "its lease has run out or was taken");
   node.owner = 0;
   node.lease = 0;
 }
