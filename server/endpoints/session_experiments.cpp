@@ -165,9 +165,9 @@ void Session::list_experiments(const v1::ListExperiments& r) {
 
 void Session::cancel_experiment(const v1::CancelExperiment& r) {
   with_experiments([&](Experiments& experiments) {
-    experiments.cancel(r.id(), r.owner());
+    const std::shared_ptr<const Experiment> experiment = experiments.cancel(r.id(), r.owner());
     audit("experiment_cancelled", "done", {{"id", r.id()}});
-    send_info(request_.id(), *experiments.find(r.id(), r.owner()));
+    send_info(request_.id(), *experiment);
   });
 }
 

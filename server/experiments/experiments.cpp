@@ -141,23 +141,25 @@ std::shared_ptr<const Experiment> Experiments::find(std::uint64_t id, const std:
   throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner", fmt::format("experiment {} belongs to somebody else", id));
 }
 
-void Experiments::cancel(std::uint64_t id, const std::string& owner) {
+std::shared_ptr<const Experiment> Experiments::cancel(std::uint64_t id, const std::string& owner) {
+  Pointer experiment;
   {
     const std::lock_guard lock(mutex_);
-    const Pointer experiment = at(id);
+    experiment = at(id);
     if (!same_secret(owner, experiment->request.owner())) {
       throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner",
                        fmt::format("experiment {} belongs to somebody else", id));
     }
     experiment->progress.cancel.store(true);
-    if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED) return;
+    if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED) return experiment;
     experiment->info.set_state(v1::EXPERIMENT_STATE_CANCELLED);
     experiment->info.set_reason("cancelled before it began");
     experiment->plan = {};
-    store(*experiment);
-    forget_oldest();
+    try_to_store(*experiment);
+    keep_ended(*experiment);
   }
   on_change();
+  return experiment;
 }
 
 v1::ExperimentInfo Experiments::info_of(const Experiment& experiment) const {
@@ -293,12 +295,8 @@ void Experiments::end(const Pointer& experiment, const RunOutcome& outcome) {
   info.set_recording_bytes(ignored ? 0 : bytes);
   experiment->plan = {};
   running_.reset();
-  try {
-    store(*experiment);
-    forget_oldest();
-  } catch (const std::exception& error) {
-    spdlog::error("experiment {}: {}", experiment->id, error.what());
-  }
+  try_to_store(*experiment);
+  keep_ended(*experiment);
 }
 
 }  // namespace drivebench

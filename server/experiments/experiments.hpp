@@ -26,6 +26,7 @@ struct Experiment {
   v1::RunExperiment request;
   ExperimentPlan plan;      ///< until it has ended
   std::uint64_t round = 0;  ///< the experiments of one round come before those of the next
+  std::uint64_t end = 0;    ///< 1 for the first that ended; 0: it has not
   RunProgress progress;
   v1::ExperimentInfo info;  ///< without what progress and queue say
 };
@@ -52,7 +53,7 @@ class Experiments {
   std::shared_ptr<const Experiment> submit(const v1::RunExperiment& request, const TableLookup& tables);
   /// The experiment with this id, if the owner may see its data.
   std::shared_ptr<const Experiment> find(std::uint64_t id, const std::string& owner) const;
-  void cancel(std::uint64_t id, const std::string& owner);
+  std::shared_ptr<const Experiment> cancel(std::uint64_t id, const std::string& owner);
 
   v1::ExperimentInfo info_of(const Experiment& experiment) const;
   v1::ExperimentList list(const std::string& owner) const;
@@ -78,13 +79,14 @@ class Experiments {
   std::filesystem::path file_of(std::uint64_t id, std::string_view ending) const;
   void lock_folder();
   void load();
-  void load_one(const std::filesystem::path& file);
+  Pointer load_one(const std::filesystem::path& file) const;
   void store(const Experiment& experiment) const;
+  void try_to_store(const Experiment& experiment) const;
   Pointer known(const v1::RunExperiment& request) const;
   Pointer at(std::uint64_t id) const;
   std::uint64_t round_for(const std::string& owner) const;
   void check_room() const;
-  void forget_oldest();
+  void keep_ended(Experiment& experiment);
   void remove(std::uint64_t id);
   void watch();
 
@@ -107,6 +109,7 @@ class Experiments {
   std::condition_variable changed_;
   std::map<std::uint64_t, Pointer> all_;
   std::uint64_t last_id_ = 0;
+  std::uint64_t last_end_ = 0;
   std::uint64_t round_ = 0;
   Pointer running_;
   bool stop_ = false;

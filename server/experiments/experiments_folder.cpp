@@ -92,19 +92,29 @@ void Experiments::load() {
     const std::uint64_t id = id_of(entry.path());
     if (id != 0) found.insert(id);
   }
+  std::vector<std::pair<std::filesystem::file_time_type, Pointer>> ended;
   for (const std::uint64_t id : found) {
     last_id_ = std::max(last_id_, id);
-    if (!std::filesystem::exists(file_of(id, ".experiment"))) {
+    std::error_code ignored;
+    const std::filesystem::path file = file_of(id, ".experiment");
+    if (!std::filesystem::exists(file)) {
       remove(id);  // what a crash left before there was anything to know about it
-    } else {
-      std::error_code ignored;
-      std::filesystem::remove(file_of(id, ".experiment.new"), ignored);
-      load_one(file_of(id, ".experiment"));
+      continue;
+    }
+    std::filesystem::remove(file_of(id, ".experiment.new"), ignored);
+    if (Pointer experiment = load_one(file)) {
+      all_[id] = experiment;
+      ended.emplace_back(std::filesystem::last_write_time(file, ignored), std::move(experiment));
     }
   }
+  // Its end was the last that was written to its file.
+  std::stable_sort(ended.begin(), ended.end(),
+                   [](const auto& x, const auto& y) { return x.first < y.first; });
+  for (const auto& [time, experiment] : ended)
+    keep_ended(*experiment);
 }
 
-void Experiments::load_one(const std::filesystem::path& file) {
+Experiments::Pointer Experiments::load_one(const std::filesystem::path& file) const {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   v1::StoredExperiment stored;
@@ -114,7 +124,7 @@ void Experiments::load_one(const std::filesystem::path& file) {
       is_read ? rule_broken_by(stored, id_of(file)) : "it must be a StoredExperiment of 4 MiB at most";
   if (!rule.empty()) {
     spdlog::warn("{} is not an experiment: {}", file.string(), rule);
-    return;
+    return nullptr;
   }
   auto experiment = std::make_shared<Experiment>();
   experiment->id = id_of(file);
@@ -125,8 +135,9 @@ void Experiments::load_one(const std::filesystem::path& file) {
   if (!has_ended(stored.info().state())) {
     experiment->info.set_state(v1::EXPERIMENT_STATE_FAILED);
     experiment->info.set_reason("the server ended before it");
+    try_to_store(*experiment);
   }
-  all_[experiment->id] = std::move(experiment);
+  return experiment;
 }
 
 void Experiments::store(const Experiment& experiment) const {
@@ -138,6 +149,14 @@ void Experiments::store(const Experiment& experiment) const {
   write_whole(file_of(experiment.id, ".experiment"), stored.SerializeAsString());
 }
 
+void Experiments::try_to_store(const Experiment& experiment) const {
+  try {
+    store(experiment);
+  } catch (const std::exception& error) {
+    spdlog::error("experiment {}: {}", experiment.id, error.what());
+  }
+}
+
 void Experiments::remove(std::uint64_t id) {
   for (const std::string_view ending : kEndings) {
     std::error_code ignored;
@@ -145,15 +164,18 @@ void Experiments::remove(std::uint64_t id) {
   }
 }
 
-void Experiments::forget_oldest() {
-  std::vector<std::uint64_t> ended;
-  for (const auto& [id, experiment] : all_) {
-    if (has_ended(experiment->info.state())) ended.push_back(id);
+/// It has ended. Beyond `kept` the one goes that did so first: by number, one that had to wait in the queue
+/// would go as soon as its data are there.
+void Experiments::keep_ended(Experiment& experiment) {
+  experiment.end = ++last_end_;
+  std::vector<Pointer> ended;
+  for (const auto& [id, each] : all_) {
+    if (each->end != 0) ended.push_back(each);
   }
-  for (std::size_t i = 0; ended.size() - i > config_.experiments.kept; ++i) {
-    remove(ended[i]);
-    all_.erase(ended[i]);
-  }
+  if (ended.size() <= config_.experiments.kept) return;
+  const Pointer& first = *std::ranges::min_element(ended, {}, [](const Pointer& each) { return each->end; });
+  all_.erase(first->id);
+  remove(first->id);
 }
 
 }  // namespace drivebench

@@ -324,6 +324,48 @@ class Experiments(WireTest):
         self.assertEqual({int(f.split(".")[0]) for f in os.listdir(self.kept.name) if f[0].isdigit()}, {3, 4, 5})
         self.assertEqual(self.run_it(client, request()).id, 6)
 
+    def test_the_first_to_end_goes_first(self):
+        """The lowest number instead of the first end: of two owners who take turns, the data of who waited longest go
+        the moment they are there, or with the next start of the server."""
+        text = SERVO_TEXT + '\n[experiments]\nfolder = "%s"\nkept = 2\n' % self.kept.name
+
+        def there(client):
+            listed = client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments
+            there = [e.id for e in listed]
+            self.assertEqual(sorted(int(f[:-5]) for f in os.listdir(self.kept.name) if f.endswith(".mcap")), there)
+            return there
+        server = self.server(text=text)
+        client = self.client(server)
+        first = self.run_it(client, endless()).id
+        self.wait_for(client, first, pb.EXPERIMENT_STATE_RUNNING)
+        waits = self.run_it(client, request(400, mode=pb.MODE_REALTIME)).id
+        turns = [self.run_it(client, request(100, owner=f"somebody else {k}")).id for k in range(2)]
+        client.ask(cancel_experiment=pb.CancelExperiment(id=first, owner=OWNER))
+        fetched = self.fetch(client, waits)
+        self.assertEqual((fetched.info.state, len(fetched.rows(3))), (pb.EXPERIMENT_STATE_COMPLETED, 401))
+        self.assertEqual(self.whole(client, request(100)).info.id, 5)
+        self.assertEqual(there(client), [waits, 5])
+        self.assertEqual(server.stop(), 0)
+        # 5 and then 2 were written last.
+        os.utime(f"{self.kept.name}/2.experiment")
+        server = self.server(text=text)
+        client = self.client(server)
+        self.assertEqual(self.whole(client, request(100)).info.id, 6)
+        self.assertEqual(there(client), [waits, 6])
+        self.assertLess(waits, min(turns))
+
+    def test_who_cancels_is_told_although_it_goes(self):
+        """An experiment that is forgotten by the request that cancels it, which then is refused."""
+        text = SERVO_TEXT + '\n[experiments]\nfolder = "%s"\nkept = 1\n' % self.kept.name
+        client = self.client(self.server(text=text))
+        running = self.run_it(client, endless())
+        self.wait_for(client, running.id, pb.EXPERIMENT_STATE_RUNNING)
+        queued = [self.run_it(client, request()).id for _ in range(3)]
+        for number in reversed(queued):
+            answer = client.ask(cancel_experiment=pb.CancelExperiment(id=number, owner=OWNER))
+            self.assertEqual(answer.experiment_info.state, pb.EXPERIMENT_STATE_CANCELLED, answer)
+            self.wait_for(client, number, pb.EXPERIMENT_STATE_CANCELLED)
+
     def test_a_file_that_is_no_experiment_is_told_of_and_left_alone(self):
         """A file that a power cut left empty: the server divides by its decimation of 0, which ends it, or gives its
         data to whoever names no owner."""
