@@ -137,7 +137,7 @@ Address parse_address(std::string_view text) {
     port = place.substr(colon + 1);
   }
   if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  if (host.empty()) bad_address(text, "expected tcp:HOST:PORT, HOST:PORT or unix:PATH");
+  if (host.empty()) bad_address(text, "expected tcp:HOST:PORT, HOST:PORT, tls:HOST:PORT or unix:PATH");
   if (host.find('/') != std::string_view::npos) {
     bad_address(text, "a host has no '/'; a unix socket is written unix:PATH");
   }

@@ -43,7 +43,8 @@ class WithoutABench(CommandTest):
                 (["watch", "--count", "-1"], "negative"), (["watch", "--signals", "volts"], "no signal 'volts'"),
                 (["control", "--compare", "none.mcap", "--from", "-1"], "negative"), (["plot", "none.mcap", "--from", "-1"], "negative"),
                 (["experiment", "fetch", "-1"], "negative"), (["status", "--link", "can:socketcan:can0"], "tcp:, tls: or unix:"),
-                (["status", "--link", "tcp:host:port"], "not an address"), (["replay"], "FILE"), (["export"], "FILE"),
+                (["status", "--link", "tcp:host:port"], "not an address"),
+                (["status", "--link", "tcp::7300"], "tls:HOST:PORT or unix:PATH"), (["replay"], "FILE"), (["export"], "FILE"),
                 (["export", "none.mcap"], "none.mcap"), (["replay", "none.mcap"], "none.mcap"),
                 (["serve", "none"], "no bench file 'none'"), (["serve", "servo", "--nope"], "--nope"),
                 (["demo", "--keep", "/proc/none"], "/proc/none")):
