@@ -159,6 +159,9 @@ TEST(ModbusDesk, AMalformedCommandIsThatOfItsSender) {
   EXPECT_EQ(owner.write(402, command_words(3, tick, 1.5f, 0.0f)), 3);
   EXPECT_TRUE(clear_is_refused()) << "a duty that there is not";
   command_well();
+  EXPECT_EQ(owner.write(122, {2}), 3);
+  EXPECT_TRUE(clear_is_refused()) << "process data with a mode that there is not";
+  command_well();
   EXPECT_EQ(other.write(400, with_key), 3);
   EXPECT_TRUE(clear_is_refused()) << "the key is his";
   command_well();
@@ -168,7 +171,7 @@ TEST(ModbusDesk, AMalformedCommandIsThatOfItsSender) {
   EXPECT_EQ(owner.write(401, {1}), 0) << "these are a stranger's";
   command_well();
   EXPECT_EQ(bench.newest().faults & kLatchedFaults, 0u);
-  EXPECT_EQ(bench.newest().refused_commands, 5u);
+  EXPECT_EQ(bench.newest().refused_commands, 6u);
 }
 
 // Catches: an owner who reads why a stranger was refused when he asks why he was.

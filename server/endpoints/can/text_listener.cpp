@@ -76,7 +76,10 @@ void TextListener::accept() {
                                                                asio::ip::tcp::socket socket) {
     if (alive.expired() || error == asio::error::operation_aborted) return;
     if (error) {
-      spdlog::warn("cannot accept a CAN client: {}", error.message());
+      if (log_.allow()) {
+        spdlog::warn("cannot accept a CAN client: {} ({} more since the last such line)", error.message(),
+                     log_.held_back());
+      }
       return accept_later();
     }
     take(std::move(socket));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/asio.hpp"
+#include "server/endpoints/log_limit.hpp"
 
 namespace drivebench::can {
 
@@ -42,6 +43,7 @@ class TextListener {
 
   asio::ip::tcp::acceptor acceptor_;
   ServerTimer pause_;
+  LogLimit log_;
   std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
 };
 

@@ -65,7 +65,7 @@ void AxisDesk::note_refusal(Visitor who, Refusal why) noexcept {
 void AxisDesk::count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words,
                              Visitor who) {
   const Written written{range, words};
-  if (!written[Content::kCounter]) return;
+  if (!written[Content::kCounter] && range.first >= kCommandStart) return;  // process data always command
   const bool has_key = leased() && written[Content::kLeaseKey] == key_;
   const Owner sender = has_key || holds(who) ? owner_ : 0;
   engine_.request({.tick = 0, .axis = axis_, .owner = sender, .action = RefusedCommand{true}},
