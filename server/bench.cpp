@@ -75,20 +75,16 @@ Refused Bench::submit(const Input& input) noexcept {
 }
 
 void Bench::apply_due() noexcept {
-  std::uint64_t due = 0;
-  while (due < scheduled_ && schedule_[due].tick <= tick_) {
-    const Input input = unpack(schedule_[due++]);
+  while (scheduled_ > 0 && schedule_[0].tick <= tick_) {
+    const Input input = unpack(schedule_[0]);
+    // Before it acts: a lease that ends takes more off the schedule.
+    const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_--);
+    *std::move(schedule_.begin() + 1, end, schedule_.begin()) = PackedInput{};
     // Nobody waits for the answer any more: what cannot be carried out is counted (a command counts itself).
     if (apply(input) != Refused::kNot && !std::holds_alternative<Command>(input.action)) {
       ++axes_[input.axis].control.refused;
     }
   }
-  if (due == 0) return;
-  std::move(schedule_.begin() + static_cast<std::ptrdiff_t>(due),
-            schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_), schedule_.begin());
-  scheduled_ -= due;
-  std::fill(schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_),
-            schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_ + due), PackedInput{});
 }
 
 Refused Bench::apply(const Input& input) noexcept {
@@ -240,9 +236,14 @@ PhaseCommand Bench::safe_command(AxisRuntime& a) noexcept {
 PhaseCommand Bench::drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept {
   Control& c = a.control;
   const bool slows = a.command_step > 0.0 && a.rules.on_excess == OnExcess::kSaturate;
-  const bool steep = slows && is_steeper(c.last.command, command, a.command_step);
-  const PhaseCommand limited = steep ? slewed(c.last.command, command, a.command_step) : command;
-  if (steep) c.flags = kCommandSlewLimited;
+  PhaseCommand limited = command;
+  if (slows) {
+    const PhaseCommand before = in_force(c.last, a.on_link_loss, a.axis.connection(), a.quick_stop_ticks);
+    if (is_steeper(before, command, a.command_step)) {
+      limited = slewed(before, command, a.command_step);
+      c.flags = kCommandSlewLimited;
+    }
+  }
   follow(c.last, limited, a.axis.connection(), a.on_link_loss == SafeAction::kQuickStop);
   return limited;
 }

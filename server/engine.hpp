@@ -42,7 +42,7 @@ class Engine {
   void request(const Input& input, Answer answer, const Client* from = nullptr);
   /// Gives the axis to `by`, even if somebody holds it: he loses it as if his session had ended, and only
   /// then, in the same tick, does `by` get it. Told to on_taken.
-  void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer);
+  virtual void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer);
   /// Ends the run: safe action, recording closed.
   virtual Verdict stop() = 0;
   /// Hash of the present state; 0 while another thread is changing it.
@@ -123,8 +123,12 @@ class Engine {
   Owners owners_;
 };
 
-/// Ticks run on the I/O thread, in the call that brings the last command.
-std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder);
+/// Ticks run on the I/O thread, in the call that brings the last command, or as soon after as the recorder
+/// has room for one.
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                             boost::asio::io_context& io);
+/// The same without a recording.
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config);
 
 /// Ticks run on a thread of their own: paced by the clock, or as fast as possible when the mode is free.
 /// Stops by itself after max_ticks, if given.

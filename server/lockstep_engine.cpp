@@ -1,5 +1,8 @@
+#include <chrono>
+#include <optional>
 #include <utility>
 
+#include "server/asio.hpp"
 #include "server/engine.hpp"
 #include "server/tick_mark.hpp"
 
@@ -8,10 +11,11 @@ namespace {
 
 class LockstepEngine final : public Engine {
  public:
-  LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder)
+  LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context* io)
       : Engine(config, std::move(recorder)),
         bench_(config_.setup, recorder_.get()),
         shown_changes_(config_.axes.size()) {
+    if (io != nullptr) disk_timer_.emplace(*io);
     schedule_events(config_, bench_);
     show();
   }
@@ -24,14 +28,22 @@ class LockstepEngine final : public Engine {
     return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
   }
 
+  void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
+    is_taking_ = true;  // no tick between the two inputs
+    Engine::take(axis, by, reason, std::move(answer));
+    is_taking_ = false;
+    advance();
+  }
+
   void advance() override {
+    if (is_taking_) return;
     bool commanded = false;
     for (std::size_t i = 0; i < bench_.axis_count(); ++i) {
       if (bench_.owner(i) != 0 && !bench_.has_command(i) && !bench_.is_latched(i)) return;
       commanded = commanded || bench_.has_command(i);
     }
     if (!commanded) return;  // without a controller a lockstep bench stands still
-    if (recorder_) recorder_->wait_for_room();
+    if (recorder_ && !recorder_->has_room()) return try_again_soon();
     watch_.beat();
     {
       const TickMark mark;
@@ -70,6 +82,17 @@ class LockstepEngine final : public Engine {
   std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
+  /// The disk is slow: time stands still until it has caught up, and everybody is served meanwhile.
+  void try_again_soon() {
+    if (std::exchange(waits_for_disk_, true)) return;
+    disk_timer_->expires_after(std::chrono::milliseconds(1));
+    disk_timer_->async_wait([this](const boost::system::error_code& error) {
+      if (error) return;
+      waits_for_disk_ = false;
+      advance();
+    });
+  }
+
   void show() {
     for (std::size_t i = 0; i < newest_.size(); ++i) {
       newest_[i] = bench_.sample(i);
@@ -81,12 +104,20 @@ class LockstepEngine final : public Engine {
 
   Bench bench_;
   std::vector<std::uint64_t> shown_changes_;
+  bool is_taking_ = false;
+  std::optional<ServerTimer> disk_timer_;  // of a run with a recorder
+  bool waits_for_disk_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder) {
-  return std::make_unique<LockstepEngine>(config, std::move(recorder));
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config) {
+  return std::make_unique<LockstepEngine>(config, nullptr, nullptr);
+}
+
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                             asio::io_context& io) {
+  return std::make_unique<LockstepEngine>(config, std::move(recorder), &io);
 }
 
 }  // namespace drivebench

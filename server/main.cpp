@@ -23,6 +23,7 @@
 #include "server/print_line.hpp"
 #include "server/replay_command.hpp"
 #include "server/service_notification.hpp"
+#include "server/stop_signal.hpp"
 #include "server/supervisor.hpp"
 
 namespace drivebench {
@@ -80,6 +81,7 @@ BenchConfig configure(const Options& o) {
   if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
     throw std::runtime_error("--duration: a lockstep run ends when its controller does");
   }
+  if (!(o.file_s <= 1e9)) throw std::runtime_error("--record-file-s: must be at most 1e9 s");
   if (!(o.duration_s <= 1e9)) throw std::runtime_error("--duration: must be at most 1e9 s");
   if (config.mode == RunMode::kRealtime && config.setup.command_delay_ticks == 0) {
     throw std::runtime_error(
@@ -151,12 +153,16 @@ void print_verdict(const Options& o, const Verdict& v) {
   if (!o.record.empty()) print_line(fmt::format("recorded in {}", o.record));
 }
 
+/// For everybody else who writes to the disk of a recording: the audit log, the system.
+constexpr std::uint64_t kDiskReserveBytes = std::uint64_t{64} << 20;
+
 RecordingOptions recording_options(const Options& o, const BenchConfig& config) {
   const double ticks = o.file_s * 1e9 / static_cast<double>(config.setup.period_ns);
   return {
       .file_ticks = o.file_s > 0.0 ? std::max<std::uint64_t>(static_cast<std::uint64_t>(ticks + 0.5), 1) : 0,
       .file_bytes = o.file_mib << 20,
-      .continues_after_errors = true};
+      .continues_after_errors = true,
+      .reserve_bytes = kDiskReserveBytes};
 }
 
 /// Refuses a host that grants less than real time needs.
@@ -175,7 +181,7 @@ std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config,
     recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
                                           recording_options(o, config));
   }
-  if (config.mode == RunMode::kLockstep) return make_lockstep_engine(config, std::move(recorder));
+  if (config.mode == RunMode::kLockstep) return make_lockstep_engine(config, std::move(recorder), io);
   std::optional<Tick> max_ticks;
   if (o.duration_s > 0.0) {
     max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
@@ -203,21 +209,23 @@ void set_log_level(LogLevel level) {
 
 /// At each SIGHUP the bench file is read again; of what it says only the tokens and the log level are taken.
 /// The audit log goes on in a new file if somebody has moved the old one.
-asio::awaitable<void> reload_on_hangup(const Options& o, StreamServer& server, Audit* audit) {
-  asio::signal_set hangups(co_await asio::this_coro::executor, SIGHUP);
+asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const Options& o, StreamServer& server,
+                                       Audit* audit) {
   for (;;) {
     co_await hangups.async_wait(asio::use_awaitable);
+    std::string result = "done";
     try {
       BenchConfig now = configure(o);
       set_log_level(now.log_level);
       server.replace_grants(std::move(now.tcp));
       spdlog::info("SIGHUP: tokens and log level are those of {} now", o.config);
     } catch (const std::exception& error) {
-      spdlog::error("SIGHUP: everything stays as it is: {}", error.what());
+      result = error.what();
+      spdlog::error("SIGHUP: everything stays as it is: {}", result);
     }
     if (audit == nullptr) continue;
     if (!audit->reopen()) spdlog::error("SIGHUP: the audit log cannot be opened again and stays the old one");
-    audit->note({.name = "reload"});
+    audit->note({.name = "reload", .result = result, .details = {{"file", o.config}}});
   }
 }
 
@@ -265,10 +273,8 @@ int serve(const Options& o) {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   asio::io_context io(1);
-  asio::signal_set signals(io, SIGINT, SIGTERM);
-  signals.async_wait([&io](const boost::system::error_code& error, int) {
-    if (!error) io.stop();
-  });
+  std::optional<StopSignal> stop_signal;
+  stop_signal.emplace(io, [&io] { io.stop(); });
   check_bus_loads(o, config);
   if (o.require_realtime) require_realtime(config);
   // First: a port in use must not leave a recording behind.
@@ -283,7 +289,8 @@ int serve(const Options& o) {
   if (audit) note_start(*audit, *engine);
   server.serve(
       *engine, [&transports] { return transports.reports(); }, experiments.get(), audit.get());
-  asio::co_spawn(io, reload_on_hangup(o, server, audit.get()), asio::detached);
+  asio::signal_set hangups(io, SIGHUP);
+  asio::co_spawn(io, reload_on_hangup(hangups, o, server, audit.get()), asio::detached);
   transports.serve(*engine, audit.get());
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
@@ -305,7 +312,7 @@ int serve(const Options& o) {
     broken = true;
   }
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
-  signals.clear();  // from here on a second signal ends the program at once
+  stop_signal.reset();
   notify_service_manager("STOPPING=1");
   supervisor.reset();  // what stands still from here on shall
   const Verdict verdict = engine->stop();

@@ -52,7 +52,7 @@ void Recorder::count_gap(bool lost) noexcept {
 }
 
 void Recorder::wait_for_room() noexcept {
-  while (ring_.room() < room_for_tick_) {
+  while (!has_room()) {
     if (!thread_.joinable()) {
       work();
     } else {
@@ -80,6 +80,7 @@ void Recorder::run() {
 bool Recorder::work() noexcept {
   const bool any = drain(kEntriesPerLook);
   writer_->sync_if_due(RecordingWriter::Clock::now());
+  is_over_.store(writer_->is_over(), std::memory_order_relaxed);
   return any;
 }
 

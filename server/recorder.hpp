@@ -33,6 +33,7 @@ struct RecordingOptions {
   std::uint64_t file_ticks = 0;         ///< a new file begins after so many; 0: never
   std::uint64_t file_bytes = 0;         ///< a new file begins with the chunk that brings it there; 0: never
   bool continues_after_errors = false;  ///< in a new file, unless the disk is full
+  std::uint64_t reserve_bytes = 0;      ///< the recording ends before less than this is free on its disk
   CreateRecordingFile create{};         ///< empty: create_recording_file
   bool own_thread = true;               ///< false: whoever has the recorder calls work() now and then
 };
@@ -57,7 +58,9 @@ class Recorder final : public BenchObserver {
   void on_input(Tick now, const Input& input) noexcept override;
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override;
 
-  /// Outside the tick, where wall time does not matter: returns when the ring has room for a tick.
+  /// Whether the ring has room for a tick; asked by the thread of the ticks, outside them.
+  bool has_room() noexcept { return ring_.room() >= room_for_tick_; }
+  /// Where wall time does not matter: returns when it has.
   void wait_for_room() noexcept;
 
   /// Writes some of what has come, and syncs when it is time; false: nothing had come.
@@ -65,6 +68,8 @@ class Recorder final : public BenchObserver {
 
   /// Entries lost because the ring was full or the disk refused them.
   std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }
+  /// Whether it has ended before the run, for want of room or of a disk that works.
+  bool is_over() const noexcept { return is_over_.load(std::memory_order_relaxed); }
   const std::string& file() const noexcept { return file_; }
 
   /// Drains the ring, writes the verdict and closes the file; gaps() is final then.
@@ -81,6 +86,7 @@ class Recorder final : public BenchObserver {
   std::size_t room_for_tick_;
   std::unique_ptr<RecordingWriter> writer_;
   std::atomic<std::uint64_t> gaps_{0};
+  std::atomic<bool> is_over_{false};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -1,6 +1,7 @@
 #include "server/recording_file.hpp"
 
 #include <fcntl.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -30,6 +31,11 @@ class SystemFile final : public RecordingFile {
   int close() noexcept override {
     if (descriptor_ < 0) return 0;
     return ::close(std::exchange(descriptor_, -1));
+  }
+  std::uint64_t free_bytes() noexcept override {
+    struct statvfs disk {};
+    if (::fstatvfs(descriptor_, &disk) != 0) return RecordingFile::free_bytes();
+    return std::uint64_t{disk.f_bavail} * disk.f_frsize;
   }
 
  private:

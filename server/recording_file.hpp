@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -21,6 +22,8 @@ class RecordingFile {
   /// What was written is on the disk (fdatasync).
   virtual int sync() noexcept = 0;
   virtual int close() noexcept = 0;
+  /// What is free on its disk, in bytes.
+  virtual std::uint64_t free_bytes() noexcept { return std::numeric_limits<std::uint64_t>::max(); }
 };
 
 using CreateRecordingFile = std::function<std::unique_ptr<RecordingFile>(const std::filesystem::path&)>;

@@ -62,6 +62,12 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const BenchC
   }
   if (!options_.create) options_.create = create_recording_file;
   std::unique_ptr<RecordingFile> made = options_.create(file);
+  if (made->free_bytes() < options_.reserve_bytes) {
+    std::filesystem::remove(file);
+    throw std::system_error(ENOSPC, std::generic_category(),
+                            "cannot create the recording " + first_ + ": less than " +
+                                std::to_string(options_.reserve_bytes >> 20) + " MiB are free on its disk");
+  }
   attempt([&] { begin(std::move(made)); });
 }
 
@@ -194,7 +200,18 @@ void RecordingWriter::write_all(std::span<const std::byte> bytes) {
 void RecordingWriter::sync_if_due(Clock::time_point now) noexcept {
   if (is_over_ || now - last_sync_ < kSyncInterval) return;
   last_sync_ = now;
-  attempt([this] { sync(); });
+  attempt([this] {
+    sync();
+    if (file_->free_bytes() < options_.reserve_bytes) end_for_want_of_room();
+  });
+}
+
+/// As a whole file, and with room left for everybody else.
+void RecordingWriter::end_for_want_of_room() {
+  is_over_ = true;
+  end_file();
+  spdlog::error("recording {}: less than {} MiB are free on its disk; it ends here",
+                segment_path(first_, number_), options_.reserve_bytes >> 20);
 }
 
 void RecordingWriter::sync() {

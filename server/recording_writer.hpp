@@ -28,7 +28,8 @@ class RecordingWriter {
  public:
   using Clock = ServerClock;
 
-  /// Begins the first file; throws std::system_error if one of its names is taken or it cannot be made.
+  /// Begins the first file; throws std::system_error if one of its names is taken, it cannot be made, or
+  /// there is less room than its reserve.
   RecordingWriter(const std::filesystem::path& file, const BenchConfig& config,
                   std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options);
   ~RecordingWriter();
@@ -41,7 +42,7 @@ class RecordingWriter {
   /// Ends the last file.
   void finish(const Verdict& verdict) noexcept;
 
-  /// The disk takes no more: every further entry is lost, and not counted here.
+  /// The disk takes no more, or shall not: every further entry is lost, and not counted here.
   bool is_over() const noexcept { return is_over_; }
   /// Entries that were given to write() and are not surely on the disk; each is told once.
   std::uint64_t take_lost() noexcept { return std::exchange(lost_, 0); }
@@ -70,6 +71,7 @@ class RecordingWriter {
   void go_on() noexcept;
   void sync();
   void end_file();
+  void end_for_want_of_room();
   bool is_full(const RecordedEntry& last) const;
   void fail(Step step, int error) noexcept;
   template <class Action>

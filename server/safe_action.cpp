@@ -69,12 +69,19 @@ void follow(LastCommands& last, const PhaseCommand& command, Connection connecti
   ++last.followed;
 }
 
+PhaseCommand in_force(const LastCommands& last, SafeAction action, Connection connection,
+                      Tick quick_stop_ticks) noexcept {
+  if (last.gone == 0 || action == SafeAction::kHold) return last.command;
+  if (action == SafeAction::kZeroVoltage) return {.gates = Gates::kZeroVoltage, .setpoint = {}};
+  if (action == SafeAction::kFreewheel) return {};
+  return ramp_down(last, connection, quick_stop_ticks);
+}
+
 PhaseCommand act_safely(LastCommands& last, SafeAction action, bool faulty, Connection connection,
                         Tick quick_stop_ticks) noexcept {
   ++last.gone;
-  if (action == SafeAction::kZeroVoltage) return {.gates = Gates::kZeroVoltage, .setpoint = {}};
-  if (faulty || action == SafeAction::kFreewheel) return {};
-  return action == SafeAction::kHold ? last.command : ramp_down(last, connection, quick_stop_ticks);
+  const bool ends = faulty && action != SafeAction::kZeroVoltage;
+  return in_force(last, ends ? SafeAction::kFreewheel : action, connection, quick_stop_ticks);
 }
 
 }  // namespace drivebench

@@ -28,6 +28,10 @@ struct LastCommands {
 /// The axis is driven with `command` in this tick.
 void follow(LastCommands& last, const PhaseCommand& command, Connection connection, bool turns) noexcept;
 
+/// What drove the axis in the last tick: the last command, or the safe action that has followed it since.
+PhaseCommand in_force(const LastCommands& last, SafeAction action, Connection connection,
+                      Tick quick_stop_ticks) noexcept;
+
 /// What drives the axis in the next tick of the safe action. A fault of the machine or the bench (`faulty`)
 /// leaves only freewheel and zero voltage: hold and quick stop then are freewheel.
 PhaseCommand act_safely(LastCommands& last, SafeAction action, bool faulty, Connection connection,

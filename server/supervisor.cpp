@@ -1,7 +1,7 @@
 #include "server/supervisor.hpp"
 
+#include <poll.h>
 #include <pthread.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -14,10 +14,12 @@ namespace {
 constexpr auto kLookInterval = std::chrono::milliseconds(100);
 constexpr auto kStopInterval = std::chrono::milliseconds(20);
 
-/// Without locks or allocation, which the thread that stands still may hold.
-[[noreturn]] void abort_with(std::string_view why) noexcept {
-  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, why.data(), why.size());
-  std::abort();
+/// Without locks or allocation, which the thread that stands still may hold, and without waiting for whoever
+/// reads.
+void say(std::string_view sentence) noexcept {
+  pollfd out{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
+  if (::poll(&out, 1, 0) <= 0) return;
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, sentence.data(), sentence.size());
 }
 
 }  // namespace
@@ -56,25 +58,25 @@ void Supervisor::run() {
       std::this_thread::sleep_for(kStopInterval);
     }
     if (ticks_by_itself_ && ticks.look(watch_.beats())) {
-      abort_with(
-          "drivebench-server: no tick for a second: the thread of the bench stands still; giving up\n");
+      say("drivebench-server: no tick for a second: the thread of the bench stands still; giving up\n");
+      std::abort();
     }
     const std::uint64_t now = signs_.load(std::memory_order_relaxed);
     if (signs.look(now)) {
       io_stands = true;
       seen_signs = now;
       if (ticks_by_itself_) watch_.abandon();
-      spdlog::critical("the I/O thread stands still{}", ticks_by_itself_ ? ": all leases are lost" : "");
+      say(ticks_by_itself_ ? "drivebench-server: the I/O thread stands still: all leases are lost\n"
+                           : "drivebench-server: the I/O thread stands still\n");
     } else if (io_stands && now != seen_signs) {
       io_stands = false;
-      spdlog::warn("the I/O thread goes on");
+      say("drivebench-server: the I/O thread goes on\n");
     }
     const std::uint64_t resets = watch_.arithmetic_resets();
     if (resets != seen_resets) {
-      spdlog::error(
-          "something changed how this program rounds; set back, {} times so far: the bits of this run are in "
-          "doubt",
-          resets);
+      say("drivebench-server: something changed how this program rounds; set back: the bits of this run are "
+          "in "
+          "doubt\n");
       seen_resets = resets;
     }
   }

@@ -19,50 +19,16 @@
 #include "server/pacer.hpp"
 #include "server/stepped_engine.hpp"
 #include "server/tick_mark.hpp"
+#include "server/tick_tap.hpp"
 
 namespace drivebench {
 namespace {
 
 constexpr std::size_t kRequestCapacity = 256;
 
-// From the tick thread to the I/O thread, with TickedSample.
-struct Outcome {
-  Refused refused;
-  Tick tick;
-};
-struct AxisEdges {
-  AxisEdges(std::uint32_t of, const TickEdges& seen) noexcept : axis(of), edges(seen) {}
-  std::uint32_t axis;
-  TickEdges edges;
-};
-struct Ended {};
-using Event = std::variant<TickedSample, Outcome, AxisEdges, Ended>;
-
 struct OwnedCommand {
   Owner owner = 0;
   Command command{};
-};
-
-/// Passes what the bench reports on to the recorder and to the I/O thread.
-class Tap final : public BenchObserver {
- public:
-  Tap(Recorder* recorder, SpscRing<Event>& events) : recorder_(recorder), events_(events) {}
-  void on_input(Tick now, const Input& input) noexcept override {
-    if (recorder_ != nullptr) recorder_->on_input(now, input);
-  }
-  void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
-    if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
-    if (bench_ != nullptr) events_.emplace(std::in_place_type<AxisEdges>, axis, edges_of(*bench_, axis));
-    // A full ring costs the viewers a sample, never the bench its time.
-    events_.emplace(std::in_place_type<TickedSample>, axis, sample);
-  }
-  /// From now on the encoder edges of each tick go before its samples.
-  void send_edges_of(const Bench& bench) noexcept { bench_ = &bench; }
-
- private:
-  Recorder* recorder_;
-  SpscRing<Event>& events_;
-  const Bench* bench_ = nullptr;
 };
 
 class ThreadedEngine final : public Engine {
@@ -125,19 +91,27 @@ class ThreadedEngine final : public Engine {
 
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = check(axis, owner, command);
-    if (why != Refused::kNot) {
+    if (why == Refused::kNot) {
+      sent_[axis] = {.owner = owner, .command = command};
+      mailboxes_[axis].write(sent_[axis]);
+    } else {
       request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{are_bad_values(why)}},
               [](Refused, Tick) {});
-      return why;
     }
-    sent_[axis] = {.owner = owner, .command = command};
-    mailboxes_[axis].write(sent_[axis]);
     return why;
   }
 
   void advance() override {}
 
   void submit(const Input& input, Answer answer) override {
+    if (ends_lease(input) && requests_.room() == 0) {
+      ends_.push_back({input, std::move(answer)});
+      return;
+    }
+    // What strangers may send without end leaves the other half to what must get through.
+    if (std::holds_alternative<RefusedCommand>(input.action) && requests_.room() <= kRequestCapacity / 2) {
+      return answer(Refused::kBusy, tick());
+    }
     const bool writes = std::holds_alternative<ParameterWrite>(input.action);
     const bool taken = requests_.push(input);
     if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;
@@ -195,7 +169,7 @@ class ThreadedEngine final : public Engine {
     while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_))
       run_tick();
     send_parameters();
-    while (!events_.push(Ended{}) && !stop_.load()) {
+    while (!events_.push(RunEnded{}) && !stop_.load()) {
       notify();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -230,7 +204,7 @@ class ThreadedEngine final : public Engine {
     for (std::size_t n = 0; n < kRequestCapacity; ++n) {
       const Input* input = requests_.front();
       if (input == nullptr || events_.room() == 0) break;
-      events_.push(Outcome{bench_.submit(*input), bench_.tick()});
+      events_.push(RequestOutcome{bench_.submit(*input), bench_.tick()});
       requests_.pop();
     }
     for (std::uint32_t axis = 0; axis < mailboxes_.size(); ++axis) {
@@ -277,12 +251,17 @@ class ThreadedEngine final : public Engine {
     for (std::size_t i = 0; i < parameter_mail_.size(); ++i)
       take_parameters(i);
     for (std::size_t n = 0; n < events_.capacity(); ++n) {
-      const Event* event = events_.front();
+      const TickEvent* event = events_.front();
       if (event == nullptr) break;
       std::visit([this](const auto& e) { handle(e); }, *event);
       events_.pop();
     }
     if (tick() != before) on_newest();
+    while (!ends_.empty() && requests_.room() > 0) {
+      LeaseEnd end = std::move(ends_.front());
+      ends_.pop_front();
+      submit(end.input, std::move(end.answer));
+    }
   }
 
   void handle(const TickedSample& s) {
@@ -292,9 +271,9 @@ class ThreadedEngine final : public Engine {
     on_tick();
   }
   // Answers wait for the samples of their tick, so that whoever gets one finds newest() as it says.
-  void handle(const Outcome& outcome) { outcomes_.push_back(outcome); }
+  void handle(const RequestOutcome& outcome) { outcomes_.push_back(outcome); }
   void handle(const AxisEdges& e) { edges_[e.axis] = e.edges; }
-  void handle(const Ended&) {
+  void handle(const RunEnded&) {
     answer_outcomes();
     if (on_end) on_end();
   }
@@ -356,19 +335,30 @@ class ThreadedEngine final : public Engine {
     std::optional<std::uint32_t> written_axis;  // of a parameter
   };
 
+  /// The end of a lease. One that found the ring full waits here: nobody would try again.
+  struct LeaseEnd {
+    Input input;
+    Answer answer;
+  };
+  static bool ends_lease(const Input& input) noexcept {
+    const auto* const action = std::get_if<LeaseAction>(&input.action);
+    return action != nullptr && (*action == LeaseAction::kLost || *action == LeaseAction::kRelease);
+  }
+
   std::optional<Tick> max_ticks_;
   Tick ticks_per_wake_;
   SpscRing<Input> requests_;
-  SpscRing<Event> events_;
-  Tap tap_;
+  SpscRing<TickEvent> events_;
+  TickTap tap_;
   Bench bench_;
   std::deque<Mailbox<OwnedCommand>> mailboxes_;
   std::deque<ParameterMail> parameter_mail_;
   std::vector<OwnedCommand> sent_;  // the last command put into each mailbox
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
-  std::deque<Waiting> answers_;   // of the requests in flight, in order
-  std::deque<Outcome> outcomes_;  // that have come back, to be answered with the samples of their tick
+  std::deque<LeaseEnd> ends_;
+  std::deque<Waiting> answers_;          // of the requests in flight, in order
+  std::deque<RequestOutcome> outcomes_;  // that have come back, to be answered with the samples of their tick
   std::unique_ptr<Pacer> pacer_;
   LatenessHistogram lateness_;
   std::atomic<std::int64_t> worst_lateness_ns_{0};

@@ -215,6 +215,7 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
               {"sessions", status.sessions()},
               {"recording", status.recording()},
               {"recording_gaps", status.recording_gaps()},
+              {"recording_over", status.recording_over()},
               {"state_hash", status.state_hash() == 0 ? "" : fmt::format("{:016x}", status.state_hash())},
               {"notes", Json::array()},
               {"transports", Json::array()},

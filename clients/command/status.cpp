@@ -47,7 +47,8 @@ int run_status(const StatusOptions& options) {
   if (status.recording().empty()) {
     fmt::print("not recording\n");
   } else {
-    fmt::print("recording {}, {} gaps\n", status.recording(), status.recording_gaps());
+    fmt::print("recording {}, {} gaps{}\n", status.recording(), status.recording_gaps(),
+               status.recording_over() ? "; it has ended: its disk is full or does not work" : "");
   }
   for (const v1::AxisSample& each : status.axes()) {
     const v1::Sample& s = each.sample();

@@ -1,5 +1,7 @@
 #include "server/endpoints/outbox.hpp"
 
+#include <algorithm>
+
 namespace drivebench {
 
 void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>& owner) {
@@ -11,9 +13,8 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
     bytes = bytes.subspan(error ? 0 : written);
     if (bytes.empty()) return;
   }
-  const std::size_t waiting = queued_.size() + in_flight_.size() - sent_;
-  if (waiting + bytes.size() > kMaxQueued) return cut("too much waits for it");
-  queued_.insert(queued_.end(), bytes.begin(), bytes.end());
+  if (waiting_ + bytes.size() > limit()) return cut("too much waits for it");
+  queue(bytes);
   if (!writing_) {
     writing_ = true;
     arm_timer(owner);
@@ -21,22 +22,49 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
   }
 }
 
+/// In chunks, so that what has gone takes no memory, and nothing that waits is ever moved.
+void Outbox::queue(std::span<const std::byte> bytes) {
+  constexpr std::size_t kChunk = std::size_t{16} * 1024;
+  waiting_ += bytes.size();
+  pool_.bytes += bytes.size();
+  while (!bytes.empty()) {
+    if (chunks_.empty() || chunks_.back().size() == chunks_.back().capacity()) {
+      chunks_.emplace_back().reserve(kChunk);
+    }
+    std::vector<std::byte>& last = chunks_.back();
+    const auto fits = bytes.first(std::min(bytes.size(), last.capacity() - last.size()));
+    last.insert(last.end(), fits.begin(), fits.end());
+    bytes = bytes.subspan(fits.size());
+  }
+}
+
+std::size_t Outbox::limit() const noexcept {
+  const std::size_t free = OutboxPool::kMaxBytes - std::min(pool_.bytes, OutboxPool::kMaxBytes);
+  return std::clamp(free, kAlwaysQueued, kMaxQueued);
+}
+
+void Outbox::forget(std::size_t bytes) noexcept {
+  waiting_ -= bytes;
+  pool_.bytes -= bytes;
+}
+
 void Outbox::write_more(const std::shared_ptr<void>& owner) {
-  if (sent_ == in_flight_.size()) {
-    in_flight_.clear();
-    in_flight_.swap(queued_);
+  if (!chunks_.empty() && sent_ == chunks_.front().size()) {
+    chunks_.pop_front();
     sent_ = 0;
   }
-  if (in_flight_.empty()) {
+  if (chunks_.empty()) {
     writing_ = false;
     timer_.cancel();
     if (on_idle) on_idle();
     return;
   }
-  socket_.async_write_some(asio::buffer(in_flight_.data() + sent_, in_flight_.size() - sent_),
+  const std::vector<std::byte>& first = chunks_.front();
+  socket_.async_write_some(asio::buffer(first.data() + sent_, first.size() - sent_),
                            [this, owner](const boost::system::error_code& error, std::size_t written) {
-                             if (error) return close();
+                             if (error || !socket_.is_open()) return close();
                              sent_ += written;
+                             forget(written);
                              arm_timer(owner);
                              write_more(owner);
                            });
@@ -59,6 +87,8 @@ void Outbox::close() noexcept {
   timer_.cancel(ignored);
   socket_.shutdown(Socket::shutdown_both, ignored);
   socket_.close(ignored);
+  forget(waiting_);
+  chunks_.clear();  // a write that was under way touches them no more
 }
 
 }  // namespace drivebench

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <span>
@@ -12,6 +13,13 @@
 
 namespace drivebench {
 
+/// What waits in all outboxes of a server, in bytes.
+struct OutboxPool {
+  /// Each may hold as much as this leaves free, so that many who do not read get little each.
+  static constexpr std::size_t kMaxBytes = std::size_t{16} * 1024 * 1024;
+  std::size_t bytes = 0;
+};
+
 /// The sending side of a stream socket: writes at once what the kernel takes, queues the rest up to a limit,
 /// and gives up on a peer that takes nothing for a while. Belongs to a session, which it keeps alive while a
 /// write is under way.
@@ -19,11 +27,15 @@ class Outbox {
  public:
   using Socket = asio::generic::stream_protocol::socket;
 
-  /// Bytes in all that may wait; above them the peer is cut off.
+  /// Bytes that may wait; above them the peer is cut off. The lower limit holds however full the pool is.
   static constexpr std::size_t kMaxQueued = std::size_t{1024} * 1024;
+  static constexpr std::size_t kAlwaysQueued = std::size_t{64} * 1024;
   static constexpr auto kNoProgressLimit = std::chrono::seconds(2);
 
-  explicit Outbox(Socket& socket) : socket_(socket), timer_(socket.get_executor()) {}
+  Outbox(Socket& socket, OutboxPool& pool) : socket_(socket), pool_(pool), timer_(socket.get_executor()) {}
+  ~Outbox() { forget(waiting_); }
+  Outbox(const Outbox&) = delete;
+  Outbox& operator=(const Outbox&) = delete;
 
   /// Sends or queues the bytes; `owner` is kept alive as long as needed.
   void send(std::span<const std::byte> bytes, const std::shared_ptr<void>& owner);
@@ -43,12 +55,16 @@ class Outbox {
   void write_more(const std::shared_ptr<void>& owner);
   void arm_timer(const std::shared_ptr<void>& owner);
   void cut(std::string_view why);
+  void queue(std::span<const std::byte> bytes);
+  std::size_t limit() const noexcept;
+  void forget(std::size_t bytes) noexcept;
 
   Socket& socket_;
+  OutboxPool& pool_;
   ServerTimer timer_;
-  std::vector<std::byte> queued_;  // behind in_flight_
-  std::vector<std::byte> in_flight_;
-  std::size_t sent_ = 0;  // of in_flight_
+  std::deque<std::vector<std::byte>> chunks_;
+  std::size_t sent_ = 0;     // of the first chunk
+  std::size_t waiting_ = 0;  // in all
   bool writing_ = false;
 };
 

@@ -1,5 +1,7 @@
 #include "server/endpoints/session.hpp"
 
+#include <google/protobuf/io/coded_stream.h>
+
 #include <algorithm>
 
 #include "protocols/descriptor_set.hpp"
@@ -11,15 +13,26 @@ namespace {
 
 constexpr std::uint32_t kProtocolVersion = 1;
 
+/// False: not an Envelope, or one that is nested more deeply than any of ours.
+bool parse(std::span<const std::byte> frame, v1::Envelope& envelope) {
+  constexpr int kMaxNesting = 16;
+  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(frame.data()),
+                                            static_cast<int>(frame.size()));
+  in.SetRecursionLimit(kMaxNesting);
+  return envelope.ParseFromCodedStream(&in) && in.ConsumedEntireMessage();
+}
+
 }  // namespace
 
 Session::Session(Outbox::Socket socket, Client who, SessionContext& context)
     : socket_(std::move(socket)),
-      outbox_(socket_),
+      outbox_(socket_, context.outboxes),
       client_(std::move(who)),
       context_(context),
       engine_(context.engine),
       reader_(kMaxRequestFrame),
+      reply_(context.reply),
+      scratch_(context.scratch),
       slot_timer_(socket_.get_executor()),
       silence_timer_(socket_.get_executor()),
       leased_(context.engine.config().axes.size()),
@@ -42,16 +55,17 @@ asio::awaitable<void> Session::run() {
   ServerTimer timer(socket_.get_executor());
   end_unless_greeted(timer);
   boost::system::error_code error;
-  bool open = true;
-  while (open && !error) {
+  Turn turn = Turn::kAll;
+  while (turn != Turn::kOver && !error) {
     const std::span<std::byte> space = reader_.free_space();
     const std::size_t count = co_await socket_.async_read_some(
         asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
     reader_.received(count);
-    open = handle_all();
+    while ((turn = handle_some()) == Turn::kMoreToCome)
+      co_await asio::post(socket_.get_executor(), asio::use_awaitable);
     watch_for_silence();
     const ServerClock::duration pause = throttle();
-    if (!open || pause == ServerClock::duration::zero()) continue;
+    if (turn == Turn::kOver || pause == ServerClock::duration::zero()) continue;
     timer.expires_after(pause);
     boost::system::error_code cancelled;
     co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
@@ -65,18 +79,34 @@ asio::awaitable<void> Session::run() {
 void Session::end_unless_greeted(ServerTimer& timer) {
   timer.expires_after(kHelloLimit);
   timer.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
-    if (!error && !self->greeted_) self->close();
+    if (error || self->greeted_) return;
+    ++self->context_.counts.cut;
+    self->audit("limit", "no hello within 2 s", {});
+    self->close();
   });
 }
 
-/// Everything that is there; false when the session is over.
-bool Session::handle_all() {
-  while (const auto frame = reader_.next()) {
-    if (!handle(*frame)) return false;
+/// What is there, as far as one turn goes: who asks for much at once shall not keep the others waiting.
+Session::Turn Session::handle_some() {
+  replied_bytes_ = 0;
+  for (int n = 0; n < kRequestsPerTurn && replied_bytes_ < kReplyBytesPerTurn; ++n) {
+    const auto frame = reader_.next();
+    if (frame && handle(*frame)) continue;
+    if (frame) return Turn::kOver;
+    if (reader_.error().empty()) return Turn::kAll;
+    request_.Clear();
+    end_malformed(v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
+    return Turn::kOver;
   }
-  if (reader_.error().empty()) return true;
-  why_ended_ = reader_.error();
-  refuse(0, v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
+  return Turn::kMoreToCome;
+}
+
+/// Refuses the present request, and the session with it; always false.
+bool Session::end_malformed(v1::RefusalCode code, const std::string& sentence, const char* field) {
+  ++context_.counts.malformed;
+  why_ended_ = sentence;
+  audit("malformed", sentence, {});
+  refuse(request_.id(), code, sentence, field);
   return false;
 }
 
@@ -130,14 +160,12 @@ bool Session::handle(std::span<const std::byte> frame) {
   if (last_frame_ > kOrdinaryFrame)
     request_ = v1::Envelope();  // it keeps the memory of the largest frame so far
   last_frame_ = frame.size();
-  if (!request_.ParseFromArray(frame.data(), static_cast<int>(frame.size()))) {
-    why_ended_ = "a frame was not an Envelope";
-    refuse(0, v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
-    return false;
+  if (!parse(frame, request_)) {
+    request_.Clear();
+    return end_malformed(v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
   }
   if (!greeted_ && request_.kind_case() != v1::Envelope::kHello) {
-    refuse(request_.id(), v1::REFUSAL_UNAUTHENTICATED, "the first message must be hello", "kind");
-    return false;
+    return end_malformed(v1::REFUSAL_UNAUTHENTICATED, "the first message must be hello", "kind");
   }
   if (greeted_ && !may_ask()) return true;
   return dispatch();
@@ -200,20 +228,18 @@ bool Session::dispatch() {
 }
 
 bool Session::greet(const v1::Hello& hello) {
-  const std::uint64_t id = request_.id();
   if (hello.protocol_min() > kProtocolVersion || hello.protocol_max() < kProtocolVersion) {
-    refuse(id, v1::REFUSAL_VERSION,
-           "this server speaks protocol " + std::to_string(kProtocolVersion) + ", the client " +
-               std::to_string(hello.protocol_min()) + " to " + std::to_string(hello.protocol_max()),
-           "protocol_max");
-    return false;
+    return end_malformed(v1::REFUSAL_VERSION,
+                         "this server speaks protocol " + std::to_string(kProtocolVersion) + ", the client " +
+                             std::to_string(hello.protocol_min()) + " to " +
+                             std::to_string(hello.protocol_max()),
+                         "protocol_max");
   }
   if (hello.client().size() > 100) {
-    refuse(id, v1::REFUSAL_OUT_OF_RANGE, "the client's name is longer than 100 bytes", "client");
-    return false;
+    return end_malformed(v1::REFUSAL_OUT_OF_RANGE, "the client's name is longer than 100 bytes", "client");
   }
   if (greeted_) {
-    refuse(id, v1::REFUSAL_MALFORMED, "hello has been said already", "kind");
+    refuse(request_.id(), v1::REFUSAL_MALFORMED, "hello has been said already", "kind");
     return true;
   }
   if (!is_admitted(hello)) return false;
@@ -222,7 +248,7 @@ bool Session::greet(const v1::Hello& hello) {
   watch_slot();
   audit("session_opened", "done", {{"client", hello.client()}, {"role", std::string(name_of(grant_.role))}});
   reply_.Clear();
-  reply_.set_id(id);
+  reply_.set_id(request_.id());
   v1::Welcome& welcome = *reply_.mutable_welcome();
   welcome.set_protocol(kProtocolVersion);
   welcome.set_build_id(std::string(build_id()));
@@ -231,8 +257,6 @@ bool Session::greet(const v1::Hello& hello) {
   welcome.set_role(static_cast<v1::Role>(grant_.role));
   welcome.set_subject(grant_.name);
   send(reply_);
-  v1::Envelope().Swap(&reply_);  // tens of KiB that nothing needs again
-  scratch_ = {};
   return true;
 }
 
@@ -300,6 +324,7 @@ void Session::send(const v1::Envelope& envelope) {
   std::copy(header.begin(), header.end(), scratch_.begin());
   envelope.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(scratch_.data()) +
                                            kFrameHeaderSize);
+  replied_bytes_ += scratch_.size();
   outbox_.send(scratch_, shared_from_this());
 }
 

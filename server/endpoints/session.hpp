@@ -37,11 +37,16 @@ struct SessionContext {
 
   struct Counts {
     std::uint64_t turned_away = 0;      ///< connections, by a limit
+    std::uint64_t tls_refused = 0;      ///< connections that did not get through the TLS handshake
+    std::uint64_t malformed = 0;        ///< sessions that sent what no client of this protocol does
     std::uint64_t wrong_tokens = 0;     ///< hellos
     std::uint64_t excess_commands = 0;  ///< in real time: more than one for a tick
     std::uint64_t throttled = 0;        ///< times that a session was not read for a while
     std::uint64_t cut = 0;              ///< sessions that took or said nothing
   } counts{};
+  OutboxPool outboxes{};
+  v1::Envelope reply{};              ///< the one that is being written, by whichever session
+  std::vector<std::byte> scratch{};  ///< its bytes
   LogLimit wrong_token_log{};
 };
 
@@ -79,6 +84,9 @@ class Session : public std::enable_shared_from_this<Session> {
   static constexpr double kExcessAtOnce = 1000.0;
   static constexpr auto kLongestThrottle = std::chrono::seconds(1);
   static constexpr std::size_t kSamplesPerMessage = 32;
+  /// A turn of this session ends after so much; then the others have theirs.
+  static constexpr int kRequestsPerTurn = 64;
+  static constexpr std::size_t kReplyBytesPerTurn = std::size_t{16} * 1024;
 
   struct Subscription {
     std::uint32_t axis;
@@ -103,7 +111,9 @@ class Session : public std::enable_shared_from_this<Session> {
     int send_buffer_bytes;  ///< of the socket, before and after
   };
 
-  bool handle_all();
+  /// How far the frames that are there have been answered.
+  enum class Turn { kAll, kMoreToCome, kOver };
+  Turn handle_some();
   bool handle(std::span<const std::byte> frame);
   bool dispatch();
   bool may_ask();
@@ -116,6 +126,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void end(const std::string& sentence);
   void audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details);
   bool greet(const v1::Hello& hello);
+  bool end_malformed(v1::RefusalCode code, const std::string& sentence, const char* field);
   bool is_admitted(const v1::Hello& hello);
   void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);
   void lease(const v1::LeaseRequest& request);
@@ -169,8 +180,9 @@ class Session : public std::enable_shared_from_this<Session> {
   FrameReader reader_;
   v1::Envelope request_;
   std::size_t last_frame_ = 0;
-  v1::Envelope reply_;
-  std::vector<std::byte> scratch_;
+  std::size_t replied_bytes_ = 0;  // in this turn
+  v1::Envelope& reply_;
+  std::vector<std::byte>& scratch_;
   std::vector<AxisSampleView> views_;
   bool greeted_ = false;
   bool over_ = false;  ///< the peer is gone

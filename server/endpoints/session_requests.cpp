@@ -195,7 +195,7 @@ void Session::exchange(const v1::Exchange& r) {
   for (const v1::Command& command : r.commands()) {
     if (engine_.check(command.axis(), owner_, *decode_command(command)) == Refused::kNot) continue;
     const Refused why = engine_.command(command.axis(), owner_, *decode_command(command));
-    if (why == Refused::kStale) charge_excess(r.commands_size());
+    charge_excess(r.commands_size());
     const std::string sentence =
         why == Refused::kNotOwner ? not_owner_of(command.axis()) : std::string(sentence_of(why));
     return refuse(id, code_of(why), sentence + " (axis " + std::to_string(command.axis()) + ")",
@@ -239,6 +239,12 @@ void Session::read_parameters(const v1::ReadParameters& r) {
   reply_.set_id(request_.id());
   v1::ParameterValues& values = *reply_.mutable_parameter_values();
   const std::span<const Parameter> table = axis_parameters(engine_.parameters(r.axis()));
+  if (static_cast<std::size_t>(r.names_size()) > table.size()) {
+    return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                  std::to_string(r.names_size()) + " names, but the axis has " +
+                      std::to_string(table.size()) + " parameters",
+                  "names");
+  }
   for (const std::string& name : r.names()) {
     const Parameter* row = find_parameter(engine_.parameters(r.axis()), name);
     if (row == nullptr) {
@@ -345,6 +351,7 @@ void Session::report_status() {
   if (const Recorder* recorder = engine_.recorder()) {
     status.set_recording(recorder->file());
     status.set_recording_gaps(recorder->gaps());
+    status.set_recording_over(recorder->is_over());
   }
   for (std::uint32_t axis = 0; axis < leased_.size(); ++axis) {
     std::array<std::byte, kMaxSampleBytes> bytes;

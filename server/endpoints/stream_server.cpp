@@ -71,7 +71,10 @@ void make_way(asio::io_context& io, const std::string& path) {
   boost::system::error_code error;
   UnixProtocol::socket probe(io);
   probe.connect(UnixProtocol::endpoint(path), error);
-  if (!error) throw std::runtime_error("cannot listen on unix:" + path + ": another server listens there");
+  if (!error) {
+    throw std::runtime_error("cannot listen on unix:" + path + ": another server listens there (" +
+                             peer_of(probe).peer + ")");
+  }
   std::filesystem::remove(path);
 }
 
@@ -129,8 +132,24 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
     for (std::size_t i = 0; i < sessions_.size(); ++i)
       sessions_[i]->on_taken(taken);
   });
+  if (door_) watch_door();
   asio::co_spawn(io_, accept_from(tcp_), asio::detached);
   if (unix_.is_open()) asio::co_spawn(io_, accept_from(unix_), asio::detached);
+}
+
+void StreamServer::watch_door() {
+  const auto note = [this](std::string_view event, const std::string& peer, std::string_view why) {
+    const Client who{.transport = "tcp", .peer = peer, .subject = {}};
+    if (context_->audit != nullptr) context_->audit->note({.name = event, .client = &who, .result = why});
+  };
+  door_->on_turned_away = [this, note](const std::string& peer, const std::string& why) {
+    ++context_->counts.tls_refused;
+    note("tls_refused", peer, why);
+  };
+  door_->on_cut = [this, note](const std::string& peer) {
+    ++context_->counts.cut;
+    note("limit", peer, "it took nothing for 2 s");
+  };
 }
 
 StreamServer::~StreamServer() {
@@ -185,6 +204,8 @@ TransportReport StreamServer::report() const {
           .state = "up",
           .counts = {{"sessions", sessions_.size()},
                      {"turned_away", counts.turned_away},
+                     {"tls_refused", counts.tls_refused},
+                     {"malformed", counts.malformed},
                      {"wrong_tokens", counts.wrong_tokens},
                      {"excess_commands", counts.excess_commands},
                      {"throttled", counts.throttled},

@@ -43,10 +43,16 @@ void add_revocations(asio::ssl::context& context, const std::filesystem::path& f
 
 std::string name_in(const X509* certificate) {
   if (certificate == nullptr) return {};
-  std::array<char, 256> name{};
-  X509_NAME_get_text_by_NID(X509_get_subject_name(certificate), NID_commonName, name.data(),
-                            static_cast<int>(name.size()));
-  return name.data();
+  const X509_NAME* const subject = X509_get_subject_name(certificate);
+  const int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
+  if (at < 0) return {};
+  unsigned char* utf8 = nullptr;
+  const int size = ASN1_STRING_to_UTF8(&utf8, X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
+  if (size < 0) return {};
+  const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owner(
+      utf8, [](unsigned char* text) { OPENSSL_free(text); });
+  constexpr int kMaxName = 100;
+  return printable({reinterpret_cast<const char*>(utf8), static_cast<std::size_t>(std::min(size, kMaxName))});
 }
 
 /// The name in the certificate of a peer who was let in; empty: he has shown none.
@@ -88,7 +94,9 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   void limit(std::chrono::milliseconds limit) {
     timer.expires_after(limit);
     timer.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
-      if (!error) self->close();
+      if (error) return;
+      self->was_late = true;
+      self->close();
     });
   }
 
@@ -96,6 +104,14 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
     boost::system::error_code ignored;
     stream.lowest_layer().close(ignored);
     inside.close(ignored);
+  }
+
+  /// Why the handshake failed.
+  std::string why_refused(const boost::system::error_code& error) {
+    if (was_late) return "no handshake within 2 s";
+    const long verdict = SSL_get_verify_result(stream.native_handle());
+    return (verdict == X509_V_OK ? error.message() : X509_verify_cert_error_string(verdict)) +
+           (refused_subject.empty() ? "" : ", certificate of " + refused_subject);
   }
 
   asio::awaitable<void> carry_in() {
@@ -119,6 +135,8 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
       if (!error) co_await write_all(stream, block, count, error);
       timer.cancel();
     }
+    was_deaf = was_late;
+    if (was_late) co_return;
     limit(kFarewellLimit);
     co_await stream.async_shutdown(asio::redirect_error(asio::use_awaitable, error));
     timer.cancel();
@@ -129,6 +147,8 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   asio::local::stream_protocol::socket inside;
   ServerTimer timer;
   std::string refused_subject;  ///< in a certificate that does not hold
+  bool was_late = false;        ///< a limit has ended it
+  bool was_deaf = false;        ///< while there was something to read
 
  private:
   template <class To>
@@ -145,6 +165,9 @@ TlsDoor::TlsDoor(asio::io_context& io, const TlsConfig& config)
     : io_(io), context_(std::make_unique<Context>()) {
   asio::ssl::context& tls = context_->tls;
   SSL_CTX_set_min_proto_version(tls.native_handle(), TLS1_3_VERSION);
+  // Nobody comes back without his certificate, which may have been revoked since.
+  SSL_CTX_set_num_tickets(tls.native_handle(), 0);
+  SSL_CTX_set_session_cache_mode(tls.native_handle(), SSL_SESS_CACHE_OFF);
   boost::system::error_code error;
   tls.use_certificate_chain_file(config.certificate.string(), error);
   check(error, config.certificate);
@@ -163,6 +186,7 @@ TlsDoor::TlsDoor(asio::io_context& io, const TlsConfig& config)
 TlsDoor::~TlsDoor() = default;
 
 void TlsDoor::turn_away(const std::string& peer, const std::string& why) {
+  if (on_turned_away) on_turned_away(peer, why);
   if (!log_.allow()) return;
   spdlog::warn("{}: no TLS: {} ({} more since the last such line)", peer, why, log_.held_back());
 }
@@ -183,10 +207,7 @@ asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std
   passage->timer.cancel();
   --handshakes_;
   if (error) {
-    const long verdict = SSL_get_verify_result(passage->stream.native_handle());
-    const std::string& subject = passage->refused_subject;
-    turn_away(peer, (verdict == X509_V_OK ? error.message() : X509_verify_cert_error_string(verdict)) +
-                        (subject.empty() ? "" : ", certificate of " + subject));
+    turn_away(peer, passage->why_refused(error));
     passage->close();
     co_return;
   }
@@ -204,6 +225,7 @@ asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std
   };
   asio::co_spawn(io_, carry(passage, true), asio::detached);
   co_await carry(passage, false);
+  if (passage->was_deaf && on_cut) on_cut(peer);
 }
 
 }  // namespace drivebench

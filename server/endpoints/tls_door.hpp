@@ -29,7 +29,12 @@ class TlsDoor {
   /// Takes a client who is let in, and the name in his certificate (empty: he showed none).
   using LetIn = std::function<void(PlainSocket, const std::string& subject)>;
 
-  /// Shakes hands with a peer and lets him in; says in the log, now and then, whom it did not let in and why.
+  /// Called with everyone who was not let in, and why. The log hears of some of them.
+  std::function<void(const std::string& peer, const std::string& why)> on_turned_away;
+  /// Called with a peer who was let in and is cut off because he took nothing for Outbox::kNoProgressLimit.
+  std::function<void(const std::string& peer)> on_cut;
+
+  /// Shakes hands with a peer and lets him in.
   void receive(asio::ip::tcp::socket socket, const std::string& peer, LetIn let_in);
 
  private:

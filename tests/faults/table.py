@@ -25,6 +25,7 @@ HEAD = """# Faults and abuse: what is tested
 Made by `/usr/bin/python3 tests/faults/table.py` from the names of the tests and [`faults/rows.toml`](faults/rows.toml); a test compares. A
 test that proves a row has its ID in its name: `TEST(Bench, CMD_06_...)`, `def test_cmd_06_...`.
 
+*differs:* where the catalogue of faults that the rows come from asks for something else, and why this is right here.
 **proved**: by the tests named; **partly**: they leave open what stands behind *open*; **missing**: no test yet; **not here**: cannot be
 tested in this suite, with the reason.
 """
@@ -85,8 +86,9 @@ def make_table(sections, names):
             status = status_of(row, proofs[row["id"]])
             counts[status] += 1
             tests = [f"`{name}`" for name in sorted(proofs[row["id"]])]
-            if "open" in row:
-                tests.append(f"*open:* {row['open']}")
+            for key in ("open", "differs"):
+                if key in row:
+                    tests.append(f"*{key}:* {row[key]}")
             text += f"| {row['id']} | {row['must']} | {status} | {'<br>'.join(tests) or row.get('not_here', '')} |\n"
     summary = ", ".join(f"{number} {status}" for status, number in counts.items())
     return f"{HEAD}\n{len(rows)} rows: {summary}.\n{text}", problems

@@ -57,7 +57,7 @@ BenchConfig two_axes() {
 class World {
  public:
   World()
-      : engine_(make_lockstep_engine(config(), nullptr)),
+      : engine_(make_lockstep_engine(config())),
         audience_(io_, *engine_),
         context_{.engine = *engine_,
                  .admission = Admission(false, {}),

@@ -220,7 +220,7 @@ class ModbusBench {
   explicit ModbusBench(const BenchConfig& config = modbus_bench_config())
       : server_(io_, config.modbus),
         engine_(config.mode == RunMode::kLockstep
-                    ? make_lockstep_engine(config, nullptr)
+                    ? make_lockstep_engine(config)
                     : make_threaded_engine(config, nullptr, io_, std::nullopt)) {
     server_.serve(*engine_);
     const std::string address = server_.address();

@@ -12,7 +12,7 @@ namespace {
 // Catches: rings that nobody reads any more and that every tick fills, as many as there have been viewers.
 TEST(Audience, AFeedEndsWithItsLastReader) {
   asio::io_context io(1);
-  const std::unique_ptr<Engine> engine = make_lockstep_engine(servo_bench(), nullptr);
+  const std::unique_ptr<Engine> engine = make_lockstep_engine(servo_bench());
   Audience audience(io, *engine);
   std::shared_ptr<const SampleFeed> first = audience.feed(0, 8);
   std::shared_ptr<const SampleFeed> second = audience.feed(0, 8);

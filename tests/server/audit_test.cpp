@@ -31,7 +31,7 @@ class AuditTest : public ::testing::Test {
     fs::remove_all(folder_);
     fs::create_directory(folder_);
     audit = std::make_unique<Audit>(AuditConfig{.file = file(), .on_failure = AuditFailure::kSafe});
-    engine = make_lockstep_engine(servo_bench(), nullptr);
+    engine = make_lockstep_engine(servo_bench());
     audit->watch(*engine);
     anna = engine->new_owner(kAnna);
   }

@@ -51,7 +51,10 @@ TEST(BenchLease, CMD_03_CMD_04_ATimeoutIsLatchedUntilItsOwnerClearsIt) {
   submit_volts(bench, kOwner, 5.0);
   step(bench, 4);
   ASSERT_EQ(bench.sample(0).faults, kCommandTimeout);
-  EXPECT_EQ(submit_volts(bench, kOwner, 5.0), Refused::kLatched);
+  for (int i = 0; i < 50; ++i)
+    EXPECT_EQ(submit_volts(bench, kOwner, 5.0), Refused::kLatched);
+  bench.step();
+  EXPECT_EQ(bench.sample(0).refused_commands, 50u);
   EXPECT_EQ(submit_clear(bench, kOther), Refused::kNotOwner);
   EXPECT_EQ(submit_clear(bench, 0), Refused::kNotOwner);
   step(bench, 100);
@@ -206,6 +209,25 @@ TEST(BenchLease, WhatAControllerHadScheduledGoesWithIt) {
   EXPECT_EQ(bench.sample(0).load_nm, 0.0);
   step(bench, 2);
   EXPECT_EQ(bench.sample(0).load_nm, 0.25);
+}
+
+// A recording may hold it, whoever wrote that. Kills: a schedule that is shortened by what it is running, and
+// a count below zero.
+TEST(BenchLease, AScheduledReleaseTakesTheRestOfItsOwnersScheduleAlong) {
+  Bench bench = owned_bench(servo_setup(), kOwner);
+  const auto schedule = [&bench](Tick tick, Owner owner, const auto& action) {
+    bench.submit({.tick = tick, .axis = 0, .owner = owner, .action = action});
+  };
+  schedule(3, kOwner, LeaseAction::kRelease);
+  schedule(3, kOwner, LoadChange{.load_nm = 0.3, .ramp_ticks = 0});
+  schedule(4, kOwner, LoadChange{.load_nm = 0.4, .ramp_ticks = 0});
+  schedule(5, 0, LoadChange{.load_nm = 0.5, .ramp_ticks = 0});
+  step(bench, 5);
+  EXPECT_EQ(bench.sample(0).owner, 0u);
+  EXPECT_EQ(bench.sample(0).load_nm, 0.0) << "what its owner had in mind goes with it";
+  bench.step();
+  EXPECT_EQ(bench.sample(0).load_nm, 0.5) << "what others had stays";
+  EXPECT_EQ(bench.sample(0).refused_commands, 0u);
 }
 
 // In lockstep time passes only with commands: a controller must be able to watch the motor run down after a

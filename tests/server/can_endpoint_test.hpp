@@ -141,7 +141,7 @@ class CanBench {
       ASSERT_TRUE(found.ok()) << name_of(found.problem);
       received.push_back({found.row, found.node, decode(*found.row, profile_, frame), frame});
     };
-    engine_ = make_lockstep_engine(bench, nullptr);
+    engine_ = make_lockstep_engine(bench);
     if (audit != nullptr) audit->watch(*engine_);
     endpoint_ = std::make_unique<Endpoint>(io_, bench.can.front(), wire_.connect("bench"));
     endpoint_->serve(*engine_, audit);

@@ -86,5 +86,34 @@ TEST(CommandRules, CMD_13_AStepBeyondTheSlewRateIsSlowedOrRefusedAsConfigured) {
   EXPECT_EQ(ramped.sample(0).u_a_v, 10.0);
 }
 
+// The limit counts from what drives the axis, and without a controller that is its safe action. Kills: a next
+// controller who asks for 0 V and gets the voltage that the one before had; one who gets all he asks for in a
+// tick because the one before had it.
+TEST(CommandRules, CMD_13_TheSlewLimitCountsFromTheSafeAction) {
+  struct Case {
+    SafeAction action;
+    double asked_v, got_v;
+  };
+  for (const Case c : {Case{SafeAction::kFreewheel, 0.0, 0.0}, Case{SafeAction::kFreewheel, 10.0, 1.0},
+                       Case{SafeAction::kZeroVoltage, 10.0, 1.0}, Case{SafeAction::kHold, 10.0, 10.0},
+                       Case{SafeAction::kHold, 0.0, 9.0}, Case{SafeAction::kQuickStop, 10.0, 6.0}}) {
+    BenchSetup setup = limited_setup(OnExcess::kSaturate, 8000.0);
+    setup.axes[0].on_link_loss = c.action;
+    setup.axes[0].quick_stop_ticks = 10;
+    Bench bench = owned_bench(setup, kOwner);
+    for (int i = 1; i <= 10; ++i) {
+      submit_volts(bench, kOwner, i);
+      bench.step();
+    }
+    submit_lease(bench, LeaseAction::kRelease, kOwner);
+    step(bench, 5);
+    submit_lease(bench, LeaseAction::kAcquire, kOwner + 1);
+    EXPECT_EQ(submit_volts(bench, kOwner + 1, c.asked_v), Refused::kNot);
+    bench.step();
+    EXPECT_NEAR(bench.sample(0).u_a_v, c.got_v, 1e-12) << static_cast<int>(c.action) << ", " << c.asked_v;
+    EXPECT_EQ(bench.sample(0).faults, c.got_v == c.asked_v ? 0u : kCommandSlewLimited);
+  }
+}
+
 }  // namespace
 }  // namespace drivebench

@@ -104,6 +104,7 @@ TEST(ConfigFiles, CFG_06_HostileFilesAreRefusedInFewWords) {
   for (int i = 0; i < 20'000; ++i)
     keys += "k" + std::to_string(i) + "=1\n";
   EXPECT_NE(refused(keys).find("more problems"), std::string::npos);
+  EXPECT_NE(refused(repeated(keys, 50)).find("is larger than"), std::string::npos) << "a million keys";
   EXPECT_NE(refused(repeated("x", 2'000'000)).find("is larger than"), std::string::npos);
   EXPECT_NE(refused("a = \"" + repeated("x", 200'000) + '"').find("line is longer"), std::string::npos);
   EXPECT_NE(refused(repeated("a.", 100'000) + "a = 1").find("line is longer"), std::string::npos);

@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <condition_variable>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -48,6 +50,7 @@ class MemoryDisk {
     };
   }
 
+  std::uint64_t free_bytes = std::numeric_limits<std::uint64_t>::max();
   std::map<std::string, DiskLog> files;
   std::vector<std::string> names;  ///< in the order in which they were made
 
@@ -68,6 +71,7 @@ class MemoryDisk {
     }
     int sync() noexcept override { return simple(DiskCall::kSync); }
     int close() noexcept override { return simple(DiskCall::kClose); }
+    std::uint64_t free_bytes() noexcept override { return disk_.free_bytes; }
 
    private:
     int simple(DiskCall call) noexcept {
@@ -88,6 +92,56 @@ class MemoryDisk {
 
   Fault fault_;
   std::map<DiskCall, std::size_t> calls_;
+};
+
+/// A disk that can be made to stand still.
+class StallingDisk {
+ public:
+  CreateRecordingFile creator() {
+    return [this](const std::filesystem::path& path) -> std::unique_ptr<RecordingFile> {
+      return std::make_unique<File>(*this, create_recording_file(path));
+    };
+  }
+  void stall(bool on) {
+    const std::lock_guard lock(mutex_);
+    stalled_ = on;
+    changed_.notify_all();
+  }
+  void wait_until_it_holds_somebody() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return waiting_; });
+  }
+
+ private:
+  class File final : public RecordingFile {
+   public:
+    File(StallingDisk& disk, std::unique_ptr<RecordingFile> file) : disk_(disk), file_(std::move(file)) {}
+    ssize_t write(std::span<const std::byte> bytes) noexcept override {
+      disk_.pass();
+      return file_->write(bytes);
+    }
+    int truncate(std::uint64_t size) noexcept override { return file_->truncate(size); }
+    int sync() noexcept override {
+      disk_.pass();
+      return file_->sync();
+    }
+    int close() noexcept override { return file_->close(); }
+
+   private:
+    StallingDisk& disk_;
+    std::unique_ptr<RecordingFile> file_;
+  };
+  void pass() {
+    std::unique_lock lock(mutex_);
+    waiting_ = stalled_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return !stalled_; });
+    waiting_ = false;
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool stalled_ = false;
+  bool waiting_ = false;
 };
 
 }  // namespace drivebench

@@ -37,7 +37,7 @@ TEST(Events, HappenAtTheirTickOnTheirAxis) {
 
 // Catches: a write whose limits, rules or read-back are lost between engine and table.
 TEST(LockstepEngine, ParametersAreTriedBeforeTheyAreWritten) {
-  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench());
   const auto row = [](const char* name) { return row_of(servo_axis(), name); };
   EXPECT_EQ(engine->try_parameter(0, row("amplifier.gain"), 1.5), "");
   EXPECT_EQ(engine->parameters(0).drive.amplifier.gain, 1.5);
@@ -51,7 +51,7 @@ TEST(LockstepEngine, ParametersAreTriedBeforeTheyAreWritten) {
 
 // Catches: a value that is shown as in force when the bench has another one: on a ramp, or later, or never.
 TEST(LockstepEngine, ShowsTheParametersInForce) {
-  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench());
   const auto gain = [&engine] { return engine->parameters(0).drive.amplifier.gain; };
   ask(*engine, lease(LeaseAction::kAcquire));
   const ParameterWrite ramp = write_of(servo_axis(), "amplifier.gain", 3.0, 4);
@@ -71,7 +71,7 @@ TEST(LockstepEngine, ShowsTheParametersInForce) {
 
 // Catches: currents that a bench without a current loop takes, and a mailbox that takes them first.
 TEST(LockstepEngine, CurrentsNeedACurrentAmplifier) {
-  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench());
   ask(*engine, lease(LeaseAction::kAcquire));
   Command currents = voltage(0, 1.0, 0.0);
   currents.phases.gates = Gates::kCurrent;

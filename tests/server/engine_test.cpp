@@ -11,6 +11,9 @@
 #include <vector>
 
 #include "server/asio.hpp"
+#include "server/pacer.hpp"
+#include "server/stepped_engine.hpp"
+#include "tests/server/disks.hpp"
 #include "tests/server/engine_requests.hpp"
 #include "tests/server/run_config.hpp"
 
@@ -21,7 +24,7 @@ namespace {
 
 // Catches: a tick that runs without its command, or does not run with it; on_tick before the sample is there.
 TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
-  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench());
   std::vector<Tick> seen;
   engine->on_tick.add([&] { seen.push_back(engine->tick()); });
   engine->advance();
@@ -41,7 +44,7 @@ TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
 
 // Catches: a bench that waits for ever for a controller that has left.
 TEST(LockstepEngine, ALeaseGivenBackLetsTheOthersGoOn) {
-  const auto engine = make_lockstep_engine(servo_bench(2), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench(2));
   ask(*engine, lease(LeaseAction::kAcquire, 0, kMe));
   ask(*engine, lease(LeaseAction::kAcquire, 1, kStranger));
   engine->command(0, kMe, voltage(0, 1.0, 0.0));
@@ -51,9 +54,56 @@ TEST(LockstepEngine, ALeaseGivenBackLetsTheOthersGoOn) {
   EXPECT_EQ(engine->tick(), 1);
 }
 
+// Catches: a tick between the two halves of a taking, in which the axis belongs to nobody.
+TEST(LockstepEngine, OWN_04_AnAxisIsTakenWithinATick) {
+  const auto engine = make_lockstep_engine(servo_bench(2));
+  ask(*engine, lease(LeaseAction::kAcquire, 0, kMe));
+  ask(*engine, lease(LeaseAction::kAcquire, 1, kStranger));
+  engine->command(1, kStranger, voltage(0, 1.0, 0.0));
+  engine->advance();
+  constexpr Owner kAdministrator = 3;
+  engine->take(0, kAdministrator, "a test", [](Refused refused, Tick tick) {
+    EXPECT_EQ(refused, Refused::kNot);
+    EXPECT_EQ(tick, 0);
+  });
+  EXPECT_EQ(engine->owner(0), kAdministrator);
+  EXPECT_EQ(engine->tick(), 0) << "the new owner has not commanded yet";
+}
+
+// Catches: an I/O thread that waits for a disk, deaf to signals and to everybody's questions; a tick that is
+// lost, or runs without its command, when the disk goes on.
+TEST(LockstepEngine, REC_06_TimeWaitsForASlowDiskAndTheIoThreadDoesNot) {
+  const TestFolder folder;
+  asio::io_context io(1);
+  StallingDisk disk;
+  const BenchConfig config = servo_bench();
+  const auto engine = make_lockstep_engine(
+      config,
+      std::make_unique<Recorder>(folder / "run.mcap", config, std::initializer_list<RecordingAttachment>{},
+                                 RecordingOptions{.create = disk.creator()}),
+      io);
+  ask(*engine, lease(LeaseAction::kAcquire));
+  disk.stall(true);
+  Tick tick = 0;
+  for (; engine->tick() == tick; ++tick) {
+    engine->command(0, kMe, voltage(tick, 1.0, 0.0));
+    engine->advance();  // does not wait, or this test would not end
+  }
+  const Tick stands_at = engine->tick();
+  EXPECT_GT(stands_at, 8000) << "the ring holds more than a second";
+  for (int i = 0; i < 5; ++i)
+    io.run_one();
+  EXPECT_EQ(engine->tick(), stands_at);
+  disk.stall(false);
+  while (engine->tick() == stands_at)
+    io.run_one();
+  EXPECT_EQ(engine->tick(), stands_at + 1);
+  EXPECT_EQ(engine->stop().gaps, 0u);
+}
+
 // Catches: an owner that is looked up in a sample from before the lease.
 TEST(LockstepEngine, TheOwnerIsKnownBeforeTheNextTick) {
-  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench());
   EXPECT_EQ(engine->owner(0), 0u);
   ask(*engine, lease(LeaseAction::kAcquire));
   EXPECT_EQ(engine->owner(0), kMe);
@@ -63,7 +113,7 @@ TEST(LockstepEngine, TheOwnerIsKnownBeforeTheNextTick) {
 
 // Catches: check() and command() that do not agree, or a check that leaves a trace in the state.
 TEST(LockstepEngine, CheckSaysWhatCommandWouldAnswer) {
-  const auto engine = make_lockstep_engine(servo_bench(), nullptr);
+  const auto engine = make_lockstep_engine(servo_bench());
   ask(*engine, lease(LeaseAction::kAcquire));
   engine->command(0, kMe, voltage(0, 1.0, 0.0));
   engine->advance();
@@ -264,6 +314,41 @@ TEST(ThreadedEngine, TooManyRequestsAreRefusedAsBusy) {
   io.run();
   EXPECT_EQ(answered, kRequests);
   engine->stop();
+}
+
+// Catches: an axis that nobody can have because the end of its lease found no room; a stranger whose refused
+// commands leave the owner no room.
+TEST(ThreadedEngine, WhatMustGetThroughDoes) {
+  asio::io_context io(1);
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kFree;
+  SteppedEngine stepped = make_stepped_engine(config, nullptr, io, make_free_pacer());
+  Engine& engine = *stepped.engine;
+  std::vector<Refused> answers;
+  const auto note = [&answers](Refused refused, Tick) { answers.push_back(refused); };
+  const auto run = [&](int ticks) {
+    for (int i = 0; i < ticks; ++i)
+      stepped.tick();
+    io.restart();
+    io.poll();
+  };
+  constexpr int kTicksPerWake = 1024;
+  engine.request(lease(LeaseAction::kAcquire), note);
+  run(kTicksPerWake);
+  ASSERT_EQ(engine.owner(0), kMe);
+  for (int i = 0; i < 1000; ++i)
+    engine.command(0, kStranger, voltage(0, 1.0, 0.0));
+  engine.request(lease(LeaseAction::kRenew), note);
+  run(kTicksPerWake);
+  EXPECT_EQ(answers, (std::vector<Refused>{Refused::kNot, Refused::kNot}));
+  for (int i = 0; i < 1000; ++i)
+    engine.request({.tick = 0, .axis = 0, .owner = 0, .action = LoadChange{}}, [](Refused, Tick) {});
+  engine.request(lease(LeaseAction::kLost), note);
+  run(kTicksPerWake);
+  run(kTicksPerWake);
+  EXPECT_EQ(engine.owner(0), 0u);
+  EXPECT_EQ(answers.size(), 3u);
+  engine.stop();
 }
 
 // Catches: commands that never reach the tick thread, real time that waits for them, and a run of a given

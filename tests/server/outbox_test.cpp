@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <string>
@@ -17,7 +18,8 @@ namespace {
 /// An outbox and its peer, who reads when told to.
 class Pair {
  public:
-  Pair() : socket_(io_, asio::generic::stream_protocol(AF_UNIX, 0)) {
+  explicit Pair(OutboxPool& pool)
+      : socket_(io_, asio::generic::stream_protocol(AF_UNIX, 0)), outbox(socket_, pool) {
     boost::system::error_code ignored;
     socket_.close(ignored);
     std::array<int, 2> ends{};
@@ -63,7 +65,7 @@ class Pair {
 
   asio::io_context io_{1};
   Outbox::Socket socket_;
-  Outbox outbox{socket_};
+  Outbox outbox;
   std::string cut;
 
  private:
@@ -82,7 +84,8 @@ class Pair {
 // that cuts a byte too early; one that tears the order of what waited.
 TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
   for (const bool one_too_many : {false, true}) {
-    Pair pair;
+    OutboxPool pool;
+    Pair pair(pool);
     pair.send(700'000);  // more than the kernel takes
     ASSERT_GT(pair.waiting(), 0u);
     while (Outbox::kMaxQueued - pair.waiting() > 100'000)
@@ -102,6 +105,32 @@ TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
       EXPECT_TRUE(pair.outbox.idle());
     }
   }
+}
+
+// Catches: memory that grows with the number of those who do not read; a share that is not given back; the
+// many who leave nothing to the one who comes last.
+TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
+  OutboxPool pool;
+  std::vector<std::unique_ptr<Pair>> deaf;
+  std::size_t most = 0;
+  for (int n = 0; n < 100; ++n) {
+    deaf.push_back(std::make_unique<Pair>(pool));
+    Pair& pair = *deaf.back();
+    pair.send(400'000);  // more than the kernel takes
+    while (pair.cut.empty() && pair.waiting() < Outbox::kMaxQueued - 10'000) {
+      most = std::max(most, pool.bytes);
+      pair.send(10'000);
+    }
+  }
+  EXPECT_LE(most, OutboxPool::kMaxBytes + 100 * Outbox::kAlwaysQueued);
+  EXPECT_GT(most, OutboxPool::kMaxBytes / 2);
+  EXPECT_FALSE(deaf.back()->cut.empty());
+  Pair modest(pool);
+  while (modest.waiting() < Outbox::kAlwaysQueued - 10'000)
+    modest.send(10'000);
+  EXPECT_EQ(modest.cut, "") << "what an answer needs is always there";
+  deaf.clear();
+  EXPECT_EQ(pool.bytes, modest.waiting());
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "protocols/mcap.hpp"
 #include "protocols/sample_codec.hpp"
+#include "server/asio.hpp"
 #include "server/build_id.hpp"
 #include "server/engine.hpp"
 #include "server/recording.hpp"
@@ -31,7 +32,9 @@ Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes =
   const TestFolder folder;
   BenchConfig config = servo_bench(axes);
   config.axes[1].events = {{.tick = 5, .action = LoadChange{.load_nm = 0.02, .ramp_ticks = 3}}};
-  const auto engine = make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config));
+  asio::io_context io(1);
+  const auto engine =
+      make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config), io);
   const auto send = [&engine](std::uint32_t axis, const auto& action, Tick tick = 0) {
     engine->request({.tick = tick, .axis = axis, .owner = 1, .action = action}, [](Refused, Tick) {});
   };

@@ -69,7 +69,7 @@ void World::make_engine() {
   std::unique_ptr<Recorder> recorder;
   if (scene_.random.chance(0.4)) recorder = make_recorder();
   if (config_.mode == RunMode::kLockstep) {
-    engine_ = make_lockstep_engine(config_, std::move(recorder));
+    engine_ = make_lockstep_engine(config_, std::move(recorder), io_);
     return;
   }
   auto pacer = std::make_unique<VirtualPacer>();

@@ -132,7 +132,7 @@ class Observing(CommandTest):
             found = self.json_of("status", link=self.link)
             self.assertSays(self.drivebench("status", link=self.link).stdout, "tick 1 ", "run, owner 1", "2 sessions")
         self.assertKeys(found, "mode", "tick", "late_ticks", "worst_lateness_s", "sessions", "recording",
-                        "recording_gaps", "state_hash", "notes", "transports", "axes")
+                        "recording_gaps", "recording_over", "state_hash", "notes", "transports", "axes")
         self.assertEqual((found["tick"], found["sessions"], found["axes"][0]["owner"]), (1, 2, 1))
         self.assertKeys(found["axes"][0], "axis", "faults_set", *(f.name for f in pb.Sample.DESCRIPTOR.fields))
         self.assertEqual(found["axes"][0]["u_a_v"], 10.0)
