@@ -95,13 +95,13 @@ class Presets(unittest.TestCase):
         machine may be busy."""
         for preset in short_ones(presets()):
             with self.subTest(preset["name"]):
-                for attempts_left in (2, 1, 0):  # a busy machine that loses many samples may trip the drive
+                for attempts_left in (5, 4, 3, 2, 1, 0):  # a busy machine that loses many samples may trip the drive
                     try:
                         report, _ = self.run_on(preset, self.over_tcp, mode="realtime")
                         break
                     except AssertionError as error:
                         if attempts_left == 0 and "the bench latched" in str(error):
-                            self.skipTest(str(error))
+                            self.skipTest(f"{preset['name']} tripped its drive in six runs on this busy machine")
                         if attempts_left == 0:
                             raise
                 self.assertEqual(report["mode"], "realtime")

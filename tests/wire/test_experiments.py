@@ -332,7 +332,8 @@ class Experiments(WireTest):
         def there(client):
             listed = client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments
             there = [e.id for e in listed]
-            self.assertEqual(sorted(int(f[:-5]) for f in os.listdir(self.kept.name) if f.endswith(".mcap")), there)
+            until(lambda: sorted(int(f[:-5]) for f in os.listdir(self.kept.name) if f.endswith(".mcap")) == there,
+                  f"the folder has {there}")
             return there
         server = self.server(text=text)
         client = self.client(server)
@@ -498,4 +499,4 @@ class Experiments(WireTest):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(verbosity=2)

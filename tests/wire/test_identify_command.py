@@ -279,4 +279,4 @@ def answer_in_http(listener):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    unittest.main(verbosity=2)
