@@ -1,7 +1,13 @@
 // What experiments put in, against closed forms.
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <numeric>
 
 #include "server/experiments/shapes.hpp"
@@ -193,6 +199,33 @@ TEST(ExperimentShapes, TablesOnDiskReadBackWhatWasAppended) {
   EXPECT_EQ(view.at(0.5, false), 1.0);
   EXPECT_EQ(view.at(1.5, true), 2.5);
   EXPECT_EQ(view.at(9.0, false), 3.0);
+}
+
+std::size_t resident_bytes() {
+  std::size_t all = 0;
+  std::size_t resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+// Catches: a table that is read in as a whole when it is mapped, while the I/O thread of a server that has
+// locked its memory waits.
+TEST(ExperimentShapes, AMappedTableIsReadWhereItIsNeeded) {
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_MEMLOCK, &limit), 0);
+  if (limit.rlim_cur != RLIM_INFINITY && ::geteuid() != 0) GTEST_SKIP() << "memory cannot be locked here";
+  std::vector<SignalTable::Row> rows(std::size_t{1} << 20);  // 16 MiB
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = {.time_s = static_cast<double>(i), .value = static_cast<double>(i % 7)};
+  SignalTable table(std::filesystem::temp_directory_path());
+  table.append(rows);
+  if (::mlockall(MCL_FUTURE) != 0) GTEST_SKIP() << "memory cannot be locked: " << std::strerror(errno);
+  const std::size_t before = resident_bytes();
+  const TableView view(table);
+  const std::size_t after = resident_bytes();
+  ::munlockall();
+  EXPECT_LT(after, before + (std::size_t{1} << 20));
+  EXPECT_EQ(view.at(1e6, false), static_cast<double>(1'000'000 % 7));
 }
 
 }  // namespace
