@@ -83,9 +83,18 @@ void Session::run_experiment(const v1::RunExperiment& r) {
       const auto found = tables_.find(number);
       return found == tables_.end() ? nullptr : found->second;
     };
-    const std::shared_ptr<const Experiment> experiment = experiments.submit(r, table);
-    audit("experiment", "done", {{"id", experiment->id}, {"user", r.user()}, {"label", r.label()}});
-    send_info(request_.id(), *experiment);
+    experiments.submit(r, table,
+                       [self = shared_from_this(), id = request_.id()](
+                           const std::shared_ptr<const Experiment>& experiment, const std::string& why_not) {
+                         if (experiment == nullptr) {
+                           return self->refuse(id, v1::REFUSAL_NOT_AVAILABLE, why_not, "experiments");
+                         }
+                         const v1::RunExperiment& wanted = experiment->request;
+                         self->audit(
+                             "experiment", "done",
+                             {{"id", experiment->id}, {"user", wanted.user()}, {"label", wanted.label()}});
+                         self->send_info(id, *experiment);
+                       });
   });
 }
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "server/input_codec.hpp"
 
@@ -27,8 +28,12 @@ bool same_secret(std::string_view a, std::string_view b) noexcept {
   return difference == 0;
 }
 
-Experiments::Experiments(asio::io_context& io, const BenchConfig& config)
-    : io_(io), config_(config), folder_(config.experiments.folder), timer_(io) {
+Experiments::Experiments(asio::io_context& io, const BenchConfig& config, WriteFile write_file)
+    : io_(io),
+      config_(config),
+      folder_(config.experiments.folder),
+      write_file_(std::move(write_file)),
+      timer_(io) {
   lock_folder();
   load();
   maximum_length_sequence(kMaxPrbsOrder);  // now, not when a request comes and the live bench runs
@@ -44,6 +49,7 @@ Experiments::~Experiments() {
   }
   changed_.notify_all();
   worker_.join();
+  disk_.reset();
   ::close(lock_);
 }
 
@@ -88,12 +94,17 @@ std::uint64_t Experiments::round_for(const std::string& owner) const {
   return round;
 }
 
-std::shared_ptr<const Experiment> Experiments::submit(const v1::RunExperiment& request,
-                                                      const TableLookup& tables) {
+void Experiments::submit(const v1::RunExperiment& request, const TableLookup& tables, Answer answer) {
+  Pointer same;
   {
     const std::lock_guard lock(mutex_);
-    if (const Pointer same = known(request)) return same;
-    check_room();
+    same = known(request);
+    if (same == nullptr) check_room();
+  }
+  if (same != nullptr) {
+    const auto waiting = answers_.find(same->id);
+    if (waiting == answers_.end()) return answer(same, {});
+    return waiting->second.push_back(std::move(answer));
   }
   auto experiment = std::make_shared<Experiment>();
   experiment->plan = make_plan(request, config_, tables);
@@ -111,26 +122,42 @@ std::shared_ptr<const Experiment> Experiments::submit(const v1::RunExperiment& r
   *info.mutable_signals() = request.signals();
   {
     const std::lock_guard lock(mutex_);
-    experiment->id = last_id_ + 1;
+    experiment->id = ++last_id_;
     info.set_id(experiment->id);
     experiment->round = round_for(request.owner());
-    try {
-      store(*experiment);
-    } catch (const std::exception& error) {
-      remove(experiment->id);
-      throw BadRequest(v1::REFUSAL_NOT_AVAILABLE, "experiments", error.what());
-    }
-    last_id_ = experiment->id;
     all_[experiment->id] = experiment;
   }
+  answers_[experiment->id].push_back(std::move(answer));
+  disk_->add([this, experiment] { keep_new(experiment); });
+}
+
+/// On the thread of the disk.
+void Experiments::keep_new(const Pointer& experiment) {
+  std::string why_not;
+  try {
+    store(*experiment, experiment->info);
+  } catch (const std::exception& error) {
+    why_not = error.what();
+    remove(experiment->id);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    experiment->is_stored = why_not.empty();
+    if (!experiment->is_stored) all_.erase(experiment->id);
+  }
   changed_.notify_all();
-  watch();
-  return experiment;
+  asio::post(io_, [this, alive = alive_, experiment, why_not] {
+    if (!*alive) return;
+    const auto answers = answers_.extract(experiment->id);
+    for (const Answer& answer : answers.mapped())
+      answer(why_not.empty() ? experiment : nullptr, why_not);
+    watch();
+  });
 }
 
 Experiments::Pointer Experiments::at(std::uint64_t id) const {
   const auto found = all_.find(id);
-  if (found != all_.end()) return found->second;
+  if (found != all_.end() && found->second->is_stored) return found->second;
   throw BadRequest(v1::REFUSAL_UNKNOWN_EXPERIMENT, "id", fmt::format("there is no experiment {}", id));
 }
 
@@ -155,7 +182,7 @@ std::shared_ptr<const Experiment> Experiments::cancel(std::uint64_t id, const st
     experiment->info.set_state(v1::EXPERIMENT_STATE_CANCELLED);
     experiment->info.set_reason("cancelled before it began");
     experiment->plan = {};
-    try_to_store(*experiment);
+    disk_->add([this, experiment] { try_to_store(*experiment, experiment->info); });
     keep_ended(*experiment);
   }
   on_change();
@@ -182,8 +209,9 @@ v1::ExperimentList Experiments::list(const std::string& owner) const {
   std::vector<Pointer> experiments;
   {
     const std::lock_guard lock(mutex_);
-    for (const auto& [id, experiment] : all_)
-      experiments.push_back(experiment);
+    for (const auto& [id, experiment] : all_) {
+      if (experiment->is_stored) experiments.push_back(experiment);
+    }
   }
   v1::ExperimentList result;
   for (const Pointer& experiment : experiments) {
@@ -244,7 +272,7 @@ void Experiments::notify() {
 Experiments::Pointer Experiments::next() const {
   Pointer first;
   for (const auto& [id, experiment] : all_) {
-    if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED) continue;
+    if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED || !experiment->is_stored) continue;
     if (!first || experiment->round < first->round) first = experiment;
   }
   return first;
@@ -283,19 +311,24 @@ void Experiments::run(const Pointer& experiment) {
   notify();
 }
 
+/// It is on the disk before others are told of it, and nobody waits for that.
 void Experiments::end(const Pointer& experiment, const RunOutcome& outcome) {
-  std::error_code ignored;
-  const std::uintmax_t bytes = std::filesystem::file_size(recording_file(experiment->id), ignored);
-  const std::lock_guard lock(mutex_);
-  v1::ExperimentInfo& info = experiment->info;
+  v1::ExperimentInfo info = experiment->info;  // while it runs only this thread changes it
   info.set_state(outcome.state);
-  info.set_reason(outcome.state == v1::EXPERIMENT_STATE_CANCELLED && stop_ ? "the server ended"
-                                                                           : outcome.reason);
+  info.set_reason(outcome.reason);
+  if (outcome.state == v1::EXPERIMENT_STATE_CANCELLED) {
+    const std::lock_guard lock(mutex_);
+    if (stop_) info.set_reason("the server ended");
+  }
   encode_verdict(outcome.verdict, *info.mutable_verdict());
-  info.set_recording_bytes(ignored ? 0 : bytes);
-  experiment->plan = {};
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(recording_file(experiment->id), error);
+  info.set_recording_bytes(error ? 0 : bytes);
+  try_to_store(*experiment, info);
+  const ExperimentPlan over = std::exchange(experiment->plan, {});  // goes when the lock is free
+  const std::lock_guard lock(mutex_);
+  experiment->info.Swap(&info);
   running_.reset();
-  try_to_store(*experiment);
   keep_ended(*experiment);
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -15,6 +16,7 @@
 #include "bench.pb.h"
 #include "server/asio.hpp"
 #include "server/config.hpp"
+#include "server/experiments/disk_thread.hpp"
 #include "server/experiments/plan.hpp"
 #include "server/experiments/run.hpp"
 
@@ -26,13 +28,21 @@ struct Experiment {
   v1::RunExperiment request;
   ExperimentPlan plan;      ///< until it has ended
   std::uint64_t round = 0;  ///< the experiments of one round come before those of the next
+  bool is_stored = false;   ///< a crash cannot forget it: others may be told of it
   std::uint64_t end = 0;    ///< 1 for the first that ended; 0: it has not
   RunProgress progress;
   v1::ExperimentInfo info;  ///< without what progress and queue say
 };
 
+/// Writes a file so that it is there whole or not at all, whatever the power does, and that only the server's
+/// user may read it. Throws std::system_error.
+void write_whole(const std::filesystem::path& file, const std::string& bytes);
+/// Tests put disks in its place that are full or stand still.
+using WriteFile = std::function<void(const std::filesystem::path&, const std::string&)>;
+
 /// The experiments of a server: a queue, one thread that runs them one after the other on benches of their
-/// own, and a folder that keeps them. All methods are called on the I/O thread.
+/// own, and a folder that keeps them. All methods are called on the I/O thread, and none waits for a disk:
+/// that do the thread that runs an experiment, with its own files, and another one.
 ///
 /// The queue is fair: in each round every owner has one turn, and within a round the one who came first goes
 /// first.
@@ -40,7 +50,7 @@ class Experiments {
  public:
   /// Takes over what the folder holds. Throws std::runtime_error if it cannot be had or another server has
   /// it.
-  Experiments(asio::io_context& io, const BenchConfig& config);
+  Experiments(asio::io_context& io, const BenchConfig& config, WriteFile write_file = write_whole);
   /// Ends the running one with safe action, and the queue.
   ~Experiments();
   Experiments(const Experiments&) = delete;
@@ -49,8 +59,11 @@ class Experiments {
   /// Called when an experiment may have gone on.
   std::function<void()> on_change;
 
+  /// The experiment once it is on the disk; or null and why it cannot be.
+  using Answer = std::function<void(const std::shared_ptr<const Experiment>&, const std::string& why_not)>;
+
   // These throw BadRequest.
-  std::shared_ptr<const Experiment> submit(const v1::RunExperiment& request, const TableLookup& tables);
+  void submit(const v1::RunExperiment& request, const TableLookup& tables, Answer answer);
   /// The experiment with this id, if the owner may see its data.
   std::shared_ptr<const Experiment> find(std::uint64_t id, const std::string& owner) const;
   std::shared_ptr<const Experiment> cancel(std::uint64_t id, const std::string& owner);
@@ -80,14 +93,15 @@ class Experiments {
   void lock_folder();
   void load();
   Pointer load_one(const std::filesystem::path& file) const;
-  void store(const Experiment& experiment) const;
-  void try_to_store(const Experiment& experiment) const;
+  void store(const Experiment& experiment, const v1::ExperimentInfo& info) const;
+  void try_to_store(const Experiment& experiment, const v1::ExperimentInfo& info) const;
+  void keep_new(const Pointer& experiment);
   Pointer known(const v1::RunExperiment& request) const;
   Pointer at(std::uint64_t id) const;
   std::uint64_t round_for(const std::string& owner) const;
   void check_room() const;
   void keep_ended(Experiment& experiment);
-  void remove(std::uint64_t id);
+  void remove(std::uint64_t id) const;
   void watch();
 
   void work();
@@ -99,13 +113,16 @@ class Experiments {
   asio::io_context& io_;
   BenchConfig config_;
   std::filesystem::path folder_;
+  WriteFile write_file_;
   int lock_ = -1;
   ServerTimer timer_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  // for what is posted; I/O thread only
   std::atomic<bool> notified_{false};
-  std::vector<std::weak_ptr<SignalTable>> tables_;  // of all sessions
+  std::vector<std::weak_ptr<SignalTable>> tables_;        // of all sessions
+  std::map<std::uint64_t, std::vector<Answer>> answers_;  // by id, while it is on its way to the disk
 
-  mutable std::mutex mutex_;  // of everything below; never taken in a tick of the live bench
+  // Of what is below; never taken in a tick of the live bench, nor held while a disk works.
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::uint64_t, Pointer> all_;
   std::uint64_t last_id_ = 0;
@@ -113,6 +130,8 @@ class Experiments {
   std::uint64_t round_ = 0;
   Pointer running_;
   bool stop_ = false;
+
+  std::optional<DiskThread> disk_{std::in_place};  // files of those that do not run
   std::thread worker_;
 };
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -34,7 +35,19 @@ std::uint64_t id_of(const std::filesystem::path& file) {
   return error == std::errc{} && std::ranges::find(kEndings, ending) != kEndings.end() ? id : 0;
 }
 
-/// All of it or nothing, whatever the power does; from its first byte on only the server's user may read it.
+/// The rule that a file of this number breaks: what others go by when they divide, or find whose it is.
+std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_t id) {
+  const v1::ExperimentInfo& info = stored.info();
+  if (info.id() != id) return "its id must be the number in its name";
+  if (stored.request().owner().empty()) return "it must have an owner";
+  if (info.decimation() == 0) return "its decimation must be 1 at least";
+  const auto signals = static_cast<std::size_t>(info.signals_size());
+  if (signals == 0 || signals > kSignals.size()) return "it must have a signal, and none twice";
+  return {};
+}
+
+}  // namespace
+
 void write_whole(const std::filesystem::path& file, const std::string& bytes) {
   const std::string draft = file.string() + ".new";
   ::unlink(draft.c_str());  // whose it is and who has it open is not known
@@ -50,19 +63,6 @@ void write_whole(const std::filesystem::path& file, const std::string& bytes) {
   if (!done) throw std::system_error(error, std::generic_category(), "cannot write " + draft);
   sync_folder_of(file);
 }
-
-/// The rule that a file of this number breaks: what others go by when they divide, or find whose it is.
-std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_t id) {
-  const v1::ExperimentInfo& info = stored.info();
-  if (info.id() != id) return "its id must be the number in its name";
-  if (stored.request().owner().empty()) return "it must have an owner";
-  if (info.decimation() == 0) return "its decimation must be 1 at least";
-  const auto signals = static_cast<std::size_t>(info.signals_size());
-  if (signals == 0 || signals > kSignals.size()) return "it must have a signal, and none twice";
-  return {};
-}
-
-}  // namespace
 
 std::filesystem::path Experiments::file_of(std::uint64_t id, std::string_view ending) const {
   return folder_ / std::to_string(id).append(ending);
@@ -128,6 +128,7 @@ Experiments::Pointer Experiments::load_one(const std::filesystem::path& file) co
   }
   auto experiment = std::make_shared<Experiment>();
   experiment->id = id_of(file);
+  experiment->is_stored = true;
   experiment->request = stored.request();
   experiment->info = stored.info();
   experiment->progress.tick.store(stored.info().tick());
@@ -135,29 +136,29 @@ Experiments::Pointer Experiments::load_one(const std::filesystem::path& file) co
   if (!has_ended(stored.info().state())) {
     experiment->info.set_state(v1::EXPERIMENT_STATE_FAILED);
     experiment->info.set_reason("the server ended before it");
-    try_to_store(*experiment);
+    try_to_store(*experiment, experiment->info);
   }
   return experiment;
 }
 
-void Experiments::store(const Experiment& experiment) const {
+void Experiments::store(const Experiment& experiment, const v1::ExperimentInfo& info) const {
   v1::StoredExperiment stored;
   *stored.mutable_request() = experiment.request;
-  *stored.mutable_info() = experiment.info;
+  *stored.mutable_info() = info;
   stored.mutable_info()->set_tick(experiment.progress.tick.load());
   stored.mutable_info()->set_rows(experiment.progress.rows.load());
-  write_whole(file_of(experiment.id, ".experiment"), stored.SerializeAsString());
+  write_file_(file_of(experiment.id, ".experiment"), stored.SerializeAsString());
 }
 
-void Experiments::try_to_store(const Experiment& experiment) const {
+void Experiments::try_to_store(const Experiment& experiment, const v1::ExperimentInfo& info) const {
   try {
-    store(experiment);
+    store(experiment, info);
   } catch (const std::exception& error) {
     spdlog::error("experiment {}: {}", experiment.id, error.what());
   }
 }
 
-void Experiments::remove(std::uint64_t id) {
+void Experiments::remove(std::uint64_t id) const {
   for (const std::string_view ending : kEndings) {
     std::error_code ignored;
     std::filesystem::remove(file_of(id, ending), ignored);
@@ -175,7 +176,7 @@ void Experiments::keep_ended(Experiment& experiment) {
   if (ended.size() <= config_.experiments.kept) return;
   const Pointer& first = *std::ranges::min_element(ended, {}, [](const Pointer& each) { return each->end; });
   all_.erase(first->id);
-  remove(first->id);
+  disk_->add([this, id = first->id] { remove(id); });
 }
 
 }  // namespace drivebench
