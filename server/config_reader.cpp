@@ -16,6 +16,7 @@
 #include "server/config_step.hpp"
 #include "server/config_words.hpp"
 #include "server/endpoints/terminals.hpp"
+#include "server/experiments/limits.hpp"
 #include "server/strict_table.hpp"
 
 namespace drivebench {
@@ -136,13 +137,14 @@ void read_experiments(StrictTable table, const std::filesystem::path& folder,
       experiments.folder = (folder / *name).lexically_normal();
     }
   }
-  experiments.queue_length =
-      static_cast<std::uint32_t>(table.integer("queue_length", 1, 10'000).value_or(experiments.queue_length));
+  experiments.queue_length = static_cast<std::uint32_t>(
+      table.integer("queue_length", 1, kMaxQueuedExperiments).value_or(experiments.queue_length));
   experiments.longest_s = table.real("longest_s", 1e-6, 86'400.0).value_or(experiments.longest_s);
   experiments.table_rows =
       static_cast<std::uint64_t>(table.integer("table_rows", 0, 100'000'000)
                                      .value_or(static_cast<std::int64_t>(experiments.table_rows)));
-  experiments.kept = static_cast<std::uint32_t>(table.integer("kept", 1, 100'000).value_or(experiments.kept));
+  experiments.kept =
+      static_cast<std::uint32_t>(table.integer("kept", 1, kMaxKeptExperiments).value_or(experiments.kept));
   table.finish();
 }
 

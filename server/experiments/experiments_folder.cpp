@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "server/experiments/experiments.hpp"
+#include "server/experiments/limits.hpp"
 #include "server/experiments/row_file.hpp"
 #include "server/holder.hpp"
 #include "server/recording_file.hpp"
@@ -43,6 +44,8 @@ std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_
   if (info.decimation() == 0) return "its decimation must be 1 at least";
   const auto signals = static_cast<std::size_t>(info.signals_size());
   if (signals == 0 || signals > kSignals.size()) return "it must have a signal, and none twice";
+  if (info.ByteSizeLong() > kMaxExperimentInfoBytes)
+    return "what there is to list must have 2048 bytes at most";
   return {};
 }
 

@@ -13,7 +13,8 @@ std::string with_experiments(const std::string& lines) {
   return kBench + "[experiments]\n" + lines;
 }
 
-// Catches: a limit that is not checked, a key that is not read, and a folder that nobody named.
+// Catches: a limit that is not checked, a key that is not read, a folder that nobody named, and more
+// experiments than one answer can list.
 TEST(ConfigExperiments, EveryKeyHasItsRule) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"kept = 3\n", ":21: experiments.folder"},
@@ -22,6 +23,9 @@ TEST(ConfigExperiments, EveryKeyHasItsRule) {
       {"folder = \"e\"\nlongest_s = 1e9\n", ":23: experiments.longest_s is 1e+09 but must lie between"},
       {"folder = \"e\"\ntable_rows = -1\n", ":23: experiments.table_rows is -1 but must lie between 0 and"},
       {"folder = \"e\"\nkept = 0\n", ":23: experiments.kept is 0 but must lie between 1 and"},
+      {"folder = \"e\"\nqueue_length = 101\n",
+       ":23: experiments.queue_length is 101 but must lie between 1 and 100"},
+      {"folder = \"e\"\nkept = 301\n", ":23: experiments.kept is 301 but must lie between 1 and 300"},
       {"folder = \"e\"\nkeep = 9\n", ":23: experiments.keep is not a known key"},
   };
   for (const auto& [lines, said] : cases) {

@@ -6,7 +6,9 @@
 #include <fstream>
 #include <semaphore>
 
+#include "protocols/framing.hpp"
 #include "server/experiments/experiments.hpp"
+#include "server/experiments/limits.hpp"
 #include "tests/server/config_test_bench.hpp"
 #include "tests/server/run_config.hpp"
 
@@ -53,6 +55,13 @@ v1::RunExperiment request(std::uint64_t ticks = 100) {
   r.set_ticks(ticks);
   r.add_signals("speed_rad_s");
   r.mutable_input()->set_kind(v1::INPUT_KIND_NONE);
+  return r;
+}
+
+/// Paced by the clock: long enough for whatever a test does meanwhile.
+v1::RunExperiment endless() {
+  v1::RunExperiment r = request(400'000);
+  r.set_mode(v1::MODE_REALTIME);
   return r;
 }
 
@@ -167,6 +176,71 @@ TEST_F(ExperimentQueue, TheSameRequestOnItsWayToTheDiskIsTheSame) {
   const auto three = submit(r);
   EXPECT_TRUE(three->is_there);
   EXPECT_EQ(three->experiment, one->experiment);
+}
+
+/// As large as an experiment can be made to be.
+v1::ExperimentInfo largest_info(std::uint64_t id) {
+  v1::ExperimentInfo info;
+  info.set_id(id);
+  info.set_state(v1::EXPERIMENT_STATE_FAILED);
+  info.set_user(std::string(64, 'u'));
+  info.set_label(std::string(100, 'l'));
+  info.set_mode(v1::MODE_REALTIME);
+  info.set_axis(100);
+  info.set_ticks(kMaxExperimentTicks);
+  info.set_tick(kMaxExperimentTicks);
+  info.set_rows(kMaxExperimentTicks);
+  info.set_decimation(1'000'000);
+  info.set_period_s(1e-4);
+  for (const Signal& signal : kSignals)
+    info.add_signals(std::string(signal.name));
+  info.set_reason(std::string(kMaxExperimentReasonBytes, 'r'));
+  info.set_recording_bytes(~std::uint64_t{0} >> 8);
+  v1::Verdict& verdict = *info.mutable_verdict();
+  verdict.set_ticks(kMaxExperimentTicks);
+  verdict.set_late_ticks(kMaxExperimentTicks);
+  verdict.set_worst_lateness_s(1.0);
+  verdict.set_gaps(kMaxExperimentTicks);
+  verdict.set_state_hash(1);
+  verdict.set_sentence(std::string(250, 's'));
+  for (std::size_t i = 0; i < LatenessHistogram::kBuckets; ++i)
+    verdict.add_lateness_counts(kMaxExperimentTicks);
+  return info;
+}
+
+// Catches: limits of the configuration with which the list does not fit into an answer, so that who asks for
+// it is cut off; what a folder holds beyond `kept` and is never forgotten.
+TEST_F(ExperimentQueue, TheListOfAllThereMayBeFitsIntoAnAnswer) {
+  for (std::uint64_t id = 1; id <= kMaxKeptExperiments + 3; ++id) {
+    v1::StoredExperiment stored;
+    stored.mutable_request()->set_owner(kOwner);
+    *stored.mutable_info() = largest_info(id);
+    ASSERT_LE(stored.info().ByteSizeLong(), kMaxExperimentInfoBytes);
+    std::ofstream(folder_.path() / (std::to_string(id) + ".experiment"), std::ios::binary)
+        << stored.SerializeAsString();
+  }
+  config_.experiments.kept = kMaxKeptExperiments;
+  config_.experiments.queue_length = kMaxQueuedExperiments;
+  start();
+  disk_.let(1000);
+  v1::RunExperiment r = endless();
+  r.set_user(std::string(64, 'u'));
+  r.set_label(std::string(100, 'l'));
+  r.clear_signals();
+  for (const Signal& signal : kSignals)
+    r.add_signals(std::string(signal.name));
+  const auto running = submit(r);
+  ASSERT_TRUE(until(
+      [&] { return running->is_there && state_of(*running->experiment) == v1::EXPERIMENT_STATE_RUNNING; }));
+  for (std::uint32_t i = 0; i < kMaxQueuedExperiments; ++i)
+    submit(r);
+  EXPECT_THROW(submit(r), BadRequest);
+  constexpr std::size_t kAll = kMaxKeptExperiments + kMaxQueuedExperiments + 1;
+  ASSERT_TRUE(until([&] { return listed() == kAll; })) << listed();
+  v1::Envelope answer;
+  answer.set_id(~std::uint64_t{0});
+  *answer.mutable_experiment_list() = experiments_->list(kOwner);
+  EXPECT_LE(answer.ByteSizeLong(), kMaxReplyFrame);
 }
 
 }  // namespace
