@@ -26,6 +26,7 @@ constexpr int kSubscribers = 32;
 constexpr std::uint32_t kEighth = 8;  // 1 kHz
 constexpr std::size_t kDeaf = 50;
 constexpr double kMaxP99Ratio = 2.0;
+constexpr double kMaxMoreLate = 5.0;  // of 10,000 ticks: the windows alone differ by as much
 constexpr double kMaxGrowthMiB = 60.0;
 constexpr double kMaxCut_s = 3.0;
 constexpr auto kWindow = 2s;
@@ -108,6 +109,7 @@ void add_rows(std::vector<Row>& rows, const std::string& beside,
   rows.push_back({.name = "late ticks per 10,000 beside " + beside,
                   .measured = late_per_10000(windows[1]),
                   .floor = late_per_10000(windows[0]),
+                  .limit = Limit{Limit::Kind::kExcessAtMost, kMaxMoreLate},
                   .gone = gone,
                   .note = "floor: alone, in windows in turn"});
 }

@@ -27,6 +27,8 @@ const char* key_of(Limit::Kind kind) {
   switch (kind) {
     case Limit::Kind::kRatioAtMost:
       return "ratio_at_most";
+    case Limit::Kind::kExcessAtMost:
+      return "excess_at_most";
     case Limit::Kind::kAtMost:
       return "at_most";
     case Limit::Kind::kAtLeast:
@@ -50,6 +52,8 @@ std::string limit_text(const Row& row) {
   switch (row.limit->kind) {
     case Limit::Kind::kRatioAtMost:
       return fmt::format("<= {} x", number(row.limit->value));
+    case Limit::Kind::kExcessAtMost:
+      return fmt::format("<= + {}", with_unit(row.limit->value, row.unit));
     case Limit::Kind::kAtMost:
       return "<= " + with_unit(row.limit->value, row.unit);
     case Limit::Kind::kAtLeast:
@@ -67,11 +71,13 @@ std::optional<double> Row::ratio() const {
 
 Judgement judgement(const Row& row) {
   if (!row.limit) return Judgement::kForInformation;
-  const bool is_ratio = row.limit->kind == Limit::Kind::kRatioAtMost;
-  const double figure = is_ratio ? row.ratio().value_or(0.0) : row.measured;
-  const bool within =
-      row.limit->kind == Limit::Kind::kAtLeast ? figure >= row.limit->value : figure <= row.limit->value;
-  if (row.gone > kMaxGone && (is_ratio || !within)) return Judgement::kNotJudged;
+  const Limit::Kind kind = row.limit->kind;
+  const bool compares = kind == Limit::Kind::kRatioAtMost || kind == Limit::Kind::kExcessAtMost;
+  const double figure = kind == Limit::Kind::kRatioAtMost    ? row.ratio().value_or(0.0)
+                        : kind == Limit::Kind::kExcessAtMost ? row.measured - row.floor.value_or(0.0)
+                                                             : row.measured;
+  const bool within = kind == Limit::Kind::kAtLeast ? figure >= row.limit->value : figure <= row.limit->value;
+  if (row.gone > kMaxGone && (compares || !within)) return Judgement::kNotJudged;
   return within ? Judgement::kWithin : Judgement::kOver;
 }
 

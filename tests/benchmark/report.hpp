@@ -10,7 +10,8 @@ namespace drivebench::speed {
 /// What a figure must keep to.
 struct Limit {
   enum class Kind {
-    kRatioAtMost,  ///< measured / floor
+    kRatioAtMost,   ///< measured / floor
+    kExcessAtMost,  ///< measured - floor
     kAtMost,
     kAtLeast,
   };
