@@ -21,7 +21,7 @@ except ImportError:
 
 from misfortune import Misfortune, signal_thread, thread_of
 from recording import Recording
-from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, pb
+from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, frame, pb
 from wire_test import SERVO_TEXT, WireTest, until
 
 # A controller that is silent for long keeps its axis, so that what takes it away is something else.
@@ -29,6 +29,7 @@ PATIENT_TEXT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 40000
 FLUSH_DENORMALS = 0x9FC0  # what -Ofast sets, for the whole process
 TIMEOUT, OVERRUN = 1 << 9, 1 << 11  # in the fault word
 RUN, HOLD = 1, 2  # states in which an axis is driven
+MIB = 1 << 20
 FAKETIME = next(pathlib.Path("/usr/lib").glob("*/faketime/libfaketime.so.1"), None)
 
 
@@ -183,6 +184,21 @@ class Threads(HostTest):
         until(lambda: "goes on" in server.errors(), "that is said as well")
         self.assertEqual(server.stop(), 0)
 
+    def test_os_01_a_second_signal_ends_at_once(self):
+        """A server that only SIGKILL ends when the thread that should end it in order stands still; or whose first signal
+        kills it already."""
+        for first, second in ((signal.SIGTERM, signal.SIGTERM), (signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGINT)):
+            with self.subTest(first=first, second=second):
+                server = self.unlucky_server(Misfortune(sleep_ms=600_000), "--mode", "realtime")
+                self.client(server).status()
+                signal_thread(server.process.pid, server.process.pid, signal.SIGUSR2)
+                until(lambda server=server: "the I/O thread stands still" in server.errors(), "it stands still")
+                server.process.send_signal(first)
+                with self.assertRaises(subprocess.TimeoutExpired):
+                    server.process.wait(timeout=1.0)
+                server.process.send_signal(second)
+                self.assertEqual(server.process.wait(timeout=10.0), -second)
+
     def test_os_01_one_signal_waits_for_an_end_in_order(self):
         """A signal that is lost because nobody listens just then, or that costs the end of the recording."""
         file = self.folder() / "run.mcap"
@@ -322,6 +338,23 @@ class House(HostTest):
         first = guests[-1].newest().tick
         until(lambda: guests[-1].newest().tick > first + 12_000, "a second and a half of samples for readers that never read")
         self.assertLess(self.memory_kib(server), 64 * 1024)
+        self.assertEqual(server.stop(), 0)
+
+    def test_os_11_a_house_full_of_those_who_ask_and_never_read_stays_below_64_mib(self):
+        """Answers that wait for each of 256 sessions as for one, 1 MiB; or others who must suffer for it."""
+        server = self.server()
+        here, greedy = self.client(server), [self.client(server, receive_buffer=4096) for _ in range(255)]
+        # So much for each that it stays below the bound of one session: it is cut for what all have together, or as
+        # it takes nothing for 2 s.
+        answer = len(frame(here.ask(read_parameters=pb.ReadParameters()).SerializeToString()))
+        count = (MIB - MIB // 8) // answer
+        self.assertGreater(255 * (count * answer - MIB // 4), 2 * 64 * MIB, "beyond what their sockets take")
+        request = frame(pb.Envelope(id=1, read_parameters=pb.ReadParameters()).SerializeToString())
+        for each in greedy:
+            each.send_bytes(request * count)
+        until(lambda: here.status().sessions == 1, "all who do not read are gone")
+        if self.memory_kib(server, "VmSize") < 1 << 30:  # a sanitizer maps terabytes, and keeps what is freed
+            self.assertLess(self.memory_kib(server), 64 * 1024)
         self.assertEqual(server.stop(), 0)
 
 

@@ -85,7 +85,7 @@ class Messages(WireTest):
         client = self.client(server)
         client.send_bytes(frame(request + opening * 16 + closing * 16))
         self.assertEqual(client.answer_to(4).WhichOneof("kind"), "status")
-        for depth in (1000, 16_000):
+        for depth in (17, 99, 1000, 16_000):
             client = self.client(server)
             client.send_bytes(frame(request + opening * depth + closing * depth))
             self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED)
@@ -179,6 +179,8 @@ class Connections(RecordingTest):
         self.assertLimitOf2s(since, connected)
         for stranger in strangers:
             self.assertTrue(stranger.is_closed())
+        counts = inside.tcp_counts()
+        self.assertEqual((counts["turned_away"], counts["cut"]), (1, 32))
         self.client(server)
 
     def test_tcp_16_limit_02_as_many_sessions_as_are_allowed(self):
@@ -374,6 +376,14 @@ class Process(RecordingTest):
         until(lambda: "everything stays as it is" in server.errors(), "the reason is told")
         client.step(3)
         self.assertEqual(server.stop(), 0)
+
+    def test_os_01_a_hangup_as_soon_as_it_is_ready_does_not_end_it(self):
+        """A handler that is put in its place after others have been told that they may come."""
+        for _ in range(10):
+            server = self.server()
+            server.process.send_signal(signal.SIGHUP)
+            self.assertEqual(self.client(server).status().sessions, 1)
+            self.assertEqual(server.stop(), 0)
 
     def test_os_02_signals_of_others_are_nothing(self):
         """A server that a signal ends which is not meant for it."""

@@ -2,6 +2,7 @@
 """The audit log: who did what, and who was turned away. Each test names the mistake that it would catch."""
 import json
 import os
+import pathlib
 import re
 import resource
 import signal
@@ -164,6 +165,24 @@ class AuditLog(UsersTest):
         self.assertEqual([line["event"] for line in said], ["limit"])
         self.assertIn("as many clients as this bus serves", said[0]["result"])
         self.assertRegex(said[0]["peer"], "^" + re.escape(bus) + r" 127\.0\.0\.1:\d+$")
+
+    def test_sec_07_what_a_reload_took_and_what_it_refused(self):
+        """A log that calls done what was refused, or that does not say which file was read."""
+        server = self.server_for(USERS, "--audit", str(self.folder_with("") / "audit"))
+        log = pathlib.Path(server.process.args[-1])
+        bench, whole = server.folder / "bench.toml", (server.folder / "bench.toml").read_text(encoding="utf-8")
+        for tokens, text in ((USERS, whole), ("no tokens", whole), (USERS, "no bench"), (USERS, whole + "# again\n")):
+            self.write_tokens(server.tokens, tokens)
+            bench.write_text(text, encoding="utf-8")
+            known = len(self.audited(log, "reload"))
+            server.process.send_signal(signal.SIGHUP)
+            until(lambda known=known: len(self.audited(log, "reload")) > known, "it is told")
+        good, bad_tokens, bad_bench, again = self.audited(log, "reload")
+        self.assertEqual((good["result"], again["result"]), ("done", "done"))
+        self.assertEqual({line["details"]["file"] for line in (good, bad_tokens, bad_bench, again)}, {str(bench)})
+        self.assertIn("tokens", bad_tokens["result"])
+        self.assertIn("bench.toml", bad_bench["result"])
+        self.assertEqual(server.errors().count("everything stays as it is"), 2)
 
     def test_sec_07_a_log_that_cannot_be_written(self):
         """A bench that drives on unwatched although that was ruled out, or stops although it was not."""

@@ -83,16 +83,18 @@ class Series(WireTest):
         self.assertIn("not by this build", done.stdout)
 
     def test_os_13_the_one_who_has_it_is_named(self):
-        """A message that says what is taken and leaves the search to its reader."""
-        file = self.folder / "run.mcap"
-        server = self.server("--record", str(file))
-        holder = f"process {server.process.pid}, "
-        done = self.run_of(SERVER, BENCHES / "servo.toml", "--port", str(server.address[1]))
-        self.assertEqual(done.returncode, 2)
-        self.assertIn(holder, done.stderr)
-        done = self.run_of(SERVER, BENCHES / "servo.toml", "--port", "0", "--record", file)
-        self.assertEqual(done.returncode, 2)
-        self.assertIn(holder, done.stderr)
+        """A message that says what is taken and leaves the search to its reader; a second server that waits, or serves."""
+        file, kept = self.folder / "run.mcap", self.folder / "kept"
+        server = self.server("--record", str(file), "--experiments", str(kept), unix=True)
+        for taken in (("--port", str(server.address[1])), ("--port", "0", "--record", file), ("--port", "0", "--experiments", kept),
+                      ("--port", "0", "--unix", server.unix_path)):
+            with self.subTest(taken=taken):
+                done = self.run_of(SERVER, BENCHES / "servo.toml", *taken)
+                self.assertEqual(done.returncode, 2)
+                self.assertRegex(done.stderr, rf"process {server.process.pid}\b")
+                self.assertEqual(done.stdout, "")
+        self.assertEqual(self.client(server, unix=True).status().sessions, 1, "the first one has noticed nothing")
+        self.assertEqual(server.stop(), 0)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 """Sessions of the server: hello, frames, strangers, leases. Each test names the mistake that it would catch."""
 import os
+import pathlib
 import socket
 import struct
 import sys
+import tempfile
 import time
 import unittest
 
@@ -25,6 +27,14 @@ class Hello(WireTest):
     @classmethod
     def tearDownClass(cls):
         cls.shared.__exit__()
+
+    def audited_server(self):
+        folder = tempfile.TemporaryDirectory(prefix="drivebench-sessions-")
+        self.addCleanup(folder.cleanup)
+        audit = pathlib.Path(folder.name) / "audit"
+        server = self.server("--audit", str(audit))
+        server.audit = audit
+        return server
 
     def still_serves(self):
         self.assertEqual(self.client(self.shared).welcome.protocol, 1)
@@ -113,9 +123,9 @@ class Hello(WireTest):
 
     def test_tcp_04_strangers_are_closed(self):
         """Foreign protocols that keep a session open or take the server down, or whose peers fill its log."""
-        server = self.server()
+        server = self.audited_server()
         began = time.monotonic()
-        for n in range(20):
+        for _ in range(20):
             for greeting in (b"GET / HTTP/1.1\r\nHost: bench\r\n\r\n", b"SSH-2.0-OpenSSH_9.2p1\r\n",
                              bytes.fromhex("16030100c8010000c40303") + os.urandom(192),  # TLS client hello
                              b"\x00\x00\x00\x06\xff\xff\xff\xff\xff\xff"):
@@ -127,7 +137,11 @@ class Hello(WireTest):
             half.send_bytes(b"\x00\x00\x00\x02\x08")
             half.socket.shutdown(socket.SHUT_WR)
             self.assertTrue(half.is_closed())
-        self.assertEqual(self.client(server).status().sessions, 1)
+        here = self.client(server)
+        self.assertEqual(here.status().sessions, 1)
+        counts = here.tcp_counts()
+        self.assertEqual((counts["malformed"], counts["cut"]), (80, 0), "no one was closed because he had nothing more to say")
+        self.assertAudited(server.audit, "malformed", 80)
         self.assertLessEqual(len(server.errors().splitlines()), 1 + (time.monotonic() - began) // 10, "a line in 10 s")
 
     def test_tcp_07_unknown_fields_are_ignored_and_the_last_scalar_counts(self):
@@ -170,14 +184,16 @@ class Hello(WireTest):
 
     def test_limit_05_silent_connection_is_closed(self):
         """Connections that never say hello and stay for ever, or long enough to take the places of others."""
-        since = time.monotonic()
-        client = self.client(self.shared, hello=False)
-        patient = self.client(self.shared, hello=False)
+        server, since = self.audited_server(), time.monotonic()
+        client = self.client(server, hello=False)
+        patient = self.client(server, hello=False)
         time.sleep(1.0)  # half of what is allowed
         self.assertEqual(patient.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="slow")).WhichOneof("kind"), "welcome")
         self.assertTrue(client.is_closed())
         self.assertLimitOf2s(since)
-        self.assertEqual(patient.newest().tick, self.client(self.shared).newest().tick)
+        self.assertEqual(patient.status().sessions, 1)
+        self.assertEqual(patient.tcp_counts()["cut"], 1)
+        self.assertEqual(self.assertAudited(server.audit, "limit", 1), ["no hello within 2 s"])
 
     def test_long_client_name_is_refused(self):
         """A log that a client fills."""

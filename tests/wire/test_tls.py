@@ -85,11 +85,19 @@ class TlsTest(WireTest):
     def tls_server(self, more="", *options):
         folder = self.made.folder
         section = f'\n[tls]\ncertificate = "{folder}/server.pem"\nkey = "{folder}/server.key"\n{more}'
-        return self.server(*options, text=SERVO_TEXT + section)
+        audit = folder / f"audit-{sum(1 for _ in folder.glob('audit-*'))}"
+        server = self.server(*options, text=SERVO_TEXT + section + f'\n[audit]\nfile = "{audit}"\n')
+        server.audit = audit
+        return server
 
     def mutual_server(self):
         folder = self.made.folder
         return self.tls_server(f'client_ca = "{folder}/ca.pem"\nclient_crl = "{folder}/crl.pem"\n')
+
+    def assertAllRefusalsAreCounted(self, server, client, count):
+        """As many as were turned away, also in the audit log, not only those of which the log hears: the reasons."""
+        self.assertEqual(client.tcp_counts()["tls_refused"], count)
+        return self.assertAudited(server.audit, "tls_refused", count)
 
     def context(self, name=None, authority="ca"):
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -98,9 +106,9 @@ class TlsTest(WireTest):
             context.load_cert_chain(self.made.folder / f"{name}.pem", self.made.folder / f"{name}.key")
         return context
 
-    def tls_client(self, server, context, **options):
+    def tls_client(self, server, context, hello=True, **options):
         wrapped = context.wrap_socket(server.raw(**options), server_hostname="127.0.0.1")
-        client = Client(wrapped)
+        client = Client(wrapped, hello)
         self.addCleanup(client.close)
         return client
 
@@ -155,7 +163,7 @@ class Plain(TlsTest):
                 except ConnectionResetError:
                     pass
         self.assertLessEqual(server.errors().count("no TLS"), 1)
-        self.tls_client(server, self.context())
+        self.assertAllRefusalsAreCounted(server, self.tls_client(server, self.context()), 4)
 
     def test_sec_05_limit_05_silent_handshakes_are_few_and_short(self):
         """Peers that begin to shake hands and take the places of all others, be it for ever; a place too few or too many."""
@@ -177,7 +185,9 @@ class Plain(TlsTest):
         for each in silent:
             self.assertEqual(each.recv(1), b"")
         self.assertLimitOf2s(since, connected)
-        self.tls_client(server, self.context())
+        first, *others = self.assertAllRefusalsAreCounted(server, self.tls_client(server, self.context()), 33)
+        self.assertEqual(first, "32 others are shaking hands")
+        self.assertEqual(set(others), {"no handshake within 2 s"})
 
     def test_tcp_10_a_reader_that_stops_is_cut_behind_tls_too(self):
         """A stream behind the door that is fed for ever."""
@@ -191,6 +201,20 @@ class Plain(TlsTest):
         ended = time.monotonic()
         until(lambda: owner.status().sessions == 1, "it is cut")
         self.assertLimitOf2s(began, ended)
+        until(lambda: owner.tcp_counts()["cut"] > 0, "it is counted")
+        self.assertEqual(owner.tcp_counts()["cut"], 1)
+        self.assertEqual(self.assertAudited(server.audit, "limit", 1), ["it took nothing for 2 s"])
+
+    def test_a_peer_that_does_not_say_goodbye_is_not_called_deaf(self):
+        """A limit that counts those who were sent away and were slow to leave."""
+        server = self.tls_server()
+        rude = self.tls_client(server, self.context(), hello=False)
+        rude.send_bytes(b"GET ")
+        self.assertRefused(rude.receive(), pb.REFUSAL_MALFORMED)
+        time.sleep(1.5)  # more than the server waits for a goodbye
+        counts = self.tls_client(server, self.context()).tcp_counts()
+        self.assertEqual((counts["malformed"], counts["cut"], counts["sessions"]), (1, 0, 1))
+        self.assertEqual(self.audited(server.audit, "limit"), [])
 
     def test_cfg_07_files_that_cannot_be_used_are_refused(self):
         """A server that starts without the encryption that was asked for, or with a key that everybody knows."""
@@ -216,7 +240,11 @@ class Mutual(TlsTest):
             with self.subTest(certificate=name):
                 self.assertTurnedAway(server, self.context(name))
         self.assertIn("no TLS", server.errors())
-        self.assertDone(self.tls_client(server, self.context("anna")).lease())
+        anna = self.tls_client(server, self.context("anna"))
+        self.assertDone(anna.lease())
+        said = self.assertAllRefusalsAreCounted(server, anna, 6)
+        self.assertEqual(len(set(said)), 6, "each with its own reason")
+        self.assertIn("certificate of gone", said[-1])
 
     def test_sec_03_who_is_turned_away_stands_in_the_log(self):
         """A log that does not say whose certificate it was, and what is wrong with it."""
@@ -224,6 +252,23 @@ class Mutual(TlsTest):
             server = self.mutual_server()
             self.assertTurnedAway(server, self.context(name), why)
             self.assertIn(f"certificate of {name}", server.errors())
+
+    def test_sec_03_nobody_comes_back_without_a_certificate(self):
+        """A ticket that opens the door after the certificate was revoked; or one that is handed out and then refused."""
+        server, anna = self.mutual_server(), self.context("anna")
+        first = self.tls_client(server, anna)
+        again = anna.wrap_socket(server.raw(), server_hostname="127.0.0.1", session=first.socket.session)
+        self.assertEqual(Client(again, True).status().sessions, 2)
+        self.assertFalse(again.session_reused)
+        again.close()
+
+    def test_sec_03_a_strange_name_moves_no_terminal(self):
+        """A certificate that nobody has signed whose name writes lines, or colours, into the log."""
+        server, folder = self.mutual_server(), self.made.folder
+        self.made.openssl("req", "-x509", *self.made.key("odd.key"), "-subj", "/CN=odd\x1b[2J\n[error] forged", "-out", "odd.pem")
+        self.assertTurnedAway(server, self.context("odd"), "certificate of odd")
+        self.assertNotIn("\x1b", server.errors())
+        self.assertFalse(any(line.startswith("[error] forged") for line in server.errors().splitlines()))
 
     def test_the_command_speaks_tls(self):
         """A client of ours that needs a tunnel of somebody else's, or that talks to any server, or goes without a certificate."""

@@ -1,4 +1,5 @@
 """What the tests of the server program share."""
+import json
 import time
 import unittest
 
@@ -77,6 +78,20 @@ class WireTest(unittest.TestCase):
             tick += 1
             time.sleep(0.001)
         return tick
+
+    def audited(self, file, event):
+        """What the audit log says of all that happened by this name."""
+        lines = (json.loads(line) for line in file.read_text(encoding="utf-8").splitlines())
+        return [line for line in lines if line["event"] == event]
+
+    def assertAudited(self, file, event, count):
+        """So many stand in the audit log, each with its peer and a reason: the reasons."""
+        lines = self.audited(file, event)
+        self.assertEqual(len(lines), count)
+        for line in lines:
+            self.assertRegex(line["peer"], r"^127\.0\.0\.1:\d+$")
+            self.assertNotIn(line["result"], ("", "done"))
+        return [line["result"] for line in lines]
 
     def assertLimitOf2s(self, *since):
         """For what ends 2 s after some moment between the first and the last of these: not before, and not much later. A
