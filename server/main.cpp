@@ -214,8 +214,10 @@ asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const Options&
   for (;;) {
     co_await hangups.async_wait(asio::use_awaitable);
     std::string result = "done";
+    std::vector<AuditDetail> details{{"file", o.config}};
     try {
       BenchConfig now = configure(o);
+      details.emplace_back("configuration_hash", fmt::format("{:016x}", configuration_hash(now)));
       set_log_level(now.log_level);
       server.replace_grants(std::move(now.tcp));
       spdlog::info("SIGHUP: tokens and log level are those of {} now", o.config);
@@ -225,7 +227,7 @@ asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const Options&
     }
     if (audit == nullptr) continue;
     if (!audit->reopen()) spdlog::error("SIGHUP: the audit log cannot be opened again and stays the old one");
-    audit->note({.name = "reload", .result = result, .details = {{"file", o.config}}});
+    audit->note({.name = "reload", .result = result, .details = std::move(details)});
   }
 }
 

@@ -90,6 +90,7 @@ void Session::end_unless_greeted(ServerTimer& timer) {
 Session::Turn Session::handle_some() {
   replied_bytes_ = 0;
   for (int n = 0; n < kRequestsPerTurn && replied_bytes_ < kReplyBytesPerTurn; ++n) {
+    if (!socket_.is_open()) return Turn::kOver;
     const auto frame = reader_.next();
     if (frame && handle(*frame)) continue;
     if (frame) return Turn::kOver;

@@ -180,6 +180,8 @@ class AuditLog(UsersTest):
         good, bad_tokens, bad_bench, again = self.audited(log, "reload")
         self.assertEqual((good["result"], again["result"]), ("done", "done"))
         self.assertEqual({line["details"]["file"] for line in (good, bad_tokens, bad_bench, again)}, {str(bench)})
+        hashes = [line["details"].get("configuration_hash") for line in (*self.audited(log, "start"), good, bad_tokens, bad_bench, again)]
+        self.assertEqual(hashes, [hashes[0], hashes[0], None, None, hashes[0]])
         self.assertIn("tokens", bad_tokens["result"])
         self.assertIn("bench.toml", bad_bench["result"])
         self.assertEqual(server.errors().count("everything stays as it is"), 2)
