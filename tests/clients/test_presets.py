@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import unittest
@@ -42,6 +43,12 @@ def bench_text(preset, ways_in):
     return "\n".join(lines).replace("[bench]\n", "[bench]\nwatchdog_ticks = 2000\n") + ways_in
 
 
+def without_trip(text):
+    """A busy machine that loses many samples must not end the run."""
+    lines = [line for line in text.splitlines() if line.split("=")[0].strip() != "over_current_trip"]
+    return re.sub(r"(?m)^over_current_a *=.*$", r"\g<0>\nover_current_trip = false", "\n".join(lines))
+
+
 def short_ones(all_presets):
     """The shortest preset for each kind of machine and of commands."""
     chosen = {}
@@ -54,7 +61,8 @@ class Presets(unittest.TestCase):
     def run_on(self, preset, link_of, mode="lockstep"):
         """What the controller reports, and the state of the bench afterwards."""
         ways_in = WAYS_IN if mode == "lockstep" else ""  # in real time a bus must carry what it promises
-        with Server("--mode", mode, text=bench_text(preset, ways_in)) as server:
+        text = bench_text(preset, ways_in)
+        with Server("--mode", mode, text=text if mode == "lockstep" else without_trip(text)) as server:
             done = subprocess.run([COMMAND, "control", "--json", "--preset", preset["name"], "--link", link_of(server)],
                                   capture_output=True, text=True, timeout=4 * PATIENCE_S, check=False)
             self.assertEqual(done.returncode, 0, f"{preset['name']}: {done.stdout}{done.stderr}")
@@ -95,15 +103,7 @@ class Presets(unittest.TestCase):
         machine may be busy."""
         for preset in short_ones(presets()):
             with self.subTest(preset["name"]):
-                for attempts_left in (5, 4, 3, 2, 1, 0):  # a busy machine that loses many samples may trip the drive
-                    try:
-                        report, _ = self.run_on(preset, self.over_tcp, mode="realtime")
-                        break
-                    except AssertionError as error:
-                        if attempts_left == 0 and "the bench latched" in str(error):
-                            self.skipTest(f"{preset['name']} tripped its drive in six runs on this busy machine")
-                        if attempts_left == 0:
-                            raise
+                report, _ = self.run_on(preset, self.over_tcp, mode="realtime")
                 self.assertEqual(report["mode"], "realtime")
                 # The last sample may come late, and then it is not one of the run.
                 self.assertLessEqual(report["samples"] + report["missed_ticks"], preset["samples"])

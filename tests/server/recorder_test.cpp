@@ -172,7 +172,9 @@ TEST(Recorder, REC_07_TheFileMustBeNew) {
   const TestFolder folder;
   std::ofstream(folder / "there.mcap") << "precious";
   std::filesystem::create_symlink(folder / "elsewhere", folder / "link.mcap");
-  for (const char* name : {"there.mcap", "link.mcap", "no/such/folder.mcap", ""}) {
+  std::filesystem::create_directory(folder / "folder.mcap");
+  for (const char* name :
+       {"there.mcap", "link.mcap", "folder.mcap", "no/such/folder.mcap", "/proc/run.mcap", ""}) {
     EXPECT_THROW(Recorder(folder / name, servo_bench()), std::system_error) << name;
   }
   EXPECT_EQ(content_of(folder / "there.mcap").size(), 8u);
