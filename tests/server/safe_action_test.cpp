@@ -193,7 +193,7 @@ TEST(SafeAction, STATE_01_OnlyARowOfGoodCommandsArmsAnAxis) {
 // Kills: a clear that starts what trips at once again; a cause that stays for ever.
 TEST(SafeAction, CMD_04_AFaultIsNotClearedWhileItsCauseLasts) {
   const std::size_t loss = find_injectable_fault("command_loss");
-  const auto inject = [loss](Bench& bench, double value) {
+  const auto inject = [](Bench& bench, double value) {
     bench.submit({.axis = 0, .owner = 0, .action = InjectFault{static_cast<std::uint32_t>(loss), value}});
   };
   BenchSetup setup = servo_setup();
