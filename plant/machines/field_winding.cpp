@@ -4,14 +4,22 @@
 #include <cmath>
 
 namespace drivebench {
+namespace {
+
+/// 0 for the inductance that nobody gave because a curve stands in its place.
+double inverse(double inductance_h) noexcept {
+  return inductance_h > 0.0 ? 1.0 / inductance_h : 0.0;
+}
+
+}  // namespace
 
 FieldWinding field_winding(double inductance_h, const Curve& saturation_curve, double series_h) noexcept {
   return {.saturation_curve = saturation_curve,
           .inductance_h = inductance_h,
-          .per_inductance = 1.0 / inductance_h,
+          .per_inductance = inverse(inductance_h),
           .series_h = series_h,
-          .per_loop_inductance = 1.0 / (inductance_h + series_h),
-          .loop_share = inductance_h / (inductance_h + series_h)};
+          .per_loop_inductance = inverse(inductance_h + series_h),
+          .loop_share = inductance_h > 0.0 ? inductance_h / (inductance_h + series_h) : 0.0};
 }
 
 double saturated_current_a(const Curve& curve, double flux_wb, double series_h) noexcept {

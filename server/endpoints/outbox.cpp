@@ -26,7 +26,7 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
 void Outbox::queue(std::span<const std::byte> bytes) {
   constexpr std::size_t kChunk = std::size_t{16} * 1024;
   waiting_ += bytes.size();
-  pool_.bytes += bytes.size();
+  pool_->bytes += bytes.size();
   while (!bytes.empty()) {
     if (chunks_.empty() || chunks_.back().size() == chunks_.back().capacity()) {
       chunks_.emplace_back().reserve(kChunk);
@@ -39,13 +39,13 @@ void Outbox::queue(std::span<const std::byte> bytes) {
 }
 
 std::size_t Outbox::limit() const noexcept {
-  const std::size_t free = OutboxPool::kMaxBytes - std::min(pool_.bytes, OutboxPool::kMaxBytes);
+  const std::size_t free = OutboxPool::kMaxBytes - std::min(pool_->bytes, OutboxPool::kMaxBytes);
   return std::clamp(free, kAlwaysQueued, kMaxQueued);
 }
 
 void Outbox::forget(std::size_t bytes) noexcept {
   waiting_ -= bytes;
-  pool_.bytes -= bytes;
+  pool_->bytes -= bytes;
 }
 
 void Outbox::write_more(const std::shared_ptr<void>& owner) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/asio.hpp"
@@ -32,7 +33,8 @@ class Outbox {
   static constexpr std::size_t kAlwaysQueued = std::size_t{64} * 1024;
   static constexpr auto kNoProgressLimit = std::chrono::seconds(2);
 
-  Outbox(Socket& socket, OutboxPool& pool) : socket_(socket), pool_(pool), timer_(socket.get_executor()) {}
+  Outbox(Socket& socket, std::shared_ptr<OutboxPool> pool)
+      : socket_(socket), pool_(std::move(pool)), timer_(socket.get_executor()) {}
   ~Outbox() { forget(waiting_); }
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
@@ -60,7 +62,7 @@ class Outbox {
   void forget(std::size_t bytes) noexcept;
 
   Socket& socket_;
-  OutboxPool& pool_;
+  std::shared_ptr<OutboxPool> pool_;  // a session may outlive the server, as long as its socket
   ServerTimer timer_;
   std::deque<std::vector<std::byte>> chunks_;
   std::size_t sent_ = 0;     // of the first chunk

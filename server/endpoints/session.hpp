@@ -44,7 +44,7 @@ struct SessionContext {
     std::uint64_t throttled = 0;        ///< times that a session was not read for a while
     std::uint64_t cut = 0;              ///< sessions that took or said nothing
   } counts{};
-  OutboxPool outboxes{};
+  std::shared_ptr<OutboxPool> outboxes = std::make_shared<OutboxPool>();
   v1::Envelope reply{};              ///< the one that is being written, by whichever session
   std::vector<std::byte> scratch{};  ///< its bytes
   LogLimit wrong_token_log{};

@@ -18,7 +18,7 @@ namespace {
 /// An outbox and its peer, who reads when told to.
 class Pair {
  public:
-  explicit Pair(OutboxPool& pool)
+  explicit Pair(const std::shared_ptr<OutboxPool>& pool)
       : socket_(io_, asio::generic::stream_protocol(AF_UNIX, 0)), outbox(socket_, pool) {
     boost::system::error_code ignored;
     socket_.close(ignored);
@@ -84,7 +84,7 @@ class Pair {
 // that cuts a byte too early; one that tears the order of what waited.
 TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
   for (const bool one_too_many : {false, true}) {
-    OutboxPool pool;
+    const auto pool = std::make_shared<OutboxPool>();
     Pair pair(pool);
     pair.send(700'000);  // more than the kernel takes
     ASSERT_GT(pair.waiting(), 0u);
@@ -110,7 +110,7 @@ TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
 // Catches: memory that grows with the number of those who do not read; a share that is not given back; the
 // many who leave nothing to the one who comes last.
 TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
-  OutboxPool pool;
+  const auto pool = std::make_shared<OutboxPool>();
   std::vector<std::unique_ptr<Pair>> deaf;
   std::size_t most = 0;
   for (int n = 0; n < 100; ++n) {
@@ -118,7 +118,7 @@ TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
     Pair& pair = *deaf.back();
     pair.send(400'000);  // more than the kernel takes
     while (pair.cut.empty() && pair.waiting() < Outbox::kMaxQueued - 10'000) {
-      most = std::max(most, pool.bytes);
+      most = std::max(most, pool->bytes);
       pair.send(10'000);
     }
   }
@@ -130,7 +130,7 @@ TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
     modest.send(10'000);
   EXPECT_EQ(modest.cut, "") << "what an answer needs is always there";
   deaf.clear();
-  EXPECT_EQ(pool.bytes, modest.waiting());
+  EXPECT_EQ(pool->bytes, modest.waiting());
 }
 
 }  // namespace
