@@ -181,19 +181,19 @@ FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) fail("no socket pair");
   FileDescriptor ours(ends[0]);
   auto tunnel = std::make_unique<Tunnel>(std::move(socket), FileDescriptor(ends[1]), std::move(tls));
-  std::promise<void> ready;
-  std::future<void> is_ready = ready.get_future();
-  std::thread([tunnel = std::move(tunnel), ready = std::move(ready), host]() mutable {
+  std::promise<std::string> shaken;  // why not, or nothing
+  std::future<std::string> why_not = shaken.get_future();
+  std::thread([tunnel = std::move(tunnel), shaken = std::move(shaken), host]() mutable {
     ignore_broken_pipes();
     try {
       tunnel->shake_hands(host);
-    } catch (...) {
-      return ready.set_exception(std::current_exception());
+    } catch (const std::exception& error) {
+      return shaken.set_value(error.what());
     }
-    ready.set_value();
+    shaken.set_value({});
     tunnel->run();
   }).detach();
-  is_ready.get();
+  if (const std::string why = why_not.get(); !why.empty()) throw ConnectError(why);
   return ours;
 }
 

@@ -94,6 +94,9 @@ TEST(Grants, SEC_04_ATokenThatIsNearlyRightIsWrong) {
 // Catches: a comparison whose time tells a guesser how much of a token is right, or which entry it comes
 // close to. Time is not measured: instruction by instruction, the program goes the same way.
 TEST(Grants, SEC_04_AWrongTokenTakesTheSameWayHoweverMuchOfItIsRight) {
+#if defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the thread sanitizer goes another way each time";
+#endif
   const std::string token = "correct-horse-battery-staple";
   const TokenHash hash = hash_of_token(token);
   TokenHash far = hash;
