@@ -183,7 +183,7 @@ FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host
   auto tunnel = std::make_unique<Tunnel>(std::move(socket), FileDescriptor(ends[1]), std::move(tls));
   std::promise<std::string> shaken;  // why not, or nothing
   std::future<std::string> why_not = shaken.get_future();
-  std::thread([tunnel = std::move(tunnel), shaken = std::move(shaken), host]() mutable {
+  std::thread carrier([tunnel = std::move(tunnel), shaken = std::move(shaken), host]() mutable {
     ignore_broken_pipes();
     try {
       tunnel->shake_hands(host);
@@ -192,8 +192,12 @@ FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host
     }
     shaken.set_value({});
     tunnel->run();
-  }).detach();
-  if (const std::string why = why_not.get(); !why.empty()) throw ConnectError(why);
+  });
+  if (const std::string why = why_not.get(); !why.empty()) {
+    carrier.join();  // what it has of OpenSSL is gone before the program ends
+    throw ConnectError(why);
+  }
+  carrier.detach();
   return ours;
 }
 
