@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "plant/parameters/parameters.hpp"
 
@@ -75,16 +76,18 @@ Refused Bench::submit(const Input& input) noexcept {
 }
 
 void Bench::apply_due() noexcept {
-  while (scheduled_ > 0 && schedule_[0].tick <= tick_) {
-    const Input input = unpack(schedule_[0]);
-    // Before it acts: a lease that ends takes more off the schedule.
-    const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_--);
-    *std::move(schedule_.begin() + 1, end, schedule_.begin()) = PackedInput{};
+  while (due_ < scheduled_ && schedule_[due_].tick <= tick_) {
+    const Input input = unpack(schedule_[due_++]);
     // Nobody waits for the answer any more: what cannot be carried out is counted (a command counts itself).
     if (apply(input) != Refused::kNot && !std::holds_alternative<Command>(input.action)) {
       ++axes_[input.axis].control.refused;
     }
   }
+  const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
+  const auto acted = static_cast<std::ptrdiff_t>(std::exchange(due_, 0));
+  if (acted == 0) return;
+  std::fill(std::move(schedule_.begin() + acted, end, schedule_.begin()), end, PackedInput{});
+  scheduled_ -= static_cast<std::uint64_t>(acted);
 }
 
 Refused Bench::apply(const Input& input) noexcept {
@@ -211,7 +214,8 @@ void Bench::lose_controller(std::size_t axis, std::uint64_t fault) noexcept {
 
 void Bench::forget_scheduled(std::size_t axis, Owner owner) noexcept {
   const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
-  const auto kept = std::remove_if(schedule_.begin(), end, [axis, owner](const PackedInput& input) {
+  const auto still_to_come = schedule_.begin() + static_cast<std::ptrdiff_t>(due_);
+  const auto kept = std::remove_if(still_to_come, end, [axis, owner](const PackedInput& input) {
     return input.axis == axis && input.owner == owner;
   });
   std::fill(kept, end, PackedInput{});

@@ -75,8 +75,7 @@ void Supervisor::run() {
     const std::uint64_t resets = watch_.arithmetic_resets();
     if (resets != seen_resets) {
       say("drivebench-server: something changed how this program rounds; set back: the bits of this run are "
-          "in "
-          "doubt\n");
+          "in doubt\n");
       seen_resets = resets;
     }
   }
