@@ -134,10 +134,7 @@ TEST(ModbusDesk, ARefusedCommandDoesNotProlongALeaseThatLapses) {
 // Catches: a malformed command that counts for nobody, so that its sender may clear a fault whose cause
 // lasts; one that counts against the owner although a stranger sent it.
 TEST(ModbusDesk, AMalformedCommandIsThatOfItsSender) {
-  BenchConfig config = modbus_bench_config();
-  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
-  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
-  ModbusBench bench(config);
+  ModbusBench bench(tripping_bench_config());
   Client owner(bench.port());
   Client other(bench.port());
   ASSERT_EQ(owner.write(400, {7}), 0);

@@ -80,10 +80,7 @@ TEST(Modbus, ControlWordsBackToBackAreAllCarriedOut) {
 
 // Catches: a fault that a level instead of an edge resets, or that a write of other registers resets.
 TEST(Modbus, AFaultIsResetByTheRisingBit) {
-  BenchConfig config = modbus_bench_config();
-  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
-  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
-  ModbusBench bench(config);
+  ModbusBench bench(tripping_bench_config());
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);
   const auto faulted = [&] { return (client.read_one(104) & 0x4f) == 0x08; };

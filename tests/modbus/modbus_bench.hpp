@@ -214,6 +214,14 @@ inline BenchConfig modbus_bench_config(std::size_t axes = 1) {
   return config;
 }
 
+/// Trips at the first current that flows.
+inline BenchConfig tripping_bench_config() {
+  BenchConfig config = modbus_bench_config();
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
+  return config;
+}
+
 /// A lockstep (or real-time) bench with its Modbus server on a thread of its own.
 class ModbusBench {
  public:

@@ -44,11 +44,6 @@ def number_of(kind):
     return pb.Envelope.DESCRIPTOR.fields_by_name[kind].number
 
 
-def memory_kib(server, which="VmHWM"):
-    status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text(encoding="utf-8")
-    return int(next(line for line in status.splitlines() if line.startswith(which)).split()[1])
-
-
 class RecordingTest(WireTest):
     def recording_server(self, resource_kind, limit):
         """A server that records to run.mcap in a folder of its own, with a limit set on it; both."""
@@ -67,15 +62,14 @@ class Messages(WireTest):
         owner.lease()
         owner.step(0)
         parts = 32_000
-        before = memory_kib(server)
+        before = server.memory_kib()
         for n in range(30):
             kind = ("exchange", "read_parameters", "subscribe")[n % 3]
             inner = {"exchange": field(1, b""), "read_parameters": field(2, b""), "subscribe": field(3, b"")}[kind] * parts
             abuser.send_bytes(frame(b"\x08\x07" + field(number_of(kind), inner)))
             self.assertEqual(abuser.answer_to(7).WhichOneof("kind"), "refusal", kind)
         owner.step(1)
-        if memory_kib(server, "VmSize") < 1 << 30:  # a sanitizer keeps what is freed
-            self.assertLess(memory_kib(server) - before, 8 * 1024)
+        self.assertMemoryBelow(server, before + 8 * 1024)
 
     def test_tcp_06_nesting_without_end_is_refused(self):
         """A parser that calls itself as often as a stranger wants."""
@@ -145,12 +139,11 @@ class Readers(WireTest):
         for reader in readers:
             reader.ask(subscribe=pb.Subscribe(decimation=1))
         tick = self.rest_in_turns(owner, readers, seen, 0, seed=7)
-        resident_kib = memory_kib(server, "VmRSS")  # with queues as large as they get
+        resident_kib = server.memory_kib("VmRSS")  # with queues as large as they get
         self.rest_in_turns(owner, readers, seen, tick, seed=8)
         self.assertEqual(owner.status().sessions, 9)
         self.assertGreater(sum(each["lost"] for each in seen), 500, "they rested for long enough")
-        if memory_kib(server, "VmSize") < 1 << 30:  # a sanitizer keeps what is freed
-            self.assertLessEqual(memory_kib(server, "VmRSS"), resident_kib + 1024)
+        self.assertMemoryBelow(server, resident_kib + 1024, "VmRSS")
 
 
 class Connections(RecordingTest):

@@ -16,7 +16,7 @@ except ImportError:
     sys.exit(77)
 
 from command_test import (
-    DRIVEBENCH, FAILED, NOBODY, NO_CONNECT, OK, SERVO, USAGE, CommandTest, environment, link_of, until)
+    DRIVEBENCH, FAILED, NOBODY, NO_CONNECT, OK, SERVO, USAGE, CommandTest, link_of, until)
 from wire_client import PATIENCE_S, REPOSITORY, pb
 
 

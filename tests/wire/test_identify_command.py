@@ -111,8 +111,8 @@ class Identify(WireTest):
                 found = self.parameters("--motor", experiment["motor"], "--experiment", experiment["name"])
                 for parameter, percent in promised.pop(name).items():
                     self.assertPercent(found, parameter, percent)
-                for signal, fit in found["validation"]["signals"].items():
-                    self.assertLess(fit["normalised"], 0.08, signal)
+                for output, fit in found["validation"]["signals"].items():
+                    self.assertLess(fit["normalised"], 0.08, output)
         self.assertEqual(promised, {})
 
     def test_a_server_that_is_there_is_used_and_a_wrong_one_told(self):

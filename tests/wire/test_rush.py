@@ -6,8 +6,6 @@
 
 Each test names the mistake that it would catch."""
 import os
-import pathlib
-import re
 import socket
 import struct
 import sys
@@ -28,10 +26,6 @@ AT_ONCE = struct.pack("ii", 1, 0)  # SO_LINGER: an end without a goodbye
 
 
 class Rush(WireTest):
-    def resident_kib(self, server):
-        status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text(encoding="utf-8")
-        return int(re.search(r"VmRSS:\s+(\d+)", status).group(1))
-
     def descriptors(self, server):
         return len(os.listdir(f"/proc/{server.process.pid}/fd"))
 
@@ -66,12 +60,13 @@ class Rush(WireTest):
         owner = self.client(server)
         self.assertDone(owner.lease())
         self.rush(server, owner, RATE_PER_S, 0)
-        before, resident = self.descriptors(server), self.resident_kib(server)
+        before, resident = self.descriptors(server), server.memory_kib("VmRSS")
         took_s = self.rush(server, owner, RATE_PER_S * SECONDS, RATE_PER_S // 100)
+        resident_after = server.memory_kib("VmRSS")
         print(f"{RATE_PER_S * SECONDS} clients in {took_s:.1f} s, {RATE_PER_S * SECONDS / took_s:.0f} a second; "
-              f"memory {resident} KiB before, {self.resident_kib(server)} KiB after", flush=True)
+              f"memory {resident} KiB before, {resident_after} KiB after", flush=True)
         self.assertEqual(self.descriptors(server), before)
-        self.assertLessEqual(self.resident_kib(server), resident + 1024)
+        self.assertLessEqual(resident_after, resident + 1024)
         self.assertEqual(owner.newest().tick, RATE_PER_S // 100 * (SECONDS + 1))
         self.assertNotIn("cannot accept", server.errors())
         self.assertEqual(server.stop(), 0)

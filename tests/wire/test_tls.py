@@ -264,7 +264,7 @@ class Mutual(TlsTest):
 
     def test_sec_03_a_strange_name_moves_no_terminal(self):
         """A certificate that nobody has signed whose name writes lines, or colours, into the log."""
-        server, folder = self.mutual_server(), self.made.folder
+        server = self.mutual_server()
         self.made.openssl("req", "-x509", *self.made.key("odd.key"), "-subj", "/CN=odd\x1b[2J\n[error] forged", "-out", "odd.pem")
         self.assertTurnedAway(server, self.context("odd"), "certificate of odd")
         self.assertNotIn("\x1b", server.errors())

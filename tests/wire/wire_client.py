@@ -92,6 +92,11 @@ class Server:
         self.log.flush()
         return (self.folder / "stderr").read_text(encoding="utf-8")
 
+    def memory_kib(self, which="VmHWM"):
+        """What the kernel says it has (VmRSS), or had at most (VmHWM)."""
+        status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text(encoding="utf-8")
+        return int(next(line for line in status.splitlines() if line.startswith(which)).split()[1])
+
     def stop(self, number=15):
         """Ends it with a signal; the exit code. The verdict it printed is then in `verdict`."""
         self.process.send_signal(number)

@@ -93,6 +93,10 @@ class WireTest(unittest.TestCase):
             self.assertNotIn(line["result"], ("", "done"))
         return [line["result"] for line in lines]
 
+    def assertMemoryBelow(self, server, limit_kib, which="VmHWM"):
+        if server.memory_kib("VmSize") < 1 << 30:  # a sanitizer maps terabytes, and keeps what is freed
+            self.assertLess(server.memory_kib(which), limit_kib)
+
     def assertLimitOf2s(self, *since):
         """For what ends 2 s after some moment between the first and the last of these: not before, and not much later. A
         machine that others use as well may add seconds; a limit that is missing, or ten times as long, adds more."""
