@@ -52,6 +52,10 @@ bool RowWriter::flush() noexcept {
   return true;
 }
 
+bool RowWriter::finish() noexcept {
+  return flush() && ::fdatasync(descriptor_) == 0;
+}
+
 FileReader::FileReader(const std::filesystem::path& file)
     : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
   if (descriptor_ < 0) {

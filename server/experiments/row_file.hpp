@@ -30,6 +30,8 @@ class RowWriter {
   bool append(const Sample& sample) noexcept;
   /// Publishes all rows so far.
   bool flush() noexcept;
+  /// The same, and whatever happens to the power, they are there.
+  bool finish() noexcept;
 
  private:
   static constexpr std::size_t kBufferBytes = std::size_t{1} << 16;

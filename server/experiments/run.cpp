@@ -47,7 +47,7 @@ class ExperimentRun {
       recorder_.wait_for_room();
       bench_.step();
     }
-    if (!rows_.flush()) fail("the disk takes no more data");
+    if (!rows_.finish()) fail("the disk takes no more data");
     return finish();
   }
 

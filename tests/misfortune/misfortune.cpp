@@ -1,6 +1,6 @@
-// Preloaded into a program: memory that runs out, threads that stand still, arithmetic that somebody changes,
-// and a count of what went to its recordings. The page in the file MISFORTUNE names is shared with the test
-// that started it.
+// Preloaded into a program: memory that runs out, a disk that does not keep what it took, threads that stand
+// still, arithmetic that somebody changes, and a count of what went to its recordings. The page in the file
+// MISFORTUNE names is shared with the test that started it.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/mman.h>
@@ -33,6 +33,7 @@ struct Page {
   std::atomic<std::uint64_t> sleep_ms;     // how long a thread stands still that gets SIGUSR2
   std::atomic<std::uint32_t> mxcsr;        // what SIGUSR1 sets in the thread that gets it
   std::atomic<std::uint32_t> mxcsr_at_start;
+  std::atomic<std::uint64_t> syncs_fail;  // 1: every fdatasync()
 };
 
 Page none{};
@@ -137,4 +138,9 @@ EXPORT ssize_t write(int descriptor, const void* data, std::size_t size) {
   const ssize_t written = syscall(SYS_write, descriptor, data, size);
   if (counts && written > 0) page->taken.fetch_add(static_cast<std::uint64_t>(written));
   return written;
+}
+
+EXPORT int fdatasync(int descriptor) {
+  if (page->syncs_fail.load() != 0) return errno = EIO, -1;
+  return static_cast<int>(syscall(SYS_fdatasync, descriptor));
 }

@@ -14,7 +14,7 @@ from wire_client import SERVER  # noqa: E402
 LIBRARY = pathlib.Path(os.environ.get("DRIVEBENCH_MISFORTUNE", SERVER.parents[1] / "tests/misfortune/libmisfortune.so"))
 SYS_TGKILL = 234  # x86-64
 PLACES = {"handed": (0, "<Q"), "taken": (8, "<Q"), "fail_in": (16, "<q"), "allocations": (24, "<Q"), "sleep_ms": (32, "<Q"),
-          "mxcsr": (40, "<I"), "mxcsr_at_start": (44, "<I")}
+          "mxcsr": (40, "<I"), "mxcsr_at_start": (44, "<I"), "syncs_fail": (48, "<Q")}
 
 
 class Misfortune:

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A host that fails the server: memory, threads, clocks, arithmetic. Each test names the mistake that it would catch."""
+"""A host that fails the server: memory, disks, threads, clocks, arithmetic. Each test names the mistake that it would catch."""
 import os
 import pathlib
 import resource
@@ -19,7 +19,8 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from misfortune import Misfortune, signal_thread, thread_of
+from misfortune import Misfortune, signal_thread, thread_of  # also finds what the others are in
+from experiment_test import ExperimentTest, request
 from recording import Recording
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, frame, pb
 from wire_test import SERVO_TEXT, WireTest, until
@@ -110,6 +111,17 @@ class Memory(HostTest):
             self.assertEqual(server.process.wait(timeout=PATIENCE_S), 1, server.errors())
             self.assertIn("no memory", server.errors())
             self.assertGreaterEqual(Recording(file.read_bytes()).messages["/servo/sample"], 800)
+
+
+class Disks(HostTest, ExperimentTest):
+    def test_rec_05_data_that_may_not_be_there_are_no_success(self):
+        """An experiment that counts as complete although its rows go with the power."""
+        misfortune = Misfortune()
+        client = self.client(self.unlucky_server(misfortune, "--experiments", self.kept.name))
+        self.assertEqual(self.whole(client, request(100)).info.state, pb.EXPERIMENT_STATE_COMPLETED)
+        misfortune.syncs_fail = 1
+        ended = self.whole(client, request(100)).info
+        self.assertEqual((ended.state, ended.reason), (pb.EXPERIMENT_STATE_FAILED, "the disk takes no more data"))
 
 
 class Stops(HostTest):
