@@ -33,6 +33,8 @@ using Tls = std::unique_ptr<SSL, decltype(&SSL_free)>;
 }
 
 Context context_for(const TlsFiles& files) {
+  // A program may end while the thread of a link still uses the library, which must not be torn down then.
+  OPENSSL_init_crypto(OPENSSL_INIT_NO_ATEXIT, nullptr);
   Context context(SSL_CTX_new(TLS_client_method()), &SSL_CTX_free);
   if (!context) fail("no memory");
   SSL_CTX_set_min_proto_version(context.get(), TLS1_3_VERSION);
@@ -183,7 +185,7 @@ FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host
   auto tunnel = std::make_unique<Tunnel>(std::move(socket), FileDescriptor(ends[1]), std::move(tls));
   std::promise<std::string> shaken;  // why not, or nothing
   std::future<std::string> why_not = shaken.get_future();
-  std::thread carrier([tunnel = std::move(tunnel), shaken = std::move(shaken), host]() mutable {
+  std::thread([tunnel = std::move(tunnel), shaken = std::move(shaken), host]() mutable {
     ignore_broken_pipes();
     try {
       tunnel->shake_hands(host);
@@ -192,12 +194,8 @@ FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host
     }
     shaken.set_value({});
     tunnel->run();
-  });
-  if (const std::string why = why_not.get(); !why.empty()) {
-    carrier.join();  // what it has of OpenSSL is gone before the program ends
-    throw ConnectError(why);
-  }
-  carrier.detach();
+  }).detach();
+  if (const std::string why = why_not.get(); !why.empty()) throw ConnectError(why);
   return ours;
 }
 
