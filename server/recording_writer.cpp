@@ -209,6 +209,7 @@ void RecordingWriter::sync_if_due(Clock::time_point now) noexcept {
 /// As a whole file, and with room left for everybody else.
 void RecordingWriter::end_for_want_of_room() {
   is_over_ = true;
+  options_.continues_after_errors = false;  // nor in a new file, if the disk refuses the end of this one
   end_file();
   spdlog::error("recording {}: less than {} MiB are free on its disk; it ends here",
                 segment_path(first_, number_), options_.reserve_bytes >> 20);

@@ -42,7 +42,7 @@ class RecordingWriter {
   /// Ends the last file.
   void finish(const Verdict& verdict) noexcept;
 
-  /// The disk takes no more, or shall not: every further entry is lost, and not counted here.
+  /// The disk takes no more, or shall not: every further entry counts as lost.
   bool is_over() const noexcept { return is_over_; }
   /// Entries that were given to write() and are not surely on the disk; each is told once.
   std::uint64_t take_lost() noexcept { return std::exchange(lost_, 0); }

@@ -264,6 +264,27 @@ TEST(RecordingDisk, REC_03_ItEndsWholeBeforeTheDiskIsFull) {
   }
 }
 
+// Catches: a recording that is ended for want of room, whose end the disk refuses, and that begins another
+// file there.
+TEST(RecordingDisk, REC_03_WhatEndsForWantOfRoomDoesNotBeginAgain) {
+  for (const DiskCall bad : {DiskCall::kSync, DiskCall::kClose}) {
+    const TestFolder folder;
+    MemoryDisk disk;
+    const auto fails_at_the_end = [bad](DiskCall call, std::size_t n) {
+      return call == bad && (call == DiskCall::kClose || n > 1) ? EIO : 0;
+    };
+    RecordingWriter writer(
+        folder / "run.mcap", servo_bench(), {},
+        {.continues_after_errors = true, .reserve_bytes = 1 << 20, .create = disk.creator(fails_at_the_end)});
+    disk.free_bytes = (1 << 20) - 1;
+    constexpr std::uint64_t kTicks = 20 * kTicksOf100Ms;
+    const std::uint64_t lost = record(writer, 0, kTicks);
+    EXPECT_TRUE(writer.is_over());
+    EXPECT_EQ(disk.names.size(), 1u);
+    EXPECT_GT(Found(contents_of(disk)).ticks.size() + lost, kTicks) << "and the end that it has not";
+  }
+}
+
 // ---- limits ----
 
 // Catches: entries that wait longer in memory than 100 ms of plant time, or are written one by one.
