@@ -45,6 +45,12 @@ void Engine::take(std::uint32_t axis, Owner by, const std::string& reason, Answe
   request({.tick = 0, .axis = axis, .owner = by, .action = LeaseAction::kAcquire}, std::move(answer));
 }
 
+void Engine::refuse_to_take(std::uint32_t axis, Owner by, Refused why, const Answer& answer) {
+  const Input wanted{.tick = 0, .axis = axis, .owner = by, .action = LeaseAction::kAcquire};
+  if (on_answered) on_answered(wanted, client(by), why, tick());
+  answer(why, tick());
+}
+
 std::string Engine::problem_with_value(std::size_t axis, std::uint32_t row, double value) const {
   const Parameter& parameter = axis_parameters(parameters_[axis])[row];
   const std::optional<std::size_t> partner = config_.setup.axes[axis].shares_shaft_with;

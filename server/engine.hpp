@@ -107,6 +107,8 @@ class Engine {
  protected:
   Engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder);
 
+  /// The answer of a take() that does not begin.
+  void refuse_to_take(std::uint32_t axis, Owner by, Refused why, const Answer& answer);
   /// request() without those who look on.
   virtual void submit(const Input& input, Answer answer) = 0;
 

@@ -103,8 +103,18 @@ class ThreadedEngine final : public Engine {
 
   void advance() override {}
 
+  void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
+    const bool is_room_for_both = ends_.empty() && requests_.room() >= 2;
+    if (is_room_for_both) return Engine::take(axis, by, reason, std::move(answer));
+    refuse_to_take(axis, by, Refused::kBusy, answer);
+  }
+
   void submit(const Input& input, Answer answer) override {
-    if (ends_lease(input) && requests_.room() == 0) {
+    const bool ends = ends_lease(input);
+    // What concerns a lease does not overtake what waits.
+    const bool has_to_wait = std::holds_alternative<LeaseAction>(input.action) && !ends_.empty();
+    if (has_to_wait || (ends && requests_.room() == 0)) {
+      if (!ends || waits(input)) return answer(Refused::kBusy, tick());
       ends_.push_back({input, std::move(answer)});
       return;
     }
@@ -112,6 +122,10 @@ class ThreadedEngine final : public Engine {
     if (std::holds_alternative<RefusedCommand>(input.action) && requests_.room() <= kRequestCapacity / 2) {
       return answer(Refused::kBusy, tick());
     }
+    push(input, std::move(answer));
+  }
+
+  void push(const Input& input, Answer answer) {
     const bool writes = std::holds_alternative<ParameterWrite>(input.action);
     const bool taken = requests_.push(input);
     if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;
@@ -258,9 +272,9 @@ class ThreadedEngine final : public Engine {
     }
     if (tick() != before) on_newest();
     while (!ends_.empty() && requests_.room() > 0) {
-      LeaseEnd end = std::move(ends_.front());
+      const LeaseEnd end = std::move(ends_.front());
       ends_.pop_front();
-      submit(end.input, std::move(end.answer));
+      push(end.input, end.answer);
     }
   }
 
@@ -344,6 +358,11 @@ class ThreadedEngine final : public Engine {
     const auto* const action = std::get_if<LeaseAction>(&input.action);
     return action != nullptr && (*action == LeaseAction::kLost || *action == LeaseAction::kRelease);
   }
+  bool waits(const Input& end) const noexcept {
+    return std::ranges::any_of(ends_, [&end](const LeaseEnd& each) {
+      return each.input.axis == end.axis && each.input.owner == end.owner;
+    });
+  }
 
   std::optional<Tick> max_ticks_;
   Tick ticks_per_wake_;
@@ -356,7 +375,7 @@ class ThreadedEngine final : public Engine {
   std::vector<OwnedCommand> sent_;  // the last command put into each mailbox
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
-  std::deque<LeaseEnd> ends_;
+  std::deque<LeaseEnd> ends_;            // one for each axis and owner at most
   std::deque<Waiting> answers_;          // of the requests in flight, in order
   std::deque<RequestOutcome> outcomes_;  // that have come back, to be answered with the samples of their tick
   std::unique_ptr<Pacer> pacer_;
