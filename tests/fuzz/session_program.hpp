@@ -37,7 +37,8 @@ class Program {
   /// Whether all values since the last call were numbers.
   bool all_finite() { return std::exchange(all_finite_, true); }
   std::string next_bytes() {
-    const std::size_t count = std::min<std::size_t>(next(), bytes_.size());
+    const std::size_t wanted = next();
+    const std::size_t count = std::min(wanted, bytes_.size());
     const std::string result(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(count));
     bytes_ = bytes_.subspan(count);
     return result;
