@@ -153,9 +153,6 @@ void print_verdict(const Options& o, const Verdict& v) {
   if (!o.record.empty()) print_line(fmt::format("recorded in {}", o.record));
 }
 
-/// For everybody else who writes to the disk of a recording: the audit log, the system.
-constexpr std::uint64_t kDiskReserveBytes = std::uint64_t{64} << 20;
-
 RecordingOptions recording_options(const Options& o, const BenchConfig& config) {
   const double ticks = o.file_s * 1e9 / static_cast<double>(config.setup.period_ns);
   return {

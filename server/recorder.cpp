@@ -67,7 +67,6 @@ bool Recorder::drain(std::size_t most) noexcept {
     writer_->write(*entry);
     ring_.pop();
   }
-  count_lost();
   return taken > 0;
 }
 
@@ -80,22 +79,26 @@ void Recorder::run() {
 bool Recorder::work() noexcept {
   const bool any = drain(kEntriesPerLook);
   writer_->sync_if_due(RecordingWriter::Clock::now());
-  is_over_.store(writer_->is_over(), std::memory_order_relaxed);
+  tell_state();
   return any;
 }
 
-void Recorder::count_lost() {
+/// What others may know of the writer, whose thread this is.
+void Recorder::tell_state() noexcept {
   gaps_.fetch_add(writer_->take_lost(), std::memory_order_relaxed);
+  lacks_room_.store(writer_->lacks_room(), std::memory_order_relaxed);
+  is_over_.store(writer_->is_over(), std::memory_order_relaxed);
 }
 
 void Recorder::finish(const Verdict& verdict) {
   stop_.store(true);
   if (thread_.joinable()) thread_.join();
   drain(ring_.capacity());
+  tell_state();
   Verdict final_verdict = verdict;
   final_verdict.gaps = gaps();
   writer_->finish(final_verdict);
-  count_lost();
+  tell_state();
 }
 
 }  // namespace drivebench

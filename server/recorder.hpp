@@ -28,6 +28,9 @@ struct ReceivedInput {
 };
 using RecordedEntry = std::variant<TickedSample, ReceivedInput>;
 
+/// What recordings leave free on their disk, for everybody else who writes to it: the audit log, the system.
+inline constexpr std::uint64_t kDiskReserveBytes = std::uint64_t{64} << 20;
+
 /// One file, and the end of the recording when its disk refuses something, unless more is asked for.
 struct RecordingOptions {
   std::uint64_t file_ticks = 0;         ///< a new file begins after so many; 0: never
@@ -70,16 +73,19 @@ class Recorder final : public BenchObserver {
   std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }
   /// Whether it has ended before the run, for want of room or of a disk that works.
   bool is_over() const noexcept { return is_over_.load(std::memory_order_relaxed); }
+  /// Whether it has ended because the disk is full, or nearly so.
+  bool lacks_room() const noexcept { return lacks_room_.load(std::memory_order_relaxed); }
   const std::string& file() const noexcept { return file_; }
 
-  /// Drains the ring, writes the verdict and closes the file; gaps() is final then.
+  /// Drains the ring, writes the verdict and closes the file; gaps(), is_over() and lacks_room() are final
+  /// then.
   void finish(const Verdict& verdict);
 
  private:
   void count_gap(bool lost) noexcept;
   void run();
   bool drain(std::size_t most) noexcept;
-  void count_lost();
+  void tell_state() noexcept;
 
   std::string file_;
   SpscRing<RecordedEntry> ring_;
@@ -87,6 +93,7 @@ class Recorder final : public BenchObserver {
   std::unique_ptr<RecordingWriter> writer_;
   std::atomic<std::uint64_t> gaps_{0};
   std::atomic<bool> is_over_{false};
+  std::atomic<bool> lacks_room_{false};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

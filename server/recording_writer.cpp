@@ -24,6 +24,8 @@ std::int64_t flush_interval_ns(RunMode mode) {
   return mode == RunMode::kFree ? 1'000'000'000 : 100'000'000;
 }
 constexpr auto kSyncInterval = std::chrono::seconds(1);
+/// So much at most between two looks at what is free: a free run writes hundreds of megabytes in a second.
+constexpr std::uint64_t kBytesPerLook = std::uint64_t{16} << 20;
 
 std::span<const std::byte> bytes_of(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
@@ -133,7 +135,8 @@ void RecordingWriter::write(const RecordedEntry& entry) noexcept {
   }
   attempt([&] {
     std::visit([this](const auto& e) { put(e); }, entry);
-    if (!is_full(entry)) return;
+    if (unlooked_bytes_ >= kBytesPerLook) end_if_room_is_short();
+    if (is_over_ || !is_full(entry)) return;
     end_file();
     begin_next();
   });
@@ -194,6 +197,7 @@ void RecordingWriter::write_all(std::span<const std::byte> bytes) {
     }
   }
   whole_bytes_ += bytes.size();
+  unlooked_bytes_ += bytes.size();
   unsynced_ += std::exchange(unwritten_, 0);  // one call brings a whole chunk
 }
 
@@ -202,13 +206,15 @@ void RecordingWriter::sync_if_due(Clock::time_point now) noexcept {
   last_sync_ = now;
   attempt([this] {
     sync();
-    if (file_->free_bytes() < options_.reserve_bytes) end_for_want_of_room();
+    end_if_room_is_short();
   });
 }
 
 /// As a whole file, and with room left for everybody else.
-void RecordingWriter::end_for_want_of_room() {
-  is_over_ = true;
+void RecordingWriter::end_if_room_is_short() {
+  unlooked_bytes_ = 0;
+  if (file_->free_bytes() >= options_.reserve_bytes) return;
+  is_over_ = lacks_room_ = true;
   options_.continues_after_errors = false;  // nor in a new file, if the disk refuses the end of this one
   end_file();
   spdlog::error("recording {}: less than {} MiB are free on its disk; it ends here",
@@ -249,6 +255,7 @@ void RecordingWriter::fail(Step step, int error) noexcept {
   const std::uint64_t lost = unwritten_ + (is_unsure ? unsynced_ : 0);
   is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
              (number_ > 1 && !was_synced_);
+  lacks_room_ = lacks_room_ || is_of_space(error);
   // A file without its end, or its beginning, does not replay even if no entry is missing.
   lost_ += std::max<std::uint64_t>(lost, is_ending_ || !is_over_ ? 1 : 0);
   if (step == Step::kWrite)

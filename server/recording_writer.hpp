@@ -44,6 +44,8 @@ class RecordingWriter {
 
   /// The disk takes no more, or shall not: every further entry counts as lost.
   bool is_over() const noexcept { return is_over_; }
+  /// It is over because the disk is full, or nearly so.
+  bool lacks_room() const noexcept { return lacks_room_; }
   /// Entries that were given to write() and are not surely on the disk; each is told once.
   std::uint64_t take_lost() noexcept { return std::exchange(lost_, 0); }
   std::size_t files() const noexcept { return number_; }
@@ -71,7 +73,7 @@ class RecordingWriter {
   void go_on() noexcept;
   void sync();
   void end_file();
-  void end_for_want_of_room();
+  void end_if_room_is_short();
   bool is_full(const RecordedEntry& last) const;
   void fail(Step step, int error) noexcept;
   template <class Action>
@@ -89,7 +91,9 @@ class RecordingWriter {
   v1::Input input_;
   Clock::time_point last_sync_ = Clock::now();
   std::uint64_t lost_ = 0;
+  std::uint64_t unlooked_bytes_ = 0;  // written since the last look at what is free
   bool is_over_ = false;
+  bool lacks_room_ = false;
 
   // Of the present file.
   std::unique_ptr<RecordingFile> file_;

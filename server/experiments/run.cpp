@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "server/engine.hpp"
 #include "server/experiments/row_file.hpp"
@@ -29,7 +31,8 @@ class ExperimentRun {
         published_(published),
         rows_(files.rows, plan.signals, progress.rows),
         recorder_(files.recording, plan.config,
-                  {RecordingAttachment{kExperimentAttachment, "application/protobuf", request}}),
+                  {RecordingAttachment{kExperimentAttachment, "application/protobuf", request}},
+                  {.reserve_bytes = kDiskReserveBytes, .create = files.create_recording}),
         bench_(plan.config.setup, &recorder_),
         pacer_(plan.mode == RunMode::kRealtime
                    ? make_realtime_pacer(PacerKind::kSleep, plan.config.setup.period_ns)
@@ -69,6 +72,7 @@ class ExperimentRun {
   }
 
   bool may_go_on() {
+    if (recorder_.is_over()) return false;  // finish() says why
     if (is_beyond(plan_.stop, sample())) {
       outcome_.state = v1::EXPERIMENT_STATE_STOPPED;
       outcome_.reason = broken_limit(plan_.stop, sample());
@@ -81,9 +85,9 @@ class ExperimentRun {
     return false;
   }
 
-  bool fail(const char* why) {
+  bool fail(std::string why) {
     outcome_.state = v1::EXPERIMENT_STATE_FAILED;
-    outcome_.reason = why;
+    outcome_.reason = std::move(why);
     return false;
   }
 
@@ -128,7 +132,9 @@ class ExperimentRun {
     recorder_.finish(outcome_.verdict);
     outcome_.verdict.gaps = recorder_.gaps();
     if (outcome_.verdict.gaps > 0 && outcome_.state != v1::EXPERIMENT_STATE_FAILED) {
-      fail("the recording lost entries");
+      fail(recorder_.lacks_room() ? "the recording ended: its disk is full, or has less than " +
+                                        std::to_string(kDiskReserveBytes >> 20) + " MiB left"
+                                  : "the recording lost entries");
     }
     return std::move(outcome_);
   }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/experiments/plan.hpp"
+#include "server/recording_file.hpp"
 #include "server/verdict.hpp"
 
 namespace drivebench {
@@ -21,6 +22,7 @@ struct RunProgress {
 struct RunFiles {
   std::filesystem::path recording;
   std::filesystem::path rows;
+  CreateRecordingFile create_recording{};  ///< empty: create_recording_file
 };
 
 struct RunOutcome {
@@ -31,7 +33,7 @@ struct RunOutcome {
 
 /// Runs an experiment on a bench of its own, on the calling thread, into two new files; the request goes into
 /// the recording. `published` is called when there are new rows. Throws std::system_error if a file cannot be
-/// made.
+/// made, or there is less room on its disk than recordings leave free.
 RunOutcome run_experiment(const ExperimentPlan& plan, const RunFiles& files, const std::string& request,
                           RunProgress& progress, const std::function<void()>& published);
 

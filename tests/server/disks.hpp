@@ -60,6 +60,11 @@ class MemoryDisk {
     File(MemoryDisk& disk, DiskLog& log) : disk_(disk), log_(log) {}
     ssize_t write(std::span<const std::byte> bytes) noexcept override {
       if (disk_.fails(DiskCall::kWrite)) return -1;
+      if (bytes.size() > disk_.free_bytes) {
+        errno = ENOSPC;
+        return -1;
+      }
+      disk_.free_bytes -= bytes.size();
       log_.entries.push_back({DiskCall::kWrite, log_.content.size(), {bytes.begin(), bytes.end()}});
       log_.content.insert(log_.content.end(), bytes.begin(), bytes.end());
       return static_cast<ssize_t>(bytes.size());

@@ -9,7 +9,7 @@
 #include "protocols/framing.hpp"
 #include "server/experiments/experiments.hpp"
 #include "server/experiments/limits.hpp"
-#include "tests/server/config_test_bench.hpp"
+#include "tests/server/experiment_requests.hpp"
 #include "tests/server/run_config.hpp"
 
 namespace drivebench {
@@ -43,10 +43,6 @@ class StallingDisk {
   std::atomic<bool> is_full_ = false;
   std::atomic<bool> stood_too_long_ = false;
 };
-
-std::shared_ptr<const SignalTable> no_tables(std::uint64_t) {
-  return nullptr;
-}
 
 v1::RunExperiment request(std::uint64_t ticks = 100) {
   v1::RunExperiment r;
