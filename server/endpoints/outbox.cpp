@@ -17,7 +17,7 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
   queue(bytes);
   if (!writing_) {
     writing_ = true;
-    arm_timer(owner);
+    expect_progress(owner);
     write_more(owner);
   }
 }
@@ -55,7 +55,7 @@ void Outbox::write_more(const std::shared_ptr<void>& owner) {
   }
   if (chunks_.empty()) {
     writing_ = false;
-    timer_.cancel();
+    deadline_.call_off();
     if (on_idle) on_idle();
     return;
   }
@@ -65,16 +65,13 @@ void Outbox::write_more(const std::shared_ptr<void>& owner) {
                              if (error || !socket_.is_open()) return close();
                              sent_ += written;
                              forget(written);
-                             arm_timer(owner);
+                             expect_progress(owner);
                              write_more(owner);
                            });
 }
 
-void Outbox::arm_timer(const std::shared_ptr<void>& owner) {
-  timer_.expires_after(kNoProgressLimit);
-  timer_.async_wait([this, owner](const boost::system::error_code& error) {
-    if (!error) cut("it took nothing for 2 s");
-  });
+void Outbox::expect_progress(const std::shared_ptr<void>& owner) {
+  deadline_.set(kNoProgressLimit, [this, owner] { cut("it took nothing for 2 s"); });
 }
 
 void Outbox::cut(std::string_view why) {
@@ -84,7 +81,7 @@ void Outbox::cut(std::string_view why) {
 
 void Outbox::close() noexcept {
   boost::system::error_code ignored;
-  timer_.cancel(ignored);
+  deadline_.call_off();
   socket_.shutdown(Socket::shutdown_both, ignored);
   socket_.close(ignored);
   forget(waiting_);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/asio.hpp"
+#include "server/endpoints/deadline.hpp"
 
 namespace drivebench {
 
@@ -34,7 +35,7 @@ class Outbox {
   static constexpr auto kNoProgressLimit = std::chrono::seconds(2);
 
   Outbox(Socket& socket, std::shared_ptr<OutboxPool> pool)
-      : socket_(socket), pool_(std::move(pool)), timer_(socket.get_executor()) {}
+      : socket_(socket), pool_(std::move(pool)), deadline_(socket.get_executor()) {}
   ~Outbox() { forget(waiting_); }
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
@@ -50,20 +51,21 @@ class Outbox {
   /// Called when the queue has become empty again.
   std::function<void()> on_idle;
 
+  /// Closes it, and says why, unless it is closed already.
+  void cut(std::string_view why);
   /// Shuts the socket down; what is queued is lost.
   void close() noexcept;
 
  private:
   void write_more(const std::shared_ptr<void>& owner);
-  void arm_timer(const std::shared_ptr<void>& owner);
-  void cut(std::string_view why);
+  void expect_progress(const std::shared_ptr<void>& owner);
   void queue(std::span<const std::byte> bytes);
   std::size_t limit() const noexcept;
   void forget(std::size_t bytes) noexcept;
 
   Socket& socket_;
   std::shared_ptr<OutboxPool> pool_;  // a session may outlive the server, as long as its socket
-  ServerTimer timer_;
+  Deadline deadline_;
   std::deque<std::vector<std::byte>> chunks_;
   std::size_t sent_ = 0;     // of the first chunk
   std::size_t waiting_ = 0;  // in all

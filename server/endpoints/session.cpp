@@ -34,7 +34,7 @@ Session::Session(Outbox::Socket socket, Client who, SessionContext& context)
       reply_(context.reply),
       scratch_(context.scratch),
       slot_timer_(socket_.get_executor()),
-      silence_timer_(socket_.get_executor()),
+      silence_(socket_.get_executor()),
       leased_(context.engine.config().axes.size()),
       taken_(context.engine.config().axes.size()) {
   reader_.set_max_payload(kMaxFrameBeforeHello);
@@ -53,7 +53,7 @@ Session::Session(Outbox::Socket socket, Client who, SessionContext& context)
 asio::awaitable<void> Session::run() {
   const std::shared_ptr<Session> self = shared_from_this();
   ServerTimer timer(socket_.get_executor());
-  end_unless_greeted(timer);
+  silence_.set(kHelloLimit, [self] { self->outbox_.cut("no hello within 2 s"); });
   boost::system::error_code error;
   Turn turn = Turn::kAll;
   while (turn != Turn::kOver && !error) {
@@ -74,16 +74,6 @@ asio::awaitable<void> Session::run() {
   if (greeted_) audit("session_ended", "done", {{"reason", why_ended_}});
   give_leases_back();
   close();
-}
-
-void Session::end_unless_greeted(ServerTimer& timer) {
-  timer.expires_after(kHelloLimit);
-  timer.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
-    if (error || self->greeted_) return;
-    ++self->context_.counts.cut;
-    self->audit("limit", "no hello within 2 s", {});
-    self->close();
-  });
 }
 
 /// What is there, as far as one turn goes: who asks for much at once shall not keep the others waiting.
@@ -113,19 +103,9 @@ bool Session::end_malformed(v1::RefusalCode code, const std::string& sentence, c
 
 /// A peer that stops within a frame is gone, or never meant to send the rest.
 void Session::watch_for_silence() {
-  if (!reader_.in_a_frame() || !greeted_) {
-    if (std::exchange(waits_for_frame_, false)) silence_timer_.cancel();
-    return;
-  }
-  waits_for_frame_ = true;
-  silence_timer_.expires_after(kFrameLimit);
-  silence_timer_.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
-    if (error || !self->waits_for_frame_) return;
-    ++self->context_.counts.cut;
-    self->why_ended_ = "silent within a frame";
-    self->audit("limit", "silent within a frame", {});
-    self->close();
-  });
+  if (!greeted_) return;
+  if (!reader_.in_a_frame()) return silence_.call_off();
+  silence_.set(kFrameLimit, [self = shared_from_this()] { self->outbox_.cut("silent within a frame"); });
 }
 
 /// In real time a session has commands that no tick can use.
@@ -245,6 +225,7 @@ bool Session::greet(const v1::Hello& hello) {
   }
   if (!is_admitted(hello)) return false;
   greeted_ = true;
+  silence_.call_off();
   reader_.set_max_payload(kMaxRequestFrame);
   watch_slot();
   audit("session_opened", "done", {{"client", hello.client()}, {"role", std::string(name_of(grant_.role))}});
@@ -264,7 +245,7 @@ bool Session::greet(const v1::Hello& hello) {
 void Session::close() {
   context_.audience.remove(*this);
   slot_timer_.cancel();
-  silence_timer_.cancel();
+  silence_.call_off();
   outbox_.close();
 }
 

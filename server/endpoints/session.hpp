@@ -16,6 +16,7 @@
 #include "server/audit.hpp"
 #include "server/endpoints/admission.hpp"
 #include "server/endpoints/audience.hpp"
+#include "server/endpoints/deadline.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/outbox.hpp"
 #include "server/endpoints/transport_report.hpp"
@@ -117,7 +118,6 @@ class Session : public std::enable_shared_from_this<Session> {
   bool handle(std::span<const std::byte> frame);
   bool dispatch();
   bool may_ask();
-  void end_unless_greeted(ServerTimer& timer);
   void watch_for_silence();
   void charge_excess(int commands);
   void refill_excess();
@@ -187,9 +187,8 @@ class Session : public std::enable_shared_from_this<Session> {
   bool greeted_ = false;
   bool over_ = false;  ///< the peer is gone
   Grant grant_;
-  ServerTimer slot_timer_;     // runs to the end of the grant
-  ServerTimer silence_timer_;  // runs while a frame is not whole
-  bool waits_for_frame_ = false;
+  ServerTimer slot_timer_;  // runs to the end of the grant
+  Deadline silence_;        // runs until hello, and while a frame is not whole
   std::string why_ended_ = "the peer left";
   double excess_left_ = kExcessAtOnce;
   ServerClock::time_point excess_refilled_ = ServerClock::now();

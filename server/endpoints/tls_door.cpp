@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/local/connect_pair.hpp>
 #include <boost/asio/ssl.hpp>
@@ -12,6 +13,7 @@
 #include <system_error>
 #include <vector>
 
+#include "server/endpoints/deadline.hpp"
 #include "server/endpoints/outbox.hpp"
 
 namespace drivebench {
@@ -80,7 +82,7 @@ struct TlsDoor::Context {
 class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
  public:
   Passage(asio::ip::tcp::socket socket, Context& context)
-      : stream(std::move(socket), context.tls), inside(stream.get_executor()), timer(stream.get_executor()) {
+      : stream(std::move(socket), context.tls), inside(stream.get_executor()), deadline(stream.get_executor()) {
     boost::system::error_code ignored;
     stream.set_verify_callback(
         [this](bool good, asio::ssl::verify_context& checked) {
@@ -92,9 +94,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
 
   /// Ends everything that is under way if it is not done by then.
   void limit(std::chrono::milliseconds limit) {
-    timer.expires_after(limit);
-    timer.async_wait([self = shared_from_this()](const boost::system::error_code& error) {
-      if (error) return;
+    deadline.set(limit, [self = shared_from_this()] {
       self->was_late = true;
       self->close();
     });
@@ -133,19 +133,19 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
           asio::buffer(block), asio::redirect_error(asio::use_awaitable, error));
       limit(Outbox::kNoProgressLimit);
       if (!error) co_await write_all(stream, block, count, error);
-      timer.cancel();
+      deadline.call_off();
     }
     was_deaf = was_late;
     if (was_late) co_return;
     limit(kFarewellLimit);
     co_await stream.async_shutdown(asio::redirect_error(asio::use_awaitable, error));
-    timer.cancel();
+    deadline.call_off();
     close();
   }
 
   Stream stream;
   asio::local::stream_protocol::socket inside;
-  ServerTimer timer;
+  Deadline deadline;
   std::string refused_subject;  ///< in a certificate that does not hold
   bool was_late = false;        ///< a limit has ended it
   bool was_deaf = false;        ///< while there was something to read
@@ -204,7 +204,7 @@ asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std
   boost::system::error_code error;
   passage->limit(kHandshakeLimit);
   co_await passage->stream.async_handshake(Stream::server, asio::redirect_error(asio::use_awaitable, error));
-  passage->timer.cancel();
+  passage->deadline.call_off();
   --handshakes_;
   if (error) {
     turn_away(peer, passage->why_refused(error));

@@ -15,6 +15,8 @@
 namespace drivebench {
 namespace {
 
+using namespace std::chrono_literals;
+
 /// An outbox and its peer, who reads when told to.
 class Pair {
  public:
@@ -52,15 +54,24 @@ class Pair {
   }
   /// What the peer gets until nothing comes; whether it is what was sent.
   bool read_all() {
-    std::array<unsigned char, 65'536> bytes;
-    for (;;) {
-      const ssize_t count = ::recv(peer_, bytes.data(), bytes.size(), MSG_DONTWAIT);
-      if (count <= 0) return true;
-      for (ssize_t i = 0; i < count; ++i) {
-        if (bytes[static_cast<std::size_t>(i)] != received_++ % 251) return false;
-      }
+    while (read_what_is_there())
       settle();
+    return intact_;
+  }
+  /// While the outbox does nothing. False: there was nothing.
+  bool read_what_is_there() {
+    std::array<unsigned char, 65'536> bytes;
+    const std::size_t before = received_;
+    ssize_t count = 0;
+    while ((count = ::recv(peer_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0) {
+      for (ssize_t i = 0; i < count; ++i)
+        intact_ = intact_ && bytes[static_cast<std::size_t>(i)] == received_++ % 251;
     }
+    return received_ > before;
+  }
+  void settle() {
+    io_.restart();
+    io_.poll();
   }
 
   asio::io_context io_{1};
@@ -69,14 +80,10 @@ class Pair {
   std::string cut;
 
  private:
-  void settle() {
-    io_.restart();
-    io_.poll();
-  }
-
   int peer_ = -1;
   std::size_t sent_ = 0;
   std::size_t received_ = 0;
+  bool intact_ = true;
   std::shared_ptr<void> owner_ = std::make_shared<int>();
 };
 
@@ -131,6 +138,59 @@ TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
   EXPECT_EQ(modest.cut, "") << "what an answer needs is always there";
   deaf.clear();
   EXPECT_EQ(pool->bytes, modest.waiting());
+}
+
+/// The server's clock, which stands still or jumps, until the end of a test.
+class Clock {
+ public:
+  Clock() { ServerClock::simulate(now_); }
+  ~Clock() { ServerClock::simulate(ServerClock::time_point(ServerClock::duration(-1))); }
+  Clock(const Clock&) = delete;
+  Clock& operator=(const Clock&) = delete;
+  /// What is due then comes at the next turn of the io_context, together with all else that there is.
+  void pass(asio::io_context& io, ServerClock::duration time) {
+    ServerClock::simulate(now_ += time);
+    const auto waker = std::make_shared<ServerTimer>(io, ServerClock::time_point::min());
+    waker->async_wait([waker](const boost::system::error_code&) {});
+  }
+
+ private:
+  ServerClock::time_point now_ = ServerClock::now();
+};
+
+// Catches: a limit that goes on although what it waited for has come in the same turn, as after a pause of
+// the process.
+TEST(Outbox, LIMIT_04_WhoHasReadDuringAPauseStays) {
+  for (const std::chrono::milliseconds pause : {2001ms, 3000ms}) {
+    Clock clock;
+    Pair pair(std::make_shared<OutboxPool>());
+    pair.send(700'000);  // more than the kernel takes
+    ASSERT_GT(pair.waiting(), 0u);
+    pair.read_what_is_there();
+    clock.pass(pair.io_, pause);
+    pair.settle();
+    EXPECT_EQ(pair.cut, "");
+    EXPECT_TRUE(pair.read_all());
+    EXPECT_EQ(pair.waiting(), 0u);
+  }
+}
+
+// Catches: a pause of the process that counts for the peer, as if what he has read meanwhile could be known
+// without a turn of whoever stands in between.
+TEST(Outbox, LIMIT_04_APauseOfTheServerCountsForNobody) {
+  Clock clock;
+  Pair pair(std::make_shared<OutboxPool>());
+  pair.send(700'000);
+  ASSERT_GT(pair.waiting(), 0u);
+  clock.pass(pair.io_, 3s);
+  pair.settle();
+  EXPECT_EQ(pair.cut, "") << "a second of it was beyond the limit";
+  clock.pass(pair.io_, 999ms);
+  pair.settle();
+  EXPECT_EQ(pair.cut, "");
+  clock.pass(pair.io_, 2ms);
+  pair.settle();
+  EXPECT_EQ(pair.cut, "it took nothing for 2 s");
 }
 
 }  // namespace

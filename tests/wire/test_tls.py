@@ -3,7 +3,9 @@
 would catch. Certificates are made here by openssl."""
 import json
 import pathlib
+import select
 import shutil
+import signal
 import socket
 import ssl
 import subprocess
@@ -20,7 +22,7 @@ except ImportError:
     sys.exit(77)
 
 from command_test import DRIVEBENCH
-from wire_client import PATIENCE_S, Client, Closed, pb
+from wire_client import PATIENCE_S, Client, Closed, frame, pb
 from wire_test import SERVO_TEXT, WireTest, until
 
 AUTHORITY = """
@@ -204,6 +206,46 @@ class Plain(TlsTest):
         until(lambda: owner.tcp_counts()["cut"] > 0, "it is counted")
         self.assertEqual(owner.tcp_counts()["cut"], 1)
         self.assertEqual(self.assertAudited(server.audit, "limit", 1), ["it took nothing for 2 s"])
+
+    def test_limit_04_limit_05_a_pause_of_the_server_cuts_nobody(self):
+        """Limits that end, when the process goes on, whoever has done his part while it was stopped: read, said hello, sent the
+        rest of a frame, or shaken hands."""
+        server = self.tls_server()
+        owner, reader, half = (self.tls_client(server, self.context(), **options) for options in ({}, {"receive_buffer": 4096}, {}))
+        owner.lease()
+        reader.ask(subscribe=pb.Subscribe(decimation=1))
+        for tick in range(3000):  # more than lies on the way
+            owner.step(tick, 1.0)
+        silent = self.tls_client(server, self.context(), hello=False)
+        shaking = self.context().wrap_socket(server.raw(), server_hostname="127.0.0.1", do_handshake_on_connect=False)
+        self.addCleanup(shaking.close)
+        shaking.setblocking(False)
+        server.process.send_signal(signal.SIGSTOP)  # so that it does not answer at once
+        with self.assertRaises(ssl.SSLWantReadError):
+            shaking.do_handshake()
+        server.process.send_signal(signal.SIGCONT)
+        select.select([shaking], [], [], PATIENCE_S)
+        whole = frame(pb.Envelope(id=7, status_request=pb.StatusRequest()).SerializeToString())
+        half.send_bytes(whole[:5])
+        owner.step(3000, 1.0)
+        server.process.send_signal(signal.SIGSTOP)
+        half.send_bytes(whole[5:])
+        hello = silent.send(hello=pb.Hello(protocol_min=1, protocol_max=1))
+        shaking.do_handshake()
+        reader.socket.settimeout(0.2)
+        with self.assertRaises(TimeoutError):
+            while True:
+                reader.buffer += reader.socket.recv(1 << 16)
+        time.sleep(2.3)
+        server.process.send_signal(signal.SIGCONT)
+        for each in (shaking, reader.socket):
+            each.settimeout(PATIENCE_S)
+        self.assertEqual(half.answer_to(7).WhichOneof("kind"), "status")
+        self.assertEqual(silent.answer_to(hello).WhichOneof("kind"), "welcome")
+        self.assertEqual(Client(shaking).newest().tick, 3001)
+        self.assertEqual(reader.newest().tick, 3001)
+        counts = owner.tcp_counts()
+        self.assertEqual((counts["cut"], counts["tls_refused"], counts["sessions"]), (0, 0, 5))
 
     def test_a_peer_that_does_not_say_goodbye_is_not_called_deaf(self):
         """A limit that counts those who were sent away and were slow to leave."""

@@ -66,10 +66,10 @@ bool Connection::has_lease() const noexcept {
 void Connection::start_timer() {
   if (timing_) return;
   timing_ = true;
-  timer_.expires_after(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms));
-  timer_.async_wait([self = shared_from_this(), run = timer_run_](const boost::system::error_code& error) {
-    if (!error && run == self->timer_run_ && self->open_) self->cut("a frame took too long");
-  });
+  timer_.set(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms),
+             [self = shared_from_this()] {
+               if (self->open_) self->cut("a frame took too long");
+             });
 }
 
 asio::awaitable<void> Connection::run() {
@@ -98,7 +98,6 @@ asio::awaitable<void> Connection::run() {
     if (reader_.in_frame()) start_timer();
   }
   stop_timer();
-  timer_.cancel();
 }
 
 void Connection::end() {

@@ -12,6 +12,7 @@
 #include "protocols/modbus/pdu.hpp"
 #include "server/asio.hpp"
 #include "server/audit.hpp"
+#include "server/endpoints/deadline.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/modbus/axis_desk.hpp"
 #include "server/endpoints/modbus/identification.hpp"
@@ -77,9 +78,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   /// Closes the connection unless stopped in time.
   void start_timer();
-  void stop_timer() noexcept {
-    ++timer_run_;
+  void stop_timer() {
     timing_ = false;
+    timer_.call_off();
   }
 
   asio::awaitable<bool> answer(Bytes adu);
@@ -104,8 +105,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::vector<std::uint8_t> out_;
   std::array<std::uint16_t, kMaxReadRegisters> words_{};  ///< of the write under way
   ServerTimer waker_;
-  ServerTimer timer_;
-  std::uint64_t timer_run_ = 0;
+  Deadline timer_;
   bool timing_ = false;
   bool waiting_ = false;
   bool open_ = true;

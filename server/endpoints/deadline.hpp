@@ -1,0 +1,38 @@
+#pragma once
+
+#include <chrono>
+#include <utility>
+
+#include "server/asio.hpp"
+
+namespace drivebench {
+
+/// A limit for a peer, in the time that this process runs. After a pause of the process (a signal, a virtual
+/// machine, a thread that hung) what the peer did meanwhile and the end of its time come together: a handler
+/// that is queued can no longer be cancelled, and bytes may have some way to go within the server.
+class Deadline {
+ public:
+  explicit Deadline(const asio::any_io_executor& executor) : timer_(executor) {}
+
+  /// Calls `on_over` after so long, in place of the one before. It keeps the owner of this object alive.
+  template <class OnOver>
+  void set(ServerClock::duration limit, OnOver on_over) {
+    timer_.expires_after(limit);
+    timer_.async_wait([this, on_over = std::move(on_over)](const boost::system::error_code& error) mutable {
+      if (error) return;
+      const ServerClock::duration late = ServerClock::now() - timer_.expiry();
+      if (late < ServerClock::duration::zero()) return;  // set anew or called off meanwhile
+      if (late > kPause) return set(late, std::move(on_over));
+      on_over();
+    });
+  }
+  void call_off() { timer_.expires_at(ServerClock::time_point::max()); }
+
+ private:
+  /// Who is as late has been away, and that time does not count.
+  static constexpr auto kPause = std::chrono::milliseconds(100);
+
+  ServerTimer timer_;
+};
+
+}  // namespace drivebench
