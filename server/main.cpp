@@ -215,8 +215,8 @@ asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const Options&
     try {
       BenchConfig now = configure(o);
       details.emplace_back("configuration_hash", fmt::format("{:016x}", configuration_hash(now)));
-      set_log_level(now.log_level);
       server.replace_grants(std::move(now.tcp));
+      set_log_level(now.log_level);
       spdlog::info("SIGHUP: tokens and log level are those of {} now", o.config);
     } catch (const std::exception& error) {
       result = error.what();

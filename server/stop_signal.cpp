@@ -3,26 +3,41 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
+#include <ctime>
 #include <utility>
 
 namespace drivebench {
 namespace {
 
-volatile std::sig_atomic_t event_of_handler = -1;
+constexpr std::int64_t kNever = 0;
+constexpr std::int64_t kLongAgo = 1;
 
-void leave_to_the_system() noexcept {
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+volatile std::sig_atomic_t event_of_handler = -1;
+std::atomic<std::int64_t> first_ns{kNever};  // of the clock below
+static_assert(std::atomic<std::int64_t>::is_always_lock_free, "a signal handler changes it");
+
+std::int64_t now_ns() noexcept {
+  std::timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
-extern "C" void on_signal(int) {
+extern "C" void on_signal(int number) {
+  constexpr std::int64_t kOneOrder_ns = 500'000'000;
   const int error = errno;
-  leave_to_the_system();
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(event_of_handler, &one, sizeof(one));
+  const std::int64_t now = now_ns();
+  std::int64_t first = kNever;
+  if (first_ns.compare_exchange_strong(first, now)) {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = ::write(event_of_handler, &one, sizeof(one));
+  } else if (now - first > kOneOrder_ns) {
+    std::signal(number, SIG_DFL);
+    ::raise(number);
+  }
   errno = error;
 }
 
@@ -40,7 +55,9 @@ StopSignal::StopSignal(asio::io_context& io, std::function<void()> on_stop)
 }
 
 StopSignal::~StopSignal() {
-  leave_to_the_system();
+  event_.release();  // stays open: a handler in another thread may be about to write to it
+  std::int64_t none = kNever;
+  first_ns.compare_exchange_strong(none, kLongAgo);
 }
 
 }  // namespace drivebench

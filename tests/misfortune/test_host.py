@@ -207,12 +207,15 @@ class Threads(HostTest):
                 self.assertEqual(server.process.wait(timeout=10.0), -second)
 
     def test_os_01_one_signal_waits_for_an_end_in_order(self):
-        """A signal that is lost because nobody listens just then, or that costs the end of the recording."""
+        """A signal that is lost because nobody listens just then, or that costs the end of the recording; one order that
+        comes as two signals, from `timeout` or a shell, and kills."""
         file = self.folder() / "run.mcap"
         server = self.unlucky_server(Misfortune(sleep_ms=1500), "--mode", "realtime", "--record", str(file))
         self.client(server).status()
         signal_thread(server.process.pid, server.process.pid, signal.SIGUSR2)
         until(lambda: "the I/O thread stands still" in server.errors(), "it stands still")
+        server.process.send_signal(signal.SIGINT)
+        time.sleep(0.01)  # it has been noticed
         self.assertEqual(server.stop(), 0)
         self.assertEqual(server.verdict["gaps"], 0)
         self.assertTrue(Recording(file.read_bytes()).finished)

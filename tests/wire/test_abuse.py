@@ -364,9 +364,14 @@ class Process(RecordingTest):
         until(lambda: "SIGHUP: tokens" in server.errors(), "the level holds")
         self.assertNotIn("stays as it is", server.errors(), "the level was off")
         client.step(2)
-        bench.write_text("no bench", encoding="utf-8")
-        server.process.send_signal(signal.SIGHUP)
-        until(lambda: "everything stays as it is" in server.errors(), "the reason is told")
+        tokens = server.folder / "tokens"
+        tokens.write_text('[[token]]\nname = "adam"\nrole = "admin"\ntoken = "adam-secret"\n', encoding="utf-8")
+        tokens.chmod(0o600)
+        with_tokens = SERVO_TEXT.replace("[tcp]", f'[tcp]\ntokens_file = "{tokens}"') + '[log]\nlevel = "off"\n'
+        for count, text in enumerate((with_tokens, "no bench"), 1):
+            bench.write_text(text, encoding="utf-8")
+            server.process.send_signal(signal.SIGHUP)
+            until(lambda count=count: server.errors().count("everything stays as it is") == count, "the reason is told")
         client.step(3)
         self.assertEqual(server.stop(), 0)
 
