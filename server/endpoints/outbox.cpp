@@ -1,6 +1,7 @@
 #include "server/endpoints/outbox.hpp"
 
 #include <algorithm>
+#include <string>
 
 namespace drivebench {
 
@@ -71,7 +72,11 @@ void Outbox::write_more(const std::shared_ptr<void>& owner) {
 }
 
 void Outbox::expect_progress(const std::shared_ptr<void>& owner) {
-  deadline_.set(kNoProgressLimit, [this, owner] { cut("it took nothing for 2 s"); });
+  deadline_.set(kNoProgressLimit, [this, owner] { cut_deaf(); });
+}
+
+void Outbox::cut_deaf() {
+  cut("it took nothing for " + std::to_string(kNoProgressLimit.count()) + " s");
 }
 
 void Outbox::cut(std::string_view why) {

@@ -53,6 +53,8 @@ class Outbox {
 
   /// Closes it, and says why, unless it is closed already.
   void cut(std::string_view why);
+  /// The same for a peer who took nothing for kNoProgressLimit.
+  void cut_deaf();
   /// Shuts the socket down; what is queued is lost.
   void close() noexcept;
 

@@ -74,6 +74,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_new_grants();
   bool greeted() const noexcept { return greeted_; }
 
+  /// When somebody who passes on what this session sends finds that the peer takes nothing.
+  void on_deaf() { outbox_.cut_deaf(); }
+
   /// Refuses the connection itself, before anything was read.
   void turn_away(std::string_view sentence);
   void close();

@@ -138,17 +138,12 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
 }
 
 void StreamServer::watch_door() {
-  const auto note = [this](std::string_view event, const std::string& peer, std::string_view why) {
-    const Client who{.transport = "tcp", .peer = peer, .subject = {}};
-    if (context_->audit != nullptr) context_->audit->note({.name = event, .client = &who, .result = why});
-  };
-  door_->on_turned_away = [this, note](const std::string& peer, const std::string& why) {
+  door_->on_turned_away = [this](const std::string& peer, const std::string& why) {
     ++context_->counts.tls_refused;
-    note("tls_refused", peer, why);
-  };
-  door_->on_cut = [this, note](const std::string& peer) {
-    ++context_->counts.cut;
-    note("limit", peer, "it took nothing for 2 s");
+    const Client who{.transport = "tcp", .peer = peer, .subject = {}};
+    if (context_->audit != nullptr) {
+      context_->audit->note({.name = "tls_refused", .client = &who, .result = why});
+    }
   };
 }
 
@@ -164,6 +159,7 @@ std::string StreamServer::tcp_address() const {
 
 template <class Acceptor>
 asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
+  LogLimit log;
   while (acceptor.is_open()) {
     try {
       boost::system::error_code error;
@@ -171,7 +167,10 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
           co_await acceptor.async_accept(asio::redirect_error(asio::use_awaitable, error));
       if (error == asio::error::operation_aborted) co_return;
       if (error) {
-        spdlog::warn("cannot accept a client: {}", error.message());
+        if (log.allow()) {
+          spdlog::warn("cannot accept a client: {} ({} more since the last such line)", error.message(),
+                       log.held_back());
+        }
         ServerTimer pause(io_, kAcceptPause);
         co_await pause.async_wait(asio::use_awaitable);
         continue;
@@ -186,10 +185,17 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
 
 void StreamServer::receive(tcp::socket socket) {
   Client who = peer_of(socket);
-  if (!door_) return start(Socket(std::move(socket)), std::move(who));
+  if (!door_) {
+    start(Socket(std::move(socket)), std::move(who));
+    return;
+  }
   const std::string peer = who.peer;
   door_->receive(std::move(socket), peer, [this, who](Socket plain, const std::string& subject) {
-    start(std::move(plain), {.transport = who.transport, .peer = who.peer, .subject = subject});
+    const std::weak_ptr<Session> session =
+        start(std::move(plain), {.transport = who.transport, .peer = who.peer, .subject = subject});
+    return [session] {
+      if (const auto still_here = session.lock()) still_here->on_deaf();
+    };
   });
 }
 
@@ -221,7 +227,7 @@ void StreamServer::replace_grants(TcpConfig now) {
     sessions_[i]->on_new_grants();
 }
 
-void StreamServer::start(Socket socket, Client who) {
+std::shared_ptr<Session> StreamServer::start(Socket socket, Client who) {
   auto session = std::make_shared<Session>(std::move(socket), who, *context_);
   const auto silent =
       std::count_if(sessions_.begin(), sessions_.end(), [](const auto& other) { return !other->greeted(); });
@@ -238,10 +244,11 @@ void StreamServer::start(Socket socket, Client who) {
     }
     session->turn_away(why_not);
     session->close();
-    return;
+    return session;
   }
   sessions_.push_back(session);
-  asio::co_spawn(io_, run(std::move(session)), asio::detached);
+  asio::co_spawn(io_, run(session), asio::detached);
+  return session;
 }
 
 asio::awaitable<void> StreamServer::run(std::shared_ptr<Session> session) {

@@ -42,7 +42,7 @@ class StreamServer {
   asio::awaitable<void> accept_from(Acceptor& acceptor);
   void receive(asio::ip::tcp::socket socket);
   void receive(asio::local::stream_protocol::socket socket);
-  void start(Socket socket, Client who);
+  std::shared_ptr<Session> start(Socket socket, Client who);
   void watch_door();
   TransportReport report() const;
   asio::awaitable<void> run(std::shared_ptr<Session> session);

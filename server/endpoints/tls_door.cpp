@@ -82,7 +82,9 @@ struct TlsDoor::Context {
 class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
  public:
   Passage(asio::ip::tcp::socket socket, Context& context)
-      : stream(std::move(socket), context.tls), inside(stream.get_executor()), deadline(stream.get_executor()) {
+      : stream(std::move(socket), context.tls),
+        inside(stream.get_executor()),
+        deadline(stream.get_executor()) {
     boost::system::error_code ignored;
     stream.set_verify_callback(
         [this](bool good, asio::ssl::verify_context& checked) {
@@ -96,6 +98,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   void limit(std::chrono::milliseconds limit) {
     deadline.set(limit, [self = shared_from_this()] {
       self->was_late = true;
+      if (self->on_deaf) self->on_deaf();
       self->close();
     });
   }
@@ -108,7 +111,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
 
   /// Why the handshake failed.
   std::string why_refused(const boost::system::error_code& error) {
-    if (was_late) return "no handshake within 2 s";
+    if (was_late) return "no handshake within " + std::to_string(kHandshakeLimit.count()) + " s";
     const long verdict = SSL_get_verify_result(stream.native_handle());
     return (verdict == X509_V_OK ? error.message() : X509_verify_cert_error_string(verdict)) +
            (refused_subject.empty() ? "" : ", certificate of " + refused_subject);
@@ -135,7 +138,6 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
       if (!error) co_await write_all(stream, block, count, error);
       deadline.call_off();
     }
-    was_deaf = was_late;
     if (was_late) co_return;
     limit(kFarewellLimit);
     co_await stream.async_shutdown(asio::redirect_error(asio::use_awaitable, error));
@@ -148,7 +150,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   Deadline deadline;
   std::string refused_subject;  ///< in a certificate that does not hold
   bool was_late = false;        ///< a limit has ended it
-  bool was_deaf = false;        ///< while there was something to read
+  OnDeaf on_deaf;               ///< of a peer who was let in
 
  private:
   template <class To>
@@ -214,7 +216,7 @@ asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std
   try {
     auto [inside, outside] = socket_pair(io_);
     passage->inside = std::move(inside);
-    let_in(PlainSocket(std::move(outside)), subject_of(passage->stream.native_handle()));
+    passage->on_deaf = let_in(PlainSocket(std::move(outside)), subject_of(passage->stream.native_handle()));
   } catch (const std::exception& problem) {
     spdlog::error("{}: a client could not be taken: {}", peer, problem.what());
     passage->close();
@@ -225,7 +227,6 @@ asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std
   };
   asio::co_spawn(io_, carry(passage, true), asio::detached);
   co_await carry(passage, false);
-  if (passage->was_deaf && on_cut) on_cut(peer);
 }
 
 }  // namespace drivebench

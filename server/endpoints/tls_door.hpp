@@ -26,13 +26,13 @@ class TlsDoor {
   ~TlsDoor();
 
   using PlainSocket = asio::generic::stream_protocol::socket;
+  /// Called when a client who was let in takes nothing for Outbox::kNoProgressLimit, before he is cut off.
+  using OnDeaf = std::function<void()>;
   /// Takes a client who is let in, and the name in his certificate (empty: he showed none).
-  using LetIn = std::function<void(PlainSocket, const std::string& subject)>;
+  using LetIn = std::function<OnDeaf(PlainSocket, const std::string& subject)>;
 
   /// Called with everyone who was not let in, and why. The log hears of some of them.
   std::function<void(const std::string& peer, const std::string& why)> on_turned_away;
-  /// Called with a peer who was let in and is cut off because he took nothing for Outbox::kNoProgressLimit.
-  std::function<void(const std::string& peer)> on_cut;
 
   /// Shakes hands with a peer and lets him in.
   void receive(asio::ip::tcp::socket socket, const std::string& peer, LetIn let_in);

@@ -101,6 +101,12 @@ class TlsTest(WireTest):
         self.assertEqual(client.tcp_counts()["tls_refused"], count)
         return self.assertAudited(server.audit, "tls_refused", count)
 
+    def assertCutOnce(self, server, why):
+        self.assertEqual(self.assertAudited(server.audit, "limit", 1), [why])
+        ended, = self.audited(server.audit, "session_ended")
+        self.assertEqual((ended["subject"], ended["details"]["reason"]), ("anna", why))
+        self.assertEqual([line["subject"] for line in self.audited(server.audit, "limit")], ["anna"])
+
     def context(self, name=None, authority="ca"):
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.load_verify_locations(self.made.folder / f"{authority}.pem")
@@ -192,9 +198,11 @@ class Plain(TlsTest):
         self.assertEqual(set(others), {"no handshake within 2 s"})
 
     def test_tcp_10_a_reader_that_stops_is_cut_behind_tls_too(self):
-        """A stream behind the door that is fed for ever."""
-        server = self.tls_server()
-        owner, deaf = self.tls_client(server, self.context()), self.tls_client(server, self.context(), receive_buffer=4096)
+        """A stream behind the door that is fed for ever; one that is cut by the door, so that the log does not know whose it was
+        or says that he left."""
+        server = self.mutual_server()
+        owner = self.tls_client(server, self.context("anna"))
+        deaf = self.tls_client(server, self.context("anna"), receive_buffer=4096)
         owner.lease()
         deaf.ask(subscribe=pb.Subscribe(decimation=1))
         began = time.monotonic()
@@ -205,7 +213,19 @@ class Plain(TlsTest):
         self.assertLimitOf2s(began, ended)
         until(lambda: owner.tcp_counts()["cut"] > 0, "it is counted")
         self.assertEqual(owner.tcp_counts()["cut"], 1)
-        self.assertEqual(self.assertAudited(server.audit, "limit", 1), ["it took nothing for 2 s"])
+        self.assertCutOnce(server, "it took nothing for 2 s")
+
+    def test_limit_03_whoever_is_cut_for_what_waits_is_cut_once(self):
+        """A door that goes on with what it has, finds the peer deaf and counts him again, without a name."""
+        server = self.mutual_server()
+        owner = self.tls_client(server, self.context("anna"))
+        greedy = self.tls_client(server, self.context("anna"), receive_buffer=4096)
+        request = frame(pb.Envelope(id=1, read_parameters=pb.ReadParameters()).SerializeToString())
+        with self.assertRaises(OSError):  # when the door gives up as well
+            while True:
+                greedy.send_bytes(request * 100)
+        self.assertEqual(owner.tcp_counts()["cut"], 1)
+        self.assertCutOnce(server, "too much waits for it")
 
     def test_limit_04_limit_05_a_pause_of_the_server_cuts_nobody(self):
         """Limits that end, when the process goes on, whoever has done his part while it was stopped: read, said hello, sent the
