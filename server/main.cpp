@@ -248,26 +248,27 @@ void note_end(Audit& audit, const Engine& engine, const Verdict& verdict) {
   audit.note({.name = "stop", .details = {{"ticks", verdict.ticks}, {"late_ticks", verdict.late_ticks}}});
 }
 
-int serve(const Options& o) {
-  const BenchConfig config = configure(o);
-  if (!o.print.empty()) {
-    fmt::print("{}", interface_text(config, o.print, o.bus));
-    return kOk;
+void print_checked(const Options& o, const BenchConfig& config) {
+  if (o.json) {
+    const nlohmann::json checked{{"event", "checked"},
+                                 {"bench", config.name},
+                                 {"axes", config.axes.size()},
+                                 {"mode", name_of(config.mode)}};
+    return print_line(checked.dump());
   }
-  if (o.check_config) {
-    if (o.json) {
-      const nlohmann::json checked{{"event", "checked"},
-                                   {"bench", config.name},
-                                   {"axes", config.axes.size()},
-                                   {"mode", name_of(config.mode)}};
-      print_line(checked.dump());
-    } else {
-      print_line(fmt::format("{}: no problems; bench {}, {} {}, {} mode", o.config, config.name,
-                             config.axes.size(), config.axes.size() == 1 ? "axis" : "axes",
-                             name_of(config.mode)));
-    }
-    return kOk;
-  }
+  print_line(fmt::format("{}: no problems; bench {}, {} {}, {} mode", o.config, config.name,
+                         config.axes.size(), config.axes.size() == 1 ? "axis" : "axes",
+                         name_of(config.mode)));
+}
+
+int exit_code(const Options& o, const Verdict& verdict) {
+  if (verdict.gaps > 0) return kFailed;
+  const bool too_late =
+      o.fail_on_late >= 0 && verdict.late_ticks > static_cast<std::uint64_t>(o.fail_on_late);
+  return too_late ? kTooLate : kOk;
+}
+
+int serve(const Options& o, const BenchConfig& config) {
   set_log_level(config.log_level);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
@@ -320,10 +321,19 @@ int serve(const Options& o) {
   server.close();
   if (audit) note_end(*audit, *engine, verdict);
   print_verdict(o, verdict);
-  if (broken || verdict.gaps > 0) return kFailed;
-  const bool too_late =
-      o.fail_on_late >= 0 && verdict.late_ticks > static_cast<std::uint64_t>(o.fail_on_late);
-  return too_late ? kTooLate : kOk;
+  return broken ? kFailed : exit_code(o, verdict);
+}
+
+int use_bench(const Options& o) {
+  const BenchConfig config = configure(o);
+  if (!o.print.empty()) {
+    fmt::print("{}", interface_text(config, o.print, o.bus));
+  } else if (o.check_config) {
+    print_checked(o, config);
+  } else {
+    return serve(o, config);
+  }
+  return kOk;
 }
 
 int run(int argc, char** argv) {
@@ -373,7 +383,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "a bench file is needed, for example configs/benches/servo.toml; see --help\n");
     return kUnusable;
   }
-  return o.replay.empty() ? serve(o) : replay_command(o.replay, o.json);
+  return o.replay.empty() ? use_bench(o) : replay_command(o.replay, o.json);
 }
 
 }  // namespace
