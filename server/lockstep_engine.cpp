@@ -20,15 +20,21 @@ class LockstepEngine final : public Engine {
     show();
   }
 
+  /// While time waits for the disk each axis gets one command, and no newer ones in its place: they would be
+  /// recorded without end.
   Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
-    return bench_.would_refuse(axis, owner, command);
+    const Refused why = bench_.would_refuse(axis, owner, command);
+    return why == Refused::kNot && waits_for_disk_ && bench_.has_command(axis) ? Refused::kBusy : why;
   }
 
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+    const Refused why = has_room() ? Refused::kNot : check(axis, owner, command);
+    if (why != Refused::kNot) return why;  // nor counted, which would be an input
     return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
   }
 
   void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
+    if (!has_room()) return refuse_to_take(axis, by, Refused::kBusy, answer);
     is_taking_ = true;  // no tick between the two inputs
     Engine::take(axis, by, reason, std::move(answer));
     is_taking_ = false;
@@ -37,13 +43,13 @@ class LockstepEngine final : public Engine {
 
   void advance() override {
     if (is_taking_) return;
+    if (recorder_ && !recorder_->has_room()) return try_again_soon();
     bool commanded = false;
     for (std::size_t i = 0; i < bench_.axis_count(); ++i) {
       if (bench_.owner(i) != 0 && !bench_.has_command(i) && !bench_.is_latched(i)) return;
       commanded = commanded || bench_.has_command(i);
     }
     if (!commanded) return;  // without a controller a lockstep bench stands still
-    if (recorder_ && !recorder_->has_room()) return try_again_soon();
     watch_.beat();
     {
       const TickMark mark;
@@ -57,7 +63,8 @@ class LockstepEngine final : public Engine {
   }
 
   void submit(const Input& input, Answer answer) override {
-    const Refused refused = bench_.submit(input);
+    const bool may_be_recorded = has_room() || is_taking_ || ends_lease(input);
+    const Refused refused = may_be_recorded ? bench_.submit(input) : Refused::kBusy;
     if (std::holds_alternative<ParameterWrite>(input.action) && input.axis < parameters_.size()) {
       parameters_[input.axis] = bench_.axis(input.axis).parameters();  // even if it was refused
     }
@@ -82,6 +89,18 @@ class LockstepEngine final : public Engine {
   std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
+  /// For inputs that may come without end; what a tick waits for and what ends a lease has a place in any
+  /// case.
+  bool has_room() const noexcept { return !recorder_ || (!waits_for_disk_ && recorder_->has_room()); }
+
+  bool ends_lease(const Input& input) const noexcept {
+    const auto* const action = std::get_if<LeaseAction>(&input.action);
+    const bool ends =
+        action != nullptr && (*action == LeaseAction::kLost || *action == LeaseAction::kRelease);
+    return ends && input.owner != 0 && input.axis < bench_.axis_count() &&
+           bench_.owner(input.axis) == input.owner;
+  }
+
   /// The disk is slow: time stands still until it has caught up, and everybody is served meanwhile.
   void try_again_soon() {
     if (std::exchange(waits_for_disk_, true)) return;

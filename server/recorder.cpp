@@ -17,6 +17,11 @@ constexpr std::size_t kMaxRingBytes = std::size_t{256} << 20;
 /// So many entries at most between two looks at the clock.
 constexpr std::size_t kEntriesPerLook = 4096;
 
+/// What may come beside the samples between two looks for room: the requests and commands of a free tick; in
+/// lockstep, where there is none, an exchange, a command and an end of the lease of each axis.
+constexpr std::size_t kInputsPerLook = 512;
+static_assert(kInputsPerLook >= 256 + 3 * kMaxAxes);
+
 }  // namespace
 
 std::size_t recorder_ring_entries(const BenchConfig& config) noexcept {
@@ -29,7 +34,7 @@ Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
                    std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options)
     : file_(file.string()),
       ring_(recorder_ring_entries(config)),
-      room_for_tick_(config.axes.size() + 512),
+      room_for_tick_(config.axes.size() + kInputsPerLook),
       writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)) {
   if (options.own_thread) thread_ = std::thread([this] { run(); });
 }
