@@ -149,6 +149,23 @@ class Descriptor {
   int value_;
 };
 
+/// Bytes of the character that begins here, 0 if none does (Unicode 15, table 3-7).
+std::size_t size_of_first(std::string_view text) noexcept {
+  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned lead = byte(0);
+  if (lead < 0x80) return 1;
+  if (lead < 0xC2 || lead > 0xF4) return 0;
+  const std::size_t size = lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : 4;
+  if (text.size() < size) return 0;
+  // Of what could be said in fewer bytes, of surrogates and beyond the last one the second byte tells.
+  const unsigned lowest = lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80;
+  const unsigned highest = lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
+  if (byte(1) < lowest || byte(1) > highest) return 0;
+  for (std::size_t i = 2; i < size; ++i)
+    if ((byte(i) & 0xC0u) != 0x80u) return 0;
+  return size;
+}
+
 std::string reason(int error) {
   return "cannot be read: " + std::generic_category().message(error);
 }
@@ -223,18 +240,25 @@ FileText read_file(const std::filesystem::path& file, std::size_t limit) {
   }
 }
 
+std::string utf8(std::string_view text, std::size_t most) {
+  std::string result;
+  while (!text.empty()) {
+    const std::size_t size = size_of_first(text);
+    const std::string_view first = size == 0 ? "?" : text.substr(0, size);
+    if (result.size() + first.size() > most) break;
+    result += first;
+    text.remove_prefix(first.size());
+  }
+  return result;
+}
+
 std::string printable(std::string_view text) {
   constexpr std::size_t kMost = 160;
-  const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) == 0x80u; };
-  std::size_t size = std::min(text.size(), kMost);
-  while (size < text.size() && size > 0 && continues(text[size]))
-    --size;
-  std::string result;
-  for (const char c : text.substr(0, size)) {
-    const auto code = static_cast<unsigned char>(c);
-    result += code < 0x20 || code == 0x7F ? '?' : c;
-  }
-  return size < text.size() ? result + "..." : result;
+  std::string result = utf8(text, kMost);
+  const bool is_cut = result.size() < text.size();
+  const auto controls = [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; };
+  std::replace_if(result.begin(), result.end(), controls, '?');
+  return is_cut ? result + "..." : result;
 }
 
 std::string hexadecimal(std::int64_t value) {

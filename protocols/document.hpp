@@ -81,7 +81,11 @@ struct FileText {
 };
 FileText read_file(const std::filesystem::path& file, std::size_t limit);
 
-/// The text fit for one line of a terminal: control characters replaced, cut after 160 bytes.
+/// The text as UTF-8, at most so many bytes of it and no character by half; '?' for a byte that belongs to
+/// none. A string of protobuf that is anything else makes its message one that nobody can read.
+std::string utf8(std::string_view text, std::size_t most = std::string_view::npos);
+
+/// The text fit for one line of a terminal: UTF-8 without control characters, cut after 160 bytes.
 std::string printable(std::string_view text);
 
 /// As hexadecimal numbers are written: 0x1a.

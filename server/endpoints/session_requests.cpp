@@ -5,6 +5,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "plant/parameters/rows.hpp"
+#include "protocols/document.hpp"
 #include "server/endpoints/description.hpp"
 #include "server/endpoints/session.hpp"
 #include "server/input_codec.hpp"
@@ -50,7 +51,7 @@ void Session::refuse(std::uint64_t id, v1::RefusalCode code, const std::string& 
   reply_.set_id(id);
   v1::Refusal& refusal = *reply_.mutable_refusal();
   refusal.set_code(code);
-  refusal.set_message(message);
+  refusal.set_message(utf8(message));  // it may hold the name of a file
   refusal.set_field(field);
   send(reply_);
 }
@@ -214,8 +215,8 @@ void Session::subscribe(const v1::Subscribe& r) {
   for (const std::string& name : r.signals()) {
     const Signal* signal = find_signal(name);
     if (signal == nullptr) {
-      return refuse(request_.id(), v1::REFUSAL_UNKNOWN_SIGNAL,
-                    "there is no signal '" + name.substr(0, 100) + "'", "signals");
+      return refuse(request_.id(), v1::REFUSAL_UNKNOWN_SIGNAL, "there is no signal '" + printable(name) + "'",
+                    "signals");
     }
     mask |= SignalMask{1} << (signal - kSignals.data());
   }
@@ -249,7 +250,7 @@ void Session::read_parameters(const v1::ReadParameters& r) {
     const Parameter* row = find_parameter(engine_.parameters(r.axis()), name);
     if (row == nullptr) {
       return refuse(request_.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
-                    "there is no parameter '" + name.substr(0, 100) + "'", "names");
+                    "there is no parameter '" + printable(name) + "'", "names");
     }
     *values.add_parameters() =
         describe_parameter(engine_, r.axis(), static_cast<std::size_t>(row - table.data()));
@@ -266,7 +267,7 @@ void Session::write_parameter(const v1::WriteParameter& r) {
   const Parameter* row = find_parameter(p, r.name());
   if (row == nullptr) {
     return refuse(request_.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
-                  "there is no parameter '" + r.name().substr(0, 100) + "'", "name");
+                  "there is no parameter '" + printable(r.name()) + "'", "name");
   }
   if (!row->live) {
     return refuse(request_.id(), v1::REFUSAL_READ_ONLY, r.name() + " cannot be changed while the bench runs",
@@ -307,8 +308,8 @@ void Session::inject_fault(const v1::InjectFault& r) {
   if (!may_change(r.axis())) return;
   const std::size_t row = find_injectable_fault(r.name());
   if (row == kInjectableFaultCount) {
-    return refuse(request_.id(), v1::REFUSAL_UNKNOWN_FAULT,
-                  "there is no fault '" + r.name().substr(0, 100) + "'", "name");
+    return refuse(request_.id(), v1::REFUSAL_UNKNOWN_FAULT, "there is no fault '" + printable(r.name()) + "'",
+                  "name");
   }
   if (const std::string problem = problem_with(kInjectableFaults[row], r.value()); !problem.empty()) {
     const bool finite = std::isfinite(r.value());
@@ -349,7 +350,7 @@ void Session::report_status() {
   status.set_worst_lateness_s(static_cast<double>(engine_.worst_lateness_ns()) * 1e-9);
   status.set_sessions(static_cast<std::uint32_t>(context_.session_count()));
   if (const Recorder* recorder = engine_.recorder()) {
-    status.set_recording(recorder->file());
+    status.set_recording(utf8(recorder->file()));
     status.set_recording_gaps(recorder->gaps());
     status.set_recording_over(recorder->is_over());
   }

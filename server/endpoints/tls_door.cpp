@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <array>
 #include <boost/asio/local/connect_pair.hpp>
 #include <boost/asio/ssl.hpp>
@@ -53,8 +52,7 @@ std::string name_in(const X509* certificate) {
   if (size < 0) return {};
   const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owner(
       utf8, [](unsigned char* text) { OPENSSL_free(text); });
-  constexpr int kMaxName = 100;
-  return printable({reinterpret_cast<const char*>(utf8), static_cast<std::size_t>(std::min(size, kMaxName))});
+  return printable({reinterpret_cast<const char*>(utf8), static_cast<std::size_t>(size)});
 }
 
 /// The name in the certificate of a peer who was let in; empty: he has shown none.

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "protocols/document.hpp"
 #include "server/experiments/limits.hpp"
 #include "server/input_codec.hpp"
 
@@ -18,15 +19,6 @@ namespace {
 constexpr auto kWatchInterval = std::chrono::milliseconds(250);
 /// Below everybody who has to meet a deadline.
 constexpr int kWorkerNice = 10;
-
-/// At most so many bytes, and no character by half.
-std::string beginning_of(std::string text, std::size_t most) {
-  if (text.size() <= most) return text;
-  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0u) == 0x80u)
-    --most;
-  text.resize(most);
-  return text;
-}
 
 }  // namespace
 
@@ -325,7 +317,7 @@ void Experiments::run(const Pointer& experiment) {
 void Experiments::end(const Pointer& experiment, const RunOutcome& outcome) {
   v1::ExperimentInfo info = experiment->info;  // while it runs only this thread changes it
   info.set_state(outcome.state);
-  info.set_reason(beginning_of(outcome.reason, kMaxExperimentReasonBytes));
+  info.set_reason(utf8(outcome.reason, kMaxExperimentReasonBytes));
   if (outcome.state == v1::EXPERIMENT_STATE_CANCELLED) {
     const std::lock_guard lock(mutex_);
     if (stop_) info.set_reason("the server ended");

@@ -7,6 +7,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "plant/parameters/rows.hpp"
+#include "protocols/document.hpp"
 #include "server/endpoints/terminals.hpp"
 #include "server/experiments/plan_shapes.hpp"
 
@@ -63,7 +64,7 @@ std::vector<const Signal*> signals_of(const v1::RunExperiment& r) {
     const Signal* const signal = find_signal(r.signals(i));
     if (signal == nullptr) {
       throw BadRequest(v1::REFUSAL_UNKNOWN_SIGNAL, field,
-                       "there is no signal '" + r.signals(i).substr(0, 100) + "'");
+                       "there is no signal '" + printable(r.signals(i)) + "'");
     }
     if (std::find(signals.begin(), signals.end(), signal) != signals.end()) {
       throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, field, r.signals(i) + " is named twice");
@@ -80,7 +81,7 @@ std::uint32_t row_of(const v1::NamedValue& wanted, const BenchConfig& config, st
   const Parameter* const row = find_parameter(p, wanted.name());
   if (row == nullptr) {
     throw BadRequest(v1::REFUSAL_UNKNOWN_PARAMETER, field + ".name",
-                     "there is no parameter '" + wanted.name().substr(0, 100) + "'");
+                     "there is no parameter '" + printable(wanted.name()) + "'");
   }
   if (config.setup.axes[axis].shares_shaft_with && row->name.starts_with("mechanics.")) {
     throw BadRequest(v1::REFUSAL_READ_ONLY, field + ".name",
@@ -158,7 +159,7 @@ Action action_of(const v1::ExperimentEvent& e, const ExperimentPlan& plan, std::
       const std::size_t row = find_injectable_fault(e.fault().name());
       if (row == kInjectableFaultCount) {
         throw BadRequest(v1::REFUSAL_UNKNOWN_FAULT, field + ".fault.name",
-                         "there is no fault '" + e.fault().name().substr(0, 100) + "'");
+                         "there is no fault '" + printable(e.fault().name()) + "'");
       }
       if (const std::string problem = problem_with(kInjectableFaults[row], e.fault().value());
           !problem.empty()) {

@@ -22,6 +22,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
+from experiment_test import request
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, Closed, frame, pb
 from wire_test import SERVO_TEXT, TWO_AXES, WireTest, until
 
@@ -70,6 +71,25 @@ class Messages(WireTest):
             self.assertEqual(abuser.answer_to(7).WhichOneof("kind"), "refusal", kind)
         owner.step(1)
         self.assertMemoryBelow(server, before + 8 * 1024)
+
+    def test_tcp_05_names_in_other_letters_are_cut_between_them(self):
+        """A letter that is cut in two: nobody can read the answer in which it stands. The same for a file whose name is in no
+        alphabet at all."""
+        with tempfile.TemporaryDirectory(prefix="drivebench-abuse-") as folder:
+            server = self.server("--experiments", f"{folder}/kept", "--record", f"{folder}/r\udcff.mcap")
+            client = self.client(server)
+            client.lease()
+            for name in ("x" + "ä" * 1000, "ä" * 1000):
+                named = [pb.NamedValue(name=name)]
+                for kind in ({"subscribe": pb.Subscribe(signals=[name])},
+                             {"read_parameters": pb.ReadParameters(names=[name])},
+                             {"write_parameter": pb.WriteParameter(name=name)},
+                             {"inject_fault": pb.InjectFault(name=name)},
+                             {"run_experiment": request(signals=[name])},
+                             {"run_experiment": request(settings=named)},
+                             {"run_experiment": request(events=[pb.ExperimentEvent(fault=named[0])])}):
+                    self.assertRegex(client.ask(**kind).refusal.message, r"^there is no \w+ 'x?ä+\.\.\.'$")
+            self.assertEqual(client.status().recording, f"{folder}/r?.mcap")
 
     def test_tcp_06_nesting_without_end_is_refused(self):
         """A parser that calls itself as often as a stranger wants."""

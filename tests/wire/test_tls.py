@@ -67,9 +67,9 @@ class Certificates:
         pretend = ["faketime", at] if at else []
         subprocess.run([*pretend, "openssl", *arguments], cwd=self.folder, check=True, capture_output=True)
 
-    def issue(self, name, authority="ca", extensions="extendedKeyUsage=clientAuth", at=None):
+    def issue(self, name, authority="ca", extensions="extendedKeyUsage=clientAuth", at=None, subject=None):
         (self.folder / "extensions").write_text(extensions, encoding="utf-8")
-        self.openssl("req", *self.key(f"{name}.key"), "-subj", f"/CN={name}", "-out", "request")
+        self.openssl("req", "-utf8", *self.key(f"{name}.key"), "-subj", f"/CN={subject or name}", "-out", "request")
         self.openssl("x509", "-req", "-in", "request", "-CA", f"{authority}.pem", "-CAkey", f"{authority}.key", "-CAcreateserial",
                      "-days", "3000" if at is None else "30", "-extfile", "extensions", "-out", f"{name}.pem", at=at)
         (self.folder / f"{name}.key").chmod(0o600)
@@ -331,6 +331,14 @@ class Mutual(TlsTest):
         self.assertTurnedAway(server, self.context("odd"), "certificate of odd")
         self.assertNotIn("\x1b", server.errors())
         self.assertFalse(any(line.startswith("[error] forged") for line in server.errors().splitlines()))
+
+    def test_a_name_in_other_letters_is_cut_between_them(self):
+        """A certificate whose name is cut within a letter: whoever asks for its owner's axis gets an answer that he cannot read."""
+        self.made.issue("long", subject="\N{EURO SIGN}" * 64)  # three bytes each; no name may have more letters
+        server = self.mutual_server()
+        self.assertDone(self.tls_client(server, self.context("long")).lease())
+        told = self.tls_client(server, self.context("anna")).lease().refusal
+        self.assertRegex(told.holder, "^\N{EURO SIGN}{50,64}")
 
     def test_the_command_speaks_tls(self):
         """A client of ours that needs a tunnel of somebody else's, or that talks to any server, or goes without a certificate."""
