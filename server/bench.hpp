@@ -189,7 +189,7 @@ class Bench {
   Tick tick_ = 0;
   std::int64_t late_now_ = 0;  ///< 1: the present tick started late
   std::uint64_t late_ticks_ = 0;
-  Digest samples_;  ///< of all samples so far
+  Digest samples_;         ///< of all samples so far
   std::uint64_t due_ = 0;  ///< of the schedule, those that have acted in this tick; 0 between ticks
   std::uint64_t scheduled_ = 0;
   std::array<PackedInput, kMaxScheduled> schedule_{};  ///< sorted by tick, first come first served within one

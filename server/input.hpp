@@ -88,6 +88,12 @@ PackedInput pack(const Input& input) noexcept;
 /// The input; a kind that does not exist gives ClearFaults by nobody, which nobody may do.
 Input unpack(const PackedInput& packed) noexcept;
 
+/// Whether it gives a lease up, whoever holds it.
+inline bool ends_lease(const Input& input) noexcept {
+  const auto* const action = std::get_if<LeaseAction>(&input.action);
+  return action != nullptr && (*action == LeaseAction::kRelease || *action == LeaseAction::kLost);
+}
+
 /// Why the bench did not do what an input asked for.
 enum class Refused : std::uint32_t {
   kNot,

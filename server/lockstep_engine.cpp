@@ -63,7 +63,7 @@ class LockstepEngine final : public Engine {
   }
 
   void submit(const Input& input, Answer answer) override {
-    const bool may_be_recorded = has_room() || is_taking_ || ends_lease(input);
+    const bool may_be_recorded = has_room() || is_taking_ || ends_own_lease(input);
     const Refused refused = may_be_recorded ? bench_.submit(input) : Refused::kBusy;
     if (std::holds_alternative<ParameterWrite>(input.action) && input.axis < parameters_.size()) {
       parameters_[input.axis] = bench_.axis(input.axis).parameters();  // even if it was refused
@@ -93,11 +93,8 @@ class LockstepEngine final : public Engine {
   /// case.
   bool has_room() const noexcept { return !recorder_ || (!waits_for_disk_ && recorder_->has_room()); }
 
-  bool ends_lease(const Input& input) const noexcept {
-    const auto* const action = std::get_if<LeaseAction>(&input.action);
-    const bool ends =
-        action != nullptr && (*action == LeaseAction::kLost || *action == LeaseAction::kRelease);
-    return ends && input.owner != 0 && input.axis < bench_.axis_count() &&
+  bool ends_own_lease(const Input& input) const noexcept {
+    return ends_lease(input) && input.owner != 0 && input.axis < bench_.axis_count() &&
            bench_.owner(input.axis) == input.owner;
   }
 

@@ -354,10 +354,6 @@ class ThreadedEngine final : public Engine {
     Input input;
     Answer answer;
   };
-  static bool ends_lease(const Input& input) noexcept {
-    const auto* const action = std::get_if<LeaseAction>(&input.action);
-    return action != nullptr && (*action == LeaseAction::kLost || *action == LeaseAction::kRelease);
-  }
   bool waits(const Input& end) const noexcept {
     return std::ranges::any_of(ends_, [&end](const LeaseEnd& each) {
       return each.input.axis == end.axis && each.input.owner == end.owner;

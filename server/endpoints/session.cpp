@@ -108,12 +108,12 @@ void Session::watch_for_silence() {
   silence_.set(kFrameLimit, [self = shared_from_this()] { self->outbox_.cut("silent within a frame"); });
 }
 
-/// In real time a session has commands that no tick can use.
-void Session::charge_excess(int commands) {
+/// In real time a session has sent an exchange that no tick can use.
+void Session::charge_excess() {
   if (engine_.config().mode != RunMode::kRealtime) return;
   refill_excess();
-  context_.counts.excess_commands += static_cast<std::uint64_t>(commands);
-  excess_left_ -= commands;
+  ++context_.counts.excess_commands;
+  excess_left_ -= 1.0;
 }
 
 void Session::refill_excess() {
@@ -124,7 +124,7 @@ void Session::refill_excess() {
   excess_left_ = std::min(excess_left_ + ticks, kExcessAtOnce);
 }
 
-/// How long this session is not to be read, so that it sends about twice as many commands as there are ticks
+/// How long this session is not to be read, so that it sends about twice as many exchanges as there are ticks
 /// at most.
 ServerClock::duration Session::throttle() {
   if (excess_left_ >= 0.0) return {};

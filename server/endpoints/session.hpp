@@ -41,7 +41,7 @@ struct SessionContext {
     std::uint64_t tls_refused = 0;      ///< connections that did not get through the TLS handshake
     std::uint64_t malformed = 0;        ///< sessions that sent what no client of this protocol does
     std::uint64_t wrong_tokens = 0;     ///< hellos
-    std::uint64_t excess_commands = 0;  ///< in real time: more than one for a tick
+    std::uint64_t excess_commands = 0;  ///< exchanges, in real time, that no tick can use
     std::uint64_t throttled = 0;        ///< times that a session was not read for a while
     std::uint64_t cut = 0;              ///< sessions that took or said nothing
   } counts{};
@@ -122,7 +122,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool dispatch();
   bool may_ask();
   void watch_for_silence();
-  void charge_excess(int commands);
+  void charge_excess();
   void refill_excess();
   ServerClock::duration throttle();
   void watch_slot();
@@ -164,7 +164,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool is_tick(std::uint64_t ticks, const char* field);
   bool is_within(double value, double bound, std::string_view unit, const char* field);
 
-  void take(const v1::LeaseRequest& request, const std::function<void()>& on_done);
+  void take(const v1::LeaseRequest& request, Engine::Answer answer);
   void request(const Input& input, const char* field, std::function<void()> on_done = nullptr);
   Engine::Answer answer_for(const char* field, std::function<void()> on_done, std::uint32_t axis);
   void refuse_owned(std::uint64_t id, std::uint32_t axis);
@@ -196,8 +196,9 @@ class Session : public std::enable_shared_from_this<Session> {
   double excess_left_ = kExcessAtOnce;
   ServerClock::time_point excess_refilled_ = ServerClock::now();
   Owner owner_ = 0;
-  std::vector<bool> leased_;        // by axis
-  std::vector<std::string> taken_;  // by axis: who took it from this session, and why
+  std::vector<bool> leased_;          // by axis
+  std::size_t leases_in_flight_ = 0;  // requests without an answer yet
+  std::vector<std::string> taken_;    // by axis: who took it from this session, and why
   std::optional<WaitingExchange> waiting_;
   std::vector<Subscription> subscriptions_;
   std::optional<Fetch> fetch_;

@@ -102,7 +102,7 @@ void Session::end(const std::string& sentence) {
   close();
 }
 
-void Session::take(const v1::LeaseRequest& r, const std::function<void()>& on_done) {
+void Session::take(const v1::LeaseRequest& r, Engine::Answer answer) {
   constexpr std::size_t kMaxReason = 200;
   if (r.reason().empty() || r.reason().size() > kMaxReason) {
     return refuse(request_.id(), v1::REFUSAL_OUT_OF_RANGE,
@@ -111,9 +111,11 @@ void Session::take(const v1::LeaseRequest& r, const std::function<void()>& on_do
                   "reason");
   }
   // A number that is newer than that of the owner before, so that numbers tell the order.
-  const bool holds_nothing = std::find(leased_.begin(), leased_.end(), true) == leased_.end();
-  if (owner_ == 0 || holds_nothing) owner_ = engine_.new_owner(client_);
-  engine_.take(r.axis(), owner_, r.reason(), answer_for("axis", on_done, r.axis()));
+  const bool may_hold =
+      leases_in_flight_ > 0 || std::find(leased_.begin(), leased_.end(), true) != leased_.end();
+  if (owner_ == 0 || !may_hold) owner_ = engine_.new_owner(client_);
+  ++leases_in_flight_;
+  engine_.take(r.axis(), owner_, r.reason(), std::move(answer));
 }
 
 void Session::on_taken(const Taken& taken) {

@@ -59,6 +59,29 @@ std::span<std::byte> begin_data_frame(std::vector<std::byte>& out, std::uint64_t
   return std::span(out).last(bytes);
 }
 
+/// The rows of a message, which come after this time. Throws BadRequest.
+std::vector<SignalTable::Row> rows_of(const v1::UploadTable& r, double last_s) {
+  std::vector<SignalTable::Row> rows;
+  rows.reserve(static_cast<std::size_t>(r.times_s_size()));
+  for (int i = 0; i < r.times_s_size(); ++i) {
+    const std::uint64_t number = r.first() + static_cast<std::uint64_t>(i);
+    if (!std::isfinite(r.times_s(i)) || r.times_s(i) <= last_s || r.times_s(i) < 0.0) {
+      throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, fmt::format("times_s[{}]", i),
+                       fmt::format("the time {} of row {} must be finite, not negative and later than that "
+                                   "before it",
+                                   r.times_s(i), number));
+    }
+    if (!(std::abs(r.values(i)) <= kMaxInputValue)) {
+      throw BadRequest(
+          v1::REFUSAL_OUT_OF_RANGE, fmt::format("values[{}]", i),
+          fmt::format("the value {} of row {} must lie between -1e6 and 1e6", r.values(i), number));
+    }
+    last_s = r.times_s(i);
+    rows.push_back({.time_s = r.times_s(i), .value = r.values(i)});
+  }
+  return rows;
+}
+
 }  // namespace
 
 template <class Action>
@@ -134,25 +157,7 @@ void Session::upload_table(const v1::UploadTable& r) {
                        fmt::format("the tables of this session come to {} rows but may have {}", rows,
                                    experiments.max_table_rows()));
     }
-    std::vector<SignalTable::Row> wanted;
-    wanted.reserve(static_cast<std::size_t>(r.times_s_size()));
-    double last_s = table->size() == 0 ? -1.0 : table->last_time_s();
-    for (int i = 0; i < r.times_s_size(); ++i) {
-      if (!std::isfinite(r.times_s(i)) || r.times_s(i) <= last_s || r.times_s(i) < 0.0) {
-        throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, fmt::format("times_s[{}]", i),
-                         fmt::format("the time {} of row {} must be finite, not negative and later than that "
-                                     "before it",
-                                     r.times_s(i), r.first() + static_cast<std::uint64_t>(i)));
-      }
-      if (!(std::abs(r.values(i)) <= kMaxInputValue)) {
-        throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, fmt::format("values[{}]", i),
-                         fmt::format("the value {} of row {} must lie between -1e6 and 1e6", r.values(i),
-                                     r.first() + static_cast<std::uint64_t>(i)));
-      }
-      last_s = r.times_s(i);
-      wanted.push_back({.time_s = r.times_s(i), .value = r.values(i)});
-    }
-    table->append(wanted);
+    table->append(rows_of(r, table->size() == 0 ? -1.0 : table->last_time_s()));
     const std::uint64_t number = r.table() == 0 ? ++last_table_ : r.table();
     tables_[number] = table;
     reply_.Clear();

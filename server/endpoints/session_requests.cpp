@@ -149,9 +149,16 @@ void Session::lease(const v1::LeaseRequest& r) {
     if (!leased_[axis]) abandon_exchange(axis);
     if (over_) give_leases_back();  // the peer left before the bench answered
   };
-  if (takes) return take(r, on_done);
+  Engine::Answer answer = [this, answered = answer_for("axis", on_done, r.axis())](Refused refused,
+                                                                                   Tick tick) {
+    --leases_in_flight_;
+    answered(refused, tick);
+  };
+  if (takes) return take(r, std::move(answer));
   if (owner_ == 0) owner_ = engine_.new_owner(client_);
-  request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, "axis", on_done);
+  ++leases_in_flight_;
+  engine_.request({.tick = 0, .axis = r.axis(), .owner = owner_, .action = action}, std::move(answer),
+                  &client_);
 }
 
 /// An exchange that waits for a tick of an axis that has just been released would wait for ever.
@@ -171,7 +178,7 @@ std::string Session::not_owner_of(std::uint32_t axis) const {
 void Session::exchange(const v1::Exchange& r) {
   const std::uint64_t id = request_.id();
   if (waiting_) {
-    charge_excess(r.commands_size());
+    charge_excess();
     return refuse(id, v1::REFUSAL_BUSY, "an exchange of this session is still waiting for its tick",
                   "commands");
   }
@@ -196,7 +203,7 @@ void Session::exchange(const v1::Exchange& r) {
   for (const v1::Command& command : r.commands()) {
     if (engine_.check(command.axis(), owner_, *decode_command(command)) == Refused::kNot) continue;
     const Refused why = engine_.command(command.axis(), owner_, *decode_command(command));
-    charge_excess(r.commands_size());
+    charge_excess();
     const std::string sentence =
         why == Refused::kNotOwner ? not_owner_of(command.axis()) : std::string(sentence_of(why));
     return refuse(id, code_of(why), sentence + " (axis " + std::to_string(command.axis()) + ")",

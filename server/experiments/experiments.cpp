@@ -19,6 +19,8 @@ namespace {
 constexpr auto kWatchInterval = std::chrono::milliseconds(250);
 /// Below everybody who has to meet a deadline.
 constexpr int kWorkerNice = 10;
+/// How many may ask for an experiment again that is not on the disk yet.
+constexpr std::size_t kMaxAnswers = 64;
 
 }  // namespace
 
@@ -106,6 +108,11 @@ void Experiments::submit(const v1::RunExperiment& request, const TableLookup& ta
   if (same != nullptr) {
     const auto waiting = answers_.find(same->id);
     if (waiting == answers_.end()) return answer(same, {});
+    if (waiting->second.size() == kMaxAnswers) {
+      throw BadRequest(v1::REFUSAL_BUSY, "request_key",
+                       fmt::format("experiment {} is not on the disk yet, and {} wait to be told of it",
+                                   same->id, kMaxAnswers));
+    }
     return waiting->second.push_back(std::move(answer));
   }
   auto experiment = std::make_shared<Experiment>();

@@ -41,8 +41,8 @@ void write_whole(const std::filesystem::path& file, const std::string& bytes);
 using WriteFile = std::function<void(const std::filesystem::path&, const std::string&)>;
 
 /// The experiments of a server: a queue, one thread that runs them one after the other on benches of their
-/// own, and a folder that keeps them. All methods are called on the I/O thread, and none waits for a disk:
-/// that do the thread that runs an experiment, with its own files, and another one.
+/// own, and a folder that keeps them. All methods are called on the I/O thread, and none waits until a disk
+/// has something: that do the thread that runs an experiment, with its own files, and another one.
 ///
 /// The queue is fair: in each round every owner has one turn, and within a round the one who came first goes
 /// first.

@@ -174,6 +174,24 @@ TEST_F(ExperimentQueue, TheSameRequestOnItsWayToTheDiskIsTheSame) {
   EXPECT_EQ(three->experiment, one->experiment);
 }
 
+// Catches: a client that says the same again and again while the disk stands still, and is remembered each
+// time.
+TEST_F(ExperimentQueue, NotMoreThan64WaitForTheSameExperiment) {
+  start();
+  v1::RunExperiment r = request();
+  r.set_request_key("again");
+  for (int i = 0; i < 64; ++i)
+    submit(r);
+  try {
+    submit(r);
+    ADD_FAILURE() << "one more waits";
+  } catch (const BadRequest& bad) {
+    EXPECT_EQ(bad.code(), v1::REFUSAL_BUSY);
+    EXPECT_EQ(bad.field(), "request_key");
+  }
+  disk_.let(100);
+}
+
 /// As large as an experiment can be made to be.
 v1::ExperimentInfo largest_info(std::uint64_t id) {
   v1::ExperimentInfo info;

@@ -12,7 +12,7 @@ except ImportError:
     sys.exit(77)
 
 from wire_client import frame, pb
-from wire_test import WireTest, until
+from wire_test import TWO_AXES, WireTest, until
 
 
 class Senders(WireTest):
@@ -51,6 +51,23 @@ class Senders(WireTest):
         self.assertEqual(counts["excess_commands"], refused)
         started = watcher.newest().tick
         until(lambda: watcher.newest().tick > started + 100, "others and the ticks go on")
+
+    def test_cmd_10_an_exchange_for_each_tick_is_no_flood_however_many_axes_it_commands(self):
+        """A controller of several axes that is throttled because one of them does not take its commands."""
+        server = self.server("--mode", "realtime", text=TWO_AXES.replace("period_us = 125", "period_us = 1000"))
+        client = self.client(server)
+        sent = 0
+        tick = -1
+        while sent < 1500:
+            newest = client.newest().tick
+            if newest == tick:
+                continue
+            tick = newest
+            commands = [pb.Command(axis=axis, tick=tick, gates=pb.GATES_VOLTAGE) for axis in range(2)]
+            self.assertRefused(client.ask(exchange=pb.Exchange(commands=commands)), pb.REFUSAL_NOT_OWNER)
+            sent += 1
+        counts = client.tcp_counts()
+        self.assertEqual((counts["throttled"], counts["excess_commands"]), (0, sent))
 
     def test_tcp_02_silence_within_a_frame_ends_the_session(self):
         """A peer that sends half a request and keeps its place, and the axis, for ever."""

@@ -15,8 +15,8 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from wire_client import PATIENCE_S, Closed, pb
-from wire_test import SERVO_TEXT, WireTest, until
+from wire_client import PATIENCE_S, Closed, frame, pb
+from wire_test import SERVO_TEXT, TWO_AXES, WireTest, until
 
 TAKE = pb.LeaseRequest.ACTION_TAKE
 PATIENT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 8000")  # a loaded host is no silent controller
@@ -106,6 +106,23 @@ class Roles(UsersTest):
         client = self.client(self.server())
         self.assertEqual((client.welcome.role, client.welcome.subject), (pb.ROLE_ADMIN, ""))
         self.assertDone(client.ask(lease=pb.LeaseRequest(action=TAKE, reason="nobody is here")))
+
+    def test_own_04_an_axis_that_is_taken_behind_another_costs_neither(self):
+        """A lease under a number that its session has given up: it is granted and cannot be used, nor given back."""
+        server = self.server("--mode", "realtime", text=TWO_AXES.replace("watchdog_ticks = 20", "watchdog_ticks = 8000"))
+        client = self.client(server)
+        asked = [pb.LeaseRequest(axis=0, action=pb.LeaseRequest.ACTION_ACQUIRE), pb.LeaseRequest(axis=1, action=TAKE, reason="both")]
+        client.send_bytes(b"".join(frame(pb.Envelope(id=100 + n, lease=each).SerializeToString()) for n, each in enumerate(asked)))
+        answers = [client.answer_to(100 + n) for n in range(2)]
+        for answer in answers:
+            self.assertDone(answer)
+        self.assertEqual(answers[0].done.owner, answers[1].done.owner)
+        for axis in range(2):
+            self.assertEqual(client.newest(axis).owner, answers[axis].done.owner)
+            self.assertEqual(client.exchange(client.newest(axis).tick, axis=axis).WhichOneof("kind"), "exchange_reply")
+        client.close()
+        watcher = self.client(server)
+        until(lambda: not any(watcher.newest(axis).owner for axis in range(2)), "both are given back")
 
     def test_hello_is_said_once(self):
         """A viewer who becomes an administrator in the middle of a session, or an operator who keeps an axis as a viewer."""
