@@ -48,7 +48,9 @@ struct Scene {
   Time stalled_until = 0;                  ///< the last time that the host stood still, or the I/O did
   Time stalled = 0;                        ///< for so long all in all
   std::function<std::size_t()> connected;  ///< stream clients that the server has not left
-  bool ending = false;                     ///< everybody finishes what is under way
+  /// A disk has stood still, while which refused commands in lockstep are not counted.
+  bool time_waited = false;
+  bool ending = false;  ///< everybody finishes what is under way
   Failure failure;
 };
 

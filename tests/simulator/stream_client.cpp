@@ -240,7 +240,7 @@ void StreamClient::on_refusal(const Asked& asked, const v1::Refusal& refusal) {
                        refusal.code() == v1::REFUSAL_STALE || refusal.code() == v1::REFUSAL_NOT_FINITE;
   // An exchange that waited was good when it came.
   const bool robbed = refusal.message().find("was taken by") != std::string::npos;
-  if (asked.counts && counted && !robbed) scene_.axes[asked.axis].command_refused();
+  if (asked.counts && counted && !robbed && !scene_.time_waited) scene_.axes[asked.axis].command_refused();
   if (asked.kind == v1::Envelope::kExchange && manners_.controls) {
     v1::Envelope request;
     request.mutable_exchange();  // what is the newest tick?
