@@ -100,7 +100,7 @@ void print_ready(const Options& o, const BenchConfig& config, const StreamServer
                                {"modbus", transports.modbus_address()},
                                {"mode", name_of(config.mode)},
                                {"bench", config.name}};
-    return print_line(ready.dump());
+    return print_line(ready);
   }
   std::string others;
   for (const std::string& bus : transports.can_names())
@@ -147,7 +147,7 @@ void print_verdict(const Options& o, const Verdict& v) {
         {"state_hash", fmt::format("{:016x}", v.state_hash)},
         {"recording", o.record},
         {"sentence", v.sentence()}};
-    return print_line(verdict.dump());
+    return print_line(verdict);
   }
   print_line(fmt::format("{}; state hash {:016x}", v.sentence(), v.state_hash));
   if (!o.record.empty()) print_line(fmt::format("recorded in {}", o.record));
@@ -254,7 +254,7 @@ void print_checked(const Options& o, const BenchConfig& config) {
                                  {"bench", config.name},
                                  {"axes", config.axes.size()},
                                  {"mode", name_of(config.mode)}};
-    return print_line(checked.dump());
+    return print_line(checked);
   }
   print_line(fmt::format("{}: no problems; bench {}, {} {}, {} mode", o.config, config.name,
                          config.axes.size(), config.axes.size() == 1 ? "axis" : "axes",

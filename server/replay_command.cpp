@@ -43,7 +43,7 @@ int replay_command(const std::string& file, bool json) {
       terminal ? +[](double share) { fmt::print(stderr, "\rreplaying {:3.0f} %", 100.0 * share); } : nullptr);
   if (terminal) fmt::print(stderr, "\r                \r");
   if (json) {
-    print_line(as_json(report).dump());
+    print_line(as_json(report));
   } else {
     const char* const verdict = report.result == ReplayReport::Result::kEqual       ? "equal, bit for bit"
                                 : report.result == ReplayReport::Result::kDifferent ? "DIFFERENT"

@@ -2,6 +2,7 @@
 """Recordings on the command line, the server program and the demo, as a user or a script meets them. Each test names the
 mistake that it would catch."""
 import json
+import os
 import pathlib
 import signal
 import struct
@@ -260,6 +261,14 @@ class Serving(CommandTest):
         """A headless run that never ends or is a tick short."""
         said = self.drivebench_server(SERVO, "--mode", "free", "--duration", "0.25", "--port", "0").stdout
         self.assertSays(said, "ready tcp=", "free run exact: 2000 ticks; state hash ")
+
+    def test_a_file_name_of_odd_bytes_costs_no_verdict(self):
+        """A run whose end is told by an exception, because the name of its recording is no JSON."""
+        name = os.fsdecode(b"run\xff.mcap")
+        done = self.drivebench_server(SERVO, "--port", "0", "--mode", "free", "--duration", "0.01", "--json", "--record", name)
+        verdict = json.loads(done.stdout.splitlines()[-1])
+        self.assertEqual((verdict["ticks"], verdict["recording"]), (80, "run\ufffd.mcap"))
+        self.assertTrue((self.folder / name).exists())
 
     def test_os_05_fail_on_late_is_3(self):
         """An exit code of 0 after a run that was not in real time."""
