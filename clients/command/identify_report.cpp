@@ -19,7 +19,7 @@ using identification::Resimulated;
 using identification::Result;
 
 std::string percent(double part, double of) {
-  const double value = 100.0 * part / std::abs(of);
+  const double value = of == 0.0 ? HUGE_VAL : 100.0 * part / std::abs(of);
   if (!std::isfinite(value)) return "-";
   return std::abs(value) >= 1e4 ? fmt::format("{:.1e} %", value) : fmt::format("{:.3g} %", value);
 }

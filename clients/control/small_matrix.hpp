@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "clients/control/pole_placement.hpp"
@@ -60,6 +61,11 @@ Matrix<N, C> solved(Matrix<N, N> a, Matrix<N, C> b) noexcept {
     }
     std::swap(a[pivot], a[column]);
     std::swap(b[pivot], b[column]);
+    if (a[column][column] == 0.0) {
+      for (auto& row : b)
+        row.fill(std::numeric_limits<double>::quiet_NaN());
+      return b;
+    }
     for (std::size_t row = 0; row < N; ++row) {
       if (row == column) continue;
       const double factor = a[row][column] / a[column][column];
