@@ -1,5 +1,9 @@
 """What the tests of the server program share."""
 import json
+import pathlib
+import resource
+import shutil
+import tempfile
 import time
 import unittest
 
@@ -51,6 +55,14 @@ class WireTest(unittest.TestCase):
         server = Server(*options, **more)
         self.addCleanup(server.__exit__)
         return server
+
+    def recording_server(self, resource_kind, limit):
+        """A server that records to run.mcap in a folder of its own, with a limit set on it; both."""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-wire-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        server = self.server("--record", str(folder / "run.mcap"),
+                             before=lambda: resource.setrlimit(resource_kind, (limit, limit)))
+        return server, folder
 
     def client(self, server, **options):
         client = server.client(**options)
