@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "plant/drive/phases.hpp"
-#include "plant/rounding.hpp"
-#include "plant/shared_shaft.hpp"
-#include "plant/trig.hpp"
+#include "plant/math/rounding.hpp"
+#include "plant/math/trig.hpp"
+#include "plant/train/shared_shaft.hpp"
 
 namespace drivebench {
 namespace {

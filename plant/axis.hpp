@@ -8,7 +8,7 @@
 #include "plant/axis_parameters.hpp"
 #include "plant/axis_state.hpp"
 #include "plant/faults.hpp"
-#include "plant/train.hpp"
+#include "plant/train/train.hpp"
 
 namespace drivebench {
 

@@ -10,8 +10,8 @@
 #include "plant/mechanics/shaft.hpp"
 #include "plant/sensors/encoder.hpp"
 #include "plant/sensors/sensor_bank.hpp"
-#include "plant/terminals.hpp"
 #include "plant/thermal.hpp"
+#include "plant/train/terminals.hpp"
 
 namespace drivebench {
 

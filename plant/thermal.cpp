@@ -1,6 +1,6 @@
 #include "plant/thermal.hpp"
 
-#include "plant/first_order.hpp"
+#include "plant/math/first_order.hpp"
 
 namespace drivebench {
 

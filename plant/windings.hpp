@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "plant/frames.hpp"
+#include "plant/math/frames.hpp"
 
 /// What a machine shows to the drive and to the shaft, whatever its kind.
 namespace drivebench {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "protocols/catalogue.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 namespace drivebench {
 

@@ -7,8 +7,8 @@
 
 #include "protocols/can/dbc.hpp"
 #include "protocols/can/table_text.hpp"
+#include "server/bench/terminals.hpp"
 #include "server/endpoints/modbus/map_info.hpp"
-#include "server/endpoints/terminals.hpp"
 
 namespace drivebench {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "protocols/can/budget.hpp"
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 
 namespace drivebench {
 

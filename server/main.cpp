@@ -10,21 +10,21 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "server/asio.hpp"
-#include "server/audit.hpp"
-#include "server/build_id.hpp"
-#include "server/config.hpp"
-#include "server/config_plausible.hpp"
-#include "server/endpoints/stream_server.hpp"
+#include "server/access/audit.hpp"
+#include "server/config/config.hpp"
+#include "server/config/plausible.hpp"
+#include "server/endpoints/tcp/stream_server.hpp"
 #include "server/endpoints/transports.hpp"
-#include "server/engine.hpp"
+#include "server/engine/engine.hpp"
+#include "server/engine/supervisor.hpp"
+#include "server/host/asio.hpp"
+#include "server/host/build_id.hpp"
+#include "server/host/memory.hpp"
+#include "server/host/print_line.hpp"
+#include "server/host/service_notification.hpp"
+#include "server/host/stop_signal.hpp"
 #include "server/interface_text.hpp"
-#include "server/memory.hpp"
-#include "server/print_line.hpp"
 #include "server/replay_command.hpp"
-#include "server/service_notification.hpp"
-#include "server/stop_signal.hpp"
-#include "server/supervisor.hpp"
 
 namespace drivebench {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "protocols/mcap_series.hpp"
-#include "server/print_line.hpp"
-#include "server/replay.hpp"
+#include "protocols/mcap/mcap_series.hpp"
+#include "server/host/print_line.hpp"
+#include "server/recording/replay.hpp"
 
 namespace drivebench {
 namespace {

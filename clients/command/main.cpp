@@ -5,12 +5,12 @@
 #include <cstdlib>
 #include <functional>
 
-#include "clients/command/can_check.hpp"
-#include "clients/command/commands.hpp"
-#include "clients/command/experiment_line.hpp"
-#include "clients/command/identify_line.hpp"
-#include "clients/command/json.hpp"
-#include "clients/command/line_values.hpp"
+#include "clients/command/can/can_check.hpp"
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/command/common/line_values.hpp"
+#include "clients/command/experiment/experiment_line.hpp"
+#include "clients/command/identify/identify_line.hpp"
 #include "clients/link/tcp_link.hpp"
 
 namespace drivebench::command {

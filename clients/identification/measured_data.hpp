@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/identification/series.hpp"
+#include "clients/identification/math/series.hpp"
 
 namespace drivebench::identification {
 

@@ -9,9 +9,9 @@
 #include <numbers>
 #include <string>
 
-#include "clients/identification/induction_regressor.hpp"
-#include "clients/identification/motor_models.hpp"
-#include "clients/identification/motors.hpp"
+#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/motor_models.hpp"
+#include "clients/identification/motors/motors.hpp"
 
 namespace drivebench::identification {
 namespace {

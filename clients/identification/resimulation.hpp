@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identification/experiment.hpp"
+#include "clients/identification/experiments/experiment.hpp"
 
 namespace drivebench::identification {
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/identification/least_squares.hpp"
+#include "clients/identification/math/least_squares.hpp"
 
 namespace drivebench::identification {
 

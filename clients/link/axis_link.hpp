@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "clients/link/tcp_link.hpp"
-#include "protocols/catalogue.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::link {
 

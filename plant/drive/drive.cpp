@@ -4,10 +4,10 @@
 #include <limits>
 
 #include "plant/drive/phases.hpp"
-#include "plant/exponential.hpp"
-#include "plant/noise.hpp"
-#include "plant/rounding.hpp"
-#include "plant/trig.hpp"
+#include "plant/math/exponential.hpp"
+#include "plant/math/noise.hpp"
+#include "plant/math/rounding.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench {
 namespace {

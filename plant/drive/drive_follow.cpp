@@ -1,7 +1,7 @@
 // What an interval leaves behind in the drive: filter, current loop, link and starting capacitor.
 #include "plant/drive/drive.hpp"
 #include "plant/drive/phases.hpp"
-#include "plant/exponential.hpp"
+#include "plant/math/exponential.hpp"
 
 namespace drivebench {
 namespace {

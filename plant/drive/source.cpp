@@ -8,8 +8,8 @@
 #include <span>
 
 #include "plant/drive/phases.hpp"
-#include "plant/rounding.hpp"
-#include "plant/trig.hpp"
+#include "plant/math/rounding.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench {
 namespace {

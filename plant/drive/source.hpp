@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "plant/curve.hpp"
+#include "plant/math/curve.hpp"
 #include "plant/windings.hpp"
 
 namespace drivebench {

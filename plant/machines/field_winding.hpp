@@ -1,6 +1,6 @@
 #pragma once
 
-#include "plant/curve.hpp"
+#include "plant/math/curve.hpp"
 
 namespace drivebench {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "plant/curve.hpp"
+#include "plant/math/curve.hpp"
 
 namespace drivebench {
 

@@ -6,20 +6,20 @@
 #include <string>
 #include <utility>
 
-#include "plant/parameters/bldc_machine_rows.hpp"
-#include "plant/parameters/drive_rows.hpp"
-#include "plant/parameters/induction_machine_rows.hpp"
-#include "plant/parameters/linear_dc_machine_rows.hpp"
-#include "plant/parameters/mechanics_rows.hpp"
-#include "plant/parameters/pm_dc_machine_rows.hpp"
-#include "plant/parameters/pm_machine_rows.hpp"
+#include "plant/drive/drive_rows.hpp"
+#include "plant/machines/bldc/bldc_machine_rows.hpp"
+#include "plant/machines/induction/induction_machine_rows.hpp"
+#include "plant/machines/linear_dc/linear_dc_machine_rows.hpp"
+#include "plant/machines/pm/pm_machine_rows.hpp"
+#include "plant/machines/pm_dc/pm_dc_machine_rows.hpp"
+#include "plant/machines/saturated_induction/saturated_induction_machine_rows.hpp"
+#include "plant/machines/separate_dc/separate_dc_machine_rows.hpp"
+#include "plant/machines/series_dc/series_dc_machine_rows.hpp"
+#include "plant/machines/shunt_dc/shunt_dc_machine_rows.hpp"
+#include "plant/machines/wound_rotor/wound_rotor_machine_rows.hpp"
+#include "plant/mechanics/mechanics_rows.hpp"
 #include "plant/parameters/rows.hpp"
-#include "plant/parameters/saturated_induction_machine_rows.hpp"
-#include "plant/parameters/sensor_rows.hpp"
-#include "plant/parameters/separate_dc_machine_rows.hpp"
-#include "plant/parameters/series_dc_machine_rows.hpp"
-#include "plant/parameters/shunt_dc_machine_rows.hpp"
-#include "plant/parameters/wound_rotor_machine_rows.hpp"
+#include "plant/sensors/sensor_rows.hpp"
 
 namespace drivebench {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "plant/rounding.hpp"
+#include "plant/math/rounding.hpp"
 
 namespace drivebench {
 

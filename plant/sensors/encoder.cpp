@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "plant/trig.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench {
 namespace {

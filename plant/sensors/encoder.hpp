@@ -5,7 +5,7 @@
 #include <span>
 
 #include "plant/injected_faults.hpp"
-#include "plant/rounding.hpp"
+#include "plant/math/rounding.hpp"
 #include "plant/tick.hpp"
 
 namespace drivebench {

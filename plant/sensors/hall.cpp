@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "plant/rounding.hpp"
+#include "plant/math/rounding.hpp"
 
 namespace drivebench {
 namespace {

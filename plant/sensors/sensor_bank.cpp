@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "plant/noise.hpp"
-#include "plant/rounding.hpp"
+#include "plant/math/noise.hpp"
+#include "plant/math/rounding.hpp"
 
 namespace drivebench {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "plant/first_order.hpp"
 #include "plant/injected_faults.hpp"
+#include "plant/math/first_order.hpp"
 #include "plant/sensors/sensors.hpp"
 #include "plant/tick.hpp"
 #include "plant/windings.hpp"

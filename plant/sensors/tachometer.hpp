@@ -1,7 +1,7 @@
 #pragma once
 
+#include "plant/math/trig.hpp"
 #include "plant/sensors/analog_channel.hpp"
-#include "plant/trig.hpp"
 
 namespace drivebench {
 

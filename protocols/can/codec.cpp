@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "protocols/catalogue.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::can {
 namespace {

@@ -10,7 +10,7 @@
 #include "protocols/can/frame.hpp"
 #include "protocols/can/profile.hpp"
 #include "protocols/can/table.hpp"
-#include "protocols/sample.hpp"
+#include "protocols/signals/sample.hpp"
 
 /// Values to frames and back, by loops over the table. Every `row` is one of kMessages.
 ///

@@ -7,7 +7,7 @@
 
 #include "protocols/can/codec.hpp"
 #include "protocols/can/text.hpp"
-#include "protocols/catalogue.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::can {
 namespace {

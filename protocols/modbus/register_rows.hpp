@@ -6,8 +6,8 @@
 #include <span>
 #include <string_view>
 
-#include "protocols/catalogue.hpp"
 #include "protocols/modbus/codec.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 /// The rows of the register map that are the same for every axis.
 namespace drivebench::modbus {

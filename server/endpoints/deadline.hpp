@@ -3,7 +3,7 @@
 #include <chrono>
 #include <utility>
 
-#include "server/asio.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench {
 

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cstdint>
 
-#include "server/clock.hpp"
+#include "server/host/clock.hpp"
 
 namespace drivebench {
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "protocols/document.hpp"
-#include "server/experiments/limits.hpp"
-#include "server/input_codec.hpp"
+#include "server/config/experiment_limits.hpp"
+#include "server/recording/input_codec.hpp"
 
 namespace drivebench {
 namespace {

@@ -14,11 +14,11 @@
 #include <vector>
 
 #include "bench.pb.h"
-#include "server/asio.hpp"
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 #include "server/experiments/disk_thread.hpp"
 #include "server/experiments/plan.hpp"
 #include "server/experiments/run.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench {
 

@@ -13,11 +13,11 @@
 #include <set>
 #include <system_error>
 
+#include "server/config/experiment_limits.hpp"
 #include "server/experiments/experiments.hpp"
-#include "server/experiments/limits.hpp"
 #include "server/experiments/row_file.hpp"
-#include "server/holder.hpp"
-#include "server/recording_file.hpp"
+#include "server/host/holder.hpp"
+#include "server/recording/recording_file.hpp"
 
 namespace drivebench {
 namespace {

@@ -8,7 +8,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "plant/parameters/rows.hpp"
 #include "protocols/document.hpp"
-#include "server/endpoints/terminals.hpp"
+#include "server/bench/terminals.hpp"
 #include "server/experiments/plan_shapes.hpp"
 
 namespace drivebench {

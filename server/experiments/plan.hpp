@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "bench.pb.h"
-#include "protocols/catalogue.hpp"
-#include "server/config.hpp"
+#include "protocols/signals/catalogue.hpp"
+#include "server/config/config.hpp"
 #include "server/experiments/shapes.hpp"
 
 namespace drivebench {

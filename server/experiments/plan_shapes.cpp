@@ -4,10 +4,10 @@
 
 #include <cmath>
 
+#include "plant/math/trig.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "plant/parameters/rows.hpp"
-#include "plant/trig.hpp"
-#include "server/endpoints/terminals.hpp"
+#include "server/bench/terminals.hpp"
 
 namespace drivebench {
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "protocols/catalogue.hpp"
-#include "protocols/sample.hpp"
+#include "protocols/signals/catalogue.hpp"
+#include "protocols/signals/sample.hpp"
 
 namespace drivebench {
 

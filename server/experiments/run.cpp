@@ -5,11 +5,11 @@
 #include <string>
 #include <utility>
 
-#include "server/engine.hpp"
+#include "server/engine/engine.hpp"
 #include "server/experiments/row_file.hpp"
-#include "server/pacer.hpp"
-#include "server/recorder.hpp"
-#include "server/recording.hpp"
+#include "server/pacing/pacer.hpp"
+#include "server/recording/recorder.hpp"
+#include "server/recording/recording.hpp"
 
 namespace drivebench {
 namespace {

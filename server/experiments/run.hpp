@@ -7,8 +7,8 @@
 #include <string>
 
 #include "server/experiments/plan.hpp"
-#include "server/recording_file.hpp"
-#include "server/verdict.hpp"
+#include "server/pacing/verdict.hpp"
+#include "server/recording/recording_file.hpp"
 
 namespace drivebench {
 

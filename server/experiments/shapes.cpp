@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "plant/trig.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench {
 namespace {

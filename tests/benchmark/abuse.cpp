@@ -9,8 +9,8 @@
 #include <optional>
 #include <thread>
 
-#include "clients/command/installation.hpp"
-#include "clients/command/process.hpp"
+#include "clients/command/common/installation.hpp"
+#include "clients/command/common/process.hpp"
 #include "protocols/modbus/register_map.hpp"
 #include "tests/benchmark/abusers.hpp"
 #include "tests/benchmark/canary.hpp"

@@ -7,7 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "clients/command/installation.hpp"
+#include "clients/command/common/installation.hpp"
 #include "protocols/can/codec.hpp"
 #include "tests/benchmark/can_wire.hpp"
 #include "tests/benchmark/canary.hpp"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/control/presets.hpp"
-#include "server/bench.hpp"
+#include "clients/control/presets/presets.hpp"
+#include "server/bench/bench.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"

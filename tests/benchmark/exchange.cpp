@@ -9,7 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "clients/command/installation.hpp"
+#include "clients/command/common/installation.hpp"
 #include "clients/link/tcp_link.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/child.hpp"

@@ -7,7 +7,7 @@
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/statistics.hpp"
-#include "tests/identification/monte_carlo.hpp"
+#include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
 
 namespace drivebench::speed {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "plant/axis.hpp"
-#include "plant/rk4.hpp"
-#include "plant/rotated.hpp"
+#include "plant/math/rk4.hpp"
+#include "plant/math/rotated.hpp"
 #include "tests/benchmark/bare_machines.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/machine.hpp"

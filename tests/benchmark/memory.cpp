@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "clients/command/installation.hpp"
+#include "clients/command/common/installation.hpp"
 #include "clients/link/tcp_link.hpp"
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"

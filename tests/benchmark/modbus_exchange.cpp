@@ -5,7 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/command/installation.hpp"
+#include "clients/command/common/installation.hpp"
 #include "protocols/modbus/register_map.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/measurements.hpp"

@@ -7,8 +7,8 @@
 #include <ctime>
 #include <thread>
 
-#include "clients/command/installation.hpp"
-#include "server/pacer.hpp"
+#include "clients/command/common/installation.hpp"
+#include "server/pacing/pacer.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"

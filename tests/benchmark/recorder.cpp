@@ -1,4 +1,4 @@
-#include "server/recorder.hpp"
+#include "server/recording/recorder.hpp"
 
 #include <fmt/core.h>
 
@@ -6,8 +6,8 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "protocols/mcap.hpp"
-#include "server/pacer.hpp"
+#include "protocols/mcap/mcap.hpp"
+#include "server/pacing/pacer.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/machine.hpp"
 #include "tests/benchmark/measurements.hpp"

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/command/installation.hpp"
+#include "clients/command/common/installation.hpp"
 
 namespace drivebench::speed {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/process.hpp"
-#include "plant/frames.hpp"
-#include "server/config.hpp"
+#include "clients/command/common/process.hpp"
+#include "plant/math/frames.hpp"
+#include "server/config/config.hpp"
 
 namespace drivebench::speed {
 

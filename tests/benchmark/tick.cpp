@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <variant>
 
-#include "server/bench.hpp"
-#include "server/recorder.hpp"
-#include "server/spsc_ring.hpp"
+#include "server/bench/bench.hpp"
+#include "server/recording/recorder.hpp"
+#include "server/recording/spsc_ring.hpp"
 #include "tests/benchmark/bare_machines.hpp"
 #include "tests/benchmark/canary.hpp"
 #include "tests/benchmark/machine.hpp"

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "server/bench.hpp"
-#include "server/config.hpp"
-#include "server/engine.hpp"
+#include "server/bench/bench.hpp"
+#include "server/config/config.hpp"
+#include "server/engine/engine.hpp"
 #include "tests/server/parameter_row.hpp"
 
 namespace drivebench {

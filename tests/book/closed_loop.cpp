@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "plant/faults.hpp"
-#include "server/engine.hpp"
+#include "server/engine/engine.hpp"
 #include "tests/book/measurement_of.hpp"
 #include "tests/server/parameter_row.hpp"
 

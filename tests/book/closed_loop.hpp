@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/control/presets.hpp"
-#include "clients/control/run.hpp"
-#include "server/bench.hpp"
-#include "server/config.hpp"
+#include "clients/control/loop/run.hpp"
+#include "clients/control/presets/presets.hpp"
+#include "server/bench/bench.hpp"
+#include "server/config/config.hpp"
 
 namespace drivebench {
 

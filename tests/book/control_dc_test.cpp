@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "clients/control/dc_open_loop.hpp"
+#include "clients/control/dc/dc_open_loop.hpp"
 #include "tests/book/closed_loop.hpp"
 
 namespace drivebench {

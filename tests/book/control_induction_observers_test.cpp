@@ -8,10 +8,10 @@
 #include <numbers>
 #include <string>
 
-#include "clients/control/flux_observers.hpp"
-#include "clients/control/load_observers.hpp"
+#include "clients/control/estimators/flux_observers.hpp"
+#include "clients/control/estimators/load_observers.hpp"
 #include "tests/book/book_bench.hpp"
-#include "tests/control/servo_motor.hpp"
+#include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench {
 namespace {

@@ -1,5 +1,6 @@
 // The field-oriented servo of 8.2.2 on the product's own bench, in process: cases 4 to 7 of the reference
-// table. The last digits are chaotic (see tests/control/run_test.cpp), hence the room in the tolerances.
+// table. The last digits are chaotic (see tests/clients/control/loop/run_test.cpp), hence the room in the
+// tolerances.
 #include <gtest/gtest.h>
 
 #include "tests/book/closed_loop.hpp"

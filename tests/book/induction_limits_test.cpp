@@ -5,7 +5,7 @@
 #include <complex>
 #include <numbers>
 
-#include "clients/control/observers.hpp"
+#include "clients/control/estimators/observers.hpp"
 #include "tests/book/steady_induction.hpp"
 #include "tests/plant/servo_axis.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "plant/axis.hpp"
 #include "plant/parameters/parameters.hpp"
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "clients/control/controller.hpp"
+#include "clients/control/loop/controller.hpp"
 #include "plant/drive/command.hpp"
-#include "protocols/sample.hpp"
+#include "protocols/signals/sample.hpp"
 
 namespace drivebench {
 

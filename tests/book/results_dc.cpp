@@ -5,7 +5,7 @@
 #include <memory>
 #include <numbers>
 
-#include "clients/control/dc_open_loop.hpp"
+#include "clients/control/dc/dc_open_loop.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/book/results.hpp"
 

@@ -4,11 +4,11 @@
 #include <span>
 #include <utility>
 
-#include "clients/identification/elimination.hpp"
-#include "clients/identification/induction_motor.hpp"
-#include "clients/identification/resistance_tracking.hpp"
+#include "clients/identification/math/elimination.hpp"
+#include "clients/identification/motors/induction_motor.hpp"
+#include "clients/identification/motors/resistance_tracking.hpp"
 #include "tests/book/results.hpp"
-#include "tests/identification/bench_data.hpp"
+#include "tests/clients/identification/bench_data.hpp"
 
 namespace drivebench {
 namespace {

@@ -2,14 +2,14 @@
 #include <cmath>
 #include <complex>
 
-#include "clients/control/flux_observers.hpp"
-#include "clients/control/induction_poles.hpp"
-#include "clients/control/observers.hpp"
-#include "clients/control/optimum_torque_induction.hpp"
+#include "clients/control/estimators/flux_observers.hpp"
+#include "clients/control/estimators/observers.hpp"
+#include "clients/control/induction/induction_poles.hpp"
+#include "clients/control/induction/optimum_torque_induction.hpp"
 #include "clients/control/presets/induction_servo.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/book/results.hpp"
-#include "tests/control/servo_motor.hpp"
+#include "tests/clients/control/induction/servo_motor.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/control/optimum_torque_pm.hpp"
+#include "clients/control/synchronous/optimum_torque_pm.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/book/results.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <complex>
 
-#include "plant/machines/induction_machine.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
 
 namespace drivebench {
 

@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <vector>
 
+#include "plant/math/trig.hpp"
 #include "plant/parameters/parameters.hpp"
-#include "plant/trig.hpp"
-#include "server/bench.hpp"
+#include "server/bench/bench.hpp"
 #include "tests/determinism/zoo.hpp"
 
 namespace drivebench {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "plant/parameters/parameters.hpp"
-#include "server/bench.hpp"
+#include "server/bench/bench.hpp"
 
 /// A bench with an axis of every kind of machine and of drive, with all sensors, and two of them on one
 /// shaft.

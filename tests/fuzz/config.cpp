@@ -1,5 +1,5 @@
 // A bench file is refused with its places and rules, or it means the same after it was written down.
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 
 #include <string_view>
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "server/input_codec.hpp"
+#include "server/recording/input_codec.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/quiet_protobuf.hpp"
 

@@ -9,7 +9,7 @@
 #include "server/experiments/plan.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/quiet_protobuf.hpp"
-#include "tests/server/run_config.hpp"
+#include "tests/server/recording/run_config.hpp"
 
 namespace drivebench::fuzz {
 namespace {

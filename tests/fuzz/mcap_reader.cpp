@@ -2,7 +2,7 @@
 #include <functional>
 #include <string_view>
 
-#include "protocols/mcap.hpp"
+#include "protocols/mcap/mcap.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace drivebench::fuzz {

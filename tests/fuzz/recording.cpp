@@ -1,5 +1,5 @@
 // A recording of anybody's making is re-simulated to a verdict: no input in it harms the bench.
-#include "server/replay.hpp"
+#include "server/recording/replay.hpp"
 
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/quiet_protobuf.hpp"

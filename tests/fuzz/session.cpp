@@ -13,11 +13,11 @@
 #include <string>
 
 #include "plant/injected_faults.hpp"
-#include "server/asio.hpp"
-#include "server/endpoints/session.hpp"
+#include "server/endpoints/tcp/session.hpp"
+#include "server/host/asio.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/session_program.hpp"
-#include "tests/server/run_config.hpp"
+#include "tests/server/recording/run_config.hpp"
 
 namespace drivebench::fuzz {
 namespace {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "plant/machines/pm_machine.hpp"
-#include "plant/parameters/bldc_machine_rows.hpp"
+#include "plant/machines/bldc/bldc_machine_rows.hpp"
+#include "plant/machines/pm/pm_machine.hpp"
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/power_balance.hpp"
 

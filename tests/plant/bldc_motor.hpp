@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "plant/machines/bldc_machine.hpp"
+#include "plant/machines/bldc/bldc_machine.hpp"
 
 /// The brushless motor of BL-05, phase by phase.
 namespace drivebench::bldc_motor {

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <random>
 
-#include "plant/rk4.hpp"
+#include "plant/math/rk4.hpp"
 #include "tests/plant/bldc_motor.hpp"
 
 namespace drivebench {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "plant/noise.hpp"
+#include "plant/math/noise.hpp"
 #include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {

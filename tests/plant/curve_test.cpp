@@ -1,4 +1,4 @@
-#include "plant/curve.hpp"
+#include "plant/math/curve.hpp"
 
 #include <gtest/gtest.h>
 

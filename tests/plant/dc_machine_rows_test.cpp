@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "plant/parameters/linear_dc_machine_rows.hpp"
-#include "plant/parameters/pm_dc_machine_rows.hpp"
-#include "plant/parameters/separate_dc_machine_rows.hpp"
-#include "plant/parameters/series_dc_machine_rows.hpp"
-#include "plant/parameters/shunt_dc_machine_rows.hpp"
+#include "plant/machines/linear_dc/linear_dc_machine_rows.hpp"
+#include "plant/machines/pm_dc/pm_dc_machine_rows.hpp"
+#include "plant/machines/separate_dc/separate_dc_machine_rows.hpp"
+#include "plant/machines/series_dc/series_dc_machine_rows.hpp"
+#include "plant/machines/shunt_dc/shunt_dc_machine_rows.hpp"
 
 namespace drivebench {
 namespace {

@@ -1,4 +1,4 @@
-#include "plant/machines/pm_dc_machine.hpp"
+#include "plant/machines/pm_dc/pm_dc_machine.hpp"
 
 #include <gtest/gtest.h>
 

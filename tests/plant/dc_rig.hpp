@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "plant/curve.hpp"
+#include "plant/math/curve.hpp"
 #include "tests/plant/power_balance.hpp"
 
 /// A machine on a plain shaft, with meters for the energies: what tests integrate.

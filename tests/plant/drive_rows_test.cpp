@@ -1,4 +1,4 @@
-#include "plant/parameters/drive_rows.hpp"
+#include "plant/drive/drive_rows.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "plant/exponential.hpp"
+#include "plant/math/exponential.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "plant/first_order.hpp"
+#include "plant/math/first_order.hpp"
 
 #include <gtest/gtest.h>
 

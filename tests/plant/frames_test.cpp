@@ -1,4 +1,4 @@
-#include "plant/frames.hpp"
+#include "plant/math/frames.hpp"
 
 #include <gtest/gtest.h>
 

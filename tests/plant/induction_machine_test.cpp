@@ -1,4 +1,4 @@
-#include "plant/machines/induction_machine.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "plant/machines/induction_machine.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
 
 /// The induction motors of the reference.
 namespace drivebench::induction_motors {

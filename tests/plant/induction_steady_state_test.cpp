@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "plant/machines/induction_machine.hpp"
-#include "plant/rk4.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
+#include "plant/math/rk4.hpp"
 #include "tests/plant/induction_motors.hpp"
 
 namespace drivebench {

@@ -1,4 +1,4 @@
-#include "plant/machines/linear_dc_machine.hpp"
+#include "plant/machines/linear_dc/linear_dc_machine.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "plant/noise.hpp"
+#include "plant/math/noise.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "plant/machines/pm_machine.hpp"
-#include "plant/machines/wound_rotor_machine.hpp"
-#include "plant/rk4.hpp"
+#include "plant/machines/pm/pm_machine.hpp"
+#include "plant/machines/wound_rotor/wound_rotor_machine.hpp"
+#include "plant/math/rk4.hpp"
 
 /// The same machine described in two ways must move in the same way. What it is compared with is written here
 /// from the book's equations and shares no code with the machines.

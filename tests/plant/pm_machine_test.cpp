@@ -1,4 +1,4 @@
-#include "plant/machines/pm_machine.hpp"
+#include "plant/machines/pm/pm_machine.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <span>
 
-#include "plant/machines/pm_machine.hpp"
+#include "plant/machines/pm/pm_machine.hpp"
 #include "tests/plant/power_balance.hpp"
 
 /// The PM machine as a hybrid stepping motor, with inertia and friction of its own.

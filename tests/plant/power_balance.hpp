@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plant/rk4.hpp"
+#include "plant/math/rk4.hpp"
 #include "plant/windings.hpp"
 
 /// The power and the energy of any kind of machine: what goes in, what is stored, lost and delivered.

@@ -1,4 +1,4 @@
-#include "plant/rk4.hpp"
+#include "plant/math/rk4.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "plant/rotated.hpp"
+#include "plant/math/rotated.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "plant/machines/saturated_induction_machine.hpp"
+#include "plant/machines/saturated_induction/saturated_induction_machine.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "plant/machines/induction_machine.hpp"
-#include "plant/parameters/saturated_induction_machine_rows.hpp"
-#include "plant/rk4.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
+#include "plant/machines/saturated_induction/saturated_induction_machine_rows.hpp"
+#include "plant/math/rk4.hpp"
 
 namespace drivebench {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-#include "plant/noise.hpp"
+#include "plant/math/noise.hpp"
 #include "tests/plant/sensor_point.hpp"
 
 namespace drivebench {

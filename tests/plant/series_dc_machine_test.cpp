@@ -1,4 +1,4 @@
-#include "plant/machines/series_dc_machine.hpp"
+#include "plant/machines/series_dc/series_dc_machine.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "plant/math/rk4.hpp"
 #include "plant/mechanics/shaft.hpp"
-#include "plant/rk4.hpp"
 
 namespace drivebench {
 

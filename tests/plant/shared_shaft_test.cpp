@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "plant/axis.hpp"
-#include "plant/rk4.hpp"
+#include "plant/math/rk4.hpp"
 
 namespace drivebench {
 namespace {

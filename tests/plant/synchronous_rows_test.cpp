@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "plant/parameters/pm_machine_rows.hpp"
-#include "plant/parameters/wound_rotor_machine_rows.hpp"
+#include "plant/machines/pm/pm_machine_rows.hpp"
+#include "plant/machines/wound_rotor/wound_rotor_machine_rows.hpp"
 
 namespace drivebench {
 namespace {

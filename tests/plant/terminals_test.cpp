@@ -1,4 +1,4 @@
-#include "plant/terminals.hpp"
+#include "plant/train/terminals.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "plant/machines/induction_machine.hpp"
-#include "plant/rk4.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
+#include "plant/math/rk4.hpp"
 #include "tests/plant/induction_motors.hpp"
 #include "tests/plant/power_balance.hpp"
 

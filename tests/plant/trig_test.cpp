@@ -1,4 +1,4 @@
-#include "plant/trig.hpp"
+#include "plant/math/trig.hpp"
 
 #include <gtest/gtest.h>
 

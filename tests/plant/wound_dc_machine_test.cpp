@@ -4,8 +4,8 @@
 #include <numbers>
 #include <random>
 
-#include "plant/machines/separate_dc_machine.hpp"
-#include "plant/machines/shunt_dc_machine.hpp"
+#include "plant/machines/separate_dc/separate_dc_machine.hpp"
+#include "plant/machines/shunt_dc/shunt_dc_machine.hpp"
 #include "tests/plant/dc_rig.hpp"
 
 /// Separately excited and shunt machine. The book gives no numbers: 240 V, 160 rad/s, 10 kW.

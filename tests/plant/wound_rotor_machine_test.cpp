@@ -1,4 +1,4 @@
-#include "plant/machines/wound_rotor_machine.hpp"
+#include "plant/machines/wound_rotor/wound_rotor_machine.hpp"
 
 #include <gtest/gtest.h>
 

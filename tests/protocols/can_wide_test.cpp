@@ -9,7 +9,7 @@
 #include "protocols/can/codec.hpp"
 #include "protocols/can/dbc.hpp"
 #include "protocols/can/table_text.hpp"
-#include "protocols/catalogue.hpp"
+#include "protocols/signals/catalogue.hpp"
 #include "tests/protocols/can_sample.hpp"
 
 namespace drivebench::can {

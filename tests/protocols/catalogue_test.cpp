@@ -1,4 +1,4 @@
-#include "protocols/catalogue.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>

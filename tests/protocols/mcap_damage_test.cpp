@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "protocols/mcap.hpp"
+#include "protocols/mcap/mcap.hpp"
 #include "tests/protocols/mcap_test_files.hpp"
 
 namespace drivebench::mcap_test {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "protocols/mcap.hpp"
+#include "protocols/mcap/mcap.hpp"
 #include "tests/protocols/mcap_test_files.hpp"
 
 namespace drivebench::mcap_test {

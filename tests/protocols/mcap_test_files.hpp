@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "protocols/mcap.hpp"
+#include "protocols/mcap/mcap.hpp"
 
 /// Recordings for the MCAP tests, and what the reader makes of them.
 namespace drivebench::mcap_test {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "plant/parameters/parameters.hpp"
-#include "server/input.hpp"
+#include "server/bench/input.hpp"
 
 namespace drivebench {
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Abuse of the network: tests/FAULTS.md. Each test names the mistake that it would catch."""
+"""Abuse of the network: tests/adversity/FAULTS.md. Each test names the mistake that it would catch."""
 import concurrent.futures
 import os
 import pathlib

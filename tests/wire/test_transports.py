@@ -7,7 +7,7 @@ import threading
 
 import can
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "can"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "peers" / "can"))
 import dbc_drive  # noqa: E402
 from dbc_drive import open_loop_voltages  # noqa: E402
 from drive_test import DriveTest, in_own_network, run_all, with_bus  # noqa: E402

@@ -32,7 +32,7 @@ pb = _generated()
 
 
 def guarded(environment):
-    """For a program whose ticks may do nothing that could wait, or it ends (tests/guard); beside what else is preloaded."""
+    """For a program whose ticks may do nothing that could wait, or it ends (tests/adversity/guard); beside what else is preloaded."""
     guard = os.environ.get("DRIVEBENCH_GUARD")
     if not guard:
         return environment

@@ -1,9 +1,9 @@
 #include <array>
 
-#include "clients/control/bldc_controller.hpp"
-#include "clients/control/limits.hpp"
-#include "clients/control/move_allowance.hpp"
+#include "clients/control/gains/move_allowance.hpp"
+#include "clients/control/math/limits.hpp"
 #include "clients/control/presets/presets_families.hpp"
+#include "clients/control/synchronous/bldc_controller.hpp"
 
 namespace drivebench::control {
 namespace {

@@ -2,15 +2,15 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/control/dc_nested_loops.hpp"
-#include "clients/control/dc_sine_loop.hpp"
-#include "clients/control/dc_speed_loop.hpp"
-#include "clients/control/dc_tachometer_loop.hpp"
-#include "clients/control/jerk_continuous_move.hpp"
+#include "clients/control/dc/dc_nested_loops.hpp"
+#include "clients/control/dc/dc_sine_loop.hpp"
+#include "clients/control/dc/dc_speed_loop.hpp"
+#include "clients/control/dc/dc_tachometer_loop.hpp"
+#include "clients/control/moves/jerk_continuous_move.hpp"
+#include "clients/control/moves/standard_inputs.hpp"
+#include "clients/control/moves/trapezoidal_move.hpp"
 #include "clients/control/presets/dc_preset.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/standard_inputs.hpp"
-#include "clients/control/trapezoidal_move.hpp"
 
 namespace drivebench::control {
 namespace {

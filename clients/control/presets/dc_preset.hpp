@@ -9,13 +9,13 @@
 #include <type_traits>
 #include <vector>
 
-#include "clients/control/dc_open_loop.hpp"
-#include "clients/control/dc_state_feedback.hpp"
-#include "clients/control/dc_voltage_feedback.hpp"
-#include "clients/control/limits.hpp"
-#include "clients/control/preset.hpp"
-#include "clients/control/separate_dc_control.hpp"
-#include "clients/control/series_dc_control.hpp"
+#include "clients/control/dc/dc_open_loop.hpp"
+#include "clients/control/dc/dc_state_feedback.hpp"
+#include "clients/control/dc/dc_voltage_feedback.hpp"
+#include "clients/control/math/limits.hpp"
+#include "clients/control/presets/preset.hpp"
+#include "clients/control/wound_dc/separate_dc_control.hpp"
+#include "clients/control/wound_dc/series_dc_control.hpp"
 
 /// How the presets of DC machines are put together, and what is looked at before a move.
 namespace drivebench::control {

@@ -3,11 +3,11 @@
 #include <numbers>
 #include <tuple>
 
-#include "clients/control/induction_demands.hpp"
-#include "clients/control/input_output_controller.hpp"
-#include "clients/control/move_allowance.hpp"
+#include "clients/control/gains/move_allowance.hpp"
+#include "clients/control/induction/induction_demands.hpp"
+#include "clients/control/induction/input_output_controller.hpp"
+#include "clients/control/induction/torque_optimal_move.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/torque_optimal_move.hpp"
 
 // Input-output linearisation against field-oriented control where the flux has to change: the move to 8000
 // rpm and exercise 15.

@@ -3,12 +3,12 @@
 #include <numbers>
 #include <tuple>
 
-#include "clients/control/direct_integrator_controller.hpp"
-#include "clients/control/induction_demands.hpp"
-#include "clients/control/move_allowance.hpp"
+#include "clients/control/gains/move_allowance.hpp"
+#include "clients/control/induction/direct_integrator_controller.hpp"
+#include "clients/control/induction/induction_demands.hpp"
+#include "clients/control/induction/quadrature_integrator_controller.hpp"
+#include "clients/control/induction/voltage_linearization_controller.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/quadrature_integrator_controller.hpp"
-#include "clients/control/voltage_linearization_controller.hpp"
 
 // The linearisations of an induction machine that the book gives equations for but no experiment: with
 // voltage command, and with an integrator before either current. Gains and moves are ours.

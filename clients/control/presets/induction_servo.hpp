@@ -2,8 +2,8 @@
 
 #include <numbers>
 
-#include "clients/control/field_oriented_controller.hpp"
-#include "clients/control/trajectory.hpp"
+#include "clients/control/induction/field_oriented_controller.hpp"
+#include "clients/control/moves/trajectory.hpp"
 
 /// The numbers of preset book/8.2.2, for those that start from them.
 namespace drivebench::control {

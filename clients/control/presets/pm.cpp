@@ -2,14 +2,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/control/limits.hpp"
-#include "clients/control/move_allowance.hpp"
-#include "clients/control/pm_current_controller.hpp"
-#include "clients/control/pm_references.hpp"
-#include "clients/control/pm_speed_controller.hpp"
-#include "clients/control/pm_voltage_controller.hpp"
+#include "clients/control/gains/move_allowance.hpp"
+#include "clients/control/math/limits.hpp"
+#include "clients/control/moves/speed_steps.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/speed_steps.hpp"
+#include "clients/control/synchronous/pm_current_controller.hpp"
+#include "clients/control/synchronous/pm_references.hpp"
+#include "clients/control/synchronous/pm_speed_controller.hpp"
+#include "clients/control/synchronous/pm_voltage_controller.hpp"
 
 namespace drivebench::control {
 namespace {

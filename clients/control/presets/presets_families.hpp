@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "clients/control/preset.hpp"
+#include "clients/control/presets/preset.hpp"
 
 /// The presets, one file for each family.
 namespace drivebench::control {

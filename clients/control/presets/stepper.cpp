@@ -1,8 +1,8 @@
 #include <array>
 
+#include "clients/control/moves/step_train.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/step_train.hpp"
-#include "clients/control/stepper_controller.hpp"
+#include "clients/control/synchronous/stepper_controller.hpp"
 
 namespace drivebench::control {
 namespace {

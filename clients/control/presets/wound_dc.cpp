@@ -1,9 +1,9 @@
 #include <array>
 
-#include "clients/control/jerk_continuous_move.hpp"
+#include "clients/control/moves/jerk_continuous_move.hpp"
 #include "clients/control/presets/dc_preset.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/shunt_dc_control.hpp"
+#include "clients/control/wound_dc/shunt_dc_control.hpp"
 
 namespace drivebench::control {
 namespace {

@@ -2,10 +2,10 @@
 #include <array>
 #include <cmath>
 
-#include "clients/control/limits.hpp"
-#include "clients/control/move_allowance.hpp"
+#include "clients/control/gains/move_allowance.hpp"
+#include "clients/control/math/limits.hpp"
 #include "clients/control/presets/presets_families.hpp"
-#include "clients/control/wound_rotor_controller.hpp"
+#include "clients/control/synchronous/wound_rotor_controller.hpp"
 
 namespace drivebench::control {
 namespace {

@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "protocols/can/command.hpp"
-#include "server/asio.hpp"
-#include "server/audit.hpp"
-#include "server/endpoints/can/bus.hpp"
+#include "server/access/audit.hpp"
+#include "server/bench/terminals.hpp"
+#include "server/endpoints/can/buses/bus.hpp"
 #include "server/endpoints/log_limit.hpp"
-#include "server/endpoints/terminals.hpp"
 #include "server/endpoints/transport_report.hpp"
-#include "server/engine.hpp"
+#include "server/engine/engine.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench::can {
 

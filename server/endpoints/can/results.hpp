@@ -1,7 +1,7 @@
 #pragma once
 
 #include "protocols/can/table.hpp"
-#include "server/input.hpp"
+#include "server/bench/input.hpp"
 
 namespace drivebench::can {
 

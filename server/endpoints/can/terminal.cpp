@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "server/endpoints/can/virtual_bus.hpp"
+#include "server/endpoints/can/buses/virtual_bus.hpp"
 
 namespace drivebench::can {
 namespace {

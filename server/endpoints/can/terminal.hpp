@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "server/asio.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench::can {
 

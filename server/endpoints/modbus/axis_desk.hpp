@@ -13,10 +13,10 @@
 #include "protocols/modbus/drive_profile.hpp"
 #include "protocols/modbus/pdu.hpp"
 #include "protocols/modbus/register_map.hpp"
-#include "server/asio.hpp"
+#include "server/bench/terminals.hpp"
 #include "server/endpoints/log_limit.hpp"
-#include "server/endpoints/terminals.hpp"
-#include "server/engine.hpp"
+#include "server/engine/engine.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench::modbus {
 

@@ -10,14 +10,14 @@
 
 #include "protocols/modbus/mbap.hpp"
 #include "protocols/modbus/pdu.hpp"
-#include "server/asio.hpp"
-#include "server/audit.hpp"
+#include "server/access/audit.hpp"
 #include "server/endpoints/deadline.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/modbus/axis_desk.hpp"
 #include "server/endpoints/modbus/identification.hpp"
 #include "server/endpoints/modbus/rate_limit.hpp"
 #include "server/endpoints/modbus/reply_builder.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench::modbus {
 

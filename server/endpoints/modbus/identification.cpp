@@ -1,6 +1,6 @@
 #include "server/endpoints/modbus/identification.hpp"
 
-#include "server/build_id.hpp"
+#include "server/host/build_id.hpp"
 
 namespace drivebench::modbus {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "protocols/modbus/register_map.hpp"
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 
 namespace drivebench::modbus {
 

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "server/asio.hpp"
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 #include "server/endpoints/modbus/connection.hpp"
 #include "server/endpoints/transport_report.hpp"
-#include "server/engine.hpp"
+#include "server/engine/engine.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <map>
 
-#include "server/asio.hpp"
+#include "server/host/asio.hpp"
 
 namespace drivebench::modbus {
 

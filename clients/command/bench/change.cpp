@@ -1,0 +1,134 @@
+// What changes an axis without controlling it: a fault, a parameter, a blow on the shaft.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/command/common/session.hpp"
+
+namespace drivebench::command {
+namespace {
+
+/// An open link and the axis that was named, whose lease is held meanwhile: only its owner may change it. A
+/// free run has no owners.
+class HeldAxis {
+ public:
+  HeldAxis(const LinkChoice& choice, std::string_view axis, std::string_view subcommand)
+      : link_(open_link(choice, subcommand)),
+        number_(axis_number(link_.welcome().bench(), axis)),
+        holds_(link_.welcome().bench().mode() != v1::MODE_FREE) {
+    if (holds_) link_.acquire(number_);
+  }
+  ~HeldAxis() {
+    try {
+      if (holds_) link_.release(number_);
+    } catch (const std::exception&) {
+      return;  // the end of the session gives it back
+    }
+  }
+  HeldAxis(const HeldAxis&) = delete;
+  HeldAxis& operator=(const HeldAxis&) = delete;
+
+  link::Link& link() noexcept { return link_; }
+  std::uint32_t number() const noexcept { return number_; }
+  const v1::BenchDescription& bench() const noexcept { return link_.welcome().bench(); }
+  const v1::AxisDescription& description() const { return bench().axes(static_cast<int>(number_)); }
+
+ private:
+  link::Link link_;
+  std::uint32_t number_;
+  bool holds_;
+};
+
+void tell(bool json, HeldAxis& axis, std::string_view name, double value, std::string_view unit,
+          std::uint64_t tick) {
+  if (json) {
+    fmt::print("{}\n", change_json(axis.number(), name, value, tick));
+  } else {
+    fmt::print("axis {} ({}): {} = {:g}{}{} from tick {} on\n", axis.number(), axis.description().name(),
+               name, value, unit.empty() || unit == "1" ? "" : " ", unit == "1" ? "" : unit, tick);
+  }
+}
+
+std::optional<double> number_of(std::string_view text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
+  return whole ? std::optional(value) : std::nullopt;
+}
+
+/// A number, or one of the words of a choice.
+double value_of(const v1::ParameterDescription& row, const std::string& text) {
+  if (const auto value = number_of(text)) return *value;
+  const auto word = std::find(row.words().begin(), row.words().end(), text);
+  if (word != row.words().end()) return static_cast<double>(word - row.words().begin());
+  throw UsageError(fmt::format("'{}' is not {} {}", text, row.words().empty() ? "a number for" : "a value of",
+                               row.name()));
+}
+
+}  // namespace
+
+int run_inject(const InjectOptions& options) {
+  HeldAxis axis(options.link, options.axis, "inject");
+  const auto& faults = axis.bench().injectable_faults();
+  const auto fault = std::find_if(faults.begin(), faults.end(),
+                                  [&](const auto& each) { return each.name() == options.fault; });
+  if (fault == faults.end()) {
+    throw UsageError(fmt::format("no fault '{}'; `drivebench describe` lists them", options.fault));
+  }
+  const std::uint64_t tick =
+      axis.link().inject_fault(axis.number(), {.name = options.fault, .value = options.value});
+  tell(options.json, axis, options.fault, options.value, fault->unit(), tick);
+  return kExitOk;
+}
+
+int run_set(const SetOptions& options) {
+  HeldAxis axis(options.link, options.axis, "set");
+  const auto& rows = axis.description().parameters();
+  const auto row =
+      std::find_if(rows.begin(), rows.end(), [&](const auto& each) { return each.name() == options.name; });
+  if (row == rows.end()) {
+    throw UsageError(fmt::format("no parameter '{}'; `drivebench describe` lists them", options.name));
+  }
+  const double value = value_of(*row, options.value);
+  const double ticks = std::round(options.ramp_s / axis.bench().period_s());
+  if (ticks > 0x1p53) throw UsageError(fmt::format("--ramp-s {:g} is too long", options.ramp_s));
+  const std::uint64_t tick = axis.link().write_parameter(
+      axis.number(), {.name = options.name, .value = value, .ramp_ticks = static_cast<std::uint64_t>(ticks)});
+  tell(options.json, axis, options.name, value, row->unit(), tick + static_cast<std::uint64_t>(ticks));
+  return kExitOk;
+}
+
+int run_take(const TakeOptions& options) {
+  if (!options.force) {
+    throw UsageError(
+        "take needs --force: whoever holds the axis loses it, and the axis goes to its safe action");
+  }
+  link::Link link = open_link(options.link, "take");
+  const std::uint32_t axis = axis_number(link.welcome().bench(), options.axis);
+  const std::uint64_t owner = link.take(axis, options.reason);
+  const std::uint64_t tick = link.status().tick();
+  link.release(axis);
+  if (options.json) {
+    fmt::print("{}\n", change_json(axis, "take", static_cast<double>(owner), tick));
+  } else {
+    fmt::print(
+        "axis {} ({}): taken and free again since tick {}; who drives it next may have to clear a fault\n",
+        axis, link.welcome().bench().axes(static_cast<int>(axis)).name(), tick);
+  }
+  return kExitOk;
+}
+
+int run_bump(const BumpOptions& options) {
+  HeldAxis axis(options.link, options.axis, "bump");
+  const std::uint64_t tick = axis.link().bump_shaft(axis.number(), options.impulse_nms);
+  tell(options.json, axis, "bump", options.impulse_nms, "N*m*s", tick);
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

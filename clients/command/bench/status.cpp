@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include <string>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/command/common/session.hpp"
+
+namespace drivebench::command {
+namespace {
+
+/// Currents and voltages of the terminals that the machine has.
+std::string terminals_text(const v1::Sample& s, const v1::AxisDescription& axis) {
+  const std::uint32_t phases = axis.phases();
+  std::string text = fmt::format("i_a {:.3f} A, ", s.i_a_a());
+  if (phases >= 2) text += fmt::format("i_b {:.3f} A, ", s.i_b_a());
+  if (phases >= 3) text += fmt::format("i_c {:.3f} A, ", s.i_c_a());
+  if (axis.field_winding()) text += fmt::format("i_f {:.3f} A, ", s.i_f_a());
+  text += fmt::format("u_a {:.2f} V, ", s.u_a_v());
+  if (phases >= 2) text += fmt::format("u_b {:.2f} V, ", s.u_b_v());
+  if (phases >= 3) text += fmt::format("u_c {:.2f} V, ", s.u_c_v());
+  if (axis.field_winding()) text += fmt::format("u_f {:.2f} V, ", s.u_f_v());
+  return text;
+}
+
+}  // namespace
+
+int run_status(const StatusOptions& options) {
+  link::Link bench_link = open_link(options.link, "status");
+  const v1::BenchDescription& bench = bench_link.welcome().bench();
+  const v1::Status& status = bench_link.status();
+  if (options.json) {
+    fmt::print("{}\n", status_json(status, bench));
+    return kExitOk;
+  }
+  v1::AxisDescription unknown;
+  unknown.set_name("?");
+  unknown.set_phases(3);
+  fmt::print("bench {} at {}: {}, tick {} ({:.3f} s), {} session{}\n", bench.name(), bench_link.peer(),
+             name_of(status.mode()), status.tick(), static_cast<double>(status.tick()) * bench.period_s(),
+             status.sessions(), status.sessions() == 1 ? "" : "s");
+  if (status.mode() == v1::MODE_REALTIME) {
+    fmt::print("late ticks {}, worst lateness {:.1f} us\n", status.late_ticks(),
+               status.worst_lateness_s() * 1e6);
+  }
+  if (status.state_hash() != 0) fmt::print("state hash {:016x}\n", status.state_hash());
+  if (status.recording().empty()) {
+    fmt::print("not recording\n");
+  } else {
+    fmt::print("recording {}, {} gaps{}\n", status.recording(), status.recording_gaps(),
+               status.recording_over() ? "; it has ended: its disk is full or does not work" : "");
+  }
+  for (const v1::AxisSample& each : status.axes()) {
+    const v1::Sample& s = each.sample();
+    const auto i = static_cast<int>(each.axis());
+    const v1::AxisDescription& axis = i < bench.axes_size() ? bench.axes(i) : unknown;
+    fmt::print("axis {} ({}): {}, owner {}, faults {}{}{}\n", i, axis.name(), name_of_state(s.state()),
+               s.owner() == 0 ? "nobody" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()),
+               s.injected() == 0 ? "" : ", injected ",
+               s.injected() == 0 ? "" : injected_names(bench, s.injected()));
+    fmt::print("  count {}, {}speed {:.3f} rad/s, load {:g} N*m\n", s.encoder_count(),
+               terminals_text(s, axis), s.speed_rad_s(), s.load_nm());
+    fmt::print("  missed commands {}, refused commands {}\n", s.missed_commands(), s.refused_commands());
+  }
+  for (const v1::TransportStatus& transport : status.transports()) {
+    fmt::print("{}: {}\n ", transport.name(), transport.state());
+    for (const v1::TransportStatus::Count& count : transport.counts()) {
+      if (count.value() > 0) fmt::print(" {} {},", count.name(), count.value());
+    }
+    fmt::print(" all else 0\n");
+  }
+  for (const std::string& note : status.notes())
+    fmt::print("note: {}\n", note);
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "clients/command/common/commands.hpp"
+
+namespace drivebench::command {
+
+/// Standard output or a file. Throws UsageError if the file cannot be made, std::runtime_error if it cannot
+/// be written.
+class Output {
+ public:
+  /// Standard output if the path is empty.
+  explicit Output(const std::string& path)
+      : path_(path.empty() ? "standard output" : path),
+        file_(path.empty() ? stdout : std::fopen(path.c_str(), "wbe"),
+              path.empty() ? &keep_open : &std::fclose) {
+    if (!file_) throw UsageError(fmt::format("cannot write {}: {}", path_, reason()));
+  }
+
+  void write(std::string_view text) {
+    if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
+  }
+  void flush() {
+    if (std::fflush(file_.get()) != 0) fail();
+  }
+
+ private:
+  static int keep_open(std::FILE*) { return 0; }
+  static std::string reason() { return std::generic_category().message(errno); }
+  [[noreturn]] void fail() { throw std::runtime_error(fmt::format("cannot write {}: {}", path_, reason())); }
+
+  std::string path_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+};
+
+}  // namespace drivebench::command

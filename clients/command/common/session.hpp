@@ -1,0 +1,71 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/link/axis_link.hpp"
+#include "clients/link/tcp_axis.hpp"
+#include "protocols/signals/sample.hpp"
+
+/// What the subcommands that talk to a bench share.
+namespace drivebench::command {
+
+/// Somebody answers and does not let us in: for whoever wants to connect, the same as nobody.
+class NotLetIn : public link::ConnectError {
+ public:
+  using ConnectError::ConnectError;
+};
+
+/// Connects as `drivebench SUBCOMMAND`. Throws NotLetIn, and UsageError for a can: or modbus: link.
+link::Link open_link(const LinkChoice& choice, std::string_view subcommand);
+
+/// The axis with this number or name. Throws UsageError with the axes there are.
+std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
+
+/// Connects to one axis over whatever the address names: tcp, unix, can or modbus. The latter two name the
+/// axis themselves, so that `axis` must be its default "0". As open_link() otherwise.
+std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
+                                          std::string_view subcommand);
+
+using link::plain;
+
+const char* name_of(v1::Mode mode) noexcept;
+const char* name_of_state(std::uint64_t state) noexcept;
+
+/// The names of the bits that are set, separated by blanks; "none".
+std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults);
+/// The same of Sample.injected.
+std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected);
+std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
+/// What is latched, for people; empty: nothing. Where the link describes no faults the control state says it.
+std::string latched_text(const v1::BenchDescription& bench, const Sample& sample);
+
+/// From now on SIGINT and SIGTERM only make interrupted() true; the second one ends the process.
+void catch_interrupts();
+bool interrupted() noexcept;
+
+/// A line on standard error for what takes longer than a second: redrawn in a terminal, else every 5 s.
+class Progress {
+ public:
+  explicit Progress(std::string what) : what_(std::move(what)) {}
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void update(double fraction, std::string_view doing);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::string what_;
+  Clock::time_point started_ = Clock::now();
+  Clock::time_point shown_ = started_;
+  bool drawn_ = false;
+};
+
+}  // namespace drivebench::command

@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/command/common/session.hpp"
+#include "clients/command/control/control_axis.hpp"
+#include "clients/command/control/control_presets.hpp"
+#include "clients/command/control/control_run.hpp"
+
+namespace drivebench::command {
+namespace {
+
+void check_fit(const link::AxisLink& axis, const control::Preset& preset, const ControlOptions& options,
+               double sample_rate_hz) {
+  const auto mismatches_with = [&axis](const control::Requirements& needs, double rate_hz) {
+    return mismatches(axis.bench(), axis.axis(), needs, rate_hz, axis.known());
+  };
+  const std::vector<std::string> found = mismatches_with(needs_of(preset, options.overrides), sample_rate_hz);
+  if (found.empty()) return;
+  std::string text = fmt::format("preset {} does not fit this bench:", preset.name);
+  for (const std::string& each : found)
+    text += "\n  " + each;
+  const bool is_described =
+      !axis.bench().axes(static_cast<int>(axis.axis())).machine_kind().empty();  // else anything would fit
+  for (const control::Preset& other : control::presets()) {
+    if (!is_described) break;
+    const std::optional<control::Run> run = made_as_it_stands(other);
+    if (run && mismatches_with(other.needs, run->timing().sample_rate_hz).empty()) {
+      text += fmt::format("\n  {} would fit", other.name);
+    }
+  }
+  throw UsageError(text);
+}
+
+void apply_settings(link::AxisLink& bench, const std::vector<ParameterSetting>& settings) {
+  for (const ParameterSetting& setting : settings) {
+    try {
+      bench.write_parameter(setting.name, setting.value);
+    } catch (const link::Refused& refused) {
+      throw UsageError(fmt::format("--set {}: {}", setting.name, refused.what()));
+    }
+  }
+}
+
+void refuse_latched_faults(link::AxisLink& bench) {
+  const std::string latched = latched_text(bench.bench(), bench.newest());
+  if (!latched.empty()) {
+    throw UsageError(fmt::format("the axis has latched {}; --clear clears it", latched));
+  }
+}
+
+/// Leased, without latched faults and at rest, or an exception that says what to do.
+void prepare(link::AxisLink& bench, const ControlOptions& options, double counts_per_revolution) {
+  bench.acquire();
+  if (options.clear_faults) {
+    bench.clear_faults();
+  } else {
+    refuse_latched_faults(bench);
+  }
+  apply_settings(bench, options.settings);
+  let_rest(bench, counts_per_revolution);
+  // In lockstep no tick may have run since a fault came, so that no sample showed it before.
+  if (bench.bench().mode() == v1::MODE_LOCKSTEP) refuse_latched_faults(bench);
+}
+
+/// Open before the move, so that a report is not lost to a folder that does not exist.
+std::ofstream opened(const std::string& file) {
+  std::ofstream out;
+  if (!file.empty()) out.open(file, std::ios::binary);
+  if (!out) throw UsageError("cannot write " + file);
+  return out;
+}
+
+void write_csv(std::ofstream out, const ControlOptions& options, const ControlRun& run) {
+  if (options.csv_file.empty()) return;
+  out << to_csv(run);
+  out.close();
+  if (!out) throw std::runtime_error("cannot write " + options.csv_file);
+}
+
+void print_report(const ControlReport& r) {
+  fmt::print("{} on axis {} of bench {}, {}\n", r.preset, r.axis, r.bench, r.mode);
+  const auto row = [](std::string_view name, std::string_view format, double value, std::string_view unit) {
+    fmt::print("  {:<34}{:>12} {}\n", name, fmt::format(fmt::runtime(format), value), unit);
+  };
+  const auto known = [&row](std::string_view name, std::string_view format, std::optional<double> value,
+                            std::string_view unit) {
+    if (value) row(name, format, *value, unit);
+  };
+  const bool is_truth = r.angle_source == "truth";
+  known(is_truth ? "peak error (true angle)" : "peak error (encoder)", "{:.2f}", r.peak_error_counts,
+        "counts");
+  row("peak error", "{:.6f}", r.peak_error_rad, "rad");
+  known("final error (encoder)", "{:.2f}", r.final_error_counts, "counts");
+  known("final error (true angle)", "{:.2f}", r.final_true_error_counts, "counts");
+  row(r.speed_source == "truth" ? "peak speed" : "peak speed (observer)", "{:.2f}", r.peak_speed_rad_s,
+      "rad/s");
+  row("peak speed error", "{:.2f}", r.peak_speed_error_rad_s, "rad/s");
+  row("peak phase current", "{:.2f}", r.peak_current_a, "A");
+  if (r.peak_field_current_a > 0.0) row("peak field current", "{:.2f}", r.peak_field_current_a, "A");
+  known("peak phase voltage, asked for", "{:.1f}", r.peak_command_voltage_v, "V");
+  known("peak phase current, asked for", "{:.2f}", r.peak_command_current_a, "A");
+  known("peak phase voltage, applied", "{:.1f}", r.peak_voltage_v, "V");
+  row("samples at a limit", "{:.0f}", static_cast<double>(r.saturated_samples), "");
+  for (const auto& [name, value] : r.peak_telemetry)
+    row("peak " + name, "{:.4g}", value, "");
+  row("duration", "{:.1f}", r.duration_s * 1e3, "ms of the bench's time");
+  row("wall time", "{:.1f}", r.wall_s * 1e3, "ms");
+  row("samples", "{:.0f}", static_cast<double>(r.samples), "");
+  row("samples missed here", "{:.0f}", static_cast<double>(r.missed_ticks), "");
+  row("late ticks of the bench", "{:.0f}", static_cast<double>(r.late_ticks), "");
+  const char* what = r.mode == "realtime" ? "us, the wait for the next tick included" : "us";
+  row("exchange p50", "{:.1f}", r.exchange_p50_us, what);
+  row("exchange p99", "{:.1f}", r.exchange_p99_us, what);
+  row("exchange max", "{:.1f}", r.exchange_max_us, what);
+}
+
+}  // namespace
+
+int run_control(const ControlOptions& options) {
+  if (options.list || options.gains) return run_list(options);
+  const control::Preset& preset = chosen_preset(options.preset);
+  control::Run run = made(preset, options.overrides);
+  const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
+  const v1::BenchDescription& description = axis->bench();
+  check_fit(*axis, preset, options, run.timing().sample_rate_hz);
+  if (!options.loads.empty() && !axis->can_set_load()) {
+    throw UsageError("--load needs a tcp:, tls: or unix: link");
+  }
+  std::ofstream csv = opened(options.csv_file);
+
+  catch_interrupts();
+  const double counts = counts_per_revolution(description, axis->axis(), needs_of(preset, options.overrides));
+  prepare(*axis, options, counts);
+  const double load_before_nm = options.loads.empty() ? 0.0 : axis->newest().load_nm;
+  ControlRun done = run_over(*axis, std::move(run), options.loads, counts);
+  try {
+    if (!options.loads.empty()) axis->set_load({.load_nm = load_before_nm});
+    axis->release();
+  } catch (const link::Refused&) {
+    // The lease may have been what was lost; the report says so.
+  } catch (const link::LinkError& error) {
+    if (done.failure.empty()) done.failure = error.what();
+  }
+
+  ControlReport report = summary_of(done, description.period_s());
+  report.bench = description.name();
+  report.mode = name_of(description.mode());
+  report.axis = description.axes(static_cast<int>(axis->axis())).name();
+  report.preset = preset.name;
+  if (options.json) {
+    fmt::print("{}\n", control_json(report));
+  } else {
+    print_report(report);
+  }
+  write_csv(std::move(csv), options, done);
+  if (report.failure.empty()) return kExitOk;
+  std::fflush(stdout);
+  fmt::print(stderr, "drivebench: the run did not end: {}\n", report.failure);
+  return kExitFailed;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,270 @@
+#include "clients/command/control/control_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+
+#include "clients/command/common/session.hpp"
+
+namespace drivebench::command {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kField = 3;  // of Terminals
+
+double larger(double peak, double value) noexcept {
+  return std::max(peak, std::abs(value));
+}
+
+double larger_phase(double peak, const Terminals& x) noexcept {
+  return larger(larger(larger(peak, x[0]), x[1]), x[2]);
+}
+
+double microseconds(Clock::duration duration) noexcept {
+  return std::chrono::duration<double, std::micro>(duration).count();
+}
+
+/// The value below which this part of the sorted values lies.
+double quantile(const std::vector<double>& sorted, double part) noexcept {
+  if (sorted.empty()) return 0.0;
+  return sorted[static_cast<std::size_t>(part * static_cast<double>(sorted.size() - 1))];
+}
+
+consteval SignalMask bit_of(std::string_view name) {
+  return SignalMask{1} << (find_signal(name) - kSignals.data());
+}
+
+/// The tick k of the run is the bench's `first_tick` + k.
+void schedule_loads(link::AxisLink& bench, const control::Run& run, const std::vector<LoadAt>& loads,
+                    std::uint64_t first_tick) {
+  for (const LoadAt& load : loads) {
+    const double after_s = run.timing().prepare_s + load.after_s;
+    const auto ticks = static_cast<std::uint64_t>(std::llround(after_s * run.timing().sample_rate_hz));
+    bench.set_load({.load_nm = load.load_nm, .ramp_ticks = 0, .at_tick = first_tick + ticks});
+  }
+}
+
+ControlRow row_of(const Sample& sample, const ControlRun& into, std::int64_t periods, double start_rad,
+                  const control::Run& run, const control::Setpoint& setpoint) {
+  const control::Controller& controller = run.controller();
+  ControlRow row = {.tick = sample.tick, .periods = periods, .time_s = run.time_s()};
+  row.reference = run.reference();
+  row.angle_rad = into.knows_angle ? sample.angle_rad - start_rad : controller.angle_rad();
+  row.error_rad = row.reference.angle_rad - row.angle_rad;
+  row.measured_error_rad = row.reference.angle_rad - controller.angle_rad();
+  row.speed_observer_rad_s = controller.speed_rad_s();
+  row.speed_rad_s = into.knows_speed ? sample.speed_rad_s : row.speed_observer_rad_s;
+  row.current_a = {sample.i_a_a, sample.i_b_a, sample.i_c_a, sample.i_f_a};
+  row.setpoint = terminals_of(setpoint);
+  row.voltage_v = {sample.u_a_v, sample.u_b_v, sample.u_c_v, sample.u_f_v};
+  row.saturated = controller.saturated();
+  return row;
+}
+
+link::Command command_of(std::uint64_t tick, const control::Setpoint& x, control::Quantity quantity) {
+  if (quantity == control::Quantity::kVoltage) {
+    return {
+        .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = x.a, .u_b_v = x.b, .u_c_v = x.c, .u_f_v = x.field};
+  }
+  return {
+      .tick = tick, .gates = v1::GATES_CURRENT, .i_a_a = x.a, .i_b_a = x.b, .i_c_a = x.c, .i_f_a = x.field};
+}
+
+/// Why the run cannot go on with this sample; empty if it can.
+std::string obstacle(const link::AxisLink& bench, const Sample& sample, const control::Measurement& m,
+                     bool is_first) {
+  if (interrupted()) return "interrupted";
+  for (const double current_a : {m.i_a_a, m.i_b_a, m.i_c_a, m.i_f_a}) {
+    if (!std::isfinite(current_a)) return fmt::format("the sample of tick {} has no currents", sample.tick);
+  }
+  const std::string latched = latched_text(bench.bench(), sample);
+  // In lockstep the first sample is from before the faults were cleared.
+  return latched.empty() || is_first ? "" : "the bench latched " + latched;
+}
+
+void append_telemetry(ControlRun& into, const control::Controller& controller) {
+  const std::span<const double> values = controller.telemetry();
+  into.telemetry.insert(into.telemetry.end(), values.begin(), values.end());
+}
+
+/// The loop itself; a link that breaks throws out of it, and the rows so far stay.
+void exchange_all(link::AxisLink& bench, control::Run& run, const std::vector<LoadAt>& loads,
+                  ControlRun& into) {
+  Progress progress("control");
+  const Sample* sample = &bench.newest();
+  const double start_rad = sample->angle_rad;
+  const std::uint64_t first_late = sample->late_ticks;
+  std::int64_t periods = 1;
+  for (;;) {
+    const control::Measurement measured = measurement_of(*sample, bench.known());
+    const control::Setpoint setpoint = run.step(measured, periods);
+    into.late_ticks = sample->late_ticks - first_late;
+    if (run.done()) return;
+    into.rows.push_back(row_of(*sample, into, periods, start_rad, run, setpoint));
+    append_telemetry(into, run.controller());
+    ControlRow& row = into.rows.back();
+    into.failure = obstacle(bench, *sample, measured, into.rows.size() == 1);
+    if (!into.failure.empty()) return;
+
+    const Clock::time_point asked = Clock::now();
+    sample = &bench.exchange(command_of(row.tick, setpoint, into.quantity));
+    row.exchange_us = microseconds(Clock::now() - asked);
+    if (into.rows.size() == 1 && !loads.empty()) {
+      // Only now it is certain which tick was the first.
+      schedule_loads(bench, run, loads, row.tick);
+      sample = &bench.newest();
+    }
+    periods = static_cast<std::int64_t>(sample->tick - row.tick);
+    if (into.rows.size() % 64 == 0) {
+      progress.update(static_cast<double>(into.rows.size()) / static_cast<double>(run.planned_samples()),
+                      name_of(run.phase()));
+    }
+  }
+}
+
+void add_to(ControlReport& report, const ControlRow& row) {
+  report.missed_ticks += row.periods - 1;
+  report.peak_error_rad = larger(report.peak_error_rad, row.error_rad);
+  report.peak_speed_rad_s = larger(report.peak_speed_rad_s, row.speed_rad_s);
+  report.peak_speed_error_rad_s =
+      larger(report.peak_speed_error_rad_s, row.reference.speed_rad_s - row.speed_rad_s);
+  report.peak_current_a = larger_phase(report.peak_current_a, row.current_a);
+  report.peak_field_current_a = larger(report.peak_field_current_a, row.current_a[kField]);
+  report.saturated_samples += row.saturated ? 1 : 0;
+}
+
+std::map<std::string, double> telemetry_peaks(const ControlRun& run) {
+  std::map<std::string, double> peaks;
+  const std::size_t columns = run.telemetry_names.size();
+  for (std::size_t i = 0; i < run.telemetry.size(); ++i) {
+    double& peak = peaks[run.telemetry_names[i % columns]];
+    peak = larger(peak, run.telemetry[i]);
+  }
+  return peaks;
+}
+
+}  // namespace
+
+control::Measurement measurement_of(const Sample& s, SignalMask known) {
+  const auto real = [known](SignalMask bit, double value) { return (known & bit) != 0 ? value : 0.0; };
+  return {.encoder_count = s.encoder_count,
+          .edge_age_s = real(bit_of("edge_age_s"), s.edge_age_s),
+          .edge_period_s = real(bit_of("edge_period_s"), s.edge_period_s),
+          .hall_lines = (known & bit_of("hall_lines")) != 0 ? s.hall_lines : 0,
+          .tachometer_v = real(bit_of("tachometer_v"), s.tachometer_v),
+          .i_a_a = s.i_a_a,
+          .i_b_a = s.i_b_a,
+          .i_c_a = real(bit_of("i_c_a"), s.i_c_a),
+          .i_f_a = real(bit_of("i_f_a"), s.i_f_a)};
+}
+
+Terminals terminals_of(const control::Setpoint& x) {
+  return {x.a, x.b, x.c, x.field};
+}
+
+ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<LoadAt>& loads,
+                    double counts_per_revolution) {
+  ControlRun into;
+  into.knows_angle = bench.knows("angle_rad");
+  into.knows_speed = bench.knows("speed_rad_s");
+  into.knows_voltage = bench.knows("u_a_v");
+  into.quantity = run.controller().quantity();
+  into.counts_per_rad = counts_per_revolution / (2.0 * std::numbers::pi);
+  const std::span<const std::string_view> names = run.controller().telemetry_names();
+  into.telemetry_names.assign(names.begin(), names.end());
+  into.rows.reserve(static_cast<std::size_t>(run.planned_samples()));
+  into.telemetry.reserve(into.rows.capacity() * names.size());
+  const Clock::time_point started = Clock::now();
+  try {
+    exchange_all(bench, run, loads, into);
+  } catch (const link::Refused& refused) {
+    into.failure = fmt::format("the bench refused: {}", refused.what());
+    if (refused.code() == v1::REFUSAL_LATCHED) {
+      const std::string latched = latched_text(bench.bench(), bench.newest());
+      if (!latched.empty()) into.failure = "the bench latched " + latched;
+    }
+  } catch (const link::LinkError& error) {
+    into.failure = error.what();  // the rows so far are not lost with it
+  }
+  into.wall_s = microseconds(Clock::now() - started) * 1e-6;
+  return into;
+}
+
+ControlReport summary_of(const ControlRun& run, double period_s) {
+  ControlReport report;
+  report.failure = run.failure;
+  if (!run.knows_angle) report.angle_source = "encoder";
+  if (!run.knows_speed) report.speed_source = "observer";
+  report.late_ticks = run.late_ticks;
+  report.wall_s = run.wall_s;
+  report.samples = static_cast<std::int64_t>(run.rows.size());
+  if (run.rows.empty()) return report;
+
+  std::vector<double> exchanges_us;
+  exchanges_us.reserve(run.rows.size());
+  double peak_setpoint = 0.0;
+  double peak_voltage_v = 0.0;
+  double final_error_rad = 0.0;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    const ControlRow& row = run.rows[i];
+    add_to(report, row);
+    peak_setpoint = larger_phase(peak_setpoint, row.setpoint);
+    peak_voltage_v = larger_phase(peak_voltage_v, row.voltage_v);
+    if (i + 100 >= run.rows.size()) {
+      report.final_error_rad = larger(report.final_error_rad, row.measured_error_rad);
+      final_error_rad = larger(final_error_rad, row.error_rad);
+    }
+    if (row.exchange_us > 0.0) exchanges_us.push_back(row.exchange_us);
+  }
+  if (run.counts_per_rad > 0.0) {
+    report.peak_error_counts = report.peak_error_rad * run.counts_per_rad;
+    report.final_error_counts = report.final_error_rad * run.counts_per_rad;
+    if (run.knows_angle) report.final_true_error_counts = final_error_rad * run.counts_per_rad;
+  }
+  (run.quantity == control::Quantity::kVoltage ? report.peak_command_voltage_v
+                                               : report.peak_command_current_a) = peak_setpoint;
+  if (run.knows_voltage) report.peak_voltage_v = peak_voltage_v;
+  report.peak_telemetry = telemetry_peaks(run);
+  report.first_tick = run.rows.front().tick;
+  report.duration_s = static_cast<double>(run.rows.back().tick + 1 - report.first_tick) * period_s;
+  std::ranges::sort(exchanges_us);
+  report.exchange_p50_us = quantile(exchanges_us, 0.50);
+  report.exchange_p99_us = quantile(exchanges_us, 0.99);
+  report.exchange_max_us = quantile(exchanges_us, 1.0);
+  return report;
+}
+
+std::string to_csv(const ControlRun& run) {
+  const std::string_view unit = run.quantity == control::Quantity::kVoltage ? "V" : "A";
+  std::string csv =
+      "tick,time [s],reference [rad],angle [rad],error [counts],measured_error [counts],error [rad],"
+      "reference_speed [rad/s],speed [rad/s],speed_observer [rad/s],i_a [A],i_b [A],i_c [A],i_f [A]";
+  for (const std::string_view terminal : {"a", "b", "c", "f"})
+    csv += fmt::format(",command_{} [{}]", terminal, unit);
+  csv += ",u_a [V],u_b [V],u_c [V],u_f [V],saturated";
+  for (const std::string& name : run.telemetry_names)
+    csv += "," + name;
+  csv += ",exchange [us]\n";
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    const ControlRow& r = run.rows[i];
+    const auto out = std::back_inserter(csv);
+    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{}", r.tick, r.time_s, r.reference.angle_rad, r.angle_rad,
+                   r.error_rad * run.counts_per_rad, r.measured_error_rad * run.counts_per_rad, r.error_rad,
+                   r.reference.speed_rad_s, r.speed_rad_s, r.speed_observer_rad_s);
+    for (const Terminals& each : {r.current_a, r.setpoint, r.voltage_v})
+      fmt::format_to(out, ",{}", fmt::join(each, ","));
+    fmt::format_to(out, ",{}", r.saturated ? 1 : 0);
+    const std::size_t columns = run.telemetry_names.size();
+    for (std::size_t column = 0; column < columns; ++column)
+      fmt::format_to(out, ",{}", run.telemetry[i * columns + column]);
+    fmt::format_to(out, ",{:.3f}\n", r.exchange_us);
+  }
+  return csv;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/control/loop/run.hpp"
+#include "clients/link/axis_link.hpp"
+
+namespace drivebench::command {
+
+/// One value for each terminal: phases a, b, c (an armature is a) and the field winding.
+using Terminals = std::array<double, 4>;
+
+/// What a sample of this link tells a controller: what the link does not carry stays zero.
+control::Measurement measurement_of(const Sample& sample, SignalMask known);
+
+Terminals terminals_of(const control::Setpoint& setpoint);
+
+/// One sample of a run and what the controller made of it.
+struct ControlRow {
+  std::uint64_t tick = 0;
+  std::int64_t periods = 1;  ///< since the row before
+  double time_s = 0.0;       ///< after the start of the trajectory
+  control::Reference reference{};
+  double angle_rad = 0.0;           ///< since the first sample: true, or else of the encoder
+  double error_rad = 0.0;           ///< reference - this angle
+  double measured_error_rad = 0.0;  ///< reference - encoder
+  double speed_rad_s = 0.0;         ///< true, or else the observer's
+  double speed_observer_rad_s = 0.0;
+  Terminals current_a{};
+  Terminals setpoint{};   ///< asked for, [V] or [A]
+  Terminals voltage_v{};  ///< at the machine during the tick before, if the link carries it
+  bool saturated = false;
+  double exchange_us = 0.0;  ///< from handing over the command to having the next sample
+};
+
+/// What a run amounted to. Phases are a, b and c; the field winding is apart.
+struct ControlReport {
+  std::string bench;
+  std::string mode;
+  std::string axis;
+  std::string preset;
+  std::string failure;  ///< why it ended early; empty: it did not
+  std::int64_t samples = 0;
+  std::int64_t missed_ticks = 0;  ///< samples that did not reach the controller
+  std::uint64_t late_ticks = 0;   ///< of the bench, during the run
+  std::uint64_t first_tick = 0;
+  double duration_s = 0.0;  ///< in the bench's time
+  double wall_s = 0.0;
+  std::string angle_source = "truth";  ///< or "encoder": the link does not carry the truth
+  std::string speed_source = "truth";  ///< or "observer"
+  double peak_error_rad = 0.0;         ///< of the angle from angle_source
+  double final_error_rad = 0.0;        ///< of the encoder, largest of the last 100 samples
+  std::optional<double> peak_error_counts;
+  std::optional<double> final_error_counts;
+  std::optional<double> final_true_error_counts;  ///< of the true angle, likewise
+  double peak_speed_rad_s = 0.0;
+  double peak_speed_error_rad_s = 0.0;  ///< reference - speed
+  double peak_current_a = 0.0;          ///< measured
+  double peak_field_current_a = 0.0;
+  std::optional<double> peak_command_voltage_v;  ///< asked for; nothing if currents are
+  std::optional<double> peak_command_current_a;  ///< asked for; nothing if voltages are
+  std::optional<double> peak_voltage_v;          ///< at the machine
+  std::int64_t saturated_samples = 0;            ///< a command stood at its limit
+  std::map<std::string, double> peak_telemetry;  ///< what else the controller tells, largest magnitudes
+  double exchange_p50_us = 0.0;
+  double exchange_p99_us = 0.0;
+  double exchange_max_us = 0.0;
+};
+
+/// Everything that happened in a run over a link.
+struct ControlRun {
+  bool knows_angle = true;  ///< whether the link carries the true angle
+  bool knows_speed = true;
+  bool knows_voltage = true;
+  control::Quantity quantity = control::Quantity::kVoltage;
+  double counts_per_rad = 0.0;  ///< 0: not known
+  std::vector<ControlRow> rows;
+  std::vector<std::string> telemetry_names;
+  std::vector<double> telemetry;  ///< of all rows, one after the other
+  std::string failure;
+  std::uint64_t late_ticks = 0;
+  double wall_s = 0.0;
+};
+
+/// Runs on an axis that is leased and at rest, sample by sample, over the link.
+/// `counts_per_revolution` turns angles into counts for the report; 0: it has none.
+ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<LoadAt>& loads,
+                    double counts_per_revolution);
+
+/// The numbers of the report that follow from the rows.
+ControlReport summary_of(const ControlRun& run, double period_s);
+
+/// Everything as CSV, units in the header.
+std::string to_csv(const ControlRun& run);
+
+}  // namespace drivebench::command

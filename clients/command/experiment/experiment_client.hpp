@@ -1,0 +1,63 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/experiment/experiment_file.hpp"
+#include "clients/link/tcp_link.hpp"
+
+namespace drivebench::command {
+
+/// 128 bits that nobody guesses.
+std::string random_word();
+
+bool has_ended(v1::ExperimentState state);
+
+/// Experiments on a server, over a link that is made anew when it breaks.
+class ExperimentClient {
+ public:
+  /// Of the options counts who asks and where: link, owner (empty: the secret of this user), user and
+  /// patience.
+  /// `subcommand` is the name by which the server knows it.
+  ExperimentClient(const ExperimentOptions& options, std::string subcommand);
+
+  const std::string& owner() const noexcept { return owner_; }
+  std::uint64_t resumed() const noexcept { return resumed_; }
+  bool gave_up() const noexcept { return gave_up_; }
+
+  /// Does something with a link, again after the link broke: it must bear being done twice. Throws as
+  /// open_link() if there is no link to begin with.
+  void with_link(const std::function<void(link::Link&)>& action);
+
+  /// Uploads tables and queues the request. Throws UsageError if the bench has no such axis.
+  v1::ExperimentInfo run(ExperimentFile file);
+
+  /// Gets what the server says about the experiment, and null or a piece of its data.
+  using Take = std::function<void(const v1::ExperimentInfo&, const v1::ExperimentData*)>;
+  /// Receives rows, or the recording, until the end; `next` says from where on they are wanted. When this
+  /// process is interrupted an experiment that run() has queued is cancelled, and what there is of it
+  /// received; any other goes on, and receiving is given up.
+  v1::ExperimentInfo fetch(std::uint64_t id, bool recording, const Take& take,
+                           const std::function<std::uint64_t()>& next);
+
+ private:
+  bool patience_is_over(std::chrono::steady_clock::time_point since) const;
+
+  ExperimentOptions options_;
+  std::string subcommand_;
+  std::string owner_;
+  std::unique_ptr<link::Link> link_;
+  bool was_connected_ = false;           // from now on a server that does not answer is waited for
+  std::optional<std::uint64_t> queued_;  // by run()
+  std::uint64_t resumed_ = 0;
+  bool gave_up_ = false;
+};
+
+}  // namespace drivebench::command

@@ -1,0 +1,251 @@
+// drivebench identify: the parameters of a motor from an experiment, a recording or somebody's file.
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/installation.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/command/common/output.hpp"
+#include "clients/command/common/session.hpp"
+#include "clients/command/identify/identify_data.hpp"
+#include "clients/command/identify/identify_report.hpp"
+#include "clients/command/identify/identify_server.hpp"
+#include "clients/identification/experiments/named_experiments.hpp"
+#include "clients/identification/motors/motors.hpp"
+#include "protocols/document.hpp"
+
+namespace drivebench::command {
+namespace {
+
+using identification::Experiment;
+using identification::IdentificationError;
+using identification::LoadModel;
+using identification::MotorKind;
+using identification::MotorName;
+using identification::NamedExperiment;
+
+int print_list(bool json) {
+  if (json) {
+    fmt::print("{}\n", named_experiments_json());
+    return kExitOk;
+  }
+  for (const MotorName& motor : identification::kMotorNames) {
+    fmt::print("--motor {:<6} {}\n", motor.name, motor.meaning);
+    for (const NamedExperiment& each : identification::named_experiments()) {
+      if (each.motor == motor.name)
+        fmt::print("    --experiment {:<15} {}; bench {}\n", each.name, each.summary, each.bench);
+    }
+  }
+  return kExitOk;
+}
+
+const MotorName& chosen_motor(const std::string& name) {
+  std::string names;
+  for (const MotorName& motor : identification::kMotorNames)
+    names += (names.empty() ? "" : ", ") + std::string(motor.name);
+  if (name.empty()) throw UsageError("--motor is missing; there are " + names);
+  const MotorName* const motor = identification::find_motor(name);
+  if (motor == nullptr)
+    throw UsageError(fmt::format("--motor '{}' is not known; there are {}", printable(name), names));
+  return *motor;
+}
+
+/// The experiment that was named; null if it is a file of the user's.
+const NamedExperiment* chosen_experiment(const MotorName& motor, const std::string& choice) {
+  for (const NamedExperiment& each : identification::named_experiments()) {
+    if (each.motor == motor.name && (choice.empty() || each.name == choice)) return &each;
+  }
+  if (choice.ends_with(".toml")) return nullptr;
+  throw UsageError(fmt::format(
+      "--experiment '{}' is not known for --motor {}; there are {}, and files that end with .toml",
+      printable(choice), motor.name, identification::experiment_names(motor.name)));
+}
+
+WantedExperiment wanted_experiment(const MotorName& motor, const NamedExperiment* named,
+                                   const std::string& choice) {
+  try {
+    const std::filesystem::path file =
+        find_experiment_file(named != nullptr ? std::string(named->file) : choice);
+    return {.file = load_experiment(file),
+            .bench = named != nullptr ? std::string(named->bench) : std::string(),
+            .machine = motor.machine};
+  } catch (const ConfigError& error) {
+    throw UsageError(error.what());
+  }
+}
+
+double seconds(std::string_view text, const std::string& whole) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value) || value < 0.0)
+    throw UsageError(
+        fmt::format("--window '{}' should be FROM:TO in seconds, 0.005:0.2 for example", printable(whole)));
+  return value;
+}
+
+void set_window(const std::string& text, identification::Processing& p) {
+  const std::size_t colon = text.find(':');
+  const std::string_view view = text;
+  p.from_s = seconds(view.substr(0, colon), text);
+  if (colon != std::string::npos && colon + 1 < text.size()) p.to_s = seconds(view.substr(colon + 1), text);
+  if (p.to_s > 0.0 && p.to_s <= p.from_s)
+    throw UsageError(fmt::format("--window '{}' ends before it begins", printable(text)));
+}
+
+/// What the command line says goes before what is known otherwise.
+void apply_options(const IdentifyOptions& o, Experiment& e) {
+  identification::Processing& p = e.processing;
+  if (o.pole_pairs) e.pole_pairs = *o.pole_pairs;
+  if (o.counts_per_revolution) e.counts_per_revolution = *o.counts_per_revolution;
+  if (o.phases) e.three_phase = *o.phases == 3;
+  if (!o.voltages.empty()) p.voltage_shift = o.voltages == "mean" ? 0.5 : 0.0;
+  if (o.voltage_shift) p.voltage_shift = *o.voltage_shift;
+  if (!o.window.empty()) set_window(o.window, p);
+  if (o.current_hz) p.current.cutoff_hz = *o.current_hz;
+  if (o.voltage_hz) p.voltage.cutoff_hz = *o.voltage_hz;
+  if (o.shaft_hz) p.shaft.cutoff_hz = *o.shaft_hz;
+  if (o.order) p.current.order = p.voltage.order = p.shaft.order = *o.order;
+  if (!o.load.empty()) e.load = o.load == "constant" ? LoadModel::kConstant : LoadModel::kViscous;
+  if (o.one_stage) e.two_stage = false;
+}
+
+Measurement measurement(const IdentifyOptions& options, const MotorName& motor,
+                        const NamedExperiment* named) {
+  if (options.from_file.empty()) return measure(options, wanted_experiment(motor, named, options.experiment));
+  Measurement m = options.from_file.ends_with(".mcap") ? read_recording(options.from_file, options.axis)
+                                                       : read_foreign(options);
+  if (!m.machine.empty() && m.machine != motor.machine)
+    throw UsageError(fmt::format("{} is of kind {}, --motor {} is for {}", m.source, m.machine, motor.name,
+                                 motor.machine));
+  return m;
+}
+
+Experiment settings(const IdentifyOptions& options, const MotorName& motor, const NamedExperiment* named,
+                    const Measurement& m) {
+  Experiment e = experiment_of(motor.kind, m.facts, m.data.period_s);
+  if (m.drive.empty())
+    e.processing.voltage_shift = usual_processing(motor.kind, m.data.period_s).voltage_shift;
+  if (named != nullptr) apply(*named, e);
+  if (m.bench.empty() && m.data.find("encoder_count") == nullptr) e.counts_per_revolution = 0.0;
+  apply_options(options, e);
+  return e;
+}
+
+void check_foreign(const IdentifyOptions& options, const MotorName& motor, const Measurement& m) {
+  if (!m.bench.empty()) return;
+  const bool counts = m.data.find("encoder_count") != nullptr;
+  if (counts && !options.counts_per_revolution && m.data.find("angle_rad") == nullptr)
+    throw UsageError("--counts is missing: how many counts of encoder_count are a revolution");
+  if (motor.kind != MotorKind::kDc && !options.pole_pairs)
+    throw UsageError("--pole-pairs is missing: the file does not say how many the motor has");
+}
+
+void compare(const Measurement& m, const Experiment& e, identification::Result& result) {
+  auto truth = truth_of(e.kind, m.bench);
+  if (truth.empty()) return;
+  add_load_truth(m.data, e, truth);
+  result.compare(truth);
+}
+
+IdentifyReport identified(const MotorName& motor, Measurement m, const Experiment& e) {
+  IdentifyReport report{.motor = std::string(motor.name),
+                        .source = m.source,
+                        .period_s = m.data.period_s,
+                        .settings = e,
+                        .result = identify(m.data, e),
+                        .validation = {},
+                        .validation_problem = {},
+                        .experiment = std::move(m.experiment)};
+  compare(m, e, report.result);
+  if (!m.facts.note.empty()) report.result.notes.push_back(m.facts.note);
+  try {
+    report.validation = resimulate(m.data, e, report.result);
+  } catch (const IdentificationError& error) {
+    report.validation_problem = error.what();
+  }
+  return report;
+}
+
+void write(const std::string& path, const std::string& text) {
+  Output out(path);
+  out.write(text);
+  out.flush();
+}
+
+/// The picture as the Markdown file beside it would name it.
+std::string relative_plot(const IdentifyOptions& options) {
+  if (options.plot_file.empty()) return {};
+  const std::filesystem::path folder = std::filesystem::absolute(options.markdown_file).parent_path();
+  return std::filesystem::absolute(options.plot_file).lexically_relative(folder).generic_string();
+}
+
+/// Files that were asked for. What cannot be made is told when the others are there.
+int write_files(const IdentifyOptions& options, const IdentifyReport& report, const Measurement& m) {
+  std::string problems;
+  const auto attempt = [&](const std::string& path, const auto& text) {
+    if (path.empty()) return;
+    try {
+      write(path, text());
+    } catch (const UsageError&) {
+      throw;
+    } catch (const std::runtime_error& error) {
+      problems += fmt::format("drivebench: {}: {}\n", path, error.what());
+    }
+  };
+  const bool plotted = report.validation.has_value();
+  attempt(options.plot_file, [&] { return identify_plot(report); });
+  attempt(options.markdown_file,
+          [&] { return identify_markdown(report, plotted ? relative_plot(options) : std::string()); });
+  attempt(options.motor_file, [&] {
+    const identification::MotorFile file = {
+        .name = (m.motor.empty() ? report.motor : m.motor) + ", identified",
+        .source = "drivebench identify: " + report.source,
+        .pole_pairs = report.settings.pole_pairs,
+        .star = report.settings.three_phase};
+    return to_motor_toml(report.result, file);
+  });
+  fmt::print(stderr, "{}", problems);
+  return problems.empty() ? kExitOk : kExitFailed;
+}
+
+void check_choice(const IdentifyOptions& options) {
+  if (options.from_file.empty() &&
+      (!options.maps.empty() || !options.time.empty() || options.period_s || !options.axis.empty()))
+    throw UsageError("--map, --time, --period and --axis belong to --from");
+  if (!options.from_file.empty() && (!options.experiment.empty() || !options.bench.empty()))
+    throw UsageError("--from reads data that are there; --experiment and --bench make new ones");
+  if (options.from_file.ends_with(".mcap") &&
+      (!options.maps.empty() || !options.time.empty() || options.period_s))
+    throw UsageError(
+        "--map, --time and --period belong to CSV files; a recording has the catalogue's signals");
+}
+
+}  // namespace
+
+int run_identify(const IdentifyOptions& options) {
+  if (options.list) return print_list(options.json);
+  const MotorName& motor = chosen_motor(options.motor);
+  check_choice(options);
+  const NamedExperiment* const named =
+      options.from_file.empty() ? chosen_experiment(motor, options.experiment) : nullptr;
+  catch_interrupts();
+  Measurement m = measurement(options, motor, named);
+  check_foreign(options, motor, m);
+  if (!options.data_file.empty()) write(options.data_file, csv_of(m.data));
+  const Experiment e = settings(options, motor, named, m);
+  IdentifyReport report;
+  try {
+    report = identified(motor, m, e);
+  } catch (const IdentificationError& error) {
+    throw UsageError(fmt::format("{}: {}", m.source, error.what()));
+  }
+  fmt::print("{}", options.json ? identify_json(report) + "\n" : identify_text(report));
+  std::fflush(stdout);
+  const int written = write_files(options, report, m);
+  return report.result.excitation.sufficient ? written : kExitFailed;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/identification/measured_data.hpp"
+
+/// How the columns of somebody else's CSV file become signals of the catalogue.
+namespace drivebench::command {
+
+/// `HEADER=SIGNAL`, `HEADER=SIGNAL*FACTOR`, `HEADER=SIGNAL*FACTOR+OFFSET`. Throws UsageError with the rule.
+identification::ColumnMap parse_column(std::string_view text);
+
+/// A column-map file: `time`, `time_factor` or `period_s`, and [columns] with SIGNAL = "HEADER" or
+/// SIGNAL = { header = "HEADER", factor = 1e-3, offset = 0.0 }. Throws ConfigError with everything wrong.
+identification::CsvOptions parse_column_map(std::string_view text, const std::string& file);
+
+/// All --map options and what stands beside them: each is a column, or the name of a column-map file. Throws
+/// UsageError.
+identification::CsvOptions csv_options(const IdentifyOptions& options);
+
+}  // namespace drivebench::command

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "clients/command/identify/identify_data.hpp"
+#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/resimulation.hpp"
+#include "clients/identification/result.hpp"
+
+namespace drivebench::command {
+
+/// What became of an identification.
+struct IdentifyReport {
+  std::string motor;  ///< as the command line names its kind
+  std::string source;
+  double period_s = 0.0;
+  identification::Experiment settings;
+  identification::Result result;
+  std::optional<identification::Resimulation> validation;
+  std::string validation_problem;  ///< why there is none
+  std::optional<v1::ExperimentInfo> experiment;
+};
+
+/// For a terminal: a line on the data, the table, verdict, validation and notes.
+std::string identify_text(const IdentifyReport& report);
+
+/// The same with a Markdown table; `plot` is the picture's file, beside this one, or empty.
+std::string identify_markdown(const IdentifyReport& report, const std::string& plot);
+
+/// Measured and re-simulated currents and speed as an SVG picture.
+std::string identify_plot(const IdentifyReport& report);
+
+}  // namespace drivebench::command

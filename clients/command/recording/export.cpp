@@ -1,0 +1,272 @@
+#include <bench.pb.h>
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/command/common/output.hpp"
+#include "clients/command/common/session.hpp"
+#include "clients/command/recording/export_can.hpp"
+#include "protocols/mcap/mcap_series.hpp"
+#include "protocols/sample_codec.hpp"
+#include "protocols/signals/catalogue.hpp"
+
+namespace drivebench::command {
+namespace {
+
+MappedSeries opened(const std::string& path) {
+  try {
+    return MappedSeries(path);
+  } catch (const std::system_error& error) {
+    throw UsageError(error.what());
+  }
+}
+
+/// The axis whose samples are on this topic, `/<axis>/sample`; empty for other topics.
+std::string_view axis_of(std::string_view topic) {
+  constexpr std::string_view kEnd = "/sample";
+  if (!topic.starts_with('/') || !topic.ends_with(kEnd) || topic.size() <= kEnd.size() + 1) return {};
+  return topic.substr(1, topic.size() - 1 - kEnd.size());
+}
+
+std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
+  std::vector<const Signal*> signals;
+  for (const std::string& name : names) {
+    const Signal* signal = find_signal(name);
+    if (signal == nullptr) throw UsageError(fmt::format("no signal '{}'", name));
+    signals.push_back(signal);
+  }
+  if (names.empty()) {
+    for (const Signal& signal : kSignals) {
+      if (signal.name != "tick") signals.push_back(&signal);  // it stands in front of every row
+    }
+  }
+  return signals;
+}
+
+std::string header_of(const std::vector<const Signal*>& signals) {
+  std::string header = "tick,time_s";
+  for (const Signal* signal : signals)
+    header += fmt::format(",{} [{}]", signal->name, signal->unit);
+  return header + "\n";
+}
+
+void append_row(std::string& text, const Sample& sample, std::uint64_t time_ns,
+                const std::vector<const Signal*>& signals) {
+  auto out = std::back_inserter(text);
+  fmt::format_to(out, "{},{}.{:09}", sample.tick, time_ns / 1'000'000'000, time_ns % 1'000'000'000);
+  for (const Signal* signal : signals) {
+    switch (signal->type) {
+      case SignalType::kUnsigned:
+        fmt::format_to(out, ",{}", sample.*signal->as_unsigned);
+        break;
+      case SignalType::kSigned:
+        fmt::format_to(out, ",{}", sample.*signal->as_signed);
+        break;
+      case SignalType::kReal:
+        fmt::format_to(out, ",{}", sample.*signal->as_real);  // the shortest text that reads back equal
+        break;
+    }
+  }
+  text += '\n';
+}
+
+struct Exported {
+  std::string axis;
+  bool has_header = false;
+  std::uint64_t rows = 0;  ///< or frames
+  std::string other_axes;
+};
+
+/// Where the messages of an axis are found, by channel.
+class AxisChannels {
+ public:
+  /// Without a name the axis is the first that comes.
+  explicit AxisChannels(std::string axis) : axis_(std::move(axis)) {}
+
+  struct Place {
+    bool is_sample;
+    bool is_wanted;
+    std::uint32_t number;  ///< of the axis: a tick brings the samples of all, in their order
+  };
+  const Place& find(const McapReader& reader, std::uint16_t channel) {
+    const auto known = places_.find(channel);
+    if (known != places_.end()) return known->second;
+    const std::string_view name = axis_of(reader.channels().at(channel).topic);
+    if (!name.empty() && axis_.empty()) axis_ = name;
+    const bool is_wanted = !name.empty() && name == axis_;
+    if (!name.empty() && !is_wanted) others_ += fmt::format("{}{}", others_.empty() ? "" : ", ", name);
+    return places_[channel] = {!name.empty(), is_wanted, name.empty() ? 0 : count_++};
+  }
+  const std::string& axis() const noexcept { return axis_; }
+  const std::string& others() const noexcept { return others_; }
+
+ private:
+  std::string axis_;
+  std::string others_;
+  std::uint32_t count_ = 0;
+  std::map<std::uint16_t, Place> places_;
+};
+
+/// Refuses an axis of which there is no sample.
+void check_axis(const MappedSeries& files, const std::string& axis) {
+  if (axis.empty()) return;
+  McapSeries reader(files.segments());
+  AxisChannels channels(axis);
+  for (McapMessage message; reader.next(message);) {
+    if (channels.find(reader.reader(), message.header.channel).is_wanted)
+      return;  // as a rule the first tick has it
+  }
+  throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}{}", axis,
+                               channels.others().empty() ? "none" : channels.others(),
+                               reader.problem() ? ", and is not whole: " + reader.problem()->what : ""));
+}
+
+/// Refuses what would cost the output file what it held, or the recording itself.
+void check_files(const McapSeries& reader, const MappedSeries& files, const ExportOptions& options) {
+  if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap) {
+    throw UsageError(fmt::format("{} is not a recording: {}", options.recording, reader.problem()->what));
+  }
+  check_axis(files, options.axis);
+  std::error_code ignored;
+  if (std::filesystem::equivalent(options.recording, options.out_file, ignored)) {
+    throw UsageError(fmt::format("--out {} is the recording itself", options.out_file));
+  }
+}
+
+/// Hands every message that can be read to `take`, and what `take` has left in `text` to the file.
+template <class Take>
+void for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
+                      std::string& text, Output& out, Take take) {
+  constexpr std::size_t kPiece = 1U << 16;
+  Progress progress("export");
+  std::uint64_t seen_bytes = 0;
+  for (McapMessage message; reader.next(message);) {
+    seen_bytes += message.payload.size() + 31;  // a message record's own bytes, for the progress only
+    take(message);
+    if (text.size() <= kPiece) continue;
+    out.write(text);
+    text.clear();
+    progress.update(static_cast<double>(seen_bytes) / static_cast<double>(file_size), options.recording);
+  }
+}
+
+/// Everything that can be read, row by row.
+Exported export_rows(McapSeries& reader, const ExportOptions& options,
+                     const std::vector<const Signal*>& signals, std::uint64_t file_size, Output& out) {
+  Exported done;
+  AxisChannels channels(options.axis);
+  std::string text;
+  for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
+    if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
+    if (!done.has_header) text += header_of(signals);  // when there is something to head
+    done.has_header = true;
+    const std::optional<Sample> sample = decode_sample(message.payload);
+    if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
+    append_row(text, *sample, message.header.log_time_ns, signals);
+    ++done.rows;
+  });
+  out.write(text);
+  out.flush();
+  done.axis = channels.axis();
+  done.other_axes = channels.others();
+  return done;
+}
+
+/// Whether the recording ends with the verdict of a lockstep run.
+bool is_lockstep(const MappedSeries& files) {
+  McapSeries reader(files.segments());
+  v1::Verdict verdict;
+  for (McapMessage message; reader.next(message);) {
+    if (reader.reader().channels().at(message.header.channel).topic != "/verdict") continue;
+    verdict.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()));
+  }
+  return verdict.mode() == v1::MODE_LOCKSTEP;
+}
+
+/// The interface, profile and nodes that the frames shall have.
+link::CanAddress can_address_of(const ExportOptions& options) {
+  return link::parse_can_address(fmt::format("can:socketcan:{}?node={}{}{}{}", options.interface,
+                                             options.node_base, options.classic ? "&fd=0" : "",
+                                             options.profile.empty() ? "" : "&", options.profile));
+}
+
+/// The frames of all axes, or of the one that was named.
+Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files,
+                       Output& out) {
+  Exported done;
+  CandumpText frames(can_address_of(options), is_lockstep(files));
+  AxisChannels channels(options.axis);
+  std::optional<std::uint32_t> only;  // the axis that was named, once a sample of it came
+  for_each_message(reader, options, files.size(), frames.text(), out, [&](const McapMessage& message) {
+    const auto& place = channels.find(reader.reader(), message.header.channel);
+    const double time_s = static_cast<double>(message.header.log_time_ns) * 1e-9;
+    if (place.is_sample) {
+      if (!options.axis.empty() && !place.is_wanted) return;
+      only = place.number;
+      const std::optional<Sample> sample = decode_sample(message.payload);
+      if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
+      frames.add(place.number, *sample, time_s);
+    } else if (reader.reader().channels().at(message.header.channel).topic == "/inputs") {
+      v1::Input input;
+      if (!input.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()))) return;
+      const std::uint64_t tick = input.received_tick();
+      if (tick < options.from_tick || tick > options.to_tick) return;
+      if (!options.axis.empty() && input.axis() != only) return;
+      frames.add(input, time_s);
+    }
+  });
+  frames.finish();
+  out.write(frames.text());
+  out.flush();
+  done.rows = frames.frames();
+  done.axis = options.axis.empty() ? "*" : options.axis;
+  done.other_axes = channels.others();
+  return done;
+}
+
+}  // namespace
+
+int run_export(const ExportOptions& options) {
+  const bool is_csv = options.format == "csv";
+  const MappedSeries files = opened(options.recording);
+  McapSeries reader(files.segments());
+  const std::vector<const Signal*> signals = chosen_signals(options.signals);
+  if (!is_csv) can_address_of(options);  // refuses what is wrong before the file is made
+  if (!is_csv && !options.signals.empty()) throw UsageError("--signals chooses columns of CSV");
+  if (options.from_tick > options.to_tick) {
+    throw UsageError(fmt::format("--from {} is behind --to {}", options.from_tick, options.to_tick));
+  }
+  check_files(reader, files, options);
+  Output out(options.out_file);
+  const Exported done = is_csv ? export_rows(reader, options, signals, files.size(), out)
+                               : export_frames(reader, options, files, out);
+
+  const std::string problem = reader.problem() ? reader.problem()->what : "";
+  std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
+  if (options.json) {
+    fmt::print(told, "{}\n", export_json(options.out_file, done.axis, done.rows, problem));
+  } else {
+    fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_csv ? "samples" : "frames",
+               done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);
+  }
+  if (!problem.empty()) {
+    fmt::print(stderr, "drivebench: the recording is not whole: {}\n", problem);
+    return kExitCutShort;
+  }
+  if (is_csv && !done.other_axes.empty() && options.axis.empty()) {
+    fmt::print(stderr, "export: the recording also has {}; --axis chooses\n", done.other_axes);
+  }
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,91 @@
+#include "clients/command/recording/export_can.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "clients/command/common/commands.hpp"
+#include "protocols/can/candump.hpp"
+#include "protocols/can/codec.hpp"
+#include "protocols/can/command.hpp"
+
+namespace drivebench::command {
+namespace {
+
+using can::Message;
+
+constexpr std::uint64_t kStateEveryTicks = 80;  // as a bench does by default
+
+}  // namespace
+
+void CandumpText::add(std::uint32_t axis, const Sample& sample, double time_s) {
+  if (open_tick_ && *open_tick_ != sample.tick) end_tick();
+  open_tick_ = sample.tick;
+  open_time_s_ = time_s;
+  Before& before = before_[axis];
+  if (sample.faults != before.faults) put(Message::kFault, axis, sample, time_s);
+  if (sample.index_tick != before.index_tick) put(Message::kIndex, axis, sample, time_s);
+  before = {.faults = sample.faults,
+            .index_tick = sample.index_tick,
+            .wide = before.wide || sample.i_c_a != 0.0 || sample.i_f_a != 0.0 || sample.u_c_v != 0.0 ||
+                    sample.u_f_v != 0.0 || sample.hall_lines != 0};
+  if (sample.tick % kStateEveryTicks == 0) {
+    put(Message::kState, axis, sample, time_s);
+    put(Message::kCounters, axis, sample, time_s);
+  }
+  put(Message::kEncoder, axis, sample, time_s);
+  put(Message::kCurrents, axis, sample, time_s);
+  put(Message::kSensors, axis, sample, time_s);
+  put(Message::kPhases, axis, sample, time_s);
+}
+
+void CandumpText::add(const v1::Input& input, double time_s) {
+  if (!input.has_command()) return;
+  end_tick();
+  const v1::Command& command = input.command();
+  const bool currents = command.gates() == v1::GATES_CURRENT;
+  const can::Setpoints setpoints{
+      .tick = command.tick(),
+      .mode = currents ? can::kCurrentMode : static_cast<unsigned>(command.gates()),
+      .lease = static_cast<unsigned>(input.owner() & 0xFF),
+      .a = currents ? command.i_a_a() : command.u_a_v(),
+      .b = currents ? command.i_b_a() : command.u_b_v(),
+      .c = currents ? command.i_c_a() : command.u_c_v(),
+      .field = currents ? command.i_f_a() : command.u_f_v()};
+  bool& wide = before_[input.axis()].wide;
+  wide = wide || setpoints.c != 0.0 || setpoints.field != 0.0;
+  for (const can::Frame& frame : can::encode_command(address_.profile, node(input.axis()), wide, setpoints)) {
+    put(frame, time_s);
+  }
+}
+
+void CandumpText::finish() {
+  end_tick();
+}
+
+void CandumpText::end_tick() {
+  if (!open_tick_) return;
+  const std::array<double, 2> values = {static_cast<double>(*open_tick_), is_lockstep_ ? 1.0 : 0.0};
+  put(can::encode(*can::find_message(Message::kSync, address_.profile.fd), address_.profile, 0, values),
+      open_time_s_);
+  open_tick_.reset();
+}
+
+std::uint32_t CandumpText::node(std::uint32_t axis) const {
+  const std::uint64_t node = std::uint64_t{address_.node} + axis;
+  if (node > can::kMaxNode) throw UsageError(fmt::format("axis {} would have node id {}", axis, node));
+  return static_cast<std::uint32_t>(node);
+}
+
+/// Nothing if the profile does not have this message.
+void CandumpText::put(Message message, std::uint32_t axis, const Sample& sample, double time_s) {
+  const can::MessageRow* const row = can::find_message(message, address_.profile.fd, before_[axis].wide);
+  if (row != nullptr) put(can::encode_sample(*row, address_.profile, node(axis), sample), time_s);
+}
+
+void CandumpText::put(const can::Frame& frame, double time_s) {
+  can::append_candump(text_, time_s, address_.channel, frame);
+  ++frames_;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,160 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+
+#include "clients/command/common/commands.hpp"
+#include "clients/command/common/output.hpp"
+#include "clients/command/control/control_axis.hpp"
+#include "clients/command/control/control_presets.hpp"
+#include "clients/command/recording/recorded_run.hpp"
+#include "clients/command/recording/svg_plot.hpp"
+#include "clients/control/loop/run.hpp"
+
+namespace drivebench::command {
+namespace {
+
+/// What a recorded run should have done, sample by sample; nothing without a preset.
+struct Plan {
+  std::vector<control::Reference> references;
+  double counts_per_rad = 0.0;  ///< 0: not known
+};
+
+std::vector<double> column(const RecordedRun& run, const std::function<double(const Answered&)>& value) {
+  std::vector<double> values;
+  values.reserve(run.rows.size());
+  for (const Answered& row : run.rows)
+    values.push_back(value(row));
+  return values;
+}
+
+std::vector<double> column(const Plan& plan, double control::Reference::*member) {
+  std::vector<double> values;
+  values.reserve(plan.references.size());
+  for (const control::Reference& reference : plan.references)
+    values.push_back(reference.*member);
+  return values;
+}
+
+/// Those of the series that are not zero throughout.
+Panel panel_of(std::string label, std::vector<Series> series) {
+  std::erase_if(series, [](const Series& each) {
+    return std::ranges::all_of(each.values, [](double value) { return value == 0.0; });
+  });
+  return {.label = std::move(label), .series = std::move(series)};
+}
+
+Panel with_reference(std::string label, const std::string& name, std::vector<double> values, const Plan& plan,
+                     double control::Reference::*member) {
+  Panel panel = {.label = std::move(label), .series = {}};
+  if (!plan.references.empty()) panel.series.push_back({"reference", column(plan, member)});
+  panel.series.push_back({name, std::move(values)});
+  return panel;
+}
+
+Panel error_panel(const RecordedRun& run, const Plan& plan) {
+  const bool in_counts = plan.counts_per_rad > 0.0;
+  const double factor = in_counts ? plan.counts_per_rad : 1.0;
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < plan.references.size(); ++i) {
+    const double angle_rad = run.rows[i].sample.angle_rad - run.rows[0].sample.angle_rad;
+    errors.push_back(factor * (plan.references[i].angle_rad - angle_rad));
+  }
+  return {.label = in_counts ? "error [counts]" : "error [rad]", .series = {{"error", std::move(errors)}}};
+}
+
+Panel currents(const RecordedRun& run) {
+  const auto of = [&run](double Sample::*member) {
+    return column(run, [member](const Answered& row) { return row.sample.*member; });
+  };
+  return panel_of("current [A]", {{"i_a", of(&Sample::i_a_a)},
+                                  {"i_b", of(&Sample::i_b_a)},
+                                  {"i_c", of(&Sample::i_c_a)},
+                                  {"i_f", of(&Sample::i_f_a)}});
+}
+
+Panel voltages(const RecordedRun& run) {
+  const auto of = [&run](double Sample::*member) {
+    return column(run, [member](const Answered& row) { return row.sample.*member; });
+  };
+  return panel_of("voltage [V]", {{"u_a", of(&Sample::u_a_v)},
+                                  {"u_b", of(&Sample::u_b_v)},
+                                  {"u_c", of(&Sample::u_c_v)},
+                                  {"u_f", of(&Sample::u_f_v)}});
+}
+
+Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& plan) {
+  if (name == "angle") {
+    const double start_rad = run.rows.front().sample.angle_rad;
+    return with_reference(
+        "angle [rad]", "angle",
+        column(run, [start_rad](const Answered& row) { return row.sample.angle_rad - start_rad; }), plan,
+        &control::Reference::angle_rad);
+  }
+  if (name == "speed") {
+    return with_reference("speed [rad/s]", "speed",
+                          column(run, [](const Answered& row) { return row.sample.speed_rad_s; }), plan,
+                          &control::Reference::speed_rad_s);
+  }
+  if (name == "error") return error_panel(run, plan);
+  if (name == "currents") return currents(run);
+  if (name == "voltages") return voltages(run);
+  if (name == "torque") {
+    return panel_of("torque [N m]",
+                    {{"machine", column(run, [](const Answered& row) { return row.sample.torque_nm; })},
+                     {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}});
+  }
+  throw UsageError(
+      fmt::format("no panel '{}': angle, speed, error, currents, voltages and torque there are", name));
+}
+
+/// The trajectory over the recorded samples; the recording is cut where the run has ended.
+Plan planned(const PlotOptions& options, RecordedRun& recorded, double& start_s) {
+  Plan plan;
+  if (options.preset.empty()) return plan;
+  const control::Preset& preset = chosen_preset(options.preset);
+  const control::Run run = made(preset, options.overrides);
+  start_s = run.timing().prepare_s;
+  plan.counts_per_rad = needs_of(preset, options.overrides).counts_per_revolution / (2.0 * std::numbers::pi);
+  const std::uint64_t first = recorded.rows.front().sample.tick;
+  std::erase_if(recorded.rows, [&](const Answered& row) {
+    return static_cast<std::int64_t>(row.sample.tick - first) >= run.planned_samples();
+  });
+  for (const Answered& row : recorded.rows) {
+    const double t_s = static_cast<double>(row.sample.tick - first) * recorded.period_s;
+    plan.references.push_back(run.trajectory().at(t_s - start_s));
+  }
+  return plan;
+}
+
+}  // namespace
+
+int run_plot(const PlotOptions& options) {
+  RecordedRun recorded = read_run(options.recording, options.axis, options.from_tick);
+  double start_s = 0.0;
+  const Plan plan = planned(options, recorded, start_s);
+  std::vector<std::string> names = options.panels;
+  if (names.empty()) names = {"speed", "currents", "voltages"};
+  if (options.panels.empty() && !plan.references.empty()) names.insert(names.begin() + 1, "error");
+  std::vector<Panel> panels;
+  for (const std::string& name : names) {
+    if (name == "error" && plan.references.empty()) throw UsageError("the panel error needs --preset");
+    panels.push_back(panel_named(name, recorded, plan));
+  }
+  const std::uint64_t first = recorded.rows.front().sample.tick;
+  const std::vector<double> times_ms = column(recorded, [&](const Answered& row) {
+    return 1e3 * (static_cast<double>(row.sample.tick - first) * recorded.period_s - start_s);
+  });
+  const std::string title = !options.title.empty()   ? options.title
+                            : options.preset.empty() ? options.recording
+                                                     : options.preset;
+  Output out(options.out_file);
+  out.write(svg_of(title, "time [ms]", times_ms, panels));
+  out.flush();
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,122 @@
+#include "clients/command/recording/recorded_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "clients/command/common/commands.hpp"
+#include "protocols/mcap/mcap_series.hpp"
+#include "protocols/sample_codec.hpp"
+
+namespace drivebench::command {
+namespace {
+
+/// Reads the samples of one axis and joins them with the commands that answered them.
+class Reader {
+ public:
+  explicit Reader(std::string axis) : wanted_(std::move(axis)) {}
+
+  void take(const McapReader& file, const McapMessage& message) {
+    constexpr std::string_view kEnd = "/sample";
+    const std::string_view topic = file.channels().at(message.header.channel).topic;
+    if (topic == "/inputs") {
+      take_input(message);
+    } else if (topic.starts_with('/') && topic.ends_with(kEnd) && topic.size() > kEnd.size() + 1) {
+      take_sample(topic.substr(1, topic.size() - 1 - kEnd.size()), message);
+    }
+  }
+
+  RecordedRun joined() const {
+    RecordedRun out = {.axis = wanted_, .period_s = period_s_, .rows = {}};
+    for (const v1::Command& command : commands_) {
+      const auto sample = std::ranges::lower_bound(samples_, command.tick(), {}, &Sample::tick);
+      if (sample == samples_.end() || sample->tick != command.tick()) continue;
+      if (!out.rows.empty() && out.rows.back().sample.tick >= command.tick()) continue;
+      out.rows.push_back({.sample = *sample, .command = command});
+    }
+    return out;
+  }
+  bool has_axis() const noexcept { return number_.has_value(); }
+  const std::string& axes() const noexcept { return axes_; }
+
+ private:
+  void take_input(const McapMessage& message) {
+    v1::Input input;
+    if (!input.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()))) return;
+    if (input.action_case() == v1::Input::kCommand && input.axis() == number_) {
+      commands_.push_back(input.command());
+    }
+  }
+  void take_sample(std::string_view axis, const McapMessage& message) {
+    if (!numbers_.contains(axis)) {
+      // A tick brings the samples of all axes, in their order.
+      const auto number = static_cast<std::uint32_t>(numbers_.size());
+      numbers_.emplace(axis, number);
+      axes_ += fmt::format("{}{}", axes_.empty() ? "" : ", ", axis);
+      if (wanted_.empty() || wanted_ == "0") wanted_ = axis;
+      if (wanted_ == axis) number_ = number;
+    }
+    if (axis != wanted_) return;
+    const std::optional<Sample> sample = decode_sample(message.payload);
+    if (!sample) return;
+    if (!samples_.empty() && sample->tick > samples_.back().tick) {
+      period_s_ = static_cast<double>(message.header.log_time_ns - last_ns_) * 1e-9 /
+                  static_cast<double>(sample->tick - samples_.back().tick);
+    }
+    last_ns_ = message.header.log_time_ns;
+    samples_.push_back(*sample);
+  }
+
+  std::string wanted_;
+  std::string axes_;
+  std::map<std::string, std::uint32_t, std::less<>> numbers_;
+  std::optional<std::uint32_t> number_;
+  std::vector<Sample> samples_;
+  std::vector<v1::Command> commands_;
+  std::uint64_t last_ns_ = 0;
+  double period_s_ = 0.0;
+};
+
+}  // namespace
+
+bool asks_for_something(const v1::Command& command) noexcept {
+  return command.gates() == v1::GATES_VOLTAGE || command.gates() == v1::GATES_CURRENT;
+}
+
+RecordedRun read_run(const std::string& path, const std::string& axis,
+                     std::optional<std::uint64_t> from_tick) {
+  Reader reader(axis);
+  bool is_whole = true;
+  try {
+    const MappedSeries files(path);
+    McapSeries mcap(files.segments());
+    for (McapMessage message; mcap.next(message);)
+      reader.take(mcap.reader(), message);
+    if (mcap.problem() && mcap.problem()->kind == McapProblem::Kind::kNotMcap) {
+      throw UsageError(fmt::format("{} is not a recording: {}", path, mcap.problem()->what));
+    }
+    is_whole = !mcap.problem();
+    if (!is_whole) fmt::print(stderr, "drivebench: {} is not whole: {}\n", path, mcap.problem()->what);
+  } catch (const std::system_error& error) {
+    throw UsageError(error.what());
+  }
+  if (!reader.has_axis()) {
+    throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}", axis,
+                                 reader.axes().empty() ? "none" : reader.axes()));
+  }
+  RecordedRun run = reader.joined();
+  run.is_whole = is_whole;
+  const auto start = std::ranges::find_if(run.rows, [&](const Answered& row) {
+    return from_tick ? row.sample.tick >= *from_tick : asks_for_something(row.command);
+  });
+  run.rows.erase(run.rows.begin(), start);
+  if (run.rows.empty()) throw UsageError(fmt::format("{} has no commands for axis {}", path, run.axis));
+  return run;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/control/estimators/observers.hpp"
+#include "clients/control/gains/gains.hpp"
+#include "clients/control/loop/controller.hpp"
+#include "clients/control/loop/current_loop.hpp"
+#include "clients/control/loop/servo_loop.hpp"
+#include "clients/control/math/frames.hpp"
+#include "clients/models/machine.hpp"
+
+namespace drivebench::control {
+
+struct FluxGains {
+  double proportional_a_per_wb;
+  double integral_a_per_wbs;
+};
+
+enum class SpeedSource {
+  kObserver,
+  kBackwardDifference,  ///< shows what encoder noise does; not for use
+};
+
+enum class QuadratureClip {
+  kFixed,  ///< |i_q,ref| ≤ quadrature_reference_limit_a
+  kCircular,  ///< |i_q,ref| ≤ √(I² − i_d,ref²): the mistake of treating a reference as if it were the current
+};
+
+struct ControllerParameters {
+  InductionMachineModel machine;
+  double sample_rate_hz;
+  double counts_per_revolution;
+  double voltage_limit_v;  ///< per phase
+  double current_limit_a;  ///< per phase, of the amplifier
+  double rated_direct_current_a;
+  double quadrature_reference_limit_a;
+  CurrentLoopGains current;
+  ServoGains position;
+  FluxGains flux;
+  SpeedObserverGains speed_observer;
+  SpeedSource speed_source = SpeedSource::kObserver;
+  QuadratureClip quadrature_clip = QuadratureClip::kFixed;
+
+  static std::span<const GainRow<ControllerParameters>> gains() noexcept;
+  /// Everything that is wrong, one sentence each; empty when a controller can be built.
+  std::vector<std::string> problems() const;
+
+  constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
+  /// ψ_d0 = M·i_d0, the flux that the rated direct current keeps up.
+  constexpr double rated_flux_wb() const noexcept {
+    return machine.mutual_inductance_h * rated_direct_current_a;
+  }
+};
+
+/// The voltages for tick k and how they came about.
+struct ControlOutput {
+  double u_a_v = 0.0;
+  double u_b_v = 0.0;
+  bool voltage_saturated = false;
+  bool references_clipped = false;
+  double i_d_a = 0.0;
+  double i_q_a = 0.0;
+  double i_d_reference_a = 0.0;
+  double i_q_reference_a = 0.0;
+  double flux_estimate_wb = 0.0;
+  double flux_angle_estimate_rad = 0.0;
+  double speed_estimate_rad_s = 0.0;    ///< by the speed source in use
+  double speed_observer_rad_s = 0.0;    ///< IMO-04, whichever is in use
+  double speed_difference_rad_s = 0.0;  ///< IMO-03, whichever is in use
+  double measured_angle_rad = 0.0;      ///< since the first sample
+  double position_error_counts = 0.0;   ///< reference − measured angle
+};
+
+/// Field-oriented position control of an induction machine from encoder counts and two phase currents:
+///   i_q,ref = (K0·∫e + K1·e + K2·(ω_ref − ω̂) + (f/J)·ω̂ + α_ref)/(μ·ψ_d0)         with e = θ_ref − θ
+///   i_d,ref = K_ψP·(ψ_d0 − ψ̂) + K_ψI·∫(ψ_d0 − ψ̂) + i_d0
+/// followed by PI current loops in the frame of the estimated flux. Friction is fed forward with a plus sign
+/// (the print has a minus). A reference at its clip freezes its own integrator; a voltage at its limit
+/// freezes all of them. Source: Chiasson 2005, (8.12), (8.19)-(8.21), (8.37), (8.40) (IMC-02, IMC-03, IMO-02,
+/// IMO-04).
+class FieldOrientedController final : public Controller {
+ public:
+  /// `p` must have no problems().
+  explicit FieldOrientedController(const ControllerParameters& p) noexcept;
+
+  /// Over a gap the observers are carried along; the integrators count it as one period.
+  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
+
+  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
+  double angle_rad() const noexcept override { return output_.measured_angle_rad; }
+  double speed_rad_s() const noexcept override { return output_.speed_observer_rad_s; }
+  bool saturated() const noexcept override { return output_.voltage_saturated; }
+  std::span<const std::string_view> telemetry_names() const noexcept override;
+  std::span<const double> telemetry() const noexcept override { return telemetry_; }
+
+  /// Of the last sample.
+  const ControlOutput& output() const noexcept { return output_; }
+  const ControllerParameters& parameters() const noexcept { return p_; }
+
+ private:
+  void carry_observers(std::int64_t periods) noexcept;
+  double direct_reference(double flux_error_wb, bool& clipped) noexcept;
+  double quadrature_reference(const Reference& r, double angle_error_rad, double speed_rad_s,
+                              double i_d_reference_a, bool& clipped) noexcept;
+
+  ControllerParameters p_;
+  double rad_per_count_;
+  double amperes_per_acceleration_;  // 1/(μ·ψ_d0)
+  CurrentLoop current_loop_;
+  PolarFluxObserver flux_;
+  SpeedObserver speed_;
+  BackwardDifference difference_;
+
+  ControlOutput output_;
+  std::array<double, 8> telemetry_{};
+  bool started_ = false;
+  std::int64_t start_count_ = 0;
+  double angle_integral_rad_s_ = 0.0;
+  double flux_integral_wb_s_ = 0.0;
+  // Of the last sample: what the observers are stepped with when the next one comes.
+  DirectQuadrature last_current_a_{.d = 0.0, .q = 0.0};
+  double last_angle_rad_ = 0.0;
+  double last_speed_rad_s_ = 0.0;
+};
+
+}  // namespace drivebench::control

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "clients/control/moves/trajectory.hpp"
+
+namespace drivebench::control {
+
+/// What the bench says about tick k, of any machine. What an axis or a link does not have stays zero; what is
+/// there must be finite: a wire on which NaN means "nothing yet" is its reader's business.
+struct Measurement {
+  std::int64_t encoder_count = 0;
+  double edge_age_s = 0.0;     ///< since the last edge
+  double edge_period_s = 0.0;  ///< between the last two edges; 0: none yet
+  std::uint64_t hall_lines = 0;
+  double tachometer_v = 0.0;
+  double i_a_a = 0.0;  ///< phase a; the armature of a DC machine
+  double i_b_a = 0.0;
+  double i_c_a = 0.0;
+  double i_f_a = 0.0;  ///< field winding
+};
+
+/// What the amplifier is asked for: voltages or currents.
+enum class Quantity { kVoltage, kCurrent };
+
+/// One value for each terminal for tick k, in volts or amperes; an armature is phase a. Terminals that the
+/// machine does not have stay 0.
+struct Setpoint {
+  double a = 0.0;
+  double b = 0.0;
+  double c = 0.0;
+  double field = 0.0;
+};
+
+/// Sampled control of one axis: pure arithmetic, no clock, no link, no plant.
+class Controller {
+ public:
+  Controller() = default;
+  Controller(const Controller&) = default;
+  Controller& operator=(const Controller&) = default;
+  virtual ~Controller() = default;
+
+  /// One sample. `periods` says how many sample periods have passed since the previous call; more than one
+  /// when samples were lost on the way. The first call defines angle 0. Does not allocate.
+  virtual Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept = 0;
+
+  virtual Quantity quantity() const noexcept = 0;
+  /// Since the first sample, from the encoder.
+  virtual double angle_rad() const noexcept = 0;
+  /// As the controller's estimator has it.
+  virtual double speed_rad_s() const noexcept = 0;
+  /// At least one terminal stood at its limit in the last sample.
+  virtual bool saturated() const noexcept = 0;
+
+  /// What else it knows, of the last sample: names with units (like "i_q_ref_a") and values in the same
+  /// order.
+  virtual std::span<const std::string_view> telemetry_names() const noexcept { return {}; }
+  virtual std::span<const double> telemetry() const noexcept { return {}; }
+};
+
+}  // namespace drivebench::control

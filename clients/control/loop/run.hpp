@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clients/control/gains/gains.hpp"
+#include "clients/control/loop/controller.hpp"
+#include "clients/control/moves/trajectory.hpp"
+
+namespace drivebench::control {
+
+/// When what happens in a run.
+struct RunTiming {
+  double sample_rate_hz;  ///< the controller's; not a gain of its own
+  double prepare_s;       ///< standing still before the move: flux build-up, alignment
+  double hold_s;          ///< what the end of the trajectory asks for is kept up, so that it can be judged
+
+  static std::span<const GainRow<RunTiming>> gains() noexcept;
+  std::vector<std::string> problems() const;
+};
+
+enum class RunPhase { kPreparing, kMoving, kHolding, kDone };
+
+/// "preparing", "moving", "holding" or "done".
+const char* name_of(RunPhase phase) noexcept;
+
+/// One run of a controller on an axis, sample by sample: prepare, follow the trajectory, hold. Statistics are
+/// the caller's.
+///   while (!run.done()) send(run.step(receive()));
+class Run {
+ public:
+  /// `timing` must have no problems(). Throws std::invalid_argument if all of it is longer than a run may be,
+  /// or shorter than a sample.
+  Run(std::unique_ptr<Controller> controller, std::shared_ptr<const Trajectory> trajectory,
+      const RunTiming& timing);
+
+  /// The set-point for this sample; `periods` as in Controller::update, so that the trajectory keeps to the
+  /// bench's time when samples are lost. After the end it keeps holding.
+  Setpoint step(const Measurement& m, std::int64_t periods = 1) noexcept;
+
+  /// Of the last sample stepped.
+  RunPhase phase() const noexcept { return phase_; }
+  bool done() const noexcept { return phase_ == RunPhase::kDone; }
+  const Reference& reference() const noexcept { return reference_; }
+  const Controller& controller() const noexcept { return *controller_; }
+  /// Since the start of the trajectory; negative while preparing.
+  double time_s() const noexcept { return static_cast<double>(sample_ - prepare_samples_) * period_s_; }
+
+  const Trajectory& trajectory() const noexcept { return *trajectory_; }
+  const RunTiming& timing() const noexcept { return timing_; }
+  double period_s() const noexcept { return period_s_; }
+  std::int64_t prepare_samples() const noexcept { return prepare_samples_; }
+  /// Samples from the first one to the end of the hold.
+  std::int64_t planned_samples() const noexcept { return planned_samples_; }
+
+ private:
+  RunPhase phase_at(std::int64_t sample) const noexcept;
+
+  std::unique_ptr<Controller> controller_;
+  std::shared_ptr<const Trajectory> trajectory_;
+  RunTiming timing_;
+  double period_s_;
+  std::int64_t prepare_samples_;
+  std::int64_t planned_samples_;
+  std::int64_t sample_ = -1;
+  RunPhase phase_ = RunPhase::kPreparing;
+  Reference reference_;
+};
+
+}  // namespace drivebench::control

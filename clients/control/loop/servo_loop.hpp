@@ -1,0 +1,43 @@
+#pragma once
+
+#include "clients/control/moves/trajectory.hpp"
+
+namespace drivebench::control {
+
+/// Gains of the position loop. Poles −r1, −r2, −r3 need K2 = Σr, K1 = Σ r·r, K0 = r1·r2·r3, if friction is
+/// fed forward or left out.
+struct ServoGains {
+  double integral_per_s3;      ///< K0
+  double proportional_per_s2;  ///< K1
+  double derivative_per_s;     ///< K2
+
+  static constexpr ServoGains placed(double r1, double r2, double r3) noexcept {
+    return {.integral_per_s3 = r1 * r2 * r3,
+            .proportional_per_s2 = r1 * r2 + r1 * r3 + r2 * r3,
+            .derivative_per_s = r1 + r2 + r3};
+  }
+};
+
+/// The acceleration that brings a shaft back to its trajectory:
+///   α = α_ref + K0·∫e + K1·e + K2·(ω_ref − ω)        with e = θ_ref − θ
+/// Source: Chiasson 2005, (10.14)-(10.15) (BL-04).
+class ServoLoop {
+ public:
+  ServoLoop(const ServoGains& gains, double period_s) noexcept : gains_(gains), period_s_(period_s) {}
+
+  double acceleration_rad_s2(const Reference& r, double angle_rad, double speed_rad_s) noexcept {
+    error_rad_ = r.angle_rad - angle_rad;
+    return r.acceleration_rad_s2 + gains_.integral_per_s3 * integral_rad_s_ +
+           gains_.proportional_per_s2 * error_rad_ + gains_.derivative_per_s * (r.speed_rad_s - speed_rad_s);
+  }
+  /// Not while something stands at its limit.
+  void integrate() noexcept { integral_rad_s_ += period_s_ * error_rad_; }
+
+ private:
+  ServoGains gains_;
+  double period_s_;
+  double error_rad_ = 0.0;
+  double integral_rad_s_ = 0.0;
+};
+
+}  // namespace drivebench::control

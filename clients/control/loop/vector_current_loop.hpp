@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cmath>
+
+#include "clients/control/math/frames.hpp"
+
+namespace drivebench::control {
+
+struct VectorCurrentGains {
+  double proportional_v_per_a;
+  double integral_v_per_as;
+};
+
+/// PI control of i_d and i_q around a feed-forward, limited as a vector:
+///   u = u_ff + K_P·e + K_I·∫e,   shortened to |u| ≤ V
+/// While the vector is shortened the integrals stand still.
+class VectorCurrentLoop {
+ public:
+  VectorCurrentLoop(const VectorCurrentGains& gains, double voltage_limit_v, double period_s) noexcept
+      : gains_(gains), voltage_limit_v_(voltage_limit_v), period_s_(period_s) {}
+
+  DirectQuadrature voltage_v(DirectQuadrature error_a, DirectQuadrature feed_forward_v) noexcept {
+    const DirectQuadrature wanted{
+        .d = feed_forward_v.d + gains_.proportional_v_per_a * error_a.d + integral_v_.d,
+        .q = feed_forward_v.q + gains_.proportional_v_per_a * error_a.q + integral_v_.q};
+    const double length_v = std::hypot(wanted.d, wanted.q);
+    saturated_ = length_v > voltage_limit_v_;
+    if (saturated_) {
+      const double share = voltage_limit_v_ / length_v;
+      return {.d = share * wanted.d, .q = share * wanted.q};
+    }
+    integral_v_.d += gains_.integral_v_per_as * period_s_ * error_a.d;
+    integral_v_.q += gains_.integral_v_per_as * period_s_ * error_a.q;
+    return wanted;
+  }
+
+  bool saturated() const noexcept { return saturated_; }  ///< in the last sample
+
+ private:
+  VectorCurrentGains gains_;
+  double voltage_limit_v_;
+  double period_s_;
+  DirectQuadrature integral_v_{.d = 0.0, .q = 0.0};
+  bool saturated_ = false;
+};
+
+}  // namespace drivebench::control

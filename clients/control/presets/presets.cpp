@@ -1,0 +1,30 @@
+#include "clients/control/presets/presets.hpp"
+
+#include <algorithm>
+
+#include "clients/control/math/nearest_name.hpp"
+#include "clients/control/presets/presets_families.hpp"
+
+namespace drivebench::control {
+
+const std::vector<Preset>& presets() {
+  static const std::vector<Preset> kAll = [] {
+    std::vector<Preset> all;
+    for (const std::span<const Preset> family : preset_families())
+      all.insert(all.end(), family.begin(), family.end());
+    return all;
+  }();
+  return kAll;
+}
+
+const Preset* find_preset(std::string_view name) {
+  const std::vector<Preset>& all = presets();
+  const auto found = std::ranges::find(all, name, &Preset::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
+std::string_view nearest_preset_name(std::string_view name) {
+  return nearest_name(name, presets(), &Preset::name);
+}
+
+}  // namespace drivebench::control

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "clients/control/presets/preset.hpp"
+
+namespace drivebench::control {
+
+/// All presets of all families, in the order of presets/presets_families.hpp.
+const std::vector<Preset>& presets();
+
+/// nullptr when there is none of that name.
+const Preset* find_preset(std::string_view name);
+
+/// The preset name with the fewest letters to change, for "did you mean".
+std::string_view nearest_preset_name(std::string_view name);
+
+}  // namespace drivebench::control

@@ -1,0 +1,37 @@
+#include "clients/control/synchronous/bldc_commutation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace drivebench::control {
+
+int commutation_sector(double electrical_rad) noexcept {
+  const double sector = std::floor(electrical_rad / (std::numbers::pi / 3.0) + 0.5);
+  return static_cast<int>(sector - 6.0 * std::floor(sector / 6.0));
+}
+
+std::optional<int> commutation_sector(std::uint64_t hall_lines) noexcept {
+  constexpr int kNone = -1;
+  constexpr std::array<int, 8> kSectors{kNone, 1, 3, 2, 5, 0, 4, kNone};
+  if (hall_lines >= kSectors.size() || kSectors[hall_lines] == kNone) return std::nullopt;
+  return kSectors[hall_lines];
+}
+
+Phases commutation_currents(int sector) noexcept {
+  constexpr std::array<Phases, 6> kTable{
+      {{0, 1, -1}, {-1, 1, 0}, {-1, 0, 1}, {0, -1, 1}, {1, -1, 0}, {1, 0, -1}}};
+  return kTable[static_cast<std::size_t>(sector)];
+}
+
+Phases trapezoids(double electrical_rad) noexcept {
+  const auto trapezoid = [](double turns) {
+    // A triangle of height 3 around the middle of the top, a quarter turn after the rise, cut off at 1.
+    const double distance = std::abs(turns - 0.25 - std::round(turns - 0.25));
+    return std::clamp(3.0 - 12.0 * distance, -1.0, 1.0);
+  };
+  const double turns = electrical_rad / (2.0 * std::numbers::pi);
+  return {trapezoid(turns), trapezoid(turns - 1.0 / 3.0), trapezoid(turns - 2.0 / 3.0)};
+}
+
+}  // namespace drivebench::control

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "clients/control/math/frames.hpp"
+#include "clients/models/pm_machine.hpp"
+
+namespace drivebench::control {
+
+/// Limits of a synchronous machine in two-phase magnitudes: |u| and |i|, not those of a phase.
+struct PmLimits {
+  double voltage_v;
+  double current_a;
+};
+
+/// What keeps the torque from growing.
+enum class LimitInForce { kCurrent, kBoth, kVoltage };
+
+struct PmOptimum {
+  double torque_nm;
+  DirectQuadrature current_a;
+  LimitInForce limit;
+};
+
+/// The largest (direction > 0) or most negative torque that a machine turning steadily at this speed can give
+/// within both limits; nothing where no current within them keeps the voltage. With X = n_p·ω·L_S and
+/// Z² = R_S² + X²:
+///   current alone   i_d = 0, i_q = ±I
+///   voltage alone   i_d = −X·K_m·ω/Z², i_q = (±V·Z − K_m·ω·R_S)/Z²
+///   both            where the circles |i| = I and |u| = V meet
+/// Source: Chiasson 2005, 9.2 (PMT-01..04).
+std::optional<PmOptimum> optimum_torque(const PmMachineModel& p, const PmLimits& limits, double speed_rad_s,
+                                        double direction) noexcept;
+
+/// |u| of a machine turning steadily with these currents.
+double steady_voltage_v(const PmMachineModel& p, double speed_rad_s, DirectQuadrature i) noexcept;
+
+/// The direct current closest to zero that keeps the voltage within its limit while i_q flows; the one of
+/// least voltage where none does.
+double direct_current_within_voltage_a(const PmMachineModel& p, double voltage_limit_v, double speed_rad_s,
+                                       double i_q_a) noexcept;
+
+/// Speeds at which the limit that decides changes, for positive speed; motoring is a positive torque.
+struct PmTransitions {
+  double first_motoring_rad_s;  ///< current alone below, both limits above
+  double first_braking_rad_s;
+  std::vector<double> second_motoring_rad_s;  ///< both limits below, voltage alone above, and again if two
+  std::vector<double> second_braking_rad_s;
+};
+
+/// First speeds, with + for motoring:
+///   (K_m² + (n_p·L_S·I)²)·ω² ± 2·R_S·K_m·I·ω + R_S²·I² = V²
+/// Second speeds, x = ω², D = (n_p·L_S·I)² − K_m², A = V² − R_S²·I²:
+///   (D·x − A)²·(x + (R_S/(n_p·L_S))²) = (2·K_m·R_S·V/(n_p·L_S))²·x
+/// of which roots with D·x < A are those of motoring. Needs V > R_S·I; throws std::invalid_argument.
+/// Source: Chiasson 2005, (9.82) with the terms that the print lacks, (9.88)-(9.94) (PMT-05).
+PmTransitions transition_speeds(const PmMachineModel& p, const PmLimits& limits);
+
+/// The optimum over the speed, for use on line: linear between points, symmetric in the speed.
+class PmTorqueTable {
+ public:
+  /// `points` at least 2. Throws std::invalid_argument if the machine cannot be kept within the limits at
+  /// some speed up to the largest one.
+  PmTorqueTable(const PmMachineModel& p, const PmLimits& limits, double max_speed_rad_s, int points);
+
+  /// Beyond the largest speed: what holds there.
+  DirectQuadrature current_a(double speed_rad_s, double direction) const noexcept;
+
+ private:
+  struct Row {
+    DirectQuadrature motoring_a;
+    DirectQuadrature braking_a;
+  };
+  double rows_per_rad_s_;
+  std::vector<Row> rows_;
+};
+
+}  // namespace drivebench::control

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/control/estimators/observers.hpp"
+#include "clients/control/gains/gains.hpp"
+#include "clients/control/loop/controller.hpp"
+#include "clients/control/math/frames.hpp"
+
+namespace drivebench::control {
+
+enum class StepMode {
+  kFull,   ///< one phase on: a quarter of an electrical turn a step
+  kHalf,   ///< one and two phases on in turn: an eighth; with two on the torque is √2 times that of one
+  kMicro,  ///< cosine and sine
+};
+
+struct StepperParameters {
+  double pole_pairs;  ///< teeth of the rotor, usually 50
+  double sample_rate_hz;
+  double counts_per_revolution;
+  double amplitude;         ///< of a phase, in volts or amperes
+  double microsteps = 1.0;  ///< in a full step, with kMicro
+  StepMode mode = StepMode::kFull;
+  Quantity drive = Quantity::kVoltage;
+
+  static std::span<const GainRow<StepperParameters>> gains() noexcept;
+  std::vector<std::string> problems() const;
+
+  /// The angle of one step: 360°/(4·n_p) for a full one.
+  double step_rad() const noexcept;
+};
+
+/// What stands on the phases, for an amplitude of 1, so that the rotor of a stepping motor rests at an
+/// electrical angle; the angle is rounded to the nearest step. Source: Chiasson 2005, 9.4 and problem 9.10
+/// (ST-01, ST-03).
+PhasePair step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept;
+
+/// A stepping motor without feedback: the phases are those at which the rotor rests at the angle of the
+/// reference, rounded to the nearest step. Angle 0 is the full step closest to where the rotor stands at the
+/// first sample. The encoder is only looked at.
+class StepperController final : public Controller {
+ public:
+  /// `p` must have no problems().
+  explicit StepperController(const StepperParameters& p) noexcept;
+
+  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
+
+  Quantity quantity() const noexcept override { return p_.drive; }
+  double angle_rad() const noexcept override { return angle_rad_; }
+  double speed_rad_s() const noexcept override { return speed_rad_s_; }
+  bool saturated() const noexcept override { return false; }
+  std::span<const std::string_view> telemetry_names() const noexcept override;
+  std::span<const double> telemetry() const noexcept override { return telemetry_; }
+
+ private:
+  StepperParameters p_;
+  BackwardDifference difference_;
+  bool started_ = false;
+  std::int64_t start_count_ = 0;
+  double start_electrical_rad_ = 0.0;
+  double angle_rad_ = 0.0;
+  double speed_rad_s_ = 0.0;
+  std::array<double, 1> telemetry_{};
+};
+
+}  // namespace drivebench::control

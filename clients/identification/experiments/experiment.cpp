@@ -1,0 +1,124 @@
+#include "clients/identification/experiments/experiment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "clients/identification/motors/bldc_motor.hpp"
+#include "clients/identification/motors/dc_motor.hpp"
+#include "clients/identification/motors/induction_motor.hpp"
+#include "clients/identification/motors/pm_motor.hpp"
+
+namespace drivebench::identification {
+
+Processing usual_processing(MotorKind kind, double period_s) {
+  const double highest_hz = 0.2 / period_s;
+  const auto low_pass = [&](int order, double cutoff_hz) {
+    return LowPass{.order = order, .cutoff_hz = std::min(cutoff_hz, highest_hz)};
+  };
+  Processing p;
+  switch (kind) {
+    case MotorKind::kDc:
+      p.current = p.voltage = p.shaft = low_pass(2, 100.0);
+      break;
+    case MotorKind::kInduction:
+      p.current = p.voltage = low_pass(3, 200.0);
+      p.shaft = low_pass(3, 100.0);
+      p.voltage_shift = 0.0;
+      break;
+    case MotorKind::kPmSynchronous:
+    case MotorKind::kBldc:
+      p.current = p.voltage = p.shaft = low_pass(3, 500.0);
+      break;
+  }
+  return p;
+}
+
+Result identify(const MeasuredData& data, const Experiment& experiment) {
+  if (!(data.period_s > 0.0 && std::isfinite(data.period_s)))
+    throw IdentificationError("the period of the data must be positive");
+  if (experiment.pole_pairs < 1) throw IdentificationError("pole_pairs must be 1 or more");
+  for (const Column& column : data.columns) {
+    if (column.values.size() != data.samples())
+      throw IdentificationError(fmt::format("column {} has {} samples, the first one {}", column.name,
+                                            column.values.size(), data.samples()));
+  }
+  switch (experiment.kind) {
+    case MotorKind::kDc:
+      return identify_dc_motor(data, experiment);
+    case MotorKind::kInduction:
+      return identify_induction_motor(data, experiment);
+    case MotorKind::kPmSynchronous:
+      return identify_pm_motor(data, experiment);
+    case MotorKind::kBldc:
+      break;
+  }
+  return identify_bldc_motor(data, experiment);
+}
+
+ShaftSignals shaft_signals(const MeasuredData& data, const Experiment& e) {
+  const Processing& p = e.processing;
+  const SeriesView measured = data.at(e.counts_per_revolution > 0.0 ? "encoder_count" : "angle_rad");
+  Series angle = e.counts_per_revolution > 0.0 ? angle_of(measured, e.counts_per_revolution, e.half_count)
+                                               : Series(measured.begin(), measured.end());
+  angle = zero_phase(angle, p.shaft, data.period_s);
+  Series speed = slope_of(angle, data, p);
+  Series acceleration =
+      p.backward_differences ? slope_of(speed, data, p) : second_difference(angle, data.period_s);
+  return {.angle = std::move(angle), .speed = std::move(speed), .acceleration = std::move(acceleration)};
+}
+
+TwoPhaseSeries windings(const MeasuredData& data, const Experiment& e, char quantity, char unit) {
+  const auto column = [&](char phase) { return data.at(fmt::format("{}_{}_{}", quantity, phase, unit)); };
+  const SeriesView a = column('a');
+  const SeriesView b = column('b');
+  if (e.three_phase) return two_phase(a, b, column('c'));
+  return {.a = {a.begin(), a.end()}, .b = {b.begin(), b.end()}};
+}
+
+SampleRange window_of(const MeasuredData& data, const Processing& p) {
+  const double rate_hz = 1.0 / data.period_s;
+  const auto sample_at = [&](double time_s) {
+    return static_cast<std::size_t>(
+        std::clamp(std::round(time_s * rate_hz), 0.0, static_cast<double>(data.samples())));
+  };
+  const std::size_t last = data.samples() - std::min(data.samples(), p.edge_samples);
+  const std::size_t first = std::max(p.edge_samples, sample_at(p.from_s));
+  const std::size_t end = p.to_s > 0.0 ? std::min(last, sample_at(p.to_s)) : last;
+  constexpr std::size_t kLeast = 50;
+  if (end < first + kLeast)
+    throw IdentificationError(
+        fmt::format("{} samples of the record's {} lie in the window, at least {} are needed",
+                    end > first ? end - first : 0, data.samples(), kLeast));
+  return {.first = first, .end = end};
+}
+
+bool varies(SeriesView x, const SampleRange& range) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const double value : x.subspan(range.first, range.count()))
+    sum += value;
+  const double mean = sum / static_cast<double>(range.count());
+  double spread = 0.0;
+  for (const double value : x.subspan(range.first, range.count())) {
+    squares += value * value;
+    spread += (value - mean) * (value - mean);
+  }
+  constexpr double kLeast = 2e-3;
+  return spread > kLeast * kLeast * squares;
+}
+
+void expect_positive(Result& result, const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    if (!(result.at(name) > 0.0)) add_unseen(result.excitation, {name}, name + " comes out as zero or less");
+  }
+}
+
+Series slope_of(SeriesView x, const MeasuredData& data, const Processing& p) {
+  return p.backward_differences ? backward_difference(x, data.period_s)
+                                : central_difference(x, data.period_s);
+}
+
+}  // namespace drivebench::identification

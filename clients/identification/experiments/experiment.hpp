@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "clients/identification/experiments/signals.hpp"
+#include "clients/identification/math/filters.hpp"
+#include "clients/identification/measured_data.hpp"
+#include "clients/identification/result.hpp"
+
+namespace drivebench::identification {
+
+enum class MotorKind : std::uint8_t { kDc, kInduction, kPmSynchronous, kBldc };
+
+/// How the data become equations. Whatever stands in one equation should have passed the same filter and
+/// belong to the same instant: a mismatch is the largest bias of all.
+struct Processing {
+  LowPass current{};  ///< of currents and what is derived from them
+  LowPass voltage{};
+  LowPass shaft{};  ///< of the angle, before its differences
+  /// Backward differences are late by half a period; they are here to show what that does.
+  bool backward_differences = false;
+  /// By how many periods the voltages are to be advanced. An amplifier of the bench, and many drives, report
+  /// the mean of the period before the sample: 0.5. The bench reports the voltage of a line source at the
+  /// sample itself: 0. Commands that arrive d periods late and hold for one: -d - 0.5.
+  double voltage_shift = 0.5;
+  double from_s = 0.0;  ///< part of the record that goes into the equations, from its first sample on; the
+                        ///< filters see all
+  double to_s = 0.0;    ///< 0: to the end
+  std::size_t edge_samples = 20;  ///< left out at both ends of the record, where the filters know less
+};
+
+/// What opposes the torque of an induction motor in the equation of motion.
+enum class LoadModel : std::uint8_t { kViscous, kConstant };
+
+/// All that identify() needs to know beside the data.
+struct Experiment {
+  MotorKind kind = MotorKind::kInduction;
+  int pole_pairs = 1;
+  bool three_phase = true;  ///< star with phases a, b, c; else the two phases of a two-phase machine
+  double counts_per_revolution = 0.0;  ///< > 0: the shaft is column encoder_count, else angle_rad
+  bool half_count = true;              ///< takes the half count out by which a floor encoder is behind
+  LoadModel load = LoadModel::kViscous;
+  bool two_stage = true;  ///< PM synchronous: first the electrical parameters, then the mechanical ones
+  Processing processing{};
+};
+
+/// Filters that suit motors of this kind at this sampling rate, none above a fifth of the rate. The voltages
+/// of an induction motor are taken as those of a line source, all others as those of an amplifier.
+Processing usual_processing(MotorKind kind, double period_s);
+
+/// One call: data and kind give parameters, error indices and a verdict. Columns: i_a_a, i_b_a, i_c_a and
+/// u_a_v, u_b_v, u_c_v (the third ones of three-phase machines only; a DC motor has phase a), encoder_count
+/// or angle_rad. Throws IdentificationError if the data cannot be used at all; if they can but do not excite
+/// the motor, the result says so.
+Result identify(const MeasuredData& data, const Experiment& experiment);
+
+/// The angle of the shaft with its derivatives [rad, rad/s, rad/s^2].
+struct ShaftSignals {
+  Series angle;
+  Series speed;
+  Series acceleration;
+};
+ShaftSignals shaft_signals(const MeasuredData& data, const Experiment& experiment);
+
+/// Currents or voltages of the two-phase equivalent, as measured: "i", "_a" reads i_a_a, i_b_a, i_c_a.
+TwoPhaseSeries windings(const MeasuredData& data, const Experiment& experiment, char quantity, char unit);
+
+/// First and last + 1 sample that go into the equations; throws if there are fewer than 50.
+struct SampleRange {
+  std::size_t first;
+  std::size_t end;
+  std::size_t count() const noexcept { return end - first; }
+};
+SampleRange window_of(const MeasuredData& data, const Processing& processing);
+
+/// Whether a signal varies enough in the window to tell what belongs to its derivative: by 0.2 % of its rms
+/// value at least. An encoder leaves 0.02 % of noise on a steady speed, which has derivatives too.
+bool varies(SeriesView x, const SampleRange& range);
+
+/// Marks those of the named parameters that are no values for a motor, zero or less, as unseen.
+void expect_positive(Result& result, const std::vector<std::string>& names);
+
+/// The derivative as Processing has it.
+Series slope_of(SeriesView x, const MeasuredData& data, const Processing& processing);
+
+}  // namespace drivebench::identification

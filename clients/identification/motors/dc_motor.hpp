@@ -1,0 +1,13 @@
+#pragma once
+
+#include "clients/identification/experiments/experiment.hpp"
+
+namespace drivebench::identification {
+
+/// L, R, K_T, J, f of a permanent-magnet DC motor by least squares on
+///   L i' + R i + K_T w = v
+///   J w' + f w - K_T i = 0
+/// with current, voltage and angle through the same filter. Source: Chiasson 2005, 2.7; tags IDN-01..03.
+Result identify_dc_motor(const MeasuredData& data, const Experiment& experiment);
+
+}  // namespace drivebench::identification

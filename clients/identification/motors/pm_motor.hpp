@@ -1,0 +1,16 @@
+#pragma once
+
+#include "clients/identification/experiments/experiment.hpp"
+
+namespace drivebench::identification {
+
+/// R_S, L_S, K_m, J, f, f_c of a PM synchronous motor without saliency by least squares on
+///   R i_d + L (i_d' - n_p w i_q)             = u_d
+///   R i_q + L (i_q' + n_p w i_d) + K_m w     = u_q
+///   J w' + f w + f_c sgn w - K_m i_q         = 0
+/// In one stage as they stand, or in two: the third one after the others, as J w' + ... = K_m i_q, so that
+/// its indices are not measured by the error of the voltages. Source: Chiasson 2005, (9.104); tags PMID-01,
+/// PMID-02.
+Result identify_pm_motor(const MeasuredData& data, const Experiment& experiment);
+
+}  // namespace drivebench::identification

@@ -1,0 +1,44 @@
+#include "plant/machines/bldc/bldc_machine_rows.hpp"
+
+#include <array>
+
+#include "plant/parameters/rows.hpp"
+
+namespace drivebench {
+namespace {
+
+using Machine = BldcMachineParameters;
+
+constexpr auto kTable = std::to_array<Parameter>({
+    machine_row<Machine, &Machine::pole_pairs>("machine.pole_pairs", "1", 1, 1000, kInteger | kRequired,
+                                               "n_p"),
+    machine_row<Machine, &Machine::stator_resistance_ohm>("machine.stator_resistance_ohm", "ohm", 1e-6, 1e6,
+                                                          kLive | kRequired, "R_S of a phase"),
+    machine_row<Machine, &Machine::self_inductance_h>("machine.self_inductance_h", "H", 1e-9, 1e3, kRequired,
+                                                      "L_S of a phase"),
+    machine_row<Machine, &Machine::mutual_inductance_h>(
+        "machine.mutual_inductance_h", "H", 0, 1e3, kRequired,
+        "M: a phase links the flux -M i of another; below half of self_inductance_h"),
+    machine_row<Machine, &Machine::torque_constant_nm_per_a>(
+        "machine.torque_constant_nm_per_a", "N*m/A", 1e-9, 1e6, kLive | kRequired,
+        "tau_p = e_p at the flat top: torque over current of a phase, and its emf over speed of the shaft"),
+    machine_row<Machine, &Machine::star>("machine.star", "1", 0, 1, kInteger,
+                                         "1: an isolated star, 0: three independent phases"),
+});
+
+}  // namespace
+
+std::span<const Parameter> bldc_machine_rows() noexcept {
+  return kTable;
+}
+
+void add_problems(const BldcMachineParameters& p, Problems& found) {
+  if (!(2.0 * p.mutual_inductance_h < p.self_inductance_h)) {
+    found.add("machine.mutual_inductance_h", [&] {
+      return "is " + text(p.mutual_inductance_h) +
+             " but must be below half of self_inductance_h = " + text(p.self_inductance_h);
+    });
+  }
+}
+
+}  // namespace drivebench

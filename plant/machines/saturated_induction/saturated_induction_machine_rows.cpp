@@ -1,0 +1,66 @@
+#include "plant/machines/saturated_induction/saturated_induction_machine_rows.hpp"
+
+#include <array>
+#include <string>
+#include <utility>
+
+#include "plant/parameters/rows.hpp"
+
+namespace drivebench {
+namespace {
+
+using Machine = SaturatedInductionMachineParameters;
+
+constexpr auto kTable = std::to_array<Parameter>({
+    machine_row<Machine, &Machine::pole_pairs>("machine.pole_pairs", "1", 1, 1000, kInteger | kRequired,
+                                               "n_p"),
+    machine_row<Machine, &Machine::stator_resistance_ohm>("machine.stator_resistance_ohm", "ohm", 1e-6, 1e6,
+                                                          kLive | kRequired, "R_S, two-phase equivalent"),
+    machine_row<Machine, &Machine::rotor_resistance_ohm>("machine.rotor_resistance_ohm", "ohm", 1e-6, 1e6,
+                                                         kLive | kRequired, "R_R, two-phase equivalent"),
+    machine_row<Machine, &Machine::stator_leakage_h>("machine.stator_leakage_h", "H", 1e-9, 1e3, kRequired,
+                                                     "l_s = L_S - M, two-phase equivalent"),
+    machine_row<Machine, &Machine::rotor_leakage_h>("machine.rotor_leakage_h", "H", 1e-9, 1e3, kRequired,
+                                                    "l_r = L_R - M, two-phase equivalent"),
+    machine_row<Machine, &Machine::star>("machine.star", "1", 0, 1, kInteger,
+                                         "1: three phases in an isolated star, 0: two phases"),
+});
+
+constexpr auto kCurves = std::to_array<CurveParameter>({
+    {.name = "machine.magnetising_curve",
+     .x_unit = "A",
+     .y_unit = "Wb",
+     .required = true,
+     .rising = true,
+     .meaning = "magnetising flux over magnetising current, two-phase equivalent, from [0, 0] on",
+     .get = [](const AxisParameters& p) noexcept -> const Curve& {
+       return std::get_if<Machine>(&p.machine)->magnetising_curve;
+     },
+     .set = [](AxisParameters& p,
+               Curve curve) { std::get_if<Machine>(&p.machine)->magnetising_curve = std::move(curve); }},
+});
+
+}  // namespace
+
+std::span<const Parameter> saturated_induction_machine_rows() noexcept {
+  return kTable;
+}
+
+std::span<const CurveParameter> saturated_induction_machine_curves() noexcept {
+  return kCurves;
+}
+
+void add_problems(const SaturatedInductionMachineParameters& p, Problems& found) {
+  constexpr std::string_view kField = "machine.magnetising_curve";
+  if (p.magnetising_curve.empty()) {
+    found.add(kField, "has no points but needs two or more");
+    return;
+  }
+  if (const CurvePoint first = p.magnetising_curve.points().front(); first != CurvePoint{0.0, 0.0}) {
+    found.add(kField, [&] {
+      return "begins at [" + text(first.x) + ", " + text(first.y) + "] but must begin at [0, 0]";
+    });
+  }
+}
+
+}  // namespace drivebench

@@ -1,0 +1,45 @@
+#include "plant/machines/series_dc/series_dc_machine_rows.hpp"
+
+#include <array>
+
+#include "plant/machines/field_winding_rows.hpp"
+
+namespace drivebench {
+namespace {
+
+using Machine = SeriesDcMachineParameters;
+
+constexpr auto kTable = std::to_array<Parameter>({
+    field_winding_rows::armature_resistance<Machine>(),
+    field_winding_rows::armature_inductance<Machine>(),
+    field_winding_rows::motor_constant<Machine>(),
+    field_winding_rows::field_resistance<Machine>(),
+    field_winding_rows::field_inductance<Machine>(),
+    machine_row<Machine, &Machine::field_shunt_resistance_ohm>(
+        "machine.field_shunt_resistance_ohm", "ohm", 0, 1e6, kReal,
+        "R_p, which machine.field_shunt lays across the field; 0: there is none"),
+    machine_row<Machine, &Machine::field_shunt>("machine.field_shunt", "1", 0, 1, kInteger | kLive,
+                                                "1: R_p is across the field and weakens it"),
+});
+
+constexpr auto kCurves = std::to_array<CurveParameter>({field_winding_rows::saturation_curve<Machine>()});
+
+}  // namespace
+
+std::span<const Parameter> series_dc_machine_rows() noexcept {
+  return kTable;
+}
+
+std::span<const CurveParameter> series_dc_machine_curves() noexcept {
+  return kCurves;
+}
+
+void add_problems(const SeriesDcMachineParameters& p, Problems& found) {
+  field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
+  if (p.field_shunt && p.field_shunt_resistance_ohm == 0.0) {
+    found.add("machine.field_shunt",
+              "is 1 but must be 0 without a resistor: machine.field_shunt_resistance_ohm is 0");
+  }
+}
+
+}  // namespace drivebench

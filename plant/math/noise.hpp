@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "plant/math/trig.hpp"
+
+/// Noise as a pure function of (seed, channel, tick): no generator state, so that a value depends neither on
+/// the order of the calls nor on which other channels exist, and a replay or a branch from a saved state sees
+/// the same noise.
+///
+/// The bits are those of a three-round keyed hash with the murmur-style finaliser below. It is not
+/// cryptographic.
+namespace drivebench {
+
+namespace noise_detail {
+
+/// A bijection of 64-bit words in which every input bit flips every output bit about half the time.
+constexpr std::uint64_t mixed(std::uint64_t word) noexcept {
+  word = (word ^ (word >> 30U)) * 0xbf58476d1ce4e5b9U;
+  word = (word ^ (word >> 27U)) * 0x94d049bb133111ebU;
+  return word ^ (word >> 31U);
+}
+
+/// The hash. Each round adds an odd multiple of one argument to the mixed earlier ones, so that equal sums of
+/// arguments, (seed + 1, channel) and (seed, channel + 1) for example, do not collide. A zero key is as good
+/// as any.
+constexpr std::uint64_t hashed(std::uint64_t seed, std::uint64_t channel, std::uint64_t tick) noexcept {
+  std::uint64_t word = mixed(seed + 0x9e3779b97f4a7c15U);
+  word = mixed(word + channel * 0xd1342543de82ef95U + 0x632be59bd9b4e019U);
+  return mixed(word + tick * 0x9e3779b97f4a7c15U + 0x2545f4914f6cdd1dU);
+}
+
+/// The upper 53 bits as a number in [0, 1).
+constexpr double unit_interval(std::uint64_t word) noexcept {
+  return static_cast<double>(word >> 11U) * 0x1p-53;
+}
+
+}  // namespace noise_detail
+
+/// Uniform in [0, 1). Not independent of gaussian_noise of the same arguments: give each use its own channel.
+constexpr double uniform_noise(std::uint64_t seed, std::uint64_t channel, std::uint64_t tick) noexcept {
+  return noise_detail::unit_interval(noise_detail::hashed(seed, channel, tick));
+}
+
+/// Normal with mean 0 and variance 1 (Box-Muller). Always finite: the magnitude is at most sqrt(106·log 2)
+/// = 8.57. Not independent of uniform_noise of the same arguments: give each use its own channel.
+inline double gaussian_noise(std::uint64_t seed, std::uint64_t channel, std::uint64_t tick) noexcept {
+  constexpr double kTwoPi = 0x1.921fb54442d18p+2;
+  const std::uint64_t word = noise_detail::hashed(seed, channel, tick);
+  const double radius_draw = noise_detail::unit_interval(word) + 0x1p-53;  // (0, 1]: its logarithm is finite
+  const double angle_draw = noise_detail::unit_interval(noise_detail::mixed(word + 0xa0761d6478bd642fU));
+  return std::sqrt(-2.0 * logarithm(radius_draw)) * cosine(kTwoPi * angle_draw);
+}
+
+}  // namespace drivebench

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <type_traits>
+
+#include "plant/math/rk4.hpp"
+#include "plant/math/rotated.hpp"
+#include "plant/math/trig.hpp"
+#include "plant/train/events.hpp"
+#include "plant/train/train.hpp"
+
+namespace drivebench {
+
+/// A train with a machine of this kind, whose rotor turns a rigid shaft (ShaftState) or one of two masses
+/// (TwoMassState).
+template <class Machine, class Shaft>
+class DriveTrain final : public Train {
+ public:
+  using State = typename Machine::State;
+
+  explicit DriveTrain(const MachineParameters& machine) noexcept { set_machine(machine, {}); }
+
+  std::unique_ptr<Train> clone() const override { return std::make_unique<DriveTrain>(*this); }
+
+  void set_machine(const MachineParameters& machine, const Adjustment& adjustment) noexcept override {
+    const auto p = adjusted(*std::get_if<typename Machine::Parameters>(&machine), adjustment);
+    c_ = constants_of(p);
+    pole_pairs_ = pole_pairs_of(p);
+  }
+
+  void run(AxisCore& core, AxisState& state, double load_nm) noexcept override;
+  MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept override;
+
+  void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
+            const RotorMotion& motion) noexcept override;
+  double stage_torque_nm(const RotorMotion& motion) const noexcept override {
+    return torque_nm(c_, piece_.stage, turned(motion));
+  }
+  void stage(int number, double duration_s, const RotorMotion& motion) noexcept override;
+  void shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
+               const RotorMotion& motion) noexcept override;
+  void find_corner(const RotorMotion& from, const RotorMotion& to) noexcept override {
+    piece_.corner = corner_between(from, to);
+  }
+  void add_events(const AxisCore& core, const AxisState& state, PieceEnd end, const RotorMotion& motion,
+                  EventValues& values) const noexcept override;
+  void close(AxisCore& core, AxisState& state, double start_s, double duration_s, const RotorMotion& from,
+             const RotorMotion& to, int event) noexcept override;
+
+ private:
+  /// The continuous state, integrated as one vector.
+  struct Whole {
+    State machine;
+    Shaft shaft;
+  };
+
+  /// What is worked out at the start of a piece.
+  struct Piece {
+    State from{};
+    State stage{};
+    State sum{};
+    TerminalDrive drive{};
+    TerminalCircuit circuit{};
+    double corner = 0.0;      ///< the one on the way through the whole piece
+    PhaseValues current_a{};  ///< of the terminals, at its start; at its end once that is known
+    bool plain = false;       ///< every terminal conducts at a constant voltage, nothing is shorted
+    bool open = false;        ///< no terminal is driven, none carries a current
+    bool stays = false;       ///< either of them, and the next piece has the same
+  };
+
+  static State machine_of(const AxisState& state) noexcept;
+  static void keep_machine(AxisState& state, const State& x) noexcept;
+  static Shaft shaft_of(const AxisState& state) noexcept;
+  static void keep_shaft(AxisState& state, const Shaft& x) noexcept;
+
+  RotorMotion turned(RotorMotion motion) const noexcept {
+    if constexpr (Machine::kUsesAngle) motion.electrical = cos_sin(pole_pairs_ * motion.angle_rad);
+    return motion;
+  }
+  /// The electrical angle is worked out now and then and rotated from there on: a third of the time of a
+  /// cosine and sine, and more exact than carrying them as states.
+  RotorMotion motion_of(const Whole& x) const noexcept {
+    RotorMotion motion{
+        .angle_rad = x.shaft.angle_rad, .speed_rad_s = x.shaft.speed_rad_s, .electrical = {1.0, 0.0}};
+    if constexpr (Machine::kUsesAngle) {
+      motion.electrical = rotated(near_, pole_pairs_ * (x.shaft.angle_rad - near_rad_));
+    }
+    return motion;
+  }
+
+  Whole slope(const AxisCore& core, const Whole& x, const TerminalInput& u, const ShaftBranch& branch,
+              double load_nm) const noexcept;
+  // Left to themselves the compilers call the slope four times, at twice the time.
+  [[gnu::flatten]] void step(const AxisCore& core, Whole& x, double duration_s, const ShaftBranch& branch,
+                             double load_nm) const noexcept;
+  [[gnu::noinline]] void step_varying(const AxisCore& core, Whole& x, double duration_s,
+                                      const ShaftBranch& branch, double load_nm) const noexcept;
+  /// A circuit whose voltages stay as they are, of which nothing dies.
+  void hold_constant(const TerminalInput& input) noexcept;
+  void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;
+  /// Whether every terminal conducts; if so, the circuit has its voltage.
+  bool conduct(const AxisCore& core, const AxisState& state) noexcept;
+  /// What open windings show where `u` lets the others carry current: of most machines what they would show
+  /// without any, else the machine has floating_voltages().
+  WindingValues floating_v(const State& x, const RotorMotion& motion, const TerminalInput& u) const noexcept;
+  /// The same with all terminals open.
+  WindingValues open_v(const State& x, const RotorMotion& motion) const noexcept;
+  /// Whether terminals of which none is driven and none carries a current stay so.
+  bool leave_open(const AxisCore& core, const State& x, const RotorMotion& motion) noexcept;
+  void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
+                     const RotorMotion& motion) noexcept;
+  /// The step up to the event that comes first, and which one it is (-1: none comes).
+  Crossing cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
+                        double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
+  EventValues values_at(const AxisCore& core, TerminalSet open, TerminalSet dying, const Whole& x,
+                        const ShaftBranch& branch, double corner) const noexcept;
+  void add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying, const State& x,
+                      const RotorMotion& motion, double corner, EventValues& values) const noexcept;
+  double corner_between(const RotorMotion& from, const RotorMotion& to) const noexcept;
+  void settle_terminals(const AxisCore& core, AxisState& state, State& x, const RotorMotion& motion,
+                        int electrical_event) const noexcept;
+  void begin_substep(const Shaft& shaft) noexcept;
+  void look_up_angle(const Shaft& shaft) noexcept;
+  /// Whether the circuit is that of the last piece but for the switches.
+  bool goes_on(AxisCore& core, AxisState& state, double start_s, const Whole& x) noexcept;
+  /// A piece in which nothing happens that anybody follows.
+  void run_smooth(AxisCore& core, Whole& x, double start_s, double end_s, double load_nm) noexcept;
+  void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
+                 double load_nm) noexcept;
+  void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
+                    const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
+  void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
+  /// Takes out what the integration lets a blocked current drift.
+  void keep_open(const AxisCore& core, const AxisState& state, State& x,
+                 const RotorMotion& motion) const noexcept;
+  /// Of the terminals, at the end of the last piece.
+  PhaseValues end_voltages(const AxisCore& core, const AxisState& state, const State& x,
+                           const RotorMotion& motion) const noexcept;
+  PhaseValues currents(const AxisCore& core, const AxisState& state, const State& x,
+                       const RotorMotion& motion) const noexcept;
+  Measurable measurable(const AxisCore& core, const AxisState& state, const State& x,
+                        const RotorMotion& motion, const PhaseValues& current_a,
+                        const PhaseValues& voltage_v) const noexcept;
+
+  typename Machine::Constants c_{};
+  double pole_pairs_ = 0.0;
+  Piece piece_{};
+  CosSin near_{1.0, 0.0};  ///< of the electrical angle
+  double near_rad_ = 0.0;  ///< of the rotor
+};
+
+/// A corner that is not within reach.
+inline constexpr double kNoCorner = 1e300;
+
+/// The integer that a corner position passes on its way between two values; kNoCorner if it passes none.
+double corner_on_the_way(double from, double to) noexcept;
+
+/// The n-th terminal of a set, from 0 on.
+int nth_terminal(TerminalSet set, int n) noexcept;
+
+/// The set of open terminals after the current of one has died; in a star the last two die together.
+TerminalSet opened(Connection connection, TerminalSet open, int terminal) noexcept;
+
+/// An interval has passed: drive, analog sensors and terminal voltages follow.
+void follow_piece(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                  const TerminalDrive& drive, const TerminalCircuit& circuit, const Measurable& from,
+                  const Measurable& to) noexcept;
+
+}  // namespace drivebench

@@ -1,0 +1,356 @@
+#pragma once
+
+#include "plant/train/drive_train_terminals.hpp"
+
+namespace drivebench {
+
+template <class Machine, class Shaft>
+auto DriveTrain<Machine, Shaft>::machine_of(const AxisState& state) noexcept -> State {
+  static_assert(std::is_trivially_copyable_v<State> && sizeof(State) <= sizeof(MachineWords));
+  std::array<double, sizeof(State) / sizeof(double)> words;
+  std::copy_n(state.machine.begin(), words.size(), words.begin());
+  return std::bit_cast<State>(words);
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::keep_machine(AxisState& state, const State& x) noexcept {
+  const auto words = std::bit_cast<std::array<double, sizeof(State) / sizeof(double)>>(x);
+  std::copy(words.begin(), words.end(), state.machine.begin());
+}
+
+template <class Machine, class Shaft>
+Shaft DriveTrain<Machine, Shaft>::shaft_of(const AxisState& state) noexcept {
+  if constexpr (std::is_same_v<Shaft, TwoMassState>) {
+    return state.shaft;
+  } else {
+    return {.speed_rad_s = state.shaft.speed_rad_s, .angle_rad = state.shaft.angle_rad};
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::keep_shaft(AxisState& state, const Shaft& x) noexcept {
+  if constexpr (std::is_same_v<Shaft, TwoMassState>) {
+    state.shaft = x;
+  } else {
+    state.shaft.speed_rad_s = x.speed_rad_s;
+    state.shaft.angle_rad = x.angle_rad;
+  }
+}
+
+template <class Machine, class Shaft>
+MachineTruth DriveTrain<Machine, Shaft>::truth(const AxisState& state,
+                                               const RotorMotion& motion) const noexcept {
+  const State x = machine_of(state);
+  const RotorMotion now = turned(motion);
+  return {.current_a = winding_currents(c_, x, now),
+          .torque_nm = torque_nm(c_, x, now),
+          .rotor_flux_wb = rotor_flux_wb(c_, x, now)};
+}
+
+template <class Machine, class Shaft>
+auto DriveTrain<Machine, Shaft>::slope(const AxisCore& core, const Whole& x, const TerminalInput& u,
+                                       const ShaftBranch& branch, double load_nm) const noexcept -> Whole {
+  const RotorMotion motion = motion_of(x);
+  Whole result;
+  result.machine = derivative(c_, x.machine, motion, u);
+  result.shaft = derivative(core.shaft, x.shaft, torque_nm(c_, x.machine, motion), load_nm, branch);
+  return result;
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::step(const AxisCore& core, Whole& x, double duration_s,
+                                      const ShaftBranch& branch, double load_nm) const noexcept {
+  if (!piece_.circuit.constant) return step_varying(core, x, duration_s, branch, load_nm);
+  x = rk4_step(x, duration_s, [&](const Whole& s) noexcept -> Whole {
+    return slope(core, s, piece_.circuit.start, branch, load_nm);
+  });
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::step_varying(const AxisCore& core, Whole& x, double duration_s,
+                                              const ShaftBranch& branch, double load_nm) const noexcept {
+  const TerminalCircuit& circuit = piece_.circuit;
+  x = rk4_step(x, duration_s, [&](const Whole& s, StepPoint point) noexcept -> Whole {
+    const TerminalInput& u = point == StepPoint::kStart    ? circuit.start
+                             : point == StepPoint::kMiddle ? circuit.middle
+                                                           : circuit.end;
+    return slope(core, s, u, branch, load_nm);
+  });
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying,
+                                                const State& x, const RotorMotion& motion, double corner,
+                                                EventValues& values) const noexcept {
+  if (dying != 0) {
+    const PhaseValues i = terminal_currents(core.connection, winding_currents(c_, x, motion), open);
+    if ((dying & 1u) != 0) values.add(i.a);
+    if ((dying & 2u) != 0) values.add(i.b);
+    if ((dying & 4u) != 0) values.add(i.c);
+  }
+  if constexpr (Machine::kHasCorners) {
+    if (corner != kNoCorner) values.add(corner_position(c_, motion.angle_rad) - corner);
+  }
+}
+
+template <class Machine, class Shaft>
+double DriveTrain<Machine, Shaft>::corner_between(const RotorMotion& from,
+                                                  const RotorMotion& to) const noexcept {
+  if constexpr (Machine::kHasCorners) {
+    return corner_on_the_way(corner_position(c_, from.angle_rad), corner_position(c_, to.angle_rad));
+  } else {
+    return kNoCorner;
+  }
+}
+
+template <class Machine, class Shaft>
+EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, TerminalSet open, TerminalSet dying,
+                                                  const Whole& x, const ShaftBranch& branch,
+                                                  double corner) const noexcept {
+  EventValues values;
+  if (core.shaft_has_events) {
+    std::array<double, 4> shaft{};
+    values.shaft = event_values(core.shaft, x.shaft, branch, shaft);
+    for (int k = 0; k < values.shaft; ++k)
+      values.add(shaft[static_cast<std::size_t>(k)]);
+  }
+  add_electrical(core, open, dying, x.machine, motion_of(x), corner, values);
+  return values;
+}
+
+template <class Machine, class Shaft>
+Crossing DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, const Whole& from,
+                                                  Whole& to, double start_s, double duration_s,
+                                                  const ShaftBranch& branch, double load_nm) noexcept {
+  const TerminalSet dying = piece_.circuit.dying;
+  const double corner = corner_between(motion_of(from), motion_of(to));
+  const EventValues before = values_at(core, state.open_terminals, dying, from, branch, corner);
+  const EventValues after = values_at(core, state.open_terminals, dying, to, branch, corner);
+  Crossing crossing = located_event(before, after, [&](double fraction) noexcept {
+    const double shorter_s = fraction * duration_s;
+    if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
+      connect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
+    }
+    to = from;
+    step(core, to, shorter_s, branch, load_nm);
+    return values_at(core, state.open_terminals, dying, to, branch, corner);
+  });
+  if (crossing.event < 0) return crossing;
+  if (crossing.event < before.shaft) {
+    to.shaft = settled(core.shaft, to.shaft, crossing.event);
+  }
+  crossing.event -=
+      before.shaft;  // from here on: negative for the shaft, else the number of the electrical one
+  return crossing;
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state, double start_s,
+                                              double duration_s, const State& from, const State& to,
+                                              const RotorMotion& from_motion,
+                                              const RotorMotion& to_motion) noexcept {
+  if (core.follows) {
+    const PhaseValues from_a = piece_.current_a;
+    piece_.current_a = currents(core, state, to, to_motion);
+    const Measurable before = measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v);
+    const Measurable after =
+        measurable(core, state, to, to_motion, piece_.current_a, end_voltages(core, state, to, to_motion));
+    if (core.p.thermal.enabled) {
+      state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
+    }
+    follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
+  }
+  core.record({.start_s = start_s,
+               .duration_s = duration_s,
+               .start_rad = from_motion.angle_rad,
+               .end_rad = to_motion.angle_rad,
+               .start_rad_s = from_motion.speed_rad_s,
+               .end_rad_s = to_motion.speed_rad_s});
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s,
+                                           double end_s, double load_nm) noexcept {
+  const bool blocked = state.injected.blocked_rotor != 0.0;
+  for (std::size_t events = 0; start_s < end_s; ++events) {
+    const double duration_s = end_s - start_s;
+    if (core.shaft_has_events || blocked) x.shaft = locked(core.shaft, x.shaft, blocked);
+    const Whole from = x;
+    const RotorMotion from_motion = motion_of(from);
+    piece_.current_a = currents(core, state, from.machine, from_motion);
+    connect_piece(core, state, start_s, duration_s, from.machine, from_motion);
+    ShaftBranch branch;
+    if (core.shaft_has_events || blocked) {
+      branch = branch_of(core.shaft, from.shaft, torque_nm(c_, from.machine, from_motion), load_nm, blocked);
+    }
+    step(core, x, duration_s, branch, load_nm);
+    const bool may_cut = piece_.circuit.dying != 0 || core.shaft_has_events || Machine::kHasCorners;
+    Crossing crossing;
+    if (may_cut && events < kMaxEvents) {
+      crossing = cut_at_event(core, state, from, x, start_s, duration_s, branch, load_nm);
+      if (crossing.fraction < 1.0 && crossing.event >= 0) {
+        settle_terminals(core, state, x.machine, motion_of(x), crossing.event);
+      }
+    }
+    const double passed_s = crossing.fraction < 1.0 ? crossing.fraction * duration_s : duration_s;
+    finish_piece(core, state, start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x));
+    start_s = crossing.fraction < 1.0 ? start_s + passed_s : end_s;
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::begin_substep(const Shaft& shaft) noexcept {
+  if constexpr (Machine::kUsesAngle) {
+    constexpr double kNearRad = 0.05;  // rotated() errs by 1e-15 there
+    if (std::abs(pole_pairs_ * (shaft.angle_rad - near_rad_)) > kNearRad) look_up_angle(shaft);
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::look_up_angle(const Shaft& shaft) noexcept {
+  if constexpr (Machine::kUsesAngle) {
+    near_rad_ = shaft.angle_rad;
+    near_ = cos_sin(pole_pairs_ * near_rad_);
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::run_smooth(AxisCore& core, Whole& x, double start_s, double end_s,
+                                            double load_nm) noexcept {
+  const double start_rad = x.shaft.angle_rad;
+  const double start_rad_s = x.shaft.speed_rad_s;
+  step(core, x, end_s - start_s, ShaftBranch{}, load_nm);
+  core.record({.start_s = start_s,
+               .duration_s = end_s - start_s,
+               .start_rad = start_rad,
+               .end_rad = x.shaft.angle_rad,
+               .start_rad_s = start_rad_s,
+               .end_rad_s = x.shaft.speed_rad_s});
+}
+
+template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::goes_on(AxisCore& core, AxisState& state, double start_s,
+                                         const Whole& x) noexcept {
+  if (piece_.stays) return piece_.plain || leave_open(core, x.machine, motion_of(x));
+  if (!piece_.plain || !core.drive.only_switches(state.drive)) return false;
+  if (!core.drive.switch_terminals(state.drive, start_s, piece_.drive)) return piece_.circuit.dying == 0;
+  if (driven_count(core.connection, piece_.drive) != terminal_count(core.connection)) return false;
+  piece_.circuit.dying = 0;
+  drive_windings(core, piece_.drive.start_v);
+  return true;
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double load_nm) noexcept {
+  Whole x;
+  x.machine = machine_of(state);
+  x.shaft = shaft_of(state);
+  look_up_angle(x.shaft);
+  piece_.plain = piece_.open = piece_.stays = false;
+  const bool smooth =
+      !Machine::kHasCorners && !core.shaft_has_events && !core.follows && state.injected.blocked_rotor == 0.0;
+  for (int n = 0; n < core.timing.substeps; ++n) {
+    begin_substep(x.shaft);
+    const double end_s = (n + 1) * core.step_s;
+    for (double start_s = n * core.step_s; start_s < end_s;) {
+      const double stop_s = std::min(end_s, core.drive.next_edge_s(state.drive, start_s));
+      if (smooth && goes_on(core, state, start_s, x)) {
+        run_smooth(core, x, start_s, stop_s, load_nm);
+      } else {
+        run_piece(core, state, x, start_s, stop_s, load_nm);
+      }
+      start_s = stop_s;
+    }
+    if (piece_.open) continue;
+    const RotorMotion motion = motion_of(x);
+    keep_open(core, state, x.machine, motion);
+    piece_.current_a = currents(core, state, x.machine, motion);
+    if (check_over_current(core, state, piece_.current_a)) piece_.stays = false;
+  }
+  if (piece_.open) {
+    keep_open(core, state, x.machine, motion_of(x));
+    piece_.current_a = currents(core, state, x.machine, motion_of(x));
+  }
+  end_run(core, state, x.machine, motion_of(x));
+  keep_machine(state, x.machine);
+  keep_shaft(state, x.shaft);
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::end_run(const AxisCore& core, AxisState& state, const State& x,
+                                         const RotorMotion& motion) noexcept {
+  if (!has_impedance(core.p.drive)) state.voltage_v = end_voltages(core, state, x, motion);
+  if (core.connection == Connection::kStar) {
+    state.neutral_v = measurable(core, state, x, motion, piece_.current_a, state.voltage_v).neutral_v;
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::open(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                                      const RotorMotion& motion) noexcept {
+  piece_.from = machine_of(state);
+  piece_.stage = piece_.from;
+  piece_.plain = piece_.open = piece_.stays = false;
+  piece_.current_a = currents(core, state, piece_.from, turned(motion));
+  connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::stage(int number, double duration_s, const RotorMotion& motion) noexcept {
+  const TerminalCircuit& circuit = piece_.circuit;
+  const TerminalInput& u = circuit.constant || number == 0 ? circuit.start
+                           : number == 3                   ? circuit.end
+                                                           : circuit.middle;
+  const State slope = derivative(c_, piece_.stage, turned(motion), u);
+  switch (number) {
+    case 0:
+      piece_.sum = slope;
+      piece_.stage = advanced(piece_.from, 0.5 * duration_s, slope);
+      return;
+    case 1:
+      piece_.sum = advanced(piece_.sum, 2.0, slope);
+      piece_.stage = advanced(piece_.from, 0.5 * duration_s, slope);
+      return;
+    case 2:
+      piece_.sum = advanced(piece_.sum, 2.0, slope);
+      piece_.stage = advanced(piece_.from, duration_s, slope);
+      return;
+    default:
+      piece_.stage = advanced(piece_.from, duration_s / 6.0, advanced(piece_.sum, 1.0, slope));
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                                         const RotorMotion& motion) noexcept {
+  piece_.stage = piece_.from;
+  if (piece_.circuit.constant) return;  // its voltages are those of any part of the piece
+  connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::add_events(const AxisCore& core, const AxisState& state, PieceEnd end,
+                                            const RotorMotion& motion, EventValues& values) const noexcept {
+  add_electrical(core, state.open_terminals, piece_.circuit.dying,
+                 end == PieceEnd::kStart ? piece_.from : piece_.stage, turned(motion), piece_.corner, values);
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                                       const RotorMotion& from, const RotorMotion& to, int event) noexcept {
+  const RotorMotion end = turned(to);
+  if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
+  keep_open(core, state, piece_.stage, end);
+  finish_piece(core, state, start_s, duration_s, piece_.from, piece_.stage, turned(from), end);
+  piece_.current_a = currents(core, state, piece_.stage, end);
+  end_run(core, state, piece_.stage, end);
+  keep_machine(state, piece_.stage);
+}
+
+template <class Machine>
+std::unique_ptr<Train> make_drive_train(const typename Machine::Parameters& machine, bool two_masses) {
+  if (two_masses) return std::make_unique<DriveTrain<Machine, TwoMassState>>(machine);
+  return std::make_unique<DriveTrain<Machine, ShaftState>>(machine);
+}
+
+}  // namespace drivebench

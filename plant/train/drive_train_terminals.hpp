@@ -1,0 +1,166 @@
+#pragma once
+
+#include "plant/train/drive_train.hpp"
+
+// Where a drive train meets its terminals.
+namespace drivebench {
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::drive_windings(const AxisCore& core, const ThreePhase& v) noexcept {
+  const WindingVoltages u = winding_voltages(core.connection, v);
+  piece_.circuit.start.voltage_v = u.stator_v;
+  piece_.circuit.start.zero_v = u.zero_v;
+  piece_.circuit.start_v = {.a = v.a, .b = v.b, .c = v.c, .field = piece_.drive.field_v};
+  if (!core.follows) return;
+  piece_.circuit.mean_v = piece_.circuit.start_v;
+  piece_.circuit.end_v = piece_.circuit.start_v;
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::hold_constant(const TerminalInput& input) noexcept {
+  piece_.circuit.start = input;
+  piece_.circuit.constant = true;
+  piece_.circuit.dying = 0;
+  piece_.circuit.short_circuit = false;
+}
+
+template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::conduct(const AxisCore& core, const AxisState& state) noexcept {
+  ThreePhase terminal_v;
+  TerminalSet dying;
+  if (!all_conduct(core.connection, piece_.drive, state.open_terminals, piece_.current_a, terminal_v, dying))
+    return false;
+  piece_.circuit.dying = dying;
+  drive_windings(core, terminal_v);
+  return true;
+}
+
+template <class Machine, class Shaft>
+WindingValues DriveTrain<Machine, Shaft>::floating_v(const State& x, const RotorMotion& motion,
+                                                     const TerminalInput& u) const noexcept {
+  if constexpr (requires { floating_voltages(c_, x, motion, u); }) {
+    return floating_voltages(c_, x, motion, u);
+  } else {
+    return open_circuit_voltages(c_, x, motion);
+  }
+}
+
+template <class Machine, class Shaft>
+WindingValues DriveTrain<Machine, Shaft>::open_v(const State& x, const RotorMotion& motion) const noexcept {
+  if constexpr (requires { open_circuit_voltages(c_, x, motion, piece_.drive.field_v); }) {
+    return open_circuit_voltages(c_, x, motion, piece_.drive.field_v);
+  } else {
+    return open_circuit_voltages(c_, x, motion);
+  }
+}
+
+template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::leave_open(const AxisCore& core, const State& x,
+                                            const RotorMotion& motion) noexcept {
+  const WindingValues emf_v = open_v(x, motion);
+  // No phase has more than the sum of the components.
+  const double most_v = std::abs(emf_v.stator.a) + std::abs(emf_v.stator.b) + std::abs(emf_v.zero);
+  if (most_v > piece_.drive.rail_v && !diodes_block(core.connection, piece_.drive, emf_v)) return false;
+  if (core.follows) {
+    piece_.circuit.start_v = open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
+    piece_.circuit.mean_v = piece_.circuit.start_v;
+  }
+  return true;
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const AxisState& state,
+                                                     const State& x,
+                                                     const RotorMotion& motion) const noexcept {
+  if (piece_.plain) return piece_.circuit.start_v;
+  if (state.open_terminals == 0) return piece_.circuit.end_v;
+  if (piece_.open) {
+    return open_terminal_voltages(core.connection, open_v(x, motion), piece_.drive.field_v);
+  }
+  TerminalDrive drive = piece_.drive;
+  if (!drive.constant) drive.start_v = drive.end_v;
+  TerminalSet open = state.open_terminals;
+  const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
+  return connect(core.connection, drive, state.injected, piece_.current_a, WindingVoltagesOf(ask), open)
+      .start_v;
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state, double start_s,
+                                               double duration_s, const State& x,
+                                               const RotorMotion& motion) noexcept {
+  if (piece_.stays && (piece_.plain || leave_open(core, x, motion))) return;
+  if (piece_.plain && core.drive.only_switches(state.drive)) {
+    core.drive.switch_terminals(state.drive, start_s, piece_.drive);
+    if (conduct(core, state)) return;
+  }
+  piece_.drive = core.drive.at(state.drive, start_s, duration_s, piece_.current_a);
+  const TerminalSet all = all_terminals(core.connection);
+  const bool sound =
+      piece_.drive.constant && state.injected.phase_short == 0.0 && state.injected.neutral_short == 0.0;
+  if (sound) hold_constant({.field_v = piece_.drive.field_v});
+  piece_.plain = sound && conduct(core, state);
+  piece_.open = sound && (state.open_terminals & all) == all &&
+                driven_count(core.connection, piece_.drive) == 0 && leave_open(core, x, motion);
+  piece_.stays =
+      (piece_.open || (piece_.plain && piece_.circuit.dying == 0)) && core.drive.steady(state.drive);
+  if (piece_.plain) {
+    state.open_terminals = 0;
+  } else if (piece_.open) {
+    TerminalInput none = open_input(core.connection, all);
+    none.field_v = piece_.drive.field_v;
+    hold_constant(none);
+    state.open_terminals = all;
+  } else {
+    const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
+    piece_.circuit = connect(core.connection, piece_.drive, state.injected, piece_.current_a,
+                             WindingVoltagesOf(ask), state.open_terminals);
+    if (piece_.circuit.short_circuit) trip(core, state);
+  }
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::settle_terminals(const AxisCore& core, AxisState& state, State& x,
+                                                  const RotorMotion& motion,
+                                                  int electrical_event) const noexcept {
+  const int terminal = nth_terminal(piece_.circuit.dying, electrical_event);
+  if (terminal < 0) return;  // a corner
+  state.open_terminals = opened(core.connection, state.open_terminals, terminal);
+  x = restricted(c_, x, motion, open_input(core.connection, state.open_terminals));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::keep_open(const AxisCore& core, const AxisState& state, State& x,
+                                           const RotorMotion& motion) const noexcept {
+  if (state.open_terminals == 0) return;
+  x = restricted(c_, x, motion,
+                 piece_.open ? piece_.circuit.start : open_input(core.connection, state.open_terminals));
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::currents(const AxisCore& core, const AxisState& state, const State& x,
+                                                 const RotorMotion& motion) const noexcept {
+  return terminal_currents(core.connection, winding_currents(c_, x, motion), state.open_terminals);
+}
+
+template <class Machine, class Shaft>
+Measurable DriveTrain<Machine, Shaft>::measurable(const AxisCore& core, const AxisState& state,
+                                                  const State& x, const RotorMotion& motion,
+                                                  const PhaseValues& current_a,
+                                                  const PhaseValues& voltage_v) const noexcept {
+  Measurable m{.current_a = current_a,
+               .voltage_v = voltage_v,
+               .bus_v = state.drive.bus_v,
+               .temperature_k = state.thermal.temperature_k,
+               .angle_rad = motion.angle_rad,
+               .speed_rad_s = motion.speed_rad_s};
+  if (core.connection == Connection::kStar) {
+    m.neutral_v = (voltage_v.a + voltage_v.b + voltage_v.c) / 3.0;
+    if constexpr (requires { neutral_voltage_v(c_, x, motion, 0.0); }) {
+      m.neutral_v = neutral_voltage_v(c_, x, motion, m.neutral_v);
+    }
+  }
+  return m;
+}
+
+}  // namespace drivebench

@@ -1,0 +1,296 @@
+#include "plant/train/terminals.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace drivebench {
+namespace {
+
+using Phases = std::array<double, 3>;
+
+constexpr TerminalSet bit(int k) noexcept {
+  return TerminalSet{1} << k;
+}
+
+constexpr std::size_t at(int k) noexcept {
+  return static_cast<std::size_t>(k);
+}
+
+Phases phases(const ThreePhase& x) noexcept {
+  return {x.a, x.b, x.c};
+}
+
+ThreePhase values(const Phases& x) noexcept {
+  return {.a = x[0], .b = x[1], .c = x[2]};
+}
+
+Phases winding_phases(Connection connection, const WindingValues& x) noexcept {
+  if (connection == Connection::kTwoPhase || connection == Connection::kArmature) {
+    return {x.stator.a, x.stator.b, 0.0};
+  }
+  const ThreePhase plane = two_to_three(x.stator);
+  const double zero = frames_detail::kRootThird * x.zero;
+  return {plane.a + zero, plane.b + zero, plane.c + zero};
+}
+
+/// What is worked out for each terminal before the windings are asked.
+struct Work {
+  Connection connection;
+  const TerminalDrive& drive;
+  Phases current_a;
+  WindingVoltagesOf ask;
+  Phases voltage_v{};
+  TerminalSet open = 0;
+  TerminalSet dying = 0;
+  int count = 0;
+
+  bool driven(int k) const noexcept { return drive.mode[at(k)] == TerminalMode::kDriven; }
+  bool has_diodes(int k) const noexcept { return drive.mode[at(k)] == TerminalMode::kDiodes; }
+  bool conducts(int k) const noexcept { return (open & bit(k)) == 0; }
+};
+
+/// Sorts the terminals into driven, dying and open ones by mode and current.
+void sort_terminals(Work& w) noexcept {
+  const Phases start = phases(w.drive.start_v);
+  for (int k = 0; k < w.count; ++k) {
+    if (w.driven(k)) {
+      w.open &= ~bit(k);
+      w.voltage_v[at(k)] = start[at(k)];
+    } else if (w.conducts(k) && w.current_a[at(k)] != 0.0) {
+      w.dying |= bit(k);
+      w.voltage_v[at(k)] = terminals_detail::against(w.current_a[at(k)], w.drive.rail_v);
+    } else {
+      w.open |= bit(k);
+    }
+  }
+}
+
+/// A diode begins to conduct: the terminal goes to the rail on this side.
+void clamp_terminal(Work& w, int k, double side) noexcept {
+  w.open &= ~bit(k);
+  w.dying |= bit(k);
+  w.voltage_v[at(k)] = side * w.drive.rail_v;
+}
+
+int conducting_count(const Work& w) noexcept {
+  return (w.conducts(0) ? 1 : 0) + (w.conducts(1) ? 1 : 0) + (w.conducts(2) ? 1 : 0);
+}
+
+/// What the circuit, as it is known so far, does to the windings.
+TerminalInput circuit_input(const Work& w, const Phases& v) noexcept {
+  TerminalInput u = open_input(w.connection, w.open);
+  const WindingVoltages across = winding_voltages(w.connection, values(v));
+  u.voltage_v = across.stator_v;
+  u.zero_v = across.zero_v;
+  u.field_v = w.drive.field_v;
+  return u;
+}
+
+/// Neutral of a star from the terminals that conduct: each is at its winding's voltage above it.
+double neutral_from_conducting(const Work& w, const Phases& winding_v) noexcept {
+  double sum_v = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    if (w.conducts(k)) sum_v += w.voltage_v[at(k)] - winding_v[at(k)];
+  }
+  const int conducting = conducting_count(w);
+  return conducting > 0 ? sum_v / conducting : 0.0;
+}
+
+/// No terminal of a star conducts: two diodes do if the voltage between their terminals is beyond the whole
+/// link.
+bool start_rectifier(Work& w, const Phases& winding_v) noexcept {
+  int high = -1;
+  int low = -1;
+  for (int k = 0; k < 3; ++k) {
+    if (!w.has_diodes(k)) continue;
+    if (high < 0 || winding_v[at(k)] > winding_v[at(high)]) high = k;
+    if (low < 0 || winding_v[at(k)] < winding_v[at(low)]) low = k;
+  }
+  if (high < 0 || high == low || winding_v[at(high)] - winding_v[at(low)] <= 2.0 * w.drive.rail_v)
+    return false;
+  clamp_terminal(w, high, 1.0);
+  clamp_terminal(w, low, -1.0);
+  return true;
+}
+
+/// Puts the open terminals where the machine has them, and lets the first diode conduct beyond whose rail
+/// that is. Whether there was one: the others must be asked again then.
+bool float_once(Work& w) noexcept {
+  const bool star = w.connection == Connection::kStar;
+  const Phases winding_v = winding_phases(w.connection, w.ask(circuit_input(w, w.voltage_v)));
+  const bool alone = star && conducting_count(w) == 0;
+  if (alone && start_rectifier(w, winding_v)) return true;
+  const double neutral_v = star ? neutral_from_conducting(w, winding_v) : 0.0;
+  for (int k = 0; k < w.count; ++k) {
+    if (w.conducts(k)) continue;
+    const double floating_v = neutral_v + winding_v[at(k)];
+    w.voltage_v[at(k)] = floating_v;
+    if (!w.has_diodes(k) || alone || std::abs(floating_v) <= w.drive.rail_v) continue;
+    clamp_terminal(w, k, floating_v > 0.0 ? 1.0 : -1.0);
+    return true;
+  }
+  return false;
+}
+
+void float_terminals(Work& w) noexcept {
+  // Each pass lets at least one more terminal conduct.
+  for (int pass = 0; pass < 3 && (w.open & all_terminals(w.connection)) != 0; ++pass) {
+    if (!float_once(w)) break;
+  }
+  // One terminal of a star alone carries nothing.
+  if (w.connection == Connection::kStar && conducting_count(w) == 1) {
+    w.open = all_terminals(w.connection);
+    w.dying = 0;
+  }
+}
+
+PhaseValues simpson_mean(const PhaseValues& start, const PhaseValues& middle,
+                         const PhaseValues& end) noexcept {
+  const auto mean = [](double x, double y, double z) noexcept { return (x + 4.0 * y + z) / 6.0; };
+  return {.a = mean(start.a, middle.a, end.a),
+          .b = mean(start.b, middle.b, end.b),
+          .c = mean(start.c, middle.c, end.c),
+          .field = mean(start.field, middle.field, end.field)};
+}
+
+/// A short between two terminals puts both at the mean of what holds them.
+bool short_terminals(Phases& v, int p, int q) noexcept {
+  const double mean_v = 0.5 * (v[at(p)] + v[at(q)]);
+  const bool differs = v[at(p)] != v[at(q)];
+  v[at(p)] = mean_v;
+  v[at(q)] = mean_v;
+  return differs;
+}
+
+/// A shorted winding: none of the terminal voltage is left for it.
+void short_winding(Connection connection, Phases& v, int k) noexcept {
+  v[at(k)] = connection == Connection::kStar ? 0.5 * (v[at((k + 1) % 3)] + v[at((k + 2) % 3)]) : 0.0;
+}
+
+struct Shorts {
+  int pair = -1;     ///< first terminal of a shorted pair (k, k + 1); -1: none
+  int winding = -1;  ///< shorted winding; -1: none
+};
+
+Shorts shorts_of(const InjectedFaults& faults, int count) noexcept {
+  Shorts result{.pair = static_cast<int>(faults.phase_short) - 1,
+                .winding = static_cast<int>(faults.neutral_short) - 1};
+  if (count < 2 || (count == 2 && result.pair > 0)) result.pair = -1;
+  if (result.winding >= count) result.winding = -1;
+  return result;
+}
+
+/// With a short the windings that it joins always conduct.
+void close_shorted(Work& w, const Shorts& shorts) noexcept {
+  if (shorts.pair >= 0) {
+    const int next = w.count == 2 ? 1 : (shorts.pair + 1) % 3;
+    w.open &= ~(bit(shorts.pair) | bit(next));
+  }
+  if (shorts.winding >= 0) w.open &= ~bit(shorts.winding);
+}
+
+bool apply_shorts(const Work& w, const Shorts& shorts, Phases& v) noexcept {
+  bool short_circuit = false;
+  if (shorts.pair >= 0) {
+    const int next = w.count == 2 ? 1 : (shorts.pair + 1) % 3;
+    short_circuit = short_terminals(v, shorts.pair, next) && w.driven(shorts.pair) && w.driven(next);
+  }
+  if (shorts.winding >= 0) {
+    short_circuit = short_circuit || (w.driven(shorts.winding) && v[at(shorts.winding)] != 0.0);
+    short_winding(w.connection, v, shorts.winding);
+  }
+  return short_circuit;
+}
+
+}  // namespace
+
+TerminalInput open_input(Connection connection, TerminalSet open) noexcept {
+  TerminalInput u;
+  open &= all_terminals(connection);
+  if (open == 0) return u;
+  if (connection == Connection::kIndependent) {
+    u.conducts = {.a = (open & 1u) != 0 ? 0.0 : 1.0,
+                  .b = (open & 2u) != 0 ? 0.0 : 1.0,
+                  .c = (open & 4u) != 0 ? 0.0 : 1.0};
+    return u;
+  }
+  if (connection != Connection::kStar) {
+    u.conduction = open == all_terminals(connection) ? Conduction::kNone : Conduction::kLine;
+    u.line = {.a = (open & 1u) != 0 ? 0.0 : 1.0, .b = (open & 2u) != 0 ? 0.0 : 1.0};
+    return u;
+  }
+  // Current flows between the two terminals that are left: b - c, c - a or a - b in the plane.
+  constexpr double kRootThreeHalves = 0x1.bb67ae8584caap-1;  // sqrt(3)/2
+  u.conduction = Conduction::kLine;
+  if (open == 1u) {
+    u.line = {.a = 0.0, .b = 1.0};
+  } else if (open == 2u) {
+    u.line = {.a = -kRootThreeHalves, .b = -0.5};
+  } else if (open == 4u) {
+    u.line = {.a = kRootThreeHalves, .b = -0.5};
+  } else {
+    u.conduction = Conduction::kNone;
+  }
+  return u;
+}
+
+PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
+                                   double field_v) noexcept {
+  const Phases v = winding_phases(connection, open_circuit_v);
+  return {.a = v[0], .b = v[1], .c = v[2], .field = field_v};
+}
+
+bool diodes_block(Connection connection, const TerminalDrive& drive,
+                  const WindingValues& open_circuit_v) noexcept {
+  const Phases emf_v = winding_phases(connection, open_circuit_v);
+  double highest_v = -drive.rail_v;
+  double lowest_v = drive.rail_v;
+  for (int k = 0; k < terminal_count(connection); ++k) {
+    if (drive.mode[at(k)] != TerminalMode::kDiodes) continue;
+    highest_v = std::max(highest_v, emf_v[at(k)]);
+    lowest_v = std::min(lowest_v, emf_v[at(k)]);
+  }
+  if (connection == Connection::kStar) return highest_v - lowest_v <= 2.0 * drive.rail_v;
+  return highest_v <= drive.rail_v && lowest_v >= -drive.rail_v;
+}
+
+TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
+                        const PhaseValues& current_a, WindingVoltagesOf winding_v,
+                        TerminalSet& open) noexcept {
+  Work w{.connection = connection,
+         .drive = drive,
+         .current_a = {current_a.a, current_a.b, current_a.c},
+         .ask = winding_v,
+         .open = open & all_terminals(connection),
+         .count = terminal_count(connection)};
+  sort_terminals(w);
+  const Shorts shorts = shorts_of(faults, w.count);
+  close_shorted(w, shorts);
+  float_terminals(w);
+  close_shorted(w, shorts);
+
+  TerminalCircuit circuit{.constant = drive.constant, .dying = w.dying};
+  const auto input = [&](const ThreePhase& driven_v, PhaseValues& terminal_v) noexcept {
+    Phases v = w.voltage_v;
+    const Phases wanted = phases(driven_v);
+    for (int k = 0; k < w.count; ++k) {
+      if (w.driven(k)) v[at(k)] = wanted[at(k)];
+    }
+    circuit.short_circuit = apply_shorts(w, shorts, v) || circuit.short_circuit;
+    terminal_v = {.a = v[0], .b = v[1], .c = v[2], .field = drive.field_v};
+    return circuit_input(w, v);
+  };
+  circuit.start = input(drive.start_v, circuit.start_v);
+  if (drive.constant) {
+    circuit.mean_v = circuit.end_v = circuit.start_v;
+  } else {
+    PhaseValues middle_v;
+    circuit.middle = input(drive.middle_v, middle_v);
+    circuit.end = input(drive.end_v, circuit.end_v);
+    circuit.mean_v = simpson_mean(circuit.start_v, middle_v, circuit.end_v);
+  }
+  open = w.open;
+  return circuit;
+}
+
+}  // namespace drivebench

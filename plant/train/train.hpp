@@ -1,0 +1,115 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "plant/axis_parameters.hpp"
+#include "plant/axis_state.hpp"
+#include "plant/train/events.hpp"
+
+namespace drivebench {
+
+// A piece of a tick splits at each event (a current or a speed reaching zero, a corner of the emf), at most
+// this often.
+inline constexpr std::size_t kMaxEvents = 6;
+// Edges of the drive in a tick, and the events on the way.
+inline constexpr std::size_t kMaxSegments = kMaxSubsteps * (kMaxEvents + 1) + 256;
+
+/// What an axis has beside its machine and its state.
+struct AxisCore {
+  AxisParameters p;
+  AxisTiming timing;
+  double step_s;
+  Connection connection;
+  double pole_pairs;  ///< electrical over mechanical angle, for the Hall sensors
+  Drive drive;
+  SensorBank sensors;
+  Encoder encoder;
+  ShaftConstants shaft;
+  bool shaft_has_events;
+  bool follows = true;  ///< in this tick drive, sensors or thermal model want to see every piece
+  std::array<AngleSegment, kMaxSegments> segments{};
+  std::size_t segment_count = 0;
+  std::int64_t last_tick_turn = 0;
+  EncoderState last_tick_encoder{};  ///< at its start
+
+  std::span<const AngleSegment> last_tick() const noexcept { return {segments.data(), segment_count}; }
+  void record(const AngleSegment& segment) noexcept {
+    if (segment_count < kMaxSegments) segments[segment_count++] = segment;
+  }
+};
+
+/// What a machine shows at one instant.
+struct MachineTruth {
+  WindingValues current_a{};
+  double torque_nm = 0.0;
+  TwoPhase rotor_flux_wb{};
+};
+
+enum class PieceEnd { kStart, kNow };  ///< of a piece of a tick: where it began, where its stages have led
+
+/// The integration of a drive train with one kind of machine. Stateless between ticks.
+class Train {
+ public:
+  Train() = default;
+  Train(const Train&) = default;
+  Train& operator=(const Train&) = default;
+  virtual ~Train() = default;
+  virtual std::unique_ptr<Train> clone() const = 0;
+
+  /// Takes the constants of a machine of the same kind, with heat, faults and series impedance.
+  virtual void set_machine(const MachineParameters& machine, const Adjustment& adjustment) noexcept = 0;
+
+  /// All substeps of a tick. `load_nm` is the active load at the output.
+  virtual void run(AxisCore& core, AxisState& state, double load_nm) noexcept = 0;
+
+  virtual MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
+
+  // Stage by stage, for two machines on one shaft. Order: open(), then for each stage stage_torque_nm() of
+  // both and stage() of both, then find_corner() and add_events(); shorten() and the stages again until an
+  // event is found; then close().
+
+  /// Connects drive and windings for a piece of the tick.
+  virtual void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                    const RotorMotion& motion) noexcept = 0;
+  virtual double stage_torque_nm(const RotorMotion& motion) const noexcept = 0;
+  /// Stage 0 to 3 of a Runge-Kutta step.
+  virtual void stage(int number, double duration_s, const RotorMotion& motion) noexcept = 0;
+  /// Goes back to the start of the piece, of which only so much will be run.
+  virtual void shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                       const RotorMotion& motion) noexcept = 0;
+  /// Looks for a corner of the emf on the way through the whole piece.
+  virtual void find_corner(const RotorMotion& from, const RotorMotion& to) noexcept = 0;
+  /// Appends the values whose passing through zero ends the piece.
+  virtual void add_events(const AxisCore& core, const AxisState& state, PieceEnd end,
+                          const RotorMotion& motion, EventValues& values) const noexcept = 0;
+  /// Takes the end of the piece into the state; `event` is the one of add_events() that ends it, negative if
+  /// none of this train does.
+  virtual void close(AxisCore& core, AxisState& state, double start_s, double duration_s,
+                     const RotorMotion& from, const RotorMotion& to, int event) noexcept = 0;
+};
+
+/// The train for the kind of machine.
+std::unique_ptr<Train> make_train(const MachineParameters& machine, bool two_masses);
+
+/// Whether the source has an impedance of its own.
+bool has_impedance(const DriveParameters& p) noexcept;
+
+/// Over-current: the fault bits, and with amplifier.over_current_trip the gates off.
+void trip(AxisCore& core, AxisState& state) noexcept;
+
+/// After each substep: over-current faults and the trip. Whether there was one.
+inline bool check_over_current(AxisCore& core, AxisState& state, const PhaseValues& current_a) noexcept {
+  const double limit_a = core.p.drive.amplifier.over_current_a;
+  if (std::abs(current_a.a) <= limit_a && std::abs(current_a.b) <= limit_a &&
+      std::abs(current_a.c) <= limit_a)
+    return false;
+  trip(core, state);
+  return true;
+}
+
+}  // namespace drivebench

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "server/access/audit_file.hpp"
+#include "server/engine/engine.hpp"
+#include "server/host/clock.hpp"
+
+namespace drivebench {
+
+/// More about an event, by name.
+using AuditDetail = std::pair<std::string_view, std::variant<std::string, double, std::uint64_t>>;
+
+/// The audit log: who did what, and what came of it, one JSON object a line. It looks on where inputs go to
+/// the engine and where samples come back, so that it sees every transport alike. Everything happens on the
+/// I/O thread.
+///
+/// What is refused (requests, tokens, connections) is written ten times a second at most after the first
+/// hundred, so that a stranger cannot fill the disk; the next line says how many were left out.
+class Audit {
+ public:
+  /// Throws std::runtime_error if the file cannot be had.
+  explicit Audit(const AuditConfig& config);
+
+  /// From now on writes what happens to this bench. Where the configuration says so, all controllers lose
+  /// their axes when a line cannot be written.
+  void watch(Engine& engine);
+
+  struct Event {
+    std::string_view name;
+    std::optional<std::uint32_t> axis{};
+    const Client* client = nullptr;
+    std::string_view result = "done";  ///< anything else: refused, and why
+    std::vector<AuditDetail> details{};
+  };
+  void note(Event event);
+
+  /// Goes on in a new file of the same name, after a rotation.
+  bool reopen() noexcept { return file_.reopen(); }
+  /// Lines that could not be written.
+  std::uint64_t lost() const noexcept { return lost_; }
+
+ private:
+  void on_answer(const Input& input, const Client* from, Refused refused, Tick tick);
+  void on_taken(const Taken& taken);
+  void on_tick();
+  void watch_axis(std::uint32_t axis);
+  bool may_write_refusal();
+  void fail();
+
+  struct Seen {
+    Owner holder = 0;  ///< who holds the axis as far as requests tell
+    std::uint64_t state = 0;
+    std::uint64_t faults = 0;
+  };
+
+  AuditFile file_;
+  AuditFailure on_failure_;
+  Engine* engine_ = nullptr;
+  std::vector<Seen> seen_;  // by axis
+  std::uint64_t seen_gaps_ = 0;
+  double refusals_left_ = kRefusalsAtOnce;
+  ServerClock::time_point refilled_{};
+  std::uint64_t left_out_ = 0;
+  std::uint64_t lost_ = 0;
+  bool failing_ = false;
+
+  static constexpr double kRefusalsAtOnce = 100.0;
+  static constexpr double kRefusalsPerSecond = 10.0;
+};
+
+}  // namespace drivebench

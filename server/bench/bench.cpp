@@ -1,0 +1,394 @@
+#include "server/bench/bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "plant/parameters/parameters.hpp"
+
+namespace drivebench {
+namespace {
+
+class NobodyWatches final : public BenchObserver {
+ public:
+  void on_input(Tick, const Input&) noexcept override {}
+  void on_sample(std::uint32_t, const Sample&) noexcept override {}
+};
+
+BenchObserver& nobody() {
+  static NobodyWatches observer;
+  return observer;
+}
+
+AxisTiming timing_of(const BenchSetup& setup) {
+  return {.period_s = static_cast<double>(setup.period_ns) * 1e-9, .substeps = setup.substeps};
+}
+
+double largest_phase_current_a(const Sample& s) noexcept {
+  return std::max({std::abs(s.true_i_a_a), std::abs(s.true_i_b_a), std::abs(s.true_i_c_a)});
+}
+
+constexpr bool expects_commands(ControlState state) noexcept {
+  return state == ControlState::kReady || is_driven(state);
+}
+
+bool concerns_all_axes(const Input& input) noexcept {
+  return std::holds_alternative<LateTick>(input.action) || std::holds_alternative<Overrun>(input.action);
+}
+
+}  // namespace
+
+Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
+    : setup_(setup), observer_(observer != nullptr ? observer : &nobody()) {
+  axes_.reserve(setup.axes.size());
+  for (std::size_t i = 0; i < setup.axes.size(); ++i) {
+    const AxisSetup& axis = setup.axes[i];
+    axes_.push_back({.axis = Axis(axis.parameters, timing_of(setup), setup.seed, i),
+                     .on_link_loss = axis.on_link_loss,
+                     .quick_stop_ticks = axis.quick_stop_ticks,
+                     .rules = axis.rules,
+                     .command_step = axis.rules.slew_per_s * timing_of(setup).period_s,
+                     .shaft = axis.shares_shaft_with.value_or(i)});
+    if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
+    axis_parameters(axis.parameters);  // their table is made on first use, which must not be a tick
+    take_sample(i);
+  }
+}
+
+Refused Bench::submit(const Input& input) noexcept {
+  if (input.axis >= axes_.size()) return Refused::kUnknownAxis;
+  if (input.tick <= tick_) {
+    Input now = input;
+    now.tick = tick_;
+    observer_->on_input(tick_, now);
+    return apply(now);
+  }
+  observer_->on_input(tick_, input);
+  if (scheduled_ == kMaxScheduled) return Refused::kBusy;
+  const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
+  const auto place = std::upper_bound(schedule_.begin(), end, input.tick,
+                                      [](Tick tick, const PackedInput& other) { return tick < other.tick; });
+  std::move_backward(place, end, end + 1);
+  *place = pack(input);
+  ++scheduled_;
+  return Refused::kNot;
+}
+
+void Bench::apply_due() noexcept {
+  while (due_ < scheduled_ && schedule_[due_].tick <= tick_) {
+    const Input input = unpack(schedule_[due_++]);
+    // Nobody waits for the answer any more: what cannot be carried out is counted (a command counts itself).
+    if (apply(input) != Refused::kNot && !std::holds_alternative<Command>(input.action)) {
+      ++axes_[input.axis].control.refused;
+    }
+  }
+  const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
+  const auto acted = static_cast<std::ptrdiff_t>(std::exchange(due_, 0));
+  if (acted == 0) return;
+  std::fill(std::move(schedule_.begin() + acted, end, schedule_.begin()), end, PackedInput{});
+  scheduled_ -= static_cast<std::uint64_t>(acted);
+}
+
+Refused Bench::apply(const Input& input) noexcept {
+  if (!concerns_all_axes(input)) return apply_action(axes_[input.axis], input);
+  late_now_ = 1;
+  ++late_ticks_;
+  if (std::holds_alternative<Overrun>(input.action)) {
+    for (AxisRuntime& a : axes_)
+      a.axis.latch(kBenchOverrun);
+  }
+  return Refused::kNot;
+}
+
+Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
+  if (const auto* command = std::get_if<Command>(&input.action)) {
+    const Refused refused = accept(input.axis, *command, input.owner);
+    if (refused != Refused::kNot) ++a.control.refused;
+    if (refused != Refused::kNot && refused != Refused::kNotOwner) {
+      count_bad_command(a.control, are_bad_values(refused));
+    }
+    return refused;
+  }
+  if (const auto* lease = std::get_if<LeaseAction>(&input.action))
+    return change_lease(input.axis, *lease, input.owner);
+  if (const auto* load = std::get_if<LoadChange>(&input.action)) {
+    if (!std::isfinite(load->load_nm)) return Refused::kNotFinite;
+    a.axis.set_load(load->load_nm, tick_, load->ramp_ticks);
+  } else if (const auto* write = std::get_if<ParameterWrite>(&input.action)) {
+    return write_parameter(a, *write);
+  } else if (const auto* fault = std::get_if<InjectFault>(&input.action)) {
+    return inject(a, *fault);
+  } else if (const auto* bump = std::get_if<ShaftBump>(&input.action)) {
+    if (!std::isfinite(bump->impulse_nms)) return Refused::kNotFinite;
+    Axis& shaft = axes_[a.shaft].axis;
+    if (&shaft == &a.axis) {
+      shaft.bump(bump->impulse_nms);
+    } else {
+      shaft.bump_output(bump->impulse_nms);
+    }
+  } else if (const auto* refused = std::get_if<RefusedCommand>(&input.action)) {
+    ++a.control.refused;
+    if (input.owner != 0 && input.owner == a.control.owner) count_bad_command(a.control, refused->bad_values);
+  } else {
+    return clear_faults(a, input.owner);
+  }
+  return Refused::kNot;
+}
+
+void Bench::count_bad_command(Control& c, bool bad_values) noexcept {
+  c.good_commands = 0;
+  if (bad_values) c.bad_values = 1;
+}
+
+Refused Bench::clear_faults(AxisRuntime& a, Owner owner) noexcept {
+  Control& c = a.control;
+  if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
+  const std::uint64_t faults = a.axis.state().faults & kLatchedFaults;
+  if (faults == 0) return Refused::kNot;
+  const double limit_a = a.axis.parameters().drive.amplifier.over_current_a;
+  const bool over_current = (faults & kOverCurrentTrip) != 0 && largest_phase_current_a(a.sample) > limit_a;
+  if (over_current || c.bad_values != 0 || a.axis.injected().command_loss != 0.0) return Refused::kCauseLasts;
+  a.axis.clear_faults();
+  c.state = ControlState::kIdle;
+  c.in_force = {};
+  c.silent_ticks = 0;
+  c.good_commands = 0;
+  c.last = {};
+  return Refused::kNot;
+}
+
+Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept {
+  const AxisRuntime& a = axes_[axis];
+  const Control& c = a.control;
+  if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
+  const Refused values = check_values(command.phases, a.rules, a.axis.parameters().drive);
+  if (values != Refused::kNot) return values;
+  if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
+  if (a.rules.on_excess == OnExcess::kRefuse && a.command_step > 0.0) {
+    const Tick ticks = c.newest.answers < 0 ? 1 : command.answers - c.newest.answers;
+    if (is_steeper(c.newest.phases, command.phases, static_cast<double>(ticks) * a.command_step)) {
+      return Refused::kBeyondDrive;
+    }
+  }
+  return is_latched(axis) && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
+}
+
+Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noexcept {
+  Control& c = axes_[axis].control;
+  const Refused why = would_refuse(axis, owner, command);
+  if (why == Refused::kNot || why == Refused::kLatched) {
+    c.renewed = tick_;  // a latched axis keeps its owner, who alone can clear it
+  }
+  if (why != Refused::kNot) return why;
+  c.newest = command;
+  c.fresh = 1;
+  c.bad_values = 0;
+  return Refused::kNot;
+}
+
+Refused Bench::change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept {
+  Control& c = axes_[axis].control;
+  if (owner == 0) return Refused::kNotOwner;
+  if (action == LeaseAction::kAcquire) {
+    if (c.owner != 0 && c.owner != owner) return Refused::kOwned;
+    if (c.owner == 0) {
+      c = {.owner = owner, .renewed = tick_, .last = c.last, .missed = c.missed, .refused = c.refused};
+    }
+    c.renewed = tick_;
+    return Refused::kNot;
+  }
+  if (owner != c.owner) return Refused::kNotOwner;
+  c.renewed = tick_;
+  if (action == LeaseAction::kRelease) lose_controller(axis, 0);
+  if (action == LeaseAction::kLost) lose_controller(axis, kLeaseLost);
+  return Refused::kNot;
+}
+
+void Bench::lose_controller(std::size_t axis, std::uint64_t fault) noexcept {
+  AxisRuntime& a = axes_[axis];
+  forget_scheduled(axis, a.control.owner);
+  if (is_driven(a.control.state)) a.axis.latch(fault);
+  a.control = {.last = a.control.last, .missed = a.control.missed, .refused = a.control.refused};
+}
+
+void Bench::forget_scheduled(std::size_t axis, Owner owner) noexcept {
+  const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
+  const auto still_to_come = schedule_.begin() + static_cast<std::ptrdiff_t>(due_);
+  const auto kept = std::remove_if(still_to_come, end, [axis, owner](const PackedInput& input) {
+    return input.axis == axis && input.owner == owner;
+  });
+  std::fill(kept, end, PackedInput{});
+  scheduled_ = static_cast<std::uint64_t>(kept - schedule_.begin());
+}
+
+void Bench::dismiss_controllers() noexcept {
+  bool dismissed = false;
+  for (std::uint32_t axis = 0; axis < axes_.size(); ++axis) {
+    if (owner(axis) == 0) continue;
+    submit({.tick = tick_, .axis = axis, .owner = owner(axis), .action = LeaseAction::kLost});
+    dismissed = true;
+  }
+  if (dismissed) step();
+}
+
+PhaseCommand Bench::safe_command(AxisRuntime& a) noexcept {
+  return act_safely(a.control.last, a.on_link_loss, a.control.state == ControlState::kFault,
+                    a.axis.connection(), a.quick_stop_ticks);
+}
+
+PhaseCommand Bench::drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept {
+  Control& c = a.control;
+  const bool slows = a.command_step > 0.0 && a.rules.on_excess == OnExcess::kSaturate;
+  PhaseCommand limited = command;
+  if (slows) {
+    const PhaseCommand before = in_force(c.last, a.on_link_loss, a.axis.connection(), a.quick_stop_ticks);
+    if (is_steeper(before, command, a.command_step)) {
+      limited = slewed(before, command, a.command_step);
+      c.flags = kCommandSlewLimited;
+    }
+  }
+  follow(c.last, limited, a.axis.connection(), a.on_link_loss == SafeAction::kQuickStop);
+  return limited;
+}
+
+void Bench::take_command(Control& c) noexcept {
+  c.silent_ticks = 0;
+  const bool arming = c.state == ControlState::kIdle || c.state == ControlState::kReady;
+  c.state = arming && ++c.good_commands < setup_.arming_commands ? ControlState::kReady : ControlState::kRun;
+  if (setup_.command_delay_ticks == 0 && c.state == ControlState::kRun) c.in_force = c.newest;
+}
+
+/// Copies that the link makes of a command answer what has been answered.
+void Bench::refuse_copies(AxisRuntime& a) noexcept {
+  const double copies = a.axis.injected().command_duplication;
+  if (copies == 0.0) return;
+  a.control.refused += static_cast<std::uint64_t>(copies);
+  count_bad_command(a.control, false);
+}
+
+void Bench::miss_command(AxisRuntime& a) noexcept {
+  Control& c = a.control;
+  ++c.silent_ticks;
+  if (c.state == ControlState::kReady) {
+    if (c.silent_ticks < setup_.watchdog_ticks) return;
+    c.state = ControlState::kIdle;
+    c.good_commands = 0;
+    return;
+  }
+  ++c.missed;
+  c.state = ControlState::kHold;
+  if (c.silent_ticks >= setup_.watchdog_ticks) a.axis.latch(kCommandTimeout);
+}
+
+PhaseCommand Bench::supervise(std::size_t axis) noexcept {
+  AxisRuntime& a = axes_[axis];
+  Control& c = a.control;
+  c.flags = 0;
+  if (c.owner != 0 && tick_ - c.renewed >= setup_.lease_ticks) lose_controller(axis, kLeaseLost);
+  if (a.axis.injected().command_loss != 0.0) c.fresh = 0;  // taken on the wire, lost on the way to the drive
+  if (c.fresh != 0) {
+    take_command(c);
+    refuse_copies(a);
+  } else if (late_now_ == 0 && expects_commands(c.state)) {
+    miss_command(a);
+  }
+  const std::uint64_t latched = a.axis.state().faults & kLatchedFaults;
+  if (latched != 0) {
+    c.state =
+        (latched & ~(kCommandTimeout | kLeaseLost)) != 0 ? ControlState::kFault : ControlState::kTimeout;
+    c.in_force = {};
+    c.fresh = 0;
+    c.good_commands = 0;
+    return safe_command(a);
+  }
+  // With a delay the first command is accepted a tick before it is in force.
+  return is_driven(c.state) && c.in_force.answers >= 0 ? drive_with(a, c.in_force.phases) : safe_command(a);
+}
+
+void Bench::step() noexcept {
+  apply_due();
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (axes_[i].ramps.count != 0) follow_ramps(axes_[i]);
+    axes_[i].command = supervise(i);
+  }
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    AxisRuntime& a = axes_[i];
+    if (a.shaft != i) continue;  // advanced with its partner
+    if (a.shares_with == 0) {
+      a.axis.advance(a.command, tick_);
+    } else {
+      AxisRuntime& partner = axes_[a.shares_with];
+      Axis::advance_pair(a.axis, partner.axis, a.command, partner.command, tick_);
+    }
+  }
+  ++tick_;
+  late_now_ = 0;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    take_sample(i);
+    Control& c = axes_[i].control;
+    // What a delay of one tick has been holding back.
+    if (c.fresh != 0 && c.state == ControlState::kRun) c.in_force = c.newest;
+    c.fresh = 0;
+  }
+}
+
+void Bench::take_sample(std::size_t index) noexcept {
+  AxisRuntime& a = axes_[index];
+  const Control& c = a.control;
+  const AxisSample s = a.axis.sample(tick_);
+  const Tick answered = c.in_force.answers;
+  a.sample = {.tick = static_cast<std::uint64_t>(tick_),
+              .command_tick = answered,
+              .command_age_ticks = answered < 0 ? 0 : static_cast<std::uint64_t>(tick_ - 1 - answered),
+              .missed_commands = c.missed,
+              .refused_commands = c.refused,
+              .late_ticks = late_ticks_,
+              .state = static_cast<std::uint64_t>(c.state),
+              .faults = s.faults | c.flags,
+              .owner = c.owner,
+              .encoder_count = s.encoder_count,
+              .encoder_levels = s.encoder_levels,
+              .edge_age_s = s.edge_age_s,
+              .edge_period_s = s.edge_period_s,
+              .index_count = s.index_count,
+              .index_tick = s.index_tick,
+              .i_a_a = s.current_a.a,
+              .i_b_a = s.current_a.b,
+              .u_a_v = s.voltage_v.a,
+              .u_b_v = s.voltage_v.b,
+              .angle_rad = s.angle_rad,
+              .speed_rad_s = s.speed_rad_s,
+              .torque_nm = s.torque_nm,
+              .load_nm = s.load_nm,
+              .true_i_a_a = s.true_current_a.a,
+              .true_i_b_a = s.true_current_a.b,
+              .psi_a_wb = s.rotor_flux_wb.a,
+              .psi_b_wb = s.rotor_flux_wb.b,
+              .bus_voltage_v = s.bus_voltage_v,
+              .i_c_a = s.current_a.c,
+              .i_f_a = s.current_a.field,
+              .u_c_v = s.voltage_v.c,
+              .u_f_v = s.voltage_v.field,
+              .u_n_v = s.neutral_v,
+              .hall_lines = s.hall_lines,
+              .tachometer_v = s.tachometer_v,
+              .resolver_sin_v = s.resolver_sine_v,
+              .resolver_cos_v = s.resolver_cosine_v,
+              .temperature_k = s.temperature_k,
+              .meter_u_rms_v = s.meter_voltage_v,
+              .meter_i_rms_a = s.meter_current_a,
+              .meter_p_w = s.meter_power_w,
+              .meter_q_var = s.meter_reactive_var,
+              .meter_pf = s.meter_power_factor,
+              .true_i_c_a = s.true_current_a.c,
+              .true_i_f_a = s.true_current_a.field,
+              .load_angle_rad = s.load_angle_rad,
+              .load_speed_rad_s = s.load_speed_rad_s,
+              .load_position_m = s.load_position_m,
+              .injected = s.injected};
+  samples_.add_block(a.sample);
+  observer_->on_sample(static_cast<std::uint32_t>(index), a.sample);
+}
+
+}  // namespace drivebench

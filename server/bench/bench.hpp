@@ -1,0 +1,199 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "plant/axis.hpp"
+#include "protocols/signals/sample.hpp"
+#include "server/bench/command_rules.hpp"
+#include "server/bench/digest.hpp"
+#include "server/bench/input.hpp"
+#include "server/bench/ramps.hpp"
+#include "server/bench/safe_action.hpp"
+
+namespace drivebench {
+
+/// State of the control of an axis, as Sample.state shows it: idle, ready, run, hold and back; timeout and
+/// fault end only when the owner clears them, and lead to idle.
+enum class ControlState : std::uint64_t {
+  kIdle = 0,     ///< nobody commands it: safe action
+  kReady = 5,    ///< the first commands arrive, fewer than arming_commands: still safe action
+  kRun = 1,      ///< commands arrive and drive the axis
+  kHold = 2,     ///< commands are missing, the last one holds
+  kTimeout = 3,  ///< latched: too many were missing, or the controller left; safe action
+  kFault = 4,    ///< latched: trip, overrun or divergence; safe action
+};
+
+/// Whether commands drive the axis: the last one, if one is missing.
+constexpr bool is_driven(ControlState state) noexcept {
+  return state == ControlState::kRun || state == ControlState::kHold;
+}
+
+/// What the bench needs to know of one axis.
+struct AxisSetup {
+  AxisParameters parameters;
+  SafeAction on_link_loss = SafeAction::kFreewheel;
+  Tick quick_stop_ticks = 4000;  ///< length of the ramp of SafeAction::kQuickStop, at most kMaxQuickStop
+  CommandRules rules{};
+  /// Number of the axis, before this one and with a shaft of its own, whose shaft this one turns: a
+  /// dynamometer. Its mechanics are those of both.
+  std::optional<std::size_t> shares_shaft_with{};
+};
+
+/// What the bench needs to know of itself.
+struct BenchSetup {
+  std::int64_t period_ns = 125'000;
+  int substeps = 5;
+  std::uint64_t seed = 1;
+  int command_delay_ticks = 1;  ///< 0: command(k) holds from tick k; 1: from tick k+1
+  /// So many good commands in a row arm an axis: from the last of them on it is driven. A command that is
+  /// refused, or silence for watchdog_ticks, begins a new row.
+  std::int64_t arming_commands = 1;
+  Tick watchdog_ticks = 20;
+  Tick lease_ticks = 16'000;
+  std::vector<AxisSetup> axes;
+};
+
+inline constexpr Tick kMaxQuickStop = 1'000'000;  ///< [ticks], so that the angle of the ramp has a cosine
+
+/// A sample on its way through a ring.
+struct TickedSample {
+  TickedSample() noexcept : axis(0), sample() {}
+  TickedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
+  std::uint32_t axis;
+  Sample sample;
+};
+
+/// Sees everything that happens, in order, inside the tick: must neither wait, allocate, lock nor throw.
+class BenchObserver {
+ public:
+  virtual ~BenchObserver() = default;
+  /// An input came in before tick `now` ran; it acts at input.tick, which may be later.
+  virtual void on_input(Tick now, const Input& input) noexcept = 0;
+  virtual void on_sample(std::uint32_t axis, const Sample& sample) noexcept = 0;
+};
+
+/// The bench: single-threaded, deterministic, without clock, thread or I/O. The same setup and the same
+/// inputs at the same ticks give the same samples, bit for bit.
+class Bench {
+ public:
+  explicit Bench(const BenchSetup& setup, BenchObserver* observer = nullptr);
+
+  /// Takes an input. One for a later tick is kept until then (at most kMaxScheduled); all others act at the
+  /// start of the present tick, with their tick set to it.
+  Refused submit(const Input& input) noexcept;
+
+  /// One tick: inputs that are due, commands, plant, sensors.
+  void step() noexcept;
+
+  /// Takes every lease back and, if there was one, runs a tick of safe action: the end of a run.
+  void dismiss_controllers() noexcept;
+
+  /// Whether a latched fault is in force on an axis. Its commands are refused, except those with the gates
+  /// off.
+  bool is_latched(std::size_t axis) const noexcept {
+    return (axes_[axis].axis.state().faults & kLatchedFaults) != 0;
+  }
+
+  /// How often parameters of an axis have changed since the bench was made.
+  std::uint64_t parameter_changes(std::size_t axis) const noexcept { return axes_[axis].parameter_changes; }
+
+  /// Why a command for the present tick would be turned away.
+  Refused would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept;
+
+  Tick tick() const noexcept { return tick_; }
+  std::size_t axis_count() const noexcept { return axes_.size(); }
+  const Sample& sample(std::size_t axis) const noexcept { return axes_[axis].sample; }
+  const Axis& axis(std::size_t index) const noexcept { return axes_[index].axis; }
+  Owner owner(std::size_t axis) const noexcept { return axes_[axis].control.owner; }
+  /// Whether a command for the present tick has come in.
+  bool has_command(std::size_t axis) const noexcept { return axes_[axis].control.fresh != 0; }
+
+  /// A hash of everything the future depends on and of every sample so far.
+  std::uint64_t state_hash() const noexcept;
+
+  /// The whole state as bytes, for restore() on a bench with the same setup in this or another process.
+  std::vector<std::byte> save() const;
+  /// False, with nothing changed, if the bytes are not a state of such a bench.
+  bool restore(std::span<const std::byte> saved);
+
+  static constexpr std::size_t kMaxScheduled = 256;
+
+ private:
+  /// What the control of an axis remembers. 8-byte members only.
+  struct Control {
+    Owner owner = 0;
+    Tick renewed = 0;  ///< tick of the last renewal of the lease
+    ControlState state = ControlState::kIdle;
+    std::int64_t fresh = 0;  ///< 1: a command came in for this tick
+    Command newest{};        ///< the last command accepted
+    Command in_force{};
+    std::int64_t silent_ticks = 0;   ///< ticks without a command, late ones not counted
+    std::int64_t good_commands = 0;  ///< in a row, until the axis is armed
+    std::int64_t bad_values = 0;     ///< 1: the last command of the owner was refused for its values
+    std::uint64_t flags = 0;         ///< fault bits of the command that is in force
+    LastCommands last{};
+    std::uint64_t missed = 0;
+    std::uint64_t refused = 0;
+  };
+  struct AxisRuntime {
+    Axis axis;
+    SafeAction on_link_loss;
+    Tick quick_stop_ticks;
+    CommandRules rules;
+    double command_step;          ///< largest change of a set-point in a tick [V or A]; 0: any
+    std::size_t shaft;            ///< the axis whose shaft this one turns: itself, or its partner before it
+    std::size_t shares_with = 0;  ///< the other axis on this shaft; 0: none
+    Control control{};
+    ParameterRamps ramps{};
+    Sample sample{};
+    PhaseCommand command{};  ///< for the present tick
+    std::uint64_t parameter_changes = 0;
+  };
+
+  Refused apply(const Input& input) noexcept;
+  Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
+  Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
+  /// A command of the owner was turned away.
+  static void count_bad_command(Control& c, bool bad_values) noexcept;
+  Refused clear_faults(AxisRuntime& a, Owner owner) noexcept;
+  Refused write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept;
+  /// Sets a parameter unless that would break a rule between values.
+  bool set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept;
+  void change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept;
+  void follow_ramps(AxisRuntime& a) noexcept;
+  Refused inject(AxisRuntime& a, const InjectFault& fault) noexcept;
+  Refused change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept;
+  void lose_controller(std::size_t axis, std::uint64_t fault) noexcept;
+  void apply_due() noexcept;
+  void forget_scheduled(std::size_t axis, Owner owner) noexcept;
+  PhaseCommand supervise(std::size_t axis) noexcept;
+  void take_command(Control& c) noexcept;
+  static void refuse_copies(AxisRuntime& a) noexcept;
+  void miss_command(AxisRuntime& a) noexcept;
+  PhaseCommand drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept;
+  void take_sample(std::size_t index) noexcept;
+  PhaseCommand safe_command(AxisRuntime& a) noexcept;
+
+  /// Calls visit(block) for every piece of the state, each a struct of 8-byte members.
+  template <class Self, class Visitor>
+  static void for_each_block(Self& self, Visitor visit);
+
+  BenchSetup setup_;
+  BenchObserver* observer_;
+  Tick tick_ = 0;
+  std::int64_t late_now_ = 0;  ///< 1: the present tick started late
+  std::uint64_t late_ticks_ = 0;
+  Digest samples_;         ///< of all samples so far
+  std::uint64_t due_ = 0;  ///< of the schedule, those that have acted in this tick; 0 between ticks
+  std::uint64_t scheduled_ = 0;
+  std::array<PackedInput, kMaxScheduled> schedule_{};  ///< sorted by tick, first come first served within one
+  std::vector<AxisRuntime> axes_;
+};
+
+}  // namespace drivebench

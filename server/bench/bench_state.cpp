@@ -1,0 +1,132 @@
+// Saving, restoring and hashing the state of the bench. The state is a list of blocks of 8-byte words; the
+// header names the setup it belongs to, the last word is a digest of all before it.
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "plant/parameters/parameters.hpp"
+#include "server/bench/bench.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x3374'6174'7362'7264u;  // "drbstat3"
+
+std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
+  Digest digest;
+  digest.add(static_cast<std::uint64_t>(setup.period_ns));
+  digest.add(static_cast<std::uint64_t>(setup.substeps));
+  digest.add(setup.seed);
+  digest.add(static_cast<std::uint64_t>(setup.command_delay_ticks));
+  digest.add(static_cast<std::uint64_t>(setup.arming_commands));
+  digest.add(static_cast<std::uint64_t>(setup.watchdog_ticks));
+  digest.add(static_cast<std::uint64_t>(setup.lease_ticks));
+  for (const AxisSetup& axis : setup.axes) {
+    digest.add(static_cast<std::uint64_t>(axis.on_link_loss));
+    digest.add(static_cast<std::uint64_t>(axis.quick_stop_ticks));
+    digest.add(static_cast<std::uint64_t>(axis.rules.on_excess));
+    digest.add(std::bit_cast<std::uint64_t>(axis.rules.slew_per_s));
+    digest.add(axis.shares_shaft_with ? *axis.shares_shaft_with + 1 : 0);
+    digest.add(axis.parameters.machine.index());
+    for (const Parameter& row : axis_parameters(axis.parameters))
+      digest.add(std::bit_cast<std::uint64_t>(row.get(axis.parameters)));
+    for (const CurveParameter& row : axis_curves(axis.parameters)) {
+      const std::vector<CurvePoint>& points = row.get(axis.parameters).points();
+      digest.add(points.size());
+      for (const CurvePoint& point : points)
+        digest.add_block(point);
+    }
+  }
+  return digest.value();
+}
+
+}  // namespace
+
+template <class Self, class Visitor>
+void Bench::for_each_block(Self& self, Visitor visit) {
+  visit(self.tick_);
+  visit(self.late_now_);
+  visit(self.late_ticks_);
+  visit(self.samples_);
+  visit(self.scheduled_);
+  visit(self.schedule_);
+  for (auto& a : self.axes_) {
+    visit(a.control);
+    visit(a.ramps);
+    visit(a.sample);
+    AxisState state = a.axis.state();
+    visit(state);
+    AxisParameters parameters = a.axis.parameters();
+    for (const Parameter& row : axis_parameters(parameters)) {
+      double value = row.get(parameters);
+      visit(value);
+      if constexpr (!std::is_const_v<Self>) row.set(parameters, value);
+    }
+    if constexpr (!std::is_const_v<Self>) {
+      a.axis.restore(state);
+      a.axis.set_parameters(parameters);
+    }
+  }
+}
+
+std::uint64_t Bench::state_hash() const noexcept {
+  Digest digest;
+  for_each_block(*this, [&digest](const auto& block) { digest.add_block(block); });
+  return digest.value();
+}
+
+std::vector<std::byte> Bench::save() const {
+  std::vector<std::byte> saved;
+  Digest digest;
+  const auto append = [&saved, &digest](const auto& block) {
+    digest.add_block(block);
+    const std::size_t end = saved.size();
+    saved.resize(end + sizeof(block));
+    std::memcpy(saved.data() + end, &block, sizeof(block));
+  };
+  append(kMagic);
+  append(setup_hash(setup_));
+  for_each_block(*this, append);
+  append(std::uint64_t{digest.value()});
+  return saved;
+}
+
+bool Bench::restore(std::span<const std::byte> saved) {
+  if (saved.size() != save().size()) return false;
+  Digest digest;
+  std::size_t position = 0;
+  const auto take = [&](auto& block) {
+    std::memcpy(&block, saved.data() + position, sizeof(block));
+    position += sizeof(block);
+  };
+  std::uint64_t word = 0;
+  while (position + sizeof(word) < saved.size()) {
+    take(word);
+    digest.add(word);
+  }
+  take(word);
+  if (word != digest.value()) return false;
+
+  position = 0;
+  take(word);
+  if (word != kMagic) return false;
+  take(word);
+  if (word != setup_hash(setup_)) return false;
+  Bench restored(*this);
+  for_each_block(restored, take);
+  if (restored.scheduled_ > kMaxScheduled) return false;
+  for (const PackedInput& input : restored.schedule_) {
+    if (input.axis >= axes_.size()) return false;
+  }
+  for (const AxisRuntime& a : restored.axes_) {
+    const std::size_t rows = axis_parameters(a.axis.parameters()).size();
+    for (const ParameterRamp& ramp : a.ramps.ramp) {
+      if (a.ramps.count > kMaxRamps || ramp.row >= rows) return false;
+    }
+  }
+  *this = std::move(restored);
+  return true;
+}
+
+}  // namespace drivebench

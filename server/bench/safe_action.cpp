@@ -1,0 +1,87 @@
+#include "server/bench/safe_action.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+#include "plant/drive/phases.hpp"
+#include "plant/math/frames.hpp"
+#include "plant/math/trig.hpp"
+
+namespace drivebench {
+namespace {
+
+/// So many commands make the mean of the frequency: long enough for the six steps of block commutation,
+/// short beside a ramp.
+constexpr std::int64_t kMeanCommands = 64;
+
+TwoPhase vector_of(const PhaseValues& x, Connection connection) noexcept {
+  if (connection == Connection::kTwoPhase) return {.a = x.a, .b = x.b};
+  return three_to_two(phases_of(x));
+}
+
+double turned_between(double from_rad, double to_rad) noexcept {
+  const double turn_rad = to_rad - from_rad;
+  if (turn_rad > std::numbers::pi) return turn_rad - 2.0 * std::numbers::pi;
+  return turn_rad < -std::numbers::pi ? turn_rad + 2.0 * std::numbers::pi : turn_rad;
+}
+
+PhaseValues turned(const PhaseValues& x, double angle_rad, Connection connection) noexcept {
+  if (connection == Connection::kArmature) return x;
+  const CosSin by = cos_sin(angle_rad);
+  const TwoPhase v = vector_of(x, connection);
+  const TwoPhase w = to_ab({.d = v.a, .q = v.b}, by);
+  if (connection == Connection::kTwoPhase) return {.a = w.a, .b = w.b, .c = 0.0, .field = x.field};
+  const double common = neutral(phases_of(x));
+  const ThreePhase phases = two_to_three(w);
+  return {.a = phases.a + common, .b = phases.b + common, .c = phases.c + common, .field = x.field};
+}
+
+/// Constant deceleration: after m of n ticks the frequency is 1 - m/n of what it was. The field winding keeps
+/// its set-point, so that an armature brakes.
+PhaseCommand ramp_down(const LastCommands& last, Connection connection, Tick ramp_ticks) noexcept {
+  if (last.gone >= ramp_ticks) return {};
+  const auto m = static_cast<double>(last.gone);
+  const double part = m / static_cast<double>(ramp_ticks);
+  PhaseCommand command = last.command;
+  command.setpoint =
+      turned(last.command.setpoint, last.turn_rad_per_tick * m * (1.0 - 0.5 * part), connection);
+  command.setpoint.a *= 1.0 - part;
+  command.setpoint.b *= 1.0 - part;
+  command.setpoint.c *= 1.0 - part;
+  return command;
+}
+
+}  // namespace
+
+void follow(LastCommands& last, const PhaseCommand& command, Connection connection, bool turns) noexcept {
+  last.gone = 0;
+  last.command = command;
+  if (!turns || connection == Connection::kArmature) return;
+  const TwoPhase v = vector_of(command.setpoint, connection);
+  if (v.a == 0.0 && v.b == 0.0) return;  // has no angle
+  const double angle_rad = arctangent2(v.b, v.a);
+  if (last.followed > 0) {
+    const double turn_rad = turned_between(last.angle_rad, angle_rad);
+    last.turn_rad_per_tick +=
+        (turn_rad - last.turn_rad_per_tick) / static_cast<double>(std::min(last.followed, kMeanCommands));
+  }
+  last.angle_rad = angle_rad;
+  ++last.followed;
+}
+
+PhaseCommand in_force(const LastCommands& last, SafeAction action, Connection connection,
+                      Tick quick_stop_ticks) noexcept {
+  if (last.gone == 0 || action == SafeAction::kHold) return last.command;
+  if (action == SafeAction::kZeroVoltage) return {.gates = Gates::kZeroVoltage, .setpoint = {}};
+  if (action == SafeAction::kFreewheel) return {};
+  return ramp_down(last, connection, quick_stop_ticks);
+}
+
+PhaseCommand act_safely(LastCommands& last, SafeAction action, bool faulty, Connection connection,
+                        Tick quick_stop_ticks) noexcept {
+  ++last.gone;
+  const bool ends = faulty && action != SafeAction::kZeroVoltage;
+  return in_force(last, ends ? SafeAction::kFreewheel : action, connection, quick_stop_ticks);
+}
+
+}  // namespace drivebench

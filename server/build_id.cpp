@@ -1,9 +1,0 @@
-#include "server/build_id.hpp"
-
-namespace drivebench {
-
-std::string_view build_id() noexcept {
-  return DRIVEBENCH_BUILD_ID;
-}
-
-}  // namespace drivebench

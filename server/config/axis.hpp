@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "server/config/config.hpp"
+#include "server/config/strict_table.hpp"
+
+namespace drivebench {
+
+/// One [[axis]] of a bench file, with its motor file.
+struct AxisReading {
+  AxisConfig config;
+  AxisSetup setup;
+  bool parameters_valid = false;  ///< setup.parameters are complete and free of problems
+};
+
+/// Reads the axis that follows `before`; its number from 1 on is its node id unless it names one. `odd` takes
+/// what is right and yet hardly meant.
+AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
+                      std::span<const AxisReading> before, ProblemList& problems,
+                      std::vector<ConfigProblem>& odd);
+
+/// A duration given as seconds, rounded to the nearest tick, or as ticks; not both.
+std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key, std::string_view ticks_key,
+                               std::int64_t period_ns);
+
+}  // namespace drivebench

@@ -1,0 +1,72 @@
+#include "server/config/config.hpp"
+
+#include <arpa/inet.h>
+
+#include <utility>
+
+#include "protocols/document.hpp"
+#include "server/config/words.hpp"
+
+namespace drivebench {
+std::string in_quotes(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+std::string real_text(double value) {
+  std::string text = shortest(value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
+}
+
+std::string_view name_of(RunMode mode) noexcept {
+  return kRunModeWords[static_cast<std::size_t>(mode)];
+}
+
+std::string_view name_of(PacerKind pacer) noexcept {
+  return kPacerWords[static_cast<std::size_t>(pacer)];
+}
+
+void change_mode(BenchConfig& config, RunMode mode) noexcept {
+  BenchSetup& setup = config.setup;
+  if (setup.arming_commands == default_arming_commands(config.mode)) {
+    setup.arming_commands = default_arming_commands(mode);
+  }
+  if (mode == RunMode::kRealtime) setup.command_delay_ticks = 1;
+  config.mode = mode;
+}
+
+std::string_view name_of(SafeAction action) noexcept {
+  return kSafeActionWords[static_cast<std::size_t>(action)];
+}
+
+std::string_view name_of(CanBackend backend) noexcept {
+  return kCanBackendWords[static_cast<std::size_t>(backend)];
+}
+
+bool is_address(const std::string& text) noexcept {
+  in_addr v4{};
+  in6_addr v6{};
+  return text == "localhost" || ::inet_pton(AF_INET, text.c_str(), &v4) == 1 ||
+         ::inet_pton(AF_INET6, text.c_str(), &v6) == 1;
+}
+
+bool is_loopback(const std::string& address) noexcept {
+  in_addr v4{};
+  in6_addr v6{};
+  if (address == "localhost") return true;
+  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+bool is_multicast(const std::string& address) noexcept {
+  in_addr v4{};
+  in6_addr v6{};
+  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 28 == 0xE;
+  return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_MULTICAST(&v6);
+}
+
+}  // namespace drivebench

@@ -1,0 +1,253 @@
+#include "server/config/events.hpp"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "server/bench/ramps.hpp"
+#include "server/config/axis.hpp"
+#include "server/config/parameters.hpp"
+#include "server/config/words.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr auto kFaultNames = [] {
+  std::array<std::string_view, kInjectableFaultCount> names{};
+  for (std::size_t row = 0; row < names.size(); ++row)
+    names[row] = kInjectableFaults[row].name;
+  return names;
+}();
+
+/// When an event of this table happens; 0 if that is not told rightly.
+Tick read_at(StrictTable& table, std::int64_t period_ns) {
+  const auto tick = read_ticks(table, "at_s", "at_tick", period_ns);
+  if (!table.has("at_tick")) table.require("at_s");
+  return tick.value_or(0);
+}
+
+void read_loads(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent>& events) {
+  for (StrictTable& table : axis.tables("load", kMaxAxisEvents)) {
+    const Tick tick = read_at(table, period_ns);
+    const auto load_nm = table.real("load_nm", -kMaxLoadNm, kMaxLoadNm);
+    const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", period_ns);
+    table.require("load_nm");
+    table.finish();
+    events.push_back({tick, LoadChange{.load_nm = load_nm.value_or(0.0), .ramp_ticks = ramp.value_or(0)}});
+  }
+}
+
+void read_bumps(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent>& events) {
+  for (StrictTable& table : axis.tables("bump", kMaxAxisEvents)) {
+    const Tick tick = read_at(table, period_ns);
+    const auto impulse_nms = table.real("impulse_nms", -kMaxImpulseNms, kMaxImpulseNms);
+    table.require("impulse_nms");
+    table.finish();
+    events.push_back({tick, ShaftBump{impulse_nms.value_or(0.0)}});
+  }
+}
+
+void read_faults(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent>& events) {
+  for (StrictTable& table : axis.tables("fault", kMaxAxisEvents)) {
+    const auto name = table.choice("name", kFaultNames);
+    const Tick tick = read_at(table, period_ns);
+    const auto until = read_ticks(table, "until_s", "until_tick", period_ns);
+    const auto value = table.real("value");
+    table.require("name");
+    table.require("value");
+    if (name && value) {
+      const std::string rule = problem_with(kInjectableFaults[*name], *value);
+      if (!rule.empty()) table.report("value", rule);
+    }
+    if (until && *until <= tick) {
+      table.report(table.has("until_s") ? "until_s" : "until_tick",
+                   "comes to tick " + std::to_string(*until) + " but must lie after tick " +
+                       std::to_string(tick) + ", where the fault begins");
+    }
+    table.finish();
+    const auto row = static_cast<std::uint32_t>(name.value_or(0));
+    events.push_back({tick, InjectFault{.row = row, .value = value.value_or(0.0)}});
+    if (until) events.push_back({*until, InjectFault{.row = row, .value = 0.0}});
+  }
+}
+
+/// A parameter change and the table that asks for it.
+struct Setting {
+  Tick tick;
+  ParameterWrite write;
+  StrictTable table;
+};
+
+/// The row that a setting names, if it may change while the bench runs.
+const Parameter* read_row(StrictTable& table, const AxisParameters* p, bool shares_shaft) {
+  const auto name = table.text("parameter", 200);
+  table.require("parameter");
+  if (!name || p == nullptr) return nullptr;
+  const Parameter* const row = find_parameter(*p, *name);
+  const auto report = [&](const std::string& why) {
+    table.report("parameter", "is \"" + printable(*name) + "\", " + why);
+    return nullptr;
+  };
+  if (row == nullptr) return report("but there is no such parameter");
+  if (!row->live) return report("which cannot be changed while the bench runs");
+  if (shares_shaft && section_of(row->name) == "mechanics") {
+    return report("which belongs to the axis whose shaft this one shares");
+  }
+  return row;
+}
+
+std::optional<Setting> read_setting(StrictTable& table, const AxisParameters* p, bool shares_shaft,
+                                    std::int64_t period_ns) {
+  const Parameter* const row = read_row(table, p, shares_shaft);
+  const Tick tick = read_at(table, period_ns);
+  const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", period_ns);
+  const auto value = row != nullptr ? read_value(table, "value", *row) : std::nullopt;
+  if (row == nullptr) table.node("value");
+  table.require("value");
+  if (row != nullptr && row->integer && ramp.value_or(0) != 0) {
+    table.report(table.has("ramp_s") ? "ramp_s" : "ramp_ticks",
+                 "must be 0: " + std::string(row->name) + " has no values in between");
+  }
+  table.finish();
+  if (!value) return std::nullopt;
+  return Setting{.tick = tick,
+                 .write = {.row = static_cast<std::uint32_t>(row - axis_parameters(*p).data()),
+                           .value = *value,
+                           .ramp_ticks = ramp.value_or(0)},
+                 .table = table};
+}
+
+bool report_broken(Setting& setting, Tick tick, const AxisParameters& p) {
+  const std::vector<Problem> broken = problems(p);
+  if (broken.empty()) return false;
+  setting.table.report("value", "would break a rule at tick " + std::to_string(tick) + ": " +
+                                    broken.front().field + " " + broken.front().rule);
+  return true;
+}
+
+/// Follows the settings as the bench will, and tells where they would break a rule between values: looked at
+/// where one begins or ends.
+void check_settings(std::vector<Setting>& settings, AxisParameters p) {
+  std::set<Tick> ticks;
+  for (const Setting& setting : settings)
+    ticks.insert({setting.tick, setting.tick + setting.write.ramp_ticks});
+  const std::span<const Parameter> rows = axis_parameters(p);
+  ParameterRamps ramps;
+  auto next = settings.begin();
+  for (const Tick tick : ticks) {
+    for (std::size_t i = ramps.count; i-- > 0;) {
+      const ParameterRamp ramp = ramps.ramp[i];
+      rows[ramp.row].set(p, ramp.at(tick));
+      if (ramp.is_over(tick)) ramps.remove(i);
+    }
+    for (; next != settings.end() && next->tick == tick; ++next) {
+      const auto& [row, value, ramp_ticks] = next->write;
+      ramps.forget(row);
+      if (ramp_ticks == 0) {
+        rows[row].set(p, value);
+      } else if (!ramps.add({row, rows[row].get(p), value, tick, ramp_ticks})) {
+        return next->table.report("parameter", "would be on its way together with " +
+                                                   std::to_string(kMaxRamps) +
+                                                   " others, which is as many as there may be");
+      }
+      if (ramp_ticks == 0 && report_broken(*next, tick, p)) return;
+    }
+    if (report_broken(*std::prev(next), tick, p)) return;
+  }
+}
+
+void read_settings(StrictTable& axis, const AxisParameters* p, bool shares_shaft, std::int64_t period_ns,
+                   std::vector<AxisEvent>& events) {
+  std::vector<Setting> settings;
+  bool all_right = p != nullptr;
+  for (StrictTable& table : axis.tables("set", kMaxAxisEvents)) {
+    if (const auto setting = read_setting(table, p, shares_shaft, period_ns)) {
+      settings.push_back(*setting);
+    } else {
+      all_right = false;
+    }
+  }
+  std::stable_sort(settings.begin(), settings.end(),
+                   [](const Setting& x, const Setting& y) { return x.tick < y.tick; });
+  if (all_right) check_settings(settings, *p);
+  for (const Setting& setting : settings)
+    events.push_back({setting.tick, setting.write});
+}
+
+/// Place of an event among those of its tick.
+int rank_of(const Action& action) {
+  if (std::holds_alternative<LoadChange>(action)) return 0;
+  if (std::holds_alternative<ParameterWrite>(action)) return 1;
+  if (const auto* fault = std::get_if<InjectFault>(&action)) return fault->value == 0.0 ? 2 : 3;
+  return 4;
+}
+
+void append(std::string& text, std::string_view key, const std::string& value) {
+  text.append(key).append(" = ").append(value).append("\n");
+}
+
+/// One event as a table of its own.
+struct EventWriter {
+  std::string& text;
+  const AxisParameters& p;
+  Tick tick;
+
+  void begin(std::string_view kind) const {
+    text.append("\n[[axis.").append(kind).append("]]\n");
+    append(text, "at_tick", std::to_string(tick));
+  }
+  void operator()(const LoadChange& load) const {
+    begin("load");
+    append(text, "load_nm", real_text(load.load_nm));
+    append(text, "ramp_ticks", std::to_string(load.ramp_ticks));
+  }
+  void operator()(const ParameterWrite& write) const {
+    const Parameter& row = axis_parameters(p)[write.row];
+    begin("set");
+    append(text, "parameter", in_quotes(row.name));
+    append(text, "value", value_text(row, write.value));
+    append(text, "ramp_ticks", std::to_string(write.ramp_ticks));
+  }
+  void operator()(const InjectFault& fault) const {
+    begin("fault");
+    append(text, "name", in_quotes(kInjectableFaults[fault.row].name));
+    append(text, "value", real_text(fault.value));
+  }
+  void operator()(const ShaftBump& bump) const {
+    begin("bump");
+    append(text, "impulse_nms", real_text(bump.impulse_nms));
+  }
+  template <class Other>
+  void operator()(const Other&) const {}  // no configuration asks for it
+};
+
+}  // namespace
+
+std::vector<AxisEvent> in_order(std::vector<AxisEvent> events) {
+  std::stable_sort(events.begin(), events.end(), [](const AxisEvent& x, const AxisEvent& y) {
+    return std::pair(x.tick, rank_of(x.action)) < std::pair(y.tick, rank_of(y.action));
+  });
+  return events;
+}
+
+std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, bool shares_shaft,
+                                   std::int64_t period_ns) {
+  std::vector<AxisEvent> events;
+  read_loads(axis, period_ns, events);
+  read_settings(axis, p, shares_shaft, period_ns, events);
+  read_faults(axis, period_ns, events);
+  read_bumps(axis, period_ns, events);
+  return in_order(std::move(events));
+}
+
+std::string events_text(const std::vector<AxisEvent>& events, const AxisParameters& p) {
+  std::string text;
+  for (const AxisEvent& event : events)
+    std::visit(EventWriter{text, p, event.tick}, event.action);
+  return text;
+}
+
+}  // namespace drivebench

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+
+#include "server/config/config.hpp"
+#include "server/config/strict_table.hpp"
+
+/// Who may come in, and what is written about it.
+namespace drivebench {
+
+void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig& tcp);
+void read_tls(StrictTable table, const std::filesystem::path& folder, TlsConfig& tls);
+void read_audit(StrictTable table, const std::filesystem::path& folder, AuditConfig& audit);
+LogLevel read_log_level(StrictTable table);
+
+}  // namespace drivebench

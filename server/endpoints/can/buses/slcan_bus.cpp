@@ -1,0 +1,185 @@
+#include "server/endpoints/can/buses/slcan_bus.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocols/can/slcan.hpp"
+#include "server/endpoints/can/buses/slcan_device.hpp"
+#include "server/endpoints/can/buses/text_listener.hpp"
+#include "server/endpoints/can/buses/text_peer.hpp"
+#include "server/endpoints/can/buses/virtual_bus.hpp"
+#include "server/endpoints/can/terminal.hpp"
+
+namespace drivebench::can {
+namespace {
+
+constexpr std::size_t kMaxClients = 16;
+constexpr std::string_view kTcp = "tcp:";
+constexpr std::string_view kPty = "pty:";
+
+/// Milliseconds that begin anew each minute, as the adapters count them.
+std::uint16_t stamp_ms() {
+  const auto now = ServerClock::now().time_since_epoch();
+  return static_cast<std::uint16_t>(std::chrono::duration_cast<std::chrono::milliseconds>(now).count() %
+                                    60'000);
+}
+
+/// A client and the adapter that it sees.
+struct Client {
+  Client(asio::io_context& io, int fd, BusStatus& status)
+      : peer(io, fd, status, [this](std::string& out, const Frame& frame) {
+          append_slcan(out, frame, stamped ? std::optional(stamp_ms()) : std::nullopt);
+        }) {}
+
+  bool open = false;
+  bool listen_only = false;
+  bool stamped = false;
+  SlcanReader reader;
+  TextPeer peer;
+};
+
+class SlcanBus final : public VirtualBus {
+ public:
+  SlcanBus(asio::io_context& io, const CanConfig& config)
+      : VirtualBus(io, config), listener_(io), terminal_(io) {
+    listener_.on_client = [this](int fd) { welcome(fd); };
+    terminal_.on_client = [this](int fd) { welcome(fd); };
+  }
+
+  void send(const Frame& frame) override { broadcast(frame, nullptr); }
+  std::string name() const override { return "slcan:" + name_; }
+
+ private:
+  std::string open() override;
+  void welcome(int fd);
+  void part(const Client* client);
+  void broadcast(const Frame& frame, const Client* except);
+  void take(Client& client, const SlcanReader::Line& line);
+  std::string answer(Client& client, std::string_view line);
+
+  bool is_tcp() const { return config_.channel.starts_with(kTcp); }
+
+  std::string name_ = config_.channel;
+  TextListener listener_;
+  Terminal terminal_;
+  std::vector<std::unique_ptr<Client>> clients_;
+};
+
+std::string SlcanBus::open() {
+  const std::string where = config_.channel.substr(kTcp.size());  // of both the same
+  if (!is_tcp()) return terminal_.open(where);
+  HostPort parsed;
+  std::string problem = parse_host_port(where, parsed);
+  if (problem.empty()) problem = listener_.open(parsed);
+  if (problem.empty())
+    name_ = config_.channel.substr(0, config_.channel.rfind(':') + 1) + std::to_string(listener_.port());
+  return problem;
+}
+
+void SlcanBus::welcome(int fd) {
+  if (clients_.size() == kMaxClients) {
+    refused(peer_of(fd), "there are as many clients as this bus serves");
+    ::close(fd);
+    return;
+  }
+  clients_.push_back(std::make_unique<Client>(io_, fd, status_));
+  Client* client = clients_.back().get();
+  client->peer.on_bytes = [this, client](std::string_view bytes) {
+    for (const char byte : bytes) {
+      if (const auto line = client->reader.push(byte)) take(*client, *line);
+    }
+  };
+  client->peer.on_end = [this, client] { part(client); };
+  client->peer.start();
+}
+
+void SlcanBus::part(const Client* client) {
+  std::erase_if(clients_, [client](const auto& each) { return each.get() == client; });
+  if (!is_tcp()) terminal_.release();
+}
+
+void SlcanBus::broadcast(const Frame& frame, const Client* except) {
+  for (const auto& client : clients_) {
+    if (client->open && client.get() != except) client->peer.send(frame);
+  }
+}
+
+void SlcanBus::take(Client& client, const SlcanReader::Line& line) {
+  if (line.refusal) return;  // a BELL from a client means nothing
+  const auto frame = line.too_long ? std::nullopt : parse_slcan(line.text);
+  const bool may_send = client.open && !client.listen_only;
+  // A client that only sends and never reads loses its answers.
+  if (line.too_long) {
+    ++status_.malformed;
+    client.peer.answer({&kSlcanRefused, 1});
+  } else if (!frame) {
+    client.peer.answer(answer(client, line.text));
+  } else {
+    client.peer.answer({may_send ? &kSlcanOk : &kSlcanRefused, 1});
+  }
+  if (!frame || !may_send) return;
+  broadcast(*frame, &client);
+  deliver(*frame, 0);
+}
+
+/// The answer to a command. Bit rates are taken and mean nothing here.
+std::string SlcanBus::answer(Client& client, std::string_view line) {
+  static const std::string kYes(1, kSlcanOk);
+  static const std::string kNo(1, kSlcanRefused);
+  if (line.empty()) return kYes;
+  const std::string_view argument = line.substr(1);
+  const auto is_digits = [&](std::size_t least, std::size_t most) {
+    return argument.size() >= least && argument.size() <= most &&
+           std::ranges::all_of(argument, [](unsigned char c) { return std::isxdigit(c) != 0; });
+  };
+  switch (line.front()) {
+    case 'O':
+    case 'L':
+      if (client.open || !argument.empty()) return kNo;
+      client.open = true;
+      client.listen_only = line.front() == 'L';
+      return kYes;
+    case 'C':
+      if (!client.open || !argument.empty()) return kNo;
+      client.open = false;
+      client.peer.forget_frames();
+      return kYes;
+    case 'S':
+    case 'Y':
+      return !client.open && is_digits(1, 1) ? kYes : kNo;
+    case 's':
+      return !client.open && is_digits(4, 8) ? kYes : kNo;
+    case 'Z':
+      if (client.open || (argument != "0" && argument != "1")) return kNo;
+      client.stamped = argument == "1";
+      return kYes;
+    case 'F':
+      return client.open && argument.empty() ? "F00" + kYes : kNo;
+    case 'V':
+      return argument.empty() ? "V0101" + kYes : kNo;
+    case 'N':
+      return argument.empty() ? "NDB01" + kYes : kNo;
+    default:
+      ++status_.malformed;
+      return kNo;
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Bus> make_slcan_bus(asio::io_context& io, const CanConfig& config) {
+  if (!config.channel.starts_with(kTcp) && !config.channel.starts_with(kPty))
+    return make_slcan_device(io, config);
+  auto bus = std::make_unique<SlcanBus>(io, config);
+  bus->start();
+  return bus;
+}
+
+}  // namespace drivebench::can

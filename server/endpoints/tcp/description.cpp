@@ -1,0 +1,122 @@
+#include "server/endpoints/tcp/description.hpp"
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "plant/parameters/parameters.hpp"
+#include "protocols/signals/catalogue.hpp"
+#include "server/bench/terminals.hpp"
+#include "server/recording/input_codec.hpp"
+
+namespace drivebench {
+namespace {
+
+v1::SignalDescription::Kind wire_kind(SignalKind kind) noexcept {
+  switch (kind) {
+    case SignalKind::kStatus:
+      return v1::SignalDescription::KIND_STATUS;
+    case SignalKind::kSensor:
+      return v1::SignalDescription::KIND_SENSOR;
+    case SignalKind::kTruth:
+      break;
+  }
+  return v1::SignalDescription::KIND_TRUTH;
+}
+
+std::string_view word_of(Connection connection) noexcept {
+  constexpr auto kWords = std::to_array<std::string_view>({"two_phase", "star", "independent", "armature"});
+  return kWords[static_cast<std::size_t>(connection)];
+}
+
+/// The word of a choice that holds; empty if there is no such parameter.
+std::string_view word_of(const AxisParameters& p, std::string_view name) {
+  const Parameter* const row = find_parameter(p, name);
+  return row == nullptr ? std::string_view{} : row->words[static_cast<std::size_t>(row->get(p))];
+}
+
+v1::AxisDescription describe_axis(const Engine& engine, std::size_t axis) {
+  const BenchConfig& config = engine.config();
+  const AxisParameters& p = engine.parameters(axis);
+  const Terminals terminals = terminals_of(p);
+  v1::AxisDescription d;
+  d.set_name(config.axes[axis].name);
+  d.set_machine(config.axes[axis].motor);
+  d.set_machine_kind(std::string(machine_kind(p)));
+  d.set_phases(static_cast<std::uint32_t>(terminal_count(terminals.connection)));
+  d.set_connection(std::string(word_of(terminals.connection)));
+  d.set_field_winding(terminals.field);
+  d.set_drive_kind(std::string(word_of(p, "drive.kind")));
+  if (const auto partner = config.setup.axes[axis].shares_shaft_with) {
+    d.set_shares_shaft_with(config.axes[*partner].name);
+  }
+  for (std::size_t row = 0; row < axis_parameters(p).size(); ++row)
+    *d.add_parameters() = describe_parameter(engine, axis, row);
+  return d;
+}
+
+}  // namespace
+
+v1::ParameterDescription describe_parameter(const Engine& engine, std::size_t axis, std::size_t row) {
+  const AxisParameters& p = engine.parameters(axis);
+  const Parameter& parameter = axis_parameters(p)[row];
+  v1::ParameterDescription d;
+  d.set_name(std::string(parameter.name));
+  d.set_unit(std::string(parameter.unit));
+  d.set_minimum(parameter.minimum);
+  d.set_maximum(parameter.maximum);
+  d.set_integer(parameter.integer);
+  d.set_live(parameter.live);
+  d.set_value(parameter.get(p));
+  d.set_meaning(std::string(parameter.meaning));
+  for (const std::string_view word : parameter.words)
+    d.add_words(std::string(word));
+  return d;
+}
+
+v1::BenchDescription describe(const Engine& engine) {
+  const BenchConfig& config = engine.config();
+  v1::BenchDescription d;
+  d.set_name(config.name);
+  d.set_mode(wire_mode(config.mode));
+  d.set_period_s(static_cast<double>(config.setup.period_ns) * 1e-9);
+  d.set_substeps(static_cast<std::uint32_t>(config.setup.substeps));
+  d.set_command_delay_ticks(static_cast<std::uint32_t>(config.setup.command_delay_ticks));
+  d.set_arming_commands(static_cast<std::uint32_t>(config.setup.arming_commands));
+  d.set_watchdog_ticks(static_cast<std::uint32_t>(config.setup.watchdog_ticks));
+  d.set_lease_s(static_cast<double>(config.setup.lease_ticks) * d.period_s());
+  d.set_seed(config.setup.seed);
+  d.set_configuration_hash(engine.configuration_hash());
+  for (std::size_t axis = 0; axis < config.axes.size(); ++axis)
+    *d.add_axes() = describe_axis(engine, axis);
+  for (const Signal& signal : kSignals) {
+    v1::SignalDescription& s = *d.add_signals();
+    s.set_name(std::string(signal.name));
+    s.set_unit(std::string(signal.unit));
+    s.set_kind(wire_kind(signal.kind));
+    s.set_minimum(signal.minimum);
+    s.set_maximum(signal.maximum);
+    s.set_meaning(std::string(signal.meaning));
+  }
+  for (const FaultInfo& fault : kFaultTable) {
+    v1::FaultDescription& f = *d.add_faults();
+    f.set_bit(fault.bit);
+    f.set_name(std::string(fault.name));
+    f.set_latched((fault.bit & kLatchedFaults) != 0);
+    f.set_meaning(std::string(fault.meaning));
+  }
+  for (std::size_t row = 0; row < kInjectableFaultCount; ++row) {
+    const InjectableFault& fault = kInjectableFaults[row];
+    v1::InjectableFaultDescription& f = *d.add_injectable_faults();
+    f.set_bit(std::uint64_t{1} << row);
+    f.set_name(std::string(fault.name));
+    f.set_unit(std::string(fault.unit));
+    f.set_minimum(fault.magnitude ? -fault.maximum : 0.0);
+    f.set_maximum(fault.maximum);
+    f.set_integer(fault.integer);
+    f.set_meaning(std::string(fault.meaning));
+  }
+  return d;
+}
+
+}  // namespace drivebench

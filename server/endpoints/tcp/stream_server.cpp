@@ -1,0 +1,277 @@
+#include "server/endpoints/tcp/stream_server.hpp"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include "server/host/holder.hpp"
+
+namespace drivebench {
+namespace {
+
+using asio::ip::tcp;
+using UnixProtocol = asio::local::stream_protocol;
+
+// After an accept that failed for want of descriptors: a pause instead of a spin.
+constexpr auto kAcceptPause = std::chrono::milliseconds(100);
+// A peer that vanished without a word is given up after this time: the kernel asks an idle one every second.
+constexpr int kUserTimeoutMs = 3000;
+constexpr int kSendBufferBytes = 64 * 1024;
+constexpr std::ptrdiff_t kMaxSilentSessions = 32;
+
+tcp::endpoint endpoint_of(const TcpConfig& config) {
+  const std::string address = config.address == "localhost" ? "127.0.0.1" : config.address;
+  return {asio::ip::make_address(address), config.port};
+}
+
+Client peer_of(const tcp::socket& socket) {
+  boost::system::error_code error;
+  const tcp::endpoint remote = socket.remote_endpoint(error);
+  return {.transport = "tcp",
+          .peer = error ? "gone" : remote.address().to_string() + ":" + std::to_string(remote.port()),
+          .subject = {}};
+}
+
+Client peer_of(UnixProtocol::socket& socket) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  const bool known = ::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return {.transport = "unix",
+          .peer = known ? "process " + std::to_string(peer.pid) + " of user " + std::to_string(peer.uid) : "",
+          .subject = {}};
+}
+
+void tune(tcp::socket& socket) {
+  boost::system::error_code ignored;
+  socket.set_option(tcp::no_delay(true), ignored);
+  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+  socket.set_option(asio::socket_base::keep_alive(true), ignored);
+  socket.set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_USER_TIMEOUT>(kUserTimeoutMs),
+                    ignored);
+  socket.set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(1), ignored);
+  socket.set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(1), ignored);
+}
+
+void tune(UnixProtocol::socket& socket) {
+  boost::system::error_code ignored;
+  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+}
+
+/// Removes the socket file of a server that is gone; throws if the path is anything else.
+void make_way(asio::io_context& io, const std::string& path) {
+  const std::filesystem::file_status status = std::filesystem::symlink_status(path);
+  if (!std::filesystem::exists(status)) return;
+  if (!std::filesystem::is_socket(status)) {
+    throw std::runtime_error("cannot listen on unix:" + path + ": the file exists and is not a socket");
+  }
+  boost::system::error_code error;
+  UnixProtocol::socket probe(io);
+  probe.connect(UnixProtocol::endpoint(path), error);
+  if (!error) {
+    throw std::runtime_error("cannot listen on unix:" + path + ": another server listens there (" +
+                             peer_of(probe).peer + ")");
+  }
+  std::filesystem::remove(path);
+}
+
+}  // namespace
+
+StreamServer::StreamServer(asio::io_context& io, const TcpConfig& config, const TlsConfig& tls)
+    : io_(io), config_(config), tcp_(io), unix_(io) {
+  if (!tls.certificate.empty()) door_.emplace(io, tls);
+  try {
+    const tcp::endpoint endpoint = endpoint_of(config);
+    tcp_.open(endpoint.protocol());
+    tcp_.set_option(tcp::acceptor::reuse_address(true));
+    tcp_.bind(endpoint);
+    tcp_.listen();
+  } catch (const boost::system::system_error& error) {
+    throw std::runtime_error("cannot listen on " + config.address + ":" + std::to_string(config.port) + ": " +
+                             error.code().message() + holder_of_port(config.port));
+  }
+  if (config.unix_path.empty()) return;
+  make_way(io_, config.unix_path);
+  try {
+    unix_.open();
+    unix_.bind(UnixProtocol::endpoint(config.unix_path));
+    unix_.listen();
+  } catch (const boost::system::system_error& error) {
+    throw std::runtime_error("cannot listen on unix:" + config.unix_path + ": " + error.code().message());
+  }
+}
+
+void StreamServer::serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
+                         Experiments* experiments, Audit* audit) {
+  const auto all_reports = [this, others = std::move(transports)] {
+    std::vector<TransportReport> reports = others();
+    reports.push_back(report());
+    return reports;
+  };
+  audience_.emplace(io_, engine);
+  context_.emplace(SessionContext{.engine = engine,
+                                  .admission = Admission(config_.asks_for_token, config_.grants),
+                                  .audience = *audience_,
+                                  .session_count = [this] { return sessions_.size(); },
+                                  .transports = all_reports,
+                                  .experiments = experiments,
+                                  .audit = audit});
+  // By index: a session may be added while another one answers; none is removed.
+  if (experiments != nullptr) {
+    experiments->on_change = [this] {
+      for (std::size_t i = 0; i < sessions_.size(); ++i)
+        sessions_[i]->on_experiments();
+    };
+  }
+  engine.on_tick.add([this] { audience_->on_tick(); });
+  engine.on_newest.add([this] { audience_->on_newest(); });
+  engine.on_taken.push_back([this](const Taken& taken) {
+    for (std::size_t i = 0; i < sessions_.size(); ++i)
+      sessions_[i]->on_taken(taken);
+  });
+  if (door_) watch_door();
+  asio::co_spawn(io_, accept_from(tcp_), asio::detached);
+  if (unix_.is_open()) asio::co_spawn(io_, accept_from(unix_), asio::detached);
+}
+
+void StreamServer::watch_door() {
+  door_->on_turned_away = [this](const std::string& peer, const std::string& why) {
+    ++context_->counts.tls_refused;
+    const Client who{.transport = "tcp", .peer = peer, .subject = {}};
+    if (context_->audit != nullptr) {
+      context_->audit->note({.name = "tls_refused", .client = &who, .result = why});
+    }
+  };
+}
+
+StreamServer::~StreamServer() {
+  close();
+}
+
+std::string StreamServer::tcp_address() const {
+  const tcp::endpoint endpoint = tcp_.local_endpoint();
+  const std::string address = endpoint.address().to_string();
+  return (endpoint.address().is_v6() ? "[" + address + "]" : address) + ":" + std::to_string(endpoint.port());
+}
+
+template <class Acceptor>
+asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
+  LogLimit log;
+  while (acceptor.is_open()) {
+    try {
+      boost::system::error_code error;
+      typename Acceptor::protocol_type::socket socket =
+          co_await acceptor.async_accept(asio::redirect_error(asio::use_awaitable, error));
+      if (error == asio::error::operation_aborted) co_return;
+      if (error) {
+        if (log.allow()) {
+          spdlog::warn("cannot accept a client: {} ({} more since the last such line)", error.message(),
+                       log.held_back());
+        }
+        ServerTimer pause(io_, kAcceptPause);
+        co_await pause.async_wait(asio::use_awaitable);
+        continue;
+      }
+      tune(socket);
+      receive(std::move(socket));
+    } catch (const std::exception& problem) {
+      spdlog::error("a client could not be taken: {}", problem.what());
+    }
+  }
+}
+
+void StreamServer::receive(tcp::socket socket) {
+  Client who = peer_of(socket);
+  if (!door_) {
+    start(Socket(std::move(socket)), std::move(who));
+    return;
+  }
+  const std::string peer = who.peer;
+  door_->receive(std::move(socket), peer, [this, who](Socket plain, const std::string& subject) {
+    const std::weak_ptr<Session> session =
+        start(std::move(plain), {.transport = who.transport, .peer = who.peer, .subject = subject});
+    return [session] {
+      if (const auto still_here = session.lock()) still_here->on_deaf();
+    };
+  });
+}
+
+void StreamServer::receive(UnixProtocol::socket socket) {
+  Client who = peer_of(socket);
+  start(Socket(std::move(socket)), std::move(who));
+}
+
+TransportReport StreamServer::report() const {
+  const SessionContext::Counts& counts = context_->counts;
+  return {.name = "tcp " + tcp_address(),
+          .state = "up",
+          .counts = {{"sessions", sessions_.size()},
+                     {"turned_away", counts.turned_away},
+                     {"tls_refused", counts.tls_refused},
+                     {"malformed", counts.malformed},
+                     {"wrong_tokens", counts.wrong_tokens},
+                     {"excess_commands", counts.excess_commands},
+                     {"throttled", counts.throttled},
+                     {"cut", counts.cut}}};
+}
+
+void StreamServer::replace_grants(TcpConfig now) {
+  if (now.asks_for_token != config_.asks_for_token) {
+    throw std::runtime_error("whether tokens are asked for changes with a new start only");
+  }
+  context_->admission.replace(std::move(now.grants));
+  for (std::size_t i = 0; i < sessions_.size(); ++i)
+    sessions_[i]->on_new_grants();
+}
+
+std::shared_ptr<Session> StreamServer::start(Socket socket, Client who) {
+  auto session = std::make_shared<Session>(std::move(socket), who, *context_);
+  const auto silent =
+      std::count_if(sessions_.begin(), sessions_.end(), [](const auto& other) { return !other->greeted(); });
+  std::string why_not;
+  if (sessions_.size() >= config_.max_sessions) {
+    why_not = "this bench serves " + std::to_string(config_.max_sessions) + " sessions at most";
+  } else if (silent >= kMaxSilentSessions) {
+    why_not = "too many sessions have not said hello yet";
+  }
+  if (!why_not.empty()) {
+    ++context_->counts.turned_away;
+    if (context_->audit != nullptr) {
+      context_->audit->note({.name = "limit", .client = &who, .result = why_not});
+    }
+    session->turn_away(why_not);
+    session->close();
+    return session;
+  }
+  sessions_.push_back(session);
+  asio::co_spawn(io_, run(session), asio::detached);
+  return session;
+}
+
+asio::awaitable<void> StreamServer::run(std::shared_ptr<Session> session) {
+  try {
+    co_await session->run();
+  } catch (const std::exception& error) {
+    spdlog::error("a session ended: {}", error.what());
+    session->close();
+  }
+  std::erase(sessions_, session);
+}
+
+void StreamServer::close() {
+  boost::system::error_code ignored;
+  tcp_.close(ignored);
+  if (unix_.is_open()) {
+    unix_.close(ignored);
+    std::error_code gone_already;
+    std::filesystem::remove(config_.unix_path, gone_already);
+  }
+  if (audience_) audience_->send_all();
+  for (const auto& session : sessions_)
+    session->close();
+}
+
+}  // namespace drivebench

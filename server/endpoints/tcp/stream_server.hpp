@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/endpoints/tcp/session.hpp"
+#include "server/endpoints/tcp/tls_door.hpp"
+#include "server/host/asio.hpp"
+
+namespace drivebench {
+
+/// Accepts clients on TCP, with TLS if it is configured, and on a unix socket, and tells them about every
+/// tick.
+class StreamServer {
+ public:
+  /// Listens at once; throws std::runtime_error that names the address if that fails.
+  StreamServer(asio::io_context& io, const TcpConfig& config, const TlsConfig& tls = {});
+  ~StreamServer();
+
+  /// Address and port that the system gave, "127.0.0.1:7300".
+  std::string tcp_address() const;
+
+  /// Starts accepting clients of this run and telling them about its ticks. `transports` tells of the other
+  /// ways in; `experiments` and `audit` may be null.
+  void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
+             Experiments* experiments, Audit* audit = nullptr);
+
+  /// What the tokens file says now: ends the sessions of tokens that hold no more. Throws std::runtime_error
+  /// if tokens are asked for now and were not before, or the other way round.
+  void replace_grants(TcpConfig now);
+
+  /// Stops accepting and ends every session; what a peer did not take at once is lost.
+  void close();
+
+ private:
+  using Socket = Outbox::Socket;
+
+  template <class Acceptor>
+  asio::awaitable<void> accept_from(Acceptor& acceptor);
+  void receive(asio::ip::tcp::socket socket);
+  void receive(asio::local::stream_protocol::socket socket);
+  std::shared_ptr<Session> start(Socket socket, Client who);
+  void watch_door();
+  TransportReport report() const;
+  asio::awaitable<void> run(std::shared_ptr<Session> session);
+
+  asio::io_context& io_;
+  TcpConfig config_;
+  std::optional<Audience> audience_;
+  std::optional<SessionContext> context_;
+  asio::ip::tcp::acceptor tcp_;
+  asio::local::stream_protocol::acceptor unix_;
+  std::optional<TlsDoor> door_;
+  std::vector<std::shared_ptr<Session>> sessions_;
+};
+
+}  // namespace drivebench

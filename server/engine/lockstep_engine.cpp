@@ -1,0 +1,139 @@
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "server/engine/engine.hpp"
+#include "server/engine/tick_mark.hpp"
+#include "server/host/asio.hpp"
+
+namespace drivebench {
+namespace {
+
+class LockstepEngine final : public Engine {
+ public:
+  LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context* io)
+      : Engine(config, std::move(recorder)),
+        bench_(config_.setup, recorder_.get()),
+        shown_changes_(config_.axes.size()) {
+    if (io != nullptr) disk_timer_.emplace(*io);
+    schedule_events(config_, bench_);
+    show();
+  }
+
+  /// While time waits for the disk each axis gets one command, and no newer ones in its place: they would be
+  /// recorded without end.
+  Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
+    const Refused why = bench_.would_refuse(axis, owner, command);
+    return why == Refused::kNot && waits_for_disk_ && bench_.has_command(axis) ? Refused::kBusy : why;
+  }
+
+  Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+    const Refused why = has_room() ? Refused::kNot : check(axis, owner, command);
+    if (why != Refused::kNot) return why;  // nor counted, which would be an input
+    return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
+  }
+
+  void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
+    if (!has_room()) return refuse_to_take(axis, by, Refused::kBusy, answer);
+    is_taking_ = true;  // no tick between the two inputs
+    Engine::take(axis, by, reason, std::move(answer));
+    is_taking_ = false;
+    advance();
+  }
+
+  void advance() override {
+    if (is_taking_) return;
+    if (recorder_ && !recorder_->has_room()) return try_again_soon();
+    bool commanded = false;
+    for (std::size_t i = 0; i < bench_.axis_count(); ++i) {
+      if (bench_.owner(i) != 0 && !bench_.has_command(i) && !bench_.is_latched(i)) return;
+      commanded = commanded || bench_.has_command(i);
+    }
+    if (!commanded) return;  // without a controller a lockstep bench stands still
+    watch_.beat();
+    {
+      const TickMark mark;
+      bench_.step();
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i)
+      edges_[i] = edges_of(bench_, i);
+    show();
+    on_tick();
+    on_newest();
+  }
+
+  void submit(const Input& input, Answer answer) override {
+    const bool may_be_recorded = has_room() || is_taking_ || ends_own_lease(input);
+    const Refused refused = may_be_recorded ? bench_.submit(input) : Refused::kBusy;
+    if (std::holds_alternative<ParameterWrite>(input.action) && input.axis < parameters_.size()) {
+      parameters_[input.axis] = bench_.axis(input.axis).parameters();  // even if it was refused
+    }
+    answer(refused, bench_.tick());
+    advance();  // the controller that everybody waited for may just have left
+  }
+
+  Verdict stop() override {
+    bench_.dismiss_controllers();
+    Verdict verdict{.mode = RunMode::kLockstep,
+                    .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                    .state_hash = bench_.state_hash()};
+    if (recorder_) {
+      recorder_->finish(verdict);
+      verdict.gaps = recorder_->gaps();
+    }
+    return verdict;
+  }
+
+  Owner owner(std::size_t axis) const override { return bench_.owner(axis); }
+  std::uint64_t state_hash() const override { return bench_.state_hash(); }
+  std::int64_t worst_lateness_ns() const override { return 0; }
+
+ private:
+  /// For inputs that may come without end; what a tick waits for and what ends a lease has a place in any
+  /// case.
+  bool has_room() const noexcept { return !recorder_ || (!waits_for_disk_ && recorder_->has_room()); }
+
+  bool ends_own_lease(const Input& input) const noexcept {
+    return ends_lease(input) && input.owner != 0 && input.axis < bench_.axis_count() &&
+           bench_.owner(input.axis) == input.owner;
+  }
+
+  /// The disk is slow: time stands still until it has caught up, and everybody is served meanwhile.
+  void try_again_soon() {
+    if (std::exchange(waits_for_disk_, true)) return;
+    disk_timer_->expires_after(std::chrono::milliseconds(1));
+    disk_timer_->async_wait([this](const boost::system::error_code& error) {
+      if (error) return;
+      waits_for_disk_ = false;
+      advance();
+    });
+  }
+
+  void show() {
+    for (std::size_t i = 0; i < newest_.size(); ++i) {
+      newest_[i] = bench_.sample(i);
+      if (std::exchange(shown_changes_[i], bench_.parameter_changes(i)) != bench_.parameter_changes(i)) {
+        parameters_[i] = bench_.axis(i).parameters();
+      }
+    }
+  }
+
+  Bench bench_;
+  std::vector<std::uint64_t> shown_changes_;
+  bool is_taking_ = false;
+  std::optional<ServerTimer> disk_timer_;  // of a run with a recorder
+  bool waits_for_disk_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config) {
+  return std::make_unique<LockstepEngine>(config, nullptr, nullptr);
+}
+
+std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                             asio::io_context& io) {
+  return std::make_unique<LockstepEngine>(config, std::move(recorder), &io);
+}
+
+}  // namespace drivebench

@@ -1,0 +1,403 @@
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdlib>
+#include <deque>
+#include <span>
+#include <thread>
+#include <utility>
+#include <variant>
+
+#include "plant/parameters/parameters.hpp"
+#include "server/engine/engine.hpp"
+#include "server/engine/mailbox.hpp"
+#include "server/engine/stepped_engine.hpp"
+#include "server/engine/tick_mark.hpp"
+#include "server/engine/tick_tap.hpp"
+#include "server/host/asio.hpp"
+#include "server/pacing/pacer.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::size_t kRequestCapacity = 256;
+
+struct OwnedCommand {
+  Owner owner = 0;
+  Command command{};
+};
+
+class ThreadedEngine final : public Engine {
+ public:
+  ThreadedEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context& io,
+                 std::unique_ptr<Pacer> pacer)
+      : Engine(config, std::move(recorder)),
+        ticks_per_wake_(
+            config_.mode == RunMode::kRealtime
+                ? 1
+                : static_cast<Tick>(std::max(kEventsPerWake / config_.axes.size(), std::size_t{1}))),
+        requests_(kRequestCapacity),
+        events_(4096 + 64 * config_.axes.size()),
+        tap_(recorder_.get(), events_),
+        bench_(config_.setup, &tap_),
+        mailboxes_(config_.axes.size()),
+        parameter_mail_(config_.axes.size()),
+        sent_(config_.axes.size()),
+        wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        pacer_(std::move(pacer)) {
+    schedule_events(config_, bench_);
+    for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
+      parameters_[i] = bench_.axis(i).parameters();
+      parameter_mail_[i].in_force = values_of(parameters_[i]);
+      parameter_mail_[i].sent = bench_.parameter_changes(i);
+    }
+    if (!edges_.empty()) tap_.send_edges_of(bench_);
+    for (std::size_t i = 0; i < newest_.size(); ++i)
+      newest_[i] = bench_.sample(i);
+    await_wake();
+  }
+
+  /// Gives the ticks a thread of their own.
+  void start(std::optional<Tick> max_ticks) {
+    max_ticks_ = max_ticks;
+    std::atomic<bool> ready{false};
+    thread_ = std::thread([this, &ready] { run(ready); });
+    while (!ready.load())
+      std::this_thread::yield();  // notes_ is written before the run starts
+  }
+
+  ~ThreadedEngine() override {
+    stop_.store(true);
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
+    const Sample& newest = newest_[axis];
+    if (owner == 0 || newest.owner != owner) return Refused::kNotOwner;
+    const Refused values =
+        check_values(command.phases, config_.setup.axes[axis].rules, parameters(axis).drive);
+    if (values != Refused::kNot) return values;
+    const bool repeated = sent_[axis].owner == owner && command.answers <= sent_[axis].command.answers;
+    if (repeated || command.answers < 0 || command.answers > static_cast<Tick>(newest.tick)) {
+      return Refused::kStale;
+    }
+    const bool latched = (newest.faults & kLatchedFaults) != 0;
+    return latched && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
+  }
+
+  Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
+    const Refused why = check(axis, owner, command);
+    if (why == Refused::kNot) {
+      sent_[axis] = {.owner = owner, .command = command};
+      mailboxes_[axis].write(sent_[axis]);
+    } else {
+      request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{are_bad_values(why)}},
+              [](Refused, Tick) {});
+    }
+    return why;
+  }
+
+  void advance() override {}
+
+  void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
+    const bool is_room_for_both = ends_.empty() && requests_.room() >= 2;
+    if (is_room_for_both) return Engine::take(axis, by, reason, std::move(answer));
+    refuse_to_take(axis, by, Refused::kBusy, answer);
+  }
+
+  void submit(const Input& input, Answer answer) override {
+    const bool ends = ends_lease(input);
+    // What concerns a lease does not overtake what waits.
+    const bool has_to_wait = std::holds_alternative<LeaseAction>(input.action) && !ends_.empty();
+    if (has_to_wait || (ends && requests_.room() == 0)) {
+      if (!ends || waits(input)) return answer(Refused::kBusy, tick());
+      ends_.push_back({input, std::move(answer)});
+      return;
+    }
+    // What strangers may send without end leaves the other half to what must get through.
+    if (std::holds_alternative<RefusedCommand>(input.action) && requests_.room() <= kRequestCapacity / 2) {
+      return answer(Refused::kBusy, tick());
+    }
+    push(input, std::move(answer));
+  }
+
+  void push(const Input& input, Answer answer) {
+    const bool writes = std::holds_alternative<ParameterWrite>(input.action);
+    const bool taken = requests_.push(input);
+    if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;
+    if (writes && !taken) show_parameters(input.axis);  // without this one
+    if (!taken) return answer(Refused::kBusy, tick());
+    answers_.push_back({std::move(answer), writes ? std::optional(input.axis) : std::nullopt});
+  }
+
+  Verdict stop() override {
+    stop_.store(true);
+    if (thread_.joinable()) thread_.join();
+    bench_.dismiss_controllers();
+    Verdict verdict{.mode = config_.mode,
+                    .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                    .late_ticks = bench_.sample(0).late_ticks,
+                    .lateness = lateness_,
+                    .state_hash = bench_.state_hash()};
+    if (recorder_) {
+      recorder_->finish(verdict);
+      verdict.gaps = recorder_->gaps();
+    }
+    return verdict;
+  }
+
+  std::uint64_t state_hash() const override { return 0; }
+  std::int64_t worst_lateness_ns() const override {
+    return worst_lateness_ns_.load(std::memory_order_relaxed);
+  }
+
+  // ---- tick thread ----
+
+  /// One tick, with all that belongs to it.
+  void run_tick() noexcept {
+    look_at_the_clock();
+    {
+      const TickMark mark;
+      watch_.beat();
+      take_requests();
+      if (watch_.take_abandoned()) abandon();
+      send_parameters();
+    }
+    if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();
+    {
+      const TickMark mark;
+      bench_.step();
+    }
+    if (bench_.tick() % ticks_per_wake_ == 0) notify();
+  }
+
+ private:
+  void run(std::atomic<bool>& ready) {
+    pthread_setname_np(pthread_self(), "ticks");
+    if (config_.mode == RunMode::kRealtime) notes_ = enter_realtime(config_.realtime);
+    ready.store(true);
+    while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_))
+      run_tick();
+    send_parameters();
+    while (!events_.push(RunEnded{}) && !stop_.load()) {
+      notify();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    notify();
+  }
+
+  /// All who hold an axis lose it.
+  void abandon() noexcept {
+    for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis) {
+      if (bench_.owner(axis) == 0) continue;
+      bench_.submit(
+          {.tick = bench_.tick(), .axis = axis, .owner = bench_.owner(axis), .action = LeaseAction::kLost});
+    }
+  }
+
+  void look_at_the_clock() noexcept {
+    const std::int64_t lateness_ns = pacer_->wait();
+    if (config_.mode != RunMode::kRealtime) return;
+    lateness_.add(lateness_ns);
+    if (lateness_ns > worst_lateness_ns_.load(std::memory_order_relaxed)) {
+      worst_lateness_ns_.store(lateness_ns, std::memory_order_relaxed);
+    }
+    if (lateness_ns > config_.realtime.max_lateness_ns) {
+      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = Overrun{}});
+      pacer_->resynchronise();
+    } else if (lateness_ns >= config_.setup.period_ns) {
+      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = LateTick{}});
+    }
+  }
+
+  void take_requests() noexcept {
+    for (std::size_t n = 0; n < kRequestCapacity; ++n) {
+      const Input* input = requests_.front();
+      if (input == nullptr || events_.room() == 0) break;
+      events_.push(RequestOutcome{bench_.submit(*input), bench_.tick()});
+      requests_.pop();
+    }
+    for (std::uint32_t axis = 0; axis < mailboxes_.size(); ++axis) {
+      if (const auto newest = mailboxes_[axis].take()) {
+        bench_.submit(
+            {.tick = bench_.tick(), .axis = axis, .owner = newest->owner, .action = newest->command});
+      }
+    }
+  }
+
+  /// Before the samples that show them, so that whoever gets an answer finds the parameters as it says.
+  void send_parameters() noexcept {
+    for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
+      ParameterMail& mail = parameter_mail_[i];
+      if (std::exchange(mail.sent, bench_.parameter_changes(i)) == bench_.parameter_changes(i)) continue;
+      mail.newest.write(values_of(bench_.axis(i).parameters()));
+    }
+  }
+
+  /// Wakes the I/O thread, unless that is on its way already.
+  void notify() noexcept {
+    if (wake_pending_.exchange(true)) return;
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = ::write(wake_.native_handle(), &one, sizeof(one));
+  }
+
+  // ---- I/O thread ----
+
+  void await_wake() {
+    wake_.async_wait(
+        asio::posix::stream_descriptor::wait_read, [this](const boost::system::error_code& error) {
+          if (error) return;
+          std::uint64_t count = 0;
+          [[maybe_unused]] const ssize_t got = ::read(wake_.native_handle(), &count, sizeof(count));
+          wake_pending_.exchange(
+              false);  // not a plain store: it must see what was pushed before the flag was set
+          drain_events();
+          await_wake();
+        });
+  }
+
+  void drain_events() {
+    const Tick before = tick();
+    for (std::size_t i = 0; i < parameter_mail_.size(); ++i)
+      take_parameters(i);
+    for (std::size_t n = 0; n < events_.capacity(); ++n) {
+      const TickEvent* event = events_.front();
+      if (event == nullptr) break;
+      std::visit([this](const auto& e) { handle(e); }, *event);
+      events_.pop();
+    }
+    if (tick() != before) on_newest();
+    while (!ends_.empty() && requests_.room() > 0) {
+      const LeaseEnd end = std::move(ends_.front());
+      ends_.pop_front();
+      push(end.input, end.answer);
+    }
+  }
+
+  void handle(const TickedSample& s) {
+    newest_[s.axis] = s.sample;
+    if (s.axis + 1 < newest_.size()) return;
+    answer_outcomes();
+    on_tick();
+  }
+  // Answers wait for the samples of their tick, so that whoever gets one finds newest() as it says.
+  void handle(const RequestOutcome& outcome) { outcomes_.push_back(outcome); }
+  void handle(const AxisEdges& e) { edges_[e.axis] = e.edges; }
+  void handle(const RunEnded&) {
+    answer_outcomes();
+    if (on_end) on_end();
+  }
+
+  void answer_outcomes() {
+    for (; !outcomes_.empty(); outcomes_.pop_front()) {
+      const Waiting waiting = std::move(answers_.front());
+      answers_.pop_front();
+      if (waiting.written_axis) {
+        take_parameters(*waiting.written_axis);
+        --parameter_mail_[*waiting.written_axis].in_flight;
+        show_parameters(*waiting.written_axis);
+      }
+      waiting.answer(outcomes_.front().refused, outcomes_.front().tick);
+    }
+  }
+
+  void take_parameters(std::size_t axis) {
+    const auto values = parameter_mail_[axis].newest.take();
+    if (!values) return;
+    parameter_mail_[axis].in_force = *values;
+    show_parameters(axis);
+  }
+
+  /// Takes over the parameters in force, unless writes are on their way that they do not show yet.
+  void show_parameters(std::size_t axis) {
+    const ParameterMail& mail = parameter_mail_[axis];
+    if (mail.in_flight != 0) return;
+    AxisParameters& p = parameters_[axis];
+    const std::span<const Parameter> rows = axis_parameters(p);
+    for (std::size_t row = 0; row < rows.size(); ++row)
+      rows[row].set(p, mail.in_force[row]);
+  }
+
+  // In free mode a wake-up costs more than several ticks; the ring holds what comes in between.
+  static constexpr std::size_t kEventsPerWake = 1024;
+
+  static constexpr std::size_t kMaxParameters = 256;
+  using ParameterValues = std::array<double, kMaxParameters>;
+
+  /// The parameters of an axis on their way from the tick thread.
+  struct ParameterMail {
+    Mailbox<ParameterValues> newest;
+    std::uint64_t sent = 0;       // tick thread: changes that were written into the mailbox
+    ParameterValues in_force{};   // I/O thread: what came last
+    std::uint64_t in_flight = 0;  // I/O thread: writes without an answer yet
+  };
+  static ParameterValues values_of(const AxisParameters& p) noexcept {
+    const std::span<const Parameter> rows = axis_parameters(p);
+    if (rows.size() > kMaxParameters) std::abort();
+    ParameterValues values{};
+    for (std::size_t row = 0; row < rows.size(); ++row)
+      values[row] = rows[row].get(p);
+    return values;
+  }
+
+  struct Waiting {
+    Answer answer;
+    std::optional<std::uint32_t> written_axis;  // of a parameter
+  };
+
+  /// The end of a lease. One that found the ring full waits here: nobody would try again.
+  struct LeaseEnd {
+    Input input;
+    Answer answer;
+  };
+  bool waits(const Input& end) const noexcept {
+    return std::ranges::any_of(ends_, [&end](const LeaseEnd& each) {
+      return each.input.axis == end.axis && each.input.owner == end.owner;
+    });
+  }
+
+  std::optional<Tick> max_ticks_;
+  Tick ticks_per_wake_;
+  SpscRing<Input> requests_;
+  SpscRing<TickEvent> events_;
+  TickTap tap_;
+  Bench bench_;
+  std::deque<Mailbox<OwnedCommand>> mailboxes_;
+  std::deque<ParameterMail> parameter_mail_;
+  std::vector<OwnedCommand> sent_;  // the last command put into each mailbox
+  asio::posix::stream_descriptor wake_;
+  std::atomic<bool> wake_pending_{false};
+  std::deque<LeaseEnd> ends_;            // one for each axis and owner at most
+  std::deque<Waiting> answers_;          // of the requests in flight, in order
+  std::deque<RequestOutcome> outcomes_;  // that have come back, to be answered with the samples of their tick
+  std::unique_ptr<Pacer> pacer_;
+  LatenessHistogram lateness_;
+  std::atomic<std::int64_t> worst_lateness_ns_{0};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                             asio::io_context& io, std::optional<Tick> max_ticks) {
+  std::unique_ptr<Pacer> pacer = config.mode == RunMode::kRealtime
+                                     ? make_realtime_pacer(config.realtime.pacer, config.setup.period_ns)
+                                     : make_free_pacer();
+  auto engine = std::make_unique<ThreadedEngine>(config, std::move(recorder), io, std::move(pacer));
+  engine->start(max_ticks);
+  return engine;
+}
+
+SteppedEngine make_stepped_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
+                                  asio::io_context& io, std::unique_ptr<Pacer> pacer) {
+  auto engine = std::make_unique<ThreadedEngine>(config, std::move(recorder), io, std::move(pacer));
+  ThreadedEngine* const stepped = engine.get();
+  return {.engine = std::move(engine), .tick = [stepped] { stepped->run_tick(); }};
+}
+
+}  // namespace drivebench

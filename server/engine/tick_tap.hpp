@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <variant>
+
+#include "server/engine/tick_edges.hpp"
+#include "server/recording/recorder.hpp"
+#include "server/recording/spsc_ring.hpp"
+
+namespace drivebench {
+
+/// What came of a request.
+struct RequestOutcome {
+  Refused refused;
+  Tick tick;
+};
+struct AxisEdges {
+  AxisEdges(std::uint32_t of, const TickEdges& seen) noexcept : axis(of), edges(seen) {}
+  std::uint32_t axis;
+  TickEdges edges;
+};
+/// The run has come to its end.
+struct RunEnded {};
+/// What the tick thread tells the I/O thread.
+using TickEvent = std::variant<TickedSample, RequestOutcome, AxisEdges, RunEnded>;
+
+/// Passes what the bench reports on to the recorder and to the I/O thread.
+class TickTap final : public BenchObserver {
+ public:
+  TickTap(Recorder* recorder, SpscRing<TickEvent>& events) : recorder_(recorder), events_(events) {}
+  void on_input(Tick now, const Input& input) noexcept override {
+    if (recorder_ != nullptr) recorder_->on_input(now, input);
+  }
+  void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
+    if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
+    if (bench_ != nullptr) events_.emplace(std::in_place_type<AxisEdges>, axis, edges_of(*bench_, axis));
+    // A full ring costs the viewers a sample, never the bench its time.
+    events_.emplace(std::in_place_type<TickedSample>, axis, sample);
+  }
+  /// From now on the encoder edges of each tick go before its samples.
+  void send_edges_of(const Bench& bench) noexcept { bench_ = &bench; }
+
+ private:
+  Recorder* recorder_;
+  SpscRing<TickEvent>& events_;
+  const Bench* bench_ = nullptr;
+};
+
+}  // namespace drivebench

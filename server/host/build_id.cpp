@@ -1,0 +1,9 @@
+#include "server/host/build_id.hpp"
+
+namespace drivebench {
+
+std::string_view build_id() noexcept {
+  return DRIVEBENCH_BUILD_ID;
+}
+
+}  // namespace drivebench

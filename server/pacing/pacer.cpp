@@ -1,0 +1,128 @@
+#include "server/pacing/pacer.hpp"
+
+#include <fmt/core.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+namespace drivebench {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+// How much earlier sleep+spin wakes: about the p99 of the wake-up latency of an idle core.
+constexpr std::int64_t kSpinNs = 30'000;
+
+std::int64_t now_ns() noexcept {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return t.tv_sec * kSecondNs + t.tv_nsec;
+}
+
+void sleep_until(std::int64_t time_ns) noexcept {
+  const timespec t{.tv_sec = time_ns / kSecondNs, .tv_nsec = time_ns % kSecondNs};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) == EINTR) {
+  }
+}
+
+class RealtimePacer final : public Pacer {
+ public:
+  RealtimePacer(std::int64_t period_ns, std::int64_t spin_ns) noexcept
+      : period_ns_(period_ns), spin_ns_(spin_ns) {}
+
+  std::int64_t wait() noexcept override {
+    if (due_ns_ == 0) due_ns_ = now_ns() - period_ns_;
+    due_ns_ += period_ns_;
+    std::int64_t now = now_ns();
+    if (now < due_ns_ - spin_ns_) {
+      sleep_until(due_ns_ - spin_ns_);
+      now = now_ns();
+    }
+    while (now < due_ns_)
+      now = now_ns();
+    return now - due_ns_;
+  }
+
+  void resynchronise() noexcept override { due_ns_ = now_ns(); }
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t spin_ns_;
+  std::int64_t due_ns_ = 0;
+};
+
+class FreePacer final : public Pacer {
+ public:
+  std::int64_t wait() noexcept override { return 0; }
+  void resynchronise() noexcept override {}
+};
+
+}  // namespace
+
+std::unique_ptr<Pacer> make_realtime_pacer(PacerKind kind, std::int64_t period_ns) {
+  const std::int64_t spin_ns = kind == PacerKind::kSleepSpin ? std::min(kSpinNs, period_ns / 2) : 0;
+  return std::make_unique<RealtimePacer>(period_ns, spin_ns);
+}
+
+std::unique_ptr<Pacer> make_free_pacer() {
+  return std::make_unique<FreePacer>();
+}
+
+void LatenessHistogram::add(std::int64_t lateness_ns) noexcept {
+  std::size_t bucket = 0;
+  for (std::int64_t edge = kFirstEdgeNs; lateness_ns >= edge && bucket + 1 < buckets_.size(); edge *= 2)
+    ++bucket;
+  ++buckets_[bucket];
+  ++count_;
+  worst_ns_ = std::max(worst_ns_, lateness_ns);
+}
+
+std::int64_t LatenessHistogram::percentile_ns(double share) const noexcept {
+  const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(count_));
+  std::uint64_t seen = 0;
+  std::int64_t edge = kFirstEdgeNs;
+  for (const std::uint64_t bucket : buckets_) {
+    seen += bucket;
+    if (seen > wanted) break;
+    edge *= 2;
+  }
+  return std::min(edge, worst_ns_);
+}
+
+std::vector<std::string> enter_realtime(const RealtimeConfig& config) {
+  std::vector<std::string> notes;
+  if (config.priority > 0) {
+    const sched_param parameters{.sched_priority = config.priority};
+    if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters); error != 0) {
+      notes.push_back(fmt::format("no real-time scheduling (SCHED_FIFO {}): {}; expect late ticks under load",
+                                  config.priority, std::strerror(error)));
+    }
+  }
+  if (config.cpu >= 0) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET(static_cast<std::size_t>(config.cpu), &set);
+    if (const int error = pthread_setaffinity_np(pthread_self(), sizeof(set), &set); error != 0) {
+      notes.push_back(fmt::format("not pinned to CPU {}: {}", config.cpu, std::strerror(error)));
+    }
+  }
+  // With MCL_FUTURE and a small limit, every later allocation beyond the limit would fail.
+  rlimit limit{};
+  getrlimit(RLIMIT_MEMLOCK, &limit);
+  const bool unlimited = limit.rlim_cur == RLIM_INFINITY || geteuid() == 0;
+  if (!unlimited || mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    notes.push_back(unlimited
+                        ? fmt::format("memory not locked: {}", std::strerror(errno))
+                        : fmt::format("memory not locked: RLIMIT_MEMLOCK is {} KiB", limit.rlim_cur / 1024));
+  }
+  return notes;
+}
+
+}  // namespace drivebench

@@ -1,0 +1,197 @@
+#include "server/recording/input_codec.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace drivebench {
+namespace {
+
+// Gates, lease actions and modes have the same numbers here and on the wire.
+static_assert(static_cast<int>(Gates::kOff) == v1::GATES_OFF);
+static_assert(static_cast<int>(Gates::kVoltage) == v1::GATES_VOLTAGE);
+static_assert(static_cast<int>(Gates::kZeroVoltage) == v1::GATES_ZERO);
+static_assert(static_cast<int>(Gates::kCurrent) == v1::GATES_CURRENT);
+static_assert(static_cast<int>(LeaseAction::kAcquire) == v1::LeaseRequest::ACTION_ACQUIRE);
+static_assert(static_cast<int>(LeaseAction::kLost) == v1::LeaseRequest::ACTION_LOST);
+
+struct ActionWriter {
+  v1::Input& message;
+  const ParameterTables& tables;
+
+  void operator()(const Command& c) const {
+    v1::Command& out = *message.mutable_command();
+    out.set_tick(static_cast<std::uint64_t>(c.answers));
+    out.set_gates(static_cast<v1::Gates>(c.phases.gates));
+    const PhaseValues& x = c.phases.setpoint;
+    if (c.phases.gates == Gates::kCurrent) {
+      out.set_i_a_a(x.a);
+      out.set_i_b_a(x.b);
+      out.set_i_c_a(x.c);
+      out.set_i_f_a(x.field);
+    } else {
+      out.set_u_a_v(x.a);
+      out.set_u_b_v(x.b);
+      out.set_u_c_v(x.c);
+      out.set_u_f_v(x.field);
+    }
+  }
+  void operator()(const LeaseAction& action) const {
+    message.set_lease(static_cast<v1::LeaseRequest::Action>(action));
+  }
+  void operator()(const LoadChange& change) const {
+    message.mutable_load()->set_load_nm(change.load_nm);
+    message.mutable_load()->set_ramp_ticks(static_cast<std::uint64_t>(change.ramp_ticks));
+  }
+  void operator()(const ParameterWrite& write) const {
+    message.mutable_parameter()->set_name(std::string(tables[message.axis()][write.row].name));
+    message.mutable_parameter()->set_value(write.value);
+    message.mutable_parameter()->set_ramp_ticks(static_cast<std::uint64_t>(write.ramp_ticks));
+  }
+  void operator()(const InjectFault& fault) const {
+    message.mutable_inject()->set_name(std::string(kInjectableFaults[fault.row].name));
+    message.mutable_inject()->set_value(fault.value);
+  }
+  void operator()(const ShaftBump& bump) const { message.mutable_bump()->set_impulse_nms(bump.impulse_nms); }
+  void operator()(const ClearFaults&) const { message.set_clear(true); }
+  void operator()(const LateTick&) const { message.set_late_tick(true); }
+  void operator()(const Overrun&) const { message.set_overrun(true); }
+  void operator()(const RefusedCommand& refused) const { message.set_refused_command(refused.bad_values); }
+};
+
+std::optional<ParameterWrite> decode_write(const v1::WriteParameter& message,
+                                           std::span<const Parameter> parameters) {
+  const auto row = std::find_if(parameters.begin(), parameters.end(),
+                                [&](const Parameter& p) { return p.name == message.name(); });
+  if (row == parameters.end() || !row->live || !problem_with(*row, message.value()).empty()) {
+    return std::nullopt;
+  }
+  if (message.ramp_ticks() > kMaxTick || (row->integer && message.ramp_ticks() != 0)) return std::nullopt;
+  return ParameterWrite{.row = static_cast<std::uint32_t>(row - parameters.begin()),
+                        .value = message.value(),
+                        .ramp_ticks = static_cast<Tick>(message.ramp_ticks())};
+}
+
+std::optional<InjectFault> decode_fault(const v1::InjectFault& message) {
+  const std::size_t row = find_injectable_fault(message.name());
+  if (row == kInjectableFaultCount) return std::nullopt;
+  if (!problem_with(kInjectableFaults[row], message.value()).empty()) return std::nullopt;
+  return InjectFault{.row = static_cast<std::uint32_t>(row), .value = message.value()};
+}
+
+}  // namespace
+
+ParameterTables parameter_tables(const BenchSetup& setup) {
+  ParameterTables tables;
+  for (const AxisSetup& axis : setup.axes)
+    tables.push_back(axis_parameters(axis.parameters));
+  return tables;
+}
+
+void encode_input(Tick received, const Input& input, const ParameterTables& tables, v1::Input& message) {
+  message.Clear();
+  message.set_tick(static_cast<std::uint64_t>(input.tick));
+  message.set_received_tick(static_cast<std::uint64_t>(received));
+  message.set_axis(input.axis);
+  message.set_owner(input.owner);
+  std::visit(ActionWriter{message, tables}, input.action);
+}
+
+std::optional<Command> decode_command(const v1::Command& message) {
+  if (!v1::Gates_IsValid(message.gates())) return std::nullopt;
+  const auto gates = static_cast<Gates>(message.gates());
+  const PhaseValues setpoint =
+      gates == Gates::kCurrent
+          ? PhaseValues{.a = message.i_a_a(),
+                        .b = message.i_b_a(),
+                        .c = message.i_c_a(),
+                        .field = message.i_f_a()}
+          : PhaseValues{
+                .a = message.u_a_v(), .b = message.u_b_v(), .c = message.u_c_v(), .field = message.u_f_v()};
+  return Command{.answers = static_cast<Tick>(message.tick()),
+                 .phases = {.gates = gates, .setpoint = setpoint}};
+}
+
+std::optional<Input> decode_input(const v1::Input& message, const ParameterTables& tables) {
+  Input input{.tick = static_cast<Tick>(message.tick()),
+              .axis = message.axis(),
+              .owner = message.owner(),
+              .action = {}};
+  switch (message.action_case()) {
+    case v1::Input::kCommand: {
+      const std::optional<Command> command = decode_command(message.command());
+      if (!command) return std::nullopt;
+      input.action = *command;
+      return input;
+    }
+    case v1::Input::kLease:
+      if (!v1::LeaseRequest::Action_IsValid(message.lease())) return std::nullopt;
+      input.action = static_cast<LeaseAction>(message.lease());
+      return input;
+    case v1::Input::kLoad:
+      if (!std::isfinite(message.load().load_nm())) return std::nullopt;
+      input.action = LoadChange{message.load().load_nm(), static_cast<Tick>(message.load().ramp_ticks())};
+      return input;
+    case v1::Input::kParameter: {
+      if (input.axis >= tables.size()) return std::nullopt;
+      const auto write = decode_write(message.parameter(), tables[input.axis]);
+      if (!write) return std::nullopt;
+      input.action = *write;
+      return input;
+    }
+    case v1::Input::kInject: {
+      const auto fault = decode_fault(message.inject());
+      if (!fault) return std::nullopt;
+      input.action = *fault;
+      return input;
+    }
+    case v1::Input::kBump:
+      if (!std::isfinite(message.bump().impulse_nms())) return std::nullopt;
+      input.action = ShaftBump{message.bump().impulse_nms()};
+      return input;
+    case v1::Input::kClear:
+      input.action = ClearFaults{};
+      return input;
+    case v1::Input::kLateTick:
+      input.action = LateTick{};
+      return input;
+    case v1::Input::kOverrun:
+      input.action = Overrun{};
+      return input;
+    case v1::Input::kRefusedCommand:
+      input.action = RefusedCommand{.bad_values = message.refused_command()};
+      return input;
+    case v1::Input::ACTION_NOT_SET:
+      break;
+  }
+  return std::nullopt;
+}
+
+v1::Mode wire_mode(RunMode mode) noexcept {
+  switch (mode) {
+    case RunMode::kRealtime:
+      return v1::MODE_REALTIME;
+    case RunMode::kLockstep:
+      return v1::MODE_LOCKSTEP;
+    case RunMode::kFree:
+      break;
+  }
+  return v1::MODE_FREE;
+}
+
+void encode_verdict(const Verdict& verdict, v1::Verdict& message) {
+  message.set_mode(wire_mode(verdict.mode));
+  message.set_ticks(verdict.ticks);
+  message.set_exact(verdict.exact());
+  message.set_realtime_valid(verdict.realtime_valid());
+  message.set_late_ticks(verdict.late_ticks);
+  message.set_worst_lateness_s(static_cast<double>(verdict.lateness.worst_ns()) * 1e-9);
+  if (verdict.mode == RunMode::kRealtime) {
+    for (const std::uint64_t count : verdict.lateness.buckets())
+      message.add_lateness_counts(count);
+  }
+  message.set_gaps(verdict.gaps);
+  message.set_state_hash(verdict.state_hash);
+  message.set_sentence(verdict.sentence());
+}
+
+}  // namespace drivebench

@@ -1,0 +1,109 @@
+#include "server/recording/recorder.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "server/recording/recording_writer.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr auto kIdleSleep = std::chrono::milliseconds(1);
+
+constexpr std::size_t kMaxRingBytes = std::size_t{256} << 20;
+
+/// So many entries at most between two looks at the clock.
+constexpr std::size_t kEntriesPerLook = 4096;
+
+/// What may come beside the samples between two looks for room: the requests and commands of a free tick; in
+/// lockstep, where there is none, an exchange, a command and an end of the lease of each axis.
+constexpr std::size_t kInputsPerLook = 512;
+static_assert(kInputsPerLook >= 256 + 3 * kMaxAxes);
+
+}  // namespace
+
+std::size_t recorder_ring_entries(const BenchConfig& config) noexcept {
+  const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
+  const auto entries = static_cast<std::size_t>(2.0 * ticks * static_cast<double>(config.axes.size())) + 1024;
+  return std::min(entries, kMaxRingBytes / sizeof(RecordedEntry));
+}
+
+Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
+                   std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options)
+    : file_(file.string()),
+      ring_(recorder_ring_entries(config)),
+      room_for_tick_(config.axes.size() + kInputsPerLook),
+      writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)) {
+  if (options.own_thread) thread_ = std::thread([this] { run(); });
+}
+
+Recorder::~Recorder() {
+  stop_.store(true);
+  if (thread_.joinable()) thread_.join();
+}
+
+void Recorder::on_input(Tick now, const Input& input) noexcept {
+  count_gap(!ring_.emplace(std::in_place_type<ReceivedInput>, now, input));
+}
+
+void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
+  count_gap(!ring_.emplace(std::in_place_type<TickedSample>, axis, sample));
+}
+
+void Recorder::count_gap(bool lost) noexcept {
+  if (lost) gaps_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void Recorder::wait_for_room() noexcept {
+  while (!has_room()) {
+    if (!thread_.joinable()) {
+      work();
+    } else {
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  }
+}
+
+bool Recorder::drain(std::size_t most) noexcept {
+  std::size_t taken = 0;
+  for (const RecordedEntry* entry = nullptr; taken < most && (entry = ring_.front()) != nullptr; ++taken) {
+    writer_->write(*entry);
+    ring_.pop();
+  }
+  return taken > 0;
+}
+
+void Recorder::run() {
+  pthread_setname_np(pthread_self(), "recorder");
+  while (!stop_.load())
+    if (!work()) std::this_thread::sleep_for(kIdleSleep);
+}
+
+bool Recorder::work() noexcept {
+  const bool any = drain(kEntriesPerLook);
+  writer_->sync_if_due(RecordingWriter::Clock::now());
+  tell_state();
+  return any;
+}
+
+/// What others may know of the writer, whose thread this is.
+void Recorder::tell_state() noexcept {
+  gaps_.fetch_add(writer_->take_lost(), std::memory_order_relaxed);
+  lacks_room_.store(writer_->lacks_room(), std::memory_order_relaxed);
+  is_over_.store(writer_->is_over(), std::memory_order_relaxed);
+}
+
+void Recorder::finish(const Verdict& verdict) {
+  stop_.store(true);
+  if (thread_.joinable()) thread_.join();
+  drain(ring_.capacity());
+  tell_state();
+  Verdict final_verdict = verdict;
+  final_verdict.gaps = gaps();
+  writer_->finish(final_verdict);
+  tell_state();
+}
+
+}  // namespace drivebench

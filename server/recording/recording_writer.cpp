@@ -1,0 +1,274 @@
+#include "server/recording/recording_writer.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "protocols/descriptor_set.hpp"
+#include "protocols/mcap/mcap_series.hpp"
+#include "protocols/sample_codec.hpp"
+#include "server/host/build_id.hpp"
+#include "server/recording/recording.hpp"
+
+namespace drivebench {
+namespace {
+
+/// In plant time, not wall time: the same run gives the same file, byte for byte. A free run is over a second
+/// of it in some milliseconds.
+std::int64_t flush_interval_ns(RunMode mode) {
+  return mode == RunMode::kFree ? 1'000'000'000 : 100'000'000;
+}
+constexpr auto kSyncInterval = std::chrono::seconds(1);
+/// So much at most between two looks at what is free: a free run writes hundreds of megabytes in a second.
+constexpr std::uint64_t kBytesPerLook = std::uint64_t{16} << 20;
+
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
+constexpr std::array<const char*, 5> kStepNames{"open", "write", "sync", "close", "memory"};
+
+/// Errors that a new file would meet as well.
+bool is_of_space(int error) noexcept {
+  return error == ENOSPC || error == EFBIG || error == EDQUOT;
+}
+
+}  // namespace
+
+/// What the disk said; the MCAP writer is spent when it has passed through.
+struct RecordingWriter::DiskError {
+  Step step;
+  int error;
+};
+
+RecordingWriter::RecordingWriter(const std::filesystem::path& file, const BenchConfig& config,
+                                 std::initializer_list<RecordingAttachment> attachments,
+                                 const RecordingOptions& options)
+    : first_(file.string()),
+      config_(config),
+      options_(options),
+      tables_(parameter_tables(config.setup)),
+      flush_ticks_(static_cast<std::uint64_t>(
+          std::max<std::int64_t>(flush_interval_ns(config.mode) / config.setup.period_ns, 1))),
+      sequences_(config.axes.size()) {
+  for (const RecordingAttachment& a : attachments)
+    attachments_.push_back({std::string(a.name), std::string(a.media_type), std::string(a.data)});
+  if (const std::string second = segment_path(first_, 2); std::filesystem::exists(second)) {
+    throw std::system_error(EEXIST, std::generic_category(),
+                            "cannot create the recording: it would go on in " + second);
+  }
+  if (!options_.create) options_.create = create_recording_file;
+  std::unique_ptr<RecordingFile> made = options_.create(file);
+  if (made->free_bytes() < options_.reserve_bytes) {
+    std::filesystem::remove(file);
+    throw std::system_error(ENOSPC, std::generic_category(),
+                            "cannot create the recording " + first_ + ": less than " +
+                                std::to_string(options_.reserve_bytes >> 20) + " MiB are free on its disk");
+  }
+  attempt([&] { begin(std::move(made)); });
+}
+
+RecordingWriter::~RecordingWriter() = default;
+
+void RecordingWriter::begin(std::unique_ptr<RecordingFile> file) {
+  mcap_.reset();
+  file_ = std::move(file);
+  whole_bytes_ = unwritten_ = unsynced_ = segment_samples_ = 0;
+  was_synced_ = is_ending_ = false;
+  samples_.clear();
+  mcap_.emplace([this](std::span<const std::byte> bytes) { write_all(bytes); },
+                McapWriterOptions{.profile = std::string(kRecordingProfile), .library = recorder_name()});
+  if (number_ > 1)
+    mcap_->add_metadata(kSegmentMetadata, {{std::string(kSegmentNumber), std::to_string(number_)}});
+  mcap_->add_attachment(kConfigurationAttachment, "application/toml", 0, bytes_of(to_toml(config_)));
+  for (const Attachment& a : attachments_)
+    mcap_->add_attachment(a.name, a.media_type, 0, bytes_of(a.data));
+  const std::string descriptors = bench_descriptor_set();
+  const auto schema = [&](const char* name) {
+    return mcap_->add_schema(name, "protobuf", bytes_of(descriptors));
+  };
+  const std::uint16_t sample = schema("drivebench.v1.Sample");
+  inputs_ = mcap_->add_channel(kInputTopic, schema("drivebench.v1.Input"), "protobuf");
+  verdict_ = mcap_->add_channel(kVerdictTopic, schema("drivebench.v1.Verdict"), "protobuf");
+  for (const AxisConfig& axis : config_.axes)
+    samples_.push_back(mcap_->add_channel(sample_topic(axis.name), sample, "protobuf"));
+}
+
+/// Does something that the disk, or the memory, may refuse.
+template <class Action>
+void RecordingWriter::attempt(Action action) noexcept {
+  try {
+    action();
+    return;
+  } catch (const DiskError& e) {
+    fail(e.step, e.error);
+  } catch (const std::system_error& e) {
+    fail(Step::kOpen, e.code().value());
+  } catch (const std::exception&) {
+    fail(Step::kMemory, ENOMEM);
+  }
+  if (!is_over_) go_on();
+}
+
+void RecordingWriter::go_on() noexcept {
+  attempt([this] { begin_next(); });
+}
+
+void RecordingWriter::begin_next() {
+  ++number_;
+  begin(options_.create(segment_path(first_, number_)));
+}
+
+void RecordingWriter::write(const RecordedEntry& entry) noexcept {
+  const auto* const sample = std::get_if<TickedSample>(&entry);
+  if (!is_over_ && sample != nullptr && sample->axis == 0 && sample->sample.tick % flush_ticks_ == 0) {
+    attempt([this] { mcap_->flush(); });
+  }
+  if (is_over_) {
+    ++lost_;
+    return;
+  }
+  attempt([&] {
+    std::visit([this](const auto& e) { put(e); }, entry);
+    if (unlooked_bytes_ >= kBytesPerLook) end_if_room_is_short();
+    if (is_over_ || !is_full(entry)) return;
+    end_file();
+    begin_next();
+  });
+}
+
+void RecordingWriter::put(const TickedSample& entry) {
+  ++unwritten_;
+  const auto room = mcap_->begin_message(
+      header(samples_[entry.axis], sequences_[entry.axis]++, entry.sample.tick), kMaxSampleBytes);
+  mcap_->end_message(encode_sample(entry.sample, kAllSignals, room.data()));
+  if (entry.axis == 0) ++segment_samples_;
+}
+
+void RecordingWriter::put(const ReceivedInput& entry) {
+  ++unwritten_;
+  encode_input(entry.received, entry.input, tables_, input_);
+  add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
+}
+
+void RecordingWriter::put(const Verdict& verdict) {
+  ++unwritten_;
+  v1::Verdict message;
+  encode_verdict(verdict, message);
+  add(verdict_, 0, verdict.ticks, message);
+}
+
+void RecordingWriter::add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick,
+                          const google::protobuf::Message& message) {
+  const std::size_t size = message.ByteSizeLong();
+  const auto room = mcap_->begin_message(header(channel, sequence, tick), size);
+  message.SerializeToArray(room.data(), static_cast<int>(size));
+  mcap_->end_message(size);
+}
+
+McapMessageHeader RecordingWriter::header(std::uint16_t channel, std::uint32_t sequence,
+                                          std::uint64_t tick) const {
+  const std::uint64_t time_ns = tick * static_cast<std::uint64_t>(config_.setup.period_ns);
+  return {.channel = channel, .sequence = sequence, .log_time_ns = time_ns, .publish_time_ns = time_ns};
+}
+
+/// A file ends behind the last sample of a tick, so that each holds whole ticks.
+bool RecordingWriter::is_full(const RecordedEntry& last) const {
+  const auto* const sample = std::get_if<TickedSample>(&last);
+  if (sample == nullptr || sample->axis + 1 < samples_.size()) return false;
+  if (options_.file_ticks > 0 && segment_samples_ >= options_.file_ticks) return true;
+  return options_.file_bytes > 0 && mcap_->bytes_written() >= options_.file_bytes;
+}
+
+void RecordingWriter::write_all(std::span<const std::byte> bytes) {
+  std::span<const std::byte> rest = bytes;
+  while (!rest.empty()) {
+    errno = ENOSPC;  // of a disk that takes nothing and does not say why
+    const ssize_t written = file_->write(rest);
+    if (written > 0) {
+      rest = rest.subspan(static_cast<std::size_t>(written));
+    } else if (errno != EINTR) {
+      throw DiskError{Step::kWrite, errno};
+    }
+  }
+  whole_bytes_ += bytes.size();
+  unlooked_bytes_ += bytes.size();
+  unsynced_ += std::exchange(unwritten_, 0);  // one call brings a whole chunk
+}
+
+void RecordingWriter::sync_if_due(Clock::time_point now) noexcept {
+  if (is_over_ || now - last_sync_ < kSyncInterval) return;
+  last_sync_ = now;
+  attempt([this] {
+    sync();
+    end_if_room_is_short();
+  });
+}
+
+/// As a whole file, and with room left for everybody else.
+void RecordingWriter::end_if_room_is_short() {
+  unlooked_bytes_ = 0;
+  if (file_->free_bytes() >= options_.reserve_bytes) return;
+  is_over_ = lacks_room_ = true;
+  options_.continues_after_errors = false;  // nor in a new file, if the disk refuses the end of this one
+  end_file();
+  spdlog::error("recording {}: less than {} MiB are free on its disk; it ends here",
+                segment_path(first_, number_), options_.reserve_bytes >> 20);
+}
+
+void RecordingWriter::sync() {
+  if (file_->sync() != 0) throw DiskError{Step::kSync, errno};
+  was_synced_ = true;
+  unsynced_ = 0;
+}
+
+void RecordingWriter::end_file() {
+  is_ending_ = true;
+  mcap_->finish();
+  sync();
+  if (file_->close() != 0) throw DiskError{Step::kClose, errno};
+  is_ending_ = false;
+}
+
+void RecordingWriter::finish(const Verdict& verdict) noexcept {
+  if (is_over_) {
+    ++lost_;
+    return;
+  }
+  options_.continues_after_errors = false;  // there is nothing more to come
+  attempt([&] {
+    put(verdict);
+    end_file();
+  });
+}
+
+/// Gives the present file up. A sync is not tried again: the system may have dropped what it could not write,
+/// and says so once.
+void RecordingWriter::fail(Step step, int error) noexcept {
+  // What was written whole before stays readable if a write failed; if a sync did, nobody knows.
+  const bool is_unsure = step == Step::kSync || step == Step::kClose;
+  const std::uint64_t lost = unwritten_ + (is_unsure ? unsynced_ : 0);
+  is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
+             (number_ > 1 && !was_synced_);
+  lacks_room_ = lacks_room_ || is_of_space(error);
+  // A file without its end, or its beginning, does not replay even if no entry is missing.
+  lost_ += std::max<std::uint64_t>(lost, is_ending_ || !is_over_ ? 1 : 0);
+  if (step == Step::kWrite)
+    file_->truncate(whole_bytes_);  // or the torn chunk stays: readers find its end missing
+  unwritten_ = unsynced_ = 0;
+  is_ending_ = false;
+  try {
+    spdlog::error("recording {}: {}: {}; {}", segment_path(first_, number_),
+                  kStepNames[static_cast<std::size_t>(step)], std::strerror(error),
+                  is_over_ ? "it ends here" : "it goes on in a new file");
+  } catch (const std::exception&) {
+    return;  // the count is there
+  }
+}
+
+}  // namespace drivebench

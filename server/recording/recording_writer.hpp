@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "bench.pb.h"
+#include "protocols/mcap/mcap.hpp"
+#include "server/config/config.hpp"
+#include "server/host/clock.hpp"
+#include "server/pacing/verdict.hpp"
+#include "server/recording/input_codec.hpp"
+#include "server/recording/recorder.hpp"
+#include "server/recording/recording_file.hpp"
+
+namespace drivebench {
+
+/// The files of a recording, from the first entry to the verdict; one thread, no clock of its own. A file
+/// whose disk refused something is left as it is, without an end; what was not surely on the disk then counts
+/// as lost.
+class RecordingWriter {
+ public:
+  using Clock = ServerClock;
+
+  /// Begins the first file; throws std::system_error if one of its names is taken, it cannot be made, or
+  /// there is less room than its reserve.
+  RecordingWriter(const std::filesystem::path& file, const BenchConfig& config,
+                  std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options);
+  ~RecordingWriter();
+  RecordingWriter(const RecordingWriter&) = delete;
+  RecordingWriter& operator=(const RecordingWriter&) = delete;
+
+  void write(const RecordedEntry& entry) noexcept;
+  /// Brings to the disk what was written, if the last time is a second ago.
+  void sync_if_due(Clock::time_point now) noexcept;
+  /// Ends the last file.
+  void finish(const Verdict& verdict) noexcept;
+
+  /// The disk takes no more, or shall not: every further entry counts as lost.
+  bool is_over() const noexcept { return is_over_; }
+  /// It is over because the disk is full, or nearly so.
+  bool lacks_room() const noexcept { return lacks_room_; }
+  /// Entries that were given to write() and are not surely on the disk; each is told once.
+  std::uint64_t take_lost() noexcept { return std::exchange(lost_, 0); }
+  std::size_t files() const noexcept { return number_; }
+
+ private:
+  struct Attachment {
+    std::string name;
+    std::string media_type;
+    std::string data;
+  };
+
+  /// Where a disk may refuse.
+  enum class Step { kOpen, kWrite, kSync, kClose, kMemory };
+  struct DiskError;
+
+  void begin(std::unique_ptr<RecordingFile> file);
+  void put(const TickedSample& entry);
+  void put(const ReceivedInput& entry);
+  void put(const Verdict& verdict);
+  void add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick,
+           const google::protobuf::Message& message);
+  McapMessageHeader header(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick) const;
+  void write_all(std::span<const std::byte> bytes);
+  void begin_next();
+  void go_on() noexcept;
+  void sync();
+  void end_file();
+  void end_if_room_is_short();
+  bool is_full(const RecordedEntry& last) const;
+  void fail(Step step, int error) noexcept;
+  template <class Action>
+  void attempt(Action action) noexcept;
+
+  std::string first_;
+  BenchConfig config_;
+  std::vector<Attachment> attachments_;
+  RecordingOptions options_;
+  ParameterTables tables_;
+  std::uint64_t flush_ticks_;
+  std::size_t number_ = 1;
+  std::vector<std::uint32_t> sequences_;  // of the samples, by axis
+  std::uint32_t input_sequence_ = 0;
+  v1::Input input_;
+  Clock::time_point last_sync_ = Clock::now();
+  std::uint64_t lost_ = 0;
+  std::uint64_t unlooked_bytes_ = 0;  // written since the last look at what is free
+  bool is_over_ = false;
+  bool lacks_room_ = false;
+
+  // Of the present file.
+  std::unique_ptr<RecordingFile> file_;
+  std::optional<McapWriter> mcap_;
+  std::uint16_t inputs_ = 0;
+  std::uint16_t verdict_ = 0;
+  std::vector<std::uint16_t> samples_;
+  std::uint64_t whole_bytes_ = 0;  // up to the last chunk that was written whole
+  std::uint64_t unwritten_ = 0;    // entries in the chunk that is being filled
+  std::uint64_t unsynced_ = 0;     // entries written since the last sync
+  std::uint64_t segment_samples_ = 0;
+  bool was_synced_ = false;
+  bool is_ending_ = false;
+};
+
+}  // namespace drivebench

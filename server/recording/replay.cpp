@@ -1,0 +1,225 @@
+#include "server/recording/replay.hpp"
+
+#include <fmt/core.h>
+
+#include <bit>
+#include <map>
+
+#include "bench.pb.h"
+#include "protocols/mcap/mcap_series.hpp"
+#include "protocols/sample_codec.hpp"
+#include "server/bench/bench.hpp"
+#include "server/config/config.hpp"
+#include "server/host/build_id.hpp"
+#include "server/recording/input_codec.hpp"
+#include "server/recording/recording.hpp"
+
+namespace drivebench {
+namespace {
+
+std::string text_of(const Signal& signal, const Sample& sample) {
+  switch (signal.type) {
+    case SignalType::kUnsigned:
+      return fmt::format("{}", sample.*signal.as_unsigned);
+    case SignalType::kSigned:
+      return fmt::format("{}", sample.*signal.as_signed);
+    case SignalType::kReal:
+      break;
+  }
+  return fmt::format("{:.17g}", sample.*signal.as_real);
+}
+
+bool same_bits(const Signal& signal, const Sample& a, const Sample& b) noexcept {
+  switch (signal.type) {
+    case SignalType::kUnsigned:
+      return a.*signal.as_unsigned == b.*signal.as_unsigned;
+    case SignalType::kSigned:
+      return a.*signal.as_signed == b.*signal.as_signed;
+    case SignalType::kReal:
+      break;
+  }
+  return std::bit_cast<std::uint64_t>(a.*signal.as_real) == std::bit_cast<std::uint64_t>(b.*signal.as_real);
+}
+
+/// Follows one recording. Each step returns false when there is no point in going on.
+class Replayer {
+ public:
+  explicit Replayer(const std::vector<std::span<const std::byte>>& segments) : series_(segments) {
+    for (const std::span<const std::byte> segment : segments)
+      bytes_ += segment.size();
+  }
+
+  ReplayReport run(void (*on_progress)(double)) {
+    bool more = true;
+    for (McapMessage message; more && series_.next(message);) {
+      if (series_.problem()) break;  // of a file before this one
+      if (!bench_ && !build_bench()) break;
+      const std::string_view topic = reader().channels().at(message.header.channel).topic;
+      if (has_verdict_) {
+        more = unusable("something follows its verdict");
+      } else if (topic == kInputTopic) {
+        more = feed(message.payload);
+      } else if (topic == kVerdictTopic) {
+        more = judge(message.payload);
+      } else if (const auto axis = axes_.find(topic); axis != axes_.end()) {
+        more = compare(axis->second, message.payload);
+      }
+      seen_ += message.payload.size() + kMessageRecordBytes;
+      if ((++messages_ & 0xffff) == 0 && on_progress != nullptr) {
+        on_progress(static_cast<double>(seen_) / static_cast<double>(bytes_));
+      }
+    }
+    conclude();
+    if (!report_.problem.empty() && bench_ && !report_.same_build) {
+      report_.problem +=
+          fmt::format("; it was recorded by {}, this is {}", report_.recorded_by, recorder_name());
+    }
+    return std::move(report_);
+  }
+
+ private:
+  bool build_bench() {
+    report_.recorded_by = reader().library();
+    report_.same_build = report_.recorded_by == recorder_name();
+    if (series_.first_number() != 1) {
+      return unusable(
+          fmt::format("it is file {} of a recording; the first one is needed", series_.first_number()));
+    }
+    for (const McapAttachment& attachment : reader().attachments()) {
+      if (attachment.name != kConfigurationAttachment) continue;
+      try {
+        const std::string_view text(reinterpret_cast<const char*>(attachment.data.data()),
+                                    attachment.data.size());
+        config_ = parse_config(text, std::string(kConfigurationAttachment), {});
+      } catch (const ConfigError& error) {
+        return unusable(fmt::format("its configuration cannot be read: {}", error.what()));
+      }
+      tables_ = parameter_tables(config_.setup);
+      bench_.emplace(config_.setup);
+      for (std::size_t i = 0; i < config_.axes.size(); ++i)
+        axes_[sample_topic(config_.axes[i].name)] = i;
+      return true;
+    }
+    return unusable("it has no configuration inside (attachment bench.toml)");
+  }
+
+  bool unusable(std::string why) {
+    report_.result = ReplayReport::Result::kUnusable;
+    report_.problem = std::move(why);
+    stopped_ = true;
+    return false;
+  }
+
+  bool different(std::string why) {
+    report_.result = ReplayReport::Result::kDifferent;
+    report_.problem = std::move(why);
+    stopped_ = true;
+    return false;
+  }
+
+  bool feed(std::span<const std::byte> payload) {
+    v1::Input message;
+    std::optional<Input> input;
+    if (message.ParseFromArray(payload.data(), static_cast<int>(payload.size())))
+      input = decode_input(message, tables_);
+    if (!input) return unusable(fmt::format("an input at tick {} cannot be read", bench_->tick()));
+    if (static_cast<Tick>(message.received_tick()) != bench_->tick()) {
+      return unusable(fmt::format("samples between tick {} and an input of tick {} are missing",
+                                  bench_->tick(), message.received_tick()));
+    }
+    bench_->submit(*input);
+    ++report_.inputs;
+    return true;
+  }
+
+  bool compare(std::size_t axis, std::span<const std::byte> payload) {
+    const std::optional<Sample> recorded = decode_sample(payload);
+    if (!recorded) return unusable(fmt::format("a sample after tick {} cannot be read", bench_->tick()));
+    const auto tick = static_cast<Tick>(recorded->tick);
+    // Tick by tick, of all axes in order, so that none can be missing or doubled.
+    const bool next_tick = axis == 0 && report_.samples > 0;
+    const Tick expected = bench_->tick() + (next_tick ? 1 : 0);
+    if (axis != report_.samples % config_.axes.size() || tick != expected) {
+      return different(fmt::format("after {} samples, up to tick {}, follows one of {} at tick {}",
+                                   report_.samples, bench_->tick(), config_.axes[axis].name, tick));
+    }
+    if (next_tick) bench_->step();
+    ++report_.samples;
+    const Sample& replayed = bench_->sample(axis);
+    for (const Signal& signal : kSignals) {
+      if (same_bits(signal, *recorded, replayed)) continue;
+      report_.difference = ReplayDifference{.tick = recorded->tick,
+                                            .axis = config_.axes[axis].name,
+                                            .signal = std::string(signal.name),
+                                            .recorded = text_of(signal, *recorded),
+                                            .replayed = text_of(signal, replayed)};
+      return different(fmt::format("tick {}: {}.{} was recorded as {} and replays as {}", tick,
+                                   report_.difference->axis, signal.name, report_.difference->recorded,
+                                   report_.difference->replayed));
+    }
+    return true;
+  }
+
+  bool judge(std::span<const std::byte> payload) {
+    if (!verdict_.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) {
+      return unusable("its verdict cannot be read");
+    }
+    has_verdict_ = true;
+    if (verdict_.gaps() > 0)
+      return unusable(fmt::format("it lost {} entries while recording", verdict_.gaps()));
+    return true;
+  }
+
+  void conclude() {
+    if (bench_) {
+      report_.ticks = static_cast<std::uint64_t>(bench_->tick());
+      report_.state_hash = bench_->state_hash();
+    }
+    if (stopped_) return;
+    if (series_.problem()) {
+      unusable(series_.problem()->what);
+    } else if (!bench_) {
+      unusable("it holds no samples");
+    } else if (!has_verdict_) {
+      unusable("it ends without a verdict");
+    } else if (verdict_.ticks() != report_.ticks ||
+               report_.samples != (report_.ticks + 1) * config_.axes.size()) {
+      different(fmt::format("its verdict speaks of {} ticks but there are {} samples of {} ticks",
+                            verdict_.ticks(), report_.samples, report_.ticks));
+    } else if (verdict_.state_hash() != report_.state_hash) {
+      different(fmt::format("all samples are equal but the state hash was {:016x} and replays as {:016x}",
+                            verdict_.state_hash(), report_.state_hash));
+    } else {
+      report_.result = ReplayReport::Result::kEqual;
+    }
+  }
+
+  static constexpr std::uint64_t kMessageRecordBytes = 31;  // around a payload, for the progress only
+
+  const McapReader& reader() const { return series_.reader(); }
+
+  McapSeries series_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t seen_ = 0;
+  BenchConfig config_;
+  ParameterTables tables_;
+  std::optional<Bench> bench_;
+  std::map<std::string, std::size_t, std::less<>> axes_;
+  v1::Verdict verdict_;
+  ReplayReport report_;
+  std::uint64_t messages_ = 0;
+  bool has_verdict_ = false;
+  bool stopped_ = false;
+};
+
+}  // namespace
+
+ReplayReport replay(std::span<const std::byte> recording, void (*on_progress)(double)) {
+  return Replayer({recording}).run(on_progress);
+}
+
+ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, void (*on_progress)(double)) {
+  return Replayer(segments).run(on_progress);
+}
+
+}  // namespace drivebench

@@ -1,0 +1,62 @@
+#include "clients/command/recording/svg_plot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace drivebench::command {
+namespace {
+
+struct Point {
+  long x;
+  long y;
+};
+
+/// The first line of a picture, in tenths of pixels.
+std::vector<Point> line_of(const std::string& svg) {
+  const std::size_t start = svg.find(" d='M") + 5;
+  std::string text = svg.substr(start, svg.find('\'', start) - start);
+  std::ranges::replace(text, 'l', ' ');
+  std::istringstream words(text);
+  std::vector<Point> points;
+  Point at = {0, 0};
+  for (Point step = {}; words >> step.x >> step.y;) {
+    at = {at.x + step.x, at.y + step.y};
+    points.push_back(at);
+  }
+  return points;
+}
+
+// Catches a picture that thins out its values and loses the one peak that mattered.
+TEST(SvgPlot, APeakOfOneSampleAmongManyIsDrawn) {
+  std::vector<double> x;
+  std::vector<double> y;
+  for (int i = 0; i < 100'000; ++i) {
+    x.push_back(i);
+    y.push_back(i == 77'777 ? 10.0 : i == 20'000 ? -10.0 : 0.0);
+  }
+  const std::vector<Point> line = line_of(svg_of("", "", x, {{"y", {{"y", y}}}}));
+  EXPECT_LT(line.size(), 1000U);
+  const auto [top, bottom] = std::ranges::minmax_element(line, {}, &Point::y);
+  // The panel is 120 pixels high, and ±10 fill it.
+  EXPECT_EQ(bottom->y - top->y, 1200);
+  EXPECT_LT(bottom->x, top->x);
+  EXPECT_EQ(line.front().x, 640);
+  EXPECT_NEAR(static_cast<double>(line.back().x), 7080.0, 20.0);
+}
+
+// Catches a title that breaks the picture, and a value range of nothing that divides by zero.
+TEST(SvgPlot, TextsAreEscapedAndConstantsHaveARange) {
+  const std::string svg = svg_of("a < b & c", "t", {0.0, 1.0}, {{"0 & 1", {{"x", {0.0, 0.0}}}}});
+  EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
+  EXPECT_NE(svg.find("0 &amp; 1"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace drivebench::command

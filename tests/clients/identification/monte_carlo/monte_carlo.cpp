@@ -1,0 +1,253 @@
+#include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <future>
+#include <sstream>
+
+namespace drivebench::identification {
+namespace {
+
+/// How much of a line another run must give again.
+enum class Check { kAll, kNumbers, kTwoCells };
+
+struct Line {
+  std::string text;
+  Check check = Check::kAll;
+};
+
+constexpr std::string_view kHead =
+    R"(# Identification of random motors
+
+Made by `drivebench-identification > tests/book/IDENTIFICATION.md`: {} motors of each kind, each
+identified {} times with other noise, in process, on the product's bench. Their parameters are drawn
+around a motor of the book, evenly in the logarithm. The test
+`MonteCarlo.TheTableIsWhatTheExperimentsGive` runs the first {} motors of each kind again and compares.
+
+Sensors: a floor encoder; converters of 12 bits for currents and voltages, both with white noise of one
+step rms. Errors of gain and offset are not among them: a gain error goes into the parameters as it is,
+and no index knows of it.
+
+* **error**: of the estimate, without its sign, in percent of the truth; worst with the number of the
+  motor.
+* **covered**: how often the truth lies within the parametric error index of the estimate. The index tells
+  how far a parameter can go until the squared error of the equations is twice (induction: 1.25 times) as
+  large. It is no standard deviation: where it is many times the error, the equations hardly fix the
+  parameter, or it is measured by the error of other equations (J, f of the DC motor: one stage).
+* **scatter**: of the estimates over the noises of one motor, rms, median over the motors. An error much
+  larger than that is a bias: steps of the encoder, filters, differences, noise on what stands before the
+  parameters.
+* **not stated**: estimates that the verdict took back. They do not count in the other columns.
+)";
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size()))) - 1];
+}
+
+std::string percent(double part) {
+  if (!std::isfinite(part)) return "-";
+  const double value = 100.0 * part;
+  const double size = std::abs(value);
+  return fmt::format("{:.{}f} %", value, size < 1.0 ? 3 : size < 10.0 ? 2 : size < 100.0 ? 1 : 0);
+}
+
+std::string range_text(const Range& range) {
+  return fmt::format("{:g} to {:g}{}{}", range.low, range.high, range.unit.empty() ? "" : " ", range.unit);
+}
+
+/// What all trials of a kind say of one parameter.
+struct Summary {
+  std::vector<double> errors{};
+  std::vector<double> indices{};  ///< over the truth
+  std::vector<double> scatters{};
+  double worst = 0.0;
+  int worst_motor = 0;
+  int covered = 0;
+  int unstated = 0;
+};
+
+Summary summary_of(const Trials& trials, std::size_t parameter) {
+  Summary s;
+  const auto noises = static_cast<std::size_t>(trials.noises);
+  for (std::size_t first = 0; first < trials.findings.size(); first += noises) {
+    std::vector<double> errors;
+    for (std::size_t trial = first; trial < first + noises; ++trial) {
+      const Finding& f = trials.findings[trial][parameter];
+      if (!f.stated) {
+        ++s.unstated;
+        continue;
+      }
+      errors.push_back(f.error());
+      s.errors.push_back(std::abs(f.error()));
+      s.indices.push_back(f.index / f.truth);
+      s.covered += f.covered() ? 1 : 0;
+      if (s.errors.back() < s.worst) continue;
+      s.worst = s.errors.back();
+      s.worst_motor = static_cast<int>(first / noises) + 1;
+    }
+    if (errors.size() < 2) continue;
+    double mean = 0.0;
+    for (const double error : errors)
+      mean += error / static_cast<double>(errors.size());
+    double squares = 0.0;
+    for (const double error : errors)
+      squares += (error - mean) * (error - mean);
+    s.scatters.push_back(std::sqrt(squares / static_cast<double>(errors.size() - 1)));
+  }
+  return s;
+}
+
+std::string summary_line(const Trials& trials, std::size_t parameter) {
+  const Range& range = trials.draw->identified[parameter];
+  const Summary s = summary_of(trials, parameter);
+  const auto of = [](int part, std::size_t all) {
+    return percent(all == 0 ? std::nan("") : part / static_cast<double>(all));
+  };
+  return fmt::format("| {} | {} | {} | {} | {} (no. {}) | {} | {} | {} | {} |", range.name, range_text(range),
+                     percent(percentile(s.errors, 0.5)), percent(percentile(s.errors, 0.95)),
+                     percent(s.errors.empty() ? std::nan("") : s.worst), s.worst_motor,
+                     of(s.covered, s.errors.size()), percent(percentile(s.indices, 0.5)),
+                     percent(percentile(s.scatters, 0.5)), s.unstated);
+}
+
+std::string motor_line(const Trials& trials, int number) {
+  const auto noises = static_cast<std::size_t>(trials.noises);
+  std::string line = fmt::format("| {} |", number);
+  for (const Finding& f : trials.findings[static_cast<std::size_t>(number - 1) * noises]) {
+    line += fmt::format(" {:g}:", f.truth);
+    line +=
+        f.stated ? fmt::format(" {} ( {} )", percent(f.error()), percent(f.index / f.truth)) : " not stated";
+    line += " |";
+  }
+  return line;
+}
+
+void add_kind(std::vector<Line>& lines, const Trials& trials) {
+  const MotorDraw& draw = *trials.draw;
+  lines.push_back({});
+  lines.push_back({fmt::format("## {}", draw.name)});
+  lines.push_back({});
+  std::string others;
+  for (const Range& range : draw.others)
+    others +=
+        fmt::format("{} {} {}", others.empty() ? " Drawn as well:" : ",", range.name, range_text(range));
+  lines.push_back(
+      {fmt::format("Bench `{}`. {}{}", draw.bench, draw.experiment, others.empty() ? "" : others + ".")});
+  lines.push_back({});
+  lines.push_back(
+      {"| parameter | drawn from | median error | 95 % below | worst | covered | median index | "
+       "scatter | not stated |"});
+  lines.push_back({"|---|---|---|---|---|---|---|---|---|"});
+  for (std::size_t k = 0; k < draw.identified.size(); ++k)
+    lines.push_back({summary_line(trials, k), Check::kTwoCells});
+  lines.push_back({});
+  lines.push_back(
+      {fmt::format("The first {} motors with the first noise: truth, error (index).", kShownMotors)});
+  lines.push_back({});
+  std::string names = "| no. |";
+  std::string rule = "|---|";
+  for (const Range& range : draw.identified) {
+    names += fmt::format(" {}{}{} |", range.name, range.unit.empty() ? "" : " in ", range.unit);
+    rule += "---|";
+  }
+  lines.push_back({names});
+  lines.push_back({rule});
+  for (int number = 1; number <= kShownMotors; ++number)
+    lines.push_back({motor_line(trials, number), Check::kNumbers});
+}
+
+std::vector<Line> lines_of(const std::vector<Trials>& trials) {
+  std::vector<Line> lines;
+  std::istringstream head(fmt::format(fmt::runtime(kHead), kAllMotors, kAllNoises, kShownMotors));
+  for (std::string line; std::getline(head, line);)
+    lines.push_back({line});
+  for (const Trials& each : trials)
+    add_kind(lines, each);
+  return lines;
+}
+
+std::vector<std::string> words_of(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;)
+    words.push_back(word);
+  return words;
+}
+
+/// Two words that are the same, or two numbers that nearly are.
+bool agree(const std::string& word, const std::string& wanted) {
+  if (word == wanted) return true;
+  char* end = nullptr;
+  const double value = std::strtod(word.c_str(), &end);
+  if (end == word.c_str() || *end != '\0') return false;
+  const double expected = std::strtod(wanted.c_str(), &end);
+  if (end == wanted.c_str() || *end != '\0') return false;
+  return std::abs(value - expected) <= 0.002 + 0.02 * std::abs(expected);
+}
+
+bool agrees(const std::string& line, const Line& wanted) {
+  if (wanted.check == Check::kTwoCells) {
+    std::size_t end = 0;
+    for (int bar = 0; bar < 3; ++bar)
+      end = wanted.text.find('|', end) + 1;
+    const auto bars = [](const std::string& text) { return std::count(text.begin(), text.end(), '|'); };
+    return line.starts_with(wanted.text.substr(0, end)) && bars(line) == bars(wanted.text);
+  }
+  if (wanted.check == Check::kAll) return line == wanted.text;
+  const std::vector<std::string> words = words_of(line);
+  const std::vector<std::string> expected = words_of(wanted.text);
+  return std::equal(words.begin(), words.end(), expected.begin(), expected.end(), agree);
+}
+
+}  // namespace
+
+std::vector<Trials> run_trials(std::span<const MotorDraw> draws, const MonteCarloPlan& plan) {
+  std::vector<Trials> trials;
+  const auto per_kind = static_cast<std::size_t>(plan.motors) * static_cast<std::size_t>(plan.noises);
+  for (const MotorDraw& draw : draws)
+    trials.push_back(
+        {.draw = &draw, .noises = plan.noises, .findings = std::vector<std::vector<Finding>>(per_kind)});
+  const auto run_part = [&](std::size_t thread) {
+    for (std::size_t k = thread; k < per_kind * draws.size(); k += static_cast<std::size_t>(plan.threads)) {
+      Trials& kind = trials[k / per_kind];
+      const int trial = static_cast<int>(k % per_kind);
+      kind.findings[k % per_kind] =
+          identify_motor(*kind.draw, trial / plan.noises + 1, trial % plan.noises + 1);
+    }
+  };
+  std::vector<std::future<void>> parts;
+  for (std::size_t thread = 0; thread < static_cast<std::size_t>(plan.threads); ++thread)
+    parts.push_back(std::async(std::launch::async, run_part, thread));
+  for (std::future<void>& part : parts)
+    part.get();
+  return trials;
+}
+
+std::string markdown_of(const std::vector<Trials>& trials) {
+  std::string text;
+  for (const Line& line : lines_of(trials))
+    text += line.text + "\n";
+  return text;
+}
+
+std::vector<std::string> differences(const std::string& text, const std::vector<Trials>& trials) {
+  std::vector<std::string> found;
+  std::istringstream lines(text);
+  std::string line;
+  for (const Line& wanted : lines_of(trials)) {
+    if (!std::getline(lines, line)) {
+      found.push_back("the text ends before: " + wanted.text);
+      return found;
+    }
+    if (!agrees(line, wanted)) found.push_back("not '" + wanted.text + "': " + line);
+  }
+  if (std::getline(lines, line)) found.push_back("the text goes on: " + line);
+  return found;
+}
+
+}  // namespace drivebench::identification

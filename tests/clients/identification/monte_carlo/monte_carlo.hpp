@@ -1,0 +1,40 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/clients/identification/monte_carlo/random_motors.hpp"
+
+/// What tests/book/IDENTIFICATION.md holds.
+namespace drivebench::identification {
+
+struct MonteCarloPlan {
+  int motors;   ///< of each kind
+  int noises;   ///< experiments with each of them
+  int threads;  ///< has no influence on the numbers
+};
+
+inline constexpr int kAllMotors = 200;
+inline constexpr int kAllNoises = 3;
+inline constexpr int kShownMotors = 5;
+
+/// The experiments with one kind, by motor and noise.
+struct Trials {
+  const MotorDraw* draw;
+  int noises;
+  std::vector<std::vector<Finding>> findings;
+};
+
+/// Runs them all: trial k on thread k modulo their number.
+std::vector<Trials> run_trials(std::span<const MotorDraw> draws, const MonteCarloPlan& plan);
+
+/// The document. What it says of all motors needs kAllMotors and kAllNoises.
+std::string markdown_of(const std::vector<Trials>& trials);
+
+/// Where a text differs from what these trials, of at least kShownMotors, would make it, one sentence each.
+/// Of the tables over all motors only names and ranges are compared; the motors that are shown one by one to
+/// 2 % of each number and 0.002 points of a percentage: other C libraries round otherwise.
+std::vector<std::string> differences(const std::string& text, const std::vector<Trials>& trials);
+
+}  // namespace drivebench::identification

@@ -1,0 +1,19 @@
+// drivebench-identification: identifies random motors and prints tests/book/IDENTIFICATION.md.
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <thread>
+
+#include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
+
+int main() {
+  using namespace drivebench::identification;
+  try {
+    const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    const auto trials = run_trials(motor_draws(), {kAllMotors, kAllNoises, threads});
+    std::fputs(markdown_of(trials).c_str(), stdout);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

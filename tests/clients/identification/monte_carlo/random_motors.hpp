@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "clients/identification/experiments/experiment.hpp"
+
+/// Motors drawn at random and the experiment that each of them goes through.
+namespace drivebench::identification {
+
+/// What a parameter is drawn from: evenly in its logarithm, or in itself if it may be zero; four digits.
+struct Range {
+  std::string_view name;
+  std::string_view unit;
+  double low;
+  double high;
+};
+
+/// A kind of motor and the experiment with it.
+struct MotorDraw {
+  MotorKind kind;
+  std::string_view name;
+  std::string_view bench;       ///< of configs/benches, whose motor stands in the middle of the ranges
+  std::string_view experiment;  ///< for people
+  std::span<const Range> identified;
+  std::span<const Range> others;  ///< what the experiment does not ask for
+  double longest_s;               ///< induction: the record ends here, whether the motor has run up or not
+};
+
+/// DC, induction, PM synchronous, brushless DC; then the same induction motors with records of 0.2 s.
+std::span<const MotorDraw> motor_draws() noexcept;
+
+/// Motor `number` of a kind, from 1 on, always the same: first the identified parameters, then the others.
+std::vector<double> draw_motor(const MotorDraw& draw, int number);
+
+/// One parameter of one motor.
+struct Finding {
+  double truth;
+  double estimate;
+  double index;
+  bool stated;  ///< the verdict does not name it
+
+  double error() const noexcept { return (estimate - truth) / truth; }
+  bool covered() const noexcept;
+};
+
+/// What an experiment gave, and how to look at it.
+struct Recorded {
+  MeasuredData data;
+  Experiment how;
+};
+
+/// The experiment on such a motor, on the product's bench with a noise of this number.
+Recorded record_motor(const MotorDraw& draw, int number, int noise);
+
+/// The same with its identification: a finding for each of draw.identified. Data that identify() refuses
+/// state nothing. May run on many threads at once.
+std::vector<Finding> identify_motor(const MotorDraw& draw, int number, int noise);
+
+}  // namespace drivebench::identification

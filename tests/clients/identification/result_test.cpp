@@ -1,0 +1,113 @@
+#include "clients/identification/result.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "server/config/config.hpp"
+
+namespace drivebench::identification {
+namespace {
+
+Result some_result() {
+  Result r = {.kind = "induction", .method = "a method"};
+  r.parameters = {{"R_S", "ohm", 9.7, 0.1, {}},    {"L_S", "H", 0.67, 0.01, {}},
+                  {"M", "H", 0.64, 0.01, {}},      {"R_R", "ohm", 8.0, HUGE_VAL, {}},
+                  {"J", "kg*m^2", 0.011, 0.0, {}}, {"f", "N*m*s/rad", -1e-5, 0.0, {}}};
+  r.excitation.verdict = "the data see every parameter";
+  return r;
+}
+
+// Kills: a truth beside the wrong parameter, a number that JSON does not have, the form that clients read.
+TEST(IdentificationResult, AsJson) {
+  Result r = some_result();
+  r.compare({{"R_S", 10.0}, {"unknown", 1.0}});
+  const nlohmann::json json = nlohmann::json::parse(to_json(r));
+  EXPECT_EQ(json["parameters"]["R_S"]["estimate"], 9.7);
+  EXPECT_EQ(json["parameters"]["R_S"]["index"], 0.1);
+  EXPECT_EQ(json["parameters"]["R_S"]["truth"], 10.0);
+  EXPECT_TRUE(json["parameters"]["L_S"]["truth"].is_null());
+  EXPECT_TRUE(json["parameters"]["R_R"]["index"].is_null());
+  EXPECT_EQ(json["identifiable"], true);
+}
+
+// An index that held the truth says so, one that did not too. Kills: a comparison of the relative with the
+// absolute, a verdict without truth.
+TEST(IdentificationResult, TellsWhetherTheIndexHeldTheTruth) {
+  Result r = some_result();
+  r.compare({{"R_S", 9.79}, {"L_S", 0.69}});
+  EXPECT_EQ(is_inside(r, *r.find("R_S")), true);
+  EXPECT_EQ(is_inside(r, *r.find("L_S")), false);
+  EXPECT_EQ(is_inside(r, *r.find("M")), std::nullopt);
+  const nlohmann::json json = nlohmann::json::parse(to_json(r));
+  EXPECT_EQ(json["parameters"]["R_S"]["inside"], true);
+  EXPECT_EQ(json["parameters"]["L_S"]["inside"], false);
+  EXPECT_TRUE(json["parameters"]["M"]["inside"].is_null());
+  EXPECT_NE(to_markdown(r).find("| L_S | H | 0.67 | 1.49 % | 0.69 | -2.9 % | no |"), std::string::npos);
+  r.compare({{"R_S", 10.0}});  // 3 % away, with an index of 0.1 ohm
+  EXPECT_EQ(is_inside(r, *r.find("R_S")), false);
+  r.excitation.unseen = {"R_S"};
+  EXPECT_EQ(is_inside(r, *r.find("R_S")), std::nullopt);
+}
+
+// Kills: a number in the table that the data do not hold.
+TEST(IdentificationResult, UnseenParametersShowNoNumber) {
+  Result r = some_result();
+  r.excitation = {.sufficient = false, .unseen = {"L_S"}, .verdict = "not identifiable: L_S"};
+  EXPECT_NE(to_markdown(r).find("| L_S | H | not seen | - | - | - |"), std::string::npos) << to_markdown(r);
+  EXPECT_NE(to_markdown(r).find("| R_S | ohm | 9.7 | 1.03 % | - | - |"), std::string::npos) << to_markdown(r);
+  EXPECT_TRUE(nlohmann::json::parse(to_json(r))["parameters"]["L_S"]["estimate"].is_null());
+  EXPECT_THROW(to_motor_toml(r, {.name = "x"}), IdentificationError);
+}
+
+BenchConfig bench_of(const Result& r, const MotorFile& file) {
+  const std::string motor = to_motor_toml(r, file);
+  const std::size_t machine = motor.find("[machine]");
+  const std::size_t mechanics = motor.find("[mechanics]");
+  std::string text =
+      "[bench]\nname = \"b\"\nmode = \"free\"\nperiod_us = 100\n[[axis]]\nname = "
+      "\"a\"\n[axis.amplifier]\nvoltage_limit_v = 40.0\nover_current_a = "
+      "9.0\n[axis.encoder]\ncounts_per_revolution = 2000\n";
+  text += "[axis.machine]\n" + motor.substr(machine + 10, mechanics - machine - 10);
+  text += "[axis.mechanics]\n" + motor.substr(mechanics + 12);
+  return parse_config(text, "made", {});
+}
+
+// The bench reads the motor file that identification writes, for every kind, with names that need quoting.
+// Kills: a key that the bench does not know, negative friction, a reserved character in a name.
+TEST(IdentificationResult, TheBenchReadsTheMotorFile) {
+  const BenchConfig im =
+      bench_of(some_result(), {.name = "a \"motor\"\n", .source = "C:\\x", .pole_pairs = 2});
+  const auto& machine = std::get<InductionMachineParameters>(im.setup.axes[0].parameters.machine);
+  EXPECT_EQ(machine.rotor_inductance_h, 0.67);
+  EXPECT_TRUE(to_motor_toml(some_result(), {.name = "a \"motor\"\n", .source = "C:\\x"})
+                  .starts_with("name = \"a \\\"motor\\\"\\u000A\"\nsource = \"C:\\\\x\"\n"));
+  EXPECT_EQ(machine.rotor_resistance_ohm, 8.0);
+  EXPECT_EQ(machine.pole_pairs, 2);
+  Result dc = {.kind = "pm_dc", .method = "m"};
+  dc.parameters = {{"L", "H", 2e-3, 0, {}},
+                   {"R", "ohm", 2, 0, {}},
+                   {"K_T", "N*m/A", 0.07, 0, {}},
+                   {"J", "", 6e-5, 0, {}},
+                   {"f", "", 4e-4, 0, {}}};
+  EXPECT_EQ(bench_of(dc, {}).setup.axes[0].parameters.mechanics.inertia_kgm2, 6e-5);
+  Result pm = {.kind = "pm_synchronous", .method = "m"};
+  pm.parameters = {{"R_S", "ohm", 0.6, 0, {}}, {"L_S", "H", 2.4e-3, 0, {}}, {"K_m", "", 0.515, 0, {}},
+                   {"J", "", 1.9e-4, 0, {}},   {"f", "", 3e-3, 0, {}},      {"f_c", "", 0.07, 0, {}}};
+  EXPECT_EQ(bench_of(pm, {.pole_pairs = 50}).setup.axes[0].parameters.mechanics.coulomb_friction_nm, 0.07);
+  Result bldc = {.kind = "bldc", .method = "m"};
+  bldc.parameters = {{"R_S", "ohm", 0.7, 0, {}},
+                     {"L+M", "H", 2.87e-3, 0, {}},
+                     {"tau_p", "", 0.5128, 0, {}},
+                     {"J", "", 2e-4, 0, {}},
+                     {"f", "", 2e-3, 0, {}}};
+  EXPECT_EQ(
+      std::get<BldcMachineParameters>(bench_of(bldc, {}).setup.axes[0].parameters.machine).self_inductance_h,
+      2.87e-3);
+  dc.parameters[1].value = -2.0;
+  EXPECT_THROW(to_motor_toml(dc, {}), IdentificationError);
+}
+
+}  // namespace
+}  // namespace drivebench::identification

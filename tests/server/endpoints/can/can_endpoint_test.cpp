@@ -1,0 +1,468 @@
+// The commanding side of the CAN endpoint: leases, commands, refusals.
+#include "server/endpoints/can/endpoint.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "server/endpoints/can/buses/text_listener.hpp"
+#include "tests/server/endpoints/can/can_endpoint_test.hpp"
+
+namespace drivebench::can {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Catches: a tick that does not run, a command that does not reach the phases, a sample that is not what the
+// bench says, a SYNC before the samples of its tick.
+TEST(CanEndpoint, ACommandEndsItsTickAndTheNextSampleComesBack) {
+  CanBench bench;
+  const std::uint8_t lease = bench.acquire();
+  ASSERT_EQ(lease, 1);
+  ASSERT_TRUE(bench.newest(Message::kSensors));
+  EXPECT_EQ((*bench.newest(Message::kSensors))["tick"], 0.0);
+  for (int tick = 0; tick < 50; ++tick) {
+    bench.command(tick, 20.0, -7.5, lease);
+    ASSERT_EQ(bench.engine().tick(), tick + 1);
+    const Sample& s = bench.engine().newest(0);
+    EXPECT_EQ(s.u_a_v, 20.0);
+    EXPECT_EQ(s.u_b_v, -7.5);
+    const Received sensors = *bench.newest(Message::kSensors);
+    EXPECT_EQ(sensors["tick"], tick + 1);
+    EXPECT_EQ(sensors["i_a"], static_cast<double>(static_cast<float>(s.i_a_a)));
+    EXPECT_EQ(sensors["encoder_count"], static_cast<double>(s.encoder_count));
+    EXPECT_EQ(sensors["command_tick"], tick);
+    EXPECT_EQ(bench.received.back().row->message, Message::kSync);
+    EXPECT_EQ(bench.received.back()["tick"], tick + 1);
+    EXPECT_EQ(bench.received.back()["mode"], 1.0);
+  }
+}
+
+// Catches: a classic frame with other scales than the profile's, or the flags of another tick than the
+// count's.
+TEST(CanEndpoint, ClassicFramesCarryTheSameSampleInScaledIntegers) {
+  CanBench bench(classic());
+  const std::uint8_t lease = bench.acquire();
+  for (int tick = 0; tick < 200; ++tick)
+    bench.command(tick, 20.0, -7.5, lease);
+  const Sample& s = bench.engine().newest(0);
+  EXPECT_EQ(s.u_a_v, 20.0);
+  const Received currents = *bench.newest(Message::kCurrents);
+  const Received encoder = *bench.newest(Message::kEncoder);
+  EXPECT_NEAR(currents["i_a"], s.i_a_a, 0.5e-3) << "half a count";
+  EXPECT_NEAR(currents["i_b"], s.i_b_a, 0.5e-3);
+  EXPECT_EQ(currents["tick"], 200.0);
+  EXPECT_EQ(currents["encoder_levels"], static_cast<double>(s.encoder_levels));
+  EXPECT_EQ(encoder["encoder_count"], static_cast<double>(s.encoder_count));
+  EXPECT_NEAR(encoder["edge_age"], s.edge_age_s, 0.5e-6);
+  ASSERT_TRUE(bench.newest(Message::kState));
+  EXPECT_EQ((*bench.newest(Message::kState))["bus_voltage"], s.bus_voltage_v);
+}
+
+// CMD-11, CMD-06, CMD-07. Catches: a refusal without its reason, or one that the bench does not count.
+TEST(CanEndpoint, EveryRefusedCommandSaysWhyAndIsCounted) {
+  CanBench bench;
+  const std::uint8_t lease = bench.acquire();
+  const auto refused = [&] { return bench.engine().newest(0).refused_commands; };
+  bench.command(0, 1.0, 1.0, lease);
+  const std::uint64_t before = refused();
+  const auto expect = [&](Result why, double answers, double u_a, std::uint8_t with, double mode) {
+    bench.command(answers, u_a, 0.0, with, mode);
+    EXPECT_EQ(bench.result(), static_cast<double>(why)) << answers << ' ' << u_a << ' ' << mode;
+    EXPECT_EQ(bench.engine().tick(), 1);
+  };
+  expect(Result::kNotOwner, 1, 1.0, static_cast<std::uint8_t>(lease + 1), 1.0);
+  expect(Result::kNotOwner, 1, 1.0, 0, 1.0);
+  expect(Result::kNotFinite, 1, kNan, lease, 1.0);
+  expect(Result::kNotFinite, 1, std::numeric_limits<double>::infinity(), lease, 1.0);
+  expect(Result::kStale, 0, 1.0, lease, 1.0);  // a duplicate
+  expect(Result::kStale, 2, 1.0, lease, 1.0);  // of the future
+  expect(Result::kMalformed, 1, 1.0, lease, 5.0);
+  expect(Result::kWrongDrive, 1, 1.0, lease, 4.0);  // currents for a voltage amplifier
+  bench.command(1, 2.0, 0.0, lease);
+  EXPECT_EQ(bench.engine().tick(), 2);
+  EXPECT_EQ(refused() - before, 8u);
+  EXPECT_EQ(bench.count("refused"), 8u);
+}
+
+// Catches: duties taken as volts, in either variant; a duty beyond 1 that is not clipped by the amplifier.
+TEST(CanEndpoint, DutiesAreShareOfTheBusVoltage) {
+  CanBench fd;
+  const std::uint8_t lease = fd.acquire();
+  fd.command(0, 0.5, -0.25, lease, 3.0);
+  const double bus_v = fd.engine().newest(0).bus_voltage_v;
+  EXPECT_EQ(fd.engine().newest(0).u_a_v, 0.5 * bus_v);
+  EXPECT_EQ(fd.engine().newest(0).u_b_v, -0.25 * bus_v);
+  fd.command(1, 1.5, 0.0, lease, 3.0);
+  EXPECT_EQ(fd.engine().newest(0).u_a_v, bus_v);
+
+  CanBench with_integers(classic());
+  const std::uint8_t other = with_integers.acquire();
+  with_integers.command(0, 1.0, -16384.0 / 32767.0, other, 3.0);
+  EXPECT_NEAR(with_integers.engine().newest(0).u_a_v, bus_v, 1e-9 * bus_v);
+  EXPECT_NEAR(with_integers.engine().newest(0).u_b_v, -bus_v * 16384 / 32767, 1e-9 * bus_v);
+}
+
+// Catches: two controllers at once, on one bus or across transports; a lease number that two
+// share.
+TEST(CanEndpoint, OWN_01_OneControllerAtATimeHoldsAnAxis) {
+  CanBench bench;
+  const std::uint8_t first = bench.acquire(1);
+  ASSERT_NE(first, 0);
+  EXPECT_EQ(bench.acquire(2), 0);
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kOwned));
+  EXPECT_EQ((*bench.newest(Message::kReply))["controller"], 2.0);
+  EXPECT_EQ(bench.acquire(1), first) << "asked again: the reply may have been lost";
+  bench.request(Request::kRelease, first, 1);
+  EXPECT_EQ(bench.result(), 0.0);
+  const std::uint8_t second = bench.acquire(2);
+  EXPECT_NE(second, 0);
+  EXPECT_NE(second, first) << "what the first one still sends must not count";
+  bench.request(Request::kRelease, first, 1);
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kNotOwner));
+  bench.request(Request::kRelease, second, 2);
+
+  std::optional<Refused> elsewhere;  // as a TCP session does
+  bench.engine().request({.tick = 0, .axis = 0, .owner = 1000, .action = LeaseAction::kAcquire},
+                         [&](Refused refused, Tick) { elsewhere = refused; });
+  ASSERT_EQ(elsewhere, Refused::kNot);
+  EXPECT_EQ(bench.acquire(3), 0);
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kOwned));
+}
+
+// Catches: a controller that is turned away, or one that asks without a lease, of which only a counter knows.
+TEST(CanEndpoint, SEC_07_WhoIsTurnedAwayStandsInTheAuditLog) {
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("drivebench-can-audit-" + std::to_string(::getpid()));
+  std::filesystem::remove(file);
+  {
+    Audit audit(AuditConfig{.file = file, .on_failure = AuditFailure::kContinue});
+    CanBench bench(on_bus(servo_bench(), {}), &audit);
+    const std::uint8_t lease = bench.acquire(1);
+    bench.acquire(2);
+    bench.request(Request::kClearFaults, static_cast<std::uint8_t>(lease + 1), 2);
+    bench.request(static_cast<Request>(9), lease, 3);
+  }
+  std::vector<std::array<std::string, 4>> said;
+  std::ifstream in(file);
+  for (std::string text; std::getline(in, text);) {
+    const auto line = nlohmann::json::parse(text);
+    said.push_back({line["event"], line["peer"], line["result"],
+                    line["details"].value("request", 0) == 0 ? "" : line["details"]["request"].dump()});
+  }
+  std::filesystem::remove(file);
+  const std::string owned(sentence_of(Refused::kOwned));
+  const std::string not_owner(sentence_of(Refused::kNotOwner));
+  EXPECT_EQ(said, (std::vector<std::array<std::string, 4>>{
+                      {"acquire", "memory:bench controller 1", "done", ""},
+                      {"acquire", "memory:bench controller 2", owned, ""},
+                      {"forbidden", "memory:bench controller 2", not_owner, "4"},
+                      {"forbidden", "memory:bench controller 3", "its code must be 1 to 4", "9"}}));
+}
+
+// Catches: a lease number 0, which means none, after 255 leases.
+TEST(CanEndpoint, LeaseNumbersSkipZeroWhenTheyWrap) {
+  CanBench bench;
+  for (int i = 0; i < 600; ++i) {
+    const std::uint8_t lease = bench.acquire();
+    ASSERT_EQ(lease, i % 255 + 1);
+    bench.request(Request::kRelease, lease);
+  }
+}
+
+// Catches: a latched fault that a stranger clears, or a command that gets through in spite of
+// it.
+TEST(CanEndpoint, CMD_04_OnlyTheOwnerClearsALatchedFault) {
+  BenchConfig config = servo_bench();
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.5;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
+  config.can.emplace_back();
+  CanBench bench(config);
+  const std::uint8_t lease = bench.acquire();
+  int tick = 0;
+  while (bench.result() != static_cast<double>(Result::kLatched) && tick < 1000)
+    bench.command(tick++, 60.0, 0.0, lease);
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kLatched));
+  bench.request(Request::kClearFaults, static_cast<std::uint8_t>(lease + 1));
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kNotOwner));
+  bench.request(Request::kClearFaults, lease);
+  EXPECT_EQ(bench.result(), 0.0);
+  bench.command(static_cast<double>(bench.engine().tick()), 1.0, 0.0, lease);
+  EXPECT_EQ(bench.result(), -1.0) << "no refusal";
+}
+
+// Catches: a frame of the wrong form taken for a command, or not counted by its kind.
+TEST(CanEndpoint, CAN_09_FramesOfTheWrongFormAreCountedByKind) {
+  CanBench bench;
+  const std::uint8_t lease = bench.acquire();
+  const MessageRow& row = *find_message(Message::kCommand, true);
+  const Frame good =
+      encode(row, bench.profile(), 1, std::array{0.0, 1.0, 1.0, 1.0, static_cast<double>(lease)});
+  Frame frame = good;
+  frame.size = 12;
+  bench.send(frame);
+  EXPECT_EQ(bench.count("wrong_size"), 1u);
+  frame = good;
+  frame.extended = true;
+  bench.send(frame);
+  EXPECT_EQ(bench.count("wrong_format"), 1u);
+  frame = good;
+  frame.fd = frame.bit_rate_switch = false;
+  frame.remote = true;
+  frame.size = 0;
+  bench.send(frame);
+  EXPECT_EQ(bench.count("remote"), 1u);
+  frame = good;
+  frame.data[15] = 1;
+  bench.send(frame);
+  EXPECT_EQ(bench.count("reserved"), 1u);
+  frame = good;
+  frame.id = 0x7DF;
+  bench.send(frame);
+  EXPECT_EQ(bench.engine().tick(), 0);
+  bench.send(good);
+  EXPECT_EQ(bench.engine().tick(), 1);
+}
+
+// Catches: an FD frame that a classic bench obeys.
+TEST(CanEndpoint, CAN_09_AClassicBenchObeysNoFdFrame) {
+  CanBench bench(classic());
+  const std::uint8_t lease = bench.acquire();
+  Frame frame = encode(*find_message(Message::kCommand, false), bench.profile(), 1,
+                       std::array{1.0, 1.0, 0.0, 1.0, static_cast<double>(lease)});
+  frame.fd = true;
+  bench.send(frame);
+  EXPECT_EQ(bench.count("wrong_kind"), 1u);
+  EXPECT_EQ(bench.engine().tick(), 0);
+}
+
+// Catches: an axis whose tick another axis' controller ends; node ids mixed up.
+TEST(CanEndpoint, TwoAxesWaitForEachOther) {
+  CanBench bench({}, 2);
+  const std::uint8_t first = bench.acquire(1, 1);
+  const std::uint8_t second = bench.acquire(1, 2);
+  (void)second;
+  ASSERT_NE(first, 0);
+  bench.command(0, 1.0, 0.0, first, 1.0, 1);
+  EXPECT_EQ(bench.engine().tick(), 0);
+  bench.request(Request::kRelease, 1, 1, 2);
+  EXPECT_EQ(bench.engine().tick(), 1) << "the one that everybody waited for has left";
+}
+
+// Catches: monitoring that begins before the first heartbeat, or never; a lost heartbeat without
+// effect.
+TEST(CanEndpoint, CAN_12_AHeartbeatThatStaysAwayLosesTheLeaseAndARestartAtOnce) {
+  CanBench bench;
+  std::uint8_t lease = bench.acquire();
+  bench.command(0, 1.0, 0.0, lease);
+  for (int beats = 0; beats < 12;
+       ++beats) {  // 120 ms without a heartbeat of the controller: not monitored yet
+    bench.received.clear();
+    bench.wait_for(Message::kHeartbeat);
+  }
+  EXPECT_NE(bench.engine().owner(0), 0u);
+  bench.send(Message::kControllerHeartbeat, std::array{5.0});
+  while (bench.engine().owner(0) != 0) {
+    bench.received.clear();
+    bench.wait_for(Message::kHeartbeat);
+  }
+  EXPECT_EQ(bench.count("heartbeats_lost"), 1u);
+  EXPECT_EQ((*bench.newest(Message::kHeartbeat))["lease"], 0.0);
+
+  lease = bench.acquire();
+  bench.send(Message::kControllerHeartbeat, std::array{0.0});  // its boot-up, late on the wire
+  EXPECT_NE(bench.engine().owner(0), 0u);
+  bench.send(Message::kControllerHeartbeat, std::array{5.0});
+  bench.send(Message::kControllerHeartbeat, std::array{0.0});
+  EXPECT_EQ(bench.engine().owner(0), 0u);
+  lease = bench.acquire();
+  bench.send(Message::kControllerHeartbeat, std::array{4.0});
+  EXPECT_EQ(bench.engine().owner(0), 0u);
+}
+
+// Catches: a time-out that is looked at with each heartbeat of the bench only.
+TEST(CanEndpoint, AHeartbeatIsMissedByABenchThatSendsNone) {
+  BenchConfig config = servo_bench();
+  config.can.emplace_back();
+  config.can.front().heartbeat_ms = 0;
+  config.can.front().controller_timeout_ms = 10;
+  CanBench bench(config);
+  bench.acquire();
+  bench.send(Message::kControllerHeartbeat, std::array{5.0});
+  while (bench.engine().owner(0) != 0)
+    bench.wait();
+  EXPECT_EQ(bench.count("heartbeats_lost"), 1u);
+  EXPECT_FALSE(bench.newest(Message::kHeartbeat));
+}
+
+// Catches: a stranger whose malformed commands begin the row of the owner anew, or bar his clear.
+TEST(CanEndpoint, AStrangersMalformedCommandIsNotTheOwners) {
+  BenchConfig config = servo_bench();
+  config.setup.arming_commands = 3;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.5;
+  config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
+  config.can.emplace_back();
+  CanBench bench(config);
+  const std::uint8_t lease = bench.acquire();
+  const auto tick = [&] { return static_cast<double>(bench.engine().tick()); };
+  const auto send_malformed = [&](std::uint8_t with) {
+    bench.command(tick(), 0.0, 0.0, with, 9.0);
+    EXPECT_EQ(bench.result(), static_cast<double>(Result::kMalformed));
+  };
+  for (int i = 0; i < 3; ++i) {
+    send_malformed(0);
+    bench.command(tick(), 60.0, 0.0, lease);
+  }
+  EXPECT_EQ(bench.engine().newest(0).state, static_cast<std::uint64_t>(ControlState::kRun));
+  EXPECT_EQ(bench.engine().newest(0).refused_commands, 3u) << "but counted";
+  while (bench.result() != static_cast<double>(Result::kLatched) && tick() < 1000)
+    bench.command(tick(), 60.0, 0.0, lease);
+  ASSERT_EQ(bench.result(), static_cast<double>(Result::kLatched));
+  send_malformed(lease);
+  bench.request(Request::kClearFaults, lease);
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kCauseLasts)) << "his own is";
+  bench.command(tick(), 0.0, 0.0, lease, 0.0);
+  send_malformed(static_cast<std::uint8_t>(lease + 1));
+  bench.request(Request::kClearFaults, lease);
+  EXPECT_EQ(bench.result(), 0.0);
+}
+
+// Catches: a controller that waits for the command of another axis and is called silent; one that is called
+// so at once when its tick has come, or never; one that is taken for the one before, who had commanded.
+TEST(CanEndpoint, WhoWaitsForOthersIsNotSilent) {
+  constexpr Owner kOther = 1000;
+  constexpr auto kPatience = std::chrono::milliseconds(50);
+  using Clock = std::chrono::steady_clock;
+  BenchConfig config = servo_bench(2);
+  config.can.emplace_back();
+  config.can.front().idle_timeout_ms = kPatience.count();
+  CanBench bench(config);
+  bench.engine().request({.tick = 0, .axis = 1, .owner = kOther, .action = LeaseAction::kAcquire},
+                         [](Refused refused, Tick) { EXPECT_EQ(refused, Refused::kNot); });
+  bench.command(0, 1.0, 0.0, bench.acquire());
+  for (const auto end = Clock::now() + 3 * kPatience; Clock::now() < end;)
+    bench.wait();
+  ASSERT_EQ(bench.engine().tick(), 0);
+  EXPECT_NE(bench.engine().owner(0), 0u);
+  const auto began = Clock::now();
+  bench.engine().command(1, kOther, voltage(0, 0.0, 0.0));
+  bench.engine().advance();
+  ASSERT_EQ(bench.engine().tick(), 1);
+  while (bench.engine().owner(0) != 0)
+    bench.wait();
+  EXPECT_GE(Clock::now() - began, kPatience);
+
+  const std::uint8_t lease = bench.acquire(1);
+  bench.command(1, 1.0, 0.0, lease);
+  bench.request(Request::kRelease, lease, 1);
+  ASSERT_NE(bench.acquire(2), 0);
+  while (bench.engine().owner(0) != 0)
+    bench.wait();
+  EXPECT_EQ(bench.engine().tick(), 1);
+}
+
+// Catches: an axis that nobody on this bus can have because the controller there has lost it, while there is
+// no tick that would show it.
+TEST(CanEndpoint, AnAxisThatWasTakenAwayIsFreeAtOnce) {
+  CanBench bench;
+  const auto take_away = [&] {
+    bench.engine().request(
+        {.tick = 0, .axis = 0, .owner = bench.engine().owner(0), .action = LeaseAction::kLost},
+        [](Refused refused, Tick) { EXPECT_EQ(refused, Refused::kNot); });
+  };
+  ASSERT_NE(bench.acquire(1), 0);
+  take_away();
+  EXPECT_NE(bench.acquire(2), 0);
+  EXPECT_EQ(bench.result(), 0.0);
+  take_away();
+  bench.received.clear();
+  EXPECT_EQ(bench.wait_for(Message::kHeartbeat)["lease"], 0.0);
+  EXPECT_EQ(bench.engine().tick(), 0);
+}
+
+// Catches: a peer that fills the log by taking the axis and saying that it has stopped, again and again.
+TEST(CanEndpoint, LostControllersDoNotFillTheLog) {
+  testing::internal::CaptureStdout();  // where the log goes if nobody says otherwise
+  CanBench bench;
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_NE(bench.acquire(), 0);
+    bench.send(Message::kControllerHeartbeat, std::array{4.0});
+  }
+  const std::string text = testing::internal::GetCapturedStdout();
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+  EXPECT_NE(text.find("axis 0 loses its controller"), std::string::npos) << text;
+}
+
+// Catches: a log that grows by ten lines a second while there are no descriptors for those who want to come
+// in.
+TEST(CanEndpoint, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
+  asio::io_context io(1);
+  TextListener listener(io);
+  int accepted = 0;
+  listener.on_client = [&accepted](int fd) {
+    ++accepted;
+    ::close(fd);
+  };
+  ASSERT_EQ(listener.open({.address = "127.0.0.1", .port = 0}), "");
+  testing::internal::CaptureStdout();
+  asio::ip::tcp::socket client(io);
+  client.connect({asio::ip::make_address("127.0.0.1"), listener.port()});
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
+  const int next = ::dup(0);
+  ::close(next);
+  const rlimit none{.rlim_cur = static_cast<rlim_t>(next), .rlim_max = limit.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  io.run_for(std::chrono::milliseconds(350));
+  EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
+  EXPECT_EQ(accepted, 0);
+  while (accepted == 0)
+    io.run_one();
+  const std::string text = testing::internal::GetCapturedStdout();
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+  EXPECT_NE(text.find("cannot accept a CAN client"), std::string::npos) << text;
+}
+
+// Catches: two benches that talk over each other, an owner whose commands go to both, or an axis that
+// is given to a controller which never hears of it.
+TEST(CanEndpoint, CAN_11_AnotherBenchWithOurIdentifiersSilencesUs) {
+  CanBench bench;
+  bench.acquire();
+  bench.send(encode_sample(*find_message(Message::kSensors, true), bench.profile(), 1, Sample{}));
+  EXPECT_EQ(bench.endpoint().report().state, "ID_CONFLICT");
+  EXPECT_EQ(bench.count("conflicts"), 1u);
+  EXPECT_EQ(bench.engine().owner(0), 0u);
+  const Owner before = bench.engine().new_owner({});
+  EXPECT_EQ(bench.acquire(), 0);
+  EXPECT_TRUE(bench.received.empty());
+  EXPECT_EQ(bench.engine().owner(0), 0u);
+  EXPECT_EQ(bench.engine().new_owner({}), before + 1) << "the bench was asked for the axis all the same";
+}
+
+// Catches: a bench that does not come back with its link.
+TEST(CanEndpoint, CAN_02_CAN_03_ALinkThatComesBackIsUsedAgain) {
+  CanBench bench;
+  const std::uint8_t lease = bench.acquire();
+  bench.wire().set_link(BusState::kDown);
+  bench.settle();
+  EXPECT_EQ(bench.endpoint().report().state, "CAN_DOWN");
+  bench.wire().set_link(BusState::kUp);
+  bench.settle();
+  EXPECT_EQ(bench.endpoint().report().state, "up");
+  bench.command(0, 3.0, 0.0, lease);
+  EXPECT_EQ(bench.engine().newest(0).u_a_v, 3.0);
+}
+
+}  // namespace
+}  // namespace drivebench::can
