@@ -192,7 +192,7 @@ TEST(CanCodec, AnUnsignedScaledNumberStopsOneBelowNoValue) {
 }
 
 // Catches: undefined conversions to single, an overflow that becomes a plausible number, a lost sign of zero.
-TEST(CanCodec, ASingleKeepsWhatItCan) {
+TEST(CanCodec, ASingleOverflowsToInfinityAndKeepsItsSign) {
   const auto raw = [](double value) { return raw_of(Message::kSensors, true, "i_a", value); };
   constexpr double kLargest = 3.4028234663852886e38;
   EXPECT_EQ(raw(kLargest), 0x7F7F'FFFFu);

@@ -50,7 +50,7 @@ TEST(CanSlcan, CarriesEveryFrame) {
 }
 
 // Catches: lines that are nearly right taken for frames.
-TEST(CanSlcan, RefusesWhatIsNoFrame) {
+TEST(CanSlcan, RefusesLinesThatAreNoFrame) {
   EXPECT_NE(parse_slcan("t12321122"), std::nullopt);
   EXPECT_NE(parse_slcan("t1232aAbB"), std::nullopt) << "small letters are common";
   for (const std::string_view line :
@@ -133,7 +133,7 @@ TEST(CanSocketcand, CarriesEveryFrame) {
 }
 
 // Catches: elements of real clients that are refused or read as other frames.
-TEST(CanSocketcand, ReadsWhatClientsSend) {
+TEST(CanSocketcand, ReadsElementsOfRealClients) {
   const Frame extended{.id = 0x12345, .extended = true, .size = 2, .data = {1, 0xF1}};
   EXPECT_EQ(parse_socketcand_send("send 00012345 2 1 F1"), extended);
   EXPECT_EQ(parse_socketcand_send("send 12345 2 1 f1"), extended) << "python-can 4.1.0";
@@ -145,7 +145,7 @@ TEST(CanSocketcand, ReadsWhatClientsSend) {
 }
 
 // Catches: elements that are nearly right taken for frames.
-TEST(CanSocketcand, RefusesWhatIsNoFrame) {
+TEST(CanSocketcand, RefusesElementsThatAreNoFrame) {
   for (const std::string_view element : {"",
                                          "send",
                                          "send 123",
@@ -174,8 +174,8 @@ TEST(CanSocketcand, RefusesWhatIsNoFrame) {
     EXPECT_FALSE(parse_socketcand_frame(element)) << element;
 }
 
-// Catches: a reader that depends on how the stream was cut, or grows, or takes rubbish for a part of an
-// element.
+// Catches: a reader that depends on how the stream was cut, that grows, or that takes rubbish for a part of
+// an element.
 TEST(CanSocketcand, CutsAStreamIntoElements) {
   SocketcandReader reader;
   std::vector<std::string> elements;
@@ -230,7 +230,7 @@ TEST(CanCandump, ReadsLinesOfOtherTools) {
 }
 
 // Catches: lines that are nearly right taken for frames.
-TEST(CanCandump, RefusesWhatIsNoLine) {
+TEST(CanCandump, RefusesLinesOfAnotherForm) {
   for (const std::string_view line : {"",
                                       "(",
                                       "(1.000000)",

@@ -9,7 +9,7 @@
 namespace drivebench::can {
 namespace {
 
-// Catches: a flag or a byte of a frame that the kernel gets and does not give back.
+// Catches: a flag or a byte of a frame that is lost in the kernel's form of it.
 TEST(CanKernelFrame, EveryKindComesBackAsItWas) {
   Frame frame{.id = 0x123, .size = 3, .data = {1, 2, 3}};
   EXPECT_EQ(frame_of(raw_of(frame), false), frame);
@@ -35,8 +35,8 @@ TEST(CanKernelFrame, AnErrorFrameKeepsItsClassAndIsNoMessage) {
   EXPECT_EQ(frame.id, 0x40u);
 }
 
-// Catches: a filter that lets a stranger in or keeps one of ours out, and one filter for each of many
-// neighbours.
+// Catches: a filter that lets a foreign frame in or keeps one of ours out, and one filter for each of many
+// neighbouring identifiers.
 TEST(CanKernelFrame, TheFiltersTakeExactlyTheIdentifiers) {
   std::vector<std::uint32_t> ids{0x300};
   for (std::uint32_t id = 0x180; id < 0x1A0; ++id)

@@ -34,7 +34,7 @@ TEST(CanMatch, EveryMessageOfEveryNodeIsRecognised) {
   }
 }
 
-// Catches: identifiers next to ours that are taken for ours; node 0, which nobody has.
+// Catches: identifiers next to ours that are taken for ours; node 0, which no axis has.
 TEST(CanMatch, OtherIdentifiersAreForeign) {
   std::size_t ours = 0;
   for (std::uint32_t id = 0; id <= kMaxStandardId; ++id) {
@@ -151,8 +151,7 @@ std::vector<ProfileProblem> with_id(Message message, std::uint32_t id, bool exte
   return problems(profile);
 }
 
-// Catches: identifiers that overlap or do not fit and are found out on the bus only; the profile as it comes
-// refused.
+// Catches: identifiers that overlap or do not fit, noticed on the bus only; a refusal of the default profile.
 TEST(CanProfile, IdentifiersMustFitAndKeepApart) {
   EXPECT_TRUE(problems(profile_of(false)).empty());
   EXPECT_TRUE(problems(profile_of(true)).empty());

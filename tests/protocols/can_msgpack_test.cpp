@@ -60,13 +60,13 @@ std::string key(const std::string& name) {
 }
 
 // Catches: a map that is not byte for byte python-can's.
-TEST(CanMsgpack, WritesWhatPythonCanWrites) {
+TEST(CanMsgpack, WritesTheBytesOfPythonCan) {
   EXPECT_EQ(pack(kShort, 1436509052.249713), kShortPacked);
   EXPECT_EQ(pack(kRemote, 0.0), kRemotePacked);
 }
 
-// Catches: a key that is mixed up, a channel that hinders, extended identifiers that become standard.
-TEST(CanMsgpack, ReadsWhatPythonCanWrites) {
+// Catches: two mixed-up keys, a channel that disturbs, an extended identifier read as a standard one.
+TEST(CanMsgpack, ReadsTheBytesOfPythonCan) {
   EXPECT_EQ(unpack(kShortPacked), kShort);
   EXPECT_EQ(unpack(kRemotePacked), kRemote);
   EXPECT_EQ(unpack(kFdPackedOnAChannel), kFd);
@@ -85,7 +85,7 @@ TEST(CanMsgpack, CarriesEveryFrame) {
   EXPECT_EQ(encode_msgpack(kShort, 0.0, small), 0u);
 }
 
-// Catches: a decoder that counts on one order, or stumbles over what a newer python-can may add.
+// Catches: a decoder that expects one order of keys, or fails on the keys of a newer python-can.
 TEST(CanMsgpack, TakesAnyOrderUnknownKeysAndWideNumbers) {
   const std::string nested = "\x82\xa1x\x92\x01\xc0\xa1y\x81\xa1z\xd6\x01\x01\x02\x03\x04"s;
   const std::string bytes = "\x87"s + key("data") + "\xc5\0\x02\x0a\x0b"s + key("is_rx") + "\xc3" +
@@ -101,7 +101,7 @@ TEST(CanMsgpack, KnowsTheDefaultsOfPythonCan) {
   EXPECT_EQ(unpack("\x80"), std::nullopt);
 }
 
-// Catches: frames that no bus can carry let in.
+// Catches: a decoder that takes frames which no bus can carry.
 TEST(CanMsgpack, RefusesImpossibleFrames) {
   const std::string standard = key("is_extended_id") + "\xc2";
   const auto with_id = [&](const std::string& id, int count, const std::string& more = "") {

@@ -25,7 +25,7 @@ inline std::string data_of(const Frame& frame) {
   return text;
 }
 
-/// A sample whose signals can be told apart.
+/// A sample in which every signal has a value of its own.
 inline Sample a_sample() {
   Sample sample;
   sample.tick = 0x1'2345'6789;

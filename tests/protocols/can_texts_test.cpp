@@ -16,7 +16,7 @@ void expect_time(const FrameTime& time, double least_us, double most_us) {
 
 // Catches: a part of a frame that is not counted. The numbers are counted by hand from ISO 11898-1:2015; of
 // the FD frames of more than 16 bytes with seven fixed stuff bits in 25 bits of stuff count and CRC.
-TEST(CanBudget, FramesTakeThisLong) {
+TEST(CanBudget, AFrameTakesTheBitsOfTheStandard) {
   expect_time(frame_time(8, false, false, 1e6, 5e6), 111, 135);
   expect_time(frame_time(0, false, false, 1e6, 5e6), 47, 55);
   expect_time(frame_time(8, false, true, 1e6, 5e6), 131, 160);
@@ -38,7 +38,7 @@ const MessageLoad& load_of(const BusLoad& load, Message message) {
 }
 
 // Catches: a message, an axis or a rate that is left out of the sum.
-TEST(CanBudget, TheLoadCountsWhatIsSent) {
+TEST(CanBudget, TheLoadCountsEveryMessageSent) {
   Profile profile;
   profile.fd = false;
   BusUse use;
@@ -65,7 +65,8 @@ TEST(CanBudget, TheLoadCountsWhatIsSent) {
   EXPECT_NEAR(load_of(load, Message::kState).frames_per_s, 25, 1e-9);
 }
 
-// Catches: rates that the documentation promises and that do not fit, or do with a third of the bus alone.
+// Catches: rates that the documentation promises and that do not fit, or leave less than a third of the bus
+// free.
 TEST(CanBudget, TheDocumentedRatesFit) {
   Profile profile;
   profile.fd = false;
@@ -90,8 +91,8 @@ TEST(CanBudget, TheTextHasALineForEachMessageAndTheSum) {
   EXPECT_NE(text.find("| all | 4045.0 |  | 42.4 to 51.5 |\n"), std::string::npos) << text;
 }
 
-// Catches: a list in the table that its loops do not read as its reader does.
-TEST(CanTexts, EveryChoiceIsListed) {
+// Catches: a list in the table that a loop reads differently from a reader.
+TEST(CanTexts, EveryEnumeratedFieldListsItsChoices) {
   std::size_t lists = 0;
   for (const MessageRow& row : kMessages) {
     for (const Field& field : row.fields) {

@@ -42,7 +42,8 @@ TEST(CanCodec, ClassicFramesOfWideAxesHaveTheseBytes) {
             "2EFB3200452301C8");
 }
 
-// Catches: a wide frame that does not begin as the narrow one: who knows the first part reads both.
+// Catches: a wide frame that does not begin like the narrow one: a client that knows the narrow part reads
+// both.
 TEST(CanCodec, FdFramesOfWideAxesBeginAsThoseOfNarrowOnes) {
   EXPECT_EQ(data_of(sent_by_wide(Message::kSensors, true)), data_of(sent(Message::kSensors, true)) +
                                                                 "0000C03F"
@@ -90,7 +91,7 @@ TEST(CanCodec, InModeFourACommandCarriesCurrents) {
 }
 
 // Catches: a page that is read into the signals of another one.
-TEST(CanCodec, APageTellsOfItsOwnSignalsOnly) {
+TEST(CanCodec, APageHoldsItsOwnSignalsOnly) {
   const MessageRow& row = *find_message(Message::kDetails, false, true);
   for (std::size_t page = 0; page < kPages; ++page) {
     Sample received;
@@ -133,8 +134,8 @@ TEST(CanMatch, OnABusWithWideAxesEveryMessageIsRecognised) {
   EXPECT_EQ(problem_of(with_wide_axes(profile_of(true)), odd), FrameProblem::kWrongSize);
 }
 
-// Catches: somebody else's frames that a bus without wide axes takes for theirs; identifiers that such a bus
-// uses for something else and that are taken for theirs.
+// Catches: foreign frames that a bus without wide axes takes for those of wide axes; identifiers that such a
+// bus uses otherwise and takes for those of wide axes.
 TEST(CanMatch, WithoutWideAxesTheirIdentifiersAreFree) {
   for (const bool fd : {false, true}) {
     for (const Message message : {Message::kPhaseCommand, Message::kPhases, Message::kDetails}) {
@@ -156,9 +157,9 @@ TEST(CanMatch, WithoutWideAxesTheirIdentifiersAreFree) {
   EXPECT_EQ(found.node, 1u);
 }
 
-// Catches: wide axes whose identifiers somebody else has, found out on the bus only; a bench without any that
-// is refused for them; a message of both kinds of axes that is in its own way.
-TEST(CanProfile, WideAxesNeedTheirIdentifiersToo) {
+// Catches: identifiers of wide axes that another message has, noticed on the bus only; a bench without wide
+// axes refused for them; a message of both kinds of axes that collides with itself.
+TEST(CanProfile, IdentifiersOfWideAxesAreCheckedToo) {
   EXPECT_TRUE(problems(with_wide_axes(profile_of(false))).empty());
   EXPECT_TRUE(problems(with_wide_axes(profile_of(true))).empty());
   const auto with_id = [](Message message, std::uint32_t id, bool wide) {
@@ -175,7 +176,7 @@ TEST(CanProfile, WideAxesNeedTheirIdentifiersToo) {
 
 // Catches: frames of wide axes that are not counted, counted for narrow ones, or counted beside those that
 // they replace.
-TEST(CanBudget, WideAxesNeedMore) {
+TEST(CanBudget, WideAxesTakeMoreOfTheBus) {
   Profile profile;
   profile.fd = false;
   BusUse use;
@@ -202,8 +203,9 @@ TEST(CanBudget, WideAxesNeedMore) {
   EXPECT_NEAR(details, 12.5, 1e-9);
 }
 
-// Catches: messages of wide axes that narrow ones are said to have; pages that are not marked as DBC does.
-TEST(CanTexts, TheDbcFileTellsOfEachAxisWhatItHas) {
+// Catches: a DBC file that gives messages of wide axes to narrow ones; pages without DBC's mark of a
+// multiplexer.
+TEST(CanTexts, TheDbcFileListsTheSignalsOfEachAxis) {
   Profile profile;
   profile.fd = false;
   const std::vector<BusAxis> axes = {{"servo", 1, false}, {"bldc", 2, true}};
@@ -227,8 +229,8 @@ TEST(CanTexts, TheDbcFileTellsOfEachAxisWhatItHas) {
   EXPECT_TRUE(contains(text, "BO_ 514 bldc_command: 24 Controller\n"));
 }
 
-// Catches: a frame of a wide axis that is shown as everybody's, a page that has no example.
-TEST(CanTexts, TheTableTellsWideAxesFromNarrowOnes) {
+// Catches: a frame of a wide axis shown for all axes, a page without an example.
+TEST(CanTexts, TheTableMarksTheFramesOfWideAxes) {
   Profile profile;
   const std::vector<BusAxis> axes = {{"servo", 1, false}, {"bldc", 2, true}};
   std::string text = table_text("bench", profile, axes);

@@ -31,7 +31,7 @@ FieldDescriptor::Type wire_type(SignalType type) {
 
 // Catches: a signal that is added to the table or to bench.proto only, in another order, or with another
 // type.
-TEST(Catalogue, IsTheMessageSampleOfTheWire) {
+TEST(Catalogue, MatchesTheMessageSampleOfTheWire) {
   const Descriptor& message = *v1::Sample::descriptor();
   ASSERT_EQ(static_cast<std::size_t>(message.field_count()), kSignals.size());
   for (std::size_t row = 0; row < kSignals.size(); ++row) {
@@ -61,7 +61,7 @@ TEST(Catalogue, RowsAreTheMembersOfSampleInOrder) {
 }
 
 // Catches: a name used twice, a name without unit or meaning, a range that is empty, a lookup that misses.
-TEST(Catalogue, EveryRowSaysWhatItIs) {
+TEST(Catalogue, EveryRowHasANameAUnitAndAMeaning) {
   std::set<std::string_view> names;
   for (const Signal& signal : kSignals) {
     EXPECT_TRUE(names.insert(signal.name).second) << signal.name;
@@ -102,8 +102,8 @@ TEST(Catalogue, DescriptorSetDescribesTheWholeWire) {
             v1::Sample::descriptor()->DebugString());
 }
 
-// Catches: a number of the wire that was changed: recordings and clients of yesterday would misread it. The
-// literal bytes were put together by hand.
+// Catches: a changed number of the wire: older recordings and clients would misread it. The literal bytes
+// were put together by hand.
 TEST(Catalogue, NumbersOfTheWireStayAsTheyAre) {
   using namespace std::string_literals;
   v1::Envelope done;

@@ -23,8 +23,8 @@ TEST(Document, TextIsCutBetweenCharacters) {
   EXPECT_EQ(utf8(text), text);
 }
 
-// Catches: bytes that a decoder of protobuf does not take for text, be it only at the end.
-TEST(Document, WhatIsNoTextBecomesQuestionMarks) {
+// Catches: bytes that protobuf refuses as text, be it only at the end.
+TEST(Document, BytesThatAreNoTextBecomeQuestionMarks) {
   EXPECT_EQ(utf8("a\xff"
                  "b"),
             "a?b");
@@ -35,8 +35,8 @@ TEST(Document, WhatIsNoTextBecomesQuestionMarks) {
   EXPECT_EQ(utf8("\xed\x9f\xbf\xf4\x8f\xbf\xbf"), "\ud7ff\U0010ffff") << "those just before";
 }
 
-// Catches: any other text that protobuf does not take.
-TEST(Document, EveryBytesBecomeWhatOthersCanRead) {
+// Catches: any other text that protobuf refuses.
+TEST(Document, AnyBytesBecomeTextThatProtobufTakes) {
   std::mt19937 random(7);
   const std::string bytes = "a\x7f\x80\x8f\x90\x9f\xa0\xbf\xc1\xc2\xdf\xe0\xe1\xed\xef\xf0\xf1\xf4\xf5\xff";
   int unchanged = 0;
@@ -53,8 +53,8 @@ TEST(Document, EveryBytesBecomeWhatOthersCanRead) {
   EXPECT_GT(unchanged, 1000);
 }
 
-// Catches: a line that goes on in another one, or moves the terminal; one without an end.
-TEST(Document, WhatIsPrintedIsOneLine) {
+// Catches: a printed text that breaks the line or moves the terminal's cursor; a text without an end.
+TEST(Document, APrintedTextIsOneLine) {
   EXPECT_EQ(printable("a\n\x1b[2J\x7f\u00e4"), "a??[2J?\u00e4");
   EXPECT_EQ(printable(std::string(160, 'x')), std::string(160, 'x'));
   EXPECT_EQ(printable(std::string(161, 'x')), std::string(160, 'x') + "...");

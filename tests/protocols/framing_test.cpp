@@ -69,7 +69,7 @@ TEST(Framing, TCP_01_LIMIT_01_OneAndMaxPassZeroAndMaxPlusOneDoNot) {
   }
 }
 
-// Catches: a cap that is looked at only when the frame is whole, a cap that cannot be raised, or one raised
+// Catches: a cap that is checked only when the frame is whole, a cap that cannot be raised, or one raised
 // beyond the buffer.
 TEST(Framing, CapMayBeLoweredAndRaisedWithinTheCapacity) {
   Stream stream(100);
@@ -87,7 +87,7 @@ TEST(Framing, CapMayBeLoweredAndRaisedWithinTheCapacity) {
   EXPECT_FALSE(lowered.reader.error().empty());
 }
 
-// Catches: a reader that finds its way back into a stream that it has lost.
+// Catches: a reader that goes on with a stream behind a bad length.
 TEST(Framing, NothingFollowsABadLength) {
   Stream stream(100);
   Bytes bytes = frame(3);
@@ -117,7 +117,7 @@ void expect_three(const Stream& stream) {
   EXPECT_EQ(stream.frames[2], Bytes(7, std::byte{3}));
 }
 
-// Catches: a reader that takes what one read brings for a frame. TCP-03.
+// Catches: a reader that takes the bytes of one read for a frame. TCP-03.
 TEST(Framing, TCP_03_OneByteAtATimeGivesTheSameFrames) {
   const Bytes bytes = three_frames();
   Stream stream(20);
@@ -126,7 +126,7 @@ TEST(Framing, TCP_03_OneByteAtATimeGivesTheSameFrames) {
   expect_three(stream);
 }
 
-// Catches: a header or payload that must not lie across two reads.
+// Catches: a reader that fails when a header or payload lies across two reads.
 TEST(Framing, TCP_03_EverySplitGivesTheSameFrames) {
   const Bytes bytes = three_frames();
   for (std::size_t first = 0; first <= bytes.size(); ++first) {

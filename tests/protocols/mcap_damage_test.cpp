@@ -1,4 +1,4 @@
-// The MCAP reader on files that are cut, flipped, forged or from somebody else.
+// The MCAP reader on files that are cut, flipped, forged or foreign.
 
 #include <gtest/gtest.h>
 

@@ -173,8 +173,8 @@ TEST(Mcap, PayloadsEncodedInPlaceTakeTheirActualSize) {
   EXPECT_EQ(contents.messages[0].payload, "four");
 }
 
-// Catches: a recording of which nothing can be read because nobody finished it.
-TEST(Mcap, WhatWasFlushedIsReadableWithoutFinish) {
+// Catches: a recording that cannot be read because its writer never finished it.
+TEST(Mcap, FlushedMessagesAreReadableWithoutFinish) {
   Bytes file;
   McapWriter writer(append_to(file), {});
   const auto channel = writer.add_channel("t", writer.add_schema("s", "", {}), "m");
@@ -192,7 +192,7 @@ TEST(Mcap, WhatWasFlushedIsReadableWithoutFinish) {
   EXPECT_EQ(contents.problem->offset, flushed);
 }
 
-// Catches: a file without messages that readers take for damaged.
+// Catches: a file without messages that the reader takes for damaged.
 TEST(Mcap, FilesWithoutMessagesAreWhole) {
   Bytes nothing;
   McapWriter(append_to(nothing), {}).finish();
@@ -265,7 +265,7 @@ TEST(Mcap, LongRecordingSurvives) {
   EXPECT_FALSE(reader.problem()) << reader.problem()->what;
 }
 
-// Catches: a programmer's mistake that would write an unreadable file instead of stopping.
+// Catches: a programmer's mistake that writes an unreadable file instead of stopping the program.
 TEST(McapWriterDeathTest, WrongUseStopsTheProgram) {
   Bytes file;
   McapWriter writer(append_to(file), {});

@@ -14,7 +14,7 @@
 
 #include "protocols/mcap/mcap.hpp"
 
-/// Recordings for the MCAP tests, and what the reader makes of them.
+/// Recordings for the MCAP tests, and the reader's results.
 namespace drivebench::mcap_test {
 
 using Bytes = std::vector<std::byte>;

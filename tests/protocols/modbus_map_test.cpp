@@ -30,8 +30,8 @@ std::span<const RegisterMap> one(const RegisterMap& map) {
   return {&map, 1};
 }
 
-// Catches: bytes or words in another order than the standard's and the documents' ABCD.
-TEST(ModbusCodec, ValuesLieInRegistersAsTheBooksSay) {
+// Catches: bytes or words in another order than ABCD, the order of the standard and of our documents.
+TEST(ModbusCodec, ValuesLieInRegistersInTheOrderABCD) {
   std::uint16_t words[4] = {};
   put(float_bits(1.2345678), Type::kFloat32, WordOrder::kAbcd, words);
   EXPECT_EQ(words[0], 0x3f9e);
@@ -67,7 +67,7 @@ TEST(ModbusCodec, ScaledValuesSaturateAndNanIsNoNumber) {
   EXPECT_EQ(counts_of(Type::kUnsigned16, std::nan(""), 0.1), 65535u);
 }
 
-// Catches: a signal that is missing or there twice, an address that moved although the version did not.
+// Catches: a signal that is missing or listed twice, an address that moved although the version did not.
 TEST(ModbusMap, EverySignalStandsInTheSampleBlockOnce) {
   std::multiset<std::string_view> names;
   for (const Row& row : map().rows())
@@ -105,7 +105,7 @@ TEST(ModbusMap, EverySignalStandsInTheSampleBlockOnce) {
 
 // Catches: process data of phase c, the field, the Hall lines or the injected faults at another address or
 // scale.
-TEST(ModbusMap, TheProcessDataOfAllTerminalsStandHere) {
+TEST(ModbusMap, TheProcessDataOfAllTerminalsHaveTheseAddresses) {
   struct Place {
     std::uint16_t address;
     std::string_view name;
@@ -141,8 +141,8 @@ TEST(ModbusMap, OneRequestReadsEverySensor) {
   }
 }
 
-// Catches: a block for all terminals that has something else in the place of what the first block has, or
-// less of it: who knows one must know the other.
+// Catches: a block for all terminals that puts another value in the place of one of the first block, or
+// leaves one out: a client of the first block must be able to read the other.
 TEST(ModbusMap, TheBlocksForAllTerminalsRepeatTheFirstOnes) {
   const auto row_at = [](std::uint16_t address) {
     const auto row = std::find_if(map().rows().begin(), map().rows().end(),
@@ -243,7 +243,7 @@ TEST(ModbusMap, ASampleComesBackAsItWasButForFloatRounding) {
   }
 }
 
-// Catches: a state that the standard does not let one reach, or does not let one leave.
+// Catches: a state that cannot be reached, or cannot be left, against the standard.
 TEST(ModbusDriveProfile, TheTransitionsAreThoseOfTheStandard) {
   using enum DriveState;
   struct Case {
@@ -300,7 +300,7 @@ TEST(ModbusFraming, FramesComeOutWholeHoweverTheStreamWasCut) {
   }
 }
 
-// Catches: a bad header that is waited for, with what it announces, before it is refused.
+// Catches: a reader that waits for the announced bytes of a bad header before it refuses.
 TEST(ModbusFraming, ABadHeaderIsKnownByItsSixBytes) {
   const auto error_of = [](std::initializer_list<std::uint8_t> header) {
     MbapReader reader;

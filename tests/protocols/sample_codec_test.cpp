@@ -58,7 +58,7 @@ void set_word(Sample& sample, const Signal& signal, std::uint64_t value) {
   }
 }
 
-/// The same word, asked of the class that protobuf generated.
+/// The same word, read from the class that protobuf generated.
 std::uint64_t word(const v1::Sample& message, const Signal& signal) {
   const FieldDescriptor* field = v1::Sample::descriptor()->FindFieldByName(std::string(signal.name));
   const google::protobuf::Reflection& reflection = *message.GetReflection();
@@ -160,7 +160,7 @@ TEST(SampleCodec, TheLargestSampleFitsTheBound) {
 }
 
 // Catches: a decoder that reads past the end, or takes a cut or foreign message for a sample.
-TEST(SampleCodec, WhatIsNotASampleIsRefused) {
+TEST(SampleCodec, BytesThatAreNoSampleAreRefused) {
   Sample sample;
   for (const Signal& signal : kSignals)
     set_word(sample, signal, 0x1234'5678'9abc'def1u);
@@ -185,7 +185,7 @@ TEST(SampleCodec, WhatIsNotASampleIsRefused) {
   }
 }
 
-// Catches: the last of two values that does not win, as the wire says.
+// Catches: a decoder in which the first of two values wins; the wire says the last.
 TEST(SampleCodec, OfARepeatedScalarTheLastCounts) {
   EXPECT_EQ(decode_sample(bytes_of("\x08\x05\x08\x07"))->tick, 7u);
 }

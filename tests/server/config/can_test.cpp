@@ -29,7 +29,7 @@ const std::string kUdp = "backend = \"udp_multicast\"\n";
 const std::string kSocketCan = "backend = \"socketcan\"\nchannel = \"can0\"\n";
 const std::string kSocketcand = "backend = \"socketcand\"\n";
 
-// Catches: a rule of a bus that is not kept, or is told at the wrong line.
+// Catches: a rule of a bus that is not checked, or whose problem names the wrong line.
 TEST(ConfigCan, EachRuleOfABusIsKept) {
   const std::vector<Case> cases = {
       {"", ":21: can.backend is missing"},
@@ -198,7 +198,7 @@ TEST(ConfigCan, EachRuleOfTheIdentifiersIsKept) {
   EXPECT_EQ(problems_of(with_can(kUdp + "fd = false\n[can.ids]\nedges = 0x280\n")), "none");
 }
 
-// Catches: a message that no key reaches, and one that reaches another message.
+// Catches: a message without a key, and a key that changes another message.
 TEST(ConfigCan, EveryMessageHasAKey) {
   for (const can::MessageRow& row : can::kMessages) {
     const std::string name(row.name);

@@ -13,7 +13,7 @@
 namespace drivebench::test {
 namespace {
 
-// Catches a shipped bench or motor that the reader no longer takes.
+// Catches: a shipped bench or motor that the reader no longer takes.
 TEST(Config, EveryShippedBenchLoadsAndEveryMotorFitsABench) {
   int benches = 0;
   for (const auto& entry : fs::directory_iterator(kConfigs / "benches")) {
@@ -30,7 +30,7 @@ TEST(Config, EveryShippedBenchLoadsAndEveryMotorFitsABench) {
   }
 }
 
-// Catches a number of the motor that was copied wrongly, and lost or mixed-up keys.
+// Catches: a number of the motor that was copied wrongly, and lost or mixed-up keys.
 TEST(Config, ServoBenchIsTheBenchOfTheBook) {
   const BenchConfig config = load_config(kConfigs / "benches/servo.toml");
   EXPECT_EQ(config.mode, RunMode::kLockstep);
@@ -58,7 +58,7 @@ TEST(Config, ServoBenchIsTheBenchOfTheBook) {
   EXPECT_EQ(p.sensors.current.bits, 0);
 }
 
-// Catches a real-time bench that differs from the lockstep bench in more than time.
+// Catches: a real-time bench that differs from the lockstep bench in more than time.
 TEST(Config, RealtimeBenchDiffersFromTheLockstepBenchInTimeOnly) {
   const BenchConfig lockstep = load_config(kConfigs / "benches/servo.toml");
   BenchConfig realtime = load_config(kConfigs / "benches/servo-realtime.toml");
@@ -71,7 +71,7 @@ TEST(Config, RealtimeBenchDiffersFromTheLockstepBenchInTimeOnly) {
   EXPECT_EQ(physics_toml(realtime), physics_toml(lockstep));
 }
 
-// Catches a key that the writer forgets, and a number that loses a bit on the way.
+// Catches: a key that the writer forgets, and a number that loses a bit on the way.
 TEST(Config, CanonicalTextReadsBackBitForBit) {
   BenchConfig config = load_config(kConfigs / "benches/servo-realtime.toml");
   expect_equal(parse(to_toml(config)), config);
@@ -109,7 +109,7 @@ TEST(Config, CanonicalTextReadsBackBitForBit) {
   EXPECT_EQ(to_toml(parse(to_toml(config))), to_toml(config));
 }
 
-// Catches a secret that ends in recordings, and an address that would open without it.
+// Catches: a secret in a recording, and an address that opens without its secret.
 TEST(Config, CanonicalTextHoldsNeitherTokenNorAnAddressThatNeedsIt) {
   BenchConfig config = parse(kBench);
   config.tcp.asks_for_token = true;
@@ -119,7 +119,7 @@ TEST(Config, CanonicalTextHoldsNeitherTokenNorAnAddressThatNeedsIt) {
   EXPECT_EQ(parse(to_toml(config)).tcp.address, "127.0.0.1");
 }
 
-/// kBench with an elastic shaft and whatever else lets values change one by one.
+/// kBench with an elastic shaft and more, so that values may change one by one.
 BenchConfig bench_with_room() {
   std::string text =
       with("1.1e-4\n", "1.1e-4\nstatic_friction_nm = 1\nload_inertia_kgm2 = 1\nshaft_stiffness_nm = 10\n");
@@ -128,7 +128,7 @@ BenchConfig bench_with_room() {
                "[axis.tachometer]\ngain_vs_per_rad = 0.1\nripple_per_turn = 12\n");
 }
 
-/// The bench with another value for this row, if one of some can be had that breaks no rule.
+/// The bench with another value in this row, if one of several breaks no rule.
 std::optional<BenchConfig> with_another_value(const BenchConfig& base, const Parameter& row) {
   const double old = row.get(base.setup.axes[0].parameters);
   std::vector<double> candidates{old * 1.0009765625, old + 1.0009765625, 0.5,
@@ -144,7 +144,7 @@ std::optional<BenchConfig> with_another_value(const BenchConfig& base, const Par
   return std::nullopt;
 }
 
-// Catches a row of the parameter table that no key reaches, and one that reaches another row.
+// Catches: a row of the parameter table that no key reaches, and one that reaches another row.
 TEST(Config, EveryRowOfTheParameterTableHasAKeyOfItsOwn) {
   const BenchConfig base = bench_with_room();
   std::string alone;
@@ -156,10 +156,11 @@ TEST(Config, EveryRowOfTheParameterTableHasAKeyOfItsOwn) {
       alone += std::string(row.name) + " ";
     }
   }
-  EXPECT_EQ(alone, "") << "no other value breaks no rule";
+  EXPECT_EQ(alone, "") << "every other value breaks a rule";
 }
 
-// Catches a hash that a port changes, which would forbid the replay, and one that misses what physics sees.
+// Catches: a hash that depends on a port, which would forbid the replay, and a hash that misses a value of
+// the physics.
 TEST(Config, HashFollowsThePhysicsAndNothingElse) {
   const BenchConfig base = parse(kBench);
   const auto changed = [&](auto change) {
@@ -191,7 +192,7 @@ TEST(Config, HashFollowsThePhysicsAndNothingElse) {
   }));
 }
 
-// Catches a default that depends on the wrong mode.
+// Catches: a default that depends on the wrong mode.
 TEST(Config, CommandsWaitATickByDefaultInRealTimeOnly) {
   EXPECT_EQ(parse(kBench).setup.command_delay_ticks, 0);
   EXPECT_EQ(parse(with("lockstep", "free")).setup.command_delay_ticks, 0);
@@ -199,8 +200,8 @@ TEST(Config, CommandsWaitATickByDefaultInRealTimeOnly) {
   EXPECT_EQ(parse(with("125", "125\ncommand_delay_ticks = 1")).setup.command_delay_ticks, 1);
 }
 
-// Catches a lockstep run that loses its first commands to arming, and a mode from the command line that keeps
-// the defaults of another.
+// Catches: a lockstep run that loses its first commands to arming, and a mode from the command line that
+// keeps the defaults of another.
 TEST(Config, TheFirstCommandArmsUnlessTimeIsReal) {
   EXPECT_EQ(parse(kBench).setup.arming_commands, 1);
   BenchConfig config = parse(with("lockstep", "realtime"));
@@ -212,10 +213,10 @@ TEST(Config, TheFirstCommandArmsUnlessTimeIsReal) {
   EXPECT_EQ(config.setup.command_delay_ticks, 1);
   config = parse(with("125", "125\narming_commands = 3"));
   change_mode(config, RunMode::kRealtime);
-  EXPECT_EQ(config.setup.arming_commands, 3) << "what the file says stays";
+  EXPECT_EQ(config.setup.arming_commands, 3) << "the file's value stays";
 }
 
-// Catches a period that is cut to whole microseconds, and a lease shorter than the watchdog by default.
+// Catches: a period that is cut to whole microseconds, and a lease shorter than the watchdog by default.
 TEST(Config, TimesAreWholeNanosecondsAndTicks) {
   EXPECT_EQ(parse(with("125", "62.5")).setup.period_ns, 62'500);
   EXPECT_EQ(parse(with("125", "33.333")).setup.period_ns, 33'333);

@@ -52,7 +52,7 @@ class Folder {
   fs::path path_;
 };
 
-/// A bench that needs no other file; its line numbers are what the tests below name.
+/// A bench that needs no other file; the tests name its line numbers.
 inline const std::string kBench =
     "[bench]\n"                        // 1
     "name = \"b\"\n"                   // 2

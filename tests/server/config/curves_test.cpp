@@ -20,7 +20,7 @@ const std::vector<CurvePoint>& profile_of(const BenchConfig& config) {
   return config.setup.axes[0].parameters.mechanics.load_profile.points();
 }
 
-// Catches points that are lost, cut or swapped on their way, and a curve that the canonical text or the hash
+// Catches: points that are lost, cut or swapped on their way, and a curve that the canonical text or the hash
 // forgets.
 TEST(ConfigCurves, PointsAreReadWrittenAndHashedBitForBit) {
   const BenchConfig config = parse(with_profile("[[0, 1], [0.1, -0.0],\n [0.30000000000000004, 5e-324]]"));
@@ -33,7 +33,7 @@ TEST(ConfigCurves, PointsAreReadWrittenAndHashedBitForBit) {
   EXPECT_TRUE(parse(kBench).setup.axes[0].parameters.mechanics.load_profile.empty());
 }
 
-// Catches a file that is looked for in the wrong folder, a header taken for a point, foreign line ends.
+// Catches: a file that is looked for in the wrong folder, a header taken for a point, foreign line ends.
 TEST(ConfigCurves, AFileOfTwoColumnsIsRead) {
   const Folder folder;
   for (const std::string text : {"0,1\n0.5,-2e-3\n", "time [s],torque [N*m]\n0,1\n0.5,-2e-3",
@@ -48,7 +48,7 @@ TEST(ConfigCurves, AFileOfTwoColumnsIsRead) {
   }
 }
 
-// Catches a curve of a motor file that is looked for beside the bench file.
+// Catches: a curve of a motor file that is looked for beside the bench file.
 TEST(ConfigCurves, AFileIsNamedRelativeToTheFileThatNamesIt) {
   const Folder folder;
   fs::create_directories(folder.path() / "motors");
@@ -63,8 +63,8 @@ TEST(ConfigCurves, AFileIsNamedRelativeToTheFileThatNamesIt) {
   EXPECT_EQ(profile_of(parse_config(own, "b.toml", folder.path()))[1].y, 3.0);
 }
 
-// Catches a value that is no curve and is taken for one, or whose place is not told.
-TEST(ConfigCurves, WrongPointsAreToldWithTheirLine) {
+// Catches: a wrong value taken for a curve, or reported without its place.
+TEST(ConfigCurves, WrongPointsAreReportedWithTheirLine) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"3", ":16: axis.mechanics.load_profile must be points [[x, y], ...] or the name of a CSV file"},
       {"true", ":16: axis.mechanics.load_profile must be points"},
@@ -90,8 +90,8 @@ TEST(ConfigCurves, WrongPointsAreToldWithTheirLine) {
   EXPECT_NE(problems_of(with_profile("\"p.csv\""), {}).find("must stand for itself"), std::string::npos);
 }
 
-// Catches a reader that crashes, hangs, reads on or fills the terminal with a file that is no table.
-TEST(ConfigCurves, HostileFilesAreToldWithTheirLine) {
+// Catches: a reader that crashes, hangs, reads on or fills the terminal with a file that is no table.
+TEST(ConfigCurves, HostileFilesAreReportedWithTheirLine) {
   const Folder folder;
   const std::string file = (folder.path() / "p.csv").string();
   const auto told = [&](const std::string& text) {
@@ -122,7 +122,7 @@ TEST(ConfigCurves, HostileFilesAreToldWithTheirLine) {
   EXPECT_NE(told(std::string(9'000'000, '\n')).find("is larger than 8388608 bytes"), std::string::npos);
 }
 
-// Catches a curve without bound, and a bound that forbids what the recording must be able to hold.
+// Catches: a curve without bound, and a bound that forbids what the recording must be able to hold.
 TEST(ConfigCurves, AHundredThousandPointsFitAndReadBack) {
   const Folder folder;
   const auto points = [](std::size_t count) {

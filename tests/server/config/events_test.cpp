@@ -23,7 +23,7 @@ const AxisParameters& parameters() {
   return config.setup.axes[0].parameters;
 }
 
-// Catches a kind of event that is not read, a time in seconds that is cut, an end that is not an event, an
+// Catches: a kind of event that is not read, a time in seconds that is cut, an end that is not an event, an
 // order in which a fault ends after it has begun anew.
 TEST(ConfigEvents, EveryKindIsReadInOrder) {
   const std::vector<AxisEvent> events = events_of(
@@ -46,7 +46,7 @@ TEST(ConfigEvents, EveryKindIsReadInOrder) {
   expect_equal(events, expected);
 }
 
-// Catches an event that the canonical text loses, changes or puts elsewhere.
+// Catches: an event that the canonical text loses, changes or puts elsewhere.
 TEST(ConfigEvents, AreWrittenAndReadBackBitForBit) {
   BenchConfig config = parse(kBench);
   config.axes[0].events = in_order({{7, ShaftBump{1.0 / 3.0}},
@@ -60,8 +60,8 @@ TEST(ConfigEvents, AreWrittenAndReadBackBitForBit) {
   EXPECT_EQ(to_toml(parse(to_toml(config))), to_toml(config));
 }
 
-// Catches a hash that is blind to an event.
-TEST(ConfigEvents, TheHashSeesEachOfThem) {
+// Catches: a hash that is blind to an event.
+TEST(ConfigEvents, TheHashDependsOnEachOfThem) {
   const BenchConfig base = parse(kBench);
   std::vector<std::uint64_t> hashes{configuration_hash(base)};
   for (const Action& action : std::vector<Action>{
@@ -80,7 +80,7 @@ TEST(ConfigEvents, TheHashSeesEachOfThem) {
   }
 }
 
-// Catches, one by one, a rule that is not kept.
+// Catches: a rule that is not checked, one by one.
 TEST(ConfigEvents, EachRuleIsKept) {
   const std::string fault = "[[axis.fault]]\nname = \"open_phase\"\n";
   const std::vector<std::pair<std::string, std::string>> cases = {
@@ -125,8 +125,8 @@ TEST(ConfigEvents, EachRuleIsKept) {
   }
 }
 
-// Catches a schedule that is only looked at value by value: static friction may not be below Coulomb
-// friction, at any time.
+// Catches: a schedule whose values are checked one by one only: static friction may at no time be below
+// Coulomb friction.
 TEST(ConfigEvents, RulesBetweenValuesAreFollowedThroughTime) {
   const auto set = [](const char* name, double value, int tick, int ramp) {
     return "[[axis.set]]\nparameter = \"mechanics." + std::string(name) +
@@ -154,8 +154,8 @@ TEST(ConfigEvents, RulesBetweenValuesAreFollowedThroughTime) {
   EXPECT_NE(on_the_way.find("would break a rule at tick 40"), std::string::npos) << on_the_way;
 }
 
-// Catches a file with more ramps at a time than the bench can follow.
-TEST(ConfigEvents, SixteenRampsAtATime) {
+// Catches: a file with more ramps at a time than the bench can follow.
+TEST(ConfigEvents, AreLimitedToSixteenRampsAtATime) {
   std::string text = kBench;
   int count = 0;
   for (const Parameter& row : axis_parameters(parameters())) {
@@ -172,7 +172,7 @@ TEST(ConfigEvents, SixteenRampsAtATime) {
   EXPECT_EQ(problems_of(text), "none");
 }
 
-// Catches a flood of events that fills the schedule of the bench.
+// Catches: a flood of events that fills the schedule of the bench.
 TEST(ConfigEvents, AreBounded) {
   std::string text = kBench;
   for (int i = 0; i < 128; ++i)

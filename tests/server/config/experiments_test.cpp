@@ -13,8 +13,8 @@ std::string with_experiments(const std::string& lines) {
   return kBench + "[experiments]\n" + lines;
 }
 
-// Catches: a limit that is not checked, a key that is not read, a folder that nobody named, and more
-// experiments than one answer can list.
+// Catches: a limit that is not checked, a key that is not read, a folder that the file does not name, and
+// more experiments than one answer can list.
 TEST(ConfigExperiments, EveryKeyHasItsRule) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"kept = 3\n", ":21: experiments.folder"},
@@ -34,8 +34,8 @@ TEST(ConfigExperiments, EveryKeyHasItsRule) {
   }
 }
 
-// Catches: a folder beside the program instead of beside the bench file, one that is there without being
-// asked for, and a recording that says where its server keeps things.
+// Catches: a folder beside the program instead of beside the bench file, a folder that the file does not ask
+// for, and a recording that contains paths of its server.
 TEST(ConfigExperiments, TheFolderLiesBesideTheBenchFileAndIsNotRecorded) {
   EXPECT_TRUE(parse(kBench).experiments.folder.empty());
   const BenchConfig config = parse(with_experiments(

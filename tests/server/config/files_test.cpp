@@ -11,7 +11,7 @@
 namespace drivebench::test {
 namespace {
 
-// Catches an override that is lost or that hides the motor's other values.
+// Catches: an override that is lost or that hides the motor's other values.
 TEST(ConfigFiles, BenchFileOverridesTheMotorFile) {
   const std::string servo = fs::canonical(kConfigs / "motors/servo-im.toml").string();
   std::string text = with("name = \"x\"", "name = \"x\"\nmotor = \"" + servo + "\"");
@@ -25,8 +25,8 @@ TEST(ConfigFiles, BenchFileOverridesTheMotorFile) {
   EXPECT_EQ(p.mechanics.viscous_friction_nms, 1.4e-4);
 }
 
-// Catches problems of the motor file that are told at the bench file's lines, twice, or not at all.
-TEST(ConfigFiles, ProblemsOfTheMotorFileNameItAndAreToldOnce) {
+// Catches: problems of the motor file reported with lines of the bench file, twice, or not at all.
+TEST(ConfigFiles, ProblemsOfTheMotorFileAreReportedOnceWithItsName) {
   const Folder folder;
   folder.write("m.toml", "name = \"m\"\n[machine]\npole_pairs = 3\nstator_resistance_ohm = 0\n[shaft]\n");
   EXPECT_EQ(
@@ -47,8 +47,7 @@ TEST(ConfigFiles, ProblemsOfTheMotorFileNameItAndAreToldOnce) {
                 ":5: shaft is not a known key; known here: name, source, machine, mechanics, thermal");
 }
 
-// Catches: an address for everybody without tokens, and a tokens file whose problems are not told with the
-// others.
+// Catches: an open address without tokens, and a tokens file whose problems are not reported with the others.
 TEST(ConfigFiles, CFG_07_SEC_04_TokensComeFromAFileThatOnlyItsOwnerReads) {
   const Folder folder;
   const std::string text = kBench + "[tcp]\naddress = \"0.0.0.0\"\ntokens_file = \"tokens.toml\"\n";
@@ -69,7 +68,7 @@ TEST(ConfigFiles, CFG_07_SEC_04_TokensComeFromAFileThatOnlyItsOwnerReads) {
   EXPECT_NE(found.find("in line 1 token.token or sha256"), std::string::npos) << found;
 }
 
-// Catches: an audit log beside the wrong folder, and words that are taken for others.
+// Catches: an audit log in the wrong folder, and mixed-up words.
 TEST(ConfigFiles, AuditAndLogAreRead) {
   const Folder folder;
   const auto with_audit = [&](const std::string& more) { return problems_of(kBench + more, folder.path()); };
@@ -85,7 +84,7 @@ TEST(ConfigFiles, AuditAndLogAreRead) {
   EXPECT_TRUE(parse_config(kBench, "b.toml", folder.path()).audit.file.empty());
 }
 
-// Catches a reader that crashes, hangs or fills the terminal on a file that is no configuration.
+// Catches: a reader that crashes, hangs or fills the terminal on a file that is no configuration.
 TEST(ConfigFiles, CFG_06_HostileFilesAreRefusedInFewWords) {
   const Folder folder;
   const auto refused = [&](const std::string& text) {
@@ -124,7 +123,7 @@ TEST(ConfigFiles, CFG_06_HostileFilesAreRefusedInFewWords) {
   EXPECT_THROW(load_config(folder.path() / "pipe"), ConfigError);  // and does not wait for a writer
 }
 
-// Catches a reader that only takes the line ends of its own system.
+// Catches: a reader that only takes the line ends of its own system.
 TEST(ConfigFiles, CFG_06_ByteOrderMarkAndCarriageReturnsAreTaken) {
   std::string text = "\xef\xbb\xbf";
   for (const char c : kBench)
@@ -132,7 +131,7 @@ TEST(ConfigFiles, CFG_06_ByteOrderMarkAndCarriageReturnsAreTaken) {
   expect_equal(parse(text), parse(kBench));
 }
 
-// Catches a crash, or an exception that the program does not expect, on any damaged byte.
+// Catches: a crash, or an exception that the program does not expect, on any damaged byte.
 TEST(ConfigFiles, CFG_08_OneDamagedByteEitherLoadsOrGivesAConfigError) {
   const Folder folder;
   fs::create_directories(folder.path() / "benches");
@@ -172,7 +171,7 @@ TEST(ConfigFiles, CFG_08_OneDamagedByteEitherLoadsOrGivesAConfigError) {
   EXPECT_GT(refused, 1000);
 }
 
-// Catches: a recording from a stranger whose configuration makes the replay open files of this machine.
+// Catches: a foreign recording whose configuration makes the replay open files of this machine.
 TEST(ConfigFiles, ATextWithoutAFolderMayNameNoOtherFile) {
   try {
     parse_config("[tcp]\ntokens_file = 'secret'\n[[axis]]\nname = 'a'\nmotor = 'motor.toml'\n", "bench.toml",

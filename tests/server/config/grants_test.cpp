@@ -21,7 +21,7 @@ sys_seconds at(std::int64_t seconds) {
   return sys_seconds(std::chrono::seconds(seconds));
 }
 
-// Catches: a time zone that is taken the wrong way round, and times that are none but read as one.
+// Catches: a time zone with the wrong sign, and texts that are no time but read as one.
 TEST(WallTime, OWN_07_ReadsTimesOfRfc3339AndNothingElse) {
   EXPECT_EQ(parse_rfc3339("1970-01-02T00:00:01Z"), at(86401));
   EXPECT_EQ(parse_rfc3339("2026-11-22T18:00:00Z"), at(1'795'370'400));  // date -d ... +%s
@@ -52,8 +52,8 @@ std::string problems_of_tokens(const std::filesystem::path& file) {
   return "none";
 }
 
-// Catches: a token that is stored as it stands, and a hash that is another one than sha256sum prints.
-TEST(Grants, TokensAndTheirHashesComeToTheSame) {
+// Catches: a token stored in plain, and a hash that differs from that of sha256sum.
+TEST(Grants, ATokenAndItsHashGiveTheSameGrant) {
   const Folder folder;
   const std::filesystem::path file =
       folder.write("tokens.toml",
@@ -74,7 +74,7 @@ TEST(Grants, TokensAndTheirHashesComeToTheSame) {
   EXPECT_FALSE(grants[1].holds_at(at(0))) << "revoked";
 }
 
-// Catches: a comparison that ends with the shorter text, or that takes a hash for the token it belongs to.
+// Catches: a comparison that ends with the shorter text, or that takes a hash for its token.
 TEST(Grants, SEC_04_ATokenThatIsNearlyRightIsWrong) {
   const std::string token = "correct-horse-battery-staple";
   const std::vector<Grant> grants{{.name = "anna", .role = Role::kOperator, .hash = hash_of_token(token)},
@@ -91,23 +91,24 @@ TEST(Grants, SEC_04_ATokenThatIsNearlyRightIsWrong) {
   EXPECT_EQ(find_grant(grants, {reinterpret_cast<const char*>(hash.data()), hash.size()}), nullptr);
 }
 
-// Catches: a comparison whose time tells a guesser how much of a token is right, or which entry it comes
-// close to. Time is not measured: instruction by instruction, the program goes the same way.
-TEST(Grants, SEC_04_AWrongTokenTakesTheSameWayHoweverMuchOfItIsRight) {
+// Catches: a comparison whose time tells a guesser how many bytes of a token are right, or of which entry.
+// Time is not measured: the program must execute the same instructions.
+TEST(Grants, SEC_04_EveryWrongTokenTakesTheSameInstructions) {
 #if defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "the thread sanitizer goes another way each time";
+  GTEST_SKIP() << "the thread sanitizer changes the instructions each time";
 #endif
   const std::string token = "correct-horse-battery-staple";
   const TokenHash hash = hash_of_token(token);
   TokenHash far = hash;
   for (unsigned char& byte : far)
     byte = static_cast<unsigned char>(byte ^ 0xff);
-  volatile bool sink = find_grant({}, token) != nullptr;  // what is bound on its first call is bound now
+  volatile bool sink =
+      find_grant({}, token) != nullptr;  // binds the functions that are bound on their first call
   std::vector<Grant> grants(3, Grant{.name = "anna", .hash = far});
   const auto path = [&] { return instruction_path([&] { sink = find_grant(grants, token) != nullptr; }); };
   const auto expected = path();
   if (!expected) GTEST_SKIP() << "no single steps here";
-  EXPECT_EQ(path(), expected) << "the measure itself varies";
+  EXPECT_EQ(path(), expected) << "the list of instructions varies by itself";
   for (const std::size_t right : {0u, 1u, 15u, 31u}) {
     TokenHash near = far;  // its first bytes are right
     std::copy_n(hash.begin(), right, near.begin());
@@ -119,14 +120,14 @@ TEST(Grants, SEC_04_AWrongTokenTakesTheSameWayHoweverMuchOfItIsRight) {
     EXPECT_EQ(path(), expected) << "but for a bit in byte " << right;
     grants[right % 3].hash = far;
   }
-  // A right one ends no search early.
+  // A right token ends no search early.
   grants[0].hash = hash;
   const auto first = path();
   grants[0].hash = far;
   grants[2].hash = hash;
   EXPECT_EQ(path()->count, first->count);
 
-  // The measure sees a comparison that stops at the first wrong byte.
+  // The test sees a comparison that stops at the first wrong byte.
   const auto naive = [&](std::size_t right) {
     TokenHash near = far;
     std::copy_n(hash.begin(), right, near.begin());
@@ -140,8 +141,8 @@ TEST(Grants, SEC_04_AWrongTokenTakesTheSameWayHoweverMuchOfItIsRight) {
   EXPECT_LT(naive(3)->count, naive(30)->count);
 }
 
-// Catches: a file of tokens that everybody reads, and a message that tells the token.
-TEST(Grants, SEC_04_AFileThatIsNotRightIsRefusedAndItsTokensAreNotTold) {
+// Catches: a file of tokens that every user can read, and a message that contains a token.
+TEST(Grants, SEC_04_AWrongFileIsRefusedWithoutNamingItsTokens) {
   const Folder folder;
   const std::string entry = "[[token]]\nname = 'anna'\nrole = 'viewer'\ntoken = 'open sesame'\n";
   const std::filesystem::path file = folder.write("tokens.toml", entry);

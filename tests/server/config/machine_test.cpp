@@ -12,7 +12,7 @@
 namespace drivebench::test {
 namespace {
 
-/// Another machine in the place of that of kBench; the keys begin at line 8.
+/// kBench with another machine; its keys begin at line 8.
 std::string with_machine(const std::string& keys) {
   const std::size_t begin = kBench.find("pole_pairs");
   return std::string(kBench).replace(begin, kBench.find("[axis.mechanics]") - begin, keys);
@@ -26,7 +26,7 @@ const std::string kShunt =
     "kind = \"shunt_dc\"\narmature_resistance_ohm = 1\narmature_inductance_h = 0.01\nmotor_constant = 1\n"
     "field_resistance_ohm = 100\nfield_inductance_h = 0\nsaturation_curve = [[0, 0], [1, 1], [2, 1.5]]\n";
 
-// Catches a kind that is ignored, and one that goes without saying.
+// Catches: a kind that is ignored, and a kind that is taken without being named.
 TEST(ConfigMachine, TheKindChoosesTheTable) {
   EXPECT_EQ(machine_kind(parse(kBench).setup.axes[0].parameters), "induction");
   EXPECT_EQ(machine_kind(
@@ -44,7 +44,7 @@ TEST(ConfigMachine, TheKindChoosesTheTable) {
             std::string::npos);
 }
 
-// Catches a kind whose parameters, words or curves the canonical text loses.
+// Catches: a kind whose parameters, words or curves the canonical text loses.
 TEST(ConfigMachine, OtherKindsAreWrittenAndReadBackBitForBit) {
   for (const std::string& machine : {kBldc, kShunt}) {
     BenchConfig config = parse(with_machine(machine));
@@ -55,7 +55,7 @@ TEST(ConfigMachine, OtherKindsAreWrittenAndReadBackBitForBit) {
   }
 }
 
-// Catches a row of a choice whose words are not read, and one that takes its numbers.
+// Catches: a choice whose words are not read, or that takes its numbers.
 TEST(ConfigMachine, ChoicesAreWords) {
   const std::string drive = kBench + "[axis.drive]\nkind = ";
   EXPECT_EQ(parse(drive + "\"averaged_inverter\"\n").setup.axes[0].parameters.drive.kind,
@@ -67,7 +67,7 @@ TEST(ConfigMachine, ChoicesAreWords) {
             "\"current_amplifier\", \"averaged_inverter\", \"switched_inverter\", \"source\"");
 }
 
-// Catches keys of another kind that are taken, or a wrong kind that buries the user in unknown keys.
+// Catches: keys of another kind that are taken, or a wrong kind that buries the user in unknown keys.
 TEST(ConfigMachine, AWrongKindIsOneProblem) {
   const std::string found = problems_of(with_machine("kind = \"bldk\"\nself_inductance_h = 1\n"));
   EXPECT_EQ(found.substr(0, 64), "b.toml:8: axis.machine.kind is \"bldk\" but must be one of \"induct");
@@ -85,7 +85,7 @@ TEST(ConfigMachine, AWrongKindIsOneProblem) {
             std::string::npos);
 }
 
-// Catches a motor file whose kind is lost, or that a bench file turns into another machine.
+// Catches: a motor file whose kind is lost, or a bench file that changes the kind.
 TEST(ConfigMachine, TheMotorFileNamesTheKind) {
   const Folder folder;
   folder.write("m.toml", "name = \"m\"\nsource = \"s\"\n[machine]\n" + kBldc);
@@ -106,7 +106,7 @@ TEST(ConfigMachine, TheMotorFileNamesTheKind) {
             "b.toml:9: axis.machine.kind is \"induction\" but the motor file says \"bldc\"");
   EXPECT_EQ(problems_of(bench("[axis.machine]\nself_inductance_h = 3\n")).find("known key"),
             std::string::npos)
-      << "of a motor file that cannot be read nobody knows the kind";
+      << "the kind of an unreadable motor file is unknown";
 }
 
 // ---- one shaft ----
@@ -123,8 +123,7 @@ std::string named(std::string text, const std::string& own, const std::string& o
   return text.replace(text.find("\"x\""), 3, '"' + other + '"');
 }
 
-// Catches an axis that turns on its own, a canonical text that parts the two, a hash that does not see the
-// shaft.
+// Catches: an axis that turns alone, a canonical text that parts the two axes, a hash that misses the shaft.
 TEST(ConfigShaft, TwoAxesShareOne) {
   const BenchConfig config = parse(kBench + kBrake);
   ASSERT_EQ(config.setup.axes.size(), 2u);
@@ -145,7 +144,7 @@ TEST(ConfigShaft, TwoAxesShareOne) {
   EXPECT_EQ(configuration_hash(renamed), configuration_hash(config)) << "names do not count";
 }
 
-// Catches a motor file that cannot be used for the second axis because it knows its inertia.
+// Catches: a motor file that is refused for the second axis because it contains an inertia.
 TEST(ConfigShaft, TheMechanicsOfTheSecondMotorFileAreNotUsed) {
   const Folder folder;
   folder.write("m.toml",
@@ -160,7 +159,7 @@ TEST(ConfigShaft, TheMechanicsOfTheSecondMotorFileAreNotUsed) {
             std::string::npos);
 }
 
-// Catches a chain of shafts, a third axis on a shaft, and settings of a shaft that is another's.
+// Catches: a chain of shafts, a third axis on a shaft, and settings for the shaft of another axis.
 TEST(ConfigShaft, EachRuleIsKept) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {named(kBrake, "brake", "z"),
@@ -186,14 +185,14 @@ TEST(ConfigShaft, EachRuleIsKept) {
 
 // ---- substeps ----
 
-// Catches an automatic number that ignores an axis, or one that overrides what the file says.
+// Catches: an automatic number that ignores an axis, or that overrides the file's.
 TEST(ConfigSubsteps, SuitTheAxisThatNeedsMost) {
   const auto needed = [](const AxisParameters& p) { return default_substeps(p, 125e-6); };
   const BenchConfig servo = parse(kBench);
   EXPECT_EQ(servo.setup.substeps, needed(servo.setup.axes[0].parameters));
   const std::string fast = std::string(kBldc).replace(kBldc.find("0.5"), 3, "9.5");
   const BenchConfig bldc = parse(with_machine(fast));
-  ASSERT_NE(bldc.setup.substeps, servo.setup.substeps) << "or this test shows nothing";
+  ASSERT_NE(bldc.setup.substeps, servo.setup.substeps) << "else this test shows nothing";
   std::string second = with_machine(fast);
   second = second.substr(second.find("[[axis]]"));
   second.replace(second.find("\"x\""), 3, "\"y\"");
@@ -204,7 +203,7 @@ TEST(ConfigSubsteps, SuitTheAxisThatNeedsMost) {
       << "a recording keeps it if the rule changes";
 }
 
-// Catches a current loop that is run too seldom.
+// Catches: a current loop that is run too seldom.
 TEST(ConfigSubsteps, ACurrentLoopNeedsShortSteps) {
   const std::string loop =
       "[axis.drive]\nkind = \"current_amplifier\"\n[axis.current_loop]\nproportional_v_per_a = 10\nlimit_a = "

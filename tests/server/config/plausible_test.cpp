@@ -1,4 +1,4 @@
-// Values that are right by the rules and hardly meant.
+// Values that keep the rules and are probably mistakes.
 #include "server/config/plausible.hpp"
 
 #include <gtest/gtest.h>
@@ -31,9 +31,9 @@ bool says(const std::vector<Problem>& odd, std::string_view field) {
   return std::any_of(odd.begin(), odd.end(), [field](const Problem& each) { return each.field == field; });
 }
 
-// Catches: millihenries, milliohms or gram square centimetres that are taken for what they are not; a message
-// without the place, the value, the window or the way out; a window with its edge on the wrong side.
-TEST(ConfigPlausible, CFG_02_AWrongUnitIsToldWithItsWindow) {
+// Catches: millihenries, milliohms or gram square centimetres that are taken for SI units; a message without
+// the place, the value, the window or the remedy; a window with its edge on the wrong side.
+TEST(ConfigPlausible, CFG_02_AWrongUnitIsReportedWithItsWindow) {
   struct Case {
     std::string from, to, said;
   };
@@ -42,7 +42,7 @@ TEST(ConfigPlausible, CFG_02_AWrongUnitIsToldWithItsWindow) {
            {"0.014\nrotor", "14.0\nrotor",
             ":11: axis.machine.stator_inductance_h is 14 H, which is odd: a machine of kind \"induction\" "
             "has 1e-04 to 3 H; --allow-odd takes it all the same"},
-           // The step is too long for such a machine, and this is why.
+           // The step is too long for such a machine; the wrong unit explains it.
            {"stator_resistance_ohm = 1.7", "stator_resistance_ohm = 1700.0",
             ":9: axis.machine.stator_resistance_ohm is 1700 ohm, which is odd: "},
            {"pole_pairs = 3", "pole_pairs = 60", ":8: axis.machine.pole_pairs is 60, which is odd: "},
@@ -63,8 +63,8 @@ TEST(ConfigPlausible, CFG_02_AWrongUnitIsToldWithItsWindow) {
   EXPECT_EQ(problems_of(with("pole_pairs = 3", "pole_pairs = 60")), "none") << "a recording of it replays";
 }
 
-// Catches: a machine whose leakage was lost with the last digit, which is nothing but stiff.
-TEST(ConfigPlausible, CFG_03_HardlyAnyLeakageIsOdd) {
+// Catches: a leakage that was lost with the last digit, which makes the machine nothing but stiff.
+TEST(ConfigPlausible, CFG_03_AVerySmallLeakageIsOdd) {
   const Folder folder;
   for (const double sigma : {0.0049, 0.0051}) {
     const double mutual_h = 0.014 * std::sqrt(1.0 - sigma);
@@ -81,7 +81,7 @@ TEST(ConfigPlausible, CFG_03_HardlyAnyLeakageIsOdd) {
 
 // Catches: a window that a machine of the book does not fit through; a kind of machine, or a number that
 // every machine of a kind must name, without a window.
-TEST(ConfigPlausible, CFG_02_EveryBenchFitsAndAMillionTimesAsMuchDoesNot) {
+TEST(ConfigPlausible, CFG_02_EveryBenchFitsAndAMillionTimesItsValuesDoNot) {
   std::set<std::string_view> kinds;
   for (const auto& entry : fs::directory_iterator(kConfigs / "benches")) {
     EXPECT_EQ(oddities_of(entry.path()), "none") << entry.path();

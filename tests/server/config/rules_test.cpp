@@ -11,8 +11,8 @@
 namespace drivebench::test {
 namespace {
 
-// Catches a reader that stops at the first problem, or names the wrong line.
-TEST(ConfigRules, CFG_01_AllProblemsAreToldAtOnceWithTheirLines) {
+// Catches: a reader that stops at the first problem, or names the wrong line.
+TEST(ConfigRules, CFG_01_AllProblemsAreReportedAtOnceWithTheirLines) {
   std::string text = kBench;
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
            {"period_us = 125", "peroid_us = 125"},
@@ -31,7 +31,7 @@ TEST(ConfigRules, CFG_01_AllProblemsAreToldAtOnceWithTheirLines) {
             "b.toml:19: axis.encoder.counts_per_revolution is 2001 but must be a multiple of 4");
 }
 
-// Catches, one by one, a rule that is not kept: each line is an edit of a good bench and what must be said.
+// Catches: a rule that is not checked: each row is an edit of a good bench and the expected problem.
 TEST(ConfigRules, CFG_01_CFG_02_CFG_03_CFG_04_SEC_02_EachRuleIsKept) {
   struct Case {
     std::string from, to, said;
@@ -129,7 +129,7 @@ TEST(ConfigRules, CFG_01_CFG_02_CFG_03_CFG_04_SEC_02_EachRuleIsKept) {
   }
 }
 
-// Catches a longest lease that is refused although it can be counted in nanoseconds.
+// Catches: a longest lease that is refused although its nanoseconds can be counted.
 TEST(ConfigRules, TheLongestLeaseIsTaken) {
   EXPECT_EQ(problems_of(with("125", "125\nlease_ticks = 8000000000000")), "none");
   const BenchConfig config = parse(with("125", "33.333\nlease_s = 1e9"));
@@ -137,7 +137,7 @@ TEST(ConfigRules, TheLongestLeaseIsTaken) {
   EXPECT_EQ(problems_of(to_toml(config)), "none");
 }
 
-// Catches a step that RK4 cannot take, or advice that does not help.
+// Catches: a step that RK4 cannot take, or advice that does not help.
 TEST(ConfigRules, CFG_05_StepTooLongForTheMachineIsRefusedWithTheSubstepsItNeeds) {
   const std::string found = problems_of(with("125", "2000\nsubsteps = 4"));
   EXPECT_NE(found.find(":5: bench.substeps comes to steps of 500 us, too long"), std::string::npos) << found;

@@ -16,7 +16,7 @@ std::string with_modbus(const std::string& lines) {
   return kBench + "[modbus]\n" + lines;
 }
 
-// Catches: a rule of [modbus] that is not kept, above all writes that any computer may send unnoticed.
+// Catches: a rule of [modbus] that is not checked, above all writes that any computer may send.
 TEST(ConfigModbus, EachRuleIsKept) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"address = \"0\"\n", ":22: modbus.address is \"0\" but must be an IPv4 or IPv6 address"},
@@ -47,7 +47,7 @@ TEST(ConfigModbus, EachRuleIsKept) {
   EXPECT_EQ(problems_of(with_modbus("address = \"::\"\nallow_writes = true\nunprotected = true\n")), "none");
 }
 
-// Catches: a section that has to say something to be there, and a default that is not the documented one.
+// Catches: an empty section that is ignored, and a default that is not the documented one.
 TEST(ConfigModbus, TheSectionAloneTurnsItOn) {
   EXPECT_FALSE(parse(kBench).modbus.enabled);
   ModbusConfig modbus;
@@ -55,7 +55,7 @@ TEST(ConfigModbus, TheSectionAloneTurnsItOn) {
   expect_equal(parse(with_modbus("")).modbus, modbus);
 }
 
-// Catches: a server that starts without what it needs for TLS, or with a key that everybody can read.
+// Catches: a server that starts without a part of TLS, or with a key that every user can read.
 TEST(ConfigTls, EachRuleIsKept) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"certificate = \"c.pem\"\n", "tls.key is missing"},
@@ -129,8 +129,8 @@ TEST(ConfigTransports, TheCanonicalTextReadsBackEqual) {
   EXPECT_EQ(to_toml(parse(kBench)).find("modbus"), std::string::npos);
 }
 
-// Catches: a recording made over CAN or Modbus that no other bench replays, or that cannot be read without a
-// folder.
+// Catches: a recording made over CAN or Modbus that replays on no other bench, or that cannot be read without
+// a folder.
 TEST(ConfigTransports, ABusChangesNeitherThePhysicsNorTheReplay) {
   const BenchConfig config = busy_bench();
   EXPECT_EQ(physics_toml(config), physics_toml(parse(kBench)));
@@ -138,8 +138,8 @@ TEST(ConfigTransports, ABusChangesNeitherThePhysicsNorTheReplay) {
   expect_equal(parse_config(to_toml(config), "bench.toml", {}), config);
 }
 
-// Catches: a bench for CAN or Modbus that is not the bench of the book any more, or not the bench it says it
-// is.
+// Catches: a bench for CAN or Modbus that is no longer the bench of the book, or whose name does not fit its
+// bus.
 TEST(ConfigTransports, ShippedBenchesAreTheServoBenchWithABus) {
   const std::uint64_t servo = configuration_hash(load_config(kConfigs / "benches/servo.toml"));
   const BenchConfig udp = load_config(kConfigs / "benches/servo-can.toml");

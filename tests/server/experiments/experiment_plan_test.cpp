@@ -1,4 +1,4 @@
-// Requests for experiments: what is right, what is wrong and how that is told.
+// Requests for experiments: which are taken, which are refused, and the field that the refusal names.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace drivebench {
 namespace {
 
-/// What the refusal of a request is about.
+/// The field that the refusal of a request names.
 std::string field_of(const v1::RunExperiment& r, const std::string& name = "servo") {
   try {
     plan_of(r, name);
@@ -25,8 +25,8 @@ struct Bad {
   void (*change)(v1::RunExperiment&);
 };
 
-// Catches: a rule that is not checked, or told with another field.
-TEST(ExperimentPlan, TellsWhatIsWrongWithARequest) {
+// Catches: a rule that is not checked, or whose refusal names another field.
+TEST(ExperimentPlan, NamesTheWrongFieldOfARequest) {
   const std::vector<Bad> bads = {
       {"nothing", [](v1::RunExperiment&) {}},
       {"owner", [](v1::RunExperiment& r) { r.set_owner("short"); }},
@@ -152,8 +152,8 @@ v1::RunExperiment on_channel(v1::Channel channel, v1::InputKind kind) {
   return r;
 }
 
-// Catches: a voltage for a terminal that the machine has not, and one that it has and that is refused.
-TEST(ExperimentPlan, AShapeDrivesTheTerminalsThatThereAre) {
+// Catches: a voltage that is taken for a terminal that the machine lacks, or refused for one that it has.
+TEST(ExperimentPlan, AShapeDrivesOnlyTerminalsOfTheMachine) {
   struct Terminals {
     const char* bench;
     v1::InputKind kind;
@@ -177,7 +177,7 @@ TEST(ExperimentPlan, AShapeDrivesTheTerminalsThatThereAre) {
   EXPECT_EQ(field_of(on_channel(v1::CHANNEL_D, v1::INPUT_KIND_DQ_VOLTAGES), "dc-a"), "input.kind");
 }
 
-// Catches: a setting that breaks a rule between values and is found out by a replay only.
+// Catches: a setting that breaks a rule between values, noticed by the replay only.
 TEST(ExperimentPlan, SettingsKeepTheRulesOfAConfiguration) {
   v1::RunExperiment r = good();
   v1::NamedValue& setting = *r.add_settings();
@@ -192,7 +192,7 @@ TEST(ExperimentPlan, SettingsKeepTheRulesOfAConfiguration) {
             5.85);
 }
 
-// Catches: dq voltages that turn by the mechanical angle, with the wrong sign, or half a count aside.
+// Catches: dq voltages that turn by the mechanical angle, with the wrong sign, or half a count off.
 TEST(ExperimentPlan, TurnsDqVoltagesByTheElectricalAngle) {
   v1::RunExperiment r = good();
   r.mutable_input()->Clear();
@@ -221,8 +221,8 @@ TEST(ExperimentPlan, TurnsDqVoltagesByTheElectricalAngle) {
   EXPECT_NEAR(command.setpoint.a, -3.0 * std::sin(0.31415926535897931), 1e-14);
 }
 
-// Catches: a register that is shifted through 2^20 bits for each shape while the I/O thread waits (2 ms), and
-// bits that each plan in the queue has of its own (128 KiB).
+// Catches: a register that the I/O thread shifts through 2^20 bits for each shape (2 ms), and bits that each
+// plan in the queue stores again (128 KiB).
 TEST(ExperimentPlan, AllRequestsShareTheSequencesOfBits) {
   v1::RunExperiment r = good();
   r.mutable_input()->clear_shapes();

@@ -34,7 +34,7 @@ class StallingDisk {
   void let(int writes) { may_write_.release(writes); }
   void fill(bool is_full) { is_full_ = is_full; }
   int begun() const { return begun_; }
-  /// Somebody waited for it who also had to let it go on.
+  /// A thread waited for the disk that also had to release it.
   bool stood_too_long() const { return stood_too_long_; }
 
  private:
@@ -54,7 +54,7 @@ v1::RunExperiment request(std::uint64_t ticks = 100) {
   return r;
 }
 
-/// Paced by the clock: long enough for whatever a test does meanwhile.
+/// Paced by the clock: longer than any test.
 v1::RunExperiment endless() {
   v1::RunExperiment r = request(400'000);
   r.set_mode(v1::MODE_REALTIME);
@@ -107,10 +107,10 @@ class ExperimentQueue : public testing::Test {
   std::optional<Experiments> experiments_;
 };
 
-// Catches: a disk that the I/O thread waits for, itself or for the lock of the thread that ends an
-// experiment; an experiment that others are told of, or that runs, and that a crash can still forget; an end
-// of that kind.
-TEST_F(ExperimentQueue, NobodyWaitsForTheDisk) {
+// Catches: an I/O thread that waits for the disk, itself or for the lock of the thread that ends an
+// experiment; an experiment that is announced, or runs, or ends, before it is on the disk, so that a crash
+// forgets it.
+TEST_F(ExperimentQueue, TheIoThreadNeverWaitsForTheDisk) {
   start();
   const auto first = submit(request());
   ASSERT_TRUE(until([this] { return disk_.begun() == 1; }));
@@ -119,7 +119,7 @@ TEST_F(ExperimentQueue, NobodyWaitsForTheDisk) {
   EXPECT_EQ(listed(), 0u);
   EXPECT_THROW(experiments_->cancel(1, kOwner), BadRequest);
   disk_.let(1);
-  ASSERT_TRUE(until([&] { return first->is_there; })) << "it is on the disk and nobody is told";
+  ASSERT_TRUE(until([&] { return first->is_there; })) << "it is on the disk and no client is told";
   ASSERT_NE(first->experiment, nullptr) << first->why_not;
   ASSERT_TRUE(until([this] { return disk_.begun() == 2; })) << "its end does not go to the disk";
   EXPECT_EQ(state_of(*first->experiment), v1::EXPERIMENT_STATE_RUNNING);
@@ -137,8 +137,8 @@ TEST_F(ExperimentQueue, NobodyWaitsForTheDisk) {
   }
 }
 
-// Catches: a refusal that leaves an experiment in the queue, or its number to the next one, whose files are
-// mixed with what is left of it.
+// Catches: a refusal that leaves an experiment in the queue, or that gives its number to the next one, whose
+// files then mix with its remains.
 TEST_F(ExperimentQueue, AFullDiskRefusesAndLeavesNothing) {
   config_.experiments.queue_length = 1;
   start();
@@ -157,8 +157,8 @@ TEST_F(ExperimentQueue, AFullDiskRefusesAndLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "1.experiment"));
 }
 
-// Catches: a request that is sent again before the disk has it, and runs twice or is never answered.
-TEST_F(ExperimentQueue, TheSameRequestOnItsWayToTheDiskIsTheSame) {
+// Catches: a request that is sent again before the disk has it, and then runs twice or is never answered.
+TEST_F(ExperimentQueue, ARequestSentAgainBeforeTheDiskHasItRunsOnce) {
   start();
   v1::RunExperiment r = request();
   r.set_request_key("again");
@@ -174,9 +174,8 @@ TEST_F(ExperimentQueue, TheSameRequestOnItsWayToTheDiskIsTheSame) {
   EXPECT_EQ(three->experiment, one->experiment);
 }
 
-// Catches: a client that says the same again and again while the disk stands still, and is remembered each
-// time.
-TEST_F(ExperimentQueue, NotMoreThan64WaitForTheSameExperiment) {
+// Catches: a client that repeats a request while the disk stands still, and is remembered each time.
+TEST_F(ExperimentQueue, AtMost64RequestsWaitForOneExperiment) {
   start();
   v1::RunExperiment r = request();
   r.set_request_key("again");
@@ -192,7 +191,7 @@ TEST_F(ExperimentQueue, NotMoreThan64WaitForTheSameExperiment) {
   disk_.let(100);
 }
 
-/// As large as an experiment can be made to be.
+/// As large as an experiment can be.
 v1::ExperimentInfo largest_info(std::uint64_t id) {
   v1::ExperimentInfo info;
   info.set_id(id);
@@ -222,9 +221,9 @@ v1::ExperimentInfo largest_info(std::uint64_t id) {
   return info;
 }
 
-// Catches: limits of the configuration with which the list does not fit into an answer, so that who asks for
-// it is cut off; what a folder holds beyond `kept` and is never forgotten.
-TEST_F(ExperimentQueue, TheListOfAllThereMayBeFitsIntoAnAnswer) {
+// Catches: limits of the configuration with which the list exceeds an answer, so that its reader is cut off;
+// experiments beyond `kept` that the folder keeps forever.
+TEST_F(ExperimentQueue, TheLongestListFitsIntoAnAnswer) {
   for (std::uint64_t id = 1; id <= kMaxKeptExperiments + 3; ++id) {
     v1::StoredExperiment stored;
     stored.mutable_request()->set_owner(kOwner);

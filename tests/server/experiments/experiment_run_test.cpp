@@ -30,9 +30,9 @@ Ran run(const ExperimentPlan& plan) {
   return ran;
 }
 
-// Catches: a run that is not that of a bench with the same commands, a row too many or too few, a recording
+// Catches: a run that differs from a bench with the same commands, a row too many or too few, a recording
 // that does not replay.
-TEST(ExperimentRun, IsThatOfABenchWithTheSameCommandsAndReplays) {
+TEST(ExperimentRun, EqualsABenchWithTheSameCommandsAndReplays) {
   const ExperimentPlan plan = plan_of(good());
   const Ran ran = run(plan);
   Bench by_hand(plan.config.setup);
@@ -55,7 +55,7 @@ TEST(ExperimentRun, IsThatOfABenchWithTheSameCommandsAndReplays) {
   EXPECT_NE(ran.rows[2 * 400 + 1], 0.0);
 }
 
-// Catches: a limit that is looked at in the kept samples only, or after another tick has run.
+// Catches: a limit that is checked in the kept samples only, or a tick too late.
 TEST(ExperimentRun, EndsWithTheFirstSampleBeyondALimit) {
   v1::RunExperiment r = good();
   r.mutable_stop()->set_current_a(5.0);
@@ -80,7 +80,7 @@ TEST(ExperimentRun, EndsWithTheFirstSampleBeyondALimit) {
 
 // Catches: an initial speed that depends on the inertia, an event a tick late, a setting that is not in
 // force.
-TEST(ExperimentRun, BeginsWithTheSpeedThatWasAskedForAndHasItsEvents) {
+TEST(ExperimentRun, BeginsWithTheRequestedSpeedAndHasItsEvents) {
   v1::RunExperiment r = good();
   r.mutable_input()->Clear();
   r.mutable_input()->set_kind(v1::INPUT_KIND_NONE);
@@ -120,8 +120,8 @@ TEST(ExperimentRun, GoesOnBehindATrip) {
   EXPECT_NE(static_cast<std::uint64_t>(ran.rows[2 * 20'000 + 1]) & kLatchedFaults, 0u);
 }
 
-// Catches: an experiment that takes the last of the disk from everybody else, goes on without its recording,
-// or does not say what it lacks.
+// Catches: an experiment that takes the last of the disk, goes on without its recording, or does not say what
+// it lacks.
 TEST(ExperimentRun, REC_03_EndsBeforeTheDiskIsFullAndSaysWhy) {
   const test::Folder folder;
   MemoryDisk disk;

@@ -1,4 +1,4 @@
-// What experiments put in, against closed forms.
+// The inputs of experiments, against closed forms.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -53,7 +53,7 @@ TEST(ExperimentShapes, RampIsAStraightLineThatHoldsItsEnds) {
 
 // Catches: a phase that counts from tick 0 instead of the start, degrees, a lost offset, and an angle that
 // loses its digits in a long run.
-TEST(ExperimentShapes, SineIsThatOfTheTimeSinceItsStart) {
+TEST(ExperimentShapes, SineCountsTimeFromItsStart) {
   const InputShape shape =
       on_a(SineShape{.amplitude = 2.5, .frequency_hz = 10.0, .phase_rad = 0.3, .offset = 0.5}, 50, 4'000'000);
   for (const Tick tick : {50, 63, 777}) {
@@ -117,9 +117,8 @@ TEST(ExperimentShapes, PrbsHasMaximumLength) {
   }
 }
 
-// Catches: other bits than those of the recordings that there are: other taps, another register to begin
-// with.
-TEST(ExperimentShapes, PrbsHasTheSameBitsForEver) {
+// Catches: other bits than those of existing recordings: other taps, another first register.
+TEST(ExperimentShapes, PrbsKeepsTheBitsOfExistingRecordings) {
   constexpr auto kHashes =
       std::to_array<std::uint32_t>({0x4736DB29, 0x0E602A71, 0xBD65B135, 0x0B151A79, 0xDC55ACE9, 0x66250AD9,
                                     0x669BCFED, 0xBF706629, 0xC35530C5, 0x34DD7B91, 0xA5AF58D5, 0x89961A91,
@@ -145,8 +144,8 @@ TEST(ExperimentShapes, PrbsHoldsItsBitsAndBeginsWhereTheSeedSays) {
   }
 }
 
-// Catches: phases that add all cosines up at the start, which is what Schroeder's are there to prevent, or a
-// harmonic that is left out.
+// Catches: phases that add up all cosines at the start, which Schroeder's phases prevent, or a harmonic that
+// is left out.
 TEST(ExperimentShapes, MultisineHasItsHarmonicsAndALowPeak) {
   std::vector<std::uint32_t> harmonics(16);
   std::iota(harmonics.begin(), harmonics.end(), 1u);
@@ -178,7 +177,7 @@ TEST(ExperimentShapes, TableHoldsOrJoinsItsRows) {
   EXPECT_EQ(at(joined, 900), -1.0);
 }
 
-// Catches: a shape that replaces what another one has put there.
+// Catches: a shape that replaces the value of another one.
 TEST(ExperimentShapes, ShapesAdd) {
   InputValues values{};
   add_shape(on_a(ConstantShape{2.0}), 5, kPeriodS, Connection::kArmature, values);
@@ -186,7 +185,7 @@ TEST(ExperimentShapes, ShapesAdd) {
   EXPECT_EQ(values[0], 1.5);
 }
 
-// Catches: a table whose second part overwrites its first, or that shows rows which are not there.
+// Catches: a table whose second part overwrites its first, or that shows rows before they are written.
 TEST(ExperimentShapes, TablesOnDiskReadBackWhatWasAppended) {
   SignalTable table(std::filesystem::temp_directory_path());
   const std::vector<SignalTable::Row> first = {{0.0, 1.0}, {1.0, 2.0}};
@@ -208,8 +207,7 @@ std::size_t resident_bytes() {
   return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// Catches: a table that is read in as a whole when it is mapped, while the I/O thread of a server that has
-// locked its memory waits.
+// Catches: a mapped table that is read whole while the I/O thread of a server with locked memory waits.
 TEST(ExperimentShapes, AMappedTableIsReadWhereItIsNeeded) {
   rlimit limit{};
   ASSERT_EQ(::getrlimit(RLIMIT_MEMLOCK, &limit), 0);

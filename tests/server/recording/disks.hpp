@@ -17,29 +17,28 @@
 
 #include "server/recording/recording_file.hpp"
 
-/// Disks for the recorder that live in memory, keep a log of what was asked of them, and fail as they are
-/// told.
+/// Disks for the recorder that live in memory, log every call, and fail on request.
 namespace drivebench {
 
 enum class DiskCall { kWrite, kTruncate, kSync, kClose };
 
 struct DiskEntry {
   DiskCall call = DiskCall::kWrite;
-  std::uint64_t at = 0;  ///< where a write went, or what size a truncate left
+  std::uint64_t at = 0;  ///< place of a write, or size after a truncate
   std::vector<std::byte> bytes{};
 };
 
-/// What happened to one file, in order.
+/// The calls for one file, in order.
 struct DiskLog {
   std::vector<DiskEntry> entries;
   std::vector<std::byte> content;  ///< as a reader sees it while the machine lives
 };
 
-/// The disk of a test. Calls come from one thread, the recorder's; look at it when the recorder is gone.
+/// The disk of a test. The recorder's thread alone calls it; read it when the recorder is gone.
 class MemoryDisk {
  public:
-  /// Gets the number of the call of its kind on this disk, from 1 on; the errno with which it fails, 0 for
-  /// none.
+  /// Returns the errno with which a call fails, 0 for none; its argument is the number of the call of its
+  /// kind on this disk, from 1 on.
   using Fault = std::function<int(DiskCall, std::size_t)>;
 
   CreateRecordingFile creator(Fault fault = {}) {

@@ -23,7 +23,7 @@ bool same_words(const Sample& a, const Sample& b) {
   return std::memcmp(&a, &b, sizeof(a)) == 0;
 }
 
-/// All that stands in a recording, in its order.
+/// The contents of a recording, in order.
 struct Recording {
   explicit Recording(const std::filesystem::path& file) : bytes(content_of(file)), reader(bytes) {
     for (McapMessage message; reader.next(message);) {
@@ -223,8 +223,8 @@ class FileSizeLimit {
   void (*old_handler_)(int);
 };
 
-// Catches: a full disk that ends the process, that nobody hears of, or that costs more than is counted: what
-// can be read and what was lost is all there was. REC-03, REC-04.
+// Catches: a full disk that ends the process, that is not reported, or that costs more than is counted: the
+// readable and the lost entries must add up to all. REC-03, REC-04.
 TEST(Recorder, REC_03_AFullDiskIsCountedToTheLastEntry) {
   for (const rlim_t limit : {rlim_t{100}, rlim_t{50'000}, rlim_t{700'000}, rlim_t{1'500'000}}) {
     const TestFolder folder;
@@ -249,7 +249,7 @@ TEST(Recorder, REC_03_AFullDiskIsCountedToTheLastEntry) {
   }
 }
 
-// Catches: a file that lost only its end and still counts as whole.
+// Catches: a file that lost its end only and still counts as whole.
 TEST(Recorder, REC_03_ADiskThatFillsAtTheVeryEndIsCounted) {
   const TestFolder folder;
   std::uintmax_t whole = 0;
@@ -268,7 +268,7 @@ TEST(Recorder, REC_03_ADiskThatFillsAtTheVeryEndIsCounted) {
   }
 }
 
-// Catches: a run that ends in an exception and waits for its recorder for ever, or kills the process.
+// Catches: a run that ends in an exception and then waits for its recorder forever, or kills the process.
 TEST(Recorder, MayBeDestroyedWithoutFinish) {
   const TestFolder folder;
   {

@@ -1,4 +1,4 @@
-// What a recording keeps when its disk fails, forgets or stalls.
+// The contents of a recording after its disk failed, lost its power or stalled.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -54,10 +54,10 @@ std::vector<Bytes> contents_of(const MemoryDisk& disk) {
   return contents;
 }
 
-/// Writes samples as the recorder's thread does in real time, which is made up here; what counted as lost.
+/// Writes samples as the recorder's thread does in real time, on a clock of the test; returns the number of
+/// lost ones.
 std::uint64_t record(RecordingWriter& writer, std::uint64_t from, std::uint64_t to) {
-  const Clock::time_point start =
-      Clock::now();  // the writer is not older than that by more than a test takes
+  const Clock::time_point start = Clock::now();  // the writer was made less than a test's duration earlier
   std::uint64_t lost = 0;
   for (std::uint64_t tick = from; tick < to; ++tick) {
     writer.write(sample_at(tick));
@@ -71,9 +71,9 @@ std::uint64_t record(RecordingWriter& writer, std::uint64_t from, std::uint64_t 
 
 constexpr std::uint64_t kSector = 512;
 
-/// What is on the disk after the power went at `cut` calls: all up to the last sync before, and of the later
-/// writes each sector by chance, in whatever order the disk chose; what was not written reads as zeros, or as
-/// what lay there.
+/// The disk's contents after a power cut behind `cut` calls: everything up to the last sync, and of the later
+/// writes each sector by chance and in any order; a sector that was not written reads as zeros, or as old
+/// data.
 Bytes image_after_cut(const std::vector<DiskEntry>& log, std::size_t cut, std::mt19937& random) {
   std::size_t synced = 0;
   for (std::size_t n = 0; n < cut; ++n)
@@ -109,7 +109,7 @@ Bytes image_after_cut(const std::vector<DiskEntry>& log, std::size_t cut, std::m
     if (random() % 64 == 0)
       image[sector.at + random() % sector.bytes.size()] ^= std::byte(1u << random() % 8);
   }
-  // The size of the file is written apart from what is in it.
+  // The disk writes the size of a file apart from its contents.
   if (random() % 3 == 0 && longest > image.size())
     image.resize(image.size() + random() % (longest - image.size()));
   if (random() % 5 == 0) image.resize(image.size() + random() % 4096, std::byte(random() % 256));
@@ -118,7 +118,7 @@ Bytes image_after_cut(const std::vector<DiskEntry>& log, std::size_t cut, std::m
 
 // Catches: a sync that does not cover what was written before it; a chunk that needs a later one to be read;
 // a reader that believes half a sector. Five seconds of a real recording, the power cut at random calls.
-TEST(RecordingDisk, REC_02_WhatWasSyncedSurvivesAPowerCut) {
+TEST(RecordingDisk, REC_02_SyncedDataSurviveAPowerCut) {
   const TestFolder folder;
   MemoryDisk disk;
   constexpr std::uint64_t kTicks = 50 * kTicksOf100Ms;
@@ -156,8 +156,8 @@ TEST(RecordingDisk, REC_02_WhatWasSyncedSurvivesAPowerCut) {
 
 // ---- errors ----
 
-// Catches: a sync that is tried again until it says yes, though the system has forgotten what it could not
-// write; a recording that ends there, or goes on in the bad file; losses that nobody counts.
+// Catches: a sync that is repeated until it succeeds, though the system has forgotten the data that it could
+// not write; a recording that ends there, or goes on in the bad file; losses that are not counted.
 TEST(RecordingDisk, REC_05_AfterAFailedSyncANewFileBegins) {
   const TestFolder folder;
   MemoryDisk disk;
@@ -168,7 +168,7 @@ TEST(RecordingDisk, REC_05_AfterAFailedSyncANewFileBegins) {
   RecordingWriter writer(folder / "run.mcap", servo_bench(), {},
                          {.continues_after_errors = true, .create = disk.creator(third_sync)});
   std::uint64_t lost = record(writer, 0, kTicks);
-  // At the third second: what came in the second before it, and what was on its way.
+  // At the third second: the data of the second before it, and those on their way.
   EXPECT_GE(lost, 10 * kTicksOf100Ms);
   EXPECT_LE(lost, 12 * kTicksOf100Ms);
   writer.finish({.ticks = kTicks, .gaps = lost});
@@ -185,8 +185,7 @@ TEST(RecordingDisk, REC_05_AfterAFailedSyncANewFileBegins) {
   EXPECT_GE(all.ticks.size() + lost, kTicks) << "nothing is lost that was not counted";
 }
 
-// Catches: an error of write that ends the run's recording though the disk has room; one that is counted
-// wrongly.
+// Catches: a failed write that ends the run's recording though the disk has room, or that is counted wrongly.
 TEST(RecordingDisk, REC_03_REC_05_AfterAFailedWriteANewFileBegins) {
   for (std::size_t run = 0; run < 40; ++run) {
     const int error = run % 2 == 0 ? EIO : ENOSPC;
@@ -205,16 +204,16 @@ TEST(RecordingDisk, REC_03_REC_05_AfterAFailedWriteANewFileBegins) {
     const Found found(contents_of(disk));
     EXPECT_EQ(disk.names.size(), error == EIO ? 2u : 1u) << "a full disk has no room for a new file either";
     EXPECT_EQ(writer.is_over(), error == ENOSPC);
-    // A file that has lost only its beginning or its end counts as one.
+    // A file that lost only its beginning or its end counts as one lost entry.
     const std::uint64_t missing = kTicks + 1 - found.ticks.size() - (found.has_verdict ? 1 : 0);
     EXPECT_EQ(lost, std::max<std::uint64_t>(missing, 1)) << std::strerror(error) << " of write " << bad;
     EXPECT_FALSE(found.is_whole);
   }
 }
 
-// Catches: an error of the last sync or of close that nobody hears of; a disk that is dead, and fills the
-// folder with file after file.
-TEST(RecordingDisk, REC_05_ErrorsAtTheEndAreToldAndADeadDiskIsGivenUp) {
+// Catches: an error of the last sync or of close that is not reported; a dead disk on which file after file
+// begins.
+TEST(RecordingDisk, REC_05_ErrorsAtTheEndAreReportedAndADeadDiskIsGivenUp) {
   for (const DiskCall bad : {DiskCall::kSync, DiskCall::kClose}) {
     const TestFolder folder;
     MemoryDisk disk;
@@ -224,7 +223,7 @@ TEST(RecordingDisk, REC_05_ErrorsAtTheEndAreToldAndADeadDiskIsGivenUp) {
     record(writer, 0, 100);
     writer.finish({.ticks = 100});
     EXPECT_GE(writer.take_lost(), 1u);
-    EXPECT_EQ(disk.names.size(), 1u) << "there is nothing more to come";
+    EXPECT_EQ(disk.names.size(), 1u) << "no entry is left for another file";
   }
   const TestFolder folder;
   MemoryDisk disk;
@@ -237,9 +236,9 @@ TEST(RecordingDisk, REC_05_ErrorsAtTheEndAreToldAndADeadDiskIsGivenUp) {
   EXPECT_EQ(disk.names.size(), 2u);
 }
 
-// Catches: a recording that takes the last of the disk from the system and the audit log, and ends torn; one
-// that begins where there is no room.
-TEST(RecordingDisk, REC_03_ItEndsWholeBeforeTheDiskIsFull) {
+// Catches: a recording that takes the last of the disk from the system and the audit log, and ends torn; a
+// recording that begins without room.
+TEST(RecordingDisk, REC_03_ARecordingEndsWholeBeforeTheDiskIsFull) {
   const TestFolder folder;
   MemoryDisk disk;
   const RecordingOptions options{
@@ -283,7 +282,7 @@ TEST(RecordingDisk, REC_03_AFreeRunEndsWholeTooInOneFileOrMany) {
 }
 
 // Catches: a recording that ends for want of room and begins another file because its end was refused.
-TEST(RecordingDisk, REC_03_WhatEndsForWantOfRoomDoesNotBeginAgain) {
+TEST(RecordingDisk, REC_03_ARecordingThatEndsForWantOfRoomDoesNotBeginAgain) {
   for (const DiskCall bad : {DiskCall::kSync, DiskCall::kClose}) {
     const TestFolder folder;
     MemoryDisk disk;
@@ -303,8 +302,8 @@ TEST(RecordingDisk, REC_03_WhatEndsForWantOfRoomDoesNotBeginAgain) {
 
 // ---- limits ----
 
-// Catches: entries that wait longer in memory than 100 ms of plant time, or are written one by one.
-TEST(RecordingDisk, LIMIT_09_WhatIs100MillisecondsOldIsWritten) {
+// Catches: entries that stay in memory longer than 100 ms of plant time, or that are written one by one.
+TEST(RecordingDisk, LIMIT_09_EntriesAreWrittenWithin100Milliseconds) {
   const TestFolder folder;
   MemoryDisk disk;
   RecordingWriter writer(folder / "run.mcap", servo_bench(), {}, {.create = disk.creator()});
@@ -318,8 +317,8 @@ TEST(RecordingDisk, LIMIT_09_WhatIs100MillisecondsOldIsWritten) {
   EXPECT_EQ(readable(), kTicksOf100Ms);
 }
 
-// Catches: a disk that is never asked to keep what it was given, or that is asked with each write.
-TEST(RecordingDisk, LIMIT_09_EverySecondIsSynced) {
+// Catches: a disk that is never asked to sync, or with each write.
+TEST(RecordingDisk, LIMIT_09_TheFileIsSyncedEverySecond) {
   const TestFolder folder;
   MemoryDisk disk;
   const Clock::time_point start = Clock::now();
@@ -360,7 +359,7 @@ TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCou
     StallingDisk disk;
     Recorder recorder(folder / "run.mcap", servo_bench(), {}, {.create = disk.creator()});
     disk.stall(true);
-    feed(recorder, 0, kTicksOf100Ms + 1);  // what it takes to make it write
+    feed(recorder, 0, kTicksOf100Ms + 1);  // so that it begins to write
     disk.wait_until_it_holds_somebody();
     const std::uint64_t end = seconds * kSecond;
     feed(recorder, kTicksOf100Ms + 1, end);  // does not wait, or this test would not end
@@ -373,7 +372,7 @@ TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCou
     }
     disk.stall(false);
     recorder.finish({.ticks = end});
-    EXPECT_EQ(recorder.gaps(), gaps) << "what came in time is there";
+    EXPECT_EQ(recorder.gaps(), gaps) << "entries that came in time are in the file";
     const Found found(std::vector<Bytes>{content_of(folder / "run.mcap")});
     EXPECT_TRUE(found.is_whole);
     EXPECT_TRUE(seconds != 2 || found.begins_with(end));

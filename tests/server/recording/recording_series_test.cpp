@@ -43,7 +43,7 @@ counts_per_revolution = 4096
   return config;
 }
 
-/// A free run of the bench; how many entries were lost.
+/// A free run of the bench; returns the number of lost entries.
 std::uint64_t run(const std::filesystem::path& file, const BenchConfig& config, Tick ticks,
                   const RecordingOptions& options) {
   Recorder recorder(file, config, {}, options);
@@ -76,9 +76,9 @@ std::uint64_t samples_in(std::span<const std::byte> file) {
   return samples;
 }
 
-// Catches: a tick that is lost, doubled or torn where one file ends and the next begins; files of other sizes
-// than asked for; a recording that replays only in one piece. A day of plant time, a file each hour.
-TEST(RecordingSeries, REC_11_ADayWithAFileEachHour) {
+// Catches: a tick that is lost, doubled or torn between two files; files of other sizes than requested; a
+// recording that replays in one piece only. A day of plant time, a file each hour.
+TEST(RecordingSeries, REC_11_ADayInHourlyFilesLosesNothing) {
   const TestFolder folder;
   EXPECT_EQ(run(folder / "day.mcap", slow_bench(), kPeriodsPerDay, {.file_ticks = 3600}), 0u);
   EXPECT_EQ(files_in((folder / "day.mcap").parent_path()), 25u)
@@ -100,8 +100,8 @@ TEST(RecordingSeries, REC_11_ADayWithAFileEachHour) {
   }
 }
 
-// Catches: a limit in bytes that is not kept: files end with the chunk that brings them there.
-TEST(RecordingSeries, REC_11_FilesOfAGivenSize) {
+// Catches: a limit in bytes that is exceeded by more than the last chunk.
+TEST(RecordingSeries, REC_11_FilesKeepTheRequestedSize) {
   const TestFolder folder;
   constexpr std::uint64_t kLimit = 300'000;
   const BenchConfig config = servo_bench(2);
@@ -116,7 +116,7 @@ TEST(RecordingSeries, REC_11_FilesOfAGivenSize) {
   EXPECT_EQ(replay(files.segments(), nullptr).result, ReplayReport::Result::kEqual);
 }
 
-// Catches: a file that is missing, doubled or of another recording, and that passes.
+// Catches: a replay that takes a series with a missing, doubled or foreign file.
 TEST(RecordingSeries, REC_11_EveryFileIsNeededInItsPlace) {
   const TestFolder folder;
   run(folder / "run.mcap", slow_bench(), 350, {.file_ticks = 100});
@@ -133,16 +133,16 @@ TEST(RecordingSeries, REC_11_EveryFileIsNeededInItsPlace) {
   }
 }
 
-// Catches: the files of yesterday's recording taken for the end of today's.
-TEST(RecordingSeries, REC_07_NoOldFileIsTakenForItsEnd) {
+// Catches: the files of an older recording taken for the end of the newer one.
+TEST(RecordingSeries, REC_07_NoOldFileIsTakenForTheEndOfARecording) {
   const TestFolder folder;
-  std::ofstream(folder / "run.2.mcap") << "yesterday";
+  std::ofstream(folder / "run.2.mcap") << "older";
   EXPECT_THROW(Recorder(folder / "run.mcap", servo_bench()), std::system_error);
   EXPECT_FALSE(std::filesystem::exists(folder / "run.mcap"));
 }
 
-// Catches: names that do not sort beside the first, or that leave the folder.
-TEST(RecordingSeries, TheNamesOfItsFiles) {
+// Catches: names that do not sort behind the first, or that leave the folder.
+TEST(RecordingSeries, FilesAreNumberedBesideTheFirst) {
   EXPECT_EQ(segment_path("run.mcap", 1), "run.mcap");
   EXPECT_EQ(segment_path("run.mcap", 2), "run.2.mcap");
   EXPECT_EQ(segment_path("a.b/run", 12), "a.b/run.12");

@@ -26,8 +26,8 @@ namespace {
 using Result = ReplayReport::Result;
 using Bytes = std::vector<std::byte>;
 
-/// A lockstep run in which everything happens that a recording can hold: two axes, a lease, commands, loads
-/// from the file and from outside, a parameter write and a ramp, a fault, a bump, refused commands, a clear.
+/// A lockstep run with every event that a recording can hold: two axes, a lease, commands, loads from the
+/// file and from clients, a parameter write and a ramp, a fault, a bump, refused commands, a clear.
 Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
   const TestFolder folder;
   BenchConfig config = servo_bench(axes);
@@ -63,8 +63,8 @@ struct Entry {
   Bytes payload;
 };
 
-/// The recording written anew, with right checksums and counts, and each message as `edit` leaves it; one
-/// that it returns false for is dropped.
+/// The recording written anew, with right checksums and counts, each message changed by `edit`; a message for
+/// which `edit` returns false is dropped.
 Bytes rewritten(const Bytes& recording, const std::function<bool(Entry&)>& edit, int repeat_from = -1) {
   McapReader reader(recording);
   Bytes out;
@@ -108,13 +108,13 @@ TEST(Replay, REC_12_ARunReplaysBitForBit) {
   EXPECT_EQ(report.state_hash, state_hash);
   EXPECT_NE(report.recorded_by.find("drivebench"), std::string::npos);
   EXPECT_FALSE(report.difference);
-  // The rewriting of the tests below is itself without a trace.
+  // Rewriting by itself changes nothing.
   EXPECT_EQ(replayed(rewritten(recording, [](Entry&) { return true; })).result, Result::kEqual);
 }
 
-// Catches: a recording of another build that is refused though it is right, or one that differs with nobody
-// saying why it may.
-TEST(Replay, REC_12_ARecordingOfAnotherBuildIsTold) {
+// Catches: a right recording of another build that is refused, or a wrong one whose report does not name the
+// build.
+TEST(Replay, REC_12_ARecordingOfAnotherBuildIsReported) {
   const Bytes recording = record(60);
   EXPECT_TRUE(replayed(recording).same_build);
   const ReplayReport other = replayed(rewritten(recording, [](Entry&) { return true; }));
@@ -133,7 +133,7 @@ TEST(Replay, OneFlippedBitOfASampleIsFoundAndNamed) {
   const Bytes recording = record(60);
   std::mt19937 random(5);
   for (const Signal& signal : kSignals) {
-    if (signal.name == "tick") continue;  // it says which sample this is; see below
+    if (signal.name == "tick") continue;  // ASampleOfAnotherTickIsADifference
     const std::uint64_t tick = 1 + random() % 60;
     const std::size_t axis = random() % 2;
     const std::uint64_t bit = random() % (signal.type == SignalType::kReal ? 64 : 40);
@@ -164,7 +164,7 @@ TEST(Replay, OneFlippedBitOfASampleIsFoundAndNamed) {
   }
 }
 
-// Catches: a byte of the file that nobody looks at.
+// Catches: a byte of the file that no check covers.
 TEST(Replay, REC_09_OneFlippedBitAnywhereIsNeverEqual) {
   const Bytes recording = record(12);
   ASSERT_EQ(replayed(recording).result, Result::kEqual);
@@ -180,7 +180,7 @@ TEST(Replay, REC_09_OneFlippedBitAnywhereIsNeverEqual) {
   }
 }
 
-// Catches: a recording that ends early and counts as equal as far as it goes.
+// Catches: a recording that ends early and counts as equal up to its end.
 TEST(Replay, REC_09_ATruncatedRecordingIsUnusable) {
   const Bytes recording = record(12);
   std::mt19937 random(7);
@@ -192,7 +192,7 @@ TEST(Replay, REC_09_ATruncatedRecordingIsUnusable) {
   }
 }
 
-// Catches: inputs that the replay does not need, that is, does not apply; each dropped in turn.
+// Catches: inputs that the replay does not apply; each is dropped in turn.
 TEST(Replay, ADroppedInputIsADifference) {
   const Bytes recording = record(20);
   std::size_t inputs = 0;
@@ -215,7 +215,7 @@ TEST(Replay, ADroppedInputIsADifference) {
   }
 }
 
-// Catches: samples of one axis that are missing, doubled or swapped with nobody counting them.
+// Catches: samples of one axis that are missing, doubled or swapped and not counted.
 TEST(Replay, AMissingOrDoubledSampleIsADifference) {
   const Bytes recording = record(20);
   for (const char* topic : {"/axis0/sample", "/axis1/sample"}) {
@@ -241,7 +241,7 @@ TEST(Replay, AMissingOrDoubledSampleIsADifference) {
   }
 }
 
-// Catches: samples that are only counted: one of an axis twice in the place of another axis's.
+// Catches: samples that are counted but not compared: one of an axis stands in the place of another axis's.
 TEST(Replay, ASampleInThePlaceOfAnotherAxisIsADifference) {
   Entry first;
   const ReplayReport report = replayed(rewritten(record(20, nullptr, 3), [&first](Entry& entry) {
@@ -253,7 +253,7 @@ TEST(Replay, ASampleInThePlaceOfAnotherAxisIsADifference) {
   EXPECT_NE(report.problem.find("axis1 at tick 7"), std::string::npos) << report.problem;
 }
 
-// Catches: a tick number that is believed.
+// Catches: a tick number that is not checked.
 TEST(Replay, ASampleOfAnotherTickIsADifference) {
   const Bytes recording = record(20);
   for (const std::uint64_t wrong :
@@ -296,8 +296,8 @@ TEST(Replay, TheVerdictMustAgree) {
             Result::kUnusable);
 }
 
-// Catches: another kind of file taken for a recording.
-TEST(Replay, WhatIsNoRecordingIsUnusable) {
+// Catches: a file of another kind taken for a recording.
+TEST(Replay, AFileThatIsNoRecordingIsUnusable) {
   EXPECT_EQ(replayed({}).result, Result::kUnusable);
   EXPECT_EQ(replayed(Bytes(1000, std::byte{0})).result, Result::kUnusable);
   Bytes out;

@@ -37,7 +37,7 @@ inline Command voltage(Tick answers, double a_v, double b_v) {
   return {.answers = answers, .phases = {.gates = Gates::kVoltage, .setpoint = {.a = a_v, .b = b_v}}};
 }
 
-/// A folder that goes away with the test.
+/// A folder that is removed with the test.
 class TestFolder {
  public:
   TestFolder() {

@@ -8,8 +8,8 @@
 namespace drivebench {
 namespace {
 
-// Catches: a capacity that is more, or less, than what was asked for.
-TEST(SpscRing, CapacityIsWhatWasAskedFor) {
+// Catches: a capacity that is more, or less, than the requested one.
+TEST(SpscRing, CapacityIsTheRequestedOne) {
   for (const std::size_t capacity : {1u, 5u, 8u}) {
     SpscRing<int> ring(capacity);
     EXPECT_EQ(ring.capacity(), capacity);
