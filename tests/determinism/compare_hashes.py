@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Runs every hash_probe_* of a folder and compares what they print: the state of the bench, tick by tick.
+"""Runs every hash_probe_* of a folder and compares their output: the state of the bench, tick by tick.
 
 Builds with fused multiply-add (hash_probe_*_fused_*) must differ; if they did not, this test would prove nothing.
 """

@@ -51,8 +51,8 @@ std::uint32_t row_of(const char* name) {
   return static_cast<std::uint32_t>(row - axis_parameters(p).data());
 }
 
-/// A voltage that turns with the measured angle plus a slip, and answers the measured current: what is
-/// rounded differently once comes back and grows.
+/// A voltage that turns with the measured angle plus a slip, and answers the measured current: a difference
+/// in rounding comes back and grows.
 Command answer(const Sample& s, double amplitude_v, double slip_rad_s) {
   const double electrical_rad = 3.0 * static_cast<double>(s.encoder_count % 2000) * 3.14159e-3;
   const CosSin turning = cos_sin(electrical_rad + slip_rad_s * 125e-6 * static_cast<double>(s.tick));
@@ -96,7 +96,7 @@ Command setpoint_of(const Bench& bench, std::size_t axis) {
                                   .field = 0.1 * most - 0.1 * s.i_f_a}}};
 }
 
-/// Every fault for a while, one after the other; parameters on their way there and back; bumps and loads.
+/// Every fault for a while, one after the other; parameters ramped away and back; bumps and loads.
 void disturb(Bench& bench, std::uint32_t axis) {
   const Tick tick = bench.tick();
   const auto submit = [&](const Action& action) {

@@ -16,7 +16,7 @@ namespace drivebench {
 
 using Values = std::vector<std::pair<std::string_view, double>>;
 
-/// What every axis of the zoo has.
+/// The parts that every axis of the zoo has.
 inline const Values kEverywhere = {{"mechanics.inertia_kgm2", 1e-3},
                                    {"mechanics.viscous_friction_nms", 1e-3},
                                    {"amplifier.voltage_limit_v", 60},
@@ -50,7 +50,7 @@ inline std::size_t kind_of(std::string_view name) {
   return kind;
 }
 
-/// An axis with these values; a rule that is broken ends the program.
+/// An axis with these values; a broken rule ends the program.
 inline AxisSetup animal(std::string_view kind, DriveKind drive, const Values& values,
                         const Curve& curve = {}) {
   AxisSetup axis;

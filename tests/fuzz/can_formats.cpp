@@ -1,5 +1,5 @@
-// What the CAN formats take for a frame is one that a bus can carry, and reads back equal after it was
-// written. The same bytes go to all of them.
+// A frame that a CAN format reads is one that a bus can carry, and reads back equal after it was written. The
+// same bytes go to all formats.
 #include <algorithm>
 #include <array>
 #include <string>

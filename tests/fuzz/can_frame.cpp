@@ -1,5 +1,5 @@
-// Frames of anybody's making: what they are is told without reading outside them, and what is taken for a
-// message encodes to the same frame.
+// Frames with any contents: they are classified without a read outside them, and a frame that is taken for a
+// message encodes to itself.
 #include <algorithm>
 #include <cmath>
 
@@ -56,7 +56,7 @@ void check_message(const MessageRow& row, std::uint32_t node, const Profile& pro
     for (std::size_t i = 0; i < kEdgesPerFrame; ++i)
       put_edge(again, i, edge_at(frame, i));
   }
-  // Bytes beyond the size mean nothing, and a NaN may lose its payload.
+  // Bytes beyond the size have no meaning, and a NaN may lose its payload.
   Frame expected = frame;
   std::fill(expected.data.begin() + frame.size, expected.data.end(), std::uint8_t{0});
   fuzz::require(again == expected || !is_number(row, values), "a message encodes to the frame it came from");

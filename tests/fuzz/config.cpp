@@ -1,4 +1,4 @@
-// A bench file is refused with its places and rules, or it means the same after it was written down.
+// A bench file is refused with places and rules, or it means the same after it was written down.
 #include "server/config/config.hpp"
 
 #include <string_view>
@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   BenchConfig config;
   try {
-    // No such folder, so that no file of this machine is read.
+    // This folder does not exist, so that no file of this machine is read.
     config = parse_config(text, "fuzz.toml", "/nonexistent-folder");
   } catch (const ConfigError& error) {
     fuzz::require(!error.problems().empty(), "a refusal has reasons");

@@ -1,4 +1,5 @@
-// A file of points is refused with the line that is wrong, or it is a curve that reads back bit for bit.
+// A file of points is refused with the number of the wrong line, or it is a curve that reads back bit for
+// bit.
 #include <cstring>
 #include <string_view>
 

@@ -1,5 +1,4 @@
-// Messages of the wire and of recordings: every command and input that is taken can be written down and read
-// back.
+// Messages of the wire and of recordings: a command or input that is taken can be written down and read back.
 #include <bench.pb.h>
 
 #include <algorithm>
@@ -50,7 +49,7 @@ void check_input(const v1::Input& message) {
   require(equal(*input, unpack(pack(*input))), "an input survives a saved state");
 }
 
-/// What a session does with the commands of an exchange, and what a recording may hold of them.
+/// A session's work on the commands of an exchange, and their form in a recording.
 void check_commands(const v1::Exchange& exchange) {
   for (const v1::Command& each : exchange.commands()) {
     const std::optional<Command> command = decode_command(each);

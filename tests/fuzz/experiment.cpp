@@ -1,5 +1,5 @@
-// Requests of experiments: whatever is asked for, there is a refusal that names a field, or a plan that keeps
-// its bounds and commands numbers.
+// Requests of experiments: each is refused with the name of a field, or becomes a plan that keeps its bounds
+// and commands numbers.
 #include <bench.pb.h>
 
 #include <algorithm>

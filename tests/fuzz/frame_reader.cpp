@@ -1,4 +1,4 @@
-// However a stream is cut into reads, the frames are the same, and none is longer than the cap.
+// The frames do not depend on how a stream is cut into reads, and none is longer than the cap.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ struct Seen {
   bool operator==(const Seen&) const = default;
 };
 
-/// Takes what is there out of the reader.
+/// Takes all whole frames out of the reader.
 void take_frames(FrameReader& reader, std::size_t cap, Seen& seen) {
   while (const auto frame = reader.next()) {
     require(!frame->empty() && frame->size() <= cap, "a frame has 1 byte to the cap");

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <span>
 
-/// What every target defines and replay_corpus.cpp (or libFuzzer) calls with bytes of anybody's making. It
-/// returns when the code under test did as promised, however bad the bytes.
+/// Every target defines it; replay_corpus.cpp (or libFuzzer) calls it with any bytes. It returns when the
+/// code under test kept its promises.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace drivebench::fuzz {

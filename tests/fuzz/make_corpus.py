@@ -45,7 +45,7 @@ def record_a_run(path):
             raise RuntimeError(server.errors())
 
 
-# Two axes on one shaft, curves, and everything that can happen by itself.
+# Two axes on one shaft, curves, and every kind of scheduled event.
 DYNAMOMETER = """
 [[axis.set]]
 parameter = "machine.rotor_resistance_ohm"
@@ -81,7 +81,7 @@ counts_per_revolution = 2000
 """
 
 
-# ---- recordings, taken apart and put together without what makes them long ----
+# ---- recordings, taken apart and put together without their long parts ----
 
 def records(data, at=0):
     while at < len(data):
@@ -166,7 +166,7 @@ def put_together(parts, attachment, chunked, metadata=()):
 
 
 def without_defaults(config):
-    """Without the sections of drives and sensors that this bench does not use: mutations shall hit what matters."""
+    """Without the sections of drives and sensors that this bench does not use: mutations shall hit the used ones."""
     used = r"bench|\[axis\]|axis\.(machine|mechanics|drive|amplifier|encoder|current_sensor)"
     sections = re.split(rb"(?m)^(?=\[)", config)
     return b"".join(each for each in sections if re.match(rb"\[(" + used.encode() + rb")\]", each))
@@ -330,7 +330,7 @@ def make_modbus_streams():
 
 
 def make_sessions():
-    """Programs of session.cpp: action x 4 + peer, then what the action takes."""
+    """Programs of session.cpp: action x 4 + peer, then the values of the action."""
     hello, newest, status, lease, command, both, clear, load, write, inject, bump = 0, 1, 2, 3, 5, 8, 9, 10, 11, 12, 13
     subscribe, read, go_on, reconnect, half_close, experiment, frame_of, stream = 14, 15, 16, 17, 18, 19, 20, 21
     loss = [f.name for f in injectable_faults()].index("command_loss")

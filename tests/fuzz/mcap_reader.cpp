@@ -1,4 +1,4 @@
-// Everything that the reader hands out lies inside the file, and it ends with a whole file or a sentence.
+// Everything that the reader hands out lies inside the file; it ends with a whole file or a sentence.
 #include <functional>
 #include <string_view>
 

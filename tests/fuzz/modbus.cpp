@@ -1,5 +1,5 @@
-// However a Modbus stream is cut into reads, the frames are the same and as long as their headers say; what
-// the validator lets through lies within the map.
+// The frames do not depend on how a Modbus stream is cut into reads, and are as long as their headers say; a
+// request that the validator passes lies within the map.
 #include <algorithm>
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// A recording of anybody's making is re-simulated to a verdict: no input in it harms the bench.
+// A recording with any contents is simulated again to a verdict: no input in it harms the bench.
 #include "server/recording/replay.hpp"
 
 #include "tests/fuzz/fuzz.hpp"

@@ -66,7 +66,7 @@ std::size_t below(Random& random, std::size_t limit) {
   return limit == 0 ? 0 : static_cast<std::size_t>(random() % limit);
 }
 
-/// Numbers that lengths, ticks and counts go wrong at.
+/// Numbers at which lengths, ticks and counts overflow.
 std::uint64_t odd_number(Random& random) {
   constexpr std::uint64_t kOdd[] = {0,
                                     1,
@@ -102,15 +102,15 @@ void mutate_once(Bytes& bytes, const Bytes& other, Random& random) {
       std::memcpy(bytes.data() + at, &number, std::min(left, std::size_t{1} << below(random, 4)));
       return;
     }
-    case 3:  // a part is gone
+    case 3:  // a part removed
       bytes.erase(place, place + some);
       return;
-    case 4: {  // a part comes twice
+    case 4: {  // a part doubled
       const Bytes part(place, place + some);
       bytes.insert(place, part.begin(), part.end());
       return;
     }
-    case 5:  // the rest is gone
+    case 5:  // the rest removed
       if (below(random, 4) == 0) bytes.resize(at);
       return;
     default: {  // a part of another file

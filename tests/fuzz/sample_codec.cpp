@@ -1,5 +1,5 @@
-// The decoder written by hand: it reads nothing outside its bytes, agrees with protobuf's, and what it took
-// encodes back.
+// The decoder written by hand: it reads nothing outside its bytes, agrees with protobuf's, and its samples
+// encode back.
 #include "protocols/sample_codec.hpp"
 
 #include <bench.pb.h>

@@ -3,8 +3,8 @@
 
     tests/fuzz/search.py BUILD-FOLDER MINUTES [TARGET...]
 
-What it finds lies in BUILD-FOLDER/fuzz/TARGET/findings, what reached new code in .../found, which the next search starts
-from. Exit 1 if anything was found, 2 if there is nothing to run."""
+Findings lie in BUILD-FOLDER/fuzz/TARGET/findings, inputs that reached new code in .../found, with which the next search
+begins. Exit 1 if anything was found, 2 if there is nothing to run."""
 import concurrent.futures
 import os
 import pathlib
@@ -21,7 +21,7 @@ OPTIONS = {"ASAN_OPTIONS": "quarantine_size_mb=16:allocator_may_return_null=1", 
 
 
 class Search:
-    """One program and what came of it."""
+    """One program and its results."""
 
     def __init__(self, program, folder, seconds):
         self.target = program.name.removeprefix("fuzz_").removesuffix("_search")
@@ -30,7 +30,7 @@ class Search:
         self.findings, self.code, self.stats = [], None, {}
 
     def run(self):
-        """Goes on after a halt of the machine, which libFuzzer's clock takes for a hang."""
+        """Searches on after a halt of the machine, which libFuzzer's clock takes for a hang."""
         (self.folder / "findings").mkdir(parents=True, exist_ok=True)
         (self.folder / "found").mkdir(exist_ok=True)
         end = time.monotonic() + self.seconds

@@ -1,7 +1,7 @@
 // Sequences of messages: four clients, each with a session of the server, and a bench of two axes in
-// lockstep. The bytes are a program of theirs; whatever it is, an axis has at most one owner, who is there,
-// time goes on only with commands, the plant stays finite, only an owner clears what is latched, and every
-// request has one answer.
+// lockstep. The bytes are a program of the clients. For every program: an axis has at most one owner, whose
+// session is connected; time advances only with commands; the plant stays finite; only an owner clears a
+// latched fault; every request has one answer.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -84,12 +84,12 @@ class World {
     const unsigned byte = program.next();
     Peer& peer = peers_[byte % kPeers];
     if (!peer.came) {
-      connect(peer, &peer != &peers_.back());  // the last one begins with whatever it likes
+      connect(peer, &peer != &peers_.back());  // the last one may begin without hello
       settle();
     }
     const std::int64_t before = engine_->tick();
     const std::array<std::uint64_t, 2> latched{latched_of(0), latched_of(1)};
-    steps_allowed_ = 2;  // a session that ends gives both axes back, and each may have been waited for
+    steps_allowed_ = 2;  // a session that ends gives both axes back, and the tick may have waited for each
     program.all_finite();
     act(peer, byte / kPeers, program);
     settle();
@@ -136,7 +136,7 @@ class World {
     peer.socket = -1;
   }
 
-  /// Until nothing is left to do; what the sessions said is then in the hands of the peers.
+  /// Runs until no work is left; all messages of the sessions are then with the peers.
   void settle() {
     for (std::size_t handled = 1; handled != 0;) {
       io_.restart();
@@ -181,7 +181,7 @@ class World {
       require(!answer.refusal().message().empty() && answer.refusal().code() != v1::REFUSAL_UNSPECIFIED,
               "a refusal says why");
     }
-    if (peer.raw) cleared_ = {true, true};  // nobody knows what it asked for
+    if (peer.raw) cleared_ = {true, true};  // its requests are unknown
     if (answer.id() == 0 || peer.raw) return;
     const auto found = peer.asked.find(answer.id());
     require(found != peer.asked.end(), "an answer belongs to a request that had none");
@@ -259,7 +259,7 @@ class World {
     const std::uint64_t at_tick = which < 128 ? 0 : static_cast<std::uint64_t>(engine_->tick()) + which % 32;
     switch (action % 24) {
       case 0:
-        if (peer.greeted && program.next() % 4 != 0) return;  // once more costs much and finds little
+        if (peer.greeted && program.next() % 4 != 0) return;  // a second hello costs much and finds little
         return greet(peer);
       case 1:
         request.mutable_exchange();
@@ -338,7 +338,7 @@ class World {
         steps_allowed_ = 64;
         return send(peer, program.next_bytes());
       default:
-        break;  // an Envelope of nothing
+        break;  // an empty Envelope
     }
     ask(peer, request, program.all_finite());
   }
@@ -359,7 +359,7 @@ class World {
   }
 
  public:
-  /// An exchange may wait for the other axis; nothing else may go without its answer.
+  /// An exchange may wait for the other axis; every other request must have its answer.
   void check_that_all_was_answered() const {
     for (const Peer& peer : peers_) {
       if (!peer.is_there() || peer.raw) continue;

@@ -12,13 +12,13 @@
 
 namespace drivebench::fuzz {
 
-/// What a client may write where a number is wanted.
+/// Values that a client may write in place of a number.
 inline constexpr auto kValues =
     std::to_array<double>({0.0, 1.0, -1.0, 5.0, -20.0, 80.0, -81.0, 1e-3, 0.5, 2.0, 1e9, -1e308, 5e-324,
                            std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
                            -std::numeric_limits<double>::infinity()});
 
-/// The program; at its end only zeros come.
+/// The program; behind its end it reads zeros.
 class Program {
  public:
   explicit Program(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The search of `./bench fuzz`, with programs that only behave like libFuzzer's. Each test names the mistake that it would catch."""
+"""The search of `./bench fuzz`, with programs that imitate libFuzzer's."""
 import pathlib
 import subprocess
 import tempfile
@@ -46,21 +46,21 @@ class Search(unittest.TestCase):
         return done.returncode, done.stdout + done.stderr
 
     def test_nothing_found_is_0_with_a_line_for_each_target(self):
-        """A target that was forgotten, or numbers of another one."""
+        """Catches: a target that was forgotten, or numbers of another one."""
         code, said = self.search({"curve": HARMLESS, "config": HARMLESS})
         self.assertEqual(code, 0, said)
         self.assertRegex(said, r"curve +1,200 runs +40 1/s +34 edges +7 new inputs  nothing found")
         self.assertIn("0 findings; 2 of 2 targets without one", said)
 
     def test_a_finding_is_1_and_named(self):
-        """Success after a crash, or bytes that nobody finds again."""
+        """Catches: success after a crash, or a finding without its file."""
         code, said = self.search({"curve": BROKEN, "config": HARMLESS})
         self.assertEqual(code, 1)
         self.assertRegex(said, r"again: build/release/bin/fuzz_curve .*/fuzz/curve/findings/crash-1")
         self.assertIn("1 finding; 1 of 2 targets without one", said)
 
     def test_a_halt_of_the_machine_is_no_finding(self):
-        """A busy machine that looks like a hang, or a search that ends there with time left; a hang that passes for a halt."""
+        """Catches: a busy machine taken for a hang, a search that ends there with time left; a hang taken for a halt."""
         code, said = self.search({"curve": HALTED})
         self.assertEqual(code, 0, said)
         self.assertRegex(said, r"curve +1,200 runs .* nothing found")
@@ -69,13 +69,13 @@ class Search(unittest.TestCase):
         self.assertRegex(said, r"again: .*/fuzz/curve/findings/timeout-1")
 
     def test_a_program_that_does_not_start_is_1(self):
-        """A search that never ran and found nothing."""
+        """Catches: a search that never ran and found nothing."""
         code, said = self.search({"curve": NO_START})
         self.assertEqual(code, 1)
         self.assertIn("ended with 3", said)
 
-    def test_what_cannot_be_searched_is_2(self):
-        """A misspelt target that counts as searched."""
+    def test_a_wrong_command_line_is_2(self):
+        """Catches: a misspelt target that counts as searched."""
         for arguments in (({"curve": HARMLESS}, "1", "curves"), ({}, "1"), ({"curve": HARMLESS}, "0"), ({"curve": HARMLESS}, "nan"),
                           ({"curve": HARMLESS}, "long")):
             self.assertEqual(self.search(*arguments)[0], 2, arguments)
