@@ -22,7 +22,7 @@ FUZZ = re.compile(r"^drivebench_fuzz\((\w+) ", re.MULTILINE)
 
 HEAD = """# Faults and abuse: what is tested
 
-Made by `/usr/bin/python3 tests/adversity/table.py` from the names of the tests and [`faults/rows.toml`](faults/rows.toml); a test compares. A
+Made by `/usr/bin/python3 tests/adversity/table.py` from the names of the tests and [`rows.toml`](rows.toml); a test compares. A
 test that proves a row has its ID in its name: `TEST(Bench, CMD_06_...)`, `def test_cmd_06_...`.
 
 *differs:* where the catalogue of faults that the rows come from asks for something else, and why this is right here.

@@ -1,5 +1,5 @@
-// Preloaded: counts what a thread calls that could wait, allocate or enter the kernel, from guard_begin() to
-// guard_end(); and ends the program if an engine does so in a tick.
+// Preloaded: counts the calls of a thread that could wait, allocate or enter the kernel, from guard_begin()
+// to guard_end(); and ends the program if an engine makes one in a tick.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <sys/syscall.h>
@@ -62,7 +62,7 @@ EXPORT const char* guard_first_hit() {
   return first_hit == nullptr ? "nothing" : first_hit;
 }
 
-// For the engines: server/tick_mark.hpp. With DRIVEBENCH_MISDEED a tick does once what it must not.
+// For the engines: tick_mark.hpp. With DRIVEBENCH_MISDEED every tick allocates, which it must not.
 EXPORT void drivebench_tick_begins() noexcept {
   was_inside = inside;
   inside = in_tick = true;

@@ -31,8 +31,7 @@ namespace {
 constexpr Tick kTicks = 1'000'000;
 constexpr Owner kOwner = 1;
 
-/// The run of a controller that never rests; ticks come in batches, between which the other threads get their
-/// turn.
+/// The run of a controller that commands every tick, in batches, between which the other threads run.
 class BusyRun {
  public:
   explicit BusyRun(Bench& bench) : bench_(bench) {
@@ -43,7 +42,7 @@ class BusyRun {
   void batch() noexcept {
     for (Tick n = 0; n < kBatch; ++n) {
       const Tick tick = bench_.tick();
-      if (tick % 500 == 0) {  // what comes through the ring of requests
+      if (tick % 500 == 0) {  // inputs that come through the ring of requests
         requests_.push({.tick = tick + 100, .axis = 0, .owner = kOwner, .action = LoadChange{0.01, 50}});
         requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = write_});
         requests_.push({.tick = tick + 7, .axis = 0, .owner = kOwner, .action = ramp_});
@@ -104,7 +103,7 @@ TEST(TickGuard, RT_01_AMillionTicksCallNothingThatCouldWait) {
   EXPECT_GT(edges, 100u) << "the shaft must move, or the encoder does no work";
 }
 
-/// A run in which every fault comes and goes, and live parameters are on their way to where they are.
+/// A run in which every fault begins and ends while live parameters ramp back to their own values.
 class HostileRun {
  public:
   explicit HostileRun(Bench& bench) : bench_(bench) {
@@ -174,7 +173,8 @@ TEST(TickGuard, RT_01_NoBenchCallsAnythingThatCouldWait) {
   }
 }
 
-/// What a tick must not do, and who can see it: the guard replaces functions, the kernel sees its own calls.
+/// A deed that a tick must not do, and its observers: the guard replaces functions, the kernel sees system
+/// calls.
 struct Misdeed {
   const char* name;
   bool guard_sees;
@@ -216,7 +216,7 @@ class BadTap final : public Tap {
 };
 
 // Catches: a guard that sees nothing.
-TEST(TickGuard, ABadObserverIsCaught) {
+TEST(TickGuard, TheGuardSeesEveryMisdeed) {
   const Guard guard;
   for (const Misdeed& misdeed : kMisdeeds) {
     BadTap tap(misdeed);
@@ -233,8 +233,8 @@ TEST(TickGuard, ABadObserverIsCaught) {
   }
 }
 
-/// From here on any system call but exit_group ends the process with SIGSYS. False if the kernel does not
-/// offer that.
+/// From here on any system call but exit_group ends the process with SIGSYS. False if the kernel has no such
+/// filter.
 bool forbid_system_calls() {
   std::array<sock_filter, 4> program{{
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
@@ -272,7 +272,7 @@ int run_in_a_child(Tap& tap, Tick ticks, bool* armed) {
   return status;
 }
 
-// Catches: any system call inside a tick, by whatever way.
+// Catches: a system call inside a tick, made in any way.
 TEST(TickGuard, RT_03_AMillionTicksMakeNoSystemCall) {
   Tap tap(nullptr);
   const int status = run_in_a_child(tap, kTicks, nullptr);
@@ -294,8 +294,8 @@ rusage usage() {
   return u;
 }
 
-// Catches: memory that a tick touches for the first time. RT-02. The kernel may take a page away for reasons
-// of its own, so one round of three without a fault is what the tick itself can promise.
+// Catches: memory that a tick touches for the first time. RT-02. The kernel may take a page away for its own
+// reasons, so one round of three without a fault must suffice.
 TEST(TickGuard, RT_02_AMillionTicksTouchNoNewMemory) {
   Tap tap(nullptr);
   const BenchConfig config = busy_bench();
@@ -317,7 +317,7 @@ TEST(TickGuard, RT_02_AMillionTicksTouchNoNewMemory) {
   }
   EXPECT_EQ(faults, 0);
 
-  // The measure sees a page that is touched for the first time.
+  // The count sees a page that is touched for the first time.
   const rusage before = usage();
   const auto fresh = std::make_unique<char[]>(std::size_t{1} << 24);
   EXPECT_GT(usage().ru_minflt, before.ru_minflt) << static_cast<int>(fresh[1]);

@@ -12,7 +12,7 @@
 #include "server/recording/spsc_ring.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-/// What the tests under the preloaded guard have in common.
+/// Shared by the tests under the preloaded guard.
 namespace drivebench {
 
 inline constexpr Tick kBatch =
@@ -33,7 +33,7 @@ struct Guard {
   const char* (*first_hit)() = find<const char*()>("guard_first_hit");
 };
 
-/// What the tap of the threaded engine does: a copy into the recorder's ring, one into the ring to the I/O
+/// The work of the threaded engine's tap: a copy into the recorder's ring, one into the ring to the I/O
 /// thread.
 class Tap : public BenchObserver {
  public:
@@ -46,7 +46,7 @@ class Tap : public BenchObserver {
     if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
     events.push(sample);
   }
-  /// Outside the tick: what the other side does.
+  /// Outside the tick: the work of the threads behind the rings.
   void drain() {
     while (events.front() != nullptr)
       events.pop();
@@ -59,7 +59,7 @@ class Tap : public BenchObserver {
   Recorder* recorder_;
 };
 
-/// Two axes, one of them with everything that costs: noise, a converter, dry friction, loads, a turning
+/// Two axes, one of them with everything that takes time: noise, a converter, dry friction, loads, a turning
 /// shaft.
 inline BenchConfig busy_bench() {
   BenchConfig config = servo_bench(2);

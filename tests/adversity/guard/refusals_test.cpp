@@ -1,5 +1,5 @@
-// What cannot be carried out is refused without a word: the sentences are made outside of the tick. Runs
-// under the preloaded guard, like guard_test.cpp.
+// The tick refuses an input without a sentence: sentences are made outside of the tick. Runs under the
+// preloaded guard, like guard_test.cpp.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -11,8 +11,8 @@
 namespace drivebench {
 namespace {
 
-/// Writes, ramps and faults that cannot be carried out, to the second axis of busy_bench(): its dry friction
-/// may not exceed its static friction. How many of them are refused while they wait or are on their way.
+/// Submits writes, ramps and faults that break a rule to the second axis of busy_bench(), whose dry friction
+/// may not exceed its static friction. Returns how many of them the ticks refuse.
 std::uint64_t refused_on_the_way(Bench& bench) {
   const AxisParameters& p = bench.axis(1).parameters();
   const auto submit = [&bench](const Action& action, Tick later = 0) noexcept {
@@ -32,8 +32,8 @@ std::uint64_t refused_on_the_way(Bench& bench) {
   return bench.sample(1).refused_commands - before;
 }
 
-// Catches: a refusal that is put into words inside the tick. RT-01.
-TEST(TickGuard, RT_01_ARuleIsBrokenWithoutAWord) {
+// Catches: a refusal whose sentence is made inside the tick. RT-01.
+TEST(TickGuard, RT_01_ARefusalInATickAllocatesNothing) {
   const Guard guard;
   const BenchConfig config = busy_bench();
   Tap tap(nullptr);
@@ -46,9 +46,9 @@ TEST(TickGuard, RT_01_ARuleIsBrokenWithoutAWord) {
   EXPECT_LT(bench.axis(1).parameters().mechanics.coulomb_friction_nm, 0.0201);
 }
 
-// Catches: a rule of a machine, drive or sensor that is put into words. Each live parameter goes from one end
-// of its range to the other and back to where it was; many of these writes break a rule.
-TEST(TickGuard, RT_01_NoRuleOfAnyBenchIsPutIntoWords) {
+// Catches: a rule of a machine, drive or sensor whose sentence is made inside the tick. Each live parameter
+// goes from one end of its range to the other and back; many of these writes break a rule.
+TEST(TickGuard, RT_01_NoRuleOfAnyBenchAllocatesInATick) {
   const Guard guard;
   std::uint64_t broken = 0;
   for (const auto& entry : std::filesystem::directory_iterator(DRIVEBENCH_BENCHES)) {

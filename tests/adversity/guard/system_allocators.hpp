@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-/// What stands in the place of malloc() and the others calls these, by the names that glibc gives them.
+/// The replacements of malloc() and the others call these, by the names that glibc gives them.
 extern "C" {
 void* __libc_malloc(std::size_t) noexcept;
 void* __libc_calloc(std::size_t, std::size_t) noexcept;

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The guard in the programs that other tests start. Each test names the mistake that it would catch."""
+"""The guard in the programs that other tests start."""
 import os
 import pathlib
 import signal
@@ -18,7 +18,7 @@ except ImportError:
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, guarded  # noqa: E402
 from wire_test import WireTest  # noqa: E402
 
-# A guard that is compiled with sanitizers cannot be had; they do its work in part.
+# The guard cannot be compiled with sanitizers; they do its work in part.
 GUARD = os.environ.get("DRIVEBENCH_GUARD")
 
 
@@ -32,7 +32,7 @@ class Guarded(WireTest):
         self.assertEqual(process.wait(timeout=PATIENCE_S), -signal.SIGABRT)
 
     def test_rt_01_a_server_whose_tick_allocates_ends(self):
-        """A guard that is not there, or sees nothing, in the servers of all other tests."""
+        """Catches: a guard that is missing or blind in the servers of all other tests."""
         self.misdeed()
         server = self.server()
         owner = self.client(server)
@@ -42,8 +42,8 @@ class Guarded(WireTest):
         self.assertCaught(server.process)
         self.assertIn("tick guard: malloc in a tick", server.errors())
 
-    def test_rt_01_so_does_one_with_a_thread_for_its_ticks(self):
-        """The same in real time and in a free run, whose ticks are none of the lockstep engine."""
+    def test_rt_01_a_server_whose_tick_thread_allocates_ends(self):
+        """Catches: the same in real time and in a free run, whose ticks are not those of the lockstep engine."""
         self.misdeed()
         for mode in ("realtime", "free"):
             done = subprocess.run([SERVER, BENCHES / "servo.toml", "--port", "0", "--mode", mode, "--duration", "0.1"],
@@ -51,8 +51,8 @@ class Guarded(WireTest):
             self.assertEqual(done.returncode, -signal.SIGABRT)
             self.assertIn("tick guard: malloc in a tick", done.stderr)
 
-    def test_a_good_server_goes_on(self):
-        """A guard that ends everything."""
+    def test_a_server_whose_ticks_allocate_nothing_goes_on(self):
+        """Catches: a guard that ends every program."""
         server = self.server("--mode", "realtime")
         owner = self.client(server)
         self.assertDone(owner.lease())

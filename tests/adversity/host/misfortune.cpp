@@ -1,6 +1,6 @@
-// Preloaded into a program: memory that runs out, a disk that does not keep what it took, threads that stand
-// still, arithmetic that somebody changes, and a count of what went to its recordings. The page in the file
-// MISFORTUNE names is shared with the test that started it.
+// Preloaded into a program: memory that runs out, a disk that loses data, threads that stand still,
+// arithmetic that a library changed, and a count of the bytes of its recordings. The page in the file that
+// MISFORTUNE names is shared with the test that started the program.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/mman.h>
@@ -26,12 +26,12 @@ namespace {
 
 /// The test maps the same page.
 struct Page {
-  std::atomic<std::uint64_t> handed;       // bytes of recordings that write() was given
-  std::atomic<std::uint64_t> taken;        // and that it took
+  std::atomic<std::uint64_t> handed;       // bytes of recordings handed to write()
+  std::atomic<std::uint64_t> taken;        // bytes that it took
   std::atomic<std::int64_t> fail_in;       // allocations of the main thread until one fails; 0: none
   std::atomic<std::uint64_t> allocations;  // of the main thread, since main()
-  std::atomic<std::uint64_t> sleep_ms;     // how long a thread stands still that gets SIGUSR2
-  std::atomic<std::uint32_t> mxcsr;        // what SIGUSR1 sets in the thread that gets it
+  std::atomic<std::uint64_t> sleep_ms;     // for which SIGUSR2 stops its thread
+  std::atomic<std::uint32_t> mxcsr;        // set by SIGUSR1 in its thread
   std::atomic<std::uint32_t> mxcsr_at_start;
   std::atomic<std::uint64_t> syncs_fail;  // 1: every fdatasync()
 };

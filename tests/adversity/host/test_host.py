@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A host that fails the server: memory, disks, threads, clocks, arithmetic. Each test names the mistake that it would catch."""
+"""A host that fails the server: memory, disks, threads, clocks, arithmetic."""
 import os
 import pathlib
 import resource
@@ -19,13 +19,13 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
-from misfortune import Misfortune, signal_thread, thread_of  # also finds what the others are in
+from misfortune import Misfortune, signal_thread, thread_of  # also adds the folders of the next imports
 from experiment_test import ExperimentTest, request
 from recording import Recording
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, frame, pb
 from wire_test import SERVO_TEXT, WireTest, until
 
-# A controller that is silent for long keeps its axis, so that what takes it away is something else.
+# A silent controller keeps its axis for so long that only the event under test takes it away.
 PATIENT_TEXT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 400000").replace("lease_s = 2.0", "lease_s = 60.0")
 FLUSH_DENORMALS = 0x9FC0  # what -Ofast sets, for the whole process
 TIMEOUT, OVERRUN = 1 << 9, 1 << 11  # in the fault word
@@ -50,7 +50,7 @@ class HostTest(WireTest):
 @unittest.skipUnless(os.environ.get("DRIVEBENCH_GUARD"), "no guard is given")
 class Guarded(HostTest):
     def test_rt_01_the_guard_is_in_servers_with_another_library_too(self):
-        """A library that takes the guard's place, so that in these servers ticks may do what they like."""
+        """Catches: a library that takes the guard's place, so that ticks in these servers are not guarded."""
         self.assertGuarded(lambda: self.unlucky_server(Misfortune()))
         if FAKETIME is not None:
             with mock.patch.dict(os.environ, {"LD_PRELOAD": str(FAKETIME)}):
@@ -68,7 +68,7 @@ class Guarded(HostTest):
 
 
 class Memory(HostTest):
-    """Without the guard: what fails here is malloc() of the library, and with both in a program it is that of the guard."""
+    """Without the guard: these tests fail the library's malloc(), and in a program with both malloc() is the guard's."""
 
     def run_of(self, misfortune):
         with tempfile.TemporaryDirectory(prefix="drivebench-host-") as folder:
@@ -77,7 +77,7 @@ class Memory(HostTest):
                  f"{folder}/run.mcap"], capture_output=True, text=True, env=misfortune.environment(), timeout=PATIENCE_S, check=False)
 
     def test_os_10_no_memory_at_the_start_is_a_clean_error(self):
-        """A start that crashes, hangs, or goes on without what it could not have."""
+        """Catches: a start that crashes, hangs, or goes on without its memory."""
         good = Misfortune()
         self.assertEqual(self.run_of(good).returncode, 0)
         self.assertGreater(good.allocations, 1000)
@@ -91,8 +91,8 @@ class Memory(HostTest):
                 failed += 1
         self.assertGreater(failed, 20)
 
-    def test_os_10_no_memory_in_a_run_is_said_and_the_recording_is_kept(self):
-        """A crash somewhere else, or a program that goes on with half a message."""
+    def test_os_10_no_memory_in_a_run_is_reported_and_the_recording_is_kept(self):
+        """Catches: a crash at another place, or a program that goes on with half a message."""
         for at in (1, 2, 5, 20):
             misfortune = Misfortune()
             file = self.folder() / "run.mcap"
@@ -114,8 +114,8 @@ class Memory(HostTest):
 
 
 class Disks(HostTest, ExperimentTest):
-    def test_rec_05_data_that_may_not_be_there_are_no_success(self):
-        """An experiment that counts as complete although its rows go with the power."""
+    def test_rec_05_an_experiment_whose_sync_failed_has_failed(self):
+        """Catches: an experiment that counts as complete although a power cut would lose its rows."""
         misfortune = Misfortune()
         client = self.client(self.unlucky_server(misfortune, "--experiments", self.kept.name))
         self.assertEqual(self.whole(client, request(100)).info.state, pb.EXPERIMENT_STATE_COMPLETED)
@@ -127,8 +127,8 @@ class Disks(HostTest, ExperimentTest):
 class Stops(HostTest):
     PERIOD_S = 128e-6  # an edge of the histogram of latenesses, which then tells late ticks from others
 
-    def test_os_03_after_stops_every_late_tick_is_counted_and_done(self):
-        """Ticks that are skipped, done without being counted, or done as if they had been in time, after a sleep of the host."""
+    def test_os_03_after_a_stop_every_late_tick_is_counted_and_executed(self):
+        """Catches: ticks that are skipped, not counted, or executed as if in time, after a stop of the process."""
         text = SERVO_TEXT.replace("period_us = 125", "period_us = 128")
         patient = self.server("--mode", "realtime", text=text + "\n[realtime]\nmax_lateness_ms = 60000\n")
         strict = self.server("--mode", "realtime", text=text)  # 100 ms
@@ -151,7 +151,7 @@ class Stops(HostTest):
         self.assertFalse(clients[0].newest().faults & OVERRUN, "that late was allowed")
         self.assertTrue(clients[1].newest().faults & OVERRUN)
         lost = sum(stop_s for stop_s in stops if stop_s >= 1.0)
-        # When `first` was read its tick may have been late itself: for that, a second.
+        # The tick of `first` may have been late itself: hence a second stop.
         self.assertLess(clients[1].newest().tick, first[1] + (time.monotonic() - since - lost + 1.0) / self.PERIOD_S,
                         "what was too late is given up")
         for server in (patient, strict):
@@ -165,17 +165,17 @@ class Stops(HostTest):
 
 class Threads(HostTest):
     def test_os_12_a_bench_that_stands_still_ends_the_program(self):
-        """A bench that looks alive, answers, and shows the same sample for ever."""
+        """Catches: a bench that answers, and shows the same sample forever."""
         misfortune = Misfortune(sleep_ms=60_000)
-        # Without the guard, which ends a tick that sleeps: this one may be stopped in the middle.
+        # Without the guard, which ends a tick that sleeps: this tick may be stopped in the middle.
         server = self.unlucky_server(misfortune, "--mode", "realtime", guard=False)
         self.client(server).status()
         signal_thread(server.process.pid, thread_of(server.process.pid, "ticks"), signal.SIGUSR2)
         self.assertEqual(server.process.wait(timeout=PATIENCE_S), -signal.SIGABRT)
         self.assertIn("no tick for a second", server.errors())
 
-    def test_os_12_a_server_that_cannot_listen_gives_its_axes_up(self):
-        """A motor that runs on while nobody could stop it."""
+    def test_os_12_a_server_without_its_io_thread_gives_its_axes_up(self):
+        """Catches: a motor that runs on while no client can stop it."""
         misfortune = Misfortune(sleep_ms=2500)
         server = self.unlucky_server(misfortune, "--mode", "realtime", text=PATIENT_TEXT)
         owner = self.client(server)
@@ -183,17 +183,17 @@ class Threads(HostTest):
         owner.exchange(owner.newest().tick, 5.0)
         self.assertNotEqual(owner.newest().owner, 0)
         signal_thread(server.process.pid, server.process.pid, signal.SIGUSR2)
-        until(lambda: "the I/O thread stands still" in server.errors(), "it is said")
-        until(lambda: owner.newest().owner == 0, "its axis is nobody's")
+        until(lambda: "the I/O thread stands still" in server.errors(), "it is logged")
+        until(lambda: owner.newest().owner == 0, "its axis has no owner")
         sample = owner.newest()
         self.assertEqual((sample.u_a_v, sample.u_b_v), (0.0, 0.0))
         self.assertRefused(owner.exchange(sample.tick, 5.0), pb.REFUSAL_NOT_OWNER)
-        until(lambda: "goes on" in server.errors(), "that is said as well")
+        until(lambda: "goes on" in server.errors(), "the end of it is logged")
         self.assertEqual(server.stop(), 0)
 
     def test_os_01_a_second_signal_ends_at_once(self):
-        """A server that only SIGKILL ends when the thread that should end it in order stands still; or whose first signal
-        kills it already."""
+        """Catches: a server that only SIGKILL ends while the thread that should end it stands still; or that the first
+        signal kills."""
         for first, second in ((signal.SIGTERM, signal.SIGTERM), (signal.SIGINT, signal.SIGTERM), (signal.SIGTERM, signal.SIGINT)):
             with self.subTest(first=first, second=second):
                 server = self.unlucky_server(Misfortune(sleep_ms=600_000), "--mode", "realtime")
@@ -206,22 +206,22 @@ class Threads(HostTest):
                 server.process.send_signal(second)
                 self.assertEqual(server.process.wait(timeout=10.0), -second)
 
-    def test_os_01_one_signal_waits_for_an_end_in_order(self):
-        """A signal that is lost because nobody listens just then, or that costs the end of the recording; one order that
-        comes as two signals, from `timeout` or a shell, and kills."""
+    def test_os_01_the_first_signal_ends_in_order(self):
+        """Catches: a signal that is lost because no thread waits for it yet, or that costs the end of the recording; one
+        order that comes as two signals, from `timeout` or a shell, and kills."""
         file = self.folder() / "run.mcap"
         server = self.unlucky_server(Misfortune(sleep_ms=1500), "--mode", "realtime", "--record", str(file))
         self.client(server).status()
         signal_thread(server.process.pid, server.process.pid, signal.SIGUSR2)
         until(lambda: "the I/O thread stands still" in server.errors(), "it stands still")
         server.process.send_signal(signal.SIGINT)
-        time.sleep(0.01)  # it has been noticed
+        time.sleep(0.01)  # the server has read the signal
         self.assertEqual(server.stop(), 0)
         self.assertEqual(server.verdict["gaps"], 0)
         self.assertTrue(Recording(file.read_bytes()).finished)
 
-    def test_os_12_a_pause_of_all_or_a_controller_that_thinks_is_no_standstill(self):
-        """A supervisor that ends a bench because its host slept, or because lockstep waits for a command."""
+    def test_os_12_a_paused_host_or_a_slow_controller_is_no_standstill(self):
+        """Catches: a supervisor that ends a bench because its host slept, or because lockstep waits for a command."""
         paused, waiting = self.server("--mode", "realtime"), self.server()
         owner = self.client(waiting)
         owner.lease()
@@ -229,14 +229,14 @@ class Threads(HostTest):
         time.sleep(1.5)
         paused.process.send_signal(signal.SIGCONT)
         first = self.client(paused).newest().tick
-        until(lambda: self.client(paused).newest().tick > first + 2000, "it goes on")
+        until(lambda: self.client(paused).newest().tick > first + 2000, "the bench goes on")
         owner.step(0, 1.0)
         for server in (paused, waiting):
             self.assertNotIn("stands still", server.errors())
             self.assertEqual(server.stop(), 0)
 
     def test_rec_06_a_recorder_that_stands_still_for_a_second_loses_nothing(self):
-        """A ring that is too small for the server's own bench, or a tick that waits for the disk."""
+        """Catches: a ring that is too small for the server's own bench, or a tick that waits for the disk."""
         misfortune = Misfortune(sleep_ms=1200)
         file = self.folder() / "run.mcap"
         server = self.unlucky_server(misfortune, "--mode", "realtime", "--record", str(file))
@@ -260,15 +260,15 @@ class Arithmetic(HostTest):
         return f"{owner.status().state_hash:016x}", server.errors()
 
     def test_det_03_a_library_that_changed_the_rounding_changes_no_bit(self):
-        """Results that depend on which libraries were loaded."""
+        """Catches: results that depend on which libraries were loaded."""
         reference, said = self.hash_of_a_run(Misfortune())
         self.assertNotIn("rounds", said)
         changed, said = self.hash_of_a_run(Misfortune(mxcsr_at_start=FLUSH_DENORMALS))
         self.assertEqual(changed, reference)
         self.assertIn("how this program rounds", said)
 
-    def test_det_03_a_change_in_the_run_is_set_back_and_said(self):
-        """Half a run with other bits, and nobody knows."""
+    def test_det_03_a_change_in_the_run_is_undone_and_reported(self):
+        """Catches: half a run with other bits and no message."""
         misfortune = Misfortune(mxcsr=FLUSH_DENORMALS)
         server = self.unlucky_server(misfortune, "--mode", "realtime")
         self.client(server).status()
@@ -284,7 +284,7 @@ class Clock(HostTest):
     WATCHDOG_TICKS, LEASE_TICKS = 20, 400
 
     def drive_on(self, owner, ticks):
-        """Commands for so many ticks and until the axis is driven, whatever the pauses of this host have cost meanwhile."""
+        """Commands for so many ticks and until the axis is driven, through any pauses of this host."""
         first, end = owner.newest().tick, time.monotonic() + PATIENCE_S
         while (sample := owner.newest()).tick < first + ticks or sample.state not in (RUN, HOLD):
             self.assertLess(time.monotonic(), end, "never driven")
@@ -295,7 +295,7 @@ class Clock(HostTest):
             owner.exchange(sample.tick, 5.0)
 
     def test_os_04_a_wall_clock_that_jumps_moves_nothing(self):
-        """A time-out, a lease, the patience with a stranger, or a tick that follows the time of day."""
+        """Catches: a time-out, a lease, a time limit of a session, or a tick that follows the time of day."""
         if FAKETIME is None:
             self.skipTest("faketime is not installed")
         folder = self.folder()
@@ -322,7 +322,7 @@ class Clock(HostTest):
         self.assertEqual(done.returncode, 0, done.stdout)
 
     def assert_every_silence_ended_in_its_tick(self, recording, at_least):
-        """By the recording: sample k+1 shows what tick k did. Late ticks do not count for the watchdog."""
+        """By the recording: sample k+1 shows tick k. Late ticks do not count for the watchdog."""
         samples = [pb.Sample.FromString(content) for content in recording.contents["/servo/sample"]]
         inputs = [pb.Input.FromString(content) for content in recording.contents["/inputs"]]
         commands = [each.tick for each in inputs if each.WhichOneof("action") == "command"]
@@ -339,8 +339,8 @@ class Clock(HostTest):
 
 
 class House(HostTest):
-    def test_os_11_a_full_house_stays_below_64_mib(self):
-        """Memory that grows with clients which do not read, or with the length of a recording."""
+    def test_os_11_all_sessions_together_stay_below_64_mib(self):
+        """Catches: memory that grows with clients which do not read, or with the length of a recording."""
         server = self.server("--mode", "realtime", "--record", str(self.folder() / "run.mcap"))
         guests = [self.client(server, receive_buffer=4096) for _ in range(150)]
         for guest in guests[:16]:
@@ -350,12 +350,13 @@ class House(HostTest):
         self.assertMemoryBelow(server, 64 * 1024)
         self.assertEqual(server.stop(), 0)
 
-    def test_os_11_a_house_full_of_those_who_ask_and_never_read_stays_below_64_mib(self):
-        """Answers that wait for each of 256 sessions as for one, 1 MiB; or others who must suffer for it."""
+    def test_os_11_clients_that_ask_and_never_read_stay_below_64_mib(self):
+        """Catches: waiting answers of 1 MiB for each of 256 sessions, as for a single one; or other clients that suffer
+        for it."""
         server = self.server()
         here, greedy = self.client(server), [self.client(server, receive_buffer=4096) for _ in range(255)]
-        # So much for each that it stays below the bound of one session: it is cut for what all have together, or as
-        # it takes nothing for 2 s.
+        # So much for each that it stays below the bound of one session: it is cut for the sum of all, or for 2 s
+        # without progress.
         answer = len(frame(here.ask(read_parameters=pb.ReadParameters()).SerializeToString()))
         count = (MIB - MIB // 8) // answer
         self.assertGreater(255 * (count * answer - MIB // 4), 2 * 64 * MIB, "beyond what their sockets take")

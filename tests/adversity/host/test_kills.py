@@ -2,12 +2,12 @@
 """REC-01: a recording server is killed at random times, and its file read.
 
     tests/adversity/host/test_kills.py                 the series of every test run
-    tests/adversity/host/test_kills.py --kills 1000    as many as you like; --seed N for other times
+    tests/adversity/host/test_kills.py --kills 1000    any other number; --seed N for other times
 
 A *written record* is one in a chunk that a call of write() has taken whole: the recorder hands a chunk over in one call,
 and a reader takes a chunk or leaves it. A kill may tear the call that runs; then the file ends in the middle of a
-chunk, whose records had not been written yet. Counted are, for each kill: bytes that write() took and that the file does not
-have, files that cannot be read, records in whole chunks that the product does not read or that differ in a bit from
+chunk, whose records had not been written yet. The script counts, for each kill: bytes that write() took and that the file
+lacks, files that cannot be read, records in whole chunks that the product does not read or that differ in a bit from
 the simulation."""
 import argparse
 import json
@@ -25,7 +25,7 @@ from wire_client import BENCHES, PATIENCE_S, SERVER, guarded
 
 
 def kill_one(local, number):
-    """What one kill cost: (unreadable files, lost records, records, whether a write was torn)."""
+    """The cost of one kill: (unreadable files, lost records, records, whether a write was torn)."""
     mode = ("realtime", "free")[number % 2]
     with tempfile.TemporaryDirectory(prefix="drivebench-kills-") as folder:
         file = pathlib.Path(folder) / "run.mcap"
@@ -41,12 +41,12 @@ def kill_one(local, number):
         process.stdout.close()
         data = file.read_bytes()
         if misfortune.taken == 0:
-            raise AssertionError("what is written is not counted")
+            raise AssertionError("the library counted no written byte")
         found = Recording(data)
         written = found.messages.get("/servo/sample", 0)
         done = subprocess.run([SERVER, "--replay", file, "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         report = json.loads(done.stdout) if done.stdout else {"samples": 0, "problem": done.stderr}
-        # Such a file is no recording of a whole run, and only that may be wrong with it.
+        # Such a file is no recording of a whole run; it must have no other problem.
         no_samples = written == 0 and "no samples" in report["problem"]
         readable = (found.has_start and found.damaged == 0 and done.returncode == 2
                     and (no_samples or "ends" in report["problem"]))

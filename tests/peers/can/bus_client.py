@@ -11,7 +11,7 @@ REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
 PROGRAMS = pathlib.Path(os.environ.get("DRIVEBENCH_SERVER", REPOSITORY / "build/release/bin/drivebench-server")).parent
 ECHO = pathlib.Path(os.environ.get("DRIVEBENCH_BUS_ECHO", PROGRAMS / "bus_echo"))
 
-# How long anything may take before a test says that it hangs. No test measures time.
+# The longest that anything may take before a test calls it a hang. No test measures time.
 PATIENCE_S = 30.0
 GROUP = "239.74.163.2"
 BURST_REQUEST = 0x1FFFFFF0
@@ -78,7 +78,7 @@ class Line:
         self.socket.sendall(text if isinstance(text, bytes) else text.encode())
 
     def until(self, *ends):
-        """What came up to the first of these ends, with it."""
+        """The text up to the first of these ends, with it."""
         while True:
             found = [self.buffer.index(end) + len(end) for end in ends if end in self.buffer]
             if found:
@@ -90,7 +90,7 @@ class Line:
             self.buffer += more
 
     def at_end(self):
-        """Reads to the end of the connection; whether it came."""
+        """Reads to the end of the connection; true if it came."""
         try:
             while self.socket.recv(65536):
                 pass

@@ -1,5 +1,5 @@
-// For tests/peers/test_can_dbc.py: what the library says of its CAN messages, and frames with the values that
-// they carry.
+// For tests/peers/can/test_can_dbc.py: the library's texts about its CAN messages, and frames with their
+// values.
 //
 //   can_texts dbc|table|frames classic|fd standard|extended narrow|wide
 //

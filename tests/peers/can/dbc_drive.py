@@ -5,7 +5,7 @@ import time
 
 import can
 
-logging.getLogger("canmatrix.formats").setLevel(logging.ERROR)  # it misses formats that nobody here needs
+logging.getLogger("canmatrix.formats").setLevel(logging.ERROR)  # it misses formats that these tests do not need
 import canmatrix.formats  # noqa: E402
 
 PATIENCE_S = 30.0
@@ -13,7 +13,7 @@ REQUESTS = {"acquire": 1, "renew": 2, "release": 3, "clear_faults": 4}
 
 
 class Refused(Exception):
-    """The bench said no; `code` is the result of its reply."""
+    """The bench refused; `code` is the result of its reply."""
 
     def __init__(self, code):
         super().__init__(f"result {code}")
@@ -99,7 +99,7 @@ class Drive:
         return tick, int(self.seen["encoder"]["encoder_count"]), currents["i_a"], currents["i_b"]
 
     def command(self, tick, u_a, u_b, mode=1, u_c=0.0, u_f=0.0):
-        """Voltages, as the DBC scales them; phase c and the field if the axis has a place for them."""
+        """Sends voltages, scaled by the DBC file; phase c and the field if the axis has a place for them."""
         frame = self.frame("command")
         bits = 32 if self.fd else 16
         factor = 1.0 if self.fd else float(frame.signal_by_name("u_a").factor)
@@ -111,7 +111,7 @@ class Drive:
         self.send("command", **common, **others, u_a=scaled(u_a), u_b=scaled(u_b))
 
     def step(self, tick, u_a, u_b, **others):
-        """One lockstep tick: the sample after it. Sent again if it was lost on the way."""
+        """One lockstep tick: the sample after it. The command is sent again if it was lost on the way."""
         self.command(tick, u_a, u_b, **others)
         sample = self.sample()
         while sample[0] <= tick:
@@ -129,7 +129,7 @@ def open_loop_voltages(tick, period_s=125e-6):
 
 
 def three_phases(u_a, u_b):
-    """The power-invariant transform: what the terminals of a star get for the same motion."""
+    """The power-invariant transform: the voltages of a star for the same motion."""
     root = math.sqrt(2.0 / 3.0)
     u_c = root * (-0.5 * u_a - 0.5 * math.sqrt(3.0) * u_b)
     return round(root * u_a, 2), round(root * (-0.5 * u_a + 0.5 * math.sqrt(3.0) * u_b), 2), round(u_c, 2)

@@ -1,4 +1,4 @@
-"""What the tests of CAN drives share: bench files with a bus, network namespaces, recordings."""
+"""Shared by the tests of CAN drives: bench files with a bus, network namespaces, recordings."""
 import csv
 import pathlib
 import sys
@@ -49,7 +49,7 @@ class DriveTest(CommandTest):
         return {int(row[names.index("tick")]): dict(zip(names, row)) for row in rows[1:]}
 
     def assertCountsRecorded(self, counts, recording):
-        """Every count that came over the wire is the recorded one, and the motor has moved."""
+        """Every count that came over the wire equals the recorded one, and the motor has moved."""
         rows = self.recorded(recording)
         for tick, count in counts:
             self.assertEqual(int(rows[tick]["encoder_count"]), count, f"tick {tick}")

@@ -27,7 +27,7 @@ def texts(what, *variant):
 
 
 def load(dbc):
-    """canmatrix 0.9.5 prints what it cannot read and goes on; also the formats that lack a package."""
+    """canmatrix 0.9.5 prints the lines that it cannot read and goes on; also the formats that lack a package."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "bench.dbc"
         path.write_bytes(dbc)
@@ -55,8 +55,8 @@ class Dbc(unittest.TestCase):
         return ((variant, load(texts("dbc", *variant))) for variant in VARIANTS)
 
     def test_it_is_read_without_complaint(self):
-        """Would catch: a line that the reader does not understand; names that are no identifiers, too long or not
-        unique; FD or extended frames that are not marked."""
+        """Catches: a line that the reader does not understand; names that are no identifiers, too long or not unique; FD
+        or extended frames that are not marked."""
         for (kind, ids, width), (matrix, complaints) in self.each():
             self.assertEqual(complaints, [])
             names = [frame.name for frame in matrix.frames]
@@ -74,8 +74,8 @@ class Dbc(unittest.TestCase):
             self.assertEqual(matrix.frame_by_name("servo_command").signals[0].receivers, ["Bench"])
             self.assertEqual(matrix.frame_by_name("servo_heartbeat").transmitters, ["Bench"])
 
-    def test_every_frame_means_what_the_codec_says(self):
-        """Would catch: a start bit, size, sign, factor, float mark or identifier that differs from the codec's."""
+    def test_every_frame_means_the_same_to_codec_and_file(self):
+        """Catches: a start bit, size, sign, factor, float mark or identifier that differs from the codec's."""
         for variant, (matrix, _) in self.each():
             seen = set()
             for line in texts("frames", *variant).decode().splitlines():
@@ -90,7 +90,7 @@ class Dbc(unittest.TestCase):
         self.assertEqual(len(data), frame.size)
         theirs = frame.decode(data)
         self.assertEqual(set(theirs), set(values))
-        # A classic command in mode 3 or 4 holds duties or currents, which a DBC file cannot tell.
+        # A classic command in mode 3 or 4 holds duties or currents, which a DBC file cannot express.
         unit = {"3": 1 / 32767, "4": 1e-3}.get(values.get("mode"))
         other_unit = unit is not None and frame.name.endswith("_command") and not frame.is_fd
         for name, text in values.items():
@@ -105,9 +105,9 @@ class Dbc(unittest.TestCase):
             else:
                 self.assertTrue(math.isclose(ours, value, rel_tol=1e-12), (frame.name, name, ours, value))
 
-    def test_every_field_is_that_of_the_table_for_people(self):
-        """Would catch: a name, place, unit, range or meaning that the two texts tell differently; a choice without a
-        name; the edges in the wrong place."""
+    def test_every_field_matches_the_markdown_table(self):
+        """Catches: a name, place, unit, range or meaning in which the two texts differ; a choice without a name; the
+        edges in the wrong place."""
         for variant, (matrix, _) in self.each():
             table = texts("table", *variant).decode()
             for row in rows(table, "## Identifiers"):
@@ -145,7 +145,7 @@ class Dbc(unittest.TestCase):
             self.assertIn(f"{number} {label}", meaning)
 
     def test_the_examples_and_the_program_for_recorded_frames_work(self):
-        """Would catch: an example whose bytes are not a frame; a program in the text that does not run."""
+        """Catches: an example whose bytes are not a frame; a program in the text that does not run."""
         for variant in VARIANTS:
             table = texts("table", *variant).decode()
             program = re.search(r"```python\n(.*?)```", table, re.S).group(1)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Programs that this project did not write read and command a bench on the kernel's own CAN: can-utils, python-can with
-canmatrix, npm's socketcan. Builds what comes from npm, then runs itself again where the kernel has CAN."""
+canmatrix, npm's socketcan. Builds the npm package, then runs itself again where the kernel has CAN."""
 import json
 import os
 import pathlib
@@ -52,7 +52,7 @@ class KernelPeer(DriveTest):
         return self.server("--record", str(recording), text=text, **options), dbc, recording
 
     def candump(self, name):
-        """Starts candump and waits until it hears the bench's heartbeat: the file it logs to."""
+        """Starts candump and waits until its log shows the bench's heartbeat; returns the log."""
         log = self.folder / name
         self.start("sh", "-c", f"exec candump -L -r 4000000 vcan0 >{log}")
         until(lambda: log.exists() and log.stat().st_size > 0, "candump hears the bench")
@@ -75,7 +75,7 @@ class KernelPeer(DriveTest):
         self.assertIn("equal, bit for bit", self.drivebench("replay", recording).stdout)
 
     def assertLogRecorded(self, log, dbc, recording, last_tick):
-        """Every frame of a log that tells the tick of its sample, as canmatrix reads it, is what was recorded."""
+        """Every frame of a log that names the tick of its sample, as canmatrix reads it, equals the recording."""
         matrix = canmatrix.formats.loadp_flat(str(dbc))
         rows = self.recorded(recording)
         ticks, encoder = set(), {}
@@ -131,7 +131,7 @@ class PythonCan(KernelPeer):
 
     # CAN-14. Catches: a server that needs a capability for CAN.
     def test_a_bench_of_an_unprivileged_user(self):
-        def become_nobody():
+        def drop_privileges():
             os.setgroups([])
             os.setgid(NOBODY)
             os.setuid(NOBODY)
@@ -139,7 +139,7 @@ class PythonCan(KernelPeer):
         text = with_bus(['backend = "socketcan"', 'channel = "vcan0"'])
         dbc = self.text_of("dbc", text)
         self.folder.chmod(0o755)
-        server = self.server(config=self.folder / "bench.toml", before=become_nobody)
+        server = self.server(config=self.folder / "bench.toml", before=drop_privileges)
         status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text(encoding="ascii")
         self.assertRegex(status, rf"Uid:\t{NOBODY}\t{NOBODY}\t{NOBODY}\t{NOBODY}")
         self.assertRegex(status, r"CapEff:\t0+\n")
@@ -151,7 +151,7 @@ class PythonCan(KernelPeer):
 
 
 class OurController(KernelPeer):
-    # Catches: a bus of the kernel on which the reference controller does not do what it does everywhere else.
+    # Catches: a kernel bus on which the reference controller behaves differently from other buses.
     def test_the_servo_move(self):
         for fd in (True, False):
             with self.subTest(fd=fd):
@@ -167,7 +167,7 @@ class CanUtils(KernelPeer):
         frame = f"{identifier}#{'#1' if fd else ''}{data.hex()}"
         subprocess.run(["cansend", "vcan0", frame], check=True, timeout=PATIENCE_S)
 
-    # Catches: a drive that only a program with our tables can command; a command that is not what was sent.
+    # Catches: a drive that only a program with our tables can command; a command that arrives changed.
     def test_cansend_commands(self):
         for fd in (False, True):
             with self.subTest(fd=fd):
@@ -190,13 +190,13 @@ class CanUtils(KernelPeer):
                 self.assertLogRecorded(log, dbc, recording, CANSEND_TICKS)
                 rows = self.recorded(recording)
                 for tick in range(CANSEND_TICKS):
-                    row = rows[tick + 1]  # it tells the voltages of the tick before
+                    row = rows[tick + 1]  # it holds the voltages of the tick before
                     self.assertEqual((float(row["u_a_v"]), float(row["u_b_v"])), (20.0 + tick, -10.5), f"tick {tick}")
                 self.assertGreater(float(rows[CANSEND_TICKS]["i_a_a"]), 0.5)
 
 
 class Npm(KernelPeer):
-    # Catches: frames that only Python's and C's programs understand.
+    # Catches: frames that only programs in Python and C understand.
     def test_socketcan(self):
         if reason := os.environ.get("DRIVEBENCH_NO_SOCKETCAN"):
             self.skipTest(reason)
@@ -221,8 +221,8 @@ class Npm(KernelPeer):
 
 
 def build_socketcan(package):
-    """npm's socketcan and its native part in a folder, with no network but the registry's: why it cannot be had, or an
-    empty text."""
+    """Builds npm's socketcan and its native part in a folder, with no network but the registry's; returns the reason if
+    that fails, else an empty text."""
     def run(*command, cwd=None):
         done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, timeout=NPM_S,
                               check=False)
@@ -245,7 +245,7 @@ def build_socketcan(package):
 
 
 def main():
-    """On the way in: the exit code of this script where the kernel has CAN."""
+    """At first returns the exit code of this script where the kernel has CAN."""
     for tool in ("candump", "cansend"):
         if shutil.which(tool) is None:
             print(f"skipped: no {tool} (Debian package can-utils)")

@@ -25,8 +25,8 @@ class CanCheck(DriveTest):
         done = self.drivebench("can", "check", self.interface, "--json", code=code)
         return json.loads(done.stdout)
 
-    # Catches: a cure that does not cure, or is not a line that a shell takes.
-    def test_the_cures_cure(self):
+    # Catches: a cure that does not work, or is not a line for a shell.
+    def test_each_printed_cure_works(self):
         found = self.check(code=2)["findings"]
         self.assertEqual(len(found), 1)
         self.must(found[0]["cure"].split("a virtual one: ")[1].removeprefix("modprobe vcan; "))
@@ -43,7 +43,7 @@ class CanCheck(DriveTest):
                 self.assertEqual((state["interface"]["up"], state["interface"]["mtu"]), (True, 72))
 
     # Catches: counters that stand still.
-    def test_it_counts_frames(self):
+    def test_check_counts_frames(self):
         self.must(f"ip link add dev {self.interface} mtu 72 type vcan && ip link set {self.interface} up")
         for _ in range(3):
             self.must(f"cansend {self.interface} 123#1122")
@@ -55,21 +55,21 @@ class CanCheck(DriveTest):
 
 
 class CanUtils(DriveTest):
-    # Catches: frames that can-utils show otherwise, or that the bench does not hear from them.
+    # Catches: frames that can-utils show differently, or that the bench does not receive from them.
     def test_candump_and_cansend_on_the_bus_of_a_bench(self):
         self.server(text=with_bus(['backend = "socketcan"', 'channel = "vcan0"', "fd = false", "heartbeat_ms = 20"]))
         listener = self.start("candump", "-L", "vcan0")
         self.addCleanup(listener.communicate)
         self.addCleanup(listener.kill)
         seen = {}
-        while "701" not in seen:  # the heartbeat of node 1: candump listens, the bench speaks
+        while "701" not in seen:  # the heartbeat of node 1: candump and the bench are connected
             self.next_frame(listener, seen)
         self.assertEqual(len(seen["701"]), 16)
         shell("cansend vcan0 301#0100050000000000")  # controller 5 asks for the axis
         while "381" not in seen:
             self.next_frame(listener, seen)
         self.assertEqual(seen["301"], "0100050000000000")
-        self.assertEqual(seen["381"][:4], "0100")  # what was asked: done
+        self.assertEqual(seen["381"][:4], "0100")  # the request is done
 
     def next_frame(self, listener, seen):
         line = listener.stdout.readline()

@@ -49,8 +49,8 @@ class UdpMulticast(VirtualBusTest):
             counters = echo.counters()
         self.assertEqual((counters["received"], counters["sent"], counters["malformed"]), (7, 7, 0))
 
-    # Catches: frames sent without pacing, which overrun a receiver's buffer, of 160 datagrams, without a word. A busy
-    # machine may keep the receiver from its buffer for long enough all the same, hence three attempts.
+    # Catches: frames sent without pacing, which silently overrun a receiver's buffer of 160 datagrams. A busy machine
+    # may keep the receiver from its buffer long enough all the same, hence three attempts.
     def test_a_burst_arrives_complete(self):
         attempts = []
         for _ in range(3):
@@ -65,18 +65,18 @@ class UdpMulticast(VirtualBusTest):
                 return
         self.fail(f"of 2000 frames arrived {attempts}")
 
-    # Catches: a datagram of anybody's making that ends the bus, or is passed over without a count.
-    def test_what_is_no_frame_is_counted(self):
+    # Catches: a foreign datagram that ends the bus, or is not counted.
+    def test_datagrams_that_are_no_frames_are_counted(self):
         with Echo("udp_multicast", GROUP, 43113) as echo, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
             for bad in (b"", b"\x80", b"hello", b"\x81\xa1x", bytes(65000)):
                 sender.sendto(bad, (GROUP, 43113))
-            self.bus.shutdown()  # python-can gives up on such datagrams
+            self.bus.shutdown()  # python-can stops at such datagrams
             self.setUp()
             self.answered(self.bus, can_kinds(self.can, fd=False)[0])
             self.assertEqual(echo.counters()["malformed"], 5)
 
-    # Catches: commands from anywhere in the local network.
+    # Catches: commands from other computers of the local network.
     def test_frames_of_other_computers_are_ignored(self):
         from can.interfaces.udp_multicast.utils import pack_message
         message = can_kinds(self.can, fd=False)[0]
@@ -87,7 +87,7 @@ class UdpMulticast(VirtualBusTest):
         with Echo("udp_multicast", GROUP, 43113) as echo, \
                 socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_RAW) as foreign:
             foreign.sendto(ip + udp, (GROUP, 0))
-            self.same(self.bus.recv(PATIENCE_S), message, 0)  # python-can does not mind
+            self.same(self.bus.recv(PATIENCE_S), message, 0)  # python-can takes it
             self.answered(self.bus, message)
             self.assertEqual(echo.counters()["received"], 1)
 
@@ -109,15 +109,15 @@ class Slcan(VirtualBusTest):
         with tempfile.TemporaryDirectory() as folder:
             path = f"{folder}/can0"
             with Echo("slcan", f"pty:{path}") as echo:
-                for _ in range(2):  # the second opens what the first has left
+                for _ in range(2):  # the second client opens the terminal as the first left it
                     with can.Bus(interface="slcan", channel=path, bitrate=1000000, sleep_after_open=0) as bus:
                         self.exchange(can, bus)
                 self.assertEqual(echo.counters()["malformed"], 0)
             self.assertFalse(os.path.lexists(path), "the link stays")
 
-    # Catches: a terminal that keeps what one program left, its open channel or its settings, for the next one; one that
-    # changes the bytes of programs that leave it as it is.
-    def test_each_program_finds_the_terminal_fresh(self):
+    # Catches: a terminal that keeps the open channel or the settings of one program for the next one; one that
+    # changes the bytes of programs that leave its settings alone.
+    def test_each_program_finds_the_terminal_reset(self):
         with tempfile.TemporaryDirectory() as folder, Echo("slcan", f"pty:{folder}/can0") as echo:
             for count in (1, 2, 3):
                 terminal = os.open(f"{folder}/can0", os.O_RDWR | os.O_NOCTTY)
@@ -147,7 +147,7 @@ class Slcan(VirtualBusTest):
             text += os.read(terminal, 1)
         return text
 
-    # Catches: a server that is a terminal only.
+    # Catches: a server that offers a terminal only.
     def test_python_can_exchanges_frames_over_tcp(self):
         import can
         with Echo("slcan", "tcp:127.0.0.1:0") as echo:
@@ -162,7 +162,7 @@ class Slcan(VirtualBusTest):
                 got = bus.recv(PATIENCE_S)
             self.same(got, message)
 
-    # Catches: a command that is answered otherwise than by an adapter.
+    # Catches: a command whose answer differs from an adapter's.
     def test_commands_are_answered_as_by_an_adapter(self):
         talk = [("\r", "\r"), ("C\r", "\a"), ("S8\r", "\r"), ("S\r", "\a"), ("Y5\r", "\r"), ("V\r", "V0101\r"),
                 ("N\r", "NDB01\r"), ("F\r", "\a"), ("t1230\r", "\a"), ("Q\r", "\a"), ("O\r", "\r"), ("O\r", "\a"),
@@ -179,7 +179,7 @@ class Slcan(VirtualBusTest):
                 self.assertEqual(got, answer, f"after {question!r}")
             line.close()
 
-    # Catches: frames that only one of several clients gets, or that come back to their sender.
+    # Catches: frames that only one of several clients receives, or that come back to their sender.
     def test_clients_hear_each_other(self):
         with Echo("slcan", "tcp:127.0.0.1:0") as echo:
             one, other = Line(echo.port), Line(echo.port)
@@ -192,7 +192,7 @@ class Slcan(VirtualBusTest):
             one.close()
             other.close()
 
-    # Catches: a bus that waits for a client that does not read, or keeps all that it does not read.
+    # Catches: a bus that waits for a client that does not read, or keeps all frames for it.
     def test_a_stalled_client_loses_frames(self):
         with Echo("slcan", "tcp:127.0.0.1:0") as echo:
             stalled, other = Line(echo.port, buffer_bytes=4096), Line(echo.port)
@@ -214,7 +214,7 @@ class Slcan(VirtualBusTest):
 
 
 class SlcanDevice(VirtualBusTest):
-    # Catches: an adapter that we do not open, or open without its bit rate, or whose answers we take for frames.
+    # Catches: an adapter that is not opened, or opened without its bit rate, or whose answers are taken for frames.
     def test_a_serial_adapter_is_opened_and_driven(self):
         controller, device = os.openpty()
         with os.fdopen(controller, "r+b", buffering=0) as adapter:
@@ -239,8 +239,8 @@ class SlcanDevice(VirtualBusTest):
             text += adapter.read(1)
         return text
 
-    # Catches: a start that goes on without its adapter, or a reason that says nothing.
-    def test_what_is_no_adapter_is_refused(self):
+    # Catches: a start that goes on without its adapter, or a reason that explains nothing.
+    def test_a_device_that_is_no_adapter_is_refused(self):
         for channel, reason in (("/dev/nowhere", "No such file"), ("/dev/null", "not a serial device"),
                                 ("/dev/null@123", "baud rate"), ("tcp:0.0.0.0:0", "other computers"),
                                 ("tcp:127.1:0", "not ADDRESS:PORT"), ("tcp:127.0.0.1:x", "not ADDRESS:PORT"),
@@ -250,7 +250,7 @@ class SlcanDevice(VirtualBusTest):
 
 
 class Socketcand(VirtualBusTest):
-    # Catches: a greeting or an element that python-can does not take; frames that its version in Debian loses.
+    # Catches: a greeting or an element that python-can refuses; frames that its version in Debian loses.
     def test_python_can_exchanges_frames(self):
         import can
         with Echo("socketcand", "127.0.0.1") as echo:
@@ -278,7 +278,7 @@ class Socketcand(VirtualBusTest):
             self.assertEqual(line.until(b">"), "< ok >", element)
         return line
 
-    # Catches: what the protocol's document promises and python-can does not use.
+    # Catches: a promise of the protocol's document that python-can does not use and the server does not keep.
     def test_a_session_by_hand(self):
         with Echo("socketcand", "127.0.0.1") as echo:
             line = self.client(echo, "< open can0 >")
@@ -321,7 +321,7 @@ class Socketcand(VirtualBusTest):
             for line in (one, other, quiet, early):
                 line.close()
 
-    # Catches: a client that reads nothing and is kept, with all that waits for it.
+    # Catches: a client that reads nothing and is kept, with all frames that wait for it.
     def test_a_stalled_client_is_cut_off(self):
         with Echo("socketcand", "127.0.0.1") as echo:
             stalled = self.client(echo, "< open can0 >", "< rawmode >", buffer_bytes=4096)
@@ -339,11 +339,11 @@ class Socketcand(VirtualBusTest):
             other.close()
 
     def is_connected(self, line):
-        """Whether the kernel has no end or error of the connection behind what it holds."""
+        """True while the kernel knows no end or error of the connection behind its received bytes."""
         state = line.socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0]
         return state == 1  # established
 
-    # Catches: a bus for everybody in the network.
+    # Catches: a bus that is open to the network.
     def test_only_loopback_is_served(self):
         for address, reason in (("0.0.0.0", "other computers"), ("127.1", "must be an address")):
             with self.subTest(address), self.assertRaisesRegex(RuntimeError, reason):

@@ -36,15 +36,16 @@ class VirtualDrive(DriveTest):
         self.assertIn("equal, bit for bit", replay.stdout)
         return server.verdict["state_hash"], drive
 
-    # Catches: frames that python-can reads otherwise than we write them, or a DBC file that does not describe them.
+    # Catches: frames that python-can reads differently from how we write them, or a DBC file that does not describe
+    # them.
     def test_open_loop_start_over_udp_multicast(self):
         for fd in (True, False):
             with self.subTest(fd=fd):
                 self.open_loop([UDP],
                                lambda _: can.Bus(interface="udp_multicast", channel=GROUP, fd=True), fd)
 
-    # Catches: a phase c, Hall lines, a tachometer or injected faults that another program, which knows them from the
-    # DBC file alone, commands or reads otherwise than the bench means them.
+    # Catches: a phase c, Hall lines, a tachometer or injected faults that a program with the DBC file alone commands
+    # or reads differently from the bench.
     def test_a_motor_in_a_star_starts_over_udp_multicast(self):
         for fd in (True, False):
             with self.subTest(fd=fd):
@@ -81,8 +82,8 @@ class VirtualDrive(DriveTest):
         self.assertGreater(abs(count), 100, "the motor turns")
         self.assertIn("equal, bit for bit", self.drivebench("replay", recording).stdout)
 
-    # Catches: a command whose phase c got lost and that the bench carries out all the same.
-    def test_half_a_command_is_refused(self):
+    # Catches: a command that lost its phase c and is executed.
+    def test_a_command_without_phase_c_is_refused(self):
         text = with_bus([UDP, "fd = false"], STAR)
         server = self.server(text=text)
         with can.Bus(interface="udp_multicast", channel=GROUP, fd=True) as bus:
@@ -106,7 +107,7 @@ class VirtualDrive(DriveTest):
                        lambda _: can.Bus(interface="slcan", channel="socket://127.0.0.1:29600", bitrate=1_000_000,
                                          sleep_after_open=0), False)
 
-    # Catches: a socketcand server that a client written from its protocol description cannot use.
+    # Catches: a socketcand server that does not suit a client written from the protocol's description.
     def test_a_socketcand_session_by_hand(self):
         text = with_bus(['backend = "socketcand"', 'channel = "127.0.0.1"', "port = 29700", "fd = false"])
         dbc = self.text_of("dbc", text)
@@ -135,9 +136,9 @@ class VirtualDrive(DriveTest):
             self.assertEqual(ids, {0x601})
         self.assertEqual(server.stop(), 0)
 
-    # CMD-02. Catches: a bus on which real time waits for the controller, a watchdog that does not bite there, or a
-    # bench that hides what it missed.
-    def test_in_real_time_the_watchdog_bites_when_the_controller_falls_silent(self):
+    # CMD-02. Catches: a bus on which real time waits for the controller, a watchdog that does not act there, or a
+    # bench that hides missed commands.
+    def test_in_real_time_the_watchdog_acts_when_the_controller_is_silent(self):
         text = with_bus([UDP, "sample_every_ticks = 2"]).replace('mode = "lockstep"', 'mode = "realtime"')
         text = text.replace("command_delay_ticks = 0", "command_delay_ticks = 1").replace(
             "period_us = 125", "period_us = 1000").replace("watchdog_ticks = 20", "watchdog_ticks = 200")
@@ -160,7 +161,7 @@ class VirtualDrive(DriveTest):
             self.assertEqual(drive.await_message("reply")["result"], 4, "latched")
         server.stop()
 
-    # Catches: a bus that is asked for more than it can carry, without a word.
+    # Catches: a bus with more frames than it can carry that is taken silently.
     def test_a_bus_that_cannot_carry_its_frames_is_refused(self):
         text = with_bus([UDP, "fd = false"]).replace('mode = "lockstep"', 'mode = "realtime"').replace(
             "command_delay_ticks = 0", "command_delay_ticks = 1")
@@ -179,7 +180,7 @@ class VirtualDrive(DriveTest):
         self.assertIn("bus 1 must carry", server.errors())
         self.assertEqual(server.stop(), 0)
 
-    # CAN-11. Catches: two benches on one bus that both go on talking.
+    # CAN-11. Catches: two benches on one bus that both go on sending.
     def test_two_benches_with_the_same_node_both_notice(self):
         text = with_bus([UDP])
         first, second = self.server(text=text), self.server(text=text)

@@ -82,7 +82,7 @@ class ModbusTest(WireTest):
 
 class Pymodbus(ModbusTest):
     def test_three_phases_in_one_transaction_a_tick(self):
-        """Would catch: a phase c that is rounded, late or lost on its way, sensors that do not come back with it."""
+        """Catches: a phase c that is rounded, late or lost, sensors that do not come back with it."""
         def voltages(tick):
             return float(8 * (tick % 7) - 24), -0.5 * (tick % 5), 0.25 * (tick % 9)
 
@@ -111,7 +111,7 @@ class Pymodbus(ModbusTest):
         self.assertEqual(server.verdict["state_hash"], other.verdict["state_hash"])
 
     def test_every_block_and_function(self):
-        """Would catch: a block that a client of the field cannot read or write, a value in another order."""
+        """Catches: a block that an ordinary client cannot read or write, a value in another order."""
         client = self.pymodbus(self.modbus_server())
         header = self.read(client, HEADER, 30)
         self.assertEqual(header[:6], [0x4442, 1, 1, 0, MIRROR, 4])
@@ -155,7 +155,7 @@ class Pymodbus(ModbusTest):
         self.exception(client.read_exception_status(slave=1), 1)
 
     def test_a_run_over_modbus_equals_the_same_run_over_tcp(self):
-        """Would catch: a command that is rounded, late or applied twice on its way; a recording of something else."""
+        """Catches: a command that is rounded, late or applied twice; a recording that differs from the run."""
         voltages = [(float(8 * (tick % 7) - 24), -0.5 * (tick % 5)) for tick in range(400)]
         folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-modbus-"))
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
@@ -186,7 +186,7 @@ class Pymodbus(ModbusTest):
             self.assertEqual(words("f", float(row["i_a_a"])), sample[56:58])
 
     def test_one_axis_has_one_owner_whatever_the_transport(self):
-        """Would catch: a lease that only its own transport respects, refusals that are not counted or not logged."""
+        """Catches: a lease that only its own transport respects, refusals that are not counted or not logged."""
         server = self.modbus_server()
         modbus, tcp = self.pymodbus(server), self.client(server)
         self.written(modbus.write_register(LEASE, KEY, slave=1))
@@ -206,7 +206,7 @@ class Pymodbus(ModbusTest):
         self.assertEqual(counts["refused_writes"], 2)
 
     def test_two_axes_two_units(self):
-        """Would catch: one axis that answers for the other."""
+        """Catches: one axis that answers for the other."""
         client = self.pymodbus(self.modbus_server(text=TWO_AXES))
         for unit in (1, 2):
             self.assertEqual(self.read(client, 2, 2, unit), [2, unit - 1])
@@ -238,7 +238,7 @@ class Mbpoll(ModbusTest):
         return {int(address.strip("[]")): value.split()[0] for address, value in pairs}
 
     def test_every_block_from_a_shell(self):
-        """Would catch: a map that needs a program of ours; a lease that cannot outlive one call of a tool."""
+        """Catches: a map that needs a program of ours; a lease that ends with one call of a tool."""
         server = self.modbus_server()
         self.assertEqual(self.values(self.mbpoll(server, first=0, count=3)), {0: "17474", 1: "1", 2: "1"})
         self.assertEqual(self.values(self.mbpoll(server, kind="4:float", first=18, count=1, big=True)), {18: "1.23457"})
@@ -262,7 +262,7 @@ class Mbpoll(ModbusTest):
 
 
     def test_three_phases_from_a_shell(self):
-        """Would catch: phase c, Hall lines or injected faults that a tool of the field cannot reach."""
+        """Catches: phase c, Hall lines or injected faults that an ordinary tool cannot reach."""
         server = self.modbus_server(text=STAR + '\n[[axis.fault]]\nat_tick = 1\nname = "open_phase"\nvalue = 3\n')
         self.assertEqual(self.values(self.mbpoll(server, first=30, count=10)),
                          dict(zip(range(30, 40), map(str, (3, 5, 120, 22, 6, 286, 50, 7, 420, 13)))))
@@ -307,7 +307,7 @@ class Npm(ModbusTest):
         self.assertEqual(found["released"], 0)
 
     def test_modbus_serial(self):
-        """Would catch: answers that only lenient clients take."""
+        """Catches: answers that only lenient clients take."""
         found = self.found_by("modbus_serial.mjs", self.modbus_server())
         self.check(found)
         self.assertEqual(found["tooMany"], 3)
@@ -316,7 +316,7 @@ class Npm(ModbusTest):
         self.assertEqual(found["exchanged"], [1, 12.0, -3.0])
 
     def test_jsmodbus(self):
-        """Would catch: answers that only lenient clients take."""
+        """Catches: answers that only lenient clients take."""
         found = self.found_by("jsmodbus.mjs", self.modbus_server())
         self.check(found)
         self.assertEqual(found["integer"], -123456789)
@@ -325,19 +325,19 @@ class Npm(ModbusTest):
 
 class Program(ModbusTest):
     def test_writes_are_off_unless_allowed(self):
-        """Would catch: a bench that anybody on the network can drive because nobody said otherwise."""
+        """Catches: a bench that any computer of the network can drive because its file does not forbid it."""
         server = self.modbus_server(section=MODBUS.replace("allow_writes = true\n", ""))
         client = self.pymodbus(server)
         self.assertEqual(self.read(client, 27, 1), [0])
         self.exception(client.write_register(LEASE, KEY, slave=1), 2)
 
-    def test_an_open_address_is_said_aloud(self):
-        """Would catch: a protocol without passwords on every interface, and nobody told."""
+    def test_an_open_address_is_logged(self):
+        """Catches: a protocol without passwords on every interface, and no line in the log."""
         server = self.modbus_server(section=MODBUS.replace("127.0.0.1", "0.0.0.0") + "unprotected = true\n")
         until(lambda: "Modbus knows no passwords" in server.errors(), "a warning")
 
     def test_the_printed_map_is_the_served_one(self):
-        """Would catch: a map that was written by hand."""
+        """Catches: a map that was written by hand."""
         text = ONE_AXIS + MODBUS
         server = self.modbus_server()
         config = server.folder / "map.toml"

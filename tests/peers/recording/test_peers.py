@@ -39,9 +39,9 @@ class Recordings(unittest.TestCase):
             self.skipTest(f"npm cannot install @mcap/core: {installed.stderr.strip().splitlines()[-1:]}")
         return package / "read_recording.mjs"
 
-    def test_mcap_core_reads_what_the_recorder_wrote(self):
-        """Would catch: a file that only our own reader understands; wrong counts, times or schemas; a sample that means
-        something else to protobuf, or to the CSV export, than to the recorder."""
+    def test_mcap_core_reads_our_recordings(self):
+        """Catches: a file that only our own reader understands; wrong counts, times or schemas; a sample that protobuf or
+        the CSV export reads differently from the recorder."""
         reader = self.install_mcap_core()
         recording = self.folder / "run.mcap"
         text = (BENCHES / "servo.toml").read_text(encoding="utf-8") + LOAD
@@ -83,7 +83,7 @@ class Recordings(unittest.TestCase):
 
 class Protocol(unittest.TestCase):
     def test_the_python_example_turns_the_motor(self):
-        """Would catch: a wire that only our own client speaks, and an example that has gone stale."""
+        """Catches: a wire that only our own client speaks, and an example that no longer works."""
         example = EXAMPLES / "open_loop_start.py"
         self.assertLessEqual(len(example.read_text(encoding="utf-8").splitlines()), 40)
         with Server() as server:
