@@ -2,9 +2,9 @@
 """Makes tests/adversity/FAULTS.md from tests/adversity/rows.toml and the names of all tests in the sources.
 
     /usr/bin/python3 tests/adversity/table.py            writes it
-    /usr/bin/python3 tests/adversity/table.py --check    exit 1 if the stored one is another, or a name is wrong
+    /usr/bin/python3 tests/adversity/table.py --check    exit 1 if the stored one differs, or a name is wrong
 
-A test is one that the build knows: its file, or itself, stands in a CMakeLists.txt."""
+A test counts if the build knows it: a CMakeLists.txt names it or its file."""
 import pathlib
 import re
 import sys
@@ -25,8 +25,8 @@ HEAD = """# Faults and abuse: what is tested
 Made by `/usr/bin/python3 tests/adversity/table.py` from the names of the tests and [`rows.toml`](rows.toml); a test compares. A
 test that proves a row has its ID in its name: `TEST(Bench, CMD_06_...)`, `def test_cmd_06_...`.
 
-*differs:* where the catalogue of faults that the rows come from asks for something else, and why this is right here.
-**proved**: by the tests named; **partly**: they leave open what stands behind *open*; **missing**: no test yet; **not here**: cannot be
+*differs:* where the catalogue of faults behind the rows requires another behaviour, and why the bench differs.
+**proved**: by the tests named; **partly**: except for the part behind *open*; **missing**: no test yet; **not here**: cannot be
 tested in this suite, with the reason.
 """
 
@@ -60,7 +60,7 @@ def status_of(row, tests):
 
 
 def make_table(sections, names):
-    """The text of the table, and what is wrong with the rows or the names."""
+    """The text of the table, and the problems of the rows and names."""
     problems = []
     rows = [row for section in sections for row in section["rows"]]
     proofs = {row["id"]: set(row.get("by", [])) for row in rows}
@@ -81,7 +81,7 @@ def make_table(sections, names):
     counts = dict.fromkeys(("proved", "partly", "missing", "not here"), 0)
     text = ""
     for section in sections:
-        text += f"\n## {section['title']}\n\n| ID | what is done -> what must happen | | tests |\n|---|---|---|---|\n"
+        text += f"\n## {section['title']}\n\n| ID | fault -> required behaviour | | tests |\n|---|---|---|---|\n"
         for row in section["rows"]:
             status = status_of(row, proofs[row["id"]])
             counts[status] += 1
@@ -102,7 +102,7 @@ def main():
     if sys.argv[1:] == ["--check"]:
         if not TABLE.exists() or TABLE.read_text(encoding="utf-8") != text:
             problems.append("")
-            print("tests/adversity/FAULTS.md is not that of the tests' names: /usr/bin/python3 tests/adversity/table.py")
+            print("tests/adversity/FAULTS.md does not match the tests' names: run /usr/bin/python3 tests/adversity/table.py")
     elif not problems:
         TABLE.write_text(text, encoding="utf-8")
     sys.exit(1 if problems else 0)
