@@ -1,4 +1,4 @@
-"""What the tests of the programs share: a folder of their own, the programs run in it, and short ways to ask."""
+"""Shared by the tests of the programs: a folder of their own, the programs run in it, and short ways to ask."""
 import json
 import os
 import pathlib
@@ -11,13 +11,13 @@ from wire_test import until  # noqa: F401
 
 DRIVEBENCH = SERVER.parent / "drivebench"
 SERVO = BENCHES / "servo.toml"
-NOBODY = "tcp:127.0.0.1:1"  # a port on which nobody listens
+NO_BENCH = "tcp:127.0.0.1:1"  # a port without a listener
 
 OK, FAILED, USAGE, NO_CONNECT, CUT_SHORT, TOO_LATE = 0, 1, 2, 3, 3, 3
 
 
-def environment(link=NOBODY):
-    """Without what the user of this machine may have set."""
+def environment(link=NO_BENCH):
+    """Without the variables of this machine's user."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")}
     return {**guarded(clean), "DRIVEBENCH_LINK": link}
 
@@ -37,11 +37,11 @@ class CommandTest(unittest.TestCase):
         self.addCleanup(server.__exit__)
         return server
 
-    def run_program(self, program, *arguments, link=NOBODY):
+    def run_program(self, program, *arguments, link=NO_BENCH):
         return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, cwd=self.folder,
                               env=environment(link), timeout=4 * PATIENCE_S, check=False)
 
-    def drivebench(self, *arguments, link=NOBODY, code=OK):
+    def drivebench(self, *arguments, link=NO_BENCH, code=OK):
         done = self.run_program(DRIVEBENCH, *arguments, link=link)
         self.assertEqual(done.returncode, code, f"drivebench {arguments}: {done.stdout}{done.stderr}")
         return done
@@ -54,8 +54,8 @@ class CommandTest(unittest.TestCase):
     def json_of(self, *arguments, **more):
         return json.loads(self.drivebench(*arguments, "--json", **more).stdout)
 
-    def start(self, *command, link=NOBODY):
-        """A program that goes on until it is told to end."""
+    def start(self, *command, link=NO_BENCH):
+        """A program that runs until it is told to end."""
         process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, cwd=self.folder, env=environment(link))
 

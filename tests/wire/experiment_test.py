@@ -1,4 +1,4 @@
-"""What the tests of experiments share: a request, and what comes of it."""
+"""Shared by the tests of experiments: a request, and its results."""
 import struct
 import tempfile
 
@@ -21,12 +21,12 @@ def request(ticks=400, amplitude=40.0, signals=SIGNALS, owner=OWNER, **more):
 
 
 def endless(**more):
-    """Paced by the clock: long enough for whatever a test does meanwhile."""
+    """Paced by the clock: longer than any test."""
     return request(ticks=400_000, mode=pb.MODE_REALTIME, **more)
 
 
 class Fetched:
-    """What came of a fetch."""
+    """The result of a fetch."""
 
     def __init__(self):
         self.data = b""
@@ -44,7 +44,7 @@ class ExperimentTest(WireTest):
         self.addCleanup(self.kept.cleanup)
 
     def configuration(self, **settings):
-        """That of the servo, with settings of its experiments."""
+        """The servo's configuration, with settings of its experiments."""
         more = "".join(f"{key} = {value}\n" for key, value in settings.items())
         return f'{SERVO_TEXT}\n[experiments]\nfolder = "{self.kept.name}"\n{more}'
 
@@ -57,7 +57,7 @@ class ExperimentTest(WireTest):
         return answer.experiment_info
 
     def fetch(self, client, number, owner=OWNER, start=0, recording=False):
-        """All of it, to the end."""
+        """Fetches everything up to the end."""
         fetched = Fetched()
         asked = client.send(fetch_experiment=pb.FetchExperiment(id=number, owner=owner, recording=recording,
                                                                 **{"from": start}))

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What changes the world around a controller, as a user of drivebench meets it, and its replay. Each test names the mistake
-that it would catch."""
+"""The subcommands of drivebench that inject faults, write parameters and take an axis, and the replay of their
+changes."""
 import struct
 import sys
 import unittest
@@ -28,7 +28,7 @@ class Commands(CommandTest):
         return self.json_of("status", link=self.link)["axes"][0]
 
     def test_inject_puts_a_fault_in_and_takes_it_back(self):
-        """A fault that the status does not tell, or that goes with the session."""
+        """Catches: a fault that the status does not show, or that ends with its session."""
         said = self.drivebench("inject", "servo", "bus_sag", "0.25", link=self.link).stdout
         self.assertEqual(said, "axis 0 (servo): bus_sag = 0.25 from tick 0 on\n")
         found = self.json_of("inject", "0", "hall_offset", "-0.5", link=self.link)
@@ -42,7 +42,7 @@ class Commands(CommandTest):
                         "drive voltage_amplifier", "injectable fault", "open_phase")
 
     def test_set_writes_numbers_and_words_and_ramps(self):
-        """A ramp in ticks of another bench, a word that is taken for 0."""
+        """Catches: a ramp in ticks of another bench, a word that is taken for 0."""
         said = self.drivebench("set", "servo", NAME, "5.9", "--ramp-s", "0.5e-3", link=self.link).stdout
         self.assertEqual(said, f"axis 0 (servo): {NAME} = 5.9 ohm from tick 4 on\n")
         self.drivebench("set", "servo", "mechanics.motion", "locked", link=self.link)
@@ -56,8 +56,8 @@ class Commands(CommandTest):
         self.assertEqual(seen, [[3.9, 1], [4.4, 1], [4.9, 1], [5.4, 1], [5.9, 1]])
         self.drivebench("bump", "servo", "-0.0001", link=self.link)
 
-    def test_own_04_take_puts_the_owner_out_and_leaves_the_axis_free(self):
-        """A command that takes an axis and keeps it, or takes it without being asked twice."""
+    def test_own_04_take_ends_the_lease_and_leaves_the_axis_free(self):
+        """Catches: a command that takes an axis and keeps it, or takes it without a confirmation."""
         with self.bench.client() as owner:
             owner.lease()
             for tick in range(3):
@@ -71,8 +71,8 @@ class Commands(CommandTest):
             self.assertEqual((found["axis"], found["name"], found["tick"]), (0, "take", 3))
             self.assertEqual(self.status()["owner"], 0)
 
-    def test_what_cannot_be_done_is_told(self):
-        """A command that ends with 0 and changed nothing."""
+    def test_a_refused_change_is_reported(self):
+        """Catches: a command that exits with 0 and changed nothing."""
         for arguments, code, fact in (
                 (["inject", "servo", "bus_sagg", "1"], USAGE, "no fault 'bus_sagg'"),
                 (["inject", "brake", "bus_sag", "1"], USAGE, "no axis 'brake'"),
@@ -95,8 +95,8 @@ class Commands(CommandTest):
 
 
 class Replays(CommandTest):
-    def test_everything_that_happened_replays_bit_for_bit(self):
-        """A change that is recorded without its ramp, its tick or its sign."""
+    def test_every_change_replays_bit_for_bit(self):
+        """Catches: a change that is recorded without its ramp, its tick or its sign."""
         recording = self.folder / "run.mcap"
         events = """
 [[axis.set]]

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""The subcommands of drivebench that talk to a bench, as a user or a script meets them: what they print, as text and as JSON,
-and their exit codes. Each test names the mistake that it would catch."""
+"""The subcommands of drivebench that talk to a bench: their output, as text and as JSON, and their exit codes."""
 import json
 import signal
 import socket
@@ -16,22 +15,22 @@ except ImportError:
     sys.exit(77)
 
 from command_test import (
-    DRIVEBENCH, FAILED, NOBODY, NO_CONNECT, OK, SERVO, USAGE, CommandTest, link_of, until)
+    DRIVEBENCH, FAILED, NO_BENCH, NO_CONNECT, OK, SERVO, USAGE, CommandTest, link_of, until)
 from wire_client import PATIENCE_S, REPOSITORY, pb
 
 
 class WithoutABench(CommandTest):
-    def test_nothing_to_connect_to_is_3(self):
-        """A script that takes a missing bench for a failed run, or for a good one."""
+    def test_a_missing_bench_is_3(self):
+        """Catches: a script that takes a missing bench for a failed run, or for a good one."""
         for command in ("describe", "status", "watch", "control"):
-            self.assertSays(self.drivebench(command, code=NO_CONNECT).stderr, "nothing answers at " + NOBODY)
+            self.assertSays(self.drivebench(command, code=NO_CONNECT).stderr, "nothing answers at " + NO_BENCH)
             error = self.json_of(command, code=NO_CONNECT)["error"]
             self.assertEqual(error["kind"], "connect")
-            self.assertSays(error["message"], NOBODY)
+            self.assertSays(error["message"], NO_BENCH)
         self.drivebench("status", "--link", f"unix:{self.folder}/none", code=NO_CONNECT)
 
-    def test_a_wrong_command_line_is_2_and_says_what_is_wrong(self):
-        """An option that is ignored, a number that is half read, NaN that passes every comparison, -1 that is 2^64 - 1."""
+    def test_a_wrong_command_line_is_2_and_names_the_mistake(self):
+        """Catches: an option that is ignored, a number that is half read, NaN that passes every comparison, -1 that is 2^64 - 1."""
         for arguments, fact in (
                 ([], "subcommand"), (["nope"], "nope"), (["status", "--nope"], "--nope"), (["status", "more"], "more"),
                 (["control", "--preset", "book/8.2"], "did you mean book/8.2.2"),
@@ -53,7 +52,7 @@ class WithoutABench(CommandTest):
             self.assertEqual(done.stdout, "")
 
     def test_a_real_number_is_finite_and_has_an_end(self):
-        """NaN that passes a range because no comparison with it is true, seconds that overflow the clock."""
+        """Catches: naN that passes a range because no comparison with it is true, seconds that overflow the clock."""
         for arguments, option, high in (
                 (["watch"], "--rate", "1e+15"), (["set", "servo", "a", "1"], "--ramp-s", "1e+09"),
                 (["control", "--compare", "none.mcap"], "--threshold", "1e+15"),
@@ -70,7 +69,8 @@ class WithoutABench(CommandTest):
         self.assertSays(self.drivebench("bump", "servo", "inf", code=USAGE).stderr, "IMPULSE: inf is not a number")
 
     def test_a_run_without_an_end_or_a_beginning_is_2(self):
-        """A gain that takes all memory, or whose samples overflow, on an axis that is held for it; a picture of no samples."""
+        """Catches: a gain that takes all memory, or whose samples overflow, on an axis that is held for it; a picture of
+        no samples."""
         for gains, fact in (("run.hold_s=1e300", "run.hold_s = 1e+300 must be at most 3600 s"),
                             ("run.prepare_s=3601", "run.prepare_s = 3601 must be at most 3600 s"),
                             ("move.ramp_up_s=1e300", "move.ramp_up_s = 1e+300 must be at most 3600 s"),
@@ -82,7 +82,7 @@ class WithoutABench(CommandTest):
             self.assertSays(self.drivebench("control", *options, code=USAGE).stderr, fact)
 
     def test_help_names_every_subcommand_and_the_exit_codes(self):
-        """A subcommand that nobody finds, a way to a bench that nobody is told."""
+        """Catches: a subcommand, or a way to name a bench, that the help leaves out."""
         said = self.drivebench("--help").stdout
         self.assertSays(said, "serve", "demo", "describe", "status", "watch", "control", "replay", "export", "Exit codes: 0 ok")
         for command in ("demo", "describe", "status", "watch", "control", "replay", "export"):
@@ -91,7 +91,7 @@ class WithoutABench(CommandTest):
             self.assertSays(self.drivebench(*command, "--help").stdout, "tcp:HOST:PORT", "tls:HOST:PORT", "unix:PATH")
 
     def test_presets_are_listed(self):
-        """A preset that cannot be found, or that does not say where it comes from."""
+        """Catches: a preset that is not listed, or that does not name its source."""
         presets = self.json_of("control", "--list")
         self.assertSays(self.drivebench("control", "--list").stdout, *(preset["name"] for preset in presets))
         self.assertIn("book/8.2.2", [preset["name"] for preset in presets])
@@ -106,7 +106,7 @@ class Observing(CommandTest):
         self.link = link_of(self.bench)
 
     def test_describe_names_everything_with_its_unit(self):
-        """A parameter without unit or limits, a signal or fault that is missing."""
+        """Catches: a parameter without unit or limits, a signal or fault that is missing."""
         said = self.drivebench("describe", link=self.link).stdout
         self.assertSays(said, "bench servo at tcp:127.0.0.1", "lockstep", "period 125 us (8 kHz), 5 substeps",
                         "command delay 0 ticks", "axis 0 (servo)", "machine.rotor_resistance_ohm", "N*m", "over_current")
@@ -122,7 +122,7 @@ class Observing(CommandTest):
             self.assertSays(said, each["name"], each["meaning"])
 
     def test_status_follows_the_bench(self):
-        """A status of the start, or without the state that a user looks for."""
+        """Catches: a status from the start of the run, or without the state of the axis."""
         said = self.drivebench("status", link=self.link).stdout
         self.assertSays(said, "lockstep, tick 0", "1 session", "not recording", "axis 0 (servo): idle", "owner nobody",
                         "faults none")
@@ -137,27 +137,27 @@ class Observing(CommandTest):
         self.assertKeys(found["axes"][0], "axis", "faults_set", *(f.name for f in pb.Sample.DESCRIPTOR.fields))
         self.assertEqual(found["axes"][0]["u_a_v"], 10.0)
 
-    def test_status_tells_what_is_recorded(self):
-        """A user who records a day and finds an empty folder."""
+    def test_status_shows_the_recording(self):
+        """Catches: a status that hides that no recording is made."""
         bench = self.server("--record", str(self.folder / "r.mcap"))
         self.assertSays(self.drivebench("status", link=link_of(bench)).stdout, "recording ", "r.mcap, 0 gaps")
         self.assertSays(self.json_of("status", link=link_of(bench))["recording"], "r.mcap")
 
     def test_the_link_may_be_a_unix_socket_or_an_option(self):
-        """An option that the environment overrides."""
+        """Catches: an option that the environment overrides."""
         bench = self.server(unix=True)
         self.drivebench("status", "--link", f"unix:{bench.unix_path}")
         self.drivebench("status", "--link", link_of(bench))
 
     def test_a_token_is_asked_for_and_taken(self):
-        """A token that is not sent, or a refusal that looks like a failed run."""
+        """Catches: a token that is not sent, or a refusal that looks like a failed run."""
         (self.folder / "tokens").write_text('[[token]]\nname = "anna"\nrole = "viewer"\ntoken = "secret"\n', encoding="utf-8")
         (self.folder / "tokens").chmod(0o600)
         text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         bench = self.server(text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{self.folder}/tokens"'))
         self.assertSays(self.drivebench("status", link=link_of(bench), code=NO_CONNECT).stderr, "does not let us in")
         self.drivebench("status", "--token", "wrong", link=link_of(bench), code=NO_CONNECT)
-        time.sleep(1.1)  # after two wrong ones
+        time.sleep(1.1)  # after two wrong tokens
         self.drivebench("status", "--token", "secret", link=link_of(bench))
         for command in (["experiment", "list"], ["identify", "--motor", "im", "--link", link_of(bench)]):
             said = self.drivebench(*command, "--owner", "anna", link=link_of(bench), code=NO_CONNECT).stderr
@@ -171,8 +171,8 @@ class Observing(CommandTest):
         self.assertEqual(watching.returncode, OK)
         return out.splitlines()
 
-    def test_watch_prints_as_many_samples_as_asked_for_at_the_rate_of_the_bench(self):
-        """A rate in wall time, which in lockstep means nothing; a --count that is one off."""
+    def test_watch_prints_the_requested_number_of_samples_at_the_rate_of_the_bench(self):
+        """Catches: a rate in wall time, which in lockstep means nothing; a --count that is one off."""
         head, *rows = self.watch_a_move("--count", "5", "--rate", "1000", "--signals", "tick,i_a_a,state")
         self.assertEqual(head.split(), ["tick", "i_a_a", "[A]", "state"])
         ticks = [int(row.split()[0]) for row in rows]
@@ -180,21 +180,21 @@ class Observing(CommandTest):
         self.assertEqual(rows[-1].split()[2], "run")
 
     def test_watch_prints_a_json_object_a_line(self):
-        """A stream that cannot be read line by line."""
+        """Catches: a stream that cannot be read line by line."""
         rows = [json.loads(row) for row in self.watch_a_move("--json", "--count", "3", "--rate", "8000", "--axis", "servo")]
         self.assertEqual([row["tick"] for row in rows], list(range(rows[0]["tick"], rows[0]["tick"] + 3)))
         self.assertKeys(rows[0], "axis", "dropped", "state", "faults", "encoder_count", "angle_rad", "speed_rad_s")
 
     def test_watch_ends_well_when_interrupted(self):
-        """A ctrl-C that looks like a failure."""
+        """Catches: ctrl-C that looks like a failure."""
         for number in (signal.SIGINT, signal.SIGTERM):
             watching = self.start(DRIVEBENCH, "watch", link=self.link)
             watching.stderr.readline()
             watching.send_signal(number)
             self.assertEqual(watching.wait(PATIENCE_S), OK)
 
-    def test_an_axis_that_is_not_there_is_2(self):
-        """A viewer that waits for ever."""
+    def test_an_unknown_axis_is_2(self):
+        """Catches: a viewer that waits forever."""
         for command in ("watch", "control"):
             self.assertSays(self.drivebench(command, "--axis", "7", link=self.link, code=USAGE).stderr,
                             "no axis '7'; this bench has 0 (servo)")
@@ -219,7 +219,7 @@ class Controlling(CommandTest):
         return next(each["value"] for each in parameters if each["name"] == name)
 
     def test_two_moves_one_after_the_other(self):
-        """A second run that starts with the flux, the load or the lease of the first."""
+        """Catches: a second run that starts with the flux, the load or the lease of the first."""
         said = self.drivebench("control", link=self.link).stdout
         self.assertSays(said, "book/8.2.2 on axis servo of bench servo, lockstep", "peak error (true angle)", "counts",
                         "peak phase current", "exchange p99")
@@ -231,7 +231,7 @@ class Controlling(CommandTest):
         self.assertEqual((report["failure"], report["samples"], report["missed_ticks"]), ("", 1024, 0))
 
     def test_set_stays_and_load_is_put_back(self):
-        """A --set that ends with its session, a --load that spins the motor afterwards."""
+        """Catches: a --set that ends with its session, a --load that spins the motor afterwards."""
         self.control("--set", "machine.rotor_resistance_ohm=5.85", "--load", "0.1@0.0365", "--load", "0.05@0.05")
         self.assertEqual(self.parameter("machine.rotor_resistance_ohm"), 5.85)
         with self.bench.client() as client:
@@ -240,7 +240,7 @@ class Controlling(CommandTest):
             self.assertEqual(client.step(tick, gates=pb.GATES_OFF).load_nm, 0.0)
 
     def test_set_refuses_what_the_bench_refuses(self):
-        """A misspelt parameter that is ignored, and a move that runs with the wrong motor."""
+        """Catches: a misspelt parameter that is ignored, and a move that runs with the wrong motor."""
         for setting, fact in (("machine.rotor_resistance=5", "there is no parameter 'machine.rotor_resistance'"),
                               ("machine.rotor_resistance_ohm=-1", "must lie between"),
                               ("machine.rotor_resistance_ohm=nan", "not a number")):
@@ -248,7 +248,7 @@ class Controlling(CommandTest):
         self.assertEqual(self.json_of("status", link=self.link)["tick"], 0)
 
     def test_csv_has_a_row_for_each_sample(self):
-        """A file that lacks its end or its units; a folder that is missing, told after the move."""
+        """Catches: a file without its end or its units; a missing folder that is reported after the move."""
         self.control("--csv", "move.csv")
         head, *rows = (self.folder / "move.csv").read_text(encoding="utf-8").splitlines()
         self.assertSays(head, "tick,time [s],reference [rad],angle [rad],error [counts]")
@@ -258,7 +258,7 @@ class Controlling(CommandTest):
         self.assertEqual(self.json_of("status", link=self.link)["tick"], before)
 
     def test_another_owner_is_not_disturbed(self):
-        """Two controllers that take turns on one motor."""
+        """Catches: two controllers that take turns on one motor."""
         with self.bench.client() as owner:
             owner.lease()
             self.assertSays(self.drivebench("control", link=self.link, code=FAILED).stderr, "another session holds the lease")
@@ -268,8 +268,8 @@ class Controlling(CommandTest):
             owner.lease(pb.LeaseRequest.ACTION_RELEASE)
         self.control()
 
-    def test_latched_faults_are_told_and_cleared_on_demand(self):
-        """A fault that is cleared unasked, or a move into a latched bench."""
+    def test_latched_faults_are_reported_and_cleared_on_demand(self):
+        """Catches: a fault that is cleared unasked, or a move into a latched bench."""
         with self.bench.client() as client:
             client.lease()
             client.step(0, 10.0)
@@ -279,12 +279,12 @@ class Controlling(CommandTest):
         self.control()
 
     def test_a_preset_that_does_not_fit_names_one_that_does(self):
-        """A controller of 4 kHz on a bench of 8 kHz."""
+        """Catches: a controller of 4 kHz on a bench of 8 kHz."""
         said = self.drivebench("control", "--preset", "book/8.2.2-4khz", link=self.link, code=USAGE).stderr
         self.assertSays(said, "the sample rate [Hz] is 8000 on the bench, 4000 in the preset", "book/8.2.2 would fit")
 
     def test_a_link_that_breaks_in_a_move_costs_no_sample(self):
-        """A report and a file of samples that are lost with the bench."""
+        """Catches: a report and a file of samples that are lost with the bench."""
         listener = socket.create_server(("127.0.0.1", 0))
         self.addCleanup(listener.close)
 
@@ -314,7 +314,7 @@ class Controlling(CommandTest):
         self.assertEqual(len(rows), 1 + found["samples"])
 
     def test_an_interrupted_move_is_a_failed_run(self):
-        """An exit code of 0 after half a move."""
+        """Catches: an exit code of 0 after half a move."""
         moving = self.start(DRIVEBENCH, "control", "--json", "--gain", "run.hold_s=60", link=self.link)
         until(lambda: self.json_of("status", link=self.link)["axes"][0]["owner"] != 0, "the move begins")
         moving.send_signal(signal.SIGINT)

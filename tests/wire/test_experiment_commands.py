@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The subcommands of `drivebench experiment` against the real server. Each test names the mistake that it would catch."""
+"""The subcommands of `drivebench experiment` against the real server."""
 import json
 import os
 import pathlib
@@ -52,7 +52,7 @@ class Commands(WireTest):
         return subprocess.CompletedProcess(words, process.returncode, out, err)
 
     def test_the_examples_run(self):
-        """An example that its bench refuses, or whose numbers are not those that it is about."""
+        """Catches: an example that its bench refuses, or whose results miss their purpose."""
         for bench, name, rows, column, at_least in (
                 ("im-8-5-5", "im-8-5-5-start", 801, "speed_rad_s [rad/s]", 140.0),
                 ("dc-a-servo", "dc-a-two-sines", 1001, "i_a_a [A]", 2.45),
@@ -69,7 +69,7 @@ class Commands(WireTest):
             server.stop()
 
     def test_run_list_fetch_and_cancel(self):
-        """A subcommand that does something else than it says, or ends well after a failure."""
+        """Catches: a subcommand that does not do its work, or exits with 0 after a failure."""
         self.start("servo")
         table = self.path / "steps.csv"
         table.write_text("time_s,u_v\n0,1\n0.01,2\n", encoding="utf-8")
@@ -95,7 +95,7 @@ class Commands(WireTest):
         self.assertEqual(self.drivebench("fetch", str(detached["id"])).returncode, 1)
 
     def test_a_fetch_that_fails_leaves_the_file_alone(self):
-        """Yesterday's data that are emptied because the server is not there, or does not know the number."""
+        """Catches: an existing file that is emptied because the server is down, or does not know the number."""
         server = self.start("servo")
         old = {self.path / name: b"precious" for name in ("old.csv", "old.mcap")}
         for path, data in old.items():
@@ -107,14 +107,14 @@ class Commands(WireTest):
         self.assertEqual({path: path.read_bytes() for path in old}, old)
 
     def test_an_interrupted_fetch_ends_and_the_experiment_goes_on(self):
-        """Ctrl-C of somebody who only looks, and ends what another terminal waits for."""
+        """Catches: ctrl-C of a fetch that also ends the experiment."""
         self.start("servo")
         toml = self.path / "e.toml"
         toml.write_text('mode = "realtime"\nduration_s = 110.0\nsignals = ["u_a_v"]\n[input]\nkind = "none"\n', encoding="utf-8")
         number = str(json.loads(self.drivebench("run", str(toml), "--json", "--detach").stdout)["id"])
         for name in ("part.csv", "part.mcap"):
             fetching = self.popen("fetch", number, "--out", name)
-            until(lambda: catches(signal.SIGINT, fetching), "it would not die of the signal")
+            until(lambda: catches(signal.SIGINT, fetching), "the program handles the signal")
             until(lambda: (self.path / "part.csv").exists(), "rows come")  # a recording comes at the end only
             fetching.send_signal(signal.SIGINT)
             _, said = fetching.communicate(timeout=PATIENCE_S)
@@ -125,8 +125,8 @@ class Commands(WireTest):
         self.assertEqual([int(line.split(",")[0]) for line in lines[1:]], list(range(len(lines) - 1)))
         self.assertEqual(self.drivebench("cancel", number).returncode, 0)
 
-    def test_the_secret_of_a_user_stands_in_the_folder_of_his_settings(self):
-        """An empty variable that puts the secret into whatever folder one happens to be in."""
+    def test_the_secret_of_a_user_is_kept_in_the_folder_of_settings(self):
+        """Catches: an empty variable that puts the secret into the current folder."""
         self.start("servo")
         for variables, place in (({"XDG_CONFIG_HOME": "", "HOME": f"{self.path}/home"}, "home/.config/drivebench/owner"),
                                  ({"XDG_CONFIG_HOME": f"{self.path}/xdg", "HOME": ""}, "xdg/drivebench/owner")):
@@ -138,8 +138,8 @@ class Commands(WireTest):
         self.assertIn("--owner is needed", refused.stderr)
         self.assertFalse((self.path / "drivebench").exists() or (self.path / ".config").exists())
 
-    def test_wrong_files_are_told_with_their_lines(self):
-        """A wrong file that is sent all the same."""
+    def test_wrong_files_are_reported_with_their_lines(self):
+        """Catches: a wrong file that is sent all the same."""
         self.start("servo")
         toml = self.path / "e.toml"
         toml.write_text('ticks = 160\nsignals = ["u_a_v"]\n[input]\nkind = "volts"\n', encoding="utf-8")
@@ -152,7 +152,7 @@ class Commands(WireTest):
         self.assertEqual(json.loads(ran.stdout)["error"]["field"], "input.kind")
 
     def test_run_goes_on_when_the_connection_breaks(self):
-        """A client that gives up or begins anew when the network does."""
+        """Catches: a client that gives up or begins anew when its connection breaks."""
         server = self.start("servo")
         proxy = Proxy(server.address)
         self.addCleanup(proxy.close)

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Experiments of several owners: whose turn it is, what is whose, and what stays. Each test names the mistake that it
-would catch."""
+"""Experiments of several owners: their turns, their data, and the folder that keeps them."""
 import os
 import pathlib
 import sys
@@ -18,8 +17,8 @@ from wire_test import until
 
 
 class Queue(ExperimentTest):
-    def test_three_clients_queue_fairly_and_get_their_own(self):
-        """A queue in which the first client with many experiments goes before all others, or data that are mixed."""
+    def test_three_clients_queue_fairly_and_get_their_own_data(self):
+        """Catches: a queue in which a client with many experiments goes before all others, or mixed-up data."""
         server = self.start()
         blocker = self.client(server)
         first = self.run_it(blocker, endless())
@@ -46,7 +45,7 @@ class Queue(ExperimentTest):
         self.assertEqual(closed, order)
 
     def test_a_full_queue_and_cancelling_in_it(self):
-        """A queue without an end, or a place in it that is not given back."""
+        """Catches: a queue without a bound, or a place in it that is not given back."""
         server = self.server(text=self.configuration(queue_length=2))
         client = self.client(server)
         running = self.run_it(client, endless())
@@ -66,19 +65,19 @@ class Queue(ExperimentTest):
         self.wait_for(client, third.id, pb.EXPERIMENT_STATE_COMPLETED)
 
     def test_the_same_request_again_is_the_same_experiment(self):
-        """A request that was sent again because its answer was lost, and runs twice."""
+        """Catches: a request that was sent again because its answer was lost, and runs twice."""
         server = self.start()
         one = self.run_it(self.client(server), request(request_key="k1"))
         two = self.run_it(self.client(server), request(request_key="k1"))
         self.assertEqual(one.id, two.id)
-        self.assertNotEqual(self.run_it(self.client(server), request(request_key="k1", owner="somebody else")).id, one.id)
+        self.assertNotEqual(self.run_it(self.client(server), request(request_key="k1", owner="another owner")).id, one.id)
         self.assertRefused(self.client(server).ask(run_experiment=request(401, request_key="k1")),
                            pb.REFUSAL_OUT_OF_RANGE, "request_key")
 
 
 class Folder(ExperimentTest):
     def test_the_data_of_others_are_refused_unless_shared(self):
-        """Data, labels or a right to cancel for somebody who does not know the secret."""
+        """Catches: data, labels or a right to cancel for a client that does not know the secret."""
         server = self.start()
         client = self.client(server)
         private = self.whole(client, request(label="private")).info.id
@@ -96,7 +95,7 @@ class Folder(ExperimentTest):
         self.assertEqual(len(self.fetch(stranger, shared, owner="").data), 401 * 3 * 8)
 
     def test_experiments_outlive_the_server_and_the_oldest_go(self):
-        """Data that are lost with the server, numbers that are given twice, a folder that grows for ever."""
+        """Catches: data that are lost with the server, numbers that are given twice, a folder that grows forever."""
         text = self.configuration(kept=3)
         server = self.server(text=text)
         client = self.client(server)
@@ -116,9 +115,9 @@ class Folder(ExperimentTest):
         self.assertEqual({int(f.split(".")[0]) for f in os.listdir(self.kept.name) if f[0].isdigit()}, {3, 4, 5})
         self.assertEqual(self.run_it(client, request()).id, 6)
 
-    def test_the_first_to_end_goes_first(self):
-        """The lowest number instead of the first end: of two owners who take turns, the data of who waited longest go
-        the moment they are there, or with the next start of the server."""
+    def test_the_first_experiment_to_end_is_removed_first(self):
+        """Catches: removal of the lowest number instead of the first end: of two owners in turn, the data of the one that
+        waited longest would go at once, or with the next start of the server."""
         text = self.configuration(kept=2)
 
         def there(client):
@@ -132,7 +131,7 @@ class Folder(ExperimentTest):
         first = self.run_it(client, endless()).id
         self.wait_for(client, first, pb.EXPERIMENT_STATE_RUNNING)
         waits = self.run_it(client, request(400, mode=pb.MODE_REALTIME)).id
-        turns = [self.run_it(client, request(100, owner=f"somebody else {k}")).id for k in range(2)]
+        turns = [self.run_it(client, request(100, owner=f"another owner {k}")).id for k in range(2)]
         client.ask(cancel_experiment=pb.CancelExperiment(id=first, owner=OWNER))
         fetched = self.fetch(client, waits)
         self.assertEqual((fetched.info.state, len(fetched.rows(3))), (pb.EXPERIMENT_STATE_COMPLETED, 401))
@@ -147,8 +146,8 @@ class Folder(ExperimentTest):
         self.assertEqual(there(client), [waits, 6])
         self.assertLess(waits, min(turns))
 
-    def test_who_cancels_is_told_although_it_goes(self):
-        """An experiment that is forgotten by the request that cancels it, which then is refused."""
+    def test_a_cancel_is_answered_although_the_experiment_goes(self):
+        """Catches: an experiment that is forgotten by the request that cancels it, which then is refused."""
         text = self.configuration(kept=1)
         client = self.client(self.server(text=text))
         running = self.run_it(client, endless())
@@ -159,9 +158,9 @@ class Folder(ExperimentTest):
             self.assertEqual(answer.experiment_info.state, pb.EXPERIMENT_STATE_CANCELLED, answer)
             self.wait_for(client, number, pb.EXPERIMENT_STATE_CANCELLED)
 
-    def test_a_file_that_is_no_experiment_is_told_of_and_left_alone(self):
-        """A file that a power cut left empty: the server divides by its decimation of 0, which ends it, or gives its
-        data to whoever names no owner."""
+    def test_a_file_that_is_no_experiment_is_reported_and_left_alone(self):
+        """Catches: a file that a power cut left empty: the server divides by its decimation of 0 and ends, or gives its
+        data to a client that names no owner."""
         folder = pathlib.Path(self.kept.name)
         server = self.start()
         self.whole(self.client(server), request(100))
@@ -180,7 +179,7 @@ class Folder(ExperimentTest):
                  13: (broken(13, lambda s: s.info.signals.extend(["i_a_a"] * 9999)), "a signal")}
         for number, (data, _) in files.items():
             (folder / f"{number}.experiment").write_bytes(data)
-        (folder / "14.experiment.new").write_bytes(whole)  # the power failed before it had its name
+        (folder / "14.experiment.new").write_bytes(whole)  # the power failed before the file was renamed
         server = self.start()
         client = self.client(server)
         listed = client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments
@@ -195,8 +194,8 @@ class Folder(ExperimentTest):
         self.assertFalse((folder / "14.experiment.new").exists())
         self.assertEqual(self.whole(client, request(100)).info.id, 15)
 
-    def test_the_secret_is_for_nobody_else_to_read(self):
-        """A file that is made for all to read, or in one that somebody has open, before its rights are set."""
+    def test_only_its_user_can_read_the_secret(self):
+        """Catches: a file that is readable by other users, or opened by one, before its rights are set."""
         folder = pathlib.Path(self.kept.name)
         server = self.start(before=lambda: os.umask(0))
         draft = folder / "1.experiment.new"

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Experiments on the real server, over the wire: what they give. Each test names the mistake that it would catch."""
+"""Experiments on the real server, over the wire: their data."""
 import json
 import math
 import os
@@ -31,7 +31,7 @@ class Experiments(ExperimentTest):
             self.fail(f"row {wrong}: {rows[wrong]} instead of {expected[wrong]}")
 
     def test_the_data_are_those_of_a_lockstep_run_with_the_same_commands(self):
-        """Commands that come a tick late, a sample that is kept before it is there, a bench of other numbers."""
+        """Catches: commands that act a tick late, a sample that is kept too early, a bench with other numbers."""
         server = self.start("--command-delay-ticks", "1")
         client = self.client(server)
         signals = ("u_a_v", "u_b_v", "i_a_a", "speed_rad_s", "encoder_count", "command_tick", "state", "owner")
@@ -44,19 +44,19 @@ class Experiments(ExperimentTest):
         lockstep = []
         for tick in range(301):
             lockstep.append(tuple(float(getattr(sample, name)) for name in signals))
-            # What the experiment commanded in tick k is at the terminals in tick k + 1: the delay.
+            # The command of the experiment in tick k is at the terminals in tick k + 1: the delay.
             later = rows[tick + 2] if tick + 2 < len(rows) else (0.0, 0.0)
             if tick < 300:
                 sample = client.step(tick, later[0], later[1])
         self.assertEqual(rows[0], (0.0,) * 5 + (-1.0, 0.0, 0.0))
-        # At tick 0 nobody had the lease yet when the sample was taken; the newest one was taken then too.
+        # At tick 0 the sample was taken before the lease; the newest sample was taken then too.
         self.assertSameRows(rows[:300], lockstep[:300])
         for tick in (1, 100, 298):  # the command of tick k is in force in tick k + 1, which sample k + 2 shows
             self.assertAlmostEqual(rows[tick + 2][0], 40.0 * math.cos(2.0 * math.pi * 60.0 * tick * 125e-6), 9)
         self.assertNotEqual(rows[-1][3], 0.0)
 
-    def test_the_live_bench_does_not_notice(self):
-        """An experiment that runs on the bench that controllers see."""
+    def test_the_live_bench_is_unchanged(self):
+        """Catches: an experiment that runs on the bench that controllers see."""
         server = self.start()
         client = self.client(server)
         before = client.status()
@@ -65,7 +65,7 @@ class Experiments(ExperimentTest):
         self.assertEqual((after.tick, after.state_hash), (before.tick, before.state_hash))
 
     def test_the_recording_replays_and_carries_its_request(self):
-        """A recording that lacks an input, or that gives the secret of its owner away."""
+        """Catches: a recording that lacks an input, or that contains the secret of its owner."""
         server = self.start()
         client = self.client(server)
         wanted = request(500, label="for a replay", decimation=7,
@@ -88,7 +88,7 @@ class Experiments(ExperimentTest):
         self.assertNotIn(OWNER.encode(), recording.data)
 
     def test_real_time_gives_the_same_bits_and_a_verdict(self):
-        """A pacer that changes what happens, or a real-time run that was none."""
+        """Catches: a pacer that changes results, or a real-time run that was none."""
         server = self.start()
         client = self.client(server)
         free = self.whole(client, request(800))
@@ -96,11 +96,11 @@ class Experiments(ExperimentTest):
         paced = self.whole(client, request(800, mode=pb.MODE_REALTIME))
         self.assertGreater(time.monotonic() - begin, 0.09)  # 800 ticks of 125 us
         self.assertEqual(paced.info.verdict.mode, pb.MODE_REALTIME)
-        if paced.info.verdict.late_ticks == 0:  # a late tick stands in the state
+        if paced.info.verdict.late_ticks == 0:  # a late tick changes the state
             self.assertEqual(paced.data, free.data)
 
-    def test_tables_are_what_was_uploaded(self):
-        """Rows that come in several messages and are mixed up, or a table that the next session can see."""
+    def test_tables_equal_the_uploaded_rows(self):
+        """Catches: rows of several messages that are mixed up, or a table that the next session can see."""
         server = self.start()
         client = self.client(server)
         period = client.welcome.bench.period_s
@@ -126,7 +126,7 @@ class Experiments(ExperimentTest):
             self.assertEqual((answer.WhichOneof("kind"), answer.refusal.field), ("refusal", field))
 
     def test_bad_requests_name_field_and_rule_and_start_nothing(self):
-        """A request that is carried out in part."""
+        """Catches: a request that is executed in part."""
         server = self.start()
         client = self.client(server)
         for wrong, code, field in (
@@ -143,12 +143,12 @@ class Experiments(ExperimentTest):
         self.assertEqual([f for f in os.listdir(self.kept.name) if f != "lock"], [])
 
     def test_without_a_folder_there_are_no_experiments(self):
-        """A server that keeps data somewhere although nobody said where."""
+        """Catches: a server that keeps data in a folder that its file does not name."""
         client = self.client(self.server())
         self.assertRefused(client.ask(run_experiment=request()), pb.REFUSAL_NOT_AVAILABLE, "experiments")
 
     def test_connections_that_break_lose_and_double_nothing(self):
-        """A fetch that begins anew elsewhere than it ended, 100 times at random."""
+        """Catches: a fetch that resumes at another place than its end, 100 times at random."""
         server = self.start()
         rng = random.Random(8)
         client = self.client(server)
@@ -163,7 +163,7 @@ class Experiments(ExperimentTest):
             broken = 0
             while info is None or info.state not in ENDED:
                 link = Client(server.raw(receive_buffer=4096))
-                kill_at = rng.randrange(1, 400_000) if broken < 5 else None  # bytes; then it may end
+                kill_at = rng.randrange(1, 400_000) if broken < 5 else None  # bytes; later connections may end
                 try:
                     self.receive_until(link, kill_at)
                     number = self.run_it(link, wanted).id
@@ -205,8 +205,8 @@ class Experiments(ExperimentTest):
             return receive(size)
         link.receive_bytes = limited
 
-    def test_a_slow_reader_slows_nobody_and_memory_stays(self):
-        """Data of 10 s at 20 kHz in the server's memory, or a reader that keeps the queue waiting."""
+    def test_a_slow_reader_delays_no_other_client_and_memory_stays(self):
+        """Catches: data of 10 s at 20 kHz in the server's memory, or a reader that delays the queue."""
         text = SERVO_TEXT.replace("period_us = 125", "period_us = 50")
         server = self.start(text=text)
         signals = [s.name for s in pb.Sample.DESCRIPTOR.fields if s.name.endswith(("_a", "_v", "_nm", "_s"))][:12]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`drivebench identify` against the real server. Each test names the mistake that it would catch."""
+"""`drivebench identify` against the real server."""
 import json
 import os
 import pathlib
@@ -32,7 +32,7 @@ class Identify(WireTest):
         self.addCleanup(folder.cleanup)
         self.path = pathlib.Path(folder.name)
         self.environment = guarded({name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")})
-        # Nothing listens there, so that a server of somebody else's is not found by chance.
+        # No server listens there, so that none is found by chance.
         self.environment.update(DRIVEBENCH_LINK=f"unix:{self.path}/nothing", XDG_CONFIG_HOME=str(self.path),
                                 TMPDIR=str(self.path))
 
@@ -52,9 +52,9 @@ class Identify(WireTest):
         row = found["parameters"][name]
         self.assertLess(abs(row["estimate"] / row["truth"] - 1.0), 0.01 * percent, f"{name}: {row}")
 
-    def test_one_command_does_all_of_it(self):
-        """The example of the README: a truth of another motor, a fit that is none, files that nobody can read, a server
-        or a folder that stays behind."""
+    def test_one_command_runs_the_experiment_and_writes_the_motor(self):
+        """Catches: the example of the README with the truth of another motor, a fit that is none, unreadable files, a
+        server or a folder that stays behind."""
         files = {name: self.path / f"im.{name}" for name in ("md", "svg", "toml", "csv")}
         found = self.parameters("--motor", "im", "--experiment", "dol-start", "--markdown", files["md"], "--plot",
                                 files["svg"], "--motor-file", files["toml"], "--data", files["csv"])
@@ -76,7 +76,7 @@ class Identify(WireTest):
         self.assertEqual(len(files["csv"].read_text(encoding="utf-8").splitlines()), 802)
         self.assertEqual({path.name for path in self.path.iterdir()}, {f"im.{name}" for name in files})
 
-        # The motor file is a motor: a bench with it loads and tells the parameters that were found.
+        # The motor file is a motor: a bench with it loads and shows the identified parameters.
         bench = (BENCHES / "im-8-5-5.toml").read_text(encoding="utf-8").replace("../motors/im-8-5-5.toml", str(files["toml"]))
         with self.server(text=bench) as server:
             described = json.loads(self.drivebench("describe", "--json", "--link", f"tcp:{server.ready['tcp']}").stdout)
@@ -84,7 +84,7 @@ class Identify(WireTest):
             self.assertEqual(values["machine.stator_resistance_ohm"], found["parameters"]["R_S"]["estimate"])
             self.assertEqual(values["mechanics.inertia_kgm2"], found["parameters"]["J"]["estimate"])
 
-        # The CSV that was written gives the same motor.
+        # The written CSV gives the same motor.
         again = self.parameters("--motor", "im", "--from", files["csv"], "--pole-pairs", 2, "--counts", 2048, "--voltages",
                                 "instant", "--window", "0.005:0", "--load", "constant")
         self.assertEqual(again["parameters"]["R_S"]["estimate"], found["parameters"]["R_S"]["estimate"])
@@ -94,7 +94,7 @@ class Identify(WireTest):
                                     "--voltages", "mean", "--load", "constant").stdout)
 
     def test_every_named_experiment_identifies_its_motor(self):
-        """An experiment that its bench refuses, or that does not tell what it was made for."""
+        """Catches: an experiment that its bench refuses, or that does not identify its parameters."""
         listed = json.loads(self.identify("--list", "--json").stdout)["experiments"]
         self.assertEqual({e["motor"] for e in listed}, {"im", "dc", "pm", "bldc"})
         promised = {"im/no-load-start": {"R_S": 1, "T_R": 1, "L_S": 1, "sigma": 1, "J": 3, "f": 10},
@@ -106,7 +106,7 @@ class Identify(WireTest):
         for experiment in listed:
             name = f"{experiment['motor']}/{experiment['name']}"
             if name == "im/dol-start":
-                continue  # the test above
+                continue  # see the test above
             with self.subTest(name):
                 found = self.parameters("--motor", experiment["motor"], "--experiment", experiment["name"])
                 for parameter, percent in promised.pop(name).items():
@@ -115,8 +115,8 @@ class Identify(WireTest):
                     self.assertLess(fit["normalised"], 0.08, output)
         self.assertEqual(promised, {})
 
-    def test_a_server_that_is_there_is_used_and_a_wrong_one_told(self):
-        """A bench beside the one that was asked for, or the truth of another."""
+    def test_a_running_server_is_used_and_a_wrong_one_refused(self):
+        """Catches: a bench other than the requested one, or the truth of another."""
         text = (BENCHES / "dc-a-voltage.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         text += "\n[axis.machine]\narmature_resistance_ohm = 3.0\n"
         server = self.server("--experiments", str(self.path / "kept"), text=text)
@@ -127,7 +127,7 @@ class Identify(WireTest):
         kept = list((self.path / "kept").glob("*.mcap"))
         self.assertEqual(len(kept), 1)
 
-        # Its recording tells the same, with the truth and everything else from its configuration.
+        # Its recording gives the same motor, with the truth and the rest from its configuration.
         from_file = self.parameters("--motor", "dc", "--from", kept[0])
         self.assertEqual(from_file["parameters"]["R"]["truth"], 3.0)
         self.assertPercent(from_file, "R", 0.5)
@@ -141,7 +141,8 @@ class Identify(WireTest):
         self.assertEqual(found["parameters"]["R"]["truth"], 4.0)
         self.assertPercent(found, "R", 0.5)
 
-        # Named on the command line it must be the right one; found by chance another is started.
+        # A server that the command line names must be the right one; beside one at the default link, another is
+        # started.
         wrong = self.identify("--motor", "im", "--link", self.environment["DRIVEBENCH_LINK"], code=2)
         self.assertIn("has no axis im-8-5-5, but dc-a", wrong.stderr)
         other = self.identify("--motor", "im")
@@ -149,9 +150,9 @@ class Identify(WireTest):
         self.environment["DRIVEBENCH_LINK"] = "tcp:127.0.0.1:1"
         self.identify("--motor", "dc", "--link", "tcp:127.0.0.1:1", code=3)
 
-    def test_a_server_found_by_chance_that_will_not_do_is_passed_over(self):
-        """A user who must stop somebody else's server first: one that keeps no experiments, one that asks for a token, something
-        that speaks another language, a link that only `control` understands."""
+    def test_an_unsuitable_server_at_the_default_link_is_passed_over(self):
+        """Catches: a user who must first stop an unsuitable server: one that keeps no experiments, one that asks for a
+        token, one that speaks another protocol, a link that only `control` understands."""
         text = (BENCHES / "dc-a-voltage.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         (self.path / "tokens").write_text('[[token]]\nname = "a"\nrole = "viewer"\ntoken = "secret"\n', encoding="utf-8")
         (self.path / "tokens").chmod(0o600)
@@ -171,16 +172,16 @@ class Identify(WireTest):
                 self.assertIn("starting a server on dc-a-voltage", passed.stderr)
                 self.assertIn(why, self.identify("--motor", "dc", "--link", link, code=code).stderr)
 
-    def test_a_bench_that_cannot_be_is_2(self):
-        """A mistake in a configuration that a script takes for a failed experiment."""
+    def test_a_wrong_bench_file_is_2(self):
+        """Catches: a mistake in a configuration that a script takes for a failed experiment."""
         broken = self.path / "broken.toml"
         broken.write_text("[bench]\nperiod_us = 0\n", encoding="utf-8")
         ran = self.identify("--motor", "dc", "--bench", broken, code=2)
         self.assertIn("broken.toml:2: bench.period_us", ran.stderr)
         self.assertIn("does not take the bench", ran.stderr)
 
-    def test_what_the_data_do_not_hold_is_no_success(self):
-        """An exit code of 0, a number or a motor file for a motor that nobody could see."""
+    def test_parameters_that_the_data_do_not_determine_are_a_failure(self):
+        """Catches: an exit code of 0, a number or a motor file although the data do not determine the motor."""
         toml = self.path / "constant.toml"
         toml.write_text('axis = "dc-a"\nduration_s = 0.2\ninitial = { speed_rad_s = 65.9 }\nsignals = ["i_a_a"]\n[input]\n'
                         'kind = "none"\n', encoding="utf-8")
@@ -190,8 +191,8 @@ class Identify(WireTest):
         self.assertIn("no motor file", ran.stderr)
         self.assertFalse(motor.exists() and motor.stat().st_size > 0)
 
-    def test_somebody_elses_file(self):
-        """A column map that takes the wrong column or scale."""
+    def test_a_foreign_file_is_read_by_its_column_map(self):
+        """Catches: a column map that takes the wrong column or scale."""
         own = self.path / "own.csv"
         self.identify("--motor", "dc", "--data", own)
         rows = [line.split(",") for line in own.read_text(encoding="utf-8").splitlines()]
@@ -223,8 +224,8 @@ class Identify(WireTest):
         foreign.unlink()
         refused("cannot be read", "--counts", "2000")
 
-    def test_wrong_words_are_told_with_the_choices(self):
-        """A refusal that leaves its user alone."""
+    def test_wrong_words_are_refused_with_the_choices(self):
+        """Catches: a refusal without the possible words."""
         for words, text in (
                 (("--experiment", "dol-start"), "--motor is missing; there are im, dc, pm, bldc"),
                 (("--motor", "ac"), "--motor 'ac' is not known; there are im, dc, pm, bldc"),
@@ -241,7 +242,8 @@ class Identify(WireTest):
                 self.assertIn(text, self.identify(*words, code=2).stderr)
 
     def test_an_interrupt_cancels_the_experiment(self):
-        """Ctrl-C that leaves an experiment running on the bench for its whole two minutes, or loses what there is."""
+        """Catches: ctrl-C that leaves an experiment running on the bench for its whole two minutes, or loses its data so
+        far."""
         server = self.server("--experiments", str(self.path / "kept"), "--mode", "lockstep")
         link = f"tcp:{server.ready['tcp']}"
         toml = self.path / "long.toml"
@@ -256,7 +258,7 @@ class Identify(WireTest):
             listed = self.drivebench("experiment", "list", "--json", "--link", link, "--owner", "the secret of a test")
             return [e["state"] for e in json.loads(listed.stdout)["experiments"]]
 
-        until(lambda: state() == ["running"], "an experiment that runs")
+        until(lambda: state() == ["running"], "an experiment runs")
         running.send_signal(signal.SIGINT)
         printed, _ = running.communicate(timeout=PATIENCE_S)
         self.assertEqual(running.returncode, 1)

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Recordings on the command line, the server program and the demo, as a user or a script meets them. Each test names the
-mistake that it would catch."""
+"""Recordings on the command line, the server program and the demo: their output and their exit codes."""
 import json
 import os
 import pathlib
@@ -24,7 +23,7 @@ from wire_client import PATIENCE_S, REPOSITORY, SERVER, Server
 
 
 def without_checksums(recording):
-    """The same file, in which no checksum is given (0), so that only a comparison of the samples finds a change."""
+    """The same file without checksums (0), so that only a comparison of the samples finds a change."""
     data, at = bytearray(recording), 8
     while at < len(data) - 8:
         opcode, (size,) = data[at], struct.unpack_from("<Q", data, at + 1)
@@ -54,7 +53,7 @@ class Recordings(CommandTest):
         return name
 
     def test_replay_of_a_recording_is_equal(self):
-        """A replay that compares nothing."""
+        """Catches: a replay that compares nothing."""
         self.assertSays(self.drivebench("replay", self.whole).stdout, "equal, bit for bit (1024 ticks, 1025 samples", self.hash)
         found = self.json_of("replay", self.whole)
         self.assertKeys(found, "equal", "usable", "ticks", "samples", "inputs", "state_hash", "recorded_by", "same_build",
@@ -62,7 +61,7 @@ class Recordings(CommandTest):
         self.assertEqual((found["equal"], found["ticks"], found["state_hash"]), (True, 1024, self.hash))
 
     def test_replay_of_a_flipped_bit_is_1_and_names_the_tick(self):
-        """A comparison with a tolerance, or one of the last sample only."""
+        """Catches: a comparison with a tolerance, or one of the last sample only."""
         data = without_checksums(self.whole.read_bytes())
         self.assertEqual(self.json_of("replay", self.written("bare.mcap", data))["state_hash"], self.hash)
         wanted = next(row.split(",") for row in self.drivebench(
@@ -76,7 +75,7 @@ class Recordings(CommandTest):
         self.assertEqual((difference["tick"], difference["axis"], difference["signal"]), (500, "servo", "speed_rad_s"))
 
     def test_replay_of_a_damaged_or_cut_file_is_2(self):
-        """A recording that lost its end or its checksum, and passes."""
+        """Catches: a recording that lost its end or its checksum, and passes."""
         whole = bytearray(self.whole.read_bytes())
         cut = self.written("cut.mcap", whole[:-100])
         self.assertSays(self.drivebench("replay", cut, code=USAGE).stdout, "cannot be replayed", "the file ends")
@@ -88,14 +87,14 @@ class Recordings(CommandTest):
         self.drivebench("replay", self.written("empty", b""), code=USAGE)
 
     def test_export_writes_every_sample_with_units(self):
-        """A missing first or last row, a value that does not read back equal."""
+        """Catches: a missing first or last row, a value that does not read back equal."""
         head, *rows = self.drivebench("export", self.whole).stdout.splitlines()
         self.assertSays(head, "tick,time_s,", "i_a_a [A]", "speed_rad_s [rad/s]", "torque_nm [N*m]")
         self.assertEqual([int(row.split(",")[0]) for row in rows], list(range(1025)))
         self.assertEqual(rows[-1].split(",")[1], "0.128000000")
 
     def test_export_chooses_signals_ticks_axis_and_file(self):
-        """A range that is open at one end, a column in another order than asked for."""
+        """Catches: a range that is open at one end, a column in another order than requested."""
         done = self.json_of("export", self.whole, "--signals", "u_b_v,tick", "--from", "10", "--to", "12", "--axis", "servo",
                             "--out", "out.csv")
         self.assertEqual(done, {"out": "out.csv", "axis": "servo", "rows": 3, "problem": ""})
@@ -104,14 +103,14 @@ class Recordings(CommandTest):
         self.assertEqual([row.split(",")[3] for row in rows], ["10", "11", "12"])
         self.assertSays(self.drivebench("export", self.whole, "--out", "all.csv").stdout, "1025 samples of axis servo to all.csv")
 
-    def test_export_of_an_axis_that_is_not_there_is_2(self):
-        """A trace of the commands of other axes, without a sample."""
+    def test_export_of_an_unknown_axis_is_2(self):
+        """Catches: output of the other axes' commands, without a sample."""
         for form in ("csv", "candump"):
             self.assertSays(self.drivebench("export", self.whole, "--format", form, "--axis", "none", code=USAGE).stderr,
                             "no samples of axis 'none'; the recording has servo")
 
-    def test_export_of_a_cut_recording_writes_what_is_there_and_ends_with_3(self):
-        """A crash that costs the samples before it, or is not told."""
+    def test_export_of_a_cut_recording_writes_its_samples_and_ends_with_3(self):
+        """Catches: a crash that costs the samples before it, or that the exit code hides."""
         cut = self.written("cut.mcap", self.whole.read_bytes()[:-100])
         done = self.drivebench("export", cut, "--out", "cut.csv", code=CUT_SHORT)
         self.assertSays(done.stderr, "the recording is not whole", "the file ends")
@@ -121,7 +120,7 @@ class Recordings(CommandTest):
         self.assertNotEqual(found["problem"], "")
 
     def test_rec_01_a_killed_server_leaves_a_recording_that_can_be_exported(self):
-        """Samples that wait in memory for an end that does not come."""
+        """Catches: samples that wait in memory for an end that does not come."""
         bench = self.server("--record", str(self.folder / "killed.mcap"))
         self.drivebench("control", link=link_of(bench))
         until(lambda: (self.folder / "killed.mcap").stat().st_size > 150_000, "the samples reach the file")
@@ -131,7 +130,8 @@ class Recordings(CommandTest):
         self.drivebench("replay", "killed.mcap", code=USAGE)
 
     def test_export_refuses_before_it_overwrites(self):
-        """A file that is emptied by a mistake on the command line: once, the recording itself. A range that holds nothing."""
+        """Catches: a file that a mistake on the command line empties: once, the recording itself. A range without
+        samples."""
         copy = self.written("copy.mcap", self.whole.read_bytes())
         self.written("precious.csv", b"tick\n")
         self.written("text", b"tick,time\n")
@@ -161,7 +161,7 @@ class Serving(CommandTest):
         return out
 
     def test_serve_starts_a_bench_and_ends_it_on_a_signal(self):
-        """A server that is left behind as an orphan, or a shell that sees a signal as a failure."""
+        """Catches: a server that is left behind as an orphan, or a signal that the shell takes for a failure."""
         for number in (signal.SIGTERM, signal.SIGINT):
             serving = self.start(DRIVEBENCH, "serve", "--port", "0")
             link = self.ready(serving)
@@ -171,7 +171,7 @@ class Serving(CommandTest):
             self.drivebench("status", link=link, code=NO_CONNECT)
 
     def test_serve_takes_a_name_or_a_file_and_the_options_of_the_server(self):
-        """Options that stop at the first one that drivebench does not know."""
+        """Catches: options that stop at the first one that drivebench does not know."""
         serving = self.start(DRIVEBENCH, "serve", "servo-realtime", "--port", "0", "--mode", "free")
         self.assertSays(self.drivebench("status", link=self.ready(serving)).stdout, "bench servo-realtime", "free")
         self.end(serving)
@@ -182,7 +182,7 @@ class Serving(CommandTest):
         self.drivebench("replay", "r.mcap")
 
     def test_os_13_a_second_server_on_the_same_place_is_2(self):
-        """Two servers that share a port or a socket file; a recording that is overwritten."""
+        """Catches: two servers that share a port or a socket file; a recording that is overwritten."""
         bench = self.server(unix=True)
         port = bench.address[1]
         self.assertSays(self.drivebench("serve", "--port", port, code=USAGE).stderr,
@@ -194,14 +194,14 @@ class Serving(CommandTest):
         self.assertEqual((self.folder / "r.mcap").read_bytes(), b"precious")
 
     def test_check_config_opens_nothing(self):
-        """A check that needs the port of the bench that runs."""
+        """Catches: a check that needs the port of the bench that runs."""
         bench = self.server()
         said = self.drivebench_server(SERVO, "--check-config", "--port", bench.address[1], "--record", "r.mcap").stdout
         self.assertSays(said, "no problems", "bench servo", "lockstep mode")
         self.assertFalse((self.folder / "r.mcap").exists())
 
-    def test_cfg_01_a_wrong_bench_file_is_told_with_place_and_nearest_key(self):
-        """One problem at a time, or one without its line."""
+    def test_cfg_01_a_wrong_bench_file_is_refused_with_place_and_nearest_key(self):
+        """Catches: one problem at a time, or one without its line."""
         text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         text = text.replace("watchdog_ticks", "watchdog_tick").replace("period_us = 125", "period_us = 0")
         lines = text.splitlines()
@@ -214,8 +214,8 @@ class Serving(CommandTest):
                 self.assertSays(done.stderr, f"bad.toml:{line}: bench.{key}")
             self.assertSays(done.stderr, "watchdog_ticks")
 
-    def test_cfg_02_odd_values_are_refused_or_taken_with_a_word(self):
-        """A motor of 14 H that was meant to have 14 mH; a prototype that nobody may try."""
+    def test_cfg_02_odd_values_are_refused_or_taken_with_a_warning(self):
+        """Catches: a motor of 14 H that was meant to have 14 mH; a prototype that no option allows."""
         text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         text += "\n[axis.machine]\nstator_inductance_h = 14.0\n"
         (self.folder / "odd.toml").write_text(text, encoding="utf-8")
@@ -230,7 +230,7 @@ class Serving(CommandTest):
             self.assertSays(done.stderr, "warning", f"odd.toml:{line}: axis.machine.stator_inductance_h")
 
     def test_a_wrong_command_line_of_the_server_is_2(self):
-        """An option that is ignored, and a run other than the one asked for."""
+        """Catches: an option that is ignored, and a run other than the requested one."""
         for arguments, fact in (
                 ([], "bench file"), (["none.toml"], "none.toml"), ([SERVO, "--nope"], "--nope"),
                 ([SERVO, "--mode", "fast"], "--mode"), ([SERVO, "--port", "65536"], "--port"),
@@ -246,8 +246,8 @@ class Serving(CommandTest):
             self.assertSays(done.stderr, fact)
             self.assertEqual(done.stdout, "")
 
-    def test_modes_and_delay_are_as_asked_for(self):
-        """An option that reaches the banner and not the bench."""
+    def test_mode_and_delay_options_reach_the_bench(self):
+        """Catches: an option that reaches the banner and not the bench."""
         for mode, delay, expected in (("lockstep", (), 0), ("lockstep", ("--command-delay-ticks", "1"), 1),
                                       ("realtime", (), 1), ("free", (), 0)):
             bench = self.server("--mode", mode, *delay)
@@ -258,12 +258,12 @@ class Serving(CommandTest):
                             "worst_lateness_us", "exact", "realtime_valid", "gaps", "state_hash", "recording", "sentence")
 
     def test_a_duration_ends_the_run_by_itself(self):
-        """A headless run that never ends or is a tick short."""
+        """Catches: a headless run that never ends or is a tick short."""
         said = self.drivebench_server(SERVO, "--mode", "free", "--duration", "0.25", "--port", "0").stdout
         self.assertSays(said, "ready tcp=", "free run exact: 2000 ticks; state hash ")
 
     def test_a_file_name_of_odd_bytes_costs_no_verdict(self):
-        """A run whose end is told by an exception, because the name of its recording is no JSON."""
+        """Catches: a run that ends in an exception, because the name of its recording is no JSON."""
         name = os.fsdecode(b"run\xff.mcap")
         done = self.drivebench_server(SERVO, "--port", "0", "--mode", "free", "--duration", "0.01", "--json", "--record", name)
         verdict = json.loads(done.stdout.splitlines()[-1])
@@ -271,7 +271,7 @@ class Serving(CommandTest):
         self.assertTrue((self.folder / name).exists())
 
     def test_os_05_fail_on_late_is_3(self):
-        """An exit code of 0 after a run that was not in real time."""
+        """Catches: an exit code of 0 after a run that was not in real time."""
         for allowed, code in (("0", TOO_LATE), ("1000000", OK)):
             bench = self.server("--mode", "realtime", "--fail-on-late", allowed)
             bench.process.send_signal(signal.SIGSTOP)
@@ -282,7 +282,7 @@ class Serving(CommandTest):
             self.assertFalse(bench.verdict["realtime_valid"])
 
     def test_version_is_the_build_of_hello(self):
-        """A bug report about another build."""
+        """Catches: a bug report about another build."""
         version = self.drivebench_server("--version").stdout.strip()
         self.assertEqual(self.json_of("describe", link=link_of(self.server()))["build_id"], version)
 
@@ -297,7 +297,7 @@ class Simulating(CommandTest):
         return done
 
     def test_a_wrong_command_line_names_the_word(self):
-        """An option that is ignored, a usage that leaves its reader to find the mistake."""
+        """Catches: an option that is ignored, a usage text that does not name the mistake."""
         for arguments, fact in (("--nope", "'--nope' is no option"), ("--seeds 5..1", "--seeds does not take '5..1'"),
                                 ("--seeds", "--seeds does not take ''"), ("--seeds 1 --seconds 0", "--seconds does not take '0'"),
                                 ("", "either --seeds, or"), ("--seeds 1 --week", "either --seeds, or"),
@@ -305,8 +305,9 @@ class Simulating(CommandTest):
                                 ("--trace --minutes 1", "belong to --seeds")):
             self.assertSays(self.simulate(*arguments.split(), code=USAGE).stderr, "drivebench-simulator: ", fact, "usage: ")
 
-    def test_a_broken_promise_comes_with_the_command_that_breaks_it_again(self):
-        """A command that leaves out --twice, and passes. With so few descriptors that a seed runs out of them."""
+    def test_a_broken_promise_is_printed_with_the_command_that_repeats_it(self):
+        """Catches: a command that leaves out --twice, and passes. With so few descriptors that a seed runs out of
+        them."""
         for files in range(12, 40):
             said = self.simulate("--seeds", "1..3", "--seconds", "1", "--twice", code=None, files=files).stdout
             if "again: " in said:
@@ -315,7 +316,7 @@ class Simulating(CommandTest):
 
 
 class Demo(CommandTest):
-    # Real time on a busy machine may fail, which the demo then says; only lockstep is judged here.
+    # Real time on a busy machine may fail, which the demo then reports; only lockstep is judged here.
 
     def demo(self, *options):
         done = self.run_program(DRIVEBENCH, "demo", *options)
@@ -323,7 +324,7 @@ class Demo(CommandTest):
         return done
 
     def test_json_has_both_runs(self):
-        """A key that a script of ours or of somebody else reads, renamed; a promise of two counts that is not kept."""
+        """Catches: a renamed key that a script reads; a promise of two counts that is not kept."""
         done = self.demo("--json", "--keep", "kept")
         found = json.loads(done.stdout)
         for mode in ("lockstep", "realtime"):
@@ -339,8 +340,8 @@ class Demo(CommandTest):
         for mode in ("lockstep", "realtime"):
             self.drivebench("replay", found[mode]["recording"])
 
-    def test_text_has_the_table_and_what_to_try_next(self):
-        """A demo that ends without telling where its recordings are."""
+    def test_text_has_the_table_and_the_next_commands(self):
+        """Catches: a demo that ends without naming its recordings."""
         said = self.demo().stdout
         self.assertSays(said, "lockstep", "real time", "peak error [counts]", "peak phase current [A]", "late ticks",
                         "exchange p99 [us]", "state hash", "lockstep exact: 1024 ticks", "equal, bit for bit",

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What the READMEs tell a user to type works, what they link to exists, and every bench file loads."""
+"""Every command in a README works, every link exists, and every bench file loads."""
 import json
 import os
 import pathlib
@@ -37,7 +37,7 @@ NOT_RUN = {
 
 
 def documents():
-    """All Markdown that is ours."""
+    """All Markdown files of the project."""
     for folder, folders, files in os.walk(REPOSITORY):
         folders[:] = [name for name in folders if name not in ("build", "node_modules") and not name.startswith(".")]
         yield from (pathlib.Path(folder) / name for name in files if name.endswith(".md"))
@@ -61,8 +61,8 @@ def commands(text):
 
 
 class Bench:
-    """Runs lines in the order in which they stand, in a folder where their files stay. The newest server that was
-    started is the bench of the commands that follow it; ports are chosen by the system instead of 7300."""
+    """Runs lines in order, in a folder that keeps their files. The newest server that was started is the bench of the
+    commands that follow it; ports are chosen by the system instead of 7300."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -112,7 +112,7 @@ class Bench:
         self.moved = True
 
     def watch(self, words):
-        """Live values: until the first come, with a controller that makes time go on, and ctrl-C."""
+        """Live values: waits for the first, with a controller that advances time, then sends ctrl-C."""
         watching = subprocess.Popen(self.program(*words), stdout=subprocess.PIPE, cwd=self.folder, env=self.environment)
         try:
             end = time.monotonic() + PATIENCE_S
@@ -149,7 +149,7 @@ class Bench:
 
 class Readmes(unittest.TestCase):
     def test_every_command_works(self):
-        """An option, a file name or a preset that was renamed everywhere but in what a user reads first."""
+        """Catches: an option, a file name or a preset that was renamed everywhere but in the READMEs."""
         unused = set(NOT_RUN)
         for name in READMES:
             lines = list(commands((REPOSITORY / name).read_text(encoding="utf-8")))
@@ -167,7 +167,7 @@ class Readmes(unittest.TestCase):
         self.assertEqual(unused, set(), "NOT_RUN names lines that no README has")
 
     def test_the_state_hash_of_the_tour_is_true(self):
-        """The README promises the same hash on every machine; a change of the physics must change it there."""
+        """Catches: a change of the physics without the README's hash, which is the same on every machine."""
         shown = re.search(r"^\s*state hash\s+([0-9a-f]{16})\s+[0-9a-f]{16}$",
                           (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.M)
         self.assertIsNotNone(shown)
@@ -179,8 +179,8 @@ class Readmes(unittest.TestCase):
             self.assertIn(f"state hash {shown[1]}\n", bench.run(["drivebench", "status"]))
             bench.stop()
 
-    def test_every_option_of_a_command_is_told(self):
-        """An option that only its --help knows."""
+    def test_every_option_of_a_command_is_documented(self):
+        """Catches: an option that only its --help names."""
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "take", "control", "plot", "replay",
                           "export", "identify", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
@@ -197,8 +197,8 @@ class Readmes(unittest.TestCase):
         for variable in ("DRIVEBENCH_LINK", "DRIVEBENCH_TOKEN", "DRIVEBENCH_OWNER", "DRIVEBENCH_CONFIGS"):
             self.assertIn(variable, told)
 
-    def test_what_can_be_built_and_where_tests_are_is_told_whole(self):
-        """A preset or a folder of tests that nobody finds."""
+    def test_every_preset_and_folder_of_tests_is_documented(self):
+        """Catches: a preset or a folder of tests that no README names."""
         presets = json.loads((REPOSITORY / "CMakePresets.json").read_text(encoding="utf-8"))["buildPresets"]
         told = re.search(r"`./bench build \[([a-z|]+)\]`", (REPOSITORY / "README.md").read_text(encoding="utf-8"))
         self.assertEqual(set(told[1].split("|")), {preset["name"] for preset in presets})
@@ -208,8 +208,8 @@ class Readmes(unittest.TestCase):
             if folder.is_dir() and folder.name not in mirrored | {"__pycache__"}:
                 self.assertIn(f"`{folder.name}/`", told)
 
-    def test_every_relative_link_points_at_something(self):
-        """A file that was moved or renamed."""
+    def test_every_relative_link_points_at_a_file(self):
+        """Catches: a file that was moved or renamed."""
         checked = 0
         for document in documents():
             text = document.read_text(encoding="utf-8")
@@ -228,7 +228,7 @@ class Readmes(unittest.TestCase):
 
 class Configs(unittest.TestCase):
     def test_every_bench_file_loads(self):
-        """A key that was renamed in the server only."""
+        """Catches: a key that was renamed in the server only."""
         files = sorted(BENCHES.iterdir())
         self.assertTrue(files)
         for file in files:
@@ -240,5 +240,5 @@ class Configs(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    in_own_network()  # some commands use ports and a bus that everybody would share
+    in_own_network()  # some commands use ports and a bus that other programs would share
     unittest.main(verbosity=2)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Recordings in several files, on the command line. Each test names the mistake that it would catch."""
+"""Recordings in several files, on the command line."""
 import csv
 import json
 import os
@@ -44,7 +44,7 @@ class Series(WireTest):
         return json.loads(done.stdout)
 
     def test_rec_11_a_run_in_four_files_is_one_run(self):
-        """Files that replay, export or compare only one by one, or the first of them as if it were all."""
+        """Catches: files that replay, export or compare only one by one, or the first file taken for all."""
         self.assertEqual(self.recorded("--record-file-s", "0.5"), ["run.2.mcap", "run.3.mcap", "run.4.mcap", "run.mcap"])
         report = self.replayed("run.mcap")
         self.assertEqual((report["equal"], report["ticks"], report["samples"], report["same_build"]), (True, 12_000, 12_001, True))
@@ -60,15 +60,15 @@ class Series(WireTest):
         self.assertEqual(self.run_of(DRIVEBENCH, "export", "run.mcap", "--out", "cut.csv").returncode, 3)
 
     def test_rec_11_files_of_a_mebibyte(self):
-        """A limit in MiB that is one in bytes, or none."""
+        """Catches: a limit in MiB that is taken for bytes, or ignored."""
         names = self.recorded("--record-file-mib", "1", duration_s=20.0)
         self.assertGreaterEqual(len(names), 3)
         for name in names:
-            self.assertLess((self.folder / name).stat().st_size, 3 << 20, "with the chunk that brings it there")
+            self.assertLess((self.folder / name).stat().st_size, 3 << 20, "with the chunk that reaches the limit")
         self.assertTrue(self.replayed("run.mcap")["equal"])
 
-    def test_rec_12_another_build_is_told(self):
-        """A replay that differs since the program does, and blames the recording."""
+    def test_rec_12_another_build_is_reported(self):
+        """Catches: a replay that differs because the build does, and blames the recording."""
         self.recorded()
         done = self.run_of(SERVER, "--replay", "run.mcap")
         self.assertNotIn("not by this build", done.stdout)
@@ -82,8 +82,8 @@ class Series(WireTest):
         self.assertEqual(done.returncode, 0, done.stdout)
         self.assertIn("not by this build", done.stdout)
 
-    def test_os_13_the_one_who_has_it_is_named(self):
-        """A message that says what is taken and leaves the search to its reader; a second server that waits, or serves."""
+    def test_os_13_a_refusal_names_the_process_that_holds_the_place(self):
+        """Catches: a refusal that does not name the process in the way; a second server that waits, or serves."""
         file, kept = self.folder / "run.mcap", self.folder / "kept"
         server = self.server("--record", str(file), "--experiments", str(kept), unix=True)
         for taken in (("--port", str(server.address[1])), ("--port", "0", "--record", file), ("--port", "0", "--experiments", kept),
@@ -93,7 +93,7 @@ class Series(WireTest):
                 self.assertEqual(done.returncode, 2)
                 self.assertRegex(done.stderr, rf"process {server.process.pid}\b")
                 self.assertEqual(done.stdout, "")
-        self.assertEqual(self.client(server, unix=True).status().sessions, 1, "the first one has noticed nothing")
+        self.assertEqual(self.client(server, unix=True).status().sessions, 1, "the first server goes on")
         self.assertEqual(server.stop(), 0)
 
 
