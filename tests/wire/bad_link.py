@@ -19,7 +19,7 @@ HERE, THERE = "10.77.0.1", "10.77.0.2"
 
 
 def tun(name, address, peer):
-    """A new device in the network of the thread that calls."""
+    """A new device in the calling thread's network."""
     device = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
     fcntl.ioctl(device, TUNSETIFF, struct.pack("16sH22x", name.encode(), IFF_TUN | IFF_NO_PI))
     for words in (f"address add {address} peer {peer} dev {name}", f"link set {name} up mtu 1400"):
@@ -28,7 +28,7 @@ def tun(name, address, peer):
 
 
 class BadLink:
-    """Between the network of the test, where HERE is, and another one, where THERE is. Good until it is told otherwise."""
+    """Between the network of the test, with HERE, and another one, with THERE. Good until `get_bad`."""
 
     def __init__(self, seed):
         self.random = random.Random(seed)
@@ -56,8 +56,8 @@ class BadLink:
         return self.far.submit(function, *arguments, **options).result()
 
     def get_bad(self, loss, damage, jitter_s):
-        """Of three packets at most one is lost or damaged, so that no retransmission has bad luck for long; every packet takes
-        up to `jitter_s`, and may overtake others."""
+        """Loses or damages at most one of three packets, so that no retransmission fails for long; every packet takes up
+        to `jitter_s` and may overtake others."""
         self.loss, self.damage, self.jitter_s = loss, damage, jitter_s
 
     def close(self):

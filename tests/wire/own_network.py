@@ -1,4 +1,4 @@
-"""A network namespace for tests that would otherwise share ports or a bus with others."""
+"""A network namespace for tests that would otherwise share ports or a bus with other programs."""
 import os
 import subprocess
 import sys

@@ -1,16 +1,16 @@
-"""Reads recordings: a parser of our own, so that not ours checks ours."""
+"""Reads recordings: a second parser, so that the product's does not check itself."""
 import struct
 import zlib
 
 
 class Recording:
-    """What stands in an MCAP file up to its last whole chunk."""
+    """The contents of an MCAP file up to its last whole chunk."""
 
     MAGIC = b"\x89MCAP0\r\n"
 
     def __init__(self, data):
         self.has_start = data.startswith(self.MAGIC)
-        self.contents = {}  # topic -> what its messages hold
+        self.contents = {}  # topic -> contents of its messages
         self.damaged = 0
         self.finished = data.endswith(self.MAGIC) and len(data) > 16
         self.topics = {}

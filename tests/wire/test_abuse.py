@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Abuse of the network: tests/adversity/FAULTS.md. Each test names the mistake that it would catch."""
+"""Abuse of the network: tests/adversity/FAULTS.md."""
 import concurrent.futures
 import os
 import pathlib
@@ -44,7 +44,7 @@ def number_of(kind):
 
 class Messages(WireTest):
     def test_tcp_05_thousands_of_empty_parts_cost_their_session_only(self):
-        """Two bytes on the wire that become hundreds in memory, and stay there."""
+        """Catches: two bytes on the wire that become hundreds in memory, and stay there."""
         server = self.server()
         owner, abuser = self.client(server), self.client(server)
         owner.lease()
@@ -59,9 +59,9 @@ class Messages(WireTest):
         owner.step(1)
         self.assertMemoryBelow(server, before + 8 * 1024)
 
-    def test_tcp_05_names_in_other_letters_are_cut_between_them(self):
-        """A letter that is cut in two: nobody can read the answer in which it stands. The same for a file whose name is in no
-        alphabet at all."""
+    def test_tcp_05_long_names_are_cut_between_characters(self):
+        """Catches: a character that is cut in two, so that its answer cannot be decoded. The same for a file whose name
+        is not UTF-8."""
         with tempfile.TemporaryDirectory(prefix="drivebench-abuse-") as folder:
             server = self.server("--experiments", f"{folder}/kept", "--record", f"{folder}/r\udcff.mcap")
             client = self.client(server)
@@ -79,7 +79,7 @@ class Messages(WireTest):
             self.assertEqual(client.status().recording, f"{folder}/r?.mcap")
 
     def test_tcp_06_nesting_without_end_is_refused(self):
-        """A parser that calls itself as often as a stranger wants."""
+        """Catches: a parser that recurses as deep as a client wants."""
         server = self.server()
         opening, closing = varint(2000 << 3 | 3), varint(2000 << 3 | 4)  # an unknown group
         request = pb.Envelope(id=4, status_request=pb.StatusRequest()).SerializeToString()
@@ -91,13 +91,13 @@ class Messages(WireTest):
             client.send_bytes(frame(request + opening * depth + closing * depth))
             self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED)
             self.assertTrue(client.is_closed())
-        self.assertEqual(self.client(server).status().sessions, 2)  # the first one is still there
+        self.assertEqual(self.client(server).status().sessions, 2)  # the first session lives
 
 
 class Readers(WireTest):
     @staticmethod
     def read_until(client, tick, seen):
-        """Takes samples up to this tick; what was seen and lost so far, which must add up."""
+        """Takes samples up to this tick; seen and lost ones must add up."""
         while seen["newest"] < tick:
             envelope = client.receive()
             if envelope.WhichOneof("kind") != "samples":
@@ -110,8 +110,8 @@ class Readers(WireTest):
                     raise AssertionError(f"gaps do not add up at tick {sample.tick}: {seen}")
 
     def rest_in_turns(self, owner, readers, seen, tick, seed):
-        """More and more of them rest, in any order, and all catch up at the end: the next tick. Nobody rests for much longer
-        than 1 s, on a slow machine either, as the server cuts after 2 s."""
+        """More and more readers rest, in any order, and all catch up at the end; returns the next tick. No reader rests
+        for much longer than 1 s, on a slow machine either, as the server cuts after 2 s."""
         local, resting = random.Random(seed), set()
         read_at = [time.monotonic()] * len(readers)
 
@@ -134,13 +134,13 @@ class Readers(WireTest):
         self.assertEqual({each["count"] + each["lost"] for each in seen}, {tick})
         return tick
 
-    def test_tcp_12_tcp_20_readers_that_rest_catch_up_and_know_what_they_missed(self):
-        """A gap that is told twice or never; a reader that stays behind for ever; one that holds up the others, or for
-        whom the server keeps ever more."""
+    def test_tcp_12_tcp_20_readers_that_rest_catch_up_and_know_their_gaps(self):
+        """Catches: a gap that is reported twice or never; a reader that stays behind forever; one that delays the others,
+        or for which the server stores more and more."""
         server = self.server(unix=True)
         owner = self.client(server)
         owner.lease()
-        # For a unix socket the kernel keeps so little that a short rest costs samples.
+        # A unix socket buffers so little that a short rest costs samples.
         readers = [self.client(server, receive_buffer=16384) for _ in range(4)] + [self.client(server, unix=True) for _ in range(4)]
         seen = [{"count": 0, "lost": 0, "newest": 0} for _ in readers]
         for reader in readers:
@@ -149,7 +149,7 @@ class Readers(WireTest):
         resident_kib = server.memory_kib("VmRSS")  # with queues as large as they get
         self.rest_in_turns(owner, readers, seen, tick, seed=8)
         self.assertEqual(owner.status().sessions, 9)
-        self.assertGreater(sum(each["lost"] for each in seen), 500, "they rested for long enough")
+        self.assertGreater(sum(each["lost"] for each in seen), 500, "the readers rested for long enough")
         self.assertMemoryBelow(server, resident_kib + 1024, "VmRSS")
 
 
@@ -157,8 +157,9 @@ class Connections(WireTest):
     def descriptors(self, server):
         return len(os.listdir(f"/proc/{server.process.pid}/fd"))
 
-    def test_tcp_13_limit_02_strangers_that_drip_are_few_and_closed(self):
-        """Silent or dripping connections that take the places of all others; a patience that begins anew with each drop."""
+    def test_tcp_13_limit_02_slow_connections_without_hello_are_few_and_closed(self):
+        """Catches: silent or slow connections that take the places of all others; a time limit that begins anew with each
+        byte."""
         server = self.server()
         inside = self.client(server)
         since = time.monotonic()
@@ -184,7 +185,7 @@ class Connections(WireTest):
         self.client(server)
 
     def test_tcp_16_limit_02_as_many_sessions_as_are_allowed(self):
-        """A cap that is one too low or too high."""
+        """Catches: a cap that is one too low or too high."""
         server = self.server()
         inside = [self.client(server) for _ in range(256)]
         self.assertEqual(inside[255].status().sessions, 256)
@@ -192,7 +193,7 @@ class Connections(WireTest):
         self.assertEqual(inside[0].status().sessions, 256)
 
     def test_tcp_17_coming_and_going_leaves_nothing_behind(self):
-        """A descriptor that is lost with each client."""
+        """Catches: a descriptor that is lost with each client."""
         server = self.server()
         inside = self.client(server)
         inside.status()
@@ -204,7 +205,7 @@ class Connections(WireTest):
             elif n % 3 == 1:
                 guest.send(b"\0\0")
             guest.close()
-        until(lambda: inside.status().sessions == 1, "all guests are gone")
+        until(lambda: inside.status().sessions == 1, "all connections are gone")
         self.assertEqual(self.descriptors(server), before)
 
     @staticmethod
@@ -212,8 +213,8 @@ class Connections(WireTest):
         fields = pathlib.Path(f"/proc/{server.process.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
-    def test_tcp_17_tcp_18_without_descriptors_those_inside_go_on(self):
-        """A server that ends, spins, fills its log or loses its recording when it may open no more files."""
+    def test_tcp_17_tcp_18_without_descriptors_open_sessions_go_on(self):
+        """Catches: a server that ends, spins, fills its log or loses its recording when it may open no more files."""
         server, folder = self.recording_server(resource.RLIMIT_NOFILE, 64)
         owner = self.client(server)
         owner.lease()
@@ -221,9 +222,9 @@ class Connections(WireTest):
         while self.descriptors(server) < 64:
             crowd.append(self.client(server))
         waiting = [server.raw() for _ in range(20)]
-        until(lambda: "cannot accept" in server.errors(), "it has run out")
+        until(lambda: "cannot accept" in server.errors(), "the server has no descriptor left")
         started, used_s = time.monotonic(), self.cpu_s(server)
-        time.sleep(1.0)  # with nothing else to do
+        time.sleep(1.0)  # without other work
         self.assertLess(self.cpu_s(server) - used_s, 0.5)
         for tick in range(500):
             owner.step(tick, 1.0)
@@ -236,25 +237,25 @@ class Connections(WireTest):
                 return self.client(server).welcome is not None
             except (Closed, AssertionError, OSError):
                 return False
-        until(served, "there is room again")
+        until(served, "a descriptor is free again")
         self.assertEqual(server.stop(), 0)
         self.assertEqual(server.verdict["gaps"], 0)
 
     def test_tcp_22_own_05_an_old_session_commands_no_more(self):
-        """A controller whose connection hangs, comes back, and drives together with its successor."""
+        """Catches: a controller whose connection hangs, comes back, and drives beside its successor."""
         server = self.server("--mode", "realtime", text=SERVO_TEXT.replace("lease_s = 2.0", "lease_ticks = 400"))
         old = self.client(server)
         self.assertDone(old.lease())
         old.exchange(old.newest().tick, 1.0)
         new = self.client(server)  # by the same name
-        until(lambda: new.lease().WhichOneof("kind") == "done", "the lease of the silent one ends")
+        until(lambda: new.lease().WhichOneof("kind") == "done", "the lease of the silent session ends")
         self.assertNotEqual(new.owner, old.owner)
         self.assertRefused(old.exchange(old.newest().tick, 5.0), pb.REFUSAL_NOT_OWNER)
         self.assertRefused(old.lease(pb.LeaseRequest.ACTION_RENEW), pb.REFUSAL_NOT_OWNER)
         self.assertRefused(old.ask(clear_faults=pb.ClearFaults()), pb.REFUSAL_NOT_OWNER)
 
-    def test_own_01_of_two_at_once_one_gets_it(self):
-        """Two owners, or none, when both ask in the same moment."""
+    def test_own_01_of_two_simultaneous_requests_one_gets_the_axis(self):
+        """Catches: two owners, or none, when two clients ask at the same moment."""
         for mode, races in (("lockstep", 300), ("realtime", 60)):
             server = self.server("--mode", mode)
             both = [self.client(server), self.client(server)]
@@ -267,7 +268,8 @@ class Connections(WireTest):
 
     @staticmethod
     def probes():
-        """What nmap says to a TCP port to find out who listens there. (It would wait between them for a minute.)"""
+        """The probes that nmap sends to find out the service behind a port. (nmap would wait between them for a
+        minute.)"""
         names = {"0": "\0", "a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v"}
 
         def meant(escape):
@@ -278,7 +280,7 @@ class Connections(WireTest):
 
     @staticmethod
     def said_to(server, probe):
-        """What the server says to a probe until it closes the connection."""
+        """The server's answer to a probe, up to the end of the connection."""
         said = b""
         with server.raw() as line:
             try:
@@ -290,7 +292,8 @@ class Connections(WireTest):
         return said
 
     def test_tcp_19_a_search_for_services_changes_nothing(self):
-        """A probe that ends the server, holds up its ticks, keeps a session or is answered as if it were a client's."""
+        """Catches: a probe that ends the server, delays its ticks, keeps a session or is answered like a client's
+        request."""
         if not PROBES.exists():
             self.skipTest("nmap is not installed")
         server = self.server()
@@ -312,9 +315,9 @@ class Connections(WireTest):
                 self.assertEqual(said, frame(refusal.SerializeToString()), probe)
                 self.assertIn(refusal.refusal.code, (pb.REFUSAL_MALFORMED, pb.REFUSAL_UNAUTHENTICATED), probe)
                 refused += 1
-        # The others began a frame that does not end, and were closed after the 2 s for hello; or a reset overtook the refusal.
+        # The other probes began a frame and were closed after the 2 s for hello; or a reset overtook the refusal.
         self.assertGreater(refused, len(probes) // 2)
-        self.assertEqual(owner.status().sessions, 1, "nobody has stayed")
+        self.assertEqual(owner.status().sessions, 1, "no probe kept a session")
         self.assertEqual([sample.tick for message in owner.samples for sample in message.samples], list(range(1, tick + 1)))
         self.assertEqual(sum(message.dropped for message in owner.samples), 0)
         self.assertEqual(server.stop(), 0)
@@ -337,7 +340,7 @@ class Secrets(WireTest):
         return found
 
     def test_sec_01_every_listening_socket_is_on_loopback(self):
-        """A second way in that the whole network can use."""
+        """Catches: a second socket that is open to the network."""
         for bench in ("servo.toml", "servo-modbus.toml"):
             text = (BENCHES / bench).read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
             server = self.server(text=text.replace("port = 1502", "port = 0"))
@@ -354,7 +357,7 @@ class Secrets(WireTest):
             return done.stderr
 
     def test_sec_02_an_open_address_without_a_token_does_not_start(self):
-        """A bench that the whole network drives because somebody wanted to reach it from his desk."""
+        """Catches: a bench that the whole network can drive because its address was opened."""
         for address in ("0.0.0.0", "::", "192.0.2.1"):
             self.assertIn("token", self.refused(address))
         for odd in ("0x7f000001", "0", "127.1", "2130706433", "local", ""):

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The audit log: who did what, and who was turned away. Each test names the mistake that it would catch."""
+"""The audit log: every change with its user, and every refused client."""
 import json
 import os
 import pathlib
@@ -24,7 +24,7 @@ from wire_test import SERVO_TEXT, until
 
 
 def at_end(host, port, said=b""):
-    """What a connection gives until its other end closes it."""
+    """Everything that a connection sends until its other end closes it."""
     with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as line:
         line.sendall(said)
         try:
@@ -37,8 +37,8 @@ class AuditLog(UsersTest):
     def lines(self, file):
         return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
 
-    def test_sec_07_own_04_everything_that_counts_stands_in_the_log(self):
-        """An event without a line; a line without a name; a log that others read."""
+    def test_sec_07_own_04_every_change_is_logged_with_its_user(self):
+        """Catches: an event without a line; a line without a name; a log that other users can read."""
         folder = self.folder_with(USERS)
         text = SERVO_TEXT.replace("[tcp]", f'[tcp]\ntokens_file = "{folder}/tokens"')
         log = folder / "audit.jsonl"
@@ -72,7 +72,7 @@ class AuditLog(UsersTest):
         until(lambda: '"reload"' in log.read_text(encoding="utf-8"), "it is reloaded")
         self.assertEqual(server.stop(), 0)
         raw = log.read_bytes()
-        self.assertTrue(all(byte == 10 or 32 <= byte < 127 for byte in raw), "nothing that moves a terminal")
+        self.assertTrue(all(byte == 10 or 32 <= byte < 127 for byte in raw), "no byte moves a terminal")
         said = self.lines(log)
         self.assertEqual([(line["event"], line["subject"], line["result"] == "done") for line in said], [
             ("start", "", True), ("recording_started", "", True), ("authentication", "", False),
@@ -95,8 +95,8 @@ class AuditLog(UsersTest):
         for line in said:
             self.assertRegex(line["time"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")
 
-    def test_sec_07_modbus_writes_stand_there_too(self):
-        """A way in that nobody looks at."""
+    def test_sec_07_modbus_writes_are_logged(self):
+        """Catches: a transport whose writes the log leaves out."""
         from pymodbus.client import ModbusTcpClient
         folder = self.folder_with(USERS)
         server = self.server("--audit", str(folder / "audit"), text=SERVO_TEXT + '\n[modbus]\nport = 0\nallow_writes = true\n')
@@ -110,13 +110,13 @@ class AuditLog(UsersTest):
         self.assertRegex(answer.refusal.holder, r"^modbus 127\.0\.0\.1:\d+$")
         self.assertDone(adam.ask(lease=pb.LeaseRequest(action=TAKE, reason="the PLC is mad")))
         adam.step(adam.newest().tick)
-        self.assertNotEqual(modbus.read_holding_registers(400, 1, slave=1).registers, [4242], "its key holds no more")
+        self.assertNotEqual(modbus.read_holding_registers(400, 1, slave=1).registers, [4242], "its key is void")
         self.assertEqual(server.stop(), 0)
         said = [(line["event"], line["transport"]) for line in self.lines(folder / "audit")]
         self.assertEqual([line for line in said if line[1] == "modbus"], [("acquire", "modbus"), ("lease_lost", "modbus")])
 
-    def test_sec_07_who_is_turned_away_by_modbus_stands_there(self):
-        """A stranger at the door, or at an axis of another, of whom only a counter knows."""
+    def test_sec_07_refused_modbus_clients_are_logged(self):
+        """Catches: a refused client, on the port or at the axis of another, that only a counter shows."""
         from pymodbus.client import ModbusTcpClient
         folder = self.folder_with(USERS)
         server = self.server("--audit", str(folder / "audit"),
@@ -127,15 +127,15 @@ class AuditLog(UsersTest):
             self.addCleanup(modbus.close)
             self.assertTrue(modbus.connect())
         self.assertFalse(owner.write_register(400, 4242, slave=1).isError())
-        self.assertTrue(stranger.write_register(400, 4243, slave=1).isError(), "another has the key")
+        self.assertTrue(stranger.write_register(400, 4243, slave=1).isError(), "another client has the key")
         self.assertTrue(stranger.write_registers(402, [1, 0, 0], slave=1).isError(), "and no command is taken")
-        self.assertEqual(at_end(host, port), b"", "the house is full")
+        self.assertEqual(at_end(host, port), b"", "no more connections")
         stranger.close()
         here = self.client(server)
         until(lambda: ("connections", 1) in [(count.name, count.value) for transport in here.status().transports
                                              for count in transport.counts], "there is room again")
-        self.assertEqual(at_end(host, port, b"\0\0\0\0\0\1\1"), b"", "a frame that cannot be ends its connection")
-        self.assertFalse(owner.read_holding_registers(400, 1, slave=1).isError(), "the owner has noticed nothing")
+        self.assertEqual(at_end(host, port, b"\0\0\0\0\0\1\1"), b"", "an impossible frame ends its connection")
+        self.assertFalse(owner.read_holding_registers(400, 1, slave=1).isError(), "the owner goes on")
         self.assertEqual(server.stop(), 0)
         said = [line for line in self.lines(folder / "audit") if line["transport"] == "modbus" and line["result"] != "done"]
         self.assertEqual([(line["event"], line["axis"]) for line in said[:3]],
@@ -145,8 +145,8 @@ class AuditLog(UsersTest):
         for line in said:
             self.assertRegex(line["peer"], r"^127\.0\.0\.1:\d+$")
 
-    def test_sec_07_who_is_turned_away_by_a_can_bus_stands_there(self):
-        """A program that is one too many on the bus, of which nobody hears."""
+    def test_sec_07_refused_can_clients_are_logged(self):
+        """Catches: a client too many on the bus that no line shows."""
         folder = self.folder_with(USERS)
         server = self.server("--audit", str(folder / "audit"),
                              text=SERVO_TEXT + '\n[[can]]\nbackend = "slcan"\nchannel = "tcp:127.0.0.1:0"\n')
@@ -159,15 +159,15 @@ class AuditLog(UsersTest):
             self.assertEqual(clients[-1].recv(100), b"V0101\r", number)
         self.assertEqual(at_end("127.0.0.1", bus.rsplit(":", 1)[1]), b"")
         clients[0].sendall(b"V\r")
-        self.assertEqual(clients[0].recv(100), b"V0101\r", "the others have noticed nothing")
+        self.assertEqual(clients[0].recv(100), b"V0101\r", "the other clients go on")
         self.assertEqual(server.stop(), 0)
         said = [line for line in self.lines(folder / "audit") if line["transport"] == "can"]
         self.assertEqual([line["event"] for line in said], ["limit"])
         self.assertIn("as many clients as this bus serves", said[0]["result"])
         self.assertRegex(said[0]["peer"], "^" + re.escape(bus) + r" 127\.0\.0\.1:\d+$")
 
-    def test_sec_07_what_a_reload_took_and_what_it_refused(self):
-        """A log that calls done what was refused, or that does not say which file was read."""
+    def test_sec_07_a_reload_is_logged_as_taken_or_refused(self):
+        """Catches: a log that calls a refused reload done, or that does not name the file."""
         server = self.server_for(USERS, "--audit", str(self.folder_with("") / "audit"))
         log = pathlib.Path(server.process.args[-1])
         bench, whole = server.folder / "bench.toml", (server.folder / "bench.toml").read_text(encoding="utf-8")
@@ -176,7 +176,7 @@ class AuditLog(UsersTest):
             bench.write_text(text, encoding="utf-8")
             known = len(self.audited(log, "reload"))
             server.process.send_signal(signal.SIGHUP)
-            until(lambda known=known: len(self.audited(log, "reload")) > known, "it is told")
+            until(lambda known=known: len(self.audited(log, "reload")) > known, "the reload is logged")
         good, bad_tokens, bad_bench, again = self.audited(log, "reload")
         self.assertEqual((good["result"], again["result"]), ("done", "done"))
         self.assertEqual({line["details"]["file"] for line in (good, bad_tokens, bad_bench, again)}, {str(bench)})
@@ -186,8 +186,9 @@ class AuditLog(UsersTest):
         self.assertIn("bench.toml", bad_bench["result"])
         self.assertEqual(server.errors().count("everything stays as it is"), 2)
 
-    def test_sec_07_a_log_that_cannot_be_written(self):
-        """A bench that drives on unwatched although that was ruled out, or stops although it was not."""
+    def test_sec_07_a_full_log_stops_the_bench_only_if_the_file_says_so(self):
+        """Catches: a bench that drives on without its log although the file forbids it, or stops although the file allows
+        it."""
         for policy in ("continue", "safe"):
             folder = self.folder_with(USERS)
             server = self.server(text=SERVO_TEXT + f'[audit]\nfile = "{folder}/audit"\non_failure = "{policy}"\n',
@@ -207,8 +208,8 @@ class AuditLog(UsersTest):
             self.assertLessEqual((folder / "audit").stat().st_size, 2000)
             self.assertEqual(server.stop(), 0)
 
-    def test_sec_07_a_log_that_cannot_be_had_is_an_error_at_once(self):
-        """A bench that believes it is watched."""
+    def test_sec_07_a_log_that_cannot_be_opened_ends_the_start(self):
+        """Catches: a bench that runs without the log that its command line names."""
         with self.assertRaisesRegex(RuntimeError, "not a regular file"):
             self.server("--audit", "/dev/null")
 

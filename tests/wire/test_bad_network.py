@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A network that loses everything for a while, or for ever: its loopback goes down; one that loses by chance. Each test names the mistake that it would catch."""
+"""A network that loses everything, for a while or forever (its loopback goes down), and one that loses at random."""
 import pathlib
 import re
 import shutil
@@ -32,21 +32,21 @@ class BadNetwork(WireTest):
     def setUp(self):
         self.addCleanup(network, "up")
 
-    def test_tcp_14_a_peer_that_vanishes_is_dead_after_seconds(self):
-        """A session that lives for a quarter of an hour, and an axis whose owner is not there."""
+    def test_tcp_14_a_peer_that_vanishes_ends_its_session_after_seconds(self):
+        """Catches: a session that lives on for a quarter of an hour, and an axis whose owner is dead."""
         server = self.server(unix=True)
         here = self.client(server, unix=True)
         gone = self.client(server)
         self.assertDone(gone.lease())
         gone.step(0, 1.0)
         time.sleep(0.2)  # its kernel acknowledges the answer
-        network("down")  # while nothing is on its way, whose loss could be noticed
+        network("down")  # while no packet is on its way, whose loss would be noticed
         self.assertRefused(here.lease(), pb.REFUSAL_OWNED)
-        until(lambda: here.status().sessions == 1, "the server gives up")
+        until(lambda: here.status().sessions == 1, "the session ends")
         self.assertDone(here.lease())
 
     def test_tcp_21_an_outage_is_hidden_by_tcp_and_seen_by_the_watchdog(self):
-        """A connection that ends with the first lost segment; an axis that goes on with old voltages."""
+        """Catches: a connection that ends with the first lost segment; an axis that goes on with old voltages."""
         server = self.server("--mode", "realtime", unix=True)
         here, owner = self.client(server, unix=True), self.client(server)
         self.assertDone(owner.lease())
@@ -60,10 +60,10 @@ class BadNetwork(WireTest):
         self.assertDone(owner.ask(clear_faults=pb.ClearFaults()))
         self.assertEqual(here.newest().owner, owner.owner)
 
-    def test_tcp_14_an_idle_peer_that_vanishes_is_dead_after_3_seconds(self):
-        """A session to which nothing is said, and which nobody therefore notices to be gone; over Modbus as well."""
+    def test_tcp_14_an_idle_peer_that_vanishes_ends_its_session_after_3_seconds(self):
+        """Catches: a session without traffic whose dead peer goes unnoticed; over Modbus as well."""
         text = SERVO_TEXT + "\n[modbus]\nport = 0\n"
-        # A busy host may take its time: of three tries one takes less than 4 s, where the rule says 3.
+        # A busy host may be slow: of three tries one takes less than 4 s, where the rule says 3.
         took = []
         while len(took) < 3 and (not took or min(took) >= 4.0):
             server = self.server(text=text, unix=True)
@@ -88,7 +88,7 @@ class BadNetwork(WireTest):
         self.assertLess(min(took), 4.0, took)
 
     def test_tcp_19_raw_scans_change_nothing(self):
-        """A half-open connection that is kept, or a stray segment that disturbs those inside."""
+        """Catches: a half-open connection that is kept, or a stray segment that disturbs a session."""
         nmap = shutil.which("nmap")
         if nmap is None:
             self.skipTest("nmap is not installed")
@@ -103,7 +103,7 @@ class BadNetwork(WireTest):
             tick = self.step_beside(owner, scan, tick)
             self.assertRegex(scan.stdout.read(), rf"(?m)^{port}/tcp +{re.escape(answer)} ", "it was scanned")
             scan.stdout.close()
-        until(lambda: owner.status().sessions == 1, "nobody else is there")
+        until(lambda: owner.status().sessions == 1, "no other session is open")
         self.assertEqual(owner.newest().tick, tick)
         self.assertEqual(server.stop(), 0)
 
@@ -134,7 +134,7 @@ class BadPath(WireTest):
             client.step(tick, 0.1 * tick)
 
     def test_tcp_21_loss_damage_and_disorder_cost_time_and_nothing_else(self):
-        """A bit that is taken as it comes, a session that ends with bad luck, a command that is done twice."""
+        """Catches: a damaged bit that is taken, a session that ends at random losses, a command that acts twice."""
         hashes = []
         for bad in (False, True):
             link = self.link(21)
@@ -154,7 +154,7 @@ class BadPath(WireTest):
         self.assertEqual(hashes[0], hashes[1])
 
     def test_tcp_21_the_watchdog_acts_when_it_must(self):
-        """An axis that is given up for a lost segment, or one that goes on when nothing comes through any more."""
+        """Catches: an axis that is given up for a lost segment, or one that goes on without commands."""
         text = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 16000").replace("lease_s = 2.0", "lease_s = 10.0")
         link = self.link(22)
         server = self.server_here("--mode", "realtime", text=text)  # a watchdog of 2 s
@@ -167,7 +167,7 @@ class BadPath(WireTest):
         until_tick = here.newest().tick + 24_000
         while here.newest().tick < until_tick:
             owner.exchange(owner.newest().tick, 3.0)
-            self.assertFalse(here.newest().faults & TIMEOUT, "two seconds are patience enough")
+            self.assertFalse(here.newest().faults & TIMEOUT, "two seconds suffice")
         link.cut = True
         until(lambda: here.newest().faults & TIMEOUT, "the watchdog acts")
         self.assertEqual(server.stop(), 0)

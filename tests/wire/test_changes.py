@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""What changes the world around a controller: parameters on a ramp, injected faults, bumps, current setpoints, as a client
-meets them. Each test names the mistake that it would catch."""
+"""Changes of the world around a controller, over the wire: parameters on a ramp, injected faults, bumps, current
+setpoints."""
 import math
 import sys
 import unittest
@@ -30,7 +30,7 @@ class Ramps(WireTest):
         return self.owner.ask(read_parameters=pb.ReadParameters(names=[name])).parameter_values.parameters[0].value
 
     def test_a_ramp_is_linear_and_can_be_read_on_its_way(self):
-        """A read-back that shows the target while the plant has another value; a ramp that is a tick early or late."""
+        """Catches: a read-back that shows the target while the plant has another value; a ramp that is a tick early or late."""
         self.assertDone(self.write(5.9, ramp_ticks=4, at_tick=3))
         seen = []
         for tick in range(1, 10):
@@ -38,8 +38,8 @@ class Ramps(WireTest):
             seen.append(round(self.read(), 12))
         self.assertEqual(seen, [3.9, 3.9, 3.9, 4.4, 4.9, 5.4, 5.9, 5.9, 5.9])
 
-    def test_the_rules_are_those_of_the_time_when_it_acts(self):
-        """A write that is only checked when it comes in; one whose refusal leaves no trace."""
+    def test_a_write_is_checked_again_when_it_acts(self):
+        """Catches: a write that is checked on arrival only; one whose refusal leaves no trace."""
         coulomb, static = "mechanics.coulomb_friction_nm", "mechanics.static_friction_nm"
         self.assertRefused(self.write(0.1, coulomb), pb.REFUSAL_OUT_OF_RANGE, "value")
         self.assertDone(self.write(0.1, coulomb, at_tick=3))
@@ -48,8 +48,8 @@ class Ramps(WireTest):
         seen = [(self.owner.step(tick).refused_commands, self.read(coulomb)) for tick in range(1, 9)]
         self.assertEqual(seen, 2 * [(0, 0.0)] + 3 * [(1, 0.0)] + 3 * [(1, 0.1)])
 
-    def test_what_cannot_ramp_is_refused(self):
-        """An integer that goes through a half; a number of ticks that overflows."""
+    def test_parameters_that_cannot_ramp_are_refused(self):
+        """Catches: an integer that passes through a half; a number of ticks that overflows."""
         self.assertRefused(self.write(0.0, "amplifier.over_current_trip", ramp_ticks=3), pb.REFUSAL_OUT_OF_RANGE, "ramp_ticks")
         self.assertRefused(self.write(5.0, ramp_ticks=2**53 + 1), pb.REFUSAL_OUT_OF_RANGE, "ramp_ticks")
         self.assertRefused(self.write(5.0, at_tick=2**64 - 1), pb.REFUSAL_OUT_OF_RANGE, "at_tick")
@@ -57,8 +57,8 @@ class Ramps(WireTest):
             self.assertRefused(self.write(bad, at_tick=9), pb.REFUSAL_NOT_FINITE, "value")
         self.assertRefused(self.write(-1.0, at_tick=9), pb.REFUSAL_OUT_OF_RANGE, "value")
 
-    def test_sixteen_at_a_time(self):
-        """A seventeenth ramp that is said to be done."""
+    def test_at_most_sixteen_ramps_at_a_time(self):
+        """Catches: a seventeenth ramp that is confirmed."""
         rows = self.owner.ask(read_parameters=pb.ReadParameters()).parameter_values.parameters
         rows = [row for row in rows if row.live and not row.integer][:17]
         self.assertEqual(len(rows), 17)
@@ -76,8 +76,8 @@ class Faults(WireTest):
     def bit(self, client, name):
         return next(f.bit for f in client.welcome.bench.injectable_faults if f.name == name)
 
-    def test_a_fault_acts_at_its_tick_and_is_seen(self):
-        """A fault that is not said in the sample, comes early, or cannot be taken back."""
+    def test_a_fault_acts_at_its_tick_and_stands_in_the_sample(self):
+        """Catches: a fault that the sample does not show, that acts early, or that cannot be taken back."""
         client = self.client(self.server())
         client.lease()
         bit = self.bit(client, "open_phase")
@@ -90,7 +90,7 @@ class Faults(WireTest):
         self.assertNotEqual(samples[4].true_i_b_a, 0.0)
 
     def test_refusals_name_the_field(self):
-        """A fault that does not exist, a value that means nothing, a stranger."""
+        """Catches: a fault that does not exist, an impossible value, a client without the right."""
         server = self.server()
         owner, viewer = self.client(server), self.client(server)
         owner.lease()
@@ -107,7 +107,7 @@ class Faults(WireTest):
         self.assertEqual(owner.step(0).injected, 0)
 
     def test_every_fault_of_the_description_can_be_injected_and_taken_back(self):
-        """A row that one layer knows and another does not."""
+        """Catches: a row that one layer knows and another does not."""
         client = self.client(self.server())
         client.lease()
         for tick, fault in enumerate(client.welcome.bench.injectable_faults):
@@ -117,7 +117,7 @@ class Faults(WireTest):
             self.assertDone(self.inject(client, fault.name, 0))
 
     def test_command_loss_is_seen_by_the_watchdog_and_not_by_the_client(self):
-        """A lockstep that stops when commands are lost; a lost command that moves the motor."""
+        """Catches: a lockstep that stops when commands are lost; a lost command that moves the motor."""
         client = self.client(self.server())
         client.lease()
         client.step(0, 5.0)
@@ -128,8 +128,8 @@ class Faults(WireTest):
         self.assertEqual(client.step(20, 9.0).state, 3)
         self.assertRefused(client.exchange(21, 9.0), pb.REFUSAL_LATCHED)
 
-    def test_a_bump_is_felt_at_its_tick(self):
-        """A bump at once instead of at its tick, or twice."""
+    def test_a_bump_acts_at_its_tick(self):
+        """Catches: a bump at once instead of at its tick, or twice."""
         client = self.client(self.server())
         client.lease()
         self.assertDone(client.ask(shaft_bump=pb.ShaftBump(impulse_nms=1.1e-4, at_tick=2)))
@@ -141,7 +141,7 @@ class Faults(WireTest):
 
 class Setpoints(WireTest):
     def test_currents_are_for_current_amplifiers(self):
-        """Amperes that a voltage amplifier takes for volts; a field that nobody can find."""
+        """Catches: amperes that a voltage amplifier takes for volts; a refusal that does not name the field."""
         client = self.client(self.server(text=TWO_DRIVES))
         client.lease(axis=0)
         client.lease(axis=1)
@@ -163,7 +163,7 @@ class Setpoints(WireTest):
         self.assertNotEqual(bldc.i_c_a, 0.0)
 
     def test_the_description_tells_kinds_and_phases(self):
-        """A client that must guess what it controls."""
+        """Catches: a client that must guess what it controls."""
         axes = self.client(self.server(text=TWO_DRIVES)).welcome.bench.axes
         found = [(a.machine_kind, a.phases, a.connection, a.drive_kind, a.shares_shaft_with) for a in axes]
         self.assertEqual(found, [("induction", 2, "two_phase", "current_amplifier", ""),
@@ -172,7 +172,7 @@ class Setpoints(WireTest):
         self.assertEqual(kind.words[int(kind.value)], "current_amplifier")
 
     def test_the_description_of_the_largest_bench_fits_its_frame(self):
-        """A bench of 64 axes that no client of ours can connect to: frames may have 1 MiB."""
+        """Catches: a bench of 64 axes that no client of ours can connect to: frames may have 1 MiB."""
         head, axis = SERVO_TEXT.split("[[axis]]")
         axes = "".join("[[axis]]" + axis.replace('"servo"', f'"{"x" * 60}{n}"') for n in range(64))
         welcome = self.client(self.server(text=head + axes)).welcome
@@ -180,7 +180,7 @@ class Setpoints(WireTest):
         self.assertLess(welcome.ByteSize(), 1024 * 1024)
 
     def test_an_axis_on_a_shared_shaft_has_no_mechanics_of_its_own(self):
-        """An inertia that is written and has no effect."""
+        """Catches: an inertia that is written and has no effect."""
         client = self.client(self.server(config=BENCHES / "dynamometer.toml"))
         self.assertEqual(client.welcome.bench.axes[1].shares_shaft_with, client.welcome.bench.axes[0].name)
         client.lease(axis=1)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Control over the wire: exchanges, parameters, loads, real time. Each test names the mistake that it would catch."""
+"""Control over the wire: exchanges, parameters, loads, real time."""
 import math
 import pathlib
 import struct
@@ -37,15 +37,15 @@ class Exchange(WireTest):
             self.assertEqual(answered, tick - shown_after)
 
     def test_without_delay_a_command_holds_in_its_own_tick(self):
-        """command(k) that takes effect at k+1 although the delay is 0."""
+        """Catches: command(k) that acts at k+1 although the delay is 0."""
         self.delay_test(0, 0)
 
     def test_with_delay_a_command_holds_one_tick_later(self):
-        """The delay of a digital controller that is left out or doubled."""
+        """Catches: the delay of a digital controller that is left out or doubled."""
         self.delay_test(1, 1)
 
     def test_cmd_06_cmd_07_stale_duplicate_and_future_commands_are_refused_and_counted(self):
-        """A command that is applied twice, or moves time."""
+        """Catches: a command that is applied twice, or advances time."""
         client = self.client(self.server())
         client.lease()
         for tick in range(3):
@@ -58,7 +58,7 @@ class Exchange(WireTest):
         self.assertEqual(sample.u_a_v, 2.0)
 
     def test_cmd_11_tcp_09_values_that_are_not_finite_never_arrive(self):
-        """NaN through a limiter is full voltage."""
+        """Catches: NaN that passes a limiter, which is full voltage."""
         client = self.client(self.server())
         client.lease()
         client.step(0, 3.0, 4.0)
@@ -71,10 +71,10 @@ class Exchange(WireTest):
         self.assertRefused(client.exchange(2, 1e308, 0.0), pb.REFUSAL_OUT_OF_RANGE)
         sample = client.step(2, 1e6, -1e6)
         self.assertEqual((sample.u_a_v, sample.u_b_v), (80.0, -80.0))
-        self.assertTrue(sample.faults & 1, "saturation is said")
+        self.assertTrue(sample.faults & 1, "saturation is flagged")
 
-    def test_cmd_11_what_is_legal_is_kept_to_the_bit(self):
-        """-0.0 that becomes 0.0 on its way, or a denormal that becomes 0."""
+    def test_cmd_11_legal_values_are_kept_to_the_bit(self):
+        """Catches: -0.0 that becomes 0.0 on its way, or a denormal that becomes 0."""
         with tempfile.TemporaryDirectory(prefix="drivebench-control-") as folder:
             file = pathlib.Path(folder) / "run.mcap"
             server = self.server("--record", str(file))
@@ -89,7 +89,7 @@ class Exchange(WireTest):
         self.assertEqual([struct.pack("<2d", each.u_a_v, each.u_b_v) for each in taken], [struct.pack("<2d", *each) for each in given])
 
     def test_unknown_axes_and_gates_are_refused(self):
-        """An index that is used before it is checked."""
+        """Catches: an index that is used before it is checked."""
         client = self.client(self.server())
         client.lease()
         for axis in (1, 64, 2**32 - 1):
@@ -106,7 +106,7 @@ class Exchange(WireTest):
         self.assertRefused(client.ask(exchange=both), pb.REFUSAL_OUT_OF_RANGE, "commands.axis")
 
     def test_the_tick_waits_for_all_controllers(self):
-        """Lockstep that runs with a command missing, or an exchange that is answered before its tick."""
+        """Catches: lockstep that runs with a command missing, or an exchange that is answered before its tick."""
         server = self.server(text=TWO_AXES)
         one, two = self.client(server), self.client(server)
         one.lease(axis=0)
@@ -118,7 +118,7 @@ class Exchange(WireTest):
         self.assertEqual(one.answer_to(waiting).exchange_reply.samples[0].sample.tick, 1)
 
     def test_the_tick_goes_on_when_a_controller_leaves(self):
-        """A controller that waits for ever for a second one that is gone."""
+        """Catches: a controller that waits forever for a second one that is gone."""
         server = self.server(text=TWO_AXES)
         one, two = self.client(server), self.client(server)
         one.lease(axis=0)
@@ -129,7 +129,7 @@ class Exchange(WireTest):
         self.assertEqual(one.answer_to(waiting).exchange_reply.samples[0].sample.tick, 1)
 
     def test_cmd_11_an_exchange_is_refused_as_a_whole(self):
-        """The command of one axis that is kept although its exchange was refused, and bars the next try."""
+        """Catches: the command of one axis that is kept although its exchange was refused, and bars the next try."""
         client = self.client(self.server(text=TWO_AXES))
         client.lease(axis=0)
         client.lease(axis=1)
@@ -142,7 +142,7 @@ class Exchange(WireTest):
         self.assertEqual([s.sample.u_a_v for s in answer.exchange_reply.samples], [7.0, 7.0])
 
     def test_a_second_exchange_while_one_waits_is_refused(self):
-        """A pipeline of commands that grows without bound."""
+        """Catches: a pipeline of commands that grows without bound."""
         server = self.server(text=TWO_AXES)
         one, two = self.client(server), self.client(server)
         one.lease(axis=0)
@@ -156,7 +156,7 @@ class Exchange(WireTest):
 
 class Parameters(WireTest):
     def test_limits_and_read_back(self):
-        """A write that is said to be done and is not, or one past its limits that is."""
+        """Catches: a write that is confirmed and not done, or one past its limits that is done."""
         server = self.server()
         client = self.client(server)
         client.lease()
@@ -198,7 +198,7 @@ class Parameters(WireTest):
                 self.assertRefused(write(p.name, math.nextafter(p.maximum, math.inf)), pb.REFUSAL_OUT_OF_RANGE)
 
     def test_only_the_owner_writes(self):
-        """A viewer that changes the plant under a controller."""
+        """Catches: a viewer that changes the plant under a controller."""
         server = self.server()
         owner, viewer = self.client(server), self.client(server)
         owner.lease()
@@ -209,7 +209,7 @@ class Parameters(WireTest):
             self.assertDone(owner.ask(**kind))
 
     def test_the_owner_may_write_before_the_first_tick(self):
-        """Ownership that is looked up in a sample taken before the lease."""
+        """Catches: ownership that is looked up in a sample taken before the lease."""
         client = self.client(self.server())
         client.lease()
         self.assertDone(client.ask(write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.1)))
@@ -217,8 +217,8 @@ class Parameters(WireTest):
         client.lease(pb.LeaseRequest.ACTION_RELEASE)
         self.assertRefused(client.ask(set_load=pb.SetLoad(load_nm=0.1)), pb.REFUSAL_NOT_OWNER)
 
-    def test_a_load_comes_at_its_tick(self):
-        """A load that starts a tick early or late, or a ramp that is a step."""
+    def test_a_load_acts_at_its_tick(self):
+        """Catches: a load that starts a tick early or late, or a ramp that is a step."""
         client = self.client(self.server())
         client.lease()
         client.step(0)
@@ -245,7 +245,7 @@ class Realtime(WireTest):
         return owner
 
     def test_state_01_the_first_commands_do_not_drive_the_axis(self):
-        """An axis that moves with the first frame of a controller that is only starting."""
+        """Catches: an axis that moves with the first frame of a controller that is only starting."""
         server = self.server("--mode", "realtime")
         owner, viewer = self.client(server), self.client(server)
         self.assertEqual(owner.welcome.bench.arming_commands, 10)
@@ -258,11 +258,11 @@ class Realtime(WireTest):
             return [s for message in viewer.samples for s in message.samples]
         until(lambda: any(s.u_a_v == 5.0 for s in seen()), "the command is in force")
         before = [s for s in seen() if s.state in (0, 5)]
-        self.assertTrue(any(s.state == 5 for s in before), "it was ready first")
+        self.assertTrue(any(s.state == 5 for s in before), "the axis was ready first")
         self.assertEqual({(s.u_a_v, s.command_tick) for s in before}, {(0.0, -1)})
 
     def test_cmd_02_silence_is_a_latched_timeout(self):
-        """A plant that goes on with the last command of a controller that hangs."""
+        """Catches: a plant that goes on with the last command of a controller that hangs."""
         server = self.server("--mode", "realtime")
         owner = self.owner_at_work(server)
         until(lambda: owner.newest().state == 3, "timeout")
@@ -278,7 +278,7 @@ class Realtime(WireTest):
         until(lambda: owner.exchange(owner.newest().tick).WhichOneof("kind") == "exchange_reply", "a command")
 
     def test_own_03_the_lease_of_a_silent_owner_ends(self):
-        """An axis that is lost to a client which keeps its socket open and does nothing."""
+        """Catches: an axis that is lost to a client which keeps its socket open and sends nothing."""
         server = self.server("--mode", "realtime")
         owner = self.owner_at_work(server)
         heir = self.client(server)
@@ -288,13 +288,13 @@ class Realtime(WireTest):
         self.assertRefused(owner.lease(), pb.REFUSAL_OWNED)
 
     def test_realtime_never_waits_for_commands(self):
-        """A paced bench that stands still without a controller."""
+        """Catches: a paced bench that stands still without a controller."""
         client = self.client(self.server("--mode", "realtime"))
         first = client.newest().tick
-        until(lambda: client.newest().tick > first + 100, "time goes on")
+        until(lambda: client.newest().tick > first + 100, "ticks go on")
 
     def test_duration_ends_the_run_with_a_verdict(self):
-        """A run of given length that is a tick short, or does not end."""
+        """Catches: a run of given length that is a tick short, or does not end."""
         for mode in ("realtime", "free"):
             server = self.server("--mode", mode, "--duration", "0.25")
             out = server.process.stdout.read()  # not communicate(): the verdict may have come with the first line

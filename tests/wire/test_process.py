@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""What befalls the process of the server: signals, pauses, crashes, its environment. Each test names the mistake that it would
-catch."""
+"""The process of the server: signals, pauses, crashes, its environment."""
 import os
 import pathlib
 import re
@@ -27,7 +26,7 @@ OVERRUN = 1 << 11  # in the fault word
 
 class Process(WireTest):
     def test_os_01_a_hangup_reads_the_log_level_again_and_the_run_goes_on(self):
-        """A run that a closing terminal ends, and a file that is read half when it has become wrong meanwhile."""
+        """Catches: a run that a closing terminal ends, and a file that is taken in part although it has become wrong."""
         server = self.server(text=SERVO_TEXT + '[log]\nlevel = "off"\n')
         client = self.client(server)
         client.lease()
@@ -48,20 +47,20 @@ class Process(WireTest):
         for count, text in enumerate((with_tokens, "no bench"), 1):
             bench.write_text(text, encoding="utf-8")
             server.process.send_signal(signal.SIGHUP)
-            until(lambda count=count: server.errors().count("everything stays as it is") == count, "the reason is told")
+            until(lambda count=count: server.errors().count("everything stays as it is") == count, "the reason is logged")
         client.step(3)
         self.assertEqual(server.stop(), 0)
 
-    def test_os_01_a_hangup_as_soon_as_it_is_ready_does_not_end_it(self):
-        """A handler that is put in its place after others have been told that they may come."""
+    def test_os_01_a_hangup_right_after_ready_does_not_end_the_server(self):
+        """Catches: a handler that is installed after clients have been told that the server is ready."""
         for _ in range(10):
             server = self.server()
             server.process.send_signal(signal.SIGHUP)
             self.assertEqual(self.client(server).status().sessions, 1)
             self.assertEqual(server.stop(), 0)
 
-    def test_os_02_signals_of_others_are_nothing(self):
-        """A server that a signal ends which is not meant for it."""
+    def test_os_02_foreign_signals_are_ignored(self):
+        """Catches: a server that ends at a signal which is not meant for it."""
         server = self.server()
         client = self.client(server)
         for number in (signal.SIGPIPE, signal.SIGXFSZ, signal.SIGCHLD, signal.SIGWINCH, signal.SIGURG):
@@ -69,7 +68,8 @@ class Process(WireTest):
             self.assertEqual(client.status().sessions, 1)
 
     def test_os_03_a_pause_longer_than_the_limit_is_a_latched_fault(self):
-        """A bench that was stopped with its host and goes on as if its controller had been there all the time."""
+        """Catches: a bench that was stopped with its host and goes on as if its controller had been connected all the
+        time."""
         server = self.server("--mode", "realtime")
         owner = self.client(server)
         owner.lease()
@@ -78,16 +78,17 @@ class Process(WireTest):
         server.process.send_signal(signal.SIGSTOP)
         time.sleep(0.3)
         server.process.send_signal(signal.SIGCONT)
-        until(lambda: owner.newest().faults & OVERRUN, "the overrun is said")
+        until(lambda: owner.newest().faults & OVERRUN, "the overrun is flagged")
         self.assertGreater(owner.newest().late_ticks, before.late_ticks)
         self.assertRefused(owner.exchange(owner.newest().tick, 5.0), pb.REFUSAL_LATCHED)
         self.assertDone(owner.ask(clear_faults=pb.ClearFaults()))
-        until(lambda: not owner.newest().faults & OVERRUN, "it is cleared")
+        until(lambda: not owner.newest().faults & OVERRUN, "the overrun is cleared")
         self.assertEqual(server.stop(), 0)
         self.assertFalse(server.verdict["realtime_valid"])
 
     def test_os_08_ticks_leave_time_to_others(self):
-        """A thread that never sleeps, which the kernel then holds up for 50 ms of each second, or which starves all others."""
+        """Catches: a thread that never sleeps, which the kernel then stops for 50 ms of each second, or which starves all
+        others."""
         server = self.server("--mode", "realtime")
         client = self.client(server)
 
@@ -101,7 +102,7 @@ class Process(WireTest):
         self.assertLess(busy, 0.8 * ticks * 125e-6)
 
     def test_os_14_a_crash_leaves_no_whole_recording_and_the_next_start_is_idle(self):
-        """Half a recording that replays as equal; a bench that comes up running."""
+        """Catches: half a recording that replays as equal; a bench that starts in operation."""
         server, folder = self.recording_server(resource.RLIMIT_CORE, 0)
         owner = self.client(server)
         owner.lease()
@@ -130,7 +131,7 @@ class Process(WireTest):
         return f"{owner.status().state_hash:016x}"
 
     def test_det_04_locale_and_time_zone_have_no_effect(self):
-        """0,25 that is read as 0 where the comma is the point."""
+        """Catches: 0,25 that is read as 0 where the comma is the point."""
         reference = self.hash_of_a_run(LC_ALL="C", TZ="UTC")
         self.assertEqual(self.hash_of_a_run(LC_ALL="C", TZ="Pacific/Kiritimati"), reference)
         folder = tempfile.mkdtemp(prefix="drivebench-abuse-")
@@ -142,7 +143,7 @@ class Process(WireTest):
         self.assertEqual(self.hash_of_a_run(LC_ALL="de_DE.UTF-8", LOCPATH=folder), reference)
 
     def test_sec_08_the_binary_is_hardened(self):
-        """A build without the flags that make a memory error hard to use."""
+        """Catches: a build without the flags that make a memory error hard to use."""
         if shutil.which("readelf") is None:
             self.skipTest("readelf is not installed")
 

@@ -2,9 +2,7 @@
 """Clients that come and go in a rush, 5,000 a second.
 
     test_rush.py                 for 3 seconds
-    test_rush.py --seconds 60    for a minute
-
-Each test names the mistake that it would catch."""
+    test_rush.py --seconds 60    for a minute"""
 import os
 import socket
 import struct
@@ -41,7 +39,7 @@ class Rush(WireTest):
         guest.close()
 
     def rush(self, server, owner, count, tick):
-        """How long it took. The owner of the axis drives on meanwhile."""
+        """The duration. The owner of the axis drives on meanwhile."""
         began = time.monotonic()
         for number in range(count):
             self.come_and_go(server, number)
@@ -51,11 +49,11 @@ class Rush(WireTest):
             if ahead_s > 0.005:
                 time.sleep(ahead_s)
         took_s = time.monotonic() - began
-        until(lambda: owner.status().sessions == 1, "all guests are gone")
+        until(lambda: owner.status().sessions == 1, "all connections are gone")
         return took_s
 
     def test_tcp_17_clients_in_a_rush_leave_nothing_behind(self):
-        """A descriptor or memory that is lost with each client; a rush that keeps those inside waiting for ever."""
+        """Catches: a descriptor or memory that is lost with each client; a rush that keeps open sessions waiting."""
         server = self.server()
         owner = self.client(server)
         self.assertDone(owner.lease())

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Senders that send too much, too little or in pieces. Each test names the mistake that it would catch."""
+"""Senders that send too much, too little or in pieces."""
 import struct
 import sys
 import time
@@ -17,13 +17,14 @@ from wire_test import TWO_AXES, WireTest, until
 
 class Senders(WireTest):
     def test_cmd_10_commands_that_no_tick_can_use_are_counted_and_throttled(self):
-        """A flood that takes the time of all others, drives the axis by its last word, or is not noticed at all."""
+        """Catches: a flood that takes the time of all others, drives the axis with its last command, or is not
+        counted."""
         server = self.server("--mode", "realtime")
         owner, watcher = self.client(server), self.client(server)
         owner.lease()
 
         def burst(count):
-            """So many commands at once, of which one tick can use one; how many were refused."""
+            """Sends so many commands at once, of which a tick can use one; returns the number of refusals."""
             tick = watcher.newest().tick
             ids = [owner.last_id + 1 + n for n in range(count)]
             owner.last_id = ids[-1]
@@ -43,17 +44,17 @@ class Senders(WireTest):
         refused = burst(10)
         self.assertGreaterEqual(refused, 1)
         self.assertEqual(watcher.tcp_counts()["excess_commands"], refused)
-        self.assertEqual(watcher.tcp_counts()["throttled"], 0, "ten at once are forgiven")
+        self.assertEqual(watcher.tcp_counts()["throttled"], 0, "ten at once are allowed")
         for _ in range(3):
             refused += burst(1500)
         until(lambda: watcher.tcp_counts()["throttled"] > 0, "the flood is throttled")
         counts = watcher.tcp_counts()
         self.assertEqual(counts["excess_commands"], refused)
         started = watcher.newest().tick
-        until(lambda: watcher.newest().tick > started + 100, "others and the ticks go on")
+        until(lambda: watcher.newest().tick > started + 100, "the other sessions and the ticks go on")
 
     def test_cmd_10_an_exchange_for_each_tick_is_no_flood_however_many_axes_it_commands(self):
-        """A controller of several axes that is throttled because one of them does not take its commands."""
+        """Catches: a controller of several axes that is throttled because one of them takes no commands."""
         server = self.server("--mode", "realtime", text=TWO_AXES.replace("period_us = 125", "period_us = 1000"))
         client = self.client(server)
         sent = 0
@@ -70,7 +71,7 @@ class Senders(WireTest):
         self.assertEqual((counts["throttled"], counts["excess_commands"]), (0, sent))
 
     def test_tcp_02_silence_within_a_frame_ends_the_session(self):
-        """A peer that sends half a request and keeps its place, and the axis, for ever."""
+        """Catches: a peer that sends half a request and keeps its session, and the axis, forever."""
         server = self.server()
         watcher, slow, quiet = self.client(server), self.client(server), self.client(server)
         request = frame(pb.Envelope(id=9, status_request=pb.StatusRequest()).SerializeToString())
@@ -84,7 +85,7 @@ class Senders(WireTest):
         quiet.send_bytes(struct.pack(">I", 100) + b"half")
         self.assertTrue(quiet.is_closed())
         self.assertLimitOf2s(silent_since)
-        until(lambda: watcher.status().sessions == 2, "it is gone, and the slow one is not")
+        until(lambda: watcher.status().sessions == 2, "the silent session is gone, and the slow one is not")
         self.assertDone(watcher.lease())
         self.assertEqual(watcher.tcp_counts()["cut"], 1)
         self.assertEqual(slow.status().sessions, 2)

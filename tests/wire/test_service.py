@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The server as a service: what it tells the service manager, its unit, its privileges. Each test names the mistake that it would catch."""
+"""The server as a service: its messages to the service manager, its unit, its privileges."""
 import ctypes
 import os
 import pathlib
@@ -28,7 +28,7 @@ UNIT = REPOSITORY / "configs/systemd/drivebench-server.service"
 
 class Notification(WireTest):
     def manager(self, name):
-        """A socket as systemd's; the server's environment names it."""
+        """A socket like systemd's; the server's environment names it."""
         manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.addCleanup(manager.close)
         manager.settimeout(PATIENCE_S)
@@ -45,8 +45,8 @@ class Notification(WireTest):
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
         return folder
 
-    def test_ready_when_clients_may_come_and_stopping_when_told_to_end(self):
-        """A service that others wait for in vain, or that is called ready before it is; abstract names taken for files."""
+    def test_ready_when_it_listens_and_stopping_at_a_signal(self):
+        """Catches: a service that is never called ready, or too early; abstract names taken for files."""
         for name in (self.folder() + "/notify", f"@drivebench-test-{os.getpid()}"):
             for mode in ("lockstep", "realtime"):
                 with self.subTest(name=name, mode=mode):
@@ -60,8 +60,8 @@ class Notification(WireTest):
                     manager.close()
                     pathlib.Path(name).unlink(missing_ok=True)
 
-    def test_a_manager_that_is_not_there_costs_a_line_and_nothing_else(self):
-        """A bench that dies because nobody listens, or a name longer than an address that runs over its end."""
+    def test_a_missing_manager_costs_a_line_and_nothing_else(self):
+        """Catches: a bench that ends because no manager listens, or a name longer than an address that overruns it."""
         for name in (self.folder() + "/nobody", "@" + "x" * 300, "/" + "x" * 107, "relative", "vsock:2:1"):
             with self.subTest(name=name):
                 server = self.started(name)
@@ -73,8 +73,8 @@ class Notification(WireTest):
         self.assertEqual(server.stop(), 0)
         self.assertNotIn("service manager", server.errors())
 
-    def test_what_does_not_serve_says_nothing(self):
-        """A check of a file that tells the manager of the running service that it is ready, or stopping."""
+    def test_programs_that_do_not_serve_notify_nothing(self):
+        """Catches: a check of a file that tells the manager that the running service is ready, or stopping."""
         name = self.folder() + "/notify"
         manager = self.manager(name)
         manager.settimeout(0)
@@ -91,7 +91,8 @@ class Unit(WireTest):
         return {key: [value for other, value in lines if other == key] for key, _ in lines}
 
     def test_sec_06_the_unit_gives_what_real_time_needs_and_nothing_else(self):
-        """A service with more rights than it needs, or one that is started again and again with a wrong bench file."""
+        """Catches: a service with more rights than it needs, or one that is started again and again with a wrong bench
+        file."""
         keys = self.keys()
         for key in ("CapabilityBoundingSet", "AmbientCapabilities"):
             self.assertEqual(set(keys[key][0].split()), {"CAP_SYS_NICE", "CAP_IPC_LOCK"}, key)
@@ -103,7 +104,7 @@ class Unit(WireTest):
         self.assertGreaterEqual(int(keys["LimitRTPRIO"][0]), 80)
 
     def test_sec_06_systemd_finds_nothing_wrong_with_the_unit(self):
-        """A key that systemd does not know and leaves out in silence."""
+        """Catches: a key that systemd does not know and silently leaves out."""
         tool = shutil.which("systemd-analyze")
         if tool is None:
             self.skipTest("systemd-analyze is not installed")
@@ -120,7 +121,8 @@ class Unit(WireTest):
             self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr)
 
     def run_without(self, rights, memory, *options, code=0):
-        """A short run in real time as an ordinary user with these rights; what it said, and whether memory could be set."""
+        """A short run in real time as an ordinary user with these rights; returns its output, and whether memory could be
+        limited."""
         if os.geteuid() != 0 or shutil.which("setpriv") is None:
             self.skipTest("needs root and setpriv, to give rights away")
         drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", f"--inh-caps={rights}",
@@ -145,7 +147,7 @@ class Unit(WireTest):
         return done.stderr, limited
 
     def test_sec_06_two_capabilities_are_enough_for_real_time(self):
-        """A server that needs root after all."""
+        """Catches: a server that needs root after all."""
         said, limited = self.run_without("-all,+sys_nice,+ipc_lock", "unlimited")
         if limited:
             self.assertNotIn("memory not locked", said)
@@ -153,19 +155,19 @@ class Unit(WireTest):
             self.assertNotIn("no real-time scheduling", said)
 
     def test_os_07_require_rt_does_not_start_without_it(self):
-        """A measurement that needs real time and runs without."""
+        """Catches: a measurement that needs real time and runs without."""
         said, _ = self.run_without("-all", "65536:65536", "--require-rt", code=2)
         self.assertRegex(said, "--require-rt: (no real-time scheduling|memory not locked)")
 
-    def test_os_09_more_than_may_be_locked_is_not_locked(self):
-        """MCL_FUTURE under a limit: each allocation beyond it fails, in the middle of a run."""
+    def test_os_09_memory_above_the_limit_is_not_locked(self):
+        """Catches: MCL_FUTURE under a limit: each allocation beyond it fails, in the middle of a run."""
         for limit in ("8388608:8388608", "1073741824:1073741824", "unlimited"):
             said, limited = self.run_without("-all", limit)
             if limited:
                 self.assertEqual("memory not locked" in said, limit != "unlimited", said)
 
-    def test_os_07_os_09_what_is_not_granted_is_said_once(self):
-        """A bench that calls itself real time without being it, or that does not start for want of a right."""
+    def test_os_07_os_09_missing_rights_are_logged_once(self):
+        """Catches: a bench that calls itself real time without being it, or that does not start for lack of a right."""
         said, limited = self.run_without("-all", "65536:65536")
         self.assertEqual(said.count("no real-time scheduling"), 1, said)
         if limited:
@@ -173,7 +175,7 @@ class Unit(WireTest):
 
 
 class Filter(WireTest):
-    """The unit's SystemCallFilter, put in force by hand where no systemd runs."""
+    """The unit's SystemCallFilter, installed by hand, without systemd."""
     ALLOW, ERRNO_EPERM = 0x7FFF0000, 0x00050001
     LOAD, EQUAL, RETURN = 0x20, 0x15, 0x06  # of a classic BPF program: a word, a jump, the end
 
@@ -189,7 +191,7 @@ class Filter(WireTest):
         return names
 
     def allowed(self):
-        """As systemd reads the lines: what they name is added, or taken away."""
+        """As systemd reads the lines: each adds its names, or takes them away."""
         names = set()
         for line in UNIT.read_text(encoding="utf-8").splitlines():
             key, _, value = line.partition("=")
@@ -212,7 +214,7 @@ class Filter(WireTest):
         return b"".join(struct.pack("<HBBI", *row) for row in rows), len(rows)
 
     def test_sec_06_the_server_works_under_the_filter_of_its_unit(self):
-        """A filter that forbids what the server needs, or that forbids nothing."""
+        """Catches: a filter that forbids a call of the server, or that forbids nothing."""
         if shutil.which("systemd-analyze") is None or platform.machine() != "x86_64":
             self.skipTest("needs systemd-analyze, and an x86-64")
         rows, count = self.program()
@@ -225,7 +227,7 @@ class Filter(WireTest):
             if prctl(no_new_privileges, 1, 0, 0, 0) != 0 or prctl(seccomp, mode_filter, program, 0, 0) != 0:
                 os._exit(99)
         forbidden = subprocess.run(["mount", "-t", "tmpfs", "none", "/mnt"], preexec_fn=confine, capture_output=True, check=False)
-        self.assertNotEqual(forbidden.returncode, 0, "the filter filters")
+        self.assertNotEqual(forbidden.returncode, 0, "the filter forbids a call")
         self.assertNotEqual(forbidden.returncode, 99, "the filter is in force")
         folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-service-"))
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Sessions of the server: hello, frames, strangers, leases. Each test names the mistake that it would catch."""
+"""Sessions of the server: hello, frames, foreign protocols, leases."""
 import os
 import pathlib
 import socket
@@ -40,7 +40,7 @@ class Hello(WireTest):
         self.assertEqual(self.client(self.shared).welcome.protocol, 1)
 
     def test_welcome_describes_the_bench(self):
-        """A description that lacks an axis, a signal or the schema of the wire."""
+        """Catches: a description that lacks an axis, a signal or the schema of the wire."""
         welcome = self.client(self.shared).welcome
         self.assertEqual([axis.name for axis in welcome.bench.axes], ["servo"])
         self.assertEqual(welcome.bench.mode, pb.MODE_LOCKSTEP)
@@ -50,15 +50,15 @@ class Hello(WireTest):
         self.assertNotEqual(welcome.build_id, "")
 
     def test_first_message_must_be_hello(self):
-        """A request that is carried out for somebody who has not introduced himself."""
+        """Catches: a request that is executed before hello."""
         for kind in ({"lease": pb.LeaseRequest(action=1)}, {"status_request": pb.StatusRequest()},
                      {"exchange": pb.Exchange()}):
             client = self.client(self.shared, hello=False)
             self.assertRefused(client.ask(**kind), pb.REFUSAL_UNAUTHENTICATED)
             self.assertTrue(client.is_closed())
 
-    def test_protocol_version_must_meet_ours(self):
-        """A version check with one bound only."""
+    def test_the_protocol_versions_must_overlap(self):
+        """Catches: a version check with one bound only."""
         for low, high in ((0, 0), (2, 9)):
             client = self.client(self.shared, hello=False)
             answer = client.ask(hello=pb.Hello(protocol_min=low, protocol_max=high))
@@ -67,8 +67,8 @@ class Hello(WireTest):
         client = self.client(self.shared, hello=False)
         self.assertEqual(client.ask(hello=pb.Hello(protocol_min=0, protocol_max=7)).welcome.protocol, 1)
 
-    def test_tcp_01_lengths_that_cannot_be_end_the_session(self):
-        """A length that is believed before it is checked: an allocation of 4 GiB, or an endless wait."""
+    def test_tcp_01_impossible_lengths_end_the_session(self):
+        """Catches: a length that is used before it is checked: an allocation of 4 GiB, or an endless wait."""
         for length in (0, 4097, 2**31 - 1, 2**31, 2**32 - 1):
             client = self.client(self.shared, hello=False)
             client.send_bytes(struct.pack(">I", length))
@@ -77,7 +77,7 @@ class Hello(WireTest):
         self.still_serves()
 
     def test_tcp_01_limit_01_the_cap_grows_with_hello_and_holds(self):
-        """An off-by-one in a cap, or a cap that hello does not raise."""
+        """Catches: an off-by-one in a cap, or a cap that hello does not raise."""
         before = self.client(self.shared, hello=False)
         hello = pb.Envelope(id=9, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()
         padding = b"\xf2\x7f"  # an unknown field of bytes, number 2046
@@ -95,7 +95,7 @@ class Hello(WireTest):
         self.assertTrue(before.is_closed())
 
     def test_tcp_02_a_truncated_frame_ends_with_its_connection(self):
-        """A session that waits for ever for the rest of a frame of a peer that is gone."""
+        """Catches: a session that waits forever for the rest of a frame of a dead peer."""
         watcher = self.client(self.shared)
         before = watcher.status().sessions
         client = self.client(self.shared)
@@ -105,14 +105,14 @@ class Hello(WireTest):
         until(lambda: watcher.status().sessions == before, "the session ended")
 
     def test_tcp_03_one_byte_at_a_time(self):
-        """A reader that takes a read for a frame."""
+        """Catches: a reader that takes a read for a frame."""
         client = self.client(self.shared, hello=False)
         for byte in frame(pb.Envelope(id=5, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()):
             client.send_bytes(bytes([byte]))
         self.assertEqual(client.answer_to(5).welcome.protocol, 1)
 
     def test_tcp_03_many_requests_in_one_segment_are_answered_in_order(self):
-        """Frames behind the first one of a read that are lost or answered out of order."""
+        """Catches: frames behind the first one of a read that are lost or answered out of order."""
         client = self.client(self.shared)
         ids = range(1000, 1200)
         client.send_bytes(b"".join(
@@ -121,8 +121,8 @@ class Hello(WireTest):
         for i in ids:
             self.assertEqual(client.answer_to(i).parameter_values.parameters[0].name, "amplifier.gain")
 
-    def test_tcp_04_strangers_are_closed(self):
-        """Foreign protocols that keep a session open or take the server down, or whose peers fill its log."""
+    def test_tcp_04_foreign_protocols_are_closed(self):
+        """Catches: foreign protocols that keep a session open or take the server down, or whose peers fill its log."""
         server = self.audited_server()
         began = time.monotonic()
         for _ in range(20):
@@ -140,19 +140,19 @@ class Hello(WireTest):
         here = self.client(server)
         self.assertEqual(here.status().sessions, 1)
         counts = here.tcp_counts()
-        self.assertEqual((counts["malformed"], counts["cut"]), (80, 0), "no one was closed because he had nothing more to say")
+        self.assertEqual((counts["malformed"], counts["cut"]), (80, 0), "no connection was closed for its silence")
         self.assertAudited(server.audit, "malformed", 80)
         self.assertLessEqual(len(server.errors().splitlines()), 1 + (time.monotonic() - began) // 10, "a line in 10 s")
 
     def test_tcp_07_unknown_fields_are_ignored_and_the_last_scalar_counts(self):
-        """A server that refuses what a newer client adds, or takes the first of two values."""
+        """Catches: a server that refuses the additions of newer clients, or takes the first of two values."""
         client = self.client(self.shared)
         twice = b"\x08\x63" + b"\x82\x01\x00" + b"\x08\x07" + b"\xa0\x7f\x01"  # id 99, status_request, id 7, unknown
         client.send_bytes(frame(twice))
         self.assertEqual(client.answer_to(7).WhichOneof("kind"), "status")
 
     def test_tcp_07_of_two_kinds_the_last_holds(self):
-        """A request that is carried out although another has taken its place, or two answers to one."""
+        """Catches: a request that is executed although another has taken its place, or two answers to one."""
         client, other = self.client(self.shared), self.client(self.shared)
         lease = b"\x32\x02\x10\x01"  # lease { action = ACQUIRE }
         status = b"\x82\x01\x00"  # status_request {}
@@ -164,7 +164,7 @@ class Hello(WireTest):
         self.assertDone(client.lease(pb.LeaseRequest.ACTION_RELEASE))
 
     def test_tcp_07_answers_are_no_requests(self):
-        """A server that obeys a message which only servers send."""
+        """Catches: a server that executes a message which only servers send."""
         client = self.client(self.shared)
         for kind in ({"done": pb.Done()}, {"welcome": pb.Welcome()}, {"samples": pb.Samples()}, {}):
             self.assertRefused(client.ask(**kind) if kind else self.empty(client), pb.REFUSAL_MALFORMED, "kind")
@@ -176,18 +176,18 @@ class Hello(WireTest):
         return client.answer_to(client.last_id)
 
     def test_tcp_08_text_that_is_not_utf_8_ends_the_session(self):
-        """A name that breaks the terminal or the JSON of somebody else."""
+        """Catches: a name that breaks a terminal or a client's JSON."""
         client = self.client(self.shared)
         client.send_bytes(frame(b"\x08\x01\x6a\x04\x12\x02\xff\xfe"))  # write_parameter { name = FF FE }
         self.assertRefused(client.receive(), pb.REFUSAL_MALFORMED)
         self.assertTrue(client.is_closed())
 
     def test_limit_05_silent_connection_is_closed(self):
-        """Connections that never say hello and stay for ever, or long enough to take the places of others."""
+        """Catches: connections that never say hello and stay forever, or long enough to take the places of others."""
         server, since = self.audited_server(), time.monotonic()
         client = self.client(server, hello=False)
         patient = self.client(server, hello=False)
-        time.sleep(1.0)  # half of what is allowed
+        time.sleep(1.0)  # half of the limit
         self.assertEqual(patient.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="slow")).WhichOneof("kind"), "welcome")
         self.assertTrue(client.is_closed())
         self.assertLimitOf2s(since)
@@ -196,7 +196,7 @@ class Hello(WireTest):
         self.assertEqual(self.assertAudited(server.audit, "limit", 1), ["no hello within 2 s"])
 
     def test_long_client_name_is_refused(self):
-        """A log that a client fills."""
+        """Catches: a log that a client fills."""
         client = self.client(self.shared, hello=False)
         answer = client.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="x" * 101))
         self.assertRefused(answer, pb.REFUSAL_OUT_OF_RANGE, "client")
@@ -204,7 +204,7 @@ class Hello(WireTest):
 
 class Lease(WireTest):
     def test_own_01_own_02_one_owner_at_a_time(self):
-        """Two controllers on one axis; a lease that outlives its holder."""
+        """Catches: two controllers on one axis; a lease that outlives its holder."""
         server = self.server()
         first, second = self.client(server), self.client(server)
         self.assertDone(first.lease())
@@ -220,7 +220,7 @@ class Lease(WireTest):
         self.assertNotEqual(first.owner, second.owner)
 
     def test_tcp_15_a_lease_ends_with_its_connection(self):
-        """An axis that nobody can take because its owner is dead: after close, half-close and reset."""
+        """Catches: an axis that stays taken although its owner is dead: after close, half-close and reset."""
         server = self.server()
         for end in ("close", "half", "reset"):
             owner = self.client(server)
@@ -243,7 +243,7 @@ class Lease(WireTest):
             heir.close()
 
     def test_cmd_03_a_controller_that_vanishes_leaves_a_latched_fault(self):
-        """Taking over a moving axis as if nothing had happened."""
+        """Catches: a lease on a moving axis without a latched fault."""
         server = self.server()
         owner = self.client(server)
         owner.lease()
@@ -256,19 +256,19 @@ class Lease(WireTest):
         self.assertDone(heir.ask(clear_faults=pb.ClearFaults()))
         self.assertEqual(heir.step(5).state, 1)
 
-    def test_actions_that_are_none_are_refused(self):
-        """Clients that write what only recordings may hold (ACTION_LOST), or an unknown number."""
+    def test_unknown_actions_are_refused(self):
+        """Catches: a client that writes an action for recordings only (ACTION_LOST), or an unknown number."""
         client = self.client(self.server())
         for action in (0, 4, 77):
             self.assertRefused(client.lease(action), pb.REFUSAL_OUT_OF_RANGE, "action")
 
     def test_free_mode_takes_no_controller(self):
-        """A controller that believes it controls a run which does not wait for it."""
+        """Catches: a controller that believes it controls a run which does not wait for it."""
         client = self.client(self.server("--mode", "free"))
         self.assertRefused(client.lease(), pb.REFUSAL_WRONG_MODE)
 
-    def test_a_lease_that_is_asked_for_and_left_at_once_is_free_again(self):
-        """An answer that comes after the session has ended and leaves the axis to a ghost."""
+    def test_a_lease_requested_by_a_session_that_ends_at_once_is_free_again(self):
+        """Catches: an answer that comes after the session has ended and leaves the axis to no session."""
         server = self.server("--mode", "realtime")
         for _ in range(30):
             ghost = self.client(server)

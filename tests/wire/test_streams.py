@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What comes out of the server: subscriptions, the same state for the same commands, recordings, the end. Each test names the mistake that it would catch."""
+"""The server's streams: subscriptions, the same state for the same commands, recordings, the end."""
 import math
 import os
 import pathlib
@@ -25,7 +25,8 @@ from wire_test import TWO_AXES, WireTest, until
 
 class Subscriptions(WireTest):
     def test_decimation_and_signals(self):
-        """Samples of the wrong ticks, signals that nobody asked for, a subscription that cannot be ended."""
+        """Catches: samples of the wrong ticks, signals that the client did not ask for, a subscription that cannot be
+        ended."""
         server = self.server()
         owner, viewer = self.client(server), self.client(server)
         owner.lease()
@@ -51,7 +52,8 @@ class Subscriptions(WireTest):
         self.assertEqual(len(viewer.samples), count)
 
     def test_many_subscribers_have_every_sample(self):
-        """A turn that never comes, one that passes somebody over, an answer that overtakes the samples of its tick."""
+        """Catches: a turn that never comes, a subscriber that is left out, an answer that overtakes the samples of its
+        tick."""
         server = self.server()
         owner = self.client(server)
         viewers = [self.client(server) for _ in range(11)]
@@ -71,7 +73,7 @@ class Subscriptions(WireTest):
             self.assertEqual(ticks, list(range(1, 201)))
 
     def test_unknown_signal_changes_nothing(self):
-        """A misspelt name that is left out in silence, or a refusal that ends what was running."""
+        """Catches: a misspelt name that is silently left out, or a refusal that ends the running subscription."""
         server = self.server()
         owner, viewer = self.client(server), self.client(server)
         owner.lease()
@@ -83,14 +85,14 @@ class Subscriptions(WireTest):
         self.assertEqual(len(viewer.samples), 1)
 
     def test_tcp_10_limit_03_a_slow_reader_loses_samples_and_is_told_how_many(self):
-        """A queue that grows for a slow client, or a loss that nobody tells of."""
+        """Catches: a queue that grows for a slow client, or a loss that the client is not told."""
         server = self.server()
         owner = self.client(server)
         slow = self.client(server, receive_buffer=4096)
         owner.lease()
         slow.ask(subscribe=pb.Subscribe(decimation=1))
         ticks = 0
-        # Nothing is read for as long as it takes to fill both socket buffers and the ring of 256 samples; the
+        # The test reads nothing for as long as it takes to fill both socket buffers and the ring of 256 samples; the
         # server cuts after two seconds without progress, these exchanges take a fraction of that.
         for ticks in range(1, 4001):
             owner.step(ticks - 1, 1.0)
@@ -109,12 +111,12 @@ class Subscriptions(WireTest):
         self.assertGreater(dropped, 0)
 
     def test_limit_03_the_newest_256_samples_wait_for_a_reader(self):
-        """A ring of another size, and a count of losses that is one off."""
+        """Catches: a ring of another size, and a count of losses that is one off."""
         server = self.server(unix=True)
         owner, slow = self.client(server), self.client(server, unix=True)
         owner.lease()
         slow.ask(subscribe=pb.Subscribe(decimation=1))
-        ticks = 2000  # more than kernel and ring hold; a unix socket that is not read takes nothing any more
+        ticks = 2000  # more than kernel and ring hold; a unix socket that is not read stops taking data
         for tick in range(ticks):
             owner.step(tick, 1.0)
         seen, gaps = [], []
@@ -129,7 +131,7 @@ class Subscriptions(WireTest):
         self.assertEqual(dropped, ticks - 256 - before)
 
     def test_tcp_10_tcp_11_limit_04_a_reader_that_stops_is_cut_and_the_others_go_on(self):
-        """A dead viewer that is fed for ever, or one that stops the bench."""
+        """Catches: a dead viewer that is fed forever, or one that stops the bench."""
         server = self.server(unix=True)
         owner, viewer = self.client(server), self.client(server)
         stopped = [self.client(server, receive_buffer=4096) for _ in range(4)]
@@ -144,7 +146,7 @@ class Subscriptions(WireTest):
             if tick % 100 == 0:
                 viewer.newest()
         ended = time.monotonic()
-        until(lambda: owner.status().sessions == 2, "they are cut")
+        until(lambda: owner.status().sessions == 2, "the stopped readers are cut")
         self.assertLimitOf2s(began, ended)
         for client in stopped:
             self.assertTrue(client.is_closed())
@@ -153,7 +155,7 @@ class Subscriptions(WireTest):
         self.assertEqual(ticks, list(range(1, 3001)))
 
     def test_limit_04_a_reader_that_rests_for_a_second_stays(self):
-        """A viewer that is cut off because it drew a picture."""
+        """Catches: a viewer that is cut because it rested for a second."""
         server = self.server()
         owner, viewer = self.client(server), self.client(server, receive_buffer=4096)
         owner.lease()
@@ -170,7 +172,7 @@ class Subscriptions(WireTest):
         self.assertEqual(owner.status().sessions, 2)
 
     def test_limit_03_a_reader_that_never_reads_its_answers_is_cut(self):
-        """Answers queued without bound for a client that only asks."""
+        """Catches: answers queued without bound for a client that only asks."""
         server = self.server()
         greedy, other = self.client(server, receive_buffer=4096), self.client(server)
         request = frame(pb.Envelope(id=1, read_parameters=pb.ReadParameters()).SerializeToString())
@@ -179,7 +181,7 @@ class Subscriptions(WireTest):
         with self.assertRaises(OSError):
             for _ in range(100_000):
                 greedy.send_bytes(request * 100)
-        until(lambda: other.status().sessions == 1, "the greedy one is gone")
+        until(lambda: other.status().sessions == 1, "the session is gone")
         self.assertMemoryBelow(server, before + 16 * 1024)
 
 
@@ -222,7 +224,7 @@ class Determinism(WireTest):
         return status.state_hash, server.verdict
 
     def test_det_01_the_same_commands_give_the_same_state(self):
-        """Viewers, their number, or the kind of socket that change the plant by a bit."""
+        """Catches: viewers, their number, or the kind of socket that change the plant by a bit."""
         alone, verdict = self.run_script()
         again, _ = self.run_script()
         watched, _ = self.run_script(viewers=8)
@@ -241,20 +243,21 @@ class Ending(WireTest):
                               timeout=PATIENCE_S, check=False)
         return done.returncode, done.stdout
 
-    def test_rec_10_os_01_a_signal_ends_it_and_the_recording_replays(self):
-        """A recording without its end; a server that outlives its signal, or waits for those who do not read."""
+    def test_rec_10_os_01_a_signal_ends_the_server_and_the_recording_replays(self):
+        """Catches: a recording without its end; a server that outlives its signal, or waits for clients that do not
+        read."""
         for mode in ("lockstep", "realtime", "free"):
             for number in (signal.SIGTERM, signal.SIGINT):
                 with self.subTest(mode=mode, signal=number):
-                    # The rule says 2 s. A host that others use as well may take its time, for instance to sync the
-                    # file: of three ends one keeps to the rule, and none takes longer than PATIENCE_S.
+                    # The rule says 2 s. A busy host may be slow, for instance to sync the file: of three ends one
+                    # keeps to the rule, and none takes longer than PATIENCE_S.
                     took = [self.end_of_a_run(mode, number)]
                     while len(took) < 3 and min(took) >= 2.0:
                         took.append(self.end_of_a_run(mode, number))
                     self.assertLess(min(took), 2.0, took)
 
     def end_of_a_run(self, mode, number):
-        """How long a run took to end by this signal; its recording must be whole."""
+        """The time that a run took to end by this signal; its recording must be whole."""
         file = self.server().folder / "run.mcap"
         server = self.server("--mode", mode, "--record", str(file))
         client, viewer, deaf = self.client(server), self.client(server), self.client(server, receive_buffer=4096)
@@ -277,7 +280,7 @@ class Ending(WireTest):
         return took
 
     def test_rec_03_rec_04_os_02_a_full_disk_costs_the_recording_and_nothing_else(self):
-        """A bench that dies with its disk, or a recording that is called whole although it is not."""
+        """Catches: a bench that dies with its disk, or a torn recording that is called whole."""
         folder = self.server().folder
         file = folder / "cut.mcap"
         server = self.server("--record", str(file), before=lambda: resource.setrlimit(
@@ -292,7 +295,7 @@ class Ending(WireTest):
         self.assertEqual(self.replayed(file)[0], 2)
 
     def test_rec_07_a_recording_is_never_overwritten(self):
-        """The measurement of yesterday that today's overwrites."""
+        """Catches: an older measurement that a newer one overwrites."""
         folder = self.server().folder
         (folder / "there.mcap").write_text("precious", encoding="utf-8")
         done = subprocess.run([str(SERVER), str(BENCHES / "servo.toml"), "--port", "0", "--record",
@@ -302,8 +305,8 @@ class Ending(WireTest):
         self.assertIn("there.mcap", done.stderr)
         self.assertEqual((folder / "there.mcap").read_text(encoding="utf-8"), "precious")
 
-    def test_cfg_01_a_bad_bench_file_ends_it_before_a_socket_opens(self):
-        """A bench that serves what its file did not say."""
+    def test_cfg_01_a_bad_bench_file_ends_the_server_before_a_socket_opens(self):
+        """Catches: a bench that serves although its file is wrong."""
         folder = self.server().folder
         bad = folder / "bad.toml"
         bad.write_text(TWO_AXES.replace("watchdog_ticks", "watchdog_tick"), encoding="utf-8")
@@ -314,7 +317,7 @@ class Ending(WireTest):
         strace = pathlib.Path("/usr/bin/strace")
         if strace.exists():
             command = [str(strace), "-f", "-e", "trace=network", "-o", str(trace), *command]
-        without_leak_check = {**os.environ, "ASAN_OPTIONS": "detect_leaks=0"}  # which fails under strace
+        without_leak_check = {**os.environ, "ASAN_OPTIONS": "detect_leaks=0"}  # the leak check fails under strace
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
                               env=without_leak_check)
         self.assertEqual(done.returncode, 2)
@@ -325,8 +328,8 @@ class Ending(WireTest):
         if trace.exists():
             self.assertNotIn("socket(", trace.read_text(encoding="utf-8"))
 
-    def test_os_13_a_port_that_is_taken_is_said(self):
-        """A second server that seems to run and serves nobody."""
+    def test_os_13_a_port_in_use_ends_the_start(self):
+        """Catches: a second server that seems to run and serves no client."""
         server = self.server()
         done = subprocess.run([str(SERVER), str(BENCHES / "servo.toml"), "--port", str(server.address[1])],
                               capture_output=True, text=True, timeout=PATIENCE_S, check=False)
@@ -334,7 +337,7 @@ class Ending(WireTest):
         self.assertIn(str(server.address[1]), done.stderr)
 
     def test_tcp_16_limit_02_sessions_beyond_the_cap_are_turned_away_with_a_reason(self):
-        """One client that takes all descriptors from the others."""
+        """Catches: one client that takes all descriptors from the others."""
         text = TWO_AXES.replace("[tcp]", "[tcp]\nmax_sessions = 3")
         server = self.server(text=text)
         inside = [self.client(server) for _ in range(3)]
@@ -351,8 +354,8 @@ class Ending(WireTest):
                 return False
         until(one_more, "room for another")
 
-    def test_tcp_15_os_02_sigpipe_does_not_end_it(self):
-        """A client that closes while samples are on their way."""
+    def test_tcp_15_os_02_sigpipe_does_not_end_the_server(self):
+        """Catches: a client that closes while samples are on their way."""
         server = self.server()
         owner = self.client(server)
         owner.lease()
@@ -365,10 +368,10 @@ class Ending(WireTest):
             for _ in range(20):
                 owner.step(tick)
                 tick += 1
-        until(lambda: owner.status().sessions == 1, "all are gone")
+        until(lambda: owner.status().sessions == 1, "all sessions are gone")
 
-    def test_sec_01_it_listens_on_loopback_only(self):
-        """A bench that the whole network can drive."""
+    def test_sec_01_the_server_listens_on_loopback_only(self):
+        """Catches: a bench that the whole network can drive."""
         self.assertEqual(self.server().address[0], "127.0.0.1")
 
 

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""TLS on the TCP port: who gets in, who does not, and what a stream behind it is like. Each test names the mistake that it
-would catch. Certificates are made here by openssl."""
+"""TLS on the TCP port: valid and refused certificates, and streams behind TLS. openssl makes the certificates here."""
 import json
 import pathlib
 import select
@@ -39,7 +38,7 @@ private_key = ca.key
 
 
 class Certificates:
-    """A folder with an authority, a server, and clients of all sorts."""
+    """A folder with an authority, a server, and valid and invalid clients."""
 
     def __init__(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-tls-"))
@@ -97,7 +96,8 @@ class TlsTest(WireTest):
         return self.tls_server(f'client_ca = "{folder}/ca.pem"\nclient_crl = "{folder}/crl.pem"\n')
 
     def assertAllRefusalsAreCounted(self, server, client, count):
-        """As many as were turned away, also in the audit log, not only those of which the log hears: the reasons."""
+        """The number of refused clients, also in the audit log, and not only those of which the log has a line; returns
+        the reasons."""
         self.assertEqual(client.tcp_counts()["tls_refused"], count)
         return self.assertAudited(server.audit, "tls_refused", count)
 
@@ -121,7 +121,7 @@ class TlsTest(WireTest):
         return client
 
     def assertTurnedAway(self, server, context, why=None):
-        # With TLS 1.3 a client learns what the server thinks of its certificate when it reads.
+        # With TLS 1.3 a client learns the server's verdict on its certificate with its first read.
         with self.assertRaises((ssl.SSLError, ConnectionError, Closed)):
             self.tls_client(server, context)
         if why:
@@ -130,7 +130,7 @@ class TlsTest(WireTest):
 
 class Plain(TlsTest):
     def test_sec_03_a_run_behind_tls_is_the_same_run(self):
-        """Bytes that are lost, doubled or overtake each other behind the door; an old protocol."""
+        """Catches: bytes that are lost, doubled or overtake each other behind TLS; an old protocol."""
         plain, door = self.server(), self.tls_server()
         expected, client = self.client(plain), self.tls_client(door, self.context())
         self.assertEqual(client.socket.version(), "TLSv1.3")
@@ -147,7 +147,7 @@ class Plain(TlsTest):
         self.assertEqual(door.stop(), 0)
 
     def test_sec_03_older_protocols_are_refused(self):
-        """A door that opens for what was broken long ago."""
+        """Catches: a server that takes a broken protocol."""
         server = self.tls_server()
         warnings.simplefilter("ignore", DeprecationWarning)
         for version in (ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_1):
@@ -158,8 +158,8 @@ class Plain(TlsTest):
             self.assertTurnedAway(server, context)
         self.tls_client(server, self.context())
 
-    def test_tcp_04_strangers_at_the_door_are_closed(self):
-        """Plain text, other protocols or an SSLv2 hello that get through, or a line in the log for each."""
+    def test_tcp_04_foreign_protocols_are_closed_before_tls(self):
+        """Catches: plain text, other protocols or an SSLv2 hello that get through, or a line in the log for each."""
         server = self.tls_server()
         hello = pb.Envelope(id=1, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()
         for said in (len(hello).to_bytes(4, "big") + hello, b"GET / HTTP/1.1\r\n\r\n", b"\x80\x2e\x01\x00\x02" + bytes(41), b"SSH-2.0-x\r\n"):
@@ -174,15 +174,16 @@ class Plain(TlsTest):
         self.assertAllRefusalsAreCounted(server, self.tls_client(server, self.context()), 4)
 
     def test_sec_05_limit_05_silent_handshakes_are_few_and_short(self):
-        """Peers that begin to shake hands and take the places of all others, be it for ever; a place too few or too many."""
+        """Catches: peers that begin a handshake and take the places of all others, even forever; a place too few or too
+        many."""
         server = self.tls_server()
         since = time.monotonic()
         silent = [server.raw() for _ in range(32)]
         for each in silent:
             self.addCleanup(each.close)
         with server.raw() as one_too_many:
-            self.assertEqual(one_too_many.recv(1), b"", "at once")
-        self.assertLess(time.monotonic() - since, 1.8, "so slow a host that the first of them have had their time")
+            self.assertEqual(one_too_many.recv(1), b"", "closed at once")
+        self.assertLess(time.monotonic() - since, 1.8, "the host is so slow that the first handshakes have timed out")
         for each in silent:
             each.setblocking(False)
             with self.assertRaises(BlockingIOError, msg="has 2 s"):
@@ -198,49 +199,49 @@ class Plain(TlsTest):
         self.assertEqual(set(others), {"no handshake within 2 s"})
 
     def test_tcp_10_a_reader_that_stops_is_cut_behind_tls_too(self):
-        """A stream behind the door that is fed for ever; one that is cut by the door, so that the log does not know whose it was
-        or says that he left."""
+        """Catches: a stream behind TLS that is fed forever; one that TLS cuts, so that the log does not name the client
+        or says that it left."""
         server = self.mutual_server()
         owner = self.tls_client(server, self.context("anna"))
         deaf = self.tls_client(server, self.context("anna"), receive_buffer=4096)
         owner.lease()
         deaf.ask(subscribe=pb.Subscribe(decimation=1))
         began = time.monotonic()
-        for tick in range(4000):  # more than lies on the way
+        for tick in range(4000):  # more than the buffers hold
             owner.step(tick, 1.0)
         ended = time.monotonic()
-        until(lambda: owner.status().sessions == 1, "it is cut")
+        until(lambda: owner.status().sessions == 1, "the session is cut")
         self.assertLimitOf2s(began, ended)
-        until(lambda: owner.tcp_counts()["cut"] > 0, "it is counted")
+        until(lambda: owner.tcp_counts()["cut"] > 0, "the cut is counted")
         self.assertEqual(owner.tcp_counts()["cut"], 1)
         self.assertCutOnce(server, "it took nothing for 2 s")
 
-    def test_limit_03_whoever_is_cut_for_what_waits_is_cut_once(self):
-        """A door that goes on with what it has, finds the peer deaf and counts him again, without a name."""
+    def test_limit_03_a_session_that_is_cut_for_its_queue_is_counted_once(self):
+        """Catches: a TLS layer that goes on sending, finds the peer deaf and counts the session again, without a name."""
         server = self.mutual_server()
         owner = self.tls_client(server, self.context("anna"))
         greedy = self.tls_client(server, self.context("anna"), receive_buffer=4096)
         request = frame(pb.Envelope(id=1, read_parameters=pb.ReadParameters()).SerializeToString())
-        with self.assertRaises(OSError):  # when the door gives up as well
+        with self.assertRaises(OSError):  # when TLS gives up as well
             while True:
                 greedy.send_bytes(request * 100)
         self.assertEqual(owner.tcp_counts()["cut"], 1)
         self.assertCutOnce(server, "too much waits for it")
 
-    def test_limit_04_limit_05_a_pause_of_the_server_cuts_nobody(self):
-        """Limits that end, when the process goes on, whoever has done his part while it was stopped: read, said hello, sent the
-        rest of a frame, or shaken hands."""
+    def test_limit_04_limit_05_a_pause_of_the_server_cuts_no_session(self):
+        """Catches: limits that, when the process goes on, cut a client that did its part during the stop: read, said
+        hello, sent the rest of a frame, or completed its handshake."""
         server = self.tls_server()
         owner, reader, half = (self.tls_client(server, self.context(), **options) for options in ({}, {"receive_buffer": 4096}, {}))
         owner.lease()
         reader.ask(subscribe=pb.Subscribe(decimation=1))
-        for tick in range(3000):  # more than lies on the way
+        for tick in range(3000):  # more than the buffers hold
             owner.step(tick, 1.0)
         silent = self.tls_client(server, self.context(), hello=False)
         shaking = self.context().wrap_socket(server.raw(), server_hostname="127.0.0.1", do_handshake_on_connect=False)
         self.addCleanup(shaking.close)
         shaking.setblocking(False)
-        server.process.send_signal(signal.SIGSTOP)  # so that it does not answer at once
+        server.process.send_signal(signal.SIGSTOP)  # so that the server does not answer at once
         with self.assertRaises(ssl.SSLWantReadError):
             shaking.do_handshake()
         server.process.send_signal(signal.SIGCONT)
@@ -267,19 +268,19 @@ class Plain(TlsTest):
         counts = owner.tcp_counts()
         self.assertEqual((counts["cut"], counts["tls_refused"], counts["sessions"]), (0, 0, 5))
 
-    def test_a_peer_that_does_not_say_goodbye_is_not_called_deaf(self):
-        """A limit that counts those who were sent away and were slow to leave."""
+    def test_a_refused_peer_that_does_not_close_is_not_counted_as_cut(self):
+        """Catches: a limit that counts refused clients that are slow to leave."""
         server = self.tls_server()
         rude = self.tls_client(server, self.context(), hello=False)
         rude.send_bytes(b"GET ")
         self.assertRefused(rude.receive(), pb.REFUSAL_MALFORMED)
-        time.sleep(1.5)  # more than the server waits for a goodbye
+        time.sleep(1.5)  # longer than the server waits for the peer's close
         counts = self.tls_client(server, self.context()).tcp_counts()
         self.assertEqual((counts["malformed"], counts["cut"], counts["sessions"]), (1, 0, 1))
         self.assertEqual(self.audited(server.audit, "limit"), [])
 
-    def test_cfg_07_files_that_cannot_be_used_are_refused(self):
-        """A server that starts without the encryption that was asked for, or with a key that everybody knows."""
+    def test_cfg_07_unusable_files_are_refused(self):
+        """Catches: a server that starts without the requested encryption, or with a key that every user can read."""
         folder = self.made.folder
         shutil.copy(folder / "server.key", folder / "open.key")
         (folder / "open.key").chmod(0o644)
@@ -294,8 +295,9 @@ class Plain(TlsTest):
 
 
 class Mutual(TlsTest):
-    def test_sec_03_only_certificates_that_hold_get_in(self):
-        """A client without a certificate, or with one that is foreign, too old, too new, not for clients, or revoked."""
+    def test_sec_03_only_valid_certificates_get_in(self):
+        """Catches: a client without a certificate, or with one that is foreign, too old, too new, not for clients, or
+        revoked."""
         server = self.mutual_server()
         self.tls_client(server, self.context("anna"))
         for name in (None, "foreign", "old", "early", "machine", "gone"):
@@ -308,15 +310,16 @@ class Mutual(TlsTest):
         self.assertEqual(len(set(said)), 6, "each with its own reason")
         self.assertIn("certificate of gone", said[-1])
 
-    def test_sec_03_who_is_turned_away_stands_in_the_log(self):
-        """A log that does not say whose certificate it was, and what is wrong with it."""
+    def test_sec_03_refused_certificates_are_logged(self):
+        """Catches: a log that does not name the certificate and the reason."""
         for name, why in (("gone", "certificate revoked"), ("old", "certificate has expired")):
             server = self.mutual_server()
             self.assertTurnedAway(server, self.context(name), why)
             self.assertIn(f"certificate of {name}", server.errors())
 
-    def test_sec_03_nobody_comes_back_without_a_certificate(self):
-        """A ticket that opens the door after the certificate was revoked; or one that is handed out and then refused."""
+    def test_sec_03_no_ticket_replaces_the_certificate(self):
+        """Catches: a ticket that opens a session after the certificate was revoked; or one that is issued and then
+        refused."""
         server, anna = self.mutual_server(), self.context("anna")
         first = self.tls_client(server, anna)
         again = anna.wrap_socket(server.raw(), server_hostname="127.0.0.1", session=first.socket.session)
@@ -324,16 +327,17 @@ class Mutual(TlsTest):
         self.assertFalse(again.session_reused)
         again.close()
 
-    def test_sec_03_a_strange_name_moves_no_terminal(self):
-        """A certificate that nobody has signed whose name writes lines, or colours, into the log."""
+    def test_sec_03_a_name_with_control_characters_moves_no_terminal(self):
+        """Catches: an unsigned certificate whose name writes lines, or colours, into the log."""
         server = self.mutual_server()
         self.made.openssl("req", "-x509", *self.made.key("odd.key"), "-subj", "/CN=odd\x1b[2J\n[error] forged", "-out", "odd.pem")
         self.assertTurnedAway(server, self.context("odd"), "certificate of odd")
         self.assertNotIn("\x1b", server.errors())
         self.assertFalse(any(line.startswith("[error] forged") for line in server.errors().splitlines()))
 
-    def test_a_name_in_other_letters_is_cut_between_them(self):
-        """A certificate whose name is cut within a letter: whoever asks for its owner's axis gets an answer that he cannot read."""
+    def test_a_long_name_is_cut_between_characters(self):
+        """Catches: a certificate whose name is cut within a character: a client that asks for the owner of an axis could
+        not decode the answer."""
         self.made.issue("long", subject="\N{EURO SIGN}" * 64)  # three bytes each; no name may have more letters
         server = self.mutual_server()
         self.assertDone(self.tls_client(server, self.context("long")).lease())
@@ -341,7 +345,8 @@ class Mutual(TlsTest):
         self.assertRegex(told.holder, "^\N{EURO SIGN}{50,64}")
 
     def test_the_command_speaks_tls(self):
-        """A client of ours that needs a tunnel of somebody else's, or that talks to any server, or goes without a certificate."""
+        """Catches: a client that needs a foreign tunnel, that talks to any server, or that connects without a
+        certificate."""
         folder, server = self.made.folder, self.mutual_server()
         place = "tls:127.0.0.1:%d" % server.address[1]
         ours = f"{place}?ca={folder}/ca.pem&certificate={folder}/anna.pem&key={folder}/anna.key"
@@ -352,13 +357,13 @@ class Mutual(TlsTest):
         self.assertEqual(moved.returncode, 0, moved.stderr)
         self.assertLess(json.loads(moved.stdout)["peak_error_counts"], 2.0)
         for link, code in ((f"{place}?ca={folder}/stranger.pem", 3), (place, 3), (f"{place}?ca={folder}/none.pem", 3),
-                           (f"{place}?ca={folder}/ca.pem", 1)):  # where only the answer to hello fails to come
+                           (f"{place}?ca={folder}/ca.pem", 1)):  # here only the answer to hello is missing
             refused = drivebench("status", "--link", link)
             self.assertEqual(refused.returncode, code, link)
             self.assertTrue(refused.stderr, link)
 
-    def test_a_server_that_is_not_ours_is_noticed(self):
-        """A client that talks to anybody."""
+    def test_a_server_with_a_foreign_certificate_is_refused(self):
+        """Catches: a client that talks to any server."""
         server = self.tls_server()
         with self.assertRaises(ssl.SSLCertVerificationError):
             self.tls_client(server, self.context(authority="stranger"))

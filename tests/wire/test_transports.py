@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""TCP, CAN and Modbus clients of one axis: they have the same rights, and what they do gives the same bits."""
+"""TCP, CAN and Modbus clients of one axis: they have the same rights, and their commands give the same bits."""
 import pathlib
 import struct
 import sys
@@ -15,7 +15,7 @@ from wire_client import pb  # noqa: E402
 
 GROUP = "239.74.163.2"
 UDP = 'backend = "udp_multicast"'
-TURNS = 12  # that each transport shall have had
+TURNS = 12  # for each transport
 MODBUS = '\n[modbus]\nport = 0\nallow_writes = true\nrequests_per_s = 0\n'
 VOLTS = {"tcp": 1.0, "can": 2.0, "modbus": 3.0}
 
@@ -52,7 +52,7 @@ class CanRival:
             self.tick = self.drive_.acquire()[0]
             return True
         except self.refused as refused:
-            assert refused.code == 2, refused  # owned by another
+            assert refused.code == 2, refused  # owned by another client
             return False
 
     def drive(self, volts):
@@ -105,7 +105,7 @@ class ModbusRival:
 
 class Transports(DriveTest):
     # OWN-01, OWN-02. Catches: two transports that hold an axis at once, or a refusal that is not counted.
-    def test_three_transports_fight_for_one_axis(self):
+    def test_three_transports_take_turns_on_one_axis(self):
         text = with_bus([UDP]) + MODBUS
         dbc = self.text_of("dbc", text)
         recording = self.folder / "run.mcap"
@@ -156,7 +156,8 @@ class Transports(DriveTest):
         self.assertEqual(set().union(*volts_of_owner.values()), set(VOLTS.values()))
 
 
-    # OWN-04. Catches: an owner on a bus who cannot be put out, or one who keeps the axis because his bus does not tell him.
+    # OWN-04. Catches: an owner on a bus that cannot be removed, or one that keeps the axis because its bus does not
+    # tell it.
     def test_own_04_an_administrator_takes_an_axis_from_any_transport(self):
         text = with_bus([UDP]) + MODBUS
         dbc = self.text_of("dbc", text)
@@ -176,7 +177,7 @@ class Transports(DriveTest):
             admin.step(admin.newest().tick, 1.0)
             admin.lease(pb.LeaseRequest.ACTION_RELEASE)
 
-    # Catches: a transport that rounds, delays or reorders what it hands to the bench, or leaves traces of its own.
+    # Catches: a transport that rounds, delays or reorders commands, or leaves traces of its own.
     def test_the_same_commands_give_the_same_recording_over_each_transport(self):
         text = with_bus([UDP]) + MODBUS
         dbc = self.text_of("dbc", text)

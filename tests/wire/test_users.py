@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Several users: tokens, roles, taking by force, slots. Each test names the mistake that it would catch."""
+"""Several users: tokens, roles, taking by force, slots."""
 import datetime
 import pathlib
 import shutil
@@ -66,7 +66,7 @@ class UsersTest(WireTest):
 
 class Roles(UsersTest):
     def test_own_06_a_viewer_looks_and_changes_nothing(self):
-        """A request that forgets to ask for the role; a role that forbids looking."""
+        """Catches: a request that forgets to ask for the role; a role that forbids looking."""
         server = self.server_for()
         viewer = self.user(server, "vera")
         self.assertEqual((viewer.welcome.role, viewer.welcome.subject), (pb.ROLE_VIEWER, "vera"))
@@ -83,7 +83,7 @@ class Roles(UsersTest):
         answers = {"id", "hello", "welcome", "refusal", "done", "exchange_reply", "samples", "parameter_values", "status",
                    "experiment_info", "table_info", "experiment_list", "experiment_data", "notice"}
         every = {field.name for field in pb.Envelope.DESCRIPTOR.fields}
-        self.assertEqual(every, asked | answers, "a new request: who may ask it?")
+        self.assertEqual(every, asked | answers, "a new request needs its roles here")
         for kind, request in allowed.items():
             answer = viewer.ask(**{kind: request})
             if answer.WhichOneof("kind") == "refusal":  # this bench keeps no experiments
@@ -101,14 +101,15 @@ class Roles(UsersTest):
         self.assertIn("admin", answer.refusal.message)
         operator.step(0)
 
-    def test_without_tokens_everybody_is_an_administrator(self):
-        """A bench on one desk that asks for a token all of a sudden."""
+    def test_without_tokens_every_client_is_an_administrator(self):
+        """Catches: a bench for one user that asks for a token."""
         client = self.client(self.server())
         self.assertEqual((client.welcome.role, client.welcome.subject), (pb.ROLE_ADMIN, ""))
-        self.assertDone(client.ask(lease=pb.LeaseRequest(action=TAKE, reason="nobody is here")))
+        self.assertDone(client.ask(lease=pb.LeaseRequest(action=TAKE, reason="no owner answers")))
 
-    def test_own_04_an_axis_that_is_taken_behind_another_costs_neither(self):
-        """A lease under a number that its session has given up: it is granted and cannot be used, nor given back."""
+    def test_own_04_taking_a_second_axis_keeps_the_first(self):
+        """Catches: a lease under a number that its session has given up: it is granted and can be neither used nor given
+        back."""
         server = self.server("--mode", "realtime", text=TWO_AXES.replace("watchdog_ticks = 20", "watchdog_ticks = 8000"))
         client = self.client(server)
         asked = [pb.LeaseRequest(axis=0, action=pb.LeaseRequest.ACTION_ACQUIRE), pb.LeaseRequest(axis=1, action=TAKE, reason="both")]
@@ -124,14 +125,15 @@ class Roles(UsersTest):
         watcher = self.client(server)
         until(lambda: not any(watcher.newest(axis).owner for axis in range(2)), "both are given back")
 
-    def test_hello_is_said_once(self):
-        """A viewer who becomes an administrator in the middle of a session, or an operator who keeps an axis as a viewer."""
+    def test_a_second_hello_is_refused(self):
+        """Catches: a viewer that becomes an administrator in mid-session, or an operator that keeps an axis as a
+        viewer."""
         viewer = self.user(self.server_for(), "vera")
         self.assertRefused(viewer.hello("adam-secret"), pb.REFUSAL_MALFORMED, "kind")
         self.assertRefused(viewer.lease(), pb.REFUSAL_FORBIDDEN)
 
-    def test_own_01_the_loser_is_told_who_and_until_when(self):
-        """"Busy", and nobody knows whom to call."""
+    def test_own_01_a_refusal_names_the_owner_and_the_end_of_its_lease(self):
+        """Catches: a refusal that says "busy" and names neither the owner nor the end of its lease."""
         server = self.server_for(unix=True)
         otto = self.user(server, "otto")
         self.assertDone(otto.lease())
@@ -146,7 +148,8 @@ class Roles(UsersTest):
 
 class Force(UsersTest):
     def test_own_04_own_05_an_administrator_takes_a_driven_axis(self):
-        """An owner who is not told, an axis that changes hands while it is driven, an old owner who goes on."""
+        """Catches: an owner that is not told, an axis that changes hands while it is driven, an old owner that goes
+        on."""
         for mode in ("lockstep", "realtime"):
             with self.subTest(mode=mode):
                 server = self.server_for(USERS, "--mode", mode, text=PATIENT)
@@ -176,7 +179,7 @@ class Force(UsersTest):
                 adam.step(adam.newest().tick, 1.0)
 
     def test_own_04_an_exchange_that_waits_is_answered(self):
-        """A controller that waits for ever for the tick of an axis that is not its own any more."""
+        """Catches: a controller that waits forever for the tick of an axis that it has lost."""
         server = self.server_for(text=SERVO_TEXT + SERVO_TEXT[SERVO_TEXT.index("[[axis]]"):].replace('"servo"', '"second"', 1))
         otto, olga, adam = (self.user(server, name) for name in ("otto", "olga", "adam"))
         otto.lease()
@@ -189,8 +192,8 @@ class Force(UsersTest):
 
 
 class Tokens(UsersTest):
-    def test_sec_04_no_token_but_the_right_one_and_it_stands_nowhere(self):
-        """Guesses that cost nothing; a guess that ends the bench for those inside; a token that the log keeps."""
+    def test_sec_04_only_the_right_token_opens_and_no_text_contains_it(self):
+        """Catches: guesses that cost nothing; a guess that ends other sessions; a token in the log."""
         folder = self.folder_with(USERS)
         text = SERVO_TEXT.replace("[tcp]", f'[tcp]\ntokens_file = "{folder}/tokens"')
         server = self.server("--record", str(folder / "run.mcap"), "--audit", str(folder / "audit"), text=text)
@@ -210,8 +213,8 @@ class Tokens(UsersTest):
 
         def right():
             return self.guess(server, "adam-secret").WhichOneof("kind") == "welcome"
-        until(right, "whoever has waited is let in")
-        self.assertTrue(right(), "and nobody waits any more")
+        until(right, "the client that waited is admitted")
+        self.assertTrue(right(), "no client waits any more")
         self.assertGreaterEqual(inside.tcp_counts()["wrong_tokens"], guesses)
         self.assertEqual(server.stop(), 0)
         command_line = " ".join(server.process.args)
@@ -221,7 +224,8 @@ class Tokens(UsersTest):
         self.assertLessEqual(server.errors().count("token"), 2, "a line in 10 s")
 
     def test_sec_04_os_01_a_hangup_reads_the_tokens_again(self):
-        """A user who was put out and stays inside, or one who had to go with him; a broken file that lets everybody in or out."""
+        """Catches: a removed user whose session goes on, or another user who loses the session with it; a broken file
+        that admits or removes every user."""
         server = self.server_for()
         otto, olga, vera = (self.user(server, name) for name in ("otto", "olga", "vera"))
         otto.lease()
@@ -238,13 +242,13 @@ class Tokens(UsersTest):
             self.assertTrue(gone.is_closed())
             self.assertEqual([n.kind for n in gone.notices], [pb.Notice.KIND_SESSION_ENDED])
         self.assertIn("otto", otto.notices[0].message)
-        until(lambda: olga.lease().WhichOneof("kind") == "done", "his axis is free")
+        until(lambda: olga.lease().WhichOneof("kind") == "done", "the axis is free")
         self.assertRefused(olga.exchange(3, 5.0), pb.REFUSAL_LATCHED)
         self.assertEqual(self.user(server, "vera").welcome.role, pb.ROLE_OPERATOR)
         self.assertRefused(self.guess(server, "otto-secret"), pb.REFUSAL_UNAUTHENTICATED, "token")
 
     def test_own_07_the_lease_ends_with_the_slot(self):
-        """A script that drives on in the time of the next user; a token that still opens after its time."""
+        """Catches: a script that drives on in the slot of the next user; a token that still opens after its time."""
         users = entry("otto", "operator", f'until = "{in_seconds(3)}"\n') + entry("olga", "operator")
         server = self.server_for(users)
         otto, olga = self.user(server, "otto"), self.user(server, "olga")

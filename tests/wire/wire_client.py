@@ -16,7 +16,7 @@ SERVER = pathlib.Path(os.environ.get("DRIVEBENCH_SERVER", REPOSITORY / "build/re
 PROTO = REPOSITORY / "protocols/bench.proto"
 BENCHES = REPOSITORY / "configs/benches"
 
-# How long anything may take before a test says that it hangs. No test measures time.
+# The longest that anything may take before a test calls it a hang. No test measures time.
 PATIENCE_S = 30.0
 
 
@@ -32,7 +32,8 @@ pb = _generated()
 
 
 def guarded(environment):
-    """For a program whose ticks may do nothing that could wait, or it ends (tests/adversity/guard); beside what else is preloaded."""
+    """The environment of a program that ends if a tick makes a call that could wait (tests/adversity/guard); keeps other
+    preloads."""
     guard = os.environ.get("DRIVEBENCH_GUARD")
     if not guard:
         return environment
@@ -93,12 +94,12 @@ class Server:
         return (self.folder / "stderr").read_text(encoding="utf-8")
 
     def memory_kib(self, which="VmHWM"):
-        """What the kernel says it has (VmRSS), or had at most (VmHWM)."""
+        """Its memory by the kernel: now (VmRSS), or at most (VmHWM)."""
         status = pathlib.Path(f"/proc/{self.process.pid}/status").read_text(encoding="utf-8")
         return int(next(line for line in status.splitlines() if line.startswith(which)).split()[1])
 
     def stop(self, number=15):
-        """Ends it with a signal; the exit code. The verdict it printed is then in `verdict`."""
+        """Ends it with a signal and returns the exit code. The verdict it printed is then in `verdict`."""
         self.process.send_signal(number)
         out, _ = self.process.communicate(timeout=PATIENCE_S)
         lines = [json.loads(line) for line in out.splitlines()]
@@ -120,7 +121,7 @@ class Server:
 
 
 class Client:
-    """One connection. What comes unasked is kept in `samples` and `notices`."""
+    """One connection. Messages without a request are kept in `samples` and `notices`."""
 
     def __init__(self, sock, hello=True, token=""):
         self.socket = sock
@@ -185,7 +186,7 @@ class Client:
         return self.answer_to(self.send(**kind))
 
     def is_closed(self):
-        """Waits for the end of the connection, whatever comes before; notices are kept."""
+        """Waits for the end of the connection and ignores other messages; notices are kept."""
         try:
             while True:
                 envelope = self.receive()
@@ -196,7 +197,7 @@ class Client:
         except socket.timeout:
             return False
 
-    # ---- what the tests do all the time ----
+    # ---- shorthand of the tests ----
 
     def lease(self, action=pb.LeaseRequest.ACTION_ACQUIRE, axis=0):
         answer = self.ask(lease=pb.LeaseRequest(axis=axis, action=action))
@@ -212,7 +213,7 @@ class Client:
         return self.ask(exchange=pb.Exchange(commands=[command]))
 
     def step(self, tick, *voltages, **options):
-        """One exchange that must go well: the sample after it."""
+        """One exchange that must succeed; returns the sample after it."""
         answer = self.exchange(tick, *voltages, **options)
         if answer.WhichOneof("kind") != "exchange_reply":
             raise AssertionError(f"tick {tick}: {answer}")
@@ -222,5 +223,5 @@ class Client:
         return self.ask(status_request=pb.StatusRequest()).status
 
     def tcp_counts(self):
-        """What the server has counted on TCP, by its names."""
+        """The server's counters on TCP, by their names."""
         return {c.name: c.value for t in self.status().transports if t.name.startswith("tcp") for c in t.counts}

@@ -1,4 +1,4 @@
-"""What the tests of the server program share."""
+"""Shared by the tests of the server program."""
 import json
 import pathlib
 import resource
@@ -41,7 +41,7 @@ counts_per_revolution = 4096
 
 
 def until(condition, what):
-    """Waits for something that another process does."""
+    """Waits for the effect of another process."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         if condition():
@@ -57,7 +57,7 @@ class WireTest(unittest.TestCase):
         return server
 
     def recording_server(self, resource_kind, limit):
-        """A server that records to run.mcap in a folder of its own, with a limit set on it; both."""
+        """A server that records to run.mcap in a folder of its own, with a limit set on it; returns both."""
         folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-wire-"))
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
         server = self.server("--record", str(folder / "run.mcap"),
@@ -77,14 +77,14 @@ class WireTest(unittest.TestCase):
             self.assertEqual(answer.refusal.field, field)
 
     def drive(self, owner, *setpoints):
-        """Commands in real time, without a pause, until they drive the axis."""
+        """Sends commands in real time, without a pause, until they drive the axis."""
         end = time.monotonic() + PATIENCE_S
         while owner.newest().state in (0, 5):  # idle, ready
             self.assertLess(time.monotonic(), end, "never armed")
             owner.exchange(owner.newest().tick, *setpoints)
 
     def step_beside(self, owner, program, tick=0):
-        """Commands in lockstep until the program has ended: the next tick."""
+        """Sends commands in lockstep until the program has ended; returns the next tick."""
         while program.poll() is None:
             owner.step(tick, 1.0)
             tick += 1
@@ -92,12 +92,12 @@ class WireTest(unittest.TestCase):
         return tick
 
     def audited(self, file, event):
-        """What the audit log says of all that happened by this name."""
+        """All events of this name in the audit log."""
         lines = (json.loads(line) for line in file.read_text(encoding="utf-8").splitlines())
         return [line for line in lines if line["event"] == event]
 
     def assertAudited(self, file, event, count):
-        """So many stand in the audit log, each with its peer and a reason: the reasons."""
+        """The audit log holds so many, each with its peer and a reason; returns the reasons."""
         lines = self.audited(file, event)
         self.assertEqual(len(lines), count)
         for line in lines:
@@ -106,12 +106,12 @@ class WireTest(unittest.TestCase):
         return [line["result"] for line in lines]
 
     def assertMemoryBelow(self, server, limit_kib, which="VmHWM"):
-        if server.memory_kib("VmSize") < 1 << 30:  # a sanitizer maps terabytes, and keeps what is freed
+        if server.memory_kib("VmSize") < 1 << 30:  # a sanitizer maps terabytes, and keeps freed memory
             self.assertLess(server.memory_kib(which), limit_kib)
 
     def assertLimitOf2s(self, *since):
-        """For what ends 2 s after some moment between the first and the last of these: not before, and not much later. A
-        machine that others use as well may add seconds; a limit that is missing, or ten times as long, adds more."""
+        """For an event 2 s after some moment between the first and the last of these: not earlier, and not much later. A
+        busy machine may add seconds; a missing limit, or one ten times as long, adds more."""
         now = time.monotonic()
         self.assertGreater(now - since[0], 1.8)
         self.assertLess(now - since[-1], 10.0)
