@@ -5,7 +5,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "tests/benchmark/machine.hpp"
+#include "tests/benchmark/harness/machine.hpp"
 #include "tests/benchmark/measurements.hpp"
 
 namespace drivebench::speed {

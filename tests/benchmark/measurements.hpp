@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "tests/benchmark/report.hpp"
+#include "tests/benchmark/harness/report.hpp"
 
 /// The measurements, one file each. They throw when something does not work at all.
 namespace drivebench::speed {

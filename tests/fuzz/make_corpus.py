@@ -11,7 +11,7 @@ import sys
 import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "wire"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "helpers"))
 from wire_client import BENCHES, Server, frame, pb  # noqa: E402
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "wire"))
 
 try:
     import google.protobuf  # noqa: F401
@@ -15,6 +14,7 @@ except ImportError:
     print("SKIPPED: python3-protobuf is not installed")
     sys.exit(77)
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, guarded  # noqa: E402
 from wire_test import WireTest  # noqa: E402
 

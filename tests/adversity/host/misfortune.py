@@ -7,8 +7,8 @@ import struct
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "wire"))
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import SERVER  # noqa: E402
 
 LIBRARY = pathlib.Path(os.environ.get("DRIVEBENCH_MISFORTUNE", SERVER.parents[1] / "tests/adversity/host/libmisfortune.so"))

@@ -20,6 +20,7 @@ except ImportError:
     sys.exit(77)
 
 from misfortune import Misfortune, signal_thread, thread_of  # also adds the folders of the next imports
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from experiment_test import ExperimentTest, request
 from recording import Recording
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, frame, pb

@@ -20,6 +20,7 @@ import tempfile
 import time
 
 from misfortune import Misfortune
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from recording import Recording
 from wire_client import BENCHES, PATIENCE_S, SERVER, guarded
 

@@ -17,7 +17,7 @@
 #include <string_view>
 
 #include "tests/adversity/simulator/week.hpp"
-#include "tests/adversity/simulator/world.hpp"
+#include "tests/adversity/simulator/world/world.hpp"
 #include "tests/server/recording/run_config.hpp"
 
 namespace drivebench::simulator {

@@ -14,8 +14,8 @@
 #include "plant/parameters/parameters.hpp"
 #include "server/bench/bench.hpp"
 #include "server/config/config.hpp"
-#include "tests/adversity/simulator/account.hpp"
-#include "tests/adversity/simulator/random.hpp"
+#include "tests/adversity/simulator/account/account.hpp"
+#include "tests/adversity/simulator/world/random.hpp"
 
 namespace drivebench::simulator {
 namespace {

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "wire"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import BENCHES, PATIENCE_S, SERVER, Server, pb  # noqa: E402
 
 COMMAND = SERVER.with_name("drivebench")

@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
 """The kernel's CAN as users meet it: `drivebench can check`, and can-utils on the bus of a bench. Run by with_can."""
 import json
+import pathlib
 import subprocess
+import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from drive_test import DriveTest, PATIENCE_S, run_all, with_bus
 
 

@@ -11,6 +11,7 @@ import termios
 import time
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from bus_client import BURST_REQUEST, GROUP, PATIENCE_S, Echo, Line, can_kinds, run_all
 
 

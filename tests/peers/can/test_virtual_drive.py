@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
 """A motor started over CAN without kernel CAN: python-can and the DBC file against the real server."""
+import pathlib
 import re
 import socket
+import sys
 import time
 
 import can
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 import dbc_drive
 from drive_test import DriveTest, PATIENCE_S, STAR, in_own_network, run_all, with_bus
 from wire_client import REPOSITORY

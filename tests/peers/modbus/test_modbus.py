@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 TESTS = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(TESTS / "wire"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
     from pymodbus.client import ModbusTcpClient
     from pymodbus.diag_message import ReturnQueryDataRequest

@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 TESTS = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(TESTS / "wire"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
     from wire_client import BENCHES, SERVER, Server, pb
 except ImportError as missing:

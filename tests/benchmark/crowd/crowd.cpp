@@ -1,0 +1,224 @@
+#include <fmt/core.h>
+#include <sys/resource.h>
+
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "clients/link/tcp_link.hpp"
+#include "tests/benchmark/crowd/viewers.hpp"
+#include "tests/benchmark/harness/canary.hpp"
+#include "tests/benchmark/harness/server.hpp"
+#include "tests/benchmark/harness/statistics.hpp"
+#include "tests/benchmark/measurements.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kIdle = 1000;
+constexpr int kSubscribers = 32;
+constexpr std::uint32_t kEighth = 8;  // 1 kHz
+constexpr std::size_t kDeaf = 50;
+constexpr double kMaxP99Ratio = 2.0;
+constexpr double kMaxMoreLate = 5.0;  // of 10,000 ticks: windows of one kind differ by as much
+constexpr double kMaxGrowthMiB = 60.0;
+constexpr double kMaxCut_s = 3.0;
+constexpr auto kWindow = 2s;
+constexpr int kRounds = 5;  // of windows of each kind, in turn
+
+/// What one healthy client noticed that asks for the newest sample 500 times a second, and how late the bench
+/// was meanwhile.
+struct Window {
+  double p99_us = 0.0;
+  double ticks = 0.0;
+  double late_ticks = 0.0;
+};
+
+Window watch(link::Link& client) {
+  const auto newest = [&client] { return client.exchange({}).samples(0).sample(); };
+  const v1::Sample first = newest();
+  std::vector<double> us;
+  const auto end = std::chrono::steady_clock::now() + kWindow;
+  while (std::chrono::steady_clock::now() < end) {
+    const std::int64_t begin = now_ns();
+    newest();
+    us.push_back(static_cast<double>(now_ns() - begin) * 1e-3);
+    std::this_thread::sleep_for(2ms);
+  }
+  const v1::Sample last = newest();
+  return {.p99_us = percentile(us, 0.99),
+          .ticks = static_cast<double>(last.tick() - first.tick()),
+          .late_ticks = static_cast<double>(last.late_ticks() - first.late_ticks())};
+}
+
+/// In the median window: a stall of the machine makes a hundred ticks late in one.
+double late_per_10000(const std::vector<Window>& windows) {
+  return median(windows, [](const Window& each) { return 1e4 * each.late_ticks / each.ticks; });
+}
+
+/// Clients that have said hello and then nothing.
+using Idlers = std::vector<std::unique_ptr<link::Link>>;
+
+Idlers idlers(const std::string& address, std::size_t count) {
+  Idlers all;
+  while (all.size() < count)
+    all.push_back(std::make_unique<link::Link>(address));
+  return all;
+}
+
+/// Clients that ask for every sample and read none.
+Idlers deaf(const std::string& address) {
+  Idlers all = idlers(address, kDeaf);
+  for (const auto& each : all)
+    each->subscribe(0, 1);
+  return all;
+}
+
+struct Windows {
+  std::vector<Window> alone;
+  std::vector<Window> beside;
+  std::vector<Window> elsewhere;  ///< the same company at another server: its load on the machine alone
+};
+
+/// Windows of each kind in turn; `come` makes the company at an address, `other` is a bench file.
+template <class Come>
+Windows in_turn(link::Link& client, const std::string& here, const std::string& other, Come come) {
+  constexpr auto kUntilTheyAreGone = 500ms;
+  Windows windows;
+  for (int round = 0; round < kRounds; ++round) {
+    windows.alone.push_back(watch(client));
+    {
+      const auto company = come(here);
+      windows.beside.push_back(watch(client));
+    }
+    std::this_thread::sleep_for(kUntilTheyAreGone);
+    Server there({other});
+    const auto company = come(there.address());
+    windows.elsewhere.push_back(watch(client));
+  }
+  return windows;
+}
+
+void add_rows(std::vector<Row>& rows, const std::string& beside, const Windows& windows, double gone) {
+  rows.push_back({.name = "p99 of a healthy client beside " + beside,
+                  .unit = "us",
+                  .measured = median(windows.beside, &Window::p99_us),
+                  .floor = median(windows.alone, &Window::p99_us),
+                  .limit = Limit{Limit::Kind::kRatioAtMost, kMaxP99Ratio},
+                  .gone = gone,
+                  .note = "floor: alone, in windows in turn"});
+  rows.push_back({.name = "late ticks per 10,000 beside " + beside,
+                  .measured = late_per_10000(windows.beside),
+                  .floor = late_per_10000(windows.elsewhere),
+                  .limit = Limit{Limit::Kind::kExcessAtMost, kMaxMoreLate},
+                  .gone = gone,
+                  .note = fmt::format("floor: the same at another server on this machine; alone: {:.2f}",
+                                      late_per_10000(windows.alone))});
+}
+
+/// Both ends of all connections are ours or our child's.
+void allow_descriptors(rlim_t count) {
+  rlimit limit{};
+  check(::getrlimit(RLIMIT_NOFILE, &limit) == 0, "getrlimit");
+  limit.rlim_cur = std::min(std::max(limit.rlim_cur, count), limit.rlim_max);
+  check(::setrlimit(RLIMIT_NOFILE, &limit) == 0, "setrlimit");
+}
+
+void expect_full(const std::string& address) {
+  try {
+    const link::Link one_more(address);
+  } catch (const link::Refused& refused) {
+    return;  // turned away with a reason
+  }
+  throw std::runtime_error("a session beyond max_sessions was taken");
+}
+
+std::filesystem::path written(const BenchConfig& config, std::filesystem::path file) {
+  if (!(std::ofstream(file) << to_toml(config))) throw std::runtime_error("cannot write " + file.string());
+  return file;
+}
+
+/// How long it takes until the server has cut those off that do not read, and its memory meanwhile.
+struct Cut {
+  double elapsed_s = 0.0;
+  double growth_mib = 0.0;
+};
+
+Cut cut_deaf(link::Link& client, const std::string& address, pid_t server) {
+  const std::uint32_t before = client.status().sessions();
+  Cut cut;
+  const double baseline_mib = resident_mib(server);
+  const Idlers company = deaf(address);
+  const std::int64_t begin = now_ns();
+  while (client.status().sessions() > before && cut.elapsed_s < 30.0) {
+    cut.growth_mib = std::max(cut.growth_mib, resident_mib(server) - baseline_mib);
+    std::this_thread::sleep_for(20ms);
+    cut.elapsed_s = static_cast<double>(now_ns() - begin) * 1e-9;
+  }
+  return cut;
+}
+
+}  // namespace
+
+std::vector<Row> measure_crowd(const Plan&) {
+  allow_descriptors(4096);
+  const ScratchFolder folder;
+  BenchConfig config = bench_config("servo-realtime");
+  config.tcp.max_sessions = kIdle + kSubscribers + 1;
+  config.tcp.unix_path = (folder / "bench.socket").string();
+  const std::filesystem::path bench = written(config, folder / "bench.toml");
+  // Its ticks shall cost nothing, only its clients.
+  config.tcp.max_sessions = kIdle + kSubscribers;
+  config.tcp.unix_path = (folder / "other.socket").string();
+  config.realtime.pacer = PacerKind::kSleep;
+  config.realtime.priority = 1;
+  const std::string other = written(config, folder / "other.toml").string();
+
+  GapCanary canary;
+  const CpuPair cpu = cpu_pair();
+  canary.look(std::array{cpu.near, cpu.far});
+  Server server({bench.string()});
+  const pid_t pid = listener_of((folder / "bench.socket").string());
+  auto client = std::make_unique<link::Link>(server.address());
+
+  const Cut cut = cut_deaf(*client, server.address(), pid);
+  struct Crowd {
+    Idlers idle;
+    std::unique_ptr<Viewers> subscribers;
+  };
+  const Windows crowded = in_turn(*client, server.address(), other, [](const std::string& place) {
+    Crowd crowd{.idle = idlers(place, kIdle),
+                .subscribers = std::make_unique<Viewers>(place, kSubscribers, kEighth)};
+    expect_full(place);
+    return crowd;
+  });
+  const Windows unheard = in_turn(*client, server.address(), other, deaf);
+  client.reset();
+  server.stop();
+  canary.look(std::array{cpu.near, cpu.far});
+
+  std::vector<Row> rows;
+  add_rows(rows, "1,000 idle ones and 32 viewers at 1 kHz", crowded, canary.gone());
+  add_rows(rows, "50 that never read", unheard, canary.gone());
+  rows.push_back({.name = "until 50 that never read are cut off",
+                  .unit = "s",
+                  .measured = cut.elapsed_s,
+                  .limit = Limit{Limit::Kind::kAtMost, kMaxCut_s},
+                  .gone = canary.gone()});
+  rows.push_back({.name = "memory that they cost",
+                  .unit = "MiB",
+                  .measured = cut.growth_mib,
+                  .limit = Limit{Limit::Kind::kAtMost, kMaxGrowthMiB}});
+  return rows;
+}
+
+}  // namespace drivebench::speed

@@ -1,0 +1,198 @@
+#include <arpa/inet.h>
+#include <fmt/core.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "clients/command/common/installation.hpp"
+#include "clients/link/tcp_link.hpp"
+#include "tests/benchmark/harness/canary.hpp"
+#include "tests/benchmark/harness/child.hpp"
+#include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/server.hpp"
+#include "tests/benchmark/harness/statistics.hpp"
+#include "tests/benchmark/measurements.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+constexpr double kMaxP50Ratio = 1.25;
+constexpr double kMaxP99Ratio = 1.5;
+constexpr std::size_t kBlock = 2000;
+constexpr std::size_t kRounds = 10;
+
+struct Sizes {
+  std::size_t request = 0;  ///< bytes on the wire, header included
+  std::size_t reply = 0;
+};
+
+/// The controller's side of a lockstep run: the servo after a line start, so that no signal is zero and
+/// short.
+class Controller {
+ public:
+  explicit Controller(const std::string& address) : link_(address) {
+    link_.acquire(0);
+    tick_ = link_.exchange({}).samples(0).sample().tick();
+    for (std::size_t k = 0; k < 2 * kBlock; ++k)
+      exchange();
+  }
+
+  void exchange() {
+    const TwoPhase& u = line_voltages()[tick_ % line_voltages().size()];
+    command_ = {.axis = 0, .tick = tick_, .gates = v1::GATES_VOLTAGE, .u_a_v = u.a, .u_b_v = u.b};
+    const v1::Sample& sample = link_.exchange({&command_, 1}).samples(0).sample();
+    if (sample.tick() != tick_ + 1) throw std::runtime_error("an exchange did not run exactly one tick");
+    tick_ = sample.tick();
+  }
+
+  Sizes sizes() {
+    const TwoPhase& u = line_voltages()[tick_ % line_voltages().size()];
+    v1::Envelope request;
+    request.set_id(tick_);
+    v1::Command& command = *request.mutable_exchange()->add_commands();
+    command.set_tick(tick_);
+    command.set_gates(v1::GATES_VOLTAGE);
+    command.set_u_a_v(u.a);
+    command.set_u_b_v(u.b);
+    v1::Envelope reply;
+    reply.set_id(tick_);
+    *reply.mutable_exchange_reply() = link_.exchange({});
+    return {.request = kFrameHeaderSize + request.ByteSizeLong(),
+            .reply = kFrameHeaderSize + reply.ByteSizeLong()};
+  }
+
+ private:
+  link::Link link_;
+  link::Command command_{};
+  std::uint64_t tick_ = 0;
+};
+
+bool receive_all(int socket, std::span<std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t got = ::recv(socket, bytes.data(), bytes.size(), 0);
+    if (got <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(got));
+  }
+  return true;
+}
+
+bool send_all(int socket, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t sent = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (sent <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(sent));
+  }
+  return true;
+}
+
+/// The floor: a process that answers every request of a given size with a reply of a given size, over TCP
+/// with blocking calls and nothing in between.
+class PingPong {
+ public:
+  explicit PingPong(Sizes sizes) : request_(sizes.request), reply_(sizes.reply) {
+    const link::FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof(address);
+    auto* const generic = reinterpret_cast<sockaddr*>(&address);
+    check(::bind(listener.get(), generic, size) == 0 && ::listen(listener.get(), 1) == 0, "listen");
+    check(::getsockname(listener.get(), generic, &size) == 0, "getsockname");
+    child_.emplace([&] { answer(listener.get()); });
+    socket_ =
+        link::connect_to({.host = "127.0.0.1", .port = std::to_string(ntohs(address.sin_port)), .path = {}},
+                         std::chrono::seconds(5));
+  }
+
+  void exchange() {
+    if (!send_all(socket_.get(), request_) || !receive_all(socket_.get(), reply_)) {
+      throw std::runtime_error("the ping-pong ended early");
+    }
+  }
+
+ private:
+  void answer(int listener) {
+    const int socket = ::accept(listener, nullptr, nullptr);
+    const int on = 1;
+    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    while (receive_all(socket, request_) && send_all(socket, reply_)) {
+    }
+  }
+
+  std::vector<std::byte> request_;
+  std::vector<std::byte> reply_;
+  std::optional<Child> child_;
+  link::FileDescriptor socket_;
+};
+
+struct Round {
+  Percentiles floor, tcp, unix_socket;
+};
+
+Rounds<Round> alternate(Controller& tcp, Controller& unix_socket, PingPong& floor, CpuPair cpu) {
+  const Pinned pinned(cpu.near);
+  const std::array cpus{cpu.near, cpu.far};
+  return undisturbed_rounds(cpus, kRounds, [&]() -> Round {
+    return {.floor = time_exchanges(kBlock, [&] { floor.exchange(); }),
+            .tcp = time_exchanges(kBlock, [&] { tcp.exchange(); }),
+            .unix_socket = time_exchanges(kBlock, [&] { unix_socket.exchange(); })};
+  });
+}
+
+/// One figure of one link beside the same figure of the floor.
+Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round::*link,
+        double Percentiles::*figure, std::optional<double> max_ratio, std::string note = {}) {
+  const auto figure_of = [figure](Percentiles Round::*each) {
+    return [each, figure](const Round& round) { return round.*each.*figure; };
+  };
+  Row row{.name = name,
+          .unit = "us",
+          .measured = median(rounds.results, figure_of(link)),
+          .floor = median(rounds.results, figure_of(&Round::floor)),
+          .gone = rounds.gone,
+          .note = std::move(note)};
+  if (max_ratio) row.limit = Limit{Limit::Kind::kRatioAtMost, *max_ratio};
+  return row;
+}
+
+}  // namespace
+
+std::vector<Row> measure_exchange(const Plan&) {
+  const CpuPair cpu = cpu_pair();
+  const ScratchFolder folder;
+  const std::string bench = command::find_config("servo").string();
+  const std::string path = folder / "bench.socket";
+
+  // Started while pinned: they inherit it. Two servers, since an axis has one controller.
+  auto pinned = std::make_unique<Pinned>(cpu.far);
+  Server tcp_server({bench});
+  Server unix_server({bench, "--unix", path});
+  Controller tcp(tcp_server.address());
+  Controller unix_socket("unix:" + path);
+  const Sizes sizes = tcp.sizes();
+  PingPong floor(sizes);
+  pinned.reset();
+
+  const Rounds<Round> across = alternate(tcp, unix_socket, floor, cpu);
+  const Rounds<Round> same = alternate(tcp, unix_socket, floor, {.near = cpu.far, .far = cpu.far});
+  const std::string floor_note =
+      fmt::format("floor: blocking TCP ping-pong of {} and {} bytes, {}", sizes.request, sizes.reply,
+                  cpu.near != cpu.far ? "across CPUs" : "on one CPU");
+  constexpr auto kTcp = &Round::tcp;
+  constexpr auto kUnix = &Round::unix_socket;
+  constexpr auto kP50 = &Percentiles::p50;
+  constexpr auto kP99 = &Percentiles::p99;
+  return {row("exchange tcp p50", across, kTcp, kP50, kMaxP50Ratio, floor_note),
+          row("exchange tcp p99", across, kTcp, kP99, kMaxP99Ratio),
+          row("exchange unix p50", across, kUnix, kP50, {}, "the floor is that of TCP"),
+          row("exchange unix p99", across, kUnix, kP99, {}),
+          row("exchange tcp p50, one CPU", same, kTcp, kP50, {}, "both ends pinned to one CPU"),
+          row("exchange unix p50, one CPU", same, kUnix, kP50, {})};
+}
+
+}  // namespace drivebench::speed

@@ -1,0 +1,128 @@
+#include "tests/benchmark/harness/report.hpp"
+
+#include <fmt/core.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/benchmark/harness/canary.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+const char* name_of(Judgement judgement) {
+  switch (judgement) {
+    case Judgement::kWithin:
+      return "within";
+    case Judgement::kOver:
+      return "over";
+    case Judgement::kNotJudged:
+      return "not judged";
+    case Judgement::kForInformation:
+      break;
+  }
+  return "-";
+}
+
+const char* key_of(Limit::Kind kind) {
+  switch (kind) {
+    case Limit::Kind::kRatioAtMost:
+      return "ratio_at_most";
+    case Limit::Kind::kExcessAtMost:
+      return "excess_at_most";
+    case Limit::Kind::kAtMost:
+      return "at_most";
+    case Limit::Kind::kAtLeast:
+      break;
+  }
+  return "at_least";
+}
+
+/// Three significant digits, without an exponent.
+std::string number(double value) {
+  const double size = value < 0.0 ? -value : value;
+  return fmt::format("{:.{}f}", value, size >= 100.0 || size == 0.0 ? 0 : size >= 10.0 ? 1 : 2);
+}
+
+std::string with_unit(double value, const std::string& unit) {
+  return unit.empty() ? number(value) : number(value) + " " + unit;
+}
+
+std::string limit_text(const Row& row) {
+  if (!row.limit) return "-";
+  switch (row.limit->kind) {
+    case Limit::Kind::kRatioAtMost:
+      return fmt::format("<= {} x", number(row.limit->value));
+    case Limit::Kind::kExcessAtMost:
+      return fmt::format("<= + {}", with_unit(row.limit->value, row.unit));
+    case Limit::Kind::kAtMost:
+      return "<= " + with_unit(row.limit->value, row.unit);
+    case Limit::Kind::kAtLeast:
+      break;
+  }
+  return ">= " + with_unit(row.limit->value, row.unit);
+}
+
+}  // namespace
+
+std::optional<double> Row::ratio() const {
+  if (!floor || *floor <= 0.0) return std::nullopt;
+  return measured / *floor;
+}
+
+Judgement judgement(const Row& row) {
+  if (!row.limit) return Judgement::kForInformation;
+  const Limit::Kind kind = row.limit->kind;
+  const bool compares = kind == Limit::Kind::kRatioAtMost || kind == Limit::Kind::kExcessAtMost;
+  const double figure = kind == Limit::Kind::kRatioAtMost    ? row.ratio().value_or(0.0)
+                        : kind == Limit::Kind::kExcessAtMost ? row.measured - row.floor.value_or(0.0)
+                                                             : row.measured;
+  const bool within = kind == Limit::Kind::kAtLeast ? figure >= row.limit->value : figure <= row.limit->value;
+  if (row.gone > kMaxGone && (compares || !within)) return Judgement::kNotJudged;
+  return within ? Judgement::kWithin : Judgement::kOver;
+}
+
+void print_table(const std::string& machine, const std::vector<Row>& rows) {
+  fmt::print("{}\n\n", machine);
+  const auto line = [](const auto&... cells) {
+    fmt::print("{:<34} {:>12} {:>12} {:>7} {:>12}  {:<10} {:>6}  {}\n", cells...);
+  };
+  line("name", "measured", "floor", "ratio", "limit", "verdict", "gone", "");
+  for (const Row& row : rows) {
+    if (row.skipped) {
+      line(row.name, "-", "-", "-", "-", "skipped", "-", row.note);
+      continue;
+    }
+    line(row.name, with_unit(row.measured, row.unit), row.floor ? with_unit(*row.floor, row.unit) : "-",
+         row.ratio() ? number(*row.ratio()) : "-", limit_text(row), name_of(judgement(row)),
+         fmt::format("{:.1f} %", 100.0 * row.gone), row.note);
+  }
+  fmt::print(
+      "\nfloor: the least that could do the job, measured in alternation. gone: share of the time that "
+      "others "
+      "took from the CPUs\naround the rounds that count; above {:.0f} % a ratio is not judged.\n",
+      100.0 * kMaxGone);
+}
+
+nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Row& row : rows) {
+    if (row.skipped) {
+      list.push_back({{"name", row.name}, {"verdict", "skipped"}, {"note", row.note}});
+      continue;
+    }
+    nlohmann::json entry{
+        {"name", row.name},
+        {"unit", row.unit},
+        {"measured", row.measured},
+        {"verdict", judgement(row) == Judgement::kForInformation ? "information" : name_of(judgement(row))},
+        {"gone_share", row.gone},
+        {"note", row.note}};
+    if (row.floor) entry["floor"] = *row.floor;
+    if (row.ratio()) entry["ratio"] = *row.ratio();
+    if (row.limit) entry["limit"] = {{key_of(row.limit->kind), row.limit->value}};
+    list.push_back(std::move(entry));
+  }
+  return {{"machine", machine}, {"rows", std::move(list)}};
+}
+
+}  // namespace drivebench::speed

@@ -1,0 +1,77 @@
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <vector>
+
+#include "tests/benchmark/harness/canary.hpp"
+#include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/statistics.hpp"
+#include "tests/benchmark/measurements.hpp"
+#include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+using namespace identification;
+
+constexpr std::size_t kRounds = 5;
+constexpr int kStarts = 20;
+constexpr double kMostMs = 100.0;
+constexpr double kMostSeconds = 180.0;
+
+/// Starts of induction motors, 0.2 s at 20 kHz, from recorded signals to parameters: filters, regressor,
+/// global search. The slowest of the motors counts.
+Row start_row() {
+  std::vector<Recorded> starts;
+  for (int number = 1; number <= kStarts; ++number)
+    starts.push_back(record_motor(motor_draws().back(), number, 1));
+  const std::array cpu{cpu_pair().far};
+  const Pinned pinned(cpu[0]);
+  const auto rounds = undisturbed_rounds(cpu, kRounds, [&] {
+    double slowest_ms = 0.0;
+    for (const Recorded& start : starts) {
+      const std::int64_t begin = now_ns();
+      const Result found = identify(start.data, start.how);
+      slowest_ms = std::max(slowest_ms, static_cast<double>(now_ns() - begin) * 1e-6);
+      if (found.parameters.empty()) throw std::runtime_error("a start is not identified");
+    }
+    return slowest_ms;
+  });
+  return {.name = "identification of a start",
+          .unit = "ms",
+          .measured = percentile(rounds.results, 0.5),
+          .limit = Limit{Limit::Kind::kAtMost, kMostMs},
+          .gone = rounds.gone,
+          .note = "slowest of 20 induction motors, 0.2 s at 20 kHz: filters, regressor, global search"};
+}
+
+/// 200 motors of three kinds, experiments and identification, on two threads.
+Row monte_carlo_row() {
+  constexpr int kThreads = 2;
+  const std::array cpus{cpu_pair().near, cpu_pair().far};
+  GapCanary canary;
+  canary.look(cpus);
+  const std::int64_t begin = now_ns();
+  const auto trials = run_trials(motor_draws().first(3), {kAllMotors, 1, kThreads});
+  const double seconds = static_cast<double>(now_ns() - begin) * 1e-9;
+  canary.look(cpus);
+  for (const Trials& kind : trials) {
+    const auto stated = std::ranges::count_if(
+        kind.findings, [](const std::vector<Finding>& motor) { return motor.front().stated; });
+    if (stated < kAllMotors * 9 / 10) throw std::runtime_error("too few motors are identified");
+  }
+  return {.name = "600 random motors",
+          .unit = "s",
+          .measured = seconds,
+          .limit = Limit{Limit::Kind::kAtMost, kMostSeconds},
+          .gone = canary.gone(),
+          .note = "200 DC, induction and PM synchronous ones with their experiments, two threads"};
+}
+
+}  // namespace
+
+std::vector<Row> measure_identification(const Plan&) {
+  return {start_row(), monte_carlo_row()};
+}
+
+}  // namespace drivebench::speed

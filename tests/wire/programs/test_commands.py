@@ -1,0 +1,330 @@
+#!/usr/bin/python3
+"""The subcommands of drivebench that talk to a bench: their output, as text and as JSON, and their exit codes."""
+import json
+import pathlib
+import signal
+import socket
+import sys
+import threading
+import time
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+from command_test import (
+    DRIVEBENCH, FAILED, NO_BENCH, NO_CONNECT, OK, SERVO, USAGE, CommandTest, link_of, until)
+from wire_client import PATIENCE_S, REPOSITORY, pb
+
+
+class WithoutABench(CommandTest):
+    def test_a_missing_bench_is_3(self):
+        """Catches: a script that takes a missing bench for a failed run, or for a good one."""
+        for command in ("describe", "status", "watch", "control"):
+            self.assertSays(self.drivebench(command, code=NO_CONNECT).stderr, "nothing answers at " + NO_BENCH)
+            error = self.json_of(command, code=NO_CONNECT)["error"]
+            self.assertEqual(error["kind"], "connect")
+            self.assertSays(error["message"], NO_BENCH)
+        self.drivebench("status", "--link", f"unix:{self.folder}/none", code=NO_CONNECT)
+
+    def test_a_wrong_command_line_is_2_and_names_the_mistake(self):
+        """Catches: an option that is ignored, a number that is half read, NaN that passes every comparison, -1 that is 2^64 - 1."""
+        for arguments, fact in (
+                ([], "subcommand"), (["nope"], "nope"), (["status", "--nope"], "--nope"), (["status", "more"], "more"),
+                (["control", "--preset", "book/8.2"], "did you mean book/8.2.2"),
+                (["control", "--load", "0.1"], "NM@SECONDS"), (["control", "--load", "0.1x@0"], "not a number"),
+                (["control", "--load", "nan@0"], "not a number"), (["control", "--load", "0.1@-1"], "between 0 and"),
+                (["control", "--load", "0.1@1e30"], "between 0 and"), (["control", "--load", "0.1@nan"], "not a number"),
+                (["control", "--set", "machine"], "NAME=VALUE"), (["control", "--set", "a=1,5"], "not a number"),
+                (["watch", "--rate", "0"], "--rate"), (["watch", "--rate", "nan"], "--rate"),
+                (["watch", "--count", "-1"], "negative"), (["watch", "--signals", "volts"], "no signal 'volts'"),
+                (["control", "--compare", "none.mcap", "--from", "-1"], "negative"), (["plot", "none.mcap", "--from", "-1"], "negative"),
+                (["experiment", "fetch", "-1"], "negative"), (["status", "--link", "can:socketcan:can0"], "tcp:, tls: or unix:"),
+                (["status", "--link", "tcp:host:port"], "not an address"),
+                (["status", "--link", "tcp::7300"], "tls:HOST:PORT or unix:PATH"), (["replay"], "FILE"), (["export"], "FILE"),
+                (["export", "none.mcap"], "none.mcap"), (["replay", "none.mcap"], "none.mcap"),
+                (["serve", "none"], "no bench file 'none'"), (["serve", "servo", "--nope"], "--nope"),
+                (["demo", "--keep", "/proc/none"], "/proc/none")):
+            done = self.drivebench(*arguments, code=USAGE)
+            self.assertSays(done.stderr, fact)
+            self.assertEqual(done.stdout, "")
+
+    def test_a_real_number_is_finite_and_has_an_end(self):
+        """Catches: naN that passes a range because no comparison with it is true, seconds that overflow the clock."""
+        for arguments, option, high in (
+                (["watch"], "--rate", "1e+15"), (["set", "servo", "a", "1"], "--ramp-s", "1e+09"),
+                (["control", "--compare", "none.mcap"], "--threshold", "1e+15"),
+                (["can-log", "can:slcan:tcp:127.0.0.1:1"], "--duration", "1e+09"),
+                (["experiment", "fetch", "1"], "--patience", "1e+09"), (["identify", "--motor", "dc"], "--period", "1e+09"),
+                (["identify", "--motor", "dc"], "--counts", "1e+09"), (["identify", "--motor", "dc"], "--voltage-shift", "100"),
+                (["identify", "--motor", "dc"], "--current-hz", "1e+09"), (["identify", "--motor", "dc"], "--voltage-hz", "1e+09"),
+                (["identify", "--motor", "dc"], "--shaft-hz", "1e+09")):
+            for value in ("nan", "inf", "1e300", "1e999", "-1e3", "1x"):
+                with self.subTest(f"{option} {value}"):
+                    said = self.drivebench(*arguments, f"{option}={value}", code=USAGE).stderr
+                    self.assertSays(said, option, f"{value} is not a number from ", f" to {high}")
+        self.assertSays(self.drivebench("inject", "servo", "bus_sag", "nan", code=USAGE).stderr, "VALUE: nan is not a number")
+        self.assertSays(self.drivebench("bump", "servo", "inf", code=USAGE).stderr, "IMPULSE: inf is not a number")
+
+    def test_a_run_without_an_end_or_a_beginning_is_2(self):
+        """Catches: a gain that takes all memory, or whose samples overflow, on an axis that is held for it; a picture of
+        no samples."""
+        for gains, fact in (("run.hold_s=1e300", "run.hold_s = 1e+300 must be at most 3600 s"),
+                            ("run.prepare_s=3601", "run.prepare_s = 3601 must be at most 3600 s"),
+                            ("move.ramp_up_s=1e300", "move.ramp_up_s = 1e+300 must be at most 3600 s"),
+                            ("run.hold_s=3600", "must together last at most 3600 s"),
+                            ("sample_rate_hz=1e300", "more than 1e9 samples"),
+                            ("run.prepare_s=0 run.hold_s=0 move.ramp_up_s=1e-9 move.cruise_s=0 move.ramp_down_s=1e-9",
+                             "over before its first sample")):
+            options = [word for gain in gains.split() for word in ("--gain", gain)]
+            self.assertSays(self.drivebench("control", *options, code=USAGE).stderr, fact)
+
+    def test_help_names_every_subcommand_and_the_exit_codes(self):
+        """Catches: a subcommand, or a way to name a bench, that the help leaves out."""
+        said = self.drivebench("--help").stdout
+        self.assertSays(said, "serve", "demo", "describe", "status", "watch", "control", "replay", "export", "Exit codes: 0 ok")
+        for command in ("demo", "describe", "status", "watch", "control", "replay", "export"):
+            self.assertSays(self.drivebench(command, "--help").stdout, "--json")
+        for command in (["describe"], ["control"], ["experiment", "run"], ["identify"]):
+            self.assertSays(self.drivebench(*command, "--help").stdout, "tcp:HOST:PORT", "tls:HOST:PORT", "unix:PATH")
+
+    def test_presets_are_listed(self):
+        """Catches: a preset that is not listed, or that does not name its source."""
+        presets = self.json_of("control", "--list")
+        self.assertSays(self.drivebench("control", "--list").stdout, *(preset["name"] for preset in presets))
+        self.assertIn("book/8.2.2", [preset["name"] for preset in presets])
+        for preset in presets:
+            self.assertKeys(preset, "name", "source", "expectation", "sample_rate_hz", "counts_per_revolution")
+
+
+class Observing(CommandTest):
+    def setUp(self):
+        super().setUp()
+        self.bench = self.server()
+        self.link = link_of(self.bench)
+
+    def test_describe_names_everything_with_its_unit(self):
+        """Catches: a parameter without unit or limits, a signal or fault that is missing."""
+        said = self.drivebench("describe", link=self.link).stdout
+        self.assertSays(said, "bench servo at tcp:127.0.0.1", "lockstep", "period 125 us (8 kHz), 5 substeps",
+                        "command delay 0 ticks", "axis 0 (servo)", "machine.rotor_resistance_ohm", "N*m", "over_current")
+        found = self.json_of("describe", link=self.link)
+        self.assertKeys(found, "bench", "mode", "build_id", "protocol", "period_s", "substeps", "command_delay_ticks",
+                        "watchdog_ticks", "lease_s", "seed", "configuration_hash", "axes", "signals", "faults")
+        self.assertEqual((found["bench"], found["mode"], found["period_s"]), ("servo", "lockstep", 125e-6))
+        self.assertEqual([s["name"] for s in found["signals"]], [f.name for f in pb.Sample.DESCRIPTOR.fields])
+        for parameter in found["axes"][0]["parameters"]:
+            self.assertKeys(parameter, "name", "value", "unit", "minimum", "maximum", "integer", "live", "meaning")
+            self.assertSays(said, parameter["name"], parameter["meaning"])
+        for each in found["signals"] + found["faults"]:
+            self.assertSays(said, each["name"], each["meaning"])
+
+    def test_status_follows_the_bench(self):
+        """Catches: a status from the start of the run, or without the state of the axis."""
+        said = self.drivebench("status", link=self.link).stdout
+        self.assertSays(said, "lockstep, tick 0", "1 session", "not recording", "axis 0 (servo): idle", "owner nobody",
+                        "faults none")
+        with self.bench.client() as client:
+            client.lease()
+            client.step(0, 10.0)
+            found = self.json_of("status", link=self.link)
+            self.assertSays(self.drivebench("status", link=self.link).stdout, "tick 1 ", "run, owner 1", "2 sessions")
+        self.assertKeys(found, "mode", "tick", "late_ticks", "worst_lateness_s", "sessions", "recording",
+                        "recording_gaps", "recording_over", "state_hash", "notes", "transports", "axes")
+        self.assertEqual((found["tick"], found["sessions"], found["axes"][0]["owner"]), (1, 2, 1))
+        self.assertKeys(found["axes"][0], "axis", "faults_set", *(f.name for f in pb.Sample.DESCRIPTOR.fields))
+        self.assertEqual(found["axes"][0]["u_a_v"], 10.0)
+
+    def test_status_shows_the_recording(self):
+        """Catches: a status that hides that no recording is made."""
+        bench = self.server("--record", str(self.folder / "r.mcap"))
+        self.assertSays(self.drivebench("status", link=link_of(bench)).stdout, "recording ", "r.mcap, 0 gaps")
+        self.assertSays(self.json_of("status", link=link_of(bench))["recording"], "r.mcap")
+
+    def test_the_link_may_be_a_unix_socket_or_an_option(self):
+        """Catches: an option that the environment overrides."""
+        bench = self.server(unix=True)
+        self.drivebench("status", "--link", f"unix:{bench.unix_path}")
+        self.drivebench("status", "--link", link_of(bench))
+
+    def test_a_token_is_asked_for_and_taken(self):
+        """Catches: a token that is not sent, or a refusal that looks like a failed run."""
+        (self.folder / "tokens").write_text('[[token]]\nname = "anna"\nrole = "viewer"\ntoken = "secret"\n', encoding="utf-8")
+        (self.folder / "tokens").chmod(0o600)
+        text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        bench = self.server(text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{self.folder}/tokens"'))
+        self.assertSays(self.drivebench("status", link=link_of(bench), code=NO_CONNECT).stderr, "does not let us in")
+        self.drivebench("status", "--token", "wrong", link=link_of(bench), code=NO_CONNECT)
+        time.sleep(1.1)  # after two wrong tokens
+        self.drivebench("status", "--token", "secret", link=link_of(bench))
+        for command in (["experiment", "list"], ["identify", "--motor", "im", "--link", link_of(bench)]):
+            said = self.drivebench(*command, "--owner", "anna", link=link_of(bench), code=NO_CONNECT).stderr
+            self.assertSays(said, "does not let us in")
+
+    def watch_a_move(self, *options):
+        watching = self.start(DRIVEBENCH, "watch", *options, link=self.link)
+        self.assertSays(watching.stderr.readline(), "waiting for the bench to tick (lockstep")
+        self.drivebench("control", link=self.link)
+        out, _ = watching.communicate(timeout=PATIENCE_S)
+        self.assertEqual(watching.returncode, OK)
+        return out.splitlines()
+
+    def test_watch_prints_the_requested_number_of_samples_at_the_rate_of_the_bench(self):
+        """Catches: a rate in wall time, which in lockstep means nothing; a --count that is one off."""
+        head, *rows = self.watch_a_move("--count", "5", "--rate", "1000", "--signals", "tick,i_a_a,state")
+        self.assertEqual(head.split(), ["tick", "i_a_a", "[A]", "state"])
+        ticks = [int(row.split()[0]) for row in rows]
+        self.assertEqual(ticks, list(range(ticks[0], ticks[0] + 40, 8)))
+        self.assertEqual(rows[-1].split()[2], "run")
+
+    def test_watch_prints_a_json_object_a_line(self):
+        """Catches: a stream that cannot be read line by line."""
+        rows = [json.loads(row) for row in self.watch_a_move("--json", "--count", "3", "--rate", "8000", "--axis", "servo")]
+        self.assertEqual([row["tick"] for row in rows], list(range(rows[0]["tick"], rows[0]["tick"] + 3)))
+        self.assertKeys(rows[0], "axis", "dropped", "state", "faults", "encoder_count", "angle_rad", "speed_rad_s")
+
+    def test_watch_ends_well_when_interrupted(self):
+        """Catches: ctrl-C that looks like a failure."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            watching = self.start(DRIVEBENCH, "watch", link=self.link)
+            watching.stderr.readline()
+            watching.send_signal(number)
+            self.assertEqual(watching.wait(PATIENCE_S), OK)
+
+    def test_an_unknown_axis_is_2(self):
+        """Catches: a viewer that waits forever."""
+        for command in ("watch", "control"):
+            self.assertSays(self.drivebench(command, "--axis", "7", link=self.link, code=USAGE).stderr,
+                            "no axis '7'; this bench has 0 (servo)")
+
+
+class Controlling(CommandTest):
+    KEYS = ("bench", "mode", "axis", "preset", "failure", "samples", "missed_ticks", "late_ticks", "first_tick",
+            "duration_s", "wall_s", "peak_error_counts", "final_error_counts", "final_true_error_counts",
+            "peak_speed_rad_s", "peak_current_a", "peak_command_voltage_v", "peak_voltage_v", "exchange_p50_us",
+            "exchange_p99_us", "exchange_max_us")
+
+    def setUp(self):
+        super().setUp()
+        self.bench = self.server()
+        self.link = link_of(self.bench)
+
+    def control(self, *options, code=OK):
+        return self.json_of("control", *options, link=self.link, code=code)
+
+    def parameter(self, name):
+        parameters = self.json_of("describe", link=self.link)["axes"][0]["parameters"]
+        return next(each["value"] for each in parameters if each["name"] == name)
+
+    def test_two_moves_one_after_the_other(self):
+        """Catches: a second run that starts with the flux, the load or the lease of the first."""
+        said = self.drivebench("control", link=self.link).stdout
+        self.assertSays(said, "book/8.2.2 on axis servo of bench servo, lockstep", "peak error (true angle)", "counts",
+                        "peak phase current", "exchange p99")
+        report = self.control()
+        self.assertKeys(report, *self.KEYS)
+        self.assertLessEqual(report["peak_error_counts"], 2.0)
+        self.assertLessEqual(report["final_error_counts"], 1.0)
+        self.assertGreater(report["first_tick"], 1024)
+        self.assertEqual((report["failure"], report["samples"], report["missed_ticks"]), ("", 1024, 0))
+
+    def test_set_stays_and_load_is_put_back(self):
+        """Catches: a --set that ends with its session, a --load that spins the motor afterwards."""
+        self.control("--set", "machine.rotor_resistance_ohm=5.85", "--load", "0.1@0.0365", "--load", "0.05@0.05")
+        self.assertEqual(self.parameter("machine.rotor_resistance_ohm"), 5.85)
+        with self.bench.client() as client:
+            client.lease()
+            tick = client.newest().tick
+            self.assertEqual(client.step(tick, gates=pb.GATES_OFF).load_nm, 0.0)
+
+    def test_set_refuses_what_the_bench_refuses(self):
+        """Catches: a misspelt parameter that is ignored, and a move that runs with the wrong motor."""
+        for setting, fact in (("machine.rotor_resistance=5", "there is no parameter 'machine.rotor_resistance'"),
+                              ("machine.rotor_resistance_ohm=-1", "must lie between"),
+                              ("machine.rotor_resistance_ohm=nan", "not a number")):
+            self.assertSays(self.control("--set", setting, code=USAGE)["error"]["message"], fact)
+        self.assertEqual(self.json_of("status", link=self.link)["tick"], 0)
+
+    def test_csv_has_a_row_for_each_sample(self):
+        """Catches: a file without its end or its units; a missing folder that is reported after the move."""
+        self.control("--csv", "move.csv")
+        head, *rows = (self.folder / "move.csv").read_text(encoding="utf-8").splitlines()
+        self.assertSays(head, "tick,time [s],reference [rad],angle [rad],error [counts]")
+        self.assertEqual([int(row.split(",")[0]) for row in rows], list(range(1024)))
+        before = self.json_of("status", link=self.link)["tick"]
+        self.assertSays(self.control("--csv", "none/move.csv", code=USAGE)["error"]["message"], "cannot write")
+        self.assertEqual(self.json_of("status", link=self.link)["tick"], before)
+
+    def test_another_owner_is_not_disturbed(self):
+        """Catches: two controllers that take turns on one motor."""
+        with self.bench.client() as owner:
+            owner.lease()
+            self.assertSays(self.drivebench("control", link=self.link, code=FAILED).stderr, "another session holds the lease")
+            error = self.control(code=FAILED)["error"]
+            self.assertEqual((error["kind"], error["field"]), ("refused", "axis"))
+            self.assertEqual(owner.step(0, 10.0).tick, 1)
+            owner.lease(pb.LeaseRequest.ACTION_RELEASE)
+        self.control()
+
+    def test_latched_faults_are_reported_and_cleared_on_demand(self):
+        """Catches: a fault that is cleared unasked, or a move into a latched bench."""
+        with self.bench.client() as client:
+            client.lease()
+            client.step(0, 10.0)
+        until(lambda: self.json_of("status", link=self.link)["axes"][0]["owner"] == 0, "the lease of a lost session ends")
+        self.assertSays(self.drivebench("control", link=self.link, code=USAGE).stderr, "latched", "--clear")
+        self.control("--clear")
+        self.control()
+
+    def test_a_preset_that_does_not_fit_names_one_that_does(self):
+        """Catches: a controller of 4 kHz on a bench of 8 kHz."""
+        said = self.drivebench("control", "--preset", "book/8.2.2-4khz", link=self.link, code=USAGE).stderr
+        self.assertSays(said, "the sample rate [Hz] is 8000 on the bench, 4000 in the preset", "book/8.2.2 would fit")
+
+    def test_a_link_that_breaks_in_a_move_costs_no_sample(self):
+        """Catches: a report and a file of samples that are lost with the bench."""
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(listener.close)
+
+        def pass_on(source, drain, most):
+            while most > 0 and (data := source.recv(4096)):
+                drain.sendall(data)
+                most -= len(data)
+            for end in (source, drain):
+                end.shutdown(socket.SHUT_RDWR)
+
+        def carry():
+            client, _ = listener.accept()
+            with client, socket.create_connection(self.bench.address) as bench:
+                up = threading.Thread(target=pass_on, args=(client, bench, float("inf")))
+                up.start()
+                pass_on(bench, client, 100_000)
+                up.join()
+
+        carrier = threading.Thread(target=carry)
+        carrier.start()
+        link = "tcp:%s:%d" % listener.getsockname()
+        found = self.json_of("control", "--csv", "broken.csv", link=link, code=FAILED)
+        carrier.join()
+        self.assertIn("closed", found["failure"])
+        self.assertGreater(found["samples"], 100)
+        rows = (self.folder / "broken.csv").read_text(encoding="utf-8").splitlines()
+        self.assertEqual(len(rows), 1 + found["samples"])
+
+    def test_an_interrupted_move_is_a_failed_run(self):
+        """Catches: an exit code of 0 after half a move."""
+        moving = self.start(DRIVEBENCH, "control", "--json", "--gain", "run.hold_s=60", link=self.link)
+        until(lambda: self.json_of("status", link=self.link)["axes"][0]["owner"] != 0, "the move begins")
+        moving.send_signal(signal.SIGINT)
+        out, _ = moving.communicate(timeout=PATIENCE_S)
+        self.assertEqual(moving.returncode, FAILED)
+        report = json.loads(out)
+        self.assertTrue(report.get("failure") or report["error"]["message"])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,245 @@
+#!/usr/bin/python3
+"""Every command in a README works, every link exists, and every bench file loads."""
+import json
+import os
+import pathlib
+import re
+import select
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+from own_network import in_own_network
+from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
+
+READMES = ("README.md", "server/README.md", "clients/README.md", "clients/control/README.md", "protocols/can/README.md",
+           "protocols/modbus/README.md")
+PROGRAMS = ("drivebench", "drivebench-server")
+
+# Lines that are not run, and why.
+NOT_RUN = {
+    "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH]":
+        "a synopsis; test_commands.py tries each option",
+    "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
+    "drivebench can check can0       # bit timing, state, error counters, queue, drops; what is wrong, with the line that cures it":
+        "needs an adapter; can_check_test and test_socketcan.py try it",
+}
+
+
+def documents():
+    """All Markdown files of the project."""
+    for folder, folders, files in os.walk(REPOSITORY):
+        folders[:] = [name for name in folders if name not in ("build", "node_modules") and not name.startswith(".")]
+        yield from (pathlib.Path(folder) / name for name in files if name.endswith(".md"))
+
+
+def code_lines(text):
+    """The lines of fenced and of indented blocks."""
+    fenced = False
+    for line in text.splitlines():
+        if line.startswith("```"):
+            fenced = not fenced
+        elif fenced or line.startswith("    "):
+            yield line.strip()
+
+
+def commands(text):
+    for line in code_lines(text):
+        line = line.removeprefix("$ ")
+        if line.split(" ")[0] in PROGRAMS:
+            yield line
+
+
+class Bench:
+    """Runs lines in order, in a folder that keeps their files. The newest server that was started is the bench of the
+    commands that follow it; ports are chosen by the system instead of 7300."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        (folder / "configs").symlink_to(REPOSITORY / "configs")
+        self.environment = guarded({name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")})
+        self.server = None
+        self.moved = False
+
+    def program(self, *words):
+        return [str(SERVER.parent / words[0]), *words[1:]]
+
+    def start(self, words):
+        self.stop()
+        self.server = subprocess.Popen(self.program(*words, "--port", "0"), stdout=subprocess.PIPE, text=True,
+                                       cwd=self.folder, env=self.environment)
+        ready = self.server.stdout.readline()
+        if not ready.startswith("ready tcp="):
+            raise AssertionError(f"{words}: no server, exit {self.server.wait()}")
+        self.environment["DRIVEBENCH_LINK"] = "tcp:" + ready.split("tcp=")[1].split()[0]
+        self.moved = False
+
+    def stop(self):
+        if self.server is None:
+            return
+        self.server.send_signal(signal.SIGTERM)
+        self.server.communicate(timeout=PATIENCE_S)
+        code, self.server = self.server.returncode, None
+        if code != 0:
+            raise AssertionError(f"the server ended with {code}")
+
+    def kill(self):
+        if self.server is not None:
+            self.server.kill()
+            self.server.communicate()
+
+    def run(self, words):
+        if ">" in words:
+            words = words[:words.index(">")]
+        done = subprocess.run(self.program(*words), capture_output=True, text=True, cwd=self.folder,
+                              env=self.environment, timeout=4 * PATIENCE_S, check=False)
+        if done.returncode != 0:
+            raise AssertionError(f"{shlex.join(words)}: exit {done.returncode}: {done.stdout}{done.stderr}")
+        return done.stdout
+
+    def move(self):
+        self.run(["drivebench", "control"])
+        self.moved = True
+
+    def watch(self, words):
+        """Live values: waits for the first, with a controller that advances time, then sends ctrl-C."""
+        watching = subprocess.Popen(self.program(*words), stdout=subprocess.PIPE, cwd=self.folder, env=self.environment)
+        try:
+            end = time.monotonic() + PATIENCE_S
+            while not select.select([watching.stdout], [], [], 0.0)[0]:
+                if time.monotonic() > end:
+                    raise AssertionError(f"{shlex.join(words)}: no values")
+                self.move()
+            watching.send_signal(signal.SIGINT)
+            out, _ = watching.communicate(timeout=PATIENCE_S)
+            if watching.returncode != 0 or not out:
+                raise AssertionError(f"{shlex.join(words)}: exit {watching.returncode}")
+        finally:
+            if watching.poll() is None:
+                watching.kill()
+                watching.communicate()
+
+    def do(self, line):
+        words = shlex.split(line, comments=True)
+        if words[:2] == ["drivebench", "serve"] or words[0] == "drivebench-server":
+            self.start(words)
+        elif words[1] in ("replay", "export", "plot") or "--compare" in words:
+            if self.server is not None and not self.moved:
+                self.move()  # something to read
+            self.stop()  # a recording is whole when its server has ended
+            self.run(words)
+        elif words[1] == "watch":
+            self.watch(words)
+        else:
+            if self.server is None:
+                self.start(["drivebench", "serve"])
+            self.run(words)
+            self.moved = self.moved or words[1] == "control"
+
+
+class Readmes(unittest.TestCase):
+    def test_every_command_works(self):
+        """Catches: an option, a file name or a preset that was renamed everywhere but in the READMEs."""
+        unused = set(NOT_RUN)
+        for name in READMES:
+            lines = list(commands((REPOSITORY / name).read_text(encoding="utf-8")))
+            self.assertTrue(lines, f"{name} has commands")
+            with tempfile.TemporaryDirectory(prefix="drivebench-readme-") as folder:
+                bench = Bench(pathlib.Path(folder))
+                self.addCleanup(bench.kill)
+                for line in lines:
+                    if line in NOT_RUN:
+                        unused.discard(line)
+                        continue
+                    with self.subTest(f"{name}: {line}"):
+                        bench.do(line)
+                bench.stop()
+        self.assertEqual(unused, set(), "NOT_RUN names lines that no README has")
+
+    def test_the_state_hash_of_the_tour_is_true(self):
+        """Catches: a change of the physics without the README's hash, which is the same on every machine."""
+        shown = re.search(r"^\s*state hash\s+([0-9a-f]{16})\s+[0-9a-f]{16}$",
+                          (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.M)
+        self.assertIsNotNone(shown)
+        with tempfile.TemporaryDirectory(prefix="drivebench-readme-") as folder:
+            bench = Bench(pathlib.Path(folder))
+            self.addCleanup(bench.kill)
+            bench.start(["drivebench", "serve"])
+            bench.move()
+            self.assertIn(f"state hash {shown[1]}\n", bench.run(["drivebench", "status"]))
+            bench.stop()
+
+    def test_every_option_of_a_command_is_documented(self):
+        """Catches: an option that only its --help names."""
+        told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
+        commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "take", "control", "plot", "replay",
+                          "export", "identify", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
+                          "dbc", "can-table", "modbus-map", "can-log", "can check")
+        names = re.findall(r"^  ([a-z-]+) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
+                                                          check=True).stdout, re.M)
+        self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))
+        for command in commands_there:
+            text = subprocess.run([SERVER.parent / "drivebench", *command.split(), "--help"], capture_output=True, text=True,
+                                  check=True).stdout
+            for option in re.findall(r"^  (--[a-z-]+)", text, re.M):
+                with self.subTest(f"{command} {option}"):
+                    self.assertRegex(told, re.escape(option) + "(?![a-z-])")
+        for variable in ("DRIVEBENCH_LINK", "DRIVEBENCH_TOKEN", "DRIVEBENCH_OWNER", "DRIVEBENCH_CONFIGS"):
+            self.assertIn(variable, told)
+
+    def test_every_preset_and_folder_of_tests_is_documented(self):
+        """Catches: a preset or a folder of tests that no README names."""
+        presets = json.loads((REPOSITORY / "CMakePresets.json").read_text(encoding="utf-8"))["buildPresets"]
+        told = re.search(r"`./bench build \[([a-z|]+)\]`", (REPOSITORY / "README.md").read_text(encoding="utf-8"))
+        self.assertEqual(set(told[1].split("|")), {preset["name"] for preset in presets})
+        told = (REPOSITORY / "tests/README.md").read_text(encoding="utf-8")
+        mirrored = {"plant", "protocols", "server", "clients", "control", "identification", "can", "modbus"}
+        for folder in (REPOSITORY / "tests").iterdir():
+            if folder.is_dir() and folder.name not in mirrored | {"__pycache__"}:
+                self.assertIn(f"`{folder.name}/`", told)
+
+    def test_every_relative_link_points_at_a_file(self):
+        """Catches: a file that was moved or renamed."""
+        checked = 0
+        for document in documents():
+            text = document.read_text(encoding="utf-8")
+            text = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+            text = re.sub(r"^    .*$", "", text, flags=re.M)
+            # Code in a line is no link, but the text of a link may be code.
+            text = re.sub(r"(?<!\[)`[^`\n]*`", "", text)
+            for target in re.findall(r"\]\(([^)\s]+)\)", text):
+                if re.match(r"[a-z]+:|#", target):
+                    continue
+                with self.subTest(f"{document.relative_to(REPOSITORY)}: {target}"):
+                    self.assertTrue((document.parent / target.split("#")[0]).exists())
+                checked += 1
+        self.assertGreater(checked, 5)
+
+
+class Configs(unittest.TestCase):
+    def test_every_bench_file_loads(self):
+        """Catches: a key that was renamed in the server only."""
+        files = sorted(BENCHES.iterdir())
+        self.assertTrue(files)
+        for file in files:
+            with self.subTest(file.name):
+                done = subprocess.run([SERVER, file, "--check-config"], capture_output=True, text=True,
+                                      timeout=PATIENCE_S, check=False)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn("no problems", done.stdout)
+
+
+if __name__ == "__main__":
+    in_own_network()  # some commands use ports and a bus that other programs would share
+    unittest.main(verbosity=2)
