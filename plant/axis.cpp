@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/drive/phases.hpp"
+#include "plant/machines/machine_kind.hpp"
 #include "plant/math/rounding.hpp"
 #include "plant/math/trig.hpp"
 #include "plant/train/shared_shaft.hpp"
@@ -26,13 +27,6 @@ double pole_pairs_of(const MachineParameters& machine) noexcept {
   return std::visit([](const auto& p) { return drivebench::pole_pairs_of(p); }, machine);
 }
 
-bool has_field(const MachineParameters& machine) noexcept {
-  return std::holds_alternative<SeparateDcMachineParameters>(machine) ||
-         std::holds_alternative<ShuntDcMachineParameters>(machine) ||
-         std::holds_alternative<SeriesDcMachineParameters>(machine) ||
-         std::holds_alternative<WoundRotorMachineParameters>(machine);
-}
-
 bool shaft_has_events(const MechanicsParameters& p) noexcept {
   return has_events(p) || p.motion != ShaftMotion::kFree;
 }
@@ -48,7 +42,7 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
           .pole_pairs = pole_pairs_of(p.machine),
           .drive = Drive(p.drive, connection, timing.period_s, seed, noise + kCommandNoise),
           .sensors = SensorBank(p.sensors, connection, timing.period_s, seed, noise,
-                                timing.period_s / timing.substeps, has_field(p.machine)),
+                                timing.period_s / timing.substeps, kind_of(p.machine).field != Field::kNone),
           .encoder = Encoder(p.encoder, timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};
@@ -90,7 +84,8 @@ void forget_negligible(AxisState& state) noexcept {
 }  // namespace
 
 Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::uint64_t index)
-    : core_(core_of(p, timing, seed, index)), train_(make_train(p.machine, has_two_masses(p.mechanics))) {
+    : core_(core_of(p, timing, seed, index)),
+      train_(kind_of(p.machine).make_train(p.machine, has_two_masses(p.mechanics))) {
   state_.drive = core_.drive.initial();
   state_.thermal.temperature_k = p.thermal.ambient_k;
   state_.encoder.count = core_.encoder.count_at(0.0, 0);
@@ -295,22 +290,6 @@ AxisSample Axis::sample(Tick tick) const noexcept {
           .load_position_m = load.position_m};
 }
 
-namespace {
-
-/// Electrical angular speed at which the emf reaches a voltage; 0 where the emf does not tell.
-double electrical_speed_rad_s(const PmMachineParameters& p, double voltage_v) noexcept {
-  return p.torque_constant_nm_per_a > 0.0 ? p.pole_pairs * voltage_v / p.torque_constant_nm_per_a : 0.0;
-}
-double electrical_speed_rad_s(const BldcMachineParameters& p, double voltage_v) noexcept {
-  return p.torque_constant_nm_per_a > 0.0 ? p.pole_pairs * voltage_v / p.torque_constant_nm_per_a : 0.0;
-}
-template <class Machine>
-double electrical_speed_rad_s(const Machine&, double) noexcept {
-  return 0.0;
-}
-
-}  // namespace
-
 int default_substeps(const AxisParameters& p, double period_s) noexcept {
   constexpr double kStepsInTimeConstant = 10.0;
   constexpr double kRadPerStep = 0.2;
@@ -326,8 +305,10 @@ int default_substeps(const AxisParameters& p, double period_s) noexcept {
           const Adjustment loop{.series_resistance_ohm = p.drive.current_loop.proportional_v_per_a};
           step_s = std::min(step_s, 0.5 * fastest_time_constant_s(adjusted(machine, loop)));
         }
-        const double turning_rad_s = electrical_speed_rad_s(machine, p.drive.amplifier.voltage_limit_v);
-        if (turning_rad_s > 0.0) step_s = std::min(step_s, kRadPerStep / turning_rad_s);
+        if constexpr (requires { electrical_speed_rad_s(machine, 0.0); }) {
+          const double turning_rad_s = electrical_speed_rad_s(machine, p.drive.amplifier.voltage_limit_v);
+          if (turning_rad_s > 0.0) step_s = std::min(step_s, kRadPerStep / turning_rad_s);
+        }
       },
       p.machine);
   const double substeps = std::ceil(period_s / step_s - 1e-9);

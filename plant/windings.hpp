@@ -7,6 +7,8 @@
 /// What a machine shows to the drive and to the shaft, whatever its kind.
 namespace drivebench {
 
+struct MachineKind;  // plant/machines/machine_kind.hpp
+
 /// How the windings of a stator meet the terminals.
 enum class Connection : std::int64_t {
   kTwoPhase,     ///< windings a and b, each between the legs of a bridge of its own
@@ -19,6 +21,13 @@ constexpr int terminal_count(Connection connection) noexcept {
   if (connection == Connection::kArmature) return 1;
   return connection == Connection::kTwoPhase ? 2 : 3;
 }
+
+/// The field winding of a machine.
+enum class Field : std::int64_t {
+  kNone,          ///< there is none: magnets or a cage
+  kOnArmature,    ///< fed from the terminals of the armature; its current can be measured
+  kOwnTerminals,  ///< the same with terminals of its own, which a command drives
+};
 
 /// One value for each terminal: phases a, b, c and the field. A machine with fewer terminals leaves the
 /// others at zero; an armature is phase a.

@@ -37,7 +37,7 @@ constexpr auto kTable = std::to_array<Parameter>({
            kKinds),
 
     amplifier<&Amplifier::voltage_limit_v>("amplifier.voltage_limit_v", "V", 1e-3, 1e6, kLive | kRequired,
-                                           "largest phase voltage, both signs; DC link voltage"),
+                                           "largest phase voltage, both signs; DC link voltage", {0.1, 1e5}),
     amplifier<&Amplifier::gain>("amplifier.gain", "1", 0, 100, kLive, "output over command"),
     amplifier<&Amplifier::offset_a_v>("amplifier.offset_a_v", "V", -1e6, 1e6, kLive,
                                       "output offset of phase a"),
@@ -50,7 +50,7 @@ constexpr auto kTable = std::to_array<Parameter>({
     amplifier<&Amplifier::filter_hz>("amplifier.filter_hz", "Hz", 0, 1e7, kLive,
                                      "corner of the first-order output filter; 0: none"),
     amplifier<&Amplifier::over_current_a>("amplifier.over_current_a", "A", 1e-6, 1e6, kLive | kRequired,
-                                          "a phase current above this raises over_current"),
+                                          "a phase current above this raises over_current", {1e-3, 1e5}),
     amplifier<&Amplifier::over_current_trip>("amplifier.over_current_trip", "1", 0, 1, kInteger | kLive,
                                              "1: over-current switches the gates off until cleared"),
 

@@ -15,11 +15,24 @@
 
 namespace drivebench {
 
-/// Every kind of machine; the alternative is the kind.
-using MachineParameters =
-    std::variant<InductionMachineParameters, SaturatedInductionMachineParameters, PmMachineParameters,
-                 BldcMachineParameters, WoundRotorMachineParameters, PmDcMachineParameters,
-                 SeparateDcMachineParameters, ShuntDcMachineParameters, SeriesDcMachineParameters,
-                 LinearDcMachineParameters>;
+template <class... Machines>
+struct MachineList {
+  using Parameters = std::variant<typename Machines::Parameters...>;
+};
+
+/// Every kind of machine. A new one is a folder and a line here; see plant/README.md.
+using AllMachines = MachineList<InductionMachine,           //
+                                SaturatedInductionMachine,  //
+                                PmMachine,                  //
+                                BldcMachine,                //
+                                WoundRotorMachine,          //
+                                PmDcMachine,                //
+                                SeparateDcMachine,          //
+                                ShuntDcMachine,             //
+                                SeriesDcMachine,            //
+                                LinearDcMachine>;
+
+/// The parameters of one machine; the alternative is the kind.
+using MachineParameters = AllMachines::Parameters;
 
 }  // namespace drivebench

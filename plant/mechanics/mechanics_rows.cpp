@@ -15,15 +15,15 @@ constexpr auto kMotions = std::to_array<std::string_view>({"free", "locked", "im
 
 template <auto Member>
 constexpr Parameter shaft_row(std::string_view name, std::string_view unit, double minimum, double maximum,
-                              unsigned traits, std::string_view meaning) {
-  return row<&AxisParameters::mechanics, Member>(name, unit, minimum, maximum, traits, meaning);
+                              unsigned traits, std::string_view meaning, Range usual = {}) {
+  return row<&AxisParameters::mechanics, Member>(name, unit, minimum, maximum, traits, meaning, usual);
 }
 
 constexpr auto kTable = std::to_array<Parameter>({
     shaft_row<&Shaft::inertia_kgm2>("mechanics.inertia_kgm2", "kg*m^2", 1e-12, 1e9, kLive | kRequired,
-                                    "J of the rotor and all that turns with it"),
+                                    "J of the rotor and all that turns with it", {1e-9, 1e5}),
     shaft_row<&Shaft::viscous_friction_nms>("mechanics.viscous_friction_nms", "N*m*s/rad", 0, 1e6, kLive,
-                                            "f, friction torque over speed"),
+                                            "f, friction torque over speed", {0, 100}),
     shaft_row<&Shaft::coulomb_friction_nm>("mechanics.coulomb_friction_nm", "N*m", 0, 1e6, kLive,
                                            "friction torque that opposes motion"),
     shaft_row<&Shaft::static_friction_nm>(
@@ -55,7 +55,7 @@ constexpr auto kTable = std::to_array<Parameter>({
                "free: the torques decide; locked: the rotor stands; imposed: a prime mover drives it"),
            kMotions),
     shaft_row<&Shaft::imposed_speed_rad_s>("mechanics.imposed_speed_rad_s", "rad/s", -1e6, 1e6, kLive,
-                                           "speed of the rotor to which the prime mover goes"),
+                                           "speed of the rotor to which the prime mover goes", {-3e4, 3e4}),
     shaft_row<&Shaft::imposed_acceleration_rad_s2>("mechanics.imposed_acceleration_rad_s2", "rad/s^2", 1e-6,
                                                    1e12, kLive, "at which it goes there"),
 });

@@ -7,16 +7,7 @@
 #include <utility>
 
 #include "plant/drive/drive_rows.hpp"
-#include "plant/machines/bldc/bldc_machine_rows.hpp"
-#include "plant/machines/induction/induction_machine_rows.hpp"
-#include "plant/machines/linear_dc/linear_dc_machine_rows.hpp"
-#include "plant/machines/pm/pm_machine_rows.hpp"
-#include "plant/machines/pm_dc/pm_dc_machine_rows.hpp"
-#include "plant/machines/saturated_induction/saturated_induction_machine_rows.hpp"
-#include "plant/machines/separate_dc/separate_dc_machine_rows.hpp"
-#include "plant/machines/series_dc/series_dc_machine_rows.hpp"
-#include "plant/machines/shunt_dc/shunt_dc_machine_rows.hpp"
-#include "plant/machines/wound_rotor/wound_rotor_machine_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
 #include "plant/mechanics/mechanics_rows.hpp"
 #include "plant/parameters/rows.hpp"
 #include "plant/sensors/sensor_rows.hpp"
@@ -25,27 +16,6 @@ namespace drivebench {
 namespace {
 
 constexpr std::size_t kKinds = std::variant_size_v<MachineParameters>;
-
-/// What is written down of a kind of machine; in the order of MachineParameters.
-struct Kind {
-  std::string_view name;
-  std::span<const Parameter> rows;
-  std::span<const CurveParameter> curves;
-};
-
-std::array<Kind, kKinds> all_kinds() noexcept {
-  return {{{InductionMachine::kKind, induction_machine_rows(), {}},
-           {SaturatedInductionMachine::kKind, saturated_induction_machine_rows(),
-            saturated_induction_machine_curves()},
-           {PmMachine::kKind, pm_machine_rows(), {}},
-           {BldcMachine::kKind, bldc_machine_rows(), {}},
-           {WoundRotorMachine::kKind, wound_rotor_machine_rows(), {}},
-           {PmDcMachine::kKind, pm_dc_machine_rows(), {}},
-           {SeparateDcMachine::kKind, separate_dc_machine_rows(), separate_dc_machine_curves()},
-           {ShuntDcMachine::kKind, shunt_dc_machine_rows(), shunt_dc_machine_curves()},
-           {SeriesDcMachine::kKind, series_dc_machine_rows(), series_dc_machine_curves()},
-           {LinearDcMachine::kKind, linear_dc_machine_rows(), {}}}};
-}
 
 /// The whole tables of each kind, put together once.
 struct Tables {
@@ -56,13 +26,13 @@ struct Tables {
 
 Tables make_tables() {
   Tables tables;
-  const std::array<Kind, kKinds> kinds = all_kinds();
   for (std::size_t k = 0; k < kKinds; ++k) {
-    tables.names[k] = kinds[k].name;
-    for (const auto part : {kinds[k].rows, mechanics_rows(), drive_rows(), sensor_rows()}) {
+    const MachineKind& kind = all_machine_kinds()[k];
+    tables.names[k] = kind.name;
+    for (const auto part : {kind.rows, mechanics_rows(), drive_rows(), sensor_rows()}) {
       tables.rows[k].insert(tables.rows[k].end(), part.begin(), part.end());
     }
-    for (const auto part : {kinds[k].curves, mechanics_curves(), drive_curves()}) {
+    for (const auto part : {kind.curves, mechanics_curves(), drive_curves()}) {
       tables.curves[k].insert(tables.curves[k].end(), part.begin(), part.end());
     }
   }
@@ -106,7 +76,7 @@ void add_curve_problems(const AxisParameters& p, Problems& found) {
 
 /// The rules between values.
 void add_rule_problems(const AxisParameters& p, Problems& found) {
-  std::visit([&found](const auto& machine) { add_problems(machine, found); }, p.machine);
+  add_problems(p.machine, found);
   add_problems(p.mechanics, found);
   add_problems(p.drive, found);
   add_problems(p.encoder, found);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,6 +10,14 @@
 #include "plant/problem.hpp"
 
 namespace drivebench {
+
+/// Where the values of nearly every machine lie. The ranges are wide, from motors for models to those of
+/// mills and ships: a value outside is allowed, and more likely in the wrong unit (mH for H, rpm for rad/s)
+/// than meant.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+};
 
 /// One number of an axis: the configuration key, the description sent to clients, the limits and the access.
 struct Parameter {
@@ -24,6 +33,7 @@ struct Parameter {
   void (*set)(AxisParameters&, double) noexcept;
   /// A choice: the word for each value from 0 on, as configurations write it; empty for numbers and switches.
   std::span<const std::string_view> words{};
+  Range usual{};
 };
 
 /// One curve of an axis, which configurations give as points [[x, y], ...] or as the name of a CSV file.

@@ -35,7 +35,7 @@ constexpr void assign(Member& member, double value) noexcept {
 }
 
 constexpr Parameter described(std::string_view name, std::string_view unit, double minimum, double maximum,
-                              unsigned traits, std::string_view meaning) {
+                              unsigned traits, std::string_view meaning, Range usual) {
   return {name,
           unit,
           minimum,
@@ -45,7 +45,9 @@ constexpr Parameter described(std::string_view name, std::string_view unit, doub
           (traits & kRequired) != 0,
           meaning,
           nullptr,
-          nullptr};
+          nullptr,
+          {},
+          usual};
 }
 
 }  // namespace rows_detail
@@ -53,23 +55,27 @@ constexpr Parameter described(std::string_view name, std::string_view unit, doub
 /// A member of a section: row<&AxisParameters::mechanics, &MechanicsParameters::inertia_kgm2>(...). Integers,
 /// switches and choices are seen as doubles.
 template <auto... Path>
-constexpr Parameter row(std::string_view name, std::string_view unit, double minimum, double maximum,
-                        unsigned traits, std::string_view meaning) {
-  Parameter result = rows_detail::described(name, unit, minimum, maximum, traits, meaning);
-  result.get = [](const AxisParameters& p) noexcept {
-    return static_cast<double>(rows_detail::at_path<Path...>(p));
-  };
-  result.set = [](AxisParameters& p, double value) noexcept {
-    rows_detail::assign(rows_detail::at_path<Path...>(p), value);
-  };
-  return result;
-}
+struct Row {
+  constexpr Parameter operator()(std::string_view name, std::string_view unit, double minimum, double maximum,
+                                 unsigned traits, std::string_view meaning, Range usual = {}) const {
+    Parameter result = rows_detail::described(name, unit, minimum, maximum, traits, meaning, usual);
+    result.get = [](const AxisParameters& p) noexcept {
+      return static_cast<double>(rows_detail::at_path<Path...>(p));
+    };
+    result.set = [](AxisParameters& p, double value) noexcept {
+      rows_detail::assign(rows_detail::at_path<Path...>(p), value);
+    };
+    return result;
+  }
+};
+template <auto... Path>
+inline constexpr Row<Path...> row{};
 
 /// A member of a kind of machine: machine_row<PmMachineParameters, &PmMachineParameters::pole_pairs>(...).
 template <class Kind, auto Member>
 constexpr Parameter machine_row(std::string_view name, std::string_view unit, double minimum, double maximum,
-                                unsigned traits, std::string_view meaning) {
-  Parameter result = rows_detail::described(name, unit, minimum, maximum, traits, meaning);
+                                unsigned traits, std::string_view meaning, Range usual = {}) {
+  Parameter result = rows_detail::described(name, unit, minimum, maximum, traits, meaning, usual);
   result.get = [](const AxisParameters& p) noexcept {
     return static_cast<double>(std::get_if<Kind>(&p.machine)->*Member);
   };

@@ -18,8 +18,8 @@ using Thermal = ThermalParameters;
 
 template <auto Member>
 constexpr Parameter encoder_row(std::string_view name, std::string_view unit, double minimum, double maximum,
-                                unsigned traits, std::string_view meaning) {
-  return row<&AxisParameters::encoder, Member>(name, unit, minimum, maximum, traits, meaning);
+                                unsigned traits, std::string_view meaning, Range usual = {}) {
+  return row<&AxisParameters::encoder, Member>(name, unit, minimum, maximum, traits, meaning, usual);
 }
 
 template <auto... Path>
@@ -40,7 +40,7 @@ constexpr std::string_view kFilterMeaning = "corner of the first-order anti-alia
 constexpr auto kEncoder = std::to_array<Parameter>({
     encoder_row<&EncoderParameters::counts_per_revolution>("encoder.counts_per_revolution", "counts", 4,
                                                            100000000, kInteger | kRequired,
-                                                           "N after quadrature, a multiple of 4"),
+                                                           "N after quadrature, a multiple of 4", {4, 1e8}),
     encoder_row<&EncoderParameters::half_count_offset>(
         "encoder.half_count_offset", "1", 0, 1, kInteger,
         "1: count = floor(theta N/(2 pi) + 1/2), error centred on zero"),

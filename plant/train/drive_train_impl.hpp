@@ -347,8 +347,9 @@ void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double 
   keep_machine(state, piece_.stage);
 }
 
+/// MachineKind::make_train of this kind of machine.
 template <class Machine>
-std::unique_ptr<Train> make_drive_train(const typename Machine::Parameters& machine, bool two_masses) {
+std::unique_ptr<Train> make_drive_train(const MachineParameters& machine, bool two_masses) {
   if (two_masses) return std::make_unique<DriveTrain<Machine, TwoMassState>>(machine);
   return std::make_unique<DriveTrain<Machine, ShaftState>>(machine);
 }

@@ -93,9 +93,6 @@ class Train {
                      const RotorMotion& from, const RotorMotion& to, int event) noexcept = 0;
 };
 
-/// The train for the kind of machine.
-std::unique_ptr<Train> make_train(const MachineParameters& machine, bool two_masses);
-
 /// Whether the source has an impedance of its own.
 bool has_impedance(const DriveParameters& p) noexcept;
 

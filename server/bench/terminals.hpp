@@ -4,6 +4,7 @@
 #include <variant>
 
 #include "plant/axis_parameters.hpp"
+#include "plant/machines/machine_kind.hpp"
 
 namespace drivebench {
 
@@ -35,12 +36,10 @@ struct Terminals {
 
 inline Terminals terminals_of(const AxisParameters& p) {
   const SensorParameters& sensors = p.sensors;
-  const bool field = std::holds_alternative<WoundRotorMachineParameters>(p.machine) ||
-                     std::holds_alternative<SeparateDcMachineParameters>(p.machine);
+  const Field field = kind_of(p.machine).field;
   return {.connection = std::visit([](const auto& machine) { return connection_of(machine); }, p.machine),
-          .field = field,
-          .field_current = field || std::holds_alternative<ShuntDcMachineParameters>(p.machine) ||
-                           std::holds_alternative<SeriesDcMachineParameters>(p.machine),
+          .field = field == Field::kOwnTerminals,
+          .field_current = field != Field::kNone,
           .speed_sensors = sensors.tachometer.analog.enabled || sensors.resolver.analog.enabled,
           .hall = sensors.hall.enabled};
 }

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "plant/machines/bldc/bldc_machine_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
 #include "plant/machines/pm/pm_machine.hpp"
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/power_balance.hpp"
@@ -224,7 +224,7 @@ TEST(BldcMachine, MutualInductanceMustStayBelowHalfOfTheSelfInductance) {
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].field, "machine.mutual_inductance_h");
   EXPECT_EQ(found[0].rule, "is 0.00136 but must be below half of self_inductance_h = 0.00272");
-  EXPECT_EQ(bldc_machine_rows().size(), 6u);
+  EXPECT_EQ(BldcMachine::kind().rows.size(), 6u);
 }
 
 }  // namespace

@@ -4,11 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "plant/machines/linear_dc/linear_dc_machine_rows.hpp"
-#include "plant/machines/pm_dc/pm_dc_machine_rows.hpp"
-#include "plant/machines/separate_dc/separate_dc_machine_rows.hpp"
-#include "plant/machines/series_dc/series_dc_machine_rows.hpp"
-#include "plant/machines/shunt_dc/shunt_dc_machine_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
 
 namespace drivebench {
 namespace {
@@ -38,11 +34,11 @@ void expect_each_row_has_a_member_of_its_own(std::span<const Parameter> rows) {
 
 // Kills: two rows that share a member or a name.
 TEST(DcMachineRows, EachHasAMemberOfItsOwn) {
-  expect_each_row_has_a_member_of_its_own<PmDcMachineParameters>(pm_dc_machine_rows());
-  expect_each_row_has_a_member_of_its_own<LinearDcMachineParameters>(linear_dc_machine_rows());
-  expect_each_row_has_a_member_of_its_own<SeparateDcMachineParameters>(separate_dc_machine_rows());
-  expect_each_row_has_a_member_of_its_own<ShuntDcMachineParameters>(shunt_dc_machine_rows());
-  expect_each_row_has_a_member_of_its_own<SeriesDcMachineParameters>(series_dc_machine_rows());
+  expect_each_row_has_a_member_of_its_own<PmDcMachineParameters>(PmDcMachine::kind().rows);
+  expect_each_row_has_a_member_of_its_own<LinearDcMachineParameters>(LinearDcMachine::kind().rows);
+  expect_each_row_has_a_member_of_its_own<SeparateDcMachineParameters>(SeparateDcMachine::kind().rows);
+  expect_each_row_has_a_member_of_its_own<ShuntDcMachineParameters>(ShuntDcMachine::kind().rows);
+  expect_each_row_has_a_member_of_its_own<SeriesDcMachineParameters>(SeriesDcMachine::kind().rows);
 }
 
 // Kills: a curve that goes to another machine, or nowhere.
@@ -55,9 +51,9 @@ TEST(DcMachineRows, TheSaturationCurveIsReadAndWritten) {
     EXPECT_EQ(curves[0].get(p).points(), points);
     EXPECT_TRUE(curves[0].rising);
   };
-  expect(axis_with<SeparateDcMachineParameters>(), separate_dc_machine_curves());
-  expect(axis_with<ShuntDcMachineParameters>(), shunt_dc_machine_curves());
-  expect(axis_with<SeriesDcMachineParameters>(), series_dc_machine_curves());
+  expect(axis_with<SeparateDcMachineParameters>(), SeparateDcMachine::kind().curves);
+  expect(axis_with<ShuntDcMachineParameters>(), ShuntDcMachine::kind().curves);
+  expect(axis_with<SeriesDcMachineParameters>(), SeriesDcMachine::kind().curves);
 }
 
 template <class Machine>

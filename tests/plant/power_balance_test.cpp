@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "plant/machines/machines.hpp"
+#include "plant/machines/machine_kind.hpp"
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/dc_rig.hpp"
 #include "tests/plant/induction_motors.hpp"
@@ -25,7 +25,7 @@ struct Start {
 /// Runs the start with the voltages held over each step, which machine and audit see alike.
 template <class Machine>
 void expect_energy_kept(const typename Machine::Parameters& p, const Start& start) {
-  SCOPED_TRACE(Machine::kKind);
+  SCOPED_TRACE(Machine::kind().name);
   const auto c = constants_of(p);
   const RigLoad load{.inertia_kgm2 = start.inertia_kgm2};
   Rig<typename Machine::State> rig;

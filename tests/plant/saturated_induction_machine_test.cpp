@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "plant/machines/induction/induction_machine.hpp"
-#include "plant/machines/saturated_induction/saturated_induction_machine_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
 #include "plant/math/rk4.hpp"
 
 namespace drivebench {
@@ -354,7 +354,7 @@ TEST(SaturatedInductionMachine, TheCurveMustBeginAtTheOriginAndRise) {
   EXPECT_EQ(rule(saturating().magnetising_curve), "");
   EXPECT_EQ(rule({}), "has no points but needs two or more");
   EXPECT_EQ(rule(Curve({{-1.0, -0.5}, {1.0, 0.5}})), "begins at [-1, -0.5] but must begin at [0, 0]");
-  const CurveParameter& row = saturated_induction_machine_curves().front();
+  const CurveParameter& row = SaturatedInductionMachine::kind().curves.front();
   AxisParameters axis;
   axis.machine = saturating();
   row.set(axis, Curve({{0.0, 0.0}, {2.0, 1.0}}));

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "plant/machines/pm/pm_machine_rows.hpp"
-#include "plant/machines/wound_rotor/wound_rotor_machine_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
 
 namespace drivebench {
 namespace {
@@ -24,9 +23,9 @@ void expect_rows_of_their_own(AxisParameters p, std::span<const Parameter> rows)
 TEST(SynchronousRows, EachRowHasAMemberOfItsOwn) {
   AxisParameters p;
   p.machine = PmMachineParameters{};
-  expect_rows_of_their_own(p, pm_machine_rows());
+  expect_rows_of_their_own(p, PmMachine::kind().rows);
   p.machine = WoundRotorMachineParameters{};
-  expect_rows_of_their_own(p, wound_rotor_machine_rows());
+  expect_rows_of_their_own(p, WoundRotorMachine::kind().rows);
 }
 
 // Kills: a machine without any torque that is let through, or a reluctance machine that is not.

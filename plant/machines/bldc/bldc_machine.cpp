@@ -139,4 +139,8 @@ double fastest_time_constant_s(const BldcMachineParameters& p) noexcept {
   return (p.star ? c.inductance_h : std::min(c.inductance_h, c.zero_inductance_h)) / p.stator_resistance_ohm;
 }
 
+double electrical_speed_rad_s(const BldcMachineParameters& p, double voltage_v) noexcept {
+  return p.torque_constant_nm_per_a > 0.0 ? p.pole_pairs * voltage_v / p.torque_constant_nm_per_a : 0.0;
+}
+
 }  // namespace drivebench

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
-
 #include "plant/windings.hpp"
 
 namespace drivebench {
@@ -164,14 +162,17 @@ BldcMachineParameters adjusted(const BldcMachineParameters& p, const Adjustment&
 /// The fastest electrical time constant, L/R_S of the smallest inductance that carries current.
 double fastest_time_constant_s(const BldcMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// Electrical angular speed at which the emf reaches a voltage; 0 without a magnet.
+double electrical_speed_rad_s(const BldcMachineParameters& p, double voltage_v) noexcept;
+
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct BldcMachine {
   using Parameters = BldcMachineParameters;
   using Constants = BldcMachineConstants;
   using State = BldcMachineState;
-  static constexpr std::string_view kKind = "bldc";
   static constexpr bool kUsesAngle = false;  ///< they read RotorMotion.angle_rad, but not its cosine and sine
   static constexpr bool kHasCorners = true;  ///< see corner_position()
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

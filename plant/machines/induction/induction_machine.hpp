@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/windings.hpp"
 
 namespace drivebench {
@@ -127,14 +125,14 @@ InductionMachineParameters adjusted(const InductionMachineParameters& p, const A
 /// The fastest electrical time constant at standstill: sets the substep.
 double fastest_time_constant_s(const InductionMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct InductionMachine {
   using Parameters = InductionMachineParameters;
   using Constants = InductionMachineConstants;
   using State = InductionMachineState;
-  static constexpr std::string_view kKind = "induction";
   static constexpr bool kUsesAngle = false;   ///< the equations read the electrical angle
   static constexpr bool kHasCorners = false;  ///< they have kinks at certain angles: see corner_position()
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

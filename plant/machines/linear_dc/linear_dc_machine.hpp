@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/windings.hpp"
 
 namespace drivebench {
@@ -78,14 +76,14 @@ LinearDcMachineParameters adjusted(const LinearDcMachineParameters& p, const Adj
 /// L/R: sets the substep.
 double fastest_time_constant_s(const LinearDcMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct LinearDcMachine {
   using Parameters = LinearDcMachineParameters;
   using Constants = LinearDcMachineConstants;
   using State = LinearDcMachineState;
-  static constexpr std::string_view kKind = "linear_dc";
   static constexpr bool kUsesAngle = false;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

@@ -95,4 +95,8 @@ double fastest_time_constant_s(const PmMachineParameters& p) noexcept {
   return std::min(p.inductance_d_h, p.inductance_q_h) / p.stator_resistance_ohm;
 }
 
+double electrical_speed_rad_s(const PmMachineParameters& p, double voltage_v) noexcept {
+  return p.torque_constant_nm_per_a > 0.0 ? p.pole_pairs * voltage_v / p.torque_constant_nm_per_a : 0.0;
+}
+
 }  // namespace drivebench

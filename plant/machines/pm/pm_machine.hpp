@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/windings.hpp"
 
 namespace drivebench {
@@ -151,14 +149,17 @@ PmMachineParameters adjusted(const PmMachineParameters& p, const Adjustment& a) 
 /// well.
 double fastest_time_constant_s(const PmMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// Electrical angular speed at which the emf reaches a voltage; 0 without a magnet.
+double electrical_speed_rad_s(const PmMachineParameters& p, double voltage_v) noexcept;
+
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct PmMachine {
   using Parameters = PmMachineParameters;
   using Constants = PmMachineConstants;
   using State = PmMachineState;
-  static constexpr std::string_view kKind = "pm_synchronous";
   static constexpr bool kUsesAngle = true;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/windings.hpp"
 
 namespace drivebench {
@@ -75,14 +73,14 @@ PmDcMachineParameters adjusted(const PmDcMachineParameters& p, const Adjustment&
 /// L/R: sets the substep.
 double fastest_time_constant_s(const PmDcMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct PmDcMachine {
   using Parameters = PmDcMachineParameters;
   using Constants = PmDcMachineConstants;
   using State = PmDcMachineState;
-  static constexpr std::string_view kKind = "pm_dc";
   static constexpr bool kUsesAngle = false;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

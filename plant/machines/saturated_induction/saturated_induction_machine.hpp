@@ -2,8 +2,6 @@
 
 #include <cmath>
 #include <span>
-#include <string_view>
-
 #include "plant/math/curve.hpp"
 #include "plant/windings.hpp"
 
@@ -177,14 +175,14 @@ SaturatedInductionMachineParameters adjusted(const SaturatedInductionMachinePara
 /// The fastest electrical time constant at any saturation: sets the substep.
 double fastest_time_constant_s(const SaturatedInductionMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct SaturatedInductionMachine {
   using Parameters = SaturatedInductionMachineParameters;
   using Constants = SaturatedInductionMachineConstants;
   using State = SaturatedInductionMachineState;
-  static constexpr std::string_view kKind = "saturated_induction";
   static constexpr bool kUsesAngle = false;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/machines/field_winding.hpp"
 #include "plant/windings.hpp"
 
@@ -100,14 +98,14 @@ SeparateDcMachineParameters adjusted(const SeparateDcMachineParameters& p, const
 /// L/R or, saturated, L_f/R_f, whichever is less: sets the substep.
 double fastest_time_constant_s(const SeparateDcMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct SeparateDcMachine {
   using Parameters = SeparateDcMachineParameters;
   using Constants = SeparateDcMachineConstants;
   using State = SeparateDcMachineState;
-  static constexpr std::string_view kKind = "separately_excited_dc";
   static constexpr bool kUsesAngle = false;  ///< the coupling reads that of the shaft
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

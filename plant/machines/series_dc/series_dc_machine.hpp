@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/machines/field_winding.hpp"
 #include "plant/windings.hpp"
 
@@ -128,14 +126,14 @@ SeriesDcMachineParameters adjusted(const SeriesDcMachineParameters& p, const Adj
 /// A lower bound, saturated and with the switch closed if there is one: sets the substep.
 double fastest_time_constant_s(const SeriesDcMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct SeriesDcMachine {
   using Parameters = SeriesDcMachineParameters;
   using Constants = SeriesDcMachineConstants;
   using State = SeriesDcMachineState;
-  static constexpr std::string_view kKind = "series_dc";
   static constexpr bool kUsesAngle = false;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

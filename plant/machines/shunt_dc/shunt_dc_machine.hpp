@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/machines/field_winding.hpp"
 #include "plant/windings.hpp"
 
@@ -98,14 +96,14 @@ ShuntDcMachineParameters adjusted(const ShuntDcMachineParameters& p, const Adjus
 /// L/R or, saturated, L_f/R_F, whichever is less: sets the substep.
 double fastest_time_constant_s(const ShuntDcMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct ShuntDcMachine {
   using Parameters = ShuntDcMachineParameters;
   using Constants = ShuntDcMachineConstants;
   using State = ShuntDcMachineState;
-  static constexpr std::string_view kKind = "shunt_dc";
   static constexpr bool kUsesAngle = false;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string_view>
-
 #include "plant/windings.hpp"
 
 namespace drivebench {
@@ -128,14 +126,14 @@ WoundRotorMachineParameters adjusted(const WoundRotorMachineParameters& p, const
 /// The fastest electrical time constant at standstill. The substep must resolve n_p w as well.
 double fastest_time_constant_s(const WoundRotorMachineParameters& p) noexcept;
 
-/// What the drive train needs to know of this kind of machine.
+/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
 struct WoundRotorMachine {
   using Parameters = WoundRotorMachineParameters;
   using Constants = WoundRotorMachineConstants;
   using State = WoundRotorMachineState;
-  static constexpr std::string_view kKind = "wound_rotor_synchronous";
   static constexpr bool kUsesAngle = true;
   static constexpr bool kHasCorners = false;
+  static MachineKind kind() noexcept;
 };
 
 }  // namespace drivebench

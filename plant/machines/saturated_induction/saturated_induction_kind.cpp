@@ -1,10 +1,12 @@
-#include "plant/machines/saturated_induction/saturated_induction_machine_rows.hpp"
+#include "plant/machines/saturated_induction/saturated_induction_machine.hpp"
 
 #include <array>
 #include <string>
 #include <utility>
 
+#include "plant/machines/machine_kind.hpp"
 #include "plant/parameters/rows.hpp"
+#include "plant/train/drive_train_impl.hpp"
 
 namespace drivebench {
 namespace {
@@ -13,15 +15,17 @@ using Machine = SaturatedInductionMachineParameters;
 
 constexpr auto kTable = std::to_array<Parameter>({
     machine_row<Machine, &Machine::pole_pairs>("machine.pole_pairs", "1", 1, 1000, kInteger | kRequired,
-                                               "n_p"),
+                                               "n_p", {1, 40}),
     machine_row<Machine, &Machine::stator_resistance_ohm>("machine.stator_resistance_ohm", "ohm", 1e-6, 1e6,
-                                                          kLive | kRequired, "R_S, two-phase equivalent"),
+                                                          kLive | kRequired, "R_S, two-phase equivalent",
+                                                          {1e-4, 500}),
     machine_row<Machine, &Machine::rotor_resistance_ohm>("machine.rotor_resistance_ohm", "ohm", 1e-6, 1e6,
-                                                         kLive | kRequired, "R_R, two-phase equivalent"),
+                                                         kLive | kRequired, "R_R, two-phase equivalent",
+                                                         {1e-4, 500}),
     machine_row<Machine, &Machine::stator_leakage_h>("machine.stator_leakage_h", "H", 1e-9, 1e3, kRequired,
-                                                     "l_s = L_S - M, two-phase equivalent"),
+                                                     "l_s = L_S - M, two-phase equivalent", {1e-6, 0.3}),
     machine_row<Machine, &Machine::rotor_leakage_h>("machine.rotor_leakage_h", "H", 1e-9, 1e3, kRequired,
-                                                    "l_r = L_R - M, two-phase equivalent"),
+                                                    "l_r = L_R - M, two-phase equivalent", {1e-6, 0.3}),
     machine_row<Machine, &Machine::star>("machine.star", "1", 0, 1, kInteger,
                                          "1: three phases in an isolated star, 0: two phases"),
 });
@@ -40,17 +44,8 @@ constexpr auto kCurves = std::to_array<CurveParameter>({
                Curve curve) { std::get_if<Machine>(&p.machine)->magnetising_curve = std::move(curve); }},
 });
 
-}  // namespace
-
-std::span<const Parameter> saturated_induction_machine_rows() noexcept {
-  return kTable;
-}
-
-std::span<const CurveParameter> saturated_induction_machine_curves() noexcept {
-  return kCurves;
-}
-
-void add_problems(const SaturatedInductionMachineParameters& p, Problems& found) {
+/// The rules between the values.
+void add_broken_rules(const Machine& p, Problems& found) {
   constexpr std::string_view kField = "machine.magnetising_curve";
   if (p.magnetising_curve.empty()) {
     found.add(kField, "has no points but needs two or more");
@@ -61,6 +56,16 @@ void add_problems(const SaturatedInductionMachineParameters& p, Problems& found)
       return "begins at [" + text(first.x) + ", " + text(first.y) + "] but must begin at [0, 0]";
     });
   }
+}
+
+}  // namespace
+
+MachineKind SaturatedInductionMachine::kind() noexcept {
+  return {.name = "saturated_induction",
+          .rows = kTable,
+          .curves = kCurves,
+          .add_broken_rules = rules_of<add_broken_rules>,
+          .make_train = make_drive_train<SaturatedInductionMachine>};
 }
 
 }  // namespace drivebench

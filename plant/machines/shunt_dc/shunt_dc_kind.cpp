@@ -1,8 +1,10 @@
-#include "plant/machines/shunt_dc/shunt_dc_machine_rows.hpp"
+#include "plant/machines/shunt_dc/shunt_dc_machine.hpp"
 
 #include <array>
 
 #include "plant/machines/field_winding_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
+#include "plant/train/drive_train_impl.hpp"
 
 namespace drivebench {
 namespace {
@@ -21,18 +23,20 @@ constexpr auto kTable = std::to_array<Parameter>({
 
 constexpr auto kCurves = std::to_array<CurveParameter>({field_winding_rows::saturation_curve<Machine>()});
 
+/// The rules between the values.
+void add_broken_rules(const Machine& p, Problems& found) {
+  field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
+}
+
 }  // namespace
 
-std::span<const Parameter> shunt_dc_machine_rows() noexcept {
-  return kTable;
-}
-
-std::span<const CurveParameter> shunt_dc_machine_curves() noexcept {
-  return kCurves;
-}
-
-void add_problems(const ShuntDcMachineParameters& p, Problems& found) {
-  field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
+MachineKind ShuntDcMachine::kind() noexcept {
+  return {.name = "shunt_dc",
+          .field = Field::kOnArmature,
+          .rows = kTable,
+          .curves = kCurves,
+          .add_broken_rules = rules_of<add_broken_rules>,
+          .make_train = make_drive_train<ShuntDcMachine>};
 }
 
 }  // namespace drivebench

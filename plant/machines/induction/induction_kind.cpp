@@ -1,8 +1,10 @@
-#include "plant/machines/induction/induction_machine_rows.hpp"
+#include "plant/machines/induction/induction_machine.hpp"
 
 #include <array>
 
+#include "plant/machines/machine_kind.hpp"
 #include "plant/parameters/rows.hpp"
+#include "plant/train/drive_train_impl.hpp"
 
 namespace drivebench {
 namespace {
@@ -11,28 +13,25 @@ using Machine = InductionMachineParameters;
 
 constexpr auto kTable = std::to_array<Parameter>({
     machine_row<Machine, &Machine::pole_pairs>("machine.pole_pairs", "1", 1, 1000, kInteger | kRequired,
-                                               "n_p"),
+                                               "n_p", {1, 40}),
     machine_row<Machine, &Machine::stator_resistance_ohm>("machine.stator_resistance_ohm", "ohm", 1e-6, 1e6,
-                                                          kLive | kRequired, "R_S, two-phase equivalent"),
+                                                          kLive | kRequired, "R_S, two-phase equivalent",
+                                                          {1e-4, 500}),
     machine_row<Machine, &Machine::rotor_resistance_ohm>("machine.rotor_resistance_ohm", "ohm", 1e-6, 1e6,
-                                                         kLive | kRequired, "R_R, two-phase equivalent"),
+                                                         kLive | kRequired, "R_R, two-phase equivalent",
+                                                         {1e-4, 500}),
     machine_row<Machine, &Machine::stator_inductance_h>("machine.stator_inductance_h", "H", 1e-9, 1e3,
-                                                        kRequired, "L_S"),
+                                                        kRequired, "L_S", {1e-4, 3}),
     machine_row<Machine, &Machine::rotor_inductance_h>("machine.rotor_inductance_h", "H", 1e-9, 1e3,
-                                                       kRequired, "L_R"),
+                                                       kRequired, "L_R", {1e-4, 3}),
     machine_row<Machine, &Machine::mutual_inductance_h>("machine.mutual_inductance_h", "H", 1e-9, 1e3,
-                                                        kRequired, "M"),
+                                                        kRequired, "M", {1e-4, 3}),
     machine_row<Machine, &Machine::star>("machine.star", "1", 0, 1, kInteger,
                                          "1: three phases in an isolated star, 0: two phases"),
 });
 
-}  // namespace
-
-std::span<const Parameter> induction_machine_rows() noexcept {
-  return kTable;
-}
-
-void add_problems(const InductionMachineParameters& p, Problems& found) {
+/// The rules between the values.
+void add_broken_rules(const Machine& p, Problems& found) {
   const bool has_inductances = p.rotor_inductance_h > 0.0 && p.stator_inductance_h > 0.0;
   if (const double sigma = has_inductances ? leakage_factor(p) : 1.0; !(sigma > 0.0)) {
     found.add("machine.mutual_inductance_h", [&] {
@@ -40,6 +39,15 @@ void add_problems(const InductionMachineParameters& p, Problems& found) {
              " but it must be above 0";
     });
   }
+}
+
+}  // namespace
+
+MachineKind InductionMachine::kind() noexcept {
+  return {.name = "induction",
+          .rows = kTable,
+          .add_broken_rules = rules_of<add_broken_rules>,
+          .make_train = make_drive_train<InductionMachine>};
 }
 
 }  // namespace drivebench

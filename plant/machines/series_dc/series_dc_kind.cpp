@@ -1,8 +1,10 @@
-#include "plant/machines/series_dc/series_dc_machine_rows.hpp"
+#include "plant/machines/series_dc/series_dc_machine.hpp"
 
 #include <array>
 
 #include "plant/machines/field_winding_rows.hpp"
+#include "plant/machines/machine_kind.hpp"
+#include "plant/train/drive_train_impl.hpp"
 
 namespace drivebench {
 namespace {
@@ -24,22 +26,24 @@ constexpr auto kTable = std::to_array<Parameter>({
 
 constexpr auto kCurves = std::to_array<CurveParameter>({field_winding_rows::saturation_curve<Machine>()});
 
-}  // namespace
-
-std::span<const Parameter> series_dc_machine_rows() noexcept {
-  return kTable;
-}
-
-std::span<const CurveParameter> series_dc_machine_curves() noexcept {
-  return kCurves;
-}
-
-void add_problems(const SeriesDcMachineParameters& p, Problems& found) {
+/// The rules between the values.
+void add_broken_rules(const Machine& p, Problems& found) {
   field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
   if (p.field_shunt && p.field_shunt_resistance_ohm == 0.0) {
     found.add("machine.field_shunt",
               "is 1 but must be 0 without a resistor: machine.field_shunt_resistance_ohm is 0");
   }
+}
+
+}  // namespace
+
+MachineKind SeriesDcMachine::kind() noexcept {
+  return {.name = "series_dc",
+          .field = Field::kOnArmature,
+          .rows = kTable,
+          .curves = kCurves,
+          .add_broken_rules = rules_of<add_broken_rules>,
+          .make_train = make_drive_train<SeriesDcMachine>};
 }
 
 }  // namespace drivebench
