@@ -17,7 +17,7 @@ constexpr LinearDcMachineParameters kBar{
 constexpr RigLoad kSlide{.inertia_kgm2 = 0.2, .friction_nms = 0.8};  // kg and N s/m
 constexpr double kVoltage_v = 10.0;
 
-using BarRig = Rig<LinearDcMachineState>;
+using BarRig = Rig<PmDcMachineState>;
 
 double steady_speed_m_s(const LinearDcMachineParameters& p) {
   const double bl = p.flux_density_t * p.bar_length_m;
@@ -40,8 +40,7 @@ TEST(LinearDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
     p.inductance_h = 1e-3;
     p.flux_density_t = draw(2.0);
     const RotorMotion motion = motion_of({.speed_rad_s = draw(20.0)});
-    ASSERT_LT(unbalanced(constants_of(p), LinearDcMachineState{draw(50.0)}, motion, voltage(draw(40.0))),
-              1e-9)
+    ASSERT_LT(unbalanced(constants_of(p), PmDcMachineState{draw(50.0)}, motion, voltage(draw(40.0))), 1e-9)
         << "state " << n;
   }
 }
@@ -49,7 +48,7 @@ TEST(LinearDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
 // DC-03. Kills: a lost factor B or l. The loop inductance shifts nothing once the bar is steady: 40 time
 // constants, the rest is rounding. Energy: RK4 at a twentieth of L/R leaves 3e-11 of it.
 TEST(LinearDcMachine, ReachesTheSteadySpeedOfTheReference) {
-  const LinearDcMachineConstants c = constants_of(kBar);
+  const PmDcMachineConstants c = constants_of(kBar);
   BarRig rig;
   run(rig, 40.0 * time_constant_s(kBar), 1e-6, c, voltage(kVoltage_v), kSlide);
   EXPECT_NEAR(steady_speed_m_s(kBar), 4.545454545, 1e-9);
@@ -96,9 +95,9 @@ TEST(LinearDcMachine, TurningTheFieldRoundTurnsTheMotionRound) {
 
 // Kills: an open loop that carries current, an emf of the wrong sign, an adjustment of the wrong parameter.
 TEST(LinearDcMachine, OpensAndAdjustsAsTheOtherArmaturesDo) {
-  const LinearDcMachineConstants c = constants_of(kBar);
+  const PmDcMachineConstants c = constants_of(kBar);
   const RotorMotion motion = motion_of({.speed_rad_s = 3.0});
-  EXPECT_EQ(derivative(c, LinearDcMachineState{}, motion, open_terminals()).i_a_a, 0.0);
+  EXPECT_EQ(derivative(c, PmDcMachineState{}, motion, open_terminals()).i_a_a, 0.0);
   EXPECT_EQ(restricted(c, {.i_a_a = 3.0}, motion, open_terminals()).i_a_a, 0.0);
   EXPECT_EQ(restricted(c, {.i_a_a = 3.0}, motion, voltage(1.0)).i_a_a, 3.0);
   EXPECT_EQ(open_circuit_voltages(c, {}, motion).stator.a, 6.0);
