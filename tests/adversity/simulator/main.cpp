@@ -55,7 +55,7 @@ bool read_seeds(std::string_view text, Options& o) {
          o.first <= o.last;
 }
 
-/// What is wrong with the command line; empty: nothing.
+/// The mistake in the command line; empty: none.
 std::string read_options(int argc, char** argv, Options& o) {
   bool seeds = false;
   bool for_seeds_only = false;
@@ -95,7 +95,7 @@ Outcome run_seed(std::uint64_t seed, const Options& o) {
   return world.run(o.duration);
 }
 
-/// `first`: the seed from which on all are needed to see it again.
+/// `first`: the first of the seeds that are needed to see the failure again.
 void print_failure(const Outcome& outcome, std::uint64_t first, const Options& o) {
   const std::string range = first == outcome.seed ? "" : std::to_string(first) + "..";
   std::printf(
@@ -112,7 +112,7 @@ std::ptrdiff_t open_files() {
                        std::filesystem::directory_iterator());
 }
 
-/// What a seed leaves behind in this process.
+/// Descriptors and memory that a seed leaves behind in this process.
 class Leftovers {
  public:
   std::string problem() {

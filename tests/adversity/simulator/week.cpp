@@ -44,7 +44,7 @@ class Week {
     const auto per_second = static_cast<Tick>(1'000'000'000 / config_.setup.period_ns);
     const Tick end = static_cast<Tick>(seconds) * per_second;
     const Tick hour = 3600 * per_second;
-    const Tick check = std::min(hour, end / 3);  // a short run is looked at as well
+    const Tick check = std::min(hour, end / 3);  // a short run is checked as well
     std::size_t memory_before = 0;
     while (bench_.tick() < end && problem_.empty()) {
       const Tick tick = bench_.tick();
@@ -54,7 +54,7 @@ class Week {
       ++steps_;
       account_.see(bench_.sample(0), late_);
       if (bench_.tick() % check != 0) continue;
-      if (!pass_through_bytes()) problem_ = "a saved state is a state";
+      if (!pass_through_bytes()) problem_ = "a saved state can be restored";
       const std::size_t memory = ::mallinfo2().uordblks;
       if (memory_before != 0 && memory > memory_before + 65536) problem_ = "memory stays flat";
       if (memory_before == 0) memory_before = memory;
@@ -92,7 +92,7 @@ class Week {
     return bench_.submit({.tick = tick, .axis = 0, .owner = owner_, .action = action});
   }
 
-  /// An honest controller: takes the axis, clears what is latched, and turns the voltage.
+  /// An honest controller: takes the axis, clears latched faults, and turns the voltage.
   void command(Tick tick) {
     if (bench_.owner(0) != owner_) {
       submit(LeaseAction::kAcquire);

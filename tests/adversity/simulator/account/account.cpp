@@ -11,7 +11,8 @@
 namespace drivebench::simulator {
 namespace {
 
-/// A tick for the engine to take the request, one for its sample, one because the I/O may run in between.
+/// Ticks until a departure shows: the engine takes the request, its sample follows, and the I/O may run in
+/// between.
 constexpr Tick kTicksToGo = 3;
 
 bool is_latched_state(std::uint64_t state) {
@@ -40,7 +41,7 @@ void AxisAccount::require(bool holds, const char* promise) {
 }
 
 void AxisAccount::see(const Sample& s, std::uint64_t late_ticks, bool stalled) {
-  // In lockstep they are counted before they are told.
+  // In lockstep the bench counts a refusal before the client gets it.
   require(!lockstep_ || s.refused_commands >= refusals_told_, "every refused command is counted at once");
   const bool whole = s.tick == before_.tick + 1;
   if (seen_ && stalled && !whole) {
@@ -50,7 +51,7 @@ void AxisAccount::see(const Sample& s, std::uint64_t late_ticks, bool stalled) {
   } else if (seen_) {
     late_now_ = late_ticks != late_before_;
     require(whole, "every tick has one sample");
-    require(s.late_ticks == late_ticks, "late ticks are counted, all of them and no others");
+    require(s.late_ticks == late_ticks, "exactly the late ticks are counted");
     check_numbers(s);
     check_counters(s);
     check_state(s);
@@ -63,7 +64,7 @@ void AxisAccount::see(const Sample& s, std::uint64_t late_ticks, bool stalled) {
 }
 
 void AxisAccount::check_numbers(const Sample& s) {
-  double zero = 0.0;  // times infinity is no number
+  double zero = 0.0;  // zero times infinity is NaN
   for (double Sample::*member : kReals)
     zero += 0.0 * s.*member;
   if (zero == 0.0) return;
@@ -82,13 +83,12 @@ void AxisAccount::check_counters(const Sample& s) {
   if (skipped_ || ((s.injected | before_.injected) >> kRow & 1) != 0) {
     copies_ += (s.tick - before_.tick) * static_cast<std::uint64_t>(kInjectableFaults[kRow].maximum);
   }
-  require(s.refused_commands <= commands_ + copies_ + scheduled_,
-          "nothing is refused that was not asked for");
+  require(s.refused_commands <= commands_ + copies_ + scheduled_, "every refusal has a request");
   const bool missed = s.missed_commands != before_.missed_commands;
   require(!missed || !late_now_, "a late tick misses no command");
   require(!missed || is(before_, ControlState::kRun) || is(before_, ControlState::kHold) ||
               is(before_, ControlState::kReady),
-          "a command is missed by an axis that had some");
+          "only a commanded axis misses a command");
   if (missed) ++silent_;
   if (is(s, ControlState::kRun) || is(s, ControlState::kReady) || is(s, ControlState::kIdle)) silent_ = 0;
 }
@@ -96,9 +96,9 @@ void AxisAccount::check_counters(const Sample& s) {
 void AxisAccount::check_state(const Sample& s) {
   const std::uint64_t latched = s.faults & kLatchedFaults;
   const std::uint64_t latched_before = before_.faults & kLatchedFaults;
-  require(s.state <= static_cast<std::uint64_t>(ControlState::kReady), "a state is one that there is");
-  require(!is_latched_state(s.state) || latched != 0, "timeout and fault have a reason");
-  // What was cleared may be there again at the end of the tick, but the state tells.
+  require(s.state <= static_cast<std::uint64_t>(ControlState::kReady), "a state is one of the enumeration");
+  require(!is_latched_state(s.state) || latched != 0, "timeout and fault have a latched bit");
+  // A cleared fault may return by the end of the tick, but the state shows that it was cleared.
   const bool cleared =
       (latched_before & ~latched) != 0 || (latched_before != 0 && !is_latched_state(s.state));
   // In lockstep the answer may come before the tick runs.
@@ -112,12 +112,12 @@ void AxisAccount::check_state(const Sample& s) {
   require(!hold || is(before_, ControlState::kRun) || is(before_, ControlState::kHold),
           "only a driven axis can hold");
   require(!hold || late_now_ || !same_owner || s.missed_commands != before_.missed_commands,
-          "an axis that holds misses a command");
+          "an axis holds only when it misses a command");
   require((!is(s, ControlState::kRun) && !hold) || s.owner != 0, "a driven axis has an owner");
   require(!hold || (silent_ < setup_.watchdog_ticks), "the watchdog comes in time");
   const bool timed_out = (latched & ~latched_before & kCommandTimeout) != 0;
   require(!timed_out || skipped_ || silent_ >= setup_.watchdog_ticks, "the watchdog does not come too early");
-  const auto lease = leases_.find(s.owner);  // given back and taken again within a tick it begins anew
+  const auto lease = leases_.find(s.owner);  // a lease given back and taken again within a tick begins anew
   const bool stays = same_owner && (lease == leases_.end() || !lease->second.gave_back);
   require(!is(s, ControlState::kIdle) || !stays || cleared || is(before_, ControlState::kIdle) ||
               is(before_, ControlState::kReady) || s.owner == 0,
@@ -130,7 +130,8 @@ void AxisAccount::check_owner(const Sample& s) {
     if (lease != leases_.end()) {
       std::set<Tick>& answered = lease->second.answered;
       lease->second.renewed = std::max(lease->second.renewed, static_cast<Tick>(s.tick) - 3);
-      require(s.command_tick < 0 || answered.contains(s.command_tick), "the owner has sent what is in force");
+      require(s.command_tick < 0 || answered.contains(s.command_tick),
+              "the owner has sent the command in force");
       answered.erase(answered.begin(), answered.lower_bound(s.command_tick));
     }
   }
@@ -145,7 +146,7 @@ void AxisAccount::check_owner(const Sample& s) {
   const auto lost = leases_.find(before_.owner);
   if (lost == leases_.end() || lost->second.may_go || !lost->second.is_there()) return;
   require(static_cast<Tick>(s.tick) - lost->second.renewed >= setup_.lease_ticks,
-          "nobody takes an axis from an owner that is there");
+          "no client takes an axis from a connected owner");
 }
 
 void AxisAccount::io_done(Owner owner) {
@@ -154,7 +155,8 @@ void AxisAccount::io_done(Owner owner) {
     const auto now = static_cast<Tick>(before_.tick);
     if (each.seen < 0) each.seen = now;
     if (!each.asks || now > each.seen) each.deadline = now + kTicksToGo;
-    require(!lockstep_ || owner != each.owner, "in lockstep the lease of who is gone is given back at once");
+    require(!lockstep_ || owner != each.owner,
+            "in lockstep the lease of a closed session is given back at once");
   }
 }
 
@@ -183,7 +185,7 @@ void AxisAccount::may_keep(const std::string& transport, Time until) {
 }
 
 void AxisAccount::check_quiet(const std::string& transport, Time awake) {
-  require(awake <= kept_until_[transport], "who has nothing to say any more does not keep an axis");
+  require(awake <= kept_until_[transport], "a silent client does not keep an axis");
 }
 
 void AxisAccount::gone(Owner owner, bool asks) {
@@ -198,15 +200,15 @@ void AxisAccount::command_sent(Owner owner, Tick answers) {
 }
 
 void AxisAccount::clear_done(Owner owner, Tick tick) {
-  require(leases_.contains(owner), "nobody clears without a lease");
+  require(leases_.contains(owner), "no client clears without a lease");
   std::erase(clearings_, tick);
   if (tick >= static_cast<Tick>(before_.tick)) clears_done_.insert(tick);
 }
 
 void AxisAccount::see_end(const Sample& s) {
-  require(s.owner == 0, "when all are gone nobody owns an axis");
+  require(s.owner == 0, "without clients no axis has an owner");
   require(lockstep_ || s.refused_commands >= refusals_told_, "every refused command is counted");
-  require(skipped_ || clearings_.size() <= clears_unknown_, "only the owner clears what is latched");
+  require(skipped_ || clearings_.size() <= clears_unknown_, "only the owner clears a latched fault");
 }
 
 }  // namespace drivebench::simulator

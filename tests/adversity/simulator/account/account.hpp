@@ -13,59 +13,59 @@
 
 namespace drivebench::simulator {
 
-/// What the simulator knows of an axis by itself, against which every sample is held.
+/// The simulator's own account of an axis, with which it compares every sample.
 class AxisAccount {
  public:
   using Report = std::function<void(const std::string&)>;
 
-  /// `broken` is told of every promise that does not hold.
+  /// `broken` gets every promise that does not hold.
   AxisAccount(const BenchSetup& setup, std::size_t axis, bool lockstep, Report broken)
       : setup_(setup), axis_(axis), lockstep_(lockstep), broken_(std::move(broken)) {}
 
-  /// After each tick. `late_ticks`: so many started late until now; `stalled`: the I/O stood still, which may
-  /// cost it samples when the ring is full.
+  /// Call it after each tick. `late_ticks`: how many ticks have started late so far; `stalled`: the I/O stood
+  /// still, which may cost it samples when the ring is full.
   void see(const Sample& s, std::uint64_t late_ticks, bool stalled = false);
-  /// After the I/O had its turn, with the owner that it knows.
+  /// Call it after the I/O ran, with the owner that the I/O knows.
   void io_done(Owner owner);
-  /// When everything has settled and nobody is connected any more.
+  /// Call it at the end, without any connected client.
   void see_end(const Sample& s);
 
-  // ---- told by clients ----
+  // ---- reports of the clients ----
 
-  /// This owner has, or had, the lease, which was renewed at this tick; `is_there` says whether it could
-  /// still speak.
+  /// This owner has, or had, the lease, renewed at this tick; `is_there` says whether its session is still
+  /// connected.
   void granted(Owner owner, Tick tick, std::function<bool()> is_there);
-  /// It has asked for its lease to end.
+  /// The owner has asked for its lease to end.
   void may_go(Owner owner);
-  /// It is gone without a word: the axis must be free soon. `asks`: with a request for the lease that has no
-  /// answer yet.
+  /// The owner's session is gone without a release: the axis must be free soon. `asks`: a request for the
+  /// lease had no answer yet.
   void gone(Owner owner, bool asks);
-  /// Nobody will hear of this owner again.
+  /// No client will speak for this owner again.
   void forget(Owner owner) { leases_.erase(owner); }
-  /// An administrator asks for the axis, whoever has it, until `force_ends`.
+  /// An administrator asks for the axis, with any owner, until `force_ends`.
   void force_begins();
   void force_ends() { --forces_; }
-  /// It has the lease, which it has taken by force; in lockstep the sample that shows it is still to come.
+  /// An administrator has taken the lease by force; in lockstep the sample that shows it is still to come.
   void came_by_force(Owner owner) {
     if (before_.owner != owner) by_force_.insert(owner);
   }
   void command_sent() { ++commands_; }
-  /// By an owner, as the answer to this tick.
+  /// An owner sent a command, as the answer to this tick.
   void command_sent(Owner owner, Tick answers);
-  /// It was sent this sample.
+  /// A client got this sample.
   void told(const v1::Sample& sample, bool in_status) {
-    require(history_.agrees(sample, in_status), "who is told of a sample is told what it says");
+    require(history_.agrees(sample, in_status), "a client gets samples as they were");
   }
   void command_refused() { ++refusals_told_; }
-  /// Somebody on a transport that tells of no owners has spoken: he may keep the axis until then, in times of
-  /// Scene::awake().
+  /// A client on a transport without reported owners has sent something: it may keep the axis until then, in
+  /// times of Scene::awake().
   void may_keep(const std::string& transport, Time until);
-  /// The axis is owned by somebody on this transport.
+  /// The axis is owned over this transport.
   void check_quiet(const std::string& transport, Time awake);
-  /// A request to clear was sent; carried out by that owner at that tick; or will never have an answer.
+  /// A clear was requested; that owner's was executed at that tick; or its answer will never come.
   void clear_done(Owner owner, Tick tick);
   void clear_unanswered() { ++clears_unknown_; }
-  /// An input for later, which may be refused then.
+  /// A client sent an input for later, which may be refused then.
   void scheduled() { ++scheduled_; }
 
  private:
@@ -73,7 +73,7 @@ class AxisAccount {
     Tick renewed = 0;  ///< at this tick or later
     bool may_go = false;
     bool gave_back = false;   ///< at some time
-    std::set<Tick> answered;  ///< by its commands, from that in force on
+    std::set<Tick> answered;  ///< by its commands, from the one in force on
     std::function<bool()> is_there;
   };
 
@@ -92,23 +92,23 @@ class AxisAccount {
   History history_;
   std::uint64_t late_before_ = 0;
   bool late_now_ = false;
-  bool skipped_ = false;     ///< some samples were never seen
+  bool skipped_ = false;     ///< the account missed some samples
   std::int64_t silent_ = 0;  ///< ticks in a row without a command
   std::map<Owner, Lease> leases_;
   struct Leaving {
     Owner owner;
-    bool asks;           ///< the bench may only be giving it the lease
+    bool asks;           ///< the bench may be about to give it the lease
     Tick seen = -1;      ///< by the I/O, before this tick
     Tick deadline = -1;  ///< -1: the I/O does not know yet that there is a lease to give back
   };
   std::vector<Leaving> leaving_;
-  std::vector<Tick> clearings_;  ///< when latched faults were cleared, not yet known to be asked for
-  std::set<Tick> clears_done_;   ///< of which no sample tells yet
+  std::vector<Tick> clearings_;  ///< of cleared faults whose request is not known yet
+  std::set<Tick> clears_done_;   ///< not yet shown by a sample
   std::set<Owner> by_force_;
   int forces_ = 0;                          ///< under way
   std::map<std::string, Time> kept_until_;  ///< by transport, at the latest
   std::uint64_t commands_ = 0;
-  std::uint64_t copies_ = 0;  ///< of commands, that the injected fault may have made
+  std::uint64_t copies_ = 0;  ///< of commands, perhaps made by the injected fault
   std::uint64_t refusals_told_ = 0;
   std::uint64_t clears_unknown_ = 0;
   std::uint64_t scheduled_ = 0;

@@ -10,12 +10,12 @@
 
 namespace drivebench::simulator {
 
-/// The last samples of an axis, against which those are held that clients are told.
+/// The last samples of an axis, with which the samples that clients get are compared.
 class History {
  public:
   void add(const Sample& s) { ring_[s.tick % kSize] = s; }
-  /// Whether it says what there was at its tick; true of ticks that nobody remembers. A status names the
-  /// owner of now, who in lockstep may have come since.
+  /// Whether it equals the sample of its tick; true of ticks before the history. A status names the present
+  /// owner, which in lockstep may be newer than the sample.
   bool agrees(const v1::Sample& told, bool in_status) const;
 
  private:

@@ -14,8 +14,8 @@ class Trace {
  public:
   explicit Trace(bool prints) : prints_(prints) {}
 
-  /// `what` must live for ever.
-  void add(Time time, const char* what, std::uint64_t who = 0, std::uint64_t a = 0, std::uint64_t b = 0);
+  /// `what` must outlive the trace.
+  void add(Time time, const char* what, std::uint64_t source = 0, std::uint64_t a = 0, std::uint64_t b = 0);
   std::uint64_t hash() const noexcept { return hash_; }
   std::uint64_t count() const noexcept { return count_; }
   /// The last ones, a line each.
@@ -25,7 +25,7 @@ class Trace {
   struct Event {
     Time time = 0;
     const char* what = "";
-    std::uint64_t who = 0;
+    std::uint64_t source = 0;
     std::uint64_t a = 0;
     std::uint64_t b = 0;
   };

@@ -38,7 +38,8 @@ void CanDrive::take_turn() {
   if (scene_.ending) return;
   scene_.schedule.after(kTurn, [this] { take_turn(); });
   const Time now = scene_.schedule.now();
-  // In lockstep who has commanded the tick may be silent until the others have, unless it sends heartbeats.
+  // In lockstep a controller that has commanded the tick may be silent until the others have, unless it sends
+  // heartbeats.
   const bool waits =
       scene_.engine->config().mode == RunMode::kLockstep && commanded_ == scene_.engine->tick();
   if (waits && !is_monitored()) keep();
@@ -79,7 +80,7 @@ void CanDrive::disturb() {
       return scene_.schedule.after(length, [this] { wire_.set_link(can::BusState::kUp); });
     }
     case 4: {
-      can::Frame noise{};  // never one of the identifiers that only a bench sends
+      can::Frame noise{};  // never an identifier that only a bench sends
       noise.id = 0x600 + static_cast<std::uint32_t>(random_.below(0x80));
       noise.size = static_cast<std::uint8_t>(random_.below(9));
       for (std::uint8_t& byte : noise.data)
@@ -93,7 +94,7 @@ void CanDrive::disturb() {
 
 void CanDrive::on_frame(const can::Frame& frame) {
   const can::Match found = can::match(profile_, frame);
-  scene_.require(found.ok(), "what the bench sends on the bus is a message");
+  scene_.require(found.ok(), "every frame of the bench is a message");
   if (!found.ok() || (found.row->per_node && found.node != node_)) return;
   const can::Values values = can::decode(*found.row, profile_, frame);
   const auto field = [&](std::string_view name) { return values[can::index_of(*found.row, name)]; };
@@ -152,7 +153,7 @@ void CanDrive::request(can::Request request) {
                   static_cast<double>(kController)});
 }
 
-/// Whose heartbeats the bench has heard, loses the lease soon after the last of them.
+/// A controller with heartbeats loses the lease soon after the last of them.
 void CanDrive::keep() {
   const Time keeps = is_monitored() ? kHeartbeatLimit : std::max(scene_.lease(), kIdle);
   scene_.axes[axis_].may_keep("can", scene_.awake() + keeps + Scene::kSlack);
@@ -173,7 +174,7 @@ void CanDrive::finish() {
   wire_.set_full(false);
   wire_.set_link(can::BusState::kUp);
   answered_ = false;
-  scene_.schedule.after(200 * kMillisecond, [this] {  // what was disturbed before is over then
+  scene_.schedule.after(200 * kMillisecond, [this] {  // earlier disturbances are over then
     wire_.set_link(can::BusState::kUp);
     send(can::Message::kRequest, std::array{static_cast<double>(can::Request::kRenew), 0.0, 0.0});
   });

@@ -8,8 +8,8 @@
 
 namespace drivebench::simulator {
 
-/// The control board of one axis on a CAN bus in memory, and what befalls that bus: frames get lost, double
-/// and old, there is no room, the wire breaks, the controller reports errors, and the board forgets to live.
+/// The control board of one axis on a CAN bus in memory, and the faults of that bus: frames get lost, doubled
+/// and late, the queue is full, the wire breaks, the controller reports errors, and the board falls silent.
 class CanDrive final : public Player {
  public:
   CanDrive(Scene& scene, can::MemoryWire& wire, const can::Profile& profile, std::uint32_t axis);
@@ -42,7 +42,7 @@ class CanDrive final : public Player {
   std::uint32_t node_;
   bool wide_;
   double commands_ = 0.0;         ///< share of the ticks that it answers
-  Time sick_until_ = 0;           ///< no heartbeat
+  Time sick_until_ = 0;           ///< without heartbeats
   std::uint64_t heartbeats_ = 0;  ///< since it got the lease, or the bus was disturbed
   Time dead_until_ = 0;           ///< sends nothing at all
   Tick commanded_ = -1;           ///< tick of its last command

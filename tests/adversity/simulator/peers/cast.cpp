@@ -13,7 +13,7 @@ constexpr auto kBenches =
     std::to_array<const char*>({"servo", "servo", "dc-a-servo", "pm-stepper", "dynamometer", "dc-shunt-servo",
                                 "stepper-current", "servo-hoist"});
 
-/// Ticks so much longer, of as many more steps: the same plant, fewer samples.
+/// Longer ticks with as many more steps: the same plant, fewer samples.
 void stretch(BenchSetup& setup, std::int64_t factor) {
   setup.period_ns *= factor;
   setup.substeps *= static_cast<int>(factor);
@@ -112,7 +112,7 @@ BenchConfig draw_bench(Random& random) {
   while (config.setup.substeps * factor > kMaxSubsteps && factor > 1)
     factor /= 2;
   stretch(config.setup, factor);
-  // Short ticks are many; some seeds have them all the same.
+  // Short ticks make many samples; some seeds have them all the same.
   if (config.setup.period_ns < 400 * kMicrosecond && random.chance(0.85)) {
     config = servo_bench(1 + which % 2);
     stretch(config.setup, 8);

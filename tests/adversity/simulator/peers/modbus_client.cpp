@@ -33,7 +33,7 @@ void ModbusClient::take_turn() {
   if (scene_.ending) return;
   scene_.schedule.after(random_.between(1, 12) * kMillisecond, [this] { take_turn(); });
   const bool is_quiet = scene_.schedule.now() < quiet_until_;
-  // A client that waits for its tick is looked after twice a second, and its key keeps the lease.
+  // The server checks a client that waits for its tick twice a second, and its key keeps the lease.
   if (!is_quiet || may_be_heard()) {
     const Time keeps = kLookedAfter + std::max(scene_.lease(), kConnectionIdle) + Scene::kSlack;
     scene_.axes[axis_].may_keep("modbus", scene_.awake() + keeps);
@@ -52,7 +52,8 @@ void ModbusClient::take_turn() {
   read();
 }
 
-/// Although it says nothing: something is on its way, or waits for a tick that others delay.
+/// A client that sends nothing keeps it too: bytes are on their way, or it waits for a tick that others
+/// delay.
 bool ModbusClient::may_be_heard() const {
   const bool lockstep = scene_.engine->config().mode == RunMode::kLockstep;
   return wire_ && wire_->is_open() && (wire_->has_under_way() || (lockstep && !asked_.empty()));

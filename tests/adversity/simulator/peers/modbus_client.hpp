@@ -11,7 +11,7 @@
 
 namespace drivebench::simulator {
 
-/// A Modbus client that reads, takes the lease, commands, and now and then sends what is no request.
+/// A Modbus client that reads, takes the lease, commands, and now and then sends invalid requests.
 class ModbusClient final : public Player {
  public:
   /// `connect` gives the client's end of a new connection to the server.
@@ -45,7 +45,7 @@ class ModbusClient final : public Player {
   std::deque<std::uint16_t> asked_;  ///< transactions without an answer, in order
   std::vector<std::uint8_t> received_;
   bool raw_ = false;
-  Time quiet_until_ = 0;  ///< says nothing
+  Time quiet_until_ = 0;  ///< sends nothing
 };
 
 }  // namespace drivebench::simulator

@@ -11,9 +11,9 @@ constexpr std::size_t kReadCapacity = std::size_t{256} * 1024;
 /// The server ends a session that does not say hello within 2 s.
 constexpr Time kHelloLimit = 2 * kSecond;
 constexpr Time kSlack = 50 * kMillisecond;
-/// Until then the server has seen who is gone.
+/// By then the server has noticed every closed connection.
 constexpr Time kSettled = 500 * kMillisecond;
-/// What came later may not have been read at the end.
+/// Messages that come later may be unread at the end.
 constexpr std::uint64_t kLastWords = 20 * kMillisecond;
 
 }  // namespace
@@ -135,7 +135,7 @@ void StreamClient::read() {
     budget = bytes.size() < room ? 0 : budget - bytes.size();
     while (const auto frame = reader_->next())
       on_frame(*frame);
-    scene_.require(reader_->error().empty(), "what the server sends is framed");
+    scene_.require(reader_->error().empty(), "the server sends whole frames");
   }
   if (!wire_->is_open()) {
     scene_.note("is cut off", number_);
@@ -149,13 +149,13 @@ void StreamClient::read() {
 
 void StreamClient::on_frame(std::span<const std::byte> frame) {
   scene_.require(answer_.ParseFromArray(frame.data(), static_cast<int>(frame.size())),
-                 "what the server sends is an Envelope");
+                 "every frame of the server is an Envelope");
   scene_.note("hears", number_, static_cast<std::uint64_t>(answer_.kind_case()), answer_.id());
   if (answer_.kind_case() == v1::Envelope::kSamples) return on_samples(answer_.samples());
   if (answer_.id() == 0) {
     return scene_.require(
         answer_.kind_case() == v1::Envelope::kRefusal || answer_.kind_case() == v1::Envelope::kNotice,
-        "unasked come samples, refusals and notices only");
+        "messages without a request are samples, refusals and notices");
   }
   const auto found = asked_.find(answer_.id());
   if (raw_ && found == asked_.end()) return;
@@ -182,7 +182,7 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
     case v1::Envelope::kExchangeReply:
       for (const v1::AxisSample& each : answer_.exchange_reply().samples()) {
         scene_.require(!asked.counts || (each.axis() == asked.axis && each.sample().tick() > asked.tick),
-                       "an exchange is answered with what came after its command");
+                       "an exchange is answered with the samples after its command");
         is_told(each.axis(), each.sample());
       }
       if (manners_.controls) control_later();
@@ -197,10 +197,11 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
   }
 }
 
-/// Nobody comes any more; who was sent away between the question and now may have been counted or not.
+/// No client connects any more; a session that ended between question and answer may have been counted or
+/// not.
 void StreamClient::on_last_look(std::uint64_t sessions) {
   scene_.require(sessions <= sessions_when_asked_ && sessions >= scene_.connected(),
-                 "the server keeps the sessions that there are, and no others");
+                 "the server keeps exactly the connected sessions");
 }
 
 void StreamClient::on_done(const Asked& asked, const v1::Done& done) {
@@ -238,12 +239,12 @@ void StreamClient::on_refusal(const Asked& asked, const v1::Refusal& refusal) {
   if (refusal.code() == v1::REFUSAL_LATCHED) latched_[asked.axis] = true;
   const bool counted = refusal.code() == v1::REFUSAL_NOT_OWNER || refusal.code() == v1::REFUSAL_LATCHED ||
                        refusal.code() == v1::REFUSAL_STALE || refusal.code() == v1::REFUSAL_NOT_FINITE;
-  // An exchange that waited was good when it came.
+  // An exchange that waited was valid on arrival.
   const bool robbed = refusal.message().find("was taken by") != std::string::npos;
   if (asked.counts && counted && !robbed && !scene_.time_waited) scene_.axes[asked.axis].command_refused();
   if (asked.kind == v1::Envelope::kExchange && manners_.controls) {
     v1::Envelope request;
-    request.mutable_exchange();  // what is the newest tick?
+    request.mutable_exchange();  // asks for the newest tick
     if (!scene_.ending) ask(request);
   }
 }
@@ -251,7 +252,7 @@ void StreamClient::on_refusal(const Asked& asked, const v1::Refusal& refusal) {
 void StreamClient::on_samples(const v1::Samples& samples) {
   scene_.require(samples.axis() < axis_count(), "samples are those of an axis");
   Subscription& s = samples_[samples.axis()];
-  scene_.require(s.every > 0, "samples come to who wants them");
+  scene_.require(s.every > 0, "only subscribers get samples");
   if (s.every == 0) return;
   std::uint64_t skipped = samples.dropped();
   const bool stalled = scene_.schedule.now() < scene_.stalled_until + kSecond;
@@ -259,10 +260,10 @@ void StreamClient::on_samples(const v1::Samples& samples) {
   for (const v1::Sample& sample : samples.samples()) {
     scene_.require(sample.tick() % s.every == 0, "samples are those of every n-th tick");
     scene_.require(sample.tick() / s.every == s.last / s.every + skipped + 1,
-                   "what a viewer has lost is what it is told");
+                   "a viewer is told of exactly its lost samples");
     s.last = sample.tick();
     skipped = 0;
-    // Of the first and the last of a message the whole is looked at, which takes its time.
+    // The first and the last sample of a message are compared whole, which takes time.
     const bool at_end = &sample == &*samples.samples().begin() || &sample == &*samples.samples().rbegin();
     at_end ? is_told(samples.axis(), sample) : see(samples.axis(), sample);
   }
@@ -285,7 +286,7 @@ void StreamClient::finish() {
   manners_.read_most = 65536;
   if (!wire_ || !wire_->is_open()) return;
   wire_->heal();
-  ++connection_;  // what it meant to do later
+  ++connection_;  // drops its scheduled turns
   read();
   scene_.schedule.after(kSettled, [this] {
     v1::Envelope request;

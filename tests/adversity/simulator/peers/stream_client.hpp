@@ -13,33 +13,33 @@
 
 namespace drivebench::simulator {
 
-/// How a client behaves. Chances are those of each of its turns, unless they say something else.
+/// How a client behaves. Chances are per turn, unless they say something else.
 struct Manners {
   const char* name = "";
   Quality quality{};
-  Time turn = 20 * kMillisecond;  ///< it does something of its own every so often
+  Time turn = 20 * kMillisecond;  ///< time between its turns
   Time read_every = 3 * kMillisecond;
   std::size_t read_most = 65536;  ///< bytes at a time
   Time think = kMillisecond;      ///< between an answer and the next command
   bool greets = true;
-  bool controls = false;  ///< wants an axis and commands it
+  bool controls = false;  ///< takes an axis and commands it
   double takes = 0.0;     ///< asks for some axis
-  double gives = 0.0;     ///< releases what it has
-  double forces = 0.0;    ///< takes some axis, whoever has it
-  double steals = 0.0;    ///< commands some axis, whoever has it
+  double gives = 0.0;     ///< releases its axis
+  double forces = 0.0;    ///< takes an axis by force
+  double steals = 0.0;    ///< commands an axis of another owner
   double clears = 0.0;
   double changes = 0.0;  ///< load, parameter, fault, blow
   double asks = 0.0;     ///< status, parameters, newest samples
-  double wild = 0.0;     ///< of commands and changes: with values that nobody can want
+  double wild = 0.0;     ///< of commands and changes: with absurd values
   double lost = 0.0;     ///< of commands: never sent
   double twice = 0.0;    ///< of commands
   double wrong_tick = 0.0;
-  double babbles = 0.0;     ///< sends bytes that mean nothing
+  double babbles = 0.0;     ///< sends random bytes
   double stops = 0.0;       ///< its network stands still for up to 3 s
-  double leaves = 0.0;      ///< disconnects without a word
+  double leaves = 0.0;      ///< disconnects without a release
   double shuts = 0.0;       ///< closes its sending side
   std::uint32_t every = 0;  ///< ticks; subscribes to samples; 0: not
-  bool gets_all = false;    ///< of which none may be lost
+  bool gets_all = false;    ///< and may lose none
 };
 
 /// A client on the stream socket: a controller, a viewer, or a nuisance.
@@ -107,16 +107,16 @@ class StreamClient final : public Player {
   Time connected_at_ = 0;
   std::optional<FrameReader> reader_;
   bool greeted_ = false;
-  bool raw_ = false;  ///< it sent bytes that mean nothing: anything may have become of it
+  bool raw_ = false;  ///< it sent random bytes: its state at the server is unknown
   bool control_due_ = false;
   Owner owner_ = 0;
   std::vector<bool> leased_;
   std::vector<std::uint64_t> newest_;  ///< tick, by axis
-  std::vector<bool> latched_;          ///< by axis, as the newest sample says
+  std::vector<bool> latched_;          ///< by axis, from the newest sample
   std::vector<Subscription> samples_;  ///< by axis
   std::map<std::uint64_t, Asked> asked_;
   std::uint64_t last_id_ = 0;
-  std::uint64_t last_look_ = 0;  ///< the status asked for at the end
+  std::uint64_t last_look_ = 0;  ///< id of the last request for the status
   std::size_t sessions_when_asked_ = 0;
   v1::Envelope answer_;
 };

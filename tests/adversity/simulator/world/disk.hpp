@@ -12,7 +12,7 @@
 
 namespace drivebench::simulator {
 
-/// A disk in memory that may fill, write less than it was given, and refuse.
+/// A disk in memory that may fill, write only a part, and refuse.
 class FakeDisk {
  public:
   struct Faults {
@@ -24,11 +24,11 @@ class FakeDisk {
 
   FakeDisk(Random random, const Faults& faults) : random_(random), faults_(faults) {}
 
-  /// For RecordingOptions::create; the disk must outlive what it makes.
+  /// For RecordingOptions::create; the disk must outlive its files.
   CreateRecordingFile creator();
   /// Whether it has refused anything.
   bool failed() const noexcept { return failed_; }
-  /// In the order in which they were made.
+  /// In the order of their creation.
   std::vector<std::span<const std::byte>> files() const;
 
  private:

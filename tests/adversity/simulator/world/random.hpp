@@ -31,7 +31,7 @@ class Random {
   const T& pick(std::span<const T, N> of) noexcept {
     return of[below(of.size())];
   }
-  /// Another sequence; what is drawn from one does not change the other.
+  /// Another sequence; a draw from one does not change the other.
   Random fork() noexcept { return Random(next()); }
 
  private:

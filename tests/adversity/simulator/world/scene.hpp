@@ -13,7 +13,7 @@
 
 namespace drivebench::simulator {
 
-/// What all who play a part share.
+/// Shared by the server's surroundings: clients, network, disk, host.
 struct Scene {
   explicit Scene(std::uint64_t seed, bool prints) : random(seed), trace(prints) {}
 
@@ -23,8 +23,8 @@ struct Scene {
     std::string promise;
   };
 
-  void note(const char* what, std::uint64_t who = 0, std::uint64_t a = 0, std::uint64_t b = 0) {
-    trace.add(schedule.now(), what, who, a, b);
+  void note(const char* what, std::uint64_t source = 0, std::uint64_t a = 0, std::uint64_t b = 0) {
+    trace.add(schedule.now(), what, source, a, b);
   }
   void require(bool holds, const std::string& promise) {
     if (!holds && failure.promise.empty()) failure = {.time = schedule.now(), .promise = promise};
@@ -42,30 +42,30 @@ struct Scene {
     const BenchSetup& setup = engine->config().setup;
     return setup.lease_ticks * setup.period_ns;
   }
-  /// For stalls that end in the middle of something.
+  /// For stalls that end in the middle of a request.
   static constexpr Time kSlack = 400 * kMillisecond;
 
   Time stalled_until = 0;                  ///< the last time that the host stood still, or the I/O did
-  Time stalled = 0;                        ///< for so long all in all
+  Time stalled = 0;                        ///< sum of all stalls
   std::function<std::size_t()> connected;  ///< stream clients that the server has not left
-  /// A disk has stood still, while which refused commands in lockstep are not counted.
+  /// A disk has stood still; meanwhile refused commands in lockstep are not counted.
   bool time_waited = false;
-  bool ending = false;  ///< everybody finishes what is under way
+  bool ending = false;  ///< every player finishes its requests
   Failure failure;
 };
 
-/// Somebody outside of the server.
+/// A client or control board outside of the server.
 class Player {
  public:
   virtual ~Player() = default;
   /// From now on it acts by itself.
   virtual void start() = 0;
-  /// It begins nothing new, and its network is a good one.
+  /// It begins no more requests, and its network is good.
   virtual void finish() = 0;
-  /// After a second of that: what it was promised must be there.
+  /// A second later: it must have received everything that it was promised.
   virtual void check_end() = 0;
   virtual void leave() = 0;
-  /// Whether it is on the stream socket, and the server's end is still there.
+  /// Whether it is on the stream socket, and the server has not closed its end.
   virtual bool has_session() const { return false; }
 };
 

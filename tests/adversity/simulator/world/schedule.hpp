@@ -14,8 +14,7 @@ inline constexpr Time kMicrosecond = 1'000;
 inline constexpr Time kMillisecond = 1'000'000;
 inline constexpr Time kSecond = 1'000'000'000;
 
-/// What is going to happen, in the order of virtual time; at one time, in the order in which it was asked
-/// for.
+/// Events to come, in the order of virtual time; at one time, in the order of their calls.
 class Schedule {
  public:
   Time now() const noexcept { return now_; }

@@ -66,7 +66,7 @@ bool Wire::is_connected() const {
 void Wire::heal() {
   quality_ = {};
   stopped_until_ = 0;
-  delivering_ = false;  // what is planned is for the end of the stop
+  delivering_ = false;  // the scheduled delivery is for the end of the stop
   deliver();
 }
 

@@ -11,15 +11,14 @@
 
 namespace drivebench::simulator {
 
-/// What a network does to a stream.
+/// The faults of a network between client and server.
 struct Quality {
-  Time delay = 0;   ///< of every byte to the server
-  Time jitter = 0;  ///< at most so much more
-  double torn =
-      0.0;  ///< share of what is sent that is torn at any byte, into pieces with delays of their own
+  Time delay = 0;     ///< of every byte to the server
+  Time jitter = 0;    ///< at most so much more
+  double torn = 0.0;  ///< share of messages that are split at any byte, into pieces with delays of their own
 };
 
-/// The client's end of a stream socket behind a network: what is sent arrives later and in pieces, it may
+/// The client's end of a stream socket behind a network: bytes arrive later and in pieces, the network may
 /// stop for a while, and it may be cut.
 class Wire : public std::enable_shared_from_this<Wire> {
  public:
@@ -30,20 +29,20 @@ class Wire : public std::enable_shared_from_this<Wire> {
   Wire& operator=(const Wire&) = delete;
 
   bool is_open() const noexcept { return socket_ >= 0; }
-  /// Whether the server's end is still there, whatever of its words has not arrived.
+  /// Whether the server's end is open, even if some of its bytes have not arrived.
   bool is_connected() const;
   void send(std::string bytes);
-  /// Whether something sent has not arrived yet.
+  /// Whether sent bytes have not arrived yet.
   bool has_under_way() const noexcept { return !under_way_.empty(); }
-  /// What has arrived, at most `most` bytes; closes the wire when the server has.
+  /// The arrived bytes, at most `most`; closes the wire when the server has.
   std::span<const std::byte> receive(std::size_t most);
   /// Nothing passes in either direction until then.
   void stop_until(Time time) { stopped_until_ = time; }
-  /// From now on the network is a good one.
+  /// From now on the network is good.
   void heal();
-  /// The end without a word: what is under way is lost.
+  /// Cuts the connection: bytes on their way are lost.
   void cut();
-  /// Nothing more comes from this end.
+  /// Closes this end for sending.
   void shut();
 
  private:

@@ -15,13 +15,13 @@
 namespace drivebench::simulator {
 namespace {
 
-/// Virtual time zero on the server's clock: some of its times say with a zero that they have not been set.
+/// Virtual time zero on the server's clock, which takes the time zero for "not set" in places.
 constexpr auto kEpoch = std::chrono::hours(1);
 
-/// Long enough for everything that is under way, and for a stall that has just begun.
+/// Longer than every request under way, and than a stall that has just begun.
 constexpr Time kTimeToSettle = 600 * kMillisecond;
 
-/// The server's clock goes on in such steps.
+/// The step of the server's clock.
 constexpr Time kClockStep = 5 * kMillisecond;
 
 void set_clock(Time now) {
@@ -30,7 +30,7 @@ void set_clock(Time now) {
 
 }  // namespace
 
-/// Says how late the world has made a tick.
+/// Reports how late the world has made a tick.
 class World::VirtualPacer final : public Pacer {
  public:
   std::int64_t wait() noexcept override { return lateness_ns; }
@@ -108,7 +108,7 @@ void World::cast() {
         "Modbus client");
 }
 
-/// The client's end of a pair of sockets whose other one the server has.
+/// The client's end of a pair of sockets whose other end the server has.
 int World::connect_modbus() {
   std::array<int, 2> ends{-1, -1};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends.data()) != 0) return -1;
@@ -118,7 +118,7 @@ int World::connect_modbus() {
 
 World::~World() = default;
 
-/// The account is kept of every tick, although the I/O learns of some of them together.
+/// The account sees every tick, although the I/O may see several of them together.
 void World::on_tick() {
   const bool lockstep = config_.mode == RunMode::kLockstep;
   if (lockstep) ++ticks_;
@@ -150,20 +150,20 @@ void World::disturb() {
   const Time now = scene_.schedule.now();
   const Time length = scene_.random.chance(0.1) ? scene_.random.between(20, 200) * kMillisecond
                                                 : scene_.random.between(100, 20'000) * kMicrosecond;
-  const std::uint64_t whom = scene_.random.below(3);
+  const std::uint64_t victim = scene_.random.below(3);
   if (!scene_.ending) {
-    scene_.note("host stalls", whom, static_cast<std::uint64_t>(length));
-    if (whom != 1) host_free_at_ = now + length;
-    if (whom != 0) io_free_at_ = now + length;
+    scene_.note("host stalls", victim, static_cast<std::uint64_t>(length));
+    if (victim != 1) host_free_at_ = now + length;
+    if (victim != 0) io_free_at_ = now + length;
     scene_.stalled += std::max<Time>(now + length - std::max(now, scene_.stalled_until), 0);
     scene_.stalled_until = std::max(scene_.stalled_until, now + length);
-    if (whom != 0) scene_.schedule.at(io_free_at_, [] {});
+    if (victim != 0) scene_.schedule.at(io_free_at_, [] {});
   }
   scene_.schedule.after(scene_.random.between(50, 2000) * kMillisecond, [this] { disturb(); });
 }
 
-/// The server's clock goes on, in steps. Asio asks the kernel when its timers are due, which knows nothing of
-/// virtual time: a timer that has been due for ever makes it look, as soon as the kernel has told it.
+/// The server's clock advances in steps. Asio asks the kernel when its timers are due, which knows nothing of
+/// virtual time: a timer that is always due makes Asio check them as soon as the kernel has reported it.
 void World::turn_clock() {
   clock_next_ = scene_.schedule.now() / kClockStep * kClockStep + kClockStep;
   set_clock(scene_.schedule.now());
@@ -186,7 +186,7 @@ void World::poll() {
     scene_.axes[axis].io_done(engine_->owner(axis));
 }
 
-/// The I/O gets its turns also when nobody outside does anything, and a last one at the end of a stretch.
+/// The I/O also runs while no client acts, and once more at the end of a stretch.
 void World::pulse() {
   scene_.schedule.after(kClockStep, [this] { pulse(); });
   for (std::uint32_t axis = 0; axis < scene_.axes.size() && !scene_.ending; ++axis) {
@@ -234,7 +234,7 @@ void World::finish() {
     player->check_end();
   for (const auto& player : players_)
     player->leave();
-  // A Modbus client that is gone keeps its lease for its key.
+  // The lease of a Modbus client that is gone lasts, as its key does.
   play_until(scene_.schedule.now() + 100 * kMillisecond + (modbus_ ? kSecond + scene_.lease() : 0));
   if (!scene_.failure.promise.empty()) return;
   for (std::size_t axis = 0; axis < scene_.axes.size(); ++axis) {
@@ -243,8 +243,8 @@ void World::finish() {
     scene_.axes[axis].see_end(last);
   }
   const Verdict verdict = engine_->stop();
-  scene_.require(verdict.ticks == static_cast<std::uint64_t>(ticks_), "every tick was run, and none twice");
-  scene_.require(verdict.late_ticks == late_ticks_, "the verdict knows all late ticks");
+  scene_.require(verdict.ticks == static_cast<std::uint64_t>(ticks_), "every tick ran once");
+  scene_.require(verdict.late_ticks == late_ticks_, "the verdict counts all late ticks");
   check_recording(verdict);
   if (can_) can_->close();
   if (modbus_) modbus_->close();
@@ -274,7 +274,7 @@ std::unique_ptr<Recorder> World::make_recorder() {
   return recorder;
 }
 
-/// The recorder's turns; now and then its disk takes nothing for seconds.
+/// The recorder runs; now and then its disk stands still for seconds.
 void World::record() {
   Time next = 5 * kMillisecond;
   while (recorder_->work()) {
@@ -290,14 +290,14 @@ void World::record() {
   });
 }
 
-/// What can be read and what was told to be lost is all that there was.
+/// Readable samples and reported losses add up to all samples.
 void World::check_recording(const Verdict& verdict) {
   if (recorder_ == nullptr) return;
   recorder_ = nullptr;
   const std::vector<std::span<const std::byte>> files = disk_->files();
   scene_.note("recording", files.size(), verdict.gaps, disk_->failed());
   scene_.require(verdict.gaps == 0 || disk_->failed() || (disk_stalled_ && !scene_.time_waited),
-                 "a disk without faults loses nothing, and in lockstep a slow one neither");
+                 "a disk without faults loses nothing, nor does a slow one in lockstep");
   if (verdict.gaps == 0) {
     const ReplayReport report = replay(files, nullptr);
     scene_.require(report.result == ReplayReport::Result::kEqual,
@@ -316,7 +316,7 @@ void World::check_recording(const Verdict& verdict) {
     scene_.require(!damaged, "a recording on a bad disk is short, not damaged");
   }
   scene_.require(samples + verdict.gaps >= (verdict.ticks + 1) * config_.axes.size(),
-                 "what a recording has lost is counted");
+                 "every loss of a recording is counted");
 }
 
 }  // namespace drivebench::simulator

@@ -17,7 +17,7 @@
 
 namespace drivebench::simulator {
 
-/// What became of a seed.
+/// The result of a seed.
 struct Outcome {
   std::uint64_t seed = 0;
   std::uint64_t ticks = 0;
@@ -29,7 +29,7 @@ struct Outcome {
   std::string tail;  ///< the last events
 };
 
-/// One server with everybody around it, in one thread and in virtual time.
+/// One server and its surroundings, in one thread and in virtual time.
 class World {
  public:
   World(std::uint64_t seed, bool prints, const std::string& folder);
@@ -63,7 +63,7 @@ class World {
   BenchConfig config_;
   asio::io_context io_{1};
   std::unique_ptr<StreamServer> server_;
-  std::unique_ptr<ModbusServer> modbus_;  ///< of benches that have it
+  std::unique_ptr<ModbusServer> modbus_;  ///< of benches with Modbus
   std::unique_ptr<can::MemoryWire> bus_;
   std::unique_ptr<can::Endpoint> can_;
   std::unique_ptr<Engine> engine_;
@@ -74,13 +74,13 @@ class World {
   std::vector<std::unique_ptr<Player>> players_;
   std::string names_;
   std::unique_ptr<FakeDisk> disk_;
-  bool disk_stalled_ = false;  ///< at some time
+  bool disk_stalled_ = false;  ///< at least once
   Time due_ = 0;               ///< of the next tick
   Time host_free_at_ = 0;
   Time io_free_at_ = 0;
-  Time io_every_ = 0;  ///< its turns come no more often
+  Time io_every_ = 0;  ///< shortest time between its turns
   Time io_next_ = 0;
-  Time clock_next_ = 0;  ///< when the server's clock goes on
+  Time clock_next_ = 0;  ///< next step of the server's clock
   std::uint64_t late_ticks_ = 0;
   std::vector<std::uint64_t> late_until_{0};  ///< late ticks before a sample, by its tick
   std::int64_t ticks_ = 0;
