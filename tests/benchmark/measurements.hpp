@@ -40,13 +40,13 @@ std::vector<Row> measure_identification(const Plan& plan);
 std::vector<Row> measure_can_codec(const Plan& plan);
 /// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.
 std::vector<Row> measure_multicast(const Plan& plan);
-/// The same over the kernel's CAN; a row that says how where there is none.
+/// The same over the kernel's CAN; without it, a row that says how to get it.
 std::vector<Row> measure_socketcan(const Plan& plan);
 /// A lockstep exchange by Modbus function 23 against plain libmodbus.
 std::vector<Row> measure_modbus(const Plan& plan);
-/// What a healthy client notices of 1,000 idle ones, 32 viewers, and 50 that never read.
+/// A healthy client beside 1,000 idle clients, 32 viewers, and 50 clients that never read.
 std::vector<Row> measure_crowd(const Plan& plan);
-/// What a polite Modbus client notices of others that are not, beside plain libmodbus.
+/// A polite Modbus client beside abusers, and beside plain libmodbus.
 std::vector<Row> measure_abuse(const Plan& plan);
 
 }  // namespace drivebench::speed

@@ -40,7 +40,7 @@ constexpr auto kAbuses = std::to_array<Kind>({{Abuse::kFlood, "illegal functions
                                               {Abuse::kDrip, "100 dripping connections"},
                                               {Abuse::kScan, "nmap -sV"}});
 
-/// Goes on until this object goes.
+/// Runs the abuser until this object goes.
 class Abuser {
  public:
   Abuser(Abuse abuse, std::uint16_t port) {
@@ -52,7 +52,7 @@ class Abuser {
     }
   }
 
-  /// A scan that is over in time; others never end.
+  /// A scan that ends in time; the other abusers never end.
   bool has_ended() { return scan_ && scan_->wait(command::Process::in(0ms)).has_value(); }
 
  private:
@@ -60,7 +60,7 @@ class Abuser {
   std::optional<command::Process> scan_;
 };
 
-/// What a client noticed that reads the process data 200 times a second.
+/// Answer times of a client that reads the process data 200 times a second.
 struct Seen {
   double p99_ms = 0.0;
   double worst_ms = 0.0;
@@ -85,7 +85,7 @@ Seen read_beside(Abuse abuse, std::uint16_t port) {
     seen.gave_up =
         ::modbus_read_registers(client.get(), modbus::kProcessStart, words.size(), words.data()) < 0;
     ms.push_back(static_cast<double>(now_ns() - begin) * 1e-6);
-    // The next one is due 5 ms after this one was; what the server kept us from asking is not made up for.
+    // The next read is due 5 ms after this one was; reads that the server delayed are not made up for.
     due = std::max(due + kReadEvery_ns, now_ns());
     const timespec at{.tv_sec = due / 1'000'000'000, .tv_nsec = due % 1'000'000'000};
     ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);

@@ -21,7 +21,7 @@ constexpr std::uint32_t kDripper = 0x7F000003;
 constexpr std::size_t kDrippers = 100;
 constexpr auto kDripEvery = 450ms;
 
-/// Connected, or on its way with SOCK_NONBLOCK; not open if that failed.
+/// Connected, or connecting with SOCK_NONBLOCK; not open if that failed.
 link::FileDescriptor connect_from(std::uint32_t source, std::uint16_t port, int flags) {
   link::FileDescriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | flags, 0));
   sockaddr_in address{};

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-/// Modbus clients that are not polite, each to be run in a process of its own, from an address of its own
-/// within 127.0.0.0/8. They come back when they are cut off, and never return.
+/// Modbus clients that misbehave, each for a process of its own, with an address of its own within
+/// 127.0.0.0/8. They connect again when they are cut off, and never return.
 namespace drivebench::speed {
 
 /// Sends requests of a function that does not exist, sixteen at a time, as fast as they are answered.

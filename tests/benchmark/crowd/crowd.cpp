@@ -35,8 +35,8 @@ constexpr double kMaxCut_s = 3.0;
 constexpr auto kWindow = 2s;
 constexpr int kRounds = 5;  // of windows of each kind, in turn
 
-/// What one healthy client noticed that asks for the newest sample 500 times a second, and how late the bench
-/// was meanwhile.
+/// Answer times of one healthy client that asks for the newest sample 500 times a second, and the late ticks
+/// of the bench meanwhile.
 struct Window {
   double p99_us = 0.0;
   double ticks = 0.0;
@@ -65,7 +65,7 @@ double late_per_10000(const std::vector<Window>& windows) {
   return median(windows, [](const Window& each) { return 1e4 * each.late_ticks / each.ticks; });
 }
 
-/// Clients that have said hello and then nothing.
+/// Clients that say hello and then nothing.
 using Idlers = std::vector<std::unique_ptr<link::Link>>;
 
 Idlers idlers(const std::string& address, std::size_t count) {
@@ -86,10 +86,10 @@ Idlers deaf(const std::string& address) {
 struct Windows {
   std::vector<Window> alone;
   std::vector<Window> beside;
-  std::vector<Window> elsewhere;  ///< the same company at another server: its load on the machine alone
+  std::vector<Window> elsewhere;  ///< the same clients at another server: their load on the machine alone
 };
 
-/// Windows of each kind in turn; `come` makes the company at an address, `other` is a bench file.
+/// Windows of each kind in turn; `come` makes the clients at an address, `other` is a bench file.
 template <class Come>
 Windows in_turn(link::Link& client, const std::string& here, const std::string& other, Come come) {
   constexpr auto kUntilTheyAreGone = 500ms;
@@ -125,7 +125,7 @@ void add_rows(std::vector<Row>& rows, const std::string& beside, const Windows& 
                                       late_per_10000(windows.alone))});
 }
 
-/// Both ends of all connections are ours or our child's.
+/// Both ends of all connections belong to this process or its child.
 void allow_descriptors(rlim_t count) {
   rlimit limit{};
   check(::getrlimit(RLIMIT_NOFILE, &limit) == 0, "getrlimit");
@@ -137,7 +137,7 @@ void expect_full(const std::string& address) {
   try {
     const link::Link one_more(address);
   } catch (const link::Refused& refused) {
-    return;  // turned away with a reason
+    return;  // refused with a reason
   }
   throw std::runtime_error("a session beyond max_sessions was taken");
 }
@@ -147,7 +147,7 @@ std::filesystem::path written(const BenchConfig& config, std::filesystem::path f
   return file;
 }
 
-/// How long it takes until the server has cut those off that do not read, and its memory meanwhile.
+/// The time until the server has cut the clients that do not read, and its memory meanwhile.
 struct Cut {
   double elapsed_s = 0.0;
   double growth_mib = 0.0;
@@ -176,7 +176,7 @@ std::vector<Row> measure_crowd(const Plan&) {
   config.tcp.max_sessions = kIdle + kSubscribers + 1;
   config.tcp.unix_path = (folder / "bench.socket").string();
   const std::filesystem::path bench = written(config, folder / "bench.toml");
-  // Its ticks shall cost nothing, only its clients.
+  // This server's ticks shall cost nothing, only its clients.
   config.tcp.max_sessions = kIdle + kSubscribers;
   config.tcp.unix_path = (folder / "other.socket").string();
   config.realtime.pacer = PacerKind::kSleep;

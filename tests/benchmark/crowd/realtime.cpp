@@ -20,11 +20,11 @@ namespace {
 
 constexpr double kMaxP99Ratio = 1.3;
 constexpr std::int64_t kPeriodNs = 125'000;
-constexpr std::size_t kTicksPerBlock = 1000;  // short, so that all see the same machine
+constexpr std::size_t kTicksPerBlock = 1000;  // short, so that all loops see the same machine
 constexpr std::size_t kRounds = 20;
 constexpr int kServerSeconds = 5;
 
-/// The floor: what anybody would write, with the kernel's timer and nothing else.
+/// The floor: the plain loop, with the kernel's timer and nothing else.
 class BarePacer final : public Pacer {
  public:
   std::int64_t wait() noexcept override {
@@ -43,7 +43,7 @@ class BarePacer final : public Pacer {
 
 struct Lateness {
   Percentiles us;
-  double late_share;  ///< of the ticks, those that started after their period was over
+  double late_share;  ///< of ticks that started after the end of their period
 };
 
 Lateness lateness(Pacer& pacer) {
@@ -60,8 +60,7 @@ struct Round {
   Lateness bare, sleep, sleep_spin;
 };
 
-/// On a thread of its own, which gets the treatment of the server's tick; what it was not granted goes to
-/// notes.
+/// On a thread of its own, prepared like the server's tick; missing rights go to notes.
 Rounds<Round> alternate(std::vector<std::string>& notes) {
   Rounds<Round> rounds;
   std::thread([&] {

@@ -43,7 +43,7 @@ Viewers::~Viewers() {
 }
 
 void Viewers::watch() {
-  // They stand for other computers: nobody here is to wait for their reading.
+  // They stand for other computers: no measured thread may wait for them.
   check(::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowestPriority) == 0, "setpriority");
   while (!stop_.load()) {
     for (const auto& viewer : links_) {

@@ -11,7 +11,7 @@
 
 namespace drivebench::speed {
 
-/// Clients that take all samples they are sent, on a thread of their own until this object goes.
+/// Clients that read all their samples, on a thread of their own until this object goes.
 class Viewers {
  public:
   /// Each has a sample every so many ticks.
@@ -36,7 +36,7 @@ class Viewers {
   std::thread thread_;
 };
 
-/// Who listens on a unix socket.
+/// The process that listens on a unix socket.
 pid_t listener_of(const std::string& path);
 
 /// Resident memory of a process [MiB].

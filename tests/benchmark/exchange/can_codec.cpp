@@ -18,7 +18,7 @@ constexpr double kMaxFrame_ns = 50.0;
 constexpr int kFramesPerBatch = 20'000;
 constexpr std::size_t kRounds = 20;
 
-/// Numbers that no shortcut fits.
+/// Numbers that take no shortcut.
 Sample a_sample() {
   Sample sample;
   sample.tick = 123'456'789'012;

@@ -28,11 +28,11 @@ constexpr std::size_t kRounds = 10;
 constexpr std::uint32_t kNode = 1;
 constexpr const char* kGroup = "239.74.163.2";
 constexpr const char* kInterface = "vcan0";
-constexpr const char* kFloorInterface = "vcan1";  // so that neither hears the other
+constexpr const char* kFloorInterface = "vcan1";  // so that floor and bench do not hear each other
 constexpr double kAcquire = 1.0;
 constexpr double kVoltageMode = 1.0;
 
-/// The datagrams of one tick: a command, and what the bench sends for it, SYNC last.
+/// The datagrams of one tick: a command, and the bench's frames for it, SYNC last.
 struct Datagrams {
   std::vector<std::byte> command;
   std::vector<std::vector<std::byte>> answers;
@@ -63,7 +63,7 @@ class Controller {
     if (!has_sample) throw std::runtime_error("a tick came without its sample");
   }
 
-  /// One exchange as it is on the bus, without what comes now and then.
+  /// One exchange on the bus, without the occasional frames.
   Datagrams datagrams() {
     Datagrams all{.command = copy_of(wire_.datagram_of(command())), .answers = {}};
     wire_.send(all.command);
@@ -171,7 +171,8 @@ class PingPong {
   Child child_;
 };
 
-/// A bus as the bench and its controller see it, and a place for the floor where neither hears the other.
+/// A bus as the bench and its controller see it, and a second one for the floor, so that they do not hear
+/// each other.
 struct Bus {
   std::string name;
   CanConfig config;
@@ -185,13 +186,13 @@ struct Round {
   std::optional<Percentiles> unicast;
 };
 
-/// Everything that takes turns.
+/// All processes that take turns.
 struct Contest {
   explicit Contest(const Bus& bus) {
-    const Pinned pinned(cpu_pair().far);  // they inherit it
+    const Pinned pinned(cpu_pair().far);  // the processes inherit it
     BenchConfig config = load_config(command::find_config("servo-can"));
     config.can = {bus.config};
-    config.can[0].idle_timeout_ms = 0;  // however slow the guest
+    config.can[0].idle_timeout_ms = 0;  // for a slow guest too
     const std::filesystem::path file = folder / "bench.toml";
     if (!(std::ofstream(file) << to_toml(config))) throw std::runtime_error("cannot write " + file.string());
     server.emplace(std::vector<std::string>{file.string()});

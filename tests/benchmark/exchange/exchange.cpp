@@ -168,7 +168,7 @@ std::vector<Row> measure_exchange(const Plan&) {
   const std::string bench = command::find_config("servo").string();
   const std::string path = folder / "bench.socket";
 
-  // Started while pinned: they inherit it. Two servers, since an axis has one controller.
+  // Started while pinned, which they inherit. Two servers, since an axis has one controller.
   auto pinned = std::make_unique<Pinned>(cpu.far);
   Server tcp_server({bench});
   Server unix_server({bench, "--unix", path});

@@ -44,7 +44,7 @@ v1::RunExperiment request() {
   return r;
 }
 
-/// Receives all data of an experiment; seconds from the request to its end.
+/// Receives all data of an experiment; returns the seconds from the request to its end.
 double fetch_s(link::Link& bench, std::uint64_t id) {
   v1::FetchExperiment wanted;
   wanted.set_id(id);

@@ -38,7 +38,7 @@ class Controller {
     sample_ = modbus::read_sample(answer_);
   }
 
-  /// Whoever answers, whatever it answers.
+  /// One exchange, with the product or with plain libmodbus.
   void exchange() {
     const TwoPhase& u = line_voltages()[sample_.tick % line_voltages().size()];
     std::array<std::uint16_t, kCommandLength> command{1};
@@ -95,7 +95,7 @@ Row row(const char* name, const Rounds<Round>& rounds, double Percentiles::*figu
 std::vector<Row> measure_modbus(const Plan&) {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
-  auto pinned = std::make_unique<Pinned>(cpu.far);  // they inherit it
+  auto pinned = std::make_unique<Pinned>(cpu.far);  // the servers inherit it
   BenchConfig config = load_config(command::find_config("servo-modbus"));
   config.modbus.port = 0;
   const std::filesystem::path file = folder / "bench.toml";

@@ -8,12 +8,12 @@
 namespace drivebench::speed {
 namespace {
 
-// Two readings are 20 to 60 ns apart when nothing comes between them; in a guest up to 40 us, because there a
-// reading may be a system call and a system call slow.
+// Two readings are 20 to 60 ns apart when nothing comes between them; in a guest up to 40 us, where a reading
+// may be a slow system call.
 constexpr std::int64_t kGapNs = 1000;
 constexpr std::int64_t kReadingsPerGap = 10;
 
-/// What lies further apart than this was interrupted.
+/// A longer gap is an interruption.
 std::int64_t gap_ns() {
   static const std::int64_t limit = [] {
     std::vector<double> apart(1001);

@@ -11,9 +11,9 @@ namespace drivebench::speed {
 /// Beyond this share of gone time a figure says more about the machine than about the program.
 inline constexpr double kMaxGone = 0.03;
 
-/// Measures how much of a CPU is taken away by others: the host, other programs, interrupts. It reads the
-/// clock without a pause; where two readings lie far apart somebody else had the CPU. Look before and after
-/// what is measured, on the CPUs and with the scheduling that it uses.
+/// Measures the share of a CPU that others take: the host, other programs, interrupts. It reads the clock
+/// without a pause; between two distant readings another program had the CPU. Look before and after the
+/// measurement, on its CPUs and with its scheduling.
 class GapCanary {
  public:
   void look(std::span<const int> cpus, std::chrono::milliseconds duration = std::chrono::milliseconds(20));
@@ -28,7 +28,7 @@ class GapCanary {
   std::int64_t gone_ns_ = 0;
 };
 
-/// What a measurement gave in its undisturbed rounds; in all of them, if there was none.
+/// The result of a measurement in its undisturbed rounds; in all of them, if there was none.
 template <class Result>
 struct Rounds {
   std::vector<Result> results;

@@ -11,7 +11,7 @@ namespace drivebench::speed {
 
 std::int64_t now_ns() noexcept;
 
-/// Throws std::system_error with errno unless it is good.
+/// Throws std::system_error with errno unless `good`.
 void check(bool good, const char* what);
 
 /// Two CPUs this process may use; the same one twice if there is no other.
@@ -33,10 +33,10 @@ class Pinned {
   cpu_set_t before_{};
 };
 
-/// Model and number of the CPUs, and the kernel: a figure says nothing without them.
+/// Model and number of the CPUs, and the kernel: a figure needs them.
 std::string machine_description();
 
-/// A new folder for what a measurement writes, gone with this object.
+/// A new folder for the files of a measurement, removed with this object.
 class ScratchFolder {
  public:
   ScratchFolder();

@@ -7,7 +7,7 @@
 
 namespace drivebench::speed {
 
-/// What a figure must keep to.
+/// The limit of a figure.
 struct Limit {
   enum class Kind {
     kRatioAtMost,   ///< measured / floor
@@ -24,17 +24,17 @@ struct Row {
   std::string name;
   std::string unit{};  ///< empty: a number
   double measured = 0.0;
-  std::optional<double> floor{};  ///< the same, of the least that could do the job, in the same run
+  std::optional<double> floor{};  ///< the same for the least program that does the job, in the same run
   std::optional<Limit> limit{};   ///< none: for information
-  double gone = 0.0;              ///< share of the time that the gap canary found taken away
+  double gone = 0.0;              ///< share of the time that the canary found gone
   std::string note{};
   bool skipped = false;  ///< not measured; the note says why
 
   std::optional<double> ratio() const;
 };
 
-/// kNotJudged: too much time was gone. A figure that has to be small or large by itself, and is, stays
-/// within: disturbances can only have spoiled it.
+/// kNotJudged: too much time was gone. A figure within its limit stays so: disturbances can only have spoiled
+/// it.
 enum class Judgement { kWithin, kOver, kNotJudged, kForInformation };
 Judgement judgement(const Row& row);
 

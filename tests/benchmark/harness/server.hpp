@@ -12,7 +12,7 @@
 
 namespace drivebench::speed {
 
-/// A bench file that the product comes with.
+/// A bench file of the product.
 BenchConfig bench_config(const std::string& name);
 
 /// Two-phase voltages of the line start: 80 V at 60 Hz, from which the servo turns with 125.4 rad/s. Sampled
@@ -26,10 +26,10 @@ class Server {
   explicit Server(std::vector<std::string> arguments);
 
   const std::string& address() const { return address_; }
-  /// 0: it does not speak Modbus.
+  /// 0: without Modbus.
   std::uint16_t modbus_port() const { return modbus_port_; }
 
-  /// Waits for the end of a run that has one; its verdict.
+  /// Waits for the end of a run of given length; its verdict.
   nlohmann::json wait(std::chrono::seconds at_most);
   /// Ends the run; its verdict.
   nlohmann::json stop();

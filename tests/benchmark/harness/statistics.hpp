@@ -10,14 +10,14 @@
 
 namespace drivebench::speed {
 
-/// The value below which this share (0..1) of all values lies. There must be one.
+/// The value below which this share (0..1) of all values lies. There must be one value.
 inline double percentile(std::vector<double> values, double share) {
   const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return values[static_cast<std::size_t>(rank)];
 }
 
-/// Median over all results of what `figure` (a member or a function) takes from each.
+/// Median over all results of `figure` (a member or a function).
 template <class Result, class Figure>
 double median(const std::vector<Result>& results, Figure figure) {
   std::vector<double> values;

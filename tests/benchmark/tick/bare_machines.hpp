@@ -6,8 +6,8 @@
 #include "plant/axis_parameters.hpp"
 #include "plant/math/rotated.hpp"
 
-/// The equations of each kind of machine with a rigid shaft, written out once more with nothing around them:
-/// the floor of a step. Members are named in the step, so that it expands to the straight line one writes by
+/// The equations of each kind of machine with a rigid shaft, written out once more without anything else: the
+/// floor of a step. Members are named in the step, so that it expands to the straight line of a program by
 /// hand.
 namespace drivebench::speed {
 

@@ -31,7 +31,7 @@ class InProcess {
     bench_.submit({.tick = 0, .axis = 0, .owner = kController, .action = LeaseAction::kAcquire});
   }
 
-  /// One tick; what the controller was told.
+  /// One tick; returns the input of the controller.
   control::Measurement step() {
     const control::Measurement measured = measurement_of(bench_.sample(0));
     const Command command = {.answers = bench_.tick(),
@@ -48,7 +48,7 @@ class InProcess {
   Bench bench_;
 };
 
-/// Median time of a sample of the controller alone, over what a run has shown it.
+/// Median time of a sample of the controller alone, over the inputs of a run.
 Row update_of(std::string_view name) {
   const control::Preset& preset = *control::find_preset(name);
   InProcess original(preset);

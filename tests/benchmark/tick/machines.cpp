@@ -68,7 +68,7 @@ double batch_ns(Step step) {
   return static_cast<double>(now_ns() - begin) / kStepsPerBatch;
 }
 
-/// Both integrate the same motor from rest at the same voltages; what they must agree on is the speed.
+/// Both integrate the same motor from rest at the same voltages; they must agree on the speed.
 template <class Machine, class Bare>
 Row race(const char* name, const AxisParameters& p, const TerminalInput& u, Bare bare) {
   const auto& machine = std::get<typename Machine::Parameters>(p.machine);
@@ -135,7 +135,7 @@ std::vector<Row> steps() {
       .rotor_leakage_h = 0.0023,
       .magnetising_curve = Curve({{0.0, 0.0}, {2.0, 0.023}, {4.0, 0.043}, {8.0, 0.07}, {16.0, 0.09}})};
   auto& field = std::get<SeparateDcMachineParameters>(separate.machine);
-  field.saturation_curve = {};  // the race is that of the equations
+  field.saturation_curve = {};  // the equations alone are compared
   field.field_inductance_h = 23.0;
   const auto field_dc = [](const auto& p, const MechanicsParameters& s, double rf, double u, double uf) {
     return BareFieldDc{p.armature_resistance_ohm,
@@ -221,7 +221,7 @@ std::vector<Row> ticks() {
                             "dc-separate", "dc-shunt", "dc-series", "linear-dc"}) {
     AxisParameters p = axis_of(bench);
     switch_all_sensors_on(p);
-    if (p.drive.kind == DriveKind::kSwitched) {  // whose edges have a row of their own
+    if (p.drive.kind == DriveKind::kSwitched) {  // its edges have a row of their own
       const AmplifierParameters amplifier = p.drive.amplifier;
       p.drive = {};
       p.drive.amplifier = amplifier;

@@ -88,7 +88,7 @@ class Race {
     return static_cast<double>(now_ns() - begin) / kTicksPerBatch;
   }
 
-  /// The ratio means something only if both have simulated the same motor.
+  /// The ratio has a meaning only if both have simulated the same motor.
   void check_same_motion() const {
     const double speed_rad_s = bench_.sample(0).speed_rad_s;
     if (bare_tick_ != bench_.tick() || std::abs(speed_rad_s - bare_.w) > 1e-6) {
