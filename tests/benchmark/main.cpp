@@ -49,6 +49,7 @@ int run(int argc, char** argv) {
   }
   std::vector<std::string> only;
   bool json = false;
+  bool markdown = false;
   bool strict = false;
   Plan plan;
   CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about three minutes.");
@@ -59,6 +60,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(0.1, 1440.0))
       ->capture_default_str();
   app.add_flag("--json", json, "print one JSON object");
+  app.add_flag("--markdown", markdown, "print the table of tests/benchmark/RESULTS.md")->excludes("--json");
   app.add_flag("--strict", strict, "exit 1 if a figure is over its limit");
   app.footer("Measurements:\n" + list);
   try {
@@ -76,6 +78,8 @@ int run(int argc, char** argv) {
   }
   if (json) {
     fmt::print("{}\n", as_json(machine_description(), rows).dump(2));
+  } else if (markdown) {
+    fmt::print("{}", as_markdown(machine_description(), today(), rows));
   } else {
     print_table(machine_description(), rows);
   }

@@ -66,6 +66,13 @@ std::string machine_description() {
   return fmt::format("{}, {} CPUs, Linux {}, {}{}", model, cpus, system.release, compiler, __VERSION__);
 }
 
+std::string today() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm date{};
+  gmtime_r(&now, &date);
+  return fmt::format("{:04}-{:02}-{:02}", date.tm_year + 1900, date.tm_mon + 1, date.tm_mday);
+}
+
 ScratchFolder::ScratchFolder() {
   std::string name = (std::filesystem::temp_directory_path() / "drivebench-benchmark-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) {

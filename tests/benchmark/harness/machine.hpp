@@ -36,6 +36,9 @@ class Pinned {
 /// Model and number of the CPUs, and the kernel: a figure needs them.
 std::string machine_description();
 
+/// `YYYY-MM-DD`, in UTC.
+std::string today();
+
 /// A new folder for the files of a measurement, removed with this object.
 class ScratchFolder {
  public:

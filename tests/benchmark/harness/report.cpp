@@ -62,6 +62,14 @@ std::string limit_text(const Row& row) {
   return ">= " + with_unit(row.limit->value, row.unit);
 }
 
+/// The limit, and the verdict where it is not "within".
+std::string judged_limit(const Row& row) {
+  const Judgement verdict = judgement(row);
+  if (verdict == Judgement::kForInformation) return "";
+  if (verdict == Judgement::kWithin) return limit_text(row);
+  return limit_text(row) + ", " + name_of(verdict);
+}
+
 }  // namespace
 
 std::optional<double> Row::ratio() const {
@@ -79,6 +87,33 @@ Judgement judgement(const Row& row) {
   const bool within = kind == Limit::Kind::kAtLeast ? figure >= row.limit->value : figure <= row.limit->value;
   if (row.gone > kMaxGone && (compares || !within)) return Judgement::kNotJudged;
   return within ? Judgement::kWithin : Judgement::kOver;
+}
+
+std::string as_markdown(const std::string& machine, const std::string& date, const std::vector<Row>& rows) {
+  std::string text = fmt::format(
+      "# Speed and size\n\n"
+      "Made by `./bench benchmark --markdown > tests/benchmark/RESULTS.md` on {}.\n\n"
+      "{}\n\n"
+      "Floor: the least that could do the job, measured in alternation in the same run. A figure is not "
+      "judged when others took "
+      "more than {:.0f} % of\nthe CPUs around the rounds that count.\n"
+      "Where the kernel has no CAN, `taskset -c 0 tests/tools/can-vm -t 300 -- "
+      "build/release/bin/drivebench-benchmark --only "
+      "socketcan`\nmeasures it in a guest.\n\n"
+      "| what | measured | floor | ratio | limit |\n"
+      "|---|---|---|---|---|\n",
+      date, machine, 100.0 * kMaxGone);
+  for (const Row& row : rows) {
+    const std::string what = row.note.empty() ? row.name : fmt::format("{} ({})", row.name, row.note);
+    if (row.skipped) {
+      text += fmt::format("| {} | skipped | | | |\n", what);
+      continue;
+    }
+    text += fmt::format("| {} | {} | {} | {} | {} |\n", what, with_unit(row.measured, row.unit),
+                        row.floor ? with_unit(*row.floor, row.unit) : "",
+                        row.ratio() ? number(*row.ratio()) : "", judged_limit(row));
+  }
+  return text;
 }
 
 void print_table(const std::string& machine, const std::vector<Row>& rows) {
