@@ -17,31 +17,9 @@ using can::Result;
 constexpr unsigned kModeLockstep = 1;
 constexpr unsigned kStopped = 4;  // of a heartbeat
 
-struct Meaning {
-  v1::RefusalCode code;
-  const char* sentence;
-};
-/// By the result of a reply.
-constexpr auto kMeanings = std::to_array<Meaning>({
-    {v1::REFUSAL_UNSPECIFIED, "done"},
-    {v1::REFUSAL_NOT_OWNER, "this controller does not hold the axis"},
-    {v1::REFUSAL_OWNED, "another controller holds the axis"},
-    {v1::REFUSAL_NOT_FINITE, "a voltage is not a number"},
-    {v1::REFUSAL_LATCHED, "a latched fault is in force; it must be cleared first"},
-    {v1::REFUSAL_STALE, "the tick has been answered"},
-    {v1::REFUSAL_BUSY, "the bench has too much to do"},
-    {v1::REFUSAL_MALFORMED, "the frame is malformed"},
-    {v1::REFUSAL_MALFORMED, "phase c and the field of its tick are missing"},
-    {v1::REFUSAL_WRONG_DRIVE, "the drive of the axis takes no currents"},
-    {v1::REFUSAL_OUT_OF_RANGE, "a setpoint is beyond what the drive can give"},
-    {v1::REFUSAL_CAUSE_LASTS, "what caused the latched fault is still there"},
-});
-
 [[noreturn]] void refuse_with(Result result) {
-  const auto number = static_cast<std::size_t>(result);
-  const Meaning& meaning =
-      kMeanings[number < kMeanings.size() ? number : static_cast<std::size_t>(Result::kMalformed)];
-  refuse(meaning.code, meaning.sentence);
+  const RefusalRow& meaning = refusal_meant_by(&RefusalRow::can, result, drivebench::Refused::kMalformed);
+  refuse(static_cast<v1::RefusalCode>(meaning.tcp), meaning.sentence);
 }
 
 /// In the numbers of the profile, where 3 are duties.

@@ -40,26 +40,6 @@ double value_of(const Row& row, std::uint16_t start, std::span<const std::uint16
                            modbus::get(row.type, modbus::WordOrder::kAbcd, &words[row.address - start]));
 }
 
-struct Meaning {
-  v1::RefusalCode code;
-  const char* sentence;
-};
-/// By the value of the register last_refusal.
-constexpr auto kMeanings = std::to_array<Meaning>({
-    {v1::REFUSAL_BUSY, "the bench is busy"},
-    {v1::REFUSAL_UNKNOWN_AXIS, "there is no such axis"},
-    {v1::REFUSAL_NOT_OWNER, "this controller does not hold the axis"},
-    {v1::REFUSAL_OWNED, "another controller holds the axis"},
-    {v1::REFUSAL_NOT_FINITE, "a voltage is not a number"},
-    {v1::REFUSAL_LATCHED, "a latched fault is in force; it must be cleared first"},
-    {v1::REFUSAL_STALE, "the tick has been answered"},
-    {v1::REFUSAL_BUSY, "the bench has too much to do"},
-    {v1::REFUSAL_OUT_OF_RANGE, "a value is out of range"},
-    {v1::REFUSAL_WRONG_MODE, "the bench runs in another mode"},
-    {v1::REFUSAL_WRONG_DRIVE, "the drive of the axis takes no currents"},
-    {v1::REFUSAL_CAUSE_LASTS, "what caused the latched fault is still there"},
-});
-
 constexpr SignalMask kKnown = [] {
   SignalMask mask = 0;
   for (const Row& row : modbus::map_detail::kFixedRows) {
@@ -258,11 +238,11 @@ void ModbusLink::check(int result, std::string_view doing) {
 /// Exception 6 has many reasons; a register tells which.
 void ModbusLink::refuse_busy() {
   std::uint16_t why = 0;
-  if (::modbus_read_registers(modbus_.get(), address_of(Content::kLastRefusal), 1, &why) < 0 ||
-      why >= kMeanings.size()) {
-    why = 0;
-  }
-  refuse(kMeanings[why].code, kMeanings[why].sentence);
+  const bool is_read =
+      ::modbus_read_registers(modbus_.get(), address_of(Content::kLastRefusal), 1, &why) >= 0;
+  const auto code = is_read && why != 0 ? static_cast<modbus::Refusal>(why) : modbus::Refusal::kBusy;
+  const RefusalRow& meaning = refusal_meant_by(&RefusalRow::modbus, code, drivebench::Refused::kBusy);
+  refuse(static_cast<v1::RefusalCode>(meaning.tcp), meaning.sentence);
 }
 
 }  // namespace drivebench::link

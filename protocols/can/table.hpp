@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "protocols/can/field.hpp"
+#include "protocols/refusals.hpp"
 
 /// The frames of the native CAN profile, written once: codec, DBC file, documentation and bus budget loop
 /// over this table. Little-endian throughout.
@@ -49,22 +50,6 @@ enum class Sender : std::uint8_t { kBench, kController };
 
 /// The codes of the field `request`; 0 in a reply to a command.
 enum class Request : std::uint8_t { kCommand = 0, kAcquire = 1, kRenew = 2, kRelease = 3, kClearFaults = 4 };
-
-/// The codes of the field `result`.
-enum class Result : std::uint8_t {
-  kDone = 0,
-  kNotOwner = 1,
-  kOwned = 2,
-  kNotFinite = 3,
-  kLatched = 4,
-  kStale = 5,
-  kBusy = 6,
-  kMalformed = 7,
-  kIncomplete = 8,    ///< setpoints of phase c and of the field did not come with it
-  kWrongDrive = 9,    ///< currents for a drive without a current loop
-  kBeyondDrive = 10,  ///< a setpoint beyond what the drive can give
-  kCauseLasts = 11,   ///< what the latched fault came from is still there
-};
 
 struct MessageRow {
   Message message;
@@ -191,10 +176,7 @@ inline constexpr auto kRequest = std::to_array<Field>({
 });
 inline constexpr auto kReply = std::to_array<Field>({
     choice("request", 0, "", "0 a command, 1 acquire, 2 renew, 3 release, 4 clear faults: what this answers"),
-    choice(
-        "result", 8, "",
-        "0 done, 1 not the owner, 2 owned by another, 3 not finite, 4 latched, 5 stale, 6 busy, 7 malformed, "
-        "8 incomplete, 9 wrong drive, 10 beyond drive, 11 cause lasts"),
+    choice("result", 8, "", kCanResultMeaning),
     code("controller", 16, 32, "", "the number in the request; 0 for a command"),
     code("lease", 48, 8, "", "lease number to command with, 0: none; of a command, the one that it carried"),
     counter("tick", 56, 8, "",

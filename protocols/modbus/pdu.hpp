@@ -5,6 +5,7 @@
 #include <span>
 
 #include "protocols/modbus/register_map.hpp"
+#include "protocols/refusals.hpp"
 
 namespace drivebench::modbus {
 
@@ -21,16 +22,6 @@ enum class Function : std::uint8_t {
   kMaskWriteRegister = 22,
   kReadWriteRegisters = 23,
   kEncapsulated = 43,
-};
-
-enum class Exception : std::uint8_t {
-  kNone = 0,
-  kIllegalFunction = 1,
-  kIllegalAddress = 2,
-  kIllegalValue = 3,
-  kFailure = 4,
-  kBusy = 6,
-  kNoTarget = 11,
 };
 
 inline constexpr std::uint16_t kMaxReadBits = 2000;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "protocols/modbus/codec.hpp"
+#include "protocols/refusals.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 /// The rows of the register map that are the same for every axis.
@@ -305,11 +306,7 @@ inline constexpr auto kCommand = std::to_array<Row>({
     fixed(
         409, kUnsigned16, kLeaseStatus, "lease_status", "enum",
         "who holds the lease: 0 nobody, 1 this connection, 2 another Modbus connection, 3 another transport"),
-    fixed(
-        410, kUnsigned16, kLastRefusal, "last_refusal", "enum",
-        "why the last write here was refused: 0 none yet, 2 not the owner, 3 owned by another, 4 not finite, "
-        "5 latched fault, 6 stale or answered already, 7 busy, 8 out of range, 9 wrong mode, "
-        "10 currents for a drive that takes none, 11 the cause of the latched fault is still there"),
+    fixed(410, kUnsigned16, kLastRefusal, "last_refusal", "enum", kLastRefusalMeaning),
 });
 
 /// The same registers for every terminal that there is, so that one request writes them all.

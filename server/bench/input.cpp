@@ -145,40 +145,4 @@ std::string problem_with(const InjectableFault& fault, double value) {
   return found.any() ? sentences.front().rule : std::string();
 }
 
-std::string_view sentence_of(Refused why) noexcept {
-  switch (why) {
-    case Refused::kUnknownAxis:
-      return "there is no such axis";
-    case Refused::kNotOwner:
-      return "this session does not hold the lease of the axis";
-    case Refused::kOwned:
-      return "another session holds the lease of the axis";
-    case Refused::kNotFinite:
-      return "a value is not a finite number";
-    case Refused::kLatched:
-      return "a latched fault is in force; its owner must clear it first";
-    case Refused::kStale:
-      return "the command answers a sample that is too old, already answered or not taken yet";
-    case Refused::kBusy:
-      return "too many requests are waiting for the bench";
-    case Refused::kWrongDrive:
-      return "GATES_CURRENT needs a drive of kind \"current_amplifier\"; the drive of the axis is another";
-    case Refused::kBeyondDrive:
-      return "a set-point is beyond what the drive of the axis can give, or moves faster than it may";
-    case Refused::kCauseLasts:
-      return "what caused the latched fault is still there: over-current, a lossy command link, or a "
-             "controller "
-             "whose last command was refused for its values";
-    case Refused::kOutOfRange:
-      return "a value is outside of its limits";
-    case Refused::kRuleBroken:
-      return "the parameter would break a rule with the values that hold now";
-    case Refused::kTooManyRamps:
-      return "16 parameters of the axis are on their way already";
-    case Refused::kNot:
-      break;
-  }
-  return {};
-}
-
 }  // namespace drivebench

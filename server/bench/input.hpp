@@ -2,13 +2,13 @@
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <variant>
 
 #include "plant/drive/drive.hpp"
 #include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
+#include "protocols/refusals.hpp"
 
 namespace drivebench {
 
@@ -94,24 +94,6 @@ inline bool ends_lease(const Input& input) noexcept {
   return action != nullptr && (*action == LeaseAction::kRelease || *action == LeaseAction::kLost);
 }
 
-/// Why the bench did not do what an input asked for.
-enum class Refused : std::uint32_t {
-  kNot,
-  kUnknownAxis,
-  kNotOwner,
-  kOwned,
-  kNotFinite,
-  kLatched,
-  kStale,
-  kBusy,
-  kWrongDrive,    ///< the drive of the axis does not take such a setpoint
-  kBeyondDrive,   ///< a setpoint is beyond what the drive can give
-  kCauseLasts,    ///< what a latched fault came from is still there
-  kOutOfRange,    ///< the value is outside of what it is about
-  kRuleBroken,    ///< a parameter would break a rule between values
-  kTooManyRamps,  ///< as many parameters as possible are on their way already
-};
-
 /// Whether a command was refused for its values.
 constexpr bool are_bad_values(Refused why) noexcept {
   return why == Refused::kNotFinite || why == Refused::kWrongDrive || why == Refused::kBeyondDrive;
@@ -138,8 +120,5 @@ inline constexpr std::uint64_t kMaxTick = std::uint64_t{1} << 53;
 /// Largest amounts that configurations and clients may ask for, both signs.
 inline constexpr double kMaxLoadNm = 1e6;
 inline constexpr double kMaxImpulseNms = 1e6;
-
-/// The reason for people; empty for kNot.
-std::string_view sentence_of(Refused why) noexcept;
 
 }  // namespace drivebench

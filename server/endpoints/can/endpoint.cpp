@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/endpoints/can/results.hpp"
-
 namespace drivebench::can {
 namespace {
 
@@ -39,6 +37,11 @@ std::string_view name_of(BusState state) noexcept {
 /// The clock of the stamps may be set back at any time.
 constexpr std::uint64_t not_negative(std::int64_t value) noexcept {
   return value > 0 ? static_cast<std::uint64_t>(value) : 0;
+}
+
+/// Of a field that holds an unsigned number.
+constexpr std::uint64_t unsigned_of(double value) noexcept {
+  return value > 0.0 ? static_cast<std::uint64_t>(value) : 0;
 }
 
 /// Whether a message with these identifiers comes from a bench.
@@ -141,11 +144,11 @@ void Endpoint::on_request(Node& node, const Values& values) {
   const auto controller = static_cast<std::uint32_t>(unsigned_of(values[field("controller")]));
   const auto request = static_cast<Request>(code);
   if (code == 0 || code > static_cast<std::uint64_t>(Request::kClearFaults)) {
-    return turn_away(node, request, controller, Result::kMalformed, "its code must be 1 to 4");
+    return turn_away(node, request, controller, Refused::kMalformed, "its code must be 1 to 4");
   }
   if (request == Request::kAcquire) return acquire(node, controller);
   if (node.owner == 0 || lease != node.lease) {
-    return turn_away(node, request, controller, Result::kNotOwner, sentence_of(Refused::kNotOwner));
+    return turn_away(node, request, controller, Refused::kNotOwner);
   }
   node.heard = Clock::now();
   act(node, request, controller);
@@ -156,8 +159,9 @@ Client Endpoint::client_of(std::uint32_t controller) const {
       .transport = "can", .peer = bus_->name() + " controller " + std::to_string(controller), .subject = {}};
 }
 
-void Endpoint::turn_away(const Node& node, Request request, std::uint32_t controller, Result result,
+void Endpoint::turn_away(const Node& node, Request request, std::uint32_t controller, Refused refused,
                          std::string_view why) {
+  if (why.empty()) why = sentence_of(refused);
   ++refused_;
   const bool acquires = request == Request::kAcquire;
   log_refusal(node, acquires ? "the lease" : "a request", why);
@@ -168,7 +172,7 @@ void Endpoint::turn_away(const Node& node, Request request, std::uint32_t contro
     if (!acquires) event.details = {{"request", static_cast<std::uint64_t>(request)}};
     audit_->note(std::move(event));
   }
-  reply(node, request, result, controller, 0, 0);
+  reply(node, request, refused, controller, 0, 0);
 }
 
 void Endpoint::note_client(const std::string& peer, std::string_view why) {
@@ -181,13 +185,15 @@ void Endpoint::note_client(const std::string& peer, std::string_view why) {
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
   check_owner(node);  // in lockstep there may have been no tick that told of a loss
   const bool known = node.controller == controller && (node.owner != 0 || node.acquiring);
-  if (engine_->config().mode == RunMode::kFree || (node.acquiring && !known)) {
-    return turn_away(node, Request::kAcquire, controller, Result::kBusy,
-                     node.acquiring ? "another controller asks for it" : "a free run takes no controller");
+  if (engine_->config().mode == RunMode::kFree) {
+    return turn_away(node, Request::kAcquire, controller, Refused::kWrongMode);
+  }
+  if (node.acquiring && !known) {
+    return turn_away(node, Request::kAcquire, controller, Refused::kBusy, "another controller asks for it");
   }
   if (node.acquiring) return;  // asked again before the answer came
   if (node.owner != 0 && !known) {
-    return turn_away(node, Request::kAcquire, controller, Result::kOwned, sentence_of(Refused::kOwned));
+    return turn_away(node, Request::kAcquire, controller, Refused::kOwned);
   }
   const Owner owner = node.owner != 0 ? node.owner : engine_->new_owner(client_of(controller));
   node.acquiring = true;
@@ -212,7 +218,7 @@ void Endpoint::acquire(Node& node, std::uint32_t controller) {
                        ++refused_;
                        log_refusal(node, "the lease", sentence_of(refused));
                      }
-                     reply(node, Request::kAcquire, result_of(refused), controller,
+                     reply(node, Request::kAcquire, refused, controller,
                            refused == Refused::kNot ? node.lease : std::uint8_t{0}, tick);
                      if (refused != Refused::kNot) return;
                      // What the controller must know to begin; in lockstep nothing would come by itself.
@@ -234,7 +240,7 @@ void Endpoint::act(Node& node, Request request, std::uint32_t controller) {
       node.lease = 0;
     }
     if (refused != Refused::kNot) ++refused_;
-    reply(node, request, result_of(refused), controller, lease, tick);
+    reply(node, request, refused, controller, lease, tick);
     send_state(node, engine_->newest(node.axis));
   });
 }

@@ -82,10 +82,11 @@ class Endpoint {
   bool is_for(const Node& node, const MessageRow& row);
   Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
   /// Turns a command away before it reaches the bench, which counts it.
-  void refuse(const Node& node, Owner sender, Result result, const Setpoints& given, std::string_view why);
+  void refuse(const Node& node, Owner sender, Refused refused, const Setpoints& given,
+              std::string_view why = {});
   /// Turns a request away before it reaches the bench.
-  void turn_away(const Node& node, Request request, std::uint32_t controller, Result result,
-                 std::string_view why);
+  void turn_away(const Node& node, Request request, std::uint32_t controller, Refused refused,
+                 std::string_view why = {});
   void note_client(const std::string& peer, std::string_view why);
   void log_refusal(const Node& node, std::string_view what, std::string_view why);
   void log_loss(const Node& node, std::string_view why);
@@ -110,7 +111,7 @@ class Endpoint {
   void send_edges(Node& node);
   void send_sync(std::uint64_t tick);
   void send_heartbeat(const Node& node, double state);
-  void reply(const Node& node, Request request, Result result, std::uint32_t controller, std::uint8_t lease,
+  void reply(const Node& node, Request request, Refused refused, std::uint32_t controller, std::uint8_t lease,
              std::int64_t tick);
 
   ServerTimer timer_;

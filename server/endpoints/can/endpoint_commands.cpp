@@ -1,6 +1,5 @@
 // What the endpoint does with commands.
 #include "server/endpoints/can/endpoint.hpp"
-#include "server/endpoints/can/results.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -49,14 +48,14 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   const Owner owner = node.owner != 0 && given.lease == node.lease ? node.owner : 0;
   if (owner != 0) node.spoke = true;
   if (given.mode > kLastMode) {
-    return refuse(node, owner, Result::kMalformed, given, "its mode must be 0 to 4");
+    return refuse(node, owner, Refused::kMalformed, given, "its mode must be 0 to 4");
   }
   const bool is_whole = row.width == Width::kWide || !node.terminals.has_more() || !has_setpoints(given.mode);
   if (!is_whole && node.phases.answers == answers && node.phases.mode == given.mode) {
     given.c = node.phases.c;
     given.field = node.phases.field;
   } else if (!is_whole && owner != 0) {
-    return refuse(node, owner, Result::kIncomplete, given, "phase c and the field of its tick are missing");
+    return refuse(node, owner, Refused::kIncomplete, given);
   }
 
   const double bus_voltage_v = engine_->newest(node.axis).bus_voltage_v;
@@ -73,19 +72,20 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   if (why != Refused::kNot) {
     ++refused_;
     log_refusal(node, "a command", sentence_of(why));
-    return reply(node, Request::kCommand, result_of(why), 0, static_cast<std::uint8_t>(given.lease), answers);
+    return reply(node, Request::kCommand, why, 0, static_cast<std::uint8_t>(given.lease), answers);
   }
   node.commanded_at = engine_->tick();
   engine_->advance();
 }
 
-void Endpoint::refuse(const Node& node, Owner sender, Result result, const Setpoints& given,
+void Endpoint::refuse(const Node& node, Owner sender, Refused refused, const Setpoints& given,
                       std::string_view why) {
+  if (why.empty()) why = sentence_of(refused);
   ++refused_;
   engine_->request({.tick = 0, .axis = node.axis, .owner = sender, .action = RefusedCommand{true}},
                    [](Refused, Tick) {});
   log_refusal(node, "a command", why);
-  reply(node, Request::kCommand, result, 0, static_cast<std::uint8_t>(given.lease),
+  reply(node, Request::kCommand, refused, 0, static_cast<std::uint8_t>(given.lease),
         static_cast<std::int64_t>(given.tick));
 }
 

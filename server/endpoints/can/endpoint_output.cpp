@@ -133,11 +133,11 @@ void Endpoint::send_heartbeat(const Node& node, double state) {
                   period_us});
 }
 
-void Endpoint::reply(const Node& node, Request request, Result result, std::uint32_t controller,
+void Endpoint::reply(const Node& node, Request request, Refused refused, std::uint32_t controller,
                      std::uint8_t lease, std::int64_t tick) {
   send(Message::kReply, node,
-       std::array{static_cast<double>(request), static_cast<double>(result), static_cast<double>(controller),
-                  static_cast<double>(lease), static_cast<double>(tick)});
+       std::array{static_cast<double>(request), static_cast<double>(refusal_row(refused).can),
+                  static_cast<double>(controller), static_cast<double>(lease), static_cast<double>(tick)});
 }
 
 }  // namespace drivebench::can

@@ -14,32 +14,6 @@ const Client kSomebody{.transport = "modbus", .peer = {}, .subject = {}};
 
 }  // namespace
 
-Refusal refusal_of(Refused why) noexcept {
-  switch (why) {
-    case Refused::kWrongDrive:
-      return Refusal::kWrongDrive;
-    case Refused::kCauseLasts:
-      return Refusal::kCauseLasts;
-    case Refused::kBeyondDrive:
-    case Refused::kOutOfRange:
-    case Refused::kRuleBroken:
-      return Refusal::kOutOfRange;
-    case Refused::kTooManyRamps:
-      return Refusal::kBusy;
-    default:
-      return static_cast<Refusal>(why);  // the registers count them alike
-  }
-}
-static_assert(static_cast<int>(Refused::kBusy) == static_cast<int>(Refusal::kBusy));
-
-std::string_view sentence_of(Refusal refusal) noexcept {
-  if (refusal == Refusal::kOutOfRange) return "a value is out of range";
-  if (refusal == Refusal::kWrongMode) return "a free run takes no controller";
-  if (refusal == Refusal::kWrongDrive) return drivebench::sentence_of(Refused::kWrongDrive);
-  if (refusal == Refusal::kCauseLasts) return drivebench::sentence_of(Refused::kCauseLasts);
-  return drivebench::sentence_of(static_cast<Refused>(refusal));
-}
-
 AxisDesk::AxisDesk(asio::io_context& io, Engine& engine, const RegisterMap& map, std::uint32_t axis)
     : engine_(engine),
       map_(map),
@@ -80,7 +54,7 @@ std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
     case Content::kLeaseStatus:
       return engine_.owner(axis_) == 0 ? 0 : holds(who) ? 1 : leased() ? 2 : 3;
     case Content::kLastRefusal:
-      return static_cast<std::uint64_t>(holds(who) ? holders_refusal_ : last_refusal_);
+      return static_cast<std::uint64_t>(refusal_row(holds(who) ? holders_refusal_ : last_refusal_).modbus);
     case Content::kParameter:
       return float_bits(parameter(row).get(engine_.parameters(axis_)));
     default:
@@ -224,7 +198,7 @@ void AxisDesk::forget() {
   command_ = {};
   process_ = {};
   state_ = DriveState::kSwitchOnDisabled;
-  holders_refusal_ = Refusal::kNone;
+  holders_refusal_ = Refused::kNot;
   on_lease_change();
 }
 

@@ -23,24 +23,6 @@ namespace drivebench::modbus {
 /// Number of a connection; 0 is none.
 using Visitor = std::uint64_t;
 
-/// Why a write was refused, as the register last_refusal shows it.
-enum class Refusal : std::uint16_t {
-  kNone = 0,
-  kUnknownAxis = 1,
-  kNotOwner = 2,
-  kOwned = 3,
-  kNotFinite = 4,
-  kLatched = 5,
-  kStale = 6,
-  kBusy = 7,
-  kOutOfRange = 8,
-  kWrongMode = 9,
-  kWrongDrive = 10,
-  kCauseLasts = 11,
-};
-Refusal refusal_of(Refused why) noexcept;
-std::string_view sentence_of(Refusal refusal) noexcept;
-
 /// One axis as Modbus sees it: registers and coils, the lease behind its key, and the state machine behind
 /// the control word.
 ///
@@ -68,7 +50,7 @@ class AxisDesk {
 
   struct Outcome {
     Exception exception = Exception::kNone;
-    Refusal refusal = Refusal::kNone;
+    Refused refused = Refused::kNot;
     bool commanded = false;  ///< the bench has accepted a command
   };
   /// Carries out a write that has been validated: all of it or nothing.
@@ -79,7 +61,7 @@ class AxisDesk {
   /// A write was turned away for its values: a command in it counts as refused.
   void count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words, Visitor who);
   /// A write was refused, as last_refusal is to say.
-  void note_refusal(Visitor who, Refusal why) noexcept;
+  void note_refusal(Visitor who, Refused why) noexcept;
 
   /// Whether this connection holds the lease.
   bool holds(Visitor who) const noexcept;
@@ -177,8 +159,8 @@ class AxisDesk {
   CommandInput command_;
   ProcessInput process_;
   DriveState state_ = DriveState::kSwitchOnDisabled;  ///< never kFault, which the sample tells
-  Refusal last_refusal_ = Refusal::kNone;
-  Refusal holders_refusal_ = Refusal::kNone;  ///< the last one of whoever holds the lease
+  Refused last_refusal_ = Refused::kNot;
+  Refused holders_refusal_ = Refused::kNot;  ///< the last one of whoever holds the lease
   LogLimit lapsed_log_;
 };
 

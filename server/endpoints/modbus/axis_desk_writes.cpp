@@ -9,31 +9,6 @@ namespace {
 
 constexpr double kReferenceUnit = 0.01;  // of the process data [V] or [A]
 
-Exception exception_of(Refused why) noexcept {
-  switch (why) {
-    case Refused::kNot:
-      return Exception::kNone;
-    case Refused::kUnknownAxis:
-      return Exception::kNoTarget;
-    case Refused::kNotFinite:
-    case Refused::kBeyondDrive:
-    case Refused::kOutOfRange:
-    case Refused::kRuleBroken:
-      return Exception::kIllegalValue;
-    case Refused::kLatched:
-    case Refused::kStale:
-    case Refused::kWrongDrive:
-    case Refused::kCauseLasts:
-      return Exception::kFailure;
-    case Refused::kNotOwner:
-    case Refused::kOwned:
-    case Refused::kBusy:
-    case Refused::kTooManyRamps:
-      break;
-  }
-  return Exception::kBusy;
-}
-
 /// The tick nearest to `newest` with these low bits.
 Tick tick_of(std::uint32_t counter, Tick newest) noexcept {
   return newest + static_cast<std::int32_t>(counter - static_cast<std::uint32_t>(newest));
@@ -54,10 +29,10 @@ std::optional<std::uint64_t> AxisDesk::Written::operator[](Content content) cons
 }
 
 AxisDesk::Outcome AxisDesk::refuse(Refused why) noexcept {
-  return {.exception = exception_of(why), .refusal = refusal_of(why)};
+  return {.exception = refusal_row(why).exception, .refused = why};
 }
 
-void AxisDesk::note_refusal(Visitor who, Refusal why) noexcept {
+void AxisDesk::note_refusal(Visitor who, Refused why) noexcept {
   last_refusal_ = why;
   if (holds(who)) holders_refusal_ = why;
 }
@@ -177,7 +152,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   const bool had_lease = leased();
   if (key.value_or(0) != 0) {
     if (engine_.config().mode == RunMode::kFree) {
-      co_return Outcome{.exception = Exception::kFailure, .refusal = Refusal::kWrongMode};
+      co_return refuse(Refused::kWrongMode);
     }
     // All or nothing: with a command that is refused the lease does not change hands either.
     if (commands && had_lease && key == key_ &&

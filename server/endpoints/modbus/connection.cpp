@@ -177,7 +177,7 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
     if (verdict.request.write.count > 0) {
       words_ = words_from(verdict.request.data);
       desk->count_refused(verdict.request.write, words_, number_);
-      note_refused_write(*desk, Refusal::kOutOfRange);
+      note_refused_write(*desk, Refused::kOutOfRange);
     }
     refuse(adu, verdict.exception);
     co_return true;
@@ -241,14 +241,14 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
       words_[0] = static_cast<std::uint16_t>((now & words_[0]) | (words_[1] & ~words_[0]));
       if (!values_fit(request.write, words_)) {
         desk.count_refused(request.write, words_, number_);
-        note_refused_write(desk, Refusal::kOutOfRange);
+        note_refused_write(desk, Refused::kOutOfRange);
         co_return Exception::kIllegalValue;
       }
     }
     outcome = co_await desk.write(request.write, words_, number_);
   }
   if (outcome.exception != Exception::kNone) {
-    note_refused_write(desk, outcome.refusal);
+    note_refused_write(desk, outcome.refused);
     co_return outcome.exception;
   }
   if (outcome.commanded) {
@@ -258,15 +258,15 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
   co_return Exception::kNone;
 }
 
-void Connection::note_refused_write(AxisDesk& desk, Refusal refusal) {
+void Connection::note_refused_write(AxisDesk& desk, Refused why) {
   ++shared_.counts.refused_writes;
-  desk.note_refusal(number_, refusal);
+  desk.note_refusal(number_, why);
   // That another has the axis; what else may be wrong with a write is between the bench and its owner.
-  const bool is_foreign = refusal == Refusal::kNotOwner || refusal == Refusal::kOwned;
-  if (is_foreign) audit("forbidden", sentence_of(refusal), desk.axis());
+  const bool is_foreign = why == Refused::kNotOwner || why == Refused::kOwned;
+  if (is_foreign) audit("forbidden", sentence_of(why), desk.axis());
   if (!shared_.refused_writes_log.allow()) return;
   spdlog::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_,
-               desk.axis(), sentence_of(refusal), shared_.refused_writes_log.held_back());
+               desk.axis(), sentence_of(why), shared_.refused_writes_log.held_back());
 }
 
 bool Connection::is_peer_gone() {

@@ -90,7 +90,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   /// Whether the peer has closed its end, with or without requests that were not read yet.
   bool is_peer_gone();
   void fill_reply(AxisDesk& desk, const Request& request);
-  void note_refused_write(AxisDesk& desk, Refusal refusal);
+  void note_refused_write(AxisDesk& desk, Refused why);
   AxisDesk* desk_of(std::uint8_t unit);
   void reply(Bytes adu, Bytes pdu);
   void refuse(Bytes adu, Exception exception);

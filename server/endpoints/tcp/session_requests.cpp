@@ -14,34 +14,7 @@ namespace drivebench {
 namespace {
 
 v1::RefusalCode code_of(Refused why) noexcept {
-  switch (why) {
-    case Refused::kUnknownAxis:
-      return v1::REFUSAL_UNKNOWN_AXIS;
-    case Refused::kNotOwner:
-      return v1::REFUSAL_NOT_OWNER;
-    case Refused::kOwned:
-      return v1::REFUSAL_OWNED;
-    case Refused::kNotFinite:
-      return v1::REFUSAL_NOT_FINITE;
-    case Refused::kLatched:
-      return v1::REFUSAL_LATCHED;
-    case Refused::kStale:
-      return v1::REFUSAL_STALE;
-    case Refused::kBusy:
-    case Refused::kTooManyRamps:
-      return v1::REFUSAL_BUSY;
-    case Refused::kWrongDrive:
-      return v1::REFUSAL_WRONG_DRIVE;
-    case Refused::kCauseLasts:
-      return v1::REFUSAL_CAUSE_LASTS;
-    case Refused::kBeyondDrive:
-    case Refused::kOutOfRange:
-    case Refused::kRuleBroken:
-      return v1::REFUSAL_OUT_OF_RANGE;
-    case Refused::kNot:
-      break;
-  }
-  return v1::REFUSAL_UNSPECIFIED;
+  return static_cast<v1::RefusalCode>(refusal_row(why).tcp);
 }
 
 }  // namespace
@@ -140,7 +113,7 @@ void Session::lease(const v1::LeaseRequest& r) {
                   "the action must be acquire, renew, release or take", "action");
   }
   if (engine_.config().mode == RunMode::kFree) {
-    return refuse(request_.id(), v1::REFUSAL_WRONG_MODE, "a free run takes no controller", "action");
+    return refuse(request_.id(), Refused::kWrongMode, "action");
   }
   const auto action = takes ? LeaseAction::kAcquire : static_cast<LeaseAction>(r.action());
   const auto on_done = [this, axis = r.axis(), action] {

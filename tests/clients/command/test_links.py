@@ -101,7 +101,7 @@ class Links(unittest.TestCase):
                 owner.ask(lease=pb.LeaseRequest(axis=0, action=pb.LeaseRequest.ACTION_ACQUIRE))
                 done = run("control", "--link", link_of(server))
                 self.assertEqual(done.returncode, 1, done.stderr)
-                self.assertIn("another controller holds the axis", done.stderr)
+                self.assertIn("another session holds the lease of the axis", done.stderr)
 
     # Catches a fault that is overlooked because the link has no names for it, and a clear that does nothing.
     def test_a_latched_fault_is_seen_and_cleared(self):

@@ -110,14 +110,5 @@ TEST(Input, FaultsAreCheckedByTheirTable) {
   EXPECT_EQ(problem("hall_offset", -4), "is -4 but must lie between -3.15 and 3.15 rad");
 }
 
-// Kills: a refusal that says nothing to people.
-TEST(Input, EveryRefusalHasASentence) {
-  for (auto why = Refused::kUnknownAxis; why <= Refused::kTooManyRamps;
-       why = static_cast<Refused>(static_cast<std::uint32_t>(why) + 1)) {
-    EXPECT_FALSE(sentence_of(why).empty()) << static_cast<std::uint32_t>(why);
-  }
-  EXPECT_TRUE(sentence_of(Refused::kNot).empty());
-}
-
 }  // namespace
 }  // namespace drivebench

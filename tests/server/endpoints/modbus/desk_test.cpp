@@ -103,7 +103,7 @@ TEST(ModbusDesk, AParameterThatDidNotGetThroughReadsAsBefore) {
   desk.run();
   ASSERT_TRUE(desk.outcome);
   EXPECT_EQ(desk.outcome->exception, Exception::kBusy);
-  EXPECT_EQ(desk.outcome->refusal, Refusal::kBusy);
+  EXPECT_EQ(desk.outcome->refused, Refused::kBusy);
   EXPECT_EQ(desk.engine.inputs.size(), 1u);
   EXPECT_EQ(parameter(desk.engine, 1), 2.0) << "this one is on its way";
   EXPECT_EQ(parameter(desk.engine, 2), second);
