@@ -180,6 +180,22 @@ class Readmes(unittest.TestCase):
             self.assertIn(f"state hash {shown[1]}\n", bench.run(["drivebench", "status"]))
             bench.stop()
 
+    def test_the_controller_in_twelve_lines_turns_the_motor(self):
+        """Catches: twelve lines that do not compile, or that are no longer those of the program that is built and run here."""
+        shown = re.search(r"^```cpp\n(.*?)^```", (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.M | re.S)[1]
+        lines = [line.strip() for line in shown.splitlines() if line.strip() != "}"]
+        self.assertEqual(len(lines), 12)
+        built = [line.strip() for line in (REPOSITORY / "clients/examples/half_turn.cpp").read_text(encoding="utf-8").splitlines()]
+        self.assertEqual([line for line in lines[1:] if line not in built], [])
+        with tempfile.TemporaryDirectory(prefix="drivebench-readme-") as folder:
+            bench = Bench(pathlib.Path(folder))
+            self.addCleanup(bench.kill)
+            bench.start(["drivebench", "serve", "dc-a-servo"])
+            done = subprocess.run([SERVER.parent / "half_turn", bench.environment["DRIVEBENCH_LINK"]], capture_output=True,
+                                  text=True, timeout=4 * PATIENCE_S, check=False)
+            bench.stop()
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "turned by 3.142 rad of 3.142\n", ""))
+
     def test_every_option_of_a_command_is_documented(self):
         """Catches: an option that only its --help names."""
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
