@@ -15,13 +15,13 @@
 
 namespace drivebench {
 
-/// What is different from the preset's own bench file.
+/// The differences from the preset's own bench file.
 struct ClosedLoopOptions {
   std::string bench{};  ///< configs/benches/<bench>.toml; empty: the preset's
   std::vector<control::Gain>
       parameters{};              ///< of axis 0, by their names: {"machine.rotor_resistance_ohm", 5.85}
-  int command_delay_ticks = -1;  ///< -1: as the bench file says
-  double sample_rate_hz = 0.0;   ///< 0: as the bench file says; the substep is kept about as long
+  int command_delay_ticks = -1;  ///< -1: the bench file's
+  double sample_rate_hz = 0.0;   ///< 0: the bench file's; the substep stays about as long
 };
 
 /// A load torque from a time after the start of the trajectory.
@@ -35,8 +35,8 @@ struct ClosedLoopRow {
   double time_s;  ///< since the start of the trajectory
   control::RunPhase phase;
   control::Reference reference;
-  Sample sample;               ///< what the bench said, the truth included
-  control::Setpoint setpoint;  ///< what the controller answered
+  Sample sample;               ///< the bench's, the truth included
+  control::Setpoint setpoint;  ///< the controller's answer
   double angle_rad;            ///< true, since the first sample of the run
   double error_rad;            ///< reference - true angle
   bool saturated;
@@ -44,7 +44,7 @@ struct ClosedLoopRow {
   std::vector<double> telemetry;
 };
 
-/// What a run amounted to, from prepare to hold unless it says otherwise.
+/// The result of a run, from prepare to hold unless it says otherwise.
 struct Outcome {
   double peak_error_rad = 0.0;  ///< of the true angle
   double peak_error_counts = 0.0;
@@ -54,10 +54,10 @@ struct Outcome {
   double peak_speed_error_rad_s = 0.0;  ///< reference - true speed
   double peak_current_a = 0.0;          ///< measured, of any phase
   double peak_field_current_a = 0.0;
-  double peak_setpoint = 0.0;          ///< asked for, of any phase [V or A]
+  double peak_setpoint = 0.0;          ///< of any phase [V or A]
   double peak_voltage_v = 0.0;         ///< at the machine, of any phase
-  std::int64_t saturated_samples = 0;  ///< as the controller has it
-  std::int64_t clipped_samples = 0;    ///< as the bench has it: fault bit voltage_saturated
+  std::int64_t saturated_samples = 0;  ///< counted by the controller
+  std::int64_t clipped_samples = 0;    ///< counted by the bench: fault bit voltage_saturated
   std::int64_t samples = 0;
   std::uint64_t faults = 0;  ///< of the last sample
   std::vector<std::string_view> telemetry_names;
@@ -69,8 +69,8 @@ struct Outcome {
   double peak_of(std::string_view telemetry_name) const;
 };
 
-/// A preset's controller on the product's own bench, in process and in lockstep. Runs one after the other
-/// start where the last one stopped, with the time that passes between them under the last command.
+/// A preset's controller on the product's own bench, in process and in lockstep. A run starts where the
+/// previous one stopped; time between them passes under the last command.
 ///   ClosedLoop loop("book/8.2.2", {.parameters = {{"machine.rotor_resistance_ohm", 5.85}}});
 ///   const Outcome seen = loop.run();
 class ClosedLoop {
@@ -82,7 +82,7 @@ class ClosedLoop {
   Outcome run(std::vector<control::Gain> gains, std::vector<LoadStep> loads = {}) {
     return run(std::span<const control::Gain>(gains), std::span<const LoadStep>(loads));
   }
-  /// A run of your own making.
+  /// A run with its own arguments.
   Outcome run(control::Run run, std::span<const LoadStep> loads = {});
   /// Gates off for so long.
   void rest(double duration_s);

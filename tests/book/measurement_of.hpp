@@ -6,7 +6,7 @@
 
 namespace drivebench {
 
-/// What a sample tells a controller, with nothing between them.
+/// A sample as the controller's measurement, with nothing between them.
 inline control::Measurement measurement_of(const Sample& s) {
   return {.encoder_count = s.encoder_count,
           .edge_age_s = s.edge_age_s,

@@ -59,8 +59,8 @@ Complex response(std::string_view preset) {
   return 2.0 * sum / static_cast<double>(count) * Complex(0.0, 1.0);
 }
 
-// AC-05. Catches a gain or an integral of the controller's own current loop that is off, a command that comes
-// a sample late: 0.99592 at -0.545 degrees, with the P loop 0.90631 at 1.681; 0.5 % and 0.1 degrees.
+// AC-05. Catches: a gain or an integral of the controller's own current loop that is off, a command that
+// comes a sample late: 0.99592 at -0.545 degrees, with the P loop 0.90631 at 1.681; 0.5 % and 0.1 degrees.
 TEST(DcControl, ItsOwnCurrentLoopFollowsASine) {
   const Complex pi = response("book/2.9");
   EXPECT_NEAR(std::abs(pi), 0.99592, 0.005);
@@ -70,20 +70,20 @@ TEST(DcControl, ItsOwnCurrentLoopFollowsASine) {
   EXPECT_NEAR(std::arg(p) * 180.0 / std::numbers::pi, 1.681, 0.1);
 }
 
-// SPD-01. Catches a feed-forward: a step to 50 rad/s is missed by f·ω/(f + K·K_T), a sixteenth.
+// SPD-01. Catches: a feed-forward: a step to 50 rad/s is missed by f·ω/(f + K·K_T), a sixteenth.
 TEST(DcControl, TheProportionalSpeedLoopMissesASixteenth) {
   const Outcome seen = closed_loop("book/2.10");
   EXPECT_NEAR(50.0 - seen.rows.back().sample.speed_rad_s, 3.125, 0.05);
 }
 
-/// 1 A, whatever happens.
+/// 1 A throughout.
 class OneAmpere final : public control::Trajectory {
  public:
   control::Reference at(double) const noexcept override { return {.acceleration_rad_s2 = 0.07 / 6e-5}; }
   double duration_s() const noexcept override { return 0.7; }
 };
 
-/// The bench at 1 A with an observer that only looks.
+/// The bench at 1 A with an observer that controls nothing.
 Outcome watched(control::ShaftSpeed source, const control::ShaftObserverGains& gains,
                 control::Discretisation how, std::vector<LoadStep> loads) {
   const control::DcOpenLoopParameters p = {
@@ -117,9 +117,9 @@ double mean_true_speed(const Outcome& seen, double from_s, double to_s) {
 
 constexpr double kFriction = 4e-4 / 6e-5;
 
-// AC-06. Catches a bias of the two-state observer that is not l1·τ_L/(J·p²): 2.3178 rad/s, 0.2 with an
+// AC-06. Catches: a bias of the two-state observer that is not l1·τ_L/(J·p²): 2.3178 rad/s, 0.2 with an
 // encoder.
-TEST(DcControl, AnUnknownLoadDeceivesTheTwoStateObserver) {
+TEST(DcControl, AnUnknownLoadBiasesTheTwoStateObserver) {
   for (const auto how : {control::Discretisation::kEuler, control::Discretisation::kTrapezoidal,
                          control::Discretisation::kExact}) {
     const Outcome seen = watched(control::ShaftSpeed::kObserver,
@@ -129,10 +129,10 @@ TEST(DcControl, AnUnknownLoadDeceivesTheTwoStateObserver) {
   }
 }
 
-// AC-07. Catches an open-loop copy with another friction or torque than the plant's: after a pulse of 0.1 s
+// AC-07. Catches: an open-loop copy with another friction or torque than the plant's: after a pulse of 0.1 s
 // it is 42.58 rad/s off, and forgets that with J/f = 0.15 s alone; with injection 0.1 rad/s (and the
 // encoder's noise) are reached 50 ms after. 1 %.
-TEST(DcControl, WithoutInjectionALoadPulseIsForgottenSlowly) {
+TEST(DcControl, WithoutInjectionTheErrorOfALoadPulseDecaysSlowly) {
   const std::vector<LoadStep> pulse = {{kLoad_nm, 0.5}, {0.0, 0.6}};
   const Outcome open = watched(control::ShaftSpeed::kObserver, {.angle_per_s = 0.0, .speed_per_s2 = 0.0},
                                control::Discretisation::kTrapezoidal, pulse);
@@ -150,7 +150,7 @@ TEST(DcControl, WithoutInjectionALoadPulseIsForgottenSlowly) {
   EXPECT_NEAR(mean_of(placed, "speed_rad_s", 0.65, 0.70) - mean_true_speed(placed, 0.65, 0.70), 0.0, 0.1);
 }
 
-// AC-08. Catches a load observer with a wrong gain: the step of 0.035 N·m is seen as a triple lag of 5 ms;
+// AC-08. Catches: a load observer with a wrong gain: the step of 0.035 N·m is seen as a triple lag of 5 ms;
 // 0.001 N·m of the encoder's noise and 3 %.
 TEST(DcControl, TheThreeStateObserverSeesALoadStep) {
   const Outcome seen =
@@ -165,7 +165,7 @@ TEST(DcControl, TheThreeStateObserverSeesALoadStep) {
   }
 }
 
-/// The half turn in 65 ms: there within 70 ms, and within the limits of motor and amplifier.
+/// The half turn in 65 ms: it ends within 70 ms, and within the limits of motor and amplifier.
 void expect_half_turn(const Outcome& seen, double late_counts = 2.5) {
   EXPECT_LE(seen.peak_error_rad, 0.015);
   for (const ClosedLoopRow& row : seen.rows) {
@@ -179,10 +179,10 @@ void expect_half_turn(const Outcome& seen, double late_counts = 2.5) {
   EXPECT_EQ(seen.saturated_samples, 0);
 }
 
-// AC-14. Catches anything between trajectory, observer, feedback and plant that does not fit: half a turn in
-// 65 ms with at most 0.015 rad. A program of its own with the same settings gives 0.0044 rad and 4.27 A, the
-// reference has 0.0090 rad and 4.26 A.
-TEST(DcControl, HalfATurnIn65Milliseconds) {
+// AC-14. Catches: any mismatch between trajectory, observer, feedback and plant: half a turn in 65 ms with at
+// most 0.015 rad. A separate program with the same settings gives 0.0044 rad and 4.27 A, the reference has
+// 0.0090 rad and 4.26 A.
+TEST(DcControl, HalfATurnTakes65Milliseconds) {
   const Outcome seen = closed_loop("book/2.18");
   expect_half_turn(seen);
   EXPECT_NEAR(seen.peak_error_rad, 0.0045, 0.0015);
@@ -190,30 +190,31 @@ TEST(DcControl, HalfATurnIn65Milliseconds) {
   EXPECT_NEAR(seen.peak_voltage_v, 12.2, 0.5);
 }
 
-// Catches a source of speed or a current loop with which the servo no longer works as it must.
-TEST(DcControl, HalfATurnWithEverySourceOfSpeedAndItsOwnCurrentLoop) {
+// Catches: a source of speed or a current loop with which the servo fails.
+TEST(DcControl, HalfATurnWorksWithEverySourceOfSpeedAndItsOwnCurrentLoop) {
   for (const char* preset : {"book/2.18-own-current-loop", "book/2.18-load-observer", "book/2.23"}) {
     SCOPED_TRACE(preset);
     expect_half_turn(closed_loop(preset));
   }
-  // Close to standstill the last edge is old news.
+  // Close to standstill the last edge is old.
   expect_half_turn(closed_loop("book/2.18-edges"), 4.0);
 }
 
-// Catches a command delay that the loop cannot stand: at 10 kHz and poles at 100 a sample is nothing.
-TEST(DcControl, HalfATurnWithASampleOfDelay) {
+// Catches: a command delay that the loop does not tolerate: at 10 kHz and poles at 100 1/s a sample hardly
+// matters.
+TEST(DcControl, HalfATurnToleratesASampleOfDelay) {
   expect_half_turn(closed_loop("book/2.18", {.command_delay_ticks = 1}));
 }
 
-// The mistake that chapter 2 warns of. Catches a bench whose encoder noise is too kind: steps of 31.4 rad/s
-// in the speed are 7.9 A in the command, which stands at its limit.
+// The mistake that chapter 2 warns of. Catches: a bench with too little encoder noise: steps of 31.4 rad/s in
+// the speed are 7.9 A in the command, which stands at its limit.
 TEST(DcControl, TheBackwardDifferenceDrivesTheCurrentIntoItsLimit) {
   const Outcome seen = closed_loop("book/2.18-raw-speed");
   EXPECT_GT(seen.saturated_samples, 200);
   EXPECT_GT(seen.peak_error_rad, 0.03);
 }
 
-// TRJ-02, TRJ-03. Catches a trajectory whose references do not fit each other: the feed-forward would miss.
+// TRJ-02, TRJ-03. Catches: a trajectory whose references do not fit each other: the feed-forward would miss.
 TEST(DcControl, TheOtherTrajectoriesAreFollowedAsWell) {
   const Outcome smooth = closed_loop("book/2.17");
   EXPECT_LE(smooth.peak_error_rad, 0.008);
@@ -233,8 +234,9 @@ std::string refusal(std::string_view preset, const std::vector<Gain>& gains) {
   return {};
 }
 
-// Catches a limit that nobody looks at before the move: which one, and when. With a continuous jerk 65 ms
-// would take 5.006 A; 59 ms are the shortest that the cubic can do; at 500 rad/s the voltage is what lacks.
+// Catches: a limit that is not checked before the move, with its name and time. With a continuous jerk 65 ms
+// would take 5.006 A; 59 ms are the shortest that the cubic can do; at 500 rad/s the voltage does not
+// suffice.
 TEST(DcControl, AMoveBeyondTheLimitsIsRefusedBeforeItStarts) {
   const std::string smooth = refusal(
       "book/2.17", {{"move.ramp_up_s", 0.025}, {"move.cruise_s", 0.015}, {"move.ramp_down_s", 0.025}});
@@ -255,9 +257,9 @@ TEST(DcControl, AMoveBeyondTheLimitsIsRefusedBeforeItStarts) {
             std::string::npos);
 }
 
-// AC-10. Catches a feedback that is weaker than its gains: 0.0158 rad with the true speed (here that of an
+// AC-10. Catches: a feedback that is weaker than its gains: 0.0158 rad with the true speed (here that of an
 // observer which sees the load, 10 %), 0.034 rad with one that does not, and then nothing.
-TEST(DcControl, AConstantLoadIsForgotten) {
+TEST(DcControl, AConstantLoadLeavesNoError) {
   const Outcome seen = closed_loop("book/2.21", {}, {}, {{kLoad_nm, 0.0}});
   EXPECT_NEAR(seen.peak_error_rad, 0.0158, 0.0016);
   EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9);
@@ -267,8 +269,8 @@ TEST(DcControl, AConstantLoadIsForgotten) {
   EXPECT_LE(deceived.final_encoder_error_counts, 1.0 + 1e-9);
 }
 
-// AC-11. Catches an offset that is driven home otherwise than the triple pole says: −2.571 A at once, 0.0249
-// rad beyond at 30 ms. The current loop, its 40 V and the encoder cost a sixteenth of it.
+// AC-11. Catches: an offset that decays differently from the triple pole: −2.571 A at once, 0.0249 rad beyond
+// at 30 ms. The current loop, its 40 V and the encoder cost a sixteenth of it.
 TEST(DcControl, AnInitialOffsetOvershoots) {
   const Outcome seen = closed_loop("book/2.19-offset");
   EXPECT_NEAR(seen.rows.front().setpoint.a, -2.571, 1e-3);
@@ -284,15 +286,15 @@ TEST(DcControl, AnInitialOffsetOvershoots) {
   EXPECT_NEAR(overshoot_s, 0.030, 0.002);
 }
 
-// AC-12. Catches an integral where there is none: 0.10314 rad stay, 0.0583 without the observer's bias. 2 %
-// and a count.
+// AC-12. Catches: an integral that the loop must not have: 0.10314 rad stay, 0.0583 without the observer's
+// bias. 2 % and a count.
 TEST(DcControl, WithoutAnIntegralALoadLeavesAnError) {
   const Outcome seen = closed_loop("book/2.21-no-integral", {}, {}, {{kLoad_nm, 0.0}});
   EXPECT_NEAR(mean_of(seen, "angle_error_rad", 0.4, 0.6), 0.10314, 0.0021);
   EXPECT_NEAR(seen.rows.back().error_rad, 0.10314, 0.0021 + kCount_rad);
 }
 
-// AC-13. Catches a feed-forward in the nested loops: 0.150 rad behind at 500 rad/s², 2 % and half a count;
+// AC-13. Catches: a feed-forward in the nested loops: 0.150 rad behind at 500 rad/s², 2 % and half a count;
 // nothing behind under a load.
 TEST(DcControl, NestedLoopsLagAnAcceleration) {
   const Outcome seen = closed_loop("book/2.24");
@@ -303,9 +305,9 @@ TEST(DcControl, NestedLoopsLagAnAcceleration) {
   EXPECT_LE(loop.run(still, load).final_encoder_error_counts, 1.0 + 1e-9);
 }
 
-// Problem 2.25. Catches nested loops that are better than they can be, and a table that does not fit: peak
+// Problem 2.25. Catches: nested loops that are better than they can be, and a table that does not fit: peak
 // error, error after 70 ms and current for r = 100, 300 and 500, 3 % and half a count.
-TEST(DcControl, NestedLoopsAreNotThereAfter70Milliseconds) {
+TEST(DcControl, NestedLoopsMissTheirPlaceAfter70Milliseconds) {
   struct Case {
     const char* preset;
     double peak_rad, after_rad, peak_a;
@@ -321,16 +323,16 @@ TEST(DcControl, NestedLoopsAreNotThereAfter70Milliseconds) {
   }
 }
 
-// CTL-05. Catches three loops that do not hold together: within a/K_thI of the long move, then there.
+// CTL-05. Catches: three loops that do not work together: within a/K_thI of the long move, then at its end.
 TEST(DcControl, ThreeNestedLoopsEndAtTheirPlace) {
   const Outcome seen = closed_loop("book/2.27");
   EXPECT_LE(seen.peak_error_rad, 0.22);
   EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9);
 }
 
-// CTL-03. Catches gains on the wrong error: under a load the angle comes back and the current stays half an
+// CTL-03. Catches: gains on the wrong error: under a load the angle comes back and the current stays half an
 // ampere above its reference.
-TEST(DcControl, VoltageFeedbackForgetsALoad) {
+TEST(DcControl, VoltageFeedbackRemovesTheErrorOfALoad) {
   const Outcome seen = closed_loop("book/2.23", {}, {{"run.hold_s", 0.2}}, {{kLoad_nm, 0.07}});
   EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9);
   double sum_a = 0.0;
@@ -339,7 +341,7 @@ TEST(DcControl, VoltageFeedbackForgetsALoad) {
   EXPECT_NEAR(sum_a, 0.5, 0.01);
 }
 
-// Problem 2.19 (a-d, e). Catches an open loop that corrects itself: under 0.035 N·m the reference of 30 rad
+// Problem 2.19 (a-d, e). Catches: an open loop that corrects itself: under 0.035 N·m the reference of 30 rad
 // is missed by 39.6 rad and 85.8 rad/s, and with feedback by 0.034 rad at most.
 TEST(DcControl, TheLongMoveNeedsItsFeedback) {
   const std::vector<LoadStep> load = {{kLoad_nm, 0.0}};
@@ -353,9 +355,9 @@ TEST(DcControl, TheLongMoveNeedsItsFeedback) {
   EXPECT_LE(closed_loop("book/2.19").peak_error_rad, 0.0108);
 }
 
-// AC-18. Catches the tachometer's gain, or a speed that is fed back through the error: 400 A at once for a
+// AC-18. Catches: the tachometer's gain, or a speed that is fed back through the error: 400 A at once for a
 // radian, and the overshoot of 32.77 % at 0.221 s that the zero of the PI makes; 1 kHz costs 2 % of it.
-TEST(DcControl, TheClassicalLoopWithTachometer) {
+TEST(DcControl, TheLoopWithTachometerOvershootsByAThird) {
   const Outcome seen = closed_loop("book/2-tachometer");
   EXPECT_NEAR(seen.rows.front().setpoint.a, 400.0, 1e-9);
   double peak_rad = 0.0;
@@ -371,13 +373,13 @@ TEST(DcControl, TheClassicalLoopWithTachometer) {
   EXPECT_NEAR(seen.rows.back().error_rad, 0.0, 1e-3);
 }
 
-// AC-18. Catches an integral in the proportional loop: a turn of ω_0 is followed ω_0/K behind.
+// AC-18. Catches: an integral in the proportional loop: a turn of ω_0 is followed ω_0/K behind.
 TEST(DcControl, TheProportionalLoopFollowsARampBehind) {
   const Outcome seen = closed_loop("book/2-proportional");
   EXPECT_NEAR(seen.rows.back().error_rad, 0.3, 1e-3);
 }
 
-// CTL-07. Catches a compensator that does not contain the sine: its error would stay.
+// CTL-07. Catches: a compensator without the sine: its error would stay.
 TEST(DcControl, ASineIsFollowedByALoopThatContainsIt) {
   const Outcome seen = closed_loop("book/2-sine");
   EXPECT_NEAR(row_at(seen, 10.0).error_rad, 0.425, 0.005);

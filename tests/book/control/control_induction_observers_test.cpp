@@ -81,9 +81,9 @@ FluxErrors flux_errors(double rate_hz) {
   return worst;
 }
 
-// Case 17: 5 %, and 1e-4 for those in polar form. Catches an observer that takes the current of the wrong
+// Case 17: 5 %, and 1e-4 for those in polar form. Catches: an observer that takes the current of the wrong
 // sample: the rectangular ones lag by half a period, which is all of their error.
-TEST(InductionObservers, FluxErrorsOnTheLine) {
+TEST(InductionObservers, TheFluxErrorsOnTheLineAreThoseOfTheTable) {
   const FluxErrors at_10_khz = flux_errors(10e3);
   EXPECT_NEAR(at_10_khz.euler, 0.0262, 0.05 * 0.0262);
   EXPECT_NEAR(at_10_khz.exact, 0.0189, 0.05 * 0.0189);
@@ -98,8 +98,8 @@ TEST(InductionObservers, FluxErrorsOnTheLine) {
   EXPECT_LT(at_2_khz.polar, 1e-4);
 }
 
-// Exercise 19, negative. Catches an Euler observer that cannot diverge: below the least rate of 125.4 rad/s,
-// 392 Hz, it does, while the exponential only lags and the polar form does not care.
+// Exercise 19, negative. Catches: an Euler observer that cannot diverge: below the least rate of 125.4 rad/s,
+// 392 Hz, it does, while the exponential only lags and the polar form is unaffected.
 TEST(InductionObservers, EulerDivergesAt330Hertz) {
   EXPECT_NEAR(control::least_euler_rate_hz(kServoMotor.machine, 125.4), 393.3, 1.0);
   const FluxErrors at_330_hz = flux_errors(330.0);
@@ -133,9 +133,9 @@ SpeedErrors speed_errors(double rate_hz) {
 }
 
 // Exercise 24 with the observer of IMO-05, which turns its own flux: no worse than the table's 2.25, 1.12 and
-// 0.81 rad/s by more than a quarter, against 31 rad/s of the difference at 10 kHz. Catches an observer
+// 0.81 rad/s by more than a quarter, against 31 rad/s of the difference at 10 kHz. Catches: an observer
 // without its torque input.
-TEST(InductionObservers, SpeedOnTheLine) {
+TEST(InductionObservers, TheSpeedErrorsOnTheLineStayNearTheTable) {
   EXPECT_LT(speed_errors(1e3).observer, 2.8);
   EXPECT_LT(speed_errors(2e3).observer, 1.4);
   const SpeedErrors at_10_khz = speed_errors(10e3);
@@ -174,7 +174,7 @@ struct VergheseSanders {
 };
 
 // Case 18 on the machine: from 0.5 Wb to 5 % of 0.169 Wb takes 4.08 time constants, of 3.59 ms for the copy
-// and 0.89 ms for k = 0.9; what the held currents add moves that by a fifth. Catches a correction of the
+// and 0.89 ms for k = 0.9; what the held currents add moves that by a fifth. Catches: a correction of the
 // wrong sign, which the difference of two observers would not show where both are wrong; k = 1.3 diverges.
 TEST(InductionObservers, VergheseSandersSettlesFaster) {
   const auto settling = [](double gain) {
@@ -199,7 +199,7 @@ struct MartinRouchon {
   PhasePair flux_wb(const Sample& s) const { return observer.flux_wb(current_of(s)); }
 };
 
-// Exercise 27 on the machine. Catches the printed signs of c1, c2 and di/dt: with rates R_R·r of 1000 and
+// Exercise 27 on the machine. Catches: the printed signs of c1, c2 and di/dt: with rates R_R·r of 1000 and
 // 1400 1/s the flux is found in a few milliseconds, twice as fast with twice the rates.
 TEST(InductionObservers, MartinRouchonSettlesAtItsRates) {
   const auto settling = [](double factor) {
@@ -213,11 +213,10 @@ TEST(InductionObservers, MartinRouchonSettlesAtItsRates) {
   EXPECT_NEAR(slow_s / fast_s, 2.0, 0.6);
 }
 
-// Exercises 25 and 26. Catches a load of the wrong sign or size: 0.2 N·m from 0.25 s on, seen by both
-// observers from the encoder; and shows what
-// the observer without load makes of it: a speed that is up to (l1/l2)·τ_L/J = 4.09 rad/s off, less as it
-// turns its flux away.
-TEST(InductionObservers, TheLoadIsFound) {
+// Exercises 25 and 26. Catches: a load of the wrong sign or size: 0.2 N·m from 0.25 s on, found by both
+// observers from the encoder. The observer without load errs in speed by up to (l1/l2)·τ_L/J = 4.09 rad/s,
+// less as it turns its flux away.
+TEST(InductionObservers, BothLoadObserversFindTheLoad) {
   constexpr double kPeriod_s = 1e-4;
   control::InductionMachineModel machine = kServoMotor.machine;
   machine.friction_nms = 0.0;

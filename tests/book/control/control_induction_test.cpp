@@ -1,5 +1,5 @@
-// Input-output linearisation and its relatives on the product's own bench, in process: cases 8 to 11 and
-// exercise 15 of the reference table, and the laws that the book only gives equations for. With the flux
+// Input-output linearisation and related laws on the product's own bench, in process: cases 8 to 11 and
+// exercise 15 of the reference table, and the laws for which the book gives equations only. With the flux
 // gains of the text the last digits are chaotic, hence bounds instead of numbers there.
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@
 namespace drivebench {
 namespace {
 
-/// The largest error from the start of the trajectory on: without what a load that is put on before it does.
+/// The largest error from the start of the trajectory on, without the error of an earlier load.
 double peak_error_while_moving_counts(const Outcome& seen) {
   double peak_rad = 0.0;
   for (const ClosedLoopRow& row : seen.rows) {
@@ -26,7 +26,7 @@ double peak_error_while_moving_counts(const Outcome& seen) {
   return peak_rad * 2000.0 / (2.0 * std::numbers::pi);
 }
 
-/// Samples from the start of the trajectory on in which the law stood aside.
+/// Samples from the start of the trajectory on in which the law was not applied.
 std::int64_t singular_samples(const Outcome& seen) {
   const std::size_t column = seen.column("singular");
   return std::ranges::count_if(seen.rows, [column](const ClosedLoopRow& row) {
@@ -34,7 +34,7 @@ std::int64_t singular_samples(const Outcome& seen) {
   });
 }
 
-/// What make() says about these gains; empty when it does not refuse.
+/// The refusal of make() for these gains; empty if it takes them.
 std::string refusal(std::string_view preset, std::vector<control::Gain> gains) {
   try {
     control::find_preset(preset)->make(gains);
@@ -44,9 +44,9 @@ std::string refusal(std::string_view preset, std::vector<control::Gain> gains) {
   return {};
 }
 
-// Case 8. Catches a flux reference that the machine cannot follow, a torque table that is off, or a division
+// Case 8. Catches: a flux reference that the machine cannot follow, a torque table that is off, or a division
 // by the wrong flux. The table has 3.7 counts, 5.8 A, 6 saturated samples, ψ from 0.0133 to 0.0473 Wb.
-TEST(InductionControl, TheMoveTo8000RpmWithASoftFluxLoop) {
+TEST(InductionControl, ASoftFluxLoopMakesTheMoveTo8000Rpm) {
   const Outcome seen = closed_loop("book/8.2.5-soft-flux");
   EXPECT_LE(seen.peak_error_counts, 8.0);
   EXPECT_NEAR(seen.peak_error_counts, 3.7, 0.7);
@@ -68,10 +68,10 @@ TEST(InductionControl, TheMoveTo8000RpmWithASoftFluxLoop) {
   EXPECT_NEAR(seen.peak_of("flux_wb"), 0.0473, 0.0015);
 }
 
-// Case 9. Catches a limit cycle that takes the shaft along: the flux loop swings between ±5.9 A and more than
-// a thousand samples are saturated, yet the text's 34 counts are kept: 11 to 31 over inertias that differ by
+// Case 9. Catches: a limit cycle that moves the shaft: the flux loop swings between ±5.9 A and more than a
+// thousand samples are saturated, yet the text's 34 counts are kept: 11 to 31 over inertias that differ by
 // 1e-9. The table has 15 to 18, 1600 samples, 9.9 A.
-TEST(InductionControl, TheMoveTo8000RpmWithTheGainsOfTheText) {
+TEST(InductionControl, TheGainsOfTheTextMakeTheMoveTo8000Rpm) {
   const Outcome seen = closed_loop("book/8.2.5");
   EXPECT_LE(seen.peak_error_counts, 50.0);
   EXPECT_LE(seen.final_encoder_error_counts, 3.0);
@@ -80,8 +80,8 @@ TEST(InductionControl, TheMoveTo8000RpmWithTheGainsOfTheText) {
   EXPECT_GT(seen.peak_current_a, 8.0);
 }
 
-// Case 10, negative. Catches a bench or move so forgiving that constant flux would do. The table fails with
-// 15500 to 20900 counts.
+// Case 10, negative. Catches: a bench or move so easy that constant flux would do. The table fails with 15500
+// to 20900 counts.
 TEST(InductionControl, ConstantFluxCannotMakeTheMoveTo8000Rpm) {
   const Outcome seen = closed_loop("book/8.2.5-constant-flux");
   EXPECT_GT(seen.final_error_counts, 1000.0);
@@ -89,8 +89,8 @@ TEST(InductionControl, ConstantFluxCannotMakeTheMoveTo8000Rpm) {
   EXPECT_LT(seen.peak_speed_rad_s, 750.0);
 }
 
-// Case 11, negative: above 100 counts. Catches friction that the bench forgets at high speed. The table has
-// 200 to 420 counts with the text's gains, 846 with the soft ones; with 6e-5 the move is still made (4.9
+// Case 11, negative: above 100 counts. Catches: friction that the bench leaves out at high speed. The table
+// has 200 to 420 counts with the text's gains, 846 with the soft ones; with 6e-5 the move is still made (4.9
 // counts).
 TEST(InductionControl, FrictionForbidsTheMoveTo8000Rpm) {
   const Outcome text = closed_loop("book/8.2.5-friction");
@@ -101,8 +101,8 @@ TEST(InductionControl, FrictionForbidsTheMoveTo8000Rpm) {
   EXPECT_LE(less.peak_error_counts, 8.0);
 }
 
-// Negative. Catches a check that lets a move through which cannot be made, or refuses without saying what and
-// when; the presets that show the failures say themselves that they are not checked.
+// Negative. Catches: a check that passes an impossible move, or that refuses without the reason and the time;
+// the presets that show failures are marked as unchecked.
 TEST(InductionControl, MovesBeyondALimitAreRefusedBeforeTheyStart) {
   EXPECT_EQ(refusal("book/8.2.5-soft-flux", {}), "");
   EXPECT_EQ(refusal("book/8.2.5-soft-flux", {{"machine.friction_nms", 1.4e-4}}),
@@ -115,38 +115,39 @@ TEST(InductionControl, MovesBeyondALimitAreRefusedBeforeTheyStart) {
             std::string::npos);
 }
 
-// Catches field weakening that does not weaken: it follows the move as well, but braking takes more than the
-// 6 A that the amplifier has. (The table loses the move; its law and limits are not stated.)
+// Catches: field weakening that does not weaken: it follows the move as well, but braking takes more than the
+// amplifier's 6 A. (The table loses the move; its law and limits are not stated.)
 TEST(InductionControl, StandardFieldWeakeningNeedsMoreCurrent) {
   const Outcome seen = closed_loop("book/8.2.5-field-weakening");
   EXPECT_LE(seen.peak_error_counts, 8.0);
   EXPECT_GT(seen.peak_current_a, 7.0);
 }
 
-// Negative. Catches a move that would not mind its timing: a sample of delay at 4 kHz is 36 degrees of flux
+// Negative. Catches: a move that tolerates any timing: a sample of delay at 4 kHz is 36 degrees of flux
 // angle. The table has 10937 counts.
 TEST(InductionControl, ASampleOfDelayLosesTheMoveTo8000Rpm) {
   EXPECT_GT(closed_loop("book/8.2.5-soft-flux", {.command_delay_ticks = 1}).peak_error_counts, 1000.0);
 }
 
-// Catches an observer or gain with 4 kHz built in: at 8 kHz the delay is borne. The table has 1.9 counts.
-TEST(InductionControl, At8KilohertzADelayIsBorne) {
+// Catches: an observer or gain with 4 kHz built in: at 8 kHz the delay is tolerated. The table has 1.9
+// counts.
+TEST(InductionControl, At8KilohertzADelayIsTolerated) {
   const Outcome seen =
       ClosedLoop("book/8.2.5-soft-flux", {.bench = "servo-frictionless", .command_delay_ticks = 1})
           .run({{"sample_rate_hz", 8000.0}});
   EXPECT_LE(seen.peak_error_counts, 4.0);
 }
 
-// Exercise 15(a). Catches a flux loop that needs its feed-forward. The table has 1.73 and 7.8 counts.
-TEST(InductionControl, HalfATurnWithoutFeedForwardOfTheFlux) {
+// Exercise 15(a). Catches: a flux loop that needs its feed-forward. The table has 1.73 and 7.8 counts.
+TEST(InductionControl, HalfATurnNeedsNoFeedForwardOfTheFlux) {
   EXPECT_NEAR(closed_loop("exercise/8.15a-field-oriented").peak_error_counts, 1.73, 0.5);
   EXPECT_NEAR(closed_loop("exercise/8.15a").peak_error_counts, 7.8, 3.0);
 }
 
-// Exercise 15(b). Catches weakening from the wrong speed on: 60 V would not do. The table has 0.81
-// counts, 58.4 V and 3.98 A, and 6.3 counts with the text's gains, whose limit cycle makes that number a
-// coincidence (12.4 here).
-TEST(InductionControl, FieldWeakeningTo838RadiansPerSecond) {
+// Exercise 15(b). Catches: weakening from the wrong speed on: 60 V would not do. The table has 0.81 counts,
+// 58.4 V and 3.98 A, and 6.3 counts with the text's gains, whose limit cycle makes that number a coincidence
+// (12.4 here).
+TEST(InductionControl, FieldWeakeningReaches838RadiansPerSecond) {
   const Outcome seen = closed_loop("exercise/8.15b");
   EXPECT_NEAR(seen.peak_error_counts, 0.81, 0.7);  // 0.98 to 1.28 over inertias that differ by 1e-9
   EXPECT_NEAR(seen.peak_current_a, 3.98, 0.1);
@@ -160,7 +161,7 @@ TEST(InductionControl, FieldWeakeningTo838RadiansPerSecond) {
   EXPECT_LE(closed_loop("exercise/8.15b-text-gains").peak_error_counts, 30.0);
 }
 
-// IMC-06. Catches a decoupling that does not decouple: half a turn with four and three poles and no current
+// IMC-06. Catches: a decoupling that does not decouple: half a turn with four and three poles and no current
 // loop. Ours: 0.88 counts, 5.88 A; with a sample of delay 1.21 counts.
 TEST(InductionControl, VoltageCommandNeedsNoCurrentLoop) {
   const Outcome seen = closed_loop("book/8.2.5-voltage");
@@ -170,19 +171,19 @@ TEST(InductionControl, VoltageCommandNeedsNoCurrentLoop) {
   EXPECT_LE(closed_loop("book/8.2.5-voltage", {.command_delay_ticks = 1}).peak_error_counts, 2.0);
 }
 
-// IMC-07. Catches a singularity that is met where there is none, or passed unseen: the flux may fall at 0.4
-// Wb/s, and not at 2.7.
+// IMC-07. Catches: a singularity that is reported where there is none, or passed unnoticed: the flux may fall
+// at 0.4 Wb/s, and not at 2.7.
 TEST(InductionControl, AnIntegratorOnTheDirectAxisFollowsAFallingFlux) {
   const Outcome seen = closed_loop("exercise/8.28");
   EXPECT_LE(seen.peak_error_counts, 1.5);
   EXPECT_EQ(singular_samples(seen), 0);
   const Outcome steep = closed_loop("exercise/8.28-singular");
   EXPECT_GT(singular_samples(steep), 5);
-  EXPECT_LE(steep.peak_error_counts, 4.0);  // the plain law stands in
+  EXPECT_LE(steep.peak_error_counts, 4.0);  // the plain law takes over
 }
 
-// IMC-08. Catches a load observer of the wrong size: lifting 0.25 N·m the torque never passes through zero
-// and the law holds all the way; without load it must stand aside at rest.
+// IMC-08. Catches: a load observer of the wrong size: lifting 0.25 N·m the torque never passes through zero
+// and the law holds throughout; without load it must give way at rest.
 TEST(InductionControl, AnIntegratorOnTheQuadratureAxisLiftsALoad) {
   const Outcome seen = closed_loop("exercise/8.29");
   EXPECT_LE(peak_error_while_moving_counts(seen), 3.0);

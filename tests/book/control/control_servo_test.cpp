@@ -8,7 +8,7 @@
 namespace drivebench {
 namespace {
 
-// Case 4. Catches a wrong sign, gain or frame anywhere between the preset and the plant. The table has 1.49
+// Case 4. Catches: a wrong sign, gain or frame anywhere between the preset and the plant. The table has 1.49
 // counts, 73.6 rad/s, 5.46 A.
 TEST(ServoControl, BookMoveStaysWithinTwoCounts) {
   const Outcome seen = closed_loop("book/8.2.2");
@@ -21,9 +21,9 @@ TEST(ServoControl, BookMoveStaysWithinTwoCounts) {
   EXPECT_EQ(seen.saturated_samples, 0);
 }
 
-// Case 5. Catches a delay of two ticks instead of one, and a harness that has one of its own: the voltage
-// that sample k + 1 shows is the command of sample k, or with the delay that of k - 1. The table has 1.62
-// counts, 5.75 A.
+// Case 5. Catches: a delay of two ticks instead of one, and a harness with a delay of its own: the voltage in
+// sample k + 1 is the command of sample k, or with the delay that of k - 1. The table has 1.62 counts, 5.75
+// A.
 TEST(ServoControl, OneTickOfDelayStaysWithinTwoCounts) {
   const Outcome at_once = closed_loop("book/8.2.2");
   const Outcome seen = closed_loop("book/8.2.2", {.command_delay_ticks = 1});
@@ -36,9 +36,9 @@ TEST(ServoControl, OneTickOfDelayStaysWithinTwoCounts) {
   EXPECT_NEAR(seen.peak_current_a, 5.75, 0.3);
 }
 
-// Case 5. Catches a period of 125 us built in anywhere: the preset's own bench, the 8 kHz bench at another
+// Case 5. Catches: a period of 125 us built in anywhere: the preset's own bench, the 8 kHz bench at another
 // rate, and the rate as a gain are one run.
-TEST(ServoControl, HalfTheSampleRateIsOneRunHoweverItIsAskedFor) {
+TEST(ServoControl, HalfTheSampleRateGivesOneRunHoweverItIsSet) {
   const Outcome seen = closed_loop("book/8.2.2-4khz");
   EXPECT_LE(seen.peak_error_counts, 2.0);
   EXPECT_NEAR(seen.peak_current_a, 5.67, 0.3);
@@ -47,7 +47,7 @@ TEST(ServoControl, HalfTheSampleRateIsOneRunHoweverItIsAskedFor) {
   EXPECT_EQ(again.peak_current_a, seen.peak_current_a);
 }
 
-// Case 5. Catches a load or a parameter that does not reach the plant. The table has 2.22 counts and 6.57 A
+// Case 5. Catches: a load or a parameter that does not reach the plant. The table has 2.22 counts and 6.57 A
 // with the load, 2.56 counts with the warm rotor.
 TEST(ServoControl, LoadStepAndWarmRotorCostACount) {
   const Outcome loaded = closed_loop("book/8.2.2", {}, {}, {{.load_nm = 0.1, .after_s = 0.0}});
@@ -57,8 +57,8 @@ TEST(ServoControl, LoadStepAndWarmRotorCostACount) {
   EXPECT_NEAR(warm.peak_error_counts, 2.56, 0.3);
 }
 
-// Case 7. Catches a bench so forgiving that the book's traps do not show.
-TEST(ServoControl, TheMistakesFail) {
+// Case 7. Catches: a bench so easy that the book's traps do not show.
+TEST(ServoControl, TheMistakesOfTheBookFail) {
   EXPECT_GT(closed_loop("book/8.2.2-clipped").peak_error_counts, 5.0);
   const Outcome difference = closed_loop("book/8.2.2-backward-difference");
   EXPECT_GT(difference.peak_error_counts, 5.0);
@@ -67,7 +67,7 @@ TEST(ServoControl, TheMistakesFail) {
   EXPECT_GT(closed_loop("book/8.2.2-clipped-backward-difference").peak_error_counts, 50.0);
 }
 
-// Catches a second run that starts with the flux, the angle or the time of the first.
+// Catches: a second run that starts with the flux, the angle or the time of the first.
 TEST(ServoControl, ASecondRunIsAsGoodAsTheFirst) {
   ClosedLoop loop("book/8.2.2");
   loop.run();

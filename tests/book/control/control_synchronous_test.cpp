@@ -17,14 +17,14 @@ namespace {
 
 constexpr double kStep_rad = std::numbers::pi / 100.0;  // 1.8 degrees
 
-// Case 26. Catches a sign or a scale of the feedback (E14), a lead angle of the wrong sign, an integral that
+// Case 26. Catches: a sign or a scale of the feedback (E14), a lead angle of the wrong sign, an integral that
 // winds up. The table has 1.69 counts with ideal sensors and 1.80 with 8 bits, swapped 2.13; the observer
 // starts from the angle of the first sample here.
 TEST(PmControl, The1p8MillimetreMoveStaysWithinThreeCounts) {
   for (const char* preset : {"book/9.1.4", "book/9.1.4-swapped"}) {
     const Outcome seen = closed_loop(preset);
     EXPECT_LE(seen.peak_error_counts, 3.0) << preset;
-    EXPECT_GE(seen.peak_error_counts, 1.0) << preset;  // nobody is better than the encoder
+    EXPECT_GE(seen.peak_error_counts, 1.0) << preset;  // no loop is better than the encoder
     EXPECT_GE(seen.peak_speed_rad_s, 141.0) << preset;
     EXPECT_LE(seen.peak_speed_rad_s, 146.0) << preset;
     EXPECT_NEAR(seen.peak_current_a, 6.9, 0.7) << preset;
@@ -42,15 +42,15 @@ TEST(PmControl, The1p8MillimetreMoveStaysWithinThreeCounts) {
   }
 }
 
-// Case 27. Catches a bench that takes the command of this tick although it says it does not: a tick of delay
-// is 40 electrical degrees at 141 rad/s, and control is lost.
+// Case 27. Catches: a bench without the delay that its file asks for: a tick of delay is 40 electrical
+// degrees at 141 rad/s, and control is lost.
 TEST(PmControl, OneTickOfDelayLosesThe1p8MillimetreMove) {
   const Outcome seen = closed_loop("book/9.1.4", {.command_delay_ticks = 1});
   EXPECT_GT(seen.peak_error_counts, 100.0);
-  EXPECT_GT(seen.peak_of("i_d_a"), 8.0);  // what the sensor of 8 A shows of 25 A
+  EXPECT_GT(seen.peak_of("i_d_a"), 8.0);  // the sensor of 8 A saturates at 25 A
 }
 
-// PMX-01. Catches a speed source that is not the one asked for. The book's motor did not track with the
+// PMX-01. Catches: another speed source than the requested one. The book's motor did not track with the
 // backward difference; with ideal timing it does (2 counts), at the price of three times the clipped samples.
 TEST(PmControl, TheBackwardDifferenceTracksButClips) {
   const Outcome seen = closed_loop("book/9.1.4-backward-difference");
@@ -72,9 +72,9 @@ double current_ripple_a(const Outcome& seen) {
   return std::sqrt(sum / samples);
 }
 
-// PMX-01. Catches a current ripple that does not come from the encoder: with 50 000 counts it is 0.19 A rms
+// PMX-01. Catches: a current ripple that does not come from the encoder: with 50 000 counts it is 0.19 A rms
 // instead of 0.6, as the book says.
-TEST(PmControl, AFineEncoderTakesTheRippleAway) {
+TEST(PmControl, AFineEncoderRemovesTheRipple) {
   const Outcome fine = closed_loop("book/9.1.4", {.parameters = {{"encoder.counts_per_revolution", 50e3}}},
                                    {{"counts_per_revolution", 50e3}});
   EXPECT_NEAR(current_ripple_a(fine), 0.19, 0.02);
@@ -82,8 +82,8 @@ TEST(PmControl, AFineEncoderTakesTheRippleAway) {
   EXPECT_GT(current_ripple_a(closed_loop("book/9.1.4")), 0.5);
 }
 
-// Catches a controller that takes the first sample for the place of the magnet: the move ends half an
-// electrical turn from where it began, and the second one starts there.
+// Catches: a controller that takes the first sample for the place of the magnet: the move ends half an
+// electrical turn from its start, and the second move starts there.
 TEST(PmControl, TheMoveCanBeMadeTwice) {
   ClosedLoop loop("book/9.1.4");
   loop.run();
@@ -92,7 +92,7 @@ TEST(PmControl, TheMoveCanBeMadeTwice) {
   EXPECT_LE(second.final_encoder_error_counts, 1.0 + 1e-9);
 }
 
-// Case 28. Catches a lead angle that is missing or of a whole sample, and a bias of half a count: nine
+// Case 28. Catches: a lead angle that is missing or of a whole sample, and a bias of half a count: nine
 // electrical degrees are one count, and 3000 rpm are 90 a sample. The table has 6.4 counts.
 TEST(PmControl, ThreeThousandRpmNeedACentredEncoderAndALead) {
   const Outcome seen = closed_loop("book/9.7-3000rpm");
@@ -103,7 +103,7 @@ TEST(PmControl, ThreeThousandRpmNeedACentredEncoderAndALead) {
   EXPECT_GT(closed_loop("book/9.7-3000rpm-no-lead").peak_error_counts, 1000.0);
 }
 
-// Case 28. Catches a half sample that is not half of the sample there is: with 20 kHz the gains of the book
+// Case 28. Catches: a half sample that is not half of the present sample: with 20 kHz the gains of the book
 // hold the run, with 10 kHz its current loop has a pole at -1.6. The table has 0.72 counts.
 TEST(PmControl, ThePrintedGainsNeed20Kilohertz) {
   const Outcome seen = closed_loop("book/9.7-3000rpm-20khz");
@@ -114,7 +114,7 @@ TEST(PmControl, ThePrintedGainsNeed20Kilohertz) {
   EXPECT_GT(slow.peak_error_counts, 1000.0);
 }
 
-/// What a preset says to gains that it refuses.
+/// The refusal of a preset for these gains.
 std::string refusal(const char* preset, std::vector<control::Gain> gains) {
   try {
     control::find_preset(preset)->make(gains);
@@ -124,7 +124,7 @@ std::string refusal(const char* preset, std::vector<control::Gain> gains) {
   return "";
 }
 
-// Catches a limit that is looked at too late or not named: with ramps of 0.1 s the references take 41.7 V.
+// Catches: a limit that is checked too late or not named: with ramps of 0.1 s the references take 41.7 V.
 TEST(PmControl, AMoveBeyondTheVoltageIsRefused) {
   const std::string text = refusal(
       "book/9.7-3000rpm", {{"move.ramp_up_s", 0.1}, {"move.cruise_s", 0.15}, {"move.ramp_down_s", 0.1}});
@@ -138,9 +138,9 @@ TEST(PmControl, AMoveBeyondTheVoltageIsRefused) {
             std::string::npos);
 }
 
-// Catches set-points in two-phase quantities at the terminals of a star, a lead of the wrong sign, friction
+// Catches: set-points in two-phase quantities at the terminals of a star, a lead of the wrong sign, friction
 // or inertia left out: ten turns in 0.15 s behind a current amplifier (PMC-04, gains of our own).
-TEST(PmControl, TheCurrentServoFollowsToAFewCounts) {
+TEST(PmControl, TheCurrentServoStaysWithin30Counts) {
   const Outcome seen = closed_loop("pm/current-servo");
   EXPECT_LE(seen.peak_error_counts, 30.0);  // of 8192; the current loop passes on 97 % of i_q
   EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9);
@@ -149,7 +149,8 @@ TEST(PmControl, TheCurrentServoFollowsToAFewCounts) {
   EXPECT_EQ(seen.saturated_samples, 0);
 }
 
-/// From the start of the trajectory: when 1000 rad/s are reached, and when next to none are left.
+/// From the start of the trajectory: the times at which 1000 rad/s are reached, and at which hardly any are
+/// left.
 struct RunUp {
   double up_s = 0.0;
   double down_s = 0.0;
@@ -168,7 +169,7 @@ RunUp run_up(const Outcome& seen) {
   return result;
 }
 
-// PMT-06. Catches a torque limit of the wrong branch, currents that the voltage does not allow, braking with
+// PMT-06. Catches: a torque limit of the wrong branch, currents that the voltage does not allow, braking with
 // the currents of motoring. The table has 44.0 and 84.3 ms at 22 A, 23.5 and 44.7 ms at 67.4 A; the book says
 // 40 ms, and currents without delay would take 41.4. 1 %.
 TEST(PmControl, TheBm500RunsUpUnderBothLimits) {
@@ -183,7 +184,7 @@ TEST(PmControl, TheBm500RunsUpUnderBothLimits) {
   EXPECT_LE(large.peak_current_a, 55.0 * 1.03);
 }
 
-// PMT-06 and E20. Catches a plant or a table with a torque constant of its own: with the 0.243 that 9.2.3
+// PMT-06 and E20. Catches: a plant or a table with a torque constant of its own: with the 0.243 that 9.2.3
 // lists, 22 A do not reach 1000 rad/s. The table has 994 rad/s.
 TEST(PmControl, TheListedTorqueConstantStalls) {
   const Outcome seen = closed_loop(
@@ -194,12 +195,12 @@ TEST(PmControl, TheListedTorqueConstantStalls) {
             std::string::npos);
 }
 
-/// Steps that the rotor has made in the end.
+/// Net steps of the rotor.
 double steps_made(const Outcome& seen, double step_rad) {
   return seen.rows.back().angle_rad / step_rad;
 }
 
-// Case 33. Catches a phase order or a number of teeth that is not the book's: 1.8 degrees a full step, 0.9 a
+// Case 33. Catches: a phase order or a number of teeth that is not the book's: 1.8 degrees a full step, 0.9 a
 // half step, a sixteenth a microstep, exactly, since nothing but the windings acts on the rotor at rest.
 TEST(StepperControl, StepsAreExact) {
   EXPECT_NEAR(steps_made(closed_loop("book/9.4-full"), kStep_rad), 4.0, 1e-6);
@@ -207,7 +208,7 @@ TEST(StepperControl, StepsAreExact) {
   EXPECT_NEAR(steps_made(closed_loop("stepper/micro"), kStep_rad / 16.0), 64.0, 1e-6);
 }
 
-// Case 33. Catches voltages where currents are asked for: only a current source leaves the oscillation
+// Case 33. Catches: voltages where currents are asked for: only a current source leaves the oscillation
 // undamped. 3.460 degrees at 7.96 ms, then 73.0 Hz; 1 %.
 TEST(StepperControl, ACurrentStepRings) {
   const Outcome seen = closed_loop("book/9.4-current");
@@ -232,7 +233,7 @@ TEST(StepperControl, ACurrentStepRings) {
   EXPECT_NEAR(5.0 / (upward_s[35] - upward_s[30]), 73.0, 0.73);
 }
 
-// ST-02. Catches a source without its resistance: driven by voltages the emf damps the step, 1.800 degrees
+// ST-02. Catches: a source without its resistance: driven by voltages the emf damps the step, 1.800 degrees
 // for 1 A and 1.891 for 6 A, settled to 5 % within 30 ms.
 TEST(StepperControl, AVoltageStepIsDamped) {
   for (const auto& [volts, degrees] : {std::pair{0.55, 1.800}, std::pair{3.3, 1.891}}) {
@@ -247,9 +248,9 @@ TEST(StepperControl, AVoltageStepIsDamped) {
   }
 }
 
-// Case 34. Catches a train of another rate or length: at 1.1 V the motor follows 200 steps a second and makes
-// four of forty at 400; what it loses are whole electrical turns.
-TEST(StepperControl, ItFallsOutOfStepByWholeElectricalTurns) {
+// Case 34. Catches: a train of another rate or length: at 1.1 V the motor follows 200 steps a second and
+// makes four of forty at 400; it loses whole electrical turns.
+TEST(StepperControl, TheMotorFallsOutOfStepByWholeElectricalTurns) {
   EXPECT_NEAR(steps_made(closed_loop("stepper/train-200"), kStep_rad), 40.0, 0.01);
   EXPECT_NEAR(steps_made(closed_loop("stepper/train-400"), kStep_rad), 4.0, 0.01);
   const auto train = [](double volts, double rate_hz) {
@@ -263,9 +264,9 @@ TEST(StepperControl, ItFallsOutOfStepByWholeElectricalTurns) {
   EXPECT_NEAR(steps_made(closed_loop("stepper/train-400", {}, {{"amplitude", 3.3}}), kStep_rad), 40.0, 0.01);
 }
 
-// AC-29. Catches a commutation against the emf, Hall lines in another order, sectors that are late. The table
-// has 0.1223 rad with P current control of 1000 V/A; 10 %.
-TEST(BldcControl, TheMoveOf240RadiansWithinAnEighth) {
+// AC-29. Catches: a commutation against the emf, Hall lines in another order, sectors that are late. The
+// table has 0.1223 rad with P current control of 1000 V/A; 10 %.
+TEST(BldcControl, TheMoveOf240RadiansStaysWithinAnEighth) {
   for (const char* preset : {"book/10.6", "book/10.6-hall"}) {
     const Outcome seen = closed_loop(preset);
     EXPECT_NEAR(seen.peak_error_rad, 0.122, 0.0122) << preset;
@@ -275,9 +276,9 @@ TEST(BldcControl, TheMoveOf240RadiansWithinAnEighth) {
   }
 }
 
-// BL-06. Catches gains that reach neither position loop nor current loop: poles at -100 with 200 V/A give
+// BL-06. Catches: gains that reach neither position loop nor current loop: poles at -100 with 200 V/A give
 // 0.0299 rad, and 350 rad/s within 200 V 0.107; 10 %.
-TEST(BldcControl, TheMoveWithOtherGainsAndSpeeds) {
+TEST(BldcControl, OtherGainsAndSpeedsMakeTheMove) {
   const Outcome stiff =
       closed_loop("book/10.6", {.parameters = {{"current_loop.proportional_v_per_a", 200.0}}},
                   {{"position.integral_per_s3", 1e6},
@@ -288,8 +289,8 @@ TEST(BldcControl, TheMoveWithOtherGainsAndSpeeds) {
   EXPECT_NEAR(slower.peak_error_rad, 0.107, 0.0107);
 }
 
-// AC-29. Catches a limit of the amplifier that the current loop does not see: 200 V hold the speed below
-// 388.98 rad/s, and the move falls behind.
+// AC-29. Catches: a limit of the amplifier that the current loop ignores: 200 V hold the speed below 388.98
+// rad/s, and the move falls behind.
 TEST(BldcControl, TwoHundredVoltsAreTooLittle) {
   const Outcome seen = closed_loop("book/10.6-200v");
   EXPECT_LE(seen.peak_speed_rad_s, 388.98 * 1.005);
@@ -301,7 +302,7 @@ TEST(BldcControl, TwoHundredVoltsAreTooLittle) {
 
 // Catches PI loops that wind up at the commutations, an emf of the wrong sign, a lead that forgets the tick
 // of delay: 350 rad/s behind a switched inverter with dead time. The table has 0.107 rad with 1000 V/A.
-TEST(BldcControl, TheMoveBehindAnInverter) {
+TEST(BldcControl, TheMoveSucceedsBehindAnInverter) {
   for (const char* preset : {"book/10.6-inverter", "book/10.6-inverter-hall"}) {
     const Outcome seen = closed_loop(preset);
     EXPECT_LT(seen.peak_error_rad, 0.12) << preset;
@@ -311,9 +312,9 @@ TEST(BldcControl, TheMoveBehindAnInverter) {
   }
 }
 
-// Catches a field that is not magnetised before the move, n_p left out of the torque (E27), a coupling of
+// Catches: a field that is not magnetised before the move, n_p left out of the torque (E27), a coupling of
 // field and d axis that is not undone.
-TEST(WoundRotorControl, TheServoFollowsToACount) {
+TEST(WoundRotorControl, TheServoStaysWithinTwoCounts) {
   const Outcome seen = closed_loop("wound-rotor/servo");
   EXPECT_LE(seen.peak_error_counts, 2.0);  // of 8192
   EXPECT_LE(seen.final_error_counts, 1.0);
@@ -323,9 +324,9 @@ TEST(WoundRotorControl, TheServoFollowsToACount) {
   EXPECT_NEAR(seen.peak_of("i_q_ref_a"), 0.02 * 1.5 * 125.0 / 0.4 / 1.6, 0.4);
 }
 
-// Catches a field command that does not follow the speed: the emf of the full field meets the 325 V at
+// Catches: a field command that does not follow the speed: the emf of the full field meets the 325 V at
 // 249 rad/s, so 350 need a weaker one.
-TEST(WoundRotorControl, FieldWeakeningReachesWhatTheFullFieldCannot) {
+TEST(WoundRotorControl, FieldWeakeningReaches350RadiansPerSecond) {
   const Outcome seen = closed_loop("wound-rotor/field-weakening");
   EXPECT_LE(seen.peak_error_counts, 2.0);
   EXPECT_NEAR(seen.peak_speed_rad_s, 350.0, 0.5);

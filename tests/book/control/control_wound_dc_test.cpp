@@ -1,5 +1,5 @@
 // Machines with a wound field under feedback linearisation (problems 2.40 to 2.47), on the product's own
-// bench. The book has no numbers: what is tested is what the laws promise.
+// bench. The book has no numbers: the tests check what the laws guarantee.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ double final_speed(const Outcome& seen) {
   return seen.rows.back().sample.speed_rad_s;
 }
 
-// CTL-08, DC-07. Catches a coupling of the field into the speed that is left over: on the way to 300 rad/s
-// the field falls to three fifths and the speed may not notice, on a saturated machine.
+// CTL-08, DC-07. Catches: a remaining coupling of the field into the speed: on the way to 300 rad/s the field
+// falls to three fifths without an effect on the speed, on a saturated machine.
 TEST(WoundDcControl, ArmatureAndFieldTogetherGoBeyondTheBaseSpeed) {
   const Outcome seen = closed_loop("book/2.40");
   EXPECT_LT(peak_speed_error(seen, 0.0, 3.0), 0.1);
@@ -39,8 +39,8 @@ TEST(WoundDcControl, ArmatureAndFieldTogetherGoBeyondTheBaseSpeed) {
   EXPECT_LT(seen.peak_current_a, 8.0);
 }
 
-// CTL-08. Catches an integral that does not take a load: 5 N·m at speed are gone after half a second, and a
-// machine whose resistance is a half more is still held.
+// CTL-08. Catches: an integral that does not balance a load: 5 N·m at speed leave no error after half a
+// second, and a machine with a resistance half as large again is still held.
 TEST(WoundDcControl, ALoadAndAWarmArmatureAreTaken) {
   const Outcome loaded = closed_loop("book/2.40", {}, {{"move.speed_rad_s", 150.0}}, {{5.0, 2.2}});
   EXPECT_GT(peak_speed_error(loaded, 2.2, 3.0), 2.0);
@@ -49,8 +49,8 @@ TEST(WoundDcControl, ALoadAndAWarmArmatureAreTaken) {
   EXPECT_LT(peak_speed_error(warm, 0.0, 3.0), 2.0);
 }
 
-// CTL-09. Catches a law that moves the armature voltage: above the start it is the field alone that brings
-// the machine to 300 rad/s.
+// CTL-09. Catches: a law that moves the armature voltage: above the start the field alone brings the machine
+// to 300 rad/s.
 TEST(WoundDcControl, TheFieldAloneControlsTheSpeedAtConstantVoltage) {
   const Outcome seen = closed_loop("book/2.41");
   EXPECT_NEAR(final_speed(seen), 300.0, 0.2);
@@ -62,15 +62,16 @@ TEST(WoundDcControl, TheFieldAloneControlsTheSpeedAtConstantVoltage) {
   }
 }
 
-// CTL-10. Catches a start that fails at no current, a torque that does not go with the square of the current.
+// CTL-10. Catches: a start that fails at zero current, a torque that is not proportional to the square of the
+// current.
 TEST(WoundDcControl, TheSeriesMotorFollowsItsRampUnderAFan) {
   const Outcome seen = closed_loop("book/2.42");
   EXPECT_LT(peak_speed_error(seen, 0.0, 3.0), 2.0);
   EXPECT_NEAR(final_speed(seen), 150.0, 0.05);
 }
 
-// EST-06. Catches a speed that comes from the shaft after all: the controller is told a wrong encoder, and
-// still keeps within 3 rad/s by the current alone, of which it reads the load as well.
+// EST-06. Catches: a speed that still comes from the shaft: the controller gets a wrong encoder, and keeps
+// within 3 rad/s by the current alone, from which it also finds the load.
 TEST(WoundDcControl, TheSeriesMotorRunsWithoutASensorOnItsShaft) {
   const Outcome seen = closed_loop("book/2.45", {}, {{"counts_per_revolution", 500.0}});
   EXPECT_LT(peak_speed_error(seen, 0.0, 3.0), 3.0);
@@ -79,8 +80,7 @@ TEST(WoundDcControl, TheSeriesMotorRunsWithoutASensorOnItsShaft) {
   EXPECT_NEAR(0.02 * seen.rows.back().telemetry[seen.column("load_rad_s2")], 2.25, 0.05);
 }
 
-// CTL-11. Catches a flux that leaves its bounds: between the two that it is kept within, and there under a
-// fan.
+// CTL-11. Catches: a flux that leaves its two bounds, or loses them under a fan.
 TEST(WoundDcControl, TheWeakenedSeriesMotorKeepsItsFlux) {
   const Outcome seen = closed_loop("book/2.43");
   EXPECT_LT(peak_speed_error(seen, 0.0, 3.0), 5.0);
@@ -89,16 +89,16 @@ TEST(WoundDcControl, TheWeakenedSeriesMotorKeepsItsFlux) {
   EXPECT_LT(seen.peak_field_current_a, seen.peak_current_a);  // the rest goes through R_p
 }
 
-// CTL-12. Catches references that do not belong to the load: the exact law must come to rest at 100 rad/s,
-// and closer on the way than the law of input and output.
+// CTL-12. Catches: references that do not belong to the load: the exact law must come to rest at 100 rad/s,
+// and closer on the way than the input-output law.
 TEST(WoundDcControl, TheShuntMotorIsLinearInBothStates) {
   const Outcome seen = closed_loop("book/2.46");
   EXPECT_LT(peak_speed_error(seen, 0.0, 4.0), 4.0);
   EXPECT_NEAR(final_speed(seen), 100.0, 0.1);
 }
 
-// CTL-13. Catches a shunt machine that any speed can be asked of: up to R_F/(K_m·L_f) = 191.3 rad/s its flux
-// is bounded, above there is no end to it but the voltage limit, and the speed is not held.
+// CTL-13. Catches: a shunt machine without a limit speed: up to R_F/(K_m·L_f) = 191.3 rad/s its flux is
+// bounded, above only the voltage limit bounds it, and the speed is not held.
 TEST(WoundDcControl, TheShuntMotorHasABoundedFluxBelowItsLimitSpeedOnly) {
   const Outcome seen = closed_loop("book/2.47");
   EXPECT_NEAR(final_speed(seen), 100.0, 0.2);
@@ -110,7 +110,7 @@ TEST(WoundDcControl, TheShuntMotorHasABoundedFluxBelowItsLimitSpeedOnly) {
   EXPECT_LT(final_speed(beyond), 200.0);
 }
 
-// Catches limits that are not looked at before a move of these machines.
+// Catches: limits that are not checked before a move of these machines.
 TEST(WoundDcControl, AMoveBeyondTheLimitsIsRefused) {
   const auto refusal = [](const char* preset, const Gain& gain) -> std::string {
     try {

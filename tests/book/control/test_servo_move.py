@@ -21,7 +21,7 @@ DRIVEBENCH = SERVER.parent / "drivebench"
 
 
 def move(server, *options, link=None):
-    """Runs the reference controller as a process of its own; what it reports."""
+    """Runs the reference controller as a process of its own; returns its report."""
     link = link or "tcp:%s:%d" % server.address
     ran = subprocess.run([DRIVEBENCH, "control", "--link", link, "--json", *options], capture_output=True, text=True, timeout=60)
     if ran.returncode != 0:
@@ -41,7 +41,7 @@ def bench_text(**changes):
 
 class TheMove(unittest.TestCase):
     def test_case_4_stays_within_two_counts_of_its_reference(self):
-        """Would catch: a wrong sign anywhere in the loop, a tick of hidden delay, a shifted encoder."""
+        """Catches: a wrong sign anywhere in the loop, a tick of hidden delay, a shifted encoder."""
         with Server() as server:
             report = move(server)
         self.assertLessEqual(report["peak_error_counts"], 2.0)
@@ -51,7 +51,7 @@ class TheMove(unittest.TestCase):
         self.assertEqual(report["late_ticks"], 0)
 
     def test_case_5_holds_with_one_tick_of_delay(self):
-        """Would catch: a delay of two ticks instead of one."""
+        """Catches: a delay of two ticks instead of one."""
         with Server("--command-delay-ticks", "1") as server:
             report = move(server)
         self.assertLessEqual(report["peak_error_counts"], 2.0)
@@ -59,14 +59,14 @@ class TheMove(unittest.TestCase):
         self.assertAlmostEqual(report["peak_current_a"], 5.75, delta=0.3)
 
     def test_case_5_holds_at_4_kHz(self):
-        """Would catch: a period taken as 125 us somewhere."""
+        """Catches: a period taken as 125 us somewhere."""
         with Server(text=bench_text(period_us=250, substeps=10)) as server:
             report = move(server, "--preset", "book/8.2.2-4khz")
         self.assertLessEqual(report["peak_error_counts"], 2.0)
         self.assertLessEqual(report["final_error_counts"], 1)
 
     def test_case_5_holds_under_a_load_step_and_with_a_hot_rotor(self):
-        """Would catch: a load or a parameter write that never reaches the plant (the errors would be those of case 4)."""
+        """Catches: a load or a parameter write that never reaches the plant (the errors would be those of case 4)."""
         with Server() as server:
             loaded = move(server, "--load", "0.1@0")
         self.assertLessEqual(loaded["peak_error_counts"], 3.0)
@@ -77,7 +77,7 @@ class TheMove(unittest.TestCase):
         self.assertGreater(hot["peak_error_counts"], 2.0)
 
     def test_case_6_the_observer_knows_the_speed_far_better_than_the_difference_of_counts(self):
-        """Would catch: an observer that lags or is fed the wrong sample, and an encoder that is not floor(theta N/2 pi)."""
+        """Catches: an observer that lags or is fed the wrong sample, and an encoder that is not floor(theta N/2 pi)."""
         file = self.folder / "move.csv"
         with Server() as server:
             move(server, "--csv", str(file))
@@ -90,7 +90,7 @@ class TheMove(unittest.TestCase):
         self.assertLess(difference, 25.2)  # one count in one tick is 25.13 rad/s
 
     def test_case_7_clipping_the_reference_ruins_the_move(self):
-        """Would catch: a bench so forgiving that the book's trap does not show."""
+        """Catches: a bench so easy that the book's trap does not show."""
         with Server() as server:
             clipped = move(server, "--preset", "book/8.2.2-clipped")
         self.assertGreater(clipped["peak_error_counts"], 5.0)
@@ -98,8 +98,8 @@ class TheMove(unittest.TestCase):
             both = move(server, "--preset", "book/8.2.2-clipped-backward-difference")
         self.assertGreater(both["peak_error_counts"], 50.0)
 
-    def test_the_same_run_gives_the_same_bits_whatever_the_link_and_the_company(self):
-        """Would catch: a hash or a sample that depends on the transport, on viewers or on wall time, and inputs missing
+    def test_the_same_run_gives_the_same_bits_for_any_link_and_viewers(self):
+        """Catches: a hash or a sample that depends on the transport, on viewers or on wall time, and inputs missing
         from the recording."""
         hashes, recordings = set(), []
         for case in ("tcp", "tcp and eight viewers", "unix"):

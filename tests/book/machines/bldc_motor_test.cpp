@@ -17,7 +17,7 @@ BenchConfig bldc_config() {
 // AC-28: trapezoids of 33 V at 10 Hz pull the motor in from rest, and it follows them with a current below
 // 11 A. Kills: an emf of the wrong sign (the motor turns backwards or not at all), a neutral that is not
 // removed.
-TEST(BookBldcMotor, TrapezoidsOf33VoltsPullItIn) {
+TEST(BookBldcMotor, TrapezoidsOf33VoltsPullTheMotorIn) {
   BookBench run("bldc");
   double peak_a = 0.0;
   const auto watch = [&peak_a](const Sample& s) {
@@ -40,7 +40,7 @@ TEST(BookBldcMotor, TrapezoidsOf33VoltsPullItIn) {
 }
 
 // The 200 V of the book's exercise drive more than 300 A through the windings: with its limit of 10 A the
-// drive trips at once. Kills: an over-current that looks at two phases, a trip that can be missed.
+// drive trips at once. Kills: an over-current check of two phases only, a trip that can be missed.
 TEST(BookBldcMotor, TwoHundredVoltsTrip) {
   BenchConfig config = bldc_config();
   config.setup.axes[0].parameters.drive.source.amplitude_v = 200.0;

@@ -68,8 +68,8 @@ Complex transfer(double k_p, double alpha) {
 /// i/i_r of the amplifier and the motor for a sine of 1 A, from ten periods of the true current.
 Complex response(double k_p, double alpha) {
   BenchConfig config = current_driven(k_p, alpha * k_p);
-  config.setup.period_ns = 20'000;  // so short that the steps of the command do not show
-  config.setup.substeps = 10;       // nor those of the loop
+  config.setup.period_ns = 20'000;  // short: hides the steps of the command
+  config.setup.substeps = 10;       // and those of the loop
   BookBench run(config);
   Complex sum;
   int count = 0;

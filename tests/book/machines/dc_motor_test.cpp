@@ -10,7 +10,7 @@ namespace {
 
 // AC-01, the bench dc-a: 10 V from rest. The closed form is the matrix exponential of the book's equations;
 // 0.1 %, the count within one. Kills: a DC source, a constant or an encoder that is not the book's.
-TEST(BookDcMotor, TenVoltsFromRest) {
+TEST(BookDcMotor, TenVoltsFromRestFollowTheClosedForm) {
   BookBench run("dc-a");
   run.run_until(0.5);
   EXPECT_NEAR(run.sample().speed_rad_s, 122.80702, 0.12);
@@ -20,9 +20,9 @@ TEST(BookDcMotor, TenVoltsFromRest) {
 }
 
 // AC-01 and AC-02, the same run sampled every 20 us, so that the peak of the current shows (0.1 %) and the
-// trapezoidal sums are good to 1e-6: of the 4.4127 J drawn none is missing. Kills: a torque or an emf that is
-// not the other's partner, friction that the shaft does not feel, a substep that loses energy.
-TEST(BookDcMotor, WhatTenVoltsDrawIsLostOrStored) {
+// trapezoidal sums are good to 1e-6: they account for all of the 4.4127 J drawn. Kills: a torque and an emf
+// with different constants, friction that the shaft does not feel, a substep that loses energy.
+TEST(BookDcMotor, TheEnergyOfTenVoltsIsLostOrStored) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dc-a.toml");
   config.setup.period_ns = 20'000;
   config.setup.substeps = 1;
@@ -82,8 +82,8 @@ TEST(BookDcMotor, TheBackwardDifferenceTakesTwoValuesAtConstantSpeed) {
   EXPECT_GT(backward.largest, 125.0);
 }
 
-// Of dc-separate and dc-shunt at 220 V and 1 A of field current, k = K_m lambda_f = 0.05 23: what friction
-// takes is i = f w/k, and 220 V = R i + k w.
+// Of dc-separate and dc-shunt at 220 V and 1 A of field current, k = K_m lambda_f = 0.05 23: friction takes i
+// = f w/k, and 220 V = R i + k w.
 constexpr double kUnloaded_rad_s = 220.0 / (1.15 + 3.0 * 1e-3 / 1.15);
 
 // DC-06: without its field a separately excited motor runs away. Kills: a loss of field without effect.
@@ -96,12 +96,12 @@ TEST(BookDcMotor, WithoutItsFieldASeparatelyExcitedMotorRunsAway) {
   run.bench().submit(
       {.tick = run.bench().tick(), .axis = 0, .owner = 0, .action = fault_of("field_loss", 1.0)});
   run.run_until(4.5);
-  EXPECT_GT(run.sample().speed_rad_s, 2.0 * speed_rad_s);  // on its way: 0.5 s after
+  EXPECT_GT(run.sample().speed_rad_s, 2.0 * speed_rad_s);  // still rising: 0.5 s after
   EXPECT_NE(run.sample().injected, 0u);
 }
 
-// The other DC benches run and come to where their equations say. Kills: a bench file that does not start, a
-// field winding at the wrong terminal.
+// The other DC benches run and reach the values of their equations. Kills: a bench file that does not start,
+// a field winding at the wrong terminal.
 TEST(BookDcMotor, TheOtherDcBenchesComeToTheirSpeeds) {
   BookBench shunt("dc-shunt");
   shunt.run_until(3.0);

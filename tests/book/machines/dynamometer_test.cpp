@@ -34,7 +34,7 @@ InductionMachineParameters servo_of(const BookBench& run) {
   return std::get<InductionMachineParameters>(run.config().setup.axes[0].parameters.machine);
 }
 
-/// Where the servo's torque at 60 V meets friction and the torque of the load machine.
+/// The speed at which the servo's torque at 60 V balances friction and the torque of the load machine.
 double balanced_rad_s(const InductionMachineParameters& servo, double load_nm) {
   const InductionMachineConstants c = constants_of(servo);
   double low = 80.0;  // both on the steep side of the torque curve
@@ -51,7 +51,7 @@ double balanced_rad_s(const InductionMachineParameters& servo, double load_nm) {
 // where the circuit of the servo meets K_T i and friction; 1e-3, of which the held voltages take 2e-4. Both
 // axes turn as one. Kills: a load machine whose torque has the wrong sign or does not reach the shaft, a
 // torque that is counted twice, friction and inertia of one rotor only.
-TEST(BookDynamometer, TheServoMeetsTheTorqueOfTheLoadMachine) {
+TEST(BookDynamometer, TheServoBalancesTheTorqueOfTheLoadMachine) {
   BookBench run("dynamometer");
   for (const double load_a : {0.0, -2.0, 4.0}) {
     const double end_s = run.now_s() + 1.0;
@@ -70,7 +70,7 @@ TEST(BookDynamometer, TheServoMeetsTheTorqueOfTheLoadMachine) {
   }
 }
 
-/// What the power analysers of both axes and the samples add up to.
+/// Sums over the power analysers of both axes and over the samples.
 struct Audit {
   double supplied_j = 0.0;
   double copper_j = 0.0;  ///< of the stator and the armature
@@ -91,10 +91,10 @@ double stored_j(const InductionMachineParameters& p, const Sample& motor, const 
 }
 
 // The same bench with a power analyser on each axis, which reads the energy of every 50 ms exactly: from rest
-// to a shaft that brakes and then drives, what both drives supply is lost in the windings and in friction or
-// is stored. 1e-4: the losses of rotor and friction are sums over samples 125 us apart. Kills: a shaft that
-// loses energy between the two machines, a meter that is blind to one that gives power back.
-TEST(BookDynamometer, WhatBothDrivesSupplyIsLostOrStored) {
+// to a shaft that brakes and then drives, the energy of both drives is lost in the windings and in friction
+// or is stored. 1e-4: the losses of rotor and friction are sums over samples 125 us apart. Kills: a shaft
+// that loses energy between the two machines, a meter that ignores negative power.
+TEST(BookDynamometer, TheEnergyOfBothDrivesIsLostOrStored) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dynamometer.toml");
   for (AxisSetup& axis : config.setup.axes)
     axis.parameters.sensors.meter = {.enabled = true, .window_s = 0.05};

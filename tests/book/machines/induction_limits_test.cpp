@@ -43,7 +43,7 @@ double fastest_s(double friction_nms, bool braking) {
 
 // Case 11: 1 %. With the listed friction the run-up takes 0.647 s, which makes the move of 0.38 s infeasible.
 // Kills: a flux, leakage or speed voltage that is off at high speed.
-TEST(BookInductionLimits, TheFastestRunUpAndBraking) {
+TEST(BookInductionLimits, TheFastestRunUpAndBrakingTakeTheTimesOfTheReference) {
   EXPECT_NEAR(fastest_s(0.0, false), 0.3124, 3.1e-3);
   EXPECT_NEAR(fastest_s(kServoFriction_nms, false), 0.647, 6.5e-3);
   EXPECT_NEAR(fastest_s(0.0, true), 0.1805, 1.8e-3);
@@ -103,7 +103,7 @@ FluxErrors flux_errors(double rate_hz) {
 // Case 17, exercises 19 to 22 of chapter 8: 5 %. The rectangular observers lag by half a sample; the polar
 // one of the bundled controller does not. Kills: currents, flux or speed of the plant that do not belong
 // together.
-TEST(BookInductionLimits, TheErrorsOfTheFluxObservers) {
+TEST(BookInductionLimits, TheFluxObserversErrAsInTheReference) {
   const FluxErrors at_10_khz = flux_errors(10e3);
   EXPECT_NEAR(at_10_khz.euler, 0.0262, 0.0013);
   EXPECT_NEAR(at_10_khz.exact, 0.0189, 0.001);

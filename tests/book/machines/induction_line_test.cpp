@@ -44,7 +44,7 @@ TEST(BookInductionLine, TheTwoPhaseMotorSettlesWhereItsEquivalentCircuitSays) {
   }
 }
 
-/// A run from the line with what AC-22 asks of it.
+/// A run from the line with the results that AC-22 checks.
 struct DirectStart {
   double reached_95_s = 0.0;
   double peak_a = 0.0;
@@ -53,8 +53,8 @@ struct DirectStart {
 };
 
 // AC-22, the bench im-b: 208 V line to line from rest. Times 2 %, the rest 0.2 %. Kills: a source of line
-// instead of phase voltage, a factor sqrt(3/2) lost between phases and two-phase quantities, currents of two
-// phases only watched for over-current.
+// instead of phase voltage, a factor sqrt(3/2) lost between phases and two-phase quantities, an over-current
+// check of two phases only.
 TEST(BookInductionLine, TheThreePhaseMotorStartsFromTheLine) {
   BookBench run("im-b");
   DirectStart start;
@@ -77,7 +77,7 @@ TEST(BookInductionLine, TheThreePhaseMotorStartsFromTheLine) {
   EXPECT_NEAR(amplitude(run.sample()) > 0.0 ? run.sample().meter_i_rms_a : 0.0, 1.30525, 1.30525 * 2e-3);
 }
 
-/// What a power analyser says of the motor im-b on 208 V: impedance per phase and its angle.
+/// The power analyser's result for the motor im-b on 208 V: impedance per phase and its angle.
 struct Reading {
   double voltage_v;
   double current_a;
@@ -152,8 +152,8 @@ TEST(BookInductionLine, OnePhaseAtHundredVoltsLiftsTheNeutralByAThird) {
 }
 
 // AC-25: IM-C on one phase, the other shorted, from synchronous speed under 0.8 N m: mean speed by
-// superposition of both rotating fields, 0.2 %; at rest there is no starting torque. Kills: a phase b that
-// sees the source, a start out of nothing.
+// superposition of both rotating fields, 0.2 %; at rest there is no starting torque. Kills: a phase b that is
+// connected to the source, a torque at rest.
 TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/im-c.toml");
   AxisParameters& p = config.setup.axes[0].parameters;
@@ -190,8 +190,8 @@ TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
 }
 
 // P3-12, the bench im-c as shipped: the capacitor makes the current of phase b lead, so that the motor turns
-// from b to a; the switch shorts phase b near synchronism, and the motor carries 0.8 N m on. Kills: a
-// capacitor that gives no phase shift or the wrong one, a switch that does nothing.
+// from b to a; the switch shorts phase b near synchronism, and the motor keeps running under 0.8 N m. Kills:
+// a capacitor that gives no phase shift or the wrong one, a switch that does nothing.
 TEST(BookInductionLine, TheCapacitorStartsTheSinglePhaseMotor) {
   BookBench run("im-c");
   run.run_until(0.2);

@@ -25,8 +25,8 @@ PhaseCommand line_voltage(Tick tick, double peak_v) {
           .setpoint = {.a = peak_v * std::cos(angle_rad), .b = peak_v * std::sin(angle_rad)}};
 }
 
-// The tests of this motor do not read the files. Kills: a servo bench for one of the transports that has
-// another motor, amplifier or sensor than the one that is tested.
+// These tests do not read the files. Kills: a servo bench for one of the transports with another motor,
+// amplifier or sensor than the tested one.
 TEST(BookInductionModel, EveryServoBenchHasTheMotorOfTheseTests) {
   AxisParameters tested = servo_axis();
   tested.drive.amplifier = {.voltage_limit_v = 80.0, .over_current_a = 6.0, .over_current_trip = false};
@@ -67,7 +67,7 @@ TEST(BookInductionModel, LineStartReachesTheSpeedFluxAndCurrentsOfTheReference) 
   EXPECT_EQ(s.faults, 0u);
 }
 
-// Kills: a phase order that only matters for the direction.
+// Kills: a phase order that only changes the direction.
 TEST(BookInductionModel, ExchangedPhasesTurnTheMotorBackwards) {
   Axis axis(servo_axis(), {.period_s = kStep_s, .substeps = 1}, 1, 0);
   for (Tick tick = 0; tick < 20'000; ++tick) {
@@ -80,7 +80,7 @@ TEST(BookInductionModel, ExchangedPhasesTurnTheMotorBackwards) {
 }
 
 // IM-05: (M, L_R, R_R) -> (k M, k^2 L_R, k^2 R_R) is the same machine at its terminals, its flux k times as
-// large. Kills: an equation in which one of the three is forgotten or stands alone.
+// large. Kills: an equation in which one of the three is missing or stands alone.
 TEST(BookInductionModel, MachinesWithScaledRotorsAreIndistinguishableAtTheTerminals) {
   constexpr double kScale = 1.37;
   AxisParameters scaled = servo_axis();

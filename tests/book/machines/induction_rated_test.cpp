@@ -56,8 +56,8 @@ double slip_of_largest(double high, F f) {
 }
 
 struct Rated {
-  double slip;         ///< where the power factor is largest
-  double pull_slip;    ///< where the torque is
+  double slip;         ///< of the largest power factor
+  double pull_slip;    ///< of the largest torque
   double factor;       ///< the power factor then
   double no_load;      ///< I_S0/I_Sr
   double pull_torque;  ///< tau_p/tau_r
@@ -74,9 +74,9 @@ Rated rated(const Circle& machine) {
 }
 
 // AC-24, P3-05 and P3-06: the ratios of Figs 7.16 and 7.17 by their formulas, 1e-3; the slips of best power
-// factor and of most torque are searched for, not taken from them; the motors of
-// Leonhard measured there are within 15 %. Kills: a leakage factor that enters
-// current and torque differently, a rotor resistance that moves anything but the slips.
+// factor and of most torque are searched for, not taken from them; the motors of Leonhard measured there are
+// within 15 %. Kills: a leakage factor that enters current and torque differently, a rotor resistance that
+// changes more than the slips.
 TEST(BookInductionRated, TheRatedRatiosFollowFromTheLeakageFactor) {
   struct Case {
     double leakage;

@@ -58,11 +58,11 @@ class CurrentControl {
   Dq integral_{};
 };
 
-// Bench bm500 as it is, 5 A across the field and then -5 A: acceleration and torque are K_m i_q/J and K_m i_q
-// (0.3 %: the sampled current is the mean of the period, its ripple drives nothing), encoder and resolver
-// follow the shaft, and what braking takes from the shaft is in the capacitor of the link. 1 % of that
-// energy: the sum of the supply's part is one of samples. Kills: an inductance or a torque of the phases
-// instead of the two-phase equivalent, a link that the motor does not charge, sensors of another angle.
+// Bench bm500 as shipped, 5 A across the field and then -5 A: acceleration and torque are K_m i_q/J and K_m
+// i_q (0.3 %: the sampled current is the mean of the period, its ripple makes no torque), encoder and
+// resolver follow the shaft, and the braking energy of the shaft is in the capacitor of the link. 1 % of that
+// energy: the supply's part is a sum of samples. Kills: an inductance or a torque of the phases instead of
+// the two-phase equivalent, a link that the motor does not charge, sensors of another angle.
 TEST(BookInverterBenches, TheBm500TurnsCurrentIntoTorqueAndBrakesIntoTheLink) {
   BookBench run("bm500");
   CurrentControl control(run.period_s());

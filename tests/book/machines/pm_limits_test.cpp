@@ -17,7 +17,7 @@ PmMachineParameters bm500() {
 }
 
 /// The machine turning steadily with its currents at rest in the frame of the rotor, at angle 0, where d is a
-/// and q is b. Its own derivative() says what voltages that takes.
+/// and q is b. Its own derivative() gives the voltages that this takes.
 class SteadyPm {
  public:
   explicit SteadyPm(double speed_rad_s, PmMachineParameters p = bm500())
@@ -58,8 +58,7 @@ struct Best {
   Dq current_a{};
 };
 
-/// The largest torque of the wanted sign within voltage and current limit, by trying the whole of both
-/// limits.
+/// The largest torque of the wanted sign within voltage and current limit, by a search along both limits.
 Best best_torque(double speed_rad_s, double limit_a, double sign, bool voltage_only = false) {
   const SteadyPm machine(speed_rad_s);
   Best best;
@@ -79,7 +78,7 @@ Best best_torque(double speed_rad_s, double limit_a, double sign, bool voltage_o
   return best;
 }
 
-/// Where a function that rises through zero between two speeds does so.
+/// The speed between two speeds at which a function rises through zero.
 template <class F>
 double crossing(double low, double high, F f) {
   const bool rises = f(high) > 0.0;
@@ -108,14 +107,14 @@ double second_transition(double limit_a, double sign) {
 
 // Case 29, K_m = 0.162. 0.2 %; the search has a grid of 20 000 angles. Kills: an inductance or a speed
 // voltage off by a factor, n_p in the wrong place.
-TEST(BookPmLimits, TheTransitionSpeedsOfTheBm500) {
+TEST(BookPmLimits, TheTransitionSpeedsOfTheBm500AreThoseOfTheReference) {
   EXPECT_NEAR(first_transition(22.05, 1.0), 591.5, 1.2);
   EXPECT_NEAR(first_transition(22.05, -1.0), 634.5, 1.3);
   EXPECT_NEAR(first_transition(67.36, 1.0), 285.3, 0.6);
   EXPECT_NEAR(first_transition(67.36, -1.0), 317.7, 0.7);
   EXPECT_NEAR(second_transition(67.36, 1.0), 340.8, 0.7);
   EXPECT_NEAR(second_transition(67.36, -1.0), 383.4, 0.8);
-  // With the K_m that the book lists, which is not the one its results come from.
+  // With the K_m that the book lists, which differs from that of its results.
   PmMachineParameters listed = bm500();
   listed.torque_constant_nm_per_a = 0.243;
   EXPECT_NEAR(first_transition(22.05, 1.0, listed), 440.0, 0.9);
@@ -123,7 +122,7 @@ TEST(BookPmLimits, TheTransitionSpeedsOfTheBm500) {
 }
 
 // Case 30. 0.2 %. Kills: a torque that does not agree with the voltages that it takes.
-TEST(BookPmLimits, TheLargestTorquesOfTheBm500) {
+TEST(BookPmLimits, TheLargestTorquesOfTheBm500AreThoseOfTheReference) {
   struct Case {
     double limit_a, speed_rad_s, motoring_nm, braking_nm;
   };

@@ -14,7 +14,7 @@
 #include "tests/book/book_bench.hpp"
 
 /// The error of the plant's steps against an adaptive method of order eight with a tolerance of 1e-13, which
-/// is Boost's and knows nothing of the drive train. Its output is the table in plant/README.md.
+/// is Boost's and independent of the drive train. Its output is the table in plant/README.md.
 namespace drivebench {
 namespace {
 
@@ -63,7 +63,7 @@ BenchConfig config_of(const Study& study) {
   return config;
 }
 
-/// Currents of the windings and the speed: what is compared.
+/// The compared values: currents of the windings, and the speed.
 using Outcome = std::array<double, 5>;
 
 Outcome outcome(const WindingValues& i, double speed_rad_s) {

@@ -93,9 +93,9 @@ long steps_made(double rate_hz, double volts) {
   return std::lround(run.sample().angle_rad / (1.8 * kDegree_rad));
 }
 
-// Case 34: at 1.1 V the motor follows 200 steps a second and falls out of step at 400; what it loses comes in
-// whole electrical turns, four steps each. Kills: damping that is not the windings' own.
-TEST(BookStepper, ItFallsOutOfStepByWholeElectricalTurns) {
+// Case 34: at 1.1 V the motor follows 200 steps a second and falls out of step at 400; it loses whole
+// electrical turns, four steps each. Kills: damping that is not the windings' own.
+TEST(BookStepper, TheMotorFallsOutOfStepByWholeElectricalTurns) {
   EXPECT_EQ(steps_made(200.0, 1.1), 40);
   const long made = steps_made(400.0, 1.1);
   EXPECT_EQ(made, 4);

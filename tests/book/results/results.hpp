@@ -5,11 +5,11 @@
 #include <string_view>
 #include <vector>
 
-/// The book's control experiments as drivebench runs them: what RESULTS.md holds.
+/// The results of the book's control experiments in drivebench: the contents of RESULTS.md.
 namespace drivebench {
 
-/// A number that an experiment gave. Another machine may be off by the tolerance: loops with an encoder in
-/// them are chaotic in their last digits, and no two C libraries round alike.
+/// A number that an experiment gave. Another machine may differ by the tolerance: loops with an encoder are
+/// chaotic in their last digits, and no two C libraries round alike.
 struct Measured {
   std::string what;
   double value;
@@ -25,7 +25,7 @@ inline Measured number(std::string what, double value, std::string unit) {
 inline Measured counts(std::string what, double value) {
   return {std::move(what), value, "counts", 0.5 + 0.05 * std::abs(value)};
 }
-/// A run that fails does not fail twice in the same way: half.
+/// A failed run fails differently each time: half.
 inline Measured failing(std::string what, double value, std::string unit) {
   return {std::move(what), value, std::move(unit), 0.5 * std::abs(value)};
 }
@@ -34,9 +34,9 @@ inline Measured failing(std::string what, double value, std::string unit) {
 struct Result {
   std::string number;  ///< of the case in the acceptance list
   std::string experiment;
-  std::string book;  ///< what it says; where it says nothing, what was derived from it, and marked so
+  std::string book;  ///< the book's value, or one derived from it and marked so
   std::vector<Measured> measured;
-  std::string why;  ///< they differ, or "agrees"
+  std::string why;  ///< the reason of a difference, or "agrees"
 };
 
 struct ResultSection {
@@ -60,7 +60,7 @@ std::vector<ResultSection> all_results();
 
 std::string markdown_of(const std::vector<ResultSection>& sections);
 
-/// Where a text differs from markdown_of(sections) by more than the tolerances, one sentence each.
+/// The places where a text differs from markdown_of(sections) by more than the tolerances, a sentence each.
 std::vector<std::string> differences(const std::string& text, const std::vector<ResultSection>& sections);
 
 }  // namespace drivebench

@@ -53,14 +53,14 @@ std::vector<Measured> response(const char* preset) {
           {"at", std::arg(ratio) * 180.0 / std::numbers::pi, "degrees", 0.05}};
 }
 
-/// 1 A, whatever happens.
+/// 1 A throughout.
 class OneAmpere final : public control::Trajectory {
  public:
   control::Reference at(double) const noexcept override { return {.acceleration_rad_s2 = 0.07 / 6e-5}; }
   double duration_s() const noexcept override { return 0.7; }
 };
 
-/// The bench at 1 A with an observer that only looks.
+/// The bench at 1 A with an observer that controls nothing.
 Outcome watched(control::ShaftSpeed source, const control::ShaftObserverGains& gains,
                 const std::vector<LoadStep>& loads) {
   const control::DcOpenLoopParameters p = {
@@ -132,7 +132,7 @@ std::vector<Measured> tachometer_step() {
           number("at", peak->time_s, "s")};
 }
 
-/// What is left of the error after 10 s and from 38 s on.
+/// The remaining error after 10 s and from 38 s on.
 std::vector<Measured> sine() {
   const Outcome seen = closed_loop("book/2-sine");
   double left = 0.0;

@@ -41,7 +41,7 @@ Measured steps_made(const char* preset, double step_rad) {
   return {"steps made", closed_loop(preset).rows.back().angle_rad / step_rad, "", 0.02};
 }
 
-/// When 1000 rad/s are reached, and when 10 are left.
+/// The times at which 1000 rad/s are reached, and at which 10 are left.
 std::vector<Measured> run_up(const char* preset) {
   double up_s = 0.0;
   double down_s = 0.0;

@@ -8,8 +8,8 @@
 namespace drivebench {
 namespace {
 
-// Catches a controller, a preset or a plant that has changed without the table, and a table written by hand.
-TEST(Results, TheTableIsWhatTheExperimentsGive) {
+// Catches: a controller, a preset or a plant that has changed without the table, and a table written by hand.
+TEST(Results, TheTableEqualsTheResultsOfTheExperiments) {
   std::ifstream file(DRIVEBENCH_RESULTS, std::ios::binary);
   ASSERT_TRUE(file) << DRIVEBENCH_RESULTS;
   std::ostringstream text;
@@ -18,7 +18,7 @@ TEST(Results, TheTableIsWhatTheExperimentsGive) {
     ADD_FAILURE() << difference;
 }
 
-// Catches a comparison that is content with another number, another unit, a row less or a row more.
+// Catches: a comparison that accepts another number, another unit, a row less or a row more.
 TEST(Results, DifferencesAreFound) {
   const std::vector<ResultSection> sections = {
       {"title", {{"1", "a run", "below 2", {counts("peak error", 1.5), number("", 3.0, "A")}, "agrees"}}}};

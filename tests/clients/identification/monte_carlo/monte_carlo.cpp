@@ -25,7 +25,7 @@ constexpr std::string_view kHead =
 Made by `drivebench-identification > tests/book/IDENTIFICATION.md`: {} motors of each kind, each
 identified {} times with other noise, in process, on the product's bench. Their parameters are drawn
 around a motor of the book, evenly in the logarithm. The test
-`MonteCarlo.TheTableIsWhatTheExperimentsGive` runs the first {} motors of each kind again and compares.
+`MonteCarlo.TheTableEqualsTheResultsOfTheExperiments` runs the first {} motors of each kind again and compares.
 
 Sensors: a floor encoder; converters of 12 bits for currents and voltages, both with white noise of one
 step rms. Errors of gain and offset are not among them: a gain error goes into the parameters as it is,

@@ -18,7 +18,7 @@ const std::vector<Trials>& shown() {
 
 // Catches a change of plant, sensors, filters or regression that the table does not have, and a table written
 // by hand.
-TEST(MonteCarlo, TheTableIsWhatTheExperimentsGive) {
+TEST(MonteCarlo, TheTableEqualsTheResultsOfTheExperiments) {
   std::ifstream file(DRIVEBENCH_IDENTIFICATION, std::ios::binary);
   ASSERT_TRUE(file) << DRIVEBENCH_IDENTIFICATION;
   std::ostringstream text;
