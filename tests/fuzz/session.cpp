@@ -74,7 +74,7 @@ class World {
       disconnect(peer);
     settle();
     for (std::size_t axis = 0; axis < 2; ++axis)
-      require(engine_->owner(axis) == 0, "when all are gone nobody owns an axis");
+      require(engine_->owner(axis) == 0, "without clients no axis has an owner");
     engine_->stop();
   }
   World(const World&) = delete;
@@ -190,10 +190,10 @@ class World {
     require(asked.possible || answer.kind_case() == v1::Envelope::kRefusal, "what is no number is refused");
     if (answer.kind_case() == v1::Envelope::kWelcome) peer.greeted = true;
     if (answer.kind_case() != v1::Envelope::kDone) return;
-    require(peer.greeted, "nothing is done for a stranger");
+    require(peer.greeted, "a request before hello is refused");
     if (asked.kind == v1::Envelope::kLease) peer.owner = answer.done().owner();
     if (asked.kind != v1::Envelope::kClearFaults) return;
-    require(peer.owner != 0 && engine_->owner(asked.cleared_axis) == peer.owner, "who clears is the owner");
+    require(peer.owner != 0 && engine_->owner(asked.cleared_axis) == peer.owner, "only the owner clears");
     cleared_[asked.cleared_axis] = true;
   }
 
@@ -367,7 +367,7 @@ class World {
       for (const auto& [id, asked] : peer.asked) {
         require(asked.kind == v1::Envelope::kExchange, "a request has an answer");
         for (const std::uint32_t axis : asked.commanded_axes)
-          require(engine_->owner(axis) == peer.owner, "who waits for a tick of an axis owns it");
+          require(engine_->owner(axis) == peer.owner, "a session that waits for a tick of an axis owns it");
         ++waiting;
       }
       require(waiting <= 1, "of a session one exchange waits");

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Which file may include which: the arrows between the top folders, and between the rooms inside each of them.
+"""The include law: the arrows between the top folders, and between the rooms inside each of them.
 
 Usage: include_law.py [ROOT]. Prints each violation as file:line: rule, and ends with 1 if there is one."""
 
@@ -8,7 +8,7 @@ import re
 import sys
 from collections import namedtuple
 
-# What the files of each top folder may include. Tests may include everything.
+# The folders that the files of each top folder may include. Tests may include everything.
 TOPS = {
     "plant": ("plant", "protocols/signals"),
     "protocols": ("protocols",),
@@ -26,7 +26,7 @@ NARROWER = {
     "clients/link": ("clients/link", "protocols"),
 }
 
-# What may stand between < and >, where that is not everything.
+# The headers allowed between < and >, where not all are.
 STANDARD = re.compile(r"[a-z_0-9]+$")
 SYSTEM = {
     "plant": re.compile(r"[a-z_0-9]+$|Eigen/"),
@@ -130,7 +130,7 @@ def upward(include):
 
 
 def node_of(name, folder):
-    """What a file counts as among the things in a folder: its room, itself if it is a foundation, or the files above."""
+    """The node of a file in a folder: its room, itself if it is a foundation, or the files above."""
     first, deeper, _ = name[len(folder) + 1 :].partition("/")
     if deeper or name in FOUNDATIONS:
         return first

@@ -85,7 +85,7 @@ class IncludeLaw(unittest.TestCase):
         self.assertIn('server/host/clock.cpp:1: "clock.hpp" is no file of the repository', found[0])
         self.assert_one("server/host/clock.cpp is no header", {"server/host/all.cpp": ['"server/host/clock.cpp"']})
 
-    def test_no_room_includes_what_stands_beside_it_or_above(self):
+    def test_no_room_includes_a_file_beside_it_or_above(self):
         self.assert_one("server/main.hpp stands above server/engine", {"server/engine/engine.hpp": ['"server/main.hpp"']})
         self.assert_one("plant/axis.hpp stands above", {"plant/machines/pm/pm.hpp": ['"plant/axis.hpp"']})
         self.assert_one(

@@ -364,7 +364,7 @@ class House(HostTest):
         request = frame(pb.Envelope(id=1, read_parameters=pb.ReadParameters()).SerializeToString())
         for each in greedy:
             each.send_bytes(request * count)
-        until(lambda: here.status().sessions == 1, "all who do not read are gone")
+        until(lambda: here.status().sessions == 1, "the sessions that do not read are gone")
         self.assertMemoryBelow(server, 64 * 1024)
         self.assertEqual(server.stop(), 0)
 

@@ -38,7 +38,7 @@ struct Row {
 enum class Judgement { kWithin, kOver, kNotJudged, kForInformation };
 Judgement judgement(const Row& row);
 
-/// What tests/benchmark/RESULTS.md holds. The date is `YYYY-MM-DD`.
+/// The contents of tests/benchmark/RESULTS.md. The date is `YYYY-MM-DD`.
 std::string as_markdown(const std::string& machine, const std::string& date, const std::vector<Row>& rows);
 void print_table(const std::string& machine, const std::vector<Row>& rows);
 nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows);

@@ -26,7 +26,7 @@ TEST(BenchmarkReport, MarkdownHasARowForEachFigure) {
 }
 
 /// Catches: a figure over its limit, or measured beside others, that reads like a good one.
-TEST(BenchmarkReport, MarkdownSaysWhatIsOverNotJudgedAndSkipped) {
+TEST(BenchmarkReport, MarkdownMarksFiguresOverTheirLimitNotJudgedAndSkipped) {
   Row over = tick();
   over.measured = 1000.0;
   Row disturbed = tick();

@@ -49,7 +49,7 @@ nlohmann::json Server::wait(std::chrono::seconds at_most) {
   const auto deadline = command::Process::in(at_most);
   const auto line = process_.read_line(deadline);
   const auto exit_code = process_.wait(deadline);
-  if (!line || exit_code != 0) throw std::runtime_error("drivebench-server did not end as it should");
+  if (!line || exit_code != 0) throw std::runtime_error("drivebench-server failed");
   return nlohmann::json::parse(*line);
 }
 

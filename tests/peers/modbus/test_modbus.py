@@ -185,7 +185,7 @@ class Pymodbus(ModbusTest):
             self.assertEqual(int(row["encoder_count"]), count)
             self.assertEqual(words("f", float(row["i_a_a"])), sample[56:58])
 
-    def test_one_axis_has_one_owner_whatever_the_transport(self):
+    def test_one_axis_has_one_owner_over_all_transports(self):
         """Catches: a lease that only its own transport respects, refusals that are not counted or not logged."""
         server = self.modbus_server()
         modbus, tcp = self.pymodbus(server), self.client(server)

@@ -55,7 +55,7 @@ TEST(CanMatch, OtherIdentifiersAreForeign) {
 }
 
 // Catches: a frame that is executed although its form is wrong (CAN-09), or is counted as something else.
-TEST(CanMatch, WrongFormsAreToldApart) {
+TEST(CanMatch, WrongFormsAreDistinguished) {
   const Profile classic = profile_of(false);
   const Frame good = a_frame(Message::kCommand, false);
   EXPECT_EQ(problem_of(classic, good), FrameProblem::kNone);

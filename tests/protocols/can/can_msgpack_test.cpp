@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::string_literals;
 
-// What python-can 4.1.0 packs for these frames.
+// The bytes of python-can 4.1.0 for these frames.
 const std::string kShortPacked =
     "\x8b\xa9timestamp\xcb\x41\xd5g\xd8\xdf\x0f\xfbL\xae"
     "arbitration_id\xcd\x01#\xaeis_extended_id\xc2"

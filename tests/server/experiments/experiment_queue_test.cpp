@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kPatience = 10s;
-const std::string kOwner = "somebody's secret";
+const std::string kOwner = "a secret";
 
 /// Writes as often as it is let, and stands still otherwise.
 class StallingDisk {

@@ -23,7 +23,7 @@ inline std::shared_ptr<const SignalTable> no_tables(std::uint64_t) {
 /// A request to the servo that is right.
 inline v1::RunExperiment good() {
   v1::RunExperiment r;
-  r.set_owner("somebody's secret");
+  r.set_owner("a secret");
   r.set_mode(v1::MODE_FREE);
   r.set_ticks(400);
   r.add_signals("i_a_a");

@@ -186,7 +186,7 @@ TEST(ExperimentShapes, ShapesAdd) {
 }
 
 // Catches: a table whose second part overwrites its first, or that shows rows before they are written.
-TEST(ExperimentShapes, TablesOnDiskReadBackWhatWasAppended) {
+TEST(ExperimentShapes, TablesOnDiskReadBackTheAppendedRows) {
   SignalTable table(std::filesystem::temp_directory_path());
   const std::vector<SignalTable::Row> first = {{0.0, 1.0}, {1.0, 2.0}};
   const std::vector<SignalTable::Row> second = {{2.0, 3.0}};

@@ -302,12 +302,12 @@ TEST(Replay, AFileThatIsNoRecordingIsUnusable) {
   EXPECT_EQ(replayed(Bytes(1000, std::byte{0})).result, Result::kUnusable);
   Bytes out;
   McapWriter writer([&out](std::span<const std::byte> b) { out.insert(out.end(), b.begin(), b.end()); },
-                    {.profile = "", .library = "somebody"});
+                    {.profile = "", .library = "another program"});
   writer.add_message({.channel = writer.add_channel("/talk", 0, "text")}, {});
   writer.finish();
   const ReplayReport report = replayed(out);
   EXPECT_EQ(report.result, Result::kUnusable);
-  EXPECT_EQ(report.recorded_by, "somebody");
+  EXPECT_EQ(report.recorded_by, "another program");
 }
 
 }  // namespace

@@ -241,7 +241,7 @@ class Controlling(CommandTest):
             tick = client.newest().tick
             self.assertEqual(client.step(tick, gates=pb.GATES_OFF).load_nm, 0.0)
 
-    def test_set_refuses_what_the_bench_refuses(self):
+    def test_set_refuses_values_that_the_bench_refuses(self):
         """Catches: a misspelt parameter that is ignored, and a move that runs with the wrong motor."""
         for setting, fact in (("machine.rotor_resistance=5", "there is no parameter 'machine.rotor_resistance'"),
                               ("machine.rotor_resistance_ohm=-1", "must lie between"),

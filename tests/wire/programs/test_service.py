@@ -91,7 +91,7 @@ class Unit(WireTest):
         lines = [line.partition("=")[::2] for line in UNIT.read_text(encoding="utf-8").splitlines() if re.match(r"\w+=", line)]
         return {key: [value for other, value in lines if other == key] for key, _ in lines}
 
-    def test_sec_06_the_unit_gives_what_real_time_needs_and_nothing_else(self):
+    def test_sec_06_the_unit_gives_the_rights_of_real_time_and_no_others(self):
         """Catches: a service with more rights than it needs, or one that is started again and again with a wrong bench
         file."""
         keys = self.keys()
