@@ -20,7 +20,7 @@ PYTHON = re.compile(r"^    def (test_\w+)\(", re.MULTILINE)
 CTEST = re.compile(r"add_test\(NAME ([\w.]+)|drivebench_script\(([\w.]+) ")
 FUZZ = re.compile(r"^drivebench_fuzz\((\w+) ", re.MULTILINE)
 
-HEAD = """# Faults and abuse: what is tested
+HEAD = """# Faults and abuse, and the tests that prove them
 
 Made by `/usr/bin/python3 tests/adversity/table.py` from the names of the tests and [`rows.toml`](rows.toml); a test compares. A
 test that proves a row has its ID in its name: `TEST(Bench, CMD_06_...)`, `def test_cmd_06_...`.

@@ -44,7 +44,7 @@ bool is_number(const MessageRow& row, const Values& values) {
 
 void require_message(const MessageRow& row, const Profile& profile, const Frame& made) {
   const Match found = match(profile, made);
-  fuzz::require(found.ok() && found.row == &row, "what is encoded is that message");
+  fuzz::require(found.ok() && found.row == &row, "an encoded message is recognised");
 }
 
 void check_message(const MessageRow& row, std::uint32_t node, const Profile& profile, const Frame& frame) {

@@ -23,11 +23,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const BenchConfig again = parse_config(written, "written.toml", {});  // as in a recording
     fuzz::require(configuration_hash(again) == configuration_hash(config),
-                  "it means the same to the samples");
+                  "the samples have the same meaning");
     fuzz::require(to_toml(again) == written, "it reads back equal");
   } catch (const ConfigError& error) {
     std::fprintf(stderr, "%s\n%s\n", error.what(), written.c_str());
-    fuzz::require(false, "what the product writes it reads");
+    fuzz::require(false, "the product reads its own text");
   }
   return 0;
 }

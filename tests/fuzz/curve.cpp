@@ -23,10 +23,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   fuzz::require(refused != points.has_value(), "a file is a curve or refused");
   if (!points) return 0;
-  fuzz::require(problem_with_points(*points, rising).empty(), "what is taken is a curve");
+  fuzz::require(problem_with_points(*points, rising).empty(), "a curve that is taken keeps the rules");
   const std::string written = "c = " + curve_text(Curve(*points));
   const auto document = parse_document(written, "written.toml", problems, kMaxRecordedConfigBytes);
-  fuzz::require(document.has_value(), "what the product writes it reads");
+  fuzz::require(document.has_value(), "the product reads its own text");
   const ConfigNode& array = document->children.at(0);
   fuzz::require(array.children.size() == points->size(), "no point is lost");
   for (std::size_t i = 0; i < points->size(); ++i) {

@@ -47,8 +47,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     fuzz::check_plan(make_plan(request, fuzz::bench(), fuzz::no_tables));
   } catch (const BadRequest& bad) {
-    fuzz::require(!bad.field().empty() && *bad.what() != '\0',
-                  "a refusal says what is wrong with which field");
+    fuzz::require(!bad.field().empty() && *bad.what() != '\0', "a refusal names the field and the rule");
   }
   return 0;
 }

@@ -18,7 +18,7 @@ class Bounds {
     const std::less<const std::byte*> before;
     const std::byte* const begin = file_.data();
     require(!before(part.data(), begin) && !before(begin + file_.size(), part.data() + part.size()),
-            "what is read lies in the file");
+            "every read lies in the file");
   }
   void check(std::string_view part) const { check(std::as_bytes(std::span(part))); }
   void check(const McapMapView& map) const {
@@ -75,7 +75,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::check_contents(reader, bounds);
   fuzz::require(messages == reader.message_count(), "the messages are counted");
   if (reader.problem()) {
-    fuzz::require(reader.problem()->offset <= size, "a problem is somewhere in the file");
+    fuzz::require(reader.problem()->offset <= size, "a problem has a place in the file");
     fuzz::require(!reader.problem()->what.empty(), "a problem is a sentence");
   }
   McapMessage nothing;

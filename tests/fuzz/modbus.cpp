@@ -71,7 +71,7 @@ void validate(const Frame& adu) {
   if (request.read.count > 0) check_range(request.read);
   if (request.write.count == 0) return;
   check_range(request.write);
-  require(map().may_write(request.write), "what is written may be");
+  require(map().may_write(request.write), "only writable registers are written");
   require(request.data.size() >= 2u * request.write.count, "there is a word for every register");
   if (request.function != modbus::Function::kMaskWriteRegister) {
     require(modbus::values_fit(request.write, modbus::words_from(request.data)), "values are in range");

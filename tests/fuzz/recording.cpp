@@ -9,7 +9,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using Result = ReplayReport::Result;
   fuzz::silence_protobuf();
   const ReplayReport report = replay(fuzz::as_bytes_of(data, size), nullptr);
-  fuzz::require((report.result == Result::kEqual) == report.problem.empty(), "what is not equal says why");
-  fuzz::require(!report.difference || report.result == Result::kDifferent, "a difference is one");
+  fuzz::require((report.result == Result::kEqual) == report.problem.empty(),
+                "a replay that differs has a reason");
+  fuzz::require(!report.difference || report.result == Result::kDifferent, "a reported difference is one");
   return 0;
 }

@@ -26,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(used <= bytes.size(), "a sample fits its bound");
   const std::optional<Sample> again = decode_sample(std::span(bytes).first(used));
   fuzz::require(again && std::bit_cast<Words>(*again) == std::bit_cast<Words>(*sample),
-                "what was decoded encodes and decodes to the same bits");
+                "a decoded sample encodes and decodes to the same bits");
 
   v1::Sample theirs;
   if (!theirs.ParseFromArray(data, static_cast<int>(size))) return 0;  // it refuses tags of more than 5 bytes

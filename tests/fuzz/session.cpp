@@ -94,11 +94,11 @@ class World {
     act(peer, byte / kPeers, program);
     settle();
     require(engine_->tick() >= before && engine_->tick() <= before + steps_allowed_,
-            "time goes on tick by tick, and only with commands");
+            "time advances tick by tick, and only with commands");
     for (std::size_t axis = 0; axis < 2; ++axis) {
       check_axis(axis);
       require((latched[axis] & ~latched_of(axis)) == 0 || cleared_[axis],
-              "only the owner clears what is latched");
+              "only the owner clears a latched fault");
       const auto state = static_cast<ControlState>(engine_->newest(axis).state);
       require((latched[axis] & latched_of(axis)) == 0 || cleared_[axis] || engine_->tick() == before ||
                   state == ControlState::kTimeout || state == ControlState::kFault,
@@ -187,7 +187,8 @@ class World {
     require(found != peer.asked.end(), "an answer belongs to a request that had none");
     const Peer::Asked asked = found->second;
     peer.asked.erase(found);
-    require(asked.possible || answer.kind_case() == v1::Envelope::kRefusal, "what is no number is refused");
+    require(asked.possible || answer.kind_case() == v1::Envelope::kRefusal,
+            "a request with a value that is no number is refused");
     if (answer.kind_case() == v1::Envelope::kWelcome) peer.greeted = true;
     if (answer.kind_case() != v1::Envelope::kDone) return;
     require(peer.greeted, "a request before hello is refused");
@@ -206,7 +207,7 @@ class World {
     require(std::ranges::any_of(
                 peers_,
                 [owner](const Peer& peer) { return peer.is_there() && (peer.owner == owner || peer.raw); }),
-            "an owner is there");
+            "an owner is connected");
     for (const Peer& peer : peers_)
       require(&peer == &peers_[0] || peer.owner == 0 || peer.owner != peers_[0].owner,
               "owners have numbers of their own");

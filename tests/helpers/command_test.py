@@ -55,7 +55,7 @@ class CommandTest(unittest.TestCase):
         return json.loads(self.drivebench(*arguments, "--json", **more).stdout)
 
     def start(self, *command, link=NO_BENCH):
-        """A program that runs until it is told to end."""
+        """A program that runs until a signal ends it."""
         process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, cwd=self.folder, env=environment(link))
 

@@ -40,7 +40,7 @@ ORDERED = {
     "server": ("host", "bench", "config", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
 }
 
-# Files beside rooms that these may include all the same. They count as rooms of their own in the search for circles.
+# Files beside rooms that the rooms may include. They count as rooms of their own in the search for circles.
 FOUNDATIONS = {
     "plant/faults.hpp",
     "plant/injected_faults.hpp",

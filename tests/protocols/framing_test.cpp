@@ -52,7 +52,7 @@ TEST(Framing, LengthIsFourBytesBigEndian) {
   EXPECT_EQ(header_of(0x0102feff), expected);
 }
 
-// Catches: an off-by-one at either end of what is allowed. TCP-01.
+// Catches: an off-by-one at either end of the allowed lengths. TCP-01.
 TEST(Framing, TCP_01_LIMIT_01_OneAndMaxPassZeroAndMaxPlusOneDoNot) {
   for (const std::size_t good : {std::size_t{1}, std::size_t{2}, std::size_t{100}}) {
     Stream stream(100);

@@ -126,7 +126,7 @@ class Disks(HostTest, ExperimentTest):
 
 
 class Stops(HostTest):
-    PERIOD_S = 128e-6  # an edge of the histogram of latenesses, which then tells late ticks from others
+    PERIOD_S = 128e-6  # an edge of the histogram of latenesses, which then separates late ticks from others
 
     def test_os_03_after_a_stop_every_late_tick_is_counted_and_executed(self):
         """Catches: ticks that are skipped, not counted, or executed as if in time, after a stop of the process."""
@@ -154,7 +154,7 @@ class Stops(HostTest):
         lost = sum(stop_s for stop_s in stops if stop_s >= 1.0)
         # The tick of `first` may have been late itself: hence a second stop.
         self.assertLess(clients[1].newest().tick, first[1] + (time.monotonic() - since - lost + 1.0) / self.PERIOD_S,
-                        "what was too late is given up")
+                        "the late ticks are given up")
         for server in (patient, strict):
             self.assertEqual(server.stop(), 0)
             verdict = server.verdict
@@ -360,7 +360,7 @@ class House(HostTest):
         # without progress.
         answer = len(frame(here.ask(read_parameters=pb.ReadParameters()).SerializeToString()))
         count = (MIB - MIB // 8) // answer
-        self.assertGreater(255 * (count * answer - MIB // 4), 2 * 64 * MIB, "beyond what their sockets take")
+        self.assertGreater(255 * (count * answer - MIB // 4), 2 * 64 * MIB, "more than their sockets take")
         request = frame(pb.Envelope(id=1, read_parameters=pb.ReadParameters()).SerializeToString())
         for each in greedy:
             each.send_bytes(request * count)

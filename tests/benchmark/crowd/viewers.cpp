@@ -71,7 +71,7 @@ double resident_mib(pid_t pid) {
   for (std::string line; std::getline(status, line);) {
     if (line.starts_with("VmRSS:")) return std::stod(line.substr(6)) / 1024.0;
   }
-  throw std::runtime_error("the server is gone");
+  throw std::runtime_error("the server has ended");
 }
 
 }  // namespace drivebench::speed

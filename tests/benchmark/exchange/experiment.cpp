@@ -66,8 +66,8 @@ double fetch_s(link::Link& bench, std::uint64_t id) {
   return static_cast<double>(now_ns() - begin) * 1e-9;
 }
 
-/// The floor: a process that sends as many bytes from memory, over TCP with blocking calls, whenever it is
-/// asked for them.
+/// The floor: a process that sends as many bytes from memory, over TCP with blocking calls, on each
+/// request.
 class RawCopy {
  public:
   RawCopy() : block_(kBlock) {

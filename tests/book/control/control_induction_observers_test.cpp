@@ -174,7 +174,7 @@ struct VergheseSanders {
 };
 
 // Case 18 on the machine: from 0.5 Wb to 5 % of 0.169 Wb takes 4.08 time constants, of 3.59 ms for the copy
-// and 0.89 ms for k = 0.9; what the held currents add moves that by a fifth. Catches: a correction of the
+// and 0.89 ms for k = 0.9; the held currents change that by a fifth. Catches: a correction of the
 // wrong sign, which the difference of two observers would not show where both are wrong; k = 1.3 diverges.
 TEST(InductionObservers, VergheseSandersSettlesFaster) {
   const auto settling = [](double gain) {

@@ -208,7 +208,7 @@ TEST(StepperControl, StepsAreExact) {
   EXPECT_NEAR(steps_made(closed_loop("stepper/micro"), kStep_rad / 16.0), 64.0, 1e-6);
 }
 
-// Case 33. Catches: voltages where currents are asked for: only a current source leaves the oscillation
+// Case 33. Catches: voltages in place of currents: only a current source leaves the oscillation
 // undamped. 3.460 degrees at 7.96 ms, then 73.0 Hz; 1 %.
 TEST(StepperControl, ACurrentStepRings) {
   const Outcome seen = closed_loop("book/9.4-current");

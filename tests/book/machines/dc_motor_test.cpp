@@ -46,7 +46,7 @@ TEST(BookDcMotor, TheEnergyOfTenVoltsIsLostOrStored) {
     last = s;
   });
   EXPECT_NEAR(peak_a, 4.51983, 4.5e-3);
-  EXPECT_NEAR(peak_s, 3.412e-3, 20e-6);  // one sample, flat as it is there
+  EXPECT_NEAR(peak_s, 3.412e-3, 20e-6);  // one sample: the peak is flat
   EXPECT_NEAR(drawn_j, 4.4127, 4.4e-3);
   const double stored_j =
       0.5 * (2e-3 * last.true_i_a_a * last.true_i_a_a + 6e-5 * last.speed_rad_s * last.speed_rad_s);

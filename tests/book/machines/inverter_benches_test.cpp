@@ -128,7 +128,7 @@ TEST(BookInverterBenches, TheBm500RunsAtItsVoltageOverKm) {
 
 // AC-26 on the bench bm500: the shaft turned at 300 rad/s with all gates off, no current flows and the
 // terminals show v_k = -K w sin(n_p theta - (k-1) 2 pi/3) with K = sqrt(2/3) K_m, which is K_m w (-sin, cos)
-// in two phases: its length to 1e-6, its angle to what the rotor turns in a substep. Kills: the signs of
+// in two phases: its length to 1e-6, its angle to the rotor's turn in a substep. Kills: the signs of
 // (7.81), an emf of the wrong axis or size, diodes that conduct against a link of 320 V.
 TEST(BookInverterBenches, TheOpenTerminalsOfTheBm500ShowItsEmf) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/bm500.toml");

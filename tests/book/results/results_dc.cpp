@@ -218,7 +218,7 @@ ResultSection dc_results() {
         "agrees"},
        {"AC-14", "half a turn in 65 ms, `book/2.18`",
         "below 5 A and 40 V, within 70 ms; simulated 0.009 rad, 4.26 A", half_turn("book/2.18"),
-        "not the reference's program, whose settings are not all told: an independent one with these gives "
+        "not the reference's program, whose settings are not all known: an independent one with these gives "
         "0.0044"},
        {"AC-14", "the same with a current loop of its own, `book/2.18-own-current-loop`", "as above",
         half_turn("book/2.18-own-current-loop"), "agrees"},

@@ -197,7 +197,7 @@ ResultSection high_speed_results() {
            {"10", "the same with field weakening from 313 rad/s on, `book/8.2.5-field-weakening`",
             "nothing; simulated 1148 counts", move_of(weakened),
             "it follows, but braking takes more than the 6 A of the amplifier; the law behind the simulated "
-            "number is not told"},
+            "number is not known"},
            {"11",
             "the move with the listed friction, `book/8.2.5-friction`",
             "nothing; derived: impossible",

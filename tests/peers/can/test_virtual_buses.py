@@ -51,7 +51,7 @@ class UdpMulticast(VirtualBusTest):
         self.assertEqual((counters["received"], counters["sent"], counters["malformed"]), (7, 7, 0))
 
     # Catches: frames sent without pacing, which silently overrun a receiver's buffer of 160 datagrams. A busy machine
-    # may keep the receiver from its buffer long enough all the same, hence three attempts.
+    # may keep the receiver from its buffer long enough, hence three attempts.
     def test_a_burst_arrives_complete(self):
         attempts = []
         for _ in range(3):

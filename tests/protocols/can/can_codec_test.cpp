@@ -48,7 +48,7 @@ Frame sent(Message message, bool fd) {
   return encode_sample(*find_message(message, fd), profile_of(fd), 5, a_sample());
 }
 
-// Catches: a byte order, a place or a scale that changes: what is on the wire is a promise.
+// Catches: a byte order, a place or a scale that changes: the bytes on the wire are a promise.
 TEST(CanCodec, ClassicFramesHaveTheseBytes) {
   EXPECT_EQ(data_of(sent(Message::kSync, false)), "8967452300");
   EXPECT_EQ(data_of(sent(Message::kFault, false)), "1000008089674523");
@@ -295,7 +295,7 @@ TEST(CanCodec, RandomSamplesComeBack) {
       sample.temperature_k = 3000.0 + 3000.0 * uniform(random);
       sample.hall_lines = random() % 8;
       sample.injected = random() >> 36;
-      Sample received = sample;  // what was known a little before
+      Sample received = sample;  // known a little earlier
       received.tick -= 50;
       received.command_tick -= 50;
       received.missed_commands -= 100;

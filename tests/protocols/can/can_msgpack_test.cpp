@@ -95,7 +95,7 @@ TEST(CanMsgpack, TakesAnyOrderUnknownKeysAndWideNumbers) {
   EXPECT_EQ(unpack(bytes), (Frame{.id = 0x123, .size = 2, .data = {10, 11}}));
 }
 
-// Catches: other defaults than python-can's, which takes an identifier for extended unless told otherwise.
+// Catches: other defaults than python-can's, which takes an identifier for extended by default.
 TEST(CanMsgpack, KnowsTheDefaultsOfPythonCan) {
   EXPECT_EQ(unpack("\x81" + key("arbitration_id") + "\x07"), (Frame{.id = 7, .extended = true}));
   EXPECT_EQ(unpack("\x80"), std::nullopt);

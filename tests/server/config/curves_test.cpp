@@ -122,7 +122,7 @@ TEST(ConfigCurves, HostileFilesAreReportedWithTheirLine) {
   EXPECT_NE(told(std::string(9'000'000, '\n')).find("is larger than 8388608 bytes"), std::string::npos);
 }
 
-// Catches: a curve without bound, and a bound that forbids what the recording must be able to hold.
+// Catches: a curve without bound, and a bound below the longest recorded curve.
 TEST(ConfigCurves, AHundredThousandPointsFitAndReadBack) {
   const Folder folder;
   const auto points = [](std::size_t count) {

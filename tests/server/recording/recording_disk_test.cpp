@@ -116,7 +116,7 @@ Bytes image_after_cut(const std::vector<DiskEntry>& log, std::size_t cut, std::m
   return image;
 }
 
-// Catches: a sync that does not cover what was written before it; a chunk that needs a later one to be read;
+// Catches: a sync that does not cover the writes before it; a chunk that needs a later one to be read;
 // a reader that believes half a sector. Five seconds of a real recording, the power cut at random calls.
 TEST(RecordingDisk, REC_02_SyncedDataSurviveAPowerCut) {
   const TestFolder folder;
@@ -147,7 +147,7 @@ TEST(RecordingDisk, REC_02_SyncedDataSurviveAPowerCut) {
     const Found found(std::vector<Bytes>{image});
     ASSERT_TRUE(found.begins_with(safe[cut])) << "image " << n << ", cut after call " << cut;
     for (std::uint64_t tick = 0; tick < found.ticks.size(); ++tick)
-      ASSERT_EQ(found.ticks[tick], tick) << "image " << n << ": what is read was written";
+      ASSERT_EQ(found.ticks[tick], tick) << "image " << n << ": only written samples are read";
     EXPECT_TRUE(!found.has_verdict || !found.is_whole || found.ticks.size() == kTicks);
     seen.insert(safe[cut]);
   }

@@ -209,7 +209,7 @@ class Tokens(UsersTest):
             refused += "has to wait" not in answer.refusal.message
             guesses += 1
         self.assertGreater(guesses, 20)
-        self.assertLessEqual(refused, 2, "looked at after 0.5 and 1.5 s")
+        self.assertLessEqual(refused, 2, "checked after 0.5 and 1.5 s")
         inside.newest()
 
         def right():

@@ -140,7 +140,7 @@ class Commands(WireTest):
         self.assertFalse((self.path / "drivebench").exists() or (self.path / ".config").exists())
 
     def test_wrong_files_are_reported_with_their_lines(self):
-        """Catches: a wrong file that is sent all the same."""
+        """Catches: a wrong file that is sent."""
         self.start("servo")
         toml = self.path / "e.toml"
         toml.write_text('ticks = 160\nsignals = ["u_a_v"]\n[input]\nkind = "volts"\n', encoding="utf-8")

@@ -165,7 +165,7 @@ class Setpoints(WireTest):
         self.assertNotEqual(bldc.i_c_a, 0.0)
 
     def test_the_description_tells_kinds_and_phases(self):
-        """Catches: a client that must guess what it controls."""
+        """Catches: a client that must guess the kind of its axis."""
         axes = self.client(self.server(text=TWO_DRIVES)).welcome.bench.axes
         found = [(a.machine_kind, a.phases, a.connection, a.drive_kind, a.shares_shaft_with) for a in axes]
         self.assertEqual(found, [("induction", 2, "two_phase", "current_amplifier", ""),

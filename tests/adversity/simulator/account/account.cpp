@@ -137,7 +137,7 @@ void AxisAccount::check_owner(const Sample& s) {
   }
   for (const Leaving& each : leaving_) {
     require(each.deadline < 0 || static_cast<Tick>(s.tick) < each.deadline || s.owner != each.owner,
-            "the lease of a controller that is gone is given back");
+            "the lease of a closed session is given back");
   }
   std::erase_if(leaving_, [&](const Leaving& each) {
     return each.deadline >= 0 && static_cast<Tick>(s.tick) >= each.deadline;

@@ -234,7 +234,7 @@ void World::finish() {
     player->check_end();
   for (const auto& player : players_)
     player->leave();
-  // The lease of a Modbus client that is gone lasts, as its key does.
+  // A Modbus client that disconnected keeps its lease as long as its key.
   play_until(scene_.schedule.now() + 100 * kMillisecond + (modbus_ ? kSecond + scene_.lease() : 0));
   if (!scene_.failure.promise.empty()) return;
   for (std::size_t axis = 0; axis < scene_.axes.size(); ++axis) {

@@ -1,4 +1,4 @@
-// Every block of drivebench's register map through jsmodbus: node jsmodbus.mjs HOST PORT. Prints what it found as JSON.
+// Every block of drivebench's register map through jsmodbus: node jsmodbus.mjs HOST PORT. Prints the values as JSON.
 import net from "node:net";
 import jsmodbus from "jsmodbus";
 

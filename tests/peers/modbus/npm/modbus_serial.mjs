@@ -1,5 +1,5 @@
-// Every block of drivebench's register map through modbus-serial: node modbus_serial.mjs HOST PORT. Prints what it
-// found as JSON.
+// Every block of drivebench's register map through modbus-serial: node modbus_serial.mjs HOST PORT. Prints the
+// values as JSON.
 import ModbusRTU from "modbus-serial";
 
 const [host, port] = process.argv.slice(2);

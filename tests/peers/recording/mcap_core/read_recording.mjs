@@ -1,7 +1,7 @@
 // node read_recording.mjs FILE
 //
 // Reads a recording with both readers of @mcap/core, by index and from front to back, and prints one JSON object:
-// what the index reader found. Ends with code 1 and a sentence on stderr when the readers refuse the file, disagree, or
+// the results of the index reader. Ends with code 1 and a sentence on stderr when the readers refuse the file, disagree, or
 // a checksum is wrong. The front-to-back reader gets the file in pieces of an odd size, as from a slow link.
 import { open, stat } from "node:fs/promises";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
