@@ -185,7 +185,7 @@ class Connections(WireTest):
         self.assertEqual((counts["turned_away"], counts["cut"]), (1, 32))
         self.client(server)
 
-    def test_tcp_16_limit_02_as_many_sessions_as_are_allowed(self):
+    def test_tcp_16_limit_02_exactly_the_allowed_sessions_are_open(self):
         """Catches: a cap that is one too low or too high."""
         server = self.server()
         inside = [self.client(server) for _ in range(256)]

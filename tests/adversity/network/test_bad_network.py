@@ -154,7 +154,7 @@ class BadPath(WireTest):
                 self.assertGreater(link.counts["overtaken"], 0, link.counts)
         self.assertEqual(hashes[0], hashes[1])
 
-    def test_tcp_21_the_watchdog_acts_when_it_must(self):
+    def test_tcp_21_the_watchdog_acts_in_an_outage_only(self):
         """Catches: an axis that is given up for a lost segment, or one that goes on without commands."""
         text = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 16000").replace("lease_s = 2.0", "lease_s = 10.0")
         link = self.link(22)

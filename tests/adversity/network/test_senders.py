@@ -55,7 +55,7 @@ class Senders(WireTest):
         started = watcher.newest().tick
         until(lambda: watcher.newest().tick > started + 100, "the other sessions and the ticks go on")
 
-    def test_cmd_10_an_exchange_for_each_tick_is_no_flood_however_many_axes_it_commands(self):
+    def test_cmd_10_an_exchange_for_each_tick_is_no_flood_with_any_number_of_axes(self):
         """Catches: a controller of several axes that is throttled because one of them takes no commands."""
         server = self.server("--mode", "realtime", text=TWO_AXES.replace("period_us = 125", "period_us = 1000"))
         client = self.client(server)

@@ -95,7 +95,7 @@ Complex response(double k_p, double alpha) {
 // holds its voltage for 2 us, half of which are 1e-4 rad of the sine. Kills: a
 // gain or an integral off by a few parts in a thousand, a current that is delayed by a tick, a back emf that
 // the loop does not see.
-TEST(BookCurrentLoop, ASineOfOneAmpereComesOutAsTheTransferFunctionSays) {
+TEST(BookCurrentLoop, ASineOfOneAmpereFollowsTheTransferFunction) {
   struct Case {
     double k_p, alpha, magnitude, phase_deg;
   };

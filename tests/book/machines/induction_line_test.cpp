@@ -24,7 +24,7 @@ double rotor_a(const Sample& s) {
 // AC-19, the bench im-a with friction-free 0, 0.2 and 0.5 N m: closed form of the equivalent circuit, 0.1 %;
 // the rotor current of the first case is 0 to 1e-3 of the stator's.
 // Kills: a two-phase source whose phase b does not follow by a quarter, a load with the wrong sign.
-TEST(BookInductionLine, TheTwoPhaseMotorSettlesWhereItsEquivalentCircuitSays) {
+TEST(BookInductionLine, TheTwoPhaseMotorSettlesAtTheSpeedOfItsEquivalentCircuit) {
   struct Case {
     double load_nm, speed_rad_s, current_a, rotor_a;
   };

@@ -54,7 +54,7 @@ class Dbc(unittest.TestCase):
     def each(self):
         return ((variant, load(texts("dbc", *variant))) for variant in VARIANTS)
 
-    def test_it_is_read_without_complaint(self):
+    def test_canmatrix_reads_it_without_complaint(self):
         """Catches: a line that the reader does not understand; names that are no identifiers, too long or not unique; FD
         or extended frames that are not marked."""
         for (kind, ids, width), (matrix, complaints) in self.each():

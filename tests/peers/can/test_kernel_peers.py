@@ -116,7 +116,7 @@ class KernelPeer(DriveTest):
 class PythonCan(KernelPeer):
     # Catches: frames that python-can or candump read otherwise than we write them; a DBC file that does not describe
     # them; samples that are lost, doubled or of another tick.
-    def test_open_loop_start_beside_candump(self):
+    def test_python_can_starts_the_motor_beside_candump(self):
         for fd in (False, True):
             with self.subTest(fd=fd):
                 server, dbc, recording = self.bench(fd)
@@ -131,7 +131,7 @@ class PythonCan(KernelPeer):
                 self.assertLogRecorded(log, dbc, recording, TICKS)
 
     # CAN-14. Catches: a server that needs a capability for CAN.
-    def test_a_bench_of_an_unprivileged_user(self):
+    def test_an_unprivileged_user_runs_a_bench_on_can(self):
         def drop_privileges():
             os.setgroups([])
             os.setgid(NOBODY)
@@ -153,7 +153,7 @@ class PythonCan(KernelPeer):
 
 class OurController(KernelPeer):
     # Catches: a kernel bus on which the reference controller behaves differently from other buses.
-    def test_the_servo_move(self):
+    def test_our_controller_makes_the_servo_move(self):
         for fd in (True, False):
             with self.subTest(fd=fd):
                 server, _, recording = self.bench(fd)
@@ -169,7 +169,7 @@ class CanUtils(KernelPeer):
         subprocess.run(["cansend", "vcan0", frame], check=True, timeout=PATIENCE_S)
 
     # Catches: a drive that only a program with our tables can command; a command that arrives changed.
-    def test_cansend_commands(self):
+    def test_cansend_commands_an_axis(self):
         for fd in (False, True):
             with self.subTest(fd=fd):
                 server, dbc, recording = self.bench(fd)
@@ -198,7 +198,7 @@ class CanUtils(KernelPeer):
 
 class Npm(KernelPeer):
     # Catches: frames that only programs in Python and C understand.
-    def test_socketcan(self):
+    def test_npm_socketcan_commands_an_axis(self):
         if reason := os.environ.get("DRIVEBENCH_NO_SOCKETCAN"):
             self.skipTest(reason)
         program = pathlib.Path(os.environ["DRIVEBENCH_SOCKETCAN"]) / "run_ticks.js"

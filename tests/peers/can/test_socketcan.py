@@ -59,7 +59,7 @@ class CanCheck(DriveTest):
 
 class CanUtils(DriveTest):
     # Catches: frames that can-utils show differently, or that the bench does not receive from them.
-    def test_candump_and_cansend_on_the_bus_of_a_bench(self):
+    def test_candump_and_cansend_work_on_the_bus_of_a_bench(self):
         self.server(text=with_bus(['backend = "socketcan"', 'channel = "vcan0"', "fd = false", "heartbeat_ms = 20"]))
         listener = self.start("candump", "-L", "vcan0")
         self.addCleanup(listener.communicate)

@@ -280,7 +280,7 @@ class Socketcand(VirtualBusTest):
         return line
 
     # Catches: a promise of the protocol's document that python-can does not use and the server does not keep.
-    def test_a_session_by_hand(self):
+    def test_a_session_by_hand_follows_the_protocol(self):
         with Echo("socketcand", "127.0.0.1") as echo:
             line = self.client(echo, "< open can0 >")
             line.send("< echo >")

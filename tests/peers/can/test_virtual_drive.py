@@ -41,7 +41,7 @@ class VirtualDrive(DriveTest):
 
     # Catches: frames that python-can reads differently from how we write them, or a DBC file that does not describe
     # them.
-    def test_open_loop_start_over_udp_multicast(self):
+    def test_the_motor_starts_over_udp_multicast(self):
         for fd in (True, False):
             with self.subTest(fd=fd):
                 self.open_loop([UDP],
@@ -101,7 +101,7 @@ class VirtualDrive(DriveTest):
         self.assertEqual(server.stop(), 0)
 
     # Catches: a terminal that python-can's slcan driver cannot talk to.
-    def test_open_loop_start_over_slcan(self):
+    def test_the_motor_starts_over_slcan(self):
         pty = self.folder / "can.pty"
         self.open_loop(['backend = "slcan"', f'channel = "pty:{pty}"'],
                        lambda _: can.Bus(interface="slcan", channel=str(pty), bitrate=1_000_000, sleep_after_open=0),
@@ -111,7 +111,7 @@ class VirtualDrive(DriveTest):
                                          sleep_after_open=0), False)
 
     # Catches: a socketcand server that does not suit a client written from the protocol's description.
-    def test_a_socketcand_session_by_hand(self):
+    def test_the_motor_starts_over_socketcand_by_hand(self):
         text = with_bus(['backend = "socketcand"', 'channel = "127.0.0.1"', "port = 29700", "fd = false"])
         dbc = self.text_of("dbc", text)
         recording = self.folder / "run.mcap"

@@ -81,7 +81,7 @@ class ModbusTest(WireTest):
 
 
 class Pymodbus(ModbusTest):
-    def test_three_phases_in_one_transaction_a_tick(self):
+    def test_one_transaction_a_tick_commands_three_phases(self):
         """Catches: a phase c that is rounded, late or lost, sensors that do not come back with it."""
         def voltages(tick):
             return float(8 * (tick % 7) - 24), -0.5 * (tick % 5), 0.25 * (tick % 9)
@@ -110,7 +110,7 @@ class Pymodbus(ModbusTest):
             self.assertEqual(other.stop(), 0)
         self.assertEqual(server.verdict["state_hash"], other.verdict["state_hash"])
 
-    def test_every_block_and_function(self):
+    def test_pymodbus_reads_and_writes_every_block(self):
         """Catches: a block that an ordinary client cannot read or write, a value in another order."""
         client = self.pymodbus(self.modbus_server())
         header = self.read(client, HEADER, 30)
@@ -205,7 +205,7 @@ class Pymodbus(ModbusTest):
         self.assertEqual(counts["connections"], 1)
         self.assertEqual(counts["refused_writes"], 2)
 
-    def test_two_axes_two_units(self):
+    def test_each_axis_answers_to_its_own_unit(self):
         """Catches: one axis that answers for the other."""
         client = self.pymodbus(self.modbus_server(text=TWO_AXES))
         for unit in (1, 2):
@@ -237,7 +237,7 @@ class Mbpoll(ModbusTest):
         pairs = [line.split(":", 1) for line in told.splitlines() if line.startswith("[")]
         return {int(address.strip("[]")): value.split()[0] for address, value in pairs}
 
-    def test_every_block_from_a_shell(self):
+    def test_mbpoll_reads_and_writes_every_block(self):
         """Catches: a map that needs a program of ours; a lease that ends with one call of a tool."""
         server = self.modbus_server()
         self.assertEqual(self.values(self.mbpoll(server, first=0, count=3)), {0: "17474", 1: "1", 2: "1"})
@@ -261,7 +261,7 @@ class Mbpoll(ModbusTest):
         self.assertEqual(self.values(self.mbpoll(server, first=LEASE + 9, count=1)), {409: "0"})
 
 
-    def test_three_phases_from_a_shell(self):
+    def test_mbpoll_commands_three_phases(self):
         """Catches: phase c, Hall lines or injected faults that an ordinary tool cannot reach."""
         server = self.modbus_server(text=STAR + '\n[[axis.fault]]\nat_tick = 1\nname = "open_phase"\nvalue = 3\n')
         self.assertEqual(self.values(self.mbpoll(server, first=30, count=10)),
@@ -306,7 +306,7 @@ class Npm(ModbusTest):
         self.assertEqual([bool(bit) for bit in found["discrete"]], [False, True, False, False, False])
         self.assertEqual(found["released"], 0)
 
-    def test_modbus_serial(self):
+    def test_modbus_serial_reads_and_writes_every_block(self):
         """Catches: answers that only lenient clients take."""
         found = self.found_by("modbus_serial.mjs", self.modbus_server())
         self.check(found)
@@ -315,7 +315,7 @@ class Npm(ModbusTest):
         self.assertEqual(found["disabled"] & 0x6F, 0x23)
         self.assertEqual(found["exchanged"], [1, 12.0, -3.0])
 
-    def test_jsmodbus(self):
+    def test_jsmodbus_reads_and_writes_every_block(self):
         """Catches: answers that only lenient clients take."""
         found = self.found_by("jsmodbus.mjs", self.modbus_server())
         self.check(found)

@@ -33,7 +33,7 @@ Bytes without_checksums(Bytes file) {
 }
 
 // Catches: a read past the end, a message made of a torn record, a torn file that passes for whole.
-TEST(McapReader, REC_01_REC_09_FileCutAtAnyByteGivesItsFirstMessagesAndSaysTruncated) {
+TEST(McapReader, REC_01_REC_09_FileCutAtAnyByteGivesItsFirstMessagesAndIsTruncated) {
   std::vector<Kept> written;
   const Bytes file = small_file(written);
   std::size_t last_count = 0;

@@ -112,7 +112,7 @@ TEST(Mcap, MessagesSurviveManyChunks) {
 
 // Catches: index entries left over from the chunk before, offsets counted from the wrong place (the reader
 // does not use them, others jump by them), chunks that never end.
-TEST(McapWriter, EveryMessageIsIndexedOnceInChunksOfTheSizeAskedFor) {
+TEST(McapWriter, EveryMessageIsIndexedOnceInChunksOfTheRequestedSize) {
   std::vector<Kept> written;
   const Bytes file = small_file(written);
   std::size_t records = 0;  // where those of the current chunk begin

@@ -134,7 +134,7 @@ TEST(ExperimentShapes, PrbsKeepsTheBitsOfExistingRecordings) {
 }
 
 // Catches: bits that last a tick whatever bit_ticks says, a seed that changes nothing.
-TEST(ExperimentShapes, PrbsHoldsItsBitsAndBeginsWhereTheSeedSays) {
+TEST(ExperimentShapes, PrbsHoldsItsBitsAndBeginsAtItsSeed) {
   const std::vector<bool>& bits = maximum_length_sequence(5);
   const InputShape shape =
       on_a(PrbsShape{.amplitude = 4.0, .bit_ticks = 3, .first_bit = 2, .bits = &bits}, 6, 1000);

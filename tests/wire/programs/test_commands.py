@@ -220,7 +220,7 @@ class Controlling(CommandTest):
         parameters = self.json_of("describe", link=self.link)["axes"][0]["parameters"]
         return next(each["value"] for each in parameters if each["name"] == name)
 
-    def test_two_moves_one_after_the_other(self):
+    def test_a_second_move_equals_the_first(self):
         """Catches: a second run that starts with the flux, the load or the lease of the first."""
         said = self.drivebench("control", link=self.link).stdout
         self.assertSays(said, "book/8.2.2 on axis servo of bench servo, lockstep", "peak error (true angle)", "counts",

@@ -164,7 +164,7 @@ class Setpoints(WireTest):
         self.assertEqual((bldc.u_a_v, bldc.u_b_v, bldc.u_c_v), (1.0, -0.5, -0.25))
         self.assertNotEqual(bldc.i_c_a, 0.0)
 
-    def test_the_description_tells_kinds_and_phases(self):
+    def test_the_description_names_kinds_and_phases(self):
         """Catches: a client that must guess the kind of its axis."""
         axes = self.client(self.server(text=TWO_DRIVES)).welcome.bench.axes
         found = [(a.machine_kind, a.phases, a.connection, a.drive_kind, a.shares_shaft_with) for a in axes]

@@ -156,7 +156,7 @@ class Exchange(WireTest):
 
 
 class Parameters(WireTest):
-    def test_limits_and_read_back(self):
+    def test_writes_keep_their_limits_and_read_back(self):
         """Catches: a write that is confirmed and not done, or one past its limits that is done."""
         server = self.server()
         client = self.client(server)

@@ -45,7 +45,7 @@ class Queue(ExperimentTest):
         closed = sorted(order, key=lambda number: os.stat(f"{self.kept.name}/{number}.mcap").st_mtime_ns)
         self.assertEqual(closed, order)
 
-    def test_a_full_queue_and_cancelling_in_it(self):
+    def test_a_full_queue_refuses_and_a_cancel_frees_a_place(self):
         """Catches: a queue without a bound, or a place in it that is not given back."""
         server = self.server(text=self.configuration(queue_length=2))
         client = self.client(server)
@@ -77,7 +77,7 @@ class Queue(ExperimentTest):
 
 
 class Folder(ExperimentTest):
-    def test_the_data_of_others_are_refused_unless_shared(self):
+    def test_the_data_of_another_owner_are_refused_unless_shared(self):
         """Catches: data, labels or a right to cancel for a client that does not know the secret."""
         server = self.start()
         client = self.client(server)

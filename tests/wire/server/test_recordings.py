@@ -60,7 +60,7 @@ class Series(WireTest):
         (self.folder / "run.2.mcap").write_bytes((self.folder / "run.2.mcap").read_bytes()[:-200])
         self.assertEqual(self.run_of(DRIVEBENCH, "export", "run.mcap", "--out", "cut.csv").returncode, 3)
 
-    def test_rec_11_files_of_a_mebibyte(self):
+    def test_rec_11_a_file_ends_at_its_mebibyte(self):
         """Catches: a limit in MiB that is taken for bytes, or ignored."""
         names = self.recorded("--record-file-mib", "1", duration_s=20.0)
         self.assertGreaterEqual(len(names), 3)

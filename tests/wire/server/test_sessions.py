@@ -105,7 +105,7 @@ class Hello(WireTest):
         client.close()
         until(lambda: watcher.status().sessions == before, "the session ended")
 
-    def test_tcp_03_one_byte_at_a_time(self):
+    def test_tcp_03_one_byte_at_a_time_is_answered(self):
         """Catches: a reader that takes a read for a frame."""
         client = self.client(self.shared, hello=False)
         for byte in frame(pb.Envelope(id=5, hello=pb.Hello(protocol_min=1, protocol_max=1)).SerializeToString()):
@@ -204,7 +204,7 @@ class Hello(WireTest):
 
 
 class Lease(WireTest):
-    def test_own_01_own_02_one_owner_at_a_time(self):
+    def test_own_01_own_02_an_axis_has_one_owner_at_a_time(self):
         """Catches: two controllers on one axis; a lease that outlives its holder."""
         server = self.server()
         first, second = self.client(server), self.client(server)

@@ -25,7 +25,7 @@ from wire_test import TWO_AXES, WireTest, until
 
 
 class Subscriptions(WireTest):
-    def test_decimation_and_signals(self):
+    def test_a_subscription_has_its_decimation_and_signals(self):
         """Catches: samples of the wrong ticks, signals that the client did not ask for, a subscription that cannot be
         ended."""
         server = self.server()
