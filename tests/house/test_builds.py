@@ -1,4 +1,4 @@
-"""How strangers build drivebench: without a preset, and inside a project of their own."""
+"""The build from a clean clone: without a preset, and inside a project of their own."""
 
 import json
 import os
@@ -28,7 +28,7 @@ class Builds(unittest.TestCase):
         self.build = pathlib.Path(folder.name) / "build"
 
     def test_without_a_preset_warnings_are_no_errors_and_g_plus_plus_finds_none_at_o3(self):
-        """Catches -Werror among the options of every target, and the overlap that g++ 12 reports in dbc.cpp at -O3."""
+        """Catches: -Werror among the options of every target, and the overlap that g++ 12 reports in dbc.cpp at -O3."""
         run("cmake", "-S", ROOT, "-B", self.build, "-DDRIVEBENCH_TESTS=OFF", "-DCMAKE_CXX_COMPILER=g++")
         entries = json.loads((self.build / "compile_commands.json").read_text())
         ours = [entry for entry in entries if pathlib.Path(entry["file"]).is_relative_to(ROOT)]
@@ -42,7 +42,7 @@ class Builds(unittest.TestCase):
         run(*words, "-Werror", cwd=entry["directory"])
 
     def test_another_project_adds_the_plant_with_one_line(self):
-        """Catches a path that is right at the top level alone, warnings and a build type that reach the other project, our
+        """Catches: a path that is right at the top level alone, warnings and a build type that reach the other project, our
         tests among its own."""
         run("cmake", "-S", HERE / "consumer", "-B", self.build, f"-DDRIVEBENCH={ROOT}")
         self.assertIn("CMAKE_BUILD_TYPE:STRING=\n", (self.build / "CMakeCache.txt").read_text())
