@@ -251,43 +251,35 @@ bool Axis::finite() const noexcept {
   return size < kEnvelope;  // false for NaN as well
 }
 
-AxisSample Axis::sample(Tick tick) const noexcept {
-  const SensorReadings r = core_.sensors.readings(state_.sensors, state_.injected, tick);
+Sample Axis::sample(Tick tick) const noexcept {
+  Sample s = core_.sensors.readings(state_.sensors, state_.injected, tick);
+  s.tick = static_cast<std::uint64_t>(tick);
+  s.faults |= state_.faults;
+  s.injected = injected_bits(state_.injected);
+  s.encoder_count = state_.encoder.count;
+  s.encoder_levels = core_.encoder.levels(state_.encoder, state_.injected);
+  s.edge_age_s = core_.encoder.edge_age_s(state_.encoder, tick);
+  s.edge_period_s = state_.encoder.period_s;
+  s.index_count = state_.encoder.index_count;
+  s.index_tick = state_.encoder.index_tick;
+  s.hall_lines = hall_lines(core_.p.sensors.hall, state_.injected, core_.pole_pairs * state_.shaft.angle_rad);
   const double turns_rad = static_cast<double>(state_.turns) * kTurnRad;
+  s.angle_rad = turns_rad + state_.shaft.angle_rad;
+  s.speed_rad_s = state_.shaft.speed_rad_s;
+  s.torque_nm = truth_.torque_nm;
+  s.load_nm = load_at(tick);
+  const PhaseValues current_a = terminal_currents(core_.connection, truth_.current_a, state_.open_terminals);
+  s.true_i_a_a = current_a.a;
+  s.true_i_b_a = current_a.b;
+  s.true_i_c_a = current_a.c;
+  s.true_i_f_a = current_a.field;
+  s.psi_a_wb = truth_.rotor_flux_wb.a;
+  s.psi_b_wb = truth_.rotor_flux_wb.b;
   const LoadSide load = load_side(core_.shaft, state_.shaft, turns_rad);
-  return {.current_a = r.current_a,
-          .voltage_v = r.voltage_v,
-          .bus_voltage_v = r.bus_v,
-          .neutral_v = r.neutral_v,
-          .encoder_count = state_.encoder.count,
-          .encoder_levels = core_.encoder.levels(state_.encoder, state_.injected),
-          .hall_lines =
-              hall_lines(core_.p.sensors.hall, state_.injected, core_.pole_pairs * state_.shaft.angle_rad),
-          .edge_age_s = core_.encoder.edge_age_s(state_.encoder, tick),
-          .edge_period_s = state_.encoder.period_s,
-          .index_count = state_.encoder.index_count,
-          .index_tick = state_.encoder.index_tick,
-          .tachometer_v = r.tachometer_v,
-          .resolver_sine_v = r.resolver_sine_v,
-          .resolver_cosine_v = r.resolver_cosine_v,
-          .temperature_k = r.temperature_k,
-          .meter_voltage_v = r.meter_voltage_v,
-          .meter_current_a = r.meter_current_a,
-          .meter_power_w = r.meter_power_w,
-          .meter_reactive_var = r.meter_reactive_var,
-          .meter_power_factor = r.meter_power_factor,
-          .faults = state_.faults | (r.saturated ? kCurrentSensorSaturated : 0) |
-                    (r.other_saturated ? kSensorSaturated : 0),
-          .injected = injected_bits(state_.injected),
-          .angle_rad = turns_rad + state_.shaft.angle_rad,
-          .speed_rad_s = state_.shaft.speed_rad_s,
-          .torque_nm = truth_.torque_nm,
-          .load_nm = load_at(tick),
-          .true_current_a = terminal_currents(core_.connection, truth_.current_a, state_.open_terminals),
-          .rotor_flux_wb = truth_.rotor_flux_wb,
-          .load_angle_rad = load.angle_rad,
-          .load_speed_rad_s = load.speed_rad_s,
-          .load_position_m = load.position_m};
+  s.load_angle_rad = load.angle_rad;
+  s.load_speed_rad_s = load.speed_rad_s;
+  s.load_position_m = load.position_m;
+  return s;
 }
 
 int default_substeps(const AxisParameters& p, double period_s) noexcept {

@@ -9,6 +9,7 @@
 #include "plant/axis_state.hpp"
 #include "plant/faults.hpp"
 #include "plant/train/train.hpp"
+#include "protocols/signals/sample.hpp"
 
 namespace drivebench {
 
@@ -31,8 +32,9 @@ class Axis {
   static void advance_pair(Axis& first, Axis& second, const PhaseCommand& first_command,
                            const PhaseCommand& second_command, Tick tick) noexcept;
 
-  /// The sensors at the start of `tick`, after the advance that led there. A pure function of state and tick.
-  AxisSample sample(Tick tick) const noexcept;
+  /// Sensors and truth at the start of `tick`, after the advance that led there: a pure function of state and
+  /// tick. What the bench knows of commands, leases and late ticks is not in it.
+  Sample sample(Tick tick) const noexcept;
 
   /// Changes parameters while running; they hold from the next advance on. The kind of machine stays.
   void set_parameters(const AxisParameters& p) noexcept;

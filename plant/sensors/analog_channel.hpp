@@ -43,9 +43,4 @@ constexpr AnalogReading converted(double analog, int bits, double full_scale) no
   return {.value = static_cast<double>(floor_to_integer(steps)) * step, .saturated = false};
 }
 
-/// gain x + offset + noise, then the converter.
-constexpr AnalogReading read_analog(const AnalogParameters& p, double x, double unit_noise) noexcept {
-  return converted(p.gain * x + p.offset + p.noise_rms * unit_noise, p.bits, p.full_scale);
-}
-
 }  // namespace drivebench

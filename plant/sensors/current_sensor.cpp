@@ -13,10 +13,4 @@ AnalogParameters current_channel(const CurrentSensorParameters& p, double gain, 
           .filter_hz = p.filter_hz};
 }
 
-CurrentReading read_current(const CurrentSensorParameters& p, double gain, double offset_a, double current_a,
-                            double unit_noise) noexcept {
-  const AnalogReading r = read_analog(current_channel(p, gain, offset_a), current_a, unit_noise);
-  return {.current_a = r.value, .saturated = r.saturated};
-}
-
 }  // namespace drivebench

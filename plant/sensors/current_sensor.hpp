@@ -23,14 +23,4 @@ struct CurrentSensorParameters {
 /// The channel of a phase with this gain and offset.
 AnalogParameters current_channel(const CurrentSensorParameters& p, double gain, double offset_a) noexcept;
 
-/// One measured phase current and whether the converter was at its end.
-struct CurrentReading {
-  double current_a;
-  bool saturated;
-};
-
-/// gain i + offset + noise, rounded to the nearest step, limited to the range of the converter.
-CurrentReading read_current(const CurrentSensorParameters& p, double gain, double offset_a, double current_a,
-                            double unit_noise) noexcept;
-
 }  // namespace drivebench

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "plant/faults.hpp"
 #include "plant/math/noise.hpp"
 #include "plant/math/rounding.hpp"
 
@@ -269,9 +270,8 @@ AnalogReading SensorBank::read(const SensorMemory& m, Channel c, const Errors& e
   return converted(errors.gain * x + errors.offset + errors.noise_rms * noise, p.bits, p.full_scale);
 }
 
-SensorReadings SensorBank::readings(const SensorMemory& m, const InjectedFaults& faults,
-                                    Tick tick) const noexcept {
-  SensorReadings r;
+Sample SensorBank::readings(const SensorMemory& m, const InjectedFaults& faults, Tick tick) const noexcept {
+  Sample s;
   const auto current = [&](Channel c, double phase) {
     const AnalogParameters& p = channels_[at(c)];
     if (!p.enabled || faults.current_sensor_stuck == phase) return 0.0;
@@ -280,45 +280,39 @@ SensorReadings SensorBank::readings(const SensorMemory& m, const InjectedFaults&
                         .offset = p.offset + (is_phase ? faults.current_sensor_offset : 0.0),
                         .noise_rms = p.noise_rms + (is_phase ? faults.current_sensor_noise : 0.0)};
     const AnalogReading reading = read(m, c, errors, tick);
-    r.saturated = r.saturated || reading.saturated;
+    if (reading.saturated) s.faults |= kCurrentSensorSaturated;
     return reading.value;
   };
   const auto other = [&](Channel c, bool lost = false) {
     const AnalogParameters& p = channels_[at(c)];
     if (!p.enabled) return 0.0;
     const AnalogReading reading = read(m, c, {lost ? 0.0 : p.gain, p.offset, p.noise_rms}, tick);
-    r.other_saturated = r.other_saturated || reading.saturated;
+    if (reading.saturated) s.faults |= kSensorSaturated;
     return reading.value;
   };
-  r.current_a = {.a = current(Channel::kCurrentA, 1.0),
-                 .b = current(Channel::kCurrentB, 2.0),
-                 .c = current(Channel::kCurrentC, 3.0),
-                 .field = current(Channel::kCurrentField, 4.0)};
+  s.i_a_a = current(Channel::kCurrentA, 1.0);
+  s.i_b_a = current(Channel::kCurrentB, 2.0);
+  s.i_c_a = current(Channel::kCurrentC, 3.0);
+  s.i_f_a = current(Channel::kCurrentField, 4.0);
   const AnalogValues& now = m.history[slot_of(m.tick)];
-  if (p_.voltage.enabled) {
-    r.voltage_v = {.a = other(Channel::kVoltageA),
-                   .b = other(Channel::kVoltageB),
-                   .c = other(Channel::kVoltageC),
-                   .field = other(Channel::kVoltageField)};
-  } else {
-    r.voltage_v = {.a = now[at(Channel::kVoltageA)],
-                   .b = now[at(Channel::kVoltageB)],
-                   .c = now[at(Channel::kVoltageC)],
-                   .field = now[at(Channel::kVoltageField)]};
-  }
-  r.bus_v = p_.bus.enabled ? other(Channel::kBus) : now[at(Channel::kBus)];
-  r.neutral_v = other(Channel::kNeutral);
-  r.temperature_k = other(Channel::kTemperature);
-  r.tachometer_v = other(Channel::kTachometer, faults.tachometer_loss != 0.0);
-  r.resolver_sine_v = other(Channel::kResolverSine, faults.resolver_loss == 1.0);
-  r.resolver_cosine_v = other(Channel::kResolverCosine, faults.resolver_loss == 2.0);
+  const auto voltage = [&](Channel c) { return p_.voltage.enabled ? other(c) : now[at(c)]; };
+  s.u_a_v = voltage(Channel::kVoltageA);
+  s.u_b_v = voltage(Channel::kVoltageB);
+  s.u_c_v = voltage(Channel::kVoltageC);
+  s.u_f_v = voltage(Channel::kVoltageField);
+  s.bus_voltage_v = p_.bus.enabled ? other(Channel::kBus) : now[at(Channel::kBus)];
+  s.u_n_v = other(Channel::kNeutral);
+  s.temperature_k = other(Channel::kTemperature);
+  s.tachometer_v = other(Channel::kTachometer, faults.tachometer_loss != 0.0);
+  s.resolver_sin_v = other(Channel::kResolverSine, faults.resolver_loss == 1.0);
+  s.resolver_cos_v = other(Channel::kResolverCosine, faults.resolver_loss == 2.0);
   const MeterFigures& figures = m.meter.figures;
-  r.meter_voltage_v = figures.voltage_v;
-  r.meter_current_a = figures.current_a;
-  r.meter_power_w = figures.power_w;
-  r.meter_reactive_var = figures.reactive_var;
-  r.meter_power_factor = figures.power_factor;
-  return r;
+  s.meter_u_rms_v = figures.voltage_v;
+  s.meter_i_rms_a = figures.current_a;
+  s.meter_p_w = figures.power_w;
+  s.meter_q_var = figures.reactive_var;
+  s.meter_pf = figures.power_factor;
+  return s;
 }
 
 }  // namespace drivebench

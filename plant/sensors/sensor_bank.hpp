@@ -9,6 +9,7 @@
 #include "plant/sensors/sensors.hpp"
 #include "plant/tick.hpp"
 #include "plant/windings.hpp"
+#include "protocols/signals/sample.hpp"
 
 namespace drivebench {
 
@@ -53,25 +54,6 @@ struct SensorMemory {
   MeterMemory meter{};
 };
 
-/// What the sensors say at a tick.
-struct SensorReadings {
-  PhaseValues current_a{};
-  PhaseValues voltage_v{};
-  double bus_v = 0.0;
-  double neutral_v = 0.0;
-  double temperature_k = 0.0;
-  double tachometer_v = 0.0;
-  double resolver_sine_v = 0.0;
-  double resolver_cosine_v = 0.0;
-  double meter_voltage_v = 0.0;
-  double meter_current_a = 0.0;
-  double meter_power_w = 0.0;
-  double meter_reactive_var = 0.0;
-  double meter_power_factor = 0.0;
-  bool saturated = false;        ///< a current converter was at its end
-  bool other_saturated = false;  ///< the converter of another channel was
-};
-
 /// All analog sensors of an axis. Those of the terminals that a machine does not have read zero. A channel
 /// that is off reads zero as well, but voltages and bus then are the true ones.
 class SensorBank {
@@ -92,8 +74,9 @@ class SensorBank {
               const Measurable& to) const noexcept;
   /// The tick has ended, `tick` begins.
   void end_tick(SensorMemory& m, const Measurable& now, Tick tick) const noexcept;
-  /// At the start of `tick`: a pure function of its arguments.
-  SensorReadings readings(const SensorMemory& m, const InjectedFaults& faults, Tick tick) const noexcept;
+  /// The sample of `tick` with what these sensors say at its start, and the bits of the fault word for
+  /// converters at their end: a pure function of its arguments.
+  Sample readings(const SensorMemory& m, const InjectedFaults& faults, Tick tick) const noexcept;
 
  private:
   /// Channels of one section have the same filter.

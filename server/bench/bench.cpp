@@ -336,57 +336,16 @@ void Bench::step() noexcept {
 void Bench::take_sample(std::size_t index) noexcept {
   AxisRuntime& a = axes_[index];
   const Control& c = a.control;
-  const AxisSample s = a.axis.sample(tick_);
   const Tick answered = c.in_force.answers;
-  a.sample = {.tick = static_cast<std::uint64_t>(tick_),
-              .command_tick = answered,
-              .command_age_ticks = answered < 0 ? 0 : static_cast<std::uint64_t>(tick_ - 1 - answered),
-              .missed_commands = c.missed,
-              .refused_commands = c.refused,
-              .late_ticks = late_ticks_,
-              .state = static_cast<std::uint64_t>(c.state),
-              .faults = s.faults | c.flags,
-              .owner = c.owner,
-              .encoder_count = s.encoder_count,
-              .encoder_levels = s.encoder_levels,
-              .edge_age_s = s.edge_age_s,
-              .edge_period_s = s.edge_period_s,
-              .index_count = s.index_count,
-              .index_tick = s.index_tick,
-              .i_a_a = s.current_a.a,
-              .i_b_a = s.current_a.b,
-              .u_a_v = s.voltage_v.a,
-              .u_b_v = s.voltage_v.b,
-              .angle_rad = s.angle_rad,
-              .speed_rad_s = s.speed_rad_s,
-              .torque_nm = s.torque_nm,
-              .load_nm = s.load_nm,
-              .true_i_a_a = s.true_current_a.a,
-              .true_i_b_a = s.true_current_a.b,
-              .psi_a_wb = s.rotor_flux_wb.a,
-              .psi_b_wb = s.rotor_flux_wb.b,
-              .bus_voltage_v = s.bus_voltage_v,
-              .i_c_a = s.current_a.c,
-              .i_f_a = s.current_a.field,
-              .u_c_v = s.voltage_v.c,
-              .u_f_v = s.voltage_v.field,
-              .u_n_v = s.neutral_v,
-              .hall_lines = s.hall_lines,
-              .tachometer_v = s.tachometer_v,
-              .resolver_sin_v = s.resolver_sine_v,
-              .resolver_cos_v = s.resolver_cosine_v,
-              .temperature_k = s.temperature_k,
-              .meter_u_rms_v = s.meter_voltage_v,
-              .meter_i_rms_a = s.meter_current_a,
-              .meter_p_w = s.meter_power_w,
-              .meter_q_var = s.meter_reactive_var,
-              .meter_pf = s.meter_power_factor,
-              .true_i_c_a = s.true_current_a.c,
-              .true_i_f_a = s.true_current_a.field,
-              .load_angle_rad = s.load_angle_rad,
-              .load_speed_rad_s = s.load_speed_rad_s,
-              .load_position_m = s.load_position_m,
-              .injected = s.injected};
+  a.sample = a.axis.sample(tick_);
+  a.sample.command_tick = answered;
+  a.sample.command_age_ticks = answered < 0 ? 0 : static_cast<std::uint64_t>(tick_ - 1 - answered);
+  a.sample.missed_commands = c.missed;
+  a.sample.refused_commands = c.refused;
+  a.sample.late_ticks = late_ticks_;
+  a.sample.state = static_cast<std::uint64_t>(c.state);
+  a.sample.faults |= c.flags;
+  a.sample.owner = c.owner;
   samples_.add_block(a.sample);
   observer_->on_sample(static_cast<std::uint32_t>(index), a.sample);
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "plant/sensors/current_sensor.hpp"
+#include "tests/plant/analog_reading.hpp"
 
 namespace drivebench {
 namespace {
@@ -48,11 +49,13 @@ TEST(AnalogChannel, TheConverterHoldsAtItsEnds) {
 // Kills: a current sensor that rounds or scales in another way than the other channels.
 TEST(AnalogChannel, ACurrentSensorIsOneOfThem) {
   const CurrentSensorParameters sensor{.bits = 12, .full_scale_a = 20.0, .noise_rms_a = 0.1};
+  const AnalogParameters channel{
+      .bits = 12, .full_scale = 20.0, .gain = 1.02, .offset = 0.3, .noise_rms = 0.1};
   for (int k = -300; k <= 300; ++k) {
     const double current_a = 0.077 * k;
-    const CurrentReading a = read_current(sensor, 1.02, 0.3, current_a, 0.7);
-    const AnalogReading b = read_analog(current_channel(sensor, 1.02, 0.3), current_a, 0.7);
-    ASSERT_EQ(a.current_a, b.value);
+    const AnalogReading a = read_current(sensor, 1.02, 0.3, current_a, 0.7);
+    const AnalogReading b = read_analog(channel, current_a, 0.7);
+    ASSERT_EQ(a.value, b.value);
     ASSERT_EQ(a.saturated, b.saturated);
   }
 }

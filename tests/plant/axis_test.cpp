@@ -112,18 +112,18 @@ TEST(Axis, ADivergedStateIsHeldAndLatched) {
   induction(p).mutual_inductance_h = 0.9e-5;  // far too fast for the step
   Axis axis(p, kServoTiming, 1, 0);
   Tick tick = 0;
-  AxisSample before = axis.sample(0);
+  Sample before = axis.sample(0);
   while ((axis.state().faults & kDiverged) == 0 && tick < 100) {
     before = axis.sample(tick);
     axis.advance(volts(5.0, 3.0), tick++);
   }
   ASSERT_LT(tick, 100);
   for (int i = 0; i < 3; ++i) {
-    const AxisSample s = axis.sample(tick);
-    EXPECT_EQ(s.true_current_a.a, before.true_current_a.a);
+    const Sample s = axis.sample(tick);
+    EXPECT_EQ(s.true_i_a_a, before.true_i_a_a);
     EXPECT_EQ(s.angle_rad, before.angle_rad);
     EXPECT_EQ(s.encoder_count, before.encoder_count);
-    EXPECT_TRUE(std::isfinite(s.current_a.a));
+    EXPECT_TRUE(std::isfinite(s.i_a_a));
     EXPECT_NE(s.faults & kDiverged, 0u);
     EXPECT_TRUE(axis.last_tick().empty());
     axis.advance(volts(5.0, 3.0), tick++);
@@ -152,11 +152,11 @@ TEST(Axis, ANewParameterHoldsFromTheNextAdvanceOn) {
   Axis from_state(hot, kServoTiming, 1, 0);
   from_state.restore(changed.state());
   changed.set_parameters(hot);
-  EXPECT_EQ(changed.sample(10).rotor_flux_wb.a, same.sample(10).rotor_flux_wb.a);
+  EXPECT_EQ(changed.sample(10).psi_a_wb, same.sample(10).psi_a_wb);
   for (Axis* axis : {&changed, &same, &from_state})
     axis->advance(volts(20.0, 0.0), 10);
-  EXPECT_NE(changed.sample(11).rotor_flux_wb.a, same.sample(11).rotor_flux_wb.a);
-  EXPECT_EQ(changed.sample(11).rotor_flux_wb.a, from_state.sample(11).rotor_flux_wb.a);
+  EXPECT_NE(changed.sample(11).psi_a_wb, same.sample(11).psi_a_wb);
+  EXPECT_EQ(changed.sample(11).psi_a_wb, from_state.sample(11).psi_a_wb);
 
   AxisParameters dry = servo_axis();
   dry.mechanics.static_friction_nm = 1.0;
@@ -170,9 +170,9 @@ TEST(Axis, ANewParameterHoldsFromTheNextAdvanceOn) {
 TEST(Axis, SamplingChangesNothingAndARestoreForgetsTheSegments) {
   Axis axis(servo_axis(), kServoTiming, 1, 0);
   axis.advance(volts(20.0, 10.0), 0);
-  const AxisSample first = axis.sample(1);
-  const AxisSample second = axis.sample(1);
-  EXPECT_EQ(first.true_current_a.a, second.true_current_a.a);
+  const Sample first = axis.sample(1);
+  const Sample second = axis.sample(1);
+  EXPECT_EQ(first.true_i_a_a, second.true_i_a_a);
   EXPECT_EQ(first.torque_nm, second.torque_nm);
   EXPECT_EQ(axis.last_tick().size(), 5u);
   axis.restore(axis.state());
@@ -189,7 +189,7 @@ TEST(Axis, SubstepsOfATickAreTheSameAsShortTicks) {
     for (Tick n = 0; n < 5; ++n)
       five.advance(volts(30.0, 10.0), 5 * tick + n);
   }
-  EXPECT_EQ(one.sample(100).true_current_a.a, five.sample(500).true_current_a.a);
+  EXPECT_EQ(one.sample(100).true_i_a_a, five.sample(500).true_i_a_a);
   EXPECT_NEAR(one.sample(100).angle_rad, five.sample(500).angle_rad, 1e-14);
 }
 

@@ -31,10 +31,10 @@ TEST(Freewheel, TheSaturationFlagLastsAsLongAsTheClipping) {
   Axis axis = axis_with_link(20.0);
   axis.advance(volts(0.0, 25.0), 0);
   EXPECT_EQ(axis.sample(1).faults, kVoltageSaturated);
-  EXPECT_EQ(axis.sample(1).voltage_v.b, 20.0);
+  EXPECT_EQ(axis.sample(1).u_b_v, 20.0);
   axis.advance(volts(0.0, 15.0), 1);
   EXPECT_EQ(axis.sample(2).faults, 0u);
-  EXPECT_EQ(axis.sample(2).voltage_v.b, 15.0);
+  EXPECT_EQ(axis.sample(2).u_b_v, 15.0);
 }
 
 // The current rises by 25 us V/(sigma L_S) = 0.59 A per substep of 100 V, so that 1 A is exceeded at the
@@ -47,23 +47,23 @@ TEST(Freewheel, OverCurrentIsAFlagAndUnmaskedTripsWithinTheTick) {
       p.drive.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0, .over_current_trip = trips};
       Axis axis(p, kServoTiming, 1, 0);
       axis.advance(volts(0.0, sign * 100.0), 0);
-      const AxisSample s = axis.sample(1);
+      const Sample s = axis.sample(1);
       EXPECT_EQ(s.faults, trips ? kOverCurrent | kOverCurrentTrip : kOverCurrent);
       if (trips) {
-        EXPECT_EQ(s.true_current_a.b, 0.0);
+        EXPECT_EQ(s.true_i_b_a, 0.0);
       } else {
-        EXPECT_GT(sign * s.true_current_a.b, 2.5);
-        EXPECT_EQ(s.voltage_v.b, sign * 100.0);
+        EXPECT_GT(sign * s.true_i_b_a, 2.5);
+        EXPECT_EQ(s.u_b_v, sign * 100.0);
       }
       axis.advance(volts(0.0, trips ? sign * 100.0 : -sign * 100.0), 1);
       EXPECT_EQ(axis.sample(2).faults & kOverCurrentTrip, trips ? kOverCurrentTrip : 0u);
       if (trips) {
         EXPECT_EQ(axis.sample(2).faults, kOverCurrentTrip);  // the current is gone, the latch is not
-        EXPECT_EQ(axis.sample(2).true_current_a.b, 0.0);
+        EXPECT_EQ(axis.sample(2).true_i_b_a, 0.0);
         axis.clear_faults();
         axis.advance(volts(0.0, sign * 10.0), 2);
         EXPECT_EQ(axis.sample(3).faults, 0u);
-        EXPECT_GT(sign * axis.sample(3).true_current_a.b, 0.2);
+        EXPECT_GT(sign * axis.sample(3).true_i_b_a, 0.2);
       }
     }
   }
@@ -75,7 +75,7 @@ TEST(Freewheel, ExactlyTheLimitIsNotAnOverCurrent) {
   p.drive.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0};
   Axis axis(p, kServoTiming, 1, 0);
   axis.advance(volts(20.0, -20.0), 0);
-  const double reached_a = std::abs(axis.sample(1).true_current_a.b);
+  const double reached_a = std::abs(axis.sample(1).true_i_b_a);
   for (const double limit_a : {reached_a, std::nextafter(reached_a, 0.0)}) {
     p.drive.amplifier.over_current_a = limit_a;
     Axis again(p, kServoTiming, 1, 0);
@@ -91,14 +91,14 @@ TEST(Freewheel, FreewheelingCurrentsDecayToExactlyZeroAndStayThere) {
   double last_b = -3.5;
   for (Tick tick = 0; tick < 400; ++tick) {
     axis.advance(kOff, tick);
-    const AxisSample s = axis.sample(tick + 1);
-    EXPECT_TRUE(s.true_current_a.a >= 0.0 && s.true_current_a.a <= last_a);
-    EXPECT_TRUE(s.true_current_a.b <= 0.0 && s.true_current_a.b >= last_b);
-    last_a = s.true_current_a.a;
-    last_b = s.true_current_a.b;
+    const Sample s = axis.sample(tick + 1);
+    EXPECT_TRUE(s.true_i_a_a >= 0.0 && s.true_i_a_a <= last_a);
+    EXPECT_TRUE(s.true_i_b_a <= 0.0 && s.true_i_b_a >= last_b);
+    last_a = s.true_i_a_a;
+    last_b = s.true_i_b_a;
     if (tick == 0) {
-      EXPECT_EQ(s.voltage_v.a, -40.0);  // against the current
-      EXPECT_EQ(s.voltage_v.b, 40.0);
+      EXPECT_EQ(s.u_a_v, -40.0);  // against the current
+      EXPECT_EQ(s.u_b_v, 40.0);
     }
   }
   EXPECT_EQ(last_a, 0.0);
@@ -158,8 +158,8 @@ TEST(Freewheel, ABackEmfBelowTheLinkVoltageDrivesNoCurrent) {
   const InductionMachineState fluxed{.psi_a_wb = 0.05};
   Axis axis = axis_with_link(40.0, fluxed, 200.0);
   axis.advance(kOff, 0);
-  EXPECT_EQ(axis.sample(1).true_current_a.a, 0.0);
-  EXPECT_EQ(axis.sample(1).true_current_a.b, 0.0);
+  EXPECT_EQ(axis.sample(1).true_i_a_a, 0.0);
+  EXPECT_EQ(axis.sample(1).true_i_b_a, 0.0);
   EXPECT_EQ(axis.sample(1).torque_nm, 0.0);
   // At the end of the tick, not a substep before: (M/L_R)(n_p w psi_a - psi_b R_R/L_R), the flux turned and
   // decayed. The speed falls a little by friction.
@@ -168,12 +168,12 @@ TEST(Freewheel, ABackEmfBelowTheLinkVoltageDrivesNoCurrent) {
   const double left_wb = 0.05 * std::exp(-eta_per_s * kServoTick_s);
   const double emf_v =
       0.0117 / 0.014 * left_wb * (600.0 * std::cos(turned_rad) - eta_per_s * std::sin(turned_rad));
-  EXPECT_NEAR(axis.sample(1).voltage_v.b, emf_v, 1e-3 * emf_v);
+  EXPECT_NEAR(axis.sample(1).u_b_v, emf_v, 1e-3 * emf_v);
   for (Tick tick = 1; tick < 100; ++tick)
     axis.advance(kOff, tick);
   // Open, the flux decays with the time constant of the rotor.
-  const TwoPhase psi = axis.sample(100).rotor_flux_wb;
-  EXPECT_NEAR(std::hypot(psi.a, psi.b), 0.05 * std::exp(-100 * kServoTick_s * 3.9 / 0.014), 1e-8);
+  const Sample s = axis.sample(100);
+  EXPECT_NEAR(std::hypot(s.psi_a_wb, s.psi_b_wb), 0.05 * std::exp(-100 * kServoTick_s * 3.9 / 0.014), 1e-8);
 }
 
 // Kills: diodes that never conduct, or conduct so that they feed the machine.
@@ -181,10 +181,10 @@ TEST(Freewheel, ABackEmfAboveTheLinkVoltageChargesTheLinkAndBrakes) {
   const InductionMachineState fluxed{.psi_a_wb = 0.05};
   Axis axis = axis_with_link(15.0, fluxed, 200.0);
   axis.advance(kOff, 0);
-  const AxisSample s = axis.sample(1);
-  EXPECT_GT(std::abs(s.true_current_a.b), 0.1);
-  EXPECT_LT(s.true_current_a.b * s.voltage_v.b, 0.0);
-  EXPECT_EQ(std::abs(s.voltage_v.b), 15.0);
+  const Sample s = axis.sample(1);
+  EXPECT_GT(std::abs(s.true_i_b_a), 0.1);
+  EXPECT_LT(s.true_i_b_a * s.u_b_v, 0.0);
+  EXPECT_EQ(std::abs(s.u_b_v), 15.0);
   EXPECT_LT(s.torque_nm, 0.0);
 }
 

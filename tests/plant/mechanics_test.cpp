@@ -25,7 +25,7 @@ Axis shaft_with(double viscous_nms, double coulomb_nm, double static_nm) {
   return {p, kServoTiming, 1, 0};
 }
 
-AxisSample run(Axis& axis, Tick from, Tick to) {
+Sample run(Axis& axis, Tick from, Tick to) {
   for (Tick tick = from; tick < to; ++tick)
     axis.advance(kShorted, tick);
   return axis.sample(to);
@@ -53,7 +53,7 @@ TEST(Mechanics, TheFrictionBranchFollowsTheMotionAndAtRestTheDrivingTorque) {
 TEST(Mechanics, ViscousFrictionSlowsExponentially) {
   Axis axis = shaft_with(1e-3, 0.0, 0.0);
   spin(axis, 80.0);
-  const AxisSample s = run(axis, 0, 800);  // 0.1 s, half a time constant
+  const Sample s = run(axis, 0, 800);  // 0.1 s, half a time constant
   EXPECT_NEAR(s.speed_rad_s, 80.0 * std::exp(-0.5), 1e-9);
   EXPECT_NEAR(s.angle_rad, 80.0 * 0.2 * (1.0 - std::exp(-0.5)), 1e-9);
 }
@@ -64,7 +64,7 @@ TEST(Mechanics, AShaftBreaksAwayOnlyAboveTheStaticFriction) {
   for (const double sign : {1.0, -1.0}) {
     Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
     axis.set_load(-sign * kStatic_nm, 0, 0);
-    AxisSample s = run(axis, 0, 2000);
+    Sample s = run(axis, 0, 2000);
     EXPECT_EQ(s.speed_rad_s, 0.0);
     EXPECT_EQ(s.angle_rad, 0.0);
     EXPECT_EQ(s.faults, kShaftHeld);
@@ -84,7 +84,7 @@ TEST(Mechanics, CoulombFrictionStopsTheShaftAtTheClosedFormTimeAndAngleAndHoldsI
   for (const double sign : {1.0, -1.0}) {
     Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
     spin(axis, sign * kSpeed_rad_s);
-    AxisSample s = run(axis, 0, 615);
+    Sample s = run(axis, 0, 615);
     EXPECT_NEAR(s.speed_rad_s, sign * kCoulomb_nm / kInertia_kgm2 * (stop_s - 615 * kServoTick_s), 1e-11);
     EXPECT_EQ(s.faults & kShaftHeld, 0u);
     s = run(axis, 615, 617);
@@ -139,7 +139,7 @@ TEST(Mechanics, AnOpposingLoadReversesTheShaftOnlyIfItExceedsTheStaticFriction) 
     Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
     spin(axis, kSpeed_rad_s);
     axis.set_load(load_nm, 0, 0);
-    const AxisSample s = run(axis, 0, 400);
+    const Sample s = run(axis, 0, 400);
     const double stop_s = kInertia_kgm2 * kSpeed_rad_s / (load_nm + kCoulomb_nm);
     const double back_s = 400 * kServoTick_s - stop_s;
     const double back_rad_s2 = load_nm > kStatic_nm ? (load_nm - kCoulomb_nm) / kInertia_kgm2 : 0.0;

@@ -119,8 +119,8 @@ Axis run(const AxisParameters& p, int k, const PhaseCommand& command = kVolts) {
 }
 
 Circuit currents(const Axis& axis) {
-  const PhaseValues i = axis.sample(50).true_current_a;
-  return {.stator = {i.a, i.b, i.c}, .field = i.field};
+  const Sample s = axis.sample(50);
+  return {.stator = {s.true_i_a_a, s.true_i_b_a, s.true_i_c_a}, .field = s.true_i_f_a};
 }
 
 Phases terminal_v(const Axis& axis) {
@@ -136,7 +136,7 @@ void expect_floating_voltages(const AxisParameters& p, const Machine& m, double 
     ASSERT_EQ(i.stator[k], 0.0);
     ASSERT_GT(std::abs(i.stator[(k + 1) % 3]), 0.5);
     const Phases driven_v{kVolts.setpoint.a, kVolts.setpoint.b, kVolts.setpoint.c};
-    const AxisSample s = axis.sample(50);
+    const Sample s = axis.sample(50);
     EXPECT_NEAR(terminal_v(axis)[k], floating_v(m, i, s.angle_rad, s.speed_rad_s, driven_v, field_v, k), 1e-5)
         << k;
   }
@@ -213,7 +213,7 @@ TEST(OpenPhase, OfASaturatedMachineShowsTheSlopeOfItsFlux) {
   axis.advance(kVolts, tick++);
   const MachineWords after = axis.state().machine;
   const double slope_v = in_phases((after[0] - before[0]) / 2e-6, (after[1] - before[1]) / 2e-6)[2];
-  EXPECT_GT(std::abs(axis.sample(tick).true_current_a.a), 2.0);
+  EXPECT_GT(std::abs(axis.sample(tick).true_i_a_a), 2.0);
   EXPECT_NEAR(shown_v, 0.5 * (kVolts.setpoint.a + kVolts.setpoint.b) + 1.5 * slope_v, 1e-4);
 }
 
@@ -240,7 +240,7 @@ TEST(OpenPhase, OfABrushlessStarShowsItsEmfAboveTheNeutral) {
   machine.star = true;
   for (std::size_t k = 0; k < 3; ++k) {
     const Axis axis = run(turned_axis(machine), static_cast<int>(k));
-    const AxisSample s = axis.sample(50);
+    const Sample s = axis.sample(50);
     const Phases e = emf_v(2.0 * s.angle_rad, s.speed_rad_s);
     const Phases v = terminal_v(axis);
     const std::size_t p = (k + 1) % 3;
@@ -256,7 +256,7 @@ TEST(OpenPhase, OfIndependentPhasesSeesTheMutualInductance) {
   machine.star = false;
   for (std::size_t k = 0; k < 3; ++k) {
     const Axis axis = run(turned_axis(machine), static_cast<int>(k));
-    const AxisSample s = axis.sample(50);
+    const Sample s = axis.sample(50);
     const Phases e = emf_v(2.0 * s.angle_rad, s.speed_rad_s);
     const Phases v = terminal_v(axis);
     const Circuit i = currents(axis);
@@ -281,14 +281,14 @@ TEST(OpenPhase, AFieldThatRisesFeedsTheDiodesAtStandstill) {
     p.drive.source.field_v = field_v;
     Axis axis(p, kTiming, 1, 0);
     axis.advance({.gates = Gates::kOff}, 0);
-    const PhaseValues i = axis.sample(1).true_current_a;
+    const Sample s = axis.sample(1);
     if (std::sqrt(1.5) * 0.12 / 0.9 * field_v < 10.0) {
-      EXPECT_EQ(i.a, 0.0);
+      EXPECT_EQ(s.true_i_a_a, 0.0);
     } else {
-      EXPECT_LT(i.a, 0.0) << "into the upper rail";
-      EXPECT_NEAR(i.a + i.b + i.c, 0.0, 1e-12);
+      EXPECT_LT(s.true_i_a_a, 0.0) << "into the upper rail";
+      EXPECT_NEAR(s.true_i_a_a + s.true_i_b_a + s.true_i_c_a, 0.0, 1e-12);
     }
-    EXPECT_GT(i.field, 0.0);
+    EXPECT_GT(s.true_i_f_a, 0.0);
   }
 }
 

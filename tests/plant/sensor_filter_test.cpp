@@ -34,7 +34,7 @@ TEST(SensorFilter, HalfATickShowsTheMiddleOfTheLastTick) {
     for (Tick tick = 0; tick < 5; ++tick) {
       run_tick(bank, m, tick, nodes_s, [](double t) { return current_point(7.0 + 3e4 * t); });
       const double middle_s = (static_cast<double>(tick) + 0.5) * kTick_s;
-      EXPECT_NEAR(bank.readings(m, {}, tick + 1).current_a.a, 7.0 + 3e4 * middle_s, 1e-12);
+      EXPECT_NEAR(bank.readings(m, {}, tick + 1).i_a_a, 7.0 + 3e4 * middle_s, 1e-12);
     }
   }
 }
@@ -50,7 +50,7 @@ TEST(SensorFilter, HalfATickOfAVoltageThatJumpsIsWhatItWasThen) {
   bank.follow(m, 0.0, 0.6 * kTick_s, high, high);
   bank.follow(m, 0.6 * kTick_s, 0.4 * kTick_s, low, low);
   bank.end_tick(m, low, 1);
-  EXPECT_EQ(bank.readings(m, {}, 1).voltage_v.a, 100.0);
+  EXPECT_EQ(bank.readings(m, {}, 1).u_a_v, 100.0);
 }
 
 // y' = (x - y)/T behind x = 7 + s t: closed form to rounding, in even steps, in steps that events cut, and
@@ -77,7 +77,7 @@ TEST(SensorFilter, TheFilterIsExactForStraightLinesInAnySteps) {
         run_tick(bank, m, tick, nodes_s, ramp);
         const double sampled_s = (static_cast<double>(tick) + 1.0 - delay_ticks) * kTick_s;
         if (sampled_s < 0.0) continue;
-        ASSERT_NEAR(bank.readings(m, {}, tick + 1).current_a.a, exact(sampled_s), 1e-13);
+        ASSERT_NEAR(bank.readings(m, {}, tick + 1).i_a_a, exact(sampled_s), 1e-13);
       }
     }
   }
@@ -107,20 +107,20 @@ TEST(SensorFilter, EverySectionHasItsOwnFilter) {
     SensorMemory m;
     for (Tick tick = 0; tick < 12; ++tick)
       run_tick(bank, m, tick, nodes_s, [&](double) { return one; });
-    const SensorReadings r = bank.readings(m, {}, 12);
+    const Sample r = bank.readings(m, {}, 12);
     const auto settled = [](double corner_hz) {
       return -std::expm1(-2.0 * std::numbers::pi * corner_hz * 12.0 * kTick_s);
     };
-    for (const double current_a : {r.current_a.a, r.current_a.b, r.current_a.c, r.current_a.field})
+    for (const double current_a : {r.i_a_a, r.i_b_a, r.i_c_a, r.i_f_a})
       EXPECT_NEAR(current_a, settled(100.0), 1e-13);
-    for (const double voltage_v : {r.voltage_v.a, r.voltage_v.b, r.voltage_v.c, r.voltage_v.field})
+    for (const double voltage_v : {r.u_a_v, r.u_b_v, r.u_c_v, r.u_f_v})
       EXPECT_NEAR(voltage_v, settled(200.0), 1e-13);
-    EXPECT_NEAR(r.bus_v, settled(300.0), 1e-13);
-    EXPECT_NEAR(r.neutral_v, settled(400.0), 1e-13);
+    EXPECT_NEAR(r.bus_voltage_v, settled(300.0), 1e-13);
+    EXPECT_NEAR(r.u_n_v, settled(400.0), 1e-13);
     EXPECT_NEAR(r.temperature_k, settled(500.0), 1e-13);
     EXPECT_NEAR(r.tachometer_v, settled(600.0), 1e-13);
-    EXPECT_NEAR(r.resolver_sine_v, std::sqrt(0.5) * settled(700.0), 1e-13);
-    EXPECT_NEAR(r.resolver_cosine_v, std::sqrt(0.5) * settled(700.0), 1e-13);
+    EXPECT_NEAR(r.resolver_sin_v, std::sqrt(0.5) * settled(700.0), 1e-13);
+    EXPECT_NEAR(r.resolver_cos_v, std::sqrt(0.5) * settled(700.0), 1e-13);
   }
 }
 
@@ -150,9 +150,9 @@ TEST(SensorFilter, AFilteredResolverLagsAsTheFilterSays) {
   }
   const double w_t = kSpeed_rad_s / (2.0 * std::numbers::pi * 20.0);
   const double angle_rad = kSpeed_rad_s * kTicks * kTick_s - std::atan(w_t);
-  const SensorReadings r = bank.readings(m, {}, kTicks);
-  EXPECT_NEAR(r.resolver_sine_v, std::sin(angle_rad) / std::hypot(1.0, w_t), 5e-8);
-  EXPECT_NEAR(r.resolver_cosine_v, std::cos(angle_rad) / std::hypot(1.0, w_t), 5e-8);
+  const Sample r = bank.readings(m, {}, kTicks);
+  EXPECT_NEAR(r.resolver_sin_v, std::sin(angle_rad) / std::hypot(1.0, w_t), 5e-8);
+  EXPECT_NEAR(r.resolver_cos_v, std::cos(angle_rad) / std::hypot(1.0, w_t), 5e-8);
   EXPECT_NEAR(r.tachometer_v, 0.1 * kSpeed_rad_s, 1e-12);
 }
 

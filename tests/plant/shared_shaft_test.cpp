@@ -56,10 +56,10 @@ TEST(SharedShaft, TwoMachinesAreOneSystem) {
       for (int n = 0; n < kTiming.substeps; ++n)
         x = pair_step(x, 20.0, u2, ratio, kTiming.period_s / kTiming.substeps);
     }
-    const AxisSample a = first.sample(3000);
-    const AxisSample b = second.sample(3000);
-    EXPECT_NEAR(a.true_current_a.a, x.i1, 1e-9);
-    EXPECT_NEAR(b.true_current_a.a, x.i2, 1e-9);
+    const Sample a = first.sample(3000);
+    const Sample b = second.sample(3000);
+    EXPECT_NEAR(a.true_i_a_a, x.i1, 1e-9);
+    EXPECT_NEAR(b.true_i_a_a, x.i2, 1e-9);
     EXPECT_NEAR(a.speed_rad_s, x.w, 1e-9);
     EXPECT_NEAR(b.speed_rad_s, x.w / ratio, 1e-9);
     EXPECT_NEAR(a.angle_rad, x.angle, 1e-8);
@@ -90,29 +90,28 @@ TEST(SharedShaft, MotorAndLoadMachineConserveEnergy) {
   Axis second(dc_axis(), kFine, 1, 1);
   const ShaftConstants shaft = constants_of(p.mechanics);
   Audit audit;
-  AxisSample a = first.sample(0);
-  AxisSample b = second.sample(0);
+  Sample a = first.sample(0);
+  Sample b = second.sample(0);
   TwoMassState x = first.state().shaft;
   ShaftBranch touching{.contact = 1.0};
   for (Tick tick = 0; tick < 40'000; ++tick) {
     const double u1 = tick < 20'000 ? 20.0 : -10.0;
     const double u2 = tick < 10'000 ? 0.0 : 5.0;
     Axis::advance_pair(first, second, volts(u1), volts(u2), tick);
-    const AxisSample a1 = first.sample(tick + 1);
-    const AxisSample b1 = second.sample(tick + 1);
+    const Sample a1 = first.sample(tick + 1);
+    const Sample b1 = second.sample(tick + 1);
     const TwoMassState x1 = first.state().shaft;
     const auto mean = [](double from, double to) { return 0.5 * (from + to) * kFine.period_s; };
-    audit.supplied_j += u1 * mean(a.true_current_a.a, a1.true_current_a.a);
-    audit.supplied_j += u2 * mean(b.true_current_a.a, b1.true_current_a.a);
-    audit.lost_j += 2.0 * mean(std::pow(a.true_current_a.a, 2), std::pow(a1.true_current_a.a, 2));
-    audit.lost_j += 2.0 * mean(std::pow(b.true_current_a.a, 2), std::pow(b1.true_current_a.a, 2));
+    audit.supplied_j += u1 * mean(a.true_i_a_a, a1.true_i_a_a);
+    audit.supplied_j += u2 * mean(b.true_i_a_a, b1.true_i_a_a);
+    audit.lost_j += 2.0 * mean(std::pow(a.true_i_a_a, 2), std::pow(a1.true_i_a_a, 2));
+    audit.lost_j += 2.0 * mean(std::pow(b.true_i_a_a, 2), std::pow(b1.true_i_a_a, 2));
     audit.lost_j += mean(losses_w(shaft, x, touching), losses_w(shaft, x1, touching));
     a = a1;
     b = b1;
     x = x1;
   }
-  audit.stored_j =
-      energy_j(shaft, x) + 1e-3 * (std::pow(a.true_current_a.a, 2) + std::pow(b.true_current_a.a, 2));
+  audit.stored_j = energy_j(shaft, x) + 1e-3 * (std::pow(a.true_i_a_a, 2) + std::pow(b.true_i_a_a, 2));
   EXPECT_GT(audit.supplied_j, 1.0);
   EXPECT_NEAR(audit.supplied_j, audit.lost_j + audit.stored_j, 1e-4 * audit.supplied_j);
 }
@@ -166,15 +165,15 @@ TEST(SharedShaft, AnIdlePartnerChangesNothing) {
     alone.advance(command, tick);
     Axis::advance_pair(first, idle_second, command, volts(0.0), tick);
     Axis::advance_pair(idle_first, second, volts(0.0), command, tick);
-    const AxisSample expected = alone.sample(tick + 1);
-    for (const AxisSample& s : {first.sample(tick + 1), second.sample(tick + 1)}) {
-      ASSERT_NEAR(s.true_current_a.a, expected.true_current_a.a, 1e-9) << tick;
-      ASSERT_NEAR(s.true_current_a.b, expected.true_current_a.b, 1e-9) << tick;
+    const Sample expected = alone.sample(tick + 1);
+    for (const Sample& s : {first.sample(tick + 1), second.sample(tick + 1)}) {
+      ASSERT_NEAR(s.true_i_a_a, expected.true_i_a_a, 1e-9) << tick;
+      ASSERT_NEAR(s.true_i_b_a, expected.true_i_b_a, 1e-9) << tick;
       ASSERT_NEAR(s.speed_rad_s, expected.speed_rad_s, 1e-9) << tick;
       ASSERT_NEAR(s.angle_rad, expected.angle_rad, 1e-9) << tick;
     }
     if (expected.speed_rad_s == 0.0) ++stood;
-    if (command.gates == Gates::kOff && expected.true_current_a.a != 0.0) ++freewheeled;
+    if (command.gates == Gates::kOff && expected.true_i_a_a != 0.0) ++freewheeled;
   }
   EXPECT_GT(stood, 10);
   EXPECT_GT(freewheeled, 10);
@@ -217,7 +216,7 @@ TEST(SharedShaft, EitherRotorCanBeBlocked) {
     EXPECT_EQ(second.sample(tick).speed_rad_s, 0.0);
     EXPECT_NEAR(second.sample(tick).angle_rad, held_rad, 1e-12);
     EXPECT_NEAR(first.sample(tick).speed_rad_s, 0.0, 1e-9);
-    EXPECT_NEAR(first.sample(tick).true_current_a.a, 10.0, 1e-9);
+    EXPECT_NEAR(first.sample(tick).true_i_a_a, 10.0, 1e-9);
     if (elastic) {
       EXPECT_NEAR(first.state().shaft.twist_rad, 2.0 * 0.7 / 20.0, 1e-9);
     } else {

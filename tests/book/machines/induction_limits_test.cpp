@@ -77,9 +77,9 @@ FluxErrors flux_errors(double rate_hz) {
   FluxErrors worst{};
   const Tick end = std::lround(1.0 / period_s);
   for (Tick tick = 0; tick < end; ++tick) {
-    const AxisSample s = axis.sample(tick);
-    const Complex i(s.true_current_a.a, s.true_current_a.b);
-    const Complex psi(s.rotor_flux_wb.a, s.rotor_flux_wb.b);
+    const Sample s = axis.sample(tick);
+    const Complex i(s.true_i_a_a, s.true_i_b_a);
+    const Complex psi(s.psi_a_wb, s.psi_b_wb);
     if (tick > end - std::lround(0.1 / period_s)) {
       const auto error = [&psi](Complex estimate) { return std::abs(estimate - psi) / std::abs(psi); };
       worst.euler = std::max(worst.euler, error(euler));

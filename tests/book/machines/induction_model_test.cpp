@@ -49,19 +49,19 @@ TEST(BookInductionModel, LineStartReachesTheSpeedFluxAndCurrentsOfTheReference) 
   double ninety_percent_s = 0.0;
   for (Tick tick = 0; tick < 40'000; ++tick) {
     axis.advance(line_voltage(tick, 80.0), tick);
-    const AxisSample s = axis.sample(tick + 1);
+    const Sample s = axis.sample(tick + 1);
     peak_speed_rad_s = std::max(peak_speed_rad_s, s.speed_rad_s);
-    peak_current_a = std::max({peak_current_a, std::abs(s.true_current_a.a), std::abs(s.true_current_a.b)});
+    peak_current_a = std::max({peak_current_a, std::abs(s.true_i_a_a), std::abs(s.true_i_b_a)});
     if (ninety_percent_s == 0.0 && s.speed_rad_s > 0.9 * 125.40) {
       ninety_percent_s = static_cast<double>(tick + 1) * kStep_s;
     }
   }
-  const AxisSample s = axis.sample(40'000);
+  const Sample s = axis.sample(40'000);
   EXPECT_NEAR(s.speed_rad_s, 125.40, 0.1);
   EXPECT_NEAR(peak_speed_rad_s, 137.4, 0.05);
   EXPECT_NEAR(peak_current_a, 20.7, 0.05);
-  EXPECT_NEAR(std::hypot(s.rotor_flux_wb.a, s.rotor_flux_wb.b), 0.1687, 5e-5);
-  EXPECT_NEAR(std::hypot(s.true_current_a.a, s.true_current_a.b), 14.42, 0.01);
+  EXPECT_NEAR(std::hypot(s.psi_a_wb, s.psi_b_wb), 0.1687, 5e-5);
+  EXPECT_NEAR(std::hypot(s.true_i_a_a, s.true_i_b_a), 14.42, 0.01);
   EXPECT_NEAR(ninety_percent_s, 12.8e-3, 0.05e-3);
   EXPECT_NEAR(s.torque_nm, kServoFriction_nms * s.speed_rad_s, 1e-4);  // the last of the slow settling
   EXPECT_EQ(s.faults, 0u);
@@ -94,12 +94,12 @@ TEST(BookInductionModel, MachinesWithScaledRotorsAreIndistinguishableAtTheTermin
     const PhaseCommand command = line_voltage(5 * tick, 60.0);
     original.advance(command, tick);
     twin.advance(command, tick);
-    const AxisSample a = original.sample(tick + 1);
-    const AxisSample b = twin.sample(tick + 1);
-    ASSERT_NEAR(a.true_current_a.a, b.true_current_a.a, 1e-9);
-    ASSERT_NEAR(a.true_current_a.b, b.true_current_a.b, 1e-9);
+    const Sample a = original.sample(tick + 1);
+    const Sample b = twin.sample(tick + 1);
+    ASSERT_NEAR(a.true_i_a_a, b.true_i_a_a, 1e-9);
+    ASSERT_NEAR(a.true_i_b_a, b.true_i_b_a, 1e-9);
     ASSERT_NEAR(a.speed_rad_s, b.speed_rad_s, 1e-9 * 125.0);
-    ASSERT_NEAR(a.rotor_flux_wb.a * kScale, b.rotor_flux_wb.a, 1e-11);
+    ASSERT_NEAR(a.psi_a_wb * kScale, b.psi_a_wb, 1e-11);
   }
   EXPECT_GT(original.sample(4'000).speed_rad_s, 100.0);
 }

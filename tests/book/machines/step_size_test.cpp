@@ -153,10 +153,11 @@ double error_of(const Study& study, const AxisParameters& p, double period_s, in
   const Tick ticks = std::lround(study.end_s / period_s);
   for (Tick tick = 0; tick < ticks; ++tick)
     axis.advance({}, tick);
-  const AxisSample s = axis.sample(ticks);
-  const PhaseValues& i = s.true_current_a;
-  WindingValues windings{.stator = {i.a, i.b}, .field = i.field};
-  if (axis.connection() == Connection::kStar) windings.stator = three_to_two({i.a, i.b, i.c});
+  const Sample s = axis.sample(ticks);
+  WindingValues windings{.stator = {s.true_i_a_a, s.true_i_b_a}, .field = s.true_i_f_a};
+  if (axis.connection() == Connection::kStar) {
+    windings.stator = three_to_two({s.true_i_a_a, s.true_i_b_a, s.true_i_c_a});
+  }
   const Outcome plant = outcome(windings, s.speed_rad_s);
   const double current = std::max({std::hypot(exact[0], exact[1]), std::abs(exact[3]), 0.1});
   double worst = std::abs(plant[4] - exact[4]) / std::max(std::abs(exact[4]), 1.0);

@@ -283,12 +283,12 @@ double flux_error(control::FluxStep kind, double rate_hz) {
   double worst = 0.0;
   const Tick end = std::lround(rate_hz);
   for (Tick tick = 0; tick < end; ++tick) {
-    const AxisSample s = axis.sample(tick);
-    const Complex flux(s.rotor_flux_wb.a, s.rotor_flux_wb.b);
+    const Sample s = axis.sample(tick);
+    const Complex flux(s.psi_a_wb, s.psi_b_wb);
     const Complex estimate(observer.flux_wb().a, observer.flux_wb().b);
     if (tick > end - std::lround(0.1 * rate_hz))
       worst = std::max(worst, std::abs(estimate - flux) / std::abs(flux));
-    observer.step({.a = s.true_current_a.a, .b = s.true_current_a.b}, s.speed_rad_s);
+    observer.step({.a = s.true_i_a_a, .b = s.true_i_b_a}, s.speed_rad_s);
     axis.advance({}, tick);
   }
   return worst;
