@@ -4,7 +4,7 @@
 
 namespace drivebench {
 
-/// The FileDescriptorSet of bench.proto, serialised: what a generic client or reader needs to decode every
+/// The serialised FileDescriptorSet of bench.proto, with which a generic client or reader decodes every
 /// message.
 std::string bench_descriptor_set();
 

@@ -12,7 +12,7 @@
 
 namespace drivebench {
 
-/// One thing wrong with a configuration, with the place it was found at.
+/// One problem of a configuration, with its place.
 struct ConfigProblem {
   std::string file;
   int line = 0;
@@ -20,8 +20,8 @@ struct ConfigProblem {
   std::string rule;
 };
 
-/// All that is wrong with a configuration, at once; what() is the list as a user reads it, "file:line: key
-/// rule" lines.
+/// All problems of a configuration at once; what() lists them for the user, one "file:line: key rule" line
+/// for each.
 class ConfigError : public std::runtime_error {
  public:
   explicit ConfigError(std::vector<ConfigProblem> problems);
@@ -31,7 +31,7 @@ class ConfigError : public std::runtime_error {
   std::vector<ConfigProblem> problems_;
 };
 
-/// Collects problems; beyond a hundred it only counts, so that a file of garbage costs no time.
+/// Collects problems. Beyond a hundred it only counts them, so that a file of garbage costs no time.
 class ProblemList {
  public:
   void add(const std::string& file, int line, std::string key, std::string rule);
@@ -46,13 +46,14 @@ class ProblemList {
 };
 
 inline constexpr std::size_t kMaxConfigBytes = 262'144;
-/// Of the text in a recording, which holds what stood in CSV files.
+/// The limit for the text in a recording, which includes the points of CSV files.
 inline constexpr std::size_t kMaxRecordedConfigBytes = 8'388'608;
 
-/// A value of a TOML document with its place: keeps the TOML library out of all files but one.
+/// A value of a TOML document with its place. Only document.cpp includes the TOML library.
 struct ConfigNode {
   enum class Kind { kTable, kArray, kScalar };
-  /// What a scalar that configurations have no use for is called, for example "a date".
+  /// A scalar of a type that no configuration uses: its description for a message, for example "a date or
+  /// time".
   struct Other {
     std::string_view what;
   };
@@ -68,12 +69,13 @@ struct ConfigNode {
   std::vector<ConfigNode> children;
 };
 
-/// The document, or nothing, with the problem added. Bounds size, line length and nesting, so that no text
-/// can cost more than some milliseconds or the stack.
+/// Parses a document; on failure adds the problem and returns nothing. Limits on size, line length and
+/// nesting bound the time to some milliseconds, and the stack.
 std::optional<ConfigNode> parse_document(std::string_view text, const std::string& file,
                                          ProblemList& problems, std::size_t limit = kMaxConfigBytes);
 
-/// A whole regular file of at most `limit` bytes, or why it cannot be had, as the end of "the file ...".
+/// The text of a regular file of at most `limit` bytes, or the reason why it cannot be read: the predicate of
+/// "the file ...".
 struct FileText {
   std::string text;
   std::string why_not;           ///< empty: text is the file
@@ -81,14 +83,14 @@ struct FileText {
 };
 FileText read_file(const std::filesystem::path& file, std::size_t limit);
 
-/// The text as UTF-8, at most so many bytes of it and no character by half; '?' for a byte that belongs to
-/// none. A string of protobuf that is anything else makes its message one that nobody can read.
+/// The text as valid UTF-8: at most `most` bytes, cut between characters, '?' for each invalid byte. Decoders
+/// refuse a protobuf message with a string that is not valid UTF-8.
 std::string utf8(std::string_view text, std::size_t most = std::string_view::npos);
 
-/// The text fit for one line of a terminal: UTF-8 without control characters, cut after 160 bytes.
+/// The text for one line of a terminal: valid UTF-8 without control characters, cut after 160 bytes.
 std::string printable(std::string_view text);
 
-/// As hexadecimal numbers are written: 0x1a.
+/// In hexadecimal with prefix: 0x1a.
 std::string hexadecimal(std::int64_t value);
 
 /// The shortest decimal text that reads back as the same double.

@@ -14,7 +14,7 @@ namespace {
 /// The members of a sample; row n of the catalogue is member n.
 using SampleWords = std::array<std::uint64_t, kSampleWords>;
 
-/// One signal, with its row known at compile time: the table becomes straight-line code.
+/// Encodes one signal. The row is a template argument, so that the table becomes straight-line code.
 template <std::size_t Row>
 std::byte* put_signal(std::byte* out, std::uint64_t word) noexcept {
   constexpr SignalType kType = kSignals[Row].type;
@@ -53,7 +53,7 @@ void store(Sample& sample, const Signal& signal, std::uint64_t value) noexcept {
   }
 }
 
-/// A sample in which every signal has the value that proto3 leaves out.
+/// A sample of zeros, the values that proto3 leaves out.
 constexpr Sample zero_sample() noexcept {
   Sample sample;
   sample.command_tick = 0;
@@ -83,8 +83,8 @@ constexpr std::uint32_t kSamplesAxis = 1;
 constexpr std::uint32_t kSamplesDropped = 2;
 constexpr std::uint32_t kSamplesSamples = 3;
 
-/// Grows a buffer from its end; lengths of nested messages take a fixed three bytes, as they are known only
-/// afterwards.
+/// Appends protobuf fields to a buffer. The length of a nested message is known only at its end, so it gets a
+/// fixed three bytes.
 class MessageWriter {
  public:
   explicit MessageWriter(std::vector<std::byte>& out) : out_(out) {}
@@ -100,7 +100,7 @@ class MessageWriter {
     used(wire::put_varint(wire::put_varint(room(20), wire::tag(field, wire::kVarint)), value));
   }
 
-  /// Opens a nested message; close() with what this returned.
+  /// Opens a nested message and returns the argument for close().
   std::size_t open(std::uint32_t field) {
     used(wire::put_varint(room(5), wire::tag(field, wire::kBytes)));
     room(kLengthBytes);
@@ -121,12 +121,12 @@ class MessageWriter {
   }
 
  private:
-  static constexpr std::size_t kLengthBytes = 3;  // enough for any frame this server sends
+  static constexpr std::size_t kLengthBytes = 3;  // lengths below 2 MiB; frames end at 1 MiB
 
   std::vector<std::byte>& out_;
 };
 
-/// Leaves room for the length of a frame, and fills it in.
+/// Reserves the header of a frame and fills it in at destruction.
 class FrameWriter {
  public:
   explicit FrameWriter(std::vector<std::byte>& out) : out_(out), begin_(out.size()) {

@@ -13,8 +13,8 @@ namespace drivebench {
 /// Upper bound of an encoded sample: two tag bytes and at most ten of value for each signal.
 inline constexpr std::size_t kMaxSampleBytes = kSignals.size() * 12;
 
-/// Writes the sample as message drivebench.v1.Sample, signals outside the mask left out, zeros left out as
-/// proto3 does. Returns the number of bytes, at most kMaxSampleBytes.
+/// Encodes the signals of the mask as message drivebench.v1.Sample; like proto3 it leaves out zeros. Returns
+/// the number of bytes, at most kMaxSampleBytes.
 std::size_t encode_sample(const Sample& sample, SignalMask mask, std::byte* out) noexcept;
 
 /// A sample with the axis it belongs to.
@@ -31,7 +31,7 @@ void append_exchange_reply(std::vector<std::byte>& out, std::uint64_t id,
 void append_samples(std::vector<std::byte>& out, std::uint32_t axis, std::uint64_t dropped,
                     std::span<const Sample> samples, SignalMask mask);
 
-/// The sample of such a message; nothing if the bytes are not one.
+/// Decodes a message Sample; nothing if the bytes are not one.
 std::optional<Sample> decode_sample(std::span<const std::byte> bytes) noexcept;
 
 }  // namespace drivebench

@@ -38,7 +38,7 @@ inline std::byte* put_fixed64(std::byte* out, std::uint64_t value) noexcept {
   return out + sizeof(value);
 }
 
-/// Reads a varint and moves `in` behind it; null if it is cut off or too long.
+/// Reads a varint and returns the position behind it; null if it is cut off or too long.
 inline const std::byte* get_varint(const std::byte* in, const std::byte* end, std::uint64_t& value) noexcept {
   value = 0;
   for (unsigned shift = 0; shift < 70 && in != end; shift += 7) {

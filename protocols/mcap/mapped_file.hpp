@@ -6,7 +6,7 @@
 
 namespace drivebench {
 
-/// A whole file, mapped for reading. It must not be cut short while it is mapped.
+/// A whole file, mapped for reading. No program may truncate the file while it is mapped.
 class MappedFile {
  public:
   /// Throws std::system_error that names the path.

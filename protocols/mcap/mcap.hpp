@@ -14,11 +14,10 @@
 
 /// Recordings: MCAP files (https://mcap.dev/spec, major version 0), written as indexed, uncompressed,
 /// checksummed chunks and read sequentially. Neither class knows files: the writer hands bytes to a sink, the
-/// reader looks at bytes somebody mapped or read.
+/// reader reads a span of bytes.
 namespace drivebench {
 
-/// What stands in front of a message's payload. `publish_time_ns` repeats `log_time_ns` when there is no
-/// other.
+/// The header of a message. `publish_time_ns` repeats `log_time_ns` where no other time is known.
 struct McapMessageHeader {
   std::uint16_t channel = 0;
   std::uint32_t sequence = 0;
@@ -29,23 +28,24 @@ struct McapMessageHeader {
 struct McapWriterOptions {
   std::string profile;  ///< Empty: no well-known profile.
   std::string library;  ///< Program and version that wrote the file.
-  /// A chunk is closed when its records reach this size. It is what a torn last write costs, and each chunk
-  /// leaves about 83 bytes (plus 10 per channel in it) in memory for the index at the end.
+  /// A chunk is closed when its records reach this size, the most that a torn last write loses. Each chunk
+  /// adds about 83 bytes (plus 10 per channel in it) to the index that the writer keeps in memory until the
+  /// end.
   std::size_t chunk_size = std::size_t{1} << 20;
 };
 
 /// Turns schemas, channels, messages, attachments and metadata into an MCAP file, in the order of the calls.
 ///
 /// One thread at a time. Messages cost a copy and an index entry; nothing is allocated once the buffers have
-/// reached their size. Whatever flush() handed out is readable without finish(): the file is then one that
-/// was cut short, and McapReader says so. The destructor writes nothing.
+/// reached their size. A file without finish() is readable up to the last flush(); McapReader reports it as
+/// truncated. The destructor writes nothing.
 ///
 /// Wrong use (an unknown id, a call after finish()) aborts; a string or map of 4 GiB throws
-/// std::length_error. After an exception, the sink's included, the writer is spent.
+/// std::length_error. After an exception, also one of the sink, the writer cannot be used again.
 class McapWriter {
  public:
-  /// Gets the bytes of the file in order: one call per chunk with its index records, one or a few per
-  /// attachment or metadata record. The bytes hold during the call.
+  /// Receives the bytes of the file in order: one call per chunk with its index records, one or a few per
+  /// attachment or metadata record. The bytes are valid during the call.
   using Sink = std::function<void(std::span<const std::byte>)>;
 
   /// Writes the magic and the header at once.
@@ -60,8 +60,8 @@ class McapWriter {
 
   void add_message(const McapMessageHeader& header, std::span<const std::byte> payload);
 
-  /// Room for a payload of at most `max_size` bytes, to encode in place. It holds until the next call, which
-  /// must be end_message(); any other call drops the message.
+  /// A buffer of `max_size` bytes in which the caller encodes a payload in place. It is valid until the next
+  /// call, which must be end_message(); any other call drops the message.
   std::span<std::byte> begin_message(const McapMessageHeader& header, std::size_t max_size);
   void end_message(std::size_t size);
 
@@ -70,7 +70,7 @@ class McapWriter {
                       std::span<const std::byte> data);
   void add_metadata(std::string_view name, const McapMap& entries);
 
-  /// Closes the current chunk, if anything is in it: all so far has now reached the sink.
+  /// Closes the current chunk unless it is empty: the sink then has everything so far.
   void flush();
 
   /// Closes the file: the data section's checksum, the summary with statistics and indexes, the footer.
@@ -108,7 +108,7 @@ class McapWriter {
   std::uint64_t position_ = 0;
   std::uint32_t data_crc_ = 0;
 
-  mcap::Buffer chunk_;  // a chunk record, its content under construction; its index records follow at the end
+  mcap::Buffer chunk_;  // the chunk record under construction; its index records follow at the end
   TimeRange chunk_times_;
   McapMessageHeader open_;
   std::size_t open_room_ = 0;
@@ -123,7 +123,7 @@ class McapWriter {
   std::uint64_t message_count_ = 0;
   TimeRange times_;
 
-  // Records of the summary, kept as they will be written.
+  // Records of the summary, encoded.
   mcap::Buffer schema_records_;
   mcap::Buffer channel_records_;
   mcap::Buffer chunk_indexes_;
@@ -131,7 +131,7 @@ class McapWriter {
   mcap::Buffer metadata_indexes_;
 };
 
-// What the reader delivers: views into the file's bytes, good as long as those are.
+// Results of the reader: views into the bytes of the file, valid as long as these.
 
 struct McapSchema {
   std::uint16_t id = 0;
@@ -174,19 +174,19 @@ struct McapMetadata {
 struct McapProblem {
   enum class Kind {
     kNotMcap,      ///< The file does not begin like an MCAP file of major version 0.
-    kTruncated,    ///< The file ends early; all before `offset` was read. So ends a recording after a crash.
+    kTruncated,    ///< The file ends early, as after a crash; all before `offset` was read.
     kDamaged,      ///< A checksum, length or reference at `offset` is wrong.
-    kUnsupported,  ///< Correct as far as one can see, but compressed.
+    kUnsupported,  ///< A chunk is compressed.
   };
   Kind kind = Kind::kDamaged;
   std::uint64_t offset = 0;  ///< Of the record concerned, from the start of the file.
   std::string what;          ///< A sentence with the offset in it.
 };
 
-/// Reads an MCAP file from front to back, trusting none of its bytes. It stops at the first problem and never
-/// throws on bad data. Messages of a chunk are delivered after the chunk's checksum was found right; a chunk
-/// that is cut short is therefore not delivered at all. What follows the messages (checksum of the data
-/// section, statistics, indexes, footer) is checked when the last message has been taken:
+/// Reads an MCAP file from front to back and checks every byte that it uses. It stops at the first problem
+/// and never throws on bad data. It delivers the messages of a chunk after checking the chunk's checksum, so
+/// that no message of a truncated chunk is delivered. After the last message it checks the rest of the file
+/// (checksum of the data section, statistics, indexes, footer):
 ///
 ///     McapReader reader(bytes);
 ///     for (McapMessage message; reader.next(message);) ...
@@ -205,7 +205,7 @@ class McapReader {
   std::string_view profile() const noexcept { return profile_; }
   std::string_view library() const noexcept { return library_; }
 
-  // All that was met so far; complete when next() has returned false.
+  // The records read so far; complete when next() has returned false.
   const std::map<std::uint16_t, McapSchema>& schemas() const noexcept { return schemas_; }
   const std::map<std::uint16_t, McapChannel>& channels() const noexcept { return channels_; }
   const std::vector<McapAttachment>& attachments() const noexcept { return attachments_; }
@@ -251,7 +251,7 @@ class McapReader {
   std::uint64_t chunk_at_ = 0;   // the next record inside the current chunk
   std::uint64_t chunk_end_ = 0;  // equal to chunk_at_ outside chunks
   std::uint64_t data_end_ = 0;   // where the data section ends, once known
-  std::uint32_t data_crc_ = 0;   // of everything before at_
+  std::uint32_t data_crc_ = 0;   // of all bytes before at_
   bool is_done_ = false;
   std::optional<McapProblem> problem_;
 

@@ -8,15 +8,15 @@
 
 #include "protocols/mcap/mcap.hpp"
 
-/// Part of mcap_reader.cpp: fields out of bytes that may be anything.
+/// Part of mcap_reader.cpp: takes fields out of untrusted bytes.
 namespace drivebench::mcap {
 
 inline std::string_view as_text(std::span<const std::byte> bytes) noexcept {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// Takes fields off the front of a record's content. Past the end it yields zeros and empty views and says so
-/// in ok(); a reader therefore takes all fields of a record and asks once.
+/// Takes fields off the front of a record's content. Past the end it returns zeros and empty views, and ok()
+/// becomes false: a reader takes all fields of a record and checks ok() once.
 class Fields {
  public:
   explicit Fields(std::span<const std::byte> bytes) noexcept : left_(bytes) {}

@@ -10,7 +10,7 @@
 namespace drivebench::mcap {
 
 std::uint32_t crc32_of(std::uint32_t crc, std::span<const std::byte> bytes) noexcept {
-  if (bytes.empty()) return crc;  // zlib takes a null pointer as "give me the initial value"
+  if (bytes.empty()) return crc;  // for a null pointer zlib returns the initial value
   return static_cast<std::uint32_t>(
       ::crc32_z(crc, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }

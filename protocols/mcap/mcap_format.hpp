@@ -10,11 +10,11 @@
 #include <string_view>
 #include <utility>
 
-/// What the MCAP writer and reader share: record codes, little-endian integers, CRC32, a growing byte buffer.
-/// The format: https://mcap.dev/spec, major version 0. Users include "protocols/mcap.hpp".
+/// Shared by the MCAP writer and reader: record codes, little-endian integers, CRC32, a growing byte buffer.
+/// The format: https://mcap.dev/spec, major version 0. Other files include "protocols/mcap/mcap.hpp".
 namespace drivebench {
 
-/// Key and value strings as recordings carry them; sorted, so the same entries always give the same bytes.
+/// Keys and values of metadata; sorted, so that the same entries always give the same bytes.
 using McapMap = std::map<std::string, std::string, std::less<>>;
 
 namespace mcap {
@@ -46,7 +46,7 @@ inline constexpr std::size_t kRecordHead = 1 + 8;
 inline constexpr std::size_t kMessageHead = 2 + 4 + 8 + 8;
 inline constexpr std::size_t kFooterSize = 8 + 8 + 4;
 
-// Unrolled at compile time, so that compilers merge the bytes into one move: this runs six times per message.
+// Unrolled at compile time, so that compilers merge the bytes into one move; runs six times per message.
 template <std::unsigned_integral T>
 void store(std::byte* at, T value) noexcept {
   const auto store_all = [&]<std::size_t... kByte>(std::index_sequence<kByte...>) {
@@ -63,18 +63,18 @@ T load(const std::byte* at) noexcept {
   return load_all(std::make_index_sequence<sizeof(T)>{});
 }
 
-/// CRC32 (the one of zlib and Ethernet) of what `crc` covers followed by `bytes`; 0 is the CRC of nothing.
+/// Continues a CRC32 (that of zlib and Ethernet) over `bytes`; 0 is the CRC of no bytes.
 std::uint32_t crc32_of(std::uint32_t crc, std::span<const std::byte> bytes) noexcept;
 
-/// CRC32 of two runs of bytes from their own CRC32s; `second_size` is the length of the second. Does not
-/// touch the bytes, so a chunk's checksum also serves the data section's.
+/// The CRC32 of two runs of bytes, computed from the CRC32 of each and the size of the second. The bytes of a
+/// chunk are thus read once for its own checksum and that of the data section.
 std::uint32_t crc32_joined(std::uint32_t first, std::uint32_t second, std::uint64_t second_size) noexcept;
 
-/// Bytes under construction. Unlike std::vector it does not clear the room it hands out, which would write
-/// every message twice.
+/// A growing run of bytes. Unlike std::vector it does not clear reserved bytes, which would write every
+/// message twice.
 class Buffer {
  public:
-  /// Room for `size` bytes behind the end; the pointer holds until the next call.
+  /// Reserves `size` bytes behind the end; the pointer is valid until the next call.
   std::byte* reserve(std::size_t size) {
     if (capacity_ - size_ < size) grow(size);
     return bytes_.get() + size_;
@@ -93,7 +93,7 @@ class Buffer {
     advance(sizeof(T));
   }
   void put_bytes(std::span<const std::byte> bytes);
-  /// A uint32 length and the bytes.
+  /// Writes a uint32 length and the bytes.
   void put_string(std::string_view text);
   void put_map(const McapMap& map);
 

@@ -14,7 +14,7 @@ using mcap::Opcode;
 
 namespace {
 
-/// Of one message; more than any of ours, and less than what overflows an int, in which protobuf counts.
+/// Limit of one message: above the largest of drivebench, below the 2 GiB of protobuf's int sizes.
 constexpr std::uint64_t kMaxMessageBytes = std::uint64_t{64} << 20;
 
 std::string name_of(Opcode opcode) {
@@ -66,7 +66,7 @@ bool McapReader::next(McapMessage& message) {
         is_good = in_chunk || read_data_record(*record);
     }
     if (!is_good) return false;
-    // A chunk and the data end see to the checksum themselves.
+    // open_chunk() and read_end() update the checksum for these two.
     if (!in_chunk && record->opcode != Opcode::kChunk && record->opcode != Opcode::kDataEnd) {
       data_crc_ = mcap::crc32_of(data_crc_, bytes(record->begin, record->end));
     }
@@ -134,7 +134,7 @@ bool McapReader::read_schema(const Record& record) {
   schema.encoding = fields.string();
   schema.data = fields.string();
   if (!fields.ok()) return damaged(record, "it is too short");
-  if (schema.id == 0) return true;  // the format says to ignore it
+  if (schema.id == 0) return true;  // the format reserves id 0: readers ignore such a schema
   const auto [known, is_new] = schemas_.try_emplace(schema.id, schema);
   if (is_new || known->second == schema) return true;
   return damaged(record, "it differs from an earlier one with the same id");
@@ -193,7 +193,7 @@ bool McapReader::read_data_record(const Record& record) {
     case Opcode::kDataEnd:
       return read_end(record);
     case Opcode::kMessageIndex:
-      return true;  // reading from front to back needs no index
+      return true;  // sequential reading needs no index
     default:
       break;
   }

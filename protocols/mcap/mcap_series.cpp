@@ -7,7 +7,7 @@
 namespace drivebench {
 namespace {
 
-/// Which file of its series this says it is; 1 if it says nothing.
+/// The number of this file in its series, from its metadata; 1 without such metadata.
 std::size_t number_of(const McapReader& reader) {
   for (const McapMetadata& metadata : reader.metadata()) {
     const auto number = metadata.entries.find(kSegmentNumber);

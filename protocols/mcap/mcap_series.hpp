@@ -12,8 +12,8 @@
 #include "protocols/mcap/mapped_file.hpp"
 #include "protocols/mcap/mcap.hpp"
 
-/// Recordings in several files: FILE.mcap, then FILE.2.mcap, FILE.3.mcap ... Each is an MCAP file of its own
-/// with the same channels; from the second on a metadata record says which one it is.
+/// Recordings in several files: FILE.mcap, then FILE.2.mcap, FILE.3.mcap ... Each is a complete MCAP file
+/// with the same channels; from the second on a metadata record holds the number of the file.
 namespace drivebench {
 
 inline constexpr std::string_view kSegmentMetadata = "drivebench.segment";
@@ -22,19 +22,19 @@ inline constexpr std::string_view kSegmentNumber = "number";  ///< a key of it
 /// The name of the n-th file of a series, from 1 on.
 std::string segment_path(const std::string& first, std::size_t number);
 
-/// Reads the files of a series as if they were one. A file that ends early does not hide those behind it, but
-/// is told.
+/// Reads the files of a series as one recording. After a file that ends early it goes on with the next file,
+/// and problem() reports the first such place.
 class McapSeries {
  public:
   explicit McapSeries(std::vector<std::span<const std::byte>> segments);
 
   bool next(McapMessage& message);
 
-  /// Of the file that the last message came from, or in which reading stopped.
+  /// The reader of the file that the last message came from, or in which reading stopped.
   const McapReader& reader() const noexcept { return *reader_; }
-  /// Which file of its series the first one is: 1, if nothing is missing in front.
+  /// The number of the first file in its series: 1 unless files before it are missing.
   std::size_t first_number() const noexcept { return first_number_; }
-  /// The first one that was met.
+  /// The first problem found.
   const std::optional<McapProblem>& problem() const noexcept { return problem_; }
 
  private:
@@ -47,10 +47,10 @@ class McapSeries {
   std::size_t first_number_ = 1;
   std::unique_ptr<McapReader> reader_;
   std::optional<McapProblem> problem_;
-  bool is_checked_ = true;  ///< that the present file is the one that its place in the series says
+  bool is_checked_ = true;  ///< the number of the current file agrees with its place in the series
 };
 
-/// A file and all that follow it, mapped.
+/// A file and all later files of its series, mapped.
 class MappedSeries {
  public:
   /// Throws std::system_error that names the path.

@@ -20,8 +20,7 @@ constexpr std::size_t kChunkHead = mcap::kRecordHead + 8 + 8 + 8 + 4 + 4 + 8;
 constexpr std::size_t kMessagePrefix = mcap::kRecordHead + mcap::kMessageHead;
 constexpr std::size_t kIndexEntrySize = 8 + 8;
 constexpr std::size_t kMaxChannels = std::size_t{1} << 16;
-// Keeps an index record's uint32 length from overflowing: entries are shorter than the messages they stand
-// for.
+// Keeps the uint32 length of an index record from overflowing: an entry is shorter than its message.
 constexpr std::size_t kMaxChunkSize = std::size_t{1} << 30;
 
 void require(bool is_met, const char* rule) {
@@ -227,8 +226,7 @@ void McapWriter::close_chunk() {
   chunk_indexes_.put(size);
   chunk_indexes_.end_record(index);
 
-  // The records were summed up once; the data section's checksum takes that sum over instead of doing it
-  // again.
+  // Joins the checksum of the records to that of the data section, without reading them a second time.
   data_crc_ = mcap::crc32_of(data_crc_, chunk_.bytes().first(kChunkHead));
   data_crc_ = mcap::crc32_joined(data_crc_, crc, size);
   data_crc_ = mcap::crc32_of(data_crc_, chunk_.bytes().subspan(length));
@@ -239,8 +237,8 @@ void McapWriter::close_chunk() {
   start_chunk();
 }
 
-// Appends the chunk's message index records behind it, and their places to the chunk index record in the
-// making.
+// Appends the message index records to the chunk, and their offsets to the chunk index record under
+// construction.
 std::uint64_t McapWriter::write_message_indexes(std::uint64_t chunk_length) {
   const std::size_t map_begin = chunk_indexes_.size();
   chunk_indexes_.put(std::uint32_t{0});

@@ -16,7 +16,7 @@ enum class SignalType {
   kReal,      ///< double on the wire
 };
 
-/// Who may know a signal: a controller on a real bench sees status and sensors, never the truth.
+/// Where a signal comes from. A controller on a real bench gets status and sensors, never the truth.
 enum class SignalKind { kStatus, kSensor, kTruth };
 
 /// One row of the catalogue.

@@ -5,7 +5,7 @@
 
 namespace drivebench {
 
-/// Everything that an axis says at one tick, as it is published, recorded and sent: a member for each row of
+/// The signals of an axis at one tick, as they are published, recorded and sent: a member for each row of
 /// signals.inc, by its name.
 struct Sample {
 #define DRIVEBENCH_UNSIGNED(kind, name, unit, maximum, meaning) std::uint64_t name = 0;
