@@ -9,8 +9,8 @@
 namespace drivebench::can {
 namespace {
 
-// Bits of a frame, ISO 11898-1:2015. A stuff bit follows five equal bits, itself the first of the next five:
-// of n bits at most (n-1)/4 are followed by one.
+// Bits of a frame, ISO 11898-1:2015. A stuff bit follows five equal bits and is the first of the next five: n
+// bits take at most (n-1)/4 stuff bits.
 constexpr std::size_t most_stuff_bits(std::size_t bits) {
   return (bits - 1) / 4;
 }
@@ -29,7 +29,7 @@ constexpr std::size_t fd_head_bits(bool extended) {
   return extended ? 1 + 11 + 1 + 1 + 18 + 1 + 1 + 1 + 1 : 1 + 11 + 1 + 1 + 1 + 1 + 1;
 }
 
-/// Stuff count and CRC with their fixed stuff bits: one before the first bit and after every fourth.
+/// Stuff count and CRC with their fixed stuff bits: one before the first bit and one after every fourth.
 constexpr std::size_t fd_check_bits(std::size_t size) {
   const std::size_t bits = 4 + (size <= 16 ? 17 : 21);
   return bits + 1 + bits / 4;
@@ -56,7 +56,7 @@ double rate_of(const MessageRow& row, const Profile& profile, const BusUse& use)
     case Message::kState:
     case Message::kCounters:
       return axes * states_per_s;
-    case Message::kDetails: {  // the page of the speed sensors goes with each sample of those who have any
+    case Message::kDetails: {  // each sample of an axis with speed sensors brings their page
       const auto sensing_axes = static_cast<double>(use.sensing_axes);
       return profile.fd ? axes * states_per_s
                         : axes * double{kPages - 1} * states_per_s + sensing_axes * samples_per_s;

@@ -8,7 +8,7 @@
 
 namespace drivebench::can {
 
-/// The log format of candump -l, which can-utils, python-can, SavvyCAN and Wireshark read.
+/// The log format of candump -l; can-utils, python-can, SavvyCAN and Wireshark read it.
 
 /// Appends a line with its end: "(1436509052.249713) vcan0 044#2A366C2BBA"; FD frames have "##" and a digit
 /// for their flags, remote frames "#R" and their size. `interface` holds neither spaces nor line ends.
@@ -16,12 +16,12 @@ void append_candump(std::string& out, double time_s, std::string_view interface,
 
 struct CandumpLine {
   double time_s = 0.0;
-  std::string_view interface;  ///< part of the line
+  std::string_view interface;  ///< a view into the line
   Frame frame;
 };
 
-/// Reads one line with or without its end, and with or without the direction (" R", " T") behind it. Nothing
-/// if it is not exactly such a line.
+/// Reads one line, with or without line end and direction (" R", " T"). Nothing if the line has any other
+/// form.
 std::optional<CandumpLine> parse_candump(std::string_view line) noexcept;
 
 }  // namespace drivebench::can

@@ -10,19 +10,20 @@
 namespace drivebench::can {
 namespace {
 
-// ---- what the table must keep ----
+// ---- rules of the table ----
 
-/// Whole numbers go as whole numbers; a code has no sign.
+/// Whether the encoding fits the signal: integers need an integer encoding, and a code has no sign.
 constexpr bool can_carry(const Field& field, const Signal& signal) {
   const bool wraps = field.encoding == Encoding::kCounter || field.encoding == Encoding::kSigned;
   if (signal.type == SignalType::kReal) return !wraps && field.encoding != Encoding::kCode;
   return wraps || (field.encoding == Encoding::kCode && signal.type == SignalType::kUnsigned);
 }
 
-/// Fields are in the order of pages, and within one sorted, disjoint, whole bytes, in the frame.
+/// Fields are in the order of their pages; within a page they are sorted, disjoint, whole bytes and inside
+/// the frame.
 constexpr bool is_sound(const MessageRow& row) {
   if (row.fields.size() > kMaxFields || !is_fd_size(row.size)) return false;
-  if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() tells them apart by it
+  if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() relies on the size
   if (is_paged(row) && (row.fields.front().name != "page" || row.fields.front().start_bit != 0)) return false;
   unsigned common_end = 0;
   unsigned end = 0;
@@ -50,16 +51,16 @@ static_assert(std::ranges::all_of(kMessages, is_sound));
 static_assert(kFirstEdgeByte + 2 * kEdgesPerFrame == 64);
 static_assert(32767 * kDutyUnit == 1.0, "the full duty is exactly 1");
 
-// ---- what follows from the table ----
+// ---- derived from the table ----
 
 struct Layout {
   std::array<const Signal*, kMaxFields> signals{};
   bool paged = false;
-  /// Bit n: byte n belongs to no field of the page; the last is of pages that do not exist.
+  /// By page. Bit n: byte n belongs to no field of the page. The last element is for pages that do not exist.
   std::array<std::uint64_t, kPages + 1> reserved{};
 };
 
-/// What match() needs of a row, close together: it looks at all of them.
+/// The part of a row that match() needs, small because match() looks at every row.
 struct Key {
   Message message;
   bool in_classic;
@@ -95,8 +96,7 @@ constexpr auto kLayouts = [] {
   return layouts;
 }();
 
-/// Those of narrow axes first: where a program knows of no wide axis and has given their identifiers to
-/// others, these count.
+/// Narrow axes come first: in a profile without wide axes their identifiers may belong to other messages.
 constexpr auto kKeys = [] {
   std::array<Key, kMessages.size()> keys{};
   std::size_t n = 0;
@@ -135,7 +135,7 @@ constexpr std::uint64_t all_ones(unsigned bits) noexcept {
   return ~std::uint64_t{0} >> (64 - bits);
 }
 
-/// std::llround without the call, which costs more than all the rest of a field. |value| < 2^63.
+/// std::llround without the call, which would cost more than the rest of a field. |value| < 2^63.
 std::int64_t rounded(double value) noexcept {
   const auto whole = static_cast<std::int64_t>(value);
   const double rest = value - static_cast<double>(whole);  // exact
@@ -150,7 +150,7 @@ std::uint64_t wrapped(double value) noexcept {
   return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::fmod(value, 0x1p32)));
 }
 
-/// Rounded within two bounds that a double holds exactly; NaN becomes the lower.
+/// Rounds and limits to two bounds that a double holds exactly; NaN becomes the lower bound.
 std::int64_t clamped(double value, std::int64_t low, std::int64_t high) noexcept {
   if (!(value > static_cast<double>(low))) return low;
   if (value >= static_cast<double>(high)) return high;
@@ -206,14 +206,14 @@ double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
 }
 
-/// What a count of a voltage in a classic command is worth in the modes that give something else; otherwise
-/// 0.
+/// The value of one count of a setpoint in a classic command whose mode gives duties or currents; 0 in the
+/// other modes.
 double setpoint_unit(const Profile& profile, double mode) noexcept {
   if (mode == double{kDutyMode}) return kDutyUnit;
   return mode == double{kCurrentMode} ? profile.current_unit_a : 0.0;
 }
 
-/// What a count of a field is worth; `setpoint`: setpoint_unit() of the frame, or 0.
+/// The value of one count of a field; `setpoint` is setpoint_unit() of the frame, or 0.
 double unit_of(const Field& field, const Profile& profile, double setpoint) noexcept {
   if (field.scale == Unit::kNone) return 1.0;
   return setpoint != 0.0 ? setpoint : profile.unit_of(field.scale);
@@ -221,7 +221,7 @@ double unit_of(const Field& field, const Profile& profile, double setpoint) noex
 
 // ---- bytes ----
 
-// One loop of constant length for each size that fields have, which compilers make one move of.
+// Loops of constant length, which compilers turn into one move.
 template <unsigned kBytes>
 void put_bytes(std::uint8_t* at, std::uint64_t raw) noexcept {
   for (unsigned i = 0; i < kBytes; ++i)
@@ -272,7 +272,7 @@ Frame empty_frame(const MessageRow& row, const Profile& profile, std::uint32_t n
   return frame;
 }
 
-/// raw_of() of the signal's value, without the way over a double for integers.
+/// raw_of() of a signal's value; integers do not pass through a double.
 std::uint64_t raw_of(const Field& field, const Signal& signal, const Sample& sample,
                      const Profile& profile) noexcept {
   if (signal.type == SignalType::kReal)

@@ -12,58 +12,57 @@
 #include "protocols/can/table.hpp"
 #include "protocols/signals/sample.hpp"
 
-/// Values to frames and back, by loops over the table. Every `row` is one of kMessages.
-///
-/// What does not fit a field: a counter and a signed number wrap; a code, a scaled number and an unsigned one
-/// stop at the end of their range; a number beyond the largest single becomes an infinity. NaN is "no value"
-/// where the encoding has one (table.hpp), and 0 in a counter, signed number or code, as is an infinity in
-/// the first two. Fractions of a count are rounded to the nearest, halves away from zero.
+/// Encodes values into frames and decodes them, by loops over the table. Every `row` is an element of
+/// kMessages. Values outside the range of a field: counters and signed numbers wrap; codes and scaled numbers
+/// saturate; a number beyond the largest single becomes an infinity. NaN becomes "no value" where the
+/// encoding has one (field.hpp), and 0 in counters, signed numbers and codes. Infinity becomes 0 in counters
+/// and signed numbers. Fractions of a count are rounded to the nearest, halves away from zero.
 namespace drivebench::can {
 
-/// One number for each field of a message, in its order; NaN: no value.
+/// One number for each field of a message, in the order of the fields; NaN: no value.
 using Values = std::array<double, kMaxFields>;
 
-/// Where a field stands in its message and in Values. Used in a constant expression, a name that does not
-/// exist does not compile.
+/// The index of a field in its message and in Values. In a constant expression an unknown name does not
+/// compile.
 constexpr std::size_t index_of(const MessageRow& row, std::string_view field) {
   for (std::size_t i = 0; i < row.fields.size(); ++i) {
     if (row.fields[i].name == field) return i;
   }
   std::abort();
 }
-/// index_of(Message::kCommand, false, "lease")
+/// Example: index_of(Message::kCommand, false, "lease").
 constexpr std::size_t index_of(Message message, bool fd, std::string_view field, bool wide = false) {
   const MessageRow* const row = find_message(message, fd, wide);
   if (row == nullptr) std::abort();
   return index_of(*row, field);
 }
 
-/// In this mode a command gives duties, and one count of a classic frame is worth kDutyUnit.
+/// The mode in which a command gives duties; one count of a classic frame is then kDutyUnit.
 inline constexpr unsigned kDutyMode = 3;
 inline constexpr double kDutyUnit = 1.0 / 32767.0;
-/// In this mode it gives currents, and one count is worth what it is in a current.
+/// The mode in which a command gives currents; one count is then current_unit_a of the profile.
 inline constexpr unsigned kCurrentMode = 4;
 
-/// The frame with these values, one for each field; bytes of no field are 0. In the FD profile every frame is
-/// an FD frame with bit rate switch. Of a message with pages it holds the page that its first value says.
+/// Encodes one value for each field; bytes outside the fields are 0. In the FD profile every frame is an FD
+/// frame with bit rate switch. The first value of a paged message selects the page.
 Frame encode(const MessageRow& row, const Profile& profile, std::uint32_t node,
              std::span<const double> values) noexcept;
 
-/// The values of a frame for which match() found this row; 0 in the fields of other pages.
+/// Decodes a frame for which match() found this row; fields of other pages are 0.
 Values decode(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept;
 
-/// The values of the fields that carry signals of a sample; the others are 0. Exact for integers below 2^53.
+/// The values of the fields that carry signals; other fields are 0. Exact for integers below 2^53.
 Values values_of(const MessageRow& row, const Sample& sample) noexcept;
 
-/// encode() of values_of(); exact for all integers.
+/// Encodes the signals of a sample; exact for all integers.
 Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t node, const Sample& sample,
                     Page page = Page{}) noexcept;
 
-/// Puts the values of a frame into the signals that they carry. Of a number that wraps, the low bits are
-/// known: the nearest to what the sample held before is taken.
+/// Puts the values of a frame into the signals that they carry. A number that wraps becomes the number with
+/// these low bits that is nearest to the one in the sample.
 void update_sample(const MessageRow& row, std::span<const double> values, Sample& sample) noexcept;
 
-/// The number nearest to `near` with these low bits; of two as near, the lower. `bits` is 1..64.
+/// The number nearest to `near` with these low bits; of two at equal distance the lower. `bits` is 1..64.
 constexpr std::int64_t unwrap(std::uint64_t low_bits, unsigned bits, std::int64_t near) noexcept {
   const unsigned unused = 64 - bits;
   const std::uint64_t start = static_cast<std::uint64_t>(near);
@@ -71,22 +70,22 @@ constexpr std::int64_t unwrap(std::uint64_t low_bits, unsigned bits, std::int64_
   return static_cast<std::int64_t>(start + static_cast<std::uint64_t>(distance));
 }
 
-/// What is wrong with a frame; the first that applies.
+/// The problem of a frame; the first in this order that applies.
 enum class FrameProblem : std::uint8_t {
   kNone,
   kError,        ///< an error frame: no message at all
-  kForeign,      ///< no identifier of this profile
-  kWrongFormat,  ///< one of our identifiers, but with 29 bits instead of 11, or the reverse
-  kRemote,       ///< asks for data
+  kForeign,      ///< the identifier is none of this profile
+  kWrongFormat,  ///< an identifier of this profile, but with 29 bits instead of 11, or the reverse
+  kRemote,       ///< a remote frame
   kWrongKind,    ///< an FD frame in the classic profile, or a classic frame with a message of FD only
   kWrongSize,
-  kReserved,  ///< a byte of no field, or of no field of its page, is not 0
+  kReserved,  ///< a byte outside the fields of its page is not 0
 };
 inline constexpr std::size_t kFrameProblems = static_cast<std::size_t>(FrameProblem::kReserved) + 1;
 
 std::string_view name_of(FrameProblem problem) noexcept;
 
-/// What a frame is, and whose.
+/// The message that a frame carries, and its node.
 struct Match {
   const MessageRow* row = nullptr;  ///< null if foreign or an error
   std::uint32_t node = 0;           ///< 0 if the message has none
@@ -95,9 +94,9 @@ struct Match {
   bool ok() const noexcept { return problem == FrameProblem::kNone; }
 };
 
-/// Finds the message that a frame carries and checks its form. In the FD profile the messages that exist in
-/// both variants may also come in classic frames. On a bus with wide axes the size tells whose sensors and
-/// commands they are.
+/// Finds the message that a frame carries and checks its form. In the FD profile, messages of both variants
+/// may also come in classic frames. On a bus with wide axes the size tells the sensors and commands of wide
+/// axes from those of narrow ones.
 Match match(const Profile& profile, const Frame& frame) noexcept;
 
 /// An edge of the encoder in the message `edges`.

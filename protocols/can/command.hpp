@@ -7,18 +7,18 @@
 
 #include "protocols/can/codec.hpp"
 
-/// What commands say, whichever frames carry them.
+/// The content of commands, independent of the frames that carry them.
 namespace drivebench::can {
 
-/// What a controller asks of an axis: voltages, duties or currents, as the mode says.
+/// The set-points of a command: voltages, duties or currents, depending on the mode.
 struct Setpoints {
-  std::uint64_t tick = 0;  ///< of the sample that it answers
+  std::uint64_t tick = 0;  ///< of the sample that the command answers
   unsigned mode = 0;
   unsigned lease = 0;
   double a = 0.0;
   double b = 0.0;
-  double c = 0.0;      ///< of a wide axis
-  double field = 0.0;  ///< of a wide axis
+  double c = 0.0;      ///< wide axes only
+  double field = 0.0;  ///< wide axes only
 };
 
 namespace command_detail {
@@ -29,7 +29,7 @@ inline constexpr auto kNames =
 
 using Numbers = std::array<double, kNames.size()>;
 
-/// Where each of them stands in a message; kMaxFields: nowhere.
+/// The index of each of these fields in a message; kMaxFields: the message lacks it.
 using Places = std::array<std::size_t, kNames.size()>;
 inline constexpr auto kPlaces = [] {
   std::array<Places, kMessages.size()> all{};
@@ -51,7 +51,7 @@ inline const Places& places_in(const MessageRow& row) noexcept {
 
 }  // namespace command_detail
 
-/// What the values of a command or of a phase_command say; of the tick its low bits.
+/// The set-points in the values of a command or a phase_command; `tick` holds only low bits.
 inline Setpoints setpoints_in(const MessageRow& row, const Values& values) noexcept {
   command_detail::Numbers n{};
   const command_detail::Places& places = command_detail::places_in(row);
@@ -66,7 +66,7 @@ inline Setpoints setpoints_in(const MessageRow& row, const Values& values) noexc
           .field = n[6]};
 }
 
-/// A command as it goes over the bus: in classic frames that of a wide axis is two, in this order.
+/// The frames of one command, in the order of sending: a wide axis takes two classic frames.
 struct CommandFrames {
   std::array<Frame, 2> frame{};
   std::size_t count = 0;

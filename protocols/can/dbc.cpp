@@ -10,10 +10,10 @@
 namespace drivebench::can {
 namespace {
 
-constexpr std::size_t kMaxSymbol = 32;  // of a name that every reader takes
+constexpr std::size_t kMaxSymbol = 32;  // the longest name that every reader accepts
 constexpr std::uint32_t kExtendedFlag = 0x80000000;
 
-/// Value of the attribute VFrameFormat, and what stands for it in the list of its names.
+/// Names of the attribute VFrameFormat, indexed by its value.
 constexpr auto kFrameFormats =
     std::to_array<std::string_view>({"StandardCAN", "ExtendedCAN", "reserved", "J1939PG", "reserved",
                                      "reserved", "reserved", "reserved", "reserved", "reserved", "reserved",
@@ -23,7 +23,7 @@ struct Entry {
   const MessageRow* row;
   std::string id;
   std::string name;
-  std::string axis;  ///< empty if the message belongs to none
+  std::string axis;  ///< empty if the message belongs to no axis
 };
 
 constexpr std::size_t longest_name() {
@@ -40,7 +40,7 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// What may stand before "_message": unlike any other, too.
+/// The prefix of an axis' message names: a DBC identifier that no other axis has.
 std::string symbol_of(const BusAxis& axis, std::set<std::string>& taken) {
   constexpr std::size_t kRoom = kMaxSymbol - 1 - longest_name();
   std::string symbol = axis.name.substr(0, kRoom);
@@ -54,7 +54,7 @@ std::string symbol_of(const BusAxis& axis, std::set<std::string>& taken) {
   return symbol;
 }
 
-/// Text between quotation marks: printable ASCII without them.
+/// The text in quotation marks, reduced to printable ASCII without quotation marks.
 std::string quoted(std::string_view text) {
   std::string out(text);
   for (char& c : out) {
@@ -93,14 +93,14 @@ bool is_signed(const Field& field) {
          field.encoding == Encoding::kFloat;
 }
 
-/// A page is what DBC calls multiplexed.
+/// The DBC multiplexer mark of a field of a paged message.
 std::string page_text(const Field& field, const MessageRow& row) {
   if (field.page != kEveryPage) return " m" + std::to_string(field.page);
   return is_paged(row) && &field == &row.fields.front() ? " M" : "";
 }
 
 std::string signal_line(const Field& field, const Profile& profile, const MessageRow& row) {
-  const Range range = range_of(field, profile).value_or(Range{0.0, 0.0});  // 0 to 0: not known
+  const Range range = range_of(field, profile).value_or(Range{0.0, 0.0});  // 0 to 0: unknown
   return " SG_ " + std::string(field.name) + page_text(field, row) + " : " + std::to_string(field.start_bit) +
          "|" + std::to_string(field.bits) + "@1" + (is_signed(field) ? "-" : "+") + " (" +
          number_text(profile.unit_of(field.scale)) + ",0) [" + number_text(range.minimum, 10) + "|" +

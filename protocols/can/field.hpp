@@ -16,7 +16,7 @@ enum class Encoding : std::uint8_t {
   kFloat,    ///< IEEE 754 single; NaN: no value
 };
 
-/// Which unit a scaled field counts in; the configuration says how much each is.
+/// The unit of a scaled field; the configuration gives its size.
 enum class Unit : std::uint8_t {
   kNone,
   kCurrent,
@@ -24,11 +24,11 @@ enum class Unit : std::uint8_t {
   kBusVoltage,
   kSpeed,
   kEdgeTime,
-  kResolver,     ///< 1 mV, not to be configured
-  kTemperature,  ///< 0.1 K, not to be configured
+  kResolver,     ///< always 1 mV
+  kTemperature,  ///< always 0.1 K
 };
 
-/// The page of a field that is in every frame of its message.
+/// The page number of a field that stands in every frame of its message.
 inline constexpr std::uint8_t kEveryPage = 0xFF;
 
 struct Field {
@@ -38,13 +38,13 @@ struct Field {
   std::uint8_t bits;
   Encoding encoding;
   Unit scale;               ///< of the scaled encodings
-  std::string_view signal;  ///< row of the catalogue that it carries; empty: none
+  std::string_view signal;  ///< the signal of the catalogue that the field carries; empty: none
   std::string_view meaning;
-  /// Only in frames whose field `page` has this value; kEveryPage: in all.
+  /// The field stands only in frames with this value of the field `page`; kEveryPage: in all frames.
   std::uint8_t page = kEveryPage;
 };
 
-/// Whether a field is in the frames with this page.
+/// Whether a field stands in the frames of this page.
 constexpr bool is_on_page(const Field& field, std::uint64_t page) noexcept {
   return field.page == kEveryPage || field.page == page;
 }

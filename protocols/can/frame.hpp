@@ -6,16 +6,16 @@
 
 namespace drivebench::can {
 
-/// A frame as every back end takes and gives it.
+/// A frame as every back end sends and receives it.
 struct Frame {
   std::uint32_t id = 0;  ///< 11 bits, or 29 if extended
   bool extended = false;
   bool remote = false;  ///< a request without data; classic only
-  bool error = false;   ///< what a controller says about the bus, never a message
+  bool error = false;   ///< an error frame: the CAN controller reports the state of the bus
   bool fd = false;      ///< up to 64 bytes; otherwise up to 8
   bool bit_rate_switch = false;
   bool error_state = false;  ///< FD: the sender is error passive
-  std::uint8_t size = 0;     ///< bytes of data in use (of a remote frame: asked for)
+  std::uint8_t size = 0;     ///< bytes of data (of a remote frame: requested)
   std::array<std::uint8_t, 64> data{};
 
   bool operator==(const Frame&) const = default;

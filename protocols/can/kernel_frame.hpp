@@ -8,10 +8,10 @@
 
 #include "protocols/can/frame.hpp"
 
-/// Frames and filters as Linux has them.
+/// Converts frames and filters to and from the structs of Linux.
 namespace drivebench::can {
 
-/// A frame as it comes from the kernel. Error frames keep the class bits of linux/can/error.h as their id.
+/// Converts a frame from the kernel. The id of an error frame holds the class bits of linux/can/error.h.
 inline Frame frame_of(const canfd_frame& raw, bool fd) {
   Frame frame;
   frame.error = (raw.can_id & CAN_ERR_FLAG) != 0;
@@ -26,7 +26,7 @@ inline Frame frame_of(const canfd_frame& raw, bool fd) {
   return frame;
 }
 
-/// A frame as the kernel takes it.
+/// Converts a frame for the kernel.
 inline canfd_frame raw_of(const Frame& frame) {
   canfd_frame raw{};
   raw.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0) | (frame.remote ? CAN_RTR_FLAG : 0);
@@ -39,15 +39,15 @@ inline canfd_frame raw_of(const Frame& frame) {
   return raw;
 }
 
-/// The filters for exactly these identifiers, of data and remote frames with 11 or 29 bits; neighbours share
-/// one, because the kernel takes 512 at most.
+/// Filters that pass exactly these identifiers, in data and remote frames with 11 or 29 bits. Neighbouring
+/// identifiers share a filter, because the kernel takes at most 512.
 inline std::vector<can_filter> filters_for(std::vector<std::uint32_t> ids) {
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   std::vector<can_filter> filters;
   for (const std::uint32_t id : ids) {
     can_filter next{.can_id = id, .can_mask = CAN_EFF_MASK};
-    // Like the carry of a counter: two equal neighbours make one of twice the size.
+    // Like the carry of a counter: two filters of equal size merge into one of twice the size.
     while (!filters.empty() && filters.back().can_mask == next.can_mask) {
       const std::uint32_t bit = next.can_mask & ~(next.can_mask - 1);
       if (filters.back().can_id != (next.can_id ^ bit)) break;

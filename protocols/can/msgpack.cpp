@@ -57,7 +57,7 @@ class Writer {
     key(name);
     byte(value ? kTrue : kFalse);
   }
-  /// In the fewest bytes, as everybody writes them.
+  /// Writes a number in the fewest bytes, as python-can does.
   void number(std::uint32_t value) {
     if (value < 0x80) return byte(value);
     const int bytes = value <= 0xff ? 1 : value <= 0xffff ? 2 : 4;
@@ -71,8 +71,8 @@ class Writer {
   std::byte* out_;
 };
 
-/// One value: a number, or what else it is; of strings and binaries the bytes, of maps and arrays the number
-/// of values inside, which follow.
+/// One value. `number` is set for numbers and flags, `bytes` for strings and binaries, `inside` for maps and
+/// arrays: the number of values that follow inside of it.
 struct Value {
   enum class Kind : std::uint8_t {
     kNothing,
@@ -120,10 +120,10 @@ class Reader {
     if (*head == kArray16 || *head == kArray32) return with_count(kOther, *head - kArray16, 1);
     if (*head == kMap16 || *head == kMap32) return with_count(kMap, *head - kMap16, 2);
     if (*head >= 0xe0) return Value{kNegative, 0, 0, {}};
-    return std::nullopt;  // 0xc1 is no value
+    return std::nullopt;  // 0xc1 is never used
   }
 
-  /// Passes over the values inside of this one, however deep.
+  /// Skips all values inside of this one, at any depth.
   bool skip_inside(const Value& value) {
     for (std::uint64_t left = value.inside; left > 0; --left) {
       const auto inner = next();
@@ -172,7 +172,7 @@ class Reader {
   std::span<const std::byte> in_;
 };
 
-/// What the map says before it is checked.
+/// The content of the map, unchecked.
 struct Fields {
   Frame frame{.extended = true};
   std::optional<std::uint32_t> id;

@@ -16,7 +16,7 @@ constexpr bool ids_are_sorted_and_disjoint(bool fd) {
   for (const MessageRow& row : kMessages) {
     if (!is_in(row, fd)) continue;
     const IdRange ids = ids_of(row, row.base_id);
-    if (row.message == message && ids.first == before.first) continue;  // of narrow and wide axes
+    if (row.message == message && ids.first == before.first) continue;  // narrow and wide rows
     if (ids.first < (message ? before.last + 1 : 0) || ids.last > kMaxStandardId) return false;
     before = ids;
     message = row.message;
@@ -31,7 +31,7 @@ void add_id_problems(const Profile& profile, std::vector<ProfileProblem>& found)
   std::vector<const MessageRow*> seen;
   std::optional<Message> before;
   for (const MessageRow& row : kMessages) {
-    // The same message of narrow and wide axes stands twice.
+    // A message of narrow and wide axes has two rows.
     if (!is_on(row, profile) || std::exchange(before, row.message) == row.message) continue;
     const std::string field = "ids." + std::string(row.name);
     const std::uint32_t base_id = profile.base_ids[static_cast<std::size_t>(row.message)];

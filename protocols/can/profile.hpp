@@ -22,24 +22,24 @@ struct IdRange {
   std::uint32_t first;
   std::uint32_t last;
 };
-/// The identifiers of a message of all nodes.
+/// The identifiers that a message has over all nodes.
 constexpr IdRange ids_of(const MessageRow& row, std::uint32_t base_id) noexcept {
   return row.per_node ? IdRange{base_id + 1, base_id + kMaxNode} : IdRange{base_id, base_id};
 }
 
-/// What both ends of a bus must agree on.
+/// The settings on which both ends of a bus must agree.
 struct Profile {
   bool fd = true;         ///< FD frames with float32; otherwise classic frames with scaled integers
   bool extended = false;  ///< 29-bit identifiers
-  bool wide = false;      ///< wide axes are on the bus: their messages have identifiers, too
-  /// By Message; the node id is added to those that have one.
+  bool wide = false;      ///< wide axes are on the bus: their messages have identifiers too
+  /// By Message; messages of an axis add the node id.
   std::array<std::uint32_t, kMessageCount> base_ids = [] {
     std::array<std::uint32_t, kMessageCount> ids{};
     for (const MessageRow& row : kMessages)
       ids[static_cast<std::size_t>(row.message)] = row.base_id;
     return ids;
   }();
-  // What one count of a scaled field is worth.
+  // The values of one count of scaled fields.
   double current_unit_a = 1e-3;
   double voltage_unit_v = 1e-2;
   double bus_voltage_unit_v = 1e-1;
@@ -84,13 +84,13 @@ struct BusAxis {
   bool wide = false;
 };
 
-/// Whether an axis has a message of its variant of the profile.
+/// Whether a message belongs to axes of this width.
 inline bool has_message(const BusAxis& axis, const MessageRow& row) noexcept {
   return row.width == Width::kAny || (row.width == Width::kWide) == axis.wide;
 }
 
-/// One thing wrong with a profile or the nodes on its bus: what, by the names of Profile ("ids.command",
-/// "current_unit_a", "node"), and the rule that it breaks.
+/// A problem of a profile or of the nodes on its bus: the field ("ids.command", "current_unit_a", "node") and
+/// the rule that it breaks.
 struct ProfileProblem {
   std::string field;
   std::string rule;

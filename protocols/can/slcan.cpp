@@ -28,7 +28,7 @@ struct BitRate {
   std::int64_t bit_rate;
   std::string_view command;
 };
-// Without S7, which is 800 kbit/s to Lawicel and 750 kbit/s to others.
+// Without S7: 800 kbit/s in Lawicel's adapters, 750 kbit/s in others.
 constexpr std::array<BitRate, 8> kBitRates{{{10'000, "S0"},
                                             {20'000, "S1"},
                                             {50'000, "S2"},

@@ -40,7 +40,7 @@ bool take_size(std::string_view word, Frame& frame) {
   return true;
 }
 
-/// One byte, or the same as a sign-extended one.
+/// Reads a byte, also in sign-extended form.
 bool take_byte(std::string_view word, std::uint8_t& byte) {
   const auto number = parse_number<std::uint64_t>(word, 16);
   if (!number) return false;

@@ -18,28 +18,28 @@ namespace drivebench::can {
 ///   to the client    < frame ID TIME BBBB >    < rtr ID TIME SIZE >  < fdframe ID FLAGS TIME BBBB >
 ///
 /// IDs, bytes B and FLAGS (1: bit rate switch, 2: error state) are hexadecimal, sizes decimal, times are
-/// seconds with six digits. An identifier of eight digits is an extended one. Debian's python-can 4.1.0
-/// writes no leading zeros, so that its extended identifiers below 0x800 arrive as standard ones (and it
-/// takes all that it receives for extended ones).
+/// seconds with six digits. An identifier of eight digits is extended. Debian's python-can 4.1.0 writes no
+/// leading zeros, so that its extended identifiers below 0x800 arrive as standard ones; it treats every
+/// received identifier as extended.
 
-/// The longest element without its brackets.
+/// The length of the longest element without its brackets.
 inline constexpr std::size_t kMaxSocketcandElement = 320;
 
-/// A frame and when it was on the bus [s since 1970].
+/// A frame and its time on the bus [s since 1970].
 struct TimedFrame {
   Frame frame;
   double time_s = 0.0;
 };
 
-/// Append one element; of an error frame the client gets "< error CLASS TIME >", a server gets nothing.
+/// Append one element. An error frame becomes "< error CLASS TIME >" for the client and nothing for a server.
 void append_socketcand_frame(std::string& out, const Frame& frame, double time_s);
 void append_socketcand_send(std::string& out, const Frame& frame);
 
-/// Read what stands between the brackets. Nothing if it is no such element or no possible frame; error frames
-/// are none.
+/// Read the text between the brackets. Nothing for any other element, an error frame or a frame that no bus
+/// can carry.
 std::optional<TimedFrame> parse_socketcand_frame(std::string_view element) noexcept;
-/// Takes also identifiers and bytes as SavvyCAN writes them: as signed numbers with all their leading Fs, and
-/// bit 31 of the identifier for an extended one.
+/// Also accepts identifiers and bytes of SavvyCAN: sign-extended numbers with all leading Fs, and bit 31 of
+/// the identifier for an extended one.
 std::optional<Frame> parse_socketcand_send(std::string_view element) noexcept;
 
 /// Cuts a byte stream into elements.
@@ -47,10 +47,10 @@ class SocketcandReader {
  public:
   struct Element {
     std::string_view text;  ///< between the brackets, without spaces at its ends; valid until the next byte
-    bool bad = false;       ///< too long, or bytes outside of brackets
+    bool bad = false;       ///< too long, or bytes stand outside of brackets
   };
 
-  /// Takes a byte; an element if it was the end of one.
+  /// Takes a byte and returns the element that it ends, if any.
   std::optional<Element> push(char byte) noexcept;
 
  private:

@@ -13,10 +13,10 @@
 /// over this table. Little-endian throughout.
 namespace drivebench::can {
 
-/// Version of the table as a narrow axis speaks it; its heartbeat carries the number. An identifier or field
-/// never changes its meaning within a version.
+/// The table version of a narrow axis; its heartbeat carries the number. An identifier or field never changes
+/// its meaning within a version.
 inline constexpr std::uint8_t kProfileVersion = 1;
-/// The same of a wide axis.
+/// The table version of a wide axis.
 inline constexpr std::uint8_t kWideVersion = 2;
 
 enum class Message : std::uint8_t {
@@ -39,10 +39,10 @@ enum class Message : std::uint8_t {
   kDetails,
 };
 
-/// In which of the two variants of the profile a message exists.
+/// The variants of the profile in which a message exists.
 enum class Variant : std::uint8_t { kBoth, kClassic, kFd };
 
-/// Which axes have a message. A wide axis has more than phases a and b and an encoder: a phase c, a field
+/// The axes that have a message. A wide axis has more than phases a and b and an encoder: a phase c, a field
 /// winding, Hall lines, a tachometer or a resolver.
 enum class Width : std::uint8_t { kAny, kNarrow, kWide };
 
@@ -57,7 +57,7 @@ struct MessageRow {
   Variant variant;
   Width width;
   Sender sender;
-  std::uint32_t base_id;  ///< the node id is added, if the message has one
+  std::uint32_t base_id;  ///< messages of an axis add the node id
   bool per_node;
   std::uint8_t size;  ///< bytes
   std::span<const Field> fields;
@@ -97,7 +97,7 @@ inline constexpr auto kCurrents = std::to_array<Field>({
     flags("encoder_levels", 48, 8, "encoder_levels", kLevelsMeaning),
     code("command_age", 56, 8, "command_age_ticks", kAgeMeaning),
 });
-/// A narrow axis has the first kNarrowSensorFields.
+/// A narrow axis has only the first kNarrowSensorFields.
 inline constexpr auto kSensors = std::to_array<Field>({
     counter("tick", 0, 32, "tick", kTickMeaning),
     real("i_a", "A", 32, "i_a_a", "measured current of phase a, into the machine"),
@@ -150,7 +150,7 @@ inline constexpr auto kPhaseCommand = std::to_array<Field>({
     choice("mode", 48, "", kModeMeaning),
     code("lease", 56, 8, "", kLeaseMeaning),
 });
-/// A narrow axis has the first kNarrowCommandFields.
+/// A narrow axis has only the first kNarrowCommandFields.
 inline constexpr auto kCommandFd = std::to_array<Field>({
     counter("tick", 0, 32, "", kSetpointTick),
     real("u_a", "V", 32, "", "voltage for phase a; in mode 3 the duty, -1 to 1, in mode 4 the current [A]"),
@@ -172,7 +172,7 @@ inline constexpr auto kEncoder = std::to_array<Field>({
 inline constexpr auto kRequest = std::to_array<Field>({
     choice("request", 0, "", "1 acquire, 2 renew, 3 release, 4 clear faults"),
     code("lease", 8, 8, "", "lease number that the bench gave; 0 with acquire"),
-    code("controller", 16, 32, "", "any number by which the controller knows its replies"),
+    code("controller", 16, 32, "", "any number; the reply repeats it"),
 });
 inline constexpr auto kReply = std::to_array<Field>({
     choice("request", 0, "", "0 a command, 1 acquire, 2 renew, 3 release, 4 clear faults: what this answers"),
@@ -192,14 +192,14 @@ inline constexpr auto kStateFd = std::to_array<Field>({
     real("speed", "rad/s", 32, "speed_rad_s", "speed, positive from a to b"),
     real("bus_voltage", "V", 64, "bus_voltage_v", "voltage of the DC link"),
     flags("faults", 96, 32, "faults", "fault word"),
-    counter("refused", 128, 16, "refused_commands", "commands that were turned away"),
+    counter("refused", 128, 16, "refused_commands", "commands that were refused"),
     counter("late_ticks", 144, 16, "late_ticks", "ticks of the bench that started after their time"),
 });
 inline constexpr auto kCounters = std::to_array<Field>({
     counter("command_tick", 0, 16, "command_tick",
             "low bits of the tick that the command in force answered; all ones in state 0: none yet"),
     counter("missed", 16, 16, "missed_commands", "commands that were owed and did not come"),
-    counter("refused", 32, 16, "refused_commands", "commands that were turned away"),
+    counter("refused", 32, 16, "refused_commands", "commands that were refused"),
     counter("late_ticks", 48, 8, "late_ticks", "ticks of the bench that started after their time"),
     choice("state", 56, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
 });
@@ -213,7 +213,7 @@ inline constexpr auto kEdges = std::to_array<Field>({
     code("edges", 64, 8, "", "edges in this frame, at most 26"),
     code("following", 72, 8, "",
          "edges of this tick in the frames that follow; all ones: some were left out"),
-    // From byte 12 on: 26 edges of 16 bits: bits 0..14 the time in units of the period/32768, bit 15 counts
+    // From byte 12 on: 26 edges of 16 bits. Bits 0..14: time in units of period/32768; bit 15: the count went
     // down.
 });
 inline constexpr auto kControllerHeartbeat = std::to_array<Field>({
@@ -223,7 +223,8 @@ inline constexpr auto kHeartbeat = std::to_array<Field>({
     choice("state", 0, "", "0 boot-up, 4 stopped, 5 operational"),
     code("profile", 8, 8, "", "version of the frame table"),
     choice("control", 16, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
-    code("lease", 24, 8, "", "lease number in force on this bus; 0: nobody on this bus commands the axis"),
+    code("lease", 24, 8, "",
+         "lease number in force on this bus; 0: no controller on this bus holds the lease"),
     counter("period_us", 32, 32, "", "sample period of the bench [us]"),
 });
 
@@ -269,9 +270,9 @@ inline constexpr std::size_t kMaxFields = 18;
 inline constexpr std::size_t kEdgesPerFrame = 26;
 inline constexpr std::size_t kFirstEdgeByte = 12;
 
-/// Sorted by base id. Node ids are 1..127, as in the predefined connection set of CANopen, whose identifiers
-/// for SYNC, emergency, heartbeat and process data these are; phase_command, phases and details stand where
-/// it has none, or SDO, which nobody here speaks.
+/// Sorted by base id. Node ids are 1..127 as in the predefined connection set of CANopen, and SYNC,
+/// emergency, heartbeat and process data have its identifiers. phase_command, phases and details use
+/// identifiers that it leaves free or gives to SDO, which the bench does not speak.
 inline constexpr auto kMessages = [] {
   using namespace table_detail;
   using enum Message;
@@ -296,11 +297,11 @@ inline constexpr auto kMessages = [] {
        "all sensors of a sample"},
       {kSensors, "sensors", kFd, kWide, kBench, 0x180, true, 64, kAllSensors, "all sensors of a sample"},
       {kCommand, "command", kClassic, kAny, kController, 0x200, true, 8, table_detail::kCommand,
-       "what the amplifier shall do"},
+       "set-points of the amplifier"},
       {kCommand, "command", kFd, kNarrow, kController, 0x200, true, 16,
-       kWholeCommand.first(kNarrowCommandFields), "what the amplifier shall do"},
+       kWholeCommand.first(kNarrowCommandFields), "set-points of the amplifier"},
       {kCommand, "command", kFd, kWide, kController, 0x200, true, 24, kWholeCommand,
-       "what the amplifier shall do"},
+       "set-points of the amplifier"},
       {kEncoder, "encoder", kClassic, kAny, kBench, 0x280, true, 8, table_detail::kEncoder,
        "encoder count and edge times; flags and tick stand in the currents frame that follows"},
       {kRequest, "request", kBoth, kAny, kController, 0x300, true, 8, table_detail::kRequest,
@@ -328,7 +329,7 @@ inline constexpr auto kMessages = [] {
   });
 }();
 
-/// Whether the frames of a message hold one page each, which their first field tells.
+/// Whether each frame of a message holds one page, numbered by the first field.
 constexpr bool is_paged(const MessageRow& row) noexcept {
   return row.fields.back().page != kEveryPage;
 }

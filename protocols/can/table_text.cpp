@@ -68,7 +68,7 @@ std::string no_value_text(const Field& field) {
   return field.encoding == Encoding::kFloat ? "NaN" : "-";
 }
 
-/// Narrow and wide axes on one bus have different frames of the same name.
+/// Adds the width where narrow and wide axes on one bus have frames of the same name.
 std::string title_of(const MessageRow& row, std::span<const MessageRow* const> rows) {
   const bool twice = std::ranges::any_of(
       rows, [&](const MessageRow* other) { return other != &row && other->message == row.message; });
@@ -126,7 +126,7 @@ std::string identifiers_text(const Profile& profile, std::span<const BusAxis> ax
   return text + "\n";
 }
 
-/// Numbers by which the fields of an example can be told apart.
+/// Example values, different for each field.
 Values example_values(const MessageRow& row) {
   Sample sample;
   sample.tick = 1000;
@@ -180,7 +180,7 @@ Values example_values(const MessageRow& row) {
   return values;
 }
 
-/// A line; `page` means nothing in a message without pages.
+/// A table line; a message without pages ignores `page`.
 std::string example_text(const MessageRow& row, const Profile& profile, std::uint32_t node,
                          const std::string& title, std::size_t page) {
   Values values = example_values(row);

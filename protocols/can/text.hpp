@@ -12,12 +12,12 @@
 
 namespace drivebench::can {
 
-/// Pieces of the text formats.
+/// Shared parts of the text formats.
 
 /// The first second of the year 10000, counted from 1970.
 inline constexpr double kEndOfTime = 253402300800.0;
 
-/// A whole text of digits as a number; neither signs nor "0x" nor space.
+/// The number that the whole text spells in digits, without sign, "0x" or space.
 template <std::unsigned_integral T = std::uint32_t>
 std::optional<T> parse_number(std::string_view text, int base) noexcept {
   T value{};
@@ -26,13 +26,13 @@ std::optional<T> parse_number(std::string_view text, int base) noexcept {
   return value;
 }
 
-/// Upper case, with leading zeros up to `digits`; what does not fit is cut off.
+/// Appends the low `digits` digits in upper case, with leading zeros.
 inline void append_hex(std::string& out, std::uint32_t value, int digits) {
   for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4)
     out.push_back("0123456789ABCDEF"[value >> shift & 0xF]);
 }
 
-/// Three digits, or eight if the identifier is an extended one.
+/// Appends three digits, or eight for an extended identifier.
 inline void append_id(std::string& out, const Frame& frame) {
   append_hex(out, frame.id, frame.extended ? 8 : 3);
 }
@@ -42,7 +42,8 @@ inline void append_data(std::string& out, const Frame& frame) {
     append_hex(out, frame.data[i], 2);
 }
 
-/// Takes the data of the frame from two digits per byte; false if they are anything else or too many.
+/// Reads the data of the frame, two digits per byte; false if the text has other characters or too many
+/// bytes.
 inline bool parse_data(std::string_view digits, Frame& frame) noexcept {
   if (digits.size() % 2 != 0 || digits.size() / 2 > frame.data.size()) return false;
   for (std::size_t i = 0; i < digits.size() / 2; ++i) {
@@ -54,7 +55,7 @@ inline bool parse_data(std::string_view digits, Frame& frame) noexcept {
   return true;
 }
 
-/// Seconds with six digits behind the point, as the kernel's microseconds; from 0 up to the year 9999.
+/// Appends seconds with six decimals, from 0 up to the year 9999.
 inline void append_time(std::string& out, double time_s) {
   const bool possible = time_s >= 0.0 && time_s < kEndOfTime;
   const auto time_us = static_cast<std::uint64_t>(possible ? std::llround(time_s * 1e6) : 0);
@@ -65,7 +66,7 @@ inline void append_time(std::string& out, double time_s) {
   out += fraction;
 }
 
-/// The same back; digits, a point and six digits.
+/// Reads such a time: digits, a point and six digits.
 inline std::optional<double> parse_time(std::string_view text) noexcept {
   const std::size_t point = text.find('.');
   if (point == std::string_view::npos || text.size() - point != 7) return std::nullopt;
@@ -75,7 +76,7 @@ inline std::optional<double> parse_time(std::string_view text) noexcept {
   return static_cast<double>(*seconds * 1'000'000 + *micros) * 1e-6;
 }
 
-/// Whether a frame like this can be on a bus.
+/// Whether a bus can carry this frame.
 constexpr bool is_possible(const Frame& frame) noexcept {
   if (frame.id > (frame.extended || frame.error ? kMaxExtendedId : kMaxStandardId)) return false;
   if (frame.remote && (frame.fd || frame.error)) return false;

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-/// How values lie in 16-bit registers.
+/// Values in 16-bit registers.
 namespace drivebench::modbus {
 
 enum class Type : std::uint8_t {
@@ -19,7 +19,7 @@ enum class Type : std::uint8_t {
   kSigned64,
 };
 
-/// Order of the registers of a value: most significant first, or last. Within a register the first byte is
+/// The order of the registers of a value: most significant first or last. The first byte of a register is
 /// always the more significant one.
 enum class WordOrder : std::uint8_t { kAbcd, kCdab };
 
@@ -39,7 +39,7 @@ constexpr std::size_t words_of(Type type) noexcept {
   return 4;
 }
 
-/// Puts the low bits of `bits`, as many as the type has, into its registers.
+/// Writes a value of this type, the low bits of `bits`, into registers.
 constexpr void put(std::uint64_t bits, Type type, WordOrder order, std::uint16_t* words) noexcept {
   const std::size_t count = words_of(type);
   for (std::size_t i = 0; i < count; ++i) {
@@ -48,7 +48,7 @@ constexpr void put(std::uint64_t bits, Type type, WordOrder order, std::uint16_t
   }
 }
 
-/// The bits of a value; those above its size are zero.
+/// Reads the bits of a value; bits above its size are zero.
 constexpr std::uint64_t get(Type type, WordOrder order, const std::uint16_t* words) noexcept {
   const std::size_t count = words_of(type);
   std::uint64_t bits = 0;
@@ -63,7 +63,7 @@ constexpr std::uint64_t float_bits(double value) noexcept {
   return std::bit_cast<std::uint32_t>(static_cast<float>(value));
 }
 
-/// The number that the bits of a value stand for, before its scale.
+/// The number that the bits of a value represent, without its scale.
 constexpr double number_of(Type type, std::uint64_t bits) noexcept {
   switch (type) {
     case Type::kSigned16:
@@ -82,8 +82,8 @@ constexpr double number_of(Type type, std::uint64_t bits) noexcept {
   return static_cast<double>(bits);
 }
 
-/// Counts in 16 bits, rounded. Signed: saturates at +-32767, NaN is -32768; unsigned: saturates at 0 and
-/// 65534, NaN is 65535.
+/// A value in 16-bit counts, rounded. Signed: saturates at +-32767, NaN is -32768; unsigned: saturates at 0
+/// and 65534, NaN is 65535.
 inline std::uint64_t counts_of(Type type, double value, double scale) noexcept {
   const double counts = std::round(value / scale);
   if (type == Type::kSigned16) {

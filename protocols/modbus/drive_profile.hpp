@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-/// The state machine behind control word and status word, as CiA 402 (IEC 61800-7-201) has it.
+/// The state machine of control word and status word from CiA 402 (IEC 61800-7-201).
 namespace drivebench::modbus {
 
 enum class DriveState : std::uint8_t {
@@ -21,7 +21,8 @@ inline constexpr std::uint16_t kNoQuickStop = 1 << 2;
 inline constexpr std::uint16_t kEnableOperation = 1 << 3;
 inline constexpr std::uint16_t kFaultReset = 1 << 7;
 
-/// The state after a control word was written. Fault is left by a fault reset alone, which is not here.
+/// The state after a write of the control word. Only a fault reset leaves the state Fault; the caller handles
+/// it.
 constexpr DriveState next_state(DriveState state, std::uint16_t control_word) noexcept {
   using enum DriveState;
   if (state == kFault) return kFault;
@@ -30,13 +31,13 @@ constexpr DriveState next_state(DriveState state, std::uint16_t control_word) no
     return state == kOperationEnabled || state == kQuickStopActive ? kQuickStopActive : kSwitchOnDisabled;
   }
   if ((control_word & kSwitchOn) == 0) return state == kQuickStopActive ? state : kReadyToSwitchOn;
-  // Only a "shutdown", the line above, leads out of this state: a word left over from before enables nothing.
+  // Only a "shutdown", the line above, leads out of this state: an old word with other bits enables nothing.
   if (state == kSwitchOnDisabled) return state;
   if ((control_word & kEnableOperation) != 0) return kOperationEnabled;
   return state == kQuickStopActive ? state : kSwitchedOn;
 }
 
-/// What the status word tells beside the state.
+/// The bits of the status word beside the state.
 struct StatusFlags {
   bool voltage_present;
   bool warning;

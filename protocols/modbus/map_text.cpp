@@ -28,7 +28,7 @@ std::string hex(std::size_t value) {
   return "0x" + std::string(4 - digits.size(), '0') + digits;
 }
 
-/// The traditional notation: a digit for the kind and four that count from 1.
+/// The traditional notation: a digit for the kind, then at least four digits that count from 1.
 std::string notation(char kind, std::size_t address) {
   const std::string digits = std::to_string(address + 1);
   return kind + std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0') + digits;
@@ -120,7 +120,7 @@ bool have_the_same_parameters(std::span<const RegisterMap> maps) {
   });
 }
 
-/// `table` tells apart what has the same address.
+/// `table` distinguishes rows of the same address.
 void add_csv(std::string& out, std::string_view table, const Line& line) {
   out += table;
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -169,23 +169,23 @@ std::vector<Line> lines_between(const RegisterMap& map, std::size_t begin, std::
 constexpr std::string_view kRules = R"(
 Functions 1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43/14 (device identification) and 8/0 (echo). Functions 3 and 4 read the same registers.
 Addresses count from 0; the columns 3xxxx and 4xxxx are the traditional notation, which counts from 1. A value of more than one register has
-its most significant word first (ABCD); the column CDAB is where it stands with the words the other way round. One request sees one tick.
-The sample goes on behind its first block: one request may read the 125 registers from 200 on, which hold every sensor.
+its most significant word first (ABCD); at the address in column CDAB it has the words in reverse order. One request sees one tick.
+The sample has two blocks without a gap: one request may read the 125 registers from 200 on, which hold every sensor.
 
 A value is a register, or registers, times its scaling. Scaled 16-bit values saturate at +-32767 (unsigned: 65534); -32768 (65535) stands for
-"no number". float32 rounds what the bench holds in double precision, in both directions.
+"no number". float32 rounds the double precision of the bench, in both directions.
 
-**Taking the axis.** Write a number of your choice to `lease_key`. If nobody holds the lease it is yours: this connection may write. When the
-connection ends, the lease stays for whoever writes the same key, until the lease time of the bench has passed. An owner that stays
-connected loses it when it sends nothing for `idle_timeout_ms`; in real time also when it sends no command for the lease time. Writing 0 or the
-request 2 gives it back.
+**Taking the axis.** Write a number of your choice to `lease_key`. If the lease is free, this connection takes it and may write. After the
+connection has ended, a connection that writes the same key takes the lease over, until the lease time of the bench has passed. A connection that
+holds the lease loses it when it sends nothing for `idle_timeout_ms`; in real time also when it sends no command for the lease time. Writing 0 or
+the request 2 gives the lease back.
 
-**Commands.** One write of `command_mode` to `command_b`; writing `command_counter` is what gives the command, so it may not come alone before the
-other registers are right. With function 23 the answer waits for the tick and reads the sample after it: one transaction for each
-tick in lockstep. The registers from `more_lease_key` on are the same ones with those of phase c and of the field behind them, so that one write
-commands a machine that has these; `terminals` tells what it has, and what it has not is ignored. A duty of 1 is the bus voltage, for a leg of a
+**Commands.** A command is one write of `command_mode` to `command_b`. The write of `command_counter` triggers it, so write the other registers
+together with it or before. With function 23 the answer waits for the tick and reads the sample after it: one transaction for each tick in
+lockstep. The registers from `more_lease_key` on repeat the block and add phase c and field, so that one write commands a machine with these;
+`terminals` lists the terminals of the machine, and set-points of other terminals are ignored. A duty of 1 is the bus voltage, for a leg of a
 star half of it. Function 16 is answered as soon as the bench has accepted the command. A write of the process data is a command as well, for the
-tick that is newest when it arrives; in real time one that finds this tick answered already waits for the next, so that none is lost.
+newest tick at its arrival; in real time it waits for the next tick if this one is answered already, so that no command is lost.
 
 | exception | meaning |
 |---|---|
@@ -193,10 +193,10 @@ tick that is newest when it arrives; in real time one that finds this tick answe
 | 2 | no such register, half a value written, or a register that is read-only (all are, unless the configuration allows writes) |
 | 3 | wrong quantity or byte count; a value that is not finite, out of range or breaks a rule between parameters; contradictory requests in one write |
 | 4 | a latched fault must be cleared first, the drive takes no currents, or the command answers a sample that is too old, answered already or not taken yet; in a free run: no leases |
-| 6 | the lease is not yours, or too many requests; for process data in lockstep also: this tick has its command already |
+| 6 | this connection does not hold the lease, or too many requests; for process data in lockstep also: this tick has its command already |
 | 11 | no axis at this unit id |
 
-Nothing is written when an exception is the answer. `last_refusal` says why the last write was refused.
+A request that an exception answers writes nothing. `last_refusal` holds the reason of the last refused write.
 )";
 
 }  // namespace

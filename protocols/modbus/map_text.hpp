@@ -8,18 +8,18 @@
 
 namespace drivebench::modbus {
 
-/// A bit of the fault word, or of the injected faults, that has a name, with its discrete input.
+/// A named bit of the fault word or of the injected faults, with its discrete input.
 struct FaultInput {
   std::size_t address;
   Bit bit;
 };
 
-/// The maps of the axes as a table for spreadsheets and PLC tools: one line for each value, coil and discrete
-/// input. The first column says which of these; the address alone does not, nor does it say whose parameter
-/// it is where the axes have different kinds of machines.
+/// The maps of the axes as a CSV table for spreadsheets and PLC tools: one line for each value, coil and
+/// discrete input. The first column tells the table of an address, and the axis where axes have different
+/// kinds of machines.
 std::string map_csv(std::span<const RegisterMap> maps, std::span<const FaultInput> faults);
 
-/// The maps for people, with the rules that a table cannot hold.
+/// The maps in Markdown, with the rules for taking an axis, for commands and for exceptions.
 std::string map_markdown(std::span<const RegisterMap> maps, std::span<const FaultInput> faults,
                          std::span<const std::string_view> axes);
 

@@ -9,29 +9,29 @@
 
 namespace drivebench::modbus {
 
-/// Transaction (2 bytes), protocol (2 bytes, zero), length of what follows (2 bytes), unit id.
+/// Header: transaction (2 bytes), protocol (2 bytes, zero), length of the rest (2 bytes), unit id.
 inline constexpr std::size_t kMbapSize = 7;
 inline constexpr std::size_t kMaxAdu = 260;
-/// Limits of the length field: unit id and a function code; unit id and the largest PDU.
+/// Limits of the length field: from unit id and function code to unit id and the largest PDU.
 inline constexpr std::size_t kMinLength = 2;
 inline constexpr std::size_t kMaxLength = 254;
 
-/// Cuts a byte stream into Modbus TCP frames. Holds a few kilobytes; never allocates.
+/// Cuts a byte stream into Modbus TCP frames. Never allocates.
 class MbapReader {
  public:
-  /// Where the next bytes from the stream go; not empty once next() has given nothing.
+  /// The buffer for the next bytes of the stream; not empty after next() has returned nothing.
   std::span<std::uint8_t> free_space() noexcept;
-  /// Says how many bytes were put there.
+  /// Reports how many bytes were put into free_space().
   void received(std::size_t count) noexcept { end_ += count; }
 
-  /// The next whole frame, header included, valid until the next call of free_space(); nothing if it is not
-  /// there yet, or if the stream is bad.
+  /// The next whole frame with its header, valid until the next call of free_space(); nothing while the frame
+  /// is incomplete, and after an error.
   std::optional<std::span<const std::uint8_t>> next() noexcept;
 
-  /// Whether a frame has begun that is not whole yet.
+  /// Whether the buffer holds the beginning of a frame.
   bool in_frame() const noexcept { return begin_ != end_; }
 
-  /// Not empty once a header was seen that cannot be one: the stream cannot be followed any further.
+  /// Not empty after an invalid header: no later frame of the stream can be found.
   std::string_view error() const noexcept { return error_; }
 
  private:

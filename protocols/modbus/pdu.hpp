@@ -28,10 +28,10 @@ inline constexpr std::uint16_t kMaxReadBits = 2000;
 inline constexpr std::uint16_t kMaxReadRegisters = 125;
 inline constexpr std::uint16_t kMaxWriteBits = 1968;
 inline constexpr std::uint16_t kMaxWriteRegisters = 123;
-inline constexpr std::uint16_t kMaxReadWriteRegisters = 121;  ///< written by function 23
+inline constexpr std::uint16_t kMaxReadWriteRegisters = 121;  ///< the limit of the write in function 23
 inline constexpr std::size_t kMaxPdu = 253;
 
-/// A request that the map has an answer to. Which members mean something depends on the function.
+/// A valid request. The function codes behind a member are those that use it.
 struct Request {
   Function function{};
   RegisterMap::Range read{};       ///< 3, 4, 23
@@ -40,7 +40,7 @@ struct Request {
   std::uint16_t read_count = 0;
   std::uint16_t write_address = 0;  ///< as it came: 5, 6, 15, 16, 22, 23
   std::uint16_t write_count = 0;
-  std::span<const std::uint8_t> data{};  ///< what is written: words, or packed bits; 22: the two masks
+  std::span<const std::uint8_t> data{};  ///< the written words or packed bits; 22: the two masks
 };
 
 constexpr bool writes(Function function) noexcept {
@@ -61,16 +61,16 @@ constexpr bool writes(Function function) noexcept {
 struct Verdict {
   enum class Action : std::uint8_t {
     kExecute,
-    kRefuse,  ///< with the exception
-    kClose,   ///< it is not as long as its function needs: whatever follows in the stream cannot be trusted
+    kRefuse,  ///< answer with the exception
+    kClose,   ///< the PDU has the wrong length for its function: later bytes of the stream cannot be trusted
   };
   Action action = Action::kClose;
   Exception exception = Exception::kNone;
-  Request request;  ///< empty when refused, except for the value of a register that may be written
+  Request request;  ///< empty when refused, except for a wrong value of a writable register
 };
 
-/// Checks a whole PDU, quantity before address before value, as the protocol specification V1.1b3 draws it.
-/// All but what only the axis knows: lease, faults, rules between parameters, the outcome of a mask.
+/// Checks a whole PDU in the order of the protocol specification V1.1b3: quantity, address, value. The axis
+/// checks the rest: lease, faults, rules between parameters, the result of a mask.
 Verdict validate(std::span<const std::uint8_t> pdu, const RegisterMap& map) noexcept;
 
 /// The words of `data`, most significant byte first.

@@ -11,12 +11,13 @@
 #include "protocols/modbus/register_rows.hpp"
 
 /// The Modbus registers of an axis, written once: reads, writes, their checks, CSV and Markdown loop over
-/// this table. Function codes 3 and 4 see the same registers; addresses count from 0.
+/// this table. Function codes 3 and 4 read the same registers; addresses count from 0.
 namespace drivebench::modbus {
 
 inline constexpr std::uint16_t kSampleLength = map_detail::length_of(map_detail::kSample);
 
-/// As many registers from kSampleStart on as one request may read, up to the last whole value: every sensor.
+/// The most registers from kSampleStart on that one request can read in whole values; they include every
+/// sensor.
 inline constexpr std::uint16_t kSensorsLength = [] {
   std::size_t end = kMoreSampleStart;
   for (const Row& row : map_detail::kMoreSample) {
@@ -26,7 +27,7 @@ inline constexpr std::uint16_t kSensorsLength = [] {
   return static_cast<std::uint16_t>(end - kSampleStart);
 }();
 
-/// Registers without a gap. Reads and writes do not go beyond a gap.
+/// Consecutive registers. A read or write across a gap is refused.
 struct Block {
   std::uint16_t id;
   std::uint16_t start;
@@ -34,7 +35,7 @@ struct Block {
   std::string_view name;
 };
 
-/// A parameter as the owner of the map describes it; the strings live as long as the map.
+/// A parameter in the map. The strings must outlive the map.
 struct ParameterInfo {
   std::string_view name;
   std::string_view unit;
@@ -44,7 +45,7 @@ struct ParameterInfo {
   std::string_view meaning;
 };
 
-/// One coil or discrete input.
+/// A coil or discrete input.
 struct Bit {
   std::string_view name;
   std::string_view meaning;
@@ -57,13 +58,13 @@ inline constexpr auto kCoils = std::to_array<Bit>({
     {"lease", "1 while this connection holds the lease; writing 1 renews it, 0 gives it back"},
 });
 
-/// Discrete inputs: the low bits of the fault word, then these, one bit of the control state each, the levels
-/// of the encoder and the Hall lines.
+/// Discrete inputs in order: the low bits of the fault word, one bit for each control state, the levels of
+/// the encoder, the Hall lines, the low bits of the injected faults.
 inline constexpr std::size_t kFaultInputs = 16;
 inline constexpr std::size_t kStateInputs = 6;
 inline constexpr std::size_t kEncoderInputs = 6;
 inline constexpr auto kOtherInputs = std::to_array<Bit>({
-    {"state_idle", "nobody commands the axis"},
+    {"state_idle", "no controller commands the axis"},
     {"state_run", "commands arrive"},
     {"state_hold", "commands are missing, the last one holds"},
     {"state_timeout", "latched: the controller left or fell silent"},
@@ -81,12 +82,12 @@ inline constexpr auto kOtherInputs = std::to_array<Bit>({
 });
 inline constexpr std::size_t kHallInputs = 3;
 static_assert(kOtherInputs.size() == kStateInputs + kEncoderInputs + kHallInputs);
-/// Then the low bits of the injected faults.
+
 inline constexpr std::size_t kFirstInjectedInput = kFaultInputs + kOtherInputs.size();
 inline constexpr std::size_t kInjectedInputs = 32;
 inline constexpr std::size_t kDiscreteInputs = kFirstInjectedInput + kInjectedInputs;
 
-/// The state of a discrete input.
+/// The value of a discrete input.
 constexpr bool discrete_input(std::size_t address, const Sample& sample) noexcept {
   if (address < kFaultInputs) return (sample.faults >> address & 1) != 0;
   address -= kFaultInputs;
@@ -98,36 +99,36 @@ constexpr bool discrete_input(std::size_t address, const Sample& sample) noexcep
   return (sample.injected >> (address - kHallInputs) & 1) != 0;
 }
 
-/// The bits of a row that shows a signal.
+/// The register bits of a signal.
 std::uint64_t signal_bits(const Row& row, const Sample& sample) noexcept;
 
-/// The sample in the registers from kSampleStart on (ABCD), as far as the words reach. Real values have been
-/// rounded to float32 on the way.
+/// Decodes the registers from kSampleStart on (ABCD) into a sample, as far as the words reach. Registers hold
+/// real values as float32.
 Sample read_sample(std::span<const std::uint16_t> words) noexcept;
 
-/// The whole map of an axis: the fixed rows and its parameters, in the order in which they are given.
+/// The map of an axis: the fixed rows, then the parameters in the given order.
 class RegisterMap {
  public:
-  /// Without `writable` no register may be written.
+  /// With `writable` false every register is read-only.
   RegisterMap(std::span<const ParameterInfo> parameters, bool writable);
 
   std::span<const Row> rows() const noexcept { return rows_; }
   std::span<const Block> blocks() const noexcept { return blocks_; }
-  /// How many of the blocks the first list in the header tells of; the second one tells of the others.
+  /// The number of blocks in the first list of the header; the second list has the others.
   static constexpr std::size_t kFirstBlocks = 4;
   bool writable() const noexcept { return writable_; }
 
-  /// Registers asked for, without a gap.
+  /// The registers of a request, without a gap.
   struct Range {
-    std::span<const Row> rows;  ///< that have at least one register among them
+    std::span<const Row> rows;  ///< rows with at least one of the registers
     WordOrder order;
     std::uint16_t first;  ///< without the offset of the mirror
     std::uint16_t count;
   };
-  /// Nothing if a register among them does not exist.
+  /// The registers from `address` on; nothing if one of them does not exist.
   std::optional<Range> find(std::uint16_t address, std::uint16_t count) const noexcept;
 
-  /// Whether these are whole values that may all be written.
+  /// Whether the registers are whole values, all of them writable.
   bool may_write(const Range& range) const noexcept;
 
  private:
@@ -136,7 +137,7 @@ class RegisterMap {
   bool writable_;
 };
 
-/// Whether every value, in registers that may_write(), is finite and in its range.
+/// Whether every value is finite and in its range. may_write() must hold for the registers.
 bool values_fit(const RegisterMap::Range& range, std::span<const std::uint16_t> words) noexcept;
 
 }  // namespace drivebench::modbus

@@ -17,7 +17,8 @@ namespace drivebench::modbus {
 inline constexpr std::uint16_t kMarker = 0x4442;
 /// Register 1. An address never changes its meaning within a version.
 inline constexpr std::uint16_t kMapVersion = 1;
-/// Every register again, this much higher, with the words of 32-bit and 64-bit values the other way round.
+/// The offset of the mirror: every register again, with the words of 32-bit and 64-bit values in reverse
+/// order.
 inline constexpr std::uint16_t kMirrorOffset = 10'000;
 
 inline constexpr std::uint16_t kProcessStart = 100;
@@ -28,10 +29,10 @@ inline constexpr std::uint16_t kCommandStart = 400;
 inline constexpr std::uint16_t kMoreCommandStart = 420;
 inline constexpr std::uint16_t kParameterStart = 1000;
 
-/// What a register says beside signals of the catalogue and parameters.
+/// The content of a register.
 enum class Content : std::uint8_t {
   kSignal,   ///< the row `index` of the catalogue: scaled and saturated if it has 16 bits
-  kLowBits,  ///< the low bits of an integer signal, which wrap around
+  kLowBits,  ///< the low bits of an integer signal; they wrap around
   kMarkerWord,
   kVersionWord,
   kAxes,
@@ -80,7 +81,7 @@ struct Row {
   std::string_view name;
   std::string_view unit;
   double scale;    ///< unit of the value per count
-  double minimum;  ///< of the value; what lies outside is refused
+  double minimum;  ///< of the value; a write outside the range is refused
   double maximum;
   std::string_view meaning;
 
@@ -88,18 +89,18 @@ struct Row {
   constexpr std::size_t end() const noexcept { return address + size(); }
 };
 
-/// What a request of the command block may ask for.
+/// The codes of the request register in the command block.
 enum class LeaseRequest : std::uint16_t { kNone = 0, kClearFaults = 1, kRelease = 2, kRenew = 3 };
 
-/// What the mode register of the command block says.
+/// The codes of the mode register in the command block.
 enum class CommandMode : std::uint16_t { kOff = 0, kVoltage = 1, kZeroVoltage = 2, kDuty = 3, kCurrent = 4 };
 
-/// What the references of the process data are.
+/// The quantity of the references in the process data.
 enum class ReferenceMode : std::uint16_t { kVoltage = 0, kCurrent = 1 };
 
 inline constexpr float kTestFloat = 1.2345678f;
 inline constexpr std::int32_t kTestInteger = -123456789;
-inline constexpr double kMaxSetpoint = 1e6;  ///< a command beyond this is refused [V] or [A]
+inline constexpr double kMaxSetpoint = 1e6;  ///< a larger set-point is refused [V] or [A]
 
 namespace map_detail {
 
@@ -117,7 +118,7 @@ constexpr Row written(std::uint16_t address, Type type, Content content, std::st
 constexpr std::uint16_t row_of(std::string_view signal) {
   return static_cast<std::uint16_t>(find_signal(signal) - kSignals.data());
 }
-/// A signal in a register of its own; the range is what 16 bits hold.
+/// A scaled signal in 16 bits; its range is that of the 16 bits.
 constexpr Row signal(std::uint16_t address, Type type, std::string_view name, double scale) {
   const Signal& s = *find_signal(name);
   const bool is_signed = type == Type::kSigned16;
@@ -210,7 +211,7 @@ inline constexpr auto kProcess = std::to_array<Row>({
     low_bits(112, kUnsigned16, "tick", "snapshot", "as at the start of the block"),
 });
 
-/// For every terminal that there is; the same words as in the block above stand behind the same names.
+/// Process data for all terminals; the registers of the block above stand here once more.
 inline constexpr auto kMoreProcess = std::to_array<Row>({
     low_bits(120, kUnsigned16, "tick", "more_snapshot",
              "low bits of the tick; equal at both ends of the block"),
@@ -241,7 +242,8 @@ inline constexpr auto kMoreProcess = std::to_array<Row>({
     low_bits(141, kUnsigned16, "tick", "more_snapshot", "as at the start of the block"),
 });
 
-// The catalogue grows; a block does not. How many signals, in its order, each block of the sample has.
+// The numbers of signals, in the order of the catalogue, in the two blocks of the sample. A block never
+// grows.
 inline constexpr std::size_t kFirstSignals = 28;
 inline constexpr std::size_t kMoreSignals = 21;
 static_assert(kFirstSignals + kMoreSignals == kSignals.size(), "further signals need a block of their own");
@@ -255,7 +257,7 @@ constexpr Row sample_row(std::size_t index, std::uint16_t address) {
   return {address, type, kSignal, row, false, s.name, s.unit, 1.0, s.minimum, s.maximum, s.meaning};
 }
 
-/// The first signals in the order of the catalogue, which begins with the tick, and the tick again.
+/// The first signals of the catalogue, which begins with the tick, and the tick again.
 inline constexpr auto kSample = [] {
   std::array<Row, kFirstSignals + 1> rows{};
   std::uint16_t address = kSampleStart;
@@ -268,8 +270,7 @@ inline constexpr auto kSample = [] {
   return rows;
 }();
 
-/// The others: what sensors say, then the truth, so that one request can read all sensors; and the tick
-/// again.
+/// The other signals: sensors before truth, so that one request can read all sensors; then the tick again.
 inline constexpr auto kMoreSample = [] {
   std::array<Row, kMoreSignals + 1> rows{};
   std::uint16_t address = kMoreSampleStart;
@@ -303,13 +304,12 @@ inline constexpr auto kCommand = std::to_array<Row>({
             "voltage of phase a, or its duty in -1 .. 1, or its current"),
     written(407, kFloat32, kSetpointB, "command_b", "V, 1 or A", 1.0, -kMaxSetpoint, kMaxSetpoint,
             "voltage of phase b, or its duty in -1 .. 1, or its current"),
-    fixed(
-        409, kUnsigned16, kLeaseStatus, "lease_status", "enum",
-        "who holds the lease: 0 nobody, 1 this connection, 2 another Modbus connection, 3 another transport"),
+    fixed(409, kUnsigned16, kLeaseStatus, "lease_status", "enum",
+          "holder of the lease: 0 none, 1 this connection, 2 another Modbus connection, 3 another transport"),
     fixed(410, kUnsigned16, kLastRefusal, "last_refusal", "enum", kLastRefusalMeaning),
 });
 
-/// The same registers for every terminal that there is, so that one request writes them all.
+/// The command registers for all terminals, so that one request writes them all.
 inline constexpr auto kMoreCommand = std::to_array<Row>({
     written(420, kUnsigned16, kLeaseKey, "more_lease_key", "1", 1.0, 0.0, kAny16, "as lease_key"),
     written(421, kUnsigned16, kRequest, "more_request", "enum", 1.0, 0.0, 3.0, "as request"),
