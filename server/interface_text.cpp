@@ -23,7 +23,7 @@ std::vector<can::BusAxis> bus_axes(const BenchConfig& config) {
   return axes;
 }
 
-/// Whether an axis has more than phases a and b and an encoder: its frames need more identifiers.
+/// Whether the bench has a wide axis, whose frames need more identifiers.
 bool has_wide_axis(const BenchConfig& config) {
   return std::any_of(config.setup.axes.begin(), config.setup.axes.end(),
                      [](const AxisSetup& axis) { return terminals_of(axis.parameters).is_wide(); });
@@ -39,13 +39,13 @@ CanConfig chosen_bus(const BenchConfig& config, std::size_t bus) {
   return chosen;
 }
 
-/// How much of a bus its frames take in real time, and of what.
+/// The share of a limit that the frames of a bus take in real time.
 struct Need {
   double share = 0.0;
   std::string limit;
 };
 
-/// What the bench itself sends.
+/// Frames that the bench sends.
 double frames_per_s(const can::BusLoad& load) {
   double sum = 0.0;
   for (const can::MessageLoad& message : load.messages) {
@@ -64,7 +64,7 @@ Need need_of(const BenchConfig& config, const CanConfig& bus) {
   return {load.most_share, fmt::format("what {} bit/s allow", bus.bit_rate)};
 }
 
-/// The least sample_every_ticks with which the bus carries its frames; 0: samples are not what overloads it.
+/// The smallest sample_every_ticks with which the bus carries its frames; 0 if no value is enough.
 std::int64_t enough_ticks(const BenchConfig& config, CanConfig bus) {
   const auto fits = [&](std::int64_t ticks) {
     bus.sample_every_ticks = ticks;

@@ -47,14 +47,14 @@ struct Options {
   bool allow_odd = false;
   std::string experiments;
   std::string audit;
-  double file_s = 0.0;         ///< of plant time in each file of a recording; 0: all
-  std::uint64_t file_mib = 0;  ///< of each file of a recording; 0: any
+  double file_s = 0.0;         ///< plant time in each file of a recording; 0: no limit
+  std::uint64_t file_mib = 0;  ///< size of each file of a recording; 0: no limit
   bool require_realtime = false;
-  std::string print;  ///< a description of an interface, instead of a run
+  std::string print;  ///< prints the description of an interface instead of a run
   std::size_t bus = 1;
 };
 
-/// The file, if everything in it is as one would expect, or odd values are taken all the same.
+/// Loads the bench file; implausible values are refused unless --allow-odd accepts them.
 BenchConfig load_plausible(const Options& o) {
   std::vector<ConfigProblem> odd;
   BenchConfig config = load_config(o.config, odd);
@@ -64,7 +64,7 @@ BenchConfig load_plausible(const Options& o) {
   return config;
 }
 
-/// The configuration of the file with what the command line changes.
+/// The configuration of the file with the changes of the command line.
 BenchConfig configure(const Options& o) {
   BenchConfig config = load_plausible(o);
   if (!o.mode.empty()) {
@@ -110,7 +110,7 @@ void print_ready(const Options& o, const BenchConfig& config, const StreamServer
                          config.tcp.unix_path, others, name_of(config.mode), config.name));
 }
 
-/// In real time a bus must be able to carry what the bench sends.
+/// In real time every bus must be able to carry its frames.
 void check_bus_loads(const Options& o, const BenchConfig& config) {
   if (config.mode != RunMode::kRealtime) return;
   for (const std::string& overload : bus_overloads(config)) {
@@ -119,7 +119,7 @@ void check_bus_loads(const Options& o, const BenchConfig& config) {
   }
 }
 
-/// The buckets that are not empty, as [upper edge in us, count].
+/// The non-empty buckets as [upper edge in us, count].
 nlohmann::json lateness_rows(const LatenessHistogram& lateness) {
   nlohmann::json rows = nlohmann::json::array();
   double edge_us = static_cast<double>(LatenessHistogram::kFirstEdgeNs) * 1e-3;
@@ -162,7 +162,7 @@ RecordingOptions recording_options(const Options& o, const BenchConfig& config) 
       .reserve_bytes = kDiskReserveBytes};
 }
 
-/// Refuses a host that grants less than real time needs.
+/// Throws if the host grants less than real time needs.
 void require_realtime(const BenchConfig& config) {
   if (config.mode != RunMode::kRealtime)
     throw std::runtime_error("--require-rt: this run is not in real time");
@@ -186,7 +186,7 @@ std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config,
   return make_threaded_engine(config, std::move(recorder), io, max_ticks);
 }
 
-/// Shows how far a run of known length is, twice a second, if somebody watches.
+/// Shows the progress of a run of known length twice a second if standard error is a terminal.
 asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
   ServerTimer timer(co_await asio::this_coro::executor);
   const double period_s = static_cast<double>(engine.config().setup.period_ns) * 1e-9;
@@ -204,8 +204,8 @@ void set_log_level(LogLevel level) {
   spdlog::set_level(kLevels[static_cast<std::size_t>(level)]);
 }
 
-/// At each SIGHUP the bench file is read again; of what it says only the tokens and the log level are taken.
-/// The audit log goes on in a new file if somebody has moved the old one.
+/// At each SIGHUP reads the bench file again and applies only its tokens and log level. Opens the audit log
+/// again, so that a moved file is replaced by a new one.
 asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const Options& o, StreamServer& server,
                                        Audit* audit) {
   for (;;) {
@@ -277,7 +277,7 @@ int serve(const Options& o, const BenchConfig& config) {
   stop_signal.emplace(io, [&io] { io.stop(); });
   check_bus_loads(o, config);
   if (o.require_realtime) require_realtime(config);
-  // First: a port in use must not leave a recording behind.
+  // Before the recording: a port in use must not leave a recording behind.
   StreamServer server(io, config.tcp, config.tls);
   Transports transports(io, config);
   std::unique_ptr<Audit> audit;
@@ -314,7 +314,7 @@ int serve(const Options& o, const BenchConfig& config) {
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
   stop_signal.reset();
   notify_service_manager("STOPPING=1");
-  supervisor.reset();  // what stands still from here on shall
+  supervisor.reset();  // ticks and I/O stop from here on
   const Verdict verdict = engine->stop();
   experiments.reset();
   transports.close();
@@ -393,7 +393,7 @@ int main(int argc, char** argv) {
   drivebench::end_without_memory(drivebench::kUnusable);
   drivebench::use_small_stacks();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("drivebench"));
-  google::protobuf::SetLogHandler(nullptr);  // a peer could fill the log with text that is not UTF-8
+  google::protobuf::SetLogHandler(nullptr);  // a peer could fill the log with texts that are not UTF-8
   try {
     if (drivebench::force_arithmetic()) {
       spdlog::warn("a library has changed how this program rounds; set back");

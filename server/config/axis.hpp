@@ -15,16 +15,16 @@ namespace drivebench {
 struct AxisReading {
   AxisConfig config;
   AxisSetup setup;
-  bool parameters_valid = false;  ///< setup.parameters are complete and free of problems
+  bool parameters_valid = false;  ///< setup.parameters are complete and without problems
 };
 
-/// Reads the axis that follows `before`; its number from 1 on is its node id unless it names one. `odd` takes
-/// what is right and yet hardly meant.
+/// Reads the axis that follows `before`. Its default node id is its number, from 1 on. `odd` collects valid
+/// but implausible values.
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
                       std::span<const AxisReading> before, ProblemList& problems,
                       std::vector<ConfigProblem>& odd);
 
-/// A duration given as seconds, rounded to the nearest tick, or as ticks; not both.
+/// Reads a duration in seconds, rounded to the nearest tick, or in ticks; both together are a problem.
 std::optional<Tick> read_ticks(StrictTable& table, std::string_view seconds_key, std::string_view ticks_key,
                                std::int64_t period_ns);
 

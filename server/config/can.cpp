@@ -36,7 +36,7 @@ bool is_number(std::string_view text, std::uint32_t minimum, std::uint32_t maxim
   return result.ec == std::errc() && result.ptr == end && number >= minimum && number <= maximum;
 }
 
-/// The names that the kernel gives to interfaces.
+/// Whether the text can be the name of an interface.
 bool is_interface(std::string_view name) {
   return name.size() <= kMaxInterfaceName && name.find_first_of("/: ") == std::string_view::npos &&
          name != "." && name != "..";
@@ -50,7 +50,7 @@ std::string_view without_baud(std::string_view device) {
   return device.substr(0, device.rfind('@'));
 }
 
-/// "ADDRESS:PORT" or "[ADDRESS]:PORT" that only this computer reaches.
+/// Whether the text is "ADDRESS:PORT" or "[ADDRESS]:PORT" with a loopback address.
 bool is_local_listener(std::string_view place) {
   const std::size_t colon = place.rfind(':');
   if (colon == std::string_view::npos || !is_number(place.substr(colon + 1), 0, 65535)) return false;
@@ -68,7 +68,7 @@ bool is_slcan(std::string_view channel) {
   return is_file(device) && baud_ok;
 }
 
-/// What a channel of the back end must be, or nothing if this is one.
+/// The rule for channels of the back end that this channel breaks; empty: none.
 std::string_view problem_with_channel(CanBackend backend, const std::string& channel) {
   switch (backend) {
     case CanBackend::kSocketCan:
@@ -129,7 +129,7 @@ void read_rates(StrictTable& table, CanConfig& bus) {
       table.integer("state_every_ticks", 1, kMaxEveryTicks).value_or(bus.state_every_ticks);
 }
 
-/// A time of at least `minimum`, or 0 for none.
+/// Reads a time of at least `minimum`, or 0 for none.
 void read_time_or_none(StrictTable& table, std::string_view key, std::int64_t minimum, std::int64_t maximum,
                        std::int64_t& time_ms) {
   time_ms = table.integer(key, 0, maximum).value_or(time_ms);
@@ -180,13 +180,13 @@ void read_profile(StrictTable& table, CanConfig& bus) {
   read_units(table.table("units"), bus.profile);
 }
 
-/// What no two buses can share; empty: this one can be shared.
+/// The resource that only one bus can use; empty: the bus needs none.
 std::string place_of(const CanConfig& bus) {
   const std::string backend(name_of(bus.backend));
   switch (bus.backend) {
     case CanBackend::kSocketCan:
       break;
-    case CanBackend::kUdpMulticast:  // its members hear every group at their port
+    case CanBackend::kUdpMulticast:  // a port receives the frames of every group
       return backend + ':' + std::to_string(bus.port);
     case CanBackend::kSlcan:
       if (bus.channel.starts_with("tcp:")) return bus.channel.ends_with(":0") ? "" : backend + bus.channel;
@@ -224,7 +224,7 @@ std::vector<CanConfig> read_can(StrictTable& root, bool wide) {
       read_channel(table, bus);
       read_port(table, bus);
       check_place(table, bus, buses);
-    } else {  // known keys all the same
+    } else {  // the keys still count as known
       table.text("channel", kMaxChannel);
       table.integer("port", 0, 65535);
     }

@@ -11,11 +11,10 @@
 
 namespace drivebench {
 
-/// Reads all [[can]] sections. `wide`: an axis has more than phases a and b and an encoder, so that its
-/// frames need identifiers, too.
+/// Reads all [[can]] sections. `wide`: the bench has a wide axis, whose frames need identifiers too.
 std::vector<CanConfig> read_can(StrictTable& root, bool wide);
 
-/// By Message; of a message with two variants, one of them: name and node id are the same.
+/// A row for each Message. Rows of one message have the same name and the same use of the node id.
 inline constexpr auto kCanMessages = [] {
   std::array<const can::MessageRow*, can::kMessageCount> rows{};
   for (const can::MessageRow& row : can::kMessages)

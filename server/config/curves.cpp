@@ -82,7 +82,7 @@ std::optional<double> number_of(std::string_view text) {
   return whole ? std::optional(value) : std::nullopt;
 }
 
-/// The next line without its end; `rest` goes behind it.
+/// Takes the next line, without its end, off the front of `rest`.
 std::string_view next_line(std::string_view& rest) {
   const std::size_t end = rest.find('\n');
   std::string_view line = rest.substr(0, end);
@@ -91,7 +91,7 @@ std::string_view next_line(std::string_view& rest) {
   return trimmed(line);
 }
 
-/// What is wrong with a point behind those before it; empty if nothing is.
+/// The problem of the next point of a curve; empty: none.
 std::string misfit(const std::vector<CurvePoint>& points, const CurvePoint& point, bool rising) {
   if (points.size() == kMaxCurvePoints) {
     return "is one more than the " + std::to_string(kMaxCurvePoints) + " points that there may be";

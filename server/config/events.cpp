@@ -22,7 +22,7 @@ constexpr auto kFaultNames = [] {
   return names;
 }();
 
-/// When an event of this table happens; 0 if that is not told rightly.
+/// Reads the tick of an event; 0 if it is missing or wrong.
 Tick read_at(StrictTable& table, std::int64_t period_ns) {
   const auto tick = read_ticks(table, "at_s", "at_tick", period_ns);
   if (!table.has("at_tick")) table.require("at_s");
@@ -74,14 +74,14 @@ void read_faults(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEven
   }
 }
 
-/// A parameter change and the table that asks for it.
+/// A parameter change and its table.
 struct Setting {
   Tick tick;
   ParameterWrite write;
   StrictTable table;
 };
 
-/// The row that a setting names, if it may change while the bench runs.
+/// The row of the parameter that a setting names; null if the parameter is not live.
 const Parameter* read_row(StrictTable& table, const AxisParameters* p, bool shares_shaft) {
   const auto name = table.text("parameter", 200);
   table.require("parameter");
@@ -128,8 +128,8 @@ bool report_broken(Setting& setting, Tick tick, const AxisParameters& p) {
   return true;
 }
 
-/// Follows the settings as the bench will, and tells where they would break a rule between values: looked at
-/// where one begins or ends.
+/// Applies the settings as the bench will, and reports the first that breaks a rule between values. Checks at
+/// the begin and end of each setting.
 void check_settings(std::vector<Setting>& settings, AxisParameters p) {
   std::set<Tick> ticks;
   for (const Setting& setting : settings)
@@ -177,7 +177,7 @@ void read_settings(StrictTable& axis, const AxisParameters* p, bool shares_shaft
     events.push_back({setting.tick, setting.write});
 }
 
-/// Place of an event among those of its tick.
+/// The rank of an event within its tick.
 int rank_of(const Action& action) {
   if (std::holds_alternative<LoadChange>(action)) return 0;
   if (std::holds_alternative<ParameterWrite>(action)) return 1;
@@ -189,7 +189,7 @@ void append(std::string& text, std::string_view key, const std::string& value) {
   text.append(key).append(" = ").append(value).append("\n");
 }
 
-/// One event as a table of its own.
+/// Writes an event as a table.
 struct EventWriter {
   std::string& text;
   const AxisParameters& p;
@@ -221,7 +221,7 @@ struct EventWriter {
     append(text, "impulse_nms", real_text(bump.impulse_nms));
   }
   template <class Other>
-  void operator()(const Other&) const {}  // no configuration asks for it
+  void operator()(const Other&) const {}  // a configuration has no other actions
 };
 
 }  // namespace

@@ -9,12 +9,12 @@
 
 namespace drivebench {
 
-/// Reads [[axis.load]], [[axis.set]], [[axis.fault]] and [[axis.bump]]. `p` are the parameters at the start,
-/// or null if they are not known: then [[axis.set]] is only looked at for its keys.
+/// Reads [[axis.load]], [[axis.set]], [[axis.fault]] and [[axis.bump]]. `p` are the initial parameters, or
+/// null if they are wrong: then only the keys of [[axis.set]] are checked.
 std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, bool shares_shaft,
                                    std::int64_t period_ns);
 
-/// The same as TOML, in ticks.
+/// The events as TOML, in ticks.
 std::string events_text(const std::vector<AxisEvent>& events, const AxisParameters& p);
 
 }  // namespace drivebench

@@ -33,7 +33,7 @@ std::optional<TokenHash> hash_of_digits(std::string_view digits) {
   return hash;
 }
 
-/// Problems name the entry, never what stands in place of the secret.
+/// Reads the token or its hash. Problems name the entry and never show the secret.
 void read_secret(StrictTable& entry, Grant& grant) {
   const auto token = entry.text("token", kMaxToken);
   const auto digits = entry.text("sha256", kMaxToken);

@@ -12,20 +12,20 @@
 
 namespace drivebench {
 
-/// What somebody may do; each role may do what those before it may.
+/// The rights of a session; each role includes those before it.
 enum class Role : std::uint32_t { kViewer = 1, kOperator = 2, kAdmin = 3 };
 std::string_view name_of(Role role) noexcept;
 
-/// SHA-256 of a token. What the server keeps: the tokens themselves are forgotten when they are read.
+/// The SHA-256 of a token. The server keeps only the hashes.
 using TokenHash = std::array<unsigned char, 32>;
 TokenHash hash_of_token(std::string_view token) noexcept;
 
-/// An entry of the tokens file: whoever has the token is this subject.
+/// An entry of the tokens file: the subject to whom a token belongs.
 struct Grant {
   std::string name{};
   Role role = Role::kViewer;
   TokenHash hash{};
-  std::optional<std::chrono::sys_seconds> until{};  ///< end of the subject's slot; none: no end
+  std::optional<std::chrono::sys_seconds> until{};  ///< the token is valid until then; none: for ever
   bool revoked = false;
 
   bool holds_at(std::chrono::system_clock::time_point now) const noexcept {
@@ -34,10 +34,11 @@ struct Grant {
   friend bool operator==(const Grant&, const Grant&) = default;
 };
 
-/// Reads a tokens file: regular, and nobody but its owner may read it. Throws ConfigError.
+/// Reads a tokens file: a regular file that only its owner can read. Throws ConfigError.
 std::vector<Grant> load_grants(const std::filesystem::path& file);
 
-/// The grant of this token, or null. Takes the same time whichever it is, and how much of it is right.
+/// The grant of a token, or null. The time does not depend on the token, so that it shows no part of a valid
+/// one.
 const Grant* find_grant(std::span<const Grant> grants, std::string_view token) noexcept;
 
 }  // namespace drivebench

@@ -13,13 +13,13 @@
 namespace drivebench {
 namespace {
 
-/// A section of the parameter tables, for example "machine", and the tables that give its values.
+/// A section of the parameters, for example "machine", and the tables with its values.
 struct Section {
   std::string_view name;
   StrictTable bench;
-  std::optional<StrictTable> motor;  ///< the bench's values have precedence
-  bool optional = false;             ///< nothing of it is required
-  bool incomplete = false;           ///< a value is missing or wrong: no rule between values can be checked
+  std::optional<StrictTable> motor;  ///< values of the bench file have precedence
+  bool optional = false;             ///< no key is required
+  bool incomplete = false;  ///< a value is missing or wrong, so that rules between values cannot be checked
 };
 
 bool is_switch(const Parameter& row) noexcept {
@@ -30,7 +30,7 @@ bool is_of_motor(std::string_view section) noexcept {
   return section == "machine" || section == "mechanics" || section == "thermal";
 }
 
-/// The kind of machine, by its place in machine_kinds(); nothing if it is not known.
+/// The index of the machine kind in machine_kinds(); nothing if the kind is unknown.
 std::optional<std::size_t> read_kind(StrictTable& bench, StrictTable* motor, bool motor_missing) {
   const auto of_motor = motor != nullptr ? motor->choice("kind", machine_kinds()) : std::nullopt;
   const auto of_bench = bench.choice("kind", machine_kinds());
@@ -44,7 +44,7 @@ std::optional<std::size_t> read_kind(StrictTable& bench, StrictTable* motor, boo
   return is_told || motor_missing ? std::nullopt : std::optional<std::size_t>(0);
 }
 
-/// All sections but that of the machine.
+/// All sections except that of the machine.
 class Sections {
  public:
   explicit Sections(const ParameterSource& source) : source_(source) {}
@@ -68,7 +68,7 @@ class Sections {
   std::vector<Section> sections_;
 };
 
-/// Reads one row or curve; `read` takes it out of a table and tells whether it was right.
+/// Reads one row or curve. `read` reads it from a table and returns whether the value is valid.
 template <class Read>
 void read_entry(Section& section, std::string_view key, bool required, bool motor_missing, Read read) {
   bool present = false;
@@ -80,12 +80,12 @@ void read_entry(Section& section, std::string_view key, bool required, bool moto
   if (section.motor) read_from(*section.motor, false);
   read_from(section.bench, true);
   if (present || !required || section.optional) return;
-  const bool excused = section.incomplete && motor_missing;  // the motor file may have had it
+  const bool excused = section.incomplete && motor_missing;  // the unreadable motor file may have the value
   section.incomplete = true;
   if (!excused) (section.motor ? *section.motor : section.bench).require(key);
 }
 
-/// The table that gives this value; null if not all of its section is there.
+/// The table with this value; null if its section is incomplete.
 StrictTable* table_of(std::vector<Section>& sections, std::string_view field) {
   const auto section = std::find_if(sections.begin(), sections.end(),
                                     [&](const Section& s) { return s.name == section_of(field); });
@@ -112,14 +112,14 @@ void report_oddities(std::vector<Section>& sections, const AxisParameters& p,
   }
 }
 
-/// The shaft is another axis': what stands in the motor file is only checked.
+/// Checks the mechanics of an axis that shares the shaft of another one, without using the values.
 void share_mechanics(Section& section, const ParameterSource& source, AxisParameters& p) {
   if (section.bench.exists()) {
     source.axis.report("mechanics",
                        "cannot stand beside shares_shaft_with: the shaft is that of the other axis");
   }
   p.mechanics = {.inertia_kgm2 = source.shared_mechanics->inertia_kgm2};
-  section.incomplete = true;  // its rules are told of the other axis
+  section.incomplete = true;  // the other axis reports broken rules
 }
 
 }  // namespace

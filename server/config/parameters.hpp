@@ -11,33 +11,33 @@
 
 namespace drivebench {
 
-/// The motor file of an axis: must outlive what reads it.
+/// The motor file of an axis. It must outlive the tables that read it.
 struct MotorFile {
   std::string path;
-  std::filesystem::path folder;  ///< where the files that it names are looked for
+  std::filesystem::path folder;  ///< names of other files are relative to it
   std::optional<ConfigNode> document;
   std::optional<StrictTable> table;
   std::string name;
 };
 
-/// Where the parameters of an axis come from.
+/// The sources of the parameters of an axis.
 struct ParameterSource {
   StrictTable& axis;
   MotorFile& motor;
-  bool motor_missing;               ///< it is named but cannot be read
-  std::filesystem::path folder;     ///< of the bench file; empty: it may name no other files
-  std::vector<ConfigProblem>& odd;  ///< takes what is right and yet hardly meant
+  bool motor_missing;               ///< the bench file names a motor file that cannot be read
+  std::filesystem::path folder;     ///< of the bench file; empty: the text must not name other files
+  std::vector<ConfigProblem>& odd;  ///< collects valid but implausible values
   const MechanicsParameters* shared_mechanics = nullptr;  ///< of the axis whose shaft this one shares
 };
 
-/// Reads the kind of machine and every row and curve of its tables. False if something was missing or wrong,
-/// which then has been told.
+/// Reads the kind of machine and every row and curve of its tables. False if a value was missing or wrong;
+/// the problem is then reported.
 bool read_parameters(const ParameterSource& source, ProblemList& problems, AxisParameters& p);
 
-/// The value of a parameter if the table has it and it is right by itself.
+/// The value of a parameter; nothing if it is absent or out of its limits.
 std::optional<double> read_value(StrictTable& table, std::string_view key, const Parameter& row);
 
-/// The value as configurations write it.
+/// The value in TOML.
 std::string value_text(const Parameter& row, double value);
 
 constexpr std::string_view section_of(std::string_view row) noexcept {

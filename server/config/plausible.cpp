@@ -9,8 +9,8 @@
 namespace drivebench {
 namespace {
 
-// Below this the transients of currents are so fast, and the leakage so small a difference of large numbers,
-// that a digit was lost rather than a machine built.
+// Below this the leakage is a small difference of large numbers, and the current transients are faster than
+// those of real machines: most likely a digit is wrong.
 constexpr double kLeastLeakageFactor = 0.005;
 
 }  // namespace

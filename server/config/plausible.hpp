@@ -9,11 +9,11 @@
 
 namespace drivebench {
 
-/// What is right by the rules, and yet hardly any machine of its kind is so: most often somebody took one
-/// unit for another.
+/// Values that keep all rules but are implausible for the kind of machine, mostly because of a mixed-up unit.
 std::vector<Problem> oddities(const AxisParameters& p);
 
-/// As the other load_config(), and says what is odd. Where something is wrong, what is odd stands behind it.
+/// Like the other load_config(), and collects implausible values. A ConfigError lists them behind its
+/// problems.
 BenchConfig load_config(const std::filesystem::path& file, std::vector<ConfigProblem>& odd);
 
 }  // namespace drivebench

@@ -24,11 +24,11 @@ namespace {
 
 constexpr std::int64_t kMaxSeed = INT64_MAX;  // the largest integer of TOML
 constexpr double kDefaultLeaseS = 2.0;
-constexpr double kLongestLeaseS = 1e9;  // so that its nanoseconds, and those of now, can be added
+constexpr double kLongestLeaseS = 1e9;  // its nanoseconds can be added to those of the clock
 constexpr std::int64_t kMaxArmingCommands = 1000;
 constexpr int kLastCpu = 1023;
 
-/// A duration in units of `ns_per_unit`, which must come to whole nanoseconds.
+/// Reads a duration in units of `ns_per_unit`; it must be a whole number of nanoseconds.
 std::optional<std::int64_t> read_ns(StrictTable& table, std::string_view key, double ns_per_unit,
                                     double minimum, double maximum) {
   const auto value = table.real(key, minimum, maximum);
@@ -65,7 +65,7 @@ void read_lease(StrictTable& bench, bool period_valid, BenchSetup& setup) {
   }
 }
 
-/// Whether the period and the substeps, if there are any, are right.
+/// Reads [bench]; false if the period or the substeps are wrong.
 bool read_bench(StrictTable& bench, BenchConfig& config) {
   for (const std::string_view key : {"name", "mode", "period_us"})
     bench.require(key);
@@ -182,7 +182,7 @@ std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::pat
   return axes;
 }
 
-/// What is odd may be why something else is wrong.
+/// Reports implausible values together with problems, since they may be the cause.
 void throw_if_any(ProblemList& problems, const std::vector<ConfigProblem>& odd) {
   try {
     problems.throw_if_any();

@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t kMaxUnixPath = 107;  // sockaddr_un
 constexpr std::size_t kMaxPath = 800;
 
-/// The file that a key names, relative to the folder; none if it may name none.
+/// Reads the name of a file, relative to the folder; without a folder a name is a problem.
 std::filesystem::path read_path(StrictTable& table, std::string_view key,
                                 const std::filesystem::path& folder) {
   const auto name = table.text(key, kMaxPath);

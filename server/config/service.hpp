@@ -5,7 +5,7 @@
 #include "server/config/config.hpp"
 #include "server/config/strict_table.hpp"
 
-/// Who may come in, and what is written about it.
+/// Reads the sections about access to the server and its logs.
 namespace drivebench {
 
 void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig& tcp);

@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-// RK4 is stable up to 2.8 of the fastest time constant, and accurate to 1e-4 of a transient at one half.
+// RK4 is stable up to 2.8 times the fastest time constant, and accurate to 1e-4 of a transient at one half.
 constexpr double kMaxStep = 0.5;
 constexpr double kMaxCurrentLoopS = 20e-6;
 
@@ -20,14 +20,14 @@ double period_s_of(const BenchSetup& setup) {
   return static_cast<double>(setup.period_ns) * 1e-9;
 }
 
-/// Of the machine and its shaft.
+/// The fastest time constant of the machine and its shaft.
 double fastest_time_constant_s(const AxisParameters& p) {
   const double machine_s =
       std::visit([](const auto& machine) { return drivebench::fastest_time_constant_s(machine); }, p.machine);
   return std::min(machine_s, drivebench::fastest_time_constant_s(p.mechanics));
 }
 
-/// What would help: more substeps, or ticks so short that the most substeps are enough.
+/// The cure: more substeps, or ticks so short that the largest number of substeps is enough.
 std::string advice(double needed, double longest_step_s) {
   if (needed <= kMaxSubsteps) return "at least " + shortest(needed) + " substeps are needed";
   return "even " + std::to_string(kMaxSubsteps) + " substeps would need a period_us of at most " +
@@ -64,7 +64,7 @@ void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& 
     bench.report("period_us",
                  "does not suit axis \"" + axis.config.name + "\": " + problem.field + " " + problem.rule);
   }
-  const double slack = 1.0 + 1e-9;  // 100 us in five steps are 20 us
+  const double slack = 1.0 + 1e-9;  // rounding: 100 us in five steps are 20 us
   if (axis.setup.parameters.drive.kind == DriveKind::kCurrent &&
       period_s > kMaxCurrentLoopS * setup.substeps * slack) {
     bench.report(key, step + "the current loop of axis \"" + axis.config.name +

@@ -7,10 +7,10 @@
 
 namespace drivebench {
 
-/// The number of substeps that suits every axis by itself, for benches that do not name one.
+/// The smallest number of substeps that suits every axis, for benches that do not set one.
 int automatic_substeps(std::span<const AxisReading> axes, std::int64_t period_ns);
 
-/// Tells if the integration step is too long for an axis.
+/// Reports an integration step that is too long for the axis.
 void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& axis);
 
 }  // namespace drivebench

@@ -12,7 +12,7 @@ namespace {
 
 using Kind = ConfigNode::Kind;
 
-/// What the node is, for "is ... but must be ...".
+/// Describes the node, for "is ... but must be ...".
 std::string described(const ConfigNode& node) {
   if (node.kind == Kind::kTable) return "a table";
   if (node.kind == Kind::kArray) return "an array";
@@ -33,7 +33,7 @@ std::string joined(const auto& words, std::string_view quote) {
   return list;
 }
 
-/// The known key that was probably meant, or all of them.
+/// Suggests the nearest known key, or lists all of them.
 std::string advice(std::string_view key, const std::vector<std::string>& known) {
   if (known.empty()) return {};
   const auto distance = [&](const std::string& other) { return edit_distance(key, other); };

@@ -13,16 +13,16 @@
 namespace drivebench {
 
 /// Reads a table key by key. A value of the wrong type, outside its limits or not finite is a problem, and so
-/// is every key that nobody asked for. Each function returns nothing for a key that is absent or wrong.
+/// is every unknown key. Each function returns nothing for a key that is absent or wrong.
 class StrictTable {
  public:
-  /// A table that does not exist reads as an empty one at `line`.
+  /// A null table reads as an empty one at `line`.
   StrictTable(const ConfigNode* table, std::string path, int line, const std::string& file,
               ProblemList& problems);
 
   std::optional<bool> boolean(std::string_view key);
   std::optional<std::int64_t> integer(std::string_view key, std::int64_t minimum, std::int64_t maximum);
-  /// The same of an integer that may be written as a hexadecimal number too.
+  /// Like integer(), also in hexadecimal.
   std::optional<std::int64_t> hexadecimal_integer(std::string_view key, std::int64_t minimum,
                                                   std::int64_t maximum);
   std::optional<double> real(std::string_view key);
@@ -31,19 +31,19 @@ class StrictTable {
   std::optional<std::string> text(std::string_view key, std::size_t most);
   /// Letters, digits, '.', '_' and '-', at most 64 of them.
   std::optional<std::string> identifier(std::string_view key);
-  /// An IPv4 or IPv6 address or "localhost", as is_address() has it.
+  /// An address, see is_address().
   std::optional<std::string> address(std::string_view key);
-  /// One of the words; its index.
+  /// The index of one of the words.
   std::optional<std::size_t> choice(std::string_view key, std::span<const std::string_view> words);
 
-  /// A value of whatever kind; null if there is none.
+  /// A value of any kind; null if absent.
   const ConfigNode* node(std::string_view key) { return take(key); }
   StrictTable table(std::string_view key);
   std::vector<StrictTable> tables(std::string_view key, std::size_t most);
 
-  /// A problem with this key if it is absent.
+  /// Reports the key if it is absent.
   void require(std::string_view key);
-  /// A problem for every key that was not asked for. To be called last.
+  /// Reports every key that no call has named. To be called last.
   void finish();
 
   bool has(std::string_view key) const { return find(key) != nullptr; }
@@ -52,16 +52,16 @@ class StrictTable {
   int line_of(std::string_view key) const;
   /// Adds a problem with this key, at its line.
   void report(std::string_view key, std::string rule) { report_at(line_of(key), key, std::move(rule)); }
-  /// What report() would add.
+  /// The problem that report() adds.
   ConfigProblem problem(std::string_view key, std::string rule) const {
     return {*file_, line_of(key), path_of(key), std::move(rule)};
   }
-  /// The same at another line, of something within its value.
+  /// report() at another line, for an element of the value.
   void report_at(int line, std::string_view key, std::string rule);
 
  private:
   const ConfigNode* find(std::string_view key) const;
-  /// The node with this key, which now counts as known.
+  /// The node with this key; the key then counts as known.
   const ConfigNode* take(std::string_view key);
   template <class T>
   const T* scalar(std::string_view key, std::string_view expected);

@@ -70,7 +70,7 @@ void append_service(std::string& text, const RealtimeConfig& realtime, const Tcp
   append(text, "cpu", std::to_string(realtime.cpu));
   append(text, "priority", std::to_string(realtime.priority));
   text += "\n[tcp]\n";
-  // Without the tokens, which stay secret, an address that others can reach would be refused.
+  // The text has no tokens, and without them a non-loopback address would be refused.
   if (is_loopback(tcp.address)) append(text, "address", in_quotes(tcp.address));
   append(text, "port", std::to_string(tcp.port));
   if (!tcp.unix_path.empty()) append(text, "unix_path", in_quotes(tcp.unix_path));
@@ -144,7 +144,7 @@ std::string physics_toml(const BenchConfig& config) {
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     text += "\n[[axis]]\n";
     if (const auto partner = config.setup.axes[i].shares_shaft_with) {
-      append(text, "shares_shaft_with", std::to_string(*partner));  // a number: names do not count here
+      append(text, "shares_shaft_with", std::to_string(*partner));  // the hash ignores names
     }
     append_axis(text, config.setup.axes[i], config.axes[i]);
   }

@@ -9,13 +9,13 @@
 
 namespace drivebench {
 
-/// Does what keeps a disk busy on a thread of its own, in the order in which it was asked for.
+/// Runs jobs that wait for a disk on a thread of its own, in the order of add().
 class DiskThread {
  public:
   using Job = std::function<void()>;
 
   DiskThread() : thread_([this] { work(); }) {}
-  /// Does first what it was asked for.
+  /// Finishes all added jobs first.
   ~DiskThread() {
     {
       const std::lock_guard lock(mutex_);
@@ -27,7 +27,7 @@ class DiskThread {
   DiskThread(const DiskThread&) = delete;
   DiskThread& operator=(const DiskThread&) = delete;
 
-  /// A job throws nothing.
+  /// A job must not throw.
   void add(Job job) {
     {
       const std::lock_guard lock(mutex_);
@@ -49,7 +49,7 @@ class DiskThread {
     }
   }
 
-  std::mutex mutex_;  // of what is below
+  std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
   std::deque<Job> jobs_;
   bool stop_ = false;

@@ -17,9 +17,9 @@ namespace drivebench {
 namespace {
 
 constexpr auto kWatchInterval = std::chrono::milliseconds(250);
-/// Below everybody who has to meet a deadline.
+/// The worker runs below all threads with deadlines.
 constexpr int kWorkerNice = 10;
-/// How many may ask for an experiment again that is not on the disk yet.
+/// The most requests that wait for one experiment to reach the disk.
 constexpr std::size_t kMaxAnswers = 64;
 
 }  // namespace
@@ -40,7 +40,7 @@ Experiments::Experiments(asio::io_context& io, const BenchConfig& config, WriteF
       timer_(io) {
   lock_folder();
   load();
-  maximum_length_sequence(kMaxPrbsOrder);  // now, not when a request comes and the live bench runs
+  maximum_length_sequence(kMaxPrbsOrder);  // takes milliseconds: now, not while the live bench runs
   worker_ = std::thread([this] { work(); });
 }
 
@@ -65,7 +65,7 @@ Experiments::Pointer Experiments::known(const v1::RunExperiment& request) const 
     const v1::RunExperiment& other = experiment->request;
     if (other.request_key() != request.request_key() || !same_secret(request.owner(), other.owner()))
       continue;
-    // Table numbers belong to a session, which may be another one by now.
+    // Table numbers belong to a session, and the client may have a new session.
     const auto without_tables = [](v1::RunExperiment r) {
       for (v1::Shape& shape : *r.mutable_input()->mutable_shapes()) {
         if (shape.has_table()) shape.mutable_table()->clear_id();
@@ -74,7 +74,7 @@ Experiments::Pointer Experiments::known(const v1::RunExperiment& request) const 
     };
     if (without_tables(other) == without_tables(request)) return experiment;
     throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, "request_key",
-                     fmt::format("request_key is that of experiment {}, which is another one", id));
+                     fmt::format("request_key belongs to experiment {}, whose request differs", id));
   }
   return nullptr;
 }
@@ -85,7 +85,7 @@ void Experiments::check_room() const {
   });
   if (waiting < static_cast<std::ptrdiff_t>(config_.experiments.queue_length)) return;
   throw BadRequest(v1::REFUSAL_BUSY, "queue",
-                   fmt::format("{} experiments are waiting, as many as may", waiting));
+                   fmt::format("{} experiments are waiting, and the queue holds no more", waiting));
 }
 
 std::uint64_t Experiments::round_for(const std::string& owner) const {
@@ -110,7 +110,7 @@ void Experiments::submit(const v1::RunExperiment& request, const TableLookup& ta
     if (waiting == answers_.end()) return answer(same, {});
     if (waiting->second.size() == kMaxAnswers) {
       throw BadRequest(v1::REFUSAL_BUSY, "request_key",
-                       fmt::format("experiment {} is not on the disk yet, and {} wait to be told of it",
+                       fmt::format("experiment {} is not on the disk yet, and {} requests wait for it",
                                    same->id, kMaxAnswers));
     }
     return waiting->second.push_back(std::move(answer));
@@ -140,7 +140,7 @@ void Experiments::submit(const v1::RunExperiment& request, const TableLookup& ta
   disk_->add([this, experiment] { keep_new(experiment); });
 }
 
-/// On the thread of the disk.
+/// Stores a new experiment. Runs on the disk thread.
 void Experiments::keep_new(const Pointer& experiment) {
   std::string why_not;
   try {
@@ -174,7 +174,7 @@ std::shared_ptr<const Experiment> Experiments::find(std::uint64_t id, const std:
   const std::lock_guard lock(mutex_);
   Pointer experiment = at(id);
   if (experiment->request.shared() || same_secret(owner, experiment->request.owner())) return experiment;
-  throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner", fmt::format("experiment {} belongs to somebody else", id));
+  throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner", fmt::format("experiment {} belongs to another owner", id));
 }
 
 std::shared_ptr<const Experiment> Experiments::cancel(std::uint64_t id, const std::string& owner) {
@@ -184,7 +184,7 @@ std::shared_ptr<const Experiment> Experiments::cancel(std::uint64_t id, const st
     experiment = at(id);
     if (!same_secret(owner, experiment->request.owner())) {
       throw BadRequest(v1::REFUSAL_NOT_OWNER, "owner",
-                       fmt::format("experiment {} belongs to somebody else", id));
+                       fmt::format("experiment {} belongs to another owner", id));
     }
     experiment->progress.cancel.store(true);
     if (experiment->info.state() != v1::EXPERIMENT_STATE_QUEUED) return experiment;
@@ -251,10 +251,11 @@ void Experiments::check_rows(std::uint64_t more) const {
     if (const auto table = each.lock()) rows += table->size();
   }
   if (rows <= kSharesOfTables * config_.experiments.table_rows) return;
-  throw BadRequest(v1::REFUSAL_BUSY, "times_s", "the tables of all sessions are as large as they may be");
+  throw BadRequest(v1::REFUSAL_BUSY, "times_s",
+                   "the tables of all sessions together would have too many rows");
 }
 
-/// While anything is under way, whoever follows it hears of it, also when there are no new rows.
+/// While an experiment is queued or runs, calls on_change regularly, also without new rows.
 void Experiments::watch() {
   timer_.expires_after(kWatchInterval);
   timer_.async_wait([this, alive = alive_](const boost::system::error_code& error) {
@@ -288,7 +289,7 @@ Experiments::Pointer Experiments::next() const {
 }
 
 void Experiments::work() {
-  // Of this thread alone, as Linux has it.
+  // On Linux this sets the priority of the thread.
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kWorkerNice);
   std::unique_lock lock(mutex_);
   while (true) {
@@ -307,7 +308,7 @@ void Experiments::work() {
 
 void Experiments::run(const Pointer& experiment) {
   v1::RunExperiment request = experiment->request;
-  request.clear_owner();  // the recording may go to others
+  request.clear_owner();  // other clients may get the recording
   RunOutcome outcome;
   try {
     outcome = run_experiment(experiment->plan,
@@ -320,9 +321,9 @@ void Experiments::run(const Pointer& experiment) {
   notify();
 }
 
-/// It is on the disk before others are told of it, and nobody waits for that.
+/// Ends an experiment: stores it before clients can see the end.
 void Experiments::end(const Pointer& experiment, const RunOutcome& outcome) {
-  v1::ExperimentInfo info = experiment->info;  // while it runs only this thread changes it
+  v1::ExperimentInfo info = experiment->info;  // only this thread changes it during the run
   info.set_state(outcome.state);
   info.set_reason(utf8(outcome.reason, kMaxExperimentReasonBytes));
   if (outcome.state == v1::EXPERIMENT_STATE_CANCELLED) {
@@ -334,7 +335,7 @@ void Experiments::end(const Pointer& experiment, const RunOutcome& outcome) {
   const std::uintmax_t bytes = std::filesystem::file_size(recording_file(experiment->id), error);
   info.set_recording_bytes(error ? 0 : bytes);
   try_to_store(*experiment, info);
-  const ExperimentPlan over = std::exchange(experiment->plan, {});  // goes when the lock is free
+  const ExperimentPlan over = std::exchange(experiment->plan, {});  // destroyed after the lock is released
   const std::lock_guard lock(mutex_);
   experiment->info.Swap(&info);
   running_.reset();

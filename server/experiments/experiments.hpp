@@ -22,49 +22,46 @@
 
 namespace drivebench {
 
-/// One experiment, from its request to its end.
+/// An experiment of the server, from its request to its end.
 struct Experiment {
   std::uint64_t id = 0;
   v1::RunExperiment request;
-  ExperimentPlan plan;      ///< until it has ended
-  std::uint64_t round = 0;  ///< the experiments of one round come before those of the next
-  bool is_stored = false;   ///< a crash cannot forget it: others may be told of it
-  std::uint64_t end = 0;    ///< 1 for the first that ended; 0: it has not
+  ExperimentPlan plan;      ///< empty after the end
+  std::uint64_t round = 0;  ///< the experiments of a round run before those of the next
+  bool is_stored = false;   ///< on the disk: clients may see it
+  std::uint64_t end = 0;    ///< order of the ends, from 1 on; 0: not ended
   RunProgress progress;
-  v1::ExperimentInfo info;  ///< without what progress and queue say
+  v1::ExperimentInfo info;  ///< without tick, rows and queue position
 };
 
-/// Writes a file so that it is there whole or not at all, whatever the power does, and that only the server's
-/// user may read it. Throws std::system_error.
+/// Writes a file that exists either whole or not at all, also after a power cut, and that only the server's
+/// user can read. Throws std::system_error.
 void write_whole(const std::filesystem::path& file, const std::string& bytes);
-/// Tests put disks in its place that are full or stand still.
+/// A replacement for write_whole(): tests use disks that are full or stand still.
 using WriteFile = std::function<void(const std::filesystem::path&, const std::string&)>;
 
 /// The experiments of a server: a queue, one thread that runs them one after the other on benches of their
-/// own, and a folder that keeps them. All methods are called on the I/O thread, and none waits until a disk
-/// has something: that do the thread that runs an experiment, with its own files, and another one.
-///
-/// The queue is fair: in each round every owner has one turn, and within a round the one who came first goes
-/// first.
+/// own, and a folder that keeps them. All methods are called on the I/O thread, and none waits for a disk:
+/// the worker writes the files of the running experiment, the disk thread all others. The queue is fair: in
+/// each round every owner has one turn; within a round the first request runs first.
 class Experiments {
  public:
-  /// Takes over what the folder holds. Throws std::runtime_error if it cannot be had or another server has
-  /// it.
+  /// Loads the folder. Throws std::runtime_error if the folder cannot be used or another server uses it.
   Experiments(asio::io_context& io, const BenchConfig& config, WriteFile write_file = write_whole);
-  /// Ends the running one with safe action, and the queue.
+  /// Ends the running experiment with the safe action, and the queue.
   ~Experiments();
   Experiments(const Experiments&) = delete;
   Experiments& operator=(const Experiments&) = delete;
 
-  /// Called when an experiment may have gone on.
+  /// Called when the state or the data of an experiment may have changed.
   std::function<void()> on_change;
 
-  /// The experiment once it is on the disk; or null and why it cannot be.
+  /// Called with the experiment once it is on the disk, or with null and the error.
   using Answer = std::function<void(const std::shared_ptr<const Experiment>&, const std::string& why_not)>;
 
   // These throw BadRequest.
   void submit(const v1::RunExperiment& request, const TableLookup& tables, Answer answer);
-  /// The experiment with this id, if the owner may see its data.
+  /// The experiment with this id, if the owner may read its data.
   std::shared_ptr<const Experiment> find(std::uint64_t id, const std::string& owner) const;
   std::shared_ptr<const Experiment> cancel(std::uint64_t id, const std::string& owner);
 
@@ -76,9 +73,9 @@ class Experiments {
 
   /// A new table for a session. Throws std::system_error.
   std::shared_ptr<SignalTable> new_table();
-  /// Of all tables of a session.
+  /// The most rows of all tables of a session.
   std::uint64_t max_table_rows() const { return config_.experiments.table_rows; }
-  /// Throws BadRequest if so many more rows were too many for all sessions together.
+  /// Throws BadRequest if the tables of all sessions cannot take this many more rows.
   void check_rows(std::uint64_t more) const;
 
   static bool has_ended(v1::ExperimentState state) noexcept { return state > v1::EXPERIMENT_STATE_RUNNING; }
@@ -86,7 +83,7 @@ class Experiments {
  private:
   using Pointer = std::shared_ptr<Experiment>;
 
-  /// So many sessions may have the largest tables at a time.
+  /// The number of sessions that can have the largest tables at the same time.
   static constexpr std::uint64_t kSharesOfTables = 4;
 
   std::filesystem::path file_of(std::uint64_t id, std::string_view ending) const;
@@ -116,12 +113,12 @@ class Experiments {
   WriteFile write_file_;
   int lock_ = -1;
   ServerTimer timer_;
-  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  // for what is posted; I/O thread only
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  // for posted handlers; I/O thread only
   std::atomic<bool> notified_{false};
   std::vector<std::weak_ptr<SignalTable>> tables_;        // of all sessions
-  std::map<std::uint64_t, std::vector<Answer>> answers_;  // by id, while it is on its way to the disk
+  std::map<std::uint64_t, std::vector<Answer>> answers_;  // by id, until the experiment is on the disk
 
-  // Of what is below; never taken in a tick of the live bench, nor held while a disk works.
+  // Guards the members below. Never locked in a tick of the live bench, nor during a disk access.
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::uint64_t, Pointer> all_;
@@ -131,11 +128,11 @@ class Experiments {
   Pointer running_;
   bool stop_ = false;
 
-  std::optional<DiskThread> disk_{std::in_place};  // files of those that do not run
+  std::optional<DiskThread> disk_{std::in_place};  // files of experiments that do not run
   std::thread worker_;
 };
 
-/// Compares without telling by its duration where the first difference is.
+/// Compares in a time that does not depend on the place of the first difference.
 bool same_secret(std::string_view a, std::string_view b) noexcept;
 
 }  // namespace drivebench

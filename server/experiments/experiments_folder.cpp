@@ -1,4 +1,4 @@
-// The folder of the experiments: what is kept, and until when.
+// The folder of the experiments: loading, storing and deleting.
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/file.h>
@@ -27,7 +27,7 @@ constexpr std::size_t kMaxStoredBytes = std::size_t{4} * 1024 * 1024;
 constexpr auto kEndings =
     std::to_array<std::string_view>({".experiment", ".rows", ".mcap", ".experiment.new"});
 
-/// The id in the name of a file of ours, 0 if it is none.
+/// The id in the name of an experiment file; 0 for other files.
 std::uint64_t id_of(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   std::uint64_t id = 0;
@@ -36,7 +36,7 @@ std::uint64_t id_of(const std::filesystem::path& file) {
   return error == std::errc{} && std::ranges::find(kEndings, ending) != kEndings.end() ? id : 0;
 }
 
-/// The rule that a file of this number breaks: what others go by when they divide, or find whose it is.
+/// The rule that the file of this experiment breaks; empty: none. Other code relies on these rules.
 std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_t id) {
   const v1::ExperimentInfo& info = stored.info();
   if (info.id() != id) return "its id must be the number in its name";
@@ -45,7 +45,7 @@ std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_
   const auto signals = static_cast<std::size_t>(info.signals_size());
   if (signals == 0 || signals > kSignals.size()) return "it must have a signal, and none twice";
   if (info.ByteSizeLong() > kMaxExperimentInfoBytes)
-    return "what there is to list must have 2048 bytes at most";
+    return "its entry in the list must have at most 2048 bytes";
   return {};
 }
 
@@ -53,7 +53,7 @@ std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_
 
 void write_whole(const std::filesystem::path& file, const std::string& bytes) {
   const std::string draft = file.string() + ".new";
-  ::unlink(draft.c_str());  // whose it is and who has it open is not known
+  ::unlink(draft.c_str());  // an old draft may have another owner or be open elsewhere
   const int descriptor = ::open(draft.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   bool done =
       descriptor >= 0 && write_all(descriptor, std::as_bytes(std::span(bytes))) && ::fsync(descriptor) == 0;
@@ -101,7 +101,7 @@ void Experiments::load() {
     std::error_code ignored;
     const std::filesystem::path file = file_of(id, ".experiment");
     if (!std::filesystem::exists(file)) {
-      remove(id);  // what a crash left before there was anything to know about it
+      remove(id);  // a crash left data without an experiment file
       continue;
     }
     std::filesystem::remove(file_of(id, ".experiment.new"), ignored);
@@ -110,7 +110,7 @@ void Experiments::load() {
       ended.emplace_back(std::filesystem::last_write_time(file, ignored), std::move(experiment));
     }
   }
-  // Its end was the last that was written to its file.
+  // The last write of an experiment file is that of its end.
   std::stable_sort(ended.begin(), ended.end(),
                    [](const auto& x, const auto& y) { return x.first < y.first; });
   for (const auto& [time, experiment] : ended)
@@ -168,8 +168,8 @@ void Experiments::remove(std::uint64_t id) const {
   }
 }
 
-/// It has ended. Beyond `kept` the one goes that did so first: by number, one that had to wait in the queue
-/// would go as soon as its data are there.
+/// Records the end of an experiment. Beyond `kept` it deletes the experiment that ended first, not the one
+/// with the lowest id, whose data may be new after a long wait in the queue.
 void Experiments::keep_ended(Experiment& experiment) {
   experiment.end = ++last_end_;
   std::vector<Pointer> ended;

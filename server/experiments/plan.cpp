@@ -74,7 +74,7 @@ std::vector<const Signal*> signals_of(const v1::RunExperiment& r) {
   return signals;
 }
 
-/// The row of a parameter that may have this value.
+/// The row of a parameter, after checking the value.
 std::uint32_t row_of(const v1::NamedValue& wanted, const BenchConfig& config, std::uint32_t axis,
                      const std::string& field) {
   const AxisParameters& p = config.setup.axes[axis].parameters;
@@ -94,10 +94,10 @@ std::uint32_t row_of(const v1::NamedValue& wanted, const BenchConfig& config, st
   return static_cast<std::uint32_t>(row - axis_parameters(p).data());
 }
 
-/// The configuration with the settings; read back as a replay will read it, so that it keeps all rules.
+/// The configuration with the settings, checked against all rules by reading it back like a replay.
 BenchConfig with_settings(const v1::RunExperiment& r, BenchConfig config) {
   config.mode = RunMode::kFree;
-  config.setup.arming_commands = 1;  // its commands cross no link
+  config.setup.arming_commands = 1;  // the commands of an experiment cross no link
   if (r.settings().empty()) return config;
   if (r.settings_size() > kMaxPlannedEvents) {
     throw BadRequest(
@@ -198,7 +198,7 @@ void add_events(const v1::RunExperiment& r, ExperimentPlan& plan) {
                    [](const PlannedEvent& x, const PlannedEvent& y) { return x.tick < y.tick; });
 }
 
-/// The rotor turns from tick 0 on: a blow that a bench of the same kind shows to be of the right size.
+/// Adds a torque impulse at tick 0 for the initial speed; a trial on a bench of the same kind gives its size.
 void add_initial_speed(double speed_rad_s, ExperimentPlan& plan) {
   bounded(speed_rad_s, 1e5, "rad/s", "initial.speed_rad_s");
   if (speed_rad_s == 0.0) return;
@@ -210,7 +210,7 @@ void add_initial_speed(double speed_rad_s, ExperimentPlan& plan) {
   const double impulse_nms = kTrialNms * speed_rad_s / jump_rad_s;
   if (jump_rad_s == 0.0 || !(std::abs(impulse_nms) <= kMaxImpulseNms)) {
     throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, "initial.speed_rad_s",
-                     "initial.speed_rad_s must be 0: no blow can turn this rotor so fast");
+                     "initial.speed_rad_s must be 0: no impulse can turn this rotor so fast");
   }
   plan.events.insert(plan.events.begin(), {.tick = 0, .axis = axis, .action = ShaftBump{impulse_nms}});
 }

@@ -14,7 +14,7 @@
 
 namespace drivebench {
 
-/// A request that cannot be carried out: what() is a sentence with value and rule.
+/// A refused request: what() is a sentence with value and rule.
 class BadRequest : public std::runtime_error {
  public:
   BadRequest(v1::RefusalCode code, std::string field, const std::string& sentence)
@@ -27,14 +27,14 @@ class BadRequest : public std::runtime_error {
   std::string field_;
 };
 
-/// Something that happens to an axis at the start of a tick.
+/// A change of an axis at the start of a tick.
 struct PlannedEvent {
   Tick tick;
   std::uint32_t axis;
   Action action;
 };
 
-/// Which angle turns dq voltages, and how it comes out of a sample.
+/// The angle of the dq transform, and its computation from a sample.
 struct DqAngle {
   bool is_measured = false;
   double pole_pairs = 1.0;
@@ -43,7 +43,7 @@ struct DqAngle {
   double back_emf_vs = 0.0;
 };
 
-/// A request that was found right: everything a run needs.
+/// A checked request: everything that a run needs.
 struct ExperimentPlan {
   BenchConfig config;  ///< with the settings of the request, in free mode
   RunMode mode = RunMode::kFree;
@@ -64,25 +64,25 @@ struct ExperimentPlan {
   }
 };
 
-/// The table that a shape names; null if the session has none with this number.
+/// Finds the table that a shape names; null if the session has none with this number.
 using TableLookup = std::function<std::shared_ptr<const SignalTable>(std::uint64_t)>;
 
-inline constexpr double kMaxInputValue = 1e6;  ///< of shapes, both signs
+inline constexpr double kMaxInputValue = 1e6;  ///< largest magnitude of a shape
 inline constexpr int kMaxShapes = 256;
-inline constexpr int kMaxHarmonics = 1000;  ///< of all shapes
+inline constexpr int kMaxHarmonics = 1000;  ///< of all shapes together
 inline constexpr int kMaxPlannedEvents = 256;
 inline constexpr Tick kMaxExperimentTicks = 100'000'000;
 
-/// Checks a request against the server's configuration. Throws BadRequest with the first thing wrong.
+/// Checks a request against the server's configuration. Throws BadRequest for the first problem.
 ExperimentPlan make_plan(const v1::RunExperiment& request, const BenchConfig& config,
                          const TableLookup& tables);
 
-/// What the drive is commanded in answer to the sample of a tick: a pure function.
+/// The command that answers the sample of a tick: a pure function.
 PhaseCommand command_of(const ExperimentPlan& plan, const Sample& sample, Tick tick) noexcept;
 
-/// Which limit the sample is beyond, as a sentence; empty: none.
+/// The first limit that the sample exceeds, as a sentence; empty: none.
 std::string broken_limit(const v1::StopLimits& stop, const Sample& sample);
-/// Whether it is beyond any.
+/// Whether the sample exceeds a limit.
 bool is_beyond(const v1::StopLimits& stop, const Sample& sample) noexcept;
 
 }  // namespace drivebench

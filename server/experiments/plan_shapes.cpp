@@ -15,7 +15,7 @@ namespace {
 constexpr double kMaxPhaseRad = 1e3;
 constexpr double kMaxShapeS = 1e6;
 
-/// The checks of one shape, with its place in the request for the refusals.
+/// Checks one shape; refusals name its place in the request.
 class ShapeReader {
  public:
   ShapeReader(const v1::Shape& shape, std::string field, const TableLookup& tables,
@@ -60,7 +60,7 @@ class ShapeReader {
   double phase(double x, std::string_view key) const {
     return within(x, -kMaxPhaseRad, kMaxPhaseRad, "rad", key);
   }
-  /// Half the sample rate is the most that samples can show.
+  /// Checks a frequency: samples show at most half the sample rate.
   double frequency(double x, std::string_view key) const {
     return within(x, -0.5 / plan_.period_s(), 0.5 / plan_.period_s(), "Hz, half the sample rate", key);
   }
@@ -235,7 +235,7 @@ void check_kind(const v1::ExperimentInput& input, const ExperimentPlan& plan) {
                  v1::REFUSAL_WRONG_DRIVE);
   }
   if (!plan.has_commands() && !input.shapes().empty()) {
-    refuse_input("shapes", "there is nothing to command with this input.kind, so there must be no shapes");
+    refuse_input("shapes", "this input.kind takes no commands, so there must be no shapes");
   }
   if (input.kind() != v1::INPUT_KIND_DQ_VOLTAGES &&
       (input.angle() != v1::ANGLE_SOURCE_UNSPECIFIED || input.back_emf_vs() != 0.0)) {

@@ -12,25 +12,25 @@
 
 namespace drivebench {
 
-/// All of it, however the system cuts it up; false, with errno, when the disk takes no more.
+/// Writes all bytes, in as many calls as the system needs; false, with errno, on an error.
 bool write_all(int descriptor, std::span<const std::byte> bytes) noexcept;
 
-/// The data of an experiment: rows of little-endian float64, one for each signal. One thread appends; others
-/// read what published() says.
+/// Writes the data of an experiment: rows of little-endian float64, one for each signal. One thread appends;
+/// other threads may read the rows that published() counts.
 class RowWriter {
  public:
-  /// Throws std::system_error if the file exists or cannot be made.
+  /// Throws std::system_error if the file exists or cannot be created.
   RowWriter(const std::filesystem::path& file, std::vector<const Signal*> signals,
             std::atomic<std::uint64_t>& published);
   ~RowWriter();
   RowWriter(const RowWriter&) = delete;
   RowWriter& operator=(const RowWriter&) = delete;
 
-  /// False when the disk takes no more; what was published before stays good.
+  /// False on a disk error; the published rows stay valid.
   bool append(const Sample& sample) noexcept;
   /// Publishes all rows so far.
   bool flush() noexcept;
-  /// The same, and whatever happens to the power, they are there.
+  /// Publishes all rows and brings them to the disk.
   bool finish() noexcept;
 
  private:
@@ -43,7 +43,7 @@ class RowWriter {
   int descriptor_;
 };
 
-/// A file that others write, read by position.
+/// Reads a file by position while another thread appends to it.
 class FileReader {
  public:
   /// Throws std::system_error if it cannot be opened.
@@ -52,7 +52,7 @@ class FileReader {
   FileReader(const FileReader&) = delete;
   FileReader& operator=(const FileReader&) = delete;
 
-  /// Fills `out` from this byte on; throws std::system_error if the file ends before.
+  /// Fills `out` from byte `from` on; throws std::system_error if the file is too short.
   void read(std::uint64_t from, std::span<std::byte> out) const;
 
  private:

@@ -17,11 +17,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr Owner kExperimenter = 1;
-/// How long a row may wait for others before viewers see it, looked at every so many ticks.
+/// The longest wait of a row before it is published, checked every kLookTicks ticks.
 constexpr auto kMaxRowWait = std::chrono::milliseconds(50);
 constexpr Tick kLookTicks = 256;
 
-/// One run, from its first tick to its verdict.
+/// The run of an experiment, from its first tick to its verdict.
 class ExperimentRun {
  public:
   ExperimentRun(const ExperimentPlan& plan, const RunFiles& files, const std::string& request,
@@ -60,7 +60,7 @@ class ExperimentRun {
   bool keep_row() {
     const Tick tick = bench_.tick();
     if (tick % plan_.decimation == 0 && !rows_.append(sample())) return fail("the disk takes no more data");
-    // In real time a tick may be long; in free mode the clock is looked at now and then only.
+    // A free run reads the clock only every kLookTicks; a real-time tick may be long.
     if (plan_.mode == RunMode::kFree && tick % kLookTicks != 0) return true;
     progress_.tick.store(static_cast<std::uint64_t>(tick), std::memory_order_relaxed);
     const Clock::time_point now = Clock::now();
@@ -72,7 +72,7 @@ class ExperimentRun {
   }
 
   bool may_go_on() {
-    if (recorder_.is_over()) return false;  // finish() says why
+    if (recorder_.is_over()) return false;  // finish() reports the reason
     if (is_beyond(plan_.stop, sample())) {
       outcome_.state = v1::EXPERIMENT_STATE_STOPPED;
       outcome_.reason = broken_limit(plan_.stop, sample());
@@ -91,7 +91,7 @@ class ExperimentRun {
     return false;
   }
 
-  /// As the engine of the live bench does it.
+  /// Paces a real-time tick like the engine of the live bench.
   void look_at_the_clock() {
     const std::int64_t lateness_ns = pacer_->wait();
     if (plan_.mode != RunMode::kRealtime) return;
@@ -114,7 +114,7 @@ class ExperimentRun {
 
   void submit_command() {
     PhaseCommand phases = command_of(plan_, sample(), bench_.tick());
-    if (bench_.is_latched(plan_.axis)) phases = {};  // what a latched bench takes: the lease stays
+    if (bench_.is_latched(plan_.axis)) phases = {};  // accepted while latched, and keeps the lease
     bench_.submit({.tick = bench_.tick(),
                    .axis = plan_.axis,
                    .owner = kExperimenter,

@@ -12,11 +12,11 @@
 
 namespace drivebench {
 
-/// What others see of a run while it lasts.
+/// The progress of a run, for other threads.
 struct RunProgress {
   std::atomic<std::uint64_t> tick{0};
   std::atomic<std::uint64_t> rows{0};  ///< in the data file
-  std::atomic<bool> cancel{false};     ///< set by others: end now
+  std::atomic<bool> cancel{false};     ///< set by another thread to end the run
 };
 
 struct RunFiles {
@@ -27,13 +27,13 @@ struct RunFiles {
 
 struct RunOutcome {
   v1::ExperimentState state = v1::EXPERIMENT_STATE_COMPLETED;
-  std::string reason;  ///< a sentence; empty: it ran to its end
+  std::string reason;  ///< a sentence; empty: the run was complete
   Verdict verdict;
 };
 
-/// Runs an experiment on a bench of its own, on the calling thread, into two new files; the request goes into
-/// the recording. `published` is called when there are new rows. Throws std::system_error if a file cannot be
-/// made, or there is less room on its disk than recordings leave free.
+/// Runs an experiment on a bench of its own, on the calling thread, into two new files; attaches the request
+/// to the recording. Calls `published` after new rows. Throws std::system_error if a file cannot be created
+/// or less than kDiskReserveBytes is free.
 RunOutcome run_experiment(const ExperimentPlan& plan, const RunFiles& files, const std::string& request,
                           RunProgress& progress, const std::function<void()>& published);
 

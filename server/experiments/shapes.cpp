@@ -9,12 +9,13 @@ namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
 
-/// The angle of so many turns, within one turn: the cosine is exact to the last bits however long it runs.
+/// The angle of this number of turns, reduced to one turn, so that the cosine keeps its precision in long
+/// runs.
 double angle_of(double turns) noexcept {
   return kTurnRad * (turns - std::floor(turns));
 }
 
-/// What a shape is at a time after its start; `ticks` is the same in ticks, `length_s` how long it lasts.
+/// A time after the start of a shape, in seconds and in ticks; `length_s` is the length of the shape.
 struct Moment {
   Tick ticks;
   double tau_s;

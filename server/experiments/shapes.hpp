@@ -10,8 +10,8 @@
 #include "plant/windings.hpp"
 #include "server/experiments/table.hpp"
 
-/// What an experiment puts in: pure functions of the tick, with the bench's own cosine, so that the same
-/// request gives the same bits everywhere. bench.proto says what each shape is.
+/// The inputs of experiments: pure functions of the tick, with the bench's own cosine, so that the same
+/// request gives the same bits everywhere. bench.proto defines the shapes.
 namespace drivebench {
 
 struct ConstantShape {
@@ -57,9 +57,9 @@ struct TableShape {
 enum class InputChannel : std::uint8_t { kA, kB, kC, kField, kD, kQ, kPhases };
 inline constexpr std::size_t kInputChannels = 6;  ///< without kPhases
 
-/// One shape, in force from `start` to before `end`.
+/// A shape, in force from tick `start` to before `end`.
 struct InputShape {
-  InputChannel channel;  ///< kPhases for a ThreePhaseShape, and for it only
+  InputChannel channel;  ///< kPhases for a ThreePhaseShape and no other
   Tick start;
   Tick end;
   std::variant<ConstantShape, RampShape, SineShape, ThreePhaseShape, ChirpShape, PrbsShape, MultisineShape,
@@ -70,13 +70,13 @@ struct InputShape {
 /// One value for each channel.
 using InputValues = std::array<double, kInputChannels>;
 
-/// Adds what the shape is at the tick. `connection` says how phases b and c lag in a ThreePhaseShape.
+/// Adds the value of the shape at the tick. `connection` gives the lag of phases b and c in a
+/// ThreePhaseShape.
 void add_shape(const InputShape& shape, Tick tick, double period_s, Connection connection,
                InputValues& values) noexcept;
 
 /// One period of a maximum-length sequence: 2^order - 1 bits, 2^(order-1) of them set. `order` is 3 to 20.
-/// The first call makes those of all orders, in some milliseconds and 256 KiB, for as long as the program
-/// runs.
+/// The first call computes the sequences of all orders, in some milliseconds, and keeps them (256 KiB).
 inline constexpr std::uint32_t kMinPrbsOrder = 3;
 inline constexpr std::uint32_t kMaxPrbsOrder = 20;
 const std::vector<bool>& maximum_length_sequence(std::uint32_t order);

@@ -17,7 +17,7 @@ namespace {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
-/// A file that nobody else finds. Not O_TMPFILE, which some file systems do not know.
+/// A file without a name. Not O_TMPFILE, which some file systems do not support.
 int nameless_file(const std::filesystem::path& folder) {
   std::string name = (folder / "table-XXXXXX").string();
   const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
@@ -51,9 +51,9 @@ void SignalTable::append(std::span<const Row> rows) {
 TableView::TableView(const SignalTable& table) {
   if (table.size() == 0) return;
   const std::size_t bytes = table.size() * sizeof(SignalTable::Row);
-  // A real-time server locks all that it maps, for which the kernel reads it in at once: 160 MB in 50 ms,
-  // while the I/O thread waits. What nobody may read yet it leaves alone, and without the lock a run reads
-  // what it needs.
+  // A real-time server locks its mappings, for which the kernel reads the whole file: 160 MB in 50 ms, while
+  // the I/O thread waits. The kernel does not read a mapping without access, and after munlock() a run reads
+  // only the pages it needs.
   mapping_ = ::mmap(nullptr, bytes, PROT_NONE, MAP_SHARED, table.descriptor_, 0);
   if (mapping_ == MAP_FAILED) fail("cannot map a table");
   ::munlock(mapping_, bytes);

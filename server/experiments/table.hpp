@@ -10,8 +10,8 @@
 
 namespace drivebench {
 
-/// Points of a signal over time, on disk: a file without a name that goes with the object. One thread adds
-/// rows, and stops before others look at them.
+/// Points of a signal over time in a nameless file, which is deleted with the object. One thread adds rows;
+/// other threads read them only afterwards.
 class SignalTable {
  public:
   struct Row {
@@ -19,14 +19,14 @@ class SignalTable {
     double value;
   };
 
-  /// Throws std::system_error if the folder takes no file.
+  /// Throws std::system_error if the folder refuses a file.
   explicit SignalTable(const std::filesystem::path& folder);
   ~SignalTable();
   SignalTable(const SignalTable&) = delete;
   SignalTable& operator=(const SignalTable&) = delete;
 
-  /// Rows in the order of their times, which must be finite and rise. Throws std::system_error if the disk
-  /// takes no more; then the table holds what it held before.
+  /// Appends rows, whose times must be finite and rise. On a disk error it throws std::system_error and the
+  /// table stays unchanged.
   void append(std::span<const Row> rows);
   std::uint64_t size() const noexcept { return size_; }
   double last_time_s() const noexcept { return last_time_s_; }
@@ -38,19 +38,19 @@ class SignalTable {
   double last_time_s_ = 0.0;
 };
 
-/// A whole table, mapped for reading: a pure function of time.
+/// A table, mapped for reading: a pure function of time.
 class TableView {
  public:
   /// Throws std::system_error if it cannot be mapped. An empty table is 0 everywhere.
   explicit TableView(const SignalTable& table);
-  /// The same over rows in memory, which must outlive it.
+  /// A view of rows in memory, which must outlive it.
   explicit TableView(std::span<const SignalTable::Row> rows) noexcept : rows_(rows) {}
   ~TableView();
   TableView(TableView&& other) noexcept;
   TableView& operator=(TableView&&) = delete;
 
-  /// The value of the last row that is not later, or a straight line from it to the next; 0 before the first
-  /// row, the last value after the last.
+  /// The value of the last row that is not later, or the linear interpolation to the next row; 0 before the
+  /// first row, the last value after the last row.
   double at(double time_s, bool interpolate) const noexcept;
 
  private:

@@ -10,10 +10,10 @@
 
 namespace drivebench {
 
-/// Rounding to nearest, denormals as they are, no traps: with anything else the same run gives other bits.
-/// Libraries that were built with -Ofast change it for the whole process when they are loaded.
+/// Rounding to nearest, denormals kept, no traps: any other setting changes the bits of a run. Loading a
+/// library built with -Ofast changes it for the whole process.
 #if defined(__SSE2__)
-inline constexpr std::uint32_t kDeclaredArithmetic = 0x1F80;  // MXCSR without the flags of what has happened
+inline constexpr std::uint32_t kDeclaredArithmetic = 0x1F80;  // MXCSR without the exception flags
 inline constexpr std::uint32_t kArithmeticFlags = 0x3F;
 inline std::uint32_t arithmetic() noexcept {
   return _mm_getcsr() & ~kArithmeticFlags;
@@ -31,7 +31,7 @@ inline void set_arithmetic(std::uint32_t word) noexcept {
 }
 #endif
 
-/// Sets the arithmetic of this thread as declared; whether it was another one.
+/// Sets the declared arithmetic in this thread; returns whether it was different.
 inline bool force_arithmetic() noexcept {
   if (arithmetic() == kDeclaredArithmetic) return false;
   set_arithmetic(kDeclaredArithmetic);

@@ -1,6 +1,6 @@
 #pragma once
 
-/// The one place that includes Boost.Asio. Boost 1.74 uses std::exchange without including <utility>.
+/// The only file that includes Boost.Asio: Boost 1.74 uses std::exchange without including <utility>.
 #include <utility>
 
 #include <boost/asio/awaitable.hpp>

@@ -8,7 +8,7 @@ namespace drivebench {
 /// The commit that this program was built from.
 std::string_view build_id() noexcept;
 
-/// How a recording says who made it.
+/// Program and build, as recordings name them.
 inline std::string recorder_name() {
   return "drivebench " + std::string(build_id());
 }

@@ -5,8 +5,8 @@
 
 namespace drivebench {
 
-/// The clock of everything in the endpoints that times out or limits a rate: the steady clock, or that of a
-/// simulation. Plant time is another thing: it counts ticks.
+/// The clock for timeouts and rate limits of the endpoints: the steady clock, or that of a simulation. Plant
+/// time counts ticks instead.
 class ServerClock {
  public:
   using duration = std::chrono::nanoseconds;
@@ -21,8 +21,8 @@ class ServerClock {
                                      : duration(std::chrono::steady_clock::now().time_since_epoch()));
   }
 
-  /// From now on it is this time until the next call. Timers that are due then expire at the next poll of
-  /// their io_context after one has been set anew.
+  /// Sets the time, which stands still until the next call. Due timers expire at the next poll of their
+  /// io_context after a timer has been set.
   static void simulate(time_point now) noexcept {
     simulated_ns_.store(now.time_since_epoch().count(), std::memory_order_relaxed);
   }

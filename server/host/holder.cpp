@@ -10,7 +10,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The first process with a descriptor for which `is_it` is true; others' are seen by root only.
+/// The first process with a descriptor for which `is_it` is true. Only root sees the descriptors of other
+/// users.
 std::string process_with(const std::function<bool(const std::string& target)>& is_it) {
   std::error_code error;
   for (const fs::directory_entry& process : fs::directory_iterator("/proc", error)) {
@@ -28,7 +29,7 @@ std::string process_with(const std::function<bool(const std::string& target)>& i
   return {};
 }
 
-/// The inode of the socket that listens on the port; empty: none.
+/// The inode of the socket that listens on the port; empty if none does.
 std::string listener_on(std::uint16_t port) {
   for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
     std::ifstream in(table);

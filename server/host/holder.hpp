@@ -3,13 +3,13 @@
 #include <cstdint>
 #include <string>
 
-/// Who already has what this program wants, as far as /proc lets it see: " (process 123, drivebench-server)",
-/// or nothing.
+/// The process that holds a port or file, from /proc: " (process 123, drivebench-server)"; empty if it is
+/// unknown.
 namespace drivebench {
 
-/// Of a TCP port on which somebody listens.
+/// The process that listens on a TCP port.
 std::string holder_of_port(std::uint16_t port);
-/// Of a file that somebody has open.
+/// A process that has a file open.
 std::string holder_of_file(const std::string& path);
 
 }  // namespace drivebench

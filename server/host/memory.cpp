@@ -32,7 +32,7 @@ void use_small_stacks() noexcept {
   pthread_attr_t attributes;
   if (pthread_attr_init(&attributes) != 0) return;
   pthread_attr_setstacksize(&attributes, kStackBytes);
-  pthread_setattr_default_np(&attributes);  // else they are larger than need be
+  pthread_setattr_default_np(&attributes);  // the default is far larger
   pthread_attr_destroy(&attributes);
 }
 

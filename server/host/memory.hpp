@@ -2,13 +2,13 @@
 
 namespace drivebench {
 
-/// From now on a program that finds no memory says so and ends with this exit code, its recording readable as
-/// after kill -9. Going on is not to be had: Protocol Buffers leave a message that cannot be destroyed when
-/// an allocation in it fails, and Asio's coroutines terminate.
+/// Makes a failed allocation print a line and end the program with this exit code; its recording stays
+/// readable as after kill -9. The program cannot go on: after a failed allocation a Protocol Buffers message
+/// cannot be destroyed, and Asio's coroutines terminate.
 void end_without_memory(int exit_code) noexcept;
 
-/// Stacks of all threads to come: of the system's 8 MiB nearly nothing is used, but all of it is locked in
-/// real time.
+/// Sets a small stack size for threads created later. A real-time server locks whole stacks, and threads use
+/// little of the default 8 MiB.
 void use_small_stacks() noexcept;
 
 }  // namespace drivebench

@@ -8,13 +8,13 @@
 
 namespace drivebench {
 
-/// For whoever reads standard output line by line: each is there at once.
+/// Prints a line to standard output and flushes it.
 inline void print_line(const std::string& line) {
   fmt::print("{}\n", line);
   std::fflush(stdout);
 }
 
-/// The names of files in it may be no UTF-8, which JSON is.
+/// Prints JSON in one line. Strings that are not valid UTF-8, such as file names, get replacement characters.
 inline void print_line(const nlohmann::json& line) {
   print_line(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }

@@ -17,7 +17,7 @@ constexpr std::int64_t kNever = 0;
 constexpr std::int64_t kLongAgo = 1;
 
 volatile std::sig_atomic_t event_of_handler = -1;
-std::atomic<std::int64_t> first_ns{kNever};  // of the clock below
+std::atomic<std::int64_t> first_ns{kNever};  // time of the first signal
 static_assert(std::atomic<std::int64_t>::is_always_lock_free, "a signal handler changes it");
 
 std::int64_t now_ns() noexcept {
@@ -55,7 +55,7 @@ StopSignal::StopSignal(asio::io_context& io, std::function<void()> on_stop)
 }
 
 StopSignal::~StopSignal() {
-  event_.release();  // stays open: a handler in another thread may be about to write to it
+  event_.release();  // stays open: a handler in another thread may still write to it
   std::int64_t none = kNever;
   first_ns.compare_exchange_strong(none, kLongAgo);
 }

@@ -6,14 +6,14 @@
 
 namespace drivebench {
 
-/// SIGINT and SIGTERM: the first one asks for the end of the run, another half a second later ends the
-/// program at once, whatever it is doing. What comes before that is the same order once more: a shell signals
-/// a whole group, `timeout` a program and its group. One object in a program at most.
+/// SIGINT and SIGTERM: the first one asks for the end of the run; another one, at least half a second later,
+/// ends the program at once. Signals in between are ignored: a shell signals a whole group, and `timeout`
+/// signals the program and its group. A program has at most one object of this class.
 class StopSignal {
  public:
   /// `on_stop` is called on the I/O thread.
   StopSignal(asio::io_context& io, std::function<void()> on_stop);
-  /// From here on a first one ends the program.
+  /// Afterwards the next signal ends the program.
   ~StopSignal();
   StopSignal(const StopSignal&) = delete;
   StopSignal& operator=(const StopSignal&) = delete;

@@ -7,7 +7,7 @@
 namespace drivebench {
 namespace {
 
-/// Cuts fixed-width numbers and marks off the front of a text.
+/// Takes numbers of fixed width and separators off the front of a text.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : rest_(text) {}

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 
-// How much earlier sleep+spin wakes: about the p99 of the wake-up latency of an idle core.
+// sleep+spin wakes this much before the deadline: about the p99 of the wake-up latency of an idle core.
 constexpr std::int64_t kSpinNs = 30'000;
 
 std::int64_t now_ns() noexcept {
@@ -113,7 +113,7 @@ std::vector<std::string> enter_realtime(const RealtimeConfig& config) {
       notes.push_back(fmt::format("not pinned to CPU {}: {}", config.cpu, std::strerror(error)));
     }
   }
-  // With MCL_FUTURE and a small limit, every later allocation beyond the limit would fail.
+  // With MCL_FUTURE every later allocation beyond a small limit would fail.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
   const bool unlimited = limit.rlim_cur == RLIM_INFINITY || geteuid() == 0;

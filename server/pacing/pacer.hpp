@@ -10,25 +10,25 @@
 
 namespace drivebench {
 
-/// The one place where wall time enters a run.
+/// Paces the ticks of a run; the only place where wall time enters a run.
 class Pacer {
  public:
   virtual ~Pacer() = default;
-  /// Returns when the next tick is due, with how late that is, in nanoseconds; the first call sets time zero.
+  /// Waits until the next tick is due and returns the lateness [ns]; the first call sets time zero.
   virtual std::int64_t wait() noexcept = 0;
-  /// Makes the tick that is due now the new time zero.
+  /// Makes the time of the due tick the new time zero.
   virtual void resynchronise() noexcept = 0;
 };
 
-/// Absolute deadlines on CLOCK_MONOTONIC. `sleep` trusts the kernel's timer; `sleep+spin` wakes earlier and
-/// polls the clock for the last kSpinNs.
+/// A pacer with absolute deadlines on CLOCK_MONOTONIC. `sleep` relies on the kernel's timer; `sleep+spin`
+/// wakes earlier and polls the clock for the last 30 us.
 std::unique_ptr<Pacer> make_realtime_pacer(PacerKind kind, std::int64_t period_ns);
 
-/// As fast as possible.
+/// A pacer that never waits.
 std::unique_ptr<Pacer> make_free_pacer();
 
-/// Counts latenesses: bucket n holds those below 125 ns times 2^n (and not in a bucket before it), the last
-/// one the rest.
+/// Counts latenesses: bucket n holds those below 125 ns times 2^n that no earlier bucket holds; the last
+/// bucket holds the rest.
 class LatenessHistogram {
  public:
   static constexpr std::int64_t kFirstEdgeNs = 125;
@@ -38,7 +38,7 @@ class LatenessHistogram {
   std::uint64_t count() const noexcept { return count_; }
   std::int64_t worst_ns() const noexcept { return worst_ns_; }
   const std::array<std::uint64_t, kBuckets>& buckets() const noexcept { return buckets_; }
-  /// Upper edge of the bucket in which this share (0..1) of all entries is reached.
+  /// The upper edge of the bucket in which this share (0..1) of all entries is reached.
   std::int64_t percentile_ns(double share) const noexcept;
 
  private:
@@ -47,8 +47,8 @@ class LatenessHistogram {
   std::int64_t worst_ns_ = 0;
 };
 
-/// What the machine granted to the thread that asked for real-time treatment, as sentences for people; empty:
-/// all.
+/// Asks for real-time scheduling, CPU and locked memory for this thread. Returns a sentence for each refusal
+/// of the system.
 std::vector<std::string> enter_realtime(const RealtimeConfig& config);
 
 }  // namespace drivebench

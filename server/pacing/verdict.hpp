@@ -8,7 +8,7 @@
 
 namespace drivebench {
 
-/// How a run went; printed at its end and stored as the last message of its recording.
+/// The result of a run; printed at its end and stored as the last message of its recording.
 struct Verdict {
   RunMode mode = RunMode::kLockstep;
   std::uint64_t ticks = 0;
@@ -17,11 +17,11 @@ struct Verdict {
   std::uint64_t gaps = 0;        ///< entries that the recorder lost
   std::uint64_t state_hash = 0;
 
-  /// Every sample follows from the recorded inputs alone, and the recording has them all.
+  /// Whether every sample follows from the recorded inputs alone, and the recording has all of them.
   bool exact() const noexcept { return gaps == 0; }
-  /// Plant time was wall time: no tick started after its period was over.
+  /// Whether plant time was wall time: no tick started after the end of its period.
   bool realtime_valid() const noexcept { return mode == RunMode::kRealtime && late_ticks == 0; }
-  /// The verdict as one sentence for people.
+  /// The verdict as a sentence.
   std::string sentence() const;
 };
 

@@ -12,17 +12,17 @@
 
 namespace drivebench {
 
-/// The parameters of each axis, which recordings know by name.
+/// The parameters of each axis; recordings name parameters, inputs number them.
 using ParameterTables = std::vector<std::span<const Parameter>>;
 ParameterTables parameter_tables(const BenchSetup& setup);
 
-/// An input that came in before tick `received` ran, as it stands in a recording. Its axis exists.
+/// Encodes an input that arrived before tick `received` ran. Its axis must exist.
 void encode_input(Tick received, const Input& input, const ParameterTables& tables, v1::Input& message);
 
-/// The input of a recorded message; nothing if it asks for something that does not exist.
+/// Decodes a recorded input; nothing if its axis, parameter or fault does not exist.
 std::optional<Input> decode_input(const v1::Input& message, const ParameterTables& tables);
 
-/// A command of the wire; nothing if its gates are unknown.
+/// Decodes a command; nothing if its gates are unknown.
 std::optional<Command> decode_command(const v1::Command& message);
 
 void encode_verdict(const Verdict& verdict, v1::Verdict& message);

@@ -14,11 +14,11 @@ constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
 constexpr std::size_t kMaxRingBytes = std::size_t{256} << 20;
 
-/// So many entries at most between two looks at the clock.
+/// The most entries between two reads of the clock.
 constexpr std::size_t kEntriesPerLook = 4096;
 
-/// What may come beside the samples between two looks for room: the requests and commands of a free tick; in
-/// lockstep, where there is none, an exchange, a command and an end of the lease of each axis.
+/// The most inputs between two checks for room: in a free run the 256 requests and commands of a tick, in
+/// lockstep an exchange, a command and an end of the lease for each axis.
 constexpr std::size_t kInputsPerLook = 512;
 static_assert(kInputsPerLook >= 256 + 3 * kMaxAxes);
 
@@ -88,7 +88,7 @@ bool Recorder::work() noexcept {
   return any;
 }
 
-/// What others may know of the writer, whose thread this is.
+/// Publishes the state of the writer. Called on the writer's thread.
 void Recorder::tell_state() noexcept {
   gaps_.fetch_add(writer_->take_lost(), std::memory_order_relaxed);
   lacks_room_.store(writer_->lacks_room(), std::memory_order_relaxed);

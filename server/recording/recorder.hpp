@@ -20,7 +20,7 @@ namespace drivebench {
 
 class RecordingWriter;
 
-/// An input on its way through the ring.
+/// An input in the ring.
 struct ReceivedInput {
   ReceivedInput(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
   Tick received;
@@ -28,30 +28,29 @@ struct ReceivedInput {
 };
 using RecordedEntry = std::variant<TickedSample, ReceivedInput>;
 
-/// What recordings leave free on their disk, for everybody else who writes to it: the audit log, the system.
+/// The space that recordings leave free on their disk for other writers: the audit log, the system.
 inline constexpr std::uint64_t kDiskReserveBytes = std::uint64_t{64} << 20;
 
-/// One file, and the end of the recording when its disk refuses something, unless more is asked for.
+/// Options of a recording. By default it has one file and ends at the first disk error.
 struct RecordingOptions {
-  std::uint64_t file_ticks = 0;         ///< a new file begins after so many; 0: never
-  std::uint64_t file_bytes = 0;         ///< a new file begins with the chunk that brings it there; 0: never
-  bool continues_after_errors = false;  ///< in a new file, unless the disk is full
+  std::uint64_t file_ticks = 0;  ///< a new file begins after this many ticks; 0: never
+  std::uint64_t file_bytes = 0;  ///< a new file begins after the chunk that reaches this size; 0: never
+  bool continues_after_errors = false;  ///< goes on in a new file after a disk error, unless the disk is full
   std::uint64_t reserve_bytes = 0;      ///< the recording ends before less than this is free on its disk
   CreateRecordingFile create{};         ///< empty: create_recording_file
-  bool own_thread = true;               ///< false: whoever has the recorder calls work() now and then
+  bool own_thread = true;               ///< false: the caller calls work() regularly
 };
 
-/// Entries of the ring between tick and recorder: two seconds, a sample and a command in each tick for each
-/// axis, as far as 256 MiB hold them.
+/// The size of the ring in entries: a sample and a command per tick and axis for two seconds, at most 256
+/// MiB.
 std::size_t recorder_ring_entries(const BenchConfig& config) noexcept;
 
-/// Writes every sample and every input of a run to MCAP files, on a thread of its own behind a bounded
-/// ring. The tick only copies into the ring; when the ring is full the entry is lost and counted. What has
-/// come is handed to the system after every 100 ms of plant time (1 s in free mode) and synced to the disk
-/// every second.
+/// Writes every sample and every input of a run to MCAP files, on a thread of its own behind a bounded ring.
+/// The tick only copies into the ring; when the ring is full the entry is lost and counted. The thread writes
+/// the entries after every 100 ms of plant time (1 s in free mode) and syncs the file every second.
 class Recorder final : public BenchObserver {
  public:
-  /// Creates the file; throws std::system_error if it exists or cannot be made.
+  /// Creates the file; throws std::system_error if it exists or cannot be created.
   Recorder(const std::filesystem::path& file, const BenchConfig& config,
            std::initializer_list<RecordingAttachment> attachments = {}, const RecordingOptions& options = {});
   ~Recorder() override;
@@ -61,24 +60,24 @@ class Recorder final : public BenchObserver {
   void on_input(Tick now, const Input& input) noexcept override;
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override;
 
-  /// Whether the ring has room for a tick; asked by the thread of the ticks, outside them.
+  /// Whether the ring has room for a tick. Called by the tick thread between ticks.
   bool has_room() noexcept { return ring_.room() >= room_for_tick_; }
-  /// Where wall time does not matter: returns when it has.
+  /// Waits until has_room(). For runs without real time.
   void wait_for_room() noexcept;
 
-  /// Writes some of what has come, and syncs when it is time; false: nothing had come.
+  /// Writes some entries of the ring and syncs when due; false if the ring was empty.
   bool work() noexcept;
 
   /// Entries lost because the ring was full or the disk refused them.
   std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }
-  /// Whether it has ended before the run, for want of room or of a disk that works.
+  /// Whether the recording has ended before the run, because the disk is full or has failed.
   bool is_over() const noexcept { return is_over_.load(std::memory_order_relaxed); }
-  /// Whether it has ended because the disk is full, or nearly so.
+  /// Whether it has ended because the disk is full or has less than its reserve.
   bool lacks_room() const noexcept { return lacks_room_.load(std::memory_order_relaxed); }
   const std::string& file() const noexcept { return file_; }
 
-  /// Drains the ring, writes the verdict and closes the file; gaps(), is_over() and lacks_room() are final
-  /// then.
+  /// Drains the ring, writes the verdict and closes the file; afterwards gaps(), is_over() and lacks_room()
+  /// are final.
   void finish(const Verdict& verdict);
 
  private:

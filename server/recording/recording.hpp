@@ -12,7 +12,7 @@ inline constexpr std::string_view kExperimentAttachment = "experiment.pb";  ///<
 inline constexpr std::string_view kInputTopic = "/inputs";
 inline constexpr std::string_view kVerdictTopic = "/verdict";
 
-/// Something that a recording carries beside its run.
+/// An attachment of a recording.
 struct RecordingAttachment {
   std::string_view name;
   std::string_view media_type;

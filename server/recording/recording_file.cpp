@@ -59,7 +59,7 @@ void sync_folder_of(const std::filesystem::path& path) noexcept {
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
-  [[maybe_unused]] const int done = ::fsync(descriptor);  // some file systems cannot
+  [[maybe_unused]] const int done = ::fsync(descriptor);  // some file systems do not support it
   ::close(descriptor);
 }
 

@@ -12,27 +12,27 @@
 
 namespace drivebench {
 
-/// What the recorder asks of a file. Each call is the system call of its name, errno included; tests put
-/// disks in its place that fill, fail, stall or forget.
+/// The file operations of the recorder. Each is the system call of its name and sets errno; tests use disks
+/// that fill, fail, stall or forget.
 class RecordingFile {
  public:
-  virtual ~RecordingFile() = default;  ///< closes it, whatever that says
+  virtual ~RecordingFile() = default;  ///< closes the file and ignores errors
   virtual ssize_t write(std::span<const std::byte> bytes) noexcept = 0;
   virtual int truncate(std::uint64_t size) noexcept = 0;
-  /// What was written is on the disk (fdatasync).
+  /// Brings the written bytes to the disk (fdatasync).
   virtual int sync() noexcept = 0;
   virtual int close() noexcept = 0;
-  /// What is free on its disk, in bytes.
+  /// Free space on the disk [bytes].
   virtual std::uint64_t free_bytes() noexcept { return std::numeric_limits<std::uint64_t>::max(); }
 };
 
 using CreateRecordingFile = std::function<std::unique_ptr<RecordingFile>(const std::filesystem::path&)>;
 
-/// A new file of the system, whose name is on the disk when this returns; throws std::system_error if it
-/// exists or cannot be made.
+/// Creates a file and brings its name to the disk; throws std::system_error if the file exists or cannot be
+/// created.
 std::unique_ptr<RecordingFile> create_recording_file(const std::filesystem::path& path);
 
-/// A file whose folder is not synced may be gone after a power cut, however often it was synced itself.
+/// Syncs the folder of a file: without it a power cut can delete the file, even a synced one.
 void sync_folder_of(const std::filesystem::path& path) noexcept;
 
 }  // namespace drivebench

@@ -18,13 +18,13 @@
 namespace drivebench {
 namespace {
 
-/// In plant time, not wall time: the same run gives the same file, byte for byte. A free run is over a second
-/// of it in some milliseconds.
+/// The interval in plant time, so that the same run gives the same file, byte for byte. A free run takes some
+/// milliseconds for a second of it.
 std::int64_t flush_interval_ns(RunMode mode) {
   return mode == RunMode::kFree ? 1'000'000'000 : 100'000'000;
 }
 constexpr auto kSyncInterval = std::chrono::seconds(1);
-/// So much at most between two looks at what is free: a free run writes hundreds of megabytes in a second.
+/// The most bytes between two checks of the free space: a free run writes hundreds of megabytes in a second.
 constexpr std::uint64_t kBytesPerLook = std::uint64_t{16} << 20;
 
 std::span<const std::byte> bytes_of(std::string_view text) {
@@ -33,14 +33,14 @@ std::span<const std::byte> bytes_of(std::string_view text) {
 
 constexpr std::array<const char*, 5> kStepNames{"open", "write", "sync", "close", "memory"};
 
-/// Errors that a new file would meet as well.
+/// Errors that a new file would have as well.
 bool is_of_space(int error) noexcept {
   return error == ENOSPC || error == EFBIG || error == EDQUOT;
 }
 
 }  // namespace
 
-/// What the disk said; the MCAP writer is spent when it has passed through.
+/// An error of the disk. The MCAP writer cannot be used after it.
 struct RecordingWriter::DiskError {
   Step step;
   int error;
@@ -99,7 +99,7 @@ void RecordingWriter::begin(std::unique_ptr<RecordingFile> file) {
     samples_.push_back(mcap_->add_channel(sample_topic(axis.name), sample, "protobuf"));
 }
 
-/// Does something that the disk, or the memory, may refuse.
+/// Runs an action that fails if the disk or the memory does.
 template <class Action>
 void RecordingWriter::attempt(Action action) noexcept {
   try {
@@ -177,7 +177,7 @@ McapMessageHeader RecordingWriter::header(std::uint16_t channel, std::uint32_t s
   return {.channel = channel, .sequence = sequence, .log_time_ns = time_ns, .publish_time_ns = time_ns};
 }
 
-/// A file ends behind the last sample of a tick, so that each holds whole ticks.
+/// Files end after the last sample of a tick, so that each holds whole ticks.
 bool RecordingWriter::is_full(const RecordedEntry& last) const {
   const auto* const sample = std::get_if<TickedSample>(&last);
   if (sample == nullptr || sample->axis + 1 < samples_.size()) return false;
@@ -188,7 +188,7 @@ bool RecordingWriter::is_full(const RecordedEntry& last) const {
 void RecordingWriter::write_all(std::span<const std::byte> bytes) {
   std::span<const std::byte> rest = bytes;
   while (!rest.empty()) {
-    errno = ENOSPC;  // of a disk that takes nothing and does not say why
+    errno = ENOSPC;  // the disk wrote nothing and set no error
     const ssize_t written = file_->write(rest);
     if (written > 0) {
       rest = rest.subspan(static_cast<std::size_t>(written));
@@ -210,12 +210,12 @@ void RecordingWriter::sync_if_due(Clock::time_point now) noexcept {
   });
 }
 
-/// As a whole file, and with room left for everybody else.
+/// Ends the recording with a complete file while the reserve is free.
 void RecordingWriter::end_if_room_is_short() {
   unlooked_bytes_ = 0;
   if (file_->free_bytes() >= options_.reserve_bytes) return;
   is_over_ = lacks_room_ = true;
-  options_.continues_after_errors = false;  // nor in a new file, if the disk refuses the end of this one
+  options_.continues_after_errors = false;  // also if the end of this file cannot be written
   end_file();
   spdlog::error("recording {}: less than {} MiB are free on its disk; it ends here",
                 segment_path(first_, number_), options_.reserve_bytes >> 20);
@@ -240,26 +240,26 @@ void RecordingWriter::finish(const Verdict& verdict) noexcept {
     ++lost_;
     return;
   }
-  options_.continues_after_errors = false;  // there is nothing more to come
+  options_.continues_after_errors = false;  // no more entries follow
   attempt([&] {
     put(verdict);
     end_file();
   });
 }
 
-/// Gives the present file up. A sync is not tried again: the system may have dropped what it could not write,
-/// and says so once.
+/// Gives up the current file. A failed sync is not repeated: the system may have dropped the pages, and
+/// reports that only once.
 void RecordingWriter::fail(Step step, int error) noexcept {
-  // What was written whole before stays readable if a write failed; if a sync did, nobody knows.
+  // After a failed write the earlier chunks stay readable; after a failed sync that is unknown.
   const bool is_unsure = step == Step::kSync || step == Step::kClose;
   const std::uint64_t lost = unwritten_ + (is_unsure ? unsynced_ : 0);
   is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
              (number_ > 1 && !was_synced_);
   lacks_room_ = lacks_room_ || is_of_space(error);
-  // A file without its end, or its beginning, does not replay even if no entry is missing.
+  // A file without its end or its beginning does not replay even if no entry is missing.
   lost_ += std::max<std::uint64_t>(lost, is_ending_ || !is_over_ ? 1 : 0);
   if (step == Step::kWrite)
-    file_->truncate(whole_bytes_);  // or the torn chunk stays: readers find its end missing
+    file_->truncate(whole_bytes_);  // if this fails the torn chunk stays, and readers report it
   unwritten_ = unsynced_ = 0;
   is_ending_ = false;
   try {
@@ -267,7 +267,7 @@ void RecordingWriter::fail(Step step, int error) noexcept {
                   kStepNames[static_cast<std::size_t>(step)], std::strerror(error),
                   is_over_ ? "it ends here" : "it goes on in a new file");
   } catch (const std::exception&) {
-    return;  // the count is there
+    return;  // the loss is counted
   }
 }
 

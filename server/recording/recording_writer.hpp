@@ -21,15 +21,14 @@
 
 namespace drivebench {
 
-/// The files of a recording, from the first entry to the verdict; one thread, no clock of its own. A file
-/// whose disk refused something is left as it is, without an end; what was not surely on the disk then counts
-/// as lost.
+/// Writes the files of a recording, from the first entry to the verdict; one thread, without a clock. After a
+/// disk error it leaves the file without an end and counts the entries that may not be on the disk as lost.
 class RecordingWriter {
  public:
   using Clock = ServerClock;
 
-  /// Begins the first file; throws std::system_error if one of its names is taken, it cannot be made, or
-  /// there is less room than its reserve.
+  /// Begins the first file; throws std::system_error if a name of the series is taken, the file cannot be
+  /// created, or less than the reserve is free.
   RecordingWriter(const std::filesystem::path& file, const BenchConfig& config,
                   std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options);
   ~RecordingWriter();
@@ -37,16 +36,16 @@ class RecordingWriter {
   RecordingWriter& operator=(const RecordingWriter&) = delete;
 
   void write(const RecordedEntry& entry) noexcept;
-  /// Brings to the disk what was written, if the last time is a second ago.
+  /// Syncs the file if the last sync was a second ago.
   void sync_if_due(Clock::time_point now) noexcept;
   /// Ends the last file.
   void finish(const Verdict& verdict) noexcept;
 
-  /// The disk takes no more, or shall not: every further entry counts as lost.
+  /// Whether the recording has ended early: every further entry counts as lost.
   bool is_over() const noexcept { return is_over_; }
-  /// It is over because the disk is full, or nearly so.
+  /// Whether it has ended because the disk is full or has less than the reserve.
   bool lacks_room() const noexcept { return lacks_room_; }
-  /// Entries that were given to write() and are not surely on the disk; each is told once.
+  /// The number of entries given to write() that may not be on the disk; each is returned once.
   std::uint64_t take_lost() noexcept { return std::exchange(lost_, 0); }
   std::size_t files() const noexcept { return number_; }
 
@@ -57,7 +56,7 @@ class RecordingWriter {
     std::string data;
   };
 
-  /// Where a disk may refuse.
+  /// The steps that a disk can refuse.
   enum class Step { kOpen, kWrite, kSync, kClose, kMemory };
   struct DiskError;
 
@@ -91,17 +90,17 @@ class RecordingWriter {
   v1::Input input_;
   Clock::time_point last_sync_ = Clock::now();
   std::uint64_t lost_ = 0;
-  std::uint64_t unlooked_bytes_ = 0;  // written since the last look at what is free
+  std::uint64_t unlooked_bytes_ = 0;  // written since the last check of the free space
   bool is_over_ = false;
   bool lacks_room_ = false;
 
-  // Of the present file.
+  // State of the current file.
   std::unique_ptr<RecordingFile> file_;
   std::optional<McapWriter> mcap_;
   std::uint16_t inputs_ = 0;
   std::uint16_t verdict_ = 0;
   std::vector<std::uint16_t> samples_;
-  std::uint64_t whole_bytes_ = 0;  // up to the last chunk that was written whole
+  std::uint64_t whole_bytes_ = 0;  // up to the end of the last whole chunk
   std::uint64_t unwritten_ = 0;    // entries in the chunk that is being filled
   std::uint64_t unsynced_ = 0;     // entries written since the last sync
   std::uint64_t segment_samples_ = 0;

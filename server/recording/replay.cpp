@@ -41,7 +41,7 @@ bool same_bits(const Signal& signal, const Sample& a, const Sample& b) noexcept 
   return std::bit_cast<std::uint64_t>(a.*signal.as_real) == std::bit_cast<std::uint64_t>(b.*signal.as_real);
 }
 
-/// Follows one recording. Each step returns false when there is no point in going on.
+/// Replays one recording. Each step returns false to end the replay.
 class Replayer {
  public:
   explicit Replayer(const std::vector<std::span<const std::byte>>& segments) : series_(segments) {
@@ -52,7 +52,7 @@ class Replayer {
   ReplayReport run(void (*on_progress)(double)) {
     bool more = true;
     for (McapMessage message; more && series_.next(message);) {
-      if (series_.problem()) break;  // of a file before this one
+      if (series_.problem()) break;  // in an earlier file
       if (!bench_ && !build_bench()) break;
       const std::string_view topic = reader().channels().at(message.header.channel).topic;
       if (has_verdict_) {
@@ -136,7 +136,7 @@ class Replayer {
     const std::optional<Sample> recorded = decode_sample(payload);
     if (!recorded) return unusable(fmt::format("a sample after tick {} cannot be read", bench_->tick()));
     const auto tick = static_cast<Tick>(recorded->tick);
-    // Tick by tick, of all axes in order, so that none can be missing or doubled.
+    // The samples of a tick come in the order of the axes: a missing or doubled one breaks the order.
     const bool next_tick = axis == 0 && report_.samples > 0;
     const Tick expected = bench_->tick() + (next_tick ? 1 : 0);
     if (axis != report_.samples % config_.axes.size() || tick != expected) {

@@ -18,7 +18,7 @@ struct ReplayDifference {
   std::string replayed;
 };
 
-/// What re-simulating a recording gave.
+/// The result of a replay.
 struct ReplayReport {
   enum class Result {
     kEqual,      ///< every sample and the state hash are equal, bit for bit
@@ -31,15 +31,15 @@ struct ReplayReport {
   std::uint64_t inputs = 0;
   std::uint64_t state_hash = 0;
   std::string recorded_by;  ///< program and build
-  bool same_build = true;   ///< as this one; else bits may differ though nothing is wrong
+  bool same_build = true;   ///< this build made the recording; another build may give other bits
   std::optional<ReplayDifference> difference;
-  std::string problem;  ///< a sentence; empty if there is none
+  std::string problem;  ///< a sentence; empty: none
 };
 
-/// Builds the bench from the configuration in the recording, feeds it the recorded inputs at their ticks and
-/// compares every sample. `on_progress` is called now and then with the share done, 0 to 1.
+/// Builds the bench from the configuration in the recording, gives it the recorded inputs at their ticks and
+/// compares every sample. Calls `on_progress` repeatedly with the finished share, 0 to 1.
 ReplayReport replay(std::span<const std::byte> recording, void (*on_progress)(double));
-/// The same for a recording in several files.
+/// Replays a recording in several files.
 ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, void (*on_progress)(double));
 
 }  // namespace drivebench

@@ -9,8 +9,8 @@
 
 namespace drivebench {
 
-/// A bounded queue between one producer thread and one consumer thread, wait-free on both sides. All memory
-/// is taken and touched at construction.
+/// A bounded queue between one producer thread and one consumer thread, wait-free on both sides. The
+/// constructor allocates and touches all memory.
 template <class T>
 class SpscRing {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -21,7 +21,7 @@ class SpscRing {
   /// Producer: false if the ring is full.
   bool push(const T& value) noexcept { return emplace(value); }
 
-  /// Producer: makes the entry where it will lie; false if the ring is full.
+  /// Producer: constructs the entry in place; false if the ring is full.
   template <class... Arguments>
   bool emplace(Arguments&&... arguments) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
@@ -35,7 +35,7 @@ class SpscRing {
     return true;
   }
 
-  /// Producer: how many more would fit now.
+  /// Producer: the number of entries that fit now.
   std::size_t room() noexcept {
     head_seen_ = head_.load(std::memory_order_acquire);
     return slots_.size() - (tail_.load(std::memory_order_relaxed) - head_seen_);
