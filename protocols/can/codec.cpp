@@ -381,11 +381,6 @@ Match match(const Profile& profile, const Frame& frame) noexcept {
           problem_of(row, profile, frame)};
 }
 
-Edge edge_at(const Frame& frame, std::size_t index) noexcept {
-  const std::uint64_t raw = get_bytes<2>(&frame.data[kFirstEdgeByte + 2 * index]);
-  return {static_cast<std::uint16_t>(raw & 0x7FFF), raw >> 15 != 0};
-}
-
 void put_edge(Frame& frame, std::size_t index, Edge edge) noexcept {
   put_bytes<2>(&frame.data[kFirstEdgeByte + 2 * index], (edge.time & 0x7FFFU) | (edge.down ? 0x8000U : 0U));
 }

@@ -106,8 +106,7 @@ struct Edge {
 
   bool operator==(const Edge&) const = default;
 };
-/// Reads or writes edge `index` < kEdgesPerFrame of such a frame.
-Edge edge_at(const Frame& frame, std::size_t index) noexcept;
+/// Writes edge `index` < kEdgesPerFrame of such a frame.
 void put_edge(Frame& frame, std::size_t index, Edge edge) noexcept;
 
 }  // namespace drivebench::can

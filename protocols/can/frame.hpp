@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -24,13 +25,11 @@ struct Frame {
 inline constexpr std::uint32_t kMaxStandardId = 0x7FF;
 inline constexpr std::uint32_t kMaxExtendedId = 0x1FFFFFFF;
 
-/// Whether a CAN FD frame can have this size.
+/// Sizes of FD frames by length code.
+inline constexpr std::array<std::uint8_t, 16> kFdSizes{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
+
 constexpr bool is_fd_size(std::size_t size) noexcept {
-  if (size <= 8) return true;
-  for (const std::size_t allowed : {12u, 16u, 20u, 24u, 32u, 48u, 64u}) {
-    if (size == allowed) return true;
-  }
-  return false;
+  return std::ranges::find(kFdSizes, size) != kFdSizes.end();
 }
 
 }  // namespace drivebench::can

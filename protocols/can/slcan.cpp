@@ -8,9 +8,6 @@
 namespace drivebench::can {
 namespace {
 
-/// Sizes of FD frames by length code.
-constexpr std::array<std::uint8_t, 16> kFdSizes{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
-
 struct Kind {
   char letter;
   bool extended, remote, fd, bit_rate_switch;

@@ -78,7 +78,6 @@ class McapWriter {
 
   /// Bytes given to the sink so far.
   std::uint64_t bytes_written() const noexcept { return position_; }
-  std::uint64_t messages_written() const noexcept { return message_count_; }
 
  private:
   struct IndexEntry {

@@ -22,11 +22,9 @@ inline constexpr std::uint16_t kMapVersion = 1;
 inline constexpr std::uint16_t kMirrorOffset = 10'000;
 
 inline constexpr std::uint16_t kProcessStart = 100;
-inline constexpr std::uint16_t kMoreProcessStart = 120;
 inline constexpr std::uint16_t kSampleStart = 200;
 inline constexpr std::uint16_t kMoreSampleStart = 286;
 inline constexpr std::uint16_t kCommandStart = 400;
-inline constexpr std::uint16_t kMoreCommandStart = 420;
 inline constexpr std::uint16_t kParameterStart = 1000;
 
 /// The content of a register.

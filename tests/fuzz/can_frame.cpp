@@ -5,6 +5,7 @@
 
 #include "protocols/can/codec.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/protocols/can/can_edge.hpp"
 
 namespace {
 using namespace drivebench;

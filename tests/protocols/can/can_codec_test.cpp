@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "tests/protocols/can/can_edge.hpp"
 #include "tests/protocols/can/can_sample.hpp"
 
 namespace drivebench::can {

@@ -248,7 +248,6 @@ TEST(Mcap, LongRecordingSurvives) {
                        std::as_bytes(std::span(payload)).first(i % 160));
   }
   writer.finish();
-  EXPECT_EQ(writer.messages_written(), kMessages);
   EXPECT_EQ(writer.bytes_written(), file.size());
   EXPECT_GT(file.size(), std::size_t{20} << 20);
 

@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include "tests/protocols/can/can_edge.hpp"
 #include "tests/server/endpoints/can/can_endpoint_test.hpp"
 
 namespace drivebench::can {
