@@ -83,17 +83,4 @@ struct FileText {
 };
 FileText read_file(const std::filesystem::path& file, std::size_t limit);
 
-/// The text as valid UTF-8: at most `most` bytes, cut between characters, '?' for each invalid byte. Decoders
-/// refuse a protobuf message with a string that is not valid UTF-8.
-std::string utf8(std::string_view text, std::size_t most = std::string_view::npos);
-
-/// The text for one line of a terminal: valid UTF-8 without control characters, cut after 160 bytes.
-std::string printable(std::string_view text);
-
-/// In hexadecimal with prefix: 0x1a.
-std::string hexadecimal(std::int64_t value);
-
-/// The shortest decimal text that reads back as the same double.
-std::string shortest(double value);
-
 }  // namespace drivebench

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "protocols/can/table_text.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -103,7 +104,7 @@ std::string signal_line(const Field& field, const Profile& profile, const Messag
   const Range range = range_of(field, profile).value_or(Range{0.0, 0.0});  // 0 to 0: unknown
   return " SG_ " + std::string(field.name) + page_text(field, row) + " : " + std::to_string(field.start_bit) +
          "|" + std::to_string(field.bits) + "@1" + (is_signed(field) ? "-" : "+") + " (" +
-         number_text(profile.unit_of(field.scale)) + ",0) [" + number_text(range.minimum, 10) + "|" +
+         shortest(profile.unit_of(field.scale)) + ",0) [" + number_text(range.minimum, 10) + "|" +
          number_text(range.maximum, 10) + "] " + unit_text(field) +
          (row.sender == Sender::kBench ? " Controller\n" : " Bench\n");
 }

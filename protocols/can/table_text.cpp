@@ -8,6 +8,7 @@
 #include "protocols/can/codec.hpp"
 #include "protocols/can/text.hpp"
 #include "protocols/signals/catalogue.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -43,7 +44,7 @@ std::string id_text(const Profile& profile, std::uint32_t id) {
 
 std::string encoding_text(const Field& field, const Profile& profile) {
   const std::string bits = std::to_string(field.bits);
-  const std::string times_unit = " x " + number_text(profile.unit_of(field.scale));
+  const std::string times_unit = " x " + shortest(profile.unit_of(field.scale));
   switch (field.encoding) {
     case Encoding::kCounter:
       return "uint" + bits + ", wraps";
@@ -271,11 +272,6 @@ std::vector<const MessageRow*> rows_of(const Profile& profile, std::span<const B
 
 unsigned version_of(std::span<const BusAxis> axes) {
   return std::ranges::any_of(axes, &BusAxis::wide) ? kWideVersion : kProfileVersion;
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
 std::string number_text(double value, int digits) {

@@ -37,8 +37,7 @@ std::vector<const MessageRow*> rows_of(const Profile& profile, std::span<const B
 /// The lowest version that covers all these axes.
 unsigned version_of(std::span<const BusAxis> axes);
 
-/// The shortest text that reads back the same, or a text rounded to so many digits.
-std::string number_text(double value);
+/// The number, rounded to `digits` digits.
 std::string number_text(double value, int digits);
 
 }  // namespace drivebench::can

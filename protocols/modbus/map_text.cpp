@@ -1,4 +1,5 @@
 #include "protocols/modbus/map_text.hpp"
+#include "protocols/text.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,12 +15,6 @@ using Line = std::vector<std::string>;
 constexpr auto kColumns =
     std::to_array<std::string_view>({"register", "hex", "3xxxx", "4xxxx", "CDAB", "name", "description",
                                      "type", "access", "unit", "scaling", "range"});
-
-std::string text(double value) {
-  std::array<char, 32> buffer{};
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
-  return {buffer.data(), end};
-}
 
 std::string hex(std::size_t value) {
   std::array<char, 8> buffer{};
@@ -57,7 +52,7 @@ std::string_view name_of(Type type) noexcept {
 std::string range_of(const Row& row) {
   if (row.content == Content::kLowBits) return "wraps";
   if (row.writable || row.content == Content::kSignal || row.content == Content::kParameter) {
-    return text(row.minimum) + " .. " + text(row.maximum);
+    return shortest(row.minimum) + " .. " + shortest(row.maximum);
   }
   return "";
 }
@@ -73,7 +68,7 @@ Line line_of(const Row& row, bool writable) {
           std::string(name_of(row.type)),
           row.writable && writable ? "rw" : "r",
           std::string(row.unit),
-          text(row.scale),
+          shortest(row.scale),
           range_of(row)};
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/parameters/rows.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench {
 namespace {
@@ -122,11 +123,11 @@ void add_problem(const InjectableFault& fault, double value, Problems& found) {
     found.add(fault.name, "is not a finite number");
   } else if (value < minimum || value > fault.maximum) {
     found.add(fault.name, [&] {
-      return "is " + text(value) + " but must lie between " + text(minimum) + " and " + text(fault.maximum) +
-             " " + std::string(fault.unit);
+      return "is " + shortest(value) + " but must lie between " + shortest(minimum) + " and " +
+             shortest(fault.maximum) + " " + std::string(fault.unit);
     });
   } else if (fault.integer && value != std::floor(value)) {
-    found.add(fault.name, [&] { return "is " + text(value) + " but must be a whole number"; });
+    found.add(fault.name, [&] { return "is " + shortest(value) + " but must be a whole number"; });
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "protocols/text.hpp"
 #include "server/config/events.hpp"
 #include "server/config/parameters.hpp"
 #include "server/config/words.hpp"

@@ -9,6 +9,7 @@
 
 #include "protocols/can/codec.hpp"
 #include "protocols/can/frame.hpp"
+#include "protocols/text.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "protocols/text.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

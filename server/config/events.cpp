@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "protocols/text.hpp"
 #include "server/bench/ramps.hpp"
 #include "server/config/axis.hpp"
 #include "server/config/parameters.hpp"

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/config/strict_table.hpp"
 #include "server/config/words.hpp"
 #include "server/host/wall_time.hpp"

@@ -4,7 +4,7 @@
 #include <variant>
 
 #include "plant/parameters/parameters.hpp"
-#include "protocols/document.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/config/axis.hpp"
 #include "server/config/can.hpp"

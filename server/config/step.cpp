@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plant/drive/drive_rows.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench {
 namespace {

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "protocols/text.hpp"
 #include "server/config/config.hpp"
 
 namespace drivebench {

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/bench/digest.hpp"
 #include "server/config/can.hpp"
 #include "server/config/config.hpp"

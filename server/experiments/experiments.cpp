@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/config/experiment_limits.hpp"
 #include "server/recording/input_codec.hpp"
 

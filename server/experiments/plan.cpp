@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "plant/parameters/parameters.hpp"
-#include "plant/parameters/rows.hpp"
 #include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/experiments/plan_shapes.hpp"
 
@@ -50,8 +50,8 @@ Tick length_of(const v1::RunExperiment& r, const BenchConfig& config) {
                                static_cast<double>(kMaxExperimentTicks));
   if (ticks >= 1.0 && ticks <= most) return static_cast<Tick>(ticks);
   throw BadRequest(std::isfinite(ticks) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE, field,
-                   fmt::format("{} comes to {} ticks but must come to 1 to {}, {} s", field, text(ticks),
-                               text(most), text(most * period_s)));
+                   fmt::format("{} comes to {} ticks but must come to 1 to {}, {} s", field, shortest(ticks),
+                               shortest(most), shortest(most * period_s)));
 }
 
 std::vector<const Signal*> signals_of(const v1::RunExperiment& r) {
@@ -122,16 +122,16 @@ BenchConfig with_settings(const v1::RunExperiment& r, BenchConfig config) {
 double bounded(double value, double bound, std::string_view unit, const std::string& field) {
   if (std::abs(value) <= bound) return value;
   throw BadRequest(std::isfinite(value) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE, field,
-                   fmt::format("{} is {} but must lie between {} and {} {}", field, text(value), text(-bound),
-                               text(bound), unit));
+                   fmt::format("{} is {} but must lie between {} and {} {}", field, shortest(value),
+                               shortest(-bound), shortest(bound), unit));
 }
 
 Tick tick_of(double time_s, double period_s, Tick most, const std::string& field) {
   const double ticks = std::round(time_s / period_s);
   if (ticks >= 0.0 && ticks <= static_cast<double>(most)) return static_cast<Tick>(ticks);
   throw BadRequest(std::isfinite(time_s) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE, field,
-                   fmt::format("{} is {} but must lie between 0 and {} s", field, text(time_s),
-                               text(static_cast<double>(most) * period_s)));
+                   fmt::format("{} is {} but must lie between 0 and {} s", field, shortest(time_s),
+                               shortest(static_cast<double>(most) * period_s)));
 }
 
 Action action_of(const v1::ExperimentEvent& e, const ExperimentPlan& plan, std::uint32_t axis, Tick ramp,
@@ -217,8 +217,9 @@ void add_initial_speed(double speed_rad_s, ExperimentPlan& plan) {
 
 void check_limit(double value, const std::string& field) {
   if (value >= 0.0 && value <= 1e9) return;
-  throw BadRequest(std::isfinite(value) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE, field,
-                   fmt::format("{} is {} but must lie between 0 and 1e9; 0 is no limit", field, text(value)));
+  throw BadRequest(
+      std::isfinite(value) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE, field,
+      fmt::format("{} is {} but must lie between 0 and 1e9; 0 is no limit", field, shortest(value)));
 }
 
 double largest_current_a(const Sample& s) noexcept {

@@ -6,7 +6,7 @@
 
 #include "plant/math/trig.hpp"
 #include "plant/parameters/parameters.hpp"
-#include "plant/parameters/rows.hpp"
+#include "protocols/text.hpp"
 #include "server/bench/terminals.hpp"
 
 namespace drivebench {
@@ -32,8 +32,8 @@ class ShapeReader {
                       .shape = ConstantShape{0.0}};
     if (result.start >= result.end) {
       refuse(end_s == 0.0 ? "start_s" : "end_s",
-             fmt::format("the shape goes from {} to {} s but must last a tick at least", text(start_s),
-                         text(static_cast<double>(result.end) * period_s)));
+             fmt::format("the shape goes from {} to {} s but must last a tick at least", shortest(start_s),
+                         shortest(static_cast<double>(result.end) * period_s)));
     }
     result.channel = channel();
     read_kind(result);
@@ -50,8 +50,8 @@ class ShapeReader {
                 std::string_view key) const {
     if (value >= minimum && value <= maximum) return value;
     refuse(key,
-           fmt::format("{} is {} but must lie between {} and {} {}", key, text(value), text(minimum),
-                       text(maximum), unit),
+           fmt::format("{} is {} but must lie between {} and {} {}", key, shortest(value), shortest(minimum),
+                       shortest(maximum), unit),
            std::isfinite(value) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE);
   }
   double value(double x, std::string_view key) const {
@@ -210,7 +210,7 @@ void read_angle(const v1::ExperimentInput& input, ExperimentPlan& plan) {
   if (!(std::abs(input.back_emf_vs()) <= kMaxInputValue)) {
     refuse_input(
         "back_emf_vs",
-        fmt::format("back_emf_vs is {} but must lie between -1e6 and 1e6 V*s", text(input.back_emf_vs())),
+        fmt::format("back_emf_vs is {} but must lie between -1e6 and 1e6 V*s", shortest(input.back_emf_vs())),
         std::isfinite(input.back_emf_vs()) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE);
   }
   if (plan.dq.is_measured && input.back_emf_vs() != 0.0) {

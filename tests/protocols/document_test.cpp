@@ -1,4 +1,3 @@
-#include "protocols/document.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +6,7 @@
 #include <string>
 
 #include "bench.pb.h"
+#include "protocols/text.hpp"
 
 namespace drivebench {
 namespace {

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "protocols/document.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {

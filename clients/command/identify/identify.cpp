@@ -16,6 +16,7 @@
 #include "clients/identification/experiments/named_experiments.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "protocols/document.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {

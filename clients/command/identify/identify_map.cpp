@@ -11,6 +11,7 @@
 
 #include "protocols/document.hpp"
 #include "protocols/signals/catalogue.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {

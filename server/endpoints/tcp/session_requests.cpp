@@ -5,7 +5,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "plant/parameters/rows.hpp"
-#include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/endpoints/tcp/description.hpp"
 #include "server/endpoints/tcp/session.hpp"
 #include "server/recording/input_codec.hpp"
@@ -67,8 +67,8 @@ bool Session::is_tick(std::uint64_t ticks, const char* field) {
 bool Session::is_within(double value, double bound, std::string_view unit, const char* field) {
   if (std::abs(value) <= bound) return true;
   refuse(request_.id(), std::isfinite(value) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
-         std::string(field) + " is " + text(value) + " but must lie between " + text(-bound) + " and " +
-             text(bound) + " " + std::string(unit),
+         std::string(field) + " is " + shortest(value) + " but must lie between " + shortest(-bound) +
+             " and " + shortest(bound) + " " + std::string(unit),
          field);
   return false;
 }

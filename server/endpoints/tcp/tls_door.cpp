@@ -12,6 +12,7 @@
 #include <system_error>
 #include <vector>
 
+#include "protocols/text.hpp"
 #include "server/endpoints/deadline.hpp"
 #include "server/endpoints/tcp/outbox.hpp"
 

@@ -13,6 +13,7 @@
 #include "protocols/can/dbc.hpp"
 #include "protocols/can/table_text.hpp"
 #include "protocols/can/text.hpp"
+#include "protocols/text.hpp"
 
 namespace {
 using namespace drivebench::can;
@@ -40,7 +41,7 @@ void print_frames(const Profile& profile, std::span<const BusAxis> axes) {
       append_data(line, frame);
       for (std::size_t field = 0; field < row->fields.size(); ++field) {
         if (!is_on_page(row->fields[field], frame.data[0])) continue;
-        line += " " + std::string(row->fields[field].name) + "=" + number_text(carried[field]);
+        line += " " + std::string(row->fields[field].name) + "=" + shortest(carried[field]);
       }
       std::puts(line.c_str());
     }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocols/text.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
 namespace drivebench::test {

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "protocols/document.hpp"
+#include "protocols/text.hpp"
 #include "server/config/config.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 #include "tests/server/parameter_row.hpp"
