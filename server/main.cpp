@@ -296,8 +296,7 @@ int serve(const Options& o, const BenchConfig& config) {
   for (const std::string& note : engine->notes())
     spdlog::warn("{}", note);
   print_ready(o, config, server, transports);
-  if (!notify_service_manager("READY=1"))
-    spdlog::warn("the service manager cannot be told that this is ready");
+  if (!notify_service_manager("READY=1")) spdlog::warn("the service manager did not take READY=1");
   if (o.duration_s > 0.0 && ::isatty(STDERR_FILENO) != 0) {
     asio::co_spawn(io, show_progress(*engine, o.duration_s), asio::detached);
   }
@@ -367,7 +366,7 @@ int run(int argc, char** argv) {
   app.add_flag("--json", o.json, "print JSON lines");
   app.add_flag("--check-config", o.check_config, "only check the bench file");
   app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
-  app.add_option("--audit", o.audit, "append who did what to this file, as JSON lines");
+  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines");
   app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");

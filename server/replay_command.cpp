@@ -50,7 +50,7 @@ int replay_command(const std::string& file, bool json) {
                                                                                     : "cannot be replayed";
     print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {})",
                            file, verdict, report.ticks, report.samples, report.inputs, report.state_hash,
-                           report.recorded_by.empty() ? "nobody"
+                           report.recorded_by.empty() ? "an unknown program"
                            : report.same_build        ? report.recorded_by
                                                       : report.recorded_by + ", not by this build"));
     if (!report.problem.empty()) print_line("  " + report.problem);

@@ -13,10 +13,12 @@
 #include "protocols/signals/sample.hpp"
 
 /// Encodes values into frames and decodes them, by loops over the table. Every `row` is an element of
-/// kMessages. Values outside the range of a field: counters and signed numbers wrap; codes and scaled numbers
-/// saturate; a number beyond the largest single becomes an infinity. NaN becomes "no value" where the
-/// encoding has one (field.hpp), and 0 in counters, signed numbers and codes. Infinity becomes 0 in counters
-/// and signed numbers. Fractions of a count are rounded to the nearest, halves away from zero.
+/// kMessages.
+///
+/// Values outside the range of a field: counters and signed numbers wrap; codes and scaled numbers saturate;
+/// a number beyond the largest single becomes an infinity. NaN becomes "no value" where the encoding has one
+/// (field.hpp), and 0 in counters, signed numbers and codes. Infinity becomes 0 in counters and signed
+/// numbers. Fractions of a count are rounded to the nearest, halves away from zero.
 namespace drivebench::can {
 
 /// One number for each field of a message, in the order of the fields; NaN: no value.

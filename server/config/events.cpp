@@ -152,7 +152,7 @@ void check_settings(std::vector<Setting>& settings, AxisParameters p) {
       } else if (!ramps.add({row, rows[row].get(p), value, tick, ramp_ticks})) {
         return next->table.report("parameter", "would be on its way together with " +
                                                    std::to_string(kMaxRamps) +
-                                                   " others, which is as many as there may be");
+                                                   " others, the most that an axis can have");
       }
       if (ramp_ticks == 0 && report_broken(*next, tick, p)) return;
     }

@@ -230,7 +230,7 @@ std::string StrictTable::path_of(std::string_view key) const {
 }
 
 std::size_t edit_distance(std::string_view x, std::string_view y) {
-  if (x.size() > 64) return x.size();  // nobody meant that
+  if (x.size() > 64) return x.size();  // longer than any key
   std::vector<std::size_t> row(y.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 0; i < x.size(); ++i) {

@@ -42,8 +42,9 @@ using WriteFile = std::function<void(const std::filesystem::path&, const std::st
 
 /// The experiments of a server: a queue, one thread that runs them one after the other on benches of their
 /// own, and a folder that keeps them. All methods are called on the I/O thread, and none waits for a disk:
-/// the worker writes the files of the running experiment, the disk thread all others. The queue is fair: in
-/// each round every owner has one turn; within a round the first request runs first.
+/// the worker writes the files of the running experiment, the disk thread all others.
+///
+/// The queue is fair: in each round every owner has one turn; within a round the first request runs first.
 class Experiments {
  public:
   /// Loads the folder. Throws std::runtime_error if the folder cannot be used or another server uses it.
