@@ -11,6 +11,8 @@
 #include <tuple>
 #include <utility>
 
+#include "protocols/text.hpp"
+
 namespace {
 
 /// An assertion of toml++ 3.3 has failed.

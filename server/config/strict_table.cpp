@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
+#include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 #include "server/config/config.hpp"
 
@@ -36,12 +36,14 @@ std::string joined(const auto& words, std::string_view quote) {
 
 /// Suggests the nearest known key, or lists all of them.
 std::string advice(std::string_view key, const std::vector<std::string>& known) {
+  constexpr std::size_t kLongest = 64;  // bounds the time that a hostile file takes
   if (known.empty()) return {};
   const auto distance = [&](const std::string& other) { return edit_distance(key, other); };
-  const auto nearest = std::min_element(
-      known.begin(), known.end(), [&](const auto& x, const auto& y) { return distance(x) < distance(y); });
-  if (distance(*nearest) <= std::max<std::size_t>(2, key.size() / 3)) {
-    return "; did you mean \"" + *nearest + "\"?";
+  if (key.size() <= kLongest) {
+    const std::string& nearest = *std::ranges::min_element(known, {}, distance);
+    if (distance(nearest) <= std::max<std::size_t>(2, key.size() / 3)) {
+      return "; did you mean \"" + nearest + "\"?";
+    }
   }
   return "; known here: " + joined(known, "");
 }
@@ -227,21 +229,6 @@ const T* StrictTable::scalar(std::string_view key, std::string_view expected) {
 
 std::string StrictTable::path_of(std::string_view key) const {
   return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
-}
-
-std::size_t edit_distance(std::string_view x, std::string_view y) {
-  if (x.size() > 64) return x.size();  // longer than any key
-  std::vector<std::size_t> row(y.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < y.size(); ++j) {
-      const std::size_t replaced = diagonal + (x[i] == y[j] ? 0u : 1u);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row[y.size()];
 }
 
 }  // namespace drivebench

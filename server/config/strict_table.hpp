@@ -75,7 +75,4 @@ class StrictTable {
   std::vector<std::string> known_;
 };
 
-/// Edit distance between two words.
-std::size_t edit_distance(std::string_view x, std::string_view y);
-
 }  // namespace drivebench

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "clients/control/math/nearest_name.hpp"
+#include "protocols/nearest_name.hpp"
 
 namespace drivebench::control {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "clients/control/math/nearest_name.hpp"
 #include "clients/control/presets/presets_families.hpp"
+#include "protocols/nearest_name.hpp"
 
 namespace drivebench::control {
 
