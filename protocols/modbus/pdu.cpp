@@ -9,23 +9,23 @@ constexpr std::uint16_t word_at(Pdu pdu, std::size_t at) noexcept {
   return static_cast<std::uint16_t>(pdu[at] << 8 | pdu[at + 1]);
 }
 
-Verdict refuse(Exception exception) noexcept {
-  return {.action = Verdict::Action::kRefuse, .exception = exception, .request = {}};
+PduCheck refuse(Exception exception) noexcept {
+  return {.action = PduCheck::Action::kRefuse, .exception = exception, .request = {}};
 }
 
-Verdict close() noexcept {
+PduCheck close() noexcept {
   return {};
 }
 
-Verdict execute(const Request& request) noexcept {
-  return {.action = Verdict::Action::kExecute, .exception = Exception::kNone, .request = request};
+PduCheck execute(const Request& request) noexcept {
+  return {.action = PduCheck::Action::kExecute, .exception = Exception::kNone, .request = request};
 }
 
 bool in_range(std::uint16_t count, std::uint16_t most) noexcept {
   return count >= 1 && count <= most;
 }
 
-Verdict read_bits(Pdu pdu, Request request, std::size_t available) noexcept {
+PduCheck read_bits(Pdu pdu, Request request, std::size_t available) noexcept {
   if (pdu.size() != 5) return close();
   request.read_address = word_at(pdu, 1);
   request.read_count = word_at(pdu, 3);
@@ -36,7 +36,7 @@ Verdict read_bits(Pdu pdu, Request request, std::size_t available) noexcept {
   return execute(request);
 }
 
-Verdict read_registers(Pdu pdu, Request request, const RegisterMap& map) noexcept {
+PduCheck read_registers(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   if (pdu.size() != 5) return close();
   request.read_address = word_at(pdu, 1);
   request.read_count = word_at(pdu, 3);
@@ -47,7 +47,7 @@ Verdict read_registers(Pdu pdu, Request request, const RegisterMap& map) noexcep
   return execute(request);
 }
 
-Verdict write_coil(Pdu pdu, Request request, const RegisterMap& map) noexcept {
+PduCheck write_coil(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   if (pdu.size() != 5) return close();
   request.write_address = word_at(pdu, 1);
   request.write_count = 1;
@@ -58,7 +58,7 @@ Verdict write_coil(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   return execute(request);
 }
 
-Verdict write_coils(Pdu pdu, Request request, const RegisterMap& map) noexcept {
+PduCheck write_coils(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   if (pdu.size() < 6) return close();
   request.write_address = word_at(pdu, 1);
   request.write_count = word_at(pdu, 3);
@@ -75,16 +75,16 @@ Verdict write_coils(Pdu pdu, Request request, const RegisterMap& map) noexcept {
 }
 
 /// The part that all writes of registers share.
-Verdict write_words(Request request, const RegisterMap& map) noexcept {
+PduCheck write_words(Request request, const RegisterMap& map) noexcept {
   const auto range = map.find(request.write_address, request.write_count);
   if (!range || !map.may_write(*range)) return refuse(Exception::kIllegalAddress);
   request.write = *range;
   const bool is_mask = request.function == Function::kMaskWriteRegister;
   if (is_mask || values_fit(*range, words_from(request.data))) return execute(request);
-  return {.action = Verdict::Action::kRefuse, .exception = Exception::kIllegalValue, .request = request};
+  return {.action = PduCheck::Action::kRefuse, .exception = Exception::kIllegalValue, .request = request};
 }
 
-Verdict write_register(Pdu pdu, Request request, const RegisterMap& map) noexcept {
+PduCheck write_register(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   const bool is_mask = request.function == Function::kMaskWriteRegister;
   if (pdu.size() != (is_mask ? 7u : 5u)) return close();
   request.write_address = word_at(pdu, 1);
@@ -93,7 +93,7 @@ Verdict write_register(Pdu pdu, Request request, const RegisterMap& map) noexcep
   return write_words(request, map);
 }
 
-Verdict write_registers(Pdu pdu, Request request, const RegisterMap& map) noexcept {
+PduCheck write_registers(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   if (pdu.size() < 6) return close();
   request.write_address = word_at(pdu, 1);
   request.write_count = word_at(pdu, 3);
@@ -106,7 +106,7 @@ Verdict write_registers(Pdu pdu, Request request, const RegisterMap& map) noexce
   return write_words(request, map);
 }
 
-Verdict read_write_registers(Pdu pdu, Request request, const RegisterMap& map) noexcept {
+PduCheck read_write_registers(Pdu pdu, Request request, const RegisterMap& map) noexcept {
   if (pdu.size() < 10) return close();
   request.read_address = word_at(pdu, 1);
   request.read_count = word_at(pdu, 3);
@@ -126,14 +126,14 @@ Verdict read_write_registers(Pdu pdu, Request request, const RegisterMap& map) n
 }
 
 /// Function 8: sub-function 0, whose data come back.
-Verdict diagnostics(Pdu pdu, const Request& request) noexcept {
+PduCheck diagnostics(Pdu pdu, const Request& request) noexcept {
   if (pdu.size() < 3) return close();
   if (word_at(pdu, 1) != 0) return refuse(Exception::kIllegalFunction);
   return pdu.size() < 5 || pdu.size() % 2 == 0 ? refuse(Exception::kIllegalValue) : execute(request);
 }
 
 /// Function 43: device identification, MEI type 14.
-Verdict encapsulated(Pdu pdu, const Request& request) noexcept {
+PduCheck encapsulated(Pdu pdu, const Request& request) noexcept {
   if (pdu.size() < 2) return close();
   if (pdu[1] != 14) return refuse(Exception::kIllegalFunction);
   if (pdu.size() != 4) return close();
@@ -142,7 +142,7 @@ Verdict encapsulated(Pdu pdu, const Request& request) noexcept {
 
 }  // namespace
 
-Verdict validate(Pdu pdu, const RegisterMap& map) noexcept {
+PduCheck validate(Pdu pdu, const RegisterMap& map) noexcept {
   if (pdu.empty() || pdu.size() > kMaxPdu) return close();
   const Request request{.function = static_cast<Function>(pdu[0])};
   switch (request.function) {

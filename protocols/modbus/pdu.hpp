@@ -57,8 +57,8 @@ constexpr bool writes(Function function) noexcept {
   }
 }
 
-/// What to do with a PDU.
-struct Verdict {
+/// The result of validate(): the reaction to a PDU.
+struct PduCheck {
   enum class Action : std::uint8_t {
     kExecute,
     kRefuse,  ///< answer with the exception
@@ -71,7 +71,7 @@ struct Verdict {
 
 /// Checks a whole PDU in the order of the protocol specification V1.1b3: quantity, address, value. The axis
 /// checks the rest: lease, faults, rules between parameters, the result of a mask.
-Verdict validate(std::span<const std::uint8_t> pdu, const RegisterMap& map) noexcept;
+PduCheck validate(std::span<const std::uint8_t> pdu, const RegisterMap& map) noexcept;
 
 /// The words of `data`, most significant byte first.
 std::array<std::uint16_t, kMaxReadRegisters> words_from(std::span<const std::uint8_t> data) noexcept;

@@ -61,13 +61,13 @@ void check_range(const modbus::RegisterMap::Range& range) {
 void validate(const Frame& adu) {
   // A copy of exactly this size, so that the sanitizer sees one byte too many.
   const Frame pdu(adu.begin() + modbus::kMbapSize, adu.end());
-  const modbus::Verdict verdict = modbus::validate(pdu, map());
-  if (verdict.action == modbus::Verdict::Action::kRefuse) {
-    const auto code = static_cast<unsigned>(verdict.exception);
+  const modbus::PduCheck check = modbus::validate(pdu, map());
+  if (check.action == modbus::PduCheck::Action::kRefuse) {
+    const auto code = static_cast<unsigned>(check.exception);
     return require(code >= 1 && code <= 3, "the validator knows three exceptions");
   }
-  if (verdict.action != modbus::Verdict::Action::kExecute) return;
-  const modbus::Request& request = verdict.request;
+  if (check.action != modbus::PduCheck::Action::kExecute) return;
+  const modbus::Request& request = check.request;
   if (request.read.count > 0) check_range(request.read);
   if (request.write.count == 0) return;
   check_range(request.write);

@@ -160,12 +160,12 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
     co_return true;
   }
   AxisDesk* const desk = desk_of(adu[6]);
-  // For nobody any map will do: it is only asked whether the frame is one.
-  const Verdict verdict =
+  // Without a desk any map does: it serves only to check the form of the frame.
+  const PduCheck check =
       validate(adu.subspan(kMbapSize), desk != nullptr ? desk->map() : shared_.desks.front()->map());
-  if (verdict.action == Verdict::Action::kClose) {
+  if (check.action == PduCheck::Action::kClose) {
     co_await flush();
-    cut("a frame is not as long as its function needs");
+    cut("a frame has the wrong length for its function");
     co_return false;
   }
   if (desk == nullptr) {
@@ -173,16 +173,16 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
     co_return true;
   }
   desk->spoke(number_);
-  if (verdict.action == Verdict::Action::kRefuse) {
-    if (verdict.request.write.count > 0) {
-      words_ = words_from(verdict.request.data);
-      desk->count_refused(verdict.request.write, words_, number_);
+  if (check.action == PduCheck::Action::kRefuse) {
+    if (check.request.write.count > 0) {
+      words_ = words_from(check.request.data);
+      desk->count_refused(check.request.write, words_, number_);
       note_refused_write(*desk, Refused::kOutOfRange);
     }
-    refuse(adu, verdict.exception);
+    refuse(adu, check.exception);
     co_return true;
   }
-  co_await execute(*desk, adu, verdict.request);
+  co_await execute(*desk, adu, check.request);
   co_return true;
 }
 
