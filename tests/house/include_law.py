@@ -50,6 +50,7 @@ FOUNDATIONS = {
     "plant/machines/field_winding.hpp",
     "plant/machines/field_winding_rows.hpp",
     "protocols/refusals.hpp",
+    "protocols/text.hpp",
     "server/endpoints/deadline.hpp",
     "server/endpoints/log_limit.hpp",
     "server/endpoints/transport_report.hpp",
