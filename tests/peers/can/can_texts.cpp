@@ -17,6 +17,7 @@
 
 namespace {
 using namespace drivebench::can;
+using drivebench::shortest;
 
 void print_frames(const Profile& profile, std::span<const BusAxis> axes) {
   constexpr int kFramesOfEach = 200;
