@@ -67,7 +67,7 @@ class Axis {
   Connection connection() const noexcept { return core_.connection; }
 
  private:
-  /// What a tick that diverges is undone to.
+  /// To which a tick that diverges goes back.
   struct MotionState {
     MachineWords machine;
     TwoMassState shaft;

@@ -12,8 +12,8 @@ struct CurrentLoopParameters {
   double limit_a = 0.0;  ///< of the command, per phase
 };
 
-/// The commanded currents within their limit. In a star the common part, which cannot flow, is taken away,
-/// lest the integrals run off with it.
+/// The commanded currents within their limit. In a star the common part, which cannot flow, is taken away:
+/// otherwise the integrals would grow with it.
 PhaseValues limited_currents(const CurrentLoopParameters& p, const PhaseValues& command_a,
                              Connection connection) noexcept;
 

@@ -34,7 +34,7 @@ struct BusInterval {
 /// The interval of a link whose terminals take `taken_j` (negative: give back):
 ///   C v' = max(U - v, 0)/R - [chopper] v/R_B - p/v
 /// by the implicit midpoint rule, which keeps the energy exactly and is stable for every interval. With R = 0
-/// the supply holds the link at U or above. An interval that takes more than there is empties the link.
+/// the supply holds the link at U or above. An interval that takes more than the link holds empties it.
 BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, bool chopper, double taken_j,
                       double duration_s) noexcept;
 

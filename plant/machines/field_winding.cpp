@@ -6,7 +6,7 @@
 namespace drivebench {
 namespace {
 
-/// 0 for the inductance that nobody gave because a curve stands in its place.
+/// 0 where a saturation curve takes the place of the inductance.
 double inverse(double inductance_h) noexcept {
   return inductance_h > 0.0 ? 1.0 / inductance_h : 0.0;
 }

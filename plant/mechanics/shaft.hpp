@@ -11,7 +11,7 @@ namespace drivebench {
 /// Who decides about the speed of the shaft.
 enum class ShaftMotion : std::int64_t {
   kFree,     ///< the torques
-  kLocked,   ///< nobody: it stands
+  kLocked,   ///< nothing: it stands
   kImposed,  ///< a prime mover: it goes to its speed whatever the torque
 };
 

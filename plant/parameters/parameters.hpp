@@ -71,7 +71,7 @@ std::string problem_with(const Parameter& parameter, double value);
 /// rules between the values.
 std::vector<Problem> problems(const AxisParameters& p);
 
-/// The same questions for the tick, which is told nothing but yes or no: no text, no allocation.
+/// The same questions with yes or no for an answer, for the tick: no text, no allocation.
 /// Whether problem_with() has something to say.
 bool breaks_a_rule(const Parameter& parameter, double value) noexcept;
 /// Whether a rule between values is broken. Each value has been asked for before, and curves cannot change

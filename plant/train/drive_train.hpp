@@ -97,7 +97,7 @@ class DriveTrain final : public Train {
                              double load_nm) const noexcept;
   [[gnu::noinline]] void step_varying(const AxisCore& core, Whole& x, double duration_s,
                                       const ShaftBranch& branch, double load_nm) const noexcept;
-  /// A circuit whose voltages stay as they are, of which nothing dies.
+  /// Makes it a circuit of constant voltages in which no current dies.
   void hold_constant(const TerminalInput& input) noexcept;
   void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;
   /// Whether every terminal conducts; if so, the circuit has its voltage.
@@ -125,14 +125,14 @@ class DriveTrain final : public Train {
   void look_up_angle(const Shaft& shaft) noexcept;
   /// Whether the circuit is that of the last piece but for the switches.
   bool goes_on(AxisCore& core, AxisState& state, double start_s, const Whole& x) noexcept;
-  /// A piece in which nothing happens that anybody follows.
+  /// A piece without events, of which drive, sensors and thermal model need only the end.
   void run_smooth(AxisCore& core, Whole& x, double start_s, double end_s, double load_nm) noexcept;
   void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
                  double load_nm) noexcept;
   void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
                     const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
-  /// Takes out what the integration lets a blocked current drift.
+  /// Sets blocked currents to zero again, from which rounding lets them drift.
   void keep_open(const AxisCore& core, const AxisState& state, State& x,
                  const RotorMotion& motion) const noexcept;
   /// Of the terminals, at the end of the last piece.

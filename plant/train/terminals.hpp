@@ -23,7 +23,7 @@ struct TerminalCircuit {
   TerminalInput middle{};  ///< the voltages of start if `constant`
   TerminalInput end{};
   bool constant = true;
-  TerminalSet dying = 0;  ///< terminals off the drive whose current flows on: its zero is an event
+  TerminalSet dying = 0;  ///< off the drive, with a current that flows on: its zero is an event
   PhaseValues start_v{};  ///< of the terminals: across the winding, in a star against the link's middle
   PhaseValues mean_v{};
   PhaseValues end_v{};
@@ -31,7 +31,7 @@ struct TerminalCircuit {
 };
 
 /// Asks a machine for the voltages of its windings, R i + d(flux)/dt, where the circuit lets the currents of
-/// this TerminalInput flow. Refers to what it is made of.
+/// this TerminalInput flow. Keeps a reference to the callable.
 class WindingVoltagesOf {
  public:
   template <class Ask>
@@ -96,8 +96,8 @@ constexpr double against(double current_a, double rail_v) noexcept {
 
 }  // namespace terminals_detail
 
-/// The common case of connect(), where nothing is shorted: every terminal carries what it likes, because it
-/// is driven or because its current goes on through a diode. `terminal_v` are then the voltages, and `dying`
+/// The common case of connect(), without a short: every terminal carries a current, because it is driven or
+/// because its current goes on through a diode. `terminal_v` are then the voltages, and `dying`
 /// those on a diode.
 constexpr bool all_conduct(Connection connection, const TerminalDrive& drive, TerminalSet open,
                            const PhaseValues& current_a, ThreePhase& terminal_v,

@@ -13,13 +13,13 @@
 
 namespace drivebench {
 
-// A piece of a tick splits at each event (a current or a speed reaching zero, a corner of the emf), at most
+// A piece of a tick is cut at each event (a current or a speed reaches zero, the emf has a corner), at most
 // this often.
 inline constexpr std::size_t kMaxEvents = 6;
 // Edges of the drive in a tick, and the events on the way.
 inline constexpr std::size_t kMaxSegments = kMaxSubsteps * (kMaxEvents + 1) + 256;
 
-/// What an axis has beside its machine and its state.
+/// All of an axis but its machine and its state.
 struct AxisCore {
   AxisParameters p;
   AxisTiming timing;
@@ -31,7 +31,7 @@ struct AxisCore {
   Encoder encoder;
   ShaftConstants shaft;
   bool shaft_has_events;
-  bool follows = true;  ///< in this tick drive, sensors or thermal model want to see every piece
+  bool follows = true;  ///< in this tick drive, sensors or thermal model need every piece
   std::array<AngleSegment, kMaxSegments> segments{};
   std::size_t segment_count = 0;
   std::int64_t last_tick_turn = 0;

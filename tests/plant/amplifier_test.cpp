@@ -6,7 +6,7 @@ namespace drivebench {
 namespace {
 
 // Kills: a gain that reaches the offset, offsets exchanged, a phase or the field forgotten.
-TEST(Amplifier, GainThenTheOffsetOfEachPhase) {
+TEST(Amplifier, TheGainActsBeforeTheOffsetOfEachPhase) {
   const AmplifierParameters p{.gain = 2.0, .offset_a_v = 0.5, .offset_b_v = -1.0, .offset_c_v = 0.25};
   const PhaseValues out = amplified(p, {.a = 3.0, .b = 4.0, .c = -5.0, .field = 6.0});
   EXPECT_EQ(out.a, 6.5);
@@ -16,7 +16,7 @@ TEST(Amplifier, GainThenTheOffsetOfEachPhase) {
 }
 
 // Kills: a limit on one side only, a flag of one phase that another one takes back.
-TEST(Amplifier, TheLimitOfEachPhase) {
+TEST(Amplifier, TheLimitHoldsForEachPhase) {
   LimitedVoltages out = clipped({10.0, -10.0, 7.0}, 10.0);  // exactly the limit is not clipped
   EXPECT_EQ(out.voltage_v.a, 10.0);
   EXPECT_EQ(out.voltage_v.b, -10.0);

@@ -47,7 +47,7 @@ TEST(AnalogChannel, TheConverterHoldsAtItsEnds) {
 }
 
 // Kills: a current sensor that rounds or scales in another way than the other channels.
-TEST(AnalogChannel, ACurrentSensorIsOneOfThem) {
+TEST(AnalogChannel, ACurrentSensorReadsAsAnAnalogChannelDoes) {
   const CurrentSensorParameters sensor{.bits = 12, .full_scale_a = 20.0, .noise_rms_a = 0.1};
   const AnalogParameters channel{
       .bits = 12, .full_scale = 20.0, .gain = 1.02, .offset = 0.3, .noise_rms = 0.1};

@@ -54,7 +54,7 @@ TEST(DriveRows, TheWordsAreThoseOfTheKinds) {
 }
 
 // Kills: a rule that holds for every kind of drive, or for none.
-TEST(DriveRows, TheRulesBetweenTheValues) {
+TEST(DriveRows, BrokenRulesBetweenValuesAreNamed) {
   DriveParameters p;
   EXPECT_EQ(fields(p), Fields{});
   p.kind = DriveKind::kCurrent;
@@ -67,7 +67,7 @@ TEST(DriveRows, TheRulesBetweenTheValues) {
 }
 
 // Kills: a chopper that cannot work and is accepted.
-TEST(DriveRows, TheRulesOfTheChopper) {
+TEST(DriveRows, BrokenRulesOfTheChopperAreNamed) {
   DriveParameters p;
   p.bus = {.voltage_v = 300.0, .capacitance_f = 1e-3, .chopper_on_v = 400.0, .chopper_off_v = 380.0};
   EXPECT_EQ(fields(p), Fields{});
@@ -81,7 +81,7 @@ TEST(DriveRows, TheRulesOfTheChopper) {
 }
 
 // Kills: a source without its waveform, a contactor that waits for ever.
-TEST(DriveRows, TheRulesOfTheSource) {
+TEST(DriveRows, BrokenRulesOfTheSourceAreNamed) {
   DriveParameters p;
   p.source.choose_angle = true;
   p.source.waveform = Waveform::kTable;

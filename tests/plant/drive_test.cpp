@@ -309,7 +309,7 @@ bool same_memory(const DriveMemory& x, const DriveMemory& y) {
 
 // A new drive with the memory of another goes on as that one would, to the bit.
 // Kills: something remembered outside of the memory from one tick to the next.
-TEST(Drive, TheMemoryIsAllThatADriveRemembers) {
+TEST(Drive, ADriveWithTheMemoryOfAnotherGoesOnAsTheOther) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged,
                                DriveKind::kSwitched, DriveKind::kSource}) {
     const DriveParameters p = with_everything(kind);
@@ -336,7 +336,7 @@ TEST(Drive, TheMemoryIsAllThatADriveRemembers) {
 
 // Asking twice, or for a shorter interval in between, must not change what comes.
 // Kills: an at() that moves the state.
-TEST(Drive, AskingTwiceChangesNothing) {
+TEST(Drive, ReadingAnIntervalTwiceGivesTheSame) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged,
                                DriveKind::kSwitched, DriveKind::kSource}) {
     DriveRig rig(with_everything(kind), Connection::kStar);

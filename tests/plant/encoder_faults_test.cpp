@@ -121,7 +121,7 @@ TEST(EncoderFaults, TheListOfEdgesAddsUpToTheCountWhateverIsInjected) {
 
 // A fault that touches neither count nor edges sends them through the code for faults. Kills: a sound encoder
 // that is not the one without faults, bit for bit.
-TEST(EncoderFaults, TheCodeForFaultsWithoutFaultsIsTheSoundEncoder) {
+TEST(EncoderFaults, TheCodeForFaultsGivesTheBitsOfTheSoundEncoder) {
   std::mt19937_64 engine(42);
   std::uniform_real_distribution<double> draw(-1.0, 1.0);
   Shaft sound(3.0);
@@ -236,7 +236,7 @@ TEST(EncoderFaults, TheLinesFallInWithALostOneEdgeByEdge) {
 }
 
 // Kills: a loss that depends on the ticks, that is not made good on the way back, or that the index hides.
-TEST(EncoderFaults, OfLostPulsesEveryNthCountIsMissing) {
+TEST(EncoderFaults, LostPulsesTakeEveryNthCountAway) {
   for (const int every : {2, 5, 100}) {
     Shaft shaft(0.5 * kQuantum_rad);
     shaft.faults.encoder_lost_pulses = every;
@@ -257,7 +257,7 @@ TEST(EncoderFaults, OfLostPulsesEveryNthCountIsMissing) {
 
 // Kills: an extra count that has no edge of its own, that depends on the ticks, or that is kept on the way
 // back.
-TEST(EncoderFaults, OfExtraPulsesEveryNthCountComesTwice) {
+TEST(EncoderFaults, ExtraPulsesDoubleEveryNthCount) {
   for (const int every : {1, 5, 100}) {
     Shaft shaft(0.5 * kQuantum_rad);
     shaft.faults.encoder_extra_pulses = every;
@@ -278,7 +278,7 @@ TEST(EncoderFaults, OfExtraPulsesEveryNthCountComesTwice) {
 }
 
 // 1e12 counts in a tick. Kills: a search through them for edges that are not there, a count that moves.
-TEST(EncoderFaults, WhenEveryCountIsLostTheEncoderIsStill) {
+TEST(EncoderFaults, AnEncoderThatLosesEveryCountStandsStill) {
   Shaft shaft(0.5 * kQuantum_rad);
   shaft.faults.encoder_lost_pulses = 1.0;
   const auto segments = segments_of({shaft.at_rad, 1e12 * kQuantum_rad / kTick_s, 0.0});

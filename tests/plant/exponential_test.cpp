@@ -34,7 +34,7 @@ TEST(Exponential, StaysBelowOneUlp) {
 }
 
 // Kills: a power of two that wraps, a limit on the wrong side of the last representable result.
-TEST(Exponential, EndsAsTheDoublesDo) {
+TEST(Exponential, OverflowsAndVanishesWhereDoublesEnd) {
   EXPECT_EQ(exponential(0.0), 1.0);
   EXPECT_EQ(exponential(-0.0), 1.0);
   EXPECT_LT(ulps(709.78), 1.0);

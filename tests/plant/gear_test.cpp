@@ -210,7 +210,7 @@ TEST(Gear, TheEnergyBalanceHoldsThroughReversalsWithEveryFriction) {
 }
 
 // Kills: a branch that the drive train is not told to look for, and a substep chosen for another shaft.
-TEST(Gear, WhatTheDriveTrainAsksOfTheParameters) {
+TEST(Gear, MassesEventsAndTimeConstantFollowTheParameters) {
   MechanicsParameters p = reference_train();
   EXPECT_FALSE(has_two_masses(p));
   EXPECT_FALSE(has_events(p));

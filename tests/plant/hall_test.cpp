@@ -66,7 +66,7 @@ TEST(Hall, AStuckLineStaysAndTheOthersGoOn) {
 }
 
 // Kills: lines of a sensor that is not there.
-TEST(Hall, ASensorThatIsOffSaysZero) {
+TEST(Hall, ASensorThatIsOffReadsZero) {
   EXPECT_EQ(lines_at(60.0, {}, {.hall_stuck_high = 2.0}), 0u);
 }
 

@@ -75,7 +75,7 @@ TEST(MechanicsRows, EachRowReadsWhatItWritesAndTouchesNothingElse) {
 
 // Recordings and configurations of older benches hold these four. Kills: another name, unit, range or
 // liveness.
-TEST(MechanicsRows, TheFirstFourAreWhatTheyWere) {
+TEST(MechanicsRows, TheRowsOfTheFirstVersionStay) {
   const auto is = [](std::string_view name, std::string_view unit, double minimum, double maximum,
                      bool required) {
     const Parameter& row = row_named(name);
@@ -109,7 +109,7 @@ TEST(MechanicsRows, TheMotionIsAChoiceOfThreeWords) {
 }
 
 // The state of a running shaft fits one ratio and one kind of shaft. Kills: a gear that jumps while it turns.
-TEST(MechanicsRows, WhatShapesTheStateIsFixedAtTheStart) {
+TEST(MechanicsRows, ParametersThatShapeTheStateAreNotLive) {
   for (const std::string_view name : {"mechanics.gear_ratio", "mechanics.shaft_stiffness_nm",
                                       "mechanics.backlash_rad", "mechanics.screw_lead_m"}) {
     EXPECT_FALSE(row_named(name).live) << name;

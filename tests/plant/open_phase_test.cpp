@@ -143,7 +143,7 @@ void expect_floating_voltages(const AxisParameters& p, const Machine& m, double 
 }
 
 // Kills: a floating terminal that does not feel the saliency.
-TEST(OpenPhase, OfASalientMachineSeesTheCurrentOfTheOthers) {
+TEST(OpenPhase, AnOpenPhaseOfASalientMachineSeesTheCurrentOfTheOthers) {
   const PmMachineParameters p{.pole_pairs = 3,
                               .stator_resistance_ohm = 0.4,
                               .inductance_d_h = 4e-3,
@@ -173,7 +173,7 @@ constexpr WoundRotorMachineParameters kWound{.pole_pairs = 2,
                                              .star = true};
 
 // Kills: a floating terminal that does not feel the slope of the field current.
-TEST(OpenPhase, OfAWoundRotorMachineSeesTheFieldChange) {
+TEST(OpenPhase, AnOpenPhaseOfAWoundRotorMachineSeesTheFieldChange) {
   AxisParameters p = turned_axis(kWound);
   p.drive.source.field_v = 40.0;
   const Machine m{.flux_wb =
@@ -193,7 +193,7 @@ TEST(OpenPhase, OfAWoundRotorMachineSeesTheFieldChange) {
 
 // The open winding has no current: its voltage is the slope of its flux, here over two ticks of 1 us (1e-6 of
 // it). Kills: a floating terminal that does not feel the saturation that the others cause.
-TEST(OpenPhase, OfASaturatedMachineShowsTheSlopeOfItsFlux) {
+TEST(OpenPhase, AnOpenPhaseOfASaturatedMachineShowsTheSlopeOfItsFlux) {
   const SaturatedInductionMachineParameters machine{
       .pole_pairs = 2,
       .stator_resistance_ohm = 1.7,
@@ -235,7 +235,7 @@ Phases emf_v(double electrical_rad, double speed_rad_s) {
 
 // With i_p' = -i_q' the mutual fluxes of the two cancel in the third, whose emf is left: the neutral is where
 // the two have it. Kills: a star whose trapezoids are taken for sines.
-TEST(OpenPhase, OfABrushlessStarShowsItsEmfAboveTheNeutral) {
+TEST(OpenPhase, AnOpenPhaseOfABrushlessStarShowsItsEmfAboveTheNeutral) {
   BldcMachineParameters machine = kBrushless;
   machine.star = true;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -251,7 +251,7 @@ TEST(OpenPhase, OfABrushlessStarShowsItsEmfAboveTheNeutral) {
 
 // L_S i_p' - M i_q' = u_p - R i_p - emf_p, and what is open has emf - M (i_p' + i_q'). Kills: independent
 // phases that do not couple where one is open.
-TEST(OpenPhase, OfIndependentPhasesSeesTheMutualInductance) {
+TEST(OpenPhase, AnOpenPhaseOfThreeIndependentOnesSeesTheMutualInductance) {
   BldcMachineParameters machine = kBrushless;
   machine.star = false;
   for (std::size_t k = 0; k < 3; ++k) {

@@ -136,7 +136,7 @@ TEST(Parameters, EachRowReadsWhatItWritesAndTouchesNothingElse) {
 
 // Kills: a parameter that the encoder or the converter has copied at the start, declared writable while
 // running.
-TEST(Parameters, WhatIsFixedAtTheStartIsNotLive) {
+TEST(Parameters, ParametersThatAreFixedAtTheStartAreNotLive) {
   for (const std::string_view name : {"machine.pole_pairs", "encoder.counts_per_revolution",
                                       "encoder.half_count_offset", "current_sensor.bits"}) {
     EXPECT_FALSE(find_of_servo(name)->live) << name;

@@ -107,7 +107,7 @@ TEST(PowerBalance, EveryMachineKeepsItsEnergyAlongAStart) {
 
 // The same where a curve or a trapezoid has kinks, at which Runge-Kutta steps lose their order. Kills: an
 // energy that jumps at a point of the curve, an emf whose corners are not those of the torque.
-TEST(PowerBalance, SoDoThoseWithKinks) {
+TEST(PowerBalance, MachinesWithKinksKeepTheirEnergyToo) {
   expect_energy_kept<SaturatedInductionMachine>(
       {.pole_pairs = 3,
        .stator_resistance_ohm = 1.7,

@@ -39,7 +39,7 @@ TEST(SensorBank, EveryIdealChannelShowsItsOwnQuantity) {
 }
 
 // Kills: a sensor that is off and still speaks, or one that hides the true voltages of the bench.
-TEST(SensorBank, WhatIsOffReadsZeroButVoltagesAndBusAreTheTrueOnes) {
+TEST(SensorBank, AChannelThatIsOffReadsZeroButVoltagesAndBusAreTheTrueOnes) {
   SensorParameters p;
   p.voltage = {.bits = 3, .gain = 2.0, .offset = 1.0, .noise_rms = 1.0, .delay_ticks = 4.0};
   p.bus = p.neutral = p.temperature = p.tachometer.analog = p.resolver.analog = p.voltage;
@@ -163,7 +163,7 @@ TEST(SensorBank, TheNoiseIsThatOfSeedChannelAndTick) {
 }
 
 // Kills: a fault on the wrong phase, one that the gain of the sensor scales, an offset on the field current.
-TEST(SensorBank, FaultsOfTheCurrentSensors) {
+TEST(SensorBank, FaultsOfCurrentSensorsActOnTheirReadings) {
   SensorParameters p;
   p.current.gain_a = 2.0;
   p.current.offset_b_a = 0.25;
@@ -207,7 +207,7 @@ TEST(SensorBank, ANoiseBurstAddsToTheNoiseOfThePhases) {
 }
 
 // Kills: an open winding that takes the other one along or its offset with it.
-TEST(SensorBank, FaultsOfTachometerAndResolver) {
+TEST(SensorBank, FaultsOfTachometerAndResolverActOnTheirReadings) {
   SensorParameters p = all_on();
   p.tachometer.analog.offset = 0.3;
   p.resolver.sine_offset_v = 0.1;
@@ -226,7 +226,7 @@ TEST(SensorBank, FaultsOfTachometerAndResolver) {
   EXPECT_EQ(r.resolver_cos_v, 0.0);
 }
 
-// Kills: a voltage at the end of its converter that is reported as a current, a flag that nobody sets.
+// Kills: a voltage at the end of its converter that is reported as a current, a flag that is never set.
 TEST(SensorBank, AConverterAtItsEndIsReportedForCurrentsAndForTheRest) {
   SensorParameters p = all_on();
   p.current.bits = p.bus.bits = 8;

@@ -72,7 +72,7 @@ TEST(SensorRows, EveryAnalogSectionHasTheSameKeys) {
 }
 
 // What configurations and clients of the first version rely on. Kills: a range or a liveness that moved.
-TEST(SensorRows, TheOldRowsAreWhatTheyWere) {
+TEST(SensorRows, TheRowsOfTheFirstVersionStay) {
   const Parameter& counts = row_of("encoder.counts_per_revolution");
   EXPECT_EQ(counts.minimum, 4);
   EXPECT_EQ(counts.maximum, 1e8);
@@ -111,7 +111,7 @@ TEST(SensorRows, ADelayIsRefusedUnlessTheHistoryHoldsIt) {
 }
 
 // Kills: a rule that is not applied, or applied to a sensor that is off.
-TEST(SensorRows, RulesBetweenValues) {
+TEST(SensorRows, BrokenRulesBetweenValuesAreNamed) {
   const auto field = [](const AxisParameters& p) {
     const std::vector<Problem> found = problems_of(p);
     return found.size() == 1 ? found[0].field : std::to_string(found.size());

@@ -195,7 +195,7 @@ AxisParameters geared_axis(bool elastic) {
 }
 
 // The rotor that is blocked stands; the other one stands with it on a rigid shaft, and on an elastic one
-// winds it up by n tau/K, with the stall torque of 10 A. Kills: a fault of the second axis that nobody looks
+// winds it up by n tau/K, with the stall torque of 10 A. Kills: a fault of the second axis that is not looked
 // at, one that stops the rotor of the first, one that outlives its fault.
 TEST(SharedShaft, EitherRotorCanBeBlocked) {
   for (const bool elastic : {false, true}) {
@@ -231,7 +231,7 @@ TEST(SharedShaft, EitherRotorCanBeBlocked) {
 // An impulse on the second rotor: on a rigid shaft it is one of 1/n on the first, of J1 + J2/n^2; on an
 // elastic one the load alone takes it. Kills: a blow that lands on the rotor of the first, one without the
 // ratio.
-TEST(SharedShaft, ABlowOnTheOutputActsThere) {
+TEST(SharedShaft, ABumpOnTheOutputActsOnTheOutput) {
   Axis rigid(geared_axis(false), kTiming, 1, 0);
   rigid.bump_output(0.003);
   EXPECT_NEAR(rigid.sample(0).speed_rad_s, 0.5 * 0.003 / (1.2e-4 + 3e-4 / 4.0), 1e-12);

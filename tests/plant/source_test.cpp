@@ -362,7 +362,7 @@ TEST(Source, TheStartCapacitorIsInSeriesWithPhaseA) {
 }
 
 // An event of the machine may leave an interval of rounding size. Kills: a slope taken from such an interval.
-TEST(Source, AnIntervalOfNoLengthTellsNothingAboutTheCurrent) {
+TEST(Source, AnIntervalOfNoLengthLeavesTheSlopeOfTheCurrent) {
   SourceParameters p;
   p.start_capacitance_f = kStartCapacitance_f;
   const StartCapacitor before{.voltage_v = 3.0, .slope_a_s = 100.0, .bend_a_s2 = 5.0, .interval_s = 10e-6};

@@ -108,7 +108,7 @@ TEST(Terminals, TheThirdDiodeOfAStarConductsWhenItsTerminalPassesARail) {
   }
 }
 
-// Kills: a short that leaves a voltage between its terminals, or that nobody is told of.
+// Kills: a short that leaves a voltage between its terminals, or one that the circuit does not report.
 TEST(Terminals, AShortPutsBothTerminalsAtOneVoltage) {
   InjectedFaults faults;
   faults.phase_short = 2.0;  // b - c

@@ -164,7 +164,7 @@ TEST(Trig, LogarithmStaysBelowOneUlp) {
 }
 
 // Kills: reading the exponent of a number that has no logarithm.
-TEST(Trig, LogarithmOfTheSpecialValues) {
+TEST(Trig, LogarithmTakesTheSpecialValues) {
   EXPECT_TRUE(same_bits(logarithm(1.0), 0.0));
   EXPECT_EQ(logarithm(0.0), -kInfinity);
   EXPECT_EQ(logarithm(-0.0), -kInfinity);

@@ -115,7 +115,7 @@ TEST(WoundRotorMachine, StatorAndFieldCoupleReciprocally) {
 
 // Kills: an open stator that still weighs on the field; a voltage of the open windings without the part that
 // a changing field current induces.
-TEST(WoundRotorMachine, WithAnOpenStatorTheFieldIsACoilAndItsFluxGivesTheVoltage) {
+TEST(WoundRotorMachine, WithAnOpenStatorTheFieldIsACoilWhoseFluxInducesTheVoltage) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
   constexpr double kSpeed_rad_s = 50.0;
   constexpr double kAngle_rad = 0.4;

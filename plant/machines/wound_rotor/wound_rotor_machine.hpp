@@ -7,8 +7,8 @@ namespace drivebench {
 /// Synchronous machine with a field winding on a round rotor, no damper, no saturation: two phases, or the
 /// two-phase equivalent (power-invariant transform) of three.
 ///
-/// The field quantities are those of one winding F whose terminals take the power u_F i_F. Whoever measures
-/// M, L_F and R_F at the field terminals has them. A three-phase rotor that carries (i_f, -i_f/2, -i_f/2) is
+/// The field quantities are those of one winding F whose terminals take the power u_F i_F: M, L_F and
+/// R_F are as measured at the field terminals. A three-phase rotor that carries (i_f, -i_f/2, -i_f/2) is
 /// i_F = sqrt(3/2) i_f, u_F = sqrt(3/2) u_R1 with R_F, L_F and M those of its two-phase equivalent. Source:
 /// Chiasson 2005, chapter 7, problem 27.
 struct WoundRotorMachineParameters {
