@@ -48,7 +48,7 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
                      .on_link_loss = axis.on_link_loss,
                      .quick_stop_ticks = axis.quick_stop_ticks,
                      .rules = axis.rules,
-                     .command_step = axis.rules.slew_per_s * timing_of(setup).period_s,
+                     .command_step = largest_step(axis.rules, setup.period_ns),
                      .shaft = axis.shares_shaft_with.value_or(i)});
     if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
     axis_parameters(axis.parameters);  // their table is made on first use, which must not be a tick
@@ -158,25 +158,20 @@ Refused Bench::clear_faults(AxisRuntime& a, Owner owner) noexcept {
   return Refused::kNot;
 }
 
-Refused Bench::would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept {
+CommandView Bench::command_view(std::size_t axis) const noexcept {
   const AxisRuntime& a = axes_[axis];
-  const Control& c = a.control;
-  if (owner == 0 || owner != c.owner) return Refused::kNotOwner;
-  const Refused values = check_values(command.phases, a.rules, a.axis.parameters().drive);
-  if (values != Refused::kNot) return values;
-  if (command.answers > tick_ || command.answers <= c.newest.answers) return Refused::kStale;
-  if (a.rules.on_excess == OnExcess::kRefuse && a.command_step > 0.0) {
-    const Tick ticks = c.newest.answers < 0 ? 1 : command.answers - c.newest.answers;
-    if (is_steeper(c.newest.phases, command.phases, static_cast<double>(ticks) * a.command_step)) {
-      return Refused::kBeyondDrive;
-    }
-  }
-  return is_latched(axis) && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
+  return {.owner = a.control.owner,
+          .tick = tick_,
+          .newest = a.control.newest,
+          .is_latched = is_latched(axis),
+          .step = a.command_step,
+          .rules = a.rules,
+          .drive = a.axis.parameters().drive};
 }
 
 Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noexcept {
   Control& c = axes_[axis].control;
-  const Refused why = would_refuse(axis, owner, command);
+  const Refused why = judge(command, owner, command_view(axis));
   if (why == Refused::kNot || why == Refused::kLatched) {
     c.renewed = tick_;  // a latched axis keeps its owner, who alone can clear it
   }

@@ -103,8 +103,8 @@ class Bench {
   /// How often parameters of an axis have changed since the bench was made.
   std::uint64_t parameter_changes(std::size_t axis) const noexcept { return axes_[axis].parameter_changes; }
 
-  /// Why a command for the present tick would be turned away.
-  Refused would_refuse(std::size_t axis, Owner owner, const Command& command) const noexcept;
+  /// What judge() needs to know of an axis for a command in the present tick.
+  CommandView command_view(std::size_t axis) const noexcept;
 
   Tick tick() const noexcept { return tick_; }
   std::size_t axis_count() const noexcept { return axes_.size(); }

@@ -23,7 +23,7 @@ class LockstepEngine final : public Engine {
   /// While time waits for the disk each axis gets one command, and no newer ones in its place: they would be
   /// recorded without end.
   Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
-    const Refused why = bench_.would_refuse(axis, owner, command);
+    const Refused why = judge(command, owner, bench_.command_view(axis));
     return why == Refused::kNot && waits_for_disk_ && bench_.has_command(axis) ? Refused::kBusy : why;
   }
 

@@ -3,9 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cstdlib>
 #include <deque>
 #include <span>
 #include <thread>
@@ -13,23 +11,18 @@
 #include <variant>
 
 #include "plant/parameters/parameters.hpp"
+#include "server/engine/axis_mail.hpp"
 #include "server/engine/engine.hpp"
-#include "server/engine/mailbox.hpp"
 #include "server/engine/stepped_engine.hpp"
 #include "server/engine/tick_mark.hpp"
 #include "server/engine/tick_tap.hpp"
 #include "server/host/asio.hpp"
-#include "server/pacing/pacer.hpp"
+#include "server/pacing/tick_clock.hpp"
 
 namespace drivebench {
 namespace {
 
 constexpr std::size_t kRequestCapacity = 256;
-
-struct OwnedCommand {
-  Owner owner = 0;
-  Command command{};
-};
 
 class ThreadedEngine final : public Engine {
  public:
@@ -44,15 +37,14 @@ class ThreadedEngine final : public Engine {
         events_(4096 + 64 * config_.axes.size()),
         tap_(recorder_.get(), events_),
         bench_(config_.setup, &tap_),
-        mailboxes_(config_.axes.size()),
+        command_mail_(config_.axes.size()),
         parameter_mail_(config_.axes.size()),
-        sent_(config_.axes.size()),
         wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
-        pacer_(std::move(pacer)) {
+        clock_(config_.mode, config_, std::move(pacer)) {
     schedule_events(config_, bench_);
     for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
       parameters_[i] = bench_.axis(i).parameters();
-      parameter_mail_[i].in_force = values_of(parameters_[i]);
+      parameter_mail_[i].in_force = ParameterMail::values_of(parameters_[i]);
       parameter_mail_[i].sent = bench_.parameter_changes(i);
     }
     if (!edges_.empty()) tap_.send_edges_of(bench_);
@@ -77,23 +69,20 @@ class ThreadedEngine final : public Engine {
 
   Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
     const Sample& newest = newest_[axis];
-    if (owner == 0 || newest.owner != owner) return Refused::kNotOwner;
-    const Refused values =
-        check_values(command.phases, config_.setup.axes[axis].rules, parameters(axis).drive);
-    if (values != Refused::kNot) return values;
-    const bool repeated = sent_[axis].owner == owner && command.answers <= sent_[axis].command.answers;
-    if (repeated || command.answers < 0 || command.answers > static_cast<Tick>(newest.tick)) {
-      return Refused::kStale;
-    }
-    const bool latched = (newest.faults & kLatchedFaults) != 0;
-    return latched && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
+    const CommandRules& rules = config_.setup.axes[axis].rules;
+    return command_mail_[axis].judge(command, owner,
+                                     {.owner = newest.owner,
+                                      .tick = static_cast<Tick>(newest.tick),
+                                      .is_latched = (newest.faults & kLatchedFaults) != 0,
+                                      .step = largest_step(rules, config_.setup.period_ns),
+                                      .rules = rules,
+                                      .drive = parameters(axis).drive});
   }
 
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = check(axis, owner, command);
     if (why == Refused::kNot) {
-      sent_[axis] = {.owner = owner, .command = command};
-      mailboxes_[axis].write(sent_[axis]);
+      command_mail_[axis].send(owner, command);
     } else {
       request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{are_bad_values(why)}},
               [](Refused, Tick) {});
@@ -141,7 +130,7 @@ class ThreadedEngine final : public Engine {
     Verdict verdict{.mode = config_.mode,
                     .ticks = static_cast<std::uint64_t>(bench_.tick()),
                     .late_ticks = bench_.sample(0).late_ticks,
-                    .lateness = lateness_,
+                    .lateness = clock_.lateness(),
                     .state_hash = bench_.state_hash()};
     if (recorder_) {
       recorder_->finish(verdict);
@@ -151,15 +140,13 @@ class ThreadedEngine final : public Engine {
   }
 
   std::uint64_t state_hash() const override { return 0; }
-  std::int64_t worst_lateness_ns() const override {
-    return worst_lateness_ns_.load(std::memory_order_relaxed);
-  }
+  std::int64_t worst_lateness_ns() const override { return clock_.worst_lateness_ns(); }
 
   // ---- tick thread ----
 
   /// One tick, with all that belongs to it.
   void run_tick() noexcept {
-    look_at_the_clock();
+    clock_.wait_for_tick(bench_);
     {
       const TickMark mark;
       watch_.beat();
@@ -199,21 +186,6 @@ class ThreadedEngine final : public Engine {
     }
   }
 
-  void look_at_the_clock() noexcept {
-    const std::int64_t lateness_ns = pacer_->wait();
-    if (config_.mode != RunMode::kRealtime) return;
-    lateness_.add(lateness_ns);
-    if (lateness_ns > worst_lateness_ns_.load(std::memory_order_relaxed)) {
-      worst_lateness_ns_.store(lateness_ns, std::memory_order_relaxed);
-    }
-    if (lateness_ns > config_.realtime.max_lateness_ns) {
-      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = Overrun{}});
-      pacer_->resynchronise();
-    } else if (lateness_ns >= config_.setup.period_ns) {
-      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = LateTick{}});
-    }
-  }
-
   void take_requests() noexcept {
     for (std::size_t n = 0; n < kRequestCapacity; ++n) {
       const Input* input = requests_.front();
@@ -221,12 +193,8 @@ class ThreadedEngine final : public Engine {
       events_.push(RequestOutcome{bench_.submit(*input), bench_.tick()});
       requests_.pop();
     }
-    for (std::uint32_t axis = 0; axis < mailboxes_.size(); ++axis) {
-      if (const auto newest = mailboxes_[axis].take()) {
-        bench_.submit(
-            {.tick = bench_.tick(), .axis = axis, .owner = newest->owner, .action = newest->command});
-      }
-    }
+    for (std::uint32_t axis = 0; axis < command_mail_.size(); ++axis)
+      command_mail_[axis].deliver(bench_, axis);
   }
 
   /// Before the samples that show them, so that whoever gets an answer finds the parameters as it says.
@@ -234,7 +202,7 @@ class ThreadedEngine final : public Engine {
     for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
       ParameterMail& mail = parameter_mail_[i];
       if (std::exchange(mail.sent, bench_.parameter_changes(i)) == bench_.parameter_changes(i)) continue;
-      mail.newest.write(values_of(bench_.axis(i).parameters()));
+      mail.newest.write(ParameterMail::values_of(bench_.axis(i).parameters()));
     }
   }
 
@@ -325,25 +293,6 @@ class ThreadedEngine final : public Engine {
   // In free mode a wake-up costs more than several ticks; the ring holds what comes in between.
   static constexpr std::size_t kEventsPerWake = 1024;
 
-  static constexpr std::size_t kMaxParameters = 256;
-  using ParameterValues = std::array<double, kMaxParameters>;
-
-  /// The parameters of an axis on their way from the tick thread.
-  struct ParameterMail {
-    Mailbox<ParameterValues> newest;
-    std::uint64_t sent = 0;       // tick thread: changes that were written into the mailbox
-    ParameterValues in_force{};   // I/O thread: what came last
-    std::uint64_t in_flight = 0;  // I/O thread: writes without an answer yet
-  };
-  static ParameterValues values_of(const AxisParameters& p) noexcept {
-    const std::span<const Parameter> rows = axis_parameters(p);
-    if (rows.size() > kMaxParameters) std::abort();
-    ParameterValues values{};
-    for (std::size_t row = 0; row < rows.size(); ++row)
-      values[row] = rows[row].get(p);
-    return values;
-  }
-
   struct Waiting {
     Answer answer;
     std::optional<std::uint32_t> written_axis;  // of a parameter
@@ -366,17 +315,14 @@ class ThreadedEngine final : public Engine {
   SpscRing<TickEvent> events_;
   TickTap tap_;
   Bench bench_;
-  std::deque<Mailbox<OwnedCommand>> mailboxes_;
+  std::deque<CommandMail> command_mail_;
   std::deque<ParameterMail> parameter_mail_;
-  std::vector<OwnedCommand> sent_;  // the last command put into each mailbox
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
   std::deque<LeaseEnd> ends_;            // one for each axis and owner at most
   std::deque<Waiting> answers_;          // of the requests in flight, in order
   std::deque<RequestOutcome> outcomes_;  // that have come back, to be answered with the samples of their tick
-  std::unique_ptr<Pacer> pacer_;
-  LatenessHistogram lateness_;
-  std::atomic<std::int64_t> worst_lateness_ns_{0};
+  TickClock clock_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -7,7 +7,7 @@
 
 #include "server/engine/engine.hpp"
 #include "server/experiments/row_file.hpp"
-#include "server/pacing/pacer.hpp"
+#include "server/pacing/tick_clock.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/recording.hpp"
 
@@ -34,7 +34,8 @@ class ExperimentRun {
                   {RecordingAttachment{kExperimentAttachment, "application/protobuf", request}},
                   {.reserve_bytes = kDiskReserveBytes, .create = files.create_recording}),
         bench_(plan.config.setup, &recorder_),
-        pacer_(plan.mode == RunMode::kRealtime
+        clock_(plan.mode, plan.config,
+               plan.mode == RunMode::kRealtime
                    ? make_realtime_pacer(PacerKind::kSleep, plan.config.setup.period_ns)
                    : make_free_pacer()) {}
 
@@ -44,7 +45,7 @@ class ExperimentRun {
       bench_.submit({.tick = 0, .axis = plan_.axis, .owner = kExperimenter, .action = LeaseAction::kAcquire});
     }
     while (keep_row() && may_go_on()) {
-      look_at_the_clock();
+      clock_.wait_for_tick(bench_);
       submit_events();
       if (plan_.has_commands()) submit_command();
       recorder_.wait_for_room();
@@ -91,19 +92,6 @@ class ExperimentRun {
     return false;
   }
 
-  /// Paces a real-time tick like the engine of the live bench.
-  void look_at_the_clock() {
-    const std::int64_t lateness_ns = pacer_->wait();
-    if (plan_.mode != RunMode::kRealtime) return;
-    lateness_.add(lateness_ns);
-    if (lateness_ns > plan_.config.realtime.max_lateness_ns) {
-      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = Overrun{}});
-      pacer_->resynchronise();
-    } else if (lateness_ns >= plan_.config.setup.period_ns) {
-      bench_.submit({.tick = bench_.tick(), .axis = 0, .owner = 0, .action = LateTick{}});
-    }
-  }
-
   void submit_events() {
     for (; next_event_ < plan_.events.size() && plan_.events[next_event_].tick == bench_.tick();
          ++next_event_) {
@@ -127,7 +115,7 @@ class ExperimentRun {
     outcome_.verdict = {.mode = plan_.mode,
                         .ticks = static_cast<std::uint64_t>(bench_.tick()),
                         .late_ticks = bench_.sample(0).late_ticks,
-                        .lateness = lateness_,
+                        .lateness = clock_.lateness(),
                         .state_hash = bench_.state_hash()};
     recorder_.finish(outcome_.verdict);
     outcome_.verdict.gaps = recorder_.gaps();
@@ -145,8 +133,7 @@ class ExperimentRun {
   RowWriter rows_;
   Recorder recorder_;
   Bench bench_;
-  std::unique_ptr<Pacer> pacer_;
-  LatenessHistogram lateness_;
+  TickClock clock_;
   std::size_t next_event_ = 0;
   Clock::time_point last_flush_ = Clock::now();
   RunOutcome outcome_;

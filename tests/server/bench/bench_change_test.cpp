@@ -287,7 +287,7 @@ Command amperes(Tick answers, PhaseValues i) {
 TEST(BenchSetpoint, CurrentsAreForCurrentAmplifiersOnly) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   const Command command = amperes(0, {.a = 1.0});
-  EXPECT_EQ(bench.would_refuse(0, kOwner, command), Refused::kWrongDrive);
+  EXPECT_EQ(judge(command, kOwner, bench.command_view(0)), Refused::kWrongDrive);
   EXPECT_EQ(bench.submit({.axis = 0, .owner = kOwner, .action = command}), Refused::kWrongDrive);
   bench.step();
   EXPECT_EQ(bench.sample(0).refused_commands, 1u);
@@ -312,10 +312,10 @@ TEST(BenchSetpoint, AllFourMustBeFinite) {
     for (const Gates gates : {Gates::kVoltage, Gates::kCurrent, Gates::kOff}) {
       Command command{.answers = 0, .phases = {.gates = gates, .setpoint = {}}};
       command.phases.setpoint.*member = kNan;
-      EXPECT_EQ(bench.would_refuse(0, kOwner, command), Refused::kNotFinite);
+      EXPECT_EQ(judge(command, kOwner, bench.command_view(0)), Refused::kNotFinite);
     }
   }
-  EXPECT_EQ(bench.would_refuse(0, kOwner, amperes(0, {.c = 1.0, .field = 1.0})), Refused::kNot);
+  EXPECT_EQ(judge(amperes(0, {.c = 1.0, .field = 1.0}), kOwner, bench.command_view(0)), Refused::kNot);
 }
 
 // ---- a dynamometer ----

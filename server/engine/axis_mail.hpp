@@ -1,0 +1,95 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+
+#include "plant/parameters/parameters.hpp"
+#include "server/bench/bench.hpp"
+#include "server/engine/mailbox.hpp"
+
+/// What the I/O thread and the tick thread tell each other about an axis, newest value by newest value.
+namespace drivebench {
+
+/// Commands on their way to the tick thread, and what the bench has made of them on its way back.
+class CommandMail {
+ public:
+  struct Sent {
+    Owner owner = 0;
+    std::uint64_t number = 0;  ///< of the command, from 1 on; 0: none
+    Command command{};
+  };
+  /// What the bench knew before a tick.
+  struct Seen {
+    Owner owner = 0;
+    std::uint64_t decided = 0;  ///< number of the last command that the bench took or refused
+    Command newest{};           ///< the last command that it took under this lease
+  };
+
+  // ---- I/O thread ----
+
+  /// Why a command would be refused. `view` is the axis as its newest sample shows it; what the bench knows
+  /// of lease and commands comes from here, and is never older.
+  Refused judge(const Command& command, Owner sender, CommandView view) const noexcept {
+    if (const auto newest = from_bench_.take()) seen_ = *newest;
+    if (seen_.owner != view.owner) view.owner = 0;  // the lease has come or gone since the sample
+    view.newest = seen_.newest;
+    const Refused why = drivebench::judge(command, sender, view);
+    if (why != Refused::kNot || sent_.owner != sender || sent_.number <= seen_.decided) return why;
+    // The bench may take the command sent before, or find this one in its place: this one must suit both.
+    view.newest = sent_.command;
+    return drivebench::judge(command, sender, view);
+  }
+  void send(Owner owner, const Command& command) noexcept {
+    sent_ = {.owner = owner, .number = sent_.number + 1, .command = command};
+    to_bench_.write(sent_);
+  }
+
+  // ---- tick thread ----
+
+  /// Gives the bench the newest command, if there is a new one, and tells what the bench knows then.
+  void deliver(Bench& bench, std::uint32_t axis) noexcept {
+    if (const auto newest = to_bench_.take()) {
+      bench.submit({.tick = bench.tick(), .axis = axis, .owner = newest->owner, .action = newest->command});
+      told_.decided = newest->number;
+      is_told_ = false;
+    }
+    const CommandView view = bench.command_view(axis);
+    if (is_told_ && told_.owner == view.owner && told_.newest.answers == view.newest.answers) return;
+    told_ = {.owner = view.owner, .decided = told_.decided, .newest = view.newest};
+    from_bench_.write(told_);
+    is_told_ = true;
+  }
+
+ private:
+  Mailbox<Sent> to_bench_;
+  mutable Mailbox<Seen> from_bench_;  // mutable: to look into a mailbox empties it
+  Sent sent_;                         // I/O thread: the last command sent
+  mutable Seen seen_;                 // I/O thread: what came back last
+  Seen told_;                         // tick thread: what went back last
+  bool is_told_ = false;              // tick thread: nothing has been decided since
+};
+
+/// The parameters of an axis on their way from the tick thread.
+struct ParameterMail {
+  static constexpr std::size_t kMaxParameters = 256;
+  using Values = std::array<double, kMaxParameters>;
+
+  Mailbox<Values> newest;
+  std::uint64_t sent = 0;       ///< tick thread: changes that were written into the mailbox
+  Values in_force{};            ///< I/O thread: what came last
+  std::uint64_t in_flight = 0;  ///< I/O thread: writes without an answer yet
+
+  static Values values_of(const AxisParameters& p) noexcept {
+    const std::span<const Parameter> rows = axis_parameters(p);
+    if (rows.size() > kMaxParameters) std::abort();
+    Values values{};
+    for (std::size_t row = 0; row < rows.size(); ++row)
+      values[row] = rows[row].get(p);
+    return values;
+  }
+};
+
+}  // namespace drivebench

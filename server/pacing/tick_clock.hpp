@@ -1,0 +1,42 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "server/bench/bench.hpp"
+#include "server/config/config.hpp"
+#include "server/pacing/pacer.hpp"
+
+namespace drivebench {
+
+/// Starts each tick of a run when it is due. In real time it counts how late the ticks are and gives the
+/// bench the input for a late one: LateTick beyond a period, Overrun beyond max_lateness, after which time
+/// begins anew.
+class TickClock {
+ public:
+  TickClock(RunMode mode, const BenchConfig& config, std::unique_ptr<Pacer> pacer) noexcept
+      : is_realtime_(mode == RunMode::kRealtime),
+        period_ns_(config.setup.period_ns),
+        max_lateness_ns_(config.realtime.max_lateness_ns),
+        pacer_(std::move(pacer)) {}
+
+  /// Returns when the next tick of the bench is due.
+  void wait_for_tick(Bench& bench) noexcept;
+
+  /// Of all ticks so far; empty outside real time. For the thread that runs the ticks.
+  const LatenessHistogram& lateness() const noexcept { return lateness_; }
+  /// The largest lateness so far; for every thread.
+  std::int64_t worst_lateness_ns() const noexcept { return worst_ns_.load(std::memory_order_relaxed); }
+
+ private:
+  bool is_realtime_;
+  std::int64_t period_ns_;
+  std::int64_t max_lateness_ns_;
+  std::unique_ptr<Pacer> pacer_;
+  LatenessHistogram lateness_;
+  std::atomic<std::int64_t> worst_ns_{0};
+};
+
+}  // namespace drivebench
