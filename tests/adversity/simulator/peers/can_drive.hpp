@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "protocols/can/codec.hpp"
-#include "server/endpoints/can/buses/memory_bus.hpp"
 #include "tests/adversity/simulator/world/scene.hpp"
+#include "tests/server/endpoints/can/memory_bus.hpp"
 
 namespace drivebench::simulator {
 

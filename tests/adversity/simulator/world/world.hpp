@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "server/endpoints/can/buses/memory_bus.hpp"
 #include "server/endpoints/can/endpoint.hpp"
 #include "server/endpoints/modbus/modbus_server.hpp"
 #include "server/endpoints/tcp/stream_server.hpp"
@@ -14,6 +13,7 @@
 #include "server/pacing/pacer.hpp"
 #include "tests/adversity/simulator/world/disk.hpp"
 #include "tests/adversity/simulator/world/scene.hpp"
+#include "tests/server/endpoints/can/memory_bus.hpp"
 
 namespace drivebench::simulator {
 

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "protocols/can/command.hpp"
-#include "server/endpoints/can/buses/memory_bus.hpp"
 #include "server/endpoints/can/endpoint.hpp"
 #include "server/host/asio.hpp"
+#include "tests/server/endpoints/can/memory_bus.hpp"
 #include "tests/server/recording/run_config.hpp"
 
 namespace drivebench::can {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
-#include "server/endpoints/can/buses/memory_bus.hpp"
+#include "tests/server/endpoints/can/memory_bus.hpp"
 
 namespace drivebench::can {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/endpoints/can/buses/memory_bus.hpp"
+#include "tests/server/endpoints/can/memory_bus.hpp"
 #include "protocols/can/kernel_frame.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 
