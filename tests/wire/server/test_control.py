@@ -16,7 +16,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from recording import Recording
 from wire_client import PATIENCE_S, pb
-from wire_test import TWO_AXES, WireTest, until
+from wire_test import SERVO_TEXT, TWO_AXES, WireTest, until
 
 
 class Exchange(WireTest):
@@ -277,6 +277,16 @@ class Realtime(WireTest):
         sample = owner.newest()
         self.assertEqual((sample.state, sample.faults & (1 << 9)), (0, 0))
         until(lambda: owner.exchange(owner.newest().tick).WhichOneof("kind") == "exchange_reply", "a command")
+
+    def test_cmd_13_a_step_beyond_the_slope_is_refused(self):
+        """Catches: a command that is answered as taken and that the bench refuses."""
+        text = SERVO_TEXT.replace('motor = "', 'on_excess = "refuse"\nslew_per_s = 1.0\nmotor = "', 1)
+        owner = self.client(self.server("--mode", "realtime", text=text))
+        self.assertDone(owner.lease())
+        until(lambda: owner.exchange(owner.newest().tick).WhichOneof("kind") == "exchange_reply", "a first command")
+        before = owner.newest()
+        self.assertRefused(owner.exchange(before.tick, 60.0), pb.REFUSAL_OUT_OF_RANGE, "commands")
+        until(lambda: owner.newest().refused_commands == before.refused_commands + 1, "the bench has counted it")
 
     def test_own_03_the_lease_of_a_silent_owner_ends(self):
         """Catches: an axis that is lost to a client which keeps its socket open and sends nothing."""
