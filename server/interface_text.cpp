@@ -56,10 +56,10 @@ double frames_per_s(const can::BusLoad& load) {
 
 Need need_of(const BenchConfig& config, const CanConfig& bus) {
   const can::BusLoad load = bus_load_of(config, bus);
-  const double datagram_share = frames_per_s(load) / can::kMulticastFramesPerS;
-  if (bus.backend == CanBackend::kUdpMulticast && datagram_share > load.most_share) {
-    return {datagram_share,
-            fmt::format("the {:.0f} datagrams/s that receivers take", can::kMulticastFramesPerS)};
+  const double limit = can::row_of(bus.backend).frames_per_s;
+  const double datagram_share = limit > 0.0 ? frames_per_s(load) / limit : 0.0;
+  if (datagram_share > load.most_share) {
+    return {datagram_share, fmt::format("the {:.0f} datagrams/s that receivers take", limit)};
   }
   return {load.most_share, fmt::format("what {} bit/s allow", bus.bit_rate)};
 }

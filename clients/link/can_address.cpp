@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <net/if.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -18,17 +19,6 @@ namespace drivebench::link {
 namespace {
 
 constexpr std::string_view kScheme = "can:";
-
-struct BackendRow {
-  CanBackend backend;
-  std::string_view name;
-};
-constexpr auto kBackends = std::to_array<BackendRow>({
-    {CanBackend::kSocketCan, "socketcan"},
-    {CanBackend::kUdpMulticast, "udp_multicast"},
-    {CanBackend::kSlcan, "slcan"},
-    {CanBackend::kSocketcand, "socketcand"},
-});
 
 struct UnitKey {
   std::string_view name;
@@ -63,9 +53,9 @@ std::optional<double> real(std::string_view text) {
   return value;
 }
 
-CanBackend backend_of(std::string_view text, std::string_view name) {
+can::Backend backend_of(std::string_view text, std::string_view name) {
   std::string known;
-  for (const BackendRow& row : kBackends) {
+  for (const can::BackendRow& row : can::kBackends) {
     if (row.name == name) return row.backend;
     known += (known.empty() ? "" : ", ") + std::string(row.name);
   }
@@ -79,43 +69,59 @@ std::pair<std::string_view, std::string_view> split(std::string_view text, char 
   return {text.substr(0, place), text.substr(place + 1)};
 }
 
-void read_channel(std::string_view text, std::string_view channel, CanAddress& address) {
-  switch (address.backend) {
-    case CanBackend::kSocketCan:
-      if (channel.empty() || channel.size() >= IFNAMSIZ) {
-        bad(text, "after socketcan: comes the name of an interface, at most 15 characters");
-      }
-      break;
-    case CanBackend::kUdpMulticast: {
-      auto [group, port] = split(channel, ':');
-      if (group.empty()) group = "239.74.163.2";
-      in_addr ip = {};
-      if (::inet_pton(AF_INET, std::string(group).c_str(), &ip) != 1 || (ntohl(ip.s_addr) >> 28) != 0xE) {
-        bad(text, "after udp_multicast: comes an IPv4 group, 224.0.0.0 to 239.255.255.255, and a port");
-      }
-      if (!port.empty()) {
-        const auto number = whole<std::uint16_t>(port);
-        if (!number || *number == 0) bad(text, "the port must be a number from 1 to 65535");
-        address.port = *number;
-      }
-      address.channel = group;
-      return;
-    }
-    case CanBackend::kSlcan:
-      if (channel.starts_with("tcp:")) {
-        parse_address(channel);
-      } else if (!channel.starts_with('/')) {
-        bad(text, "after slcan: comes tcp:HOST:PORT or the path of a terminal");
-      }
-      break;
-    case CanBackend::kSocketcand:
-      if (channel.empty()) bad(text, "after socketcand: comes HOST:PORT");
-      address.channel = std::string(channel) + (channel.find(':') == std::string_view::npos ? ":29536" : "");
-      parse_address(address.channel);
-      return;
+// What stands between the name of the back end and the keys.
+
+void read_interface(std::string_view text, std::string_view channel, CanAddress& address) {
+  if (channel.empty() || channel.size() >= IFNAMSIZ) {
+    bad(text, "after socketcan: comes the name of an interface, at most 15 characters");
   }
   address.channel = channel;
 }
+
+void read_group(std::string_view text, std::string_view channel, CanAddress& address) {
+  auto [group, port] = split(channel, ':');
+  if (group.empty()) group = can::row_of(address.backend).default_channel;
+  in_addr ip = {};
+  if (::inet_pton(AF_INET, std::string(group).c_str(), &ip) != 1 || (ntohl(ip.s_addr) >> 28) != 0xE) {
+    bad(text, "after udp_multicast: comes an IPv4 group, 224.0.0.0 to 239.255.255.255, and a port");
+  }
+  if (!port.empty()) {
+    const auto number = whole<std::uint16_t>(port);
+    if (!number || *number == 0) bad(text, "the port must be a number from 1 to 65535");
+    address.port = *number;
+  }
+  address.channel = group;
+}
+
+void read_terminal(std::string_view text, std::string_view channel, CanAddress& address) {
+  if (channel.starts_with("tcp:")) {
+    parse_address(channel);
+  } else if (!channel.starts_with('/')) {
+    bad(text, "after slcan: comes tcp:HOST:PORT or the path of a terminal");
+  }
+  address.channel = channel;
+}
+
+void read_host(std::string_view text, std::string_view channel, CanAddress& address) {
+  if (channel.empty()) bad(text, "after socketcand: comes HOST:PORT");
+  address.channel = channel;
+  if (channel.find(':') == std::string_view::npos) {
+    address.channel += ':' + std::to_string(can::row_of(address.backend).default_port);
+  }
+  parse_address(address.channel);
+}
+
+struct ChannelReader {
+  can::Backend backend;
+  void (*read)(std::string_view text, std::string_view channel, CanAddress& address);
+};
+constexpr auto kChannelReaders = std::to_array<ChannelReader>({
+    {can::Backend::kSocketCan, read_interface},
+    {can::Backend::kUdpMulticast, read_group},
+    {can::Backend::kSlcan, read_terminal},
+    {can::Backend::kSocketcand, read_host},
+});
+static_assert(kChannelReaders.size() == can::kBackends.size());
 
 bool read_switch(std::string_view text, std::string_view key, std::string_view value) {
   if (value == "1") return true;
@@ -179,7 +185,7 @@ CanAddress parse_can_address(std::string_view text) {
   const auto [name, channel] = split(place, ':');
   CanAddress address;
   address.backend = backend_of(text, name);
-  read_channel(text, channel, address);
+  std::ranges::find(kChannelReaders, address.backend, &ChannelReader::backend)->read(text, channel, address);
   for (std::string_view rest = keys; !rest.empty();) {
     const auto [pair, after] = split(rest, '&');
     const auto [key, value] = split(pair, '=');
@@ -193,16 +199,10 @@ CanAddress parse_can_address(std::string_view text) {
   return address;
 }
 
-std::string name_of(CanBackend backend) {
-  for (const BackendRow& row : kBackends) {
-    if (row.backend == backend) return std::string(row.name);
-  }
-  return {};
-}
-
 std::string to_string(const CanAddress& address) {
-  std::string text = std::string(kScheme) + name_of(address.backend) + ":" + address.channel;
-  if (address.backend == CanBackend::kUdpMulticast) text += ":" + std::to_string(address.port);
+  std::string text =
+      std::string(kScheme) + std::string(can::name_of(address.backend)) + ":" + address.channel;
+  if (address.backend == can::Backend::kUdpMulticast) text += ":" + std::to_string(address.port);
   return text;
 }
 

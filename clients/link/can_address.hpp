@@ -4,19 +4,18 @@
 #include <string>
 #include <string_view>
 
+#include "protocols/can/backends.hpp"
 #include "protocols/can/profile.hpp"
 
 namespace drivebench::link {
 
-enum class CanBackend { kSocketCan, kUdpMulticast, kSlcan, kSocketcand };
-
 /// An axis on a CAN bus, and what both ends must agree on.
 struct CanAddress {
-  CanBackend backend = CanBackend::kUdpMulticast;
+  can::Backend backend = can::Backend::kUdpMulticast;
   /// socketcan: the interface; udp_multicast: the group; slcan: path of a terminal or "tcp:HOST:PORT";
   /// socketcand: "HOST:PORT".
   std::string channel;
-  std::uint16_t port = 43113;               ///< udp_multicast
+  std::uint16_t port = can::row_of(can::Backend::kUdpMulticast).default_port;  ///< udp_multicast
   std::string bus = "can0";                 ///< socketcand: the bus to open
   std::uint32_t bit_rate = 1'000'000;       ///< slcan: what an adapter is set to
   std::uint32_t data_bit_rate = 5'000'000;  ///< the same for the data of FD frames
@@ -31,9 +30,6 @@ bool is_can_address(std::string_view text) noexcept;
 /// node, fd, extended, bus, bit_rate, data_bit_rate, the names of the messages (their base identifiers) and
 /// of the units of can::Profile. Throws AddressError.
 CanAddress parse_can_address(std::string_view text);
-
-/// "socketcan", "udp_multicast", "slcan" or "socketcand".
-std::string name_of(CanBackend backend);
 
 /// Without keys: "can:socketcan:vcan0".
 std::string to_string(const CanAddress& address);

@@ -351,21 +351,39 @@ class SocketcandBus final : public TextBus {
   std::string text_;
 };
 
+struct Opening {
+  const CanAddress& address;
+  std::chrono::milliseconds deadline;
+  std::span<const std::uint32_t> ids;
+};
+struct BusOpener {
+  can::Backend backend;
+  std::unique_ptr<CanBus> (*open)(const Opening& opening);
+};
+constexpr auto kBusOpeners = std::to_array<BusOpener>({
+    {can::Backend::kSocketCan,
+     [](const Opening& o) -> std::unique_ptr<CanBus> {
+       return std::make_unique<SocketCanBus>(o.address, o.ids);
+     }},
+    {can::Backend::kUdpMulticast,
+     [](const Opening& o) -> std::unique_ptr<CanBus> { return std::make_unique<MulticastBus>(o.address); }},
+    {can::Backend::kSlcan,
+     [](const Opening& o) -> std::unique_ptr<CanBus> {
+       return std::make_unique<SlcanBus>(o.address, o.deadline);
+     }},
+    {can::Backend::kSocketcand,
+     [](const Opening& o) -> std::unique_ptr<CanBus> {
+       return std::make_unique<SocketcandBus>(o.address, o.deadline);
+     }},
+});
+static_assert(kBusOpeners.size() == can::kBackends.size());
+
 }  // namespace
 
 std::unique_ptr<CanBus> open_can_bus(const CanAddress& address, std::chrono::milliseconds deadline,
                                      std::span<const std::uint32_t> ids) {
-  switch (address.backend) {
-    case CanBackend::kSocketCan:
-      return std::make_unique<SocketCanBus>(address, ids);
-    case CanBackend::kSlcan:
-      return std::make_unique<SlcanBus>(address, deadline);
-    case CanBackend::kSocketcand:
-      return std::make_unique<SocketcandBus>(address, deadline);
-    case CanBackend::kUdpMulticast:
-      break;
-  }
-  return std::make_unique<MulticastBus>(address);
+  return std::ranges::find(kBusOpeners, address.backend, &BusOpener::backend)
+      ->open({.address = address, .deadline = deadline, .ids = ids});
 }
 
 }  // namespace drivebench::link

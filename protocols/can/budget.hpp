@@ -9,9 +9,6 @@
 
 namespace drivebench::can {
 
-/// Limit of the frames a bench sends over udp_multicast; above it the buffers of receivers lose datagrams.
-inline constexpr double kMulticastFramesPerS = 8000.0;
-
 /// Time of a data frame and the pause after it on the bus: without stuff bits, and with the most possible
 /// ones.
 struct FrameTime {

@@ -1,12 +1,14 @@
 #include "server/config/can.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "protocols/can/backends.hpp"
 #include "protocols/can/codec.hpp"
 #include "protocols/can/frame.hpp"
 #include "protocols/text.hpp"
@@ -17,7 +19,6 @@ namespace {
 
 constexpr std::size_t kMaxChannel = 255;
 constexpr std::size_t kMaxInterfaceName = 15;  // IFNAMSIZ
-constexpr std::uint16_t kSocketcandPort = 29536;
 constexpr std::uint32_t kMaxBaud = 4'000'000;
 constexpr std::int64_t kMinBitRate = 10'000;
 constexpr std::int64_t kMaxBitRate = 1'000'000;
@@ -69,49 +70,74 @@ bool is_slcan(std::string_view channel) {
   return is_file(device) && baud_ok;
 }
 
-/// The rule for channels of the back end that this channel breaks; empty: none.
-std::string_view problem_with_channel(CanBackend backend, const std::string& channel) {
-  switch (backend) {
-    case CanBackend::kSocketCan:
-      if (is_interface(channel)) break;
-      return "the name of an interface: 1 to 15 bytes without '/', ':' and blanks";
-    case CanBackend::kUdpMulticast:
-      if (is_multicast(channel)) break;
-      return "a multicast address: 224.0.0.0 to 239.255.255.255, or ff00::/8";
-    case CanBackend::kSlcan:
-      if (is_slcan(channel)) break;
-      return "\"pty:PATH\", \"tcp:ADDRESS:PORT\" with a loopback address, or the PATH of a serial device, if "
-             "need "
-             "be with \"@BAUD\" (300 to 4000000); paths are absolute";
-    case CanBackend::kSocketcand:
-      if (is_loopback(channel)) break;
-      return "a loopback address: socketcand knows no password";
-  }
-  return {};
+// The resource that only one bus can use; empty: the bus needs none.
+std::string channel_of(const CanConfig& bus) {
+  return bus.channel;
+}
+std::string port_of(const CanConfig& bus) {  // a port receives the frames of every group
+  return ':' + std::to_string(bus.port);
+}
+std::string slcan_place(const CanConfig& bus) {
+  if (bus.channel.starts_with("tcp:")) return bus.channel.ends_with(":0") ? "" : bus.channel;
+  return std::string(without_baud(bus.channel));
+}
+std::string listener_of(const CanConfig& bus) {
+  return bus.port == 0 ? "" : bus.channel + ':' + std::to_string(bus.port);
 }
 
+/// What a section may say of channel and port with each back end.
+struct ChannelRules {
+  can::Backend backend;
+  bool (*is_channel)(const std::string& channel);
+  std::string_view channel_rule;  ///< what a channel must be
+  std::int64_t least_port;
+  std::string (*place)(const CanConfig& bus);
+  std::string_view same_port;  ///< why two buses may not have one port; empty: their channels clash instead
+};
+constexpr auto kChannelRules = std::to_array<ChannelRules>({
+    {can::Backend::kSocketCan, [](const std::string& channel) { return is_interface(channel); },
+     "the name of an interface: 1 to 15 bytes without '/', ':' and blanks", 0, channel_of, ""},
+    {can::Backend::kUdpMulticast, is_multicast,
+     "a multicast address: 224.0.0.0 to 239.255.255.255, or ff00::/8", 1, port_of,
+     "all groups at a port are one bus"},
+    {can::Backend::kSlcan, [](const std::string& channel) { return is_slcan(channel); },
+     "\"pty:PATH\", \"tcp:ADDRESS:PORT\" with a loopback address, or the PATH of a serial device, if need be "
+     "with \"@BAUD\" (300 to 4000000); paths are absolute",
+     0, slcan_place, ""},
+    {can::Backend::kSocketcand, is_loopback, "a loopback address: socketcand knows no password", 0,
+     listener_of, ""},
+});
+
+const ChannelRules& rules_of(can::Backend backend) {
+  return *std::ranges::find(kChannelRules, backend, &ChannelRules::backend);
+}
+static_assert(kChannelRules.size() == can::kBackends.size());
+
 void read_channel(StrictTable& table, CanConfig& bus) {
-  if (bus.backend == CanBackend::kSocketcand) {
-    bus.channel = "127.0.0.1";
-    bus.port = kSocketcandPort;
-  } else if (bus.backend != CanBackend::kUdpMulticast) {
+  const std::string_view usual = can::row_of(bus.backend).default_channel;
+  if (usual.empty()) {
     table.require("channel");
+  } else {
+    bus.channel = usual;
   }
   if (const auto channel = table.text("channel", kMaxChannel)) {
     bus.channel = *channel;
-    const std::string_view rule = problem_with_channel(bus.backend, *channel);
-    if (!rule.empty()) {
-      table.report("channel", "is \"" + printable(*channel) + "\" but must be " + std::string(rule));
+    const ChannelRules& rules = rules_of(bus.backend);
+    if (!rules.is_channel(*channel)) {
+      table.report("channel",
+                   "is \"" + printable(*channel) + "\" but must be " + std::string(rules.channel_rule));
     }
   }
 }
 
 void read_port(StrictTable& table, CanConfig& bus) {
-  const auto port = table.integer("port", bus.backend == CanBackend::kUdpMulticast ? 1 : 0, 65535);
+  const std::uint16_t usual = can::row_of(bus.backend).default_port;
+  if (usual != 0) bus.port = usual;
+  const auto port = table.integer("port", rules_of(bus.backend).least_port, 65535);
   bus.port = static_cast<std::uint16_t>(port.value_or(bus.port));
-  if (port && (bus.backend == CanBackend::kSocketCan || bus.backend == CanBackend::kSlcan)) {
+  if (port && usual == 0) {
     table.report("port", "is " + std::to_string(*port) + " but must be left out with backend \"" +
-                             std::string(name_of(bus.backend)) + '"');
+                             std::string(can::name_of(bus.backend)) + '"');
   }
 }
 
@@ -181,35 +207,28 @@ void read_profile(StrictTable& table, CanConfig& bus) {
   read_units(table.table("units"), bus.profile);
 }
 
-/// The resource that only one bus can use; empty: the bus needs none.
-std::string place_of(const CanConfig& bus) {
-  const std::string backend(name_of(bus.backend));
-  switch (bus.backend) {
-    case CanBackend::kSocketCan:
-      break;
-    case CanBackend::kUdpMulticast:  // a port receives the frames of every group
-      return backend + ':' + std::to_string(bus.port);
-    case CanBackend::kSlcan:
-      if (bus.channel.starts_with("tcp:")) return bus.channel.ends_with(":0") ? "" : backend + bus.channel;
-      return backend + std::string(without_baud(bus.channel));
-    case CanBackend::kSocketcand:
-      return bus.port == 0 ? "" : backend + bus.channel + ':' + std::to_string(bus.port);
+void check_place(StrictTable& table, const CanConfig& bus, const std::vector<CanConfig>& others) {
+  const ChannelRules& rules = rules_of(bus.backend);
+  const std::string place = rules.place(bus);
+  const auto same = [&](const CanConfig& other) {
+    return other.backend == bus.backend && rules.place(other) == place;
+  };
+  if (place.empty() || std::none_of(others.begin(), others.end(), same)) return;
+  const std::string another = "of another " + std::string(can::name_of(bus.backend)) + " bus";
+  if (rules.same_port.empty()) {
+    table.report("channel", "is \"" + printable(bus.channel) + "\", the channel " + another);
+  } else {
+    table.report("port", "is " + std::to_string(bus.port) + ", the port " + another + ": " +
+                             std::string(rules.same_port));
   }
-  return backend + bus.channel;
 }
 
-void check_place(StrictTable& table, const CanConfig& bus, const std::vector<CanConfig>& others) {
-  const std::string place = place_of(bus);
-  const auto same = [&](const CanConfig& other) { return place_of(other) == place; };
-  if (place.empty() || std::none_of(others.begin(), others.end(), same)) return;
-  if (bus.backend == CanBackend::kUdpMulticast) {
-    table.report("port", "is " + std::to_string(bus.port) +
-                             ", the port of another udp_multicast bus: all groups at a port are one bus");
-  } else {
-    table.report("channel", "is \"" + printable(bus.channel) + "\", the channel of another " +
-                                std::string(name_of(bus.backend)) + " bus");
-  }
-}
+constexpr auto kBackendWords = [] {
+  std::array<std::string_view, can::kBackends.size()> words{};
+  for (std::size_t i = 0; i < words.size(); ++i)
+    words[i] = can::kBackends[i].name;
+  return words;
+}();
 
 }  // namespace
 
@@ -219,9 +238,9 @@ std::vector<CanConfig> read_can(StrictTable& root, bool wide) {
     CanConfig bus;
     bus.profile.wide = wide;
     table.require("backend");
-    const auto backend = table.choice("backend", kCanBackendWords);
+    const auto backend = table.choice("backend", kBackendWords);
     if (backend) {
-      bus.backend = static_cast<CanBackend>(*backend);
+      bus.backend = can::kBackends[*backend].backend;
       read_channel(table, bus);
       read_port(table, bus);
       check_place(table, bus, buses);

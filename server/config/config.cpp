@@ -43,10 +43,6 @@ std::string_view name_of(SafeAction action) noexcept {
   return kSafeActionWords[static_cast<std::size_t>(action)];
 }
 
-std::string_view name_of(CanBackend backend) noexcept {
-  return kCanBackendWords[static_cast<std::size_t>(backend)];
-}
-
 bool is_address(const std::string& text) noexcept {
   in_addr v4{};
   in6_addr v6{};

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "protocols/can/backends.hpp"
 #include "protocols/can/profile.hpp"
 #include "protocols/document.hpp"
 #include "server/bench/bench.hpp"
@@ -39,19 +40,13 @@ struct TcpConfig {
   std::uint32_t max_sessions = 256;
 };
 
-/// The back end of a [[can]] section.
-enum class CanBackend { kSocketCan, kUdpMulticast, kSlcan, kSocketcand };
-
-/// Section [[can]]: a bus that controllers share with the bench.
+/// Section [[can]]: a bus that controllers share with the bench. What channel and port are depends on the
+/// back end; those that listen do so on a loopback address, because none of them knows a password.
 struct CanConfig {
-  CanBackend backend = CanBackend::kUdpMulticast;
-  /// socketcan: name of the interface; udp_multicast: the group; slcan: the absolute path of a serial device,
-  /// with "@BAUD" if need be, "pty:PATH" (a terminal made at this absolute path) or "tcp:ADDRESS:PORT"
-  /// (listens; an IPv6 address may stand in brackets); socketcand: the address to listen on. slcan and
-  /// socketcand have no password and listen on loopback addresses only.
-  std::string channel = "239.74.163.2";
-  std::uint16_t port = 43113;  ///< udp_multicast and socketcand; 0: chosen by the system (socketcand only)
-  bool required = true;        ///< whether the bench may start without it
+  can::Backend backend = can::Backend::kUdpMulticast;
+  std::string channel{can::row_of(can::Backend::kUdpMulticast).default_channel};
+  std::uint16_t port = can::row_of(can::Backend::kUdpMulticast).default_port;
+  bool required = true;  ///< whether the bench may start without it
   can::Profile profile;
   std::int64_t bit_rate = 1'000'000;
   std::int64_t data_bit_rate = 5'000'000;  ///< FD: of the data phase
@@ -171,7 +166,6 @@ std::uint64_t configuration_hash(const BenchConfig& config);
 std::string_view name_of(RunMode mode) noexcept;
 std::string_view name_of(PacerKind pacer) noexcept;
 std::string_view name_of(SafeAction action) noexcept;
-std::string_view name_of(CanBackend backend) noexcept;
 
 /// Sorts events by tick; within a tick loads, parameters, faults that end, faults that begin, bumps.
 std::vector<AxisEvent> in_order(std::vector<AxisEvent> events);

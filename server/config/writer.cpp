@@ -79,10 +79,9 @@ void append_service(std::string& text, const RealtimeConfig& realtime, const Tcp
 
 void append_can(std::string& text, const CanConfig& bus) {
   text += "\n[[can]]\n";
-  append(text, "backend", in_quotes(name_of(bus.backend)));
+  append(text, "backend", in_quotes(can::name_of(bus.backend)));
   append(text, "channel", in_quotes(bus.channel));
-  const bool has_port = bus.backend == CanBackend::kUdpMulticast || bus.backend == CanBackend::kSocketcand;
-  if (has_port) append(text, "port", std::to_string(bus.port));
+  if (can::row_of(bus.backend).default_port != 0) append(text, "port", std::to_string(bus.port));
   append(text, "required", boolean(bus.required));
   append(text, "fd", boolean(bus.profile.fd));
   append(text, "extended", boolean(bus.profile.extended));

@@ -64,7 +64,6 @@ KNOWN = (
     ("plant/train/", "plant/axis_"),
     ("plant/machines/", "plant/machines/trains.hpp"),
     ("plant/machines/", "plant/machines/machine_kind.hpp"),
-    ("server/endpoints/can/buses/", "server/endpoints/can/terminal.hpp"),
     ("clients/models/", "clients/control/moves/"),
     ("clients/command/common/", "clients/command/"),
     ("clients/command/recording/", "clients/command/control/"),

@@ -71,9 +71,9 @@ int run_can_log(const CanLogOptions& options) {
   const link::CanAddress address = link::parse_can_address(options.address);
   const auto bus = link::open_can_bus(address, 5s);
   // A trace names an interface; what is none has the name of its kind.
-  Trace trace(options.out_file, address.backend == link::CanBackend::kSocketCan
+  Trace trace(options.out_file, address.backend == can::Backend::kSocketCan
                                     ? address.channel
-                                    : link::name_of(address.backend));
+                                    : std::string(can::name_of(address.backend)));
   catch_interrupts();
   try {
     follow(*bus, options, trace);

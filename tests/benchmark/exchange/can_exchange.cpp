@@ -199,7 +199,7 @@ struct Contest {
     controller.emplace(bus.open(), bus.config.profile.fd);
     const Datagrams datagrams = controller->datagrams();
     floor.emplace(datagrams, bus.open_floor());
-    if (bus.config.backend == CanBackend::kUdpMulticast) unicast.emplace(datagrams, CanWire::unicast());
+    if (bus.config.backend == can::Backend::kUdpMulticast) unicast.emplace(datagrams, CanWire::unicast());
     what = fmt::format("{} B out", datagrams.command.size());
     for (const auto& answer : datagrams.answers)
       what += fmt::format(", {} B", answer.size());
@@ -274,7 +274,7 @@ std::vector<Row> measure_multicast(const Plan&) {
             .open = {},
             .open_floor = {},
             .max_ratio = kMaxMulticastRatio};
-    bus.config.backend = CanBackend::kUdpMulticast;
+    bus.config.backend = can::Backend::kUdpMulticast;
     bus.config.channel = kGroup;
     bus.config.port = free_udp_port();
     bus.config.profile.fd = fd;
@@ -305,7 +305,7 @@ std::vector<Row> measure_socketcan(const Plan&) {
                   return std::pair(CanWire::socketcan(kFloorInterface), CanWire::socketcan(kFloorInterface));
                 },
             .max_ratio = kMaxSocketCanRatio};
-    bus.config.backend = CanBackend::kSocketCan;
+    bus.config.backend = can::Backend::kSocketCan;
     bus.config.channel = kInterface;
     bus.config.profile.fd = fd;
     return bus;

@@ -156,7 +156,7 @@ TEST(ConfigCan, ChannelsFitTheirBackEnd) {
 // Catches: a default that is not the documented one, and the port of one back end with another.
 TEST(ConfigCan, DefaultsDependOnTheBackEnd) {
   const CanConfig udp = bus_of(kUdp);
-  EXPECT_EQ(udp.backend, CanBackend::kUdpMulticast);
+  EXPECT_EQ(udp.backend, can::Backend::kUdpMulticast);
   expect_equal(udp, CanConfig{});
   const CanConfig socketcand = bus_of(kSocketcand);
   EXPECT_EQ(socketcand.channel, "127.0.0.1");
@@ -307,12 +307,12 @@ TEST(ConfigCan, TablesBelongToTheBusAboveThem) {
 
 // Catches: a list of words that is not in the order of the enumeration.
 TEST(ConfigCan, BackEndsAreNamedAsInTheFile) {
-  EXPECT_EQ(name_of(CanBackend::kSocketCan), "socketcan");
-  EXPECT_EQ(name_of(CanBackend::kUdpMulticast), "udp_multicast");
-  EXPECT_EQ(name_of(CanBackend::kSlcan), "slcan");
-  EXPECT_EQ(name_of(CanBackend::kSocketcand), "socketcand");
-  EXPECT_EQ(bus_of(kSocketCan).backend, CanBackend::kSocketCan);
-  EXPECT_EQ(bus_of(kSocketcand).backend, CanBackend::kSocketcand);
+  EXPECT_EQ(can::name_of(can::Backend::kSocketCan), "socketcan");
+  EXPECT_EQ(can::name_of(can::Backend::kUdpMulticast), "udp_multicast");
+  EXPECT_EQ(can::name_of(can::Backend::kSlcan), "slcan");
+  EXPECT_EQ(can::name_of(can::Backend::kSocketcand), "socketcand");
+  EXPECT_EQ(bus_of(kSocketCan).backend, can::Backend::kSocketCan);
+  EXPECT_EQ(bus_of(kSocketcand).backend, can::Backend::kSocketcand);
 }
 
 }  // namespace

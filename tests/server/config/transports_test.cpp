@@ -98,16 +98,16 @@ BenchConfig busy_bench() {
   config.can.push_back(bus);
   bus.profile.fd = false;
   bus.edges = false;
-  const auto add = [&](CanBackend backend, const std::string& channel, std::uint16_t port) {
+  const auto add = [&](can::Backend backend, const std::string& channel, std::uint16_t port) {
     bus.backend = backend;
     bus.channel = channel;
     bus.port = port;
     config.can.push_back(bus);
   };
   const std::uint16_t no_port = CanConfig{}.port;
-  add(CanBackend::kSocketCan, "vcan0", no_port);
-  add(CanBackend::kSlcan, "pty:/run/\"a\\b\"", no_port);
-  add(CanBackend::kSocketcand, "::1", 0);
+  add(can::Backend::kSocketCan, "vcan0", no_port);
+  add(can::Backend::kSlcan, "pty:/run/\"a\\b\"", no_port);
+  add(can::Backend::kSocketcand, "::1", 0);
   config.modbus = {.enabled = true,
                    .address = "0.0.0.0",
                    .port = 0,

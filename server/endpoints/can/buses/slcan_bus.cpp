@@ -1,4 +1,4 @@
-#include "server/endpoints/can/buses/slcan_bus.hpp"
+#include "server/endpoints/can/buses/backends.hpp"
 
 #include <unistd.h>
 
@@ -12,10 +12,10 @@
 
 #include "protocols/can/slcan.hpp"
 #include "server/endpoints/can/buses/slcan_device.hpp"
+#include "server/endpoints/can/buses/terminal.hpp"
 #include "server/endpoints/can/buses/text_listener.hpp"
 #include "server/endpoints/can/buses/text_peer.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
-#include "server/endpoints/can/terminal.hpp"
 
 namespace drivebench::can {
 namespace {

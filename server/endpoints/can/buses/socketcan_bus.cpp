@@ -1,5 +1,6 @@
 #include "server/endpoints/can/buses/socketcan_bus.hpp"
 #include "protocols/can/kernel_frame.hpp"
+#include "server/endpoints/can/buses/backends.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 
@@ -395,6 +396,10 @@ void SocketCanBus::probe() {
   } else {
     probe_later();
   }
+}
+
+std::unique_ptr<Bus> make_socketcan_bus(asio::io_context& io, const CanConfig& config) {
+  return std::make_unique<SocketCanBus>(io, config);
 }
 
 }  // namespace drivebench::can

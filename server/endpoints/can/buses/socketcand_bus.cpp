@@ -1,4 +1,4 @@
-#include "server/endpoints/can/buses/socketcand_bus.hpp"
+#include "server/endpoints/can/buses/backends.hpp"
 
 #include <unistd.h>
 

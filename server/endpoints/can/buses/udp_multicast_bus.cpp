@@ -1,4 +1,4 @@
-#include "server/endpoints/can/buses/udp_multicast_bus.hpp"
+#include "server/endpoints/can/buses/backends.hpp"
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
@@ -325,7 +325,7 @@ bool UdpMulticastBus::transmit(const Frame& frame) {
   const Clock::time_point now = Clock::now();
   const double elapsed_s = std::chrono::duration<double>(now - allowed_at_).count();
   allowed_at_ = now;
-  allowance_ = std::min(allowance_ + elapsed_s * kMulticastFramesPerS, kBurst);
+  allowance_ = std::min(allowance_ + elapsed_s * row_of(Backend::kUdpMulticast).frames_per_s, kBurst);
   if (allowance_ < 1.0) return false;
   std::array<std::byte, kMaxMsgpackFrame> bytes;
   const std::size_t size = encode_msgpack(frame, realtime_s(), bytes);

@@ -12,9 +12,7 @@
 #include <memory>
 #include <string_view>
 
-#include "server/endpoints/can/buses/slcan_bus.hpp"
-#include "server/endpoints/can/buses/socketcand_bus.hpp"
-#include "server/endpoints/can/buses/udp_multicast_bus.hpp"
+#include "server/endpoints/can/buses/backends.hpp"
 #include "server/host/asio.hpp"
 
 namespace {

@@ -96,7 +96,7 @@ class SocketCan : public testing::Test {
 
   CanConfig config(bool required = true) const {
     CanConfig config;
-    config.backend = CanBackend::kSocketCan;
+    config.backend = Backend::kSocketCan;
     config.channel = interface_;
     config.required = required;
     config.profile.fd = false;

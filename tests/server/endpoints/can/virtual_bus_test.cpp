@@ -7,9 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "server/endpoints/can/buses/backends.hpp"
 #include "server/endpoints/can/buses/send_queue.hpp"
-#include "server/endpoints/can/buses/socketcand_bus.hpp"
-#include "server/endpoints/can/buses/udp_multicast_bus.hpp"
 #include "server/host/asio.hpp"
 
 namespace drivebench::can {
@@ -186,7 +185,7 @@ TEST(VirtualBus, OpensLaterIfItIsNotRequired) {
   auto holder = std::make_unique<asio::ip::tcp::acceptor>(
       io, asio::ip::tcp::endpoint(asio::ip::make_address("127.0.0.1"), 0));
   CanConfig config;
-  config.backend = CanBackend::kSocketcand;
+  config.backend = Backend::kSocketcand;
   config.channel = "127.0.0.1";
   config.port = holder->local_endpoint().port();
   EXPECT_THROW(make_socketcand_bus(io, config), std::runtime_error);

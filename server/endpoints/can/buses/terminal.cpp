@@ -1,4 +1,4 @@
-#include "server/endpoints/can/terminal.hpp"
+#include "server/endpoints/can/buses/terminal.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
