@@ -1,8 +1,8 @@
 #pragma once
 
-namespace drivebench::control {
+namespace drivebench {
 
-/// What the controller believes about a synchronous machine with permanent magnets and a round rotor, two
+/// What a client believes about a synchronous machine with permanent magnets and a round rotor, two
 /// phases or the power-invariant two-phase equivalent of a star:
 ///   L_S·di_d/dt = −R_S·i_d + n_p·ω·L_S·i_q + u_d
 ///   L_S·di_q/dt = −R_S·i_q − n_p·ω·L_S·i_d − K_m·ω + u_q
@@ -23,4 +23,4 @@ struct PmMachineModel {
   constexpr double acceleration_per_a() const noexcept { return torque_constant_nm_per_a / inertia_kgm2; }
 };
 
-}  // namespace drivebench::control
+}  // namespace drivebench

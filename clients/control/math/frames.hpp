@@ -3,15 +3,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "clients/models/two_phase.hpp"
+
 namespace drivebench::control {
 
-/// A two-phase quantity in the stator frame, phases a and b in quadrature.
-struct PhasePair {
-  double a;
-  double b;
-};
-
-/// The same along (d) and across (q) a direction, usually the rotor flux.
+/// A two-phase quantity along (d) and across (q) a direction, usually the rotor flux.
 struct DirectQuadrature {
   double d;
   double q;

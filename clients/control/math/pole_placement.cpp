@@ -1,6 +1,5 @@
 #include "clients/control/math/pole_placement.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>

@@ -1,8 +1,9 @@
 #include "clients/control/synchronous/bldc_commutation.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "clients/models/bldc_machine.hpp"
 
 namespace drivebench::control {
 
@@ -25,11 +26,6 @@ Phases commutation_currents(int sector) noexcept {
 }
 
 Phases trapezoids(double electrical_rad) noexcept {
-  const auto trapezoid = [](double turns) {
-    // A triangle of height 3 around the middle of the top, a quarter turn after the rise, cut off at 1.
-    const double distance = std::abs(turns - 0.25 - std::round(turns - 0.25));
-    return std::clamp(3.0 - 12.0 * distance, -1.0, 1.0);
-  };
   const double turns = electrical_rad / (2.0 * std::numbers::pi);
   return {trapezoid(turns), trapezoid(turns - 1.0 / 3.0), trapezoid(turns - 2.0 / 3.0)};
 }

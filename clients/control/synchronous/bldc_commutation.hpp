@@ -20,8 +20,7 @@ std::optional<int> commutation_sector(std::uint64_t hall_lines) noexcept;
 /// third. Their sum is 0. Source: Chiasson 2005, (10.10) (BL-03).
 Phases commutation_currents(int sector) noexcept;
 
-/// e(n_p·θ) of the three phases: 0 at 0, 1 from 30° to 150°, −1 from 210° to 330°. Source: Chiasson 2005,
-/// (10.7)-(10.8) (BL-02).
+/// e(n_p·θ) of the three phases.
 Phases trapezoids(double electrical_rad) noexcept;
 
 }  // namespace drivebench::control

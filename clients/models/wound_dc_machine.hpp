@@ -1,10 +1,9 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstddef>
 
-namespace drivebench::control {
+namespace drivebench {
 
 /// Flux linkage of a field winding over its current: piecewise linear from (0, 0) on, odd; the last piece
 /// goes on for ever.
@@ -44,7 +43,7 @@ struct FieldCurve {
   }
 };
 
-/// What a controller believes about a DC machine with a wound field: torque K_m·λ_f·i, back-emf K_m·λ_f·ω.
+/// What a client believes about a DC machine with a wound field: torque K_m·λ_f·i, back-emf K_m·λ_f·ω.
 struct WoundDcModel {
   double armature_resistance_ohm;     ///< R
   double armature_inductance_h;       ///< L
@@ -68,4 +67,4 @@ struct WoundDcModel {
   }
 };
 
-}  // namespace drivebench::control
+}  // namespace drivebench

@@ -1,13 +1,30 @@
 #pragma once
 
-#include <cmath>
+namespace drivebench {
 
-#include "clients/models/machine.hpp"
+/// What a client believes about a two-phase induction machine, as far as field-oriented control needs it. It
+/// is the client's own copy: the machine that it drives may differ (a warm rotor), and no client knows the
+/// true one.
+struct InductionMachineModel {
+  double pole_pairs;
+  double mutual_inductance_h;
+  double rotor_resistance_ohm;
+  double rotor_inductance_h;
+  double friction_nms;  ///< viscous, f [N·m·s/rad]
+  double inertia_kgm2;
 
-namespace drivebench::control {
+  /// η = R_R/L_R [1/s], the rate at which the rotor flux decays.
+  constexpr double flux_decay_per_s() const noexcept { return rotor_resistance_ohm / rotor_inductance_h; }
+  /// f/J [1/s]
+  constexpr double friction_rate_per_s() const noexcept { return friction_nms / inertia_kgm2; }
+  /// μ = n_p·M/(J·L_R): acceleration = μ·ψ_d·i_q.
+  constexpr double acceleration_per_wb_a() const noexcept {
+    return pole_pairs * mutual_inductance_h / (inertia_kgm2 * rotor_inductance_h);
+  }
+};
 
-/// The whole two-phase induction machine: what field-oriented control needs to know, and the stator, which
-/// matters wherever voltages are reckoned with.
+/// The whole two-phase induction machine: the part above, and the stator, which matters wherever voltages
+/// count.
 struct InductionMotorModel {
   InductionMachineModel machine;
   double stator_resistance_ohm;
@@ -39,4 +56,4 @@ struct InductionMotorModel {
   }
 };
 
-}  // namespace drivebench::control
+}  // namespace drivebench
