@@ -1,11 +1,11 @@
 #pragma once
 
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/gains/gains.hpp"
-#include "clients/control/moves/trajectory.hpp"
+#include "clients/control/moves/move_of.hpp"
 
 namespace drivebench::control {
 
@@ -17,20 +17,18 @@ struct SpeedStepsParameters {
   double second_rad_s;
   double second_s;
 
-  static std::span<const GainRow<SpeedStepsParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{
+      gain("steps.first_rad_s", &SpeedStepsParameters::first_rad_s),
+      gain("steps.first_s", &SpeedStepsParameters::first_s, GainRule::kDuration),
+      gain("steps.second_rad_s", &SpeedStepsParameters::second_rad_s),
+      gain("steps.second_s", &SpeedStepsParameters::second_s, GainRule::kDuration)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
+
+  Reference at(double t_s) const noexcept;
+  double duration_s() const noexcept { return first_s + second_s; }
 };
 
 /// The angle is that of the speeds, the acceleration 0.
-class SpeedSteps final : public Trajectory {
- public:
-  /// `p` must have no problems().
-  explicit SpeedSteps(const SpeedStepsParameters& p) noexcept : p_(p) {}
-  Reference at(double t_s) const noexcept override;
-  double duration_s() const noexcept override { return p_.first_s + p_.second_s; }
-
- private:
-  SpeedStepsParameters p_;
-};
+using SpeedSteps = MoveOf<SpeedStepsParameters>;
 
 }  // namespace drivebench::control

@@ -1,6 +1,10 @@
 #pragma once
 
-#include "clients/control/moves/trajectory.hpp"
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "clients/control/moves/move_of.hpp"
 
 /// References that no machine can follow or that are followed for ever: what loops are tested with.
 namespace drivebench::control {
@@ -11,20 +15,16 @@ struct StepMoveParameters {
   double speed_rad_s;
   double duration_s;
 
-  static std::span<const GainRow<StepMoveParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gain("move.distance_rad", &StepMoveParameters::distance_rad),
+      gain("move.speed_rad_s", &StepMoveParameters::speed_rad_s),
+      gain("move.duration_s", &StepMoveParameters::duration_s, GainRule::kDuration)};
   std::vector<std::string> problems() const { return range_problems(*this); }
+
+  Reference at(double t_s) const noexcept;
 };
 
-class StepMove final : public Trajectory {
- public:
-  /// `p` must have no problems().
-  explicit StepMove(const StepMoveParameters& p) noexcept : p_(p) {}
-  Reference at(double t_s) const noexcept override;
-  double duration_s() const noexcept override { return p_.duration_s; }
-
- private:
-  StepMoveParameters p_;
-};
+using StepMove = MoveOf<StepMoveParameters>;
 
 /// The angle of a sine from time 0 on, θ = A·sin(Ωt): its speed jumps there.
 struct SineMoveParameters {
@@ -32,20 +32,16 @@ struct SineMoveParameters {
   double angular_frequency_rad_s;
   double duration_s;
 
-  static std::span<const GainRow<SineMoveParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gain("move.amplitude_rad", &SineMoveParameters::amplitude_rad),
+      gain("move.angular_frequency_rad_s", &SineMoveParameters::angular_frequency_rad_s, GainRule::kPositive),
+      gain("move.duration_s", &SineMoveParameters::duration_s, GainRule::kDuration)};
   std::vector<std::string> problems() const { return range_problems(*this); }
+
+  Reference at(double t_s) const noexcept;
 };
 
-class SineMove final : public Trajectory {
- public:
-  /// `p` must have no problems().
-  explicit SineMove(const SineMoveParameters& p) noexcept : p_(p) {}
-  Reference at(double t_s) const noexcept override;
-  double duration_s() const noexcept override { return p_.duration_s; }
-
- private:
-  SineMoveParameters p_;
-};
+using SineMove = MoveOf<SineMoveParameters>;
 
 /// The motion that a sinusoidal torque makes of a shaft at rest with friction: α + (f/J)·ω = A·sin(Ωt). A
 /// controller that works out the current of the reference gets the sine back.
@@ -55,19 +51,18 @@ struct SineTorqueMoveParameters {
   double friction_rate_per_s;      ///< f/J
   double duration_s;
 
-  static std::span<const GainRow<SineTorqueMoveParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gain("move.amplitude_rad_s2", &SineTorqueMoveParameters::amplitude_rad_s2),
+      gain("move.angular_frequency_rad_s", &SineTorqueMoveParameters::angular_frequency_rad_s,
+           GainRule::kPositive),
+      gain("move.friction_rate_per_s", &SineTorqueMoveParameters::friction_rate_per_s,
+           GainRule::kNotNegative),
+      gain("move.duration_s", &SineTorqueMoveParameters::duration_s, GainRule::kDuration)};
   std::vector<std::string> problems() const { return range_problems(*this); }
+
+  Reference at(double t_s) const noexcept;
 };
 
-class SineTorqueMove final : public Trajectory {
- public:
-  /// `p` must have no problems().
-  explicit SineTorqueMove(const SineTorqueMoveParameters& p) noexcept : p_(p) {}
-  Reference at(double t_s) const noexcept override;
-  double duration_s() const noexcept override { return p_.duration_s; }
-
- private:
-  SineTorqueMoveParameters p_;
-};
+using SineTorqueMove = MoveOf<SineTorqueMoveParameters>;
 
 }  // namespace drivebench::control

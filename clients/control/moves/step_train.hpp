@@ -1,11 +1,11 @@
 #pragma once
 
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/gains/gains.hpp"
-#include "clients/control/moves/trajectory.hpp"
+#include "clients/control/moves/move_of.hpp"
 
 namespace drivebench::control {
 
@@ -15,20 +15,17 @@ struct StepTrainParameters {
   double steps;     ///< a whole number
   double rate_hz;
 
-  static std::span<const GainRow<StepTrainParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gain("train.step_rad", &StepTrainParameters::step_rad),
+      gain("train.steps", &StepTrainParameters::steps, GainRule::kPositive),
+      gain("train.rate_hz", &StepTrainParameters::rate_hz, GainRule::kPositive)};
   std::vector<std::string> problems() const;
+
+  Reference at(double t_s) const noexcept;
+  double duration_s() const noexcept { return steps / rate_hz; }
 };
 
 /// The angle jumps; speed and acceleration are 0. The last step lasts as long as the others.
-class StepTrain final : public Trajectory {
- public:
-  /// `p` must have no problems().
-  explicit StepTrain(const StepTrainParameters& p) noexcept : p_(p) {}
-  Reference at(double t_s) const noexcept override;
-  double duration_s() const noexcept override { return p_.steps / p_.rate_hz; }
-
- private:
-  StepTrainParameters p_;
-};
+using StepTrain = MoveOf<StepTrainParameters>;
 
 }  // namespace drivebench::control

@@ -7,10 +7,9 @@
 #include <numbers>
 #include <vector>
 
-#include "clients/control/moves/jerk_continuous_move.hpp"
+#include "clients/control/dc/dc_references.hpp"
+#include "clients/control/moves/speed_ramp.hpp"
 #include "clients/control/moves/standard_inputs.hpp"
-#include "clients/control/moves/trapezoidal_move.hpp"
-#include "clients/models/dc_machine_model.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -130,10 +129,10 @@ TEST(CubicMove, NeedsTheBooksCurrentsAndVoltagesOfDcA) {
       const Reference r = move.at(t);
       top = std::max(top, r.speed_rad_s);
       peak = std::max(peak, r.acceleration_rad_s2);
-      i_max = std::max(i_max, kDcA.current_a(r));
-      i_min = std::min(i_min, kDcA.current_a(r));
-      v_max = std::max(v_max, kDcA.voltage_v(r));
-      v_min = std::min(v_min, kDcA.voltage_v(r));
+      i_max = std::max(i_max, reference_current_a(kDcA, r));
+      i_min = std::min(i_min, reference_current_a(kDcA, r));
+      v_max = std::max(v_max, reference_voltage_v(kDcA, r));
+      v_min = std::min(v_min, reference_voltage_v(kDcA, r));
     }
     EXPECT_NEAR(top, c.top_rad_s, 1e-3 * c.top_rad_s);
     EXPECT_NEAR(peak, c.peak_rad_s2, 1e-3 * c.peak_rad_s2);
