@@ -3,13 +3,11 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <span>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
-#include <vector>
 
 #include "clients/control/dc/dc_open_loop.hpp"
+#include "clients/control/dc/dc_references.hpp"
 #include "clients/control/dc/dc_state_feedback.hpp"
 #include "clients/control/dc/dc_voltage_feedback.hpp"
 #include "clients/control/math/limits.hpp"
@@ -17,7 +15,7 @@
 #include "clients/control/wound_dc/separate_dc_control.hpp"
 #include "clients/control/wound_dc/series_dc_control.hpp"
 
-/// How the presets of DC machines are put together, and what is looked at before a move.
+/// How the presets of DC machines are put together, and the limits that are checked before a move.
 namespace drivebench::control {
 
 using DcDemands = std::array<Demand, 2>;
@@ -30,8 +28,8 @@ inline DcDemands dc_demands(double current_a, double current_limit_a, double vol
 
 /// Laws with the reference's own current or voltage in front: i_ref and v_ref of the move.
 inline DcDemands demands_of(const DcAxisParameters& axis, const Reference& r) noexcept {
-  return dc_demands(axis.machine.current_a(r), axis.current_limit_a, axis.machine.voltage_v(r),
-                    axis.voltage_limit_v);
+  return dc_demands(reference_current_a(axis.machine, r), axis.current_limit_a,
+                    reference_voltage_v(axis.machine, r), axis.voltage_limit_v);
 }
 
 /// Torque (J·α + f·ω) at the flux of the reference.
@@ -84,28 +82,25 @@ constexpr std::string_view signal_of(const P& p) noexcept {
   return {};
 }
 
-/// A preset of a controller, a trajectory and their parameters.
-template <class ControllerType, class Move, const auto& kP, const auto& kPath, const RunTiming& kTiming>
-constexpr Preset dc_preset(std::string_view name, std::string_view source, std::string_view expectation,
-                           std::string_view bench, std::string_view machine_kind, Quantity quantity) {
-  return {.name = name,
-          .source = source,
-          .expectation = expectation,
-          .bench = bench,
-          .needs = {.machine_kind = machine_kind,
-                    .counts_per_revolution = kP.axis.shaft.counts_per_revolution,
+template <class ControllerType, class Move, class P, class Path>
+Run dc_run(const P& p, const Path& path, const RunTiming& timing) {
+  auto move = std::make_shared<Move>(path);
+  refuse_beyond_limits(p, *move, p.axis.period_s());
+  return run_at(p.axis.sample_rate_hz, std::make_unique<ControllerType>(p), std::move(move), timing);
+}
+
+/// A preset of a controller and a move of these types.
+template <class ControllerType, class Move, class P, class Path>
+Preset dc_preset(const PresetText& text, std::string_view machine_kind, Quantity quantity, const P& p,
+                 const Path& path, const RunTiming& timing) {
+  return preset_of(text,
+                   {.machine_kind = machine_kind,
+                    .counts_per_revolution = p.axis.shaft.counts_per_revolution,
                     .pole_pairs = 0.0,
-                    .voltage_limit_v = kP.axis.voltage_limit_v,
+                    .voltage_limit_v = p.axis.voltage_limit_v,
                     .quantity = quantity,
-                    .signal = signal_of(kP)},
-          .gains = [] { return gains_of(kP, kPath, kTiming); },
-          .make = [](std::span<const Gain> overrides) -> Run {
-            auto [p, path, timing] = with_gains(std::tuple{kP, kPath, kTiming}, overrides);
-            timing.sample_rate_hz = p.axis.sample_rate_hz;
-            auto move = std::make_shared<Move>(path);
-            refuse_beyond_limits(p, *move, p.axis.period_s());
-            return {std::make_unique<ControllerType>(p), std::move(move), timing};
-          }};
+                    .signal = signal_of(p)},
+                   dc_run<ControllerType, Move, P, Path>, p, path, timing);
 }
 
 }  // namespace drivebench::control

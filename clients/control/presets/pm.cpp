@@ -1,9 +1,9 @@
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <vector>
 
-#include "clients/control/gains/move_allowance.hpp"
-#include "clients/control/math/limits.hpp"
 #include "clients/control/moves/speed_steps.hpp"
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/synchronous/pm_current_controller.hpp"
@@ -36,11 +36,6 @@ constexpr PmFeedbackGains kMovePrinted = {.direct_per_s = 1.06e4,
                                           .speed_a_per_rad = 340.0,
                                           .angle_a_per_rad_s = 3.8e6,
                                           .integral_a_per_rads2 = 1.07e7};
-constexpr PmFeedbackGains kMoveSwapped = {.direct_per_s = 1.78e4,
-                                          .quadrature_per_s = 1.06e4,
-                                          .speed_a_per_rad = 340.0,
-                                          .angle_a_per_rad_s = 3.8e6,
-                                          .integral_a_per_rads2 = 1.07e7};
 constexpr PmFeedbackGains kRunPrinted = {.direct_per_s = 2.587e4,
                                          .quadrature_per_s = 2.446e4,
                                          .speed_a_per_rad = 603.1,
@@ -53,26 +48,16 @@ constexpr PmFeedbackGains kRunReduced = {.direct_per_s = 4000.0,
                                          .angle_a_per_rad_s = 2.993e5,
                                          .integral_a_per_rads2 = 1.48e6};
 
-constexpr PmVoltageParameters stepper_servo(const PmFeedbackGains& feedback, double sample_rate_hz,
-                                            double lead_samples,
-                                            SpeedFrom speed_from = SpeedFrom::kObserver) noexcept {
-  return {.machine = kStepper,
-          .sample_rate_hz = sample_rate_hz,
-          .counts_per_revolution = 2000.0,
-          .voltage_limit_v = 40.0,
-          .feedback = feedback,
-          .speed_observer = {.angle_per_s = 5272.0, .speed_per_s2 = 7.0e6},
-          .angle_lead_samples = lead_samples,
-          .speed_from = speed_from};
-}
-
-constexpr PmVoltageParameters kMoveController = stepper_servo(kMovePrinted, 10e3, 0.0);
-constexpr PmVoltageParameters kSwappedController = stepper_servo(kMoveSwapped, 10e3, 0.0);
-constexpr PmVoltageParameters kDifferenceController =
-    stepper_servo(kMovePrinted, 10e3, 0.0, SpeedFrom::kDifference);
-constexpr PmVoltageParameters kRunController = stepper_servo(kRunReduced, 10e3, 0.5);
-constexpr PmVoltageParameters kNoLeadController = stepper_servo(kRunReduced, 10e3, 0.0);
-constexpr PmVoltageParameters k20KhzController = stepper_servo(kRunPrinted, 20e3, 0.5);
+constexpr PmVoltageParameters kMoveController = {
+    .machine = kStepper,
+    .sample_rate_hz = 10e3,
+    .counts_per_revolution = 2000.0,
+    .voltage_limit_v = 40.0,
+    .feedback = kMovePrinted,
+    .speed_observer = {.angle_per_s = 5272.0, .speed_per_s2 = 7.0e6}};
+constexpr PmVoltageParameters kRunController =
+    with(kMoveController, &PmVoltageParameters::feedback, kRunReduced,
+         &PmVoltageParameters::angle_lead_samples, 0.5);
 
 /// 900 counts in 30 ms.
 constexpr TrajectoryParameters kMove = {
@@ -86,16 +71,16 @@ constexpr MoveAllowance kStepperLimits = {.voltage_v = 40.0, .current_a = 6.0};
 constexpr MoveAllowance kMoveAllowance = {.voltage_v = 42.0, .current_a = 6.0};
 
 /// Voltage and current of the references as vectors.
-std::array<Demand, 2> demands(const PmVoltageParameters& p, const MoveAllowance& allowed,
-                              const Reference& r) {
+std::array<Demand, 2> reference_demands(const PmVoltageParameters& p, const MoveAllowance& allowed,
+                                        const Reference& r) {
   const PmReferences ref = pm_references(p.machine, r);
   return {Demand{"stator voltage", std::hypot(ref.voltage_v.d, ref.voltage_v.q), allowed.voltage_v, "V"},
           Demand{"stator current", std::hypot(ref.current_a.d, ref.current_a.q), allowed.current_a, "A"}};
 }
 
 /// The same of steady currents.
-std::array<Demand, 2> demands(const PmCurrentParameters& p, const MoveAllowance& allowed,
-                              const Reference& r) {
+std::array<Demand, 2> steady_demands(const PmCurrentParameters& p, const MoveAllowance& allowed,
+                                     const Reference& r) {
   DirectQuadrature i = pm_references(p.machine, r).current_a;
   i.d = direct_current_within_voltage_a(p.machine, p.voltage_limit_v, r.speed_rad_s, i.q);
   return {Demand{"stator voltage", steady_voltage_v(p.machine, r.speed_rad_s, i), allowed.voltage_v, "V"},
@@ -103,36 +88,6 @@ std::array<Demand, 2> demands(const PmCurrentParameters& p, const MoveAllowance&
 }
 
 constexpr RunTiming kTiming = {.sample_rate_hz = 10e3, .prepare_s = 0.002, .hold_s = 0.020};
-
-template <class ControllerType, class Parameters>
-Run servo_run(std::tuple<Parameters, TrajectoryParameters, MoveAllowance, RunTiming> parts) {
-  auto [p, move, allowed, timing] = parts;
-  timing.sample_rate_hz = p.sample_rate_hz;
-  const auto demands_at = [&servo = p, &limits = allowed, &path = move](double t_s) {
-    return demands(servo, limits, trajectory_at(path, t_s));
-  };
-  refuse(first_exceeded(move.duration_s(), p.period_s(), demands_at));
-  return {std::make_unique<ControllerType>(p), std::make_shared<CubicMove>(move), timing};
-}
-
-template <const PmVoltageParameters& kP, const TrajectoryParameters& kPath, const MoveAllowance& kAllowed>
-constexpr Preset stepper_preset(std::string_view name, std::string_view source, std::string_view expectation,
-                                std::string_view bench) {
-  return {.name = name,
-          .source = source,
-          .expectation = expectation,
-          .bench = bench,
-          .needs = {.machine_kind = "pm_synchronous",
-                    .counts_per_revolution = kP.counts_per_revolution,
-                    .pole_pairs = kP.machine.pole_pairs,
-                    .voltage_limit_v = kP.voltage_limit_v},
-          .gains = [] { return gains_of(kP, kPath, kAllowed, kTiming); },
-          .make =
-              [](std::span<const Gain> overrides) {
-                return servo_run<PmVoltageController>(
-                    with_gains(std::tuple{kP, kPath, kAllowed, kTiming}, overrides));
-              }};
-}
 
 constexpr double kBm500Voltage = 124.75;  // √(3/2)·(2/π)·160 V
 
@@ -150,19 +105,16 @@ constexpr TrajectoryParameters kBm500Move = {
 constexpr MoveAllowance kBm500Limits = {.voltage_v = kBm500Voltage, .current_a = 22.05};
 constexpr RunTiming kBm500Timing = {.sample_rate_hz = 10e3, .prepare_s = 0.005, .hold_s = 0.030};
 
-constexpr PmSpeedParameters run_up(double current_limit_a) noexcept {
-  return {.machine = kBm500,
-          .sample_rate_hz = 20e3,
-          .counts_per_revolution = 8192.0,
-          .voltage_limit_v = kBm500Voltage,
-          .current_limit_a = current_limit_a,
-          .speed_gain_per_s = 2000.0,
-          .max_speed_rad_s = 1050.0,
-          .current = {.proportional_v_per_a = 10.0, .integral_v_per_as = 2000.0},
-          .speed_observer = SpeedObserverGains::placed(3000.0, 3000.0, 0.0)};
-}
-constexpr PmSpeedParameters kRunUp22 = run_up(22.05);
-constexpr PmSpeedParameters kRunUp67 = run_up(67.36);
+constexpr PmSpeedParameters kRunUp22 = {
+    .machine = kBm500,
+    .sample_rate_hz = 20e3,
+    .counts_per_revolution = 8192.0,
+    .voltage_limit_v = kBm500Voltage,
+    .current_limit_a = 22.05,
+    .speed_gain_per_s = 2000.0,
+    .max_speed_rad_s = 1050.0,
+    .current = {.proportional_v_per_a = 10.0, .integral_v_per_as = 2000.0},
+    .speed_observer = SpeedObserverGains::placed(3000.0, 3000.0, 0.0)};
 /// Towards 10 000 rpm, which the bearings stand, and back as soon as 1000 rad/s are there.
 constexpr SpeedStepsParameters kUpAndDown22 = {
     .first_rad_s = 1047.2, .first_s = 0.0440, .second_rad_s = 0.0, .second_s = 0.045};
@@ -170,76 +122,92 @@ constexpr SpeedStepsParameters kUpAndDown67 = {
     .first_rad_s = 1047.2, .first_s = 0.0235, .second_rad_s = 0.0, .second_s = 0.025};
 constexpr RunTiming kRunUpTiming = {.sample_rate_hz = 20e3, .prepare_s = 0.002, .hold_s = 0.005};
 
-template <const PmSpeedParameters& kP, const SpeedStepsParameters& kSteps>
-constexpr Preset run_up_preset(std::string_view name, std::string_view source, std::string_view expectation) {
-  return {.name = name,
-          .source = source,
-          .expectation = expectation,
-          .bench = "bm500-run-up",
-          .needs = {.machine_kind = "pm_synchronous",
-                    .counts_per_revolution = kP.counts_per_revolution,
-                    .pole_pairs = kP.machine.pole_pairs,
-                    .voltage_limit_v = 101.8},
-          .gains = [] { return gains_of(kP, kSteps, kRunUpTiming); },
-          .make = [](std::span<const Gain> overrides) -> Run {
-            auto [p, steps, timing] = with_gains(std::tuple{kP, kSteps, kRunUpTiming}, overrides);
-            timing.sample_rate_hz = p.sample_rate_hz;
-            return {std::make_unique<PmSpeedController>(p), std::make_shared<SpeedSteps>(steps), timing};
-          }};
+Run voltage_run(const PmVoltageParameters& p, const TrajectoryParameters& path, const MoveAllowance& allowed,
+                const RunTiming& timing) {
+  return cubic_run<PmVoltageController>(p, path, allowed, timing, reference_demands);
 }
 
-constexpr auto kPresets = std::to_array<Preset>({
-    stepper_preset<kMoveController, kMove, kMoveAllowance>(
-        "book/9.1.4", "Chiasson 2005, 9.1.4: 1.8 mm in 30 ms, 900 counts, state feedback to the voltages",
-        "peak error at most 3 counts, the encoder within 1 count of 900; one tick of delay loses control",
-        "pm-stepper"),
-    stepper_preset<kSwappedController, kMove, kMoveAllowance>(
-        "book/9.1.4-swapped", "as book/9.1.4 with k11 and k22 exchanged, which gives the printed poles",
-        "peak error at most 3 counts, the encoder within 1 count of 900", "pm-stepper"),
-    stepper_preset<kDifferenceController, kMove, kMoveAllowance>(
-        "book/9.1.4-backward-difference",
-        "as book/9.1.4, speed by backward difference, with which the book's motor did not track",
-        "tracks all the same, with three times the clipped samples", "pm-stepper"),
-    stepper_preset<kRunController, kRun, kStepperLimits>(
-        "book/9.7-3000rpm",
-        "Chiasson 2005, problem 9.7: 3000 rpm at 10 kHz, gains reduced to what 10 kHz can sample",
-        "peak error at most 10 counts, final at most 1", "pm-stepper-centred"),
-    stepper_preset<kRunController, kRun, kStepperLimits>(
-        "book/9.7-3000rpm-floor", "as book/9.7-3000rpm with an encoder that rounds down: a mistake",
-        "fails: more than 1000 counts", "pm-stepper"),
-    stepper_preset<kNoLeadController, kRun, kStepperLimits>(
-        "book/9.7-3000rpm-no-lead", "as book/9.7-3000rpm without turning the voltages ahead: a mistake",
-        "fails: more than 1000 counts", "pm-stepper-centred"),
-    stepper_preset<k20KhzController, kRun, kStepperLimits>(
-        "book/9.7-3000rpm-20khz", "as book/9.7-3000rpm at 20 kHz with the gains of the book",
-        "peak error at most 2 counts, final at most 1", "pm-stepper-20khz"),
-    {.name = "pm/current-servo",
-     .source = "Chiasson 2005, (9.49)-(9.52) on the motor of 9.2.3; move and gains are ours",
-     .expectation = "peak error at most 30 counts of 8192, final at most 1",
-     .bench = "bm500-current",
-     .needs = {.machine_kind = "pm_synchronous",
-               .counts_per_revolution = 8192.0,
-               .pole_pairs = 4.0,
-               .voltage_limit_v = 101.8,
-               .quantity = Quantity::kCurrent},
-     .gains = [] { return gains_of(kBm500Servo, kBm500Move, kBm500Limits, kBm500Timing); },
-     .make =
-         [](std::span<const Gain> overrides) {
-           return servo_run<PmCurrentController>(
-               with_gains(std::tuple{kBm500Servo, kBm500Move, kBm500Limits, kBm500Timing}, overrides));
-         }},
-    run_up_preset<kRunUp22, kUpAndDown22>(
-        "book/9.8-22a",
-        "Chiasson 2005, problem 9.8 and figures 9.25-9.28: run-up to 10 000 rpm, 18 A of a phase",
-        "1000 rad/s after 44.0 ms, at rest again after 84.3 ms"),
-    run_up_preset<kRunUp67, kUpAndDown67>("book/9.8-67a", "as book/9.8-22a with 55 A of a phase",
-                                          "1000 rad/s after 23.5 ms, at rest again after 44.7 ms"),
-});
+Run current_run(const PmCurrentParameters& p, const TrajectoryParameters& path, const MoveAllowance& allowed,
+                const RunTiming& timing) {
+  return cubic_run<PmCurrentController>(p, path, allowed, timing, steady_demands);
+}
+
+Run speed_run(const PmSpeedParameters& p, const SpeedStepsParameters& steps, const RunTiming& timing) {
+  return run_at(p.sample_rate_hz, std::make_unique<PmSpeedController>(p), std::make_shared<SpeedSteps>(steps),
+                timing);
+}
+
+template <class P>
+Requirements needs_of(const P& p, double voltage_limit_v, Quantity quantity = Quantity::kVoltage) {
+  return {.machine_kind = "pm_synchronous",
+          .counts_per_revolution = p.counts_per_revolution,
+          .pole_pairs = p.machine.pole_pairs,
+          .voltage_limit_v = voltage_limit_v,
+          .quantity = quantity};
+}
+
+/// √(2/3) of the two-phase limit: that of a phase.
+constexpr double kBm500PhaseVoltage = 101.8;
+
+Preset stepper(const PresetText& text, const PmVoltageParameters& p, const TrajectoryParameters& path,
+               const MoveAllowance& allowed) {
+  return preset_of(text, needs_of(p, p.voltage_limit_v), voltage_run, p, path, allowed, kTiming);
+}
+
+Preset run_up(const PresetText& text, const PmSpeedParameters& p, const SpeedStepsParameters& steps) {
+  return preset_of(text, needs_of(p, kBm500PhaseVoltage), speed_run, p, steps, kRunUpTiming);
+}
 
 }  // namespace
 
-std::span<const Preset> pm_presets() noexcept {
-  return kPresets;
+std::vector<Preset> pm_presets() {
+  using P = PmVoltageParameters;
+  return {
+      stepper(
+          {"book/9.1.4", "Chiasson 2005, 9.1.4: 1.8 mm in 30 ms, 900 counts, state feedback to the voltages",
+           "peak error at most 3 counts, the encoder within 1 count of 900; one tick of delay loses control",
+           "pm-stepper"},
+          kMoveController, kMove, kMoveAllowance),
+      stepper(
+          {"book/9.1.4-swapped", "as book/9.1.4 with k11 and k22 exchanged, which gives the printed poles",
+           "peak error at most 3 counts, the encoder within 1 count of 900", "pm-stepper"},
+          with(kMoveController, &P::feedback,
+               with(kMovePrinted, &PmFeedbackGains::direct_per_s, kMovePrinted.quadrature_per_s,
+                    &PmFeedbackGains::quadrature_per_s, kMovePrinted.direct_per_s)),
+          kMove, kMoveAllowance),
+      stepper({"book/9.1.4-backward-difference",
+               "as book/9.1.4, speed by backward difference, with which the book's motor did not track",
+               "tracks all the same, with three times the clipped samples", "pm-stepper"},
+              with(kMoveController, &P::speed_source, SpeedSource::kBackwardDifference), kMove,
+              kMoveAllowance),
+      stepper({"book/9.7-3000rpm",
+               "Chiasson 2005, problem 9.7: 3000 rpm at 10 kHz, gains reduced to what 10 kHz can sample",
+               "peak error at most 10 counts, final at most 1", "pm-stepper-centred"},
+              kRunController, kRun, kStepperLimits),
+      stepper({"book/9.7-3000rpm-floor", "as book/9.7-3000rpm with an encoder that rounds down: a mistake",
+               "fails: more than 1000 counts", "pm-stepper"},
+              kRunController, kRun, kStepperLimits),
+      stepper(
+          {"book/9.7-3000rpm-no-lead", "as book/9.7-3000rpm without turning the voltages ahead: a mistake",
+           "fails: more than 1000 counts", "pm-stepper-centred"},
+          with(kRunController, &P::angle_lead_samples, 0.0), kRun, kStepperLimits),
+      stepper({"book/9.7-3000rpm-20khz", "as book/9.7-3000rpm at 20 kHz with the gains of the book",
+               "peak error at most 2 counts, final at most 1", "pm-stepper-20khz"},
+              with(kRunController, &P::feedback, kRunPrinted, &P::sample_rate_hz, 20e3), kRun,
+              kStepperLimits),
+      preset_of(
+          {"pm/current-servo", "Chiasson 2005, (9.49)-(9.52) on the motor of 9.2.3; move and gains are ours",
+           "peak error at most 30 counts of 8192, final at most 1", "bm500-current"},
+          needs_of(kBm500Servo, kBm500PhaseVoltage, Quantity::kCurrent), current_run, kBm500Servo, kBm500Move,
+          kBm500Limits, kBm500Timing),
+      run_up({"book/9.8-22a",
+              "Chiasson 2005, problem 9.8 and figures 9.25-9.28: run-up to 10 000 rpm, 18 A of a phase",
+              "1000 rad/s after 44.0 ms, at rest again after 84.3 ms", "bm500-run-up"},
+             kRunUp22, kUpAndDown22),
+      run_up({"book/9.8-67a", "as book/9.8-22a with 55 A of a phase",
+              "1000 rad/s after 23.5 ms, at rest again after 44.7 ms", "bm500-run-up"},
+             with(kRunUp22, &PmSpeedParameters::current_limit_a, 67.36), kUpAndDown67),
+  };
 }
 
 }  // namespace drivebench::control

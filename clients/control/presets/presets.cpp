@@ -1,6 +1,7 @@
 #include "clients/control/presets/presets.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "clients/control/presets/presets_families.hpp"
 #include "protocols/nearest_name.hpp"
@@ -10,8 +11,8 @@ namespace drivebench::control {
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> kAll = [] {
     std::vector<Preset> all;
-    for (const std::span<const Preset> family : preset_families())
-      all.insert(all.end(), family.begin(), family.end());
+    for (const auto family : kPresetFamilies)
+      std::ranges::move(family(), std::back_inserter(all));
     return all;
   }();
   return kAll;

@@ -1,6 +1,8 @@
 #include <array>
+#include <string_view>
+#include <vector>
 
-#include "clients/control/moves/jerk_continuous_move.hpp"
+#include "clients/control/moves/speed_ramp.hpp"
 #include "clients/control/presets/dc_preset.hpp"
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/wound_dc/shunt_dc_control.hpp"
@@ -32,20 +34,9 @@ constexpr WoundDcModel kSeries = {.armature_resistance_ohm = 1.5,
                                   .inertia_kgm2 = 0.02,
                                   .friction_nms = 1e-3,
                                   .field = FieldCurve::linear(0.12)};
-constexpr WoundDcModel kShunt = {.armature_resistance_ohm = 3.0,
-                                 .armature_inductance_h = 0.03,
-                                 .motor_constant = 0.05,
-                                 .field_resistance_ohm = 220.0,
-                                 .field_flux_scale = 1.0,
-                                 .field_shunt_resistance_ohm = 0.0,
-                                 .inertia_kgm2 = 0.02,
-                                 .friction_nms = 0.05,  // with the load that turns with it
-                                 .field = FieldCurve::linear(23.0)};
-
-constexpr WoundDcModel with_field_shunt(WoundDcModel m, double resistance_ohm) noexcept {
-  m.field_shunt_resistance_ohm = resistance_ohm;
-  return m;
-}
+/// The separate machine without saturation, with the friction of the load that turns with it.
+constexpr WoundDcModel kShunt =
+    with(kSeparate, &WoundDcModel::friction_nms, 0.05, &WoundDcModel::field, FieldCurve::linear(23.0));
 
 constexpr WoundDcAxisParameters axis_of(const WoundDcModel& machine, double field_voltage_limit_v,
                                         double least_flux_wb, double observer_per_s) noexcept {
@@ -68,7 +59,7 @@ constexpr SeparateDcParameters kArmatureAndField = {
     .axis = axis_of(kSeparate, 220.0, 2.0, 150.0),
     .flux = {.rated_flux_wb = kRated_wb, .base_speed_rad_s = 180.0},
     .flux_per_s = 20.0,
-    .speed = SpeedChainGains::placed(placed_polynomial<3>({30.0, 30.0, 30.0}))};
+    .speed = ServoGains::placed(placed_polynomial<3>({30.0, 30.0, 30.0}))};
 
 constexpr Polynomial<4> kEnergyPoles = placed_polynomial<4>({8.0, 8.0, 8.0, 8.0});
 constexpr FieldControlDcParameters kFieldControl = {.axis = axis_of(kSeparate, 220.0, 2.0, 150.0),
@@ -83,16 +74,12 @@ constexpr FieldControlDcParameters kFieldControl = {.axis = axis_of(kSeparate, 2
 constexpr SeriesDcParameters kSeriesSpeed = {
     .axis = axis_of(kSeries, 0.0, 0.02, 100.0),
     .least_current_a = 0.5,
-    .speed = SpeedChainGains::placed(placed_polynomial<3>({15.0, 15.0, 15.0}))};
-constexpr SeriesDcParameters sensorless() noexcept {
-  SeriesDcParameters p = kSeriesSpeed;
-  p.source = SeriesDcSpeed::kCurrent;
-  p.observer = SeriesDcObserverGains::placed(std::array{80.0, 80.0, 80.0}, kSeries);
-  return p;
-}
-constexpr SeriesDcParameters kSeriesSensorless = sensorless();
+    .speed = ServoGains::placed(placed_polynomial<3>({15.0, 15.0, 15.0}))};
+constexpr SeriesDcParameters kSeriesSensorless =
+    with(kSeriesSpeed, &SeriesDcParameters::source, SeriesDcSpeed::kCurrent, &SeriesDcParameters::observer,
+         SeriesDcObserverGains::placed(std::array{80.0, 80.0, 80.0}, kSeries));
 constexpr WeakenedSeriesDcParameters kWeakened = {
-    .axis = axis_of(with_field_shunt(kSeries, 4.0), 0.0, 0.1, 100.0),
+    .axis = axis_of(with(kSeries, &WoundDcModel::field_shunt_resistance_ohm, 4.0), 0.0, 0.1, 100.0),
     .most_flux_wb = 0.9,
     .speed_proportional_per_s = 10.0,
     .speed_integral_per_s2 = 25.0};
@@ -113,45 +100,49 @@ constexpr SpeedRampParameters kTo100 = {.speed_rad_s = 100.0, .ramp_s = 2.0, .cr
 constexpr RunTiming kAtOnce = {.sample_rate_hz = 10e3, .prepare_s = 0.0, .hold_s = 0.0};
 constexpr RunTiming kBuildUp = {.sample_rate_hz = 10e3, .prepare_s = 0.5, .hold_s = 0.0};
 
-template <class ControllerType, const auto& kP, const auto& kPath, const RunTiming& kWhen>
-constexpr Preset preset(std::string_view name, std::string_view source, std::string_view expectation,
-                        std::string_view bench, std::string_view machine_kind) {
-  return dc_preset<ControllerType, SpeedRamp, kP, kPath, kWhen>(name, source, expectation, bench,
-                                                                machine_kind, Quantity::kVoltage);
+template <class ControllerType, class P>
+Preset preset(const PresetText& text, std::string_view machine_kind, const P& p,
+              const SpeedRampParameters& ramp, const RunTiming& timing) {
+  return dc_preset<ControllerType, SpeedRamp>(text, machine_kind, Quantity::kVoltage, p, ramp, timing);
 }
-
-constexpr auto kPresets = std::to_array<Preset>({
-    preset<SeparateDcController, kArmatureAndField, kTo300, kBuildUp>(
-        "book/2.40",
-        "Chiasson 2005, problem 2.40: separately excited motor by armature and field, to 300 rad/s",
-        "speed within 1 rad/s of the reference, beyond the base speed too", "dc-separate-servo",
-        "separately_excited_dc"),
-    preset<FieldControlDcController, kFieldControl, kSlowlyTo300, kBuildUp>(
-        "book/2.41", "Chiasson 2005, problem 2.41: the same motor by its field alone above 205 rad/s",
-        "300 rad/s at a constant 220 V", "dc-separate-servo", "separately_excited_dc"),
-    preset<SeriesDcController, kSeriesSpeed, kTo150, kAtOnce>(
-        "book/2.42", "Chiasson 2005, problem 2.42: series motor with a fan to 150 rad/s",
-        "speed within 2 rad/s of the reference", "dc-series-servo", "series_dc"),
-    preset<WeakenedSeriesDcController, kWeakened, kTo150, kAtOnce>(
-        "book/2.43",
-        "Chiasson 2005, problem 2.43: series motor with 4 ohm across its field, a fan, to 150 rad/s",
-        "150 rad/s within 1 rad/s", "dc-series-weakened", "series_dc"),
-    preset<SeriesDcController, kSeriesSensorless, kTo150, kAtOnce>(
-        "book/2.45", "Chiasson 2005, problems 2.42 and 2.45: the same without a sensor on the shaft",
-        "speed within 3 rad/s of the reference", "dc-series-servo", "series_dc"),
-    preset<ExactShuntDcController, kShuntExact, kTo100, kAtOnce>(
-        "book/2.46", "Chiasson 2005, problem 2.46: shunt motor, exact linearisation, to 100 rad/s under load",
-        "100 rad/s within 1 rad/s", "dc-shunt-servo", "shunt_dc"),
-    preset<ShuntDcController, kShuntSpeed, kTo100, kAtOnce>(
-        "book/2.47",
-        "Chiasson 2005, problem 2.47: shunt motor, input-output linearisation, to 100 rad/s under load",
-        "100 rad/s within 1 rad/s; no bounded flux above 191 rad/s", "dc-shunt-servo", "shunt_dc"),
-});
 
 }  // namespace
 
-std::span<const Preset> wound_dc_presets() noexcept {
-  return kPresets;
+std::vector<Preset> wound_dc_presets() {
+  return {
+      preset<SeparateDcController>(
+          {"book/2.40",
+           "Chiasson 2005, problem 2.40: separately excited motor by armature and field, to 300 rad/s",
+           "speed within 1 rad/s of the reference, beyond the base speed too", "dc-separate-servo"},
+          "separately_excited_dc", kArmatureAndField, kTo300, kBuildUp),
+      preset<FieldControlDcController>(
+          {"book/2.41", "Chiasson 2005, problem 2.41: the same motor by its field alone above 205 rad/s",
+           "300 rad/s at a constant 220 V", "dc-separate-servo"},
+          "separately_excited_dc", kFieldControl, kSlowlyTo300, kBuildUp),
+      preset<SeriesDcController>(
+          {"book/2.42", "Chiasson 2005, problem 2.42: series motor with a fan to 150 rad/s",
+           "speed within 2 rad/s of the reference", "dc-series-servo"},
+          "series_dc", kSeriesSpeed, kTo150, kAtOnce),
+      preset<WeakenedSeriesDcController>(
+          {"book/2.43",
+           "Chiasson 2005, problem 2.43: series motor with 4 ohm across its field, a fan, to 150 rad/s",
+           "150 rad/s within 1 rad/s", "dc-series-weakened"},
+          "series_dc", kWeakened, kTo150, kAtOnce),
+      preset<SeriesDcController>(
+          {"book/2.45", "Chiasson 2005, problems 2.42 and 2.45: the same without a sensor on the shaft",
+           "speed within 3 rad/s of the reference", "dc-series-servo"},
+          "series_dc", kSeriesSensorless, kTo150, kAtOnce),
+      preset<ExactShuntDcController>(
+          {"book/2.46",
+           "Chiasson 2005, problem 2.46: shunt motor, exact linearisation, to 100 rad/s under load",
+           "100 rad/s within 1 rad/s", "dc-shunt-servo"},
+          "shunt_dc", kShuntExact, kTo100, kAtOnce),
+      preset<ShuntDcController>(
+          {"book/2.47",
+           "Chiasson 2005, problem 2.47: shunt motor, input-output linearisation, to 100 rad/s under load",
+           "100 rad/s within 1 rad/s; no bounded flux above 191 rad/s", "dc-shunt-servo"},
+          "shunt_dc", kShuntSpeed, kTo100, kAtOnce),
+  };
 }
 
 }  // namespace drivebench::control

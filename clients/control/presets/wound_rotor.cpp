@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
+#include <vector>
 
-#include "clients/control/gains/move_allowance.hpp"
-#include "clients/control/math/limits.hpp"
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/synchronous/wound_rotor_controller.hpp"
 
@@ -20,23 +20,19 @@ constexpr WoundRotorModel kMotor = {.pole_pairs = 2.0,
                                     .inertia_kgm2 = 0.02,
                                     .star = true};
 
-constexpr WoundRotorParameters servo(double base_speed_rad_s) noexcept {
-  return {.machine = kMotor,
-          .sample_rate_hz = 10e3,
-          .counts_per_revolution = 8192.0,
-          .voltage_limit_v = 325.0,
-          .field_voltage_limit_v = 325.0,
-          .current_limit_a = 15.0,
-          .field_current_a = 1.0,
-          .base_speed_rad_s = base_speed_rad_s,
-          .current = {.bandwidth_per_s = 800.0, .integral_rate_per_s = 80.0},
-          .position = ServoGains::placed(60.0, 60.0, 60.0),
-          .speed_observer = SpeedObserverGains::placed(800.0, 800.0, kMotor.friction_rate_per_s())};
-}
-
 /// The emf of 1 A in the field meets the 325 V at 249 rad/s.
-constexpr WoundRotorParameters kWeakening = servo(160.0);
-constexpr WoundRotorParameters kConstant = servo(1e4);
+constexpr WoundRotorParameters kWeakening = {
+    .machine = kMotor,
+    .sample_rate_hz = 10e3,
+    .counts_per_revolution = 8192.0,
+    .voltage_limit_v = 325.0,
+    .field_voltage_limit_v = 325.0,
+    .current_limit_a = 15.0,
+    .field_current_a = 1.0,
+    .base_speed_rad_s = 160.0,
+    .current = {.bandwidth_per_s = 800.0, .integral_rate_per_s = 80.0},
+    .position = ServoGains::placed(60.0, 60.0, 60.0),
+    .speed_observer = SpeedObserverGains::placed(800.0, 800.0, kMotor.friction_rate_per_s())};
 
 constexpr TrajectoryParameters kMove = {
     .distance_rad = 100.0, .ramp_up_s = 0.4, .cruise_s = 0.4, .ramp_down_s = 0.4};
@@ -64,47 +60,37 @@ std::array<Demand, 2> demands(const WoundRotorParameters& p, const MoveAllowance
           Demand{"stator current", i_q_a, allowed.current_a, "A"}};
 }
 
-template <const WoundRotorParameters& kP, const TrajectoryParameters& kPath, const MoveAllowance& kAllowed>
-constexpr Preset preset(std::string_view name, std::string_view source, std::string_view expectation) {
-  return {.name = name,
-          .source = source,
-          .expectation = expectation,
-          .bench = "wound-rotor-servo",
-          .needs = {.machine_kind = "wound_rotor_synchronous",
-                    .counts_per_revolution = kP.counts_per_revolution,
-                    .pole_pairs = kP.machine.pole_pairs,
-                    .voltage_limit_v = kP.voltage_limit_v,
-                    .signal = "i_f_a"},
-          .gains = [] { return gains_of(kP, kPath, kAllowed, kTiming); },
-          .make = [](std::span<const Gain> overrides) -> Run {
-            auto [p, path, allowed, timing] = with_gains(std::tuple{kP, kPath, kAllowed, kTiming}, overrides);
-            timing.sample_rate_hz = p.sample_rate_hz;
-            const auto demands_at = [&servo = p, &limits = allowed, &move = path](double t_s) {
-              return demands(servo, limits, trajectory_at(move, t_s));
-            };
-            refuse(first_exceeded(path.duration_s(), p.period_s(), demands_at));
-            return {std::make_unique<WoundRotorController>(p), std::make_shared<CubicMove>(path), timing};
-          }};
+Run run(const WoundRotorParameters& p, const TrajectoryParameters& path, const MoveAllowance& allowed,
+        const RunTiming& timing) {
+  return cubic_run<WoundRotorController>(p, path, allowed, timing, demands);
 }
 
-constexpr auto kPresets = std::to_array<Preset>({
-    preset<kWeakening, kMove, kLimits>(
-        "wound-rotor/servo",
-        "equations: Chiasson 2005, (6.38) and problem 6.14; machine, move and gains are ours",
-        "peak error at most 2 counts of 8192, final at most 1"),
-    preset<kWeakening, kFastMove, kLimits>(
-        "wound-rotor/field-weakening", "as wound-rotor/servo up to 350 rad/s, field weakened from 160 rad/s",
-        "peak error at most 2 counts, field down to 0.46 A"),
-    preset<kConstant, kFastMove, kBeyond>(
-        "wound-rotor/constant-field",
-        "as wound-rotor/field-weakening with the field left as it is: a mistake",
-        "fails: the emf meets the voltage limit at 249 rad/s"),
-});
+Preset preset(std::string_view name, std::string_view source, std::string_view expectation,
+              const WoundRotorParameters& p, const TrajectoryParameters& path, const MoveAllowance& allowed) {
+  return preset_of({name, source, expectation, "wound-rotor-servo"},
+                   {.machine_kind = "wound_rotor_synchronous",
+                    .counts_per_revolution = p.counts_per_revolution,
+                    .pole_pairs = p.machine.pole_pairs,
+                    .voltage_limit_v = p.voltage_limit_v,
+                    .signal = "i_f_a"},
+                   run, p, path, allowed, kTiming);
+}
 
 }  // namespace
 
-std::span<const Preset> wound_rotor_presets() noexcept {
-  return kPresets;
+std::vector<Preset> wound_rotor_presets() {
+  return {
+      preset("wound-rotor/servo",
+             "equations: Chiasson 2005, (6.38) and problem 6.14; machine, move and gains are ours",
+             "peak error at most 2 counts of 8192, final at most 1", kWeakening, kMove, kLimits),
+      preset("wound-rotor/field-weakening",
+             "as wound-rotor/servo up to 350 rad/s, field weakened from 160 rad/s",
+             "peak error at most 2 counts, field down to 0.46 A", kWeakening, kFastMove, kLimits),
+      preset("wound-rotor/constant-field",
+             "as wound-rotor/field-weakening with the field left as it is: a mistake",
+             "fails: the emf meets the voltage limit at 249 rad/s",
+             with(kWeakening, &WoundRotorParameters::base_speed_rad_s, 1e4), kFastMove, kBeyond),
+  };
 }
 
 }  // namespace drivebench::control
