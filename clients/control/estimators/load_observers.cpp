@@ -1,7 +1,5 @@
 #include "clients/control/estimators/load_observers.hpp"
 
-#include <cmath>
-
 namespace drivebench::control {
 
 LoadTorqueObserver::LoadTorqueObserver(const InductionMachineModel& machine, const LoadObserverGains& gains,
@@ -17,24 +15,6 @@ void LoadTorqueObserver::step(double measured_angle_rad, double motor_accelerati
   speed_rad_s_ += period_s_ * (motor_acceleration_rad_s2 - friction_rate_per_s_ * speed_rad_s_ -
                                load_rad_s2_ + gains_.speed_per_s2 * error_rad);
   load_rad_s2_ += period_s_ * gains_.load_per_s3 * error_rad;
-}
-
-RotorFrameObserver::RotorFrameObserver(const InductionMachineModel& machine, const LoadObserverGains& gains,
-                                       double period_s) noexcept
-    : machine_(machine),
-      kept_(std::exp(-machine.flux_decay_per_s() * period_s)),
-      motion_(machine, gains, period_s) {}
-
-PhasePair RotorFrameObserver::flux_wb(double shaft_angle_rad) const noexcept {
-  const Direction rotor = Direction::at(machine_.pole_pairs * shaft_angle_rad);
-  return rotor.to_ab({.d = flux_wb_.a, .q = flux_wb_.b});
-}
-
-void RotorFrameObserver::step(PhasePair current_a, double shaft_angle_rad) noexcept {
-  const DirectQuadrature i = Direction::at(machine_.pole_pairs * shaft_angle_rad).to_dq(current_a);
-  motion_.step(shaft_angle_rad, machine_.acceleration_per_wb_a() * (flux_wb_.a * i.q - flux_wb_.b * i.d));
-  const double gain_h = (1.0 - kept_) * machine_.mutual_inductance_h;
-  flux_wb_ = {.a = kept_ * flux_wb_.a + gain_h * i.d, .b = kept_ * flux_wb_.b + gain_h * i.q};
 }
 
 CoupledObserver::CoupledObserver(const InductionMachineModel& machine, const SpeedObserverGains& gains,

@@ -1,6 +1,5 @@
 #pragma once
 
-#include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/observers.hpp"
 
 // Observers of the speed of an induction machine with what else must be known for it: the load torque, the
@@ -46,30 +45,6 @@ class LoadTorqueObserver {
   double angle_rad_ = 0.0;
   double speed_rad_s_ = 0.0;
   double load_rad_s2_ = 0.0;  // τ_L/J
-};
-
-/// Flux in rotor coordinates, which turn with n_p·θ and so need no speed, then speed and load from it:
-///   dψ_r/dt = −η·ψ_r + η·M·i_r        α_motor = μ·(ψ_x·i_y − ψ_y·i_x)
-/// The flux error decays at η and does not depend on speed or load; the flux is exact for a held i_r. Source:
-/// exercise 26 (IMO-10).
-class RotorFrameObserver {
- public:
-  RotorFrameObserver(const InductionMachineModel& machine, const LoadObserverGains& gains,
-                     double period_s) noexcept;
-
-  /// In the stator frame, with the measured shaft angle of the same sample.
-  PhasePair flux_wb(double shaft_angle_rad) const noexcept;
-  PhasePair rotor_frame_flux_wb() const noexcept { return flux_wb_; }
-  double speed_rad_s() const noexcept { return motion_.speed_rad_s(); }
-  double load_nm() const noexcept { return motion_.load_nm(); }
-  void start_at(PhasePair rotor_frame_flux_wb) noexcept { flux_wb_ = rotor_frame_flux_wb; }
-  void step(PhasePair current_a, double shaft_angle_rad) noexcept;
-
- private:
-  InductionMachineModel machine_;
-  double kept_;  // exp(−η·T)
-  PhasePair flux_wb_{.a = 0.0, .b = 0.0};
-  LoadTorqueObserver motion_;
 };
 
 /// The four states of field-oriented control, each estimated with the others:

@@ -1,25 +1,9 @@
 #include "clients/control/induction/flux_reference.hpp"
 
-#include <array>
 #include <cmath>
 #include <utility>
 
 namespace drivebench::control {
-
-std::span<const GainRow<FluxReferenceParameters>> FluxReferenceParameters::gains() noexcept {
-  using P = FluxReferenceParameters;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"flux_reference.rated_flux_wb", [](P& p) -> double& { return p.rated_flux_wb; }, GainRule::kPositive},
-      {"flux_reference.base_speed_rad_s", [](P& p) -> double& { return p.base_speed_rad_s; },
-       GainRule::kPositive},
-      {"flux_reference.feed_forward", [](P& p) -> double& { return p.feed_forward; }, GainRule::kNotNegative},
-  });
-  return kRows;
-}
-
-std::vector<std::string> FluxReferenceParameters::problems() const {
-  return range_problems(*this);
-}
 
 FluxReference::FluxReference(const FluxReferenceParameters& p, const InductionMachineModel& machine,
                              double period_s, std::shared_ptr<const OptimumTorqueTable> optimum) noexcept
@@ -65,17 +49,6 @@ FluxTarget FluxReference::optimum(const Reference& r, std::int64_t periods) noex
           .rate_wb_s = rate_wb_s,
           .second_rate_wb_s2 = -machine_.flux_decay_per_s() * rate_wb_s,
           .i_d_a = i_d_a};
-}
-
-double base_speed_of_book_rad_s(const InductionMachineModel& machine, double rated_flux_wb,
-                                double voltage_v) noexcept {
-  return voltage_v / (machine.pole_pairs * rated_flux_wb);
-}
-
-double base_speed_of_slides_rad_s(const InductionMachineModel& machine, double rated_flux_wb,
-                                  double voltage_v) noexcept {
-  return base_speed_of_book_rad_s(machine, rated_flux_wb, voltage_v) * machine.rotor_inductance_h /
-         machine.mutual_inductance_h;
 }
 
 }  // namespace drivebench::control

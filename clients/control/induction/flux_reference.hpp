@@ -2,8 +2,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/gains/gains.hpp"
@@ -27,8 +27,12 @@ struct FluxReferenceParameters {
   double feed_forward = 1.0;      ///< what of i_d,ref is passed on; 0 leaves all of it to the flux loop
   FluxPolicy policy = FluxPolicy::kConstant;
 
-  static std::span<const GainRow<FluxReferenceParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{
+      gain("flux_reference.rated_flux_wb", &FluxReferenceParameters::rated_flux_wb, GainRule::kPositive),
+      gain("flux_reference.base_speed_rad_s", &FluxReferenceParameters::base_speed_rad_s,
+           GainRule::kPositive),
+      gain("flux_reference.feed_forward", &FluxReferenceParameters::feed_forward, GainRule::kNotNegative)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 };
 
 struct FluxTarget {
@@ -62,12 +66,5 @@ class FluxReference {
   double flux_wb_ = 0.0;
   double last_i_d_a_ = 0.0;
 };
-
-/// Where the machine's voltage comes to its limit at rated flux, as the book has it for L_S = L_R = M:
-/// n_p·ω_base·ψ_d0 = V. The slides keep M/L_R before it, so their base speed is L_R/M times as high.
-double base_speed_of_book_rad_s(const InductionMachineModel& machine, double rated_flux_wb,
-                                double voltage_v) noexcept;
-double base_speed_of_slides_rad_s(const InductionMachineModel& machine, double rated_flux_wb,
-                                  double voltage_v) noexcept;
 
 }  // namespace drivebench::control

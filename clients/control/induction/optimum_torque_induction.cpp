@@ -101,35 +101,6 @@ TorquePoint optimum_torque(const SteadyInductionModel& m, const VectorLimits& li
   return best;
 }
 
-double base_speed_rad_s(const SteadyInductionModel& m, const VectorLimits& limits, TorqueSign sign) noexcept {
-  const double r = ratio_of_times(m);
-  const double k = ratio_of_limits(m, limits);
-  const double one_and_s2 = 1.0 + m.leakage * m.leakage;
-  const double electrical_s = m.stator_time_s * m.pole_pairs;
-  const double square = electrical_s * electrical_s * one_and_s2;
-  const double half = electrical_s * sign_of(sign) * (1.0 - m.leakage + r * one_and_s2);
-  const double constant = 2.0 + 2.0 * (1.0 - m.leakage) * r + r * r * one_and_s2 - 2.0 * k * k;
-  const double under_root = half * half - square * constant;
-  return under_root < 0.0 ? 0.0 : std::max(0.0, (-half + std::sqrt(under_root)) / square);
-}
-
-double voltage_limited_speed_rad_s(const SteadyInductionModel& m, const VectorLimits& limits) {
-  const auto above_current_limit = [&](double speed_rad_s) {
-    const double delta = voltage_extrema(m, speed_rad_s).back();
-    return limits.voltage_v * m.current_a_per_direct(delta) >
-           limits.current_a * m.voltage_v_per_direct(delta, speed_rad_s);
-  };
-  double low = 0.0;
-  double high = 1.0;
-  while (above_current_limit(high))
-    high *= 2.0;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (above_current_limit(middle) ? low : high) = middle;
-  }
-  return high;
-}
-
 OptimumTorqueTable::OptimumTorqueTable(const SteadyInductionModel& m, const VectorLimits& limits,
                                        double top_speed_rad_s, std::size_t intervals)
     : step_rad_s_(top_speed_rad_s / static_cast<double>(intervals)) {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "clients/models/induction_motor.hpp"
+#include "clients/models/induction_machine.hpp"
 
 namespace drivebench::control {
 
@@ -66,15 +66,6 @@ TorquePoint torque_at(const SteadyInductionModel& m, const VectorLimits& limits,
 /// the current forbids loses to the local one beside it. Source: 8.4 (IMT-04).
 TorquePoint optimum_torque(const SteadyInductionModel& m, const VectorLimits& limits, double speed_rad_s,
                            TorqueSign sign);
-
-/// Up to this speed the current alone limits the torque: the positive root of
-///   0 = T_S²n_p²(1+σ²)ω² + 2T_S·δ1·n_p(1 − σ + r(1+σ²))ω + 2 + 2(1−σ)r + r²(1+σ²) − 2k²     δ1 = ±1
-/// and 0 when there is none. Source: (8.85) (IMT-05).
-double base_speed_rad_s(const SteadyInductionModel& m, const VectorLimits& limits, TorqueSign sign) noexcept;
-
-/// From this speed on the voltage alone limits the motoring torque: there the current at the voltage's own
-/// optimum has come down to the limit.
-double voltage_limited_speed_rad_s(const SteadyInductionModel& m, const VectorLimits& limits);
 
 /// optimum_torque() over the speed, made once and read on line: linear between its points, beyond the top
 /// speed as at the top speed. Reading does not allocate.

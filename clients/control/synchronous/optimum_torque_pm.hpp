@@ -41,22 +41,6 @@ double steady_voltage_v(const PmMachineModel& p, double speed_rad_s, DirectQuadr
 double direct_current_within_voltage_a(const PmMachineModel& p, double voltage_limit_v, double speed_rad_s,
                                        double i_q_a) noexcept;
 
-/// Speeds at which the limit that decides changes, for positive speed; motoring is a positive torque.
-struct PmTransitions {
-  double first_motoring_rad_s;  ///< current alone below, both limits above
-  double first_braking_rad_s;
-  std::vector<double> second_motoring_rad_s;  ///< both limits below, voltage alone above, and again if two
-  std::vector<double> second_braking_rad_s;
-};
-
-/// First speeds, with + for motoring:
-///   (K_m² + (n_p·L_S·I)²)·ω² ± 2·R_S·K_m·I·ω + R_S²·I² = V²
-/// Second speeds, x = ω², D = (n_p·L_S·I)² − K_m², A = V² − R_S²·I²:
-///   (D·x − A)²·(x + (R_S/(n_p·L_S))²) = (2·K_m·R_S·V/(n_p·L_S))²·x
-/// of which roots with D·x < A are those of motoring. Needs V > R_S·I; throws std::invalid_argument.
-/// Source: Chiasson 2005, (9.82) with the terms that the print lacks, (9.88)-(9.94) (PMT-05).
-PmTransitions transition_speeds(const PmMachineModel& p, const PmLimits& limits);
-
 /// The optimum over the speed, for use on line: linear between points, symmetric in the speed.
 class PmTorqueTable {
  public:

@@ -8,16 +8,15 @@
 #include <numbers>
 #include <string>
 
-#include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/load_observers.hpp"
 #include "tests/book/book_bench.hpp"
+#include "tests/clients/control/estimators/book_observers.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench {
 namespace {
 
 using control::kServoMotor;
-using control::PhasePair;
 using Complex = std::complex<double>;
 
 constexpr double kRadPerCount = 2.0 * std::numbers::pi / 2000.0;
@@ -218,7 +217,7 @@ TEST(InductionObservers, MartinRouchonSettlesAtItsRates) {
 // less as it turns its flux away.
 TEST(InductionObservers, BothLoadObserversFindTheLoad) {
   constexpr double kPeriod_s = 1e-4;
-  control::InductionMachineModel machine = kServoMotor.machine;
+  InductionMachineModel machine = kServoMotor.machine;
   machine.friction_nms = 0.0;
   const auto gains = control::LoadObserverGains::placed(300.0, 300.0, 300.0, 0.0);
   control::RotorFrameObserver rotor_frame(machine, gains, kPeriod_s);

@@ -65,12 +65,12 @@ FluxErrors flux_errors(double rate_hz) {
   p.drive.source.amplitude_v = 80.0;
   p.drive.source.frequency_hz = 60.0;
   Axis axis(p, {.period_s = period_s, .substeps = static_cast<int>(std::lround(period_s / 1e-5))}, 1, 0);
-  const control::InductionMachineModel model{.pole_pairs = 3,
-                                             .mutual_inductance_h = 0.0117,
-                                             .rotor_resistance_ohm = 3.9,
-                                             .rotor_inductance_h = 0.014,
-                                             .friction_nms = kServoFriction_nms,
-                                             .inertia_kgm2 = kServoInertia_kgm2};
+  const InductionMachineModel model{.pole_pairs = 3,
+                                    .mutual_inductance_h = 0.0117,
+                                    .rotor_resistance_ohm = 3.9,
+                                    .rotor_inductance_h = 0.014,
+                                    .friction_nms = kServoFriction_nms,
+                                    .inertia_kgm2 = kServoInertia_kgm2};
   control::PolarFluxObserver polar(model, period_s);
   Complex euler;
   Complex exact;

@@ -2,13 +2,14 @@
 #include <cmath>
 #include <complex>
 
-#include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/observers.hpp"
 #include "clients/control/induction/induction_poles.hpp"
 #include "clients/control/induction/optimum_torque_induction.hpp"
 #include "clients/control/presets/induction_servo.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/book/results/results.hpp"
+#include "tests/clients/control/estimators/book_observers.hpp"
+#include "tests/clients/control/induction/limit_speeds.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 #include "tests/plant/servo_axis.hpp"
 
@@ -301,14 +302,14 @@ ResultSection flux_observer_results() {
   const auto factor = [](double rate_hz) {
     return number("", control::euler_error_factor(kServoMotor.machine, kLine_rad_s, 1.0 / rate_hz), "");
   };
-  const control::InductionMotorModel example = {.machine = {.pole_pairs = 2.0,
-                                                            .mutual_inductance_h = 0.0806,
-                                                            .rotor_resistance_ohm = 0.8,
-                                                            .rotor_inductance_h = 0.085,
-                                                            .friction_nms = 0.0,
-                                                            .inertia_kgm2 = 0.06},
-                                                .stator_resistance_ohm = 0.6,
-                                                .stator_inductance_h = 0.085};
+  const InductionMotorModel example = {.machine = {.pole_pairs = 2.0,
+                                                   .mutual_inductance_h = 0.0806,
+                                                   .rotor_resistance_ohm = 0.8,
+                                                   .rotor_inductance_h = 0.085,
+                                                   .friction_nms = 0.0,
+                                                   .inertia_kgm2 = 0.06},
+                                       .stator_resistance_ohm = 0.6,
+                                       .stator_inductance_h = 0.085};
   const auto rate = [&example](double gain) {
     return number("", control::VergheseSandersObserver(example, gain, 1e-4).error_decay_per_s(), "1/s");
   };

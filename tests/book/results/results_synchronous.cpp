@@ -5,19 +5,20 @@
 #include "clients/control/synchronous/optimum_torque_pm.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/book/results/results.hpp"
+#include "tests/clients/control/synchronous/pm_transitions.hpp"
 
 namespace drivebench {
 namespace {
 
 constexpr double kStep_rad = std::numbers::pi / 100.0;  // 1.8 degrees
 
-constexpr control::PmMachineModel kBm500 = {.pole_pairs = 4.0,
-                                            .resistance_ohm = 0.25,
-                                            .inductance_h = 1.4e-3,
-                                            .torque_constant_nm_per_a = 0.162,
-                                            .friction_nms = 0.0,
-                                            .inertia_kgm2 = 1.39e-4,
-                                            .star = true};
+constexpr PmMachineModel kBm500 = {.pole_pairs = 4.0,
+                                   .resistance_ohm = 0.25,
+                                   .inductance_h = 1.4e-3,
+                                   .torque_constant_nm_per_a = 0.162,
+                                   .friction_nms = 0.0,
+                                   .inertia_kgm2 = 1.39e-4,
+                                   .star = true};
 constexpr double kBm500_v = 124.75;  // 100 V rms between phases, as a two-phase amplitude
 
 std::vector<Measured> move_of(const Outcome& seen) {

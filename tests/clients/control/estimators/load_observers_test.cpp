@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/control/math/polynomial.hpp"
+#include "tests/clients/control/estimators/book_observers.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tests/clients/control/induction/limit_speeds.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "tests/clients/control/induction/limit_speeds.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {

@@ -8,6 +8,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "tests/clients/control/synchronous/pm_transitions.hpp"
+
 namespace drivebench::control {
 namespace {
 
