@@ -20,44 +20,39 @@ std::vector<std::string> DcAxisParameters::problems() const {
 }
 
 DcController::DcController(const DcAxisParameters& axis, Law law) noexcept
-    : acceleration_per_a_(axis.machine.acceleration_per_a()),
+    : Controller(
+          law == Law::kCurrent && axis.drive == DcDrive::kCurrentAmplifier ? Quantity::kCurrent
+                                                                           : Quantity::kVoltage,
+          {law == Law::kCurrent ? "i_ref_a" : "v_ref_v", "angle_error_rad", "speed_rad_s", "load_rad_s2"}),
+      acceleration_per_a_(axis.machine.acceleration_per_a()),
       period_s_(axis.period_s()),
       law_(law),
       drive_(axis.drive),
-      quantity_(law == Law::kCurrent && axis.drive == DcDrive::kCurrentAmplifier ? Quantity::kCurrent
-                                                                                 : Quantity::kVoltage),
       current_limit_a_(axis.current_limit_a),
       voltage_limit_v_(axis.voltage_limit_v),
       regulator_(axis.current, axis.current_limit_a, axis.voltage_limit_v, axis.period_s()),
       shaft_(axis.shaft, axis.machine.friction_rate_per_s(), axis.period_s()) {}
 
-Setpoint DcController::update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
+Setpoint DcController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   const ShaftEstimate& shaft = shaft_.update(m, acceleration_per_a_ * m.i_a_a, periods);
   const double asked = wanted(r, shaft, m.i_a_a);
   const double limit = law_ == Law::kCurrent ? current_limit_a_ : voltage_limit_v_;
   const double allowed = std::clamp(asked, -limit, limit);
   double excess = asked - allowed;
   double given = allowed;
-  saturated_ = excess != 0.0;
+  bool saturated = excess != 0.0;
   if (law_ == Law::kCurrent && drive_ == DcDrive::kOwnRegulator) {
     given = regulator_.step(allowed, m.i_a_a);
     // A voltage at its limit holds the current back: the law must not go on towards where it pushes.
     if (regulator_.saturated()) {
-      saturated_ = true;
+      saturated = true;
       if (excess == 0.0) excess = given;
     }
   }
   integrate(excess);
-  telemetry_ = {asked, r.angle_rad - shaft.angle_rad, shaft.speed_rad_s, shaft.load_rad_s2};
+  tell({.angle_rad = shaft.angle_rad, .speed_rad_s = shaft.speed_rad_s, .saturated = saturated},
+       {asked, r.angle_rad - shaft.angle_rad, shaft.speed_rad_s, shaft.load_rad_s2});
   return {.a = given};
-}
-
-std::span<const std::string_view> DcController::telemetry_names() const noexcept {
-  static constexpr std::array<std::string_view, 4> kCurrentNames = {"i_ref_a", "angle_error_rad",
-                                                                    "speed_rad_s", "load_rad_s2"};
-  static constexpr std::array<std::string_view, 4> kVoltageNames = {"v_ref_v", "angle_error_rad",
-                                                                    "speed_rad_s", "load_rad_s2"};
-  return law_ == Law::kCurrent ? kCurrentNames : kVoltageNames;
 }
 
 }  // namespace drivebench::control

@@ -1,16 +1,15 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
+#include <cstdint>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/dc/dc_current_regulator.hpp"
 #include "clients/control/estimators/shaft_estimator.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
-#include "clients/models/dc_machine_model.hpp"
+#include "clients/models/dc_machine.hpp"
 
 namespace drivebench::control {
 
@@ -27,51 +26,21 @@ struct DcAxisParameters {
   double current_limit_a;
   double voltage_limit_v;
   DcDrive drive = DcDrive::kCurrentAmplifier;
-  DcCurrentGains current{};  ///< of kOwnRegulator
+  CurrentGains current{};  ///< of kOwnRegulator
   ShaftEstimatorParameters shaft;
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
   /// The rules between numbers; those of single numbers stand in the rows.
   std::vector<std::string> problems() const;
+
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &DcAxisParameters::machine),
+      gain("sample_rate_hz", &DcAxisParameters::sample_rate_hz, GainRule::kPositive),
+      gain("current_limit_a", &DcAxisParameters::current_limit_a, GainRule::kPositive),
+      gain("voltage_limit_v", &DcAxisParameters::voltage_limit_v, GainRule::kPositive),
+      gains_in("current.", &DcAxisParameters::current),
+      gains_in("", &DcAxisParameters::shaft)};
 };
-
-template <class Row, std::size_t A, std::size_t B>
-constexpr std::array<Row, A + B> joined(const std::array<Row, A>& a, const std::array<Row, B>& b) noexcept {
-  std::array<Row, A + B> result{};
-  for (std::size_t k = 0; k < A; ++k)
-    result[k] = a[k];
-  for (std::size_t k = 0; k < B; ++k)
-    result[A + k] = b[k];
-  return result;
-}
-
-/// The gain rows of member `axis` of P.
-template <class P>
-inline constexpr auto kDcAxisRows = std::to_array<GainRow<P>>({
-    {"machine.resistance_ohm", [](P& p) -> double& { return p.axis.machine.resistance_ohm; },
-     GainRule::kNotNegative},
-    {"machine.inductance_h", [](P& p) -> double& { return p.axis.machine.inductance_h; },
-     GainRule::kPositive},
-    {"machine.torque_constant_nm_per_a",
-     [](P& p) -> double& { return p.axis.machine.torque_constant_nm_per_a; }, GainRule::kPositive},
-    {"machine.inertia_kgm2", [](P& p) -> double& { return p.axis.machine.inertia_kgm2; },
-     GainRule::kPositive},
-    {"machine.friction_nms", [](P& p) -> double& { return p.axis.machine.friction_nms; },
-     GainRule::kNotNegative},
-    {"sample_rate_hz", [](P& p) -> double& { return p.axis.sample_rate_hz; }, GainRule::kPositive},
-    {"current_limit_a", [](P& p) -> double& { return p.axis.current_limit_a; }, GainRule::kPositive},
-    {"voltage_limit_v", [](P& p) -> double& { return p.axis.voltage_limit_v; }, GainRule::kPositive},
-    {"current.proportional_v_per_a", [](P& p) -> double& { return p.axis.current.proportional_v_per_a; },
-     GainRule::kNotNegative},
-    {"current.integral_v_per_as", [](P& p) -> double& { return p.axis.current.integral_v_per_as; },
-     GainRule::kNotNegative},
-    {"counts_per_revolution", [](P& p) -> double& { return p.axis.shaft.counts_per_revolution; },
-     GainRule::kPositive},
-    {"observer.angle_per_s", [](P& p) -> double& { return p.axis.shaft.observer.angle_per_s; }},
-    {"observer.speed_per_s2", [](P& p) -> double& { return p.axis.shaft.observer.speed_per_s2; }},
-    {"observer.load_per_s3", [](P& p) -> double& { return p.axis.shaft.observer.load_per_s3; }},
-    {"tachometer.vs_per_rad", [](P& p) -> double& { return p.axis.shaft.tachometer_vs_per_rad; }},
-});
 
 /// range_problems() of P and those of its axis.
 template <class P>
@@ -81,20 +50,12 @@ std::vector<std::string> dc_problems(const P& p) {
   return p.axis.problems();
 }
 
-/// A controller of a DC motor with permanent magnets: what is left to the law is one number a sample. Over
+/// A controller of a DC motor with permanent magnets: the law gives one number a sample. Over
 /// lost samples its observers are carried on; its integrals count a gap as one period.
 class DcController : public Controller {
  public:
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept final;
-  Quantity quantity() const noexcept final { return quantity_; }
-  double angle_rad() const noexcept final { return shaft_.now().angle_rad; }
-  double speed_rad_s() const noexcept final { return shaft_.now().speed_rad_s; }
-  bool saturated() const noexcept final { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept final;
-  std::span<const double> telemetry() const noexcept final { return telemetry_; }
-
  protected:
-  /// What the law commands.
+  /// The law's command.
   enum class Law { kCurrent, kVoltage };
   DcController(const DcAxisParameters& axis, Law law) noexcept;
 
@@ -109,17 +70,16 @@ class DcController : public Controller {
   }
 
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept final;
+
   double acceleration_per_a_;
   double period_s_;
   Law law_;
   DcDrive drive_;
-  Quantity quantity_;
   double current_limit_a_;
   double voltage_limit_v_;
   DcCurrentRegulator regulator_;
   ShaftEstimator shaft_;
-  bool saturated_ = false;
-  std::array<double, 4> telemetry_{};
 };
 
 }  // namespace drivebench::control

@@ -1,12 +1,8 @@
 #pragma once
 
-namespace drivebench::control {
+#include "clients/control/gains/loop_gains.hpp"
 
-/// K_P and K_I = α·K_P of K_P·(s + α)/s; K_I = 0 is the P loop.
-struct DcCurrentGains {
-  double proportional_v_per_a;
-  double integral_v_per_as;
-};
+namespace drivebench::control {
 
 /// The current loop of an armature: v = K_P·e + K_I·∫e with e = i_ref − i, within the voltage limit; the
 /// command is clamped to the current limit first. While the voltage stands at its limit the integral does not
@@ -14,7 +10,7 @@ struct DcCurrentGains {
 /// 2.2 (CUR-01).
 class DcCurrentRegulator {
  public:
-  DcCurrentRegulator(const DcCurrentGains& gains, double current_limit_a, double voltage_limit_v,
+  DcCurrentRegulator(const CurrentGains& gains, double current_limit_a, double voltage_limit_v,
                      double period_s) noexcept
       : gains_(gains),
         current_limit_a_(current_limit_a),
@@ -27,7 +23,7 @@ class DcCurrentRegulator {
   bool saturated() const noexcept { return saturated_; }
 
  private:
-  DcCurrentGains gains_;
+  CurrentGains gains_;
   double current_limit_a_;
   double voltage_limit_v_;
   double period_s_;

@@ -1,23 +1,10 @@
 #include "clients/control/dc/dc_nested_loops.hpp"
 
-namespace drivebench::control {
+#include <span>
+#include <string>
+#include <vector>
 
-std::span<const GainRow<DcNestedLoopsParameters>> DcNestedLoopsParameters::gains() noexcept {
-  using P = DcNestedLoopsParameters;
-  static constexpr auto kRows =
-      joined(kDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"angle.proportional_per_s",
-                  [](P& p) -> double& { return p.loops.angle_proportional_per_s; }, GainRule::kNotNegative},
-                 {"angle.integral_per_s2", [](P& p) -> double& { return p.loops.angle_integral_per_s2; },
-                  GainRule::kNotNegative},
-                 {"speed.proportional_as_per_rad",
-                  [](P& p) -> double& { return p.loops.speed_proportional_as_per_rad; }, GainRule::kPositive},
-                 {"speed.integral_a_per_rad",
-                  [](P& p) -> double& { return p.loops.speed_integral_a_per_rad; }, GainRule::kNotNegative},
-             }));
-  return kRows;
-}
+namespace drivebench::control {
 
 std::vector<std::string> DcNestedLoopsParameters::problems() const {
   std::vector<std::string> found = dc_problems(*this);

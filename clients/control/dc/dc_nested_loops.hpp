@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
 
 namespace drivebench::control {
@@ -19,13 +23,21 @@ struct DcNestedGains {
             .angle_integral_per_s2 = poles[2] / speed_per_s,
             .speed_proportional_as_per_rad = speed_per_s / m.acceleration_per_a()};
   }
+
+  static constexpr std::tuple kGains{
+      gain("angle.proportional_per_s", &DcNestedGains::angle_proportional_per_s, GainRule::kNotNegative),
+      gain("angle.integral_per_s2", &DcNestedGains::angle_integral_per_s2, GainRule::kNotNegative),
+      gain("speed.proportional_as_per_rad", &DcNestedGains::speed_proportional_as_per_rad,
+           GainRule::kPositive),
+      gain("speed.integral_a_per_rad", &DcNestedGains::speed_integral_a_per_rad, GainRule::kNotNegative)};
 };
 
 struct DcNestedLoopsParameters {
   DcAxisParameters axis;
   DcNestedGains loops;
 
-  static std::span<const GainRow<DcNestedLoopsParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{gains_in("", &DcNestedLoopsParameters::axis),
+                                     gains_in("", &DcNestedLoopsParameters::loops)};
   std::vector<std::string> problems() const;
 };
 

@@ -1,13 +1,18 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
+#include "clients/control/dc/dc_references.hpp"
 
 namespace drivebench::control {
 
 struct DcOpenLoopParameters {
   DcAxisParameters axis;
 
-  static std::span<const GainRow<DcOpenLoopParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{gains_in("", &DcOpenLoopParameters::axis)};
   std::vector<std::string> problems() const { return dc_problems(*this); }
 };
 
@@ -22,7 +27,7 @@ class DcOpenLoop final : public DcController {
 
  private:
   double wanted(const Reference& r, const ShaftEstimate&, double) noexcept override {
-    return machine_.current_a(r);
+    return reference_current_a(machine_, r);
   }
   void integrate(double) noexcept override {}
 

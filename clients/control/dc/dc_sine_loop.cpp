@@ -1,19 +1,9 @@
 #include "clients/control/dc/dc_sine_loop.hpp"
 
-namespace drivebench::control {
+#include <string>
+#include <vector>
 
-std::span<const GainRow<DcSineLoopParameters>> DcSineLoopParameters::gains() noexcept {
-  using P = DcSineLoopParameters;
-  static constexpr auto kRows =
-      joined(kDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"loop.gain_a_s_per_rad", [](P& p) -> double& { return p.loop.gain_a_s_per_rad; }},
-                 {"loop.zero_per_s", [](P& p) -> double& { return p.loop.zero_per_s; }},
-                 {"loop.angular_frequency_rad_s",
-                  [](P& p) -> double& { return p.loop.angular_frequency_rad_s; }, GainRule::kPositive},
-             }));
-  return kRows;
-}
+namespace drivebench::control {
 
 std::vector<std::string> DcSineLoopParameters::problems() const {
   std::vector<std::string> found = dc_problems(*this);

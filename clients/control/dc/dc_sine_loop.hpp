@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
 #include "clients/control/math/small_matrix.hpp"
 
@@ -10,13 +14,18 @@ struct DcSineGains {
   double gain_a_s_per_rad;         ///< K [A·s/rad], may be negative
   double zero_per_s;               ///< a, may be negative
   double angular_frequency_rad_s;  ///< ω_0
+
+  static constexpr std::tuple kGains{
+      gain("gain_a_s_per_rad", &DcSineGains::gain_a_s_per_rad), gain("zero_per_s", &DcSineGains::zero_per_s),
+      gain("angular_frequency_rad_s", &DcSineGains::angular_frequency_rad_s, GainRule::kPositive)};
 };
 
 struct DcSineLoopParameters {
   DcAxisParameters axis;
   DcSineGains loop;
 
-  static std::span<const GainRow<DcSineLoopParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{gains_in("", &DcSineLoopParameters::axis),
+                                     gains_in("loop.", &DcSineLoopParameters::loop)};
   /// The loop's polynomial is s·(s + f/J)·(s² + ω_0²) + K·(K_T/J)·(s + a).
   std::vector<std::string> problems() const;
 };

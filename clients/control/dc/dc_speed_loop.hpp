@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
 
 namespace drivebench::control {
@@ -8,7 +12,10 @@ struct DcSpeedLoopParameters {
   DcAxisParameters axis;
   double proportional_as_per_rad;  ///< K
 
-  static std::span<const GainRow<DcSpeedLoopParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &DcSpeedLoopParameters::axis),
+      gain("speed.proportional_as_per_rad", &DcSpeedLoopParameters::proportional_as_per_rad,
+           GainRule::kNotNegative)};
   std::vector<std::string> problems() const { return dc_problems(*this); }
 };
 

@@ -1,21 +1,8 @@
 #include "clients/control/dc/dc_state_feedback.hpp"
 
-namespace drivebench::control {
+#include "clients/control/dc/dc_references.hpp"
 
-std::span<const GainRow<DcStateFeedbackParameters>> DcStateFeedbackParameters::gains() noexcept {
-  using P = DcStateFeedbackParameters;
-  static constexpr auto kRows =
-      joined(kDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"position.integral_per_s3", [](P& p) -> double& { return p.position.integral_per_s3; },
-                  GainRule::kNotNegative},
-                 {"position.proportional_per_s2",
-                  [](P& p) -> double& { return p.position.proportional_per_s2; }, GainRule::kNotNegative},
-                 {"position.derivative_per_s", [](P& p) -> double& { return p.position.derivative_per_s; },
-                  GainRule::kNotNegative},
-             }));
-  return kRows;
-}
+namespace drivebench::control {
 
 DcStateFeedback::DcStateFeedback(const DcStateFeedbackParameters& p) noexcept
     : DcController(p.axis, Law::kCurrent), machine_(p.axis.machine), gains_(p.position) {}
@@ -25,7 +12,7 @@ double DcStateFeedback::wanted(const Reference& r, const ShaftEstimate& shaft, d
   const double feedback_rad_s2 = gains_.integral_per_s3 * error_integral_rad_s_ +
                                  gains_.proportional_per_s2 * error_rad_ +
                                  gains_.derivative_per_s * (r.speed_rad_s - shaft.speed_rad_s);
-  return machine_.current_a(r) + feedback_rad_s2 / machine_.acceleration_per_a();
+  return reference_current_a(machine_, r) + feedback_rad_s2 / machine_.acceleration_per_a();
 }
 
 void DcStateFeedback::integrate(double excess) noexcept {

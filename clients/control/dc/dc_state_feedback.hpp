@@ -1,33 +1,20 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
+#include "clients/control/gains/loop_gains.hpp"
 
 namespace drivebench::control {
 
-/// Gains on ∫e, e and the speed error, as accelerations. The loop's polynomial is s³ + (K2 + f/J)·s² + K1·s +
-/// K0, without an integral s² + (K2 + f/J)·s + K1.
-struct DcStateGains {
-  double integral_per_s3;      ///< K0; 0: no integral (CTL-02)
-  double proportional_per_s2;  ///< K1
-  double derivative_per_s;     ///< K2
-
-  static constexpr DcStateGains placed(const Polynomial<3>& poles, double friction_rate_per_s) noexcept {
-    return {.integral_per_s3 = poles[2],
-            .proportional_per_s2 = poles[1],
-            .derivative_per_s = poles[0] - friction_rate_per_s};
-  }
-  static constexpr DcStateGains placed(const Polynomial<2>& poles, double friction_rate_per_s) noexcept {
-    return {.integral_per_s3 = 0.0,
-            .proportional_per_s2 = poles[1],
-            .derivative_per_s = poles[0] - friction_rate_per_s};
-  }
-};
-
 struct DcStateFeedbackParameters {
   DcAxisParameters axis;
-  DcStateGains position;
+  ServoGains position;  ///< as accelerations; the friction f/J stays in the loop
 
-  static std::span<const GainRow<DcStateFeedbackParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{gains_in("", &DcStateFeedbackParameters::axis),
+                                     gains_in("position.", &DcStateFeedbackParameters::position)};
   std::vector<std::string> problems() const { return dc_problems(*this); }
 };
 
@@ -45,7 +32,7 @@ class DcStateFeedback final : public DcController {
   void integrate(double excess) noexcept override;
 
   DcMachineModel machine_;
-  DcStateGains gains_;
+  ServoGains gains_;
   double error_rad_ = 0.0;
   double error_integral_rad_s_ = 0.0;
 };

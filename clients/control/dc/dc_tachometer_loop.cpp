@@ -1,20 +1,10 @@
 #include "clients/control/dc/dc_tachometer_loop.hpp"
 
-namespace drivebench::control {
+#include <span>
+#include <string>
+#include <vector>
 
-std::span<const GainRow<DcTachometerLoopParameters>> DcTachometerLoopParameters::gains() noexcept {
-  using P = DcTachometerLoopParameters;
-  static constexpr auto kRows = joined(
-      kDcAxisRows<P>,
-      std::to_array<GainRow<P>>({
-          {"loop.proportional_a_per_rad", [](P& p) -> double& { return p.loop.proportional_a_per_rad; },
-           GainRule::kPositive},
-          {"loop.zero_per_s", [](P& p) -> double& { return p.loop.zero_per_s; }, GainRule::kNotNegative},
-          {"loop.speed_as_per_rad", [](P& p) -> double& { return p.loop.speed_as_per_rad; },
-           GainRule::kNotNegative},
-      }));
-  return kRows;
-}
+namespace drivebench::control {
 
 std::vector<std::string> DcTachometerLoopParameters::problems() const {
   std::vector<std::string> found = dc_problems(*this);

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
 
 namespace drivebench::control {
@@ -16,13 +20,19 @@ struct DcTachometerGains {
             .zero_per_s = poles[2] / poles[1],
             .speed_as_per_rad = (poles[0] - m.friction_rate_per_s()) / k};
   }
+
+  static constexpr std::tuple kGains{
+      gain("proportional_a_per_rad", &DcTachometerGains::proportional_a_per_rad, GainRule::kPositive),
+      gain("zero_per_s", &DcTachometerGains::zero_per_s, GainRule::kNotNegative),
+      gain("speed_as_per_rad", &DcTachometerGains::speed_as_per_rad, GainRule::kNotNegative)};
 };
 
 struct DcTachometerLoopParameters {
   DcAxisParameters axis;
   DcTachometerGains loop;
 
-  static std::span<const GainRow<DcTachometerLoopParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{gains_in("", &DcTachometerLoopParameters::axis),
+                                     gains_in("loop.", &DcTachometerLoopParameters::loop)};
   std::vector<std::string> problems() const;
 };
 

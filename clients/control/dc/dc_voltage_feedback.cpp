@@ -1,21 +1,12 @@
 #include "clients/control/dc/dc_voltage_feedback.hpp"
 
-namespace drivebench::control {
+#include <span>
+#include <string>
+#include <vector>
 
-std::span<const GainRow<DcVoltageFeedbackParameters>> DcVoltageFeedbackParameters::gains() noexcept {
-  using P = DcVoltageFeedbackParameters;
-  static constexpr auto kRows = joined(
-      kDcAxisRows<P>,
-      std::to_array<GainRow<P>>({
-          {"position.integral_a_per_rad_s2",
-           [](P& p) -> double& { return p.position.integral_a_per_rad_s2; }},
-          {"position.proportional_a_per_rad_s",
-           [](P& p) -> double& { return p.position.proportional_a_per_rad_s; }},
-          {"position.derivative_a_per_rad", [](P& p) -> double& { return p.position.derivative_a_per_rad; }},
-          {"position.current_per_s", [](P& p) -> double& { return p.position.current_per_s; }},
-      }));
-  return kRows;
-}
+#include "clients/control/dc/dc_references.hpp"
+
+namespace drivebench::control {
 
 std::vector<std::string> DcVoltageFeedbackParameters::problems() const {
   std::vector<std::string> found = dc_problems(*this);
@@ -43,8 +34,8 @@ double DcVoltageFeedback::wanted(const Reference& r, const ShaftEstimate& shaft,
   const double feedback_a_per_s = gains_.integral_a_per_rad_s2 * error_integral_rad_s_ +
                                   gains_.proportional_a_per_rad_s * error_rad_ +
                                   gains_.derivative_a_per_rad * (r.speed_rad_s - shaft.speed_rad_s) +
-                                  gains_.current_per_s * (machine_.current_a(r) - armature_a);
-  return machine_.voltage_v(r) + machine_.inductance_h * feedback_a_per_s;
+                                  gains_.current_per_s * (reference_current_a(machine_, r) - armature_a);
+  return reference_voltage_v(machine_, r) + machine_.inductance_h * feedback_a_per_s;
 }
 
 void DcVoltageFeedback::integrate(double excess) noexcept {

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/dc/dc_controller.hpp"
 
 namespace drivebench::control {
@@ -22,13 +26,20 @@ struct DcVoltageGains {
                 (poles[1] - electrical * friction) / per_a - m.torque_constant_nm_per_a / m.inductance_h,
             .current_per_s = electrical - m.resistance_ohm / m.inductance_h};
   }
+
+  static constexpr std::tuple kGains{
+      gain("integral_a_per_rad_s2", &DcVoltageGains::integral_a_per_rad_s2),
+      gain("proportional_a_per_rad_s", &DcVoltageGains::proportional_a_per_rad_s),
+      gain("derivative_a_per_rad", &DcVoltageGains::derivative_a_per_rad),
+      gain("current_per_s", &DcVoltageGains::current_per_s)};
 };
 
 struct DcVoltageFeedbackParameters {
   DcAxisParameters axis;
   DcVoltageGains position;
 
-  static std::span<const GainRow<DcVoltageFeedbackParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{gains_in("", &DcVoltageFeedbackParameters::axis),
+                                     gains_in("position.", &DcVoltageFeedbackParameters::position)};
   std::vector<std::string> problems() const;
 };
 

@@ -1,7 +1,6 @@
 #include "clients/control/estimators/edge_speed.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 namespace drivebench::control {

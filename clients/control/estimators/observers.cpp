@@ -16,6 +16,17 @@ void PolarFluxObserver::step(DirectQuadrature current_a, double speed_rad_s) noe
   magnitude_wb_ += gain_ * current_a.d - decay_ * magnitude_wb_;
 }
 
+PositionFluxObserver::PositionFluxObserver(const InductionMachineModel& machine, double period_s) noexcept
+    : decay_(machine.flux_decay_per_s() * period_s),
+      gain_(machine.flux_decay_per_s() * machine.mutual_inductance_h * period_s),
+      pole_pairs_(machine.pole_pairs) {}
+
+void PositionFluxObserver::step(DirectQuadrature current_a) noexcept {
+  constexpr double kLeastDivisorWb = 1e-3;
+  slip_angle_rad_ += gain_ * current_a.q / std::max(magnitude_wb_, kLeastDivisorWb);
+  magnitude_wb_ += gain_ * current_a.d - decay_ * magnitude_wb_;
+}
+
 void SpeedObserver::step(double measured_angle_rad, double motor_acceleration_rad_s2) noexcept {
   const double error_rad = measured_angle_rad - angle_rad_;
   angle_rad_ += period_s_ * (speed_rad_s_ + gains_.angle_per_s * error_rad);

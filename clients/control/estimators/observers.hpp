@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <tuple>
 
+#include "clients/control/gains/gains.hpp"
 #include "clients/control/math/frames.hpp"
-#include "clients/models/machine.hpp"
+#include "clients/models/induction_machine.hpp"
 
 namespace drivebench::control {
 
@@ -30,6 +32,28 @@ class PolarFluxObserver {
   double angle_rad_ = 0.0;
 };
 
+/// The polar observer with the angle counted from the rotor: ρ = n_p·θ + s, which needs no speed:
+///   dψ/dt = −η·ψ + η·M·i_d        ds/dt = η·M·i_q/ψ
+/// Forward Euler; start and divisor as in PolarFluxObserver. Source: exercise 23 (IMO-08).
+class PositionFluxObserver {
+ public:
+  PositionFluxObserver(const InductionMachineModel& machine, double period_s) noexcept;
+
+  double magnitude_wb() const noexcept { return magnitude_wb_; }
+  /// Of the flux from phase a, not wrapped, with the measured shaft angle of the same sample.
+  double angle_rad(double shaft_angle_rad) const noexcept {
+    return pole_pairs_ * shaft_angle_rad + slip_angle_rad_;
+  }
+  void step(DirectQuadrature current_a) noexcept;
+
+ private:
+  double decay_;  // η·T
+  double gain_;   // η·M·T
+  double pole_pairs_;
+  double magnitude_wb_ = 1e-4;
+  double slip_angle_rad_ = 0.0;
+};
+
 /// Gains of the speed observer. Poles −r1, −r2 need l1 = r1 + r2 − f/J and l2 = r1·r2 − l1·f/J.
 struct SpeedObserverGains {
   double angle_per_s;   ///< l1
@@ -40,6 +64,10 @@ struct SpeedObserverGains {
     const double l1 = r1_per_s + r2_per_s - friction_rate_per_s;
     return {.angle_per_s = l1, .speed_per_s2 = r1_per_s * r2_per_s - l1 * friction_rate_per_s};
   }
+
+  static constexpr std::tuple kGains{
+      gain("angle_per_s", &SpeedObserverGains::angle_per_s, GainRule::kNotNegative),
+      gain("speed_per_s2", &SpeedObserverGains::speed_per_s2, GainRule::kNotNegative)};
 };
 
 /// Angle and speed from the encoder and the torque the machine should be making:
@@ -63,6 +91,12 @@ class SpeedObserver {
   double period_s_;
   double angle_rad_ = 0.0;
   double speed_rad_s_ = 0.0;
+};
+
+/// The speed that a controller works with.
+enum class SpeedSource {
+  kObserver,
+  kBackwardDifference,  ///< shows what encoder noise does; not for use
 };
 
 /// Speed as the last change of the count over the time it took. Its error against the mean speed stays below

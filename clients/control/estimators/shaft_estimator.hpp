@@ -1,8 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -32,6 +32,13 @@ struct ShaftEstimatorParameters {
 
   /// Whether the poles of the observer, if there is one, are stable and remain so at this sample rate.
   std::vector<std::string> problems(double friction_rate_per_s, double period_s) const;
+
+  static constexpr std::tuple kWithoutTachometer{
+      gain("counts_per_revolution", &ShaftEstimatorParameters::counts_per_revolution, GainRule::kPositive),
+      gains_in("observer.", &ShaftEstimatorParameters::observer)};
+  static constexpr auto kGains = std::tuple_cat(
+      kWithoutTachometer,
+      std::tuple{gain("tachometer.vs_per_rad", &ShaftEstimatorParameters::tachometer_vs_per_rad)});
 };
 
 /// The shaft as a controller sees it.

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
-#include <string>
-#include <vector>
+#include <tuple>
 
 #include "clients/control/estimators/linear_observer.hpp"
+#include "clients/control/gains/gains.hpp"
 
 namespace drivebench::control {
 
@@ -28,6 +28,10 @@ struct ShaftObserverGains {
     const double l1 = c[0] - friction_rate_per_s;
     return {.angle_per_s = l1, .speed_per_s2 = c[1] - l1 * friction_rate_per_s, .load_per_s3 = -c[2]};
   }
+
+  static constexpr std::tuple kGains{gain("angle_per_s", &ShaftObserverGains::angle_per_s),
+                                     gain("speed_per_s2", &ShaftObserverGains::speed_per_s2),
+                                     gain("load_per_s3", &ShaftObserverGains::load_per_s3)};
 };
 
 /// Angle θ̂ and speed ω̂ from the angle and the acceleration that the machine's torque gives to J:

@@ -9,20 +9,15 @@
 
 namespace drivebench::control {
 
-enum class SpeedFrom {
-  kObserver,
-  kDifference,  ///< of the last two counts: shows what encoder noise does
-};
-
 /// Angle and speed of a shaft from the counts of its encoder, speed by the observer with the torque that the
 /// machine should be making (PMO-01, IMO-04).
 ///
 /// The position counts from the first sample. The angle of the disc counts from count 0, as a commissioned
-/// drive knows it: a synchronous machine must know where its magnet is whatever ran before.
+/// drive knows it: a synchronous machine must know where its magnet is after any earlier run.
 class ShaftSensing {
  public:
   ShaftSensing(double counts_per_revolution, const SpeedObserverGains& gains, double friction_rate_per_s,
-               double period_s, SpeedFrom source = SpeedFrom::kObserver) noexcept
+               double period_s, SpeedSource source = SpeedSource::kObserver) noexcept
       : counts_per_revolution_(counts_per_revolution),
         period_s_(period_s),
         source_(source),
@@ -43,7 +38,7 @@ class ShaftSensing {
       }
     }
     const double difference_rad_s = difference_.step(count, periods);
-    speed_rad_s_ = source_ == SpeedFrom::kObserver ? observer_.speed_rad_s() : difference_rad_s;
+    speed_rad_s_ = source_ == SpeedSource::kObserver ? observer_.speed_rad_s() : difference_rad_s;
     const double rad_per_count = 2.0 * std::numbers::pi / counts_per_revolution_;
     angle_rad_ = rad_per_count * static_cast<double>(count - start_count_);
     disc_rad_ = rad_per_count * std::fmod(static_cast<double>(count), counts_per_revolution_);
@@ -56,7 +51,7 @@ class ShaftSensing {
  private:
   double counts_per_revolution_;
   double period_s_;
-  SpeedFrom source_;
+  SpeedSource source_;
   SpeedObserver observer_;
   BackwardDifference difference_;
   bool started_ = false;

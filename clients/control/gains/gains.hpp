@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 namespace drivebench::control {
@@ -14,47 +15,97 @@ struct Gain {
   double value;
 };
 
-/// What a run may last, with all that stands before and after its move.
+/// The longest a run may last, with all that stands before and after its move.
 inline constexpr double kLongestRun_s = 3600.0;
 
 /// What a gain must be, beside finite. A duration is positive and a pause may be 0; neither is longer than
 /// the longest run.
 enum class GainRule { kAny, kPositive, kNotNegative, kDuration, kPause };
 
-/// One row of the gain table of a parameter struct P: how to reach the number, and its rule. Every parameter
-/// struct has `static std::span<const GainRow<P>> gains() noexcept` and `std::vector<std::string> problems()
-/// const`; the latter starts from range_problems(*this), adds the rules between numbers, and every sentence
-/// begins with the name of a gain.
+/// One row of the gain table of a parameter struct P: a number, its name and its rule.
 template <class P>
 struct GainRow {
   std::string_view name;
-  double& (*of)(P&);
-  GainRule rule = GainRule::kAny;
+  double P::*number;
+  GainRule rule;
+
+  template <class Owner, class Visit>
+  constexpr void visit(Owner& p, const std::string& prefix, const Visit& see) const {
+    see(prefix + std::string(name), p.*number, rule);
+  }
 };
+
+/// The gain table of a parameter struct: rows in the order in which users see them. It stands in the struct
+/// as `kGains`; a struct of clients/models has its own in gains/machine_gains.hpp.
+template <class P>
+inline constexpr auto kGainsOf = P::kGains;
+
+/// All rows of a member of P, under a prefix.
+template <class P, class Part, class Table>
+struct GainPart {
+  std::string_view prefix;
+  Part P::*part;
+  const Table* table;  ///< null: that of Part
+
+  template <class Owner, class Visit>
+  constexpr void visit(Owner& p, const std::string& prefix_of_owner, const Visit& see) const {
+    const std::string all = prefix_of_owner + std::string(prefix);
+    const auto each = [&](const auto&... row) { (row.visit(p.*part, all, see), ...); };
+    if constexpr (std::is_same_v<Table, void>) {
+      std::apply(each, kGainsOf<Part>);
+    } else {
+      std::apply(each, *table);
+    }
+  }
+};
+
+template <class P>
+constexpr GainRow<P> gain(std::string_view name, double P::*number, GainRule rule = GainRule::kAny) {
+  return {name, number, rule};
+}
+
+/// The member's own table.
+template <class P, class Part>
+constexpr GainPart<P, Part, void> gains_in(std::string_view prefix, Part P::*part) {
+  return {prefix, part, nullptr};
+}
+
+/// Another table for the member: some of its numbers. The table must be static.
+template <class P, class Part, class Table>
+constexpr GainPart<P, Part, Table> gains_in(std::string_view prefix, Part P::*part, const Table& table) {
+  return {prefix, part, &table};
+}
+
+/// see(name, number, rule) for every gain of p.
+template <class P, class Visit>
+void for_each_gain(P& p, const Visit& see) {
+  std::apply([&](const auto&... row) { (row.visit(p, {}, see), ...); }, kGainsOf<std::remove_const_t<P>>);
+}
 
 /// What is wrong with this number, a sentence; empty if nothing is.
 std::string problem_with_gain(std::string_view name, double value, GainRule rule);
 
-/// Every number of p that breaks the rule of its row, one sentence each.
+/// Every number of p that breaks the rule of its row, one sentence each. A parameter struct has
+/// `std::vector<std::string> problems() const`, which starts from these and adds the rules between numbers;
+/// every sentence begins with the name of a gain.
 template <class P>
-std::vector<std::string> range_problems(P p) {
+std::vector<std::string> range_problems(const P& p) {
   std::vector<std::string> found;
-  for (const GainRow<P>& row : P::gains()) {
-    std::string problem = problem_with_gain(row.name, row.of(p), row.rule);
+  for_each_gain(p, [&found](const std::string& name, double value, GainRule rule) {
+    std::string problem = problem_with_gain(name, value, rule);
     if (!problem.empty()) found.push_back(std::move(problem));
-  }
+  });
   return found;
 }
 
 /// The rows of the parts as they stand, one part after the other: names must differ between parts.
 template <class... Parts>
-std::vector<Gain> gains_of(Parts... parts) {
+std::vector<Gain> gains_of(const Parts&... parts) {
   std::vector<Gain> result;
-  const auto append = [&result]<class P>(P& p) {
-    for (const GainRow<P>& row : P::gains())
-      result.push_back({std::string(row.name), row.of(p)});
+  const auto append = [&result](const std::string& name, double value, GainRule) {
+    result.push_back({name, value});
   };
-  (append(parts), ...);
+  (for_each_gain(parts, append), ...);
   return result;
 }
 
@@ -62,12 +113,13 @@ namespace gains_detail {
 
 template <class P>
 bool set_gain(P& p, const Gain& gain) {
-  for (const GainRow<P>& row : P::gains()) {
-    if (row.name != gain.name) continue;
-    row.of(p) = gain.value;
-    return true;
-  }
-  return false;
+  bool found = false;
+  for_each_gain(p, [&](const std::string& name, double& value, GainRule) {
+    if (name != gain.name) return;
+    value = gain.value;
+    found = true;
+  });
+  return found;
 }
 
 /// Throw std::invalid_argument.

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <array>
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/gains/gains.hpp"
@@ -15,13 +14,9 @@ struct MoveAllowance {
   double voltage_v;
   double current_a;
 
-  static std::span<const GainRow<MoveAllowance>> gains() noexcept {
-    static constexpr auto kRows = std::to_array<GainRow<MoveAllowance>>({
-        {"allowed.voltage_v", [](MoveAllowance& p) -> double& { return p.voltage_v; }, GainRule::kPositive},
-        {"allowed.current_a", [](MoveAllowance& p) -> double& { return p.current_a; }, GainRule::kPositive},
-    });
-    return kRows;
-  }
+  static constexpr std::tuple kGains{
+      gain("allowed.voltage_v", &MoveAllowance::voltage_v, GainRule::kPositive),
+      gain("allowed.current_a", &MoveAllowance::current_a, GainRule::kPositive)};
   std::vector<std::string> problems() const { return range_problems(*this); }
 };
 

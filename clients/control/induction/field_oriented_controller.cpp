@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/control/gains/gain_rows.hpp"
-
 namespace drivebench::control {
 namespace {
 
@@ -21,7 +19,9 @@ double clamped(double x, double limit, bool& clipped) noexcept {
 }  // namespace
 
 FieldOrientedController::FieldOrientedController(const ControllerParameters& p) noexcept
-    : p_(p),
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "flux_wb", "flux_angle_rad",
+                                      "speed_difference_rad_s", "references_clipped"}),
+      p_(p),
       rad_per_count_(2.0 * std::numbers::pi / p.counts_per_revolution),
       amperes_per_acceleration_(1.0 / (p.machine.acceleration_per_wb_a() * p.rated_flux_wb())),
       current_loop_(p.current, p.voltage_limit_v, p.period_s()),
@@ -29,15 +29,8 @@ FieldOrientedController::FieldOrientedController(const ControllerParameters& p) 
       speed_(p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()),
       difference_(p.counts_per_revolution, p.period_s()) {}
 
-std::span<const std::string_view> FieldOrientedController::telemetry_names() const noexcept {
-  static constexpr auto kNames =
-      std::to_array<std::string_view>({"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "flux_wb",
-                                       "flux_angle_rad", "speed_difference_rad_s", "references_clipped"});
-  return kNames;
-}
-
-Setpoint FieldOrientedController::update(const Measurement& m, const Reference& r,
-                                         std::int64_t periods) noexcept {
+Setpoint FieldOrientedController::step(const Measurement& m, const Reference& r,
+                                       std::int64_t periods) noexcept {
   if (started_) {
     carry_observers(periods);
   } else {
@@ -68,7 +61,7 @@ Setpoint FieldOrientedController::update(const Measurement& m, const Reference& 
                                              out.i_d_reference_a, quadrature_clipped);
   out.references_clipped = direct_clipped || quadrature_clipped;
 
-  const PhaseCommand command = current_loop_.step(
+  const PhaseVoltages command = current_loop_.step(
       {.d = out.i_d_reference_a - current_a.d, .q = out.i_q_reference_a - current_a.q}, flux);
   out.u_a_v = command.voltage_v.a;
   out.u_b_v = command.voltage_v.b;
@@ -80,14 +73,11 @@ Setpoint FieldOrientedController::update(const Measurement& m, const Reference& 
   last_angle_rad_ = out.measured_angle_rad;
   last_speed_rad_s_ = out.speed_estimate_rad_s;
   output_ = out;
-  telemetry_ = {out.i_d_a,
-                out.i_q_a,
-                out.i_d_reference_a,
-                out.i_q_reference_a,
-                out.flux_estimate_wb,
-                out.flux_angle_estimate_rad,
-                out.speed_difference_rad_s,
-                out.references_clipped ? 1.0 : 0.0};
+  tell({.angle_rad = out.measured_angle_rad,
+        .speed_rad_s = out.speed_observer_rad_s,
+        .saturated = out.voltage_saturated},
+       {out.i_d_a, out.i_q_a, out.i_d_reference_a, out.i_q_reference_a, out.flux_estimate_wb,
+        out.flux_angle_estimate_rad, out.speed_difference_rad_s, out.references_clipped ? 1.0 : 0.0});
   return {.a = out.u_a_v, .b = out.u_b_v};
 }
 
@@ -120,35 +110,6 @@ double FieldOrientedController::quadrature_reference(const Reference& r, double 
                              : std::sqrt(std::max(0.0, p_.current_limit_a * p_.current_limit_a -
                                                            i_d_reference_a * i_d_reference_a));
   return clamped(acceleration_rad_s2 * amperes_per_acceleration_, limit_a, clipped);
-}
-
-std::span<const GainRow<ControllerParameters>> ControllerParameters::gains() noexcept {
-  using P = ControllerParameters;
-  constexpr GainRule kPositive = GainRule::kPositive;
-  static constexpr auto kRows = joined(
-      std::to_array<GainRow<P>>({
-          {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
-          {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
-           kPositive},
-          {"machine.rotor_resistance_ohm", [](P& p) -> double& { return p.machine.rotor_resistance_ohm; },
-           kPositive},
-          {"machine.rotor_inductance_h", [](P& p) -> double& { return p.machine.rotor_inductance_h; },
-           kPositive},
-      }),
-      shaft_and_sampling_rows<P>(),
-      std::to_array<GainRow<P>>({
-          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-          {"rated_direct_current_a", [](P& p) -> double& { return p.rated_direct_current_a; }, kPositive},
-          {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
-           kPositive},
-      }),
-      current_rows<P>(), position_rows<P>(), flux_rows<P>(), speed_observer_rows<P>());
-  return kRows;
-}
-
-std::vector<std::string> ControllerParameters::problems() const {
-  return range_problems(*this);
 }
 
 }  // namespace drivebench::control

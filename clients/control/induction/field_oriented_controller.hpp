@@ -1,31 +1,19 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/observers.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/current_loop.hpp"
 #include "clients/control/loop/servo_loop.hpp"
 #include "clients/control/math/frames.hpp"
-#include "clients/models/machine.hpp"
+#include "clients/models/induction_machine.hpp"
 
 namespace drivebench::control {
-
-struct FluxGains {
-  double proportional_a_per_wb;
-  double integral_a_per_wbs;
-};
-
-enum class SpeedSource {
-  kObserver,
-  kBackwardDifference,  ///< shows what encoder noise does; not for use
-};
 
 enum class QuadratureClip {
   kFixed,  ///< |i_q,ref| ≤ quadrature_reference_limit_a
@@ -40,16 +28,28 @@ struct ControllerParameters {
   double current_limit_a;  ///< per phase, of the amplifier
   double rated_direct_current_a;
   double quadrature_reference_limit_a;
-  CurrentLoopGains current;
+  CurrentGains current;
   ServoGains position;
   FluxGains flux;
   SpeedObserverGains speed_observer;
   SpeedSource speed_source = SpeedSource::kObserver;
   QuadratureClip quadrature_clip = QuadratureClip::kFixed;
 
-  static std::span<const GainRow<ControllerParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &ControllerParameters::machine),
+      gain("sample_rate_hz", &ControllerParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &ControllerParameters::counts_per_revolution, GainRule::kPositive),
+      gain("voltage_limit_v", &ControllerParameters::voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &ControllerParameters::current_limit_a, GainRule::kPositive),
+      gain("rated_direct_current_a", &ControllerParameters::rated_direct_current_a, GainRule::kPositive),
+      gain("quadrature_reference_limit_a", &ControllerParameters::quadrature_reference_limit_a,
+           GainRule::kPositive),
+      gains_in("current.", &ControllerParameters::current),
+      gains_in("position.", &ControllerParameters::position),
+      gains_in("flux.", &ControllerParameters::flux),
+      gains_in("speed_observer.", &ControllerParameters::speed_observer)};
   /// Everything that is wrong, one sentence each; empty when a controller can be built.
-  std::vector<std::string> problems() const;
+  std::vector<std::string> problems() const { return range_problems(*this); }
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
   /// ψ_d0 = M·i_d0, the flux that the rated direct current keeps up.
@@ -89,21 +89,13 @@ class FieldOrientedController final : public Controller {
   /// `p` must have no problems().
   explicit FieldOrientedController(const ControllerParameters& p) noexcept;
 
-  /// Over a gap the observers are carried along; the integrators count it as one period.
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
-  double angle_rad() const noexcept override { return output_.measured_angle_rad; }
-  double speed_rad_s() const noexcept override { return output_.speed_observer_rad_s; }
-  bool saturated() const noexcept override { return output_.voltage_saturated; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
   /// Of the last sample.
   const ControlOutput& output() const noexcept { return output_; }
   const ControllerParameters& parameters() const noexcept { return p_; }
 
  private:
+  /// Over a gap the observers are carried along; the integrators count it as one period.
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
   void carry_observers(std::int64_t periods) noexcept;
   double direct_reference(double flux_error_wb, bool& clipped) noexcept;
   double quadrature_reference(const Reference& r, double angle_error_rad, double speed_rad_s,
@@ -118,7 +110,6 @@ class FieldOrientedController final : public Controller {
   BackwardDifference difference_;
 
   ControlOutput output_;
-  std::array<double, 8> telemetry_{};
   bool started_ = false;
   std::int64_t start_count_ = 0;
   double angle_integral_rad_s_ = 0.0;

@@ -7,7 +7,7 @@
 #include "clients/control/induction/flux_reference.hpp"
 #include "clients/control/math/limits.hpp"
 #include "clients/control/moves/trajectory.hpp"
-#include "clients/models/induction_motor.hpp"
+#include "clients/models/induction_machine.hpp"
 
 namespace drivebench::control {
 

@@ -1,49 +1,16 @@
 #include "clients/control/induction/induction_drive.hpp"
 
 #include <algorithm>
-#include <array>
 #include <numbers>
 
-#include "clients/control/gains/gain_rows.hpp"
-
 namespace drivebench::control {
+
 namespace {
 
 /// A longer gap than this is 8 ms at 8 kHz, two time constants of the flux: nothing is left to carry over.
 constexpr std::int64_t kLongestGap = 64;
 
 }  // namespace
-
-std::span<const GainRow<InductionDriveParameters>> InductionDriveParameters::gains() noexcept {
-  using P = InductionDriveParameters;
-  constexpr GainRule kPositive = GainRule::kPositive;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = joined(
-      std::to_array<GainRow<P>>({
-          {"machine.pole_pairs", [](P& p) -> double& { return p.motor.machine.pole_pairs; }, kPositive},
-          {"machine.mutual_inductance_h", [](P& p) -> double& { return p.motor.machine.mutual_inductance_h; },
-           kPositive},
-          {"machine.rotor_resistance_ohm",
-           [](P& p) -> double& { return p.motor.machine.rotor_resistance_ohm; }, kPositive},
-          {"machine.rotor_inductance_h", [](P& p) -> double& { return p.motor.machine.rotor_inductance_h; },
-           kPositive},
-          {"machine.stator_resistance_ohm", [](P& p) -> double& { return p.motor.stator_resistance_ohm; },
-           kPositive},
-          {"machine.stator_inductance_h", [](P& p) -> double& { return p.motor.stator_inductance_h; },
-           kPositive},
-          {"machine.friction_nms", [](P& p) -> double& { return p.motor.machine.friction_nms; },
-           kNotNegative},
-          {"machine.inertia_kgm2", [](P& p) -> double& { return p.motor.machine.inertia_kgm2; }, kPositive},
-          {"sample_rate_hz", [](P& p) -> double& { return p.sample_rate_hz; }, kPositive},
-          {"counts_per_revolution", [](P& p) -> double& { return p.counts_per_revolution; }, kPositive},
-          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-          {"quadrature_reference_limit_a", [](P& p) -> double& { return p.quadrature_reference_limit_a; },
-           kPositive},
-      }),
-      speed_observer_rows<P>());
-  return kRows;
-}
 
 std::vector<std::string> InductionDriveParameters::problems() const {
   std::vector<std::string> found = range_problems(*this);
@@ -114,6 +81,40 @@ double clipped(double x, double limit, bool& at_limit) noexcept {
   const double y = std::clamp(x, -limit, limit);
   at_limit = at_limit || y != x;
   return y;
+}
+
+DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
+                                     DirectQuadrature rate_a_s) noexcept {
+  const InductionMachineModel& m = motor.machine;
+  const double eta = m.flux_decay_per_s();
+  const double gamma = motor.current_decay_per_s();
+  const double beta = motor.current_per_wb();
+  const double electrical_rad_s = m.pole_pairs * x.speed_rad_s;
+  const double flux_speed_rad_s =
+      electrical_rad_s + eta * m.mutual_inductance_h * x.current_a.q / x.flux_divisor_wb();
+  const auto [i_d, i_q] = x.current_a;
+  return {.d = motor.leakage_inductance_h() *
+               (gamma * i_d - eta * beta * x.flux_wb - flux_speed_rad_s * i_q + rate_a_s.d),
+          .q = motor.leakage_inductance_h() *
+               (gamma * i_q + beta * electrical_rad_s * x.flux_wb + flux_speed_rad_s * i_d + rate_a_s.q)};
+}
+
+PhaseVoltages held_voltage(const InductionDriveParameters& drive, const InductionState& x,
+                           DirectQuadrature voltage_v) noexcept {
+  const double ahead_rad = 0.5 * drive.period_s() * drive.motor.machine.pole_pairs * x.speed_rad_s;
+  const PhasePair wanted_v = Direction::at(x.flux_angle_rad + ahead_rad).to_ab(voltage_v);
+  bool saturated = false;
+  const PhasePair given_v = {.a = clipped(wanted_v.a, drive.voltage_limit_v, saturated),
+                             .b = clipped(wanted_v.b, drive.voltage_limit_v, saturated)};
+  return {.voltage_v = given_v, .saturated = saturated};
+}
+
+PhaseVoltages DecoupledCurrentLoop::step(const InductionState& x, DirectQuadrature reference_a,
+                                         DirectQuadrature reference_rate_a_s) const noexcept {
+  const DirectQuadrature rate_a_s = {
+      .d = reference_rate_a_s.d + pole_per_s_ * (reference_a.d - x.current_a.d),
+      .q = reference_rate_a_s.q + pole_per_s_ * (reference_a.q - x.current_a.q)};
+  return held_voltage(drive_, x, decoupled_voltage_v(drive_.motor, x, rate_a_s));
 }
 
 }  // namespace drivebench::control

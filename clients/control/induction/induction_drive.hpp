@@ -1,15 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/load_observers.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
+#include "clients/control/loop/current_loop.hpp"
 #include "clients/control/math/frames.hpp"
-#include "clients/models/induction_motor.hpp"
+#include "clients/models/induction_machine.hpp"
 
 namespace drivebench::control {
 
@@ -24,7 +25,15 @@ struct InductionDriveParameters {
   double quadrature_reference_limit_a;
   SpeedObserverGains speed_observer;
 
-  static std::span<const GainRow<InductionDriveParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &InductionDriveParameters::motor),
+      gain("sample_rate_hz", &InductionDriveParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &InductionDriveParameters::counts_per_revolution, GainRule::kPositive),
+      gain("voltage_limit_v", &InductionDriveParameters::voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &InductionDriveParameters::current_limit_a, GainRule::kPositive),
+      gain("quadrature_reference_limit_a", &InductionDriveParameters::quadrature_reference_limit_a,
+           GainRule::kPositive),
+      gains_in("speed_observer.", &InductionDriveParameters::speed_observer)};
   std::vector<std::string> problems() const;
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
@@ -87,5 +96,33 @@ class LoadedInductionFeedback {
 
 /// x within ±limit; notes when that took something off.
 double clipped(double x, double limit, bool& at_limit) noexcept;
+
+/// The voltages that bring these rates of both currents about, by undoing what couples them:
+///   u_d = σ·L_S·(γ·i_d − η·β·ψ − n_p·ω·i_q − η·M·i_q²/ψ + di_d/dt)
+///   u_q = σ·L_S·(γ·i_q + β·n_p·ω·ψ + n_p·ω·i_d + η·M·i_d·i_q/ψ + di_q/dt)
+/// Source: Chiasson 2005, (8.10), (8.11) (IMC-01), which practice does without, as the text says.
+DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
+                                     DirectQuadrature current_rate_a_s) noexcept;
+
+/// The phase voltages, each within the limit, turned half a period ahead since they are held while the flux
+/// moves on.
+PhaseVoltages held_voltage(const InductionDriveParameters& drive, const InductionState& x,
+                           DirectQuadrature voltage_v) noexcept;
+
+/// Currents of first order: di/dt = di_ref/dt + p·(i_ref − i) on both axes, by decoupled_voltage_v(). A law
+/// with an integrator before a current takes that current for its state, so the current must be there; PI
+/// loops without decoupling are not enough.
+class DecoupledCurrentLoop {
+ public:
+  DecoupledCurrentLoop(const InductionDriveParameters& drive, double pole_per_s) noexcept
+      : drive_(drive), pole_per_s_(pole_per_s) {}
+
+  PhaseVoltages step(const InductionState& x, DirectQuadrature reference_a,
+                     DirectQuadrature reference_rate_a_s) const noexcept;
+
+ private:
+  InductionDriveParameters drive_;
+  double pole_per_s_;
+};
 
 }  // namespace drivebench::control

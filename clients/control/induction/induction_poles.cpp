@@ -16,8 +16,7 @@ std::vector<std::complex<double>> flux_poles(const InductionMachineModel& machin
   return roots(std::array{gain * gains.integral_a_per_wbs, eta + gain * gains.proportional_a_per_wb, 1.0});
 }
 
-std::vector<std::complex<double>> current_poles(const InductionMotorModel& motor,
-                                                const CurrentLoopGains& gains) {
+std::vector<std::complex<double>> current_poles(const InductionMotorModel& motor, const CurrentGains& gains) {
   const double inductance_h = motor.leakage_inductance_h();
   return roots(std::array{gains.integral_v_per_as / inductance_h,
                           motor.current_decay_per_s() + gains.proportional_v_per_a / inductance_h, 1.0});

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "clients/control/induction/field_oriented_controller.hpp"
-#include "clients/models/induction_motor.hpp"
+#include "clients/models/induction_machine.hpp"
 
 // Where the gains of a field-oriented or linearised induction machine put the poles, each loop alone and
 // without sampling. Source: Chiasson 2005, exercise 14 of chapter 8.
@@ -19,7 +19,6 @@ std::vector<std::complex<double>> flux_poles(const InductionMachineModel& machin
 /// s² + (γ + K_P/(σ·L_S))·s + K_I/(σ·L_S): either current, without what couples it to the other and to the
 /// flux. A loop whose slow pole is far below the other passes on only K_P/(K_P + σ·L_S·γ) of a quick
 /// reference.
-std::vector<std::complex<double>> current_poles(const InductionMotorModel& motor,
-                                                const CurrentLoopGains& gains);
+std::vector<std::complex<double>> current_poles(const InductionMotorModel& motor, const CurrentGains& gains);
 
 }  // namespace drivebench::control

@@ -2,39 +2,22 @@
 
 #include <utility>
 
-#include "clients/control/gains/gain_rows.hpp"
-
 namespace drivebench::control {
-
-std::span<const GainRow<InputOutputParameters>> InputOutputParameters::gains() noexcept {
-  using P = InputOutputParameters;
-  static constexpr auto kRows = joined(current_rows<P>(), position_rows<P>(), flux_rows<P>());
-  return kRows;
-}
-
-std::vector<std::string> InputOutputParameters::problems() const {
-  return range_problems(*this);
-}
 
 InputOutputController::InputOutputController(const InductionDriveParameters& drive,
                                              const InputOutputParameters& p,
                                              const FluxReferenceParameters& flux,
                                              std::shared_ptr<const OptimumTorqueTable> optimum) noexcept
-    : drive_(drive),
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "flux_wb", "flux_ref_wb",
+                                      "flux_angle_rad", "references_clipped"}),
+      drive_(drive),
       p_(p),
       feedback_(drive),
       flux_reference_(flux, drive.motor.machine, drive.period_s(), std::move(optimum)),
       current_loop_(p.current, drive.voltage_limit_v, drive.period_s()) {}
 
-std::span<const std::string_view> InputOutputController::telemetry_names() const noexcept {
-  static constexpr auto kNames =
-      std::to_array<std::string_view>({"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "flux_wb", "flux_ref_wb",
-                                       "flux_angle_rad", "references_clipped"});
-  return kNames;
-}
-
-Setpoint InputOutputController::update(const Measurement& m, const Reference& r,
-                                       std::int64_t periods) noexcept {
+Setpoint InputOutputController::step(const Measurement& m, const Reference& r,
+                                     std::int64_t periods) noexcept {
   const InductionMachineModel& machine = drive_.motor.machine;
   const InductionState& x = feedback_.sample(m, periods);
   const FluxTarget target = flux_reference_.step(r, periods);
@@ -56,14 +39,13 @@ Setpoint InputOutputController::update(const Measurement& m, const Reference& r,
   const double i_q_ref_a = clipped(motor_rad_s2 / (machine.acceleration_per_wb_a() * divisor_wb),
                                    drive_.quadrature_reference_limit_a, quadrature_clipped);
 
-  const PhaseCommand command =
+  const PhaseVoltages command =
       current_loop_.step({.d = i_d_ref_a - x.current_a.d, .q = i_q_ref_a - x.current_a.q}, x.flux);
-  saturated_ = command.saturated;
-  if (!saturated_ && !direct_clipped) flux_integral_wb_s_ += drive_.period_s() * flux_error_wb;
-  if (!saturated_ && !quadrature_clipped) angle_integral_rad_s_ += drive_.period_s() * angle_error_rad;
-  telemetry_ = {
-      x.current_a.d, x.current_a.q,  i_d_ref_a,        i_q_ref_a,
-      x.flux_wb,     target.flux_wb, x.flux_angle_rad, direct_clipped || quadrature_clipped ? 1.0 : 0.0};
+  if (!command.saturated && !direct_clipped) flux_integral_wb_s_ += drive_.period_s() * flux_error_wb;
+  if (!command.saturated && !quadrature_clipped) angle_integral_rad_s_ += drive_.period_s() * angle_error_rad;
+  tell({.angle_rad = x.angle_rad, .speed_rad_s = x.speed_rad_s, .saturated = command.saturated},
+       {x.current_a.d, x.current_a.q, i_d_ref_a, i_q_ref_a, x.flux_wb, target.flux_wb, x.flux_angle_rad,
+        direct_clipped || quadrature_clipped ? 1.0 : 0.0});
   return {.a = command.voltage_v.a, .b = command.voltage_v.b};
 }
 

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <array>
 #include <memory>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/induction/field_oriented_controller.hpp"
@@ -21,13 +19,15 @@ enum class TorqueDivisor {
 };
 
 struct InputOutputParameters {
-  CurrentLoopGains current;
+  CurrentGains current;
   ServoGains position;
   FluxGains flux;
   TorqueDivisor divisor = TorqueDivisor::kEstimatedFlux;
 
-  static std::span<const GainRow<InputOutputParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{gains_in("current.", &InputOutputParameters::current),
+                                     gains_in("position.", &InputOutputParameters::position),
+                                     gains_in("flux.", &InputOutputParameters::flux)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 };
 
 /// Position control of an induction machine whose flux is being moved, with current command:
@@ -44,16 +44,9 @@ class InputOutputController final : public Controller {
                         const FluxReferenceParameters& flux,
                         std::shared_ptr<const OptimumTorqueTable> optimum = nullptr) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
-  double angle_rad() const noexcept override { return feedback_.state().angle_rad; }
-  double speed_rad_s() const noexcept override { return feedback_.state().speed_rad_s; }
-  bool saturated() const noexcept override { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
+
   InductionDriveParameters drive_;
   InputOutputParameters p_;
   InductionFeedback feedback_;
@@ -61,8 +54,6 @@ class InputOutputController final : public Controller {
   CurrentLoop current_loop_;
   double angle_integral_rad_s_ = 0.0;
   double flux_integral_wb_s_ = 0.0;
-  bool saturated_ = false;
-  std::array<double, 8> telemetry_{};
 };
 
 }  // namespace drivebench::control

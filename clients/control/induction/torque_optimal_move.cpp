@@ -1,8 +1,6 @@
 #include "clients/control/induction/torque_optimal_move.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstddef>
 #include <stdexcept>
 
@@ -105,17 +103,6 @@ Reference between(const Reference& a, const Reference& b, double h_s, double x) 
 }
 
 }  // namespace
-
-std::span<const GainRow<TorqueMoveParameters>> TorqueMoveParameters::gains() noexcept {
-  using P = TorqueMoveParameters;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"move.top_speed_rad_s", [](P& p) -> double& { return p.top_speed_rad_s; }, GainRule::kPositive},
-      {"move.run_up_s", [](P& p) -> double& { return p.run_up_s; }, GainRule::kDuration},
-      {"move.run_down_s", [](P& p) -> double& { return p.run_down_s; }, GainRule::kDuration},
-      {"move.torque_ramp_s", [](P& p) -> double& { return p.torque_ramp_s; }, GainRule::kDuration},
-  });
-  return kRows;
-}
 
 std::vector<std::string> TorqueMoveParameters::problems() const {
   std::vector<std::string> found = range_problems(*this);

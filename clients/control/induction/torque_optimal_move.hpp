@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/gains/gains.hpp"
@@ -18,7 +18,11 @@ struct TorqueMoveParameters {
   double run_down_s;
   double torque_ramp_s;  ///< at both ends of either phase the torque is faded by 3x² − 2x³
 
-  static std::span<const GainRow<TorqueMoveParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gain("move.top_speed_rad_s", &TorqueMoveParameters::top_speed_rad_s, GainRule::kPositive),
+      gain("move.run_up_s", &TorqueMoveParameters::run_up_s, GainRule::kDuration),
+      gain("move.run_down_s", &TorqueMoveParameters::run_down_s, GainRule::kDuration),
+      gain("move.torque_ramp_s", &TorqueMoveParameters::torque_ramp_s, GainRule::kDuration)};
   std::vector<std::string> problems() const;
 };
 

@@ -2,47 +2,21 @@
 
 #include <utility>
 
-#include "clients/control/induction/decoupled_current_loop.hpp"
+#include "clients/control/induction/induction_drive.hpp"
 
 namespace drivebench::control {
-
-std::span<const GainRow<VoltageLinearizationParameters>> VoltageLinearizationParameters::gains() noexcept {
-  using P = VoltageLinearizationParameters;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = std::to_array<GainRow<P>>({
-      {"position.integral_per_s4", [](P& p) -> double& { return p.position_integral_per_s4; }, kNotNegative},
-      {"position.proportional_per_s3", [](P& p) -> double& { return p.position_proportional_per_s3; },
-       kNotNegative},
-      {"position.derivative_per_s2", [](P& p) -> double& { return p.position_derivative_per_s2; },
-       kNotNegative},
-      {"acceleration.proportional_per_s", [](P& p) -> double& { return p.acceleration_per_s; }, kNotNegative},
-      {"flux.integral_per_s3", [](P& p) -> double& { return p.flux_integral_per_s3; }, kNotNegative},
-      {"flux.proportional_per_s2", [](P& p) -> double& { return p.flux_proportional_per_s2; }, kNotNegative},
-      {"flux.derivative_per_s", [](P& p) -> double& { return p.flux_derivative_per_s; }, kNotNegative},
-  });
-  return kRows;
-}
-
-std::vector<std::string> VoltageLinearizationParameters::problems() const {
-  return range_problems(*this);
-}
 
 VoltageLinearizationController::VoltageLinearizationController(
     const InductionDriveParameters& drive, const VoltageLinearizationParameters& p,
     const FluxReferenceParameters& flux, std::shared_ptr<const OptimumTorqueTable> optimum) noexcept
-    : drive_(drive),
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "flux_wb", "flux_ref_wb", "flux_angle_rad"}),
+      drive_(drive),
       p_(p),
       feedback_(drive),
       flux_reference_(flux, drive.motor.machine, drive.period_s(), std::move(optimum)) {}
 
-std::span<const std::string_view> VoltageLinearizationController::telemetry_names() const noexcept {
-  static constexpr auto kNames =
-      std::to_array<std::string_view>({"i_d_a", "i_q_a", "flux_wb", "flux_ref_wb", "flux_angle_rad"});
-  return kNames;
-}
-
-Setpoint VoltageLinearizationController::update(const Measurement& m, const Reference& r,
-                                                std::int64_t periods) noexcept {
+Setpoint VoltageLinearizationController::step(const Measurement& m, const Reference& r,
+                                              std::int64_t periods) noexcept {
   const InductionMachineModel& machine = drive_.motor.machine;
   const InductionState& x = feedback_.sample(m, periods);
   const FluxTarget target = flux_reference_.step(r, periods);
@@ -69,13 +43,13 @@ Setpoint VoltageLinearizationController::update(const Measurement& m, const Refe
       decoupled_voltage_v(drive_.motor, x,
                           {.d = flux_rate_wb_s / machine.mutual_inductance_h + w_d / flux_gain,
                            .q = -flux_rate_wb_s * x.current_a.q / psi + w_q / (mu * psi)});
-  const PhaseCommand command = held_voltage(drive_, x, voltage_v);
-  saturated_ = command.saturated;
-  if (!saturated_) {
+  const PhaseVoltages command = held_voltage(drive_, x, voltage_v);
+  if (!command.saturated) {
     flux_integral_wb_s_ += drive_.period_s() * flux_error_wb;
     angle_integral_rad_s_ += drive_.period_s() * angle_error_rad;
   }
-  telemetry_ = {x.current_a.d, x.current_a.q, x.flux_wb, target.flux_wb, x.flux_angle_rad};
+  tell({.angle_rad = x.angle_rad, .speed_rad_s = x.speed_rad_s, .saturated = command.saturated},
+       {x.current_a.d, x.current_a.q, x.flux_wb, target.flux_wb, x.flux_angle_rad});
   return {.a = command.voltage_v.a, .b = command.voltage_v.b};
 }
 

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <array>
 #include <memory>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/induction/flux_reference.hpp"
@@ -24,8 +22,22 @@ struct VoltageLinearizationParameters {
   double flux_proportional_per_s2;      ///< G1
   double flux_derivative_per_s;         ///< G2
 
-  static std::span<const GainRow<VoltageLinearizationParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{
+      gain("position.integral_per_s4", &VoltageLinearizationParameters::position_integral_per_s4,
+           GainRule::kNotNegative),
+      gain("position.proportional_per_s3", &VoltageLinearizationParameters::position_proportional_per_s3,
+           GainRule::kNotNegative),
+      gain("position.derivative_per_s2", &VoltageLinearizationParameters::position_derivative_per_s2,
+           GainRule::kNotNegative),
+      gain("acceleration.proportional_per_s", &VoltageLinearizationParameters::acceleration_per_s,
+           GainRule::kNotNegative),
+      gain("flux.integral_per_s3", &VoltageLinearizationParameters::flux_integral_per_s3,
+           GainRule::kNotNegative),
+      gain("flux.proportional_per_s2", &VoltageLinearizationParameters::flux_proportional_per_s2,
+           GainRule::kNotNegative),
+      gain("flux.derivative_per_s", &VoltageLinearizationParameters::flux_derivative_per_s,
+           GainRule::kNotNegative)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 
   /// (s + r)⁴ and (s + g)³, with the friction rate f/J in the loop.
   static constexpr VoltageLinearizationParameters placed(double r_per_s, double g_per_s,
@@ -58,24 +70,15 @@ class VoltageLinearizationController final : public Controller {
                                  const VoltageLinearizationParameters& p, const FluxReferenceParameters& flux,
                                  std::shared_ptr<const OptimumTorqueTable> optimum = nullptr) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
-  double angle_rad() const noexcept override { return feedback_.state().angle_rad; }
-  double speed_rad_s() const noexcept override { return feedback_.state().speed_rad_s; }
-  bool saturated() const noexcept override { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
+
   InductionDriveParameters drive_;
   VoltageLinearizationParameters p_;
   InductionFeedback feedback_;
   FluxReference flux_reference_;
   double angle_integral_rad_s_ = 0.0;
   double flux_integral_wb_s_ = 0.0;
-  bool saturated_ = false;
-  std::array<double, 5> telemetry_{};
 };
 
 }  // namespace drivebench::control

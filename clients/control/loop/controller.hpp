@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <string_view>
 
@@ -37,27 +40,53 @@ struct Setpoint {
 /// Sampled control of one axis: pure arithmetic, no clock, no link, no plant.
 class Controller {
  public:
-  Controller() = default;
-  Controller(const Controller&) = default;
-  Controller& operator=(const Controller&) = default;
   virtual ~Controller() = default;
 
   /// One sample. `periods` says how many sample periods have passed since the previous call; more than one
   /// when samples were lost on the way. The first call defines angle 0. Does not allocate.
-  virtual Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept = 0;
+  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept {
+    return step(m, r, periods);
+  }
 
-  virtual Quantity quantity() const noexcept = 0;
+  Quantity quantity() const noexcept { return quantity_; }
   /// Since the first sample, from the encoder.
-  virtual double angle_rad() const noexcept = 0;
+  double angle_rad() const noexcept { return seen_.angle_rad; }
   /// As the controller's estimator has it.
-  virtual double speed_rad_s() const noexcept = 0;
+  double speed_rad_s() const noexcept { return seen_.speed_rad_s; }
   /// At least one terminal stood at its limit in the last sample.
-  virtual bool saturated() const noexcept = 0;
+  bool saturated() const noexcept { return seen_.saturated; }
 
   /// What else it knows, of the last sample: names with units (like "i_q_ref_a") and values in the same
   /// order.
-  virtual std::span<const std::string_view> telemetry_names() const noexcept { return {}; }
-  virtual std::span<const double> telemetry() const noexcept { return {}; }
+  std::span<const std::string_view> telemetry_names() const noexcept {
+    return std::span(telemetry_names_).first(telemetry_count_);
+  }
+  std::span<const double> telemetry() const noexcept { return std::span(telemetry_).first(telemetry_count_); }
+
+ protected:
+  static constexpr std::size_t kMostTelemetry = 8;
+
+  /// The names must be literals, at most kMostTelemetry of them.
+  Controller(Quantity quantity, std::initializer_list<std::string_view> telemetry_names) noexcept;
+  Controller(const Controller&) = default;
+  Controller& operator=(const Controller&) = default;
+
+  struct Seen {
+    double angle_rad = 0.0;
+    double speed_rad_s = 0.0;
+    bool saturated = false;
+  };
+  /// What a sample has shown, told at the end of every step(); one value for each name.
+  void tell(const Seen& seen, std::initializer_list<double> telemetry) noexcept;
+
+ private:
+  virtual Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept = 0;
+
+  Quantity quantity_;
+  Seen seen_;
+  std::size_t telemetry_count_;
+  std::array<std::string_view, kMostTelemetry> telemetry_names_{};
+  std::array<double, kMostTelemetry> telemetry_{};
 };
 
 }  // namespace drivebench::control

@@ -4,7 +4,7 @@
 
 namespace drivebench::control {
 
-PhaseCommand CurrentLoop::step(DirectQuadrature error_a, const Direction& flux) noexcept {
+PhaseVoltages CurrentLoop::step(DirectQuadrature error_a, const Direction& flux) noexcept {
   const PhasePair wanted_v = flux.to_ab({.d = gains_.proportional_v_per_a * error_a.d + integral_v_.d,
                                          .q = gains_.proportional_v_per_a * error_a.q + integral_v_.q});
   const PhasePair given_v = {.a = std::clamp(wanted_v.a, -voltage_limit_v_, voltage_limit_v_),

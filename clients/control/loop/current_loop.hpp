@@ -1,15 +1,11 @@
 #pragma once
 
+#include "clients/control/gains/loop_gains.hpp"
 #include "clients/control/math/frames.hpp"
 
 namespace drivebench::control {
 
-struct CurrentLoopGains {
-  double proportional_v_per_a;
-  double integral_v_per_as;
-};
-
-struct PhaseCommand {
+struct PhaseVoltages {
   PhasePair voltage_v;
   bool saturated;  ///< at least one phase stands at its limit
 };
@@ -20,15 +16,15 @@ struct PhaseCommand {
 /// 2005, (8.12) (IMC-02).
 class CurrentLoop {
  public:
-  CurrentLoop(const CurrentLoopGains& gains, double voltage_limit_v, double period_s) noexcept
+  CurrentLoop(const CurrentGains& gains, double voltage_limit_v, double period_s) noexcept
       : gains_(gains), voltage_limit_v_(voltage_limit_v), period_s_(period_s) {}
 
-  PhaseCommand step(DirectQuadrature error_a, const Direction& flux) noexcept;
+  PhaseVoltages step(DirectQuadrature error_a, const Direction& flux) noexcept;
 
   DirectQuadrature integral_v() const noexcept { return integral_v_; }
 
  private:
-  CurrentLoopGains gains_;
+  CurrentGains gains_;
   double voltage_limit_v_;
   double period_s_;
   DirectQuadrature integral_v_{.d = 0.0, .q = 0.0};

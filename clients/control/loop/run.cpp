@@ -1,6 +1,5 @@
 #include "clients/control/loop/run.hpp"
 
-#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -28,18 +27,6 @@ std::int64_t checked_samples(double duration_s, double rate_hz) {
 }
 
 }  // namespace
-
-std::span<const GainRow<RunTiming>> RunTiming::gains() noexcept {
-  static constexpr auto kRows = std::to_array<GainRow<RunTiming>>({
-      {"run.prepare_s", [](RunTiming& t) -> double& { return t.prepare_s; }, GainRule::kPause},
-      {"run.hold_s", [](RunTiming& t) -> double& { return t.hold_s; }, GainRule::kPause},
-  });
-  return kRows;
-}
-
-std::vector<std::string> RunTiming::problems() const {
-  return range_problems(*this);
-}
 
 const char* name_of(RunPhase phase) noexcept {
   switch (phase) {

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/gains/gains.hpp"
@@ -12,14 +12,15 @@
 
 namespace drivebench::control {
 
-/// When what happens in a run.
+/// The times of a run.
 struct RunTiming {
   double sample_rate_hz;  ///< the controller's; not a gain of its own
   double prepare_s;       ///< standing still before the move: flux build-up, alignment
   double hold_s;          ///< what the end of the trajectory asks for is kept up, so that it can be judged
 
-  static std::span<const GainRow<RunTiming>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{gain("run.prepare_s", &RunTiming::prepare_s, GainRule::kPause),
+                                     gain("run.hold_s", &RunTiming::hold_s, GainRule::kPause)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 };
 
 enum class RunPhase { kPreparing, kMoving, kHolding, kDone };

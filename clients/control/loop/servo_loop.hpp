@@ -1,22 +1,9 @@
 #pragma once
 
+#include "clients/control/gains/loop_gains.hpp"
 #include "clients/control/moves/trajectory.hpp"
 
 namespace drivebench::control {
-
-/// Gains of the position loop. Poles −r1, −r2, −r3 need K2 = Σr, K1 = Σ r·r, K0 = r1·r2·r3, if friction is
-/// fed forward or left out.
-struct ServoGains {
-  double integral_per_s3;      ///< K0
-  double proportional_per_s2;  ///< K1
-  double derivative_per_s;     ///< K2
-
-  static constexpr ServoGains placed(double r1, double r2, double r3) noexcept {
-    return {.integral_per_s3 = r1 * r2 * r3,
-            .proportional_per_s2 = r1 * r2 + r1 * r3 + r2 * r3,
-            .derivative_per_s = r1 + r2 + r3};
-  }
-};
 
 /// The acceleration that brings a shaft back to its trajectory:
 ///   α = α_ref + K0·∫e + K1·e + K2·(ω_ref − ω)        with e = θ_ref − θ

@@ -2,21 +2,17 @@
 
 #include <cmath>
 
+#include "clients/control/gains/loop_gains.hpp"
 #include "clients/control/math/frames.hpp"
 
 namespace drivebench::control {
-
-struct VectorCurrentGains {
-  double proportional_v_per_a;
-  double integral_v_per_as;
-};
 
 /// PI control of i_d and i_q around a feed-forward, limited as a vector:
 ///   u = u_ff + K_P·e + K_I·∫e,   shortened to |u| ≤ V
 /// While the vector is shortened the integrals stand still.
 class VectorCurrentLoop {
  public:
-  VectorCurrentLoop(const VectorCurrentGains& gains, double voltage_limit_v, double period_s) noexcept
+  VectorCurrentLoop(const CurrentGains& gains, double voltage_limit_v, double period_s) noexcept
       : gains_(gains), voltage_limit_v_(voltage_limit_v), period_s_(period_s) {}
 
   DirectQuadrature voltage_v(DirectQuadrature error_a, DirectQuadrature feed_forward_v) noexcept {
@@ -37,7 +33,7 @@ class VectorCurrentLoop {
   bool saturated() const noexcept { return saturated_; }  ///< in the last sample
 
  private:
-  VectorCurrentGains gains_;
+  CurrentGains gains_;
   double voltage_limit_v_;
   double period_s_;
   DirectQuadrature integral_v_{.d = 0.0, .q = 0.0};

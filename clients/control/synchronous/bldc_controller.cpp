@@ -2,22 +2,17 @@
 
 #include <algorithm>
 
-#include "clients/control/gains/gain_rows.hpp"
 #include "clients/control/loop/three_phase.hpp"
 
 namespace drivebench::control {
 
 BldcController::BldcController(const BldcParameters& p) noexcept
-    : p_(p),
+    : Controller(p.drive, {"i_p_ref_a", "i_p_a", "sector"}),
+      p_(p),
       shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()),
       position_(p.position, p.period_s()) {}
 
-std::span<const std::string_view> BldcController::telemetry_names() const noexcept {
-  static constexpr auto kNames = std::to_array<std::string_view>({"i_p_ref_a", "i_p_a", "sector"});
-  return kNames;
-}
-
-Setpoint BldcController::update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
+Setpoint BldcController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, p_.machine.acceleration_per_a() * last_current_a_);
   const double ahead_rad = p_.angle_lead_samples * p_.period_s() * shaft_.speed_rad_s();
   const double electrical_rad = p_.machine.pole_pairs * (shaft_.disc_rad() + ahead_rad);
@@ -32,12 +27,13 @@ Setpoint BldcController::update(const Measurement& m, const Reference& r, std::i
   const Phases currents_a{m.i_a_a, m.i_b_a, m.i_c_a};
   last_current_a_ =
       0.5 * (pattern[0] * currents_a[0] + pattern[1] * currents_a[1] + pattern[2] * currents_a[2]);
-  telemetry_ = {peak_a, last_current_a_, now ? static_cast<double>(*now) : -1.0};
 
   const Setpoint out = p_.drive == Quantity::kCurrent
                            ? Setpoint{.a = references_a[0], .b = references_a[1], .c = references_a[2]}
                            : voltages(references_a, currents_a, electrical_rad);
   if (!saturated_) position_.integrate();
+  tell({.angle_rad = shaft_.angle_rad(), .speed_rad_s = shaft_.speed_rad_s(), .saturated = saturated_},
+       {peak_a, last_current_a_, now ? static_cast<double>(*now) : -1.0});
   return out;
 }
 
@@ -67,33 +63,6 @@ Setpoint BldcController::voltages(const Phases& wanted_a, const Phases& current_
       integral_v_[k] += p_.current.integral_v_per_as * p_.period_s() * (wanted_a[k] - current_a[k]);
   }
   return given;
-}
-
-std::span<const GainRow<BldcParameters>> BldcParameters::gains() noexcept {
-  using P = BldcParameters;
-  constexpr GainRule kPositive = GainRule::kPositive;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = joined(
-      std::to_array<GainRow<P>>({
-          {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
-          {"machine.resistance_ohm", [](P& p) -> double& { return p.machine.resistance_ohm; }, kNotNegative},
-          {"machine.torque_constant_nm_per_a",
-           [](P& p) -> double& { return p.machine.torque_constant_nm_per_a; }, kPositive},
-      }),
-      shaft_and_sampling_rows<P>(),
-      std::to_array<GainRow<P>>({
-          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-      }),
-      position_rows<P>(), current_rows<P>(), speed_observer_rows<P>(),
-      std::to_array<GainRow<P>>({
-          {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
-      }));
-  return kRows;
-}
-
-std::vector<std::string> BldcParameters::problems() const {
-  return range_problems(*this);
 }
 
 }  // namespace drivebench::control

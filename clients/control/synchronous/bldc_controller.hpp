@@ -1,25 +1,18 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/shaft_sensing.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/servo_loop.hpp"
 #include "clients/control/synchronous/bldc_commutation.hpp"
 #include "clients/models/bldc_machine.hpp"
 
 namespace drivebench::control {
-
-struct PhaseCurrentGains {
-  double proportional_v_per_a;
-  double integral_v_per_as;
-};
 
 enum class CommutationBy { kEncoder, kHall };
 
@@ -30,15 +23,24 @@ struct BldcParameters {
   double voltage_limit_v;  ///< of a terminal against the middle of the DC link
   double current_limit_a;
   ServoGains position;
-  PhaseCurrentGains current;  ///< with Quantity::kVoltage
+  CurrentGains current;  ///< with Quantity::kVoltage
   SpeedObserverGains speed_observer;
   double angle_lead_samples =
       0.5;  ///< the sector is that of the angle so many samples on; not with Hall lines
   CommutationBy commutation = CommutationBy::kEncoder;
   Quantity drive = Quantity::kCurrent;
 
-  static std::span<const GainRow<BldcParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &BldcParameters::machine),
+      gain("sample_rate_hz", &BldcParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &BldcParameters::counts_per_revolution, GainRule::kPositive),
+      gain("voltage_limit_v", &BldcParameters::voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &BldcParameters::current_limit_a, GainRule::kPositive),
+      gains_in("position.", &BldcParameters::position),
+      gains_in("current.", &BldcParameters::current),
+      gains_in("speed_observer.", &BldcParameters::speed_observer),
+      gain("angle_lead_samples", &BldcParameters::angle_lead_samples, GainRule::kNotNegative)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
 };
@@ -55,16 +57,8 @@ class BldcController final : public Controller {
   /// `p` must have no problems().
   explicit BldcController(const BldcParameters& p) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return p_.drive; }
-  double angle_rad() const noexcept override { return shaft_.angle_rad(); }
-  double speed_rad_s() const noexcept override { return shaft_.speed_rad_s(); }
-  bool saturated() const noexcept override { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
   std::optional<int> sector(const Measurement& m, double electrical_rad) const noexcept;
   Setpoint voltages(const Phases& wanted_a, const Phases& current_a, double electrical_rad) noexcept;
 
@@ -74,7 +68,6 @@ class BldcController final : public Controller {
   Phases integral_v_{};
   double last_current_a_ = 0.0;
   bool saturated_ = false;
-  std::array<double, 3> telemetry_{};
 };
 
 }  // namespace drivebench::control

@@ -1,14 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/shaft_sensing.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/servo_loop.hpp"
 #include "clients/models/pm_machine.hpp"
@@ -25,8 +23,16 @@ struct PmCurrentParameters {
   SpeedObserverGains speed_observer;
   double angle_lead_samples = 0.5;  ///< the currents are turned ahead by the angle of so many samples
 
-  static std::span<const GainRow<PmCurrentParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &PmCurrentParameters::machine),
+      gain("sample_rate_hz", &PmCurrentParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &PmCurrentParameters::counts_per_revolution, GainRule::kPositive),
+      gains_in("speed_observer.", &PmCurrentParameters::speed_observer),
+      gain("angle_lead_samples", &PmCurrentParameters::angle_lead_samples, GainRule::kNotNegative),
+      gain("voltage_limit_v", &PmCurrentParameters::voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &PmCurrentParameters::current_limit_a, GainRule::kPositive),
+      gains_in("position.", &PmCurrentParameters::position)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
 };
@@ -43,22 +49,13 @@ class PmCurrentController final : public Controller {
   /// `p` must have no problems().
   explicit PmCurrentController(const PmCurrentParameters& p) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kCurrent; }
-  double angle_rad() const noexcept override { return shaft_.angle_rad(); }
-  double speed_rad_s() const noexcept override { return shaft_.speed_rad_s(); }
-  bool saturated() const noexcept override { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
+
   PmCurrentParameters p_;
   ShaftSensing shaft_;
   ServoLoop position_;
   double last_i_q_a_ = 0.0;
-  bool saturated_ = false;
-  std::array<double, 4> telemetry_{};
 };
 
 }  // namespace drivebench::control

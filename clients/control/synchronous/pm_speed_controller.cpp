@@ -2,9 +2,7 @@
 
 #include <cmath>
 
-#include "clients/control/gains/gain_rows.hpp"
 #include "clients/control/loop/three_phase.hpp"
-#include "clients/control/synchronous/pm_machine_rows.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -15,18 +13,13 @@ constexpr int kTablePoints = 501;
 }  // namespace
 
 PmSpeedController::PmSpeedController(const PmSpeedParameters& p)
-    : p_(p),
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "u_d_v", "u_q_v"}),
+      p_(p),
       shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()),
       table_(p.machine, p.limits(), p.max_speed_rad_s, kTablePoints),
       current_loop_(p.current, p.voltage_limit_v, p.period_s()) {}
 
-std::span<const std::string_view> PmSpeedController::telemetry_names() const noexcept {
-  static constexpr auto kNames =
-      std::to_array<std::string_view>({"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "u_d_v", "u_q_v"});
-  return kNames;
-}
-
-Setpoint PmSpeedController::update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
+Setpoint PmSpeedController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, p_.machine.acceleration_per_a() * last_i_q_a_);
   const double omega_rad_s = p_.machine.pole_pairs * shaft_.speed_rad_s();
   const double magnet_rad = p_.machine.pole_pairs * shaft_.disc_rad();
@@ -39,7 +32,10 @@ Setpoint PmSpeedController::update(const Measurement& m, const Reference& r, std
       {.d = wanted.d - i.d, .q = wanted.q - i.q},
       {.d = -omega_rad_s * l * i.q,
        .q = omega_rad_s * l * i.d + p_.machine.torque_constant_nm_per_a * shaft_.speed_rad_s()});
-  telemetry_ = {i.d, i.q, wanted.d, wanted.q, u.d, u.q};
+  tell({.angle_rad = shaft_.angle_rad(),
+        .speed_rad_s = shaft_.speed_rad_s(),
+        .saturated = current_loop_.saturated()},
+       {i.d, i.q, wanted.d, wanted.q, u.d, u.q});
   const double lead_rad = p_.angle_lead_samples * p_.period_s() * omega_rad_s;
   return terminal_values(Direction::at(magnet_rad + lead_rad).to_ab(u), p_.machine.star);
 }
@@ -53,21 +49,6 @@ DirectQuadrature PmSpeedController::wanted_current_a(const Reference& r) const n
   if (std::abs(i_q_a) >= std::abs(most.q)) return most;
   return {.d = direct_current_within_voltage_a(p_.machine, p_.voltage_limit_v, speed_rad_s, i_q_a),
           .q = i_q_a};
-}
-
-std::span<const GainRow<PmSpeedParameters>> PmSpeedParameters::gains() noexcept {
-  using P = PmSpeedParameters;
-  constexpr GainRule kPositive = GainRule::kPositive;
-  static constexpr auto kRows =
-      joined(pm_machine_rows<P>(),
-             std::to_array<GainRow<P>>({
-                 {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-                 {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-                 {"speed_gain_per_s", [](P& p) -> double& { return p.speed_gain_per_s; }, kPositive},
-                 {"max_speed_rad_s", [](P& p) -> double& { return p.max_speed_rad_s; }, kPositive},
-             }),
-             current_rows<P>());
-  return kRows;
 }
 
 std::vector<std::string> PmSpeedParameters::problems() const {

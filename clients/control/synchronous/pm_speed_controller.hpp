@@ -1,14 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/shaft_sensing.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/vector_current_loop.hpp"
 #include "clients/control/synchronous/optimum_torque_pm.hpp"
@@ -24,11 +22,21 @@ struct PmSpeedParameters {
   double current_limit_a;   ///< of |i|, two-phase
   double speed_gain_per_s;  ///< acceleration wanted for an error of the speed
   double max_speed_rad_s;   ///< up to which the torque table reaches
-  VectorCurrentGains current;
+  CurrentGains current;
   SpeedObserverGains speed_observer;
   double angle_lead_samples = 0.5;  ///< the voltages are turned ahead by the angle of so many samples
 
-  static std::span<const GainRow<PmSpeedParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &PmSpeedParameters::machine),
+      gain("sample_rate_hz", &PmSpeedParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &PmSpeedParameters::counts_per_revolution, GainRule::kPositive),
+      gains_in("speed_observer.", &PmSpeedParameters::speed_observer),
+      gain("angle_lead_samples", &PmSpeedParameters::angle_lead_samples, GainRule::kNotNegative),
+      gain("voltage_limit_v", &PmSpeedParameters::voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &PmSpeedParameters::current_limit_a, GainRule::kPositive),
+      gain("speed_gain_per_s", &PmSpeedParameters::speed_gain_per_s, GainRule::kPositive),
+      gain("max_speed_rad_s", &PmSpeedParameters::max_speed_rad_s, GainRule::kPositive),
+      gains_in("current.", &PmSpeedParameters::current)};
   std::vector<std::string> problems() const;
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
@@ -47,16 +55,8 @@ class PmSpeedController final : public Controller {
   /// `p` must have no problems().
   explicit PmSpeedController(const PmSpeedParameters& p);
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
-  double angle_rad() const noexcept override { return shaft_.angle_rad(); }
-  double speed_rad_s() const noexcept override { return shaft_.speed_rad_s(); }
-  bool saturated() const noexcept override { return current_loop_.saturated(); }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
   DirectQuadrature wanted_current_a(const Reference& r) const noexcept;
 
   PmSpeedParameters p_;
@@ -64,7 +64,6 @@ class PmSpeedController final : public Controller {
   PmTorqueTable table_;
   VectorCurrentLoop current_loop_;
   double last_i_q_a_ = 0.0;
-  std::array<double, 6> telemetry_{};
 };
 
 }  // namespace drivebench::control

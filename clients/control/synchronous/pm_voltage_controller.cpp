@@ -1,40 +1,36 @@
 #include "clients/control/synchronous/pm_voltage_controller.hpp"
 
 #include "clients/control/loop/three_phase.hpp"
-#include "clients/control/synchronous/pm_machine_rows.hpp"
 #include "clients/control/synchronous/pm_references.hpp"
 
 namespace drivebench::control {
 
 PmVoltageController::PmVoltageController(const PmVoltageParameters& p) noexcept
-    : p_(p),
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "u_d_v", "u_q_v"}),
+      p_(p),
       shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s(),
-             p.speed_from) {}
+             p.speed_source) {}
 
-std::span<const std::string_view> PmVoltageController::telemetry_names() const noexcept {
-  static constexpr auto kNames =
-      std::to_array<std::string_view>({"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "u_d_v", "u_q_v"});
-  return kNames;
-}
-
-Setpoint PmVoltageController::update(const Measurement& m, const Reference& r,
-                                     std::int64_t periods) noexcept {
+Setpoint PmVoltageController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, p_.machine.acceleration_per_a() * last_i_q_a_);
   const double magnet_rad = p_.machine.pole_pairs * shaft_.disc_rad();
   const DirectQuadrature i = Direction::at(magnet_rad).to_dq(stator_currents(m, p_.machine.star));
-  const DirectQuadrature u = wanted_voltage_v(r, i);
+  const PmReferences ref = pm_references(p_.machine, r);
+  const DirectQuadrature u = wanted_voltage_v(r, ref, i);
   const double lead_rad =
       p_.angle_lead_samples * p_.period_s() * p_.machine.pole_pairs * shaft_.speed_rad_s();
   const Setpoint wanted = terminal_values(Direction::at(magnet_rad + lead_rad).to_ab(u), p_.machine.star);
   const Setpoint given = clipped(wanted, p_.voltage_limit_v);
-  saturated_ = !same_phases(wanted, given);
-  if (!saturated_) angle_integral_rad_s_ += p_.period_s() * (shaft_.angle_rad() - r.angle_rad);
+  const bool saturated = !same_phases(wanted, given);
+  if (!saturated) angle_integral_rad_s_ += p_.period_s() * (shaft_.angle_rad() - r.angle_rad);
   last_i_q_a_ = i.q;
+  tell({.angle_rad = shaft_.angle_rad(), .speed_rad_s = shaft_.speed_rad_s(), .saturated = saturated},
+       {i.d, i.q, ref.current_a.d, ref.current_a.q, u.d, u.q});
   return given;
 }
 
-DirectQuadrature PmVoltageController::wanted_voltage_v(const Reference& r, DirectQuadrature i) noexcept {
-  const PmReferences ref = pm_references(p_.machine, r);
+DirectQuadrature PmVoltageController::wanted_voltage_v(const Reference& r, const PmReferences& ref,
+                                                       DirectQuadrature i) const noexcept {
   const PmFeedbackGains& k = p_.feedback;
   const double speed_rad_s = shaft_.speed_rad_s();
   const double l = p_.machine.inductance_h;
@@ -44,30 +40,8 @@ DirectQuadrature PmVoltageController::wanted_voltage_v(const Reference& r, Direc
                      k.angle_a_per_rad_s * (shaft_.angle_rad() - r.angle_rad) -
                      k.integral_a_per_rads2 * angle_integral_rad_s_;
   const double nl = p_.machine.pole_pairs * l;
-  const DirectQuadrature u{
-      .d = ref.voltage_v.d - nl * (speed_rad_s * i.q - r.speed_rad_s * ref.current_a.q) + l * v_d,
-      .q = ref.voltage_v.q + nl * (speed_rad_s * i.d - r.speed_rad_s * ref.current_a.d) + l * v_q};
-  telemetry_ = {i.d, i.q, ref.current_a.d, ref.current_a.q, u.d, u.q};
-  return u;
-}
-
-std::span<const GainRow<PmVoltageParameters>> PmVoltageParameters::gains() noexcept {
-  using P = PmVoltageParameters;
-  static constexpr auto kRows = joined(
-      pm_machine_rows<P>(),
-      std::to_array<GainRow<P>>({
-          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, GainRule::kPositive},
-          {"feedback.direct_per_s", [](P& p) -> double& { return p.feedback.direct_per_s; }},
-          {"feedback.quadrature_per_s", [](P& p) -> double& { return p.feedback.quadrature_per_s; }},
-          {"feedback.speed_a_per_rad", [](P& p) -> double& { return p.feedback.speed_a_per_rad; }},
-          {"feedback.angle_a_per_rad_s", [](P& p) -> double& { return p.feedback.angle_a_per_rad_s; }},
-          {"feedback.integral_a_per_rads2", [](P& p) -> double& { return p.feedback.integral_a_per_rads2; }},
-      }));
-  return kRows;
-}
-
-std::vector<std::string> PmVoltageParameters::problems() const {
-  return range_problems(*this);
+  return {.d = ref.voltage_v.d - nl * (speed_rad_s * i.q - r.speed_rad_s * ref.current_a.q) + l * v_d,
+          .q = ref.voltage_v.q + nl * (speed_rad_s * i.d - r.speed_rad_s * ref.current_a.d) + l * v_q};
 }
 
 }  // namespace drivebench::control

@@ -1,16 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/shaft_sensing.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/math/frames.hpp"
+#include "clients/control/synchronous/pm_references.hpp"
 #include "clients/models/pm_machine.hpp"
 
 namespace drivebench::control {
@@ -22,6 +21,12 @@ struct PmFeedbackGains {
   double speed_a_per_rad;       ///< k23, of ω
   double angle_a_per_rad_s;     ///< k24, of θ
   double integral_a_per_rads2;  ///< k25, of ∫θ
+
+  static constexpr std::tuple kGains{gain("direct_per_s", &PmFeedbackGains::direct_per_s),
+                                     gain("quadrature_per_s", &PmFeedbackGains::quadrature_per_s),
+                                     gain("speed_a_per_rad", &PmFeedbackGains::speed_a_per_rad),
+                                     gain("angle_a_per_rad_s", &PmFeedbackGains::angle_a_per_rad_s),
+                                     gain("integral_a_per_rads2", &PmFeedbackGains::integral_a_per_rads2)};
 };
 
 struct PmVoltageParameters {
@@ -33,10 +38,17 @@ struct PmVoltageParameters {
   SpeedObserverGains speed_observer;
   /// The voltages are turned ahead by the angle of so many samples; half a sample is the mean of a hold.
   double angle_lead_samples = 0.0;
-  SpeedFrom speed_from = SpeedFrom::kObserver;
+  SpeedSource speed_source = SpeedSource::kObserver;
 
-  static std::span<const GainRow<PmVoltageParameters>> gains() noexcept;
-  std::vector<std::string> problems() const;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &PmVoltageParameters::machine),
+      gain("sample_rate_hz", &PmVoltageParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &PmVoltageParameters::counts_per_revolution, GainRule::kPositive),
+      gains_in("speed_observer.", &PmVoltageParameters::speed_observer),
+      gain("angle_lead_samples", &PmVoltageParameters::angle_lead_samples, GainRule::kNotNegative),
+      gain("voltage_limit_v", &PmVoltageParameters::voltage_limit_v, GainRule::kPositive),
+      gains_in("feedback.", &PmVoltageParameters::feedback)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
 };
@@ -56,24 +68,15 @@ class PmVoltageController final : public Controller {
   /// `p` must have no problems().
   explicit PmVoltageController(const PmVoltageParameters& p) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
-  double angle_rad() const noexcept override { return shaft_.angle_rad(); }
-  double speed_rad_s() const noexcept override { return shaft_.speed_rad_s(); }
-  bool saturated() const noexcept override { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
-  DirectQuadrature wanted_voltage_v(const Reference& r, DirectQuadrature i) noexcept;
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
+  DirectQuadrature wanted_voltage_v(const Reference& r, const PmReferences& ref,
+                                    DirectQuadrature i) const noexcept;
 
   PmVoltageParameters p_;
   ShaftSensing shaft_;
   double angle_integral_rad_s_ = 0.0;  // of θ − θ_ref
   double last_i_q_a_ = 0.0;
-  bool saturated_ = false;
-  std::array<double, 6> telemetry_{};
 };
 
 }  // namespace drivebench::control

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/observers.hpp"
@@ -29,7 +27,12 @@ struct StepperParameters {
   StepMode mode = StepMode::kFull;
   Quantity drive = Quantity::kVoltage;
 
-  static std::span<const GainRow<StepperParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gain("machine.pole_pairs", &StepperParameters::pole_pairs, GainRule::kPositive),
+      gain("sample_rate_hz", &StepperParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &StepperParameters::counts_per_revolution, GainRule::kPositive),
+      gain("amplitude", &StepperParameters::amplitude, GainRule::kPositive),
+      gain("microsteps", &StepperParameters::microsteps, GainRule::kPositive)};
   std::vector<std::string> problems() const;
 
   /// The angle of one step: 360°/(4·n_p) for a full one.
@@ -49,24 +52,14 @@ class StepperController final : public Controller {
   /// `p` must have no problems().
   explicit StepperController(const StepperParameters& p) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return p_.drive; }
-  double angle_rad() const noexcept override { return angle_rad_; }
-  double speed_rad_s() const noexcept override { return speed_rad_s_; }
-  bool saturated() const noexcept override { return false; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
+
   StepperParameters p_;
   BackwardDifference difference_;
   bool started_ = false;
   std::int64_t start_count_ = 0;
   double start_electrical_rad_ = 0.0;
-  double angle_rad_ = 0.0;
-  double speed_rad_s_ = 0.0;
-  std::array<double, 1> telemetry_{};
 };
 
 }  // namespace drivebench::control

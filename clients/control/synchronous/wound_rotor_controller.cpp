@@ -2,26 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
-#include "clients/control/gains/gain_rows.hpp"
 #include "clients/control/loop/three_phase.hpp"
 
 namespace drivebench::control {
 
 WoundRotorController::WoundRotorController(const WoundRotorParameters& p) noexcept
-    : p_(p),
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "i_q_ref_a", "i_field_ref_a", "u_d_v", "u_q_v"}),
+      p_(p),
       shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()),
       position_(p.position, p.period_s()) {}
 
-std::span<const std::string_view> WoundRotorController::telemetry_names() const noexcept {
-  static constexpr auto kNames =
-      std::to_array<std::string_view>({"i_d_a", "i_q_a", "i_q_ref_a", "i_field_ref_a", "u_d_v", "u_q_v"});
-  return kNames;
-}
-
-Setpoint WoundRotorController::update(const Measurement& m, const Reference& r,
-                                      std::int64_t periods) noexcept {
+Setpoint WoundRotorController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, last_torque_nm_ / p_.machine.inertia_kgm2);
   const double field_rad = p_.machine.pole_pairs * shaft_.disc_rad();
   const Currents i{.stator = Direction::at(field_rad).to_dq(stator_currents(m, p_.machine.star)),
@@ -39,7 +31,8 @@ Setpoint WoundRotorController::update(const Measurement& m, const Reference& r,
     integral_as_.stator.q += p_.period_s() * error.stator.q;
     integral_as_.field += p_.period_s() * error.field;
   }
-  telemetry_ = {i.stator.d, i.stator.q, wanted.stator.q, wanted.field, u.stator.d, u.stator.q};
+  tell({.angle_rad = shaft_.angle_rad(), .speed_rad_s = shaft_.speed_rad_s(), .saturated = saturated_},
+       {i.stator.d, i.stator.q, wanted.stator.q, wanted.field, u.stator.d, u.stator.q});
   const double lead_rad =
       p_.angle_lead_samples * p_.period_s() * p_.machine.pole_pairs * shaft_.speed_rad_s();
   Setpoint out = terminal_values(Direction::at(field_rad + lead_rad).to_ab(u.stator), p_.machine.star);
@@ -91,42 +84,6 @@ WoundRotorController::Voltages WoundRotorController::voltages(const Currents& i,
   const double q_v = std::clamp(u.q, -room_v, room_v);
   saturated_ = saturated_ || d_v != u.d || q_v != u.q || field_v != wanted_field_v;
   return {.stator = {.d = d_v, .q = q_v}, .field = field_v};
-}
-
-std::span<const GainRow<WoundRotorParameters>> WoundRotorParameters::gains() noexcept {
-  using P = WoundRotorParameters;
-  constexpr GainRule kPositive = GainRule::kPositive;
-  constexpr GainRule kNotNegative = GainRule::kNotNegative;
-  static constexpr auto kRows = joined(
-      std::to_array<GainRow<P>>({
-          {"machine.pole_pairs", [](P& p) -> double& { return p.machine.pole_pairs; }, kPositive},
-          {"machine.stator_resistance_ohm", [](P& p) -> double& { return p.machine.stator_resistance_ohm; },
-           kPositive},
-          {"machine.stator_inductance_h", [](P& p) -> double& { return p.machine.stator_inductance_h; },
-           kPositive},
-          {"machine.field_resistance_ohm", [](P& p) -> double& { return p.machine.field_resistance_ohm; },
-           kPositive},
-          {"machine.field_inductance_h", [](P& p) -> double& { return p.machine.field_inductance_h; },
-           kPositive},
-          {"machine.mutual_inductance_h", [](P& p) -> double& { return p.machine.mutual_inductance_h; },
-           kPositive},
-      }),
-      shaft_and_sampling_rows<P>(),
-      std::to_array<GainRow<P>>({
-          {"voltage_limit_v", [](P& p) -> double& { return p.voltage_limit_v; }, kPositive},
-          {"field_voltage_limit_v", [](P& p) -> double& { return p.field_voltage_limit_v; }, kPositive},
-          {"current_limit_a", [](P& p) -> double& { return p.current_limit_a; }, kPositive},
-          {"field_current_a", [](P& p) -> double& { return p.field_current_a; }, kPositive},
-          {"base_speed_rad_s", [](P& p) -> double& { return p.base_speed_rad_s; }, kPositive},
-          {"current.bandwidth_per_s", [](P& p) -> double& { return p.current.bandwidth_per_s; }, kPositive},
-          {"current.integral_rate_per_s", [](P& p) -> double& { return p.current.integral_rate_per_s; },
-           kNotNegative},
-      }),
-      position_rows<P>(), speed_observer_rows<P>(),
-      std::to_array<GainRow<P>>({
-          {"angle_lead_samples", [](P& p) -> double& { return p.angle_lead_samples; }, kNotNegative},
-      }));
-  return kRows;
 }
 
 std::vector<std::string> WoundRotorParameters::problems() const {

@@ -1,45 +1,27 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "clients/control/estimators/shaft_sensing.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/servo_loop.hpp"
 #include "clients/control/math/frames.hpp"
+#include "clients/models/wound_rotor_machine.hpp"
 
 namespace drivebench::control {
-
-/// What the controller believes about a synchronous machine with a field winding, in the frame of the field,
-/// two phases or the two-phase equivalent of a star:
-///   u_d = R_S·i_d + L_S·di_d/dt + M·di_F/dt − n_p·ω·L_S·i_q
-///   u_q = R_S·i_q + L_S·di_q/dt + n_p·ω·(L_S·i_d + M·i_F)
-///   u_F = R_F·i_F + L_F·di_F/dt + M·di_d/dt
-///   J·dω/dt = n_p·M·i_F·i_q − f·ω − τ_L
-/// Source: Chiasson 2005, (6.38) and problem 6.14, whose print lacks n_p in the torque (SM-01, SM-03).
-struct WoundRotorModel {
-  double pole_pairs;
-  double stator_resistance_ohm;
-  double stator_inductance_h;
-  double field_resistance_ohm;
-  double field_inductance_h;
-  double mutual_inductance_h;
-  double friction_nms;  ///< viscous, f [N·m·s/rad]
-  double inertia_kgm2;
-  bool star = false;
-
-  constexpr double friction_rate_per_s() const noexcept { return friction_nms / inertia_kgm2; }
-};
 
 /// Both kinds of current follow di/dt = ω_c·(e + ω_i·∫e).
 struct WoundRotorCurrentGains {
   double bandwidth_per_s;      ///< ω_c
   double integral_rate_per_s;  ///< ω_i
+
+  static constexpr std::tuple kGains{
+      gain("bandwidth_per_s", &WoundRotorCurrentGains::bandwidth_per_s, GainRule::kPositive),
+      gain("integral_rate_per_s", &WoundRotorCurrentGains::integral_rate_per_s, GainRule::kNotNegative)};
 };
 
 struct WoundRotorParameters {
@@ -56,7 +38,19 @@ struct WoundRotorParameters {
   SpeedObserverGains speed_observer;
   double angle_lead_samples = 0.5;  ///< the voltages are turned ahead by the angle of so many samples
 
-  static std::span<const GainRow<WoundRotorParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &WoundRotorParameters::machine),
+      gain("sample_rate_hz", &WoundRotorParameters::sample_rate_hz, GainRule::kPositive),
+      gain("counts_per_revolution", &WoundRotorParameters::counts_per_revolution, GainRule::kPositive),
+      gain("voltage_limit_v", &WoundRotorParameters::voltage_limit_v, GainRule::kPositive),
+      gain("field_voltage_limit_v", &WoundRotorParameters::field_voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &WoundRotorParameters::current_limit_a, GainRule::kPositive),
+      gain("field_current_a", &WoundRotorParameters::field_current_a, GainRule::kPositive),
+      gain("base_speed_rad_s", &WoundRotorParameters::base_speed_rad_s, GainRule::kPositive),
+      gains_in("current.", &WoundRotorParameters::current),
+      gains_in("position.", &WoundRotorParameters::position),
+      gains_in("speed_observer.", &WoundRotorParameters::speed_observer),
+      gain("angle_lead_samples", &WoundRotorParameters::angle_lead_samples, GainRule::kNotNegative)};
   std::vector<std::string> problems() const;
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
@@ -74,15 +68,6 @@ class WoundRotorController final : public Controller {
   /// `p` must have no problems().
   explicit WoundRotorController(const WoundRotorParameters& p) noexcept;
 
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods = 1) noexcept override;
-
-  Quantity quantity() const noexcept override { return Quantity::kVoltage; }
-  double angle_rad() const noexcept override { return shaft_.angle_rad(); }
-  double speed_rad_s() const noexcept override { return shaft_.speed_rad_s(); }
-  bool saturated() const noexcept override { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept override;
-  std::span<const double> telemetry() const noexcept override { return telemetry_; }
-
  private:
   struct Currents {
     DirectQuadrature stator;
@@ -92,6 +77,7 @@ class WoundRotorController final : public Controller {
     DirectQuadrature stator;
     double field;
   };
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
   Currents references(const Reference& r, double i_field_a) noexcept;
   Voltages voltages(const Currents& i, const Currents& error) noexcept;
 
@@ -101,7 +87,6 @@ class WoundRotorController final : public Controller {
   Currents integral_as_{};
   double last_torque_nm_ = 0.0;
   bool saturated_ = false;
-  std::array<double, 6> telemetry_{};
 };
 
 }  // namespace drivebench::control

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 namespace drivebench::control {
 
@@ -10,22 +12,6 @@ FieldWeakening::Flux FieldWeakening::at(const Reference& r) const noexcept {
   if (speed_rad_s <= base_speed_rad_s) return {.flux_wb = rated_flux_wb, .slope_wb_per_s = 0.0};
   const double flux_wb = rated_flux_wb * base_speed_rad_s / speed_rad_s;
   return {.flux_wb = flux_wb, .slope_wb_per_s = -flux_wb * r.acceleration_rad_s2 / r.speed_rad_s};
-}
-
-std::span<const GainRow<SeparateDcParameters>> SeparateDcParameters::gains() noexcept {
-  using P = SeparateDcParameters;
-  static constexpr auto kRows = joined(
-      kWoundDcAxisRows<P>,
-      std::to_array<GainRow<P>>({
-          {"flux.rated_wb", [](P& p) -> double& { return p.flux.rated_flux_wb; }, GainRule::kPositive},
-          {"flux.base_speed_rad_s", [](P& p) -> double& { return p.flux.base_speed_rad_s; },
-           GainRule::kPositive},
-          {"flux.proportional_per_s", [](P& p) -> double& { return p.flux_per_s; }, GainRule::kPositive},
-          {"speed.integral_per_s3", [](P& p) -> double& { return p.speed.integral_per_s3; }},
-          {"speed.proportional_per_s2", [](P& p) -> double& { return p.speed.proportional_per_s2; }},
-          {"speed.derivative_per_s", [](P& p) -> double& { return p.speed.derivative_per_s; }},
-      }));
-  return kRows;
 }
 
 std::vector<std::string> SeparateDcParameters::problems() const {
@@ -55,22 +41,6 @@ Setpoint SeparateDcController::voltages(const Reference& r, const WoundDcState& 
 
 void SeparateDcController::integrate(const Setpoint& excess_v) noexcept {
   speed_integral_rad_ = integrated(speed_integral_rad_, speed_error_rad_s_, excess_v.a);
-}
-
-std::span<const GainRow<FieldControlDcParameters>> FieldControlDcParameters::gains() noexcept {
-  using P = FieldControlDcParameters;
-  static constexpr auto kRows = joined(
-      kWoundDcAxisRows<P>,
-      std::to_array<GainRow<P>>({
-          {"armature_voltage_v", [](P& p) -> double& { return p.armature_voltage_v; }, GainRule::kPositive},
-          {"flux.rated_wb", [](P& p) -> double& { return p.rated_flux_wb; }, GainRule::kPositive},
-          {"start_speed_rad_s", [](P& p) -> double& { return p.start_speed_rad_s; }, GainRule::kPositive},
-          {"energy.integral_per_s4", [](P& p) -> double& { return p.energy_integral_per_s4; }},
-          {"energy.proportional_per_s3", [](P& p) -> double& { return p.energy_proportional_per_s3; }},
-          {"energy.power_per_s2", [](P& p) -> double& { return p.power_per_s2; }},
-          {"energy.power_slope_per_s", [](P& p) -> double& { return p.power_slope_per_s; }},
-      }));
-  return kRows;
 }
 
 std::vector<std::string> FieldControlDcParameters::problems() const {

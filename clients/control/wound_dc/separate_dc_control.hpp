@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/wound_dc/wound_dc_controller.hpp"
 
 namespace drivebench::control {
@@ -15,26 +19,22 @@ struct FieldWeakening {
     double slope_wb_per_s;
   };
   Flux at(const Reference& r) const noexcept;
-};
 
-/// Gains on ∫e, e and the acceleration error of a speed: s³ + K2·s² + K1·s + K0.
-struct SpeedChainGains {
-  double integral_per_s3;      ///< K0
-  double proportional_per_s2;  ///< K1
-  double derivative_per_s;     ///< K2
-
-  static constexpr SpeedChainGains placed(const Polynomial<3>& poles) noexcept {
-    return {.integral_per_s3 = poles[2], .proportional_per_s2 = poles[1], .derivative_per_s = poles[0]};
-  }
+  static constexpr std::tuple kGains{
+      gain("rated_wb", &FieldWeakening::rated_flux_wb, GainRule::kPositive),
+      gain("base_speed_rad_s", &FieldWeakening::base_speed_rad_s, GainRule::kPositive)};
 };
 
 struct SeparateDcParameters {
   WoundDcAxisParameters axis;
   FieldWeakening flux;
   double flux_per_s;  ///< K_f: how fast the flux comes to its reference
-  SpeedChainGains speed;
+  ServoGains speed;   ///< on ∫e, e and the acceleration error of the speed
 
-  static std::span<const GainRow<SeparateDcParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &SeparateDcParameters::axis), gains_in("flux.", &SeparateDcParameters::flux),
+      gain("flux.proportional_per_s", &SeparateDcParameters::flux_per_s, GainRule::kPositive),
+      gains_in("speed.", &SeparateDcParameters::speed)};
   std::vector<std::string> problems() const;
 };
 
@@ -70,7 +70,15 @@ struct FieldControlDcParameters {
   double power_per_s2;                ///< K2
   double power_slope_per_s;           ///< K3
 
-  static std::span<const GainRow<FieldControlDcParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &FieldControlDcParameters::axis),
+      gain("armature_voltage_v", &FieldControlDcParameters::armature_voltage_v, GainRule::kPositive),
+      gain("flux.rated_wb", &FieldControlDcParameters::rated_flux_wb, GainRule::kPositive),
+      gain("start_speed_rad_s", &FieldControlDcParameters::start_speed_rad_s, GainRule::kPositive),
+      gain("energy.integral_per_s4", &FieldControlDcParameters::energy_integral_per_s4),
+      gain("energy.proportional_per_s3", &FieldControlDcParameters::energy_proportional_per_s3),
+      gain("energy.power_per_s2", &FieldControlDcParameters::power_per_s2),
+      gain("energy.power_slope_per_s", &FieldControlDcParameters::power_slope_per_s)};
   std::vector<std::string> problems() const;
 };
 

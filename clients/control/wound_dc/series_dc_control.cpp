@@ -1,24 +1,10 @@
 #include "clients/control/wound_dc/series_dc_control.hpp"
 
 #include <algorithm>
+#include <string>
+#include <vector>
 
 namespace drivebench::control {
-
-std::span<const GainRow<SeriesDcParameters>> SeriesDcParameters::gains() noexcept {
-  using P = SeriesDcParameters;
-  static constexpr auto kRows =
-      joined(kWoundDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"least_current_a", [](P& p) -> double& { return p.least_current_a; }, GainRule::kPositive},
-                 {"speed.integral_per_s3", [](P& p) -> double& { return p.speed.integral_per_s3; }},
-                 {"speed.proportional_per_s2", [](P& p) -> double& { return p.speed.proportional_per_s2; }},
-                 {"speed.derivative_per_s", [](P& p) -> double& { return p.speed.derivative_per_s; }},
-                 {"current_observer.flux_per_s", [](P& p) -> double& { return p.observer.flux_per_s; }},
-                 {"current_observer.speed_per_s2", [](P& p) -> double& { return p.observer.speed_per_s2; }},
-                 {"current_observer.load_per_s3", [](P& p) -> double& { return p.observer.load_per_s3; }},
-             }));
-  return kRows;
-}
 
 std::vector<std::string> SeriesDcParameters::problems() const {
   std::vector<std::string> found = wound_dc_problems(
@@ -67,20 +53,6 @@ Setpoint SeriesDcController::voltages(const Reference& r, const WoundDcState& x)
 
 void SeriesDcController::integrate(const Setpoint& excess_v) noexcept {
   speed_integral_rad_ = integrated(speed_integral_rad_, speed_error_rad_s_, excess_v.a);
-}
-
-std::span<const GainRow<WeakenedSeriesDcParameters>> WeakenedSeriesDcParameters::gains() noexcept {
-  using P = WeakenedSeriesDcParameters;
-  static constexpr auto kRows =
-      joined(kWoundDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"most_flux_wb", [](P& p) -> double& { return p.most_flux_wb; }, GainRule::kPositive},
-                 {"speed.proportional_per_s", [](P& p) -> double& { return p.speed_proportional_per_s; },
-                  GainRule::kPositive},
-                 {"speed.integral_per_s2", [](P& p) -> double& { return p.speed_integral_per_s2; },
-                  GainRule::kPositive},
-             }));
-  return kRows;
 }
 
 std::vector<std::string> WeakenedSeriesDcParameters::problems() const {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
 
-#include "clients/control/wound_dc/separate_dc_control.hpp"
 #include "clients/control/wound_dc/series_dc_observer.hpp"
 #include "clients/control/wound_dc/wound_dc_controller.hpp"
 
@@ -17,11 +19,15 @@ enum class SeriesDcSpeed {
 struct SeriesDcParameters {
   WoundDcAxisParameters axis;
   double least_current_a;  ///< divisions by the current take at least this
-  SpeedChainGains speed;
+  ServoGains speed;        ///< as of SeparateDcParameters
   SeriesDcSpeed source = SeriesDcSpeed::kShaft;
   SeriesDcObserverGains observer{};  ///< of kCurrent
 
-  static std::span<const GainRow<SeriesDcParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &SeriesDcParameters::axis),
+      gain("least_current_a", &SeriesDcParameters::least_current_a, GainRule::kPositive),
+      gains_in("speed.", &SeriesDcParameters::speed),
+      gains_in("current_observer.", &SeriesDcParameters::observer)};
   std::vector<std::string> problems() const;
 };
 
@@ -53,7 +59,12 @@ struct WeakenedSeriesDcParameters {
   double speed_proportional_per_s;  ///< K1
   double speed_integral_per_s2;     ///< K0
 
-  static std::span<const GainRow<WeakenedSeriesDcParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &WeakenedSeriesDcParameters::axis),
+      gain("most_flux_wb", &WeakenedSeriesDcParameters::most_flux_wb, GainRule::kPositive),
+      gain("speed.proportional_per_s", &WeakenedSeriesDcParameters::speed_proportional_per_s,
+           GainRule::kPositive),
+      gain("speed.integral_per_s2", &WeakenedSeriesDcParameters::speed_integral_per_s2, GainRule::kPositive)};
   std::vector<std::string> problems() const;
 };
 

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <tuple>
 
 #include "clients/control/estimators/linear_observer.hpp"
-#include "clients/models/wound_dc_model.hpp"
+#include "clients/control/gains/gains.hpp"
+#include "clients/models/wound_dc_machine.hpp"
 
 namespace drivebench::control {
 
@@ -30,6 +32,10 @@ struct SeriesDcObserverGains {
             .speed_per_s2 = (l1 * m.friction_rate_per_s() - c[1]) / m.motor_constant,
             .load_per_s3 = c[2] / m.motor_constant};
   }
+
+  static constexpr std::tuple kGains{gain("flux_per_s", &SeriesDcObserverGains::flux_per_s),
+                                     gain("speed_per_s2", &SeriesDcObserverGains::speed_per_s2),
+                                     gain("load_per_s3", &SeriesDcObserverGains::load_per_s3)};
 };
 
 /// Speed and load of an unsaturated series motor from its current and voltage alone. With z = (ln λ_f, ω,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 namespace drivebench::control {
 namespace {
@@ -14,19 +16,6 @@ double accelerating_v(const WoundDcModel& m, const WoundDcState& x, double divis
 }
 
 }  // namespace
-
-std::span<const GainRow<ShuntDcParameters>> ShuntDcParameters::gains() noexcept {
-  using P = ShuntDcParameters;
-  static constexpr auto kRows =
-      joined(kWoundDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"speed.proportional_per_s", [](P& p) -> double& { return p.speed_proportional_per_s; },
-                  GainRule::kPositive},
-                 {"speed.integral_per_s2", [](P& p) -> double& { return p.speed_integral_per_s2; },
-                  GainRule::kPositive},
-             }));
-  return kRows;
-}
 
 std::vector<std::string> ShuntDcParameters::problems() const {
   return wound_dc_problems(*this, Polynomial<2>{speed_proportional_per_s, speed_integral_per_s2},
@@ -62,22 +51,6 @@ double ShuntDcChain::holding_flux_wb(const WoundDcModel& m, double speed_rad_s, 
   const double headroom = m.field_resistance_ohm / m.flux_slope_h(0.0) - m.motor_constant * speed_rad_s;
   return std::sqrt(std::max(load_nm, 0.0) * m.armature_resistance_ohm /
                    (m.motor_constant * std::max(headroom, 1e-3)));
-}
-
-std::span<const GainRow<ExactShuntDcParameters>> ExactShuntDcParameters::gains() noexcept {
-  using P = ExactShuntDcParameters;
-  static constexpr auto kRows =
-      joined(kWoundDcAxisRows<P>,
-             std::to_array<GainRow<P>>({
-                 {"start_per_s", [](P& p) -> double& { return p.start_per_s; }, GainRule::kPositive},
-                 {"chain.proportional_per_s2", [](P& p) -> double& { return p.chain_proportional_per_s2; },
-                  GainRule::kPositive},
-                 {"chain.derivative_per_s", [](P& p) -> double& { return p.chain_derivative_per_s; },
-                  GainRule::kPositive},
-                 {"least_beta_rad_s3_per_v", [](P& p) -> double& { return p.least_beta_rad_s3_per_v; },
-                  GainRule::kPositive},
-             }));
-  return kRows;
 }
 
 std::vector<std::string> ExactShuntDcParameters::problems() const {

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include "clients/control/wound_dc/wound_dc_controller.hpp"
 
 namespace drivebench::control {
@@ -9,7 +13,10 @@ struct ShuntDcParameters {
   double speed_proportional_per_s;  ///< K1
   double speed_integral_per_s2;     ///< K0
 
-  static std::span<const GainRow<ShuntDcParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &ShuntDcParameters::axis),
+      gain("speed.proportional_per_s", &ShuntDcParameters::speed_proportional_per_s, GainRule::kPositive),
+      gain("speed.integral_per_s2", &ShuntDcParameters::speed_integral_per_s2, GainRule::kPositive)};
   std::vector<std::string> problems() const;
 };
 
@@ -56,7 +63,13 @@ struct ExactShuntDcParameters {
   double chain_derivative_per_s;     ///< K2
   double least_beta_rad_s3_per_v;
 
-  static std::span<const GainRow<ExactShuntDcParameters>> gains() noexcept;
+  static constexpr std::tuple kGains{
+      gains_in("", &ExactShuntDcParameters::axis),
+      gain("start_per_s", &ExactShuntDcParameters::start_per_s, GainRule::kPositive),
+      gain("chain.proportional_per_s2", &ExactShuntDcParameters::chain_proportional_per_s2,
+           GainRule::kPositive),
+      gain("chain.derivative_per_s", &ExactShuntDcParameters::chain_derivative_per_s, GainRule::kPositive),
+      gain("least_beta_rad_s3_per_v", &ExactShuntDcParameters::least_beta_rad_s3_per_v, GainRule::kPositive)};
   std::vector<std::string> problems() const;
 };
 

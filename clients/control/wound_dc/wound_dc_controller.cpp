@@ -1,12 +1,12 @@
 #include "clients/control/wound_dc/wound_dc_controller.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace drivebench::control {
 
 WoundDcController::WoundDcController(const WoundDcAxisParameters& axis, Terminals terminals) noexcept
-    : axis_(axis),
+    : Controller(Quantity::kVoltage, {"speed_error_rad_s", "flux_wb", "speed_rad_s", "load_rad_s2"}),
+      axis_(axis),
       terminals_(terminals),
       shaft_(axis.shaft, axis.machine.friction_rate_per_s(), axis.period_s()) {}
 
@@ -27,7 +27,7 @@ ShaftEstimate WoundDcController::seen_from_terminals(double, const ShaftEstimate
   return shaft;
 }
 
-Setpoint WoundDcController::update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
+Setpoint WoundDcController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   const WoundDcModel& machine = axis_.machine;
   const bool whole_field = terminals_ == Terminals::kSeries && machine.field_shunt_resistance_ohm == 0.0;
   const double armature_a = terminals_ == Terminals::kShunt ? m.i_a_a - m.i_f_a : m.i_a_a;
@@ -36,26 +36,21 @@ Setpoint WoundDcController::update(const Measurement& m, const Reference& r, std
   const double motor_rad_s2 = machine.torque_nm(flux_wb, armature_a) / machine.inertia_kgm2;
   const ShaftEstimate shaft =
       seen_from_terminals(armature_a, shaft_.update(m, motor_rad_s2, periods), periods);
-  speed_rad_s_ = shaft.speed_rad_s;
 
   const Setpoint wanted =
-      voltages(r, {.speed_rad_s = speed_rad_s_,
+      voltages(r, {.speed_rad_s = shaft.speed_rad_s,
                    .load_rad_s2 = shaft.load_rad_s2,
                    .armature_a = armature_a,
                    .field_a = field_a,
                    .flux_wb = flux_wb,
-                   .motor_rad_s2 = motor_rad_s2 - machine.friction_rate_per_s() * speed_rad_s_});
+                   .motor_rad_s2 = motor_rad_s2 - machine.friction_rate_per_s() * shaft.speed_rad_s});
   last_ = {.a = clamped_armature_v(wanted.a), .field = clamped_field_v(wanted.field)};
-  saturated_ = last_.a != wanted.a || last_.field != wanted.field;
   integrate({.a = wanted.a - last_.a, .field = wanted.field - last_.field});
-  telemetry_ = {r.speed_rad_s - speed_rad_s_, flux_wb, speed_rad_s_, shaft.load_rad_s2};
+  tell({.angle_rad = shaft_.now().angle_rad,
+        .speed_rad_s = shaft.speed_rad_s,
+        .saturated = last_.a != wanted.a || last_.field != wanted.field},
+       {r.speed_rad_s - shaft.speed_rad_s, flux_wb, shaft.speed_rad_s, shaft.load_rad_s2});
   return last_;
-}
-
-std::span<const std::string_view> WoundDcController::telemetry_names() const noexcept {
-  static constexpr std::array<std::string_view, 4> kNames = {"speed_error_rad_s", "flux_wb", "speed_rad_s",
-                                                             "load_rad_s2"};
-  return kNames;
 }
 
 }  // namespace drivebench::control

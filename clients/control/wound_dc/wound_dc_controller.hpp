@@ -1,15 +1,16 @@
 #pragma once
 
-#include <array>
+#include <cstdint>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
-#include "clients/control/dc/dc_controller.hpp"
 #include "clients/control/estimators/shaft_estimator.hpp"
-#include "clients/control/gains/gains.hpp"
+#include "clients/control/gains/loop_gains.hpp"
+#include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
-#include "clients/models/wound_dc_model.hpp"
+#include "clients/control/math/pole_placement.hpp"
+#include "clients/models/wound_dc_machine.hpp"
 
 namespace drivebench::control {
 
@@ -24,39 +25,16 @@ struct WoundDcAxisParameters {
   ShaftEstimatorParameters shaft;
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
-};
 
-/// The gain rows of member `axis` of P.
-template <class P>
-inline constexpr auto kWoundDcAxisRows = std::to_array<GainRow<P>>({
-    {"machine.armature_resistance_ohm",
-     [](P& p) -> double& { return p.axis.machine.armature_resistance_ohm; }, GainRule::kPositive},
-    {"machine.armature_inductance_h", [](P& p) -> double& { return p.axis.machine.armature_inductance_h; },
-     GainRule::kPositive},
-    {"machine.motor_constant", [](P& p) -> double& { return p.axis.machine.motor_constant; },
-     GainRule::kPositive},
-    {"machine.field_resistance_ohm", [](P& p) -> double& { return p.axis.machine.field_resistance_ohm; },
-     GainRule::kPositive},
-    {"machine.field_flux_scale", [](P& p) -> double& { return p.axis.machine.field_flux_scale; },
-     GainRule::kPositive},
-    {"machine.field_shunt_resistance_ohm",
-     [](P& p) -> double& { return p.axis.machine.field_shunt_resistance_ohm; }, GainRule::kNotNegative},
-    {"machine.inertia_kgm2", [](P& p) -> double& { return p.axis.machine.inertia_kgm2; },
-     GainRule::kPositive},
-    {"machine.friction_nms", [](P& p) -> double& { return p.axis.machine.friction_nms; },
-     GainRule::kNotNegative},
-    {"sample_rate_hz", [](P& p) -> double& { return p.axis.sample_rate_hz; }, GainRule::kPositive},
-    {"voltage_limit_v", [](P& p) -> double& { return p.axis.voltage_limit_v; }, GainRule::kPositive},
-    {"current_limit_a", [](P& p) -> double& { return p.axis.current_limit_a; }, GainRule::kPositive},
-    {"field_voltage_limit_v", [](P& p) -> double& { return p.axis.field_voltage_limit_v; },
-     GainRule::kNotNegative},
-    {"least_flux_wb", [](P& p) -> double& { return p.axis.least_flux_wb; }, GainRule::kPositive},
-    {"counts_per_revolution", [](P& p) -> double& { return p.axis.shaft.counts_per_revolution; },
-     GainRule::kPositive},
-    {"observer.angle_per_s", [](P& p) -> double& { return p.axis.shaft.observer.angle_per_s; }},
-    {"observer.speed_per_s2", [](P& p) -> double& { return p.axis.shaft.observer.speed_per_s2; }},
-    {"observer.load_per_s3", [](P& p) -> double& { return p.axis.shaft.observer.load_per_s3; }},
-});
+  static constexpr std::tuple kGains{
+      gains_in("machine.", &WoundDcAxisParameters::machine),
+      gain("sample_rate_hz", &WoundDcAxisParameters::sample_rate_hz, GainRule::kPositive),
+      gain("voltage_limit_v", &WoundDcAxisParameters::voltage_limit_v, GainRule::kPositive),
+      gain("current_limit_a", &WoundDcAxisParameters::current_limit_a, GainRule::kPositive),
+      gain("field_voltage_limit_v", &WoundDcAxisParameters::field_voltage_limit_v, GainRule::kNotNegative),
+      gain("least_flux_wb", &WoundDcAxisParameters::least_flux_wb, GainRule::kPositive),
+      gains_in("", &WoundDcAxisParameters::shaft, ShaftEstimatorParameters::kWithoutTachometer)};
+};
 
 /// range_problems() of P, those of its estimator, and the loop's.
 template <class P, std::size_t N>
@@ -79,19 +57,11 @@ struct WoundDcState {
   double motor_rad_s2;
 };
 
-/// Speed control of a DC machine with a wound field: what is left to the law are the voltages.
+/// Speed control of a DC machine with a wound field: the law gives the voltages.
 class WoundDcController : public Controller {
  public:
-  Setpoint update(const Measurement& m, const Reference& r, std::int64_t periods) noexcept final;
-  Quantity quantity() const noexcept final { return Quantity::kVoltage; }
-  double angle_rad() const noexcept final { return shaft_.now().angle_rad; }
-  double speed_rad_s() const noexcept final { return speed_rad_s_; }
-  bool saturated() const noexcept final { return saturated_; }
-  std::span<const std::string_view> telemetry_names() const noexcept final;
-  std::span<const double> telemetry() const noexcept final { return telemetry_; }
-
  protected:
-  /// Whose current the terminals carry.
+  /// The current that the terminals carry.
   enum class Terminals {
     kSeparate,  ///< the armature's
     kSeries,    ///< that of armature and field, of the armature with R_p
@@ -121,13 +91,12 @@ class WoundDcController : public Controller {
   const Setpoint& last() const noexcept { return last_; }
 
  private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept final;
+
   WoundDcAxisParameters axis_;
   Terminals terminals_;
   ShaftEstimator shaft_;
   Setpoint last_;
-  double speed_rad_s_ = 0.0;
-  bool saturated_ = false;
-  std::array<double, 4> telemetry_{};
 };
 
 }  // namespace drivebench::control

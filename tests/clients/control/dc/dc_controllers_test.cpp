@@ -15,7 +15,6 @@
 #include "clients/control/dc/dc_tachometer_loop.hpp"
 #include "clients/control/dc/dc_voltage_feedback.hpp"
 #include "clients/control/moves/standard_inputs.hpp"
-#include "clients/control/moves/trapezoidal_move.hpp"
 #include "tests/clients/control/dc/ideal_dc_shaft.hpp"
 
 namespace drivebench::control {
@@ -62,7 +61,7 @@ void run(Controller& controller, const Trajectory& move, double duration_s, doub
 
 const StepMove kRest({.distance_rad = 0.0, .speed_rad_s = 0.0, .duration_s = 1.0});
 
-constexpr DcStateGains kTriple = DcStateGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kFriction);
+constexpr ServoGains kTriple = ServoGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kFriction);
 
 // Catches a gain with f/J of the wrong sign or in other units: the book's numbers for r = 100.
 TEST(DcStateFeedback, HasTheBooksGains) {
@@ -70,7 +69,7 @@ TEST(DcStateFeedback, HasTheBooksGains) {
   EXPECT_DOUBLE_EQ(kTriple.proportional_per_s2, 3e4);
   EXPECT_NEAR(kTriple.derivative_per_s, 293.3333, 1e-4);
   EXPECT_NEAR(kTriple.derivative_per_s / kDcA.acceleration_per_a(), 0.251429, 1e-6);
-  constexpr DcStateGains kDouble = DcStateGains::placed(placed_polynomial<2>({100.0, 100.0}), kFriction);
+  constexpr ServoGains kDouble = ServoGains::placed(placed_polynomial<2>({100.0, 100.0}), kFriction);
   EXPECT_NEAR(kDouble.derivative_per_s, 193.3333, 1e-4);
   EXPECT_EQ(kDouble.integral_per_s3, 0.0);
 }
@@ -136,7 +135,7 @@ TEST(DcStateFeedback, AnInitialOffsetOvershootsAsTheTriplePoleSays) {
 // AC-12. Catches an integral that is there all the same, a speed gain with the wrong sign: without it
 // τ_L/(J·K1) = 0.058333 rad stay, with the observer (τ_L/J)·(1 + K2·l1/p²)/K1 = 0.10314 rad.
 TEST(DcStateFeedback, WithoutAnIntegralALoadLeavesAnError) {
-  const DcStateGains gains = DcStateGains::placed(placed_polynomial<2>({100.0, 100.0}), kFriction);
+  const ServoGains gains = ServoGains::placed(placed_polynomial<2>({100.0, 100.0}), kFriction);
   for (const double expected_rad : {0.058333, 0.10314}) {
     const bool ideal = expected_rad < 0.1;
     DcStateFeedback controller({.axis = ideal ? kAxis : observed(500.0), .position = gains});

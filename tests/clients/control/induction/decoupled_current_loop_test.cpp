@@ -1,4 +1,4 @@
-#include "clients/control/induction/decoupled_current_loop.hpp"
+#include "clients/control/induction/induction_drive.hpp"
 
 #include <gtest/gtest.h>
 
@@ -51,10 +51,10 @@ TEST(DecoupledVoltage, BringsAboutTheRatesThatWereAskedFor) {
 TEST(HeldVoltage, IsTurnedHalfAPeriodAheadAndLimitedPerPhase) {
   InductionState x;
   x.speed_rad_s = 800.0;  // 0.15 rad in half a period
-  const PhaseCommand free = held_voltage(kServoDrive, x, {.d = 10.0, .q = 0.0});
+  const PhaseVoltages free = held_voltage(kServoDrive, x, {.d = 10.0, .q = 0.0});
   EXPECT_NEAR(std::atan2(free.voltage_v.b, free.voltage_v.a), 0.5 * 125e-6 * 3.0 * 800.0, 1e-12);
   EXPECT_FALSE(free.saturated);
-  const PhaseCommand limited = held_voltage(kServoDrive, x, {.d = 100.0, .q = 0.0});
+  const PhaseVoltages limited = held_voltage(kServoDrive, x, {.d = 100.0, .q = 0.0});
   EXPECT_EQ(limited.voltage_v.a, 80.0);
   EXPECT_TRUE(limited.saturated);
 }
@@ -66,8 +66,8 @@ TEST(DecoupledCurrentLoop, AddsTheErrorTimesItsPole) {
   InductionState x;
   x.flux_wb = 0.0455;
   x.current_a = {.d = 4.0, .q = 0.0};
-  const PhaseCommand at_reference = loop.step(x, {.d = 4.0, .q = 0.0}, {.d = 0.0, .q = 0.0});
-  const PhaseCommand missing = loop.step(x, {.d = 4.0, .q = 1.0}, {.d = 0.0, .q = 0.0});
+  const PhaseVoltages at_reference = loop.step(x, {.d = 4.0, .q = 0.0}, {.d = 0.0, .q = 0.0});
+  const PhaseVoltages missing = loop.step(x, {.d = 4.0, .q = 1.0}, {.d = 0.0, .q = 0.0});
   EXPECT_NEAR(missing.voltage_v.b - at_reference.voltage_v.b, kServoMotor.leakage_inductance_h() * 2500.0,
               1e-9);
   EXPECT_EQ(missing.voltage_v.a, at_reference.voltage_v.a);

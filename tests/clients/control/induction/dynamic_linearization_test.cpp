@@ -4,8 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "clients/control/induction/direct_integrator_controller.hpp"
-#include "clients/control/induction/quadrature_integrator_controller.hpp"
+#include "clients/control/induction/dynamic_linearization.hpp"
 #include "clients/control/induction/voltage_linearization_controller.hpp"
 #include "clients/control/math/polynomial.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "clients/models/induction_motor.hpp"
+#include "clients/models/induction_machine.hpp"
 
 namespace drivebench::control {
 

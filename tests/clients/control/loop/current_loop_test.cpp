@@ -5,7 +5,7 @@
 namespace drivebench::control {
 namespace {
 
-constexpr CurrentLoopGains kBookGains = {.proportional_v_per_a = 6.4, .integral_v_per_as = 740.0};
+constexpr CurrentGains kBookGains = {.proportional_v_per_a = 6.4, .integral_v_per_as = 740.0};
 constexpr double kPeriodS = 125e-6;
 const Direction kAlongPhaseA = Direction::at(0.0);
 
@@ -13,7 +13,7 @@ const Direction kAlongPhaseA = Direction::at(0.0);
 TEST(CurrentLoop, IsProportionalPlusIntegralOnEachAxis) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);
   for (int k = 0; k < 100; ++k) {
-    const PhaseCommand command = loop.step({.d = 1.0, .q = -2.0}, kAlongPhaseA);
+    const PhaseVoltages command = loop.step({.d = 1.0, .q = -2.0}, kAlongPhaseA);
     EXPECT_NEAR(command.voltage_v.a, 6.4 + 740.0 * kPeriodS * k, 1e-12);
     EXPECT_NEAR(command.voltage_v.b, -2.0 * (6.4 + 740.0 * kPeriodS * k), 1e-12);
     EXPECT_FALSE(command.saturated);
@@ -25,7 +25,7 @@ TEST(CurrentLoop, IsProportionalPlusIntegralOnEachAxis) {
 TEST(CurrentLoop, IntegratorsStandStillWhileAPhaseIsAtItsLimit) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);
   for (int k = 0; k < 1000; ++k) {
-    const PhaseCommand command = loop.step({.d = 1.0, .q = 20.0}, kAlongPhaseA);
+    const PhaseVoltages command = loop.step({.d = 1.0, .q = 20.0}, kAlongPhaseA);
     EXPECT_TRUE(command.saturated);
     EXPECT_EQ(command.voltage_v.a, 6.4);
     EXPECT_EQ(command.voltage_v.b, 80.0);
@@ -38,11 +38,11 @@ TEST(CurrentLoop, IntegratorsStandStillWhileAPhaseIsAtItsLimit) {
 TEST(CurrentLoop, LimitHoldsPerPhaseAndNotPerAxis) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);
   const Direction diagonal = Direction::at(0.785398163397448);
-  const PhaseCommand inside = loop.step({.d = 110.0 / 6.4, .q = 0.0}, diagonal);
+  const PhaseVoltages inside = loop.step({.d = 110.0 / 6.4, .q = 0.0}, diagonal);
   EXPECT_FALSE(inside.saturated);
   EXPECT_NEAR(inside.voltage_v.a, 77.78, 0.01);
   EXPECT_NEAR(inside.voltage_v.b, 77.78, 0.01);
-  const PhaseCommand outside = loop.step({.d = -120.0 / 6.4, .q = 0.0}, diagonal);
+  const PhaseVoltages outside = loop.step({.d = -120.0 / 6.4, .q = 0.0}, diagonal);
   EXPECT_TRUE(outside.saturated);
   EXPECT_EQ(outside.voltage_v.a, -80.0);
   EXPECT_EQ(outside.voltage_v.b, -80.0);

@@ -214,7 +214,7 @@ TEST(Run, CircularClipWithBackwardDifferenceRunsAway) {
 }
 
 // Catches a result that hangs on where within a count the shaft happens to stand: the true error may change
-// by the count that nobody can see, not by more (1.03 to 2.05 over a fine sweep).
+// by the count that no encoder shows, not by more (1.03 to 2.05 over a fine sweep).
 TEST(Run, StartWithinACountMovesTheErrorByLessThanThatCount) {
   for (int tenth = 0; tenth < 10; ++tenth) {
     const Outcome seen = run("book/8.2.2", {.start_counts = -4711.0 + 0.1 * tenth});

@@ -70,7 +70,7 @@ TEST(SeparateDc, BothChainsAreLinear) {
   const SeparateDcParameters p = {.axis = axis_of(kSeparate),
                                   .flux = {.rated_flux_wb = 20.0, .base_speed_rad_s = 100.0},
                                   .flux_per_s = 20.0,
-                                  .speed = SpeedChainGains::placed(placed_polynomial<3>({30.0, 40.0, 50.0}))};
+                                  .speed = ServoGains::placed(placed_polynomial<3>({30.0, 40.0, 50.0}))};
   for (const State& x : {State{4.0, 120.0, 15.0}, State{-3.0, 150.0, 8.0}, State{0.0, -20.0, 21.0}}) {
     SeparateDcController controller(p);
     const double i_f = x.flux / 23.0;
@@ -97,7 +97,7 @@ TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
   SeparateDcParameters p = {.axis = axis_of(kSeparate),
                             .flux = {.rated_flux_wb = 20.0, .base_speed_rad_s = 1000.0},
                             .flux_per_s = 50.0,
-                            .speed = SpeedChainGains::placed(placed_polynomial<3>({30.0, 40.0, 50.0}))};
+                            .speed = ServoGains::placed(placed_polynomial<3>({30.0, 40.0, 50.0}))};
   p.axis.field_voltage_limit_v = 150.0;
   SeparateDcController controller(p);
   const State x = {.i_a = 5.0, .w = 120.0, .flux = 10.0};
@@ -156,7 +156,7 @@ TEST(SeparateDc, TheFieldAloneMakesTheEnergyAChainOfThree) {
 TEST(SeriesDc, TheAccelerationIsAChainOfTwo) {
   const SeriesDcParameters p = {.axis = axis_of(kSeries),
                                 .least_current_a = 0.5,
-                                .speed = SpeedChainGains::placed(placed_polynomial<3>({15.0, 20.0, 25.0}))};
+                                .speed = ServoGains::placed(placed_polynomial<3>({15.0, 20.0, 25.0}))};
   for (const State& x : {State{4.0, 120.0, 0.48}, State{9.0, 30.0, 1.08}, State{0.6, 140.0, 0.072}}) {
     SeriesDcController controller(p);
     const Setpoint u = controller.update({.tachometer_v = x.w, .i_a_a = x.i_a}, kWanted, 1);
@@ -176,7 +176,7 @@ TEST(SeriesDc, TheAccelerationIsAChainOfTwo) {
 TEST(SeriesDc, StartsFromNoCurrentAndNeverReversesIt) {
   SeriesDcController controller({.axis = axis_of(kSeries),
                                  .least_current_a = 0.5,
-                                 .speed = SpeedChainGains::placed(placed_polynomial<3>({15.0, 15.0, 15.0}))});
+                                 .speed = ServoGains::placed(placed_polynomial<3>({15.0, 15.0, 15.0}))});
   const double start_v = controller.update({}, kWanted, 1).a;
   EXPECT_GT(start_v, 0.0);
   EXPECT_TRUE(std::isfinite(start_v));
