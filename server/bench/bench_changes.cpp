@@ -1,4 +1,4 @@
-// What changes an axis from outside while it runs: parameters, at once or on a ramp, and injected faults.
+// Changes of a running axis: parameters, at once or on a ramp, and injected faults.
 #include <cmath>
 #include <span>
 
@@ -44,7 +44,7 @@ void Bench::follow_ramps(AxisRuntime& a) noexcept {
   if (possible) change_parameters(a, p);
   for (std::size_t i = a.ramps.count; i-- > 0;) {
     const ParameterRamp ramp = a.ramps.ramp[i];
-    // Together they break a rule: those that can go on alone do so, the others stay where they are.
+    // The ramps together break a rule: each ramp that alone keeps the rules goes on, the others stop.
     const bool follows = possible || set_parameter(a, ramp.row, ramp.at(tick_));
     if (!follows) ++a.control.refused;
     if (!follows || ramp.is_over(tick_)) a.ramps.remove(i);

@@ -1,5 +1,5 @@
-// Saving, restoring and hashing the state of the bench. The state is a list of blocks of 8-byte words; the
-// header names the setup it belongs to, the last word is a digest of all before it.
+// Saves, restores and hashes the state of the bench. The state is a list of blocks of 8-byte words; the
+// header identifies the setup, the last word is a digest of all words before it.
 #include <bit>
 #include <cmath>
 #include <cstring>

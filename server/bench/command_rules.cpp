@@ -12,7 +12,7 @@ double largest(const PhaseValues& x) noexcept {
   return std::max({std::abs(x.a), std::abs(x.b), std::abs(x.c), std::abs(x.field)});
 }
 
-/// What is in force before a command with these gates.
+/// The set-points in force before a command with these gates.
 PhaseValues start_of(const PhaseCommand& before, Gates gates) noexcept {
   return before.gates == gates ? before.setpoint : PhaseValues{};
 }

@@ -7,19 +7,19 @@
 
 namespace drivebench {
 
-/// What becomes of a command that asks for more than the drive can give, or for it too fast.
+/// The reaction to a command beyond the limits of the drive or `slew_per_s`.
 enum class OnExcess : std::uint32_t {
-  kSaturate,  ///< it is limited, and a bit of the fault word says so
-  kRefuse,    ///< it is refused as a whole and counts as missing
+  kSaturate,  ///< limited, with a bit in the fault word
+  kRefuse,    ///< refused as a whole; counts as missing
 };
 
-/// What a command of an axis must keep to.
+/// The rules for commands of an axis.
 struct CommandRules {
   OnExcess on_excess = OnExcess::kSaturate;
-  double slew_per_s = 0.0;  ///< largest slope of a set-point [V/s], or [A/s] of a current; 0: none
+  double slew_per_s = 0.0;  ///< largest slope of a set-point [V/s], or [A/s] of a current; 0: no limit
 };
 
-/// Largest magnitude of a set-point, [V] or [A]; beyond it a number is an accident and refused by every axis.
+/// The largest magnitude of a set-point [V] or [A]; every axis refuses larger numbers as accidents.
 inline constexpr double kMaxSetpoint = 1e6;
 
 /// What decides whether an axis takes a command.
@@ -45,10 +45,11 @@ constexpr double largest_step(const CommandRules& rules, std::int64_t period_ns)
 /// off.
 Refused judge(const Command& command, Owner sender, const CommandView& axis) noexcept;
 
-/// Whether `command` is further away from `before` than this step; a command with other gates starts at 0.
+/// Whether a set-point of `command` differs from `before` by more than `step`; a command with other gates
+/// starts from 0.
 bool is_steeper(const PhaseCommand& before, const PhaseCommand& command, double step) noexcept;
 
-/// The command, each set-point no further away than this step from that of the one before.
+/// The command with each set-point limited to a change of at most `step` from `before`.
 PhaseCommand slewed(const PhaseCommand& before, const PhaseCommand& command, double step) noexcept;
 
 }  // namespace drivebench

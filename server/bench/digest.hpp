@@ -29,7 +29,7 @@ class Digest {
       return result;
     };
     constexpr std::size_t kInFours = kWords - kWords % 4;
-    std::uint64_t first = lane_at(0);  // all four in registers
+    std::uint64_t first = lane_at(0);  // keeps all four lanes in registers
     std::uint64_t second = lane_at(1);
     std::uint64_t third = lane_at(2);
     std::uint64_t fourth = lane_at(3);
@@ -49,7 +49,7 @@ class Digest {
     position_ += kWords;
   }
 
-  /// Of the words so far, their order and their number.
+  /// The digest of the words so far, their order and their number.
   constexpr std::uint64_t value() const noexcept {
     std::uint64_t result = position_;
     for (const std::uint64_t lane : lanes_)
@@ -58,7 +58,7 @@ class Digest {
   }
 
  private:
-  /// The lane of the n-th word from here.
+  /// The lane for the n-th next word.
   constexpr std::uint64_t& lane_at(std::size_t n) noexcept { return lanes_[(position_ + n) & 3u]; }
 
   static constexpr std::uint64_t mixed(std::uint64_t lane, std::uint64_t word) noexcept {

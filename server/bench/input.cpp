@@ -11,7 +11,7 @@ namespace {
 
 using Words = std::uint64_t[6];
 
-// One pair for each action that has contents.
+// One pair of functions for each action with contents.
 void put(Words& w, const Command& c) noexcept {
   w[0] = static_cast<std::uint64_t>(c.answers);
   w[1] = static_cast<std::uint64_t>(c.phases.gates);

@@ -11,7 +11,7 @@ namespace drivebench {
 
 inline constexpr std::size_t kMaxRamps = 16;  ///< of an axis at a time
 
-/// A parameter on its way to a value, linear in time.
+/// A linear ramp of a parameter.
 struct ParameterRamp {
   std::uint64_t row = 0;  ///< of axis_parameters() of the axis
   double from = 0.0;
@@ -19,7 +19,7 @@ struct ParameterRamp {
   Tick start = 0;
   Tick ticks = 0;
 
-  /// The value that holds during this tick.
+  /// The value in force during a tick.
   double at(Tick tick) const noexcept {
     const Tick elapsed = tick - start;
     if (elapsed >= ticks) return to;
@@ -28,8 +28,7 @@ struct ParameterRamp {
   bool is_over(Tick tick) const noexcept { return tick - start >= ticks; }
 };
 
-/// The parameters of an axis that are on their way, oldest first. 8-byte members only; what is not in use is
-/// zero.
+/// The running ramps of an axis, oldest first. 8-byte members only; unused entries are zero.
 struct ParameterRamps {
   std::uint64_t count = 0;
   std::array<ParameterRamp, kMaxRamps> ramp{};
@@ -37,7 +36,7 @@ struct ParameterRamps {
   bool has(std::uint64_t row) const noexcept {
     return std::any_of(ramp.begin(), end(), [row](const ParameterRamp& r) { return r.row == row; });
   }
-  /// False if there is no room.
+  /// Returns false if all kMaxRamps entries are in use.
   bool add(const ParameterRamp& added) noexcept {
     if (count == kMaxRamps) return false;
     ramp[count++] = added;

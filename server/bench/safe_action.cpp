@@ -10,8 +10,8 @@
 namespace drivebench {
 namespace {
 
-/// So many commands make the mean of the frequency: long enough for the six steps of block commutation,
-/// short beside a ramp.
+/// The number of commands in the mean of the frequency: enough for the six steps of block commutation, and
+/// short compared with a ramp.
 constexpr std::int64_t kMeanCommands = 64;
 
 TwoPhase vector_of(const PhaseValues& x, Connection connection) noexcept {
@@ -36,7 +36,7 @@ PhaseValues turned(const PhaseValues& x, double angle_rad, Connection connection
   return {.a = phases.a + common, .b = phases.b + common, .c = phases.c + common, .field = x.field};
 }
 
-/// Constant deceleration: after m of n ticks the frequency is 1 - m/n of what it was. The field winding keeps
+/// Constant deceleration: after m of n ticks the frequency is 1 - m/n of its start. The field winding keeps
 /// its set-point, so that an armature brakes.
 PhaseCommand ramp_down(const LastCommands& last, Connection connection, Tick ramp_ticks) noexcept {
   if (last.gone >= ramp_ticks) return {};
@@ -58,7 +58,7 @@ void follow(LastCommands& last, const PhaseCommand& command, Connection connecti
   last.command = command;
   if (!turns || connection == Connection::kArmature) return;
   const TwoPhase v = vector_of(command.setpoint, connection);
-  if (v.a == 0.0 && v.b == 0.0) return;  // has no angle
+  if (v.a == 0.0 && v.b == 0.0) return;  // no angle
   const double angle_rad = arctangent2(v.b, v.a);
   if (last.followed > 0) {
     const double turn_rad = turned_between(last.angle_rad, angle_rad);

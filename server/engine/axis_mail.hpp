@@ -10,10 +10,10 @@
 #include "server/bench/bench.hpp"
 #include "server/engine/mailbox.hpp"
 
-/// What the I/O thread and the tick thread tell each other about an axis, newest value by newest value.
+/// The newest values that the I/O thread and the tick thread exchange about an axis.
 namespace drivebench {
 
-/// Commands on their way to the tick thread, and what the bench has made of them on its way back.
+/// Passes commands to the tick thread and the bench's decisions back.
 class CommandMail {
  public:
   struct Sent {
@@ -21,24 +21,24 @@ class CommandMail {
     std::uint64_t number = 0;  ///< of the command, from 1 on; 0: none
     Command command{};
   };
-  /// What the bench knew before a tick.
+  /// The state of lease and commands in the bench before a tick.
   struct Seen {
     Owner owner = 0;
-    std::uint64_t decided = 0;  ///< number of the last command that the bench took or refused
-    Command newest{};           ///< the last command that it took under this lease
+    std::uint64_t decided = 0;  ///< number of the last command that the bench accepted or refused
+    Command newest{};           ///< the last command accepted under this lease
   };
 
   // ---- I/O thread ----
 
-  /// Why a command would be refused. `view` is the axis as its newest sample shows it; what the bench knows
-  /// of lease and commands comes from here, and is never older.
+  /// The reason why a command would be refused. `view` holds the axis from its newest sample; lease and
+  /// commands come from here and are never older.
   Refused judge(const Command& command, Owner sender, CommandView view) const noexcept {
     if (const auto newest = from_bench_.take()) seen_ = *newest;
-    if (seen_.owner != view.owner) view.owner = 0;  // the lease has come or gone since the sample
+    if (seen_.owner != view.owner) view.owner = 0;  // the lease has changed since the sample
     view.newest = seen_.newest;
     const Refused why = drivebench::judge(command, sender, view);
     if (why != Refused::kNot || sent_.owner != sender || sent_.number <= seen_.decided) return why;
-    // The bench may take the command sent before, or find this one in its place: this one must suit both.
+    // The bench may accept the previous command or see only this one: this one must be valid in both cases.
     view.newest = sent_.command;
     return drivebench::judge(command, sender, view);
   }
@@ -49,7 +49,7 @@ class CommandMail {
 
   // ---- tick thread ----
 
-  /// Gives the bench the newest command, if there is a new one, and tells what the bench knows then.
+  /// Gives the bench the newest command, if there is a new one, and sends its state back.
   void deliver(Bench& bench, std::uint32_t axis) noexcept {
     if (const auto newest = to_bench_.take()) {
       bench.submit({.tick = bench.tick(), .axis = axis, .owner = newest->owner, .action = newest->command});
@@ -65,21 +65,21 @@ class CommandMail {
 
  private:
   Mailbox<Sent> to_bench_;
-  mutable Mailbox<Seen> from_bench_;  // mutable: to look into a mailbox empties it
+  mutable Mailbox<Seen> from_bench_;  // mutable: reading a mailbox empties it
   Sent sent_;                         // I/O thread: the last command sent
-  mutable Seen seen_;                 // I/O thread: what came back last
-  Seen told_;                         // tick thread: what went back last
-  bool is_told_ = false;              // tick thread: nothing has been decided since
+  mutable Seen seen_;                 // I/O thread: the last received state
+  Seen told_;                         // tick thread: the last sent state
+  bool is_told_ = false;              // tick thread: no decision since then
 };
 
-/// The parameters of an axis on their way from the tick thread.
+/// Parameters of an axis from the tick thread.
 struct ParameterMail {
   static constexpr std::size_t kMaxParameters = 256;
   using Values = std::array<double, kMaxParameters>;
 
   Mailbox<Values> newest;
-  std::uint64_t sent = 0;       ///< tick thread: changes that were written into the mailbox
-  Values in_force{};            ///< I/O thread: what came last
+  std::uint64_t sent = 0;       ///< tick thread: number of changes in the mailbox
+  Values in_force{};            ///< I/O thread: the last received values
   std::uint64_t in_flight = 0;  ///< I/O thread: writes without an answer yet
 
   static Values values_of(const AxisParameters& p) noexcept {

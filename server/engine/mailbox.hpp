@@ -8,8 +8,8 @@
 
 namespace drivebench {
 
-/// The newest value from one writer thread to one reader thread; older ones are forgotten. Wait-free: three
-/// slots, of which the writer owns one, the reader one, and the third changes hands.
+/// Passes the newest value from one writer thread to one reader thread; older values are lost. Wait-free,
+/// with three slots: one of the writer, one of the reader, and a third that they exchange.
 template <class T>
 class Mailbox {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -20,7 +20,7 @@ class Mailbox {
     write_ = middle_.exchange(write_ | kNew, std::memory_order_acq_rel) & kIndex;
   }
 
-  /// The value written last, if it has not been taken yet.
+  /// The last written value, unless it has been taken.
   std::optional<T> take() noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kNew) == 0) return std::nullopt;
     read_ = middle_.exchange(read_, std::memory_order_acq_rel) & kIndex;

@@ -14,8 +14,8 @@ namespace {
 constexpr auto kLookInterval = std::chrono::milliseconds(100);
 constexpr auto kStopInterval = std::chrono::milliseconds(20);
 
-/// Without locks or allocation, which the thread that stands still may hold, and without waiting for whoever
-/// reads.
+/// Writes to standard error without locks or allocation, which the blocked thread may hold, and without
+/// waiting for the reader.
 void say(std::string_view sentence) noexcept {
   pollfd out{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
   if (::poll(&out, 1, 0) <= 0) return;
@@ -36,7 +36,7 @@ Supervisor::~Supervisor() {
 }
 
 asio::awaitable<void> Supervisor::give_signs() {
-  // Not a ServerTimer: whatever time others see, this is about threads.
+  // Not a ServerTimer: the supervisor watches threads in real time, also in a simulation.
   asio::basic_waitable_timer<std::chrono::steady_clock> timer(co_await asio::this_coro::executor);
   for (;;) {
     signs_.fetch_add(1, std::memory_order_relaxed);

@@ -28,7 +28,7 @@ TickEdges edges_of(const Bench& bench, std::size_t index) noexcept {
   double travel_rad = 0.0;
   for (const AngleSegment& segment : axis.last_tick())
     travel_rad += std::abs(segment.end_rad - segment.start_rad);
-  // A fault that comes or goes may make the count jump without travel.
+  // The begin or end of a fault can make the count jump without travel.
   const std::int64_t jump = std::abs(axis.state().encoder.count - start.count);
   if (!(travel_rad * counts_per_revolution / (2.0 * std::numbers::pi) < kMaxTravelCounts) ||
       jump >= static_cast<std::int64_t>(kMaxTravelCounts)) {

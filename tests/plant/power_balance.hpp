@@ -51,8 +51,8 @@ double storing_w(const Constants& c, const State& x, const RotorMotion& motion, 
   }
 }
 
-/// What of the input power is neither stored, nor lost, nor delivered to the shaft, over the largest of them;
-/// for a slope and a torque of anybody's making.
+/// The part of the input power that is neither stored, nor lost, nor delivered to the shaft, relative to the
+/// largest of these powers; for any given slope and torque.
 template <class Constants, class State>
 double unbalanced(const Constants& c, const State& x, const RotorMotion& motion, const TerminalInput& u,
                   const State& slope, double torque) {

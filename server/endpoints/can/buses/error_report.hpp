@@ -6,7 +6,7 @@
 
 namespace drivebench::can {
 
-/// What an error frame (linux/can/error.h) says about the state of the controller that was in `before`.
+/// The state of the CAN controller after an error frame (linux/can/error.h).
 inline BusState state_after(const Frame& error, BusState before) noexcept {
   if ((error.id & CAN_ERR_BUSOFF) != 0) return BusState::kDown;
   if ((error.id & CAN_ERR_RESTARTED) != 0) return BusState::kUp;

@@ -9,14 +9,14 @@
 namespace drivebench::can {
 
 /// Frames that wait for room in the transport: at most one per identifier, the newest, in the order in which
-/// the identifiers came.
+/// the identifiers arrived.
 class SendQueue {
  public:
-  /// As many as there are standard identifiers.
+  /// The number of standard identifiers.
   static constexpr std::size_t kMaxPending = 2048;
 
-  /// Keeps a frame instead of an older one with its identifier. Returns how many frames are lost by that: the
-  /// older one, or this one if there is no place left.
+  /// Adds a frame, or replaces an older one with its identifier. Returns the number of lost frames: the older
+  /// one, or this one if the queue is full.
   std::uint64_t push(const Frame& frame) {
     const auto same = [&](const Frame& other) {
       return other.id == frame.id && other.extended == frame.extended && other.remote == frame.remote;
@@ -35,7 +35,7 @@ class SendQueue {
   const Frame& front() const noexcept { return frames_.front(); }
   void pop() noexcept { frames_.pop_front(); }
 
-  /// Gives all of them up; returns how many.
+  /// Drops all frames and returns their number.
   std::uint64_t clear() noexcept {
     const std::uint64_t count = frames_.size();
     frames_.clear();

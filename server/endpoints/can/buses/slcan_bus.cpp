@@ -24,14 +24,14 @@ constexpr std::size_t kMaxClients = 16;
 constexpr std::string_view kTcp = "tcp:";
 constexpr std::string_view kPty = "pty:";
 
-/// Milliseconds that begin anew each minute, as the adapters count them.
+/// Milliseconds within a minute, like the time stamps of adapters.
 std::uint16_t stamp_ms() {
   const auto now = ServerClock::now().time_since_epoch();
   return static_cast<std::uint16_t>(std::chrono::duration_cast<std::chrono::milliseconds>(now).count() %
                                     60'000);
 }
 
-/// A client and the adapter that it sees.
+/// A client with the adapter that it sees.
 struct Client {
   Client(asio::io_context& io, int fd, BusStatus& status)
       : peer(io, fd, status, [this](std::string& out, const Frame& frame) {
@@ -73,7 +73,7 @@ class SlcanBus final : public VirtualBus {
 };
 
 std::string SlcanBus::open() {
-  const std::string where = config_.channel.substr(kTcp.size());  // of both the same
+  const std::string where = config_.channel.substr(kTcp.size());  // both prefixes have this length
   if (!is_tcp()) return terminal_.open(where);
   HostPort parsed;
   std::string problem = parse_host_port(where, parsed);
@@ -112,10 +112,10 @@ void SlcanBus::broadcast(const Frame& frame, const Client* except) {
 }
 
 void SlcanBus::take(Client& client, const SlcanReader::Line& line) {
-  if (line.refusal) return;  // a BELL from a client means nothing
+  if (line.refusal) return;  // a BELL from a client has no meaning
   const auto frame = line.too_long ? std::nullopt : parse_slcan(line.text);
   const bool may_send = client.open && !client.listen_only;
-  // A client that only sends and never reads loses its answers.
+  // A client that never reads loses its answers.
   if (line.too_long) {
     ++status_.malformed;
     client.peer.answer({&kSlcanRefused, 1});
@@ -129,7 +129,7 @@ void SlcanBus::take(Client& client, const SlcanReader::Line& line) {
   deliver(*frame, 0);
 }
 
-/// The answer to a command. Bit rates are taken and mean nothing here.
+/// The answer to a command. Bit rates are accepted without effect.
 std::string SlcanBus::answer(Client& client, std::string_view line) {
   static const std::string kYes(1, kSlcanOk);
   static const std::string kNo(1, kSlcanRefused);

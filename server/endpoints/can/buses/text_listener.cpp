@@ -13,9 +13,9 @@
 namespace drivebench::can {
 namespace {
 
-// So small that what waits in it is not old.
+// Small, so that the waiting bytes are not old.
 constexpr int kSendBufferBytes = 16 * 1024;
-// After an accept that failed for want of descriptors: a pause instead of a spin.
+// The pause after an accept that failed for lack of descriptors.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace drivebench::can {
 namespace {
 
-// After so many bytes the others get their turn.
+// After this many bytes other handlers have their turn.
 constexpr std::size_t kReadAtOnce = 4096;
 
 }  // namespace
@@ -42,8 +42,7 @@ void TextPeer::send(const Frame& frame) {
   if (!waiting_) write();
 }
 
-/// Writes what the kernel takes: first the text, then the frames, each of which becomes text when its turn
-/// comes.
+/// Writes as much as the kernel takes: first the text, then the frames, each converted to text at its turn.
 void TextPeer::write() {
   while (!ended_ && !(unsent_.empty() && frames_.empty())) {
     if (unsent_.empty()) {
@@ -87,7 +86,7 @@ void TextPeer::watch_for_stall() {
       });
 }
 
-/// An ordinary end would wait in the kernel behind what the peer does not read.
+/// Resets the connection: an ordinary end would wait in the kernel behind unread bytes.
 void TextPeer::reset() {
   const linger at_once{.l_onoff = 1, .l_linger = 0};
   if (!ended_) ::setsockopt(stream_.native_handle(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
@@ -111,7 +110,7 @@ void TextPeer::read() {
   if (count > 0) {
     if (on_bytes) on_bytes({buffer.data(), static_cast<std::size_t>(count)});
   } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
-    end();  // a terminal whose other end is closed says EIO
+    end();  // a terminal whose other end is closed returns EIO
   }
 }
 
@@ -123,7 +122,7 @@ void TextPeer::end() {
   forget_frames();
   asio::post(stream_.get_executor(), [this, alive = std::weak_ptr(alive_)] {
     if (alive.expired() || !on_end) return;
-    const auto tell = std::move(on_end);  // it outlives the peer, which it may destroy
+    const auto tell = std::move(on_end);  // moved out, because it may destroy the peer
     tell();
   });
 }

@@ -11,31 +11,31 @@
 
 namespace drivebench::can {
 
-/// What the buses without a CAN interface of the kernel have in common: opening again, filter, counters.
+/// The common part of buses without a CAN interface of the kernel: opening again, filter, counters.
 class VirtualBus : public Bus {
  public:
   VirtualBus(asio::io_context& io, const CanConfig& config) : io_(io), config_(config), retry_(io) {}
 
-  /// Opens it. Throws std::runtime_error if that fails and the bus is required; otherwise tries again later.
+  /// Opens the bus. If that fails, a required bus throws std::runtime_error; any other tries again later.
   void start();
 
   void set_filter(const std::vector<std::uint32_t>& ids) override;
   const BusStatus& status() const noexcept override { return status_; }
 
  protected:
-  /// Opens the transport; what hinders it, with the cure, or nothing.
+  /// Opens the transport. Returns the problem with its cure; empty: none.
   virtual std::string open() = 0;
 
-  /// To be called when the transport has gone: opens it again as soon as it is there.
+  /// To be called after the transport is lost: opens it again as soon as possible.
   void lost(const std::string& why);
   /// Counts a frame from the transport and passes it on.
   void deliver(const Frame& frame, std::int64_t stamp_ns);
-  /// To be called when a client of the bus is turned away or cut off.
+  /// To be called when a client of the bus is refused or cut off.
   void refused(const std::string& peer, std::string_view why) const {
     if (on_refused) on_refused(peer, why);
   }
   bool is_up() const noexcept { return status_.state == BusState::kUp; }
-  /// For handlers, which may run when the bus is gone.
+  /// For handlers, which may run after the end of the bus.
   std::weak_ptr<const bool> alive() const { return alive_; }
 
   asio::io_context& io_;
@@ -52,7 +52,7 @@ class VirtualBus : public Bus {
   std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();
 };
 
-/// What errno says.
+/// The text of errno.
 std::string reason();
 /// Seconds since 1970, for formats whose frames carry the time.
 double realtime_s();
