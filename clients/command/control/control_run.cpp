@@ -100,11 +100,16 @@ void exchange_all(link::AxisLink& bench, control::Run& run, const std::vector<Lo
   const double start_rad = sample->angle_rad;
   const std::uint64_t first_late = sample->late_ticks;
   std::int64_t periods = 1;
+  std::int64_t covered = 0;  // samples of the plan up to the newest row
   for (;;) {
     const control::Measurement measured = measurement_of(*sample, bench.known());
     const control::Setpoint setpoint = run.step(measured, periods);
     into.late_ticks = sample->late_ticks - first_late;
-    if (run.done()) return;
+    if (run.done()) {
+      into.missed_at_end = run.planned_samples() - covered;
+      return;
+    }
+    covered += periods;
     into.rows.push_back(row_of(*sample, into, periods, start_rad, run, setpoint));
     append_telemetry(into, run.controller());
     ControlRow& row = into.rows.back();
@@ -203,6 +208,7 @@ ControlReport summary_of(const ControlRun& run, double period_s) {
   report.late_ticks = run.late_ticks;
   report.wall_s = run.wall_s;
   report.samples = static_cast<std::int64_t>(run.rows.size());
+  report.missed_ticks = run.missed_at_end;
   if (run.rows.empty()) return report;
 
   std::vector<double> exchanges_us;

@@ -86,6 +86,7 @@ struct ControlRun {
   std::vector<std::string> telemetry_names;
   std::vector<double> telemetry;  ///< of all rows, one after the other
   std::string failure;
+  std::int64_t missed_at_end = 0;  ///< samples after the last row that did not reach the controller
   std::uint64_t late_ticks = 0;
   double wall_s = 0.0;
 };

@@ -9,7 +9,9 @@ namespace drivebench::control {
 
 int commutation_sector(double electrical_rad) noexcept {
   const double sector = std::floor(electrical_rad / (std::numbers::pi / 3.0) + 0.5);
-  return static_cast<int>(sector - 6.0 * std::floor(sector / 6.0));
+  const double within_turn = sector - 6.0 * std::floor(sector / 6.0);
+  // An estimate that has run away, to infinity or beyond what a double resolves, is in no sector.
+  return within_turn >= 0.0 && within_turn < 6.0 ? static_cast<int>(within_turn) : 0;
 }
 
 std::optional<int> commutation_sector(std::uint64_t hall_lines) noexcept {

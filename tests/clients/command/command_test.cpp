@@ -314,6 +314,8 @@ TEST(ControlRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples
   EXPECT_FALSE(report.peak_command_current_a.has_value());
   EXPECT_EQ(report.samples, 200);
   EXPECT_EQ(report.missed_ticks, 2);
+  run.missed_at_end = 40;
+  EXPECT_EQ(summary_of(run, 0.001).missed_ticks, 42);
   EXPECT_NEAR(report.duration_s, 0.202, 1e-12);
   EXPECT_EQ(report.exchange_p50_us, 100.0);
   EXPECT_EQ(report.exchange_p99_us, 198.0);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace drivebench::control {
@@ -33,6 +34,17 @@ TEST(Commutation, KnowsItsSectorInEveryTurn) {
       EXPECT_EQ(commutation_sector(middle - 29.9 * kDegree_rad), sector);
       EXPECT_EQ(commutation_sector(middle + 29.9 * kDegree_rad), sector);
     }
+  }
+}
+
+// Catches a sector that is no row of the table: an estimate of the angle that runs away ended the program.
+TEST(Commutation, HasARowForEveryAngle) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double angle :
+       {kInfinity, -kInfinity, std::numeric_limits<double>::quiet_NaN(), 1e18, -1e18, 1e300, -1e300}) {
+    const int sector = commutation_sector(angle);
+    EXPECT_GE(sector, 0) << angle;
+    EXPECT_LT(sector, 6) << angle;
   }
 }
 
