@@ -71,7 +71,7 @@ class Process(WireTest):
     def test_os_03_a_pause_longer_than_the_limit_is_a_latched_fault(self):
         """Catches: a bench that was stopped with its host and goes on as if its controller had been connected all the
         time."""
-        server = self.server("--mode", "realtime")
+        server = self.server("--mode", "realtime", text=SERVO_TEXT, strict=True)
         owner = self.client(server)
         owner.lease()
         owner.exchange(owner.newest().tick, 5.0)
@@ -82,8 +82,11 @@ class Process(WireTest):
         until(lambda: owner.newest().faults & OVERRUN, "the overrun is flagged")
         self.assertGreater(owner.newest().late_ticks, before.late_ticks)
         self.assertRefused(owner.exchange(owner.newest().tick, 5.0), pb.REFUSAL_LATCHED)
-        self.assertDone(owner.ask(clear_faults=pb.ClearFaults()))
-        until(lambda: not owner.newest().faults & OVERRUN, "the overrun is cleared")
+
+        def clear():
+            self.assertDone(owner.ask(clear_faults=pb.ClearFaults()))
+            return not owner.newest().faults & OVERRUN
+        until(clear, "the overrun is cleared")  # a busy machine may bring the next one
         self.assertEqual(server.stop(), 0)
         self.assertFalse(server.verdict["realtime_valid"])
 

@@ -39,8 +39,8 @@ def presets():
 def bench_text(preset, ways_in):
     """The bench of a preset with more ways in, and with a watchdog that a busy machine does not set off."""
     text = (BENCHES / (preset["bench"] + ".toml")).read_text(encoding="utf-8").replace("../motors", str(BENCHES.parent / "motors"))
-    lines = [line for line in text.splitlines() if line.split("=")[0].strip() != "watchdog_ticks"]
-    return "\n".join(lines).replace("[bench]\n", "[bench]\nwatchdog_ticks = 2000\n") + ways_in
+    lines = [line for line in text.splitlines() if line.split("=")[0].strip() not in ("watchdog_ticks", "lease_s", "lease_ticks")]
+    return "\n".join(lines).replace("[bench]\n", "[bench]\nwatchdog_ticks = 50000\n") + ways_in
 
 
 def without_trip(text):
@@ -59,15 +59,17 @@ def short_ones(all_presets):
 
 class Presets(unittest.TestCase):
     def run_on(self, preset, link_of, mode="lockstep"):
-        """What the controller reports, and the state of the bench afterwards."""
+        """What the controller reports, and the last sample and the state hash of the bench."""
         ways_in = WAYS_IN if mode == "lockstep" else ""  # in real time a bus must carry what it promises
         text = bench_text(preset, ways_in)
         with Server("--mode", mode, text=text if mode == "lockstep" else without_trip(text)) as server:
             done = subprocess.run([COMMAND, "control", "--json", "--preset", preset["name"], "--link", link_of(server)],
                                   capture_output=True, text=True, timeout=4 * PATIENCE_S, check=False)
             self.assertEqual(done.returncode, 0, f"{preset['name']}: {done.stdout}{done.stderr}")
+            with server.client() as client:
+                last = client.newest()
             self.assertEqual(server.stop(), 0, server.errors())
-        return json.loads(done.stdout), server.verdict["state_hash"]
+        return json.loads(done.stdout), last, server.verdict["state_hash"]
 
     @staticmethod
     def over_tcp(server):
@@ -79,7 +81,7 @@ class Presets(unittest.TestCase):
             if preset["samples"] > LONG:
                 continue  # the benches of these run others as well
             with self.subTest(preset["name"]):
-                report, _ = self.run_on(preset, self.over_tcp)
+                report, *_ = self.run_on(preset, self.over_tcp)
                 self.assertEqual((report["failure"], report["missed_ticks"], report["late_ticks"]), ("", 0, 0))
                 if preset["commands"] == "currents":
                     self.assertIsNone(report["peak_command_voltage_v"])
@@ -91,23 +93,26 @@ class Presets(unittest.TestCase):
         are one, bit for bit; TCP carries doubles."""
         for preset in short_ones(presets()):
             with self.subTest(f"{preset['name']}, {preset['machine_kind']}, {preset['commands']}"):
-                _, can_hash = self.run_on(preset, lambda server: CAN)
-                modbus, modbus_hash = self.run_on(preset, lambda server: f"modbus:{server.ready['modbus']}")
-                tcp, _ = self.run_on(preset, self.over_tcp)
+                _, can_last, can_hash = self.run_on(preset, lambda server: CAN)
+                modbus, modbus_last, modbus_hash = self.run_on(preset, lambda server: f"modbus:{server.ready['modbus']}")
+                tcp, *_ = self.run_on(preset, self.over_tcp)
                 self.assertEqual(modbus["samples"], tcp["samples"])
-                self.assertEqual(can_hash, modbus_hash)
+                if can_last.refused_commands == modbus_last.refused_commands:
+                    self.assertEqual(can_hash, modbus_hash)
+                # A command that has no answer after 20 ms goes over CAN again; the bench refuses the second one, and counts it.
+                for last in (can_last, modbus_last):
+                    last.refused_commands = 0
+                self.assertEqual(can_last, modbus_last)
                 self.assertAlmostEqual(modbus["peak_speed_rad_s"], tcp["peak_speed_rad_s"], delta=0.05 * tcp["peak_speed_rad_s"])
 
     def test_each_kind_of_machine_runs_in_real_time(self):
-        """Would catch: a trajectory on the client's clock, a lost sample that is not counted. How well it tracks is not asked: this
-        machine may be busy."""
+        """Would catch: a trajectory on the client's clock, a lost sample that is not counted. How well it
+        tracks is not asked: this machine may be busy, and the client lose as many samples as it likes."""
         for preset in short_ones(presets()):
             with self.subTest(preset["name"]):
-                report, _ = self.run_on(preset, self.over_tcp, mode="realtime")
+                report, *_ = self.run_on(preset, self.over_tcp, mode="realtime")
                 self.assertEqual(report["mode"], "realtime")
-                # The last sample may come late, and then it is not one of the run.
-                self.assertLessEqual(report["samples"] + report["missed_ticks"], preset["samples"])
-                self.assertGreater(report["samples"] + report["missed_ticks"], 0.9 * preset["samples"])
+                self.assertEqual(report["samples"] + report["missed_ticks"], preset["samples"])
 
 
 if __name__ == "__main__":

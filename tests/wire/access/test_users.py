@@ -17,10 +17,9 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import PATIENCE_S, Closed, frame, pb
-from wire_test import SERVO_TEXT, TWO_AXES, WireTest, until
+from wire_test import PATIENT_TEXT, SERVO_TEXT, TWO_AXES, WireTest, until
 
 TAKE = pb.LeaseRequest.ACTION_TAKE
-PATIENT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 8000")  # a loaded host is no silent controller
 LEASE_LOST = 1 << 10  # in the fault word
 
 
@@ -153,7 +152,7 @@ class Force(UsersTest):
         on."""
         for mode in ("lockstep", "realtime"):
             with self.subTest(mode=mode):
-                server = self.server_for(USERS, "--mode", mode, text=PATIENT)
+                server = self.server_for(USERS, "--mode", mode, text=PATIENT_TEXT)
                 otto, adam = self.user(server, "otto"), self.user(server, "adam")
                 otto.lease()
                 tick = otto.newest().tick

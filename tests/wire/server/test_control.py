@@ -291,8 +291,8 @@ class Realtime(WireTest):
     def test_own_03_the_lease_of_a_silent_owner_ends(self):
         """Catches: an axis that is lost to a client which keeps its socket open and sends nothing."""
         server = self.server("--mode", "realtime")
-        owner = self.owner_at_work(server)
         heir = self.client(server)
+        owner = self.owner_at_work(server)
         self.assertRefused(heir.lease(), pb.REFUSAL_OWNED)
         until(lambda: heir.lease().WhichOneof("kind") == "done", "the lease ran out")
         self.assertRefused(owner.exchange(owner.newest().tick), pb.REFUSAL_NOT_OWNER)

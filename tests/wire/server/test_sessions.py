@@ -17,7 +17,7 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import Server, frame, pb
-from wire_test import WireTest, until
+from wire_test import SERVO_TEXT, WireTest, until
 
 
 class Hello(WireTest):
@@ -270,15 +270,13 @@ class Lease(WireTest):
 
     def test_a_lease_requested_by_a_session_that_ends_at_once_is_free_again(self):
         """Catches: an answer that comes after the session has ended and leaves the axis to no session."""
-        server = self.server("--mode", "realtime")
+        server = self.server("--mode", "realtime", text=SERVO_TEXT.replace("lease_s = 2.0", "lease_s = 60.0"))
         for _ in range(30):
             ghost = self.client(server)
             ghost.send(lease=pb.LeaseRequest(action=pb.LeaseRequest.ACTION_ACQUIRE))
             ghost.close()
         heir = self.client(server)
-        ticks = heir.newest().tick
-        until(lambda: heir.lease().WhichOneof("kind") == "done", "the lease is free")
-        self.assertLess(heir.newest().tick - ticks, 8000, "free only because the lease had run out")
+        until(lambda: heir.lease().WhichOneof("kind") == "done", "the lease is free long before it runs out")
 
 
 if __name__ == "__main__":
