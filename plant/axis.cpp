@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "plant/drive/phases.hpp"
-#include "plant/machines/machine_kind.hpp"
 #include "plant/math/rounding.hpp"
 #include "plant/math/trig.hpp"
+#include "plant/parameters/machine_kind.hpp"
 #include "plant/train/shared_shaft.hpp"
 
 namespace drivebench {

@@ -5,13 +5,13 @@
 #include <cstdint>
 
 #include "plant/drive/drive.hpp"
+#include "plant/drive/terminals.hpp"
 #include "plant/injected_faults.hpp"
 #include "plant/mechanics/load.hpp"
 #include "plant/mechanics/shaft.hpp"
 #include "plant/sensors/encoder.hpp"
 #include "plant/sensors/sensor_bank.hpp"
 #include "plant/thermal.hpp"
-#include "plant/train/terminals.hpp"
 
 namespace drivebench {
 

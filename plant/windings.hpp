@@ -7,7 +7,7 @@
 /// What a machine shows to the drive and to the shaft, whatever its kind.
 namespace drivebench {
 
-struct MachineKind;  // plant/machines/machine_kind.hpp
+struct MachineKind;  // plant/parameters/machine_kind.hpp
 
 /// How the windings of a stator meet the terminals.
 enum class Connection : std::int64_t {

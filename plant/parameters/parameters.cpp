@@ -6,11 +6,11 @@
 #include <string>
 #include <utility>
 
-#include "plant/drive/drive_rows.hpp"
-#include "plant/machines/machine_kind.hpp"
-#include "plant/mechanics/mechanics_rows.hpp"
+#include "plant/parameters/drive_rows.hpp"
+#include "plant/parameters/machine_kind.hpp"
+#include "plant/parameters/mechanics_rows.hpp"
 #include "plant/parameters/rows.hpp"
-#include "plant/sensors/sensor_rows.hpp"
+#include "plant/parameters/sensor_rows.hpp"
 
 namespace drivebench {
 namespace {

@@ -4,7 +4,7 @@
 #include <variant>
 
 #include "plant/axis_parameters.hpp"
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 
 namespace drivebench {
 

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "plant/drive/drive_rows.hpp"
+#include "plant/parameters/drive_rows.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "plant/machines/machine_kind.hpp"
 #include "plant/machines/pm/pm_machine.hpp"
+#include "plant/parameters/machine_kind.hpp"
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/power_balance.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 
 namespace drivebench {
 namespace {

@@ -1,4 +1,4 @@
-#include "plant/drive/drive_rows.hpp"
+#include "plant/parameters/drive_rows.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "plant/mechanics/mechanics_rows.hpp"
 #include "plant/mechanics/shaft.hpp"
+#include "plant/parameters/mechanics_rows.hpp"
 
 namespace drivebench {
 namespace {

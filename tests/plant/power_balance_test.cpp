@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/dc_rig.hpp"
 #include "tests/plant/induction_motors.hpp"

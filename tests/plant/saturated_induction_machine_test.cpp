@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "plant/machines/induction/induction_machine.hpp"
-#include "plant/machines/machine_kind.hpp"
 #include "plant/math/rk4.hpp"
+#include "plant/parameters/machine_kind.hpp"
 
 namespace drivebench {
 namespace {

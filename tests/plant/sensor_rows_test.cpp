@@ -1,4 +1,4 @@
-#include "plant/sensors/sensor_rows.hpp"
+#include "plant/parameters/sensor_rows.hpp"
 
 #include <gtest/gtest.h>
 

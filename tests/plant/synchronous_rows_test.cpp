@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 
 namespace drivebench {
 namespace {

@@ -1,4 +1,4 @@
-#include "plant/train/terminals.hpp"
+#include "plant/drive/terminals.hpp"
 
 #include <gtest/gtest.h>
 

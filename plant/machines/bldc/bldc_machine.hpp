@@ -165,7 +165,7 @@ double fastest_time_constant_s(const BldcMachineParameters& p) noexcept;
 /// Electrical angular speed at which the emf reaches a voltage; 0 without a magnet.
 double electrical_speed_rad_s(const BldcMachineParameters& p, double voltage_v) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
+/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
 struct BldcMachine {
   using Parameters = BldcMachineParameters;
   using Constants = BldcMachineConstants;

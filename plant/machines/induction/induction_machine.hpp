@@ -125,7 +125,7 @@ InductionMachineParameters adjusted(const InductionMachineParameters& p, const A
 /// The fastest electrical time constant at standstill: sets the substep.
 double fastest_time_constant_s(const InductionMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
+/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
 struct InductionMachine {
   using Parameters = InductionMachineParameters;
   using Constants = InductionMachineConstants;

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 #include "plant/parameters/rows.hpp"
 #include "plant/train/drive_train_impl.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 #include "plant/parameters/rows.hpp"
 #include "plant/train/drive_train_impl.hpp"
 

@@ -175,7 +175,7 @@ SaturatedInductionMachineParameters adjusted(const SaturatedInductionMachinePara
 /// The fastest electrical time constant at any saturation: sets the substep.
 double fastest_time_constant_s(const SaturatedInductionMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
+/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
 struct SaturatedInductionMachine {
   using Parameters = SaturatedInductionMachineParameters;
   using Constants = SaturatedInductionMachineConstants;

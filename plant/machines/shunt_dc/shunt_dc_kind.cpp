@@ -2,8 +2,8 @@
 
 #include <array>
 
-#include "plant/machines/field_winding_rows.hpp"
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/field_winding_rows.hpp"
+#include "plant/parameters/machine_kind.hpp"
 #include "plant/train/drive_train_impl.hpp"
 
 namespace drivebench {

@@ -96,7 +96,7 @@ ShuntDcMachineParameters adjusted(const ShuntDcMachineParameters& p, const Adjus
 /// L/R or, saturated, L_f/R_F, whichever is less: sets the substep.
 double fastest_time_constant_s(const ShuntDcMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
+/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
 struct ShuntDcMachine {
   using Parameters = ShuntDcMachineParameters;
   using Constants = ShuntDcMachineConstants;

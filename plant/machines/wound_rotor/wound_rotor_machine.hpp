@@ -126,7 +126,7 @@ WoundRotorMachineParameters adjusted(const WoundRotorMachineParameters& p, const
 /// The fastest electrical time constant at standstill. The substep must resolve n_p w as well.
 double fastest_time_constant_s(const WoundRotorMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/machines/machine_kind.hpp.
+/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
 struct WoundRotorMachine {
   using Parameters = WoundRotorMachineParameters;
   using Constants = WoundRotorMachineConstants;

@@ -1,4 +1,4 @@
-#include "plant/machines/field_winding_rows.hpp"
+#include "plant/parameters/field_winding_rows.hpp"
 
 namespace drivebench::field_winding_rows {
 namespace {

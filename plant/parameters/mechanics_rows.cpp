@@ -1,4 +1,4 @@
-#include "plant/mechanics/mechanics_rows.hpp"
+#include "plant/parameters/mechanics_rows.hpp"
 
 #include <array>
 #include <string_view>

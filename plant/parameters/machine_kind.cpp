@@ -1,4 +1,4 @@
-#include "plant/machines/machine_kind.hpp"
+#include "plant/parameters/machine_kind.hpp"
 
 #include <array>
 
