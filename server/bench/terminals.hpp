@@ -8,27 +8,27 @@
 
 namespace drivebench {
 
-/// What an axis has to be commanded and measured at, as the field buses want to know it.
+/// The terminals and sensors of an axis, for the field buses.
 struct Terminals {
   Connection connection = Connection::kTwoPhase;
-  bool field = false;          ///< a field winding with terminals of its own
-  bool field_current = false;  ///< a field winding, whose current is measured
+  bool field = false;          ///< a field winding with its own terminals
+  bool field_current = false;  ///< a field winding with a measured current
   bool speed_sensors = false;  ///< a tachometer or a resolver
   bool hall = false;
 
   bool has_b() const noexcept { return terminal_count(connection) >= 2; }
   bool has_c() const noexcept { return terminal_count(connection) >= 3; }
-  /// Whether there is more to command than phases a and b.
+  /// Whether the axis has more set-points than phases a and b.
   bool has_more() const noexcept { return has_c() || field; }
-  /// Whether there is more to command or to measure than phases a and b, and an encoder.
+  /// Whether the axis has more than phases a and b and an encoder.
   bool is_wide() const noexcept { return has_more() || field_current || speed_sensors || hall; }
   /// 1 a, 2 b, 4 c, 8 field.
   std::uint64_t bits() const noexcept {
     return 1u | (has_b() ? 2u : 0u) | (has_c() ? 4u : 0u) | (field ? 8u : 0u);
   }
 
-  /// What a duty of 1 stands for: the whole DC link across a winding with a bridge of its own, half of it for
-  /// a leg of a star, whose voltages are against the middle of the link.
+  /// The voltage of a duty of 1: the whole DC link across a winding with its own bridge; half of it for a leg
+  /// of a star, whose voltages are against the middle of the link.
   double volts_per_duty(double bus_voltage_v) const noexcept {
     return connection == Connection::kStar ? 0.5 * bus_voltage_v : bus_voltage_v;
   }
