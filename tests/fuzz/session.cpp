@@ -13,7 +13,7 @@
 #include <string>
 
 #include "plant/injected_faults.hpp"
-#include "server/endpoints/tcp/session.hpp"
+#include "server/endpoints/tcp/session/session.hpp"
 #include "server/host/asio.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/session_program.hpp"

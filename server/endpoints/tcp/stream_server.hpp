@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/endpoints/tcp/session.hpp"
+#include "server/endpoints/tcp/session/session.hpp"
 #include "server/endpoints/tcp/tls_door.hpp"
 #include "server/host/asio.hpp"
 

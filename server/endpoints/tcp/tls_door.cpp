@@ -14,7 +14,7 @@
 
 #include "protocols/text.hpp"
 #include "server/endpoints/deadline.hpp"
-#include "server/endpoints/tcp/outbox.hpp"
+#include "server/endpoints/tcp/sending/outbox.hpp"
 
 namespace drivebench {
 namespace {

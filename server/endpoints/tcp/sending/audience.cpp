@@ -1,33 +1,31 @@
-#include "server/endpoints/tcp/audience.hpp"
+#include "server/endpoints/tcp/sending/audience.hpp"
 
 #include <algorithm>
-
-#include "server/endpoints/tcp/session.hpp"
 
 namespace drivebench {
 namespace {
 
-void add_once(std::vector<Session*>& sessions, Session& session) {
-  if (std::find(sessions.begin(), sessions.end(), &session) == sessions.end()) sessions.push_back(&session);
+template <class Member>
+void add_once(std::vector<Member*>& members, Member& member) {
+  if (std::find(members.begin(), members.end(), &member) == members.end()) members.push_back(&member);
 }
 
 }  // namespace
 
-void Audience::add_subscriber(Session& session) {
-  add_once(subscribers_, session);
+void Audience::add_subscriber(Viewer& viewer) {
+  add_once(subscribers_, viewer);
 }
 
-void Audience::remove_subscriber(const Session& session) {
-  std::erase(subscribers_, &session);
+void Audience::remove_subscriber(const Viewer& viewer) {
+  std::erase(subscribers_, &viewer);
 }
 
-void Audience::add_waiting(Session& session) {
-  add_once(waiting_, session);
+void Audience::add_waiting(Waiter& waiter) {
+  add_once(waiting_, waiter);
 }
 
-void Audience::remove(const Session& session) {
-  remove_subscriber(session);
-  std::erase(waiting_, &session);
+void Audience::remove_waiting(const Waiter& waiter) {
+  std::erase(waiting_, &waiter);
 }
 
 std::shared_ptr<const SampleFeed> Audience::feed(std::uint32_t axis, std::uint32_t decimation) {
@@ -53,17 +51,17 @@ void Audience::on_newest() {
   ticks_behind_ = 0;
   answered_.clear();
   answered_.swap(waiting_);
-  for (Session* const session : answered_)
-    session->on_newest();
+  for (Waiter* const waiter : answered_)
+    waiter->on_newest();
   if (!turn_to_come_) take_turn();
 }
 
 void Audience::send_all() {
-  for (Session* const session : subscribers_)
-    session->send_samples();
+  for (Viewer* const viewer : subscribers_)
+    viewer->send_samples();
 }
 
-/// Ends when nobody is left who has samples and takes them.
+/// Goes on with turns until no subscriber has samples and takes them.
 void Audience::take_turn() {
   turn_to_come_ = false;
   int served = 0;

@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/audience.hpp"
+#include "server/endpoints/tcp/sending/audience.hpp"
 
 #include <gtest/gtest.h>
 

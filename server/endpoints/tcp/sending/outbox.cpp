@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/outbox.hpp"
+#include "server/endpoints/tcp/sending/outbox.hpp"
 
 #include <algorithm>
 #include <string>

@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/sample_feed.hpp"
+#include "server/endpoints/tcp/sending/sample_feed.hpp"
 
 #include <gtest/gtest.h>
 

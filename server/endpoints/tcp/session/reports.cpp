@@ -1,11 +1,13 @@
-#include "server/endpoints/tcp/description.hpp"
+#include "server/endpoints/tcp/session/reports.hpp"
 
 #include <array>
 #include <optional>
 #include <string_view>
 
 #include "plant/parameters/parameters.hpp"
+#include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
+#include "protocols/text.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/recording/input_codec.hpp"
 
@@ -35,6 +37,23 @@ std::string_view word_of(const AxisParameters& p, std::string_view name) {
   return row == nullptr ? std::string_view{} : row->words[static_cast<std::size_t>(row->get(p))];
 }
 
+v1::ParameterDescription describe_parameter(const Engine& engine, std::size_t axis, std::size_t row) {
+  const AxisParameters& p = engine.parameters(axis);
+  const Parameter& parameter = axis_parameters(p)[row];
+  v1::ParameterDescription d;
+  d.set_name(std::string(parameter.name));
+  d.set_unit(std::string(parameter.unit));
+  d.set_minimum(parameter.minimum);
+  d.set_maximum(parameter.maximum);
+  d.set_integer(parameter.integer);
+  d.set_live(parameter.live);
+  d.set_value(parameter.get(p));
+  d.set_meaning(std::string(parameter.meaning));
+  for (const std::string_view word : parameter.words)
+    d.add_words(std::string(word));
+  return d;
+}
+
 v1::AxisDescription describe_axis(const Engine& engine, std::size_t axis) {
   const BenchConfig& config = engine.config();
   const AxisParameters& p = engine.parameters(axis);
@@ -56,23 +75,6 @@ v1::AxisDescription describe_axis(const Engine& engine, std::size_t axis) {
 }
 
 }  // namespace
-
-v1::ParameterDescription describe_parameter(const Engine& engine, std::size_t axis, std::size_t row) {
-  const AxisParameters& p = engine.parameters(axis);
-  const Parameter& parameter = axis_parameters(p)[row];
-  v1::ParameterDescription d;
-  d.set_name(std::string(parameter.name));
-  d.set_unit(std::string(parameter.unit));
-  d.set_minimum(parameter.minimum);
-  d.set_maximum(parameter.maximum);
-  d.set_integer(parameter.integer);
-  d.set_live(parameter.live);
-  d.set_value(parameter.get(p));
-  d.set_meaning(std::string(parameter.meaning));
-  for (const std::string_view word : parameter.words)
-    d.add_words(std::string(word));
-  return d;
-}
 
 v1::BenchDescription describe(const Engine& engine) {
   const BenchConfig& config = engine.config();
@@ -117,6 +119,71 @@ v1::BenchDescription describe(const Engine& engine) {
     f.set_meaning(std::string(fault.meaning));
   }
   return d;
+}
+
+void report_parameters(Dialogue& dialogue, const v1::ReadParameters& r) {
+  if (!dialogue.axis_exists(r.axis())) return;
+  const Engine& engine = dialogue.engine();
+  const std::span<const Parameter> table = axis_parameters(engine.parameters(r.axis()));
+  if (static_cast<std::size_t>(r.names_size()) > table.size()) {
+    return dialogue.refuse(dialogue.id(), v1::REFUSAL_OUT_OF_RANGE,
+                           std::to_string(r.names_size()) + " names, but the axis has " +
+                               std::to_string(table.size()) + " parameters",
+                           "names");
+  }
+  v1::ParameterValues& values = *dialogue.begin_reply(dialogue.id()).mutable_parameter_values();
+  for (const std::string& name : r.names()) {
+    const Parameter* row = find_parameter(engine.parameters(r.axis()), name);
+    if (row == nullptr) {
+      return dialogue.refuse(dialogue.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
+                             "there is no parameter '" + printable(name) + "'", "names");
+    }
+    *values.add_parameters() =
+        describe_parameter(engine, r.axis(), static_cast<std::size_t>(row - table.data()));
+  }
+  for (std::size_t row = 0; r.names().empty() && row < table.size(); ++row) {
+    *values.add_parameters() = describe_parameter(engine, r.axis(), row);
+  }
+  dialogue.send_reply();
+}
+
+void report_status(Dialogue& dialogue) {
+  const Engine& engine = dialogue.engine();
+  const SessionContext& context = dialogue.context();
+  v1::Status& status = *dialogue.begin_reply(dialogue.id()).mutable_status();
+  status.set_mode(wire_mode(engine.config().mode));
+  status.set_tick(static_cast<std::uint64_t>(engine.tick()));
+  status.set_late_ticks(engine.newest(0).late_ticks);
+  status.set_worst_lateness_s(static_cast<double>(engine.worst_lateness_ns()) * 1e-9);
+  status.set_sessions(static_cast<std::uint32_t>(context.session_count()));
+  if (const Recorder* recorder = engine.recorder()) {
+    status.set_recording(utf8(recorder->file()));
+    status.set_recording_gaps(recorder->gaps());
+    status.set_recording_over(recorder->is_over());
+  }
+  for (std::uint32_t axis = 0; axis < dialogue.axis_count(); ++axis) {
+    std::array<std::byte, kMaxSampleBytes> bytes;
+    Sample now = engine.newest(axis);
+    now.owner = engine.owner(axis);  // in lockstep it may have changed while time stood still
+    const std::size_t size = encode_sample(now, kAllSignals, bytes.data());
+    v1::AxisSample& sample = *status.add_axes();
+    sample.set_axis(axis);
+    sample.mutable_sample()->ParseFromArray(bytes.data(), static_cast<int>(size));
+  }
+  status.set_state_hash(engine.state_hash());
+  for (const std::string& note : engine.notes())
+    status.add_notes(note);
+  for (const TransportReport& report : context.transports()) {
+    v1::TransportStatus& transport = *status.add_transports();
+    transport.set_name(report.name);
+    transport.set_state(report.state);
+    for (const auto& [name, value] : report.counts) {
+      v1::TransportStatus::Count& count = *transport.add_counts();
+      count.set_name(std::string(name));
+      count.set_value(value);
+    }
+  }
+  dialogue.send_reply();
 }
 
 }  // namespace drivebench

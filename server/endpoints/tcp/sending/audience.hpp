@@ -1,0 +1,77 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "server/endpoints/tcp/sending/sample_feed.hpp"
+#include "server/engine/engine.hpp"
+#include "server/host/asio.hpp"
+
+namespace drivebench {
+
+/// The sessions that a tick concerns, so that all others cost it nothing: those whose exchange waits for it,
+/// which are answered first, and those with subscriptions. Of these a few are served in a turn, and there is
+/// a pause between turns: many viewers get more samples in a message, instead of making a controller wait.
+class Audience {
+ public:
+  /// The part of a session that sends samples.
+  class Viewer {
+   public:
+    /// Sends the samples that wait; false if there are none, or the peer takes nothing now.
+    virtual bool send_samples() = 0;
+
+   protected:
+    ~Viewer() = default;
+  };
+  /// The part of a session that answers exchanges.
+  class Waiter {
+   public:
+    /// The newest sample is that of the tick it waits for.
+    virtual void on_newest() = 0;
+
+   protected:
+    ~Waiter() = default;
+  };
+
+  Audience(asio::io_context& io, Engine& engine) : engine_(engine), next_turn_(io) {}
+
+  /// Until remove_subscriber().
+  void add_subscriber(Viewer& viewer);
+  void remove_subscriber(const Viewer& viewer);
+  /// Until the next on_newest(), or remove_waiting().
+  void add_waiting(Waiter& waiter);
+  void remove_waiting(const Waiter& waiter);
+  /// Samples from now on, kept as long as a subscription holds them.
+  std::shared_ptr<const SampleFeed> feed(std::uint32_t axis, std::uint32_t decimation);
+
+  /// As Engine calls its listeners.
+  void on_tick();
+  void on_newest();
+
+  /// Sends the samples that wait to all subscribers that take them.
+  void send_all();
+
+ private:
+  static constexpr int kSessionsPerTurn = 4;
+  static constexpr auto kPause = std::chrono::microseconds(500);
+  static constexpr std::size_t kTicksBehind =
+      32;  ///< without time for turns; then all subscribers are served
+
+  void drop_unread_feeds();
+  void take_turn();
+
+  Engine& engine_;
+  std::vector<std::shared_ptr<SampleFeed>> feeds_;
+  std::vector<Viewer*> subscribers_;
+  std::vector<Waiter*> waiting_;
+  std::vector<Waiter*> answered_;  // those that on_newest() answers just now
+  std::size_t ticks_behind_ = 0;   // since on_newest()
+  std::size_t next_ = 0;           // of subscribers_, in the next turn
+  ServerTimer next_turn_;
+  bool turn_to_come_ = false;
+};
+
+}  // namespace drivebench

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "server/endpoints/tcp/session/dialogue.hpp"
+#include "server/endpoints/tcp/session/leases.hpp"
+
+/// Requests that change an axis: each is checked, and then put to the bench under the owner number of the
+/// session.
+namespace drivebench {
+
+void write_parameter(Dialogue& dialogue, Leases& leases, const v1::WriteParameter& request);
+void set_load(Dialogue& dialogue, Leases& leases, const v1::SetLoad& request);
+void inject_fault(Dialogue& dialogue, Leases& leases, const v1::InjectFault& request);
+void bump_shaft(Dialogue& dialogue, Leases& leases, const v1::ShaftBump& request);
+void clear_faults(Dialogue& dialogue, Leases& leases, const v1::ClearFaults& request);
+
+}  // namespace drivebench

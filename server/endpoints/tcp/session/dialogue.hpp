@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bench.pb.h"
+#include "server/endpoints/tcp/sending/outbox.hpp"
+#include "server/endpoints/tcp/session/context.hpp"
+
+namespace drivebench {
+
+/// What the parts of a session have in common: the client, the request that is being answered, and the way
+/// back to the client.
+class Dialogue {
+ public:
+  /// `keep_alive` gives the session, which must live until the bench has answered it.
+  Dialogue(Outbox::Socket socket, Client client, SessionContext& context,
+           std::function<std::shared_ptr<void>()> keep_alive);
+
+  Outbox::Socket& socket() noexcept { return socket_; }
+  Outbox& outbox() noexcept { return outbox_; }
+  Client& client() noexcept { return client_; }
+  SessionContext& context() noexcept { return context_; }
+  Engine& engine() const noexcept { return context_.engine; }
+  std::size_t axis_count() const { return context_.engine.config().axes.size(); }
+  /// The number under which the bench knows the session: every `done` tells it. 0: it has asked for no lease.
+  Owner owner() const noexcept { return owner_; }
+  void set_owner(Owner owner) noexcept { owner_ = owner; }
+  std::shared_ptr<void> keep_alive() const { return keep_alive_(); }
+
+  /// The request that is being answered, and its id.
+  v1::Envelope& request() noexcept { return request_; }
+  std::uint64_t id() const noexcept { return request_.id(); }
+
+  /// An empty message that answers the request with this id; send_reply() sends it.
+  v1::Envelope& begin_reply(std::uint64_t id);
+  void send_reply();
+  /// For frames that are written without an Envelope: send_scratch() sends what stands in scratch().
+  std::vector<std::byte>& scratch() noexcept { return context_.scratch; }
+  void send_scratch();
+
+  void done(std::uint64_t id, Tick tick);
+  void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
+  void refuse(std::uint64_t id, Refused why, const char* field);
+  void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);
+  /// A line in the audit log, if one is kept.
+  void audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details);
+
+  /// Whether the bench has this axis; if not, refuses the request.
+  bool axis_exists(std::uint32_t axis);
+
+  /// Counts the bytes of replies from here on.
+  void begin_turn() noexcept { bytes_in_turn_ = 0; }
+  std::size_t bytes_in_turn() const noexcept { return bytes_in_turn_; }
+
+ private:
+  Outbox::Socket socket_;
+  Outbox outbox_;
+  Client client_;
+  SessionContext& context_;
+  std::function<std::shared_ptr<void>()> keep_alive_;
+  v1::Envelope request_;
+  Owner owner_ = 0;
+  std::size_t bytes_in_turn_ = 0;
+};
+
+/// How TCP says why the bench refused a request.
+v1::RefusalCode code_of(Refused why) noexcept;
+
+}  // namespace drivebench

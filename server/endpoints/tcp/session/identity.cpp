@@ -1,0 +1,102 @@
+#include "server/endpoints/tcp/session/identity.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+namespace drivebench {
+namespace {
+
+/// The address at which wrong tokens are counted: without the port; of IPv6 the network, which is what one
+/// computer has. All unix sockets are one address.
+std::string address_of(const Client& client) {
+  if (client.transport != "tcp") return client.transport;
+  std::string address = client.peer.substr(0, client.peer.rfind(':'));
+  boost::system::error_code error;
+  const asio::ip::address_v6 v6 = asio::ip::make_address_v6(address, error);
+  if (error) return address;
+  if (v6.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, v6).to_string();
+  asio::ip::address_v6::bytes_type bytes = v6.to_bytes();
+  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
+  return asio::ip::address_v6(bytes).to_string();
+}
+
+Role role_needed_for(const v1::Envelope& request) {
+  switch (request.kind_case()) {
+    case v1::Envelope::kHello:
+    case v1::Envelope::kSubscribe:
+    case v1::Envelope::kReadParameters:
+    case v1::Envelope::kStatusRequest:
+    case v1::Envelope::kListExperiments:
+    case v1::Envelope::kFetchExperiment:
+      return Role::kViewer;
+    case v1::Envelope::kExchange:
+      return request.exchange().commands().empty() ? Role::kViewer : Role::kOperator;
+    case v1::Envelope::kLease:
+      return request.lease().action() == v1::LeaseRequest::ACTION_TAKE ? Role::kAdmin : Role::kOperator;
+    default:
+      return Role::kOperator;
+  }
+}
+
+}  // namespace
+
+Identity::Identity(Dialogue& dialogue) : dialogue_(dialogue), slot_timer_(dialogue.socket().get_executor()) {}
+
+bool Identity::admit(const v1::Hello& hello) {
+  SessionContext& context = dialogue_.context();
+  Client& client = dialogue_.client();
+  const Admission::Decision decision = context.admission.admit(
+      hello.token(), address_of(client), ServerClock::now(), std::chrono::system_clock::now());
+  if (decision.admitted) {
+    grant_ = decision.grant;
+    if (!grant_.name.empty()) client.subject = grant_.name;  // else the name of the certificate stays
+    return true;
+  }
+  ++context.counts.wrong_tokens;
+  if (context.wrong_token_log.allow()) {
+    spdlog::warn("{}: {} ({} more since the last such line)", name_of(client), decision.why_not,
+                 context.wrong_token_log.held_back());
+  }
+  dialogue_.audit("authentication", decision.why_not, {{"client", hello.client()}});
+  dialogue_.refuse(dialogue_.id(), v1::REFUSAL_UNAUTHENTICATED, decision.why_not, "token");
+  return false;
+}
+
+bool Identity::may_ask() {
+  const Role needed = role_needed_for(dialogue_.request());
+  if (grant_.role >= needed) return true;
+  const auto* kind =
+      v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(dialogue_.request().kind_case()));
+  const std::string field = kind == nullptr ? "kind" : kind->name();
+  dialogue_.audit("forbidden", "the role does not allow it", {{"request", field}});
+  dialogue_.refuse(dialogue_.id(), v1::REFUSAL_FORBIDDEN,
+                   "this session is that of " + (grant_.name.empty() ? "nobody" : grant_.name) + ", a " +
+                       std::string(name_of(grant_.role)) + "; this needs the role " +
+                       std::string(name_of(needed)),
+                   field.c_str());
+  return false;
+}
+
+/// The slot is a wall time, but once the timer runs no jump of the wall clock moves it.
+void Identity::watch_slot() {
+  slot_timer_.cancel();
+  if (!grant_.until) return;
+  slot_timer_.expires_after(
+      std::chrono::duration_cast<ServerClock::duration>(*grant_.until - std::chrono::system_clock::now()));
+  slot_timer_.async_wait([this, session = dialogue_.keep_alive()](const boost::system::error_code& error) {
+    if (!error) on_end("the time of " + grant_.name + " is over");
+  });
+}
+
+void Identity::look_again() {
+  const Grant* const now = dialogue_.context().admission.renewed(grant_, std::chrono::system_clock::now());
+  if (now == nullptr) return on_end("the token of " + grant_.name + " holds no more");
+  if (now->role != grant_.role || now->name != grant_.name) {
+    return on_end("the token of " + grant_.name + " means something else now: say hello again");
+  }
+  grant_ = *now;
+  watch_slot();
+}
+
+}  // namespace drivebench

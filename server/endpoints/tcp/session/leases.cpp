@@ -1,0 +1,123 @@
+#include "server/endpoints/tcp/session/leases.hpp"
+
+#include <algorithm>
+
+namespace drivebench {
+
+Leases::Leases(Dialogue& dialogue)
+    : dialogue_(dialogue),
+      engine_(dialogue.engine()),
+      held_(dialogue.axis_count()),
+      taken_(dialogue.axis_count()) {}
+
+void Leases::lease(const v1::LeaseRequest& r) {
+  if (!dialogue_.axis_exists(r.axis())) return;
+  const bool takes = r.action() == v1::LeaseRequest::ACTION_TAKE;
+  if (!takes &&
+      (r.action() < v1::LeaseRequest::ACTION_ACQUIRE || r.action() > v1::LeaseRequest::ACTION_RELEASE)) {
+    return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                            "the action must be acquire, renew, release or take", "action");
+  }
+  if (engine_.config().mode == RunMode::kFree) {
+    return dialogue_.refuse(dialogue_.id(), Refused::kWrongMode, "action");
+  }
+  const auto action = takes ? LeaseAction::kAcquire : static_cast<LeaseAction>(r.action());
+  const auto on_done = [this, axis = r.axis(), action] {
+    held_[axis] = action != LeaseAction::kRelease;
+    taken_[axis].clear();
+    if (!held_[axis]) on_gone(axis);
+    if (over_) lose_all();  // the peer left before the bench answered
+  };
+  Engine::Answer answer = [this, answered = answer_for(r.axis(), "axis", on_done)](Refused refused,
+                                                                                   Tick tick) {
+    --in_flight_;
+    answered(refused, tick);
+  };
+  if (takes) return take(r, std::move(answer));
+  if (dialogue_.owner() == 0) dialogue_.set_owner(engine_.new_owner(dialogue_.client()));
+  ++in_flight_;
+  engine_.request({.tick = 0, .axis = r.axis(), .owner = dialogue_.owner(), .action = action},
+                  std::move(answer), &dialogue_.client());
+}
+
+void Leases::take(const v1::LeaseRequest& r, Engine::Answer answer) {
+  constexpr std::size_t kMaxReason = 200;
+  if (r.reason().empty() || r.reason().size() > kMaxReason) {
+    return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                            "taking an axis by force needs a reason of 1 to 200 bytes, not of " +
+                                std::to_string(r.reason().size()),
+                            "reason");
+  }
+  // A number that is newer than that of the owner before, so that numbers tell the order.
+  const bool may_hold = in_flight_ > 0 || std::find(held_.begin(), held_.end(), true) != held_.end();
+  if (dialogue_.owner() == 0 || !may_hold) dialogue_.set_owner(engine_.new_owner(dialogue_.client()));
+  ++in_flight_;
+  engine_.take(r.axis(), dialogue_.owner(), r.reason(), std::move(answer));
+}
+
+void Leases::on_taken(const Taken& taken) {
+  if (taken.from != dialogue_.owner() || !held_[taken.axis]) return;
+  const Client* const by = engine_.client(taken.by);
+  const std::string sentence = "axis " + std::to_string(taken.axis) + " was taken by " +
+                               (by == nullptr ? "an administrator" : name_of(*by)) + ": " + taken.reason;
+  held_[taken.axis] = false;
+  taken_[taken.axis] = sentence;
+  dialogue_.notify(v1::Notice::KIND_LEASE_TAKEN, sentence, taken.axis);
+  on_gone(taken.axis);
+}
+
+void Leases::lose_all() {
+  over_ = true;
+  for (std::uint32_t axis = 0; axis < held_.size(); ++axis) {
+    if (!held_[axis]) continue;
+    held_[axis] = false;
+    engine_.request(
+        {.tick = 0, .axis = axis, .owner = dialogue_.owner(), .action = LeaseAction::kLost},
+        [](Refused, Tick) {}, &dialogue_.client());
+  }
+}
+
+bool Leases::may_change(std::uint32_t axis) {
+  if (!dialogue_.axis_exists(axis)) return false;
+  const Owner owner = engine_.owner(axis);
+  if (engine_.config().mode == RunMode::kFree || (owner != 0 && owner == dialogue_.owner())) return true;
+  dialogue_.refuse(dialogue_.id(), Refused::kNotOwner, "axis");
+  return false;
+}
+
+std::string Leases::not_owner_of(std::uint32_t axis) const {
+  const std::string sentence(sentence_of(Refused::kNotOwner));
+  return taken_[axis].empty() ? sentence : sentence + ": " + taken_[axis];
+}
+
+void Leases::ask(const Input& input, const char* field) {
+  engine_.request(input, answer_for(input.axis, field, nullptr), &dialogue_.client());
+}
+
+Engine::Answer Leases::answer_for(std::uint32_t axis, const char* field, std::function<void()> on_done) {
+  return [this, session = dialogue_.keep_alive(), id = dialogue_.id(), axis, field,
+          on_done = std::move(on_done)](Refused refused, Tick tick) {
+    if (refused == Refused::kOwned) return refuse_owned(id, axis);
+    if (refused != Refused::kNot) return dialogue_.refuse(id, refused, field);
+    if (on_done) on_done();
+    dialogue_.done(id, tick);
+  };
+}
+
+/// Tells the holder of the axis. The lease may have been renewed this tick, of which nothing is known yet, so
+/// this is the latest end that it can have.
+void Leases::refuse_owned(std::uint64_t id, std::uint32_t axis) {
+  const Client* const holder = engine_.client(engine_.owner(axis));
+  const std::string name = holder == nullptr ? "somebody" : name_of(*holder);
+  const Tick end = engine_.tick() + engine_.config().setup.lease_ticks;
+  v1::Refusal& refusal = *dialogue_.begin_reply(id).mutable_refusal();
+  refusal.set_code(v1::REFUSAL_OWNED);
+  refusal.set_message(std::string(sentence_of(Refused::kOwned)) + ": " + name + ", until tick " +
+                      std::to_string(end) + " at the latest unless it is renewed");
+  refusal.set_field("axis");
+  refusal.set_holder(name);
+  refusal.set_lease_end_tick(static_cast<std::uint64_t>(end));
+  dialogue_.send_reply();
+}
+
+}  // namespace drivebench

@@ -1,0 +1,251 @@
+#include "server/endpoints/tcp/session/session.hpp"
+
+#include <google/protobuf/io/coded_stream.h>
+
+#include "protocols/descriptor_set.hpp"
+#include "server/endpoints/tcp/session/changes.hpp"
+#include "server/endpoints/tcp/session/experiment_requests.hpp"
+#include "server/endpoints/tcp/session/reports.hpp"
+#include "server/host/build_id.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr std::uint32_t kProtocolVersion = 1;
+
+/// False: not an Envelope, or one that is nested more deeply than any of ours.
+bool parse(std::span<const std::byte> frame, v1::Envelope& envelope) {
+  constexpr int kMaxNesting = 16;
+  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(frame.data()),
+                                            static_cast<int>(frame.size()));
+  in.SetRecursionLimit(kMaxNesting);
+  return envelope.ParseFromCodedStream(&in) && in.ConsumedEntireMessage();
+}
+
+}  // namespace
+
+Session::Session(Outbox::Socket socket, Client client, SessionContext& context)
+    : dialogue_(std::move(socket), std::move(client), context, [this] { return shared_from_this(); }),
+      identity_(dialogue_),
+      subscriptions_(dialogue_),
+      leases_(dialogue_),
+      exchanges_(dialogue_, leases_, subscriptions_),
+      uploads_(dialogue_),
+      fetch_(dialogue_),
+      reader_(kMaxRequestFrame),
+      silence_(dialogue_.socket().get_executor()) {
+  reader_.set_max_payload(kMaxFrameBeforeHello);
+  identity_.on_end = [this](const std::string& sentence) { end(sentence); };
+  leases_.on_gone = [this](std::uint32_t axis) { exchanges_.abandon(axis); };
+  dialogue_.outbox().on_idle = [this] {
+    subscriptions_.send_samples();
+    fetch_.go_on();
+  };
+  dialogue_.outbox().on_cut = [this](std::string_view why) {
+    ++dialogue_.context().counts.cut;
+    why_ended_ = why;
+    dialogue_.audit("limit", why, {});
+  };
+}
+
+asio::awaitable<void> Session::run() {
+  const std::shared_ptr<Session> self = shared_from_this();
+  Outbox::Socket& socket = dialogue_.socket();
+  ServerTimer timer(socket.get_executor());
+  silence_.set(kHelloLimit, [self] { self->dialogue_.outbox().cut("no hello within 2 s"); });
+  boost::system::error_code error;
+  Turn turn = Turn::kAll;
+  while (turn != Turn::kOver && !error) {
+    const std::span<std::byte> space = reader_.free_space();
+    const std::size_t count = co_await socket.async_read_some(
+        asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
+    reader_.received(count);
+    while ((turn = take_turn()) == Turn::kMoreToCome)
+      co_await asio::post(socket.get_executor(), asio::use_awaitable);
+    watch_for_silence();
+    const ServerClock::duration pause = exchanges_.excess().pause();
+    if (turn == Turn::kOver || pause == ServerClock::duration::zero()) continue;
+    timer.expires_after(pause);
+    boost::system::error_code cancelled;
+    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
+  }
+  timer.cancel();
+  if (greeted_) dialogue_.audit("session_ended", "done", {{"reason", why_ended_}});
+  over_ = true;
+  fetch_.drop();
+  uploads_.clear();
+  leases_.lose_all();
+  close();
+}
+
+/// Answers the requests that have come, up to the limits of a turn: a client that asks for much at once does
+/// not keep the others waiting.
+Session::Turn Session::take_turn() {
+  dialogue_.begin_turn();
+  for (int n = 0; n < kRequestsPerTurn && dialogue_.bytes_in_turn() < kReplyBytesPerTurn; ++n) {
+    if (!dialogue_.socket().is_open()) return Turn::kOver;
+    const auto frame = reader_.next();
+    if (frame && handle(*frame)) continue;
+    if (frame) return Turn::kOver;
+    if (reader_.error().empty()) return Turn::kAll;
+    dialogue_.request().Clear();
+    end_malformed(v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
+    return Turn::kOver;
+  }
+  return Turn::kMoreToCome;
+}
+
+/// Refuses the request and ends the session with it; always false.
+bool Session::end_malformed(v1::RefusalCode code, const std::string& sentence, const char* field) {
+  ++dialogue_.context().counts.malformed;
+  why_ended_ = sentence;
+  dialogue_.audit("malformed", sentence, {});
+  dialogue_.refuse(dialogue_.id(), code, sentence, field);
+  return false;
+}
+
+/// A peer that stops within a frame is gone, or never meant to send the rest.
+void Session::watch_for_silence() {
+  if (!greeted_) return;
+  if (!reader_.in_a_frame()) return silence_.call_off();
+  silence_.set(kFrameLimit,
+               [self = shared_from_this()] { self->dialogue_.outbox().cut("silent within a frame"); });
+}
+
+bool Session::handle(std::span<const std::byte> frame) {
+  constexpr std::size_t kOrdinaryFrame = 4096;
+  v1::Envelope& request = dialogue_.request();
+  if (last_frame_ > kOrdinaryFrame)
+    request = v1::Envelope();  // it keeps the memory of the largest frame so far
+  last_frame_ = frame.size();
+  if (!parse(frame, request)) {
+    request.Clear();
+    return end_malformed(v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
+  }
+  if (!greeted_ && request.kind_case() != v1::Envelope::kHello) {
+    return end_malformed(v1::REFUSAL_UNAUTHENTICATED, "the first message must be hello", "kind");
+  }
+  if (greeted_ && !identity_.may_ask()) return true;
+  return dispatch();
+}
+
+/// False: the session is over.
+bool Session::dispatch() {
+  const v1::Envelope& request = dialogue_.request();
+  switch (request.kind_case()) {
+    case v1::Envelope::kExchange:
+      exchanges_.exchange(request.exchange());
+      break;
+    case v1::Envelope::kHello:
+      return greet(request.hello());
+    case v1::Envelope::kLease:
+      leases_.lease(request.lease());
+      break;
+    case v1::Envelope::kSubscribe:
+      subscriptions_.subscribe(request.subscribe());
+      break;
+    case v1::Envelope::kReadParameters:
+      report_parameters(dialogue_, request.read_parameters());
+      break;
+    case v1::Envelope::kWriteParameter:
+      write_parameter(dialogue_, leases_, request.write_parameter());
+      break;
+    case v1::Envelope::kSetLoad:
+      set_load(dialogue_, leases_, request.set_load());
+      break;
+    case v1::Envelope::kInjectFault:
+      inject_fault(dialogue_, leases_, request.inject_fault());
+      break;
+    case v1::Envelope::kShaftBump:
+      bump_shaft(dialogue_, leases_, request.shaft_bump());
+      break;
+    case v1::Envelope::kClearFaults:
+      clear_faults(dialogue_, leases_, request.clear_faults());
+      break;
+    case v1::Envelope::kStatusRequest:
+      report_status(dialogue_);
+      break;
+    case v1::Envelope::kRunExperiment:
+      run_experiment(
+          dialogue_, [this](std::uint64_t table) { return uploads_.find(table); }, request.run_experiment());
+      break;
+    case v1::Envelope::kUploadTable:
+      uploads_.upload(request.upload_table());
+      break;
+    case v1::Envelope::kListExperiments:
+      list_experiments(dialogue_, request.list_experiments());
+      break;
+    case v1::Envelope::kFetchExperiment:
+      fetch_.begin(request.fetch_experiment());
+      break;
+    case v1::Envelope::kCancelExperiment:
+      cancel_experiment(dialogue_, request.cancel_experiment());
+      break;
+    default:
+      dialogue_.refuse(request.id(), v1::REFUSAL_MALFORMED, "not a request", "kind");
+      break;
+  }
+  return true;
+}
+
+bool Session::greet(const v1::Hello& hello) {
+  if (hello.protocol_min() > kProtocolVersion || hello.protocol_max() < kProtocolVersion) {
+    return end_malformed(v1::REFUSAL_VERSION,
+                         "this server speaks protocol " + std::to_string(kProtocolVersion) + ", the client " +
+                             std::to_string(hello.protocol_min()) + " to " +
+                             std::to_string(hello.protocol_max()),
+                         "protocol_max");
+  }
+  if (hello.client().size() > 100) {
+    return end_malformed(v1::REFUSAL_OUT_OF_RANGE, "the client's name is longer than 100 bytes", "client");
+  }
+  if (greeted_) {
+    dialogue_.refuse(dialogue_.id(), v1::REFUSAL_MALFORMED, "hello has been said already", "kind");
+    return true;
+  }
+  if (!identity_.admit(hello)) return false;
+  greeted_ = true;
+  silence_.call_off();
+  reader_.set_max_payload(kMaxRequestFrame);
+  identity_.watch_slot();
+  dialogue_.audit("session_opened", "done",
+                  {{"client", hello.client()}, {"role", std::string(name_of(identity_.grant().role))}});
+  welcome();
+  return true;
+}
+
+void Session::welcome() {
+  v1::Welcome& welcome = *dialogue_.begin_reply(dialogue_.id()).mutable_welcome();
+  welcome.set_protocol(kProtocolVersion);
+  welcome.set_build_id(std::string(build_id()));
+  *welcome.mutable_bench() = describe(dialogue_.engine());
+  welcome.set_descriptor_set(bench_descriptor_set());
+  welcome.set_role(static_cast<v1::Role>(identity_.grant().role));
+  welcome.set_subject(identity_.grant().name);
+  dialogue_.send_reply();
+}
+
+void Session::on_new_grants() {
+  if (greeted_ && !over_) identity_.look_again();
+}
+
+void Session::turn_away(std::string_view sentence) {
+  dialogue_.refuse(0, v1::REFUSAL_BUSY, std::string(sentence), "session");
+}
+
+void Session::end(const std::string& sentence) {
+  why_ended_ = sentence;
+  dialogue_.notify(v1::Notice::KIND_SESSION_ENDED, sentence, 0);
+  close();
+}
+
+void Session::close() {
+  Audience& audience = dialogue_.context().audience;
+  audience.remove_subscriber(subscriptions_);
+  audience.remove_waiting(exchanges_);
+  identity_.stop_watching();
+  silence_.call_off();
+  dialogue_.outbox().close();
+}
+
+}  // namespace drivebench

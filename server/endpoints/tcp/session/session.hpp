@@ -1,0 +1,81 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "bench.pb.h"
+#include "protocols/framing.hpp"
+#include "server/endpoints/deadline.hpp"
+#include "server/endpoints/tcp/session/dialogue.hpp"
+#include "server/endpoints/tcp/session/exchanges.hpp"
+#include "server/endpoints/tcp/session/fetch.hpp"
+#include "server/endpoints/tcp/session/identity.hpp"
+#include "server/endpoints/tcp/session/leases.hpp"
+#include "server/endpoints/tcp/session/subscriptions.hpp"
+#include "server/endpoints/tcp/session/uploads.hpp"
+
+namespace drivebench {
+
+/// One client on a stream socket: hello first, then requests. Every request gets an answer with its id; a
+/// refusal has a code, a sentence and the field. An error ends this session and nothing else.
+///
+/// This class cuts the stream into frames and gives each request to the part that answers it.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  /// `client` without a subject, which hello tells.
+  Session(Outbox::Socket socket, Client client, SessionContext& context);
+
+  /// Reads and answers until the peer or an error ends the session, then gives its leases back.
+  asio::awaitable<void> run();
+
+  /// An experiment may have gone on.
+  void on_experiments() { fetch_.go_on(); }
+  /// An administrator has taken an axis from a session, this one or another.
+  void on_taken(const Taken& taken) { leases_.on_taken(taken); }
+  /// The tokens file has changed.
+  void on_new_grants();
+  /// The peer takes nothing, as the TLS door has found.
+  void on_deaf() { dialogue_.outbox().cut_deaf(); }
+
+  bool greeted() const noexcept { return greeted_; }
+  /// Refuses the connection itself, before anything was read.
+  void turn_away(std::string_view sentence);
+  void close();
+
+ private:
+  static constexpr auto kHelloLimit = std::chrono::seconds(2);
+  static constexpr auto kFrameLimit = std::chrono::seconds(2);  ///< of silence within a frame
+  /// A turn of this session ends after this much; then the others have theirs.
+  static constexpr int kRequestsPerTurn = 64;
+  static constexpr std::size_t kReplyBytesPerTurn = std::size_t{16} * 1024;
+
+  /// How far the frames that have come were answered.
+  enum class Turn { kAll, kMoreToCome, kOver };
+  Turn take_turn();
+  bool handle(std::span<const std::byte> frame);
+  bool dispatch();
+  bool greet(const v1::Hello& hello);
+  void welcome();
+  bool end_malformed(v1::RefusalCode code, const std::string& sentence, const char* field);
+  void watch_for_silence();
+  void end(const std::string& sentence);
+
+  Dialogue dialogue_;
+  Identity identity_;
+  Subscriptions subscriptions_;
+  Leases leases_;
+  Exchanges exchanges_;
+  Uploads uploads_;
+  Fetch fetch_;
+  FrameReader reader_;
+  std::size_t last_frame_ = 0;
+  Deadline silence_;  // runs until hello, and while a frame is not whole
+  bool greeted_ = false;
+  bool over_ = false;  // the peer is gone
+  std::string why_ended_ = "the peer left";
+};
+
+}  // namespace drivebench
