@@ -61,7 +61,8 @@ void Endpoint::serve(Engine& engine, Audit* audit) {
   for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
     nodes_.push_back({.axis = axis,
                       .id = engine.config().axes[axis].can_node,
-                      .terminals = terminals_of(engine.parameters(axis))});
+                      .terminals = terminals_of(engine.parameters(axis)),
+                      .seat = Seat(engine, axis)});
     config_.profile.wide |= nodes_.back().wide();
     nodes_.back().index_tick = engine.newest(axis).index_tick;
   }
@@ -117,7 +118,7 @@ void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
     if (!found.row->per_node || node != nullptr) note_conflict(frame);
     return;
   }
-  if (node == nullptr || !transmitting_) return;  // nobody would hear the answer
+  if (node == nullptr || !transmitting_) return;  // the answer would not be sent
   const Values values = decode(*found.row, config_.profile, frame);
   switch (found.row->message) {
     case Message::kCommand:
@@ -147,10 +148,10 @@ void Endpoint::on_request(Node& node, const Values& values) {
     return turn_away(node, request, controller, Refused::kMalformed, "its code must be 1 to 4");
   }
   if (request == Request::kAcquire) return acquire(node, controller);
-  if (node.owner == 0 || lease != node.lease) {
+  if (node.seat.owner() == 0 || lease != node.lease) {
     return turn_away(node, request, controller, Refused::kNotOwner);
   }
-  node.heard = Clock::now();
+  node.seat.hear(Clock::now());
   act(node, request, controller);
 }
 
@@ -166,9 +167,9 @@ void Endpoint::turn_away(const Node& node, Request request, std::uint32_t contro
   const bool acquires = request == Request::kAcquire;
   log_refusal(node, acquires ? "the lease" : "a request", why);
   if (audit_ != nullptr) {
-    const Client who = client_of(controller);
+    const Client client = client_of(controller);
     Audit::Event event{
-        .name = acquires ? "acquire" : "forbidden", .axis = node.axis, .client = &who, .result = why};
+        .name = acquires ? "acquire" : "forbidden", .axis = node.axis, .client = &client, .result = why};
     if (!acquires) event.details = {{"request", static_cast<std::uint64_t>(request)}};
     audit_->note(std::move(event));
   }
@@ -178,76 +179,70 @@ void Endpoint::turn_away(const Node& node, Request request, std::uint32_t contro
 void Endpoint::note_client(const std::string& peer, std::string_view why) {
   ++turned_away_;
   if (audit_ == nullptr) return;
-  const Client who{.transport = "can", .peer = bus_->name() + " " + peer, .subject = {}};
-  audit_->note({.name = "limit", .client = &who, .result = why});
+  const Client client{.transport = "can", .peer = bus_->name() + " " + peer, .subject = {}};
+  audit_->note({.name = "limit", .client = &client, .result = why});
 }
 
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
-  check_owner(node);  // in lockstep there may have been no tick that told of a loss
-  const bool known = node.controller == controller && (node.owner != 0 || node.acquiring);
+  notice_end(node);  // in lockstep there may have been no tick since the lease ended
+  const bool known = node.controller == controller && (node.seat.owner() != 0 || node.seat.is_acquiring());
   if (engine_->config().mode == RunMode::kFree) {
     return turn_away(node, Request::kAcquire, controller, Refused::kWrongMode);
   }
-  if (node.acquiring && !known) {
+  if (node.seat.is_acquiring() && !known) {
     return turn_away(node, Request::kAcquire, controller, Refused::kBusy, "another controller asks for it");
   }
-  if (node.acquiring) return;  // asked again before the answer came
-  if (node.owner != 0 && !known) {
+  if (node.seat.is_acquiring()) return;  // asked again before the answer came
+  if (node.seat.owner() != 0 && !known) {
     return turn_away(node, Request::kAcquire, controller, Refused::kOwned);
   }
-  const Owner owner = node.owner != 0 ? node.owner : engine_->new_owner(client_of(controller));
-  node.acquiring = true;
   node.controller = controller;
-  engine_->request({.tick = 0, .axis = node.axis, .owner = owner, .action = LeaseAction::kAcquire},
-                   [this, &node, owner, controller](Refused refused, Tick tick) {
-                     node.acquiring = false;
-                     if (refused == Refused::kNot && !transmitting_) {  // since it was asked
-                       node.owner = owner;
-                       return lose(node, "another bench has its identifiers");
-                     }
-                     if (refused == Refused::kNot) {
-                       if (node.owner == 0) {
-                         node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
-                         node.commanded_at = -1;
-                       }
-                       node.owner = owner;
-                       node.phases = {};
-                       node.monitored = false;
-                       node.heard = Clock::now();
-                     } else {
-                       ++refused_;
-                       log_refusal(node, "the lease", sentence_of(refused));
-                     }
-                     reply(node, Request::kAcquire, refused, controller,
-                           refused == Refused::kNot ? node.lease : std::uint8_t{0}, tick);
-                     if (refused != Refused::kNot) return;
-                     // What the controller must know to begin; in lockstep nothing would come by itself.
-                     const Sample& newest = engine_->newest(node.axis);
-                     send_state(node, newest);
-                     send_sensors(node, newest);
-                     if (lockstep()) send_sync(newest.tick);
-                   });
+  node.seat.ask(LeaseAction::kAcquire, node.seat.number_for(client_of(controller)),
+                [this, &node, controller](Refused refused, Tick tick) {
+                  on_acquired(node, controller, refused, tick);
+                });
+}
+
+void Endpoint::on_acquired(Node& node, std::uint32_t controller, Refused refused, Tick tick) {
+  if (refused != Refused::kNot) {
+    ++refused_;
+    log_refusal(node, "the lease", sentence_of(refused));
+    return reply(node, Request::kAcquire, refused, controller, 0, tick);
+  }
+  if (!transmitting_) return lose(node, "another bench has its identifiers");  // since it was asked
+  if (node.lease == 0) {
+    node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
+    node.commanded_at = -1;
+  }
+  node.phases = {};
+  node.monitored = false;
+  node.seat.hear(Clock::now());
+  reply(node, Request::kAcquire, refused, controller, node.lease, tick);
+  // The controller needs these to begin; in lockstep there is no tick that would send them.
+  const Sample& newest = engine_->newest(node.axis);
+  send_state(node, newest);
+  send_sensors(node, newest);
+  if (lockstep()) send_sync(newest.tick);
 }
 
 void Endpoint::act(Node& node, Request request, std::uint32_t controller) {
-  Input input{.tick = 0, .axis = node.axis, .owner = node.owner, .action = ClearFaults{}};
-  if (request == Request::kRenew) input.action = LeaseAction::kRenew;
-  if (request == Request::kRelease) input.action = LeaseAction::kRelease;
-  engine_->request(input, [this, &node, request, controller](Refused refused, Tick tick) {
+  Engine::Answer answer = [this, &node, request, controller](Refused refused, Tick tick) {
     const std::uint8_t lease = node.lease;
-    if (request == Request::kRelease && refused == Refused::kNot) {
-      node.owner = 0;
-      node.lease = 0;
-    }
+    if (request == Request::kRelease && refused == Refused::kNot) node.lease = 0;
     if (refused != Refused::kNot) ++refused_;
     reply(node, request, refused, controller, lease, tick);
     send_state(node, engine_->newest(node.axis));
-  });
+  };
+  const Owner owner = node.seat.owner();
+  if (request == Request::kRenew) return node.seat.ask(LeaseAction::kRenew, owner, std::move(answer));
+  if (request == Request::kRelease) return node.seat.ask(LeaseAction::kRelease, owner, std::move(answer));
+  engine_->request({.tick = 0, .axis = node.axis, .owner = owner, .action = ClearFaults{}},
+                   std::move(answer));
 }
 
 void Endpoint::on_heartbeat(Node& node, const Values& values) {
-  node.heard = Clock::now();
-  if (node.owner == 0) return;
+  node.seat.hear(Clock::now());
+  if (node.seat.owner() == 0) return;
   const double state = values[index_of(Message::kControllerHeartbeat, true, "state")];
   if (state == kBootUp && node.monitored) return lose(node, "its controller has started anew");
   if (state == kStopped) return lose(node, "its controller says that it has stopped");
@@ -256,11 +251,8 @@ void Endpoint::on_heartbeat(Node& node, const Values& values) {
 
 void Endpoint::lose(Node& node, const char* why) {
   log_loss(node, why);
-  const Owner owner = node.owner;
-  node.owner = 0;
   node.lease = 0;
-  engine_->request({.tick = 0, .axis = node.axis, .owner = owner, .action = LeaseAction::kLost},
-                   [](Refused, Tick) {});
+  node.seat.lose();
 }
 
 void Endpoint::log_loss(const Node& node, std::string_view why) {
@@ -278,7 +270,7 @@ void Endpoint::note_conflict(const Frame& frame) {
   }
   if (!transmitting_) return;
   for (Node& node : nodes_) {
-    if (node.owner != 0) lose(node, "another bench has its identifiers");
+    if (node.seat.owner() != 0) lose(node, "another bench has its identifiers");
     send_heartbeat(node, kStopped);  // so that the other one notices as well
   }
   transmitting_ = false;
@@ -311,13 +303,13 @@ void Endpoint::on_timer() {
   const Clock::time_point now = Clock::now();
   if (!transmitting_ && now - conflict_ > kConflictPause) transmitting_ = true;
   measure_latency_ = true;
-  // All of them first: one that loses its lease may begin the next tick for the others.
+  // First for all nodes: an axis that loses its lease may begin the next tick for the others.
   const Tick tick = engine_->tick();
   for (Node& node : nodes_) {
-    check_owner(node);
-    if (std::exchange(node.spoke, false)) node.heard = now;
+    notice_end(node);
+    if (std::exchange(node.spoke, false)) node.seat.hear(now);
     const bool waits = node.commanded_at == tick;
-    if (std::exchange(node.waits, waits) || waits) node.waited = now;
+    if (std::exchange(node.waits, waits) || waits) node.seat.wait(now);
   }
   for (Node& node : nodes_)
     look_after(node, now);
@@ -327,16 +319,16 @@ void Endpoint::on_timer() {
     send_heartbeat(node, kOperational);
 }
 
-/// Takes the lease from a controller that is gone. In lockstep one that has commanded the present tick may be
-/// silent: it waits for the others.
+/// Takes the lease from a controller that is gone. In lockstep a controller that has commanded the present
+/// tick may be silent: it waits for the others.
 void Endpoint::look_after(Node& node, Clock::time_point now) {
-  if (node.owner == 0) return;
+  if (node.seat.owner() == 0) return;
   const std::chrono::milliseconds heartbeat_limit(config_.controller_timeout_ms);
   const std::chrono::milliseconds idle_limit(config_.idle_timeout_ms);
-  if (node.monitored && now - node.heard > heartbeat_limit) {
+  if (node.monitored && node.seat.is_unheard(now, heartbeat_limit)) {
     ++heartbeats_lost_;
     lose(node, "its heartbeat stays away");
-  } else if (lockstep() && idle_limit.count() > 0 && now - std::max(node.heard, node.waited) > idle_limit) {
+  } else if (lockstep() && idle_limit.count() > 0 && node.seat.is_silent(now, idle_limit)) {
     lose(node, "it has been silent for too long");
   }
 }

@@ -10,6 +10,7 @@
 
 #include "protocols/can/command.hpp"
 #include "server/access/audit.hpp"
+#include "server/access/seat.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/endpoints/can/buses/bus.hpp"
 #include "server/endpoints/log_limit.hpp"
@@ -20,8 +21,8 @@
 namespace drivebench::can {
 
 /// The native profile on one bus: sends samples, state and heartbeats of every axis, and lets one controller
-/// at a time command each axis, which knows itself by the lease number that it was given. Nothing that comes
-/// in does more than this controller could over TCP.
+/// at a time command each axis. The controller proves itself by the lease number that it was given. No frame
+/// can do more than a session over TCP.
 class Endpoint {
  public:
   Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus);
@@ -49,18 +50,15 @@ class Endpoint {
     std::uint32_t axis = 0;
     std::uint32_t id = 0;
     Terminals terminals{};
-    Owner owner = 0;         ///< of the controller on this bus; 0: none
-    std::uint8_t lease = 0;  ///< its number; 0: none
+    Seat seat;               ///< of the controller on this bus
+    std::uint8_t lease = 0;  ///< its lease number; 0 while the seat is empty
     std::uint8_t last_lease = 0;
-    std::uint32_t controller = 0;  ///< as it calls itself
-    bool acquiring = false;        ///< asked the bench, no answer yet
-    bool monitored = false;        ///< its controller sends heartbeats
-    bool spoke = false;            ///< it commanded since the timer last looked
-    Clock::time_point heard{};     ///< last sign of life of the controller
+    std::uint32_t controller = 0;  ///< number that the controller gives itself
+    bool monitored = false;        ///< the controller sends heartbeats
+    bool spoke = false;            ///< the controller commanded since the timer last looked
     Tick commanded_at = -1;        ///< tick in which the bench took its newest command
     bool waits = false;            ///< it had commanded the present tick when the timer last looked
-    Clock::time_point waited{};    ///< until when, as the timer saw it
-    PhaseSetpoints phases{};       ///< of the owner
+    PhaseSetpoints phases{};       ///< of the controller
     std::uint64_t faults = 0;      ///< last sent
     std::uint64_t injected = 0;    ///< last sent
     std::int64_t index_tick = -1;
@@ -78,6 +76,7 @@ class Endpoint {
   void on_state();
   Client client_of(std::uint32_t controller) const;
   void acquire(Node& node, std::uint32_t controller);
+  void on_acquired(Node& node, std::uint32_t controller, Refused refused, Tick tick);
   void act(Node& node, Request request, std::uint32_t controller);
   bool is_for(const Node& node, const MessageRow& row);
   Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
@@ -98,7 +97,7 @@ class Endpoint {
   void on_timer();
   void arm_timer();
   void look_after(Node& node, Clock::time_point now);
-  void check_owner(Node& node);
+  void notice_end(Node& node);
 
   bool lockstep() const { return engine_->config().mode == RunMode::kLockstep; }
   Node* find_node(std::uint32_t id);

@@ -33,8 +33,8 @@ Tick Endpoint::answered_by(const Node& node, const MessageRow& row, const Setpoi
 
 void Endpoint::on_phase_command(Node& node, const MessageRow& row, const Values& values) {
   const Setpoints given = setpoints_in(row, values);
-  // Without the lease it is nobody's: the command that follows is turned away, and answered.
-  if (node.owner == 0 || given.lease != node.lease) return;
+  // Without the lease it is ignored here: the command that follows is refused, and answered.
+  if (node.seat.owner() == 0 || given.lease != node.lease) return;
   node.spoke = true;
   node.phases = {
       .answers = answered_by(node, row, given), .mode = given.mode, .c = given.c, .field = given.field};
@@ -44,8 +44,8 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   ++commands_;
   Setpoints given = setpoints_in(row, values);
   const Tick answers = answered_by(node, row, given);
-  // Whoever commands without the lease is nobody: the bench counts it and says no.
-  const Owner owner = node.owner != 0 && given.lease == node.lease ? node.owner : 0;
+  // Without the lease the command goes to the bench as that of no owner, which counts and refuses it.
+  const Owner owner = given.lease == node.lease ? node.seat.owner() : 0;
   if (owner != 0) node.spoke = true;
   if (given.mode > kLastMode) {
     return refuse(node, owner, Refused::kMalformed, given, "its mode must be 0 to 4");

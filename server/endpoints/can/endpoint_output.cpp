@@ -26,7 +26,7 @@ void Endpoint::send_sample(Message message, const Node& node, const Sample& samp
 
 void Endpoint::on_tick() {
   for (Node& node : nodes_) {
-    check_owner(node);
+    notice_end(node);
     const Sample& newest = engine_->newest(node.axis);
     const auto every = static_cast<std::uint64_t>(lockstep() ? 1 : config_.sample_every_ticks);
     if (newest.tick % every == 0) node.due = newest;
@@ -55,12 +55,12 @@ void Endpoint::on_newest() {
   together_.clear();
 }
 
-/// The lease may have run out, or been taken: by an administrator, or together with all others when this
-/// thread stood still or the audit log could not be written.
-void Endpoint::check_owner(Node& node) {
-  if (node.owner == 0 || node.acquiring || engine_->owner(node.axis) == node.owner) return;
+/// The lease may have run out or been taken: by an administrator, or together with all others because this
+/// thread stood still or the audit log could not be written. While the lease is being acquired anew the
+/// answer decides.
+void Endpoint::notice_end(Node& node) {
+  if (node.seat.is_acquiring() || !node.seat.notice_end()) return;
   log_loss(node, "its lease has run out or was taken");
-  node.owner = 0;
   node.lease = 0;
 }
 

@@ -9,8 +9,8 @@ namespace drivebench::modbus {
 
 namespace {
 
-/// Who writes in a free run, which has no owners.
-const Client kSomebody{.transport = "modbus", .peer = {}, .subject = {}};
+/// The client behind a write in a free run, which has no owners.
+const Client kAnyClient{.transport = "modbus", .peer = {}, .subject = {}};
 
 }  // namespace
 
@@ -22,14 +22,15 @@ AxisDesk::AxisDesk(asio::io_context& io, Engine& engine, const RegisterMap& map,
       parameter_rows_(parameter_rows(engine.parameters(axis))),
       lease_time_(engine.config().setup.lease_ticks * engine.config().setup.period_ns),
       idle_timeout_(std::chrono::milliseconds(engine.config().modbus.idle_timeout_ms)),
+      seat_(engine, axis),
       timer_(io) {}
 
 // ---- reading ----
 
-void AxisDesk::read(const RegisterMap::Range& range, Visitor who, std::span<std::uint16_t> words) const {
+void AxisDesk::read(const RegisterMap::Range& range, Visitor visitor, std::span<std::uint16_t> words) const {
   for (const Row& row : range.rows) {
     std::uint16_t value[4];
-    put(bits_of(row, who), row.type, range.order, value);
+    put(bits_of(row, visitor), row.type, range.order, value);
     for (std::size_t i = 0; i < row.size(); ++i) {  // a value may lie partly outside
       const std::size_t address = row.address + i;
       if (address >= range.first && address - range.first < range.count)
@@ -38,7 +39,7 @@ void AxisDesk::read(const RegisterMap::Range& range, Visitor who, std::span<std:
   }
 }
 
-std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
+std::uint64_t AxisDesk::bits_of(const Row& row, Visitor visitor) const {
   const Sample& sample = engine_.newest(axis_);
   switch (row.content) {
     case Content::kSignal:
@@ -47,14 +48,15 @@ std::uint64_t AxisDesk::bits_of(const Row& row, Visitor who) const {
     case Content::kStatusWord:
       return status_word(drive_state(), {.voltage_present = sample.bus_voltage_v > 0.0,
                                          .warning = (sample.faults & ~kLatchedFaults) != 0,
-                                         .remote = leased(),
+                                         .remote = seat_.is_held(),
                                          .limit = (sample.faults & kVoltageSaturated) != 0});
     case Content::kLeaseKey:
-      return holds(who) ? key_ : 0;
+      return holds(visitor) ? key_ : 0;
     case Content::kLeaseStatus:
-      return engine_.owner(axis_) == 0 ? 0 : holds(who) ? 1 : leased() ? 2 : 3;
+      return engine_.owner(axis_) == 0 ? 0 : holds(visitor) ? 1 : seat_.is_held() ? 2 : 3;
     case Content::kLastRefusal:
-      return static_cast<std::uint64_t>(refusal_row(holds(who) ? holders_refusal_ : last_refusal_).modbus);
+      return static_cast<std::uint64_t>(
+          refusal_row(holds(visitor) ? holders_refusal_ : last_refusal_).modbus);
     case Content::kParameter:
       return float_bits(parameter(row).get(engine_.parameters(axis_)));
     default:
@@ -139,8 +141,8 @@ std::uint64_t AxisDesk::input_bits(Content content) const {
   }
 }
 
-bool AxisDesk::coil(std::size_t address, Visitor who) const {
-  return address == static_cast<std::size_t>(Coil::kLease) && holds(who);
+bool AxisDesk::coil(std::size_t address, Visitor visitor) const {
+  return address == static_cast<std::size_t>(Coil::kLease) && holds(visitor);
 }
 
 bool AxisDesk::latched() const noexcept {
@@ -153,45 +155,39 @@ DriveState AxisDesk::drive_state() const noexcept {
 
 // ---- the lease ----
 
-bool AxisDesk::holds(Visitor who) const noexcept {
-  return leased() && holder_ == who;
+bool AxisDesk::holds(Visitor visitor) const noexcept {
+  return seat_.is_held() && holder_ == visitor;
 }
 
-void AxisDesk::spoke(Visitor who) {
-  if (owner_ != 0 && holder_ == who) last_word_ = Clock::now();
+void AxisDesk::spoke(Visitor visitor) {
+  if (seat_.owner() != 0 && holder_ == visitor) seat_.hear(Clock::now());
 }
 
-void AxisDesk::connection_ended(Visitor who) {
-  if (owner_ == 0 || holder_ != who) return;
+void AxisDesk::connection_ended(Visitor visitor) {
+  if (seat_.owner() == 0 || holder_ != visitor) return;
   holder_ = 0;
   waiting_ = false;
   watch();
 }
 
 void AxisDesk::watch() {
-  const auto patience = holder_ != 0 ? idle_timeout_ : lease_time_;
-  timer_.expires_at((waiting_ ? Clock::now() : last_word_) + patience);
+  if (waiting_) seat_.wait(Clock::now());
+  timer_.expires_at(seat_.silent_since() + patience());
   timer_.async_wait([this](const boost::system::error_code& error) {
-    if (error || owner_ == 0) return;
-    if (!leased()) return forget();  // the bench has taken it back
-    const bool spoke_since = Clock::now() < last_word_ + (holder_ != 0 ? idle_timeout_ : lease_time_);
-    if (waiting_ || spoke_since) return watch();
+    if (error || seat_.owner() == 0) return;
+    if (seat_.notice_end()) return forget_holder();
+    if (waiting_ || !seat_.is_silent(Clock::now(), patience())) return watch();
     if (lapsed_log_.allow()) {
       spdlog::warn("modbus: the owner of axis {} {} and loses its lease ({} more since the last such line)",
                    axis_, holder_ != 0 ? "has fallen silent" : "went away", lapsed_log_.held_back());
     }
-    give_back(LeaseAction::kLost);
+    forget_holder();
+    seat_.lose();
   });
 }
 
-void AxisDesk::give_back(LeaseAction action) {
-  const Owner owner = owner_;
-  forget();
-  engine_.request({.tick = 0, .axis = axis_, .owner = owner, .action = action}, [](Refused, Tick) {});
-}
-
-void AxisDesk::forget() {
-  owner_ = 0;
+/// The seat is, or is about to be, empty.
+void AxisDesk::forget_holder() {
   key_ = 0;
   holder_ = 0;
   timer_.cancel();
@@ -205,14 +201,21 @@ void AxisDesk::forget() {
 /// The engine may answer at once or with a later tick.
 std::shared_ptr<AxisDesk::Asked> AxisDesk::send(const Input& input) {
   auto asked = std::make_shared<Asked>();
-  engine_.request(
-      input,
-      [asked](Refused refused, Tick) {
-        asked->answer = refused;
-        if (asked->waiting != nullptr) asked->waiting->cancel();
-      },
-      input.owner == 0 ? &kSomebody : nullptr);
+  engine_.request(input, answer_into(asked), input.owner == 0 ? &kAnyClient : nullptr);
   return asked;
+}
+
+asio::awaitable<Refused> AxisDesk::ask(LeaseAction action, Owner number) {
+  auto asked = std::make_shared<Asked>();
+  seat_.ask(action, number, answer_into(asked));
+  return answer_to(std::move(asked));
+}
+
+Engine::Answer AxisDesk::answer_into(std::shared_ptr<Asked> asked) {
+  return [asked = std::move(asked)](Refused refused, Tick) {
+    asked->answer = refused;
+    if (asked->waiting != nullptr) asked->waiting->cancel();
+  };
 }
 
 asio::awaitable<Refused> AxisDesk::answer_to(std::shared_ptr<Asked> asked) {
@@ -226,26 +229,24 @@ asio::awaitable<Refused> AxisDesk::answer_to(std::shared_ptr<Asked> asked) {
   co_return asked->answer.value_or(Refused::kBusy);
 }
 
-asio::awaitable<Refused> AxisDesk::take_lease(std::uint16_t key, bool renew, Visitor who) {
-  if (owner_ != 0 && !leased()) forget();
-  Input input{.tick = 0, .axis = axis_, .owner = owner_, .action = LeaseAction::kRenew};
-  if (owner_ == 0) {
-    input.owner = engine_.new_owner({"modbus", name_of_visitor ? name_of_visitor(who) : "", ""});
-    input.action = LeaseAction::kAcquire;
-    const Refused why = co_await ask(input);
+asio::awaitable<Refused> AxisDesk::take_lease(std::uint16_t key, bool renew, Visitor visitor) {
+  if (seat_.notice_end()) forget_holder();
+  if (seat_.owner() == 0) {
+    const Client client{
+        .transport = "modbus", .peer = name_of_visitor ? name_of_visitor(visitor) : "", .subject = {}};
+    const Refused why = co_await ask(LeaseAction::kAcquire, seat_.number_for(client));
     if (why != Refused::kNot) co_return why;
-    owner_ = input.owner;
     key_ = key;
   } else if (key != key_) {
     co_return Refused::kOwned;
   } else if (renew) {
-    const Refused why = co_await ask(input);
+    const Refused why = co_await ask(LeaseAction::kRenew, seat_.owner());
     if (why != Refused::kNot) co_return why;
   }
-  const bool changes_hands = holder_ != who;
+  const bool changes_hands = holder_ != visitor;
   if (changes_hands) waiting_ = false;
-  holder_ = who;
-  last_word_ = Clock::now();
+  holder_ = visitor;
+  seat_.hear(Clock::now());
   watch();
   if (changes_hands) on_lease_change();
   co_return Refused::kNot;

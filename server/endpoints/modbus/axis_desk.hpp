@@ -13,6 +13,7 @@
 #include "protocols/modbus/drive_profile.hpp"
 #include "protocols/modbus/pdu.hpp"
 #include "protocols/modbus/register_map.hpp"
+#include "server/access/seat.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/engine/engine.hpp"
@@ -26,14 +27,14 @@ using Visitor = std::uint64_t;
 /// One axis as Modbus sees it: registers and coils, the lease behind its key, and the state machine behind
 /// the control word.
 ///
-/// The lease belongs to the connection that wrote the key last. When that connection ends it stays for the
-/// key until the lease time of the bench has passed by the wall clock; so does the lease of an owner that is
-/// connected but silent for idle_timeout_ms, which in lockstep nobody else would notice.
+/// The lease belongs to the connection that wrote the key last. When that connection ends, the lease stays
+/// for the key until the lease time of the bench has passed by the wall clock. A holder that is connected but
+/// silent for idle_timeout_ms loses the lease as well: in lockstep the bench would wait for it for ever.
 class AxisDesk {
  public:
   AxisDesk(asio::io_context& io, Engine& engine, const RegisterMap& map, std::uint32_t axis);
 
-  /// Called when the lease has changed hands or is gone, so that nobody waits for it.
+  /// Called when the lease has changed hands or is gone, so that no exchange goes on waiting for it.
   std::function<void()> on_lease_change;
   /// Address and port of a connection, for the audit log; may be empty.
   std::function<std::string(Visitor)> name_of_visitor;
@@ -42,8 +43,8 @@ class AxisDesk {
   const RegisterMap& map() const noexcept { return map_; }
 
   /// Puts the registers asked for to words[0..count).
-  void read(const RegisterMap::Range& range, Visitor who, std::span<std::uint16_t> words) const;
-  bool coil(std::size_t address, Visitor who) const;
+  void read(const RegisterMap::Range& range, Visitor visitor, std::span<std::uint16_t> words) const;
+  bool coil(std::size_t address, Visitor visitor) const;
   bool discrete_input(std::size_t address) const {
     return modbus::discrete_input(address, engine_.newest(axis_));
   }
@@ -54,28 +55,29 @@ class AxisDesk {
     bool commanded = false;  ///< the bench has accepted a command
   };
   /// Carries out a write that has been validated: all of it or nothing.
-  asio::awaitable<Outcome> write(RegisterMap::Range range, std::span<const std::uint16_t> words, Visitor who);
+  asio::awaitable<Outcome> write(RegisterMap::Range range, std::span<const std::uint16_t> words,
+                                 Visitor visitor);
   asio::awaitable<Outcome> write_coils(std::size_t address, std::size_t count, std::uint8_t bits,
-                                       Visitor who);
+                                       Visitor visitor);
 
   /// A write was turned away for its values: a command in it counts as refused.
-  void count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words, Visitor who);
+  void count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words, Visitor visitor);
   /// A write was refused, as last_refusal is to say.
-  void note_refusal(Visitor who, Refused why) noexcept;
+  void note_refusal(Visitor visitor, Refused why) noexcept;
 
   /// Whether this connection holds the lease.
-  bool holds(Visitor who) const noexcept;
+  bool holds(Visitor visitor) const noexcept;
   /// Whether process data of this connection would be in time, but for a command that this tick has already.
-  bool has_answered_tick(Visitor who) const {
-    return holds(who) && engine_.check(axis_, owner_, gates_off()) == Refused::kStale;
+  bool has_answered_tick(Visitor visitor) const {
+    return holds(visitor) && engine_.check(axis_, seat_.owner(), gates_off()) == Refused::kStale;
   }
   /// A request of this connection came in.
-  void spoke(Visitor who);
-  /// An owner that waits for its tick is not silent.
-  void set_waiting(Visitor who, bool waiting) noexcept {
-    if (holder_ == who) waiting_ = waiting;
+  void spoke(Visitor visitor);
+  /// A holder that waits for its tick is not silent.
+  void set_waiting(Visitor visitor, bool waiting) noexcept {
+    if (holder_ == visitor) waiting_ = waiting;
   }
-  void connection_ended(Visitor who);
+  void connection_ended(Visitor visitor);
 
  private:
   using Clock = ServerClock;
@@ -105,11 +107,11 @@ class AxisDesk {
     std::optional<std::uint64_t> operator[](Content content) const noexcept;
   };
 
-  asio::awaitable<Outcome> write_process(Written written, Visitor who);
-  asio::awaitable<Outcome> write_command(Written written, Visitor who);
-  asio::awaitable<Outcome> write_parameters(Written written, Visitor who);
-  asio::awaitable<Outcome> carry_out(LeaseRequest request, Visitor who);
-  asio::awaitable<Refused> take_lease(std::uint16_t key, bool renew, Visitor who);
+  asio::awaitable<Outcome> write_process(Written written, Visitor visitor);
+  asio::awaitable<Outcome> write_command(Written written, Visitor visitor);
+  asio::awaitable<Outcome> write_parameters(Written written, Visitor visitor);
+  asio::awaitable<Outcome> carry_out(LeaseRequest request, Visitor visitor);
+  asio::awaitable<Refused> take_lease(std::uint16_t key, bool renew, Visitor visitor);
   /// An input on its way to the bench.
   struct Asked {
     std::optional<Refused> answer;
@@ -118,8 +120,10 @@ class AxisDesk {
   std::shared_ptr<Asked> send(const Input& input);
   asio::awaitable<Refused> answer_to(std::shared_ptr<Asked> asked);
   asio::awaitable<Refused> ask(Input input) { return answer_to(send(input)); }
+  asio::awaitable<Refused> ask(LeaseAction action, Owner number);
+  static Engine::Answer answer_into(std::shared_ptr<Asked> asked);
 
-  std::uint64_t bits_of(const Row& row, Visitor who) const;
+  std::uint64_t bits_of(const Row& row, Visitor visitor) const;
   /// Of a register that shows what was written; 0 if it is another one.
   std::uint64_t input_bits(Content content) const;
   std::uint64_t header_bits(const Row& row) const;
@@ -135,10 +139,8 @@ class AxisDesk {
 
   bool latched() const noexcept;
   DriveState drive_state() const noexcept;
-  /// Whether the bench still knows the lease.
-  bool leased() const noexcept { return owner_ != 0 && engine_.owner(axis_) == owner_; }
-  void give_back(LeaseAction action);
-  void forget();
+  std::chrono::nanoseconds patience() const noexcept { return holder_ != 0 ? idle_timeout_ : lease_time_; }
+  void forget_holder();
   void watch();
 
   Engine& engine_;
@@ -149,18 +151,17 @@ class AxisDesk {
   std::chrono::nanoseconds lease_time_;
   std::chrono::nanoseconds idle_timeout_;
 
-  Owner owner_ = 0;  ///< in the bench; 0: Modbus does not hold the lease
-  std::uint16_t key_ = 0;
-  Visitor holder_ = 0;  ///< 0: the connection has ended, the key still counts
-  bool waiting_ = false;
-  Clock::time_point last_word_{};
+  Seat seat_;
+  std::uint16_t key_ = 0;  ///< of the holder
+  Visitor holder_ = 0;     ///< 0: the connection has ended, the key still counts
+  bool waiting_ = false;   ///< the holder waits for its tick
   ServerTimer timer_;
 
   CommandInput command_;
   ProcessInput process_;
   DriveState state_ = DriveState::kSwitchOnDisabled;  ///< never kFault, which the sample tells
   Refused last_refusal_ = Refused::kNot;
-  Refused holders_refusal_ = Refused::kNot;  ///< the last one of whoever holds the lease
+  Refused holders_refusal_ = Refused::kNot;  ///< the last one of the holder
   LogLimit lapsed_log_;
 };
 

@@ -32,31 +32,31 @@ AxisDesk::Outcome AxisDesk::refuse(Refused why) noexcept {
   return {.exception = refusal_row(why).exception, .refused = why};
 }
 
-void AxisDesk::note_refusal(Visitor who, Refused why) noexcept {
+void AxisDesk::note_refusal(Visitor visitor, Refused why) noexcept {
   last_refusal_ = why;
-  if (holds(who)) holders_refusal_ = why;
+  if (holds(visitor)) holders_refusal_ = why;
 }
 
 void AxisDesk::count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words,
-                             Visitor who) {
+                             Visitor visitor) {
   const Written written{range, words};
   if (!written[Content::kCounter] && range.first >= kCommandStart) return;  // process data always command
-  const bool has_key = leased() && written[Content::kLeaseKey] == key_;
-  const Owner sender = has_key || holds(who) ? owner_ : 0;
+  const bool has_key = seat_.is_held() && written[Content::kLeaseKey] == key_;
+  const Owner sender = has_key || holds(visitor) ? seat_.owner() : 0;
   engine_.request({.tick = 0, .axis = axis_, .owner = sender, .action = RefusedCommand{true}},
                   [](Refused, Tick) {});
 }
 
 asio::awaitable<AxisDesk::Outcome> AxisDesk::write(RegisterMap::Range range,
-                                                   std::span<const std::uint16_t> words, Visitor who) {
+                                                   std::span<const std::uint16_t> words, Visitor visitor) {
   const Written written{range, words};
-  if (range.first >= kParameterStart) return write_parameters(written, who);
-  return range.first >= kCommandStart ? write_command(written, who) : write_process(written, who);
+  if (range.first >= kParameterStart) return write_parameters(written, visitor);
+  return range.first >= kCommandStart ? write_command(written, visitor) : write_process(written, visitor);
 }
 
 /// Hands a command to the bench, which counts it if it refuses it.
 AxisDesk::Outcome AxisDesk::command(const Command& command) {
-  const Refused why = engine_.command(axis_, owner_, command);
+  const Refused why = engine_.command(axis_, seat_.owner(), command);
   if (why != Refused::kNot) return refuse(why);
   engine_.advance();
   return {.commanded = true};
@@ -75,7 +75,7 @@ Command AxisDesk::command_of(const ProcessInput& input, DriveState state) const 
   return command;
 }
 
-asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visitor who) {
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visitor visitor) {
   ProcessInput input = process_;
   if (const auto word = written[Content::kControlWord])
     input.control_word = static_cast<std::uint16_t>(*word);
@@ -85,7 +85,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
   if (const auto bits = written[Content::kReferenceC]) input.c = static_cast<std::int16_t>(*bits);
   if (const auto bits = written[Content::kReferenceField]) input.field = static_cast<std::int16_t>(*bits);
   // First of all, so that nothing is cleared by a write that the bench then does not take.
-  const Owner owner = holds(who) ? owner_ : 0;
+  const Owner owner = holds(visitor) ? seat_.owner() : 0;
   if (const Refused why = engine_.check(axis_, owner, gates_off()); why != Refused::kNot) {
     engine_.command(axis_, owner, gates_off());  // so that it is counted
     Outcome outcome = refuse(why);
@@ -97,14 +97,14 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
   DriveState state = next_state(before, input.control_word);
   const bool resets = (input.control_word & ~process_.control_word & kFaultReset) != 0;
   if (before == DriveState::kFault && resets) {
-    const Input clear{.tick = 0, .axis = axis_, .owner = owner_, .action = ClearFaults{}};
+    const Input clear{.tick = 0, .axis = axis_, .owner = seat_.owner(), .action = ClearFaults{}};
     const Refused why = co_await ask(clear);
     if (why != Refused::kNot) co_return refuse(why);
-    if (!holds(who)) co_return refuse(Refused::kNotOwner);  // lost it meanwhile
+    if (!holds(visitor)) co_return refuse(Refused::kNotOwner);  // lost meanwhile
     state = DriveState::kSwitchOnDisabled;
   }
   const Command wanted = command_of(input, state);
-  if (engine_.check(axis_, owner_, wanted) == Refused::kNot) {
+  if (engine_.check(axis_, seat_.owner(), wanted) == Refused::kNot) {
     process_ = input;
     state_ = state == DriveState::kFault ? DriveState::kSwitchOnDisabled : state;
   }
@@ -127,7 +127,7 @@ Command AxisDesk::command_of(const CommandInput& input) const {
   return command;
 }
 
-asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visitor who) {
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visitor visitor) {
   const auto key = written[Content::kLeaseKey];
   const auto request = static_cast<LeaseRequest>(written[Content::kRequest].value_or(0));
   const bool commands = written[Content::kCounter].has_value();
@@ -145,57 +145,65 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   const bool asks_more = request != LeaseRequest::kNone && request != LeaseRequest::kRelease;
   if ((input.mode == CommandMode::kDuty && beyond) || (key == 0u && asks_more) ||
       (commands && (gives_back || request == LeaseRequest::kClearFaults))) {
-    count_refused(written.range, written.words, who);
+    count_refused(written.range, written.words, visitor);
     co_return refuse(Refused::kOutOfRange);
   }
 
-  const bool had_lease = leased();
+  const bool had_lease = seat_.is_held();
   if (key.value_or(0) != 0) {
     if (engine_.config().mode == RunMode::kFree) {
       co_return refuse(Refused::kWrongMode);
     }
     // All or nothing: with a command that is refused the lease does not change hands either.
     if (commands && had_lease && key == key_ &&
-        engine_.check(axis_, owner_, command_of(input)) != Refused::kNot) {
-      co_return refuse(engine_.command(axis_, owner_, command_of(input)));  // so that it is counted
+        engine_.check(axis_, seat_.owner(), command_of(input)) != Refused::kNot) {
+      co_return refuse(engine_.command(axis_, seat_.owner(), command_of(input)));  // so that it is counted
     }
-    const Refused why = co_await take_lease(static_cast<std::uint16_t>(*key), !commands, who);
+    const Refused why = co_await take_lease(static_cast<std::uint16_t>(*key), !commands, visitor);
     if (why != Refused::kNot) {
       if (commands) engine_.command(axis_, 0, command_of(input));  // so that it is counted
       co_return refuse(why);
     }
   }
   if (!commands) {
-    if (!holds(who)) co_return refuse(Refused::kNotOwner);
+    if (!holds(visitor)) co_return refuse(Refused::kNotOwner);
     command_ = input;
     const LeaseRequest wanted = gives_back ? LeaseRequest::kRelease : request;
-    co_return co_await carry_out(wanted, who);
+    co_return co_await carry_out(wanted, visitor);
   }
-  const Owner owner = holds(who) ? owner_ : 0;
+  const Owner owner = holds(visitor) ? seat_.owner() : 0;
   if (engine_.check(axis_, owner, command_of(input)) == Refused::kNot) {
     command_ = input;
     co_return command(command_of(input));
   }
   const Refused why = engine_.command(axis_, owner, command_of(input));
-  if (!had_lease && holds(who)) give_back(LeaseAction::kRelease);  // it goes as it came
+  if (!had_lease && holds(visitor)) {  // a lease that came with this command goes with it
+    forget_holder();
+    seat_.give_back();
+  }
   co_return refuse(why);
 }
 
-asio::awaitable<AxisDesk::Outcome> AxisDesk::carry_out(LeaseRequest request, Visitor who) {
-  if (!holds(who)) co_return refuse(Refused::kNotOwner);
-  Input input{.tick = 0, .axis = axis_, .owner = owner_, .action = ClearFaults{}};
+asio::awaitable<AxisDesk::Outcome> AxisDesk::carry_out(LeaseRequest request, Visitor visitor) {
+  if (!holds(visitor)) co_return refuse(Refused::kNotOwner);
   if (request == LeaseRequest::kNone) co_return Outcome{};
-  if (request == LeaseRequest::kRelease) input.action = LeaseAction::kRelease;
-  if (request == LeaseRequest::kRenew) input.action = LeaseAction::kRenew;
-  const Refused why = co_await ask(input);
+  const Owner owner = seat_.owner();
+  Refused why = Refused::kNot;
+  if (request == LeaseRequest::kRelease) {
+    why = co_await ask(LeaseAction::kRelease, owner);
+  } else if (request == LeaseRequest::kRenew) {
+    why = co_await ask(LeaseAction::kRenew, owner);
+  } else {
+    why = co_await ask({.tick = 0, .axis = axis_, .owner = owner, .action = ClearFaults{}});
+  }
   if (why != Refused::kNot) co_return refuse(why);
-  if (request == LeaseRequest::kRelease && owner_ == input.owner) forget();
+  if (request == LeaseRequest::kRelease && seat_.owner() == 0) forget_holder();
   if (request == LeaseRequest::kClearFaults) state_ = DriveState::kSwitchOnDisabled;
   co_return Outcome{};
 }
 
 asio::awaitable<AxisDesk::Outcome> AxisDesk::write_coils(std::size_t address, std::size_t count,
-                                                         std::uint8_t bits, Visitor who) {
+                                                         std::uint8_t bits, Visitor visitor) {
   Outcome outcome;
   for (std::size_t i = 0; i < count && outcome.exception == Exception::kNone; ++i) {
     const bool on = (bits >> i & 1) != 0;
@@ -203,13 +211,13 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_coils(std::size_t address, st
     const LeaseRequest request = is_lease ? (on ? LeaseRequest::kRenew : LeaseRequest::kRelease)
                                  : on     ? LeaseRequest::kClearFaults
                                           : LeaseRequest::kNone;
-    outcome = co_await carry_out(request, who);
+    outcome = co_await carry_out(request, visitor);
   }
   co_return outcome;
 }
 
-asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, Visitor who) {
-  if (!holds(who) && engine_.config().mode != RunMode::kFree) co_return refuse(Refused::kNotOwner);
+asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, Visitor visitor) {
+  if (!holds(visitor) && engine_.config().mode != RunMode::kFree) co_return refuse(Refused::kNotOwner);
   struct Change {
     std::uint32_t row;
     double before;
@@ -230,7 +238,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, V
     co_return refuse(Refused::kOutOfRange);
   }
   // All on their way before any is waited for: the bench takes them together, in one tick.
-  const Owner owner = holds(who) ? owner_ : 0;
+  const Owner owner = holds(visitor) ? seat_.owner() : 0;
   std::vector<std::shared_ptr<Asked>> asked;
   for (const Change& change : changes) {
     asked.push_back(

@@ -54,8 +54,8 @@ void Connection::cut(std::string_view why) {
 void Connection::audit(std::string_view event, std::string_view why_not,
                        std::optional<std::uint32_t> axis) const {
   if (shared_.audit == nullptr) return;
-  const drivebench::Client who{.transport = "modbus", .peer = peer_name(), .subject = {}};
-  shared_.audit->note({.name = event, .axis = axis, .client = &who, .result = why_not});
+  const drivebench::Client client{.transport = "modbus", .peer = peer_name(), .subject = {}};
+  shared_.audit->note({.name = event, .axis = axis, .client = &client, .result = why_not});
 }
 
 bool Connection::has_lease() const noexcept {
@@ -210,7 +210,7 @@ asio::awaitable<void> Connection::execute(AxisDesk& desk, Bytes adu, Request req
                  : static_cast<void>(out_.insert(out_.end(), answer.begin(), answer.end()));
 }
 
-/// Puts what libmodbus will read where it looks for it.
+/// Writes the registers and bits that libmodbus is going to read.
 void Connection::fill_reply(AxisDesk& desk, const Request& request) {
   const std::size_t from = request.read_address;
   for (std::size_t i = from; i < from + request.read_count; ++i) {
@@ -261,7 +261,7 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
 void Connection::note_refused_write(AxisDesk& desk, Refused why) {
   ++shared_.counts.refused_writes;
   desk.note_refusal(number_, why);
-  // That another has the axis; what else may be wrong with a write is between the bench and its owner.
+  // Only writes to the axis of another client are audited; other mistakes concern the owner alone.
   const bool is_foreign = why == Refused::kNotOwner || why == Refused::kOwned;
   if (is_foreign) audit("forbidden", sentence_of(why), desk.axis());
   if (!shared_.refused_writes_log.allow()) return;
@@ -278,7 +278,7 @@ bool Connection::is_peer_gone() {
 /// and in real time process data that come twice within a tick count for two.
 asio::awaitable<Exception> Connection::wait_for_tick(AxisDesk& desk, Tick before) {
   if (shared_.engine.tick() != before) co_return Exception::kNone;
-  const bool sent = co_await flush();  // what came before this request must not wait with it
+  const bool sent = co_await flush();  // earlier answers must not wait with this request
   if (!sent) open_ = false;
   desk.set_waiting(number_, true);
   waiting_ = true;
@@ -286,13 +286,13 @@ asio::awaitable<Exception> Connection::wait_for_tick(AxisDesk& desk, Tick before
     boost::system::error_code cancelled;
     waker_.expires_after(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms));
     co_await waker_.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
-    // Nobody reads meanwhile, so nobody else would notice that the owner is dead.
+    // Nothing is read meanwhile, so only this look tells that the owner is dead.
     if (!cancelled && open_ && is_peer_gone()) close();
   }
   waiting_ = false;
   desk.set_waiting(number_, false);
   desk.spoke(number_);
-  // Without a tick the lease is gone, and with it the hope for one.
+  // Without a tick the lease has gone, so the tick may never come.
   co_return shared_.engine.tick() != before ? Exception::kNone : Exception::kBusy;
 }
 

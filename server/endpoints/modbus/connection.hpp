@@ -35,7 +35,7 @@ struct Shared {
     std::uint64_t exceptions = 0;
     std::uint64_t refused_writes = 0;  ///< for want of the lease, a latched fault, staleness, value
     std::uint64_t throttled = 0;
-    std::uint64_t cut = 0;  ///< connections: malformed frames, time-outs, floods, a full house
+    std::uint64_t cut = 0;  ///< connections: malformed frames, time-outs, floods, no free connection
     std::uint64_t turned_away = 0;
   } counts;
   LogLimit refused_writes_log;
@@ -52,10 +52,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   /// Reads and answers until the peer or an error ends the connection.
   asio::awaitable<void> run();
-  /// Afterwards: its leases begin to lapse.
+  /// After run(): its leases begin to lapse.
   void end();
 
-  /// When a tick has run or a lease has changed hands: an exchange that waits for that goes on.
+  /// A tick has run or a lease has changed hands: an exchange that waits for that goes on.
   void wake() {
     if (waiting_) waker_.cancel();
   }
@@ -70,7 +70,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   /// Address and port.
   std::string peer_name() const { return name_.substr(name_.find(' ') + 1); }
   bool has_lease() const noexcept;
-  /// Since when it has said nothing.
+  /// The time of its last request; now, while it waits for a tick.
   Clock::time_point idle_since() const noexcept { return waiting_ ? Clock::now() : last_request_; }
 
  private:

@@ -15,9 +15,9 @@ namespace {
 
 using asio::ip::tcp;
 
-// After an accept that failed for want of descriptors: a pause instead of a spin.
+// After an accept that failed for want of descriptors the server pauses instead of spinning.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-// A peer that vanished without a word is given up after this time: the kernel asks an idle one every second.
+// A peer that vanished silently is given up after this time: the kernel probes an idle peer every second.
 constexpr int kUserTimeoutMs = 3000;
 
 void tune(tcp::socket& socket) {
@@ -59,7 +59,7 @@ std::string ModbusServer::address() const {
 
 void ModbusServer::serve(Engine& engine, Audit* audit) {
   if (!is_loopback(config_.address)) {
-    spdlog::warn("Modbus knows no passwords: whoever reaches {} can read this bench{}", address(),
+    spdlog::warn("Modbus knows no passwords: every client that reaches {} can read this bench{}", address(),
                  config_.allow_writes ? " and drive its motors" : "");
   }
   identification_.emplace(engine.config().name);
@@ -73,15 +73,16 @@ void ModbusServer::serve(Engine& engine, Audit* audit) {
   for (std::uint32_t axis = 0; axis < engine.config().axes.size(); ++axis) {
     shared_->desks.push_back(std::make_unique<modbus::AxisDesk>(io_, engine, maps_[axis], axis));
     shared_->desks.back()->on_lease_change = wake_all;
-    shared_->desks.back()->name_of_visitor = [this](modbus::Visitor who) { return name_of(who); };
+    shared_->desks.back()->name_of_visitor = [this](modbus::Visitor visitor) { return name_of(visitor); };
   }
   engine.on_newest.add(wake_all);
   asio::co_spawn(io_, accept(), asio::detached);
 }
 
-std::string ModbusServer::name_of(modbus::Visitor who) const {
-  const auto found = std::find_if(connections_.begin(), connections_.end(),
-                                  [who](const auto& connection) { return connection->number() == who; });
+std::string ModbusServer::name_of(modbus::Visitor visitor) const {
+  const auto found =
+      std::find_if(connections_.begin(), connections_.end(),
+                   [visitor](const auto& connection) { return connection->number() == visitor; });
   return found == connections_.end() ? std::string() : (*found)->peer_name();
 }
 
@@ -126,16 +127,16 @@ void ModbusServer::start(tcp::socket socket) {
   asio::co_spawn(io_, run(std::move(connection)), asio::detached);
 }
 
-/// A full house turns out whoever has said nothing for longest, if that is long: it has lost its leases by
-/// then. Otherwise the peer with the most connections, if it has more than the newcomer's would have, gives
-/// up its idlest one without a lease.
+/// When there are as many connections as there may be, the one that has been silent for longest goes, if its
+/// silence is longer than idle_timeout_ms: then it has lost its leases. Otherwise the peer with the most
+/// connections, if it has more than the newcomer's would have, gives up its idlest one without a lease.
 bool ModbusServer::make_room(const asio::ip::address& newcomer) {
   const auto longest =
       std::min_element(connections_.begin(), connections_.end(),
                        [](const auto& a, const auto& b) { return a->idle_since() < b->idle_since(); });
   const auto limit = modbus::Connection::Clock::now() - std::chrono::milliseconds(config_.idle_timeout_ms);
   if (longest != connections_.end() && (*longest)->idle_since() <= limit) {
-    (*longest)->cut("the house is full, and it has been idle for long");
+    (*longest)->cut("all connections are taken, and this one has been idle for long");
     connections_.erase(longest);
     return true;
   }
@@ -151,7 +152,7 @@ bool ModbusServer::make_room(const asio::ip::address& newcomer) {
     if (count > most || (count == most && (*each)->idle_since() < (*found)->idle_since())) found = each;
   }
   if (found == connections_.end()) return false;
-  (*found)->cut("the house is full, and this peer has the most connections");
+  (*found)->cut("all connections are taken, and this peer has the most");
   connections_.erase(found);
   return true;
 }

@@ -26,7 +26,7 @@ class ModbusServer {
   /// Starts accepting clients of this run. `audit` may be null.
   void serve(Engine& engine, Audit* audit = nullptr);
 
-  /// Serves a client whose socket is there already.
+  /// Serves a client on a connected socket.
   void start(asio::ip::tcp::socket socket);
 
   /// Stops accepting and ends every connection.
@@ -36,7 +36,7 @@ class ModbusServer {
 
  private:
   asio::awaitable<void> accept();
-  std::string name_of(modbus::Visitor who) const;
+  std::string name_of(modbus::Visitor visitor) const;
   bool make_room(const asio::ip::address& newcomer);
   asio::awaitable<void> run(std::shared_ptr<modbus::Connection> connection);
 

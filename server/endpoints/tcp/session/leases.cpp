@@ -5,10 +5,10 @@
 namespace drivebench {
 
 Leases::Leases(Dialogue& dialogue)
-    : dialogue_(dialogue),
-      engine_(dialogue.engine()),
-      held_(dialogue.axis_count()),
-      taken_(dialogue.axis_count()) {}
+    : dialogue_(dialogue), engine_(dialogue.engine()), taken_(dialogue.axis_count()) {
+  for (std::uint32_t axis = 0; axis < dialogue.axis_count(); ++axis)
+    seats_.emplace_back(engine_, axis);
+}
 
 void Leases::lease(const v1::LeaseRequest& r) {
   if (!dialogue_.axis_exists(r.axis())) return;
@@ -22,22 +22,15 @@ void Leases::lease(const v1::LeaseRequest& r) {
     return dialogue_.refuse(dialogue_.id(), Refused::kWrongMode, "action");
   }
   const auto action = takes ? LeaseAction::kAcquire : static_cast<LeaseAction>(r.action());
-  const auto on_done = [this, axis = r.axis(), action] {
-    held_[axis] = action != LeaseAction::kRelease;
+  const auto on_done = [this, axis = r.axis()] {
     taken_[axis].clear();
-    if (!held_[axis]) on_gone(axis);
+    if (seats_[axis].owner() == 0) on_gone(axis);
     if (over_) lose_all();  // the peer left before the bench answered
   };
-  Engine::Answer answer = [this, answered = answer_for(r.axis(), "axis", on_done)](Refused refused,
-                                                                                   Tick tick) {
-    --in_flight_;
-    answered(refused, tick);
-  };
+  Engine::Answer answer = answer_for(r.axis(), "axis", on_done);
   if (takes) return take(r, std::move(answer));
   if (dialogue_.owner() == 0) dialogue_.set_owner(engine_.new_owner(dialogue_.client()));
-  ++in_flight_;
-  engine_.request({.tick = 0, .axis = r.axis(), .owner = dialogue_.owner(), .action = action},
-                  std::move(answer), &dialogue_.client());
+  seats_[r.axis()].ask(action, dialogue_.owner(), std::move(answer), &dialogue_.client());
 }
 
 void Leases::take(const v1::LeaseRequest& r, Engine::Answer answer) {
@@ -48,19 +41,18 @@ void Leases::take(const v1::LeaseRequest& r, Engine::Answer answer) {
                                 std::to_string(r.reason().size()),
                             "reason");
   }
-  // A number that is newer than that of the owner before, so that numbers tell the order.
-  const bool may_hold = in_flight_ > 0 || std::find(held_.begin(), held_.end(), true) != held_.end();
+  // The new owner's number is newer than that of the owner before, so that numbers tell the order.
+  const bool may_hold = std::any_of(seats_.begin(), seats_.end(),
+                                    [](const Seat& seat) { return seat.is_asking() || seat.owner() != 0; });
   if (dialogue_.owner() == 0 || !may_hold) dialogue_.set_owner(engine_.new_owner(dialogue_.client()));
-  ++in_flight_;
-  engine_.take(r.axis(), dialogue_.owner(), r.reason(), std::move(answer));
+  seats_[r.axis()].take(dialogue_.owner(), r.reason(), std::move(answer));
 }
 
 void Leases::on_taken(const Taken& taken) {
-  if (taken.from != dialogue_.owner() || !held_[taken.axis]) return;
+  if (!seats_[taken.axis].notice_taken(taken)) return;
   const Client* const by = engine_.client(taken.by);
   const std::string sentence = "axis " + std::to_string(taken.axis) + " was taken by " +
                                (by == nullptr ? "an administrator" : name_of(*by)) + ": " + taken.reason;
-  held_[taken.axis] = false;
   taken_[taken.axis] = sentence;
   dialogue_.notify(v1::Notice::KIND_LEASE_TAKEN, sentence, taken.axis);
   on_gone(taken.axis);
@@ -68,13 +60,8 @@ void Leases::on_taken(const Taken& taken) {
 
 void Leases::lose_all() {
   over_ = true;
-  for (std::uint32_t axis = 0; axis < held_.size(); ++axis) {
-    if (!held_[axis]) continue;
-    held_[axis] = false;
-    engine_.request(
-        {.tick = 0, .axis = axis, .owner = dialogue_.owner(), .action = LeaseAction::kLost},
-        [](Refused, Tick) {}, &dialogue_.client());
-  }
+  for (Seat& seat : seats_)
+    seat.lose(&dialogue_.client());
 }
 
 bool Leases::may_change(std::uint32_t axis) {
@@ -108,7 +95,7 @@ Engine::Answer Leases::answer_for(std::uint32_t axis, const char* field, std::fu
 /// this is the latest end that it can have.
 void Leases::refuse_owned(std::uint64_t id, std::uint32_t axis) {
   const Client* const holder = engine_.client(engine_.owner(axis));
-  const std::string name = holder == nullptr ? "somebody" : name_of(*holder);
+  const std::string name = holder == nullptr ? "another client" : name_of(*holder);
   const Tick end = engine_.tick() + engine_.config().setup.lease_ticks;
   v1::Refusal& refusal = *dialogue_.begin_reply(id).mutable_refusal();
   refusal.set_code(v1::REFUSAL_OWNED);

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "server/access/seat.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
 
 namespace drivebench {
 
-/// The leases of a session, which holds all of them under one owner number, and what may be asked of the
-/// bench with them.
+/// The leases of a session: a seat for each axis, all under one owner number.
 class Leases {
  public:
   explicit Leases(Dialogue& dialogue);
@@ -39,8 +39,7 @@ class Leases {
 
   Dialogue& dialogue_;
   Engine& engine_;
-  std::vector<bool> held_;          // by axis
-  std::size_t in_flight_ = 0;       // requests for leases without an answer yet
+  std::vector<Seat> seats_;         // by axis
   std::vector<std::string> taken_;  // by axis: the administrator that took it, and why
   bool over_ = false;
 };

@@ -12,12 +12,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/server/endpoints/simulated_clock.hpp"
+
 namespace drivebench {
 namespace {
 
 using namespace std::chrono_literals;
 
-/// An outbox and its peer, who reads when told to.
+/// An outbox and its peer, which reads when told to.
 class Pair {
  public:
   explicit Pair(const std::shared_ptr<OutboxPool>& pool)
@@ -87,8 +89,8 @@ class Pair {
   std::shared_ptr<void> owner_ = std::make_shared<int>();
 };
 
-// Catches: a limit that counts only what came after the piece under way, so that twice as much waits; one
-// that cuts a byte too early; one that tears the order of what waited.
+// Catches: a limit that does not count the piece under way, so that twice as much waits; a limit that cuts a
+// byte too early; queued bytes that leave out of order.
 TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
   for (const bool one_too_many : {false, true}) {
     const auto pool = std::make_shared<OutboxPool>();
@@ -114,9 +116,9 @@ TEST(Outbox, LIMIT_03_AMebibyteMayWaitAndNotAByteMore) {
   }
 }
 
-// Catches: memory that grows with the number of those who do not read; a share that is not given back; the
-// many who leave nothing to the one who comes last.
-TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
+// Catches: memory that grows with the number of peers that do not read; a share that is not given back; many
+// peers that leave nothing to the last one.
+TEST(Outbox, OS_11_ManyPeersThatDoNotReadGetLittleEach) {
   const auto pool = std::make_shared<OutboxPool>();
   std::vector<std::unique_ptr<Pair>> deaf;
   std::size_t most = 0;
@@ -135,34 +137,16 @@ TEST(Outbox, OS_11_ManyWhoDoNotReadGetLittleEach) {
   Pair modest(pool);
   while (modest.waiting() < Outbox::kAlwaysQueued - 10'000)
     modest.send(10'000);
-  EXPECT_EQ(modest.cut, "") << "what an answer needs is always there";
+  EXPECT_EQ(modest.cut, "") << "there is always room for an answer";
   deaf.clear();
   EXPECT_EQ(pool->bytes, modest.waiting());
 }
 
-/// The server's clock, which stands still or jumps, until the end of a test.
-class Clock {
- public:
-  Clock() { ServerClock::simulate(now_); }
-  ~Clock() { ServerClock::simulate(ServerClock::time_point(ServerClock::duration(-1))); }
-  Clock(const Clock&) = delete;
-  Clock& operator=(const Clock&) = delete;
-  /// What is due then comes at the next turn of the io_context, together with all else that there is.
-  void pass(asio::io_context& io, ServerClock::duration time) {
-    ServerClock::simulate(now_ += time);
-    const auto waker = std::make_shared<ServerTimer>(io, ServerClock::time_point::min());
-    waker->async_wait([waker](const boost::system::error_code&) {});
-  }
-
- private:
-  ServerClock::time_point now_ = ServerClock::now();
-};
-
-// Catches: a limit that goes on although what it waited for has come in the same turn, as after a pause of
-// the process.
-TEST(Outbox, LIMIT_04_WhoHasReadDuringAPauseStays) {
+// Catches: a limit that ends a peer although its bytes have arrived in the same turn, as after a pause of the
+// process.
+TEST(Outbox, LIMIT_04_APeerThatReadDuringAPauseStays) {
   for (const std::chrono::milliseconds pause : {2001ms, 3000ms}) {
-    Clock clock;
+    SimulatedClock clock;
     Pair pair(std::make_shared<OutboxPool>());
     pair.send(700'000);  // more than the kernel takes
     ASSERT_GT(pair.waiting(), 0u);
@@ -175,10 +159,10 @@ TEST(Outbox, LIMIT_04_WhoHasReadDuringAPauseStays) {
   }
 }
 
-// Catches: a pause of the process that counts for the peer, as if what he has read meanwhile could be known
-// without a turn of whoever stands in between.
-TEST(Outbox, LIMIT_04_APauseOfTheServerCountsForNobody) {
-  Clock clock;
+// Catches: a pause of the process that counts as silence of the peer, although the server has not yet looked
+// at what the peer has read meanwhile.
+TEST(Outbox, LIMIT_04_APauseOfTheServerIsNoSilenceOfThePeer) {
+  SimulatedClock clock;
   Pair pair(std::make_shared<OutboxPool>());
   pair.send(700'000);
   ASSERT_GT(pair.waiting(), 0u);
