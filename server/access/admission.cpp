@@ -29,7 +29,8 @@ Admission::Decision Admission::admit(std::string_view token, const std::string& 
   return {.why_not = grant->revoked ? "the token has been revoked" : "the time of the token is over"};
 }
 
-/// Bounded: first go those whose wait is long over, then whoever is free soonest.
+/// Keeps the table bounded: drops addresses whose wait is long over, and if that is not enough, the address
+/// whose wait ends first.
 void Admission::make_room(Time now) {
   if (guesses_.size() < kMaxAddresses) return;
   std::erase_if(guesses_, [now](const auto& entry) { return now - entry.second.until > kForgotten; });

@@ -12,11 +12,11 @@
 
 namespace drivebench {
 
-/// Who may come in: looks at tokens, and makes those wait who guess.
+/// Decides whether a token opens a session, and slows guessing down.
 ///
-/// After a wrong token nobody from the same address is listened to for half a second, after the next one for
-/// twice as long, up to half a minute: so nobody has more than two guesses a minute in the long run, however
-/// many connections he makes. A right token makes that good.
+/// After a wrong token no token from the same address is looked at for half a second, after the next wrong
+/// one for twice as long, up to half a minute. So an address has at most two guesses a minute in the long
+/// run, over any number of connections. A right token ends the wait.
 class Admission {
  public:
   using Time = ServerClock::time_point;
@@ -28,22 +28,22 @@ class Admission {
   static constexpr auto kForgotten = std::chrono::minutes(10);
   static constexpr std::size_t kMaxAddresses = 1024;
 
-  /// Without `asks_for_token` everybody may come in as an administrator.
+  /// Without `asks_for_token` every session is that of an administrator.
   Admission(bool asks_for_token, std::vector<Grant> grants)
       : asks_(asks_for_token), grants_(std::move(grants)) {}
 
   struct Decision {
     bool admitted = false;
-    bool looked_at = true;  ///< false: the token was not looked at, its sender has to wait
-    Grant grant{};          ///< of the subject; that of nobody in particular if no token is asked for
+    bool looked_at = true;  ///< false: the address must wait, the token was not looked at
+    Grant grant{};          ///< of the user; without a name if no token is asked for
     std::string why_not{};  ///< one sentence
   };
   /// `address` is where the peer comes from, without its port.
   Decision admit(std::string_view token, const std::string& address, Time now, WallTime wall);
 
-  /// What holds from now on.
+  /// Puts these grants in place of those before.
   void replace(std::vector<Grant> grants) { grants_ = std::move(grants); }
-  /// The grant that an earlier one has become; null: it holds no more.
+  /// What an earlier grant is now; null: it holds no more.
   const Grant* renewed(const Grant& earlier, WallTime wall) const;
 
   std::size_t addresses_that_wait() const noexcept { return guesses_.size(); }
@@ -51,7 +51,7 @@ class Admission {
  private:
   struct Guesses {
     ServerClock::duration wait{};  ///< after the last one
-    Time until{};                  ///< nothing is looked at before
+    Time until{};                  ///< no token is looked at before
   };
 
   void make_room(Time now);

@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-/// What an input is called and what is to be said of it; no name: nothing is written.
+/// Name and details of an input in the log; without a name it is not written.
 class Description {
  public:
   Description(const Engine& engine, const Input& input) : engine_(engine), input_(input) {
@@ -162,8 +162,8 @@ void Audit::note(Event event) {
   line["tick"] = engine_ != nullptr ? engine_->tick() : 0;
   line["event"] = event.name;
   line["axis"] = event.axis ? nlohmann::ordered_json(engine_->config().axes[*event.axis].name) : nullptr;
-  const Client nobody;
-  const Client& client = event.client != nullptr ? *event.client : nobody;
+  const Client unknown;
+  const Client& client = event.client != nullptr ? *event.client : unknown;
   line["transport"] = client.transport;
   line["peer"] = client.peer;
   line["subject"] = client.subject;
@@ -175,8 +175,7 @@ void Audit::note(Event event) {
   }
   if (left_out_ > 0) line["details"]["left_out_before"] = left_out_;
   if (lost_ > 0) line["details"]["lost_before"] = lost_;
-  // All but ASCII is escaped: whatever a client calls itself, a line is a line and does nothing to a
-  // terminal.
+  // All but ASCII is escaped, so that the name of a client can neither break a line nor control a terminal.
   if (file_.append(line.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace))) {
     left_out_ = 0;
     if (std::exchange(failing_, false)) spdlog::warn("the audit log can be written again");
@@ -190,7 +189,7 @@ void Audit::fail() {
   const bool is_news = !std::exchange(failing_, true);
   if (is_news) spdlog::error("the audit log cannot be written: {}", std::generic_category().message(errno));
   if (on_failure_ != AuditFailure::kSafe || engine_ == nullptr) return;
-  // What comes of this is noted as well, and fails as well, when these leases are gone already.
+  // The loss is noted as well, which fails as well; by then these leases are gone from seen_.
   for (std::uint32_t axis = 0; axis < seen_.size(); ++axis) {
     const Owner owner = std::exchange(seen_[axis].holder, Owner{0});
     if (owner == 0) continue;

@@ -19,26 +19,26 @@ namespace drivebench {
 /// More about an event, by name.
 using AuditDetail = std::pair<std::string_view, std::variant<std::string, double, std::uint64_t>>;
 
-/// The audit log: who did what, and what came of it, one JSON object a line. It looks on where inputs go to
-/// the engine and where samples come back, so that it sees every transport alike. Everything happens on the
-/// I/O thread.
+/// The audit log: the client, the action and the result, one JSON object a line. It observes the inputs on
+/// their way to the engine and the samples on their way back, so all transports look alike to it. Everything
+/// happens on the I/O thread.
 ///
-/// What is refused (requests, tokens, connections) is written ten times a second at most after the first
+/// Refusals (of requests, tokens, connections) are written at most ten times a second after the first
 /// hundred, so that a stranger cannot fill the disk; the next line says how many were left out.
 class Audit {
  public:
   /// Throws std::runtime_error if the file cannot be had.
   explicit Audit(const AuditConfig& config);
 
-  /// From now on writes what happens to this bench. Where the configuration says so, all controllers lose
-  /// their axes when a line cannot be written.
+  /// Writes the events of this bench from now on. If the configuration says so, all controllers lose their
+  /// axes when a line cannot be written.
   void watch(Engine& engine);
 
   struct Event {
     std::string_view name;
     std::optional<std::uint32_t> axis{};
     const Client* client = nullptr;
-    std::string_view result = "done";  ///< anything else: refused, and why
+    std::string_view result = "done";  ///< anything else is the reason of a refusal
     std::vector<AuditDetail> details{};
   };
   void note(Event event);
@@ -57,7 +57,7 @@ class Audit {
   void fail();
 
   struct Seen {
-    Owner holder = 0;  ///< who holds the axis as far as requests tell
+    Owner holder = 0;  ///< of the axis, as the answered requests tell
     std::uint64_t state = 0;
     std::uint64_t faults = 0;
   };

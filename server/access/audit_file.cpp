@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-/// Not blocking, so that a pipe nobody reads cannot hold the server up before it is turned down.
+/// Opens without blocking, so that a pipe without a reader is turned down instead of holding the server up.
 int open_at(const std::filesystem::path& path) {
   constexpr int kFlags = O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
   const int file = ::open(path.c_str(), kFlags, S_IRUSR | S_IWUSR);

@@ -7,19 +7,19 @@
 
 namespace drivebench {
 
-/// A file of lines that are only ever appended, each in one write, so that several programs and a rotation
-/// may share it.
+/// A file to which lines are appended, each in one write, so that several programs and a rotation may share
+/// it.
 class AuditFile {
  public:
   /// Opens or makes it, for its owner only. Throws std::runtime_error if it is not a regular file, a link, or
-  /// one that others may read or write.
+  /// one that other users may read or write.
   explicit AuditFile(std::filesystem::path path);
   ~AuditFile();
   AuditFile(const AuditFile&) = delete;
   AuditFile& operator=(const AuditFile&) = delete;
 
-  /// Appends a line; false if the system did not take all of it, with errno saying why. What is then left of
-  /// it ends before the next.
+  /// Appends a line; false if the system did not take all of it, with errno saying why. The next line
+  /// then begins on a line of its own.
   bool append(std::string line) noexcept;
   /// Opens the path anew, after a rotation; false, and the old one stays, if that does not work.
   bool reopen() noexcept;

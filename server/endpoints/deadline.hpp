@@ -8,8 +8,9 @@
 namespace drivebench {
 
 /// A limit for a peer, in the time that this process runs. After a pause of the process (a signal, a virtual
-/// machine, a thread that hung) what the peer did meanwhile and the end of its time come together: a handler
-/// that is queued can no longer be cancelled, and bytes may have some way to go within the server.
+/// machine, a thread that hung) the bytes of the peer and the end of its time arrive together; then the peer
+/// gets the time of the pause on top, since a queued handler can no longer be cancelled and its bytes may
+/// still be on their way through the server.
 class Deadline {
  public:
   explicit Deadline(const asio::any_io_executor& executor) : timer_(executor) {}
@@ -29,7 +30,7 @@ class Deadline {
   void call_off() { timer_.expires_at(ServerClock::time_point::max()); }
 
  private:
-  /// Who is as late has been away, and that time does not count.
+  /// A timer that is this late shows that the process was paused.
   static constexpr auto kPause = std::chrono::milliseconds(100);
 
   ServerTimer timer_;

@@ -8,7 +8,7 @@
 
 namespace drivebench {
 
-/// How a transport is doing, for whoever asks the bench.
+/// State and counts of a transport, for the status of the bench.
 struct TransportReport {
   std::string name;   ///< for example "can socketcan:vcan0"
   std::string state;  ///< "up", or what is wrong

@@ -10,10 +10,10 @@
 
 namespace drivebench {
 
-/// The ways in beside the stream sockets, as configured: every CAN bus, and Modbus.
+/// The transports beside the stream sockets, as configured: every CAN bus, and Modbus.
 class Transports {
  public:
-  /// Opens them; throws std::runtime_error that names what cannot be had.
+  /// Opens them; throws std::runtime_error that names the bus or address that cannot be opened.
   Transports(asio::io_context& io, const BenchConfig& config);
 
   /// `audit` may be null.

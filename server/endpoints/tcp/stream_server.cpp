@@ -16,9 +16,9 @@ namespace {
 using asio::ip::tcp;
 using UnixProtocol = asio::local::stream_protocol;
 
-// After an accept that failed for want of descriptors: a pause instead of a spin.
+// After an accept that failed for want of descriptors the server pauses instead of spinning.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-// A peer that vanished without a word is given up after this time: the kernel asks an idle one every second.
+// A peer that vanished silently is given up after this time: the kernel probes an idle peer every second.
 constexpr int kUserTimeoutMs = 3000;
 constexpr int kSendBufferBytes = 64 * 1024;
 constexpr std::ptrdiff_t kMaxSilentSessions = 32;
@@ -140,9 +140,9 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
 void StreamServer::watch_door() {
   door_->on_turned_away = [this](const std::string& peer, const std::string& why) {
     ++context_->counts.tls_refused;
-    const Client who{.transport = "tcp", .peer = peer, .subject = {}};
+    const Client client{.transport = "tcp", .peer = peer, .subject = {}};
     if (context_->audit != nullptr) {
-      context_->audit->note({.name = "tls_refused", .client = &who, .result = why});
+      context_->audit->note({.name = "tls_refused", .client = &client, .result = why});
     }
   };
 }
@@ -184,15 +184,15 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
 }
 
 void StreamServer::receive(tcp::socket socket) {
-  Client who = peer_of(socket);
+  Client client = peer_of(socket);
   if (!door_) {
-    start(Socket(std::move(socket)), std::move(who));
+    start(Socket(std::move(socket)), std::move(client));
     return;
   }
-  const std::string peer = who.peer;
-  door_->receive(std::move(socket), peer, [this, who](Socket plain, const std::string& subject) {
+  const std::string peer = client.peer;
+  door_->receive(std::move(socket), peer, [this, client](Socket plain, const std::string& subject) {
     const std::weak_ptr<Session> session =
-        start(std::move(plain), {.transport = who.transport, .peer = who.peer, .subject = subject});
+        start(std::move(plain), {.transport = client.transport, .peer = client.peer, .subject = subject});
     return [session] {
       if (const auto still_here = session.lock()) still_here->on_deaf();
     };
@@ -200,8 +200,8 @@ void StreamServer::receive(tcp::socket socket) {
 }
 
 void StreamServer::receive(UnixProtocol::socket socket) {
-  Client who = peer_of(socket);
-  start(Socket(std::move(socket)), std::move(who));
+  Client client = peer_of(socket);
+  start(Socket(std::move(socket)), std::move(client));
 }
 
 TransportReport StreamServer::report() const {
@@ -227,8 +227,8 @@ void StreamServer::replace_grants(TcpConfig now) {
     sessions_[i]->on_new_grants();
 }
 
-std::shared_ptr<Session> StreamServer::start(Socket socket, Client who) {
-  auto session = std::make_shared<Session>(std::move(socket), who, *context_);
+std::shared_ptr<Session> StreamServer::start(Socket socket, Client client) {
+  auto session = std::make_shared<Session>(std::move(socket), client, *context_);
   const auto silent =
       std::count_if(sessions_.begin(), sessions_.end(), [](const auto& other) { return !other->greeted(); });
   std::string why_not;
@@ -240,7 +240,7 @@ std::shared_ptr<Session> StreamServer::start(Socket socket, Client who) {
   if (!why_not.empty()) {
     ++context_->counts.turned_away;
     if (context_->audit != nullptr) {
-      context_->audit->note({.name = "limit", .client = &who, .result = why_not});
+      context_->audit->note({.name = "limit", .client = &client, .result = why_not});
     }
     session->turn_away(why_not);
     session->close();

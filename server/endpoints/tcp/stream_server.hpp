@@ -23,16 +23,16 @@ class StreamServer {
   /// Address and port that the system gave, "127.0.0.1:7300".
   std::string tcp_address() const;
 
-  /// Starts accepting clients of this run and telling them about its ticks. `transports` tells of the other
-  /// ways in; `experiments` and `audit` may be null.
+  /// Starts accepting clients of this run and telling them about its ticks. `transports` gives the
+  /// reports of the other transports; `experiments` and `audit` may be null.
   void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
              Experiments* experiments, Audit* audit = nullptr);
 
-  /// What the tokens file says now: ends the sessions of tokens that hold no more. Throws std::runtime_error
-  /// if tokens are asked for now and were not before, or the other way round.
+  /// Takes over a changed tokens file and ends the sessions whose token holds no more. Throws
+  /// std::runtime_error if the file would begin or cease to ask for tokens.
   void replace_grants(TcpConfig now);
 
-  /// Stops accepting and ends every session; what a peer did not take at once is lost.
+  /// Stops accepting and ends every session; bytes that a peer did not take at once are lost.
   void close();
 
  private:
@@ -42,7 +42,7 @@ class StreamServer {
   asio::awaitable<void> accept_from(Acceptor& acceptor);
   void receive(asio::ip::tcp::socket socket);
   void receive(asio::local::stream_protocol::socket socket);
-  std::shared_ptr<Session> start(Socket socket, Client who);
+  std::shared_ptr<Session> start(Socket socket, Client client);
   void watch_door();
   TransportReport report() const;
   asio::awaitable<void> run(std::shared_ptr<Session> session);

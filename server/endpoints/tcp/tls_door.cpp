@@ -25,7 +25,7 @@ constexpr std::size_t kBlock = 16 * 1024;
 constexpr int kPairBufferBytes = 64 * 1024;
 constexpr auto kFarewellLimit = std::chrono::milliseconds(500);
 
-/// What went wrong with a file, as OpenSSL or the system says it.
+/// Throws with the reason that OpenSSL or the system gives.
 [[noreturn]] void refuse_file(const std::filesystem::path& file, const std::string& why) {
   throw std::runtime_error("TLS: " + file.string() + ": " + why);
 }
@@ -56,7 +56,7 @@ std::string name_in(const X509* certificate) {
   return printable({reinterpret_cast<const char*>(utf8), static_cast<std::size_t>(size)});
 }
 
-/// The name in the certificate of a peer who was let in; empty: he has shown none.
+/// The name in the certificate of a peer; empty: it has shown none.
 std::string subject_of(SSL* tls) {
   const std::unique_ptr<X509, decltype(&X509_free)> certificate(SSL_get1_peer_certificate(tls), &X509_free);
   return name_in(certificate.get());
@@ -149,7 +149,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   Deadline deadline;
   std::string refused_subject;  ///< in a certificate that does not hold
   bool was_late = false;        ///< a limit has ended it
-  OnDeaf on_deaf;               ///< of a peer who was let in
+  OnDeaf on_deaf;               ///< of a peer that has been let in
 
  private:
   template <class To>
@@ -166,7 +166,7 @@ TlsDoor::TlsDoor(asio::io_context& io, const TlsConfig& config)
     : io_(io), context_(std::make_unique<Context>()) {
   asio::ssl::context& tls = context_->tls;
   SSL_CTX_set_min_proto_version(tls.native_handle(), TLS1_3_VERSION);
-  // Nobody comes back without his certificate, which may have been revoked since.
+  // No resumption: each connection shows its certificate, which may have been revoked since.
   SSL_CTX_set_num_tickets(tls.native_handle(), 0);
   SSL_CTX_set_session_cache_mode(tls.native_handle(), SSL_SESS_CACHE_OFF);
   boost::system::error_code error;

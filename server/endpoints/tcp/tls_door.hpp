@@ -15,7 +15,8 @@ namespace drivebench {
 /// for kHandshakeLimit.
 ///
 /// Behind the door each peer is one end of a pair of unix sockets; this object carries bytes between it and
-/// the other, one block at a time in each direction: who does not read is found out as without TLS.
+/// the other end, one block at a time in each direction, so that a peer that does not read is noticed as
+/// without TLS.
 class TlsDoor {
  public:
   static constexpr int kMaxHandshakes = 32;
@@ -26,15 +27,15 @@ class TlsDoor {
   ~TlsDoor();
 
   using PlainSocket = asio::generic::stream_protocol::socket;
-  /// Called when a client who was let in takes nothing for Outbox::kNoProgressLimit, before he is cut off.
+  /// Called when a client takes nothing for Outbox::kNoProgressLimit, before it is cut off.
   using OnDeaf = std::function<void()>;
-  /// Takes a client who is let in, and the name in his certificate (empty: he showed none).
+  /// Takes a client after the handshake, with the name in its certificate (empty: it showed none).
   using LetIn = std::function<OnDeaf(PlainSocket, const std::string& subject)>;
 
-  /// Called with everyone who was not let in, and why. The log hears of some of them.
+  /// Called for every peer that was turned away, with the reason. The log has a limited number of them.
   std::function<void(const std::string& peer, const std::string& why)> on_turned_away;
 
-  /// Shakes hands with a peer and lets him in.
+  /// Shakes hands with a peer and hands its plain socket to `let_in`.
   void receive(asio::ip::tcp::socket socket, const std::string& peer, LetIn let_in);
 
  private:

@@ -12,9 +12,9 @@
 
 namespace drivebench {
 
-/// The sessions that a tick concerns, so that all others cost it nothing: those whose exchange waits for it,
-/// which are answered first, and those with subscriptions. Of these a few are served in a turn, and there is
-/// a pause between turns: many viewers get more samples in a message, instead of making a controller wait.
+/// The sessions that a tick concerns; all others cost it nothing. Sessions whose exchange waits for the tick
+/// are answered first. Of the sessions with subscriptions a few are served in a turn, with a pause between
+/// turns, so that many viewers get more samples in a message instead of making a controller wait.
 class Audience {
  public:
   /// The part of a session that sends samples.

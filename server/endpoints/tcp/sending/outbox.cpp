@@ -23,7 +23,7 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
   }
 }
 
-/// In chunks, so that what has gone takes no memory, and nothing that waits is ever moved.
+/// Queues in chunks, so that sent bytes take no memory and waiting bytes are never moved.
 void Outbox::queue(std::span<const std::byte> bytes) {
   constexpr std::size_t kChunk = std::size_t{16} * 1024;
   waiting_ += bytes.size();

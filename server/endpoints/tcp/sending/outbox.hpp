@@ -15,15 +15,16 @@
 
 namespace drivebench {
 
-/// What waits in all outboxes of a server, in bytes.
+/// The bytes that wait in all outboxes of a server.
 struct OutboxPool {
-  /// Each may hold as much as this leaves free, so that many who do not read get little each.
+  /// Each outbox may hold as much as the others leave free of this, so that among many peers that do not read
+  /// each gets little.
   static constexpr std::size_t kMaxBytes = std::size_t{16} * 1024 * 1024;
   std::size_t bytes = 0;
 };
 
-/// The sending side of a stream socket: writes at once what the kernel takes, queues the rest up to a limit,
-/// and gives up on a peer that takes nothing for a while. Belongs to a session, which it keeps alive while a
+/// The sending side of a stream socket: writes what the kernel takes at once, queues the rest up to a limit,
+/// and cuts off a peer that takes nothing for a while. Belongs to a session, which it keeps alive while a
 /// write is under way.
 class Outbox {
  public:
@@ -43,7 +44,7 @@ class Outbox {
   /// Sends or queues the bytes; `owner` is kept alive as long as needed.
   void send(std::span<const std::byte> bytes, const std::shared_ptr<void>& owner);
 
-  /// Whether everything so far has gone to the kernel.
+  /// Whether the kernel has taken all bytes so far.
   bool idle() const noexcept { return !writing_; }
 
   /// Called when the peer is cut off, with the reason.
@@ -51,11 +52,11 @@ class Outbox {
   /// Called when the queue has become empty again.
   std::function<void()> on_idle;
 
-  /// Closes it, and says why, unless it is closed already.
+  /// Closes the socket and reports the reason, unless it is closed already.
   void cut(std::string_view why);
-  /// The same for a peer who took nothing for kNoProgressLimit.
+  /// The same for a peer that took nothing for kNoProgressLimit.
   void cut_deaf();
-  /// Shuts the socket down; what is queued is lost.
+  /// Shuts the socket down; queued bytes are lost.
   void close() noexcept;
 
  private:

@@ -9,17 +9,17 @@
 
 namespace drivebench {
 
-/// The newest samples of an axis, or every n-th of them, kept once for all who subscribe to them.
+/// The newest samples of an axis, or every n-th of them, kept once for all subscriptions to them.
 class SampleFeed {
  public:
-  /// Samples that wait for a reader: of more he loses the oldest.
+  /// So many samples wait for a reader; when there are more, it loses the oldest.
   static constexpr std::size_t kDepth = 256;
 
-  /// Where a reader stands, and how many samples he has lost that nobody has told him of.
+  /// Position of a reader in the feed.
   struct Reader {
-    std::uint64_t next;
-    std::uint64_t skipped;
-    std::uint64_t dropped;
+    std::uint64_t next;     ///< number of the sample that it reads next
+    std::uint64_t skipped;  ///< the feed's count of skipped samples at its last read
+    std::uint64_t dropped;  ///< samples that it has lost and has not been told of
   };
 
   /// Samples whose tick is a multiple of `decimation`, 1 or more, after the tick `now`.
@@ -31,9 +31,10 @@ class SampleFeed {
 
   /// After each tick.
   void take(const Sample& newest);
-  /// A reader of what comes from now on.
+  /// A reader of the samples from now on.
   Reader reader() const noexcept { return {.next = taken_, .skipped = skipped_, .dropped = 0}; }
-  /// The next samples for the reader, those that lie in one piece and `at_most` of them; empty if he has all.
+  /// The next samples for the reader: as many as lie in one piece, and at most `at_most`. Empty if it has
+  /// read all.
   std::span<const Sample> read(Reader& reader, std::size_t at_most) const;
 
  private:
@@ -41,7 +42,7 @@ class SampleFeed {
   std::uint32_t decimation_;
   std::uint64_t last_tick_;  // seen
   std::uint64_t taken_ = 0;
-  std::uint64_t skipped_ = 0;  // samples of ticks that were over before this thread saw them
+  std::uint64_t skipped_ = 0;  // samples of ticks that this thread did not see
   std::vector<Sample> ring_;   // sample n at n modulo kDepth
 };
 

@@ -71,8 +71,8 @@ bool Identity::may_ask() {
   const std::string field = kind == nullptr ? "kind" : kind->name();
   dialogue_.audit("forbidden", "the role does not allow it", {{"request", field}});
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_FORBIDDEN,
-                   "this session is that of " + (grant_.name.empty() ? "nobody" : grant_.name) + ", a " +
-                       std::string(name_of(grant_.role)) + "; this needs the role " +
+                   "this session is that of " + (grant_.name.empty() ? "an unnamed user" : grant_.name) +
+                       ", a " + std::string(name_of(grant_.role)) + "; this request needs the role " +
                        std::string(name_of(needed)),
                    field.c_str());
   return false;
