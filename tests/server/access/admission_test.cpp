@@ -41,12 +41,12 @@ TEST_F(AdmissionTest, SEC_04_TenThousandGuessesAreHeldUp) {
   }
   // In 1000 s: at 0, 0.5, 1.5, 3.5, 7.5, 15.5, 31.5 s and then every 30 s.
   EXPECT_EQ(looked_at, 7 + static_cast<int>((999.9 - 31.5) / 30.0));
-  EXPECT_FALSE(try_with("right").admitted) << "nobody is listened to while he has to wait";
+  EXPECT_FALSE(try_with("right").admitted) << "no token is looked at during the wait";
   now += 30s;
   EXPECT_TRUE(try_with("right").admitted);
 }
 
-// Catches: a wait that is not of the length that was promised, and one that a right token does not end.
+// Catches: a wait of another length than promised, and one that a right token does not end.
 TEST_F(AdmissionTest, SEC_04_TheWaitDoublesAndARightTokenEndsIt) {
   for (const auto wait : {500ms, 1000ms, 2000ms, 4000ms, 8000ms, 16'000ms, 30'000ms, 30'000ms}) {
     EXPECT_TRUE(try_with("wrong").looked_at);
@@ -60,24 +60,24 @@ TEST_F(AdmissionTest, SEC_04_TheWaitDoublesAndARightTokenEndsIt) {
   EXPECT_TRUE(try_with("right").admitted) << "after a right token the wait is short again";
 }
 
-// Catches: one who guesses and locks everybody out.
-TEST_F(AdmissionTest, SEC_04_OthersDoNotWaitForHim) {
+// Catches: guesses from one address that lock the others out.
+TEST_F(AdmissionTest, SEC_04_OtherAddressesDoNotWait) {
   EXPECT_FALSE(try_with("wrong").admitted);
   EXPECT_TRUE(try_with("right", "192.0.2.2").admitted);
 }
 
-// Catches: a table that strangers make as large as they like.
+// Catches: a table that grows with every address that guesses.
 TEST_F(AdmissionTest, SEC_04_TheTableOfAddressesIsBounded) {
   for (int peer = 0; peer < 10'000; ++peer) {
     try_with("wrong", "peer " + std::to_string(peer));
     now += 1ms;
     ASSERT_LE(admission.addresses_that_wait(), Admission::kMaxAddresses);
   }
-  EXPECT_FALSE(try_with("wrong", "peer 9999").looked_at) << "the last ones still wait";
+  EXPECT_FALSE(try_with("wrong", "peer 9999").looked_at) << "the newest addresses still wait";
 }
 
-// Catches: tokens that work after their time, after they were revoked, or that stay when the file has gone
-// on.
+// Catches: tokens that open a session after their time, after they were revoked, or after they were removed
+// from the file.
 TEST_F(AdmissionTest, OWN_07_SEC_04_ATokenHoldsUntilItEndsOrIsTakenAway) {
   EXPECT_EQ(try_with("until one").grant.name, "ben");
   wall += 1h;
@@ -95,16 +95,16 @@ TEST_F(AdmissionTest, OWN_07_SEC_04_ATokenHoldsUntilItEndsOrIsTakenAway) {
   EXPECT_FALSE(try_with("right").admitted);
   admission.replace({});
   now += 30s;
-  EXPECT_FALSE(try_with("until one").admitted) << "without entries nobody comes in";
+  EXPECT_FALSE(try_with("until one").admitted) << "without entries no token opens anything";
 }
 
-// Catches: a bench without tokens that lets nobody do anything.
-TEST(Admission, WithoutTokensEverybodyIsAnAdministrator) {
+// Catches: a bench without tokens on which no session may do anything.
+TEST(Admission, WithoutTokensEverySessionIsAnAdministrator) {
   Admission open(false, {});
   const Admission::Decision decision = open.admit("whatever", "127.0.0.1", Admission::Time{}, kNoon);
   EXPECT_TRUE(decision.admitted);
   EXPECT_EQ(decision.grant.role, Role::kAdmin);
-  EXPECT_EQ(open.renewed(decision.grant, kNoon), &decision.grant) << "and stays it";
+  EXPECT_EQ(open.renewed(decision.grant, kNoon), &decision.grant) << "it stays so";
 }
 
 }  // namespace

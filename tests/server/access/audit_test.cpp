@@ -75,9 +75,8 @@ class AuditTest : public ::testing::Test {
   Owner anna = 0;
 };
 
-// Catches: an event that leaves no line, stands under the name of another, or lacks who, when and what came
-// of it.
-TEST_F(AuditTest, SEC_07_EveryChangeIsALineWithWhoWhenAndWhat) {
+// Catches: an event that leaves no line, has the name of another event, or lacks client, time or result.
+TEST_F(AuditTest, SEC_07_EveryChangeIsALineWithClientTimeAndResult) {
   act(anna, LeaseAction::kAcquire);
   act(anna, LeaseAction::kRenew);
   drive(anna, 3);
@@ -105,11 +104,11 @@ TEST_F(AuditTest, SEC_07_EveryChangeIsALineWithWhoWhenAndWhat) {
   EXPECT_EQ(said[2]["subject"], "anna");
   EXPECT_EQ(said[5]["result"], "done");
   EXPECT_EQ(said[6]["result"], sentence_of(Refused::kNotOwner));
-  EXPECT_EQ(said[6]["peer"], "") << "nobody knows owner 99";
+  EXPECT_EQ(said[6]["peer"], "") << "owner 99 is unknown";
 }
 
-// Catches: an axis that is given to the administrator while it is still driven, and an owner who is not told
-// why.
+// Catches: an axis that is given to the administrator while it is still driven, and an owner that is not told
+// the reason.
 TEST_F(AuditTest, OWN_04_TakingByForceStopsTheAxisBeforeItChangesHands) {
   const Owner admin = engine->new_owner(kBen);
   std::vector<Taken> told;
@@ -160,9 +159,9 @@ class ShownEngine final : public Engine {
   }
 };
 
-// Catches: a lease that runs out, a fault or a second start with nobody noting it; one start that is noted
-// each tick.
-TEST_F(AuditTest, SEC_07_WhatSamplesTellStandsThere) {
+// Catches: a lease that runs out, a fault or a second start without a line; a start with a line for each
+// tick.
+TEST_F(AuditTest, SEC_07_EventsThatOnlySamplesShowAreLogged) {
   ShownEngine shown;
   audit->watch(shown);
   const Owner ben = shown.new_owner(kBen);
@@ -195,7 +194,7 @@ TEST_F(AuditTest, SEC_07_NamesCannotForgeLines) {
   EXPECT_TRUE(kept.starts_with("x\n{\"event\":\"forged\"}\r\x1b[31m\x7f\u009b")) << "escaped, not lost";
 }
 
-// Catches: a stranger whose refusals fill the disk, and lines that are left out without a word.
+// Catches: a stranger whose refusals fill the disk, and lines that are left out uncounted.
 TEST_F(AuditTest, SEC_07_RefusalsAreBoundedAndCounted) {
   for (int i = 0; i < 5000; ++i)
     act(99, ClearFaults{});
@@ -210,15 +209,15 @@ TEST_F(AuditTest, SEC_07_RefusalsAreBoundedAndCounted) {
   EXPECT_EQ(left_out, 5000 - said.size());
 }
 
-// Catches: a bench that is driven on with nobody writing down who does it, although that was asked for.
-TEST_F(AuditTest, SEC_07_WithoutALogNobodyDrives) {
+// Catches: a bench that is driven on without a log, although the configuration forbids it.
+TEST_F(AuditTest, SEC_07_WithoutALogEveryControllerLosesItsAxis) {
   act(anna, LeaseAction::kAcquire);
   drive(anna, 3);
   limit_files(fs::file_size(file()) + 10);
   act(anna, LoadChange{.load_nm = 0.5, .ramp_ticks = 0});
   EXPECT_EQ(engine->owner(0), 0u);
   EXPECT_EQ(act(anna, LeaseAction::kAcquire), Refused::kNot);
-  EXPECT_EQ(engine->owner(0), 0u) << "it cannot be written that she has it";
+  EXPECT_EQ(engine->owner(0), 0u) << "the line of this lease cannot be written";
   limit_files(RLIM_INFINITY);
   act(anna, LeaseAction::kAcquire);
   EXPECT_EQ(engine->owner(0), anna);
@@ -227,12 +226,12 @@ TEST_F(AuditTest, SEC_07_WithoutALogNobodyDrives) {
   std::string torn, last;
   for (std::string line; std::getline(in, line);)
     torn = std::exchange(last, line);
-  EXPECT_EQ(torn.size(), 10u) << "what the system had taken ends before the next line";
+  EXPECT_EQ(torn.size(), 10u) << "the torn line ends before the next one";
   EXPECT_EQ(json::parse(last)["details"].value("lost_before", std::uint64_t{0}), audit->lost());
 }
 
-// Catches: a run that ends because its log does, although it was to go on.
-TEST_F(AuditTest, SEC_07_ALogThatFailsMayBeToCountOnly) {
+// Catches: a run that ends with its log, although the configuration lets it go on.
+TEST_F(AuditTest, SEC_07_ALogThatFailsMayJustBeCounted) {
   audit =
       std::make_unique<Audit>(AuditConfig{.file = folder_ / "other", .on_failure = AuditFailure::kContinue});
   audit->watch(*engine);
@@ -244,8 +243,8 @@ TEST_F(AuditTest, SEC_07_ALogThatFailsMayBeToCountOnly) {
   EXPECT_EQ(audit->lost(), 1u);
 }
 
-// Catches: a log that others read, that goes where a link points, or that is lost in a rotation.
-TEST_F(AuditTest, SEC_07_TheFileIsItsOwnersAlone) {
+// Catches: a log that other users can read, that follows a link, or that is lost in a rotation.
+TEST_F(AuditTest, SEC_07_OnlyTheServersUserReadsTheFile) {
   struct stat status = {};
   ASSERT_EQ(::stat(file().c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777u, 0600u);

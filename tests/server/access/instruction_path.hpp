@@ -11,15 +11,15 @@
 
 namespace drivebench::test {
 
-/// The way of a program through its instructions.
+/// The instructions that a program executes, in order.
 struct InstructionPath {
   std::uint64_t count = 0;
   std::uint64_t hash = 0;  ///< of their addresses, in order
   friend bool operator==(const InstructionPath&, const InstructionPath&) = default;
 };
 
-/// Carries out `call` in a child, one instruction after the other. Children of one process have the same
-/// addresses, so the same way is the same path. Nothing if the kernel or the processor does not offer that.
+/// Carries out `call` in a child, one instruction at a time. Children of one process have the same addresses,
+/// so equal executions have equal paths. Empty if the kernel or the processor does not offer that.
 template <class Call>
 std::optional<InstructionPath> instruction_path(Call call) {
 #ifdef __x86_64__
