@@ -1,4 +1,4 @@
-// Writes that are carried out as a whole: what reaches the bench, in which order, and what stays of a
+// Writes that are carried out as a whole: the inputs that reach the bench, their order, and the state after a
 // refusal.
 #include <cmath>
 
@@ -10,7 +10,7 @@ namespace {
 
 constexpr Visitor kClient = 1;
 
-/// Keeps the inputs that it has room for and answers them when told.
+/// Keeps inputs up to its room and answers them when told.
 class SlowEngine final : public Engine {
  public:
   explicit SlowEngine(const BenchConfig& config) : Engine(config, nullptr) {}
@@ -77,7 +77,7 @@ double parameter(const Engine& engine, std::size_t place) {
   return axis_parameters(p)[parameter_rows(p)[place]].get(p);
 }
 
-// Catches: a block of parameters that takes a tick for each of them, and is half written in between.
+// Catches: a block of parameters that takes a tick for each, and is half written in between.
 TEST(ModbusDesk, ABlockOfParametersGoesToTheBenchTogether) {
   Desk desk;
   desk.write(1002, {0x4000, 0, 0x4000, 0});  // 2 ohm each
@@ -91,8 +91,8 @@ TEST(ModbusDesk, ABlockOfParametersGoesToTheBenchTogether) {
   EXPECT_EQ(parameter(desk.engine, 2), 2.0);
 }
 
-// Catches: a parameter that had no room on its way to the bench and reads as if it had arrived.
-TEST(ModbusDesk, AParameterThatDidNotGetThroughReadsAsBefore) {
+// Catches: a parameter that found no room on its way to the bench and reads as if it had arrived.
+TEST(ModbusDesk, AParameterThatDidNotReachTheBenchReadsAsBefore) {
   Desk desk;
   desk.engine.room = 1;
   const double second = parameter(desk.engine, 2);
@@ -110,8 +110,7 @@ TEST(ModbusDesk, AParameterThatDidNotGetThroughReadsAsBefore) {
   EXPECT_EQ(parameter(desk.engine, 3), third);
 }
 
-// Catches: a lease without a connection that a refused command keeps for as long as an owner may be silent,
-// or gives away.
+// Catches: a refused command that prolongs a lease without a connection, or that gives it away.
 TEST(ModbusDesk, ARefusedCommandDoesNotProlongALeaseThatLapses) {
   BenchConfig config = modbus_bench_config();
   config.setup.lease_ticks = 500'000'000 / config.setup.period_ns;
@@ -131,9 +130,9 @@ TEST(ModbusDesk, ARefusedCommandDoesNotProlongALeaseThatLapses) {
   bench.until([&] { return bench.owner() == 0; });
 }
 
-// Catches: a malformed command that counts for nobody, so that its sender may clear a fault whose cause
-// lasts; one that counts against the owner although a stranger sent it.
-TEST(ModbusDesk, AMalformedCommandIsThatOfItsSender) {
+// Catches: a malformed command that does not count, so that its sender may clear a fault whose cause lasts; a
+// stranger's command that counts against the owner.
+TEST(ModbusDesk, AMalformedCommandCountsAgainstItsSender) {
   ModbusBench bench(tripping_bench_config());
   Client owner(bench.port());
   Client other(bench.port());
@@ -151,28 +150,28 @@ TEST(ModbusDesk, AMalformedCommandIsThatOfItsSender) {
   const auto clear_is_refused = [&] { return owner.write(401, {1}) == 4 && owner.read_one(410) == 11; };
 
   EXPECT_EQ(owner.write(402, malformed), 3);
-  EXPECT_TRUE(clear_is_refused()) << "his last command was malformed";
+  EXPECT_TRUE(clear_is_refused()) << "the last command of the owner was malformed";
   command_well();
   EXPECT_EQ(owner.write(402, command_words(3, tick, 1.5f, 0.0f)), 3);
-  EXPECT_TRUE(clear_is_refused()) << "a duty that there is not";
+  EXPECT_TRUE(clear_is_refused()) << "a duty above 1";
   command_well();
   EXPECT_EQ(owner.write(122, {2}), 3);
-  EXPECT_TRUE(clear_is_refused()) << "process data with a mode that there is not";
+  EXPECT_TRUE(clear_is_refused()) << "process data with an unknown mode";
   command_well();
   EXPECT_EQ(other.write(400, with_key), 3);
-  EXPECT_TRUE(clear_is_refused()) << "the key is his";
+  EXPECT_TRUE(clear_is_refused()) << "the key is that of the owner";
   command_well();
   EXPECT_EQ(other.write(402, malformed), 3);
   with_key[0] = 8;
   EXPECT_EQ(other.write(400, with_key), 3);
-  EXPECT_EQ(owner.write(401, {1}), 0) << "these are a stranger's";
+  EXPECT_EQ(owner.write(401, {1}), 0) << "these two came from a stranger";
   command_well();
   EXPECT_EQ(bench.newest().faults & kLatchedFaults, 0u);
   EXPECT_EQ(bench.newest().refused_commands, 6u);
 }
 
-// Catches: an owner who reads why a stranger was refused when he asks why he was.
-TEST(ModbusDesk, LastRefusalTellsTheOwnerWhyHisOwnWriteWasRefused) {
+// Catches: an owner that reads the refusal of a stranger instead of its own.
+TEST(ModbusDesk, LastRefusalShowsTheOwnerTheRefusalOfItsOwnWrite) {
   ModbusBench bench;
   Client owner(bench.port());
   Client other(bench.port());
@@ -188,8 +187,8 @@ TEST(ModbusDesk, LastRefusalTellsTheOwnerWhyHisOwnWriteWasRefused) {
   EXPECT_EQ(other.read_one(410), 0) << "nothing that the new owner wrote";
 }
 
-// Catches: a key that is given back with a request that nobody carries out, and no word of it.
-TEST(ModbusDesk, GivingBackTheLeaseGoesWithNothingElse) {
+// Catches: a release together with a request that is silently not carried out.
+TEST(ModbusDesk, AReleaseTakesNoOtherRequest) {
   ModbusBench bench;
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);
@@ -197,14 +196,14 @@ TEST(ModbusDesk, GivingBackTheLeaseGoesWithNothingElse) {
     EXPECT_EQ(client.write(400, {0, request}), 3) << request;
     EXPECT_NE(bench.owner(), 0u);
   }
-  EXPECT_EQ(client.write(400, {0, 2}), 0) << "says the same twice";
+  EXPECT_EQ(client.write(400, {0, 2}), 0) << "both say release";
   EXPECT_EQ(bench.owner(), 0u);
   ASSERT_EQ(client.write(400, {7}), 0);
   EXPECT_EQ(client.write(400, {0, 0}), 0);
   EXPECT_EQ(bench.owner(), 0u);
 }
 
-// Catches: an exchange that reads back the words as they came, whatever the registers show.
+// Catches: an exchange that reads back the words as written instead of the registers.
 TEST(ModbusDesk, AnExchangeReadsWhatTheRegistersShow) {
   ModbusBench bench;
   Client client(bench.port());

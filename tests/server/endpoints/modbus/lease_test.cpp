@@ -1,4 +1,4 @@
-// Who may write, and what a command does: MB-11, MB-13 and MB-15 of the list of faults, and the exchange.
+// Leases, commands and exchanges: MB-11, MB-13 and MB-15 of the list of faults.
 #include <cmath>
 
 #include "plant/faults.hpp"
@@ -13,7 +13,7 @@ Input lease_input(LeaseAction action, std::uint32_t axis = 0) {
   return {.tick = 0, .axis = axis, .owner = kTcpSession, .action = action};
 }
 
-/// Bench whose lease lasts this long.
+/// A bench whose lease lasts this long.
 BenchConfig with_lease(std::int64_t lease_ms, RunMode mode = RunMode::kLockstep) {
   BenchConfig config = modbus_bench_config();
   config.mode = mode;
@@ -27,7 +27,7 @@ std::uint16_t lease_status(Client& client) {
   return client.read_one(409);
 }
 
-// Catches: numbers put together from two ticks, a float whose halves belong to different values.
+// Catches: a block put together from two ticks, a float whose halves belong to different values.
 TEST(Modbus, MB_11_ABlockIsOfOneTick) {
   BenchConfig config = modbus_bench_config();
   config.mode = RunMode::kRealtime;
@@ -51,7 +51,7 @@ TEST(Modbus, MB_11_ABlockIsOfOneTick) {
   EXPECT_GT(changes, 10) << "the bench was running";
 }
 
-// Catches: a sample block whose order, types or words differ from the catalogue; a mirror that is not one.
+// Catches: a sample block whose order, types or words differ from the catalogue; a mirror with other values.
 TEST(Modbus, MB_11_TheSampleBlockIsTheSample) {
   ModbusBench bench;
   Client client(bench.port());
@@ -80,7 +80,7 @@ TEST(Modbus, MB_11_TheSampleBlockIsTheSample) {
   EXPECT_EQ(process[9], 10'000u) << "1000 V";
 }
 
-// Catches: a write without the lease that works, is not counted, or is answered as if it had worked.
+// Catches: a write without the lease that is carried out, is not counted, or is answered as if carried out.
 TEST(Modbus, MB_13_WithoutTheLeaseNothingIsWritten) {
   ModbusBench bench;
   Client client(bench.port());
@@ -103,7 +103,7 @@ TEST(Modbus, MB_13_WithoutTheLeaseNothingIsWritten) {
   EXPECT_TRUE(client.exchange(1, 0, 5.0f, 0.0f).empty());
   EXPECT_EQ(client.last_exception(), 6);
   EXPECT_EQ(lease_status(client), kAnotherConnection);
-  EXPECT_EQ(client.read_one(400), 0) << "the key is told to its holder only";
+  EXPECT_EQ(client.read_one(400), 0) << "only the holder reads the key";
   EXPECT_EQ(owner.read_one(400), 7);
   EXPECT_FALSE(owner.exchange(1, 0, 5.0f, 0.0f).empty());
   EXPECT_EQ(bench.newest().refused_commands, 4u) << "three commands and the control word";
@@ -111,7 +111,7 @@ TEST(Modbus, MB_13_WithoutTheLeaseNothingIsWritten) {
 }
 
 // Catches: an axis with two owners, one on each transport.
-TEST(Modbus, MB_13_AnotherTransportHoldsTheLeaseAsWell) {
+TEST(Modbus, MB_13_ALeaseOfAnotherTransportCounts) {
   ModbusBench bench;
   Client client(bench.port());
   ASSERT_EQ(bench.request(lease_input(LeaseAction::kAcquire)), Refused::kNot);
@@ -127,7 +127,7 @@ TEST(Modbus, MB_13_AnotherTransportHoldsTheLeaseAsWell) {
   EXPECT_EQ(bench.owner(), 0u);
 }
 
-// Catches: ways to take, renew and give back that do not.
+// Catches: a register or coil that does not acquire, renew or release.
 TEST(Modbus, TheLeaseComesAndGoesByRegisterAndCoil) {
   ModbusBench bench;
   Client client(bench.port());
@@ -153,7 +153,7 @@ TEST(Modbus, TheLeaseComesAndGoesByRegisterAndCoil) {
   EXPECT_FALSE(client.exchange(1, 0, 1.0f, 0.0f).empty());
 }
 
-// Catches: a lease that ends with its connection, or never; one that another key can take meanwhile.
+// Catches: a lease that ends with its connection, or never; a lease that another key can take meanwhile.
 TEST(Modbus, MB_15_TheLeaseOutlivesTheConnectionForALeaseTime) {
   {
     ModbusBench bench(with_lease(60'000));
@@ -188,7 +188,7 @@ TEST(Modbus, MB_15_TheLeaseOutlivesTheConnectionForALeaseTime) {
   EXPECT_EQ(bench.newest().faults & kLatchedFaults, 0u);
 }
 
-// Catches: a bench in lockstep that waits for ever for an owner that stays connected and says nothing.
+// Catches: a bench in lockstep that waits for ever for an owner that is connected but silent.
 TEST(Modbus, MB_15_AnOwnerThatFallsSilentLosesItsLease) {
   BenchConfig config = with_lease(60'000);
   config.modbus.idle_timeout_ms = 50;
@@ -224,7 +224,7 @@ TEST(Modbus, AnExchangeShowsTheTickThatItCaused) {
   EXPECT_EQ(bench.newest().u_a_v, 2.0);
 }
 
-// Catches: modes that mean something else than the map says.
+// Catches: modes with another meaning than the map says.
 TEST(Modbus, EveryModeDoesWhatItSays) {
   ModbusBench bench;
   Client client(bench.port());
@@ -254,7 +254,7 @@ TEST(Modbus, AnExchangeWaitsForTheOtherAxis) {
   const Bytes answer = first.receive_adu();
   ASSERT_GT(answer.size(), 100u);
   EXPECT_EQ(answer[1], 9);
-  EXPECT_EQ(first.receive_adu().at(1), 10) << "what came after it is answered after it";
+  EXPECT_EQ(first.receive_adu().at(1), 10) << "the later request is answered later";
 
   // One connection for both: the first command is written, the second exchanged.
   ASSERT_EQ(second.write(400, {0}, 2), 0);
@@ -279,7 +279,7 @@ TEST(Modbus, AnExchangeEndsWithItsLease) {
   EXPECT_EQ(bench.newest().tick, 0u);
 }
 
-// Catches: an owner that dies while its exchange waits for another axis, whose end nobody reads.
+// Catches: an owner that dies unnoticed while its exchange waits for another axis.
 TEST(Modbus, MB_15_AnOwnerThatDiesInAnExchangeLosesItsLease) {
   BenchConfig config = modbus_bench_config(2);
   config.setup.lease_ticks = 50'000'000 / config.setup.period_ns;
@@ -293,7 +293,7 @@ TEST(Modbus, MB_15_AnOwnerThatDiesInAnExchangeLosesItsLease) {
     owner.send(adu_of(10, 1, pdu_of(3, {0, 1})));
     bench.until([&] { return bench.count("requests") == 2; });
     std::this_thread::sleep_for(std::chrono::milliseconds(30));
-    EXPECT_EQ(bench.count("connections"), 1u) << "who is alive may wait";
+    EXPECT_EQ(bench.count("connections"), 1u) << "a living owner may wait";
   }
   bench.until([&] { return bench.count("connections") == 0; });
   bench.until([&] { return bench.owner(0) == 0; });
@@ -321,7 +321,7 @@ TEST(Modbus, ARealTimeExchangeBringsANewSample) {
   EXPECT_EQ(client.read(1002, 2), (Words{0x4000, 0}));
 }
 
-// Catches: a lease in a run that takes none; parameters that need one where there is none to have.
+// Catches: a lease in a free run, which has none; parameters that need one there.
 TEST(Modbus, AFreeRunTakesNoController) {
   BenchConfig config = modbus_bench_config();
   config.mode = RunMode::kFree;

@@ -1,4 +1,4 @@
-// Who must go when there are too many, too fast or too silent, and what the log says of it.
+// Limits on the number of connections, on their rate and on their silence, and the log of each.
 #include <sstream>
 
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
@@ -6,7 +6,7 @@
 namespace drivebench::modbus {
 namespace {
 
-/// How many lines hold these words.
+/// Number of lines with these words.
 int lines_with(const std::string& words, const std::string& log) {
   int count = 0;
   std::istringstream lines(log);
@@ -16,8 +16,8 @@ int lines_with(const std::string& words, const std::string& log) {
 }
 
 // Catches: one peer that takes every place and keeps the owner of an axis out.
-TEST(Modbus, OnePeerCannotFillTheHouse) {
-  testing::internal::CaptureStdout();  // where the log goes if nobody says otherwise
+TEST(Modbus, OnePeerCannotTakeAllConnections) {
+  testing::internal::CaptureStdout();  // the default place of the log
   {
     BenchConfig config = modbus_bench_config();
     config.modbus.max_connections = 4;
@@ -32,16 +32,16 @@ TEST(Modbus, OnePeerCannotFillTheHouse) {
     for (const int i : {0, 2, 3})
       ASSERT_EQ(hoard[static_cast<std::size_t>(i)]->read_one(0), kMarker);
     Client fifth(bench.port(), "127.0.0.2");
-    EXPECT_TRUE(fifth.is_closed()) << "who fills the house gets no more";
+    EXPECT_TRUE(fifth.is_closed()) << "a peer that has all connections gets no more";
     Client owner(bench.port());
     EXPECT_EQ(owner.read_one(0), kMarker);
-    EXPECT_TRUE(hoard[0]->is_closed()) << "the idlest without a lease";
-    EXPECT_EQ(hoard[1]->read_one(409), 1) << "who drives a motor may stay";
+    EXPECT_TRUE(hoard[0]->is_closed()) << "the idlest connection without a lease";
+    EXPECT_EQ(hoard[1]->read_one(409), 1) << "a connection that drives a motor stays";
     Client guest(bench.port(), "127.0.0.3");
     EXPECT_EQ(guest.read_one(0), kMarker);
     EXPECT_TRUE(hoard[2]->is_closed());
     Client second(bench.port());
-    EXPECT_TRUE(second.is_closed()) << "it would have as many as the other";
+    EXPECT_TRUE(second.is_closed()) << "it would have as many connections as the other peer";
     EXPECT_EQ(owner.read_one(0), kMarker);
     EXPECT_EQ(bench.count("turned_away"), 2u);
     EXPECT_EQ(bench.count("cut"), 2u);
@@ -52,7 +52,7 @@ TEST(Modbus, OnePeerCannotFillTheHouse) {
   EXPECT_EQ(lines_with("turned away", log), 1) << "the second within the limit of the log";
 }
 
-// Catches: a log that a client fills by taking leases; a peer that said goodbye called silent.
+// Catches: a log that a client fills by acquiring leases; a connection that was closed but is called silent.
 TEST(Modbus, LapsedLeasesAreLoggedOnceAndByTheirReason) {
   BenchConfig config = modbus_bench_config();
   config.setup.lease_ticks = 20'000'000 / config.setup.period_ns;
@@ -97,8 +97,8 @@ TEST(Modbus, ARateOfOneRefusesBeforeItCuts) {
   }
 }
 
-// Catches: a rate that is refused before it is reached, a second's worth of requests that may not come at
-// once, and a bucket that is filled a little too fast or too slowly, which only time shows.
+// Catches: a refusal below the rate, a second's worth of requests that is refused when it comes at once, and
+// a bucket that is filled slightly too fast or too slowly, which shows after an hour.
 TEST(Modbus, LIMIT_06_JustBelowTheRateEverythingIsAnswered) {
   using Answer = RateLimit::Answer;
   constexpr std::uint32_t kRate = 2000;
@@ -133,7 +133,7 @@ TEST(Modbus, LIMIT_06_JustBelowTheRateEverythingIsAnswered) {
   ModbusBench bench(config);
   Client client(bench.port());
   for (int i = 0; i < 50; ++i)
-    ASSERT_EQ(client.read_one(0), kMarker) << "the bucket has held them all along, " << i;
+    ASSERT_EQ(client.read_one(0), kMarker) << "the bucket holds a second's worth, " << i;
   EXPECT_EQ(bench.count("throttled"), 0u);
 }
 

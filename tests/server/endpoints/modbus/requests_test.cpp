@@ -37,7 +37,7 @@ bool exists(std::size_t address, std::size_t count) {
   return false;
 }
 
-/// What a write of zeros by nobody in particular must be answered with.
+/// The exception that answers a write of zeros by a connection without the lease.
 int verdict_of_zeros(std::size_t address, std::size_t count) {
   if (!exists(address, count)) return 2;
   const std::size_t first = address % 10'000;
@@ -201,7 +201,7 @@ TEST(Modbus, MB_02_EveryEdgeOfTheMapHasItsVerdict) {
   }
 }
 
-// Catches: a byte count that is believed, a coil that is half on, bits that nobody asked for.
+// Catches: a byte count that is believed, a coil that is half on, bits beyond the quantity.
 TEST(Modbus, MB_03_CountsAndBitsThatDoNotFitAreRefused) {
   ModbusBench bench;
   Client client(bench.port());
@@ -273,7 +273,7 @@ TEST(Modbus, MB_07_TheUnitIdIsTheAxis) {
 }
 
 // Catches: NaN or Inf that reaches the bench, a value out of range, a read-only register that takes a value.
-TEST(Modbus, MB_12_WhatIsNotAValueIsRefused) {
+TEST(Modbus, MB_12_AnInvalidValueIsRefused) {
   ModbusBench bench;
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);

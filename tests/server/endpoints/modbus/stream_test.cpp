@@ -189,7 +189,7 @@ TEST(Modbus, MB_10_LIMIT_06_AFrameThatDripsIsCutOff) {
     }
     EXPECT_LT(sent, adu.size());
   }
-  EXPECT_EQ(patient.read_one(0), kMarker) << "who says nothing between frames may stay";
+  EXPECT_EQ(patient.read_one(0), kMarker) << "silence between frames is allowed";
   EXPECT_EQ(bench.count("cut"), 2u);
 }
 
@@ -209,7 +209,7 @@ TEST(Modbus, MB_10_APeerThatTakesNothingIsCutOff) {
   bench.until([&] { return bench.count("cut") == 1; });
 }
 
-// Catches: connections beyond the cap that are kept, or that throw out somebody who is at work.
+// Catches: connections beyond the cap that are kept, or that push out a connection that is at work.
 TEST(Modbus, AFullHouseTurnsAwayOrTurnsOutTheIdle) {
   BenchConfig config = modbus_bench_config();
   config.modbus.max_connections = 2;
@@ -228,7 +228,7 @@ TEST(Modbus, AFullHouseTurnsAwayOrTurnsOutTheIdle) {
     bench.until([&] { return bench.count("connections") == 1; });
     EXPECT_TRUE(still_serves(bench));
   }
-  config.modbus.idle_timeout_ms = 0;  // everybody counts as idle at once
+  config.modbus.idle_timeout_ms = 0;  // every connection counts as idle at once
   ModbusBench bench(config);
   Client first(bench.port());
   ASSERT_EQ(first.read_one(0), kMarker);
@@ -236,7 +236,7 @@ TEST(Modbus, AFullHouseTurnsAwayOrTurnsOutTheIdle) {
   ASSERT_EQ(second.read_one(0), kMarker);
   Client third(bench.port());
   EXPECT_EQ(third.read_one(0), kMarker);
-  EXPECT_TRUE(first.is_closed()) << "it was idle longest";
+  EXPECT_TRUE(first.is_closed()) << "the connection that was idle longest";
   EXPECT_EQ(second.read_one(0), kMarker);
 }
 

@@ -59,7 +59,7 @@ TEST(ModbusTerminals, OneTransactionCommandsThreePhasesAndReadsEverySensor) {
   }
   EXPECT_EQ(client.read(405, 4), client.read(425, 4)) << "the same registers";
   EXPECT_EQ(client.read(429, 2), (Words{0xc0f0, 0}));
-  EXPECT_TRUE(client.exchange(1, 50, 1.0f, 2.0f).size() > 0) << "who writes phases a and b leaves c as it is";
+  EXPECT_TRUE(client.exchange(1, 50, 1.0f, 2.0f).size() > 0) << "a write of phases a and b leaves c as it is";
   EXPECT_EQ(bench.newest().u_c_v, -7.5);
 }
 
@@ -170,7 +170,7 @@ TEST(ModbusTerminals, TheParametersOfTheFirstMapStayWhereTheyWere) {
   }
 }
 
-// Catches: a header that tells old clients of blocks that they do not know, and new ones nothing of them.
+// Catches: a header that shows old clients blocks that they do not know, or hides them from new clients.
 TEST(ModbusTerminals, TheHeaderTellsOfTheOtherBlocks) {
   ModbusBench bench;
   Client client(bench.port());

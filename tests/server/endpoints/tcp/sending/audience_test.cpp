@@ -9,7 +9,7 @@
 namespace drivebench {
 namespace {
 
-// Catches: rings that nobody reads any more and that every tick fills, as many as there have been viewers.
+// Catches: rings without a reader that every tick goes on filling, one for each viewer there has been.
 TEST(Audience, AFeedEndsWithItsLastReader) {
   asio::io_context io(1);
   const std::unique_ptr<Engine> engine = make_lockstep_engine(servo_bench());
@@ -20,7 +20,7 @@ TEST(Audience, AFeedEndsWithItsLastReader) {
   const std::weak_ptr<const SampleFeed> kept = first;
   first.reset();
   audience.on_tick();
-  EXPECT_FALSE(kept.expired()) << "somebody reads it still";
+  EXPECT_FALSE(kept.expired()) << "one reader is left";
   second.reset();
   audience.on_tick();
   EXPECT_TRUE(kept.expired()) << "after the next tick";

@@ -32,8 +32,8 @@ std::vector<std::uint64_t> every(std::uint64_t step, std::uint64_t first, std::u
   return ticks;
 }
 
-// A sample too few that waits, or the newest lost instead of the oldest, or a loss that is not counted.
-TEST(SampleFeed, LIMIT_03_256SamplesWaitAndOfOneMoreTheOldestIsLost) {
+// Catches: a ring that is one sample short, a loss of the newest instead of the oldest, or an uncounted loss.
+TEST(SampleFeed, LIMIT_03_256SamplesWaitAndOneMorePushesOutTheOldest) {
   SampleFeed feed(0, 1, 0);
   SampleFeed::Reader at_the_limit = feed.reader();
   SampleFeed::Reader above = feed.reader();
@@ -43,11 +43,11 @@ TEST(SampleFeed, LIMIT_03_256SamplesWaitAndOfOneMoreTheOldestIsLost) {
   take(feed, 257, 257);
   EXPECT_EQ(read_all(feed, above), every(1, 2, 257));
   EXPECT_EQ(above.dropped, 1u);
-  EXPECT_EQ(read_all(feed, at_the_limit), every(1, 257, 257)) << "who has read loses nothing";
+  EXPECT_EQ(read_all(feed, at_the_limit), every(1, 257, 257)) << "a reader that keeps up loses nothing";
   EXPECT_EQ(at_the_limit.dropped, 0u);
 }
 
-// Samples of the wrong ticks, or a reader who is given what was before him.
+// Catches: samples of the wrong ticks, or samples from before the reader came.
 TEST(SampleFeed, EveryNthFromTheTickOfTheReader) {
   SampleFeed feed(0, 8, 5);
   SampleFeed::Reader first = feed.reader();
@@ -59,8 +59,9 @@ TEST(SampleFeed, EveryNthFromTheTickOfTheReader) {
   EXPECT_EQ(first.dropped + second.dropped, 0u);
 }
 
-// Ticks that nobody saw counted wrongly: each sample that was due in them is one, for those who wait already.
-TEST(SampleFeed, TicksThatWereNotSeenAreLost) {
+// Catches: unseen ticks that are counted wrongly: each sample that was due in them is one loss, for readers
+// that wait already.
+TEST(SampleFeed, SamplesOfUnseenTicksCountAsLost) {
   SampleFeed feed(0, 4, 0);
   SampleFeed::Reader early = feed.reader();
   take(feed, 1, 4);

@@ -13,7 +13,7 @@
 namespace drivebench {
 namespace {
 
-/// A client on a socket of its own, who does not wait.
+/// A client on a socket of its own, which does not wait for answers.
 class Peer {
  public:
   Peer(asio::io_context& io, const StreamServer& server) : socket_(io) {
@@ -38,7 +38,7 @@ class Peer {
     EXPECT_EQ(socket_.send(asio::buffer(bytes)), bytes.size());
   }
 
-  /// The answers that are there.
+  /// The answers that have arrived.
   std::vector<v1::Envelope> answers() {
     std::vector<v1::Envelope> found;
     boost::system::error_code error;
@@ -81,9 +81,9 @@ class SessionTurns : public ::testing::Test {
   StreamServer server_{io_, any_port()};
 };
 
-// Catches: a viewer who asks for everything a thousand times in one go, and a controller who waits for all of
+// Catches: a viewer that asks for everything a thousand times at once, and a controller that waits for all of
 // these answers.
-TEST_F(SessionTurns, TCP_11_WhoAsksForMuchDoesNotKeepTheOthersWaiting) {
+TEST_F(SessionTurns, TCP_11_ASessionThatAsksForMuchDoesNotDelayTheOthers) {
   Peer greedy = greeted();
   Peer modest = greeted();
   v1::Envelope everything;
@@ -105,7 +105,7 @@ TEST_F(SessionTurns, TCP_11_WhoAsksForMuchDoesNotKeepTheOthersWaiting) {
     io_.run_one();
 }
 
-// Catches: an answer as long as the list of names, of which 64 KiB hold five thousand.
+// Catches: an answer that grows with the list of names; a request of 64 KiB holds five thousand of them.
 TEST_F(SessionTurns, TCP_05_ParametersAreDescribedOnceEach) {
   Peer peer = greeted();
   v1::Envelope request;
