@@ -1,15 +1,15 @@
-// What changes an axis without controlling it: a fault, a parameter, a blow on the shaft.
+#include "clients/command/bench/change.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <optional>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/bench/bench_json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/command/common/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -55,16 +55,9 @@ void tell(bool json, HeldAxis& axis, std::string_view name, double value, std::s
   }
 }
 
-std::optional<double> number_of(std::string_view text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
-  return whole ? std::optional(value) : std::nullopt;
-}
-
 /// A number, or one of the words of a choice.
 double value_of(const v1::ParameterDescription& row, const std::string& text) {
-  if (const auto value = number_of(text)) return *value;
+  if (const auto value = finite_number(text)) return *value;
   const auto word = std::find(row.words().begin(), row.words().end(), text);
   if (word != row.words().end()) return static_cast<double>(word - row.words().begin());
   throw UsageError(fmt::format("'{}' is not {} {}", text, row.words().empty() ? "a number for" : "a value of",

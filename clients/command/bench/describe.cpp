@@ -1,10 +1,12 @@
+#include "clients/command/bench/describe.hpp"
+
 #include <fmt/format.h>
 
 #include <cstdio>
 #include <string>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/bench/bench_json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 
 namespace drivebench::command {

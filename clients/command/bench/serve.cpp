@@ -1,4 +1,5 @@
-#include "clients/command/common/commands.hpp"
+#include "clients/command/bench/serve.hpp"
+
 #include "clients/command/common/installation.hpp"
 #include "clients/command/common/process.hpp"
 
@@ -18,12 +19,6 @@ int run_print(const PrintOptions& options) {
   if (options.what == "dbc" || options.what == "can-table") {
     server.insert(server.end(), {"--bus", std::to_string(options.bus)});
   }
-  replace_process(server);
-}
-
-int run_replay(const ReplayOptions& options) {
-  std::vector<std::string> server = {server_executable().string(), "--replay", options.recording};
-  if (options.json) server.emplace_back("--json");
   replace_process(server);
 }
 

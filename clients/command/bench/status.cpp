@@ -1,9 +1,11 @@
+#include "clients/command/bench/status.hpp"
+
 #include <fmt/format.h>
 
 #include <string>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/bench/bench_json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 
 namespace drivebench::command {

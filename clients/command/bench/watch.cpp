@@ -1,3 +1,5 @@
+#include "clients/command/bench/watch.hpp"
+
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -5,8 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/bench/bench_json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 
 namespace drivebench::command {

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -14,7 +14,6 @@ using link::CanBitTiming;
 using link::CanController;
 using link::CanControllerState;
 using link::CanInterface;
-using Json = nlohmann::ordered_json;
 
 constexpr int kExitCannotBeHad = 2;
 constexpr std::uint32_t kMtuFd = 72;

@@ -1,3 +1,5 @@
+#include "clients/command/can/can_log.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/link/can_bus.hpp"

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 
 namespace drivebench::command {
 namespace fs = std::filesystem;

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 
 namespace drivebench::command {
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/link/file_descriptor.hpp"
@@ -25,6 +26,16 @@ class Process {
 
   /// The next line without its end; nothing at the end of the output or when none comes in time.
   std::optional<std::string> read_line(Deadline deadline);
+
+  /// The first line that `parse` understands, as it understood it; nothing if the output ends or the deadline
+  /// passes before.
+  template <class Parse>
+  auto await(Deadline deadline, Parse parse) -> decltype(parse(std::string_view())) {
+    while (const std::optional<std::string> line = read_line(deadline)) {
+      if (auto found = parse(*line)) return found;
+    }
+    return std::nullopt;
+  }
 
   /// SIGTERM; harmless when it has ended.
   void terminate() noexcept;

@@ -7,6 +7,8 @@
 #include <csignal>
 #include <cstdio>
 
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/text.hpp"
 #include "clients/link/can_link.hpp"
 #include "clients/link/modbus_link.hpp"
 
@@ -61,14 +63,19 @@ std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_
   }
 }
 
-std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice) {
-  std::string known;
+std::optional<std::uint32_t> find_axis(const v1::BenchDescription& bench, std::string_view choice) {
   for (int i = 0; i < bench.axes_size(); ++i) {
     if (bench.axes(i).name() == choice || fmt::format("{}", i) == choice) {
       return static_cast<std::uint32_t>(i);
     }
-    known += fmt::format("{}{} ({})", i == 0 ? "" : ", ", i, bench.axes(i).name());
   }
+  return std::nullopt;
+}
+
+std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice) {
+  if (const auto number = find_axis(bench, choice)) return *number;
+  const std::string known = listed(
+      bench.axes(), [n = 0](const auto& axis) mutable { return fmt::format("{} ({})", n++, axis.name()); });
   throw UsageError(fmt::format("no axis '{}'; this bench has {}", choice, known));
 }
 

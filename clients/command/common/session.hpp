@@ -5,10 +5,12 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/link_choice.hpp"
 #include "clients/link/axis_link.hpp"
 #include "clients/link/tcp_axis.hpp"
 #include "protocols/signals/sample.hpp"
@@ -16,16 +18,12 @@
 /// What the subcommands that talk to a bench share.
 namespace drivebench::command {
 
-/// Somebody answers and does not let us in: for whoever wants to connect, the same as nobody.
-class NotLetIn : public link::ConnectError {
- public:
-  using ConnectError::ConnectError;
-};
-
 /// Connects as `drivebench SUBCOMMAND`. Throws NotLetIn, and UsageError for a can: or modbus: link.
 link::Link open_link(const LinkChoice& choice, std::string_view subcommand);
 
-/// The axis with this number or name. Throws UsageError with the axes there are.
+/// The axis with this number or name.
+std::optional<std::uint32_t> find_axis(const v1::BenchDescription& bench, std::string_view choice);
+/// The same. Throws UsageError with the axes there are.
 std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
 
 /// Connects to one axis over whatever the address names: tcp, unix, can or modbus. The latter two name the

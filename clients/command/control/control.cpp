@@ -1,3 +1,5 @@
+#include "clients/command/control/control.hpp"
+
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -6,10 +8,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/control/control_axis.hpp"
+#include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_run.hpp"
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 
 namespace drivebench::command {

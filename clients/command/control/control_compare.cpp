@@ -6,8 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/control/control_axis.hpp"
+#include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/command/recording/recorded_run.hpp"

@@ -7,7 +7,23 @@
 #include <utility>
 #include <vector>
 
+#include "clients/control/gains/gains.hpp"
+
 namespace drivebench::command {
+
+/// The preset's controller fed with what a recording says, without a bench.
+struct CompareOptions {
+  std::string recording{};
+  bool json = false;
+  std::string preset = "book/8.2.2";
+  std::vector<control::Gain> overrides{};
+  std::string axis{};                        ///< name; empty or "0": the first in the file
+  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
+  std::string other{};                       ///< recording of the reference's own run; empty: none
+  /// [V] or [A]; the exit code is 1 if a command differs by more or some of the run is missing.
+  std::optional<double> threshold{};
+};
+int run_compare(const CompareOptions& options);
 
 /// How far two series are apart.
 struct Difference {

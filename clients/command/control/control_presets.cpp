@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/errors.hpp"
+#include "clients/command/control/control_json.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/control/control.hpp"
 #include "clients/control/presets/presets.hpp"
 
 /// Presets as the command line names them.

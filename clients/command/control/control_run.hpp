@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/commands.hpp"
 #include "clients/control/loop/run.hpp"
 #include "clients/link/axis_link.hpp"
 
@@ -17,6 +16,12 @@ namespace drivebench::command {
 
 /// One value for each terminal: phases a, b, c (an armature is a) and the field winding.
 using Terminals = std::array<double, 4>;
+
+/// A load torque at a time after the start of the trajectory.
+struct LoadAt {
+  double load_nm = 0.0;
+  double after_s = 0.0;
+};
 
 /// What a sample of this link tells a controller: what the link does not carry stays zero.
 control::Measurement measurement_of(const Sample& sample, SignalMask known);

@@ -1,6 +1,7 @@
-#include <unistd.h>
+#include "clients/command/demo/demo.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -8,10 +9,12 @@
 #include <ctime>
 #include <filesystem>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
-#include "clients/command/common/json.hpp"
 #include "clients/command/common/process.hpp"
+#include "clients/command/common/server_ready.hpp"
+#include "clients/command/control/control_json.hpp"
+#include "clients/command/demo/demo_json.hpp"
 
 namespace drivebench::command {
 namespace fs = std::filesystem;
@@ -32,19 +35,10 @@ std::string time_stamp() {
   return fmt::format("{}-{}", text, ::getpid());
 }
 
-/// The first line that `parse` understands; nothing if the output ends or the deadline passes before.
-template <class Parse>
-auto await(Process& process, Process::Deadline deadline, Parse parse) -> decltype(parse(std::string_view())) {
-  while (const std::optional<std::string> line = process.read_line(deadline)) {
-    if (auto found = parse(*line)) return found;
-  }
-  return std::nullopt;
-}
-
 /// The controller as a process of its own against the server at this address.
 void control(const std::string& address, DemoRun& run) {
   Process controller({own_executable().string(), "control", "--json", "--link", address});
-  const auto report = await(controller, Process::in(60s), parse_control);
+  const auto report = controller.await(Process::in(60s), parse_control);
   const std::optional<int> exit_code = controller.wait(Process::in(5s));
   if (report) run.control = *report;
   if (!report) {
@@ -64,14 +58,14 @@ DemoRun run_mode(const std::string& mode, int command_delay_ticks, const fs::pat
   Process server({server_executable().string(), find_config("servo").string(), "--mode", mode, "--port", "0",
                   "--command-delay-ticks", std::to_string(command_delay_ticks), "--record", run.recording,
                   "--json"});
-  const auto ready = await(server, Process::in(15s), parse_ready);
+  const auto ready = server.await(Process::in(15s), parse_ready);
   if (!ready) {
     run.failure = "the server did not start";
     return run;
   }
   control(ready->tcp, run);
   server.terminate();
-  const auto verdict = await(server, Process::in(15s), parse_verdict);
+  const auto verdict = server.await(Process::in(15s), parse_verdict);
   const std::optional<int> exit_code = server.wait(Process::in(5s));
   if (verdict) run.verdict = *verdict;
   if (run.failure.empty() && !verdict) run.failure = "the server gave no verdict";
@@ -96,7 +90,7 @@ DemoRun run_realtime(const fs::path& folder, const std::string& stamp) {
 
 DemoReplay replay(const std::string& recording) {
   Process server({server_executable().string(), "--replay", recording, "--json"});
-  const auto report = await(server, Process::in(60s), parse_replay);
+  const auto report = server.await(Process::in(60s), parse_replay);
   const std::optional<int> exit_code = server.wait(Process::in(5s));
   DemoReplay replay = report.value_or(DemoReplay{});
   if (!report) replay.problem = "the replay gave no report";

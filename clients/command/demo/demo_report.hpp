@@ -8,14 +8,7 @@
 
 namespace drivebench::command {
 
-/// What drivebench-server says when it listens.
-struct ServerReady {
-  std::string tcp;
-  std::string mode;
-  std::string bench;
-};
-
-/// What it says at its end.
+/// What drivebench-server says at its end.
 struct ServerVerdict {
   std::uint64_t ticks = 0;
   std::uint64_t late_ticks = 0;

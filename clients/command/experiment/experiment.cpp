@@ -1,13 +1,14 @@
-// drivebench experiment: what the server runs on a bench of its own.
+#include "clients/command/experiment/experiment.hpp"
+
 #include <fmt/format.h>
 
 #include <stdexcept>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/experiment/experiment_client.hpp"
 #include "clients/command/experiment/experiment_data.hpp"
+#include "clients/command/experiment/experiment_json.hpp"
 #include "protocols/document.hpp"
 
 namespace drivebench::command {
@@ -70,7 +71,7 @@ ExperimentFile load(const std::string& file) {
 
 int run_experiment_run(const ExperimentOptions& options) {
   ExperimentFile file = load(options.file);
-  ExperimentClient client(options, kName);
+  ExperimentClient client(options.server, kName);
   catch_interrupts();
   v1::ExperimentInfo info = client.run(std::move(file));
   if (options.detach) {
@@ -87,7 +88,7 @@ int run_experiment_run(const ExperimentOptions& options) {
 }
 
 int run_experiment_list(const ExperimentOptions& options) {
-  ExperimentClient client(options, kName);
+  ExperimentClient client(options.server, kName);
   v1::ExperimentList list;
   client.with_link([&](link::Link& link) { list = link.list_experiments(client.owner()); });
   if (options.json) {
@@ -105,7 +106,7 @@ int run_experiment_list(const ExperimentOptions& options) {
 }
 
 int run_experiment_fetch(const ExperimentOptions& options) {
-  ExperimentClient client(options, kName);
+  ExperimentClient client(options.server, kName);
   catch_interrupts();
   const v1::ExperimentInfo info = fetch_into(client, options, options.id, true);
   if (client.gave_up()) {
@@ -116,7 +117,7 @@ int run_experiment_fetch(const ExperimentOptions& options) {
 }
 
 int run_experiment_cancel(const ExperimentOptions& options) {
-  ExperimentClient client(options, kName);
+  ExperimentClient client(options.server, kName);
   v1::ExperimentInfo info;
   client.with_link([&](link::Link& link) { info = link.cancel_experiment(options.id, client.owner()); });
   if (options.json) {

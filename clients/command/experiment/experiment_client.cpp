@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 #include "protocols/document.hpp"
 
@@ -75,6 +76,13 @@ void show(const v1::ExperimentInfo& info, Progress& progress) {
 
 }  // namespace
 
+ExperimentServer server_of_environment() {
+  ExperimentServer server;
+  if (const char* owner = std::getenv("DRIVEBENCH_OWNER"); owner != nullptr) server.owner = owner;
+  if (const char* user = std::getenv("USER"); user != nullptr) server.user = user;
+  return server;
+}
+
 std::string random_word() {
   std::array<unsigned char, 16> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
@@ -90,20 +98,20 @@ bool has_ended(v1::ExperimentState state) {
   return state > v1::EXPERIMENT_STATE_RUNNING;
 }
 
-ExperimentClient::ExperimentClient(const ExperimentOptions& options, std::string subcommand)
-    : options_(options),
+ExperimentClient::ExperimentClient(const ExperimentServer& server, std::string subcommand)
+    : server_(server),
       subcommand_(std::move(subcommand)),
-      owner_(options.owner.empty() ? own_secret() : options.owner) {}
+      owner_(server.owner.empty() ? own_secret() : server.owner) {}
 
 bool ExperimentClient::patience_is_over(Clock::time_point since) const {
-  return std::chrono::duration<double>(Clock::now() - since).count() > options_.patience_s || interrupted();
+  return std::chrono::duration<double>(Clock::now() - since).count() > server_.patience_s || interrupted();
 }
 
 void ExperimentClient::with_link(const std::function<void(link::Link&)>& action) {
   std::optional<Clock::time_point> broken;
   for (;;) {
     try {
-      if (!link_) link_.reset(new link::Link(open_link(options_.link, subcommand_)));  // it does not move
+      if (!link_) link_.reset(new link::Link(open_link(server_.link, subcommand_)));  // it does not move
       if (broken) ++resumed_;
       broken.reset();
       return action(*link_);
@@ -122,7 +130,7 @@ void ExperimentClient::with_link(const std::function<void(link::Link&)>& action)
 
 v1::ExperimentInfo ExperimentClient::run(ExperimentFile file) {
   file.request.set_owner(owner_);
-  file.request.set_user(options_.user);
+  file.request.set_user(server_.user);
   file.request.set_request_key(random_word());
   v1::ExperimentInfo info;
   try {
@@ -169,7 +177,7 @@ v1::ExperimentInfo ExperimentClient::fetch(std::uint64_t id, bool recording, con
       last = is_whole();
       if (!last && interrupted() && !cancelled) {
         cancelled = true;
-        open_link(options_.link, subcommand_).cancel_experiment(id, owner_);
+        open_link(server_.link, subcommand_).cancel_experiment(id, owner_);
       }
     }
   });

@@ -9,13 +9,23 @@
 #include <optional>
 #include <string>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/link_choice.hpp"
 #include "clients/command/experiment/experiment_file.hpp"
 #include "clients/link/tcp_link.hpp"
 
 namespace drivebench::command {
 
-/// 128 bits that nobody guesses.
+/// Where experiments run, and for which user.
+struct ExperimentServer {
+  LinkChoice link{};
+  std::string owner{};       ///< the secret that opens the data; empty: that of this user, kept in a file
+  std::string user{};        ///< a name that every client sees
+  double patience_s = 30.0;  ///< so long a broken link may stay broken
+};
+/// The default one: DRIVEBENCH_OWNER and USER.
+ExperimentServer server_of_environment();
+
+/// 128 random bits in hexadecimal digits.
 std::string random_word();
 
 bool has_ended(v1::ExperimentState state);
@@ -23,10 +33,8 @@ bool has_ended(v1::ExperimentState state);
 /// Experiments on a server, over a link that is made anew when it breaks.
 class ExperimentClient {
  public:
-  /// Of the options counts who asks and where: link, owner (empty: the secret of this user), user and
-  /// patience.
-  /// `subcommand` is the name by which the server knows it.
-  ExperimentClient(const ExperimentOptions& options, std::string subcommand);
+  /// `subcommand` is the name by which the server knows this client.
+  ExperimentClient(const ExperimentServer& server, std::string subcommand);
 
   const std::string& owner() const noexcept { return owner_; }
   std::uint64_t resumed() const noexcept { return resumed_; }
@@ -50,7 +58,7 @@ class ExperimentClient {
  private:
   bool patience_is_over(std::chrono::steady_clock::time_point since) const;
 
-  ExperimentOptions options_;
+  ExperimentServer server_;
   std::string subcommand_;
   std::string owner_;
   std::unique_ptr<link::Link> link_;

@@ -1,15 +1,10 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <functional>
-
-#include "clients/command/common/commands.hpp"
-
 namespace drivebench::command {
 
-/// Adds `experiment` with its own subcommands to the command line. `choose` gets the one that was named, when
-/// `options` hold what was said.
-void add_experiment_commands(CLI::App& app, LinkChoice& link, bool& json, ExperimentOptions& options,
-                             const std::function<void(int (*)(const ExperimentOptions&))>& choose);
+class CommandLine;
+
+/// experiment run, list, fetch and cancel.
+void add_experiment_commands(CommandLine& line);
 
 }  // namespace drivebench::command

@@ -1,16 +1,17 @@
-// drivebench identify: the parameters of a motor from an experiment, a recording or somebody's file.
+#include "clients/command/identify/identify.hpp"
+
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
-#include "clients/command/common/json.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/command/common/text.hpp"
 #include "clients/command/identify/identify_data.hpp"
+#include "clients/command/identify/identify_json.hpp"
 #include "clients/command/identify/identify_report.hpp"
 #include "clients/command/identify/identify_server.hpp"
 #include "clients/identification/experiments/named_experiments.hpp"
@@ -44,9 +45,7 @@ int print_list(bool json) {
 }
 
 const MotorName& chosen_motor(const std::string& name) {
-  std::string names;
-  for (const MotorName& motor : identification::kMotorNames)
-    names += (names.empty() ? "" : ", ") + std::string(motor.name);
+  const std::string names = listed(identification::kMotorNames, &MotorName::name);
   if (name.empty()) throw UsageError("--motor is missing; there are " + names);
   const MotorName* const motor = identification::find_motor(name);
   if (motor == nullptr)
@@ -79,12 +78,11 @@ WantedExperiment wanted_experiment(const MotorName& motor, const NamedExperiment
 }
 
 double seconds(std::string_view text, const std::string& whole) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value) || value < 0.0)
+  const auto value = finite_number(text);
+  if (!value || *value < 0.0)
     throw UsageError(
         fmt::format("--window '{}' should be FROM:TO in seconds, 0.005:0.2 for example", printable(whole)));
-  return value;
+  return *value;
 }
 
 void set_window(const std::string& text, identification::Processing& p) {

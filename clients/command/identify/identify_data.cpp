@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "clients/command/common/errors.hpp"
+#include "clients/command/identify/identify.hpp"
 #include "clients/command/identify/identify_map.hpp"
 #include "protocols/document.hpp"
 #include "protocols/mcap/mcap_series.hpp"

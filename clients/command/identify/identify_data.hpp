@@ -7,11 +7,12 @@
 #include <string>
 #include <string_view>
 
-#include "clients/command/common/commands.hpp"
 #include "clients/identification/measured_data.hpp"
 #include "clients/identification/motors/motors.hpp"
 
 namespace drivebench::command {
+
+struct IdentifyOptions;
 
 /// Signals of a motor, and all that is known about them.
 struct Measurement {

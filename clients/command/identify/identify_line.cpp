@@ -1,23 +1,23 @@
 #include "clients/command/identify/identify_line.hpp"
 
-#include <cstdlib>
-
-#include "clients/command/common/line_values.hpp"
+#include "clients/command/common/command_line.hpp"
+#include "clients/command/identify/identify.hpp"
 
 namespace drivebench::command {
 namespace {
 
-void add_measurement(CLI::App& sub, LinkChoice& link, IdentifyOptions& o) {
+void add_measurement(CLI::App& sub, IdentifyOptions& o) {
   sub.add_option("--motor", o.motor, "im, dc, pm or bldc");
   sub.add_option("--experiment", o.experiment,
                  "by name, or a file that ends with .toml; default: the motor's first");
   sub.add_flag("--list", o.list, "print motors and experiments and end");
   sub.add_option("--bench", o.bench, "start a server on this bench, file or name, for the experiment");
-  sub.add_option("--link", link.address,
-                 std::string(kStreamLinks) +
-                     " of a server that has the bench; without it one that is there, "
-                     "or else one that is started");
-  sub.add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
+  o.server = server_of_environment();
+  add_link_with_help(sub, o.server.link,
+                     std::string(kStreamLinks) +
+                         " of a server that has the bench; without it the one of DRIVEBENCH_LINK or at the "
+                         "default address if it fits, or else one that is started");
+  sub.get_option("--link")->each([&named = o.link_was_named](const std::string&) { named = true; });
   sub.add_option("--owner", o.server.owner,
                  "the secret that opens the data; else from DRIVEBENCH_OWNER, else this user's own");
   sub.add_option("--from", o.from_file, "a recording (.mcap) or a CSV file in the place of an experiment");
@@ -61,31 +61,24 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
   sub.add_flag("--one-stage", o.one_stage, "pm: all parameters in one least squares")->group(kGroup);
 }
 
+void add_files(CLI::App& sub, IdentifyOptions& o) {
+  sub.add_option("--markdown", o.markdown_file, "write the report");
+  sub.add_option("--plot", o.plot_file, "write an SVG picture: measured against re-simulated");
+  sub.add_option("--motor-file", o.motor_file, "write a TOML file for configs/motors");
+  sub.add_option("--data", o.data_file, "write what was measured as CSV");
+}
+
 }  // namespace
 
-void add_identify_command(CLI::App& app, LinkChoice& link, bool& json, IdentifyOptions& options,
-                          const std::function<void()>& choose) {
-  CLI::App* const sub =
-      app.add_subcommand("identify", "the parameters of a motor, from an experiment or a file");
-  sub->add_flag("--json", json, "print JSON");
-  add_measurement(*sub, link, options);
-  sub->add_option("--markdown", options.markdown_file, "write the report");
-  sub->add_option("--plot", options.plot_file, "write an SVG picture: measured against re-simulated");
-  sub->add_option("--motor-file", options.motor_file, "write a TOML file for configs/motors");
-  sub->add_option("--data", options.data_file, "write what was measured as CSV");
-  add_settings(*sub, options);
-  sub->footer(
+void add_identify_command(CommandLine& line) {
+  const auto [sub, o] = line.add<IdentifyOptions>(
+      "identify", "the parameters of a motor, from an experiment or a file", run_identify);
+  add_measurement(sub, o);
+  add_files(sub, o);
+  add_settings(sub, o);
+  sub.footer(
       "Exit codes: 0 ok, 1 the experiment failed or its data do not tell every parameter, 2 usage, file or "
       "configuration, 3 cannot connect.");
-  sub->callback([&, sub, choose] {
-    if (const char* owner = std::getenv("DRIVEBENCH_OWNER"); owner != nullptr && options.server.owner.empty())
-      options.server.owner = owner;
-    if (const char* user = std::getenv("USER"); user != nullptr) options.server.user = user;
-    options.json = json;
-    options.server.link = link;
-    options.link_was_named = sub->get_option("--link")->count() > 0;
-    choose();
-  });
 }
 
 }  // namespace drivebench::command

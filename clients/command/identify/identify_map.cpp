@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <optional>
 
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/text.hpp"
+#include "clients/command/identify/identify.hpp"
 #include "protocols/document.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "protocols/text.hpp"
@@ -21,12 +23,9 @@ using identification::CsvOptions;
 
 constexpr std::string_view kForm = "HEADER=SIGNAL, HEADER=SIGNAL*FACTOR or HEADER=SIGNAL*FACTOR+OFFSET";
 
-std::optional<double> finite_number(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
+/// A number that may begin with a plus.
+std::optional<double> signed_number(std::string_view text) {
+  return finite_number(text.substr(text.starts_with('+') ? 1 : 0));
 }
 
 /// Signals that an identification reads.
@@ -34,10 +33,7 @@ constexpr std::array<std::string_view, 9> kWanted = {"i_a_a", "i_b_a",   "i_c_a"
                                                      "u_c_v", "load_nm", "encoder_count", "angle_rad"};
 
 std::string wanted_signals() {
-  std::string text;
-  for (const std::string_view name : kWanted)
-    text += (text.empty() ? "" : ", ") + std::string(name);
-  return text;
+  return listed(kWanted);
 }
 
 bool is_wanted(std::string_view name) {
@@ -162,8 +158,8 @@ ColumnMap parse_column(std::string_view text) {
   if (star == std::string_view::npos) return column;
   rest.remove_prefix(star + 1);
   const std::size_t end = end_of_factor(rest);
-  const auto factor = finite_number(rest.substr(0, end));
-  const auto offset = end < rest.size() ? finite_number(rest.substr(end)) : 0.0;
+  const auto factor = signed_number(rest.substr(0, end));
+  const auto offset = end < rest.size() ? signed_number(rest.substr(end)) : 0.0;
   if (!factor || *factor == 0.0 || !offset)
     throw wrong(fmt::format("'{}' should be a factor other than 0, or one and an offset: {}", printable(rest),
                             kForm));

@@ -4,11 +4,12 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/command/common/commands.hpp"
 #include "clients/identification/measured_data.hpp"
 
 /// How the columns of somebody else's CSV file become signals of the catalogue.
 namespace drivebench::command {
+
+struct IdentifyOptions;
 
 /// `HEADER=SIGNAL`, `HEADER=SIGNAL*FACTOR`, `HEADER=SIGNAL*FACTOR+OFFSET`. Throws UsageError with the rule.
 identification::ColumnMap parse_column(std::string_view text);

@@ -9,11 +9,12 @@
 #include <optional>
 #include <system_error>
 
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
-#include "clients/command/common/json.hpp"
 #include "clients/command/common/process.hpp"
+#include "clients/command/common/server_ready.hpp"
 #include "clients/command/common/session.hpp"
-#include "clients/command/demo/demo_report.hpp"
+#include "clients/command/common/text.hpp"
 #include "clients/command/experiment/experiment_client.hpp"
 #include "clients/command/experiment/experiment_data.hpp"
 
@@ -49,10 +50,7 @@ class OwnServer {
   explicit OwnServer(const std::string& bench)
       : process_({server_executable().string(), find_config(bench).string(), "--mode", "lockstep", "--port",
                   "0", "--experiments", folder_.path() + "/kept", "--json"}) {
-    const auto deadline = Process::in(15s);
-    while (const std::optional<std::string> line = process_.read_line(deadline)) {
-      const auto ready = parse_ready(*line);
-      if (!ready) continue;
+    if (const auto ready = process_.await(Process::in(15s), parse_ready)) {
       address_ = ready->tcp;
       return;
     }
@@ -79,31 +77,22 @@ class OwnServer {
   std::string address_;
 };
 
-/// The axis of this name or number, or null.
-const v1::AxisDescription* find_axis(const v1::BenchDescription& bench, std::string_view choice) {
-  for (int n = 0; n < bench.axes_size(); ++n) {
-    if (bench.axes(n).name() == choice || std::to_string(n) == choice) return &bench.axes(n);
-  }
-  return nullptr;
-}
-
 /// Why the bench behind a link will not do; empty: it will. One that was named must, or else this throws.
 std::string why_not(const IdentifyOptions& options, const WantedExperiment& wanted) {
   try {
     link::Link link = open_link(options.server.link, "identify");
     const v1::BenchDescription& bench = link.welcome().bench();
-    const v1::AxisDescription* const axis = find_axis(bench, wanted.file.axis);
-    if (axis == nullptr) {
-      std::string names;
-      for (const v1::AxisDescription& each : bench.axes())
-        names += (names.empty() ? "" : ", ") + each.name();
+    const std::optional<std::uint32_t> number = find_axis(bench, wanted.file.axis);
+    if (!number) {
       return fmt::format("the bench {} at {} has no axis {}, but {}", bench.name(),
-                         options.server.link.address, wanted.file.axis, names);
+                         options.server.link.address, wanted.file.axis,
+                         listed(bench.axes(), &v1::AxisDescription::name));
     }
-    if (axis->machine_kind() != wanted.machine)
-      return fmt::format("axis {} of the bench {} is of kind {}, not {}", axis->name(), bench.name(),
-                         axis->machine_kind(), wanted.machine);
-    link.list_experiments("");  // nobody's: a bench that keeps none says so
+    const v1::AxisDescription& axis = bench.axes(static_cast<int>(*number));
+    if (axis.machine_kind() != wanted.machine)
+      return fmt::format("axis {} of the bench {} is of kind {}, not {}", axis.name(), bench.name(),
+                         axis.machine_kind(), wanted.machine);
+    link.list_experiments("");  // without an owner: a bench that keeps no experiments refuses
   } catch (const std::runtime_error& error) {
     // Nobody answers, or somebody else, or who does will not have us.
     if (options.link_was_named) throw;
@@ -149,7 +138,7 @@ class Columns {
   ExperimentRows rows_;
 };
 
-Measurement run_on(const IdentifyOptions& options, const ExperimentOptions& server, WantedExperiment wanted) {
+Measurement run_on(const IdentifyOptions& options, const ExperimentServer& server, WantedExperiment wanted) {
   Measurement m;
   ExperimentClient client(server, "identify");
   v1::RunExperiment& request = wanted.file.request;
@@ -182,7 +171,7 @@ Measurement run_on(const IdentifyOptions& options, const ExperimentOptions& serv
 
 Measurement run_on_own_server(const IdentifyOptions& options, const WantedExperiment& wanted) {
   const OwnServer server(wanted.bench);
-  ExperimentOptions there = options.server;
+  ExperimentServer there = options.server;
   there.link = {.address = server.address(), .token = {}};
   there.owner = random_word();
   return run_on(options, there, wanted);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "clients/command/experiment/experiment_file.hpp"
+#include "clients/command/identify/identify.hpp"
 #include "clients/command/identify/identify_data.hpp"
 
 namespace drivebench::command {

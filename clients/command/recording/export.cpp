@@ -1,3 +1,5 @@
+#include "clients/command/recording/export.hpp"
+
 #include <bench.pb.h>
 #include <fmt/format.h>
 
@@ -11,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
@@ -254,7 +256,9 @@ int run_export(const ExportOptions& options) {
   const std::string problem = reader.problem() ? reader.problem()->what : "";
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
   if (options.json) {
-    fmt::print(told, "{}\n", export_json(options.out_file, done.axis, done.rows, problem));
+    fmt::print(told, "{}\n",
+               Json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", problem}}
+                   .dump());
   } else {
     fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_csv ? "samples" : "frames",
                done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);

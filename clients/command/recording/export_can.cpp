@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "protocols/can/candump.hpp"
 #include "protocols/can/codec.hpp"
 #include "protocols/can/command.hpp"

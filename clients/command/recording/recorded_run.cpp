@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "protocols/mcap/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
 

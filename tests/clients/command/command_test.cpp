@@ -7,12 +7,20 @@
 #include <fstream>
 #include <sstream>
 
-#include "clients/command/common/commands.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/bench/describe.hpp"
+#include "clients/command/bench/status.hpp"
+#include "clients/command/bench/watch.hpp"
+#include "clients/command/can/can_log.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/process.hpp"
+#include "clients/command/common/server_ready.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/control/control_axis.hpp"
+#include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_run.hpp"
+#include "clients/command/experiment/experiment.hpp"
+#include "clients/command/identify/identify.hpp"
+#include "clients/command/recording/export.hpp"
 #include "protocols/mcap/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 
@@ -213,11 +221,12 @@ TEST(Links, OnlyControlGoesOverCanAndModbus) {
     EXPECT_THROW(run_describe({.link = {.address = address, .token = {}}}), UsageError);
     EXPECT_THROW(run_watch({.link = {.address = address, .token = {}}, .signals = {}}), UsageError);
     EXPECT_THROW(open_axis({.address = address, .token = {}}, "1", "control"), UsageError);
-    const ExperimentOptions experiment = {.link = {.address = address, .token = {}}, .owner = "o", .id = 1};
+    const ExperimentOptions experiment = {
+        .server = {.link = {.address = address, .token = {}}, .owner = "o"}, .id = 1};
     EXPECT_THROW(run_experiment_list(experiment), UsageError);
     EXPECT_THROW(run_experiment_fetch(experiment), UsageError);
     EXPECT_THROW(run_experiment_cancel(experiment), UsageError);
-    EXPECT_THROW(run_identify({.server = experiment, .link_was_named = true, .motor = "im"}), UsageError);
+    EXPECT_THROW(run_identify({.server = experiment.server, .link_was_named = true, .motor = "im"}), UsageError);
   }
   EXPECT_THROW(run_can_log({.address = "tcp:127.0.0.1:7300", .out_file = {}}), UsageError);
 }

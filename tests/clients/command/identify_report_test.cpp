@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/identify/identify_json.hpp"
 
 namespace drivebench::command {
 namespace {

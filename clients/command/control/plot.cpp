@@ -1,3 +1,5 @@
+#include "clients/command/control/plot.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,7 @@
 #include <numbers>
 #include <optional>
 
-#include "clients/command/common/commands.hpp"
+#include "clients/command/common/errors.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+
+#include "clients/command/common/link_choice.hpp"
+
+/// What changes an axis without controlling it.
+namespace drivebench::command {
+
+/// Puts a fault into an axis; the value 0 takes it away.
+struct InjectOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string axis{};  ///< number or name
+  std::string fault{};
+  double value = 0.0;
+};
+int run_inject(const InjectOptions& options);
+
+/// Writes a parameter.
+struct SetOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string axis{};  ///< number or name
+  std::string name{};
+  std::string value{};  ///< a number, or a word of a choice
+  double ramp_s = 0.0;  ///< in the bench's time; 0: a step
+};
+int run_set(const SetOptions& options);
+
+/// Hits the shaft.
+struct BumpOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string axis{};  ///< number or name
+  double impulse_nms = 0.0;
+};
+int run_bump(const BumpOptions& options);
+
+/// Takes an axis from the session that holds it and leaves it free.
+struct TakeOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string axis = "0";  ///< number or name
+  bool force = false;
+  std::string reason{};  ///< told to that session, and kept in the server's audit log
+};
+int run_take(const TakeOptions& options);
+
+}  // namespace drivebench::command

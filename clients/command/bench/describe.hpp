@@ -1,0 +1,13 @@
+#pragma once
+
+#include "clients/command/common/link_choice.hpp"
+
+namespace drivebench::command {
+
+struct DescribeOptions {
+  LinkChoice link{};
+  bool json = false;
+};
+int run_describe(const DescribeOptions& options);
+
+}  // namespace drivebench::command

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "clients/command/common/link_choice.hpp"
+
+namespace drivebench::command {
+
+struct StatusOptions {
+  LinkChoice link{};
+  bool json = false;
+};
+int run_status(const StatusOptions& options);
+
+}  // namespace drivebench::command

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "clients/command/common/link_choice.hpp"
+
+namespace drivebench::command {
+
+struct WatchOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string axis = "0";              ///< number or name
+  std::vector<std::string> signals{};  ///< empty: the usual ones of the axis
+  double rate_hz = 10.0;               ///< in the bench's time
+  std::uint64_t count = 0;             ///< 0: until interrupted
+};
+int run_watch(const WatchOptions& options);
+
+}  // namespace drivebench::command

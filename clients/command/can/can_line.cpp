@@ -1,0 +1,40 @@
+#include "clients/command/can/can_line.hpp"
+
+#include "clients/command/can/can_check.hpp"
+#include "clients/command/can/can_log.hpp"
+#include "clients/command/common/command_line.hpp"
+
+namespace drivebench::command {
+namespace {
+
+void add_can_check(CommandLine& line) {
+  CLI::App& can = *line.app().add_subcommand("can", "CAN interfaces of this computer");
+  can.require_subcommand(1);
+  const auto [sub, o] = line.add<CanCheckOptions>(
+      can, "check", "how an interface is doing, what is wrong and the cure", run_can_check);
+  sub.add_option("IFACE", o.interface, "for example can0")->required();
+  sub.add_flag("--classic", o.classic, "classic frames will do");
+  sub.footer("Exit codes: 0 nothing is wrong, 1 something is, 2 there is no such CAN interface.");
+}
+
+void add_can_log(CommandLine& line) {
+  const auto [sub, o] =
+      line.add<CanLogOptions>("can-log", "write what is on a CAN bus, as candump -l does", run_can_log);
+  sub.add_option("LINK", o.address, "can:BACKEND:CHANNEL, for example can:socketcan:vcan0")->required();
+  sub.add_option("--output", o.out_file, "instead of standard output");
+  sub.add_option("--count", o.count, "end after so many frames; 0: never")
+      ->check(not_negative())
+      ->capture_default_str();
+  sub.add_option("--duration", o.duration_s, "end after so many seconds; 0: never")
+      ->check(finite_between(0.0, kMost_s))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_can_commands(CommandLine& line) {
+  add_can_check(line);
+  add_can_log(line);
+}
+
+}  // namespace drivebench::command

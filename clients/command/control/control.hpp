@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clients/command/common/link_choice.hpp"
+#include "clients/command/control/control_run.hpp"
+#include "clients/control/gains/gains.hpp"
+
+namespace drivebench::command {
+
+struct ParameterSetting {
+  std::string name;
+  double value = 0.0;
+};
+
+struct ControlOptions {
+  LinkChoice link{};
+  bool json = false;
+  bool list = false;   ///< print the presets and end
+  bool gains = false;  ///< print the gains of the preset, with --list of all, and end
+  std::string preset = "book/8.2.2";
+  std::vector<control::Gain> overrides{};  ///< of its gains
+  std::string axis = "0";                  ///< number or name
+  std::string csv_file{};                  ///< empty: none
+  std::vector<LoadAt> loads{};
+  std::vector<ParameterSetting> settings{};
+  bool clear_faults = false;
+};
+int run_control(const ControlOptions& options);
+
+}  // namespace drivebench::command

@@ -1,0 +1,139 @@
+#include "clients/command/control/control_line.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/text.hpp"
+#include "clients/command/control/control.hpp"
+#include "clients/command/control/control_compare.hpp"
+#include "clients/command/control/plot.hpp"
+
+namespace drivebench::command {
+namespace {
+
+double number(std::string_view text, std::string_view whole) {
+  const auto value = finite_number(text);
+  if (!value) throw UsageError(fmt::format("'{}' in '{}' is not a number", text, whole));
+  return *value;
+}
+
+std::pair<std::string_view, std::string_view> split(std::string_view text, char at, std::string_view form) {
+  const std::size_t place = text.find(at);
+  if (place == std::string_view::npos) throw UsageError(fmt::format("'{}' should be {}", text, form));
+  return {text.substr(0, place), text.substr(place + 1)};
+}
+
+/// `0.1@0.0365`: N·m at seconds after the start of the trajectory.
+LoadAt parse_load(std::string_view text) {
+  const auto [load, after] = split(text, '@', "NM@SECONDS, for example 0.1@0.0365");
+  const LoadAt parsed = {.load_nm = number(load, text), .after_s = number(after, text)};
+  if (parsed.after_s < 0.0 || parsed.after_s > control::kLongestRun_s) {
+    throw UsageError(
+        fmt::format("'{}': the time must lie between 0 and {:g} s", text, control::kLongestRun_s));
+  }
+  return parsed;
+}
+
+/// `machine.rotor_resistance_ohm=5.85`.
+ParameterSetting parse_setting(std::string_view text) {
+  const auto [name, value] = split(text, '=', "NAME=VALUE");
+  return {.name = std::string(name), .value = number(value, text)};
+}
+
+/// An option that may be given several times, each text parsed into one of `values`.
+template <class Value, class Parse>
+void add_parsed(CLI::App& sub, const std::string& name, std::vector<Value>& values, Parse parse,
+                const std::string& help) {
+  sub.add_option_function<std::vector<std::string>>(
+      name,
+      [&values, parse](const std::vector<std::string>& texts) {
+        for (const std::string& text : texts)
+          values.push_back(parse(text));
+      },
+      help);
+}
+
+void add_gains(CLI::App& sub, std::vector<control::Gain>& overrides) {
+  const auto parse = [](const std::string& text) {
+    const ParameterSetting gain = parse_setting(text);
+    return control::Gain{gain.name, gain.value};
+  };
+  add_parsed(sub, "--gain", overrides, parse, "NAME=VALUE: another value for a gain of the preset");
+}
+
+/// `control` runs a preset on a bench, or with --compare on a recording.
+struct ControlLine : ControlOptions {
+  CompareOptions compare{};
+};
+
+int run_control_or_compare(const ControlLine& line) {
+  CompareOptions compare = line.compare;
+  if (compare.recording.empty()) {
+    if (!compare.other.empty() || compare.from_tick || compare.threshold) {
+      throw UsageError("--with, --from and --threshold belong to --compare");
+    }
+    return run_control(line);
+  }
+  compare.json = line.json;
+  compare.preset = line.preset;
+  compare.overrides = line.overrides;
+  compare.axis = line.axis;
+  return run_compare(compare);
+}
+
+void add_compare(CLI::App& sub, CompareOptions& o) {
+  sub.add_option("--compare", o.recording,
+                 "MCAP recording of your controller: what the preset's would have commanded");
+  sub.add_option("--with", o.other, "--compare: recording of the preset's own run, compared too");
+  sub.add_option("--from", o.from_tick, "--compare: tick at which the run starts")->check(not_negative());
+  sub.add_option("--threshold", o.threshold,
+                 "--compare: [V] or [A]; exit code 1 if a command differs by more, or the recording does "
+                 "not hold the whole run")
+      ->check(finite_between(0.0, kMost));
+}
+
+void add_control(CommandLine& line) {
+  const auto [sub, o] =
+      line.add<ControlLine>("control", "run the reference controller on a move", run_control_or_compare);
+  add_link(sub, o.link, std::string(kStreamLinks) + ", can:BACKEND:CHANNEL?node=N, modbus:HOST:PORT?unit=N");
+  sub.add_option("--preset", o.preset, "gains and move by name")->capture_default_str();
+  sub.add_flag("--list", o.list, "print the presets and end; with --gains all their gains");
+  sub.add_flag("--gains", o.gains, "print the gains of the preset and end");
+  add_gains(sub, o.overrides);
+  add_compare(sub, o.compare);
+  sub.add_option("--axis", o.axis, "number or name; CAN and Modbus links name it themselves")
+      ->capture_default_str();
+  sub.add_option("--csv", o.csv_file, "write every sample to this file");
+  add_parsed(sub, "--load", o.loads, parse_load,
+             "NM@SECONDS: load torque at a time after the start of the trajectory; put back at the end");
+  add_parsed(sub, "--set", o.settings, parse_setting,
+             "NAME=VALUE: write a parameter of the axis first; it stays");
+  sub.add_flag("--clear", o.clear_faults, "clear latched faults first");
+}
+
+void add_plot(CommandLine& line) {
+  const auto [sub, o] =
+      line.add<PlotOptions>("plot", "a controlled run of a recording as an SVG picture", run_plot);
+  sub.add_option("FILE", o.recording, "an MCAP recording")->required();
+  sub.add_option("--out", o.out_file, "instead of standard output");
+  sub.add_option("--preset", o.preset, "draws its trajectory and the error too");
+  add_gains(sub, o.overrides);
+  sub.add_option("--axis", o.axis, "name; default: the first in the file");
+  sub.add_option("--from", o.from_tick, "tick at which the run starts")->check(not_negative());
+  sub.add_option("--panels", o.panels,
+                 "of angle, speed, error, currents, voltages, torque, separated by commas")
+      ->delimiter(',');
+  sub.add_option("--title", o.title, "default: the preset, or else the file");
+}
+
+}  // namespace
+
+void add_control_commands(CommandLine& line) {
+  add_control(line);
+  add_plot(line);
+}
+
+}  // namespace drivebench::command

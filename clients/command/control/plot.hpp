@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/control/gains/gains.hpp"
+
+namespace drivebench::command {
+
+/// A controlled run of a recording as an SVG picture.
+struct PlotOptions {
+  std::string recording{};
+  std::string out_file{};  ///< empty: standard output
+  std::string preset{};    ///< whose trajectory is drawn beside it; empty: none
+  std::vector<control::Gain> overrides{};
+  std::string axis{};                        ///< name; empty: the first in the file
+  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
+  std::vector<std::string> panels{};         ///< empty: speed, currents and voltages
+  std::string title{};                       ///< empty: the preset, or else the file
+};
+int run_plot(const PlotOptions& options);
+
+}  // namespace drivebench::command

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "clients/command/demo/demo_report.hpp"
+
+namespace drivebench::command {
+
+std::string demo_json(const DemoReport& report);
+
+// Of a line that drivebench-server prints; nothing of any other line.
+std::optional<ServerVerdict> parse_verdict(std::string_view line);
+std::optional<DemoReplay> parse_replay(std::string_view line);
+
+}  // namespace drivebench::command

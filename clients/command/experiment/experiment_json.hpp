@@ -1,0 +1,18 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+
+namespace drivebench::command {
+
+/// What the server says of an experiment.
+nlohmann::ordered_json json_of(const v1::ExperimentInfo& info);
+/// The same in a line; `resumed`: how often a broken link was made anew.
+std::string experiment_json(const v1::ExperimentInfo& info, std::string_view out_file, std::uint64_t resumed);
+std::string experiments_json(const v1::ExperimentList& list);
+
+}  // namespace drivebench::command

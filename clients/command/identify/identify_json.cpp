@@ -1,0 +1,54 @@
+#include "clients/command/identify/identify_json.hpp"
+
+#include <cmath>
+
+#include "clients/command/common/json.hpp"
+#include "clients/command/experiment/experiment_json.hpp"
+#include "clients/identification/experiments/named_experiments.hpp"
+
+namespace drivebench::command {
+
+std::string identify_json(const IdentifyReport& report) {
+  const identification::Processing& p = report.settings.processing;
+  Json out = Json::parse(to_json(report.result));
+  out["motor"] = report.motor;
+  out["source"] = report.source;
+  out["experiment"] = report.experiment ? json_of(*report.experiment) : Json(nullptr);
+  out["settings"] = Json{{"period_s", report.period_s},
+                         {"pole_pairs", report.settings.pole_pairs},
+                         {"phases", report.settings.three_phase ? 3 : 2},
+                         {"counts_per_revolution", report.settings.counts_per_revolution},
+                         {"voltage_shift", p.voltage_shift},
+                         {"from_s", p.from_s},
+                         {"to_s", p.to_s},
+                         {"current_hz", p.current.cutoff_hz},
+                         {"voltage_hz", p.voltage.cutoff_hz},
+                         {"shaft_hz", p.shaft.cutoff_hz},
+                         {"order", p.current.order}};
+  Json signals = Json::object();
+  if (report.validation) {
+    for (const identification::Resimulated& signal : report.validation->signals) {
+      signals[signal.name] =
+          Json{{"unit", signal.unit},
+               {"rms_error", signal.rms_error},
+               {"normalised", std::isfinite(signal.normalised) ? Json(signal.normalised) : Json(nullptr)}};
+    }
+  }
+  out["validation"] = Json{{"from_rest", report.validation && report.validation->from_rest},
+                           {"signals", signals},
+                           {"problem", report.validation_problem}};
+  return out.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string named_experiments_json() {
+  Json out = Json::array();
+  for (const identification::NamedExperiment& each : identification::named_experiments())
+    out.push_back(Json{{"motor", each.motor},
+                       {"name", each.name},
+                       {"file", each.file},
+                       {"bench", each.bench},
+                       {"summary", each.summary}});
+  return Json{{"experiments", out}}.dump(2);
+}
+
+}  // namespace drivebench::command

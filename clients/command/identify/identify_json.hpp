@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "clients/command/identify/identify_report.hpp"
+
+namespace drivebench::command {
+
+/// What identification::to_json says, and experiment, settings and validation.
+std::string identify_json(const IdentifyReport& report);
+/// Motors and their experiments.
+std::string named_experiments_json();
+
+}  // namespace drivebench::command

@@ -1,0 +1,43 @@
+#include "clients/command/recording/recording_line.hpp"
+
+#include "clients/command/common/command_line.hpp"
+#include "clients/command/recording/export.hpp"
+#include "clients/command/recording/replay.hpp"
+
+namespace drivebench::command {
+namespace {
+
+void add_replay(CommandLine& line) {
+  const auto [sub, o] =
+      line.add<ReplayOptions>("replay", "re-simulate a recording and compare it bit for bit", run_replay);
+  sub.add_option("FILE", o.recording, "an MCAP recording")->required();
+}
+
+void add_export(CommandLine& line) {
+  const auto [sub, o] = line.add<ExportOptions>("export", "a recording as CSV or as a CAN trace", run_export);
+  sub.add_option("--format", o.format, "csv: samples; candump: the frames that a CAN bus would have")
+      ->check(CLI::IsMember({"csv", "candump"}))
+      ->capture_default_str();
+  sub.add_option("--interface", o.interface, "candump: name of the interface")->capture_default_str();
+  sub.add_option("--node-base", o.node_base, "candump: node id of the first axis")
+      ->check(CLI::Range(1, 127))
+      ->capture_default_str();
+  sub.add_flag("--classic", o.classic, "candump: classic frames instead of FD");
+  sub.add_option("--profile", o.profile, "candump: as in a can: link, current_unit_a=0.01&extended=1");
+  sub.add_option("FILE", o.recording, "an MCAP recording")->required();
+  sub.add_option("--out", o.out_file, "instead of standard output");
+  sub.add_option("--axis", o.axis, "name; default: the first in the file");
+  sub.add_option("--signals", o.signals, "names, separated by commas")->delimiter(',');
+  sub.add_option("--from", o.from_tick, "first tick")->check(not_negative());
+  sub.add_option("--to", o.to_tick, "last tick")->check(not_negative());
+  sub.footer("Exit code 3: the recording ends early; what it holds was written.");
+}
+
+}  // namespace
+
+void add_recording_commands(CommandLine& line) {
+  add_replay(line);
+  add_export(line);
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+namespace drivebench::command {
+
+/// Replaces this process by drivebench-server, which replays.
+struct ReplayOptions {
+  std::string recording{};
+  bool json = false;
+};
+int run_replay(const ReplayOptions& options);
+
+}  // namespace drivebench::command
