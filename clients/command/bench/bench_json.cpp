@@ -131,9 +131,12 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
   return out.dump(2);
 }
 
-std::string sample_json(const Sample& sample, std::uint32_t axis, std::uint64_t dropped,
-                        const std::vector<const Signal*>& signals) {
-  Json out = {{"axis", axis}, {"dropped", dropped}};
+std::string sample_json(const Sample& sample, const v1::BenchDescription& bench, std::uint32_t axis,
+                        std::uint64_t dropped, const std::vector<const Signal*>& signals) {
+  Json out = {{"bench", bench.name()},
+              {"axis", axis},
+              {"dropped", dropped},
+              {"time_s", static_cast<double>(sample.tick) * bench.period_s()}};
   for (const Signal* signal : signals)
     out[std::string(signal->name)] = value_as_json(*signal, sample);
   return out.dump();
