@@ -10,35 +10,12 @@
 namespace drivebench::command {
 namespace {
 
-using link::CanBitTiming;
-using link::CanController;
-using link::CanControllerState;
-using link::CanInterface;
-
-constexpr int kExitCannotBeHad = 2;
+constexpr int kExitNoInterface = 2;
 constexpr std::uint32_t kMtuFd = 72;
 constexpr std::uint32_t kShortQueue = 100;  // the kernel's default for hardware is 10
 constexpr std::string_view kAskTheWires =
     "all nodes need the same bit rates and about the same sample points, the bus 60 ohm between CAN_H and "
-    "CAN_L, and somebody besides us who acknowledges";
-
-std::string_view name_of(CanControllerState state) {
-  switch (state) {
-    case CanControllerState::kErrorActive:
-      return "error-active";
-    case CanControllerState::kErrorWarning:
-      return "error-warning";
-    case CanControllerState::kErrorPassive:
-      return "error-passive";
-    case CanControllerState::kBusOff:
-      return "bus-off";
-    case CanControllerState::kStopped:
-      return "stopped";
-    case CanControllerState::kSleeping:
-      return "sleeping";
-  }
-  return "unknown";
-}
+    "CAN_L, and a second node that acknowledges";
 
 bool is_virtual(const CanInterface& interface) {
   return interface.kind == "vcan" || interface.kind == "vxcan";
@@ -107,10 +84,10 @@ void check_controller(const CanInterface& interface, const CanController& contro
   if (controller.state == CanControllerState::kBusOff) {
     found.push_back({true, "bus-off: too many errors, the controller has left the bus",
                      fmt::format("ip link set {} type can restart; {}", interface.name, kAskTheWires)});
-  } else if (controller.state == CanControllerState::kErrorPassive ||
-             controller.state == CanControllerState::kErrorWarning) {
-    found.push_back({true, fmt::format("{}: many errors on the bus", name_of(controller.state)),
-                     std::string(kAskTheWires)});
+  } else if (controller.state == CanControllerState::kErrorPassive) {
+    found.push_back({true, "error-passive: many errors on the bus", std::string(kAskTheWires)});
+  } else if (controller.state == CanControllerState::kErrorWarning) {
+    found.push_back({true, "error-warning: many errors on the bus", std::string(kAskTheWires)});
   }
   if (controller.restart_ms == 0) {
     found.push_back({true, "no restart-ms: after bus-off it stays off the bus",
@@ -126,89 +103,24 @@ void check_controller(const CanInterface& interface, const CanController& contro
   }
 }
 
-std::string timing_text(std::string_view what, const CanBitTiming& timing) {
-  return fmt::format("  {}: {} bit/s, sample point {:.3f}, sjw {} of {} quanta of {:g} ns\n", what,
-                     timing.bit_rate, timing.sample_point, timing.sjw, timing.quanta, timing.quantum_ns);
+bool is_problem(const CanFinding& finding) {
+  return finding.problem;
 }
 
-std::string as_text(const CanInterface& i) {
-  std::string text =
-      fmt::format("{}: {}, {}, {}, queue of {} frames\n", i.name, i.kind.empty() ? "CAN" : i.kind,
-                  i.up ? "up" : "down", i.mtu >= kMtuFd ? "CAN FD" : "classic CAN", i.queue_length);
-  if (i.controller) {
-    const CanController& c = *i.controller;
-    text += fmt::format("  {}, restart-ms {}", name_of(c.state), c.restart_ms);
-    if (c.transmit_errors && c.receive_errors) {
-      text += fmt::format(", error counters {} sent and {} received", *c.transmit_errors, *c.receive_errors);
-    }
-    text += '\n';
-    if (c.timing) text += timing_text("bit timing", *c.timing);
-    if (c.data_timing) text += timing_text("data phase", *c.data_timing);
-    text += fmt::format("  {} times off the bus, {} bus errors, {} arbitrations lost\n", c.bus_offs,
-                        c.bus_errors, c.arbitration_lost);
-  }
-  text += fmt::format("  received {} frames, {} errors, {} dropped; sent {} frames, {} errors, {} dropped\n",
-                      i.receive_packets, i.receive_errors, i.receive_dropped, i.transmit_packets,
-                      i.transmit_errors, i.transmit_dropped);
-  return text;
-}
-
-Json timing_json(const std::optional<CanBitTiming>& timing) {
-  if (!timing) return nullptr;
-  return {{"bit_rate", timing->bit_rate},
-          {"sample_point", timing->sample_point},
-          {"sjw", timing->sjw},
-          {"quanta", timing->quanta},
-          {"quantum_ns", timing->quantum_ns}};
-}
-
-Json controller_json(const std::optional<CanController>& controller) {
-  if (!controller) return nullptr;
-  const auto counter = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
-  return {{"state", name_of(controller->state)},
-          {"fd", controller->fd},
-          {"restart_ms", controller->restart_ms},
-          {"transmit_errors", counter(controller->transmit_errors)},
-          {"receive_errors", counter(controller->receive_errors)},
-          {"bus_offs", controller->bus_offs},
-          {"bus_errors", controller->bus_errors},
-          {"arbitration_lost", controller->arbitration_lost},
-          {"timing", timing_json(controller->timing)},
-          {"data_timing", timing_json(controller->data_timing)}};
-}
-
-Json as_json(const CanInterface& i) {
-  return {{"name", i.name},
-          {"kind", i.kind},
-          {"up", i.up},
-          {"mtu", i.mtu},
-          {"queue_length", i.queue_length},
-          {"received",
-           {{"frames", i.receive_packets}, {"errors", i.receive_errors}, {"dropped", i.receive_dropped}}},
-          {"sent",
-           {{"frames", i.transmit_packets}, {"errors", i.transmit_errors}, {"dropped", i.transmit_dropped}}},
-          {"controller", controller_json(i.controller)}};
-}
-
-/// Prints what was found; the interface is null if it cannot be had.
-void print(const CanInterface* interface, const std::vector<CanFinding>& findings, bool json) {
+void print(const std::string& interface, const std::vector<CanFinding>& findings, bool json) {
   if (json) {
     Json list = Json::array();
     for (const CanFinding& finding : findings)
       list.push_back({{"problem", finding.problem}, {"what", finding.what}, {"cure", finding.cure}});
-    const Json all = {{"interface", interface == nullptr ? Json(nullptr) : as_json(*interface)},
-                      {"findings", list}};
+    const Json all = {{"interface", interface}, {"findings", list}};
     fmt::print("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
     return;
   }
-  if (interface != nullptr) fmt::print("{}", as_text(*interface));
   for (const CanFinding& finding : findings) {
     fmt::print("{}: {}\n", finding.problem ? "problem" : "note", finding.what);
     if (!finding.cure.empty()) fmt::print("  cure: {}\n", finding.cure);
   }
-  if (std::none_of(findings.begin(), findings.end(), [](const auto& each) { return each.problem; })) {
-    fmt::print("no problems\n");
-  }
+  if (std::ranges::none_of(findings, is_problem)) fmt::print("no problems\n");
 }
 
 }  // namespace
@@ -231,36 +143,30 @@ std::vector<CanFinding> can_findings(const CanInterface& interface, bool classic
                      fmt::format("ip link set {} txqueuelen 1000", interface.name)});
   }
   if (interface.controller) check_controller(interface, *interface.controller, found);
-  if (interface.receive_dropped + interface.transmit_dropped > 0) {
-    found.push_back({false,
-                     fmt::format("{} frames received and {} to be sent were dropped since it was made",
-                                 interface.receive_dropped, interface.transmit_dropped),
-                     {}});
-  }
   return found;
 }
 
 int run_can_check(const CanCheckOptions& options) {
-  const std::optional<CanInterface> interface = link::read_can_interface(options.interface);
+  const std::string& name = options.interface;
+  const std::optional<CanInterface> interface = read_can_interface(name);
   if (!interface) {
-    print(nullptr,
-          {{true, fmt::format("there is no interface {}", options.interface),
-            "connect the adapter and load its driver; a virtual one: " + make_virtual(options.interface)}},
+    print(name,
+          {{true, fmt::format("there is no interface {}", name),
+            "connect the adapter and load its driver; a virtual one: " + make_virtual(name)}},
           options.json);
-    return kExitCannotBeHad;
+    return kExitNoInterface;
   }
   if (!interface->is_can) {
-    print(nullptr,
-          {{true, fmt::format("{} is no CAN interface", options.interface),
+    print(name,
+          {{true, fmt::format("{} is no CAN interface", name),
             "those that are: grep -lx 280 /sys/class/net/*/type"}},
           options.json);
-    return kExitCannotBeHad;
+    return kExitNoInterface;
   }
   const std::vector<CanFinding> findings = can_findings(*interface, options.classic);
-  print(&*interface, findings, options.json);
-  return std::any_of(findings.begin(), findings.end(), [](const auto& each) { return each.problem; })
-             ? kExitFailed
-             : kExitOk;
+  print(name, findings, options.json);
+  if (!options.json) fmt::print("its numbers: ip -details -statistics link show {}\n", name);
+  return std::ranges::any_of(findings, is_problem) ? kExitFailed : kExitOk;
 }
 
 }  // namespace drivebench::command

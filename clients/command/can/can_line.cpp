@@ -11,7 +11,7 @@ void add_can_check(CommandLine& line) {
   CLI::App& can = *line.app().add_subcommand("can", "CAN interfaces of this computer");
   can.require_subcommand(1);
   const auto [sub, o] = line.add<CanCheckOptions>(
-      can, "check", "how an interface is doing, what is wrong and the cure", run_can_check);
+      can, "check", "what is wrong with an interface, and the line that cures it", run_can_check);
   sub.add_option("IFACE", o.interface, "for example can0")->required();
   sub.add_flag("--classic", o.classic, "classic frames will do");
   sub.footer("Exit codes: 0 nothing is wrong, 1 something is, 2 there is no such CAN interface.");

@@ -32,7 +32,7 @@ NOT_RUN = {
     "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH]":
         "a synopsis; test_commands.py tries each option",
     "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
-    "drivebench can check can0       # bit timing, state, error counters, queue, drops; for each problem the line that cures it":
+    "drivebench can check can0       # what is wrong with bit timing, state or queue, and the line that cures it":
         "needs an adapter; can_check_test and test_socketcan.py try it",
 }
 

@@ -1,7 +1,6 @@
-#include "clients/link/can_netlink.hpp"
+#include "clients/command/can/can_netlink.hpp"
 
 #include <linux/can/netlink.h>
-#include <linux/if_link.h>
 #include <linux/netlink.h>
 #include <linux/rtnetlink.h>
 #include <net/if.h>
@@ -18,7 +17,7 @@
 
 #include "clients/link/file_descriptor.hpp"
 
-namespace drivebench::link {
+namespace drivebench::command {
 namespace {
 
 using Bytes = std::span<const std::byte>;
@@ -66,11 +65,10 @@ std::optional<CanBitTiming> timing_of(const std::map<int, Bytes>& attributes, in
   return CanBitTiming{.bit_rate = raw.bitrate,
                       .sample_point = raw.sample_point / 1000.0,
                       .sjw = raw.sjw,
-                      .quanta = 1 + raw.prop_seg + raw.phase_seg1 + raw.phase_seg2,
-                      .quantum_ns = static_cast<double>(raw.tq)};
+                      .quanta = 1 + raw.prop_seg + raw.phase_seg1 + raw.phase_seg2};
 }
 
-CanController controller_of(const std::map<int, Bytes>& data, const std::map<int, Bytes>& info) {
+CanController controller_of(const std::map<int, Bytes>& data) {
   CanController controller;
   const auto at = [&](int type) { return data.contains(type) ? data.at(type) : Bytes{}; };
   controller.timing = timing_of(data, IFLA_CAN_BITTIMING);
@@ -83,17 +81,6 @@ CanController controller_of(const std::map<int, Bytes>& data, const std::map<int
   controller.listen_only = (mode.flags & CAN_CTRLMODE_LISTENONLY) != 0;
   controller.one_shot = (mode.flags & CAN_CTRLMODE_ONE_SHOT) != 0;
   controller.restart_ms = read_as<std::uint32_t>(at(IFLA_CAN_RESTART_MS));
-  if (data.contains(IFLA_CAN_BERR_COUNTER)) {
-    const auto counters = read_as<can_berr_counter>(at(IFLA_CAN_BERR_COUNTER));
-    controller.transmit_errors = counters.txerr;
-    controller.receive_errors = counters.rxerr;
-  }
-  if (const auto found = info.find(IFLA_INFO_XSTATS); found != info.end()) {
-    const auto statistics = read_as<can_device_stats>(found->second);
-    controller.bus_offs = statistics.bus_off;
-    controller.arbitration_lost = statistics.arbitration_lost;
-    controller.bus_errors = statistics.bus_error;
-  }
   return controller;
 }
 
@@ -136,24 +123,17 @@ std::optional<CanInterface> parse_link_message(Bytes message) {
   interface.up = (body.ifi_flags & IFF_UP) != 0;
   interface.mtu = read_as<std::uint32_t>(at(IFLA_MTU));
   interface.queue_length = read_as<std::uint32_t>(at(IFLA_TXQLEN));
-  const auto statistics = read_as<rtnl_link_stats64>(at(IFLA_STATS64));
-  interface.receive_packets = statistics.rx_packets;
-  interface.transmit_packets = statistics.tx_packets;
-  interface.receive_errors = statistics.rx_errors;
-  interface.transmit_errors = statistics.tx_errors;
-  interface.receive_dropped = statistics.rx_dropped + statistics.rx_over_errors;
-  interface.transmit_dropped = statistics.tx_dropped;
   const auto info = attributes_in(at(IFLA_LINKINFO));
   if (const auto kind = info.find(IFLA_INFO_KIND); kind != info.end()) interface.kind = text_of(kind->second);
   if (const auto data = info.find(IFLA_INFO_DATA); data != info.end() && interface.kind == "can") {
-    interface.controller = controller_of(attributes_in(data->second), info);
+    interface.controller = controller_of(attributes_in(data->second));
   }
   return interface;
 }
 
 std::optional<CanInterface> read_can_interface(const std::string& name) {
   if (name.empty() || name.size() >= IFNAMSIZ) return std::nullopt;
-  const FileDescriptor socket(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE));
+  const link::FileDescriptor socket(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE));
   if (!socket.is_open()) fail(errno);
   const timeval patience = {.tv_sec = 5, .tv_usec = 0};
   if (::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience) != 0) fail(errno);
@@ -172,4 +152,4 @@ std::optional<CanInterface> read_can_interface(const std::string& name) {
   return parse_link_message(answer);
 }
 
-}  // namespace drivebench::link
+}  // namespace drivebench::command

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace drivebench::link {
+namespace drivebench::command {
 
 /// How a CAN controller samples bits, in one phase of a frame.
 struct CanBitTiming {
@@ -14,7 +14,6 @@ struct CanBitTiming {
   double sample_point = 0.0;  ///< fraction of a bit
   std::uint32_t sjw = 0;      ///< synchronisation jump width, time quanta
   std::uint32_t quanta = 0;   ///< time quanta a bit
-  double quantum_ns = 0.0;
 };
 
 enum class CanControllerState : std::uint8_t {
@@ -26,7 +25,7 @@ enum class CanControllerState : std::uint8_t {
   kSleeping
 };
 
-/// What a driver of real hardware tells beside it.
+/// What only a driver of real hardware tells.
 struct CanController {
   CanControllerState state = CanControllerState::kStopped;
   std::optional<CanBitTiming> timing;
@@ -34,15 +33,10 @@ struct CanController {
   bool fd = false;
   bool listen_only = false;
   bool one_shot = false;
-  std::uint32_t restart_ms = 0;                  ///< 0: stays off the bus after bus-off
-  std::optional<std::uint16_t> transmit_errors;  ///< the controller's counters, if the driver reads them
-  std::optional<std::uint16_t> receive_errors;
-  std::uint32_t bus_offs = 0;
-  std::uint32_t arbitration_lost = 0;
-  std::uint32_t bus_errors = 0;
+  std::uint32_t restart_ms = 0;  ///< 0: stays off the bus after bus-off
 };
 
-/// A network interface, as the kernel describes it.
+/// Of a network interface what `drivebench can check` judges.
 struct CanInterface {
   std::string name;
   bool is_can = false;
@@ -50,12 +44,6 @@ struct CanInterface {
   bool up = false;
   std::uint32_t mtu = 0;
   std::uint32_t queue_length = 0;
-  std::uint64_t receive_packets = 0;
-  std::uint64_t transmit_packets = 0;
-  std::uint64_t receive_errors = 0;
-  std::uint64_t transmit_errors = 0;
-  std::uint64_t receive_dropped = 0;
-  std::uint64_t transmit_dropped = 0;
   std::optional<CanController> controller;
 };
 
@@ -65,4 +53,4 @@ std::optional<CanInterface> read_can_interface(const std::string& name);
 /// Reads a message of type RTM_NEWLINK, header and all; nothing if it is none.
 std::optional<CanInterface> parse_link_message(std::span<const std::byte> message);
 
-}  // namespace drivebench::link
+}  // namespace drivebench::command
