@@ -9,7 +9,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/text.hpp"
-#include "clients/link/can_link.hpp"
+#include "clients/link/can/can_link.hpp"
 #include "clients/link/modbus_link.hpp"
 
 namespace drivebench::command {

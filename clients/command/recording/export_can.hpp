@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "clients/link/can_address.hpp"
+#include "clients/link/can/can_address.hpp"
 #include "protocols/can/frame.hpp"
 #include "protocols/can/table.hpp"
 #include "protocols/signals/sample.hpp"

@@ -1,13 +1,13 @@
 // The controller's side of the CAN profile against a bench in memory that answers as the profile says, and
 // loses or spoils what a test wants.
-#include "clients/link/can_link.hpp"
+#include "clients/link/can/can_link.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <limits>
 
-#include "tests/clients/link/fake_can_bench.hpp"
+#include "tests/clients/link/can/fake_can_bench.hpp"
 
 namespace drivebench::link {
 namespace {

@@ -1,4 +1,4 @@
-#include "clients/link/can_address.hpp"
+#include "clients/link/can/can_address.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "clients/link/axis_link.hpp"
-#include "clients/link/can_bus.hpp"
+#include "clients/link/can/can_bus.hpp"
 #include "protocols/can/command.hpp"
 
 namespace drivebench::link {

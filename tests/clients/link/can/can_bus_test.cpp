@@ -1,5 +1,5 @@
 // The client's back ends against the other end of a socket. Kernel CAN and real peers are in the CAN tests.
-#include "clients/link/can_bus.hpp"
+#include "clients/link/can/can_bus.hpp"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>

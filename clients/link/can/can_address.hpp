@@ -15,7 +15,7 @@ struct CanAddress {
   /// socketcan: the interface; udp_multicast: the group; slcan: path of a terminal or "tcp:HOST:PORT";
   /// socketcand: "HOST:PORT".
   std::string channel;
-  std::uint16_t port = can::row_of(can::Backend::kUdpMulticast).default_port;  ///< udp_multicast
+  std::uint16_t port = 0;                   ///< udp_multicast
   std::string bus = "can0";                 ///< socketcand: the bus to open
   std::uint32_t bit_rate = 1'000'000;       ///< slcan: what an adapter is set to
   std::uint32_t data_bit_rate = 5'000'000;  ///< the same for the data of FD frames

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "clients/link/can_address.hpp"
+#include "clients/link/can/can_address.hpp"
 #include "protocols/can/frame.hpp"
 
 namespace drivebench::link {

@@ -1,4 +1,4 @@
-#include "clients/link/can_link.hpp"
+#include "clients/link/can/can_link.hpp"
 
 #include <algorithm>
 #include <array>

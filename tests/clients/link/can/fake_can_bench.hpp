@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/link/can_bus.hpp"
+#include "clients/link/can/can_bus.hpp"
 #include "protocols/can/command.hpp"
 
 namespace drivebench::link {
