@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 """The subcommands of drivebench that talk to a bench: their output, as text and as JSON, and their exit codes."""
 import json
+import os
 import pathlib
 import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -17,7 +19,7 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from command_test import (
-    DRIVEBENCH, FAILED, NO_BENCH, NO_CONNECT, OK, SERVO, USAGE, CommandTest, link_of, until)
+    DRIVEBENCH, FAILED, NO_BENCH, NO_CONNECT, OK, SERVO, USAGE, CommandTest, environment, link_of, until)
 from wire_client import PATIENCE_S, REPOSITORY, pb
 
 
@@ -165,13 +167,57 @@ class Observing(CommandTest):
             said = self.drivebench(*command, "--owner", "anna", link=link_of(bench), code=NO_CONNECT).stderr
             self.assertSays(said, "does not let us in")
 
+    STILL = "in lockstep time stands still until a controller drives the bench"
+
     def watch_a_move(self, *options):
+        """The values that come before and in a move."""
         watching = self.start(DRIVEBENCH, "watch", *options, link=self.link)
-        self.assertSays(watching.stderr.readline(), "waiting for the bench to tick (lockstep")
+        if "--json" not in options:
+            self.assertSays(watching.stderr.readline(), "watch: axis 0 (servo) of bench servo, lockstep")
+        self.assertSays(watching.stderr.readline(), self.STILL)
         self.drivebench("control", link=self.link)
         out, _ = watching.communicate(timeout=PATIENCE_S)
         self.assertEqual(watching.returncode, OK)
         return out.splitlines()
+
+    def test_watch_shows_the_present_values_of_a_lockstep_without_a_controller(self):
+        """Catches: a viewer that waits for ever beside a bench whose time stands still, without a word."""
+        present, = self.drivebench("watch", "--json", "--count", "1", link=self.link).stdout.splitlines()
+        present = json.loads(present)
+        self.assertEqual((present["bench"], present["tick"], present["time_s"], present["state"]), ("servo", 0, 0.0, 0))
+        watching = self.start(DRIVEBENCH, "watch", link=self.link)
+        self.assertEqual(watching.stdout.readline().split()[:3], ["tick", "time", "[s]"])
+        self.assertEqual(watching.stdout.readline().split()[:3], ["0", "0.000000", "idle"])
+        watching.stderr.readline()
+        self.assertSays(watching.stderr.readline(), self.STILL, "drivebench control", "the values go on then")
+        self.drivebench("control", link=self.link)
+        self.assertEqual(watching.stdout.readline().split()[2], "run")
+
+    def test_watch_draws_a_block_in_a_terminal(self):
+        """Catches: a block that creeps down the terminal, or that covers the note about the time."""
+        ours, theirs = os.openpty()
+        self.addCleanup(os.close, ours)
+        watching = subprocess.Popen([DRIVEBENCH, "watch", "--signals", "state,i_a_a", "--count", "2", "--rate", "8"], stdout=theirs,
+                                    stderr=subprocess.PIPE, text=True, cwd=self.folder, env=environment(self.link))
+        os.close(theirs)
+        self.addCleanup(watching.communicate)
+        self.addCleanup(watching.kill)
+        drawn = b""
+        while self.STILL.encode() not in drawn:
+            drawn += os.read(ours, 4096)
+        self.drivebench("control", link=self.link)
+        self.assertEqual(watching.wait(PATIENCE_S), OK)
+        while True:
+            try:
+                drawn += os.read(ours, 4096)
+            except OSError:  # the other end is closed
+                break
+        lines = drawn.decode().replace("\r", "").split("\n")
+        self.assertSays(lines[0], "axis 0 (servo) of bench servo, lockstep: tick 0, 0.000000 s")
+        self.assertEqual([lines[1].split()[:2], lines[2].split()[:3]], [["state", "idle\x1b[K"], ["i_a_a", "[A]", "0\x1b[K"]])
+        self.assertSays(lines[4], "\x1b[1A", self.STILL)
+        self.assertSays(lines[5], "\x1b[4A", "tick 1000, 0.125000 s")
+        self.assertEqual(watching.stderr.read(), "")
 
     def test_watch_prints_the_requested_number_of_samples_at_the_rate_of_the_bench(self):
         """Catches: a rate in wall time, which in lockstep means nothing; a --count that is one off."""
