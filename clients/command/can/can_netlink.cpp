@@ -15,7 +15,7 @@
 #include <system_error>
 #include <vector>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 namespace drivebench::command {
 

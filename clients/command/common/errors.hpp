@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 
 /// How a subcommand ends: its exit code, or one of these exceptions, which main() turns into one.
 namespace drivebench::command {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 
 namespace drivebench::command {
 

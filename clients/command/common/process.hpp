@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 
 namespace drivebench::command {
 

@@ -10,7 +10,7 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/text.hpp"
 #include "clients/link/can/can_link.hpp"
-#include "clients/link/modbus_link.hpp"
+#include "clients/link/modbus/modbus_link.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "clients/command/common/link_choice.hpp"
-#include "clients/link/axis_link.hpp"
-#include "clients/link/tcp_axis.hpp"
+#include "clients/link/common/axis_link.hpp"
+#include "clients/link/tcp/tcp_axis.hpp"
 #include "protocols/signals/sample.hpp"
 
 /// What the subcommands that talk to a bench share.

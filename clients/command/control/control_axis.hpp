@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "clients/control/presets/presets.hpp"
-#include "clients/link/axis_link.hpp"
+#include "clients/link/common/axis_link.hpp"
 
 /// What an axis must be like before a preset runs on it.
 namespace drivebench::command {

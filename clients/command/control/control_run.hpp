@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "clients/control/loop/run.hpp"
-#include "clients/link/axis_link.hpp"
+#include "clients/link/common/axis_link.hpp"
 
 namespace drivebench::command {
 

@@ -11,7 +11,7 @@
 
 #include "clients/command/common/link_choice.hpp"
 #include "clients/command/experiment/experiment_file.hpp"
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 namespace drivebench::command {
 

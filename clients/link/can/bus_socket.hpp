@@ -10,9 +10,9 @@
 #include <string>
 #include <system_error>
 
-#include "clients/link/address.hpp"
 #include "clients/link/can/can_bus.hpp"
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/address.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 
 /// What the buses share that are sockets of whole frames.
 namespace drivebench::link {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include "clients/link/address.hpp"
 #include "clients/link/can/can_bus_kind.hpp"
+#include "clients/link/common/address.hpp"
 #include "protocols/can/codec.hpp"
 #include "protocols/can/slcan.hpp"
 #include "protocols/can/text.hpp"

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "clients/link/axis_link.hpp"
 #include "clients/link/can/can_bus.hpp"
+#include "clients/link/common/axis_link.hpp"
 #include "protocols/can/command.hpp"
 
 namespace drivebench::link {

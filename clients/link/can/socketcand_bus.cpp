@@ -1,9 +1,9 @@
 #include <deque>
 #include <utility>
 
-#include "clients/link/address.hpp"
 #include "clients/link/can/can_bus_kind.hpp"
 #include "clients/link/can/text_bus.hpp"
+#include "clients/link/common/address.hpp"
 #include "protocols/can/socketcand.hpp"
 
 namespace drivebench::link {

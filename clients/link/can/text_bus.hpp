@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "clients/link/can/can_bus.hpp"
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 
 namespace drivebench::link {
 

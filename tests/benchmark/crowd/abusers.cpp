@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <thread>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 
 namespace drivebench::speed {
 namespace {

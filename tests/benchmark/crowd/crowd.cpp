@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 #include "tests/benchmark/crowd/viewers.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/server.hpp"

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "clients/command/common/installation.hpp"
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 #include "tests/benchmark/crowd/viewers.hpp"
 #include "tests/benchmark/harness/machine.hpp"
 #include "tests/benchmark/harness/server.hpp"

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 namespace drivebench::speed {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 #include "protocols/can/frame.hpp"
 
 namespace drivebench::speed {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 #include "tests/benchmark/harness/machine.hpp"
 
 namespace drivebench::speed {

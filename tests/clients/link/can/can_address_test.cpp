@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 
 namespace drivebench::link {
 namespace {

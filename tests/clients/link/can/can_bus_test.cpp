@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 
 namespace drivebench::link {
 namespace {

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <string>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 
 namespace drivebench::link {
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/link/file_descriptor.hpp"
+#include "clients/link/common/file_descriptor.hpp"
 #include "protocols/framing.hpp"
 
 namespace drivebench::link {

@@ -5,7 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "clients/link/axis_link.hpp"
+#include "clients/link/common/axis_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 namespace drivebench::link {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "clients/link/axis_link.hpp"
+#include "clients/link/common/axis_link.hpp"
 
 struct _modbus;
 

@@ -1,12 +1,12 @@
 // The link against a peer that answers whatever a test wants, good and bad.
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <vector>
 
-#include "tests/clients/link/fake_peer.hpp"
+#include "tests/clients/link/tcp/fake_peer.hpp"
 
 namespace drivebench::link {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/common/requests.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::link {

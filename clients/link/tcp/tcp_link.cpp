@@ -1,4 +1,4 @@
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 #include <poll.h>
 #include <sys/socket.h>

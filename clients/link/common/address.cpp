@@ -1,4 +1,4 @@
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 
 #include <fcntl.h>
 #include <netdb.h>

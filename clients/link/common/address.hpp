@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "clients/link/file_descriptor.hpp"
-#include "clients/link/tls_tunnel.hpp"
+#include "clients/link/common/file_descriptor.hpp"
+#include "clients/link/common/tls_tunnel.hpp"
 
 namespace drivebench::link {
 

@@ -1,4 +1,4 @@
-#include "clients/link/tcp_axis.hpp"
+#include "clients/link/tcp/tcp_axis.hpp"
 
 #include <cstddef>
 #include <span>

@@ -1,5 +1,5 @@
 // Requests about experiments.
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 namespace drivebench::link {
 

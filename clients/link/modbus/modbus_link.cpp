@@ -1,4 +1,4 @@
-#include "clients/link/modbus_link.hpp"
+#include "clients/link/modbus/modbus_link.hpp"
 
 #include <modbus/modbus.h>
 
@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 #include "protocols/modbus/register_map.hpp"
 
 namespace drivebench::link {

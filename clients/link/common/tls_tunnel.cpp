@@ -1,4 +1,4 @@
-#include "clients/link/tls_tunnel.hpp"
+#include "clients/link/common/tls_tunnel.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -17,7 +17,7 @@
 #include <thread>
 #include <utility>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 
 namespace drivebench::link {
 namespace {

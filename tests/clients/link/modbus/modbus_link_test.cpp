@@ -1,5 +1,5 @@
 // The controller's side of the register map against a server in this process.
-#include "clients/link/modbus_link.hpp"
+#include "clients/link/modbus/modbus_link.hpp"
 
 #include <gtest/gtest.h>
 #include <modbus/modbus.h>
@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "clients/link/address.hpp"
+#include "clients/link/common/address.hpp"
 #include "protocols/modbus/register_map.hpp"
 
 namespace drivebench::link {

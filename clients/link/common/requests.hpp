@@ -1,0 +1,63 @@
+#pragma once
+
+#include <bench.pb.h>
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+/// What a client asks of a bench over any link, and how the bench turns it down.
+namespace drivebench::link {
+
+/// The bench turned a request down and told why; the link goes on. what() is its sentence.
+class Refused : public std::runtime_error {
+ public:
+  explicit Refused(const v1::Refusal& refusal)
+      : std::runtime_error(refusal.message()), code_(refusal.code()), field_(refusal.field()) {}
+
+  v1::RefusalCode code() const noexcept { return code_; }
+  const std::string& field() const noexcept { return field_; }  ///< what it is about; may be empty
+
+ private:
+  v1::RefusalCode code_;
+  std::string field_;
+};
+
+/// What a controller asks of one axis, in answer to the sample of `tick`: voltages, or with GATES_CURRENT
+/// currents. A machine with fewer terminals ignores the others; `f` is the field winding.
+struct Command {
+  std::uint32_t axis = 0;
+  std::uint64_t tick = 0;
+  v1::Gates gates = v1::GATES_OFF;
+  double u_a_v = 0.0;
+  double u_b_v = 0.0;
+  double u_c_v = 0.0;
+  double u_f_v = 0.0;
+  double i_a_a = 0.0;
+  double i_b_a = 0.0;
+  double i_c_a = 0.0;
+  double i_f_a = 0.0;
+};
+
+struct LoadChange {
+  double load_nm = 0.0;
+  std::uint64_t ramp_ticks = 0;  ///< 0: a step
+  std::uint64_t at_tick = 0;     ///< 0: as soon as possible
+};
+
+/// A new value of a parameter.
+struct ParameterChange {
+  std::string name{};
+  double value = 0.0;
+  std::uint64_t ramp_ticks = 0;  ///< 0: a step
+  std::uint64_t at_tick = 0;     ///< 0: as soon as possible
+};
+
+/// A fault to put into an axis; a value of 0 takes it away.
+struct FaultInjection {
+  std::string name{};
+  double value = 0.0;
+  std::uint64_t at_tick = 0;  ///< 0: as soon as possible
+};
+
+}  // namespace drivebench::link
