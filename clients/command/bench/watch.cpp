@@ -10,6 +10,7 @@
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/command/common/signals.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -27,17 +28,6 @@ std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
   if (axis.field_winding()) names.insert(names.end(), {"i_f_a", "u_f_v"});
   names.insert(names.end(), {"angle_rad", "speed_rad_s"});
   return names;
-}
-
-std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
-  std::vector<const Signal*> signals;
-  for (const std::string& name : names) {
-    const Signal* signal = find_signal(name);
-    if (signal == nullptr)
-      throw UsageError(fmt::format("no signal '{}'; `drivebench describe` lists them", name));
-    signals.push_back(signal);
-  }
-  return signals;
 }
 
 std::string value_text(const Signal& signal, const Sample& sample, const v1::BenchDescription& bench) {
@@ -63,7 +53,7 @@ class View {
       : form_(form),
         bench_(bench),
         axis_(axis),
-        signals_(chosen_signals(options.signals.empty() ? usual_signals(description()) : options.signals)),
+        signals_(signals_named(options.signals.empty() ? usual_signals(description()) : options.signals)),
         has_time_(options.signals.empty()) {
     if (form_ == Form::kLines) fmt::print(stderr, "watch: {}\n", title());
   }
@@ -170,7 +160,7 @@ std::string shown_value(const Signal& signal, const Sample& sample) {
 }
 
 int run_watch(const WatchOptions& options) {
-  chosen_signals(options.signals);  // a wrong name is told before a bench is looked for
+  signals_named(options.signals);  // a wrong name is told before a bench is looked for
   link::Link bench_link = open_link(options.link, "watch");
   const v1::BenchDescription& bench = bench_link.welcome().bench();
   const std::uint32_t axis = axis_number(bench, options.axis);

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "clients/command/common/signals.hpp"
+
 namespace drivebench::command {
 namespace {
 
@@ -56,10 +58,7 @@ void ExperimentRows::take(const v1::ExperimentData& data, const OnRow& on_row) {
 void DataWriter::describe(const v1::ExperimentInfo& info) {
   if (!rows_.describe(info)) return;
   if (is_wanted_) out_.emplace(file_);
-  text_ = "tick,time_s";
-  for (const Signal* signal : rows_.signals())
-    text_ += fmt::format(",{} [{}]", signal->name, signal->unit);
-  text_ += '\n';
+  text_ = csv_header(rows_.signals());
 }
 
 void DataWriter::take(const v1::ExperimentData& data) {
@@ -70,9 +69,8 @@ void DataWriter::take(const v1::ExperimentData& data) {
 }
 
 void DataWriter::write_row(std::uint64_t tick, const std::vector<double>& values) {
-  const std::uint64_t time_ns = tick * rows_.tick_ns();
+  append_time(text_, tick, tick * rows_.tick_ns());
   auto out = std::back_inserter(text_);
-  fmt::format_to(out, "{},{}.{:09}", tick, time_ns / 1'000'000'000, time_ns % 1'000'000'000);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (rows_.signals()[i]->type == SignalType::kReal) {
       fmt::format_to(out, ",{}", values[i]);  // the shortest text that reads back equal

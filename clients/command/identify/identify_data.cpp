@@ -6,15 +6,14 @@
 #include <iterator>
 #include <span>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/identify/identify.hpp"
 #include "clients/command/identify/identify_map.hpp"
+#include "clients/command/recording/recording_file.hpp"
 #include "protocols/document.hpp"
-#include "protocols/mcap/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 
@@ -39,13 +38,11 @@ class AxisColumns {
   }
 
   void take(const McapReader& file, const McapMessage& message) {
-    constexpr std::string_view kEnd = "/sample";
-    std::string_view topic = file.channels().at(message.header.channel).topic;
-    if (!topic.starts_with('/') || !topic.ends_with(kEnd) || topic.size() <= kEnd.size() + 1) return;
-    topic = topic.substr(1, topic.size() - 1 - kEnd.size());
-    if (std::ranges::find(axes_, topic) == axes_.end()) axes_.emplace_back(topic);
-    if (axis_.empty()) axis_ = topic;
-    if (axis_ != topic) return;
+    const std::string_view axis = axis_of(file.channels().at(message.header.channel).topic);
+    if (axis.empty()) return;
+    if (std::ranges::find(axes_, axis) == axes_.end()) axes_.emplace_back(axis);
+    if (axis_.empty()) axis_ = axis;
+    if (axis_ != axis) return;
     if (const std::optional<Sample> sample = decode_sample(message.payload)) {
       add(*sample, message.header.log_time_ns);
     }
@@ -188,30 +185,24 @@ void take_configuration(std::string_view toml, const std::string& axis, Measurem
 
 Measurement read_recording(const std::string& path, const std::string& axis) {
   Measurement m;
-  try {
-    const MappedSeries files(path);
-    McapSeries reader(files.segments());
-    if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap)
-      throw UsageError(fmt::format("{} is not a recording: {}", path, reader.problem()->what));
-    AxisColumns columns(axis);
-    for (McapMessage message; reader.next(message);)
-      columns.take(reader.reader(), message);
-    if (!columns.hole().empty())
-      throw UsageError(
-          fmt::format("{}: axis {}: {}; every tick is needed", path, columns.axis(), columns.hole()));
-    m.data = columns.take_data();
-    if (m.data.samples() < 2)
-      throw UsageError(fmt::format("{}: no samples of axis '{}'; the recording has {}{}", path,
-                                   columns.axis(), columns.axes(),
-                                   reader.problem() ? "; " + reader.problem()->what : ""));
-    if (reader.problem())
-      fmt::print(stderr, "identify: the recording is not whole: {}; what is there is used\n",
-                 reader.problem()->what);
-    read_configuration(reader.reader(), columns.axis(), m);
-    m.source = fmt::format("recording {}, axis {}", path, columns.axis());
-  } catch (const std::system_error& error) {
-    throw UsageError(error.what());
-  }
+  const MappedSeries files = open_recording(path);
+  McapSeries reader(files.segments());
+  refuse_other_files(reader, path);
+  AxisColumns columns(axis);
+  for (McapMessage message; reader.next(message);)
+    columns.take(reader.reader(), message);
+  if (!columns.hole().empty())
+    throw UsageError(
+        fmt::format("{}: axis {}: {}; every tick is needed", path, columns.axis(), columns.hole()));
+  m.data = columns.take_data();
+  if (m.data.samples() < 2)
+    throw UsageError(fmt::format("{}: no samples of axis '{}'; the recording has {}{}", path, columns.axis(),
+                                 columns.axes(), reader.problem() ? "; " + reader.problem()->what : ""));
+  if (reader.problem())
+    fmt::print(stderr, "identify: the recording is not whole: {}; its sound part is used\n",
+               reader.problem()->what);
+  read_configuration(reader.reader(), columns.axis(), m);
+  m.source = fmt::format("recording {}, axis {}", path, columns.axis());
   return m;
 }
 

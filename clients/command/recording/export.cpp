@@ -17,55 +17,29 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/command/common/signals.hpp"
 #include "clients/command/recording/export_can.hpp"
-#include "protocols/mcap/mcap_series.hpp"
+#include "clients/command/recording/recording_file.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::command {
 namespace {
 
-MappedSeries opened(const std::string& path) {
-  try {
-    return MappedSeries(path);
-  } catch (const std::system_error& error) {
-    throw UsageError(error.what());
-  }
-}
-
-/// The axis whose samples are on this topic, `/<axis>/sample`; empty for other topics.
-std::string_view axis_of(std::string_view topic) {
-  constexpr std::string_view kEnd = "/sample";
-  if (!topic.starts_with('/') || !topic.ends_with(kEnd) || topic.size() <= kEnd.size() + 1) return {};
-  return topic.substr(1, topic.size() - 1 - kEnd.size());
-}
-
+/// All but the tick, which begins every row, if none is named.
 std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
-  std::vector<const Signal*> signals;
-  for (const std::string& name : names) {
-    const Signal* signal = find_signal(name);
-    if (signal == nullptr) throw UsageError(fmt::format("no signal '{}'", name));
-    signals.push_back(signal);
-  }
-  if (names.empty()) {
-    for (const Signal& signal : kSignals) {
-      if (signal.name != "tick") signals.push_back(&signal);  // it stands in front of every row
-    }
+  std::vector<const Signal*> signals = signals_named(names);
+  if (!names.empty()) return signals;
+  for (const Signal& signal : kSignals) {
+    if (signal.name != "tick") signals.push_back(&signal);
   }
   return signals;
 }
 
-std::string header_of(const std::vector<const Signal*>& signals) {
-  std::string header = "tick,time_s";
-  for (const Signal* signal : signals)
-    header += fmt::format(",{} [{}]", signal->name, signal->unit);
-  return header + "\n";
-}
-
 void append_row(std::string& text, const Sample& sample, std::uint64_t time_ns,
                 const std::vector<const Signal*>& signals) {
+  append_time(text, sample.tick, time_ns);
   auto out = std::back_inserter(text);
-  fmt::format_to(out, "{},{}.{:09}", sample.tick, time_ns / 1'000'000'000, time_ns % 1'000'000'000);
   for (const Signal* signal : signals) {
     switch (signal->type) {
       case SignalType::kUnsigned:
@@ -135,9 +109,7 @@ void check_axis(const MappedSeries& files, const std::string& axis) {
 
 /// Refuses what would cost the output file what it held, or the recording itself.
 void check_files(const McapSeries& reader, const MappedSeries& files, const ExportOptions& options) {
-  if (reader.problem() && reader.problem()->kind == McapProblem::Kind::kNotMcap) {
-    throw UsageError(fmt::format("{} is not a recording: {}", options.recording, reader.problem()->what));
-  }
+  refuse_other_files(reader, options.recording);
   check_axis(files, options.axis);
   std::error_code ignored;
   if (std::filesystem::equivalent(options.recording, options.out_file, ignored)) {
@@ -170,7 +142,7 @@ Exported export_rows(McapSeries& reader, const ExportOptions& options,
   std::string text;
   for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
     if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
-    if (!done.has_header) text += header_of(signals);  // when there is something to head
+    if (!done.has_header) text += csv_header(signals);  // when there is something to head
     done.has_header = true;
     const std::optional<Sample> sample = decode_sample(message.payload);
     if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
@@ -240,7 +212,7 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
 
 int run_export(const ExportOptions& options) {
   const bool is_csv = options.format == "csv";
-  const MappedSeries files = opened(options.recording);
+  const MappedSeries files = open_recording(options.recording);
   McapSeries reader(files.segments());
   const std::vector<const Signal*> signals = chosen_signals(options.signals);
   if (!is_csv) can_address_of(options);  // refuses what is wrong before the file is made

@@ -6,11 +6,10 @@
 #include <cstdio>
 #include <map>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "clients/command/common/errors.hpp"
-#include "protocols/mcap/mcap_series.hpp"
+#include "clients/command/recording/recording_file.hpp"
 #include "protocols/sample_codec.hpp"
 
 namespace drivebench::command {
@@ -22,12 +21,11 @@ class Reader {
   explicit Reader(std::string axis) : wanted_(std::move(axis)) {}
 
   void take(const McapReader& file, const McapMessage& message) {
-    constexpr std::string_view kEnd = "/sample";
     const std::string_view topic = file.channels().at(message.header.channel).topic;
     if (topic == "/inputs") {
       take_input(message);
-    } else if (topic.starts_with('/') && topic.ends_with(kEnd) && topic.size() > kEnd.size() + 1) {
-      take_sample(topic.substr(1, topic.size() - 1 - kEnd.size()), message);
+    } else if (const std::string_view axis = axis_of(topic); !axis.empty()) {
+      take_sample(axis, message);
     }
   }
 
@@ -91,26 +89,18 @@ bool asks_for_something(const v1::Command& command) noexcept {
 RecordedRun read_run(const std::string& path, const std::string& axis,
                      std::optional<std::uint64_t> from_tick) {
   Reader reader(axis);
-  bool is_whole = true;
-  try {
-    const MappedSeries files(path);
-    McapSeries mcap(files.segments());
-    for (McapMessage message; mcap.next(message);)
-      reader.take(mcap.reader(), message);
-    if (mcap.problem() && mcap.problem()->kind == McapProblem::Kind::kNotMcap) {
-      throw UsageError(fmt::format("{} is not a recording: {}", path, mcap.problem()->what));
-    }
-    is_whole = !mcap.problem();
-    if (!is_whole) fmt::print(stderr, "drivebench: {} is not whole: {}\n", path, mcap.problem()->what);
-  } catch (const std::system_error& error) {
-    throw UsageError(error.what());
-  }
+  const MappedSeries files = open_recording(path);
+  McapSeries mcap(files.segments());
+  for (McapMessage message; mcap.next(message);)
+    reader.take(mcap.reader(), message);
+  refuse_other_files(mcap, path);
+  if (mcap.problem()) fmt::print(stderr, "drivebench: {} is not whole: {}\n", path, mcap.problem()->what);
   if (!reader.has_axis()) {
     throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}", axis,
                                  reader.axes().empty() ? "none" : reader.axes()));
   }
   RecordedRun run = reader.joined();
-  run.is_whole = is_whole;
+  run.is_whole = !mcap.problem();
   const auto start = std::ranges::find_if(run.rows, [&](const Answered& row) {
     return from_tick ? row.sample.tick >= *from_tick : asks_for_something(row.command);
   });

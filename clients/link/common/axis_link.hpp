@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "clients/link/common/address.hpp"
 #include "clients/link/common/requests.hpp"
 #include "protocols/signals/catalogue.hpp"
 

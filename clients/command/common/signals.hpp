@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocols/signals/catalogue.hpp"
+
+/// Signals by their names, and as columns of CSV.
+namespace drivebench::command {
+
+/// Throws UsageError if there is no signal of one of the names.
+std::vector<const Signal*> signals_named(const std::vector<std::string>& names);
+
+/// `tick,time_s,i_a_a [A]...` and the end of the line.
+std::string csv_header(const std::vector<const Signal*>& signals);
+
+/// The first two columns of a row.
+void append_time(std::string& csv, std::uint64_t tick, std::uint64_t time_ns);
+
+}  // namespace drivebench::command
