@@ -100,7 +100,7 @@ int run_set(const SetOptions& options) {
 int run_take(const TakeOptions& options) {
   if (!options.force) {
     throw UsageError(
-        "take needs --force: whoever holds the axis loses it, and the axis goes to its safe action");
+        "take needs --force: the session that holds the axis loses it, and the axis goes to its safe action");
   }
   link::Link link = open_link(options.link, "take");
   const std::uint32_t axis = axis_number(link.welcome().bench(), options.axis);
@@ -111,7 +111,7 @@ int run_take(const TakeOptions& options) {
     fmt::print("{}\n", change_json(axis, "take", static_cast<double>(owner), tick));
   } else {
     fmt::print(
-        "axis {} ({}): taken and free again since tick {}; who drives it next may have to clear a fault\n",
+        "axis {} ({}): taken and free again since tick {}; its next controller may have to clear a fault\n",
         axis, link.welcome().bench().axes(static_cast<int>(axis)).name(), tick);
   }
   return kExitOk;

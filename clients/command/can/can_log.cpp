@@ -57,7 +57,7 @@ void follow(link::CanBus& bus, const CanLogOptions& options, Trace& trace) {
   while (!interrupted() && Clock::now() < end && (options.count == 0 || trace.frames() < options.count)) {
     auto frame = bus.receive(Clock::time_point::min());
     if (!frame) {
-      trace.flush();  // before a pause, so that who follows the file sees it
+      trace.flush();  // before a pause, so that `tail -f` shows it
       frame = bus.receive(std::min(end, Clock::now() + 100ms));
     }
     if (frame) trace.add(*frame);

@@ -40,7 +40,7 @@ link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
     return link::Link(choice.address,
                       {.client = fmt::format("drivebench {}", subcommand), .token = choice.token});
   } catch (const link::Refused& refused) {
-    throw NotLetIn(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
+    throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
   }
 }
 
@@ -59,7 +59,7 @@ std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_
     if (is_can) return std::make_unique<link::CanLink>(link::parse_can_address(choice.address));
     return std::make_unique<link::ModbusLink>(link::parse_modbus_address(choice.address));
   } catch (const link::Refused& refused) {
-    throw NotLetIn(fmt::format("{} does not let us in: {}", choice.address, refused.what()));
+    throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
   }
 }
 

@@ -26,8 +26,8 @@ std::optional<std::uint32_t> find_axis(const v1::BenchDescription& bench, std::s
 /// The same. Throws UsageError with the axes there are.
 std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
 
-/// Connects to one axis over whatever the address names: tcp, unix, can or modbus. The latter two name the
-/// axis themselves, so that `axis` must be its default "0". As open_link() otherwise.
+/// Connects to one axis over the transport of the address: tcp, tls, unix, can or modbus. Addresses of the
+/// latter two name the axis, so that `axis` must be its default "0". As open_link() otherwise.
 std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
                                           std::string_view subcommand);
 
@@ -41,7 +41,7 @@ std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults)
 /// The same of Sample.injected.
 std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected);
 std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
-/// What is latched, for people; empty: nothing. Where the link describes no faults the control state says it.
+/// The latched faults, for people; empty: none. Of a link that describes no faults the control state.
 std::string latched_text(const v1::BenchDescription& bench, const Sample& sample);
 
 /// From now on SIGINT and SIGTERM only make interrupted() true; the second one ends the process.

@@ -22,11 +22,11 @@ std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint
                                     const control::Requirements& needs, double sample_rate_hz,
                                     SignalMask known);
 
-/// Counts of the encoder: as the bench describes it, or else as the preset expects it; 0: nobody knows.
+/// Counts of the encoder: as the bench describes it, or else as the preset expects it; 0: not known.
 double counts_per_revolution(const v1::BenchDescription& bench, std::uint32_t axis,
                              const control::Requirements& needs);
 
-/// Arms an axis and brings it to rest, as somebody may have used it: gates off for 50 ms of the bench's time,
+/// Arms an axis and brings it to rest after an earlier run: gates off for 50 ms of the bench's time,
 /// in which the rotor flux of a servo motor decays to nothing (in lockstep it would otherwise wait there for
 /// ever), and longer while the shaft runs out. Does nothing at tick 0 of a bench whose first command arms.
 /// Throws UsageError if it still turns after 5 s.

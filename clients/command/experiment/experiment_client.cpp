@@ -29,7 +29,7 @@ std::filesystem::path folder_in(const char* variable) {
   return folder == nullptr ? "" : folder;
 }
 
-/// The secret of this user: made once, kept where only he can read it.
+/// The secret of this user: made once, kept in a file that no other user can read.
 std::string own_secret() {
   const std::filesystem::path base = folder_in("XDG_CONFIG_HOME");
   const std::filesystem::path home = folder_in("HOME");
@@ -116,7 +116,7 @@ void ExperimentClient::with_link(const std::function<void(link::Link&)>& action)
       broken.reset();
       return action(*link_);
     } catch (const NotLetIn&) {
-      throw;  // a wrong token does not become right, and each one makes others at this address wait
+      throw;  // a wrong token stays wrong, and each try makes other clients at this address wait
     } catch (const link::LinkError& error) {
       link_.reset();
       const bool nobody_there = dynamic_cast<const link::ConnectError*>(&error) != nullptr;
@@ -165,7 +165,7 @@ v1::ExperimentInfo ExperimentClient::fetch(std::uint64_t id, bool recording, con
              next() >= (recording ? info.recording_bytes() : info.rows() * info.decimation());
     };
     take(info, nullptr);
-    // The server ends with one more word, also if everything was there at once.
+    // The server ends with one more ExperimentInfo, also where all data came at once.
     for (bool last = false; !last && !gave_up_; gave_up_ = !last && interrupted() && queued_ != id) {
       const v1::Envelope& message = link.next_of_fetch();
       if (message.has_experiment_data()) {

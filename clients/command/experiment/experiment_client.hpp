@@ -40,18 +40,18 @@ class ExperimentClient {
   std::uint64_t resumed() const noexcept { return resumed_; }
   bool gave_up() const noexcept { return gave_up_; }
 
-  /// Does something with a link, again after the link broke: it must bear being done twice. Throws as
-  /// open_link() if there is no link to begin with.
+  /// Runs the action on a link, and again after the link broke: it may run twice. Throws as open_link() if
+  /// the first link cannot be opened.
   void with_link(const std::function<void(link::Link&)>& action);
 
   /// Uploads tables and queues the request. Throws UsageError if the bench has no such axis.
   v1::ExperimentInfo run(ExperimentFile file);
 
-  /// Gets what the server says about the experiment, and null or a piece of its data.
+  /// Takes the description of the experiment, and a piece of its data or null.
   using Take = std::function<void(const v1::ExperimentInfo&, const v1::ExperimentData*)>;
-  /// Receives rows, or the recording, until the end; `next` says from where on they are wanted. When this
-  /// process is interrupted an experiment that run() has queued is cancelled, and what there is of it
-  /// received; any other goes on, and receiving is given up.
+  /// Receives rows, or the recording, until the end; `next` gives the first that is missing. An interrupt
+  /// cancels an experiment that run() has queued, and its data so far still come; for any other experiment
+  /// it ends the receiving alone.
   v1::ExperimentInfo fetch(std::uint64_t id, bool recording, const Take& take,
                            const std::function<std::uint64_t()>& next);
 

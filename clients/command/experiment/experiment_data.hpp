@@ -15,12 +15,12 @@
 
 namespace drivebench::command {
 
-/// Takes the rows of an experiment as they come, in any number of pieces; none is taken twice, whatever is
-/// sent twice.
+/// Takes the rows of an experiment as they come, in any number of pieces. A row that is sent twice is taken
+/// once.
 class ExperimentRows {
  public:
-  /// What the rows are; before the first of them. Gives whether that was new. Throws std::runtime_error if it
-  /// is nonsense.
+  /// Which signals the rows have; before the first row. Gives whether this was the first description. Throws
+  /// std::runtime_error if it contradicts itself.
   bool describe(const v1::ExperimentInfo& info);
   /// Hands every new row to `on_row`, with its tick. Throws std::runtime_error if rows are missing before
   /// them.
@@ -49,7 +49,7 @@ class DataWriter {
   DataWriter(std::string file, bool standard_output)
       : file_(std::move(file)), is_wanted_(!file_.empty() || standard_output) {}
 
-  /// The first description makes the file: until there is one, whatever the file held is left alone.
+  /// The first description makes the file; before it an existing file keeps its content.
   void describe(const v1::ExperimentInfo& info);
   void take(const v1::ExperimentData& data);
   void flush();

@@ -27,7 +27,7 @@ constexpr int kRowsPerUpload = 4000;
 constexpr std::size_t kMaxCsvLine = 200;
 constexpr int kMaxElements = 1000;
 
-/// What files do not say: who asks, and what the client finds out by itself.
+/// Fields that no file has: the client sets them.
 bool is_hidden(const FieldDescriptor& field) {
   const std::string& name = field.full_name();
   return name == "drivebench.v1.RunExperiment.owner" || name == "drivebench.v1.RunExperiment.request_key" ||

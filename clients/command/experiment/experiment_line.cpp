@@ -36,10 +36,10 @@ void add_experiment_commands(CommandLine& line) {
   const auto [run, o] =
       add(line, parent, "run", "queue an experiment and fetch its data", run_experiment_run);
   run.add_option("FILE", o.file, "what to do, in TOML")->required();
-  run.add_option("--user", o.server.user, "a name that everybody sees; default: USER");
+  run.add_option("--user", o.server.user, "a name that every client sees; default: USER");
   run.add_flag("--detach", o.detach, "do not wait for its end");
   add_file_options(run, o);
-  add(line, parent, "list", "what waits, runs and is kept", run_experiment_list);
+  add(line, parent, "list", "the experiments that wait, run or are kept", run_experiment_list);
   const auto fetch = add(line, parent, "fetch", "the data of an experiment, to standard output without --out",
                          run_experiment_fetch);
   add_id(fetch.app, fetch.options);

@@ -18,7 +18,7 @@ struct IdentifyOptions;
 struct Measurement {
   identification::MeasuredData data{};
   identification::MeasurementFacts facts{};
-  identification::BenchParameters bench{};  ///< empty: nobody knows the truth
+  identification::BenchParameters bench{};  ///< empty: the truth is not known
   std::string source{};                     ///< one line for people
   std::string machine{};                    ///< its kind; empty: not known
   std::string motor{};                      ///< its name

@@ -6,7 +6,7 @@
 
 #include "clients/identification/measured_data.hpp"
 
-/// How the columns of somebody else's CSV file become signals of the catalogue.
+/// How the columns of any CSV file become signals of the catalogue.
 namespace drivebench::command {
 
 struct IdentifyOptions;

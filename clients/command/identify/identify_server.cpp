@@ -54,7 +54,7 @@ class OwnServer {
       address_ = ready->tcp;
       return;
     }
-    if (process_.wait(Process::in(1s)) == kExitUsage) {  // it has said why
+    if (process_.wait(Process::in(1s)) == kExitUsage) {  // the server has printed why
       throw UsageError(fmt::format("the server does not take the bench {}", bench));
     }
     throw std::runtime_error(fmt::format("the server for the bench {} did not start", bench));
@@ -77,7 +77,8 @@ class OwnServer {
   std::string address_;
 };
 
-/// Why the bench behind a link will not do; empty: it will. One that was named must, or else this throws.
+/// Why the bench behind the link does not fit; empty: it fits. Throws what is wrong with a link that was
+/// named on the command line.
 std::string why_not(const IdentifyOptions& options, const WantedExperiment& wanted) {
   try {
     link::Link link = open_link(options.server.link, "identify");
@@ -94,7 +95,7 @@ std::string why_not(const IdentifyOptions& options, const WantedExperiment& want
                          axis.machine_kind(), wanted.machine);
     link.list_experiments("");  // without an owner: a bench that keeps no experiments refuses
   } catch (const std::runtime_error& error) {
-    // Nobody answers, or somebody else, or who does will not have us.
+    // Nothing answers, or another program, or a bench that refuses.
     if (options.link_was_named) throw;
     return error.what();
   }

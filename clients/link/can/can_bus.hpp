@@ -23,8 +23,8 @@ class CanBus {
   virtual ~CanBus() = default;
 
   virtual void send(const can::Frame& frame) = 0;
-  /// The next frame of somebody else, perhaps an error frame; nothing if none comes in time or a signal does.
-  /// A time that is past: what has already come.
+  /// The next frame of another node, perhaps an error frame; nothing if none comes in time or a signal does.
+  /// With a time that is past it gives only a frame that has come already.
   virtual std::optional<can::Frame> receive(Clock::time_point until) = 0;
 };
 

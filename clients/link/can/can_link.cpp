@@ -191,12 +191,13 @@ void CanLink::check_replies() {
   const Result result = *std::exchange(command_result_, std::nullopt);
   if (result == Result::kIncomplete) return;  // one of its two frames was lost; in lockstep both go again
   if (result == Result::kNotOwner) {
-    send_request(Request::kRenew);  // it may be about somebody else; the reply to this is about us
+    send_request(
+        Request::kRenew);  // the refusal may be about another controller; the reply to this request is not
   } else if (result != Result::kStale) {
     refuse_with(result);
   } else if (is_lockstep()) {
-    // The command was repeated, or the network doubled it: the sample that answered it was lost. Who has the
-    // lease and asks for it is sent the newest one.
+    // The command was repeated, or the network doubled it: the sample that answered it was lost. A request
+    // for the lease by the controller that holds it brings the newest one.
     send_request(Request::kAcquire);
   }
 }

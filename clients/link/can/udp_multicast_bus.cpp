@@ -76,7 +76,8 @@ class MulticastBus final : public CanBus {
       if (size == 0) return std::nullopt;
       const bool own = from.sin_port == own_port_;
       if (auto frame = own ? std::nullopt : can::decode_msgpack(std::span(bytes).first(size))) return frame;
-      if (until <= Clock::now()) return std::nullopt;  // whatever else comes
+      if (until <= Clock::now())
+        return std::nullopt;  // own frames and other datagrams do not extend the wait
     }
   }
 

@@ -12,7 +12,7 @@
 
 namespace drivebench::link {
 
-/// What a controller of one axis needs of a link, whatever carries it. Requests throw Refused and LinkError
+/// What a controller of one axis needs of a link over any transport. Requests throw Refused and LinkError
 /// as those of Link do; references to samples hold until the next call.
 class AxisLink {
  public:

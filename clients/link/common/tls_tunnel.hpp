@@ -9,7 +9,7 @@ namespace drivebench::link {
 
 /// Files in PEM. Without `ca` those certificates are trusted that the system trusts.
 struct TlsFiles {
-  std::string ca;           ///< who may have signed the certificate of the server
+  std::string ca;           ///< certificates of the authorities that may sign the server's
   std::string certificate;  ///< our own, for a server that asks for one; empty: none
   std::string key;          ///< of our certificate
 };

@@ -127,7 +127,7 @@ void ModbusLink::describe() {
 ModbusLink::~ModbusLink() {
   if (!holds_axis_) return;
   try {
-    release();  // the end of the connection alone keeps the axis for whoever has the key
+    release();  // the end of the connection alone keeps the axis for the client that has the key
   } catch (const std::exception&) {
     return;  // then the lease runs out
   }

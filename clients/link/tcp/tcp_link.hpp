@@ -56,11 +56,11 @@ class Link {
   std::uint64_t acquire(std::uint32_t axis);
   void renew(std::uint32_t axis);
   void release(std::uint32_t axis);
-  /// Acquires the axis even if somebody holds it, which needs the role of an administrator; he is told the
-  /// reason.
+  /// Acquires the axis from the session that holds it, which is told the reason. Needs the role of an
+  /// administrator.
   std::uint64_t take(std::uint32_t axis, const std::string& reason);
-  /// What the bench has said unasked since the last call: that somebody took an axis from this session, or
-  /// that its token holds no more.
+  /// The notices of the bench since the last call: an administrator took an axis from this session, or its
+  /// token is no longer valid.
   std::vector<v1::Notice> take_notices() { return std::exchange(notices_, {}); }
 
   /// All parameters if no names are given.

@@ -138,7 +138,7 @@ class Compare(ControlTest):
         self.json_of("--compare", file, "--threshold", 1000, code=FAILED)
 
     def test_a_recording_that_lost_its_end_is_not_as_good_as_a_whole_one(self):
-        """Would catch: a regression run that passes because the bench died in it. What is there differs by nothing."""
+        """Would catch: a regression run that passes because the bench died in it: its samples until then do not differ."""
         held = ("--gain", "run.hold_s=0.5")
         file, _ = self.recording("own", *held)
         cut = self.folder / "cut.mcap"

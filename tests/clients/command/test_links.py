@@ -203,7 +203,7 @@ class Links(unittest.TestCase):
             self.assertEqual((modbus_["name"], modbus_["state"]), ("modbus " + server.ready["modbus"], "up"))
             self.assertRegex(run("status", "--link", link).stdout, r"(?m)^can udp_multicast:.*: up\n  sent \d+,")
 
-    # Catches a subcommand that nobody finds.
+    # Catches a subcommand that --help does not list.
     def test_the_help_lists_every_interface_command(self):
         text = run("--help").stdout
         for name in ("dbc", "can-table", "modbus-map", "can-log", "can ", "export"):

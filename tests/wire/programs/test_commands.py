@@ -159,13 +159,13 @@ class Observing(CommandTest):
         (self.folder / "tokens").chmod(0o600)
         text = SERVO.read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         bench = self.server(text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{self.folder}/tokens"'))
-        self.assertSays(self.drivebench("status", link=link_of(bench), code=NO_CONNECT).stderr, "does not let us in")
+        self.assertSays(self.drivebench("status", link=link_of(bench), code=NO_CONNECT).stderr, "turns this client away")
         self.drivebench("status", "--token", "wrong", link=link_of(bench), code=NO_CONNECT)
         time.sleep(1.1)  # after two wrong tokens
         self.drivebench("status", "--token", "secret", link=link_of(bench))
         for command in (["experiment", "list"], ["identify", "--motor", "im", "--link", link_of(bench)]):
             said = self.drivebench(*command, "--owner", "anna", link=link_of(bench), code=NO_CONNECT).stderr
-            self.assertSays(said, "does not let us in")
+            self.assertSays(said, "turns this client away")
 
     STILL = "in lockstep time stands still until a controller drives the bench"
 

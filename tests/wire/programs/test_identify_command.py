@@ -163,7 +163,7 @@ class Identify(WireTest):
         stranger = socket.create_server(("127.0.0.1", 0))
         self.addCleanup(stranger.close)
         threading.Thread(target=answer_in_http, args=(stranger,), daemon=True).start()
-        for link, why, code in ((bare, "keeps no experiments", 1), (closed, "does not let us in", 3),
+        for link, why, code in ((bare, "keeps no experiments", 1), (closed, "turns this client away", 3),
                                 ("tcp:%s:%d" % stranger.getsockname(), "does not speak", 1), ("can:socketcan:can0", "over CAN", 2),
                                 ("modbus:127.0.0.1:1", "over CAN and Modbus", 2)):
             with self.subTest(link):

@@ -68,7 +68,7 @@ TEST(ControlRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples
   EXPECT_EQ(report.exchange_max_us, 200.0);
 }
 
-// Catches a report that passes off the encoder's angle for the truth, or shows what nobody measured.
+// Catches a report that passes off the encoder's angle for the truth, or shows a value that was not measured.
 TEST(ControlRunSummary, SaysWhatItsNumbersRestOn) {
   ControlRun run;
   run.counts_per_rad = 2.0;

@@ -276,17 +276,17 @@ TEST_P(CanLinkOf, ALostLeaseIsARefusal) {
   }
 }
 
-// Catches a controller that gives up because somebody else on the bus was turned away.
+// Catches a controller that gives up because the bench refused another controller on the bus.
 TEST_P(CanLinkOf, RefusalsOfOthersAreTheirs) {
   link();
-  bench_->put_reply(0.0, 1.0, 0.0, 7.0, 0.0);   // somebody commanded without the lease
+  bench_->put_reply(0.0, 1.0, 0.0, 7.0, 0.0);   // another controller commanded without the lease
   bench_->put_reply(1.0, 2.0, 77.0, 0.0, 0.0);  // or asked for it
   bench_->put_reply(2.0, 1.0, 77.0, 0.0, 0.0);
   bench_->put_reply(0.0, 4.0, 0.0, 7.0, 200.0);  // and this is about a tick long gone
   EXPECT_EQ(link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0}).tick, 1U);
 }
 
-// Catches frames of another node, of nobody or about the bus that pass for the bench's.
+// Catches frames of another node, of no node or about the bus that pass for the bench's.
 TEST_P(CanLinkOf, IgnoresWhatIsNotForIt) {
   link();
   can::Profile profile = address_.profile;

@@ -45,7 +45,7 @@ TEST(Address, RefusesWhatIsNone) {
   EXPECT_NO_THROW(parse_address("unix:/" + std::string(106, 'a')));
 }
 
-// Catches a connection that is reported as made when nobody listens, and a socket left non-blocking.
+// Catches a connection that is reported as made when nothing listens, and a socket left non-blocking.
 TEST(Address, ConnectsOnlyWhereSomebodyListens) {
   const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in here = {};

@@ -216,7 +216,7 @@ TEST(Link, OWN_04_KeepsWhatItIsToldUnasked) {
   EXPECT_EQ(message_of([&] { link.status(); }), "the bench ended the session: smoke");
 }
 
-// Catches a queue without bound, and losses that nobody is told about.
+// Catches a queue without bound, and losses without a count.
 TEST(Link, DropsTheOldestSamplesAndCountsThem) {
   constexpr int kPerMessage = 1024;
   constexpr auto kMessages = static_cast<int>(Link::kMaxKeptSamples / kPerMessage) + 3;
