@@ -2,7 +2,7 @@
 #include <numbers>
 #include <utility>
 
-#include "clients/link/tcp_link.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
 
 /// Turns a DC servo by half a turn; the bench is `drivebench serve dc-a-servo`. Argument: the address of
 /// another bench.
