@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -68,24 +69,15 @@ Panel error_panel(const RecordedRun& run, const Plan& plan) {
   return {.label = in_counts ? "error [counts]" : "error [rad]", .series = {{"error", std::move(errors)}}};
 }
 
-Panel currents(const RecordedRun& run) {
-  const auto of = [&run](double Sample::*member) {
-    return column(run, [member](const Answered& row) { return row.sample.*member; });
-  };
-  return panel_of("current [A]", {{"i_a", of(&Sample::i_a_a)},
-                                  {"i_b", of(&Sample::i_b_a)},
-                                  {"i_c", of(&Sample::i_c_a)},
-                                  {"i_f", of(&Sample::i_f_a)}});
-}
-
-Panel voltages(const RecordedRun& run) {
-  const auto of = [&run](double Sample::*member) {
-    return column(run, [member](const Answered& row) { return row.sample.*member; });
-  };
-  return panel_of("voltage [V]", {{"u_a", of(&Sample::u_a_v)},
-                                  {"u_b", of(&Sample::u_b_v)},
-                                  {"u_c", of(&Sample::u_c_v)},
-                                  {"u_f", of(&Sample::u_f_v)}});
+/// Phases a, b and c and the field winding.
+Panel terminals(const RecordedRun& run, std::string label, char quantity,
+                const std::array<double Sample::*, 4>& members) {
+  std::vector<Series> series;
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    series.push_back({fmt::format("{}_{}", quantity, "abcf"[k]),
+                      column(run, [&](const Answered& row) { return row.sample.*members[k]; })});
+  }
+  return panel_of(std::move(label), std::move(series));
 }
 
 Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& plan) {
@@ -102,15 +94,21 @@ Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& pla
                           &control::Reference::speed_rad_s);
   }
   if (name == "error") return error_panel(run, plan);
-  if (name == "currents") return currents(run);
-  if (name == "voltages") return voltages(run);
+  if (name == "currents") {
+    return terminals(run, "current [A]", 'i',
+                     {&Sample::i_a_a, &Sample::i_b_a, &Sample::i_c_a, &Sample::i_f_a});
+  }
+  if (name == "voltages") {
+    return terminals(run, "voltage [V]", 'u',
+                     {&Sample::u_a_v, &Sample::u_b_v, &Sample::u_c_v, &Sample::u_f_v});
+  }
   if (name == "torque") {
     return panel_of("torque [N m]",
                     {{"machine", column(run, [](const Answered& row) { return row.sample.torque_nm; })},
                      {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}});
   }
   throw UsageError(
-      fmt::format("no panel '{}': angle, speed, error, currents, voltages and torque there are", name));
+      fmt::format("no panel '{}'; there are angle, speed, error, currents, voltages and torque", name));
 }
 
 /// The trajectory over the recorded samples; the recording is cut where the run has ended.
