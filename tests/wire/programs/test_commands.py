@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import select
 import signal
 import socket
 import subprocess
@@ -204,6 +205,7 @@ class Observing(CommandTest):
         self.addCleanup(watching.kill)
         drawn = b""
         while self.STILL.encode() not in drawn:
+            self.assertTrue(select.select([ours], [], [], PATIENCE_S)[0], drawn)
             drawn += os.read(ours, 4096)
         self.drivebench("control", link=self.link)
         self.assertEqual(watching.wait(PATIENCE_S), OK)
