@@ -11,7 +11,7 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
-#include "clients/link/can/can_bus_kind.hpp"
+#include "clients/link/can/can_bus.hpp"
 #include "protocols/can/candump.hpp"
 
 namespace drivebench::command {
@@ -72,9 +72,10 @@ int run_can_log(const CanLogOptions& options) {
   }
   const link::CanAddress address = link::parse_can_address(options.address);
   const auto bus = link::open_can_bus(address, 5s);
-  // A trace names an interface; a bus that is none has the name of its kind.
-  Trace trace(options.out_file,
-              address.kind->is_network_interface ? address.channel : std::string(address.kind->name));
+  // A trace names an interface; a bus that is none has the name of its back end.
+  Trace trace(options.out_file, address.backend == can::Backend::kSocketCan
+                                    ? address.channel
+                                    : std::string(can::name_of(address.backend)));
   catch_interrupts();
   try {
     follow(*bus, options, trace);

@@ -62,8 +62,7 @@ std::string read_terminal(std::string_view text, CanAddress& address) {
 
 }  // namespace
 
-constinit const CanBusKind kSlcan = {.name = "slcan",
-                                     .is_network_interface = false,
+constinit const CanBusKind kSlcan = {.backend = can::Backend::kSlcan,
                                      .read_channel = read_terminal,
                                      .open = [](const CanAddress& address, std::chrono::milliseconds deadline,
                                                 std::span<const std::uint32_t>) -> std::unique_ptr<CanBus> {

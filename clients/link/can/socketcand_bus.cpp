@@ -62,7 +62,10 @@ class SocketcandBus final : public TextBus {
 
 std::string read_host(std::string_view text, CanAddress& address) {
   if (text.empty()) return "after socketcand: comes HOST:PORT";
-  address.channel = std::string(text) + (text.find(':') == std::string_view::npos ? ":29536" : "");
+  address.channel = text;
+  if (text.find(':') == std::string_view::npos) {
+    address.channel += ':' + std::to_string(can::row_of(can::Backend::kSocketcand).default_port);
+  }
   parse_address(address.channel);  // throws AddressError
   return {};
 }
@@ -70,8 +73,7 @@ std::string read_host(std::string_view text, CanAddress& address) {
 }  // namespace
 
 constinit const CanBusKind kSocketcand = {
-    .name = "socketcand",
-    .is_network_interface = false,
+    .backend = can::Backend::kSocketcand,
     .read_channel = read_host,
     .open = [](const CanAddress& address, std::chrono::milliseconds deadline, std::span<const std::uint32_t>)
         -> std::unique_ptr<CanBus> { return std::make_unique<SocketcandBus>(address, deadline); }};

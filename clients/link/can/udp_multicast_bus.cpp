@@ -91,12 +91,13 @@ class MulticastBus final : public CanBus {
 std::string read_group(std::string_view text, CanAddress& address) {
   const std::size_t colon = std::min(text.find(':'), text.size());
   const std::string_view port = text.substr(std::min(colon + 1, text.size()));
-  address.channel = colon == 0 ? "239.74.163.2" : text.substr(0, colon);
+  const can::BackendRow& row = can::row_of(can::Backend::kUdpMulticast);
+  address.channel = colon == 0 ? row.default_channel : text.substr(0, colon);
   in_addr ip = {};
   if (::inet_pton(AF_INET, address.channel.c_str(), &ip) != 1 || (ntohl(ip.s_addr) >> 28) != 0xE) {
     return "after udp_multicast: comes an IPv4 group, 224.0.0.0 to 239.255.255.255, and a port";
   }
-  address.port = port.empty() ? 43113 : can::parse_number<std::uint16_t>(port, 10).value_or(0);
+  address.port = port.empty() ? row.default_port : can::parse_number<std::uint16_t>(port, 10).value_or(0);
   return address.port != 0 ? "" : "the port must be a number from 1 to 65535";
 }
 
