@@ -11,6 +11,8 @@
 #include <span>
 #include <string>
 
+#include "clients/command/common/errors.hpp"
+#include "clients/command/identify/identify.hpp"
 #include "protocols/mcap/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"

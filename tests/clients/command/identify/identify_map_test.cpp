@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/command/common/errors.hpp"
+#include "clients/command/identify/identify.hpp"
 #include "protocols/document.hpp"
 
 namespace drivebench::command {

@@ -1,5 +1,6 @@
 #include "clients/command/recording/export.hpp"
 
+#include <bench.pb.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
