@@ -27,7 +27,7 @@ struct BldcMachineModel {
 
 /// e over the electrical angle, in turns: 0 at 0, rising to 1 at 30°, falling from 150° on, −1 from 210° to
 /// 330°. Source: Chiasson 2005, (10.7)-(10.8) (BL-02).
-inline double trapezoid(double turns) noexcept {
+inline double trapezoid_at_turns(double turns) noexcept {
   // A triangle of height 3 around the middle of the top, a quarter turn after the rise, cut off at 1.
   const double from_middle = turns - 0.25;
   return std::clamp(3.0 - 12.0 * std::abs(from_middle - std::round(from_middle)), -1.0, 1.0);

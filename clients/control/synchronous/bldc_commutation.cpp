@@ -29,7 +29,8 @@ Phases commutation_currents(int sector) noexcept {
 
 Phases trapezoids(double electrical_rad) noexcept {
   const double turns = electrical_rad / (2.0 * std::numbers::pi);
-  return {trapezoid(turns), trapezoid(turns - 1.0 / 3.0), trapezoid(turns - 2.0 / 3.0)};
+  return {trapezoid_at_turns(turns), trapezoid_at_turns(turns - 1.0 / 3.0),
+          trapezoid_at_turns(turns - 2.0 / 3.0)};
 }
 
 }  // namespace drivebench::control
