@@ -1,0 +1,78 @@
+#include "server/pacing/tick_clock.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "tests/server/recording/run_config.hpp"
+
+namespace drivebench {
+namespace {
+
+/// Ticks that are so late, one after the other.
+class ScriptedPacer final : public Pacer {
+ public:
+  ScriptedPacer(std::vector<std::int64_t> lateness_ns, int& resynchronised)
+      : lateness_ns_(std::move(lateness_ns)), resynchronised_(resynchronised) {}
+  std::int64_t wait() noexcept override { return lateness_ns_[next_++]; }
+  void resynchronise() noexcept override { ++resynchronised_; }
+
+ private:
+  std::vector<std::int64_t> lateness_ns_;
+  int& resynchronised_;
+  std::size_t next_ = 0;
+};
+
+constexpr std::int64_t kPeriodNs = 125'000;
+constexpr std::int64_t kMaxLatenessNs = 1'000'000;
+const std::vector<std::int64_t> kLatenessesNs = {0, kPeriodNs - 1, kPeriodNs, kMaxLatenessNs,
+                                                 kMaxLatenessNs + 1};
+
+BenchConfig paced_bench() {
+  BenchConfig config = servo_bench();
+  config.setup.period_ns = kPeriodNs;
+  config.realtime.max_lateness_ns = kMaxLatenessNs;
+  return config;
+}
+
+// Catches: a limit that is off by one, an overrun that is only a late tick or the other way round, lost time
+// that is caught up after an overrun.
+TEST(TickClock, OS_03_TellsTheBenchOfLateTicksAndOverruns) {
+  const BenchConfig config = paced_bench();
+  Bench bench(config.setup);
+  int resynchronised = 0;
+  TickClock clock(RunMode::kRealtime, config, std::make_unique<ScriptedPacer>(kLatenessesNs, resynchronised));
+  const std::vector<std::uint64_t> late_ticks = {0, 0, 1, 2, 3};
+  for (std::size_t i = 0; i < kLatenessesNs.size(); ++i) {
+    EXPECT_FALSE(bench.is_latched(0)) << i;
+    clock.wait_for_tick(bench);
+    bench.step();
+    EXPECT_EQ(bench.sample(0).late_ticks, late_ticks[i]) << i;
+    EXPECT_EQ(clock.worst_lateness_ns(), kLatenessesNs[i]) << i;
+  }
+  EXPECT_EQ(bench.sample(0).faults, kBenchOverrun);
+  EXPECT_EQ(resynchronised, 1);
+  EXPECT_EQ(clock.lateness().count(), kLatenessesNs.size());
+}
+
+// Catches: a free run that depends on the time that it takes.
+TEST(TickClock, AFreeRunHasNoLateTicks) {
+  const BenchConfig config = paced_bench();
+  Bench bench(config.setup);
+  int resynchronised = 0;
+  TickClock clock(RunMode::kFree, config, std::make_unique<ScriptedPacer>(kLatenessesNs, resynchronised));
+  for (std::size_t i = 0; i < kLatenessesNs.size(); ++i) {
+    clock.wait_for_tick(bench);
+    bench.step();
+  }
+  EXPECT_EQ(bench.sample(0).late_ticks, 0u);
+  EXPECT_EQ(bench.sample(0).faults, 0u);
+  EXPECT_EQ(resynchronised, 0);
+  EXPECT_EQ(clock.lateness().count(), 0u);
+}
+
+}  // namespace
+}  // namespace drivebench
