@@ -10,14 +10,14 @@
 namespace drivebench {
 namespace {
 
-class NobodyWatches final : public BenchObserver {
+class NoObserver final : public BenchObserver {
  public:
   void on_input(Tick, const Input&) noexcept override {}
   void on_sample(std::uint32_t, const Sample&) noexcept override {}
 };
 
-BenchObserver& nobody() {
-  static NobodyWatches observer;
+BenchObserver& no_observer() {
+  static NoObserver observer;
   return observer;
 }
 
@@ -40,7 +40,7 @@ bool concerns_all_axes(const Input& input) noexcept {
 }  // namespace
 
 Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
-    : setup_(setup), observer_(observer != nullptr ? observer : &nobody()) {
+    : setup_(setup), observer_(observer != nullptr ? observer : &no_observer()) {
   axes_.reserve(setup.axes.size());
   for (std::size_t i = 0; i < setup.axes.size(); ++i) {
     const AxisSetup& axis = setup.axes[i];
@@ -78,7 +78,7 @@ Refused Bench::submit(const Input& input) noexcept {
 void Bench::apply_due() noexcept {
   while (due_ < scheduled_ && schedule_[due_].tick <= tick_) {
     const Input input = unpack(schedule_[due_++]);
-    // Nobody waits for the answer any more: what cannot be carried out is counted (a command counts itself).
+    // The answer was given when the input was scheduled: a refusal now is counted (a command counts itself).
     if (apply(input) != Refused::kNot && !std::holds_alternative<Command>(input.action)) {
       ++axes_[input.axis].control.refused;
     }
@@ -173,7 +173,7 @@ Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noe
   Control& c = axes_[axis].control;
   const Refused why = judge(command, owner, command_view(axis));
   if (why == Refused::kNot || why == Refused::kLatched) {
-    c.renewed = tick_;  // a latched axis keeps its owner, who alone can clear it
+    c.renewed = tick_;  // a latched axis keeps its owner, because no other session can clear it
   }
   if (why != Refused::kNot) return why;
   c.newest = command;

@@ -21,7 +21,7 @@ namespace drivebench {
 /// State of the control of an axis, as Sample.state shows it: idle, ready, run, hold and back; timeout and
 /// fault end only when the owner clears them, and lead to idle.
 enum class ControlState : std::uint64_t {
-  kIdle = 0,     ///< nobody commands it: safe action
+  kIdle = 0,     ///< no commands arrive: safe action
   kReady = 5,    ///< the first commands arrive, fewer than arming_commands: still safe action
   kRun = 1,      ///< commands arrive and drive the axis
   kHold = 2,     ///< commands are missing, the last one holds
@@ -69,7 +69,8 @@ struct TickedSample {
   Sample sample;
 };
 
-/// Sees everything that happens, in order, inside the tick: must neither wait, allocate, lock nor throw.
+/// Is told of each input and each sample, in order, inside the tick: must neither wait, allocate, lock nor
+/// throw.
 class BenchObserver {
  public:
   virtual ~BenchObserver() = default;
@@ -91,7 +92,7 @@ class Bench {
   /// One tick: inputs that are due, commands, plant, sensors.
   void step() noexcept;
 
-  /// Takes every lease back and, if there was one, runs a tick of safe action: the end of a run.
+  /// The end of a run: takes every lease back and, if an axis had one, runs a tick of safe action.
   void dismiss_controllers() noexcept;
 
   /// Whether a latched fault is in force on an axis. Its commands are refused, except those with the gates

@@ -12,7 +12,7 @@
 
 namespace drivebench {
 
-/// Number of a session; 0 is nobody.
+/// Number of a session; 0: no session.
 using Owner = std::uint64_t;
 
 /// What a controller asks for, in answer to the sample of `answers`.
@@ -49,7 +49,7 @@ struct InjectFault {
   double value;
 };
 
-/// A blow on the shaft, an angular impulse that acts at once.
+/// A blow on the shaft: an angular impulse, all of it at once.
 struct ShaftBump {
   double impulse_nms;  ///< positive like a machine torque
 };
@@ -85,10 +85,10 @@ struct PackedInput {
 
 PackedInput pack(const Input& input) noexcept;
 
-/// The input; a kind that does not exist gives ClearFaults by nobody, which nobody may do.
+/// The input; a kind that does not exist gives ClearFaults without an owner, which every axis refuses.
 Input unpack(const PackedInput& packed) noexcept;
 
-/// Whether it gives a lease up, whoever holds it.
+/// Whether the input gives a lease up.
 inline bool ends_lease(const Input& input) noexcept {
   const auto* const action = std::get_if<LeaseAction>(&input.action);
   return action != nullptr && (*action == LeaseAction::kRelease || *action == LeaseAction::kLost);
@@ -108,16 +108,15 @@ constexpr bool suits(DriveKind drive, Gates gates) noexcept {
   return gates != Gates::kCurrent || drive == DriveKind::kCurrent;
 }
 
-/// What is wrong with putting `value` into this fault: empty if nothing is, otherwise a sentence with value
-/// and rule.
+/// Why the fault cannot have this value: a sentence with value and rule, or empty if it can.
 std::string problem_with(const InjectableFault& fault, double value);
-/// Whether problem_with() has something to say; for the tick: no text, no allocation.
+/// Whether problem_with() finds a problem; for the tick: no text, no allocation.
 bool breaks_a_rule(const InjectableFault& fault, double value) noexcept;
 
 /// Ticks that clients may name lie up to here: what a double holds exactly.
 inline constexpr std::uint64_t kMaxTick = std::uint64_t{1} << 53;
 
-/// Largest amounts that configurations and clients may ask for, both signs.
+/// Largest amounts, in both directions, that configurations and clients may ask for.
 inline constexpr double kMaxLoadNm = 1e6;
 inline constexpr double kMaxImpulseNms = 1e6;
 

@@ -8,7 +8,7 @@
 
 namespace drivebench {
 
-/// What the bench does to an axis that nobody commands any more.
+/// What the bench does to an axis whose commands have ended.
 enum class SafeAction : std::uint32_t {
   kFreewheel,    ///< gates off: currents flow through the diodes into the DC link until they are zero
   kZeroVoltage,  ///< active short circuit: the machine brakes against its own resistance

@@ -24,9 +24,9 @@ void Engine::request(const Input& input, Answer answer, const Client* from) {
     return submit(input, std::move(answer));
   }
   const Client* known = from != nullptr ? from : client(input.owner);
-  submit(input, [this, input, who = known != nullptr ? std::optional(*known) : std::nullopt,
+  submit(input, [this, input, named = known != nullptr ? std::optional(*known) : std::nullopt,
                  answer = std::move(answer)](Refused refused, Tick tick) {
-    on_answered(input, who ? &*who : nullptr, refused, tick);
+    on_answered(input, named ? &*named : nullptr, refused, tick);
     answer(refused, tick);
   });
 }
@@ -36,12 +36,12 @@ void Engine::take(std::uint32_t axis, Owner by, const std::string& reason, Answe
   if (before != 0 && before != by) {
     request({.tick = 0, .axis = axis, .owner = before, .action = LeaseAction::kLost},
             [this, taken = Taken{axis, before, by, reason}](Refused refused, Tick) {
-              if (refused != Refused::kNot) return;  // he has just left
+              if (refused != Refused::kNot) return;  // the owner has just left
               for (const auto& listener : on_taken)
                 listener(taken);
             });
   }
-  // Behind the other in the same queue: nobody comes in between, but somebody may have come before both.
+  // Behind the other in the same queue: no request comes between the two, but one may have come before both.
   request({.tick = 0, .axis = axis, .owner = by, .action = LeaseAction::kAcquire}, std::move(answer));
 }
 

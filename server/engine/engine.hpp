@@ -21,8 +21,8 @@ class io_context;
 
 namespace drivebench {
 
-/// One run: the bench, its recorder and what makes its ticks happen, as the endpoints see it. All methods are
-/// called, and all callbacks come, on the I/O thread.
+/// One run as the endpoints see it: the bench, its recorder, and the thread that runs the ticks. All methods
+/// are called, and all callbacks come, on the I/O thread.
 class Engine {
  public:
   /// Whether an input was carried out, and the tick at whose start.
@@ -37,11 +37,11 @@ class Engine {
   /// Lockstep: runs the present tick if the commands of all controlled axes are there. Otherwise time goes on
   /// by itself.
   virtual void advance() = 0;
-  /// Any other input; the answer comes when the bench has taken it. `from` is who asks, if it is not the
-  /// client behind input.owner.
+  /// Any other input; the answer comes when the bench has taken or refused it. `from` is the client that
+  /// asks, if it is not the client of input.owner.
   void request(const Input& input, Answer answer, const Client* from = nullptr);
-  /// Gives the axis to `by`, even if somebody holds it: he loses it as if his session had ended, and only
-  /// then, in the same tick, does `by` get it. Told to on_taken.
+  /// Gives the axis to `by`, even if another owner holds it: that owner loses the lease as at the end of its
+  /// session, and in the same tick `by` gets it. Calls on_taken.
   virtual void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer);
   /// Ends the run: safe action, recording closed.
   virtual Verdict stop() = 0;
@@ -69,12 +69,12 @@ class Engine {
   Listeners on_newest;
   /// Called once, when a run that has an end has reached it.
   std::function<void()> on_end;
-  /// Called with every answer to a request before whoever asked has it; `from` may be null.
+  /// Called with every answer to a request, before the session that asked has it; `from` may be null.
   std::function<void(const Input& input, const Client* from, Refused refused, Tick tick)> on_answered;
   /// Called when take() has taken the lease of an axis from an owner.
   std::vector<std::function<void(const Taken&)>> on_taken;
 
-  /// Who holds the lease of the axis, as far as the I/O thread knows.
+  /// The owner of the axis, as far as the I/O thread knows; 0: none.
   virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
 
   const Sample& newest(std::size_t axis) const { return newest_[axis]; }
@@ -83,25 +83,25 @@ class Engine {
   Tick tick() const { return static_cast<Tick>(newest_[0].tick); }
   const BenchConfig& config() const { return config_; }
   const Recorder* recorder() const { return recorder_.get(); }
-  /// What the machine did not grant, for people.
+  /// Sentences for people: what the operating system did not grant.
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// How ticks go on, for whoever looks after that from another thread.
+  /// For the supervisor, which watches the ticks from another thread.
   Watch& watch() noexcept { return watch_; }
 
   /// The parameters in force at newest(), with those writes whose answer is still to come.
   const AxisParameters& parameters(std::size_t axis) const { return parameters_[axis]; }
-  /// What is wrong with a write that acts at once: empty, and then it counts as done; the caller sends the
+  /// Why a parameter cannot be written at once. Empty: it can, and counts as written; the caller sends the
   /// input.
   std::string try_parameter(std::size_t axis, std::uint32_t row, double value);
-  /// What is wrong with the value by itself, whatever the others are when a write acts later.
+  /// Why the parameter cannot have this value, whatever the values of the others.
   std::string problem_with_value(std::size_t axis, std::uint32_t row, double value) const;
   /// Hash of the configuration, as configuration_hash() has it.
   std::uint64_t configuration_hash() const { return configuration_hash_; }
 
-  /// A number for the next controller, and who that is.
-  Owner new_owner(Client who) { return owners_.add(std::move(who), newest_); }
-  /// Who stands behind the number; null if that is long ago.
+  /// A number for a new controller.
+  Owner new_owner(Client client) { return owners_.add(std::move(client), newest_); }
+  /// The client that has this number; null once it is forgotten.
   const Client* client(Owner owner) const { return owners_.find(owner); }
 
  protected:
@@ -109,14 +109,14 @@ class Engine {
 
   /// The answer of a take() that does not begin.
   void refuse_to_take(std::uint32_t axis, Owner by, Refused why, const Answer& answer);
-  /// request() without those who look on.
+  /// request() without on_answered.
   virtual void submit(const Input& input, Answer answer) = 0;
 
   BenchConfig config_;
   Watch watch_;
   std::unique_ptr<Recorder> recorder_;
   std::vector<Sample> newest_;
-  std::vector<TickEdges> edges_;  ///< empty: nobody wants them
+  std::vector<TickEdges> edges_;  ///< empty: no bus sends them
   std::vector<std::string> notes_;
   std::vector<AxisParameters> parameters_;  ///< parameters(), by axis
 
@@ -137,7 +137,7 @@ std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config);
 std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
                                              boost::asio::io_context& io, std::optional<Tick> max_ticks);
 
-/// Hands the events of the configuration to the bench: there is no other way for what happens by itself.
+/// Gives the bench the events of the configuration, as inputs for later ticks.
 void schedule_events(const BenchConfig& config, Bench& bench);
 
 }  // namespace drivebench

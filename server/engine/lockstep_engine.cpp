@@ -69,7 +69,7 @@ class LockstepEngine final : public Engine {
       parameters_[input.axis] = bench_.axis(input.axis).parameters();  // even if it was refused
     }
     answer(refused, bench_.tick());
-    advance();  // the controller that everybody waited for may just have left
+    advance();  // the controller that the tick waited for may have left
   }
 
   Verdict stop() override {
@@ -89,8 +89,8 @@ class LockstepEngine final : public Engine {
   std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
-  /// For inputs that may come without end; what a tick waits for and what ends a lease has a place in any
-  /// case.
+  /// Whether inputs that may come without end may be recorded. The commands of a tick and the end of a lease
+  /// always may.
   bool has_room() const noexcept { return !recorder_ || (!waits_for_disk_ && recorder_->has_room()); }
 
   bool ends_own_lease(const Input& input) const noexcept {
@@ -98,7 +98,7 @@ class LockstepEngine final : public Engine {
            bench_.owner(input.axis) == input.owner;
   }
 
-  /// The disk is slow: time stands still until it has caught up, and everybody is served meanwhile.
+  /// The disk is slow: no tick runs until it has caught up, and sessions are served meanwhile.
   void try_again_soon() {
     if (std::exchange(waits_for_disk_, true)) return;
     disk_timer_->expires_after(std::chrono::milliseconds(1));

@@ -12,11 +12,11 @@
 
 namespace drivebench {
 
-/// Somebody outside, for people and the audit log.
+/// A client as people and the audit log name it.
 struct Client {
   std::string transport;  ///< "tcp", "unix", "can" or "modbus"
   std::string peer;       ///< address and port, or the bus
-  std::string subject;    ///< whose token it is; empty: unknown
+  std::string subject;    ///< owner of the token; empty: unknown
 };
 
 /// A name for sentences: "anna (127.0.0.1:5000)".
@@ -34,13 +34,13 @@ struct Taken {
   std::string reason;
 };
 
-/// Gives controllers their numbers, which only grow, and remembers who they are: the last thousand, and
-/// whoever holds an axis.
+/// Gives controllers their numbers, which only grow, and remembers the clients behind them: the last
+/// thousand, and those that hold an axis.
 class Owners {
  public:
   static constexpr std::size_t kRemembered = 1000;
 
-  Owner add(Client who, std::span<const Sample> axes) {
+  Owner add(Client client, std::span<const Sample> axes) {
     if (known_.size() >= kRemembered) {
       const auto idle = std::find_if(known_.begin(), known_.end(), [axes](const auto& entry) {
         return std::none_of(axes.begin(), axes.end(),
@@ -48,7 +48,7 @@ class Owners {
       });
       known_.erase(idle);
     }
-    known_.emplace(++last_, std::move(who));
+    known_.emplace(++last_, std::move(client));
     return last_;
   }
   const Client* find(Owner owner) const {

@@ -8,8 +8,8 @@
 
 namespace drivebench {
 
-/// The engine of a real-time or free run without its thread: `tick` does what that does for each tick, and
-/// the pacer says how late it is. The one who calls both may do so in a time of its own.
+/// The engine of a real-time or free run without its thread: the caller runs each tick with `tick`, and the
+/// pacer says how late it is. So a test can run it in virtual time.
 struct SteppedEngine {
   std::unique_ptr<Engine> engine;
   std::function<void()> tick;

@@ -18,7 +18,7 @@ namespace drivebench {
 /// still.
 class Supervisor {
  public:
-  /// `ticks_by_itself`: time must go on without anybody's doing, as in real time.
+  /// `ticks_by_itself`: ticks must go on without commands, as in real time.
   Supervisor(asio::io_context& io, Watch& watch, bool ticks_by_itself);
   ~Supervisor();
   Supervisor(const Supervisor&) = delete;

@@ -100,14 +100,14 @@ class ThreadedEngine final : public Engine {
 
   void submit(const Input& input, Answer answer) override {
     const bool ends = ends_lease(input);
-    // What concerns a lease does not overtake what waits.
+    // Lease actions do not overtake the ends of leases that wait.
     const bool has_to_wait = std::holds_alternative<LeaseAction>(input.action) && !ends_.empty();
     if (has_to_wait || (ends && requests_.room() == 0)) {
       if (!ends || waits(input)) return answer(Refused::kBusy, tick());
       ends_.push_back({input, std::move(answer)});
       return;
     }
-    // What strangers may send without end leaves the other half to what must get through.
+    // Refused commands, which sessions without a lease may send without end, leave half of the ring free.
     if (std::holds_alternative<RefusedCommand>(input.action) && requests_.room() <= kRequestCapacity / 2) {
       return answer(Refused::kBusy, tick());
     }
@@ -177,7 +177,7 @@ class ThreadedEngine final : public Engine {
     notify();
   }
 
-  /// All who hold an axis lose it.
+  /// Takes every lease back.
   void abandon() noexcept {
     for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis) {
       if (bench_.owner(axis) == 0) continue;
@@ -197,7 +197,7 @@ class ThreadedEngine final : public Engine {
       command_mail_[axis].deliver(bench_, axis);
   }
 
-  /// Before the samples that show them, so that whoever gets an answer finds the parameters as it says.
+  /// Before the samples that show them, so that a session finds the parameters as its answer says.
   void send_parameters() noexcept {
     for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
       ParameterMail& mail = parameter_mail_[i];
@@ -206,7 +206,7 @@ class ThreadedEngine final : public Engine {
     }
   }
 
-  /// Wakes the I/O thread, unless that is on its way already.
+  /// Wakes the I/O thread, unless it has been woken already.
   void notify() noexcept {
     if (wake_pending_.exchange(true)) return;
     const std::uint64_t one = 1;
@@ -252,7 +252,7 @@ class ThreadedEngine final : public Engine {
     answer_outcomes();
     on_tick();
   }
-  // Answers wait for the samples of their tick, so that whoever gets one finds newest() as it says.
+  // Answers wait for the samples of their tick, so that a session finds newest() as its answer says.
   void handle(const RequestOutcome& outcome) { outcomes_.push_back(outcome); }
   void handle(const AxisEdges& e) { edges_[e.axis] = e.edges; }
   void handle(const RunEnded&) {
@@ -290,7 +290,7 @@ class ThreadedEngine final : public Engine {
       rows[row].set(p, mail.in_force[row]);
   }
 
-  // In free mode a wake-up costs more than several ticks; the ring holds what comes in between.
+  // In free mode a wake-up costs more than several ticks; the ring holds the events in between.
   static constexpr std::size_t kEventsPerWake = 1024;
 
   struct Waiting {
@@ -298,7 +298,7 @@ class ThreadedEngine final : public Engine {
     std::optional<std::uint32_t> written_axis;  // of a parameter
   };
 
-  /// The end of a lease. One that found the ring full waits here: nobody would try again.
+  /// The end of a lease that found the ring full; its sender does not try again, so it waits here.
   struct LeaseEnd {
     Input input;
     Answer answer;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Of the guard that the tests preload (tests/adversity/guard): it ends a program that allocates, locks, waits
-// or enters the kernel between the two. Nobody else has them.
+// The guard that tests preload (tests/adversity/guard) defines them, and ends a program that allocates,
+// locks, waits or enters the kernel between the two. Without the guard they are null.
 extern "C" {
 [[gnu::weak]] void drivebench_tick_begins() noexcept;
 [[gnu::weak]] void drivebench_tick_ends() noexcept;
@@ -9,7 +9,7 @@ extern "C" {
 
 namespace drivebench {
 
-/// As long as it lives nothing may be done that could wait.
+/// During its lifetime the thread must do nothing that could wait.
 class TickMark {
  public:
   TickMark() noexcept {

@@ -10,7 +10,7 @@
 
 namespace drivebench {
 
-/// What came of a request.
+/// How the bench answered a request.
 struct RequestOutcome {
   Refused refused;
   Tick tick;
@@ -25,7 +25,7 @@ struct RunEnded {};
 /// What the tick thread tells the I/O thread.
 using TickEvent = std::variant<TickedSample, RequestOutcome, AxisEdges, RunEnded>;
 
-/// Passes what the bench reports on to the recorder and to the I/O thread.
+/// Passes inputs to the recorder, and samples to the recorder and the I/O thread.
 class TickTap final : public BenchObserver {
  public:
   TickTap(Recorder* recorder, SpscRing<TickEvent>& events) : recorder_(recorder), events_(events) {}
@@ -35,7 +35,7 @@ class TickTap final : public BenchObserver {
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
     if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
     if (bench_ != nullptr) events_.emplace(std::in_place_type<AxisEdges>, axis, edges_of(*bench_, axis));
-    // A full ring costs the viewers a sample, never the bench its time.
+    // With a full ring viewers lose a sample, and the tick does not wait.
     events_.emplace(std::in_place_type<TickedSample>, axis, sample);
   }
   /// From now on the encoder edges of each tick go before its samples.

@@ -7,10 +7,10 @@
 
 namespace drivebench {
 
-/// What the thread that runs the ticks and those that look after it tell each other.
+/// What the tick thread and the supervisor tell each other.
 class Watch {
  public:
-  /// How many ticks lie between two looks at the arithmetic: those of a second.
+  /// The arithmetic is looked at once in a second of ticks.
   explicit Watch(std::int64_t period_ns) noexcept
       : look_ticks_(period_ns < 1'000'000'000 ? static_cast<std::uint32_t>(1'000'000'000 / period_ns) : 1) {}
 
@@ -27,9 +27,9 @@ class Watch {
     return arithmetic_resets_.load(std::memory_order_relaxed);
   }
 
-  /// From the supervisor: nobody can command any more.
+  /// From the supervisor: the I/O thread stands still, so that no command can arrive.
   void abandon() noexcept { abandoned_.store(true, std::memory_order_relaxed); }
-  /// Tick thread: whether that was said since the last time.
+  /// Tick thread: whether abandon() was called since the last time.
   bool take_abandoned() noexcept {
     if (!abandoned_.load(std::memory_order_relaxed)) return false;
     return abandoned_.exchange(false, std::memory_order_relaxed);

@@ -1,5 +1,5 @@
-// What changes the world around a controller: parameters on a ramp, injected faults, bumps, current
-// setpoints, two axes on one shaft.
+// Changes around a controller: parameters on a ramp, injected faults, bumps, current setpoints, two axes on
+// one shaft.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -98,7 +98,7 @@ TEST(BenchRamp, SixteenAtATimeOfAnAxis) {
   step(bench, 3);
   EXPECT_EQ(ramp(kMaxRamps, 5), Refused::kNot);
   EXPECT_EQ(ramp(3, 5), Refused::kTooManyRamps);
-  EXPECT_EQ(bench.sample(0).refused_commands, 0u) << "who asks is told";
+  EXPECT_EQ(bench.sample(0).refused_commands, 0u) << "the answer tells of it";
 }
 
 // Static friction may not be below Coulomb friction. Kills: a rule that only the first value of a ramp keeps,
@@ -142,7 +142,7 @@ TEST(BenchRamp, HostileWritesAreRefused) {
   EXPECT_EQ(bench.sample(0).faults, 0u);
 }
 
-// Kills: a change that whoever shows parameters does not hear of, or hears of without end.
+// Kills: a change that is not counted, or that is counted without end.
 TEST(BenchRamp, ChangesAreCounted) {
   Bench bench(servo_setup());
   const std::uint64_t start = bench.parameter_changes(0);
@@ -183,7 +183,7 @@ TEST(BenchFault, HostileFaultsAndBumpsAreRefused) {
   EXPECT_EQ(submit(bench, fault_of("bus_sag", kNan)), Refused::kNotFinite);
   EXPECT_EQ(submit(bench, ShaftBump{kNan}), Refused::kNotFinite);
   EXPECT_EQ(submit(bench, ShaftBump{-HUGE_VAL}), Refused::kNotFinite);
-  EXPECT_EQ(submit(bench, fault_of("open_phase", 4.0), 2), Refused::kNot) << "told when its time comes";
+  EXPECT_EQ(submit(bench, fault_of("open_phase", 4.0), 2), Refused::kNot) << "judged when its tick comes";
   step(bench, 3);
   EXPECT_EQ(bench.sample(0).injected, 0u);
   EXPECT_EQ(bench.sample(0).speed_rad_s, 0.0);
@@ -233,8 +233,8 @@ TEST(BenchFault, CMD_02_CommandLossKeepsCommandsFromTheDriveAndTheWatchdogSeesIt
   EXPECT_EQ(bench.sample(0).u_a_v, 9.0);
 }
 
-// Kills: a copy that feeds the watchdog, that reaches the drive after a newer command, or that nobody counts;
-// an axis that is armed by a link which says everything twice.
+// Kills: a copy that feeds the watchdog, that reaches the drive after a newer command, or that is not
+// counted; an axis that is armed by a link which sends each command twice.
 TEST(BenchFault, CMD_06_CopiesThatTheLinkMakesAreRefusedAndCounted) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 3;
@@ -304,7 +304,7 @@ TEST(BenchSetpoint, CurrentsAreForCurrentAmplifiersOnly) {
   EXPECT_NEAR(current.sample(0).true_i_b_a, 0.0, 0.05);
 }
 
-// Kills: a setpoint that only two phases look at.
+// Kills: a check of two set-points of the four.
 TEST(BenchSetpoint, AllFourMustBeFinite) {
   Bench bench = owned_bench(current_setup(), kOwner);
   for (double PhaseValues::*member :
@@ -338,7 +338,7 @@ void turn(Bench& bench, std::uint32_t axis, double amplitude_v) {
 }
 
 // Kills: a second axis that stands still, turns on its own, or is advanced twice; a bump or a load on it that
-// nobody feels.
+// moves neither.
 TEST(BenchSharedShaft, BothAxesTurnAsOne) {
   Bench bench(dynamometer());
   submit_lease(bench, LeaseAction::kAcquire, kOwner);

@@ -1,4 +1,4 @@
-// Who may command an axis, and what happens when it falls silent.
+// The lease of an axis, and the watchdog of its commands.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -92,8 +92,8 @@ TEST(BenchLease, OS_05_LateTicksNeitherFeedNorStarveTheWatchdog) {
   EXPECT_EQ(bench.sample(0).faults, kCommandTimeout);
 }
 
-// Kills: an axis that nobody commands and that times out all the same.
-TEST(BenchLease, AnOwnerWhoNeverCommandedIsIdleNotTimedOut) {
+// Kills: an axis without commands that times out all the same.
+TEST(BenchLease, AnOwnerThatNeverCommandedIsIdleNotTimedOut) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   step(bench, 500);
   EXPECT_EQ(state_of(bench), ControlState::kIdle);
@@ -101,7 +101,7 @@ TEST(BenchLease, AnOwnerWhoNeverCommandedIsIdleNotTimedOut) {
   EXPECT_EQ(bench.sample(0).owner, kOwner);
 }
 
-// Kills: a second writer, commands without a lease, a lease for nobody.
+// Kills: a second writer, commands without a lease, a lease for owner 0.
 TEST(BenchLease, OWN_01_OWN_02_OnlyTheOwnerCommands) {
   Bench bench(servo_setup());
   EXPECT_EQ(submit_volts(bench, kOwner, 1.0), Refused::kNotOwner);
@@ -152,7 +152,7 @@ TEST(BenchLease, OWN_03_LIMIT_08_ALeaseExpiresExactlyItsTicksAfterItsLastRenewal
 }
 
 // Kills: an idle owner that leaves a fault behind, a lease that refused commands keep alive.
-TEST(BenchLease, ALeaseThatNobodyUsesEndsWithoutAFault) {
+TEST(BenchLease, AnUnusedLeaseEndsWithoutAFault) {
   BenchSetup setup = servo_setup();
   setup.lease_ticks = 50;
   Bench bench = owned_bench(setup, kOwner);
@@ -181,8 +181,8 @@ TEST(BenchLease, AReleaseIsNoFaultALostControllerIsOne) {
   }
 }
 
-// Kills: a run that ends with voltage on the motor, a lease that outlives the run, a tick when nobody was
-// there.
+// Kills: a run that ends with voltage on the motor, a lease that outlives the run, a tick of safe action
+// on a bench without a controller.
 TEST(BenchLease, DismissingTheControllersEndsTheRunWithATickOfSafeAction) {
   BenchSetup setup = servo_setup();
   setup.axes[0].on_link_loss = SafeAction::kZeroVoltage;
@@ -198,9 +198,9 @@ TEST(BenchLease, DismissingTheControllersEndsTheRunWithATickOfSafeAction) {
   EXPECT_EQ(bench.tick(), 2);
 }
 
-// Kills: a load that a controller had planned and that hits its successor, and loads of the configuration
-// that go with it.
-TEST(BenchLease, WhatAControllerHadScheduledGoesWithIt) {
+// Kills: a load scheduled by one controller that hits the next one, and loads of the configuration that go
+// with the first.
+TEST(BenchLease, TheScheduleOfAControllerEndsWithItsLease) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   bench.submit({.tick = 5, .axis = 0, .owner = kOwner, .action = LoadChange{0.5, 0}});
   bench.submit({.tick = 8, .axis = 0, .owner = 0, .action = LoadChange{0.25, 0}});
@@ -211,7 +211,7 @@ TEST(BenchLease, WhatAControllerHadScheduledGoesWithIt) {
   EXPECT_EQ(bench.sample(0).load_nm, 0.25);
 }
 
-// A recording may hold it, whoever wrote that. Kills: a schedule that is shortened by what it is running, and
+// A recording may hold such an input. Kills: a schedule that is shortened by what it is running, and
 // a count below zero.
 TEST(BenchLease, AScheduledReleaseTakesTheRestOfItsOwnersScheduleAlong) {
   Bench bench = owned_bench(servo_setup(), kOwner);
@@ -224,9 +224,9 @@ TEST(BenchLease, AScheduledReleaseTakesTheRestOfItsOwnersScheduleAlong) {
   schedule(5, 0, LoadChange{.load_nm = 0.5, .ramp_ticks = 0});
   step(bench, 5);
   EXPECT_EQ(bench.sample(0).owner, 0u);
-  EXPECT_EQ(bench.sample(0).load_nm, 0.0) << "what its owner had in mind goes with it";
+  EXPECT_EQ(bench.sample(0).load_nm, 0.0) << "its owner's load goes with it";
   bench.step();
-  EXPECT_EQ(bench.sample(0).load_nm, 0.5) << "what others had stays";
+  EXPECT_EQ(bench.sample(0).load_nm, 0.5) << "the load of the configuration stays";
   EXPECT_EQ(bench.sample(0).refused_commands, 0u);
 }
 

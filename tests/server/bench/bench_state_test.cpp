@@ -13,7 +13,7 @@ namespace {
 
 constexpr Owner kOwner = 3;
 
-/// Two axes, friction, noise, a coarse converter: everything that has a state.
+/// Two axes with friction, noise and a coarse converter: each has a state.
 BenchSetup rich_setup() {
   BenchSetup setup = servo_setup(1);
   AxisParameters& p = setup.axes[0].parameters;

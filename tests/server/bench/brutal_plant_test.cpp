@@ -1,5 +1,4 @@
-// What a motor may meet and what costs real ones their life: the state stays finite, or the axis says that it
-// does not.
+// Loads that destroy real motors: the state stays finite, or the axis reports the divergence.
 #include <gtest/gtest.h>
 
 #include <cmath>

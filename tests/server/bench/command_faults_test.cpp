@@ -1,5 +1,4 @@
-// What may happen to a stream of commands on its way: lost, late, doubled, overtaken, in a burst, not
-// numbers.
+// Faults of a stream of commands: lost, late, doubled, overtaken, in a burst, not numbers.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -30,7 +29,7 @@ std::uint64_t bits(double value) {
   return std::bit_cast<std::uint64_t>(value);
 }
 
-// Kills: a loss that changes the voltage, that is counted wrongly, or that needs anybody to clear it.
+// Kills: a loss that changes the voltage, that is counted wrongly, or that must be cleared.
 TEST(CommandFaults, CMD_01_LostCommandsHoldTheVoltageAndTheStreamGoesOn) {
   Bench bench = owned_bench(watched_setup(), kOwner);
   std::uint64_t missed = 0;
@@ -70,7 +69,7 @@ TEST(CommandFaults, CMD_05_ALateCommandActsInTheNextTickAndTheNewestWins) {
   EXPECT_EQ(state_of(bench), ControlState::kHold) << "none is left over for this tick";
 }
 
-// Kills: a stuck sender that keeps the axis alive by saying the same thing again.
+// Kills: a stuck sender that keeps the axis alive by repeating one command.
 TEST(CommandFaults, CMD_06_CMD_08_ARepeatedCommandFeedsNoWatchdog) {
   Bench bench = owned_bench(watched_setup(), kOwner);
   ASSERT_EQ(submit_answer(bench, 0, 1.0), Refused::kNot);

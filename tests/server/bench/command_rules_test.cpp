@@ -18,7 +18,7 @@ BenchSetup limited_setup(OnExcess on_excess, double slew_per_s) {
 }
 
 // Kills: a finite accident (1e308) that passes for a voltage, a limit that refuses itself.
-TEST(CommandRules, CMD_11_NumbersThatNoDriveKnowsAreRefusedByEveryAxis) {
+TEST(CommandRules, CMD_11_NumbersBeyondEveryDriveAreRefusedByEveryAxis) {
   for (double PhaseValues::*field :
        {&PhaseValues::a, &PhaseValues::b, &PhaseValues::c, &PhaseValues::field}) {
     Bench bench = owned_bench(servo_setup(), kOwner);
@@ -87,7 +87,7 @@ TEST(CommandRules, CMD_13_AStepBeyondTheSlewRateIsSlowedOrRefusedAsConfigured) {
 }
 
 // The limit counts from what drives the axis, and without a controller that is its safe action. Kills: a next
-// controller who asks for 0 V and gets the voltage that the one before had; one who gets all he asks for in a
+// controller that asks for 0 V and gets the voltage of the one before; one that gets its whole set-point in a
 // tick because the one before had it.
 TEST(CommandRules, CMD_13_TheSlewLimitCountsFromTheSafeAction) {
   struct Case {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr Owner kOwner = 7;
 
-/// What must come out of it, tick by tick: which voltage is in force, if any, and the state.
+/// The reference: the state in each tick, and the voltage in force, if any.
 struct Reference {
   Tick watchdog_ticks;
   std::int64_t arming_commands;
@@ -105,7 +105,7 @@ TEST(ControlStates, STATE_01_AgreeWithTheReferenceInEveryPatternOfLosses) {
       ASSERT_EQ(bench.sample(0).faults, reference.latched ? kCommandTimeout : 0u);
     }
   }
-  EXPECT_GT(timeouts, 10'000u) << "the patterns are worth their time";
+  EXPECT_GT(timeouts, 10'000u) << "patterns that reach the timeout";
   EXPECT_GT(readied, 100'000u);
 }
 

@@ -84,7 +84,7 @@ TEST(Input, UnusedWordsAreZero) {
 }
 
 // Kills: a kind from a damaged file that reads past the table.
-TEST(Input, AnUnknownKindIsAClearByNobody) {
+TEST(Input, AnUnknownKindIsAClearWithoutAnOwner) {
   for (const std::uint64_t kind : {std::uint64_t{10}, std::numeric_limits<std::uint64_t>::max()}) {
     const Input input = unpack({.tick = 4, .axis = 1, .owner = 0, .kind = kind, .words = {1, 2, 3, 4, 5, 6}});
     EXPECT_TRUE(std::holds_alternative<ClearFaults>(input.action));

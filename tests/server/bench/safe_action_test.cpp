@@ -1,4 +1,4 @@
-// What the safe actions do to a machine, and what leads out of them.
+// The safe actions, and the ways out of them.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -6,7 +6,7 @@
 #include "tests/plant/servo_axis.hpp"
 #include "tests/server/parameter_row.hpp"
 
-/// A bench with the servo motor of the book, and short ways to say what comes in from outside.
+/// A bench with the servo motor of the book, and short forms of its inputs.
 namespace drivebench {
 
 inline BenchSetup servo_setup(int command_delay_ticks = 0) {

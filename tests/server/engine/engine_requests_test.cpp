@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kRequestsThatWait = 256;
 
-/// A free run of one axis that I hold, whose ticks run when they are told to.
+/// A free run of one axis, owned by kMe, whose ticks the test runs one by one.
 class EngineRequests : public testing::Test {
  protected:
   EngineRequests() {
@@ -34,7 +34,7 @@ class EngineRequests : public testing::Test {
     for (std::size_t i = 0; i < count; ++i)
       engine().request({.tick = 0, .axis = 0, .owner = 0, .action = LoadChange{}}, [](Refused, Tick) {});
   }
-  /// As many ticks as it takes until the I/O thread is told, and then that thread.
+  /// Runs ticks until the I/O thread is woken, and then that thread.
   void run() {
     constexpr int kTicksPerWake = 1024;
     for (int i = 0; i < kTicksPerWake; ++i)
@@ -54,7 +54,7 @@ class EngineRequests : public testing::Test {
   std::vector<Refused> answers_;
 };
 
-// Catches: an axis that is taken from its owner although there is no room to give it to who takes it.
+// Catches: an axis taken from its owner while the queue has no room to give it to the new one.
 TEST_F(EngineRequests, OWN_04_AnAxisIsTakenAndGivenOrNeither) {
   for (const std::size_t filled : {kRequestsThatWait - 1, kRequestsThatWait, 2 * kRequestsThatWait}) {
     fill(filled);
@@ -75,7 +75,7 @@ TEST_F(EngineRequests, OWN_04_AnAxisIsTakenAndGivenOrNeither) {
 TEST_F(EngineRequests, AnEndThatWaitsIsNotOvertaken) {
   fill(kRequestsThatWait);
   engine().request(lease(LeaseAction::kRelease), noted());
-  stepped_.tick();  // now there is room again, of which the I/O thread does not know
+  stepped_.tick();  // makes room that the I/O thread does not know of
   engine().request(lease(LeaseAction::kAcquire), noted());
   engine().request(lease(LeaseAction::kLost, 0, kStranger), noted());
   engine().take(0, kStranger, "mine", noted());
@@ -85,7 +85,7 @@ TEST_F(EngineRequests, AnEndThatWaitsIsNotOvertaken) {
   EXPECT_EQ(answers_, (std::vector{Refused::kBusy, Refused::kBusy, Refused::kNot, Refused::kNotOwner}));
 }
 
-// Catches: a queue without end, of ends of leases that whoever sends them does not even hold.
+// Catches: a queue of lease ends without a bound, sent by sessions that hold no lease.
 TEST_F(EngineRequests, OneEndOfALeaseWaitsForEachOwner) {
   fill(kRequestsThatWait);
   for (int i = 0; i < 1000; ++i)

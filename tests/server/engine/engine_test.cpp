@@ -140,8 +140,8 @@ TEST(ThreadedEngine, RequestsAreAnsweredInOrderWithTheirTick) {
     EXPECT_EQ(answered[static_cast<std::size_t>(n)], n);
 }
 
-// Catches: two owners of an axis, or none, in the moment in which one leaves and two come; a loser who may
-// release what is not his.
+// Catches: two owners of an axis, or none, when one leaves while two ask; a session that can release the
+// lease of another.
 TEST(ThreadedEngine, OWN_01_TenThousandRacesHaveOneWinnerEach) {
   BenchConfig config = servo_bench();
   config.mode = RunMode::kFree;
@@ -203,9 +203,9 @@ TEST(ThreadedEngine, TooManyRequestsAreRefusedAsBusy) {
   engine->stop();
 }
 
-// Catches: an axis that nobody can have because the end of its lease found no room; a stranger whose refused
-// commands leave the owner no room.
-TEST(ThreadedEngine, WhatMustGetThroughDoes) {
+// Catches: an axis that stays taken because the end of its lease found no room; refused commands of another
+// session that leave the owner no room.
+TEST(ThreadedEngine, RenewalsAndEndsOfLeasesGetThroughAFullQueue) {
   asio::io_context io(1);
   BenchConfig config = servo_bench();
   config.mode = RunMode::kFree;

@@ -45,8 +45,8 @@ const Step kLatch{.what = Step::What::kLatch};
 const Step kClear{.what = Step::What::kClear};
 const Step kRetake{.what = Step::What::kRetake};
 
-/// One axis that I hold, whose set-points may move by 1 V in a turn: a tick, or in a free run as many as pass
-/// before the I/O thread hears of them.
+/// One axis, owned by kMe, whose set-points may move by 1 V in a turn: a tick, or in a free run as many ticks
+/// as pass before the I/O thread is told.
 class JudgedBench {
  public:
   explicit JudgedBench(RunMode mode) : mode_(mode), turn_ticks_(mode == RunMode::kFree ? 1024 : 1) {

@@ -28,7 +28,7 @@ struct SlowDiskRun {
     disk.stall(true);
     Tick tick = engine->tick();
     for (; engine->tick() == tick; ++tick) {
-      if (tick == 4000) disk.wait_until_it_holds_somebody();
+      if (tick == 4000) disk.wait_until_it_holds_a_writer();
       engine->command(0, kMe, voltage(tick, 1.0, 0.0));
       engine->advance();  // does not wait, or this test would not end
     }
@@ -53,7 +53,7 @@ TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
   std::vector<Tick> seen;
   engine->on_tick.add([&] { seen.push_back(engine->tick()); });
   engine->advance();
-  EXPECT_EQ(engine->tick(), 0) << "nobody controls";
+  EXPECT_EQ(engine->tick(), 0) << "no controller";
   EXPECT_EQ(ask(*engine, lease(LeaseAction::kAcquire)), Refused::kNot);
   engine->advance();
   EXPECT_EQ(engine->tick(), 0) << "no command";
@@ -79,7 +79,8 @@ TEST(LockstepEngine, ALeaseGivenBackLetsTheOthersGoOn) {
   EXPECT_EQ(engine->tick(), 1);
 }
 
-// Catches: a tick between the two halves of a taking, in which the axis belongs to nobody.
+// Catches: a tick between the end of the old lease and the begin of the new one, in which the axis has no
+// owner.
 TEST(LockstepEngine, OWN_04_AnAxisIsTakenWithinATick) {
   const auto engine = make_lockstep_engine(servo_bench(2));
   ask(*engine, lease(LeaseAction::kAcquire, 0, kMe));
@@ -95,7 +96,7 @@ TEST(LockstepEngine, OWN_04_AnAxisIsTakenWithinATick) {
   EXPECT_EQ(engine->tick(), 0) << "the new owner has not commanded yet";
 }
 
-// Catches: an I/O thread that waits for a disk, deaf to signals and to everybody's questions; a tick that is
+// Catches: an I/O thread that waits for a disk and serves no session or signal meanwhile; a tick that is
 // lost, or runs without its command, when the disk goes on.
 TEST(LockstepEngine, REC_06_TimeWaitsForASlowDiskAndTheIoThreadDoesNot) {
   SlowDiskRun run(servo_bench());
@@ -114,7 +115,7 @@ TEST(LockstepEngine, REC_06_TimeWaitsForASlowDiskAndTheIoThreadDoesNot) {
 // Catches: inputs that are taken while there is no room to record them: refused commands, answers to one old
 // sample after the other, whatever else clients send without end; a lease that cannot end meanwhile; one that
 // is taken and not given.
-TEST(LockstepEngine, REC_06_WhatIsCarriedOutWhileTheDiskStandsStillIsRecorded) {
+TEST(LockstepEngine, REC_06_EveryInputTakenWhileTheDiskStandsStillIsRecorded) {
   BenchConfig config = servo_bench(2);
   config.setup.lease_ticks = 1'000'000;  // longer than it takes to fill the ring
   SlowDiskRun run(config);
@@ -143,7 +144,7 @@ TEST(LockstepEngine, REC_06_WhatIsCarriedOutWhileTheDiskStandsStillIsRecorded) {
              LoadChange{.load_nm = 0.1, .ramp_ticks = 0}, LeaseAction::kRenew, RefusedCommand{true}, gain}) {
       EXPECT_EQ(ask(engine, {.tick = 0, .axis = 0, .owner = kMe, .action = action}), Refused::kBusy);
     }
-    EXPECT_EQ(ask(engine, lease(LeaseAction::kRelease, 0, kStranger)), Refused::kBusy) << "no lease of his";
+    EXPECT_EQ(ask(engine, lease(LeaseAction::kRelease, 0, kStranger)), Refused::kBusy) << "it holds no lease";
     engine.take(0, kStranger, "a test", [](Refused refused, Tick) { EXPECT_EQ(refused, Refused::kBusy); });
   }
   ASSERT_EQ(engine.owner(0), kMe);
@@ -161,7 +162,7 @@ TEST(LockstepEngine, REC_06_WhatIsCarriedOutWhileTheDiskStandsStillIsRecorded) {
 }
 
 // Catches: room that is looked for only where a tick is due, or where a lease is.
-TEST(LockstepEngine, REC_06_StrangersDoNotFillTheRingOfABenchThatNobodyControls) {
+TEST(LockstepEngine, REC_06_SessionsWithoutALeaseDoNotFillTheRingOfAnIdleBench) {
   SlowDiskRun run(servo_bench());
   run.disk.stall(true);
   for (int i = 0; i < 100'000; ++i) {

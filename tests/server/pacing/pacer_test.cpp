@@ -139,7 +139,7 @@ TEST(LatenessHistogram, EveryLatenessHasABucket) {
   EXPECT_EQ(histogram.percentile_ns(0.0), 125);
 }
 
-// Catches: a wish that the machine does not grant and nobody is told of.
+// Catches: a refusal of the operating system that no note tells of.
 TEST(EnterRealtime, OS_07_SaysWhatWasNotGranted) {
   std::vector<std::string> notes;
   std::thread([&notes] { notes = enter_realtime({.cpu = 1023, .priority = 1000}); }).join();

@@ -111,7 +111,7 @@ class StallingDisk {
     stalled_ = on;
     changed_.notify_all();
   }
-  void wait_until_it_holds_somebody() {
+  void wait_until_it_holds_a_writer() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return waiting_; });
   }

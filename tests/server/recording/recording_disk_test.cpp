@@ -360,7 +360,7 @@ TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCou
     Recorder recorder(folder / "run.mcap", servo_bench(), {}, {.create = disk.creator()});
     disk.stall(true);
     feed(recorder, 0, kTicksOf100Ms + 1);  // so that it begins to write
-    disk.wait_until_it_holds_somebody();
+    disk.wait_until_it_holds_a_writer();
     const std::uint64_t end = seconds * kSecond;
     feed(recorder, kTicksOf100Ms + 1, end);  // does not wait, or this test would not end
     const std::uint64_t gaps = recorder.gaps();

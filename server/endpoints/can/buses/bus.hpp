@@ -17,17 +17,17 @@ class io_context;
 
 namespace drivebench::can {
 
-/// How a bus is doing.
+/// State of a bus.
 enum class BusState : std::uint8_t { kUp, kWarning, kPassive, kDown, kAbsent };
 
-/// Everything that a back end counts.
+/// State and counters of a back end.
 struct BusStatus {
   BusState state = BusState::kAbsent;
   std::uint64_t sent = 0;
   std::uint64_t confirmed = 0;  ///< seen on the bus, where the back end can tell
   std::uint64_t received = 0;
   std::uint64_t send_dropped = 0;     ///< replaced by a newer frame with the same identifier, or given up
-  std::uint64_t receive_dropped = 0;  ///< lost before we read them, as far as the system tells
+  std::uint64_t receive_dropped = 0;  ///< lost before the bench read them, as far as the system tells
   std::uint64_t error_frames = 0;
   std::uint64_t malformed = 0;  ///< bytes from the transport that were no frame
 };
@@ -51,12 +51,12 @@ class Bus {
   /// What it is connected to, for people: "socketcan:vcan0".
   virtual std::string name() const = 0;
 
-  /// A message of somebody else; remote frames too, error frames never. `stamp_ns` is the time of its arrival
-  /// on CLOCK_REALTIME as the kernel has it, or 0.
+  /// A frame of another sender, remote frames included, error frames never. `stamp_ns` is the time of its
+  /// arrival on CLOCK_REALTIME as the kernel has it, or 0.
   std::function<void(const Frame& frame, std::int64_t stamp_ns)> on_frame;
   /// After status().state has changed.
   std::function<void()> on_state;
-  /// A client of ours was turned away or cut off: its address, and why. Some back ends have clients.
+  /// For back ends that have clients: one was refused or cut off; its address, and why.
   std::function<void(const std::string& peer, std::string_view why)> on_refused;
 };
 

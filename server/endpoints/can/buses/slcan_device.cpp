@@ -90,7 +90,7 @@ std::string SlcanDevice::open() {
   return {};
 }
 
-/// Opens the device for us alone, raw.
+/// Opens the device raw and for this process alone.
 std::string SlcanDevice::open_line(int& fd) {
   const std::size_t at = config_.channel.rfind('@');
   const std::string path = config_.channel.substr(0, at);
@@ -114,7 +114,7 @@ std::string SlcanDevice::open_line(int& fd) {
   return problem;
 }
 
-/// What opens the channel: ends any line that somebody left unfinished, closes, sets the bit rates, opens.
+/// The lines that open the channel: end an unfinished line, close, set the bit rates, open.
 std::string SlcanDevice::handshake(std::string& out) const {
   const auto rate = slcan_bit_rate(config_.bit_rate);
   if (!rate) return "slcan adapters do not know bit_rate " + std::to_string(config_.bit_rate);

@@ -61,7 +61,7 @@ std::int64_t stamp_of(const scm_timestamping& stamps) {
 }
 
 /// How long to wait for room: not less than the longest classic frame takes, 8 bytes with all the bits that
-/// can be stuffed, nor so little that a bus where nobody listens keeps us busy.
+/// can be stuffed, nor so short that a bus without listeners takes a core.
 std::chrono::nanoseconds retry_after(const CanConfig& config) {
   const std::chrono::nanoseconds frame(135 * std::int64_t{1'000'000'000} / config.bit_rate);
   return std::max<std::chrono::nanoseconds>(frame, std::chrono::milliseconds(1));
@@ -139,14 +139,14 @@ void SocketCanBus::set_filter(const std::vector<std::uint32_t>& ids) {
   filter_ = filters_for(ids);
   filtered_ = filter_.size() <= CAN_RAW_FILTER_MAX;
   if (!filtered_) {
-    spdlog::warn("{}: the kernel takes {} filters, not {}; foreign frames wake us", name(),
+    spdlog::warn("{}: the kernel takes {} filters, not {}; foreign frames wake the bench", name(),
                  CAN_RAW_FILTER_MAX, filter_.size());
   }
   if (!stream_.is_open()) return;
   try {
     apply_filter(stream_.native_handle());
   } catch (const std::system_error& error) {
-    spdlog::warn("{}: {}; foreign frames wake us", name(), error.what());
+    spdlog::warn("{}: {}; foreign frames wake the bench", name(), error.what());
   }
 }
 
@@ -196,7 +196,7 @@ void SocketCanBus::close() {
 
 void SocketCanBus::set_state(BusState state) {
   if (std::exchange(status_.state, state) == state || !on_state) return;
-  // Never from inside send(): who is told may send.
+  // Never from inside send(): the listener may send.
   asio::post(io_, [this, alive = std::weak_ptr(alive_)] {
     if (!alive.expired() && on_state) on_state();
   });
@@ -349,7 +349,7 @@ void SocketCanBus::flush() {
   while (!pending_.empty()) {
     const Sent sent = transmit(pending_.front());
     if (sent == Sent::kFull) return retry_later();
-    if (pending_.empty()) return;  // the bus went down, and all of them with it
+    if (pending_.empty()) return;  // the bus went down, and the frames were given up
     if (sent == Sent::kLost) ++status_.send_dropped;
     pending_.pop();
   }
@@ -390,7 +390,7 @@ void SocketCanBus::probe() {
   const int fd = stream_.native_handle();
   ifreq request = request_for(config_.channel);
   const bool works = ::ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & kWorks) == kWorks;
-  // While it was down, somebody may have made it a classic one.
+  // While it was down, it may have been made a classic one.
   if (works && interface_problem(fd).empty()) {
     set_state(BusState::kUp);
   } else {

@@ -70,7 +70,8 @@ class SocketCanBus final : public Bus {
   int index_ = 0;                  ///< of the interface that the socket is bound to
   std::uint32_t lost_before_ = 0;  ///< the socket's own count
   std::string problem_;            ///< last one logged
-  std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
+  std::shared_ptr<const bool> alive_ =
+      std::make_shared<const bool>();  ///< for handlers that outlive the object
 };
 
 }  // namespace drivebench::can

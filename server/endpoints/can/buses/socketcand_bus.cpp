@@ -31,7 +31,7 @@ std::size_t data_size(const Frame& frame) {
 }
 
 /// python-can 4.1.0 loses the first character of what is left of its buffer when that ends inside an element,
-/// so each frame has a blank before it that nobody misses.
+/// so each frame has a blank before it, which readers skip.
 void append_with_blank(std::string& out, const Frame& frame) {
   out += ' ';
   append_socketcand_frame(out, frame, realtime_s());
@@ -106,7 +106,7 @@ void SocketcandBus::welcome(int fd) {
       if (const auto element = client->reader.push(byte)) take(*client, *element);
     }
   };
-  client->peer.on_stall = [this, who = peer_of(fd)] { refused(who, "it does not read what it is sent"); };
+  client->peer.on_stall = [this, peer = peer_of(fd)] { refused(peer, "it does not read what it is sent"); };
   client->peer.on_end = [this, client] {
     std::erase_if(clients_, [client](const auto& each) { return each.get() == client; });
   };

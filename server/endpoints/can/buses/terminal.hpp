@@ -35,7 +35,8 @@ class Terminal {
   int fd_ = -1;
   std::string device_;
   std::string link_;
-  std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
+  std::shared_ptr<const bool> alive_ =
+      std::make_shared<const bool>();  ///< for handlers that outlive the object
 };
 
 }  // namespace drivebench::can

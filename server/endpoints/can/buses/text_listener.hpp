@@ -44,7 +44,8 @@ class TextListener {
   asio::ip::tcp::acceptor acceptor_;
   ServerTimer pause_;
   LogLimit log_;
-  std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
+  std::shared_ptr<const bool> alive_ =
+      std::make_shared<const bool>();  ///< for handlers that outlive the object
 };
 
 }  // namespace drivebench::can

@@ -13,8 +13,8 @@
 
 namespace drivebench::can {
 
-/// Somebody who takes frames as text: over a TCP socket, a terminal or a serial line. Bounded: of frames
-/// that it does not read in time it gets the newest of each identifier.
+/// A peer that takes frames as text: over a TCP socket, a terminal or a serial line. Its queue is bounded: of
+/// frames that it does not read in time it gets the newest of each identifier.
 class TextPeer {
  public:
   using Encode = std::function<void(std::string& out, const Frame& frame)>;
@@ -67,7 +67,8 @@ class TextPeer {
   bool watching_ = false;
   bool ended_ = false;
   bool is_socket_ = false;
-  std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
+  std::shared_ptr<const bool> alive_ =
+      std::make_shared<const bool>();  ///< for handlers that outlive the object
 };
 
 }  // namespace drivebench::can

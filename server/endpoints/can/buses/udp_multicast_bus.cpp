@@ -137,7 +137,7 @@ class UdpMulticastBus final : public VirtualBus {
   void flush_later();
 
   Address group_;
-  Address own_;  ///< where our frames come from
+  Address own_;  ///< address that the frames of this bus come from
   asio::posix::stream_descriptor in_;
   asio::posix::stream_descriptor out_;
 
@@ -188,7 +188,7 @@ std::string UdpMulticastBus::parse_group() {
 std::string UdpMulticastBus::open_sender(unsigned loopback) {
   const int fd = ::socket(group_.family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0 || !adopt(out_, fd)) return reason();
-  // Its port is what tells our frames from those of others, which all come from the port of the bus.
+  // Its own port tells the frames of this bus from all others, which come from the port of the group.
   own_ = {};
   own_.storage.ss_family = group_.family();
   socklen_t size = sizeof own_.storage;
@@ -210,7 +210,7 @@ std::string UdpMulticastBus::open_receiver(unsigned loopback) {
     return reason() + " (a program that uses this port without sharing it? ss -ulpn 'sport = :" +
            std::to_string(config_.port) + "')";
   }
-  // Others send where the routes say, if they say anything; with IPv6 we do so, too.
+  // Other programs send where the routes say, if there are any; with IPv6 this one does so, too.
   const bool is_v4 = group_.family() == AF_INET;
   join(fd, group_, is_v4 ? 0 : loopback);
   if (!join(fd, group_, is_v4 ? loopback : 0)) return reason() + " (joining the group)";
@@ -288,7 +288,7 @@ void UdpMulticastBus::note_losses(const msghdr& message, std::int64_t& stamp_ns)
   }
 }
 
-/// Anybody in the local network can send to a multicast group. Frames from there are none of this bus.
+/// Every computer of the local network can send to a multicast group. Frames of other computers are dropped.
 /// Programs here send from 0.0.0.0 if the route goes over lo; from elsewhere the kernel does not let that in.
 bool UdpMulticastBus::is_from_here(const Address& sender) {
   if (sender.family() == AF_INET && sender.v4().sin_addr.s_addr == htonl(INADDR_ANY)) return true;

@@ -141,8 +141,8 @@ TEST(CanEndpoint, OWN_01_OneControllerAtATimeHoldsAnAxis) {
   EXPECT_EQ(bench.result(), static_cast<double>(Result::kOwned));
 }
 
-// Catches: a controller that is turned away, or one that asks without a lease, of which only a counter knows.
-TEST(CanEndpoint, SEC_07_WhoIsTurnedAwayStandsInTheAuditLog) {
+// Catches: a controller that is refused, or one that asks without a lease, of which only a counter knows.
+TEST(CanEndpoint, SEC_07_ARefusedControllerStandsInTheAuditLog) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / ("drivebench-can-audit-" + std::to_string(::getpid()));
   std::filesystem::remove(file);
@@ -257,7 +257,7 @@ TEST(CanEndpoint, TwoAxesWaitForEachOther) {
   bench.command(0, 1.0, 0.0, first, 1.0, 1);
   EXPECT_EQ(bench.engine().tick(), 0);
   bench.request(Request::kRelease, 1, 1, 2);
-  EXPECT_EQ(bench.engine().tick(), 1) << "the one that everybody waited for has left";
+  EXPECT_EQ(bench.engine().tick(), 1) << "the controller that the tick waited for has left";
 }
 
 // Catches: monitoring that begins before the first heartbeat, or never; a lost heartbeat without
@@ -306,7 +306,8 @@ TEST(CanEndpoint, AHeartbeatIsMissedByABenchThatSendsNone) {
   EXPECT_FALSE(bench.newest(Message::kHeartbeat));
 }
 
-// Catches: a stranger whose malformed commands begin the row of the owner anew, or bar his clear.
+// Catches: malformed commands of another controller that end the owner's row of good commands, or bar its
+// clear.
 TEST(CanEndpoint, AStrangersMalformedCommandIsNotTheOwners) {
   BenchConfig config = servo_bench();
   config.setup.arming_commands = 3;
@@ -331,16 +332,17 @@ TEST(CanEndpoint, AStrangersMalformedCommandIsNotTheOwners) {
   ASSERT_EQ(bench.result(), static_cast<double>(Result::kLatched));
   send_malformed(lease);
   bench.request(Request::kClearFaults, lease);
-  EXPECT_EQ(bench.result(), static_cast<double>(Result::kCauseLasts)) << "his own is";
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kCauseLasts)) << "the owner's own is";
   bench.command(tick(), 0.0, 0.0, lease, 0.0);
   send_malformed(static_cast<std::uint8_t>(lease + 1));
   bench.request(Request::kClearFaults, lease);
   EXPECT_EQ(bench.result(), 0.0);
 }
 
-// Catches: a controller that waits for the command of another axis and is called silent; one that is called
-// so at once when its tick has come, or never; one that is taken for the one before, who had commanded.
-TEST(CanEndpoint, WhoWaitsForOthersIsNotSilent) {
+// Catches: a controller that waits for the command of another axis and counts as silent; one that counts so
+// at once when its tick has come, or never; one that is taken for the controller before it, which had
+// commanded.
+TEST(CanEndpoint, AControllerThatWaitsForAnotherAxisIsNotSilent) {
   constexpr Owner kOther = 1000;
   constexpr auto kPatience = std::chrono::milliseconds(50);
   using Clock = std::chrono::steady_clock;
@@ -372,8 +374,7 @@ TEST(CanEndpoint, WhoWaitsForOthersIsNotSilent) {
   EXPECT_EQ(bench.engine().tick(), 1);
 }
 
-// Catches: an axis that nobody on this bus can have because the controller there has lost it, while there is
-// no tick that would show it.
+// Catches: an axis that stays taken for this bus after its controller lost it, while no tick shows the loss.
 TEST(CanEndpoint, AnAxisThatWasTakenAwayIsFreeAtOnce) {
   CanBench bench;
   const auto take_away = [&] {
@@ -393,7 +394,7 @@ TEST(CanEndpoint, AnAxisThatWasTakenAwayIsFreeAtOnce) {
 
 // Catches: a peer that fills the log by taking the axis and saying that it has stopped, again and again.
 TEST(CanEndpoint, LostControllersDoNotFillTheLog) {
-  testing::internal::CaptureStdout();  // where the log goes if nobody says otherwise
+  testing::internal::CaptureStdout();  // the log goes there by default
   CanBench bench;
   for (int i = 0; i < 100; ++i) {
     EXPECT_NE(bench.acquire(), 0);
@@ -404,8 +405,7 @@ TEST(CanEndpoint, LostControllersDoNotFillTheLog) {
   EXPECT_NE(text.find("axis 0 loses its controller"), std::string::npos) << text;
 }
 
-// Catches: a log that grows by ten lines a second while there are no descriptors for those who want to come
-// in.
+// Catches: a log that grows by ten lines a second while no descriptors are left for new clients.
 TEST(CanEndpoint, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
   asio::io_context io(1);
   TextListener listener(io);
@@ -436,7 +436,7 @@ TEST(CanEndpoint, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
 
 // Catches: two benches that talk over each other, an owner whose commands go to both, or an axis that
 // is given to a controller which never hears of it.
-TEST(CanEndpoint, CAN_11_AnotherBenchWithOurIdentifiersSilencesUs) {
+TEST(CanEndpoint, CAN_11_AnotherBenchWithTheSameIdentifiersSilencesThisOne) {
   CanBench bench;
   bench.acquire();
   bench.send(encode_sample(*find_message(Message::kSensors, true), bench.profile(), 1, Sample{}));

@@ -28,7 +28,7 @@ struct Received {
   double operator[](std::string_view field) const { return values[index_of(*row, field)]; }
 };
 
-/// A bench whose bus says everything often.
+/// A bench that sends all its messages often.
 inline BenchConfig on_bus(BenchConfig bench, Profile profile) {
   CanConfig can;
   can.profile = profile;
@@ -40,7 +40,7 @@ inline BenchConfig on_bus(BenchConfig bench, Profile profile) {
   return bench;
 }
 
-/// A lockstep bench on a bus in memory, and a controller on the same bus that says what it is told to.
+/// A lockstep bench on a bus in memory, and a controller on the same bus that the test speaks for.
 class CanBench {
  public:
   explicit CanBench(Profile profile = {}, std::size_t axes = 1) { setup(on_bus(servo_bench(axes), profile)); }

@@ -1,4 +1,4 @@
-// What the CAN endpoint sends beside the sensors.
+// Frames that the CAN endpoint sends beside the sensors.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -9,7 +9,7 @@
 namespace drivebench::can {
 namespace {
 
-// Catches: a bench that says nothing at start, or something else than boot-up first.
+// Catches: a bench that is silent at start, or sends another frame before the boot-up.
 TEST(CanOutput, TheFirstHeartbeatIsTheBootUp) {
   CanBench bench({}, 2);
   for (const std::uint32_t node : {1u, 2u}) {
@@ -82,7 +82,7 @@ TEST(CanOutput, TheIndexIsSentOnceEachTurn) {
   EXPECT_EQ(messages, ticks.size());
 }
 
-// Catches: a fault that nobody is told of, or that is sent at every tick.
+// Catches: a fault that is not sent, or that is sent at every tick.
 TEST(CanOutput, AChangeOfTheFaultWordIsSentOnce) {
   CanBench bench;
   const std::uint8_t lease = bench.acquire();

@@ -91,7 +91,7 @@ TEST_P(WideAxis, ACommandWithoutPhaseCIsIncomplete) {
   send_half(0, 3, lease);
   EXPECT_EQ(bench.result(), static_cast<double>(Result::kIncomplete));
   send_half(0, 1, static_cast<std::uint8_t>(lease + 1));
-  EXPECT_EQ(bench.result(), static_cast<double>(Result::kNotOwner)) << "that comes first";
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kNotOwner)) << "this is judged first";
   EXPECT_EQ(bench.engine().tick(), 0);
   send_half(0, 0, lease);
   EXPECT_EQ(bench.result(), -1.0);
@@ -122,18 +122,18 @@ TEST(ClassicWideAxis, SetpointsAreKeptForTheirCommandAlone) {
   EXPECT_EQ(bench.result(), kIncomplete) << "duties";
   phases(0, 1, lease + 1.0, 7.0);
   main(0, 1, lease);
-  EXPECT_EQ(bench.result(), kIncomplete) << "of a stranger";
+  EXPECT_EQ(bench.result(), kIncomplete) << "of another controller";
   phases(0, 1, lease, 7.0);
   phases(0, 1, lease + 1.0, 9.0);
   main(0, 1, lease);
   EXPECT_EQ(bench.engine().newest(0).u_c_v, 7.0);
   main(1, 1, lease);
-  EXPECT_EQ(bench.result(), kIncomplete) << "they held for one command";
+  EXPECT_EQ(bench.result(), kIncomplete) << "set-points serve one command";
   phases(1, 1, lease, 7.0);
   bench.request(Request::kRelease, lease);
   lease = bench.acquire(78);
   main(1, 1, lease);
-  EXPECT_EQ(bench.result(), kIncomplete) << "of the one before";
+  EXPECT_EQ(bench.result(), kIncomplete) << "of the controller before";
 }
 
 // Catches: a leg of a star whose duty is taken across the whole link.
@@ -183,7 +183,7 @@ TEST_P(WideAxis, TheFieldAndTheTachometerHaveTheirPlaces) {
               0.5001e-2);
 }
 
-// Catches: details at another rate than the state's, a fault that is put in and that nobody is told of, a
+// Catches: details at another rate than the state's, an injected fault that is not sent, a
 // wide axis that its heartbeat does not tell from a narrow one.
 TEST_P(WideAxis, DetailsComeWithTheStateAndWithAnInjectedFault) {
   CanBench bench(on_bus(star_bench(), profile_of(GetParam())));

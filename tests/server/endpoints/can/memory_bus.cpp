@@ -131,7 +131,7 @@ void MemoryWire::deliver() {
   posted_ = false;
   for (const Passage& passage : std::exchange(under_way_, {})) {
     if (is_off(link_)) return;
-    // By number: who hears may make or end a port.
+    // By number: a listener may make or end a port.
     for (std::size_t i = 0; i < ports_.size(); ++i)
       if (ports_[i] != passage.from) ports_[i]->hear(passage.frame);
   }

@@ -28,7 +28,7 @@ class MemoryWire {
   void set_link(BusState state);
   /// No room for any frame: ports keep the newest of each identifier until there is room again.
   void set_full(bool full);
-  /// The next frames reach nobody; the ports learn of it with the first frame that comes through.
+  /// The next frames are lost; the ports learn of it with the first frame that comes through.
   void lose(std::uint64_t frames) { to_lose_ += frames; }
   /// What a controller says about the bus (linux/can/error.h), to every port. Bus-off lasts until
   /// set_link(kUp).
@@ -52,7 +52,8 @@ class MemoryWire {
   BusState link_ = BusState::kUp;
   bool full_ = false;
   std::uint64_t to_lose_ = 0;
-  std::shared_ptr<const bool> alive_ = std::make_shared<const bool>();  ///< for handlers that outlive us
+  std::shared_ptr<const bool> alive_ =
+      std::make_shared<const bool>();  ///< for handlers that outlive the object
 };
 
 }  // namespace drivebench::can

@@ -1,4 +1,4 @@
-// The bus inside the process: what tests of other code rely on when they use it instead of a real one.
+// The bus inside the process, on which tests of other code rely.
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
@@ -68,7 +68,7 @@ TEST_F(MemoryBusTest, AnAnswerIsDeliveredAfterItsQuestion) {
   EXPECT_GE(answers, 1000);
 }
 
-// Catches: a filter that the kernel's would not be like.
+// Catches: a filter that differs from the kernel's.
 TEST_F(MemoryBusTest, CAN_09_AFilterLetsRemoteFramesAndLookAlikesThrough) {
   ports_[0].bus->set_filter({0x101, 0x55});
   const Frame remote{.id = 0x101, .remote = true, .size = 8};
@@ -99,8 +99,8 @@ TEST_F(MemoryBusTest, CAN_01_AFullBusKeepsTheNewestOfEachIdentifier) {
   EXPECT_EQ(bench_.status().send_dropped, 198u);
 }
 
-// Catches: frames that survive a cable that is out; states that nobody is told of.
-TEST_F(MemoryBusTest, CAN_02_CAN_03_CAN_04_WhatIsSentOrUnderWayIsLostWhileItIsDown) {
+// Catches: frames that survive a cable that is out; a change of state without a call of on_state.
+TEST_F(MemoryBusTest, CAN_02_CAN_03_CAN_04_FramesSentOrUnderWayAreLostWhileItIsDown) {
   bench_.send(data_frame(1));
   wire_.set_link(BusState::kDown);
   bench_.send(data_frame(2));
@@ -139,7 +139,7 @@ TEST_F(MemoryBusTest, CAN_06_ErrorFramesChangeTheState) {
   EXPECT_TRUE(ports_[1].heard.empty());
 }
 
-// Catches: losses that nobody counts, or that are told before the kernel would tell them.
+// Catches: losses that are not counted, or that are told before the kernel would tell them.
 TEST_F(MemoryBusTest, CAN_07_LostFramesAreToldWithTheNextOne) {
   wire_.lose(2);
   bench_.send(data_frame(1));

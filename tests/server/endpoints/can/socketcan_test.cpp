@@ -132,7 +132,7 @@ TEST_F(SocketCan, CAN_05_AMissingInterfaceIsRefusedOrWaitedFor) {
   ASSERT_TRUE(shell("ip link del " + interface_));
   try {
     open(config());
-    FAIL() << "opened what is not there";
+    FAIL() << "opened a missing interface";
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("ip link add dev dbtest0 type vcan"), std::string::npos)
         << error.what();
@@ -191,8 +191,8 @@ TEST_F(SocketCan, CAN_06_ErrorFramesChangeTheStateAndAreNoMessages) {
   EXPECT_EQ(bus_->status().error_frames, 9u);
 }
 
-// Catches: a receive buffer that is too small for 100 ms; frames that the kernel dropped and nobody counted.
-TEST_F(SocketCan, CAN_07_WhatTheKernelDropsIsCounted) {
+// Catches: a receive buffer that is too small for 100 ms; dropped frames that are not counted.
+TEST_F(SocketCan, CAN_07_FramesThatTheKernelDropsAreCounted) {
   open(config());
   const Peer peer(interface_);
   // 100 ms of the shortest classic frames at 1 Mbit/s.
@@ -214,8 +214,8 @@ TEST_F(SocketCan, CAN_07_WhatTheKernelDropsIsCounted) {
   EXPECT_EQ(bus_->status().received + bus_->status().receive_dropped, kFull + 2 * (kFlood + 1));
 }
 
-// Catches: frames of others that wake us: full load of foreign traffic would take a core.
-TEST_F(SocketCan, CAN_08_ForeignIdentifiersDoNotWakeUs) {
+// Catches: foreign frames that wake the bench: full load of them would take a core.
+TEST_F(SocketCan, CAN_08_ForeignIdentifiersDoNotWakeTheBench) {
   open(config());
   bus_->set_filter({0x101, 0x102, 0x301});
   while (io_.poll() > 0) {
@@ -248,8 +248,8 @@ TEST_F(SocketCan, CAN_09_LookAlikesAreToldApart) {
   EXPECT_EQ(heard_[3].size, 3);
 }
 
-// Catches: our own frames taken for another bench with our identifiers.
-TEST_F(SocketCan, CAN_10_OurOwnFramesAreConfirmedAndNotDelivered) {
+// Catches: the bench's own frames taken for those of another bench with the same identifiers.
+TEST_F(SocketCan, CAN_10_OwnFramesAreConfirmedAndNotDelivered) {
   open(config(), true);
   bus_->set_filter({0x101});
   const Peer peer(interface_);
@@ -262,8 +262,8 @@ TEST_F(SocketCan, CAN_10_OurOwnFramesAreConfirmedAndNotDelivered) {
   EXPECT_EQ(bus_->status().received, 1u);
 }
 
-// Catches: stamps from another clock, or from when we got round to reading. That they may jump back
-// (can-utils issue 233) is nothing to us: frames are delivered in the order of the queue.
+// Catches: stamps from another clock, or of the reading instead of the arrival. That they may jump back
+// (can-utils issue 233) does no harm: frames are delivered in the order of the queue.
 TEST_F(SocketCan, CAN_13_StampsAreOfTheArrivalAndOrderIsOfTheQueue) {
   open(config());
   const auto now = [] {
@@ -321,7 +321,7 @@ TEST_F(SocketCan, AFilterForSixtyFourAxes) {
   EXPECT_EQ(heard, expected);
 }
 
-// Catches: a merged filter that lets a foreign identifier through or keeps one of ours out.
+// Catches: a merged filter that lets a foreign identifier through or keeps a wanted one out.
 TEST(SocketCanFilters, AreExactForAnySet) {
   std::mt19937 random(7);
   for (int round = 0; round < 50; ++round) {

@@ -20,7 +20,7 @@
 
 namespace drivebench::can {
 
-/// How long anything may take before a test says that it hangs.
+/// A wait of this length means that the test hangs.
 inline constexpr auto kPatience = std::chrono::seconds(20);
 inline constexpr auto kShort = std::chrono::milliseconds(5);
 
@@ -34,7 +34,7 @@ inline Frame data_frame(std::uint32_t id, std::uint8_t first = 0) {
   return frame;
 }
 
-/// A raw socket of somebody else.
+/// A raw socket of another program.
 class Peer {
  public:
   explicit Peer(const std::string& interface)

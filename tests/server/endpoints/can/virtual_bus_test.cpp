@@ -14,7 +14,7 @@
 namespace drivebench::can {
 namespace {
 
-// How long anything may take before a test says that it hangs.
+// A wait of this length means that the test hangs.
 constexpr auto kPatience = std::chrono::seconds(30);
 
 Frame frame(std::uint32_t id, std::uint8_t value = 0) {
@@ -28,13 +28,13 @@ void run_until(asio::io_context& io, const std::function<bool()>& holds) {
   ASSERT_TRUE(holds());
 }
 
-/// A port that nobody uses at present.
+/// A port that is free at present.
 std::uint16_t free_port(asio::io_context& io) {
   const asio::ip::tcp::acceptor probe(io, {asio::ip::make_address("127.0.0.1"), 0});
   return probe.local_endpoint().port();
 }
 
-// ---- what waits ----
+// ---- the queue of frames that wait ----
 
 // Catches: old frames that are sent after newer ones, or identifiers that overtake each other.
 TEST(SendQueue, KeepsTheNewestFrameOfEachIdentifierInOrder) {
@@ -168,7 +168,7 @@ TEST_F(UdpMulticast, CanBeClosedWithFramesUnderWay) {
   run_until(io_, [&] { return one->status().sent == 500; });
 }
 
-// Catches: a bus that is none.
+// Catches: an address that is no multicast group taken for a bus.
 TEST_F(UdpMulticast, NeedsAMulticastGroup) {
   for (const char* channel : {"127.0.0.1", "can0", "", "::1", "240.0.0.0"}) {
     CanConfig config;
@@ -179,7 +179,7 @@ TEST_F(UdpMulticast, NeedsAMulticastGroup) {
 
 // ---- opening again ----
 
-// Catches: a bus that need not be there and ends the bench, or never comes up.
+// Catches: a bus that is not required and yet ends the bench, or never comes up.
 TEST(VirtualBus, OpensLaterIfItIsNotRequired) {
   asio::io_context io;
   auto holder = std::make_unique<asio::ip::tcp::acceptor>(
