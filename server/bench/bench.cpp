@@ -51,7 +51,7 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
                      .command_step = largest_step(axis.rules, setup.period_ns),
                      .shaft = axis.shares_shaft_with.value_or(i)});
     if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
-    axis_parameters(axis.parameters);  // their table is made on first use, which must not be a tick
+    axis_parameters(axis.parameters);  // the first use builds the table, which must not happen in a tick
     take_sample(i);
   }
 }
@@ -254,7 +254,7 @@ void Bench::take_command(Control& c) noexcept {
   if (setup_.command_delay_ticks == 0 && c.state == ControlState::kRun) c.in_force = c.newest;
 }
 
-/// Copies that the link makes of a command answer what has been answered.
+/// Refuses the copies of a command that the injected fault of the link makes: their tick is answered.
 void Bench::refuse_copies(AxisRuntime& a) noexcept {
   const double copies = a.axis.injected().command_duplication;
   if (copies == 0.0) return;
@@ -281,7 +281,7 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
   Control& c = a.control;
   c.flags = 0;
   if (c.owner != 0 && tick_ - c.renewed >= setup_.lease_ticks) lose_controller(axis, kLeaseLost);
-  if (a.axis.injected().command_loss != 0.0) c.fresh = 0;  // taken on the wire, lost on the way to the drive
+  if (a.axis.injected().command_loss != 0.0) c.fresh = 0;  // accepted on the wire, lost before the drive
   if (c.fresh != 0) {
     take_command(c);
     refuse_copies(a);
@@ -297,7 +297,7 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
     c.good_commands = 0;
     return safe_command(a);
   }
-  // With a delay the first command is accepted a tick before it is in force.
+  // With a delay the first command is accepted one tick before it is in force.
   return is_driven(c.state) && c.in_force.answers >= 0 ? drive_with(a, c.in_force.phases) : safe_command(a);
 }
 
@@ -322,7 +322,7 @@ void Bench::step() noexcept {
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     take_sample(i);
     Control& c = axes_[i].control;
-    // What a delay of one tick has been holding back.
+    // With a delay of one tick the newest command is in force from the next tick on.
     if (c.fresh != 0 && c.state == ControlState::kRun) c.in_force = c.newest;
     c.fresh = 0;
   }

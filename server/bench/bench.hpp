@@ -18,8 +18,8 @@
 
 namespace drivebench {
 
-/// State of the control of an axis, as Sample.state shows it: idle, ready, run, hold and back; timeout and
-/// fault end only when the owner clears them, and lead to idle.
+/// The control state of an axis, as in Sample.state. Only a clear by the controller ends timeout and fault;
+/// it leads to idle.
 enum class ControlState : std::uint64_t {
   kIdle = 0,     ///< no commands arrive: safe action
   kReady = 5,    ///< the first commands arrive, fewer than arming_commands: still safe action
@@ -29,30 +29,30 @@ enum class ControlState : std::uint64_t {
   kFault = 4,    ///< latched: trip, overrun or divergence; safe action
 };
 
-/// Whether commands drive the axis: the last one, if one is missing.
+/// Whether commands drive the axis; if one is missing, the last one does.
 constexpr bool is_driven(ControlState state) noexcept {
   return state == ControlState::kRun || state == ControlState::kHold;
 }
 
-/// What the bench needs to know of one axis.
+/// The settings of an axis.
 struct AxisSetup {
   AxisParameters parameters;
   SafeAction on_link_loss = SafeAction::kFreewheel;
   Tick quick_stop_ticks = 4000;  ///< length of the ramp of SafeAction::kQuickStop, at most kMaxQuickStop
   CommandRules rules{};
-  /// Number of the axis, before this one and with a shaft of its own, whose shaft this one turns: a
-  /// dynamometer. Its mechanics are those of both.
+  /// The number of an earlier axis with the same shaft: a dynamometer. The mechanics of that axis are those
+  /// of both.
   std::optional<std::size_t> shares_shaft_with{};
 };
 
-/// What the bench needs to know of itself.
+/// The settings of a bench.
 struct BenchSetup {
   std::int64_t period_ns = 125'000;
   int substeps = 5;
   std::uint64_t seed = 1;
   int command_delay_ticks = 1;  ///< 0: command(k) holds from tick k; 1: from tick k+1
-  /// So many good commands in a row arm an axis: from the last of them on it is driven. A command that is
-  /// refused, or silence for watchdog_ticks, begins a new row.
+  /// The number of accepted commands in a row that arm an axis; the last of them drives it. A refused
+  /// command, or silence for watchdog_ticks, starts the count again.
   std::int64_t arming_commands = 1;
   Tick watchdog_ticks = 20;
   Tick lease_ticks = 16'000;
@@ -61,7 +61,7 @@ struct BenchSetup {
 
 inline constexpr Tick kMaxQuickStop = 1'000'000;  ///< [ticks], so that the angle of the ramp has a cosine
 
-/// A sample on its way through a ring.
+/// A sample in a ring, with its axis.
 struct TickedSample {
   TickedSample() noexcept : axis(0), sample() {}
   TickedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}
@@ -74,7 +74,7 @@ struct TickedSample {
 class BenchObserver {
  public:
   virtual ~BenchObserver() = default;
-  /// An input came in before tick `now` ran; it acts at input.tick, which may be later.
+  /// An input arrived before tick `now` ran; it acts at input.tick, which may be later.
   virtual void on_input(Tick now, const Input& input) noexcept = 0;
   virtual void on_sample(std::uint32_t axis, const Sample& sample) noexcept = 0;
 };
@@ -85,23 +85,22 @@ class Bench {
  public:
   explicit Bench(const BenchSetup& setup, BenchObserver* observer = nullptr);
 
-  /// Takes an input. One for a later tick is kept until then (at most kMaxScheduled); all others act at the
-  /// start of the present tick, with their tick set to it.
+  /// Takes an input. An input for a later tick waits in the schedule (at most kMaxScheduled); every other
+  /// acts at the start of the current tick, and its tick is set to that.
   Refused submit(const Input& input) noexcept;
 
-  /// One tick: inputs that are due, commands, plant, sensors.
+  /// Runs one tick: due inputs, commands, plant, sensors.
   void step() noexcept;
 
   /// The end of a run: takes every lease back and, if an axis had one, runs a tick of safe action.
   void dismiss_controllers() noexcept;
 
-  /// Whether a latched fault is in force on an axis. Its commands are refused, except those with the gates
-  /// off.
+  /// Whether a fault is latched on an axis. The bench then refuses commands, except those with the gates off.
   bool is_latched(std::size_t axis) const noexcept {
     return (axes_[axis].axis.state().faults & kLatchedFaults) != 0;
   }
 
-  /// How often parameters of an axis have changed since the bench was made.
+  /// The number of parameter changes of an axis since the start of the bench.
   std::uint64_t parameter_changes(std::size_t axis) const noexcept { return axes_[axis].parameter_changes; }
 
   /// What judge() needs to know of an axis for a command in the present tick.
@@ -112,32 +111,32 @@ class Bench {
   const Sample& sample(std::size_t axis) const noexcept { return axes_[axis].sample; }
   const Axis& axis(std::size_t index) const noexcept { return axes_[index].axis; }
   Owner owner(std::size_t axis) const noexcept { return axes_[axis].control.owner; }
-  /// Whether a command for the present tick has come in.
+  /// Whether a command for the current tick has arrived.
   bool has_command(std::size_t axis) const noexcept { return axes_[axis].control.fresh != 0; }
 
-  /// A hash of everything the future depends on and of every sample so far.
+  /// A hash of the whole state and of every sample so far.
   std::uint64_t state_hash() const noexcept;
 
-  /// The whole state as bytes, for restore() on a bench with the same setup in this or another process.
+  /// The whole state as bytes, for restore() on a bench with the same setup, in any process.
   std::vector<std::byte> save() const;
-  /// False, with nothing changed, if the bytes are not a state of such a bench.
+  /// Returns false and changes nothing if the bytes are not a state of such a bench.
   bool restore(std::span<const std::byte> saved);
 
   static constexpr std::size_t kMaxScheduled = 256;
 
  private:
-  /// What the control of an axis remembers. 8-byte members only.
+  /// The state of the control of an axis. 8-byte members only.
   struct Control {
     Owner owner = 0;
     Tick renewed = 0;  ///< tick of the last renewal of the lease
     ControlState state = ControlState::kIdle;
-    std::int64_t fresh = 0;  ///< 1: a command came in for this tick
+    std::int64_t fresh = 0;  ///< 1: a command for this tick has arrived
     Command newest{};        ///< the last command accepted
     Command in_force{};
     std::int64_t silent_ticks = 0;   ///< ticks without a command, late ones not counted
-    std::int64_t good_commands = 0;  ///< in a row, until the axis is armed
-    std::int64_t bad_values = 0;     ///< 1: the last command of the owner was refused for its values
-    std::uint64_t flags = 0;         ///< fault bits of the command that is in force
+    std::int64_t good_commands = 0;  ///< accepted ones in a row, until the axis is armed
+    std::int64_t bad_values = 0;     ///< 1: the controller's last command was refused for its values
+    std::uint64_t flags = 0;         ///< fault bits of the command in force
     LastCommands last{};
     std::uint64_t missed = 0;
     std::uint64_t refused = 0;
@@ -147,8 +146,8 @@ class Bench {
     SafeAction on_link_loss;
     Tick quick_stop_ticks;
     CommandRules rules;
-    double command_step;          ///< largest change of a set-point in a tick [V or A]; 0: any
-    std::size_t shaft;            ///< the axis whose shaft this one turns: itself, or its partner before it
+    double command_step;          ///< largest change of a set-point in a tick [V or A]; 0: no limit
+    std::size_t shaft;            ///< the axis that owns the shaft: this one, or its partner before it
     std::size_t shares_with = 0;  ///< the other axis on this shaft; 0: none
     Control control{};
     ParameterRamps ramps{};
@@ -160,11 +159,11 @@ class Bench {
   Refused apply(const Input& input) noexcept;
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
   Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;
-  /// A command of the owner was turned away.
+  /// Counts a refused command of the controller.
   static void count_bad_command(Control& c, bool bad_values) noexcept;
   Refused clear_faults(AxisRuntime& a, Owner owner) noexcept;
   Refused write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept;
-  /// Sets a parameter unless that would break a rule between values.
+  /// Sets a parameter unless the value would break a rule between values.
   bool set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept;
   void change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept;
   void follow_ramps(AxisRuntime& a) noexcept;
@@ -188,10 +187,10 @@ class Bench {
   BenchSetup setup_;
   BenchObserver* observer_;
   Tick tick_ = 0;
-  std::int64_t late_now_ = 0;  ///< 1: the present tick started late
+  std::int64_t late_now_ = 0;  ///< 1: the current tick started late
   std::uint64_t late_ticks_ = 0;
   Digest samples_;         ///< of all samples so far
-  std::uint64_t due_ = 0;  ///< of the schedule, those that have acted in this tick; 0 between ticks
+  std::uint64_t due_ = 0;  ///< number of scheduled inputs that have acted in this tick; 0 between ticks
   std::uint64_t scheduled_ = 0;
   std::array<PackedInput, kMaxScheduled> schedule_{};  ///< sorted by tick, first come first served within one
   std::vector<AxisRuntime> axes_;

@@ -20,8 +20,8 @@ class LockstepEngine final : public Engine {
     show();
   }
 
-  /// While time waits for the disk each axis gets one command, and no newer ones in its place: they would be
-  /// recorded without end.
+  /// While time waits for the disk each axis accepts one command and no newer ones, which would be recorded
+  /// without end.
   Refused check(std::uint32_t axis, Owner owner, const Command& command) const override {
     const Refused why = judge(command, owner, bench_.command_view(axis));
     return why == Refused::kNot && waits_for_disk_ && bench_.has_command(axis) ? Refused::kBusy : why;
@@ -29,7 +29,7 @@ class LockstepEngine final : public Engine {
 
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = has_room() ? Refused::kNot : check(axis, owner, command);
-    if (why != Refused::kNot) return why;  // nor counted, which would be an input
+    if (why != Refused::kNot) return why;  // not counted: that would be an input
     return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
   }
 
@@ -49,7 +49,7 @@ class LockstepEngine final : public Engine {
       if (bench_.owner(i) != 0 && !bench_.has_command(i) && !bench_.is_latched(i)) return;
       commanded = commanded || bench_.has_command(i);
     }
-    if (!commanded) return;  // without a controller a lockstep bench stands still
+    if (!commanded) return;  // without a controller time stands still
     watch_.beat();
     {
       const TickMark mark;
@@ -121,7 +121,7 @@ class LockstepEngine final : public Engine {
   Bench bench_;
   std::vector<std::uint64_t> shown_changes_;
   bool is_taking_ = false;
-  std::optional<ServerTimer> disk_timer_;  // of a run with a recorder
+  std::optional<ServerTimer> disk_timer_;  // only with a recorder
   bool waits_for_disk_ = false;
 };
 

@@ -19,7 +19,7 @@ struct Client {
   std::string subject;    ///< owner of the token; empty: unknown
 };
 
-/// A name for sentences: "anna (127.0.0.1:5000)".
+/// The client's name in sentences: "anna (127.0.0.1:5000)".
 inline std::string name_of(const Client& client) {
   const std::string place =
       client.transport == client.peer ? client.peer : client.transport + " " + client.peer;

@@ -10,12 +10,12 @@
 
 namespace drivebench {
 
-/// A thread that looks every 100 ms whether the others go on. Ten looks in a row without a tick of a bench in
-/// real time end the program with a core: what a controller sees then is a bench that is gone, not one that
-/// lies. Ten looks without a sign of the I/O thread take the leases away, which makes every axis safe.
+/// A thread that checks every 100 ms whether the other threads go on. After ten checks in a row without a
+/// tick in real time it aborts the program with a core: a controller then loses its connection instead of
+/// getting old samples. After ten checks without the I/O thread it ends all leases, so that every axis takes
+/// its safe action.
 ///
-/// Looks are counted, not time: a process that was stopped as a whole, or a machine that was, has not stood
-/// still.
+/// It counts checks, not time, so that stopping the whole process or the machine is no standstill.
 class Supervisor {
  public:
   /// `ticks_by_itself`: ticks must go on without commands, as in real time.
@@ -24,11 +24,11 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Counts looks without progress.
+  /// Counts checks without progress.
   class Stillness {
    public:
     static constexpr int kLooks = 10;
-    /// Whether this is the tenth look in a row that found the same number.
+    /// Whether this is the tenth check in a row with the same number.
     bool look(std::uint64_t progress) noexcept {
       looks_ = progress == last_ ? looks_ + 1 : 0;
       last_ = progress;
@@ -46,7 +46,7 @@ class Supervisor {
 
   Watch& watch_;
   bool ticks_by_itself_;
-  std::atomic<std::uint64_t> signs_{1};  // of the I/O thread
+  std::atomic<std::uint64_t> signs_{1};  // counts the signs of life of the I/O thread
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

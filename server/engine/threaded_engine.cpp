@@ -53,7 +53,7 @@ class ThreadedEngine final : public Engine {
     await_wake();
   }
 
-  /// Gives the ticks a thread of their own.
+  /// Starts the tick thread.
   void start(std::optional<Tick> max_ticks) {
     max_ticks_ = max_ticks;
     std::atomic<bool> ready{false};
@@ -118,7 +118,7 @@ class ThreadedEngine final : public Engine {
     const bool writes = std::holds_alternative<ParameterWrite>(input.action);
     const bool taken = requests_.push(input);
     if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;
-    if (writes && !taken) show_parameters(input.axis);  // without this one
+    if (writes && !taken) show_parameters(input.axis);  // without the refused write
     if (!taken) return answer(Refused::kBusy, tick());
     answers_.push_back({std::move(answer), writes ? std::optional(input.axis) : std::nullopt});
   }
@@ -144,7 +144,7 @@ class ThreadedEngine final : public Engine {
 
   // ---- tick thread ----
 
-  /// One tick, with all that belongs to it.
+  /// Runs one tick with its requests, commands and answers.
   void run_tick() noexcept {
     clock_.wait_for_tick(bench_);
     {
@@ -222,7 +222,7 @@ class ThreadedEngine final : public Engine {
           std::uint64_t count = 0;
           [[maybe_unused]] const ssize_t got = ::read(wake_.native_handle(), &count, sizeof(count));
           wake_pending_.exchange(
-              false);  // not a plain store: it must see what was pushed before the flag was set
+              false);  // not a plain store: it must see all entries pushed before the flag was set
           drain_events();
           await_wake();
         });
@@ -280,7 +280,7 @@ class ThreadedEngine final : public Engine {
     show_parameters(axis);
   }
 
-  /// Takes over the parameters in force, unless writes are on their way that they do not show yet.
+  /// Publishes the parameters in force, unless they lack a write that is in flight.
   void show_parameters(std::size_t axis) {
     const ParameterMail& mail = parameter_mail_[axis];
     if (mail.in_flight != 0) return;
@@ -319,9 +319,9 @@ class ThreadedEngine final : public Engine {
   std::deque<ParameterMail> parameter_mail_;
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
-  std::deque<LeaseEnd> ends_;            // one for each axis and owner at most
+  std::deque<LeaseEnd> ends_;            // at most one for each axis and owner
   std::deque<Waiting> answers_;          // of the requests in flight, in order
-  std::deque<RequestOutcome> outcomes_;  // that have come back, to be answered with the samples of their tick
+  std::deque<RequestOutcome> outcomes_;  // results that wait for the samples of their tick
   TickClock clock_;
   std::atomic<bool> stop_{false};
   std::thread thread_;

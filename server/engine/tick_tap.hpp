@@ -20,9 +20,9 @@ struct AxisEdges {
   std::uint32_t axis;
   TickEdges edges;
 };
-/// The run has come to its end.
+/// The run has ended.
 struct RunEnded {};
-/// What the tick thread tells the I/O thread.
+/// A message from the tick thread to the I/O thread.
 using TickEvent = std::variant<TickedSample, RequestOutcome, AxisEdges, RunEnded>;
 
 /// Passes inputs to the recorder, and samples to the recorder and the I/O thread.
@@ -38,7 +38,7 @@ class TickTap final : public BenchObserver {
     // With a full ring viewers lose a sample, and the tick does not wait.
     events_.emplace(std::in_place_type<TickedSample>, axis, sample);
   }
-  /// From now on the encoder edges of each tick go before its samples.
+  /// Sends the encoder edges of each tick before its samples from now on.
   void send_edges_of(const Bench& bench) noexcept { bench_ = &bench; }
 
  private:

@@ -22,7 +22,7 @@ class Watch {
     if (force_arithmetic()) arithmetic_resets_.fetch_add(1, std::memory_order_relaxed);
   }
   std::uint64_t beats() const noexcept { return beats_.load(std::memory_order_relaxed); }
-  /// How often the arithmetic was not as declared.
+  /// The number of times that the arithmetic was not as declared.
   std::uint64_t arithmetic_resets() const noexcept {
     return arithmetic_resets_.load(std::memory_order_relaxed);
   }

@@ -16,7 +16,7 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
 /// One line: bench, axis, dropped, the time of the tick and the chosen signals.
 std::string sample_json(const Sample& sample, const v1::BenchDescription& bench, std::uint32_t axis,
                         std::uint64_t dropped, const std::vector<const Signal*>& signals);
-/// A fault, parameter or bump that was taken, with its tick.
+/// An accepted fault, parameter or bump, with its tick.
 std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick);
 
 }  // namespace drivebench::command

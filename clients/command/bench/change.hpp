@@ -4,10 +4,10 @@
 
 #include "clients/command/common/link_choice.hpp"
 
-/// What changes an axis without controlling it.
+/// Verbs that change an axis without controlling it.
 namespace drivebench::command {
 
-/// Puts a fault into an axis; the value 0 takes it away.
+/// Injects a fault into an axis; the value 0 ends it.
 struct InjectOptions {
   LinkChoice link{};
   bool json = false;
@@ -28,7 +28,7 @@ struct SetOptions {
 };
 int run_set(const SetOptions& options);
 
-/// Hits the shaft.
+/// Puts a torque impulse on the shaft.
 struct BumpOptions {
   LinkChoice link{};
   bool json = false;
@@ -43,7 +43,7 @@ struct TakeOptions {
   bool json = false;
   std::string axis = "0";  ///< number or name
   bool force = false;
-  std::string reason{};  ///< told to that session, and kept in the server's audit log
+  std::string reason{};  ///< sent to that session and kept in the server's audit log
 };
 int run_take(const TakeOptions& options);
 

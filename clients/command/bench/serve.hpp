@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-/// What drivebench-server does by itself. Both replace this process by it.
+/// Verbs of drivebench-server, which replaces this process.
 namespace drivebench::command {
 
 int run_serve(const std::vector<std::string>& arguments);
 
-/// What drivebench-server can print of a bench file.
+/// A description that drivebench-server prints of a bench file.
 struct PrintOptions {
   std::string config = "servo";  ///< path or name
   std::string what{};            ///< "dbc", "can-table", "modbus-map" or "modbus-csv"

@@ -57,7 +57,7 @@ int run_status(const StatusOptions& options) {
     const auto i = static_cast<int>(each.axis());
     const v1::AxisDescription& axis = i < bench.axes_size() ? bench.axes(i) : unknown;
     fmt::print("axis {} ({}): {}, owner {}, faults {}{}{}\n", i, axis.name(), name_of_state(s.state()),
-               s.owner() == 0 ? "nobody" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()),
+               s.owner() == 0 ? "none" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()),
                s.injected() == 0 ? "" : ", injected ",
                s.injected() == 0 ? "" : injected_names(bench, s.injected()));
     fmt::print("  count {}, {}speed {:.3f} rad/s, load {:g} N*m\n", s.encoder_count(),

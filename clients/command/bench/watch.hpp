@@ -19,8 +19,7 @@ struct WatchOptions {
 };
 int run_watch(const WatchOptions& options);
 
-/// A value with six digits, without exponents for what is nothing: a magnitude far below the usual range of
-/// the signal shows as 0.
+/// A value with six digits. A magnitude far below the usual range of the signal shows as 0.
 std::string shown_value(const Signal& signal, const Sample& sample);
 
 }  // namespace drivebench::command

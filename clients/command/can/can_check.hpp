@@ -10,19 +10,19 @@ namespace drivebench::command {
 struct CanCheckOptions {
   std::string interface {};
   bool json = false;
-  bool classic = false;  ///< classic frames will do: no FD is no problem
+  bool classic = false;  ///< classic frames are enough: missing FD is no problem
 };
 
-/// Judges a CAN interface: says what is wrong and which line cures it. Its numbers are those of
-/// `ip -details -statistics link show`. Exit code 0: nothing is wrong, 1: something is, 2: there is no such
-/// interface, or it is no CAN interface.
+/// Checks a CAN interface and prints each problem with the line that cures it. The numbers are those of `ip
+/// -details -statistics link show`. Exit code 0: no problems, 1: problems, 2: the interface does not exist or
+/// is no CAN interface.
 int run_can_check(const CanCheckOptions& options);
 
-/// Something about an interface that its user should know.
+/// A problem of an interface, or a note about it.
 struct CanFinding {
-  bool problem = true;  ///< otherwise a note, which needs nothing done
+  bool problem = true;  ///< false: a note, which needs no action
   std::string what;
-  std::string cure;  ///< lines for a shell, or what else to do; may be empty for a note
+  std::string cure;  ///< shell lines or another action; may be empty for a note
 };
 
 std::vector<CanFinding> can_findings(const CanInterface& interface, bool classic);

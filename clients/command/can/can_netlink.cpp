@@ -22,8 +22,8 @@ namespace {
 
 using Bytes = std::span<const std::byte>;
 
-/// The start of some bytes as a structure of the kernel's, which may have grown since: what is missing is
-/// zero.
+/// The start of the bytes as a structure of the kernel; missing bytes are zero, because the structure may be
+/// older than ours.
 template <class T>
 T read_as(Bytes bytes) {
   T value{};

@@ -8,7 +8,7 @@
 
 namespace drivebench::command {
 
-/// How a CAN controller samples bits, in one phase of a frame.
+/// The bit timing of a CAN controller in one phase of a frame.
 struct CanBitTiming {
   std::uint32_t bit_rate = 0;
   double sample_point = 0.0;  ///< fraction of a bit
@@ -25,7 +25,7 @@ enum class CanControllerState : std::uint8_t {
   kSleeping
 };
 
-/// What only a driver of real hardware tells.
+/// Properties that only drivers of real hardware report.
 struct CanController {
   CanControllerState state = CanControllerState::kStopped;
   std::optional<CanBitTiming> timing;
@@ -36,7 +36,7 @@ struct CanController {
   std::uint32_t restart_ms = 0;  ///< 0: stays off the bus after bus-off
 };
 
-/// Of a network interface what `drivebench can check` judges.
+/// The properties of a network interface that `drivebench can check` needs.
 struct CanInterface {
   std::string name;
   bool is_can = false;
@@ -47,10 +47,11 @@ struct CanInterface {
   std::optional<CanController> controller;
 };
 
-/// Asks the kernel; nothing if there is no such interface. Throws std::system_error if it does not answer.
+/// Reads an interface from the kernel; nothing if it does not exist. Throws std::system_error if the kernel
+/// does not answer.
 std::optional<CanInterface> read_can_interface(const std::string& name);
 
-/// Reads a message of type RTM_NEWLINK, header and all; nothing if it is none.
+/// Parses a message of type RTM_NEWLINK with its header; nothing for any other message.
 std::optional<CanInterface> parse_link_message(std::span<const std::byte> message);
 
 }  // namespace drivebench::command

@@ -9,10 +9,10 @@
 
 namespace drivebench::command {
 
-/// What --link takes, for its help.
+/// The addresses that --link accepts, for its help.
 inline constexpr const char* kStreamLinks = "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE or unix:PATH";
 
-/// A subcommand and the options that its command line fills; both last as long as the command line.
+/// A subcommand and its options; both live as long as the command line.
 template <class Options>
 struct Verb {
   CLI::App& app;
@@ -44,10 +44,10 @@ class CommandLine {
     return add<Options>(app_, name, description, action);
   }
 
-  /// What runs when the command line has named this subcommand and all of it is good.
+  /// Sets the action that runs if the command line names this subcommand and is valid.
   void when_named(CLI::App& sub, std::function<int()> action);
 
-  /// Parses, runs the subcommand that is named and prints what went wrong; gives the exit code.
+  /// Parses the command line, runs the named subcommand and prints errors; returns the exit code.
   int run(int argc, char** argv);
 
  private:
@@ -59,13 +59,13 @@ class CommandLine {
   bool json_ = false;
 };
 
-/// --link and --token, whose defaults are DRIVEBENCH_LINK and DRIVEBENCH_TOKEN. `links` says what --link
-/// takes.
+/// Adds --link and --token, with the defaults DRIVEBENCH_LINK and DRIVEBENCH_TOKEN. `links` lists the
+/// addresses that --link accepts.
 void add_link(CLI::App& sub, LinkChoice& link, const std::string& links = kStreamLinks);
-/// The same with a help text of its own.
+/// add_link() with another help text.
 void add_link_with_help(CLI::App& sub, LinkChoice& link, const std::string& help);
 
-// ---- what values must be ----
+// ---- validators ----
 
 /// For unsigned options: without it -1 is 2^64 - 1.
 CLI::Validator not_negative();
@@ -73,9 +73,9 @@ CLI::Validator not_negative();
 /// For real options. CLI11's own ranges let NaN pass, with which no comparison is true.
 CLI::Validator finite_between(double low, double high);
 
-/// The high of an option for which its own meaning has none.
+/// The upper limit of options without a limit of their own.
 inline constexpr double kMost = 1e15;
-/// The same of one in seconds: they fit into nanoseconds of 64 bits.
+/// The upper limit of options in seconds: their nanoseconds fit into 64 bits.
 inline constexpr double kMost_s = 1e9;
 
 }  // namespace drivebench::command

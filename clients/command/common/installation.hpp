@@ -6,7 +6,7 @@
 
 namespace drivebench::command {
 
-/// This program's own file.
+/// The file of this program.
 std::filesystem::path own_executable();
 
 /// drivebench-server, which stands next to this program. Throws UsageError when it does not.
@@ -16,7 +16,7 @@ std::filesystem::path server_executable();
 /// the folder DRIVEBENCH_CONFIGS, of `configs` here or of `configs` in a folder above the program. Throws
 /// UsageError with all places looked at.
 std::filesystem::path find_config(std::string_view choice);
-/// The same for experiments, in `experiments/` of these folders.
+/// An experiment file, searched for like a bench file, in `experiments/` of these folders.
 std::filesystem::path find_experiment_file(std::string_view choice);
 
 }  // namespace drivebench::command

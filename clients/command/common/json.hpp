@@ -4,11 +4,11 @@
 #include <optional>
 #include <string_view>
 
-/// What the rooms share of JSON. The parser costs 1.4 s in every file that includes this one, so only the
-/// rooms' own *_json.cpp do, and what prints a few keys.
+/// JSON helpers of all rooms. The parser costs 1.4 s in every file that includes this header, so only the
+/// rooms' *_json.cpp and files that print a few keys include it.
 namespace nlohmann {
 
-/// A value that is not known is null.
+/// An unknown value is null.
 template <class T>
 struct adl_serializer<std::optional<T>> {
   template <class Json>
@@ -27,7 +27,8 @@ namespace drivebench::command {
 
 using Json = nlohmann::ordered_json;
 
-/// A T from a line that is a JSON object, and has this event unless it is empty; nothing of any other line.
+/// Parses a T from a line that is a JSON object with this event (empty: any object); nothing for any other
+/// line.
 template <class T>
 std::optional<T> parsed(std::string_view line, std::string_view event = {}) {
   try {

@@ -6,7 +6,7 @@
 
 namespace drivebench::command {
 
-/// Where the bench is, and what it asks for.
+/// The address of the bench and the token for it.
 struct LinkChoice {
   std::string address{link::kDefaultAddress};
   std::string token{};

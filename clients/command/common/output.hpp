@@ -13,8 +13,8 @@
 
 namespace drivebench::command {
 
-/// Standard output or a file. Throws UsageError if the file cannot be made, std::runtime_error if it cannot
-/// be written.
+/// Standard output or a file. Throws UsageError if the file cannot be created, std::runtime_error if a write
+/// fails.
 class Output {
  public:
   /// Standard output if the path is empty.

@@ -12,8 +12,8 @@
 
 namespace drivebench::command {
 
-/// A program run as a child, its standard output in a pipe, its standard error ours. It gets SIGTERM when
-/// this process ends, however that happens, and SIGKILL when this object goes while it still runs.
+/// A child process with its standard output in a pipe and the standard error of this process. It gets SIGTERM
+/// at the end of this process, for whatever reason, and SIGKILL from the destructor if it still runs.
 class Process {
  public:
   using Deadline = std::chrono::steady_clock::time_point;
@@ -27,7 +27,7 @@ class Process {
   /// The next line without its end; nothing at the end of the output or when none comes in time.
   std::optional<std::string> read_line(Deadline deadline);
 
-  /// The first line that `parse` understands, as it understood it; nothing if the output ends or the deadline
+  /// The result of `parse` for the first line that it understands; nothing if the output ends or the deadline
   /// passes before.
   template <class Parse>
   auto await(Deadline deadline, Parse parse) -> decltype(parse(std::string_view())) {
@@ -37,7 +37,7 @@ class Process {
     return std::nullopt;
   }
 
-  /// SIGTERM; harmless when it has ended.
+  /// Sends SIGTERM; has no effect after the end of the child.
   void terminate() noexcept;
 
   /// Exit code (128 + n after signal n); nothing if it still runs at the deadline.

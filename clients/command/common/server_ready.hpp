@@ -6,14 +6,14 @@
 
 namespace drivebench::command {
 
-/// What drivebench-server says when it listens.
+/// The line of drivebench-server when it is ready.
 struct ServerReady {
   std::string tcp;
   std::string mode;
   std::string bench;
 };
 
-/// Of a line that drivebench-server prints with --json; nothing of any other line.
+/// Parses the line that drivebench-server prints with --json; nothing for any other line.
 std::optional<ServerReady> parse_ready(std::string_view line);
 
 }  // namespace drivebench::command

@@ -15,7 +15,7 @@
 #include "clients/link/tcp/tcp_axis.hpp"
 #include "protocols/signals/sample.hpp"
 
-/// What the subcommands that talk to a bench share.
+/// Helpers of the subcommands that talk to a bench.
 namespace drivebench::command {
 
 /// Connects as `drivebench SUBCOMMAND`. Throws NotLetIn, and UsageError for a can: or modbus: link.
@@ -23,7 +23,7 @@ link::Link open_link(const LinkChoice& choice, std::string_view subcommand);
 
 /// The axis with this number or name.
 std::optional<std::uint32_t> find_axis(const v1::BenchDescription& bench, std::string_view choice);
-/// The same. Throws UsageError with the axes there are.
+/// The axis with this number or name; otherwise throws UsageError with the list of axes.
 std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
 
 /// Connects to one axis over the transport of the address: tcp, tls, unix, can or modbus. Addresses of the
@@ -38,17 +38,18 @@ const char* name_of_state(std::uint64_t state) noexcept;
 
 /// The names of the bits that are set, separated by blanks; "none".
 std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults);
-/// The same of Sample.injected.
+/// The names of the set bits of Sample.injected.
 std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected);
 std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
-/// The latched faults, for people; empty: none. Of a link that describes no faults the control state.
+/// The latched faults for display; empty: none. For a link without fault descriptions the control state.
 std::string latched_text(const v1::BenchDescription& bench, const Sample& sample);
 
-/// From now on SIGINT and SIGTERM only make interrupted() true; the second one ends the process.
+/// Makes the first SIGINT or SIGTERM only set interrupted(); the second one ends the process.
 void catch_interrupts();
 bool interrupted() noexcept;
 
-/// A line on standard error for what takes longer than a second: redrawn in a terminal, else every 5 s.
+/// The progress of an operation longer than a second, as a line on standard error: redrawn in a terminal,
+/// else every 5 s.
 class Progress {
  public:
   explicit Progress(std::string what) : what_(std::move(what)) {}

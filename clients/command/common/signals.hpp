@@ -9,7 +9,7 @@
 /// Signals by their names, and as columns of CSV.
 namespace drivebench::command {
 
-/// Throws UsageError if there is no signal of one of the names.
+/// The signals with these names. Throws UsageError for an unknown name.
 std::vector<const Signal*> signals_named(const std::vector<std::string>& names);
 
 /// `tick,time_s,i_a_a [A]...` and the end of the line.

@@ -9,7 +9,7 @@
 
 namespace drivebench::command {
 
-/// The name of each thing, with commas between them: for errors that say what there is.
+/// The names of things, separated by commas, for errors that list the choices.
 template <class Things, class Name = std::identity>
 std::string listed(const Things& things, Name name = {}) {
   std::string text;
@@ -20,7 +20,7 @@ std::string listed(const Things& things, Name name = {}) {
   return text;
 }
 
-/// The number that the whole text is; nothing if it is none, or not finite.
+/// The finite number that the whole text spells; otherwise nothing.
 inline std::optional<double> finite_number(std::string_view text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

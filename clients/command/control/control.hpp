@@ -18,7 +18,7 @@ struct ControlOptions {
   LinkChoice link{};
   bool json = false;
   bool list = false;   ///< print the presets and end
-  bool gains = false;  ///< print the gains of the preset, with --list of all, and end
+  bool gains = false;  ///< print the gains of the preset (with --list: of all presets) and end
   std::string preset = "book/8.2.2";
   std::vector<control::Gain> overrides{};  ///< of its gains
   std::string axis = "0";                  ///< number or name

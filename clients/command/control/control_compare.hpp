@@ -11,21 +11,22 @@
 
 namespace drivebench::command {
 
-/// The preset's controller fed with what a recording says, without a bench.
+/// Feeds the preset's controller with the samples of a recording, without a bench.
 struct CompareOptions {
   std::string recording{};
   bool json = false;
   std::string preset = "book/8.2.2";
   std::vector<control::Gain> overrides{};
-  std::string axis{};                        ///< name; empty or "0": the first in the file
-  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
-  std::string other{};                       ///< recording of the reference's own run; empty: none
+  std::string axis{};  ///< name; empty or "0": the first in the file
+  std::optional<std::uint64_t>
+      from_tick{};      ///< start of the run; default: the first command with a set-point
+  std::string other{};  ///< recording of the reference's own run; empty: none
   /// [V] or [A]; the exit code is 1 if a command differs by more or some of the run is missing.
   std::optional<double> threshold{};
 };
 int run_compare(const CompareOptions& options);
 
-/// How far two series are apart.
+/// The difference of two series.
 struct Difference {
   double largest = 0.0;
   std::uint64_t largest_tick = 0;
@@ -37,7 +38,7 @@ struct Difference {
   double rms() const noexcept;
 };
 
-/// A recorded run beside the reference controller that was fed with the same samples.
+/// A recorded run and the reference controller fed with the same samples.
 struct Comparison {
   std::string recording;
   std::string axis;
@@ -51,7 +52,7 @@ struct Comparison {
   std::vector<std::pair<std::string, Difference>> terminals;
   Difference tracking_rad;  ///< reference of the trajectory - recorded angle
   double final_error_rad = 0.0;
-  double counts_per_rad = 0.0;  ///< 0: not known
+  double counts_per_rad = 0.0;  ///< 0: unknown
   std::string other;            ///< recording of the reference's own run; empty: none
   Difference other_commands;    ///< recorded - those of that run, at the same time
   Difference other_angle_rad;

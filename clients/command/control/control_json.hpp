@@ -15,7 +15,7 @@ std::string presets_json();
 std::string gains_json(const std::vector<control::Gain>& gains);
 std::string comparison_json(const Comparison& comparison);
 std::string control_json(const ControlReport& report);
-/// The report that control_json() wrote; nothing of any other line.
+/// Parses a report of control_json(); nothing for any other line.
 std::optional<ControlReport> parse_control(std::string_view line);
 
 }  // namespace drivebench::command

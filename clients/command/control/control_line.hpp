@@ -4,7 +4,7 @@ namespace drivebench::command {
 
 class CommandLine;
 
-/// control and plot: what needs a preset.
+/// control and plot, the verbs that need a preset.
 void add_control_commands(CommandLine& line);
 
 }  // namespace drivebench::command

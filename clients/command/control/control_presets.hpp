@@ -7,19 +7,19 @@
 #include "clients/command/control/control.hpp"
 #include "clients/control/presets/presets.hpp"
 
-/// Presets as the command line names them.
+/// Finds and builds presets by their names on the command line.
 namespace drivebench::command {
 
-/// Throws UsageError with the nearest name there is.
+/// The preset with this name; otherwise throws UsageError with the nearest name.
 const control::Preset& chosen_preset(const std::string& name);
 
-/// The run of a preset; UsageError if a gain cannot be or the move exceeds a limit.
+/// The run of a preset. Throws UsageError if a gain is impossible or the move exceeds a limit.
 control::Run made(const control::Preset& preset, std::span<const control::Gain> overrides);
 
-/// With its own gains; nothing for a preset that is there to be refused.
+/// The run with the preset's own gains; nothing for a preset that exists to be refused.
 std::optional<control::Run> made_as_it_stands(const control::Preset& preset);
 
-/// The gains of a preset with the overrides in their place.
+/// The gains of a preset, overridden.
 std::vector<control::Gain> gains_with(const control::Preset& preset,
                                       std::span<const control::Gain> overrides);
 

@@ -23,36 +23,36 @@ struct LoadAt {
   double after_s = 0.0;
 };
 
-/// What a sample of this link tells a controller: what the link does not carry stays zero.
+/// The measurement in a sample of a link with these signals; other values are zero.
 control::Measurement measurement_of(const Sample& sample, SignalMask known);
 
 Terminals terminals_of(const control::Setpoint& setpoint);
 
-/// One sample of a run and what the controller made of it.
+/// A sample of a run and the controller's answer.
 struct ControlRow {
   std::uint64_t tick = 0;
-  std::int64_t periods = 1;  ///< since the row before
+  std::int64_t periods = 1;  ///< since the previous row
   double time_s = 0.0;       ///< after the start of the trajectory
   control::Reference reference{};
-  double angle_rad = 0.0;           ///< since the first sample: true, or else of the encoder
+  double angle_rad = 0.0;           ///< since the first sample: the true angle, or else that of the encoder
   double error_rad = 0.0;           ///< reference - this angle
   double measured_error_rad = 0.0;  ///< reference - encoder
-  double speed_rad_s = 0.0;         ///< true, or else the observer's
+  double speed_rad_s = 0.0;         ///< the true speed, or else the observer's
   double speed_observer_rad_s = 0.0;
   Terminals current_a{};
-  Terminals setpoint{};   ///< asked for, [V] or [A]
-  Terminals voltage_v{};  ///< at the machine during the tick before, if the link carries it
+  Terminals setpoint{};   ///< commanded, [V] or [A]
+  Terminals voltage_v{};  ///< at the machine during the previous tick, if the link carries it
   bool saturated = false;
-  double exchange_us = 0.0;  ///< from handing over the command to having the next sample
+  double exchange_us = 0.0;  ///< from sending the command to receiving the next sample
 };
 
-/// What a run amounted to. Phases are a, b and c; the field winding is apart.
+/// The summary of a run. Phases are a, b and c; the field winding is separate.
 struct ControlReport {
   std::string bench;
   std::string mode;
   std::string axis;
   std::string preset;
-  std::string failure;  ///< why it ended early; empty: it did not
+  std::string failure;  ///< the reason of an early end; empty: none
   std::int64_t samples = 0;
   std::int64_t missed_ticks = 0;  ///< samples that did not reach the controller
   std::uint64_t late_ticks = 0;   ///< of the bench, during the run
@@ -70,34 +70,34 @@ struct ControlReport {
   double peak_speed_error_rad_s = 0.0;  ///< reference - speed
   double peak_current_a = 0.0;          ///< measured
   double peak_field_current_a = 0.0;
-  std::optional<double> peak_command_voltage_v;  ///< asked for; nothing if currents are
-  std::optional<double> peak_command_current_a;  ///< asked for; nothing if voltages are
+  std::optional<double> peak_command_voltage_v;  ///< nothing if the run commands currents
+  std::optional<double> peak_command_current_a;  ///< nothing if the run commands voltages
   std::optional<double> peak_voltage_v;          ///< at the machine
-  std::int64_t saturated_samples = 0;            ///< a command stood at its limit
-  std::map<std::string, double> peak_telemetry;  ///< what else the controller tells, largest magnitudes
+  std::int64_t saturated_samples = 0;            ///< samples with a command at its limit
+  std::map<std::string, double> peak_telemetry;  ///< largest magnitudes of the controller's telemetry
   double exchange_p50_us = 0.0;
   double exchange_p99_us = 0.0;
   double exchange_max_us = 0.0;
 };
 
-/// Everything that happened in a run over a link.
+/// The record of a run over a link.
 struct ControlRun {
   bool knows_angle = true;  ///< whether the link carries the true angle
   bool knows_speed = true;
   bool knows_voltage = true;
   control::Quantity quantity = control::Quantity::kVoltage;
-  double counts_per_rad = 0.0;  ///< 0: not known
+  double counts_per_rad = 0.0;  ///< 0: unknown
   std::vector<ControlRow> rows;
   std::vector<std::string> telemetry_names;
-  std::vector<double> telemetry;  ///< of all rows, one after the other
+  std::vector<double> telemetry;  ///< of all rows, concatenated
   std::string failure;
   std::int64_t missed_at_end = 0;  ///< samples after the last row that did not reach the controller
   std::uint64_t late_ticks = 0;
   double wall_s = 0.0;
 };
 
-/// Runs on an axis that is leased and at rest, sample by sample, over the link.
-/// `counts_per_revolution` turns angles into counts for the report; 0: it has none.
+/// Runs a controller over the link, sample by sample, on an axis that is leased and at rest.
+/// `counts_per_revolution` converts angles to counts for the report; 0: no encoder.
 ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<LoadAt>& loads,
                     double counts_per_revolution);
 

@@ -13,12 +13,13 @@ namespace drivebench::command {
 struct PlotOptions {
   std::string recording{};
   std::string out_file{};  ///< empty: standard output
-  std::string preset{};    ///< whose trajectory is drawn beside it; empty: none
+  std::string preset{};    ///< draws its trajectory too; empty: none
   std::vector<control::Gain> overrides{};
-  std::string axis{};                        ///< name; empty: the first in the file
-  std::optional<std::uint64_t> from_tick{};  ///< where the run starts; else where the first command counts
-  std::vector<std::string> panels{};         ///< empty: speed, currents and voltages
-  std::string title{};                       ///< empty: the preset, or else the file
+  std::string axis{};  ///< name; empty: the first in the file
+  std::optional<std::uint64_t>
+      from_tick{};                    ///< start of the run; default: the first command with a set-point
+  std::vector<std::string> panels{};  ///< empty: speed, currents and voltages
+  std::string title{};                ///< empty: the preset, or else the file
 };
 int run_plot(const PlotOptions& options);
 

@@ -10,7 +10,7 @@ namespace drivebench::command {
 
 std::string demo_json(const DemoReport& report);
 
-// Of a line that drivebench-server prints; nothing of any other line.
+// Parses a line of drivebench-server; nothing for any other line.
 std::optional<ServerVerdict> parse_verdict(std::string_view line);
 std::optional<DemoReplay> parse_replay(std::string_view line);
 

@@ -8,7 +8,7 @@
 
 namespace drivebench::command {
 
-/// What drivebench-server says at its end.
+/// The last line of drivebench-server.
 struct ServerVerdict {
   std::uint64_t ticks = 0;
   std::uint64_t late_ticks = 0;
@@ -29,7 +29,7 @@ struct DemoRun {
   int attempts = 1;
 };
 
-/// What re-simulating the lockstep recording gave.
+/// The result of replaying the lockstep recording.
 struct DemoReplay {
   bool equal = false;
   std::uint64_t ticks = 0;

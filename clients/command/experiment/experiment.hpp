@@ -7,11 +7,11 @@
 
 namespace drivebench::command {
 
-/// What the verbs of `experiment` need, each some of it.
+/// The options of the verbs of `experiment`; each verb uses some of them.
 struct ExperimentOptions {
   ExperimentServer server{};
   bool json = false;
-  std::string file{};  ///< run: what to do
+  std::string file{};  ///< run: the experiment file
   std::uint64_t id = 0;
   /// CSV, or the recording if it ends with .mcap; empty: fetch writes to standard output.
   std::string out_file{};

@@ -15,14 +15,14 @@
 
 namespace drivebench::command {
 
-/// Where experiments run, and for which user.
+/// The server of experiments, and the user.
 struct ExperimentServer {
   LinkChoice link{};
-  std::string owner{};       ///< the secret that opens the data; empty: that of this user, kept in a file
+  std::string owner{};       ///< the secret that opens the data; empty: this user's secret, kept in a file
   std::string user{};        ///< a name that every client sees
-  double patience_s = 30.0;  ///< so long a broken link may stay broken
+  double patience_s = 30.0;  ///< the longest time without a link
 };
-/// The default one: DRIVEBENCH_OWNER and USER.
+/// The default server, with DRIVEBENCH_OWNER and USER.
 ExperimentServer server_of_environment();
 
 /// 128 random bits in hexadecimal digits.
@@ -30,24 +30,24 @@ std::string random_word();
 
 bool has_ended(v1::ExperimentState state);
 
-/// Experiments on a server, over a link that is made anew when it breaks.
+/// Experiments on a server. The client connects again after a broken link.
 class ExperimentClient {
  public:
-  /// `subcommand` is the name by which the server knows this client.
+  /// `subcommand` is the client's name in the server's log.
   ExperimentClient(const ExperimentServer& server, std::string subcommand);
 
   const std::string& owner() const noexcept { return owner_; }
   std::uint64_t resumed() const noexcept { return resumed_; }
   bool gave_up() const noexcept { return gave_up_; }
 
-  /// Runs the action on a link, and again after the link broke: it may run twice. Throws as open_link() if
-  /// the first link cannot be opened.
+  /// Runs the action on a link, and again after a broken link: it may run more than once. Throws like
+  /// open_link() if the first link cannot be opened.
   void with_link(const std::function<void(link::Link&)>& action);
 
   /// Uploads tables and queues the request. Throws UsageError if the bench has no such axis.
   v1::ExperimentInfo run(ExperimentFile file);
 
-  /// Takes the description of the experiment, and a piece of its data or null.
+  /// Receives the description of the experiment, and a piece of its data or null.
   using Take = std::function<void(const v1::ExperimentInfo&, const v1::ExperimentData*)>;
   /// Receives rows, or the recording, until the end; `next` gives the first that is missing. An interrupt
   /// cancels an experiment that run() has queued, and its data so far still come; for any other experiment
@@ -62,7 +62,7 @@ class ExperimentClient {
   std::string subcommand_;
   std::string owner_;
   std::unique_ptr<link::Link> link_;
-  bool was_connected_ = false;           // from now on a server that does not answer is waited for
+  bool was_connected_ = false;           // after the first connection the client waits for a silent server
   std::optional<std::uint64_t> queued_;  // by run()
   std::uint64_t resumed_ = 0;
   bool gave_up_ = false;

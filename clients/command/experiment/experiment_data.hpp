@@ -15,15 +15,13 @@
 
 namespace drivebench::command {
 
-/// Takes the rows of an experiment as they come, in any number of pieces. A row that is sent twice is taken
-/// once.
+/// Collects the rows of an experiment from pieces of any size; ignores repeated rows.
 class ExperimentRows {
  public:
-  /// Which signals the rows have; before the first row. Gives whether this was the first description. Throws
-  /// std::runtime_error if it contradicts itself.
+  /// Sets the signals of the rows; to be called before the first row. Returns whether this is the first
+  /// description. Throws std::runtime_error if descriptions contradict each other.
   bool describe(const v1::ExperimentInfo& info);
-  /// Hands every new row to `on_row`, with its tick. Throws std::runtime_error if rows are missing before
-  /// them.
+  /// Calls `on_row` with every new row and its tick. Throws std::runtime_error if rows before it are missing.
   using OnRow = std::function<void(std::uint64_t tick, const std::vector<double>& values)>;
   void take(const v1::ExperimentData& data, const OnRow& on_row);
 
@@ -45,11 +43,11 @@ class ExperimentRows {
 /// Writes the rows of an experiment as CSV.
 class DataWriter {
  public:
-  /// Without a file and without standard output the rows are only counted.
+  /// Without a file and standard output it only counts the rows.
   DataWriter(std::string file, bool standard_output)
       : file_(std::move(file)), is_wanted_(!file_.empty() || standard_output) {}
 
-  /// The first description makes the file; before it an existing file keeps its content.
+  /// The first description creates the file; until then an existing file keeps its content.
   void describe(const v1::ExperimentInfo& info);
   void take(const v1::ExperimentData& data);
   void flush();
@@ -68,11 +66,11 @@ class DataWriter {
   std::string text_;
 };
 
-/// The same for the bytes of a recording.
+/// Writes the bytes of a recording to a file.
 class RecordingWriter {
  public:
   explicit RecordingWriter(std::string file) : file_(std::move(file)) {}
-  /// Before the first of them: makes the file.
+  /// Creates the file; to be called before the first bytes.
   void describe() {
     if (!out_) out_.emplace(file_);
   }

@@ -16,15 +16,15 @@ struct ExperimentFile {
   std::string axis = "0";     ///< number or name
 };
 
-/// Throws ConfigError with everything wrong and its lines.
+/// Parses an experiment file. Throws ConfigError with all problems and their lines.
 ExperimentFile parse_experiment(std::string_view text, const std::string& name);
 ExperimentFile load_experiment(const std::filesystem::path& file);
 
-/// Hands the rows of a CSV file, time and value, to `take`, as many at a time as fit into a request. Throws
-/// ConfigError with the line of the first row that is none.
+/// Calls `take` with the rows of a CSV file, time and value, in pieces that fit into a request. Throws
+/// ConfigError with the line of the first wrong row.
 void read_table(const std::filesystem::path& file, const std::function<void(v1::UploadTable&)>& take);
 
-/// The word of a state, as files and printouts have it.
+/// The word for a state in files and printouts.
 std::string word_of(v1::ExperimentState state);
 
 }  // namespace drivebench::command

@@ -9,9 +9,9 @@
 
 namespace drivebench::command {
 
-/// What the server says of an experiment.
+/// The server's information about an experiment.
 nlohmann::ordered_json json_of(const v1::ExperimentInfo& info);
-/// The same in a line; `resumed`: how often a broken link was made anew.
+/// The information as a line; `resumed` is the number of reconnections.
 std::string experiment_json(const v1::ExperimentInfo& info, std::string_view out_file, std::uint64_t resumed);
 std::string experiments_json(const v1::ExperimentList& list);
 

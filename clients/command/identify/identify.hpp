@@ -11,14 +11,14 @@ namespace drivebench::command {
 /// A motor identified from an experiment on a bench, or from a file.
 struct IdentifyOptions {
   ExperimentServer server{};
-  bool link_was_named = false;  ///< on the command line: no other bench will do
+  bool link_was_named = false;  ///< the command line names the link: uses no other bench
   bool json = false;
   bool list = false;  ///< print motors and experiments and end
   std::string motor{};
   std::string experiment{};  ///< name, or file; empty: the first of the motor
-  std::string bench{};  ///< a server of our own on this bench, by path or name; empty: as the experiment says
+  std::string bench{};  ///< starts a server on this bench, by path or name; empty: that of the experiment
 
-  std::string from_file{};          ///< a recording (.mcap) or CSV in the place of an experiment
+  std::string from_file{};          ///< a recording (.mcap) or CSV instead of an experiment
   std::vector<std::string> maps{};  ///< of CSV: HEADER=SIGNAL or a column-map file
   std::string time{};               ///< of CSV: header of the time; empty: time_s
   std::optional<double> period_s{};
@@ -27,14 +27,14 @@ struct IdentifyOptions {
   std::optional<int> pole_pairs{};
   std::optional<double> counts_per_revolution{};
   std::optional<int> phases{};
-  std::string voltages{};  ///< mean or instant; empty: as the source of the data says
+  std::string voltages{};  ///< mean or instant; empty: that of the data's source
   std::optional<double> voltage_shift{};
   std::string window{};  ///< FROM:TO [s]
   std::optional<double> current_hz{};
   std::optional<double> voltage_hz{};
   std::optional<double> shaft_hz{};
   std::optional<int> order{};
-  std::string load{};  ///< viscous or constant; empty: as the experiment says
+  std::string load{};  ///< viscous or constant; empty: that of the experiment
   bool one_stage = false;
 
   std::string markdown_file{};

@@ -6,7 +6,7 @@
 
 namespace drivebench::command {
 
-/// What identification::to_json says, and experiment, settings and validation.
+/// The JSON of identification::to_json() with experiment, settings and validation.
 std::string identify_json(const IdentifyReport& report);
 /// Motors and their experiments.
 std::string named_experiments_json();

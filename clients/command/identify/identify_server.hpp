@@ -6,16 +6,16 @@
 
 namespace drivebench::command {
 
-/// What is to run, and where if no bench for it is found.
+/// An experiment to run, and a bench to start if no server has one for it.
 struct WantedExperiment {
   ExperimentFile file;
-  std::string bench;         ///< to start a server on; empty: none is known
+  std::string bench;         ///< the bench to start; empty: none
   std::string_view machine;  ///< kind that the axis must have
 };
 
-/// Runs the experiment on a server and fetches its data: on that of the link if its bench has the axis, else
-/// on one of our own, which ends with this call. Throws UsageError if the bench is not the right one,
-/// std::runtime_error if the experiment does not come to its end.
+/// Runs the experiment on a server and fetches its data: on the server of the link if its bench has the axis,
+/// else on a server that this call starts and ends. Throws UsageError if the bench does not fit,
+/// std::runtime_error if the experiment does not complete.
 Measurement measure(const IdentifyOptions& options, const WantedExperiment& wanted);
 
 }  // namespace drivebench::command

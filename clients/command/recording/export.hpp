@@ -7,7 +7,7 @@
 
 namespace drivebench::command {
 
-/// The exit code when the recording ends early; what it holds was written.
+/// The exit code for a recording that ends early; its content was written.
 inline constexpr int kExitCutShort = 3;
 
 struct ExportOptions {
@@ -22,7 +22,7 @@ struct ExportOptions {
   std::string interface = "can0";  ///< candump: its name in every line
   unsigned node_base = 1;          ///< candump: node id of the first axis
   bool classic = false;            ///< candump: classic frames instead of FD
-  std::string profile{};           ///< candump: keys as in a can: address
+  std::string profile{};           ///< candump: keys of a can: address
 };
 int run_export(const ExportOptions& options);
 

@@ -14,22 +14,22 @@
 
 namespace drivebench::command {
 
-/// The frames of a run as candump -l writes them: what the bench sends of each sample and the commands that
-/// it took. Heartbeats, requests and replies are not in a recording. The lease number of the commands is the
-/// low bits of the session's number.
+/// The frames of a run in the format of candump -l: the bench's frames of each sample and the accepted
+/// commands. Heartbeats, requests and replies are not in a recording. The lease number of the commands is the
+/// low bits of the owner number.
 class CandumpText {
  public:
-  /// Interface, profile and the node id of the first axis are the address's.
+  /// The address gives interface, profile and the node id of the first axis.
   CandumpText(const link::CanAddress& address, bool is_lockstep)
       : address_(address), is_lockstep_(is_lockstep) {}
 
-  /// In the order of the recording.
+  /// Adds a sample; in the order of the recording.
   void add(std::uint32_t axis, const Sample& sample, double time_s);
   void add(const v1::Input& input, double time_s);
-  /// After the last sample.
+  /// To be called after the last sample.
   void finish();
 
-  /// What has been written since it was last emptied.
+  /// The text since the caller last cleared it.
   std::string& text() noexcept { return text_; }
   std::uint64_t frames() const noexcept { return frames_; }
 
@@ -37,13 +37,13 @@ class CandumpText {
   struct Before {
     std::uint64_t faults = 0;
     std::int64_t index_tick = -1;
-    bool wide = false;  ///< it has shown a phase c, a field or Hall lines: from then on its frames carry them
+    bool wide = false;  ///< the axis has shown a phase c, a field or Hall lines; later frames carry them
   };
 
   void put(can::Message message, std::uint32_t axis, const Sample& sample, double time_s);
   void put(const can::Frame& frame, double time_s);
   std::uint32_t node(std::uint32_t axis) const;
-  /// Every sample of a tick goes before its SYNC.
+  /// Writes the SYNC of a tick after all its samples.
   void end_tick();
 
   link::CanAddress address_;

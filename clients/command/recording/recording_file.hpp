@@ -5,7 +5,7 @@
 
 #include "protocols/mcap/mcap_series.hpp"
 
-/// Recordings as the command line names them.
+/// Opens the recordings that the command line names.
 namespace drivebench::command {
 
 /// Throws UsageError if the file cannot be read.

@@ -4,7 +4,7 @@
 
 namespace drivebench::command {
 
-/// Replaces this process by drivebench-server, which replays.
+/// Replaces this process by drivebench-server, which replays the recording.
 struct ReplayOptions {
   std::string recording{};
   bool json = false;

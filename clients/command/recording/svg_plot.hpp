@@ -6,7 +6,7 @@
 
 namespace drivebench::command {
 
-/// One line of a panel; as many values as there are places on the common axis.
+/// A line of a panel, with a value for each place on the common axis.
 struct Series {
   std::string name;
   std::vector<double> values;
@@ -17,8 +17,8 @@ struct Panel {
   std::vector<Series> series;
 };
 
-/// Panels below each other over a common horizontal axis, as an SVG picture of 720 pixels width. Of many
-/// values in one pixel the smallest and the largest are drawn.
+/// Panels below each other over a common horizontal axis, as an SVG picture of 720 pixels width. Where many
+/// values fall into one pixel it draws the smallest and the largest.
 std::string svg_of(std::string_view title, std::string_view x_label, const std::vector<double>& x,
                    const std::vector<Panel>& panels);
 

@@ -55,7 +55,7 @@ can::Backend backend_named(std::string_view text, std::string_view name) {
   bad(text, "after can: comes one of " + known);
 }
 
-/// Text before and after the first `at`; nothing after it if it does not occur.
+/// Splits the text at the first `at`; without one the second part is empty.
 std::pair<std::string_view, std::string_view> split(std::string_view text, char at) {
   const std::size_t place = text.find(at);
   if (place == std::string_view::npos) return {text, {}};
@@ -68,7 +68,7 @@ bool read_switch(std::string_view text, std::string_view key, std::string_view v
   return false;
 }
 
-/// Whether the key is the name of a message; sets its identifier.
+/// Sets the identifier of a message; false if the key is not the name of a message.
 bool read_id(std::string_view text, std::string_view key, std::string_view value, can::Profile& profile) {
   for (const can::MessageRow& row : can::kMessages) {
     if (row.name != key) continue;

@@ -9,7 +9,7 @@
 
 namespace drivebench::link {
 
-/// An axis on a CAN bus, and what both ends must agree on.
+/// An axis on a CAN bus, with the settings on which both ends must agree.
 struct CanAddress {
   can::Backend backend = can::Backend::kUdpMulticast;
   /// socketcan: the interface; udp_multicast: the group; slcan: path of a terminal or "tcp:HOST:PORT";
@@ -17,13 +17,13 @@ struct CanAddress {
   std::string channel;
   std::uint16_t port = 0;                   ///< udp_multicast
   std::string bus = "can0";                 ///< socketcand: the bus to open
-  std::uint32_t bit_rate = 1'000'000;       ///< slcan: what an adapter is set to
-  std::uint32_t data_bit_rate = 5'000'000;  ///< the same for the data of FD frames
+  std::uint32_t bit_rate = 1'000'000;       ///< slcan: set in the adapter
+  std::uint32_t data_bit_rate = 5'000'000;  ///< slcan: set in the adapter, for the data phase
   std::uint32_t node = 1;
   can::Profile profile;
 };
 
-/// Whether the text begins as such an address does.
+/// Whether the text begins like a CAN address.
 bool is_can_address(std::string_view text) noexcept;
 
 /// `can:BACKEND:CHANNEL[?KEY=VALUE&...]`, for example `can:socketcan:vcan0?node=2&fd=0&command=0x210`. Keys:

@@ -28,8 +28,8 @@ class CanBus {
   virtual std::optional<can::Frame> receive(Clock::time_point until) = 0;
 };
 
-/// Opens the bus. Where the kernel can filter it delivers only data frames with these identifiers; with none
-/// given, everything. Throws ConnectError.
+/// Opens the bus. With identifiers, a kernel filter passes only data frames with these, if the back end
+/// supports it. Throws ConnectError.
 std::unique_ptr<CanBus> open_can_bus(const CanAddress& address, std::chrono::milliseconds deadline,
                                      std::span<const std::uint32_t> ids = {});
 

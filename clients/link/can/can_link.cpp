@@ -22,7 +22,7 @@ constexpr unsigned kStopped = 4;  // of a heartbeat
   refuse(static_cast<v1::RefusalCode>(meaning.tcp), meaning.sentence);
 }
 
-/// In the numbers of the profile, where 3 are duties.
+/// The mode in the numbers of the profile.
 unsigned mode_of(v1::Gates gates) {
   return gates == v1::GATES_CURRENT ? can::kCurrentMode : static_cast<unsigned>(gates);
 }
@@ -37,8 +37,8 @@ constexpr SignalMask signals_of(const can::MessageRow& row) {
   return mask;
 }
 
-/// What the sensors of every sample and the frames about the state carry, without the speed: the state frame
-/// has it, but not of every sample.
+/// The signals in the frames of sensors and state, without the speed, which the state frame does not carry
+/// for every sample.
 SignalMask signals_in(const can::Profile& profile) {
   SignalMask mask = 0;
   for (const can::MessageRow& row : can::kMessages) {
@@ -50,7 +50,7 @@ SignalMask signals_in(const can::Profile& profile) {
   return mask;
 }
 
-/// Of a field that holds an unsigned number of at most 32 bits.
+/// The value of an unsigned field of at most 32 bits.
 std::uint32_t as_code(double value) {
   return static_cast<std::uint32_t>(value);
 }
@@ -91,9 +91,9 @@ CanLink::CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::st
 CanLink::~CanLink() {
   if (lease_ == 0) return;
   try {
-    send_request(Request::kRelease);  // no connection ends that would tell the bench
+    send_request(Request::kRelease);  // CAN has no connection whose end the bench could see
   } catch (const LinkError&) {
-    return;  // then the lease runs out
+    return;  // the lease runs out
   }
 }
 
@@ -102,7 +102,8 @@ void CanLink::acquire() {
   if (reply.result != Result::kDone) refuse_with(reply.result);
   if (reply.lease == 0) throw LinkError(name_ + " gave the axis without a lease number");
   lease_ = reply.lease;
-  // The request has the bench send where it stands, so that a lockstep that waits can be joined.
+  // After the request the bench sends state and sample, so that a controller can join a waiting lockstep
+  // bench.
   await(
       "state and sample after the request",
       [this] {
@@ -178,18 +179,19 @@ const Sample& CanLink::exchange(const Command& command) {
       [this, &send] {
         if (is_lockstep()) send();
       });
-  // In real time a slow controller goes on with the newest sample.
+  // In real time a slow controller continues with the newest sample.
   while (!is_lockstep() && receive(Clock::time_point::min())) {
   }
   return sample_;
 }
 
-/// While a command waits for its sample.
+/// Handles replies while a command waits for its sample.
 void CanLink::check_replies() {
   if (reply_ && reply_->result != Result::kDone) refuse_with(reply_->result);
   if (!command_result_) return;
   const Result result = *std::exchange(command_result_, std::nullopt);
-  if (result == Result::kIncomplete) return;  // one of its two frames was lost; in lockstep both go again
+  if (result == Result::kIncomplete)
+    return;  // one of the two frames was lost; in lockstep both are sent again
   if (result == Result::kNotOwner) {
     send_request(
         Request::kRenew);  // the refusal may be about another controller; the reply to this request is not
@@ -284,7 +286,7 @@ void CanLink::take(const can::MessageRow& row, const can::Values& values) {
       return;
     case Message::kCurrents: {
       can::update_sample(row, values, coming_);
-      // Without the other frames it is no sample: the count, or a current, would be that of the one before.
+      // Without the other frames the sample is incomplete: the count or a current would be old.
       const bool has_phases = std::exchange(has_phases_, false) || !profile_.wide;
       if (std::exchange(has_encoder_, false) && has_phases) take_sample();
       return;
@@ -300,12 +302,12 @@ void CanLink::take(const can::MessageRow& row, const can::Values& values) {
     default:
       break;
   }
-  // The page of the speed sensors belongs to the sample that is coming.
+  // The page of the speed sensors belongs to the next sample.
   const bool is_part = row.message == Message::kDetails && can::is_paged(row) &&
                        as_code(values[0]) == static_cast<unsigned>(can::Page::kSpeedSensors);
   has_state_ |= row.message == Message::kState;
   has_counters_ |= row.message == Message::kCounters;
-  // A tick in them is the frame's: the sample stays that of its sensors.
+  // A tick in these frames is their own; the sample keeps the tick of its sensors.
   for (Sample* const sample : {&coming_, &sample_}) {
     if (is_part && sample == &sample_) continue;
     const std::uint64_t tick = sample->tick;
@@ -330,8 +332,8 @@ void CanLink::take_heartbeat(const can::Values& values) {
   bench_.set_period_s(field("period_us") * 1e-6);
 }
 
-/// The currents frame has 16 bits of the tick, SYNC 32. If they are of one tick, the sample learns the
-/// others.
+/// The currents frame has 16 bits of the tick, SYNC has 32. If both are of one tick, the sample gets the
+/// other 16 bits.
 void CanLink::take_sync_tick(std::uint32_t tick) {
   const bool is_of_sample = has_sample_ && (tick & 0xFFFF) == (sample_.tick & 0xFFFF);
   if (profile_.fd || !is_of_sample) return;
@@ -354,7 +356,7 @@ void CanLink::take_reply(const can::Values& values) {
 }
 
 void CanLink::take_sample() {
-  // No SYNC since the sample before: only real time goes on without one.
+  // No SYNC since the previous sample: the bench runs in real time.
   if (bench_.mode() == v1::MODE_UNSPECIFIED && has_sample_ && coming_.tick != sample_.tick) {
     bench_.set_mode(v1::MODE_REALTIME);
   }

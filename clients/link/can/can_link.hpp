@@ -13,20 +13,21 @@
 namespace drivebench::link {
 
 struct CanLinkOptions {
-  std::chrono::milliseconds deadline{5000};    ///< for every answer
-  std::chrono::milliseconds repeat_after{20};  ///< what got no answer is sent again; frames may be lost
+  std::chrono::milliseconds deadline{5000};  ///< for every answer
+  std::chrono::milliseconds repeat_after{
+      20};  ///< repeats a request or command without an answer, since frames can get lost
 };
 
-/// A controller of one axis by the native CAN profile. It sees no truth, and of the state, the faults and the
-/// counters what the last frame that carried them said. Ticks and counts are carried on from their low bits.
+/// The link of a controller over the native CAN profile. Samples have no truth; state, faults and counters
+/// are those of the last frame that carried them. The link extends ticks and counts from their low bits.
 class CanLink final : public AxisLink {
  public:
   /// Connects and waits for the bench's heartbeat. Throws ConnectError.
   explicit CanLink(const CanAddress& address, const CanLinkOptions& options = {});
-  /// The same on an open bus; `name` stands for it in errors and in bench().
+  /// Uses an open bus; `name` is its name in errors and in bench().
   CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::string name,
           const CanLinkOptions& options = {});
-  /// Gives the axis back if it is still held, without waiting for the answer.
+  /// Releases the axis if it is still held, without waiting for the answer.
   ~CanLink() override;
 
   const v1::BenchDescription& bench() const noexcept override { return bench_; }
@@ -50,7 +51,7 @@ class CanLink final : public AxisLink {
     unsigned lease;
   };
 
-  /// Takes one frame if it comes in time.
+  /// Takes a frame if one comes in time.
   bool receive(Clock::time_point until);
   void take(const can::MessageRow& row, const can::Values& values);
   void take_heartbeat(const can::Values& values);
@@ -60,7 +61,7 @@ class CanLink final : public AxisLink {
   void take_sync_tick(std::uint32_t tick);
   void send_request(can::Request request);
   Reply ask(can::Request request);
-  /// Receives until `done`, and calls `repeat` when nothing comes for a while.
+  /// Receives until `done`, and calls `repeat` after each `repeat_after` without an answer.
   template <class Done, class Repeat>
   void await(const std::string& what, Done done, Repeat repeat);
   void check_replies();
@@ -76,17 +77,17 @@ class CanLink final : public AxisLink {
   std::uint32_t controller_;
   unsigned lease_ = 0;
 
-  Sample coming_;  // classic: holds the encoder frame until the currents come
+  Sample coming_;  // classic: holds the encoder frame until the currents frame comes
   Sample sample_;
-  bool has_encoder_ = false;  // in coming_, and not yet in a sample
-  bool has_phases_ = false;   // the same, of a wide axis
+  bool has_encoder_ = false;  // coming_ has an encoder frame
+  bool has_phases_ = false;   // wide axis: coming_ has a phases frame
   bool has_sample_ = false;
   bool has_state_ = false;
   bool has_counters_ = false;
-  can::FrameProblem misfit_ = can::FrameProblem::kNone;  // of the last frame of the bench that had one
+  can::FrameProblem misfit_ = can::FrameProblem::kNone;  // the last problem of a frame of the bench
   std::uint64_t commanded_tick_ = 0;
   std::optional<can::Result> command_result_;    // of the command for it, if it was turned down
-  can::Request asked_ = can::Request::kCommand;  // request that an answer is expected to; kCommand: none
+  can::Request asked_ = can::Request::kCommand;  // the request that waits for an answer; kCommand: none
   std::optional<Reply> reply_;
 };
 

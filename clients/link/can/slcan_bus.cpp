@@ -27,7 +27,7 @@ class SlcanBus final : public TextBus {
  public:
   SlcanBus(const CanAddress& address, std::chrono::milliseconds deadline)
       : TextBus(to_string(address), open_slcan(address, deadline)) {
-    // Answers are not waited for: the other end of a pseudo terminal may say nothing.
+    // Does not wait for answers: the other end of a pseudo terminal may send none.
     write("\rC\r" + std::string(*can::slcan_bit_rate(address.bit_rate)) + "\r" +
           (address.profile.fd ? std::string(*can::slcan_data_bit_rate(address.data_bit_rate)) + "\r" : "") +
           "O\r");

@@ -45,7 +45,7 @@ class SocketCanBus final : public CanBus {
   void send(const Frame& frame) override {
     const canfd_frame out = can::raw_of(frame);
     const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
-    // A full queue empties at the speed of the bus; poll() calls it writable all the same.
+    // A full queue empties at the speed of the bus; poll() reports it as writable nevertheless.
     for (const Clock::time_point give_up = Clock::now() + 1s; ::write(fd_.get(), &out, size) < 0;) {
       if (errno == EINTR) continue;
       if (errno != ENOBUFS || Clock::now() > give_up) throw LinkError(name_ + " failed: " + reason());

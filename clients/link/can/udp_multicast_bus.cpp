@@ -20,7 +20,8 @@ double seconds_since_1970() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-/// The virtual bus of python-can. What is sent comes from a port of its own, by which own frames are known.
+/// The virtual bus of python-can. Frames are sent from a separate port, by which the bus recognises its own
+/// frames.
 class MulticastBus final : public CanBus {
  public:
   explicit MulticastBus(const CanAddress& address)
@@ -35,14 +36,14 @@ class MulticastBus final : public CanBus {
     try {
       set_option(in_, SOL_SOCKET, SO_REUSEADDR, 1);
       if (::bind(in_.get(), peer, sizeof group) != 0) throw ConnectError(reason());
-      // Sent over the loopback interface, whatever the routes, and never beyond this computer.
+      // Always over the loopback interface, so that no frame leaves this computer.
       ip_mreqn request = {.imr_multiaddr = group.sin_addr,
                           .imr_address = {},
                           .imr_ifindex = static_cast<int>(::if_nametoindex("lo"))};
       set_option(in_, IPPROTO_IP, IP_ADD_MEMBERSHIP, request);
       set_option(out_, IPPROTO_IP, IP_MULTICAST_IF, request);
       set_option(out_, IPPROTO_IP, IP_MULTICAST_TTL, 0);
-      // Where others send that do not choose an interface; there is none without a route.
+      // Joins also on the default interface, where programs send that choose none; fails without a route.
       request.imr_ifindex = 0;
       ::setsockopt(in_.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &request, sizeof request);
       if (::connect(out_.get(), peer, sizeof group) != 0) throw ConnectError(reason());

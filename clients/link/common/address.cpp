@@ -28,7 +28,7 @@ bool is_port(std::string_view text) {
   return error == std::errc{} && end == text.data() + text.size() && value >= 1 && value <= 65535;
 }
 
-/// What stands behind the question mark of a tls: address.
+/// Parses the part of a tls: address behind the question mark.
 TlsFiles files_in(std::string_view text, std::string_view query) {
   TlsFiles files;
   while (!query.empty()) {
@@ -56,7 +56,7 @@ std::string reason(int error) {
   return std::generic_category().message(error);
 }
 
-/// 0, or why it did not work.
+/// Returns 0 or an error number.
 int connect_within(int fd, const sockaddr* peer, socklen_t size, std::chrono::milliseconds deadline) {
   if (::connect(fd, peer, size) != 0 && errno != EINPROGRESS) return errno;
   pollfd waiting = {.fd = fd, .events = POLLOUT, .revents = 0};

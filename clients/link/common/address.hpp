@@ -10,7 +10,7 @@
 
 namespace drivebench::link {
 
-/// The link failed and is closed: the peer is gone, silent or does not speak the protocol.
+/// The link failed and is closed: the peer left, fell silent or does not speak the protocol.
 class LinkError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -30,7 +30,7 @@ class AddressError : public std::invalid_argument {
 
 inline constexpr std::string_view kDefaultAddress = "tcp:127.0.0.1:7300";
 
-/// Where a bench listens: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300),
+/// The address of a bench: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300),
 /// `tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE` (each file may be left out) or `unix:PATH`.
 struct Address {
   std::string host;
@@ -46,7 +46,7 @@ Address parse_address(std::string_view text);
 /// `tcp:HOST:PORT`, `tls:HOST:PORT` without the files, or `unix:PATH`.
 std::string to_string(const Address& address);
 
-/// A connected, blocking stream socket, without Nagle's delay; of a tls: address, one that leads through a
+/// Returns a connected, blocking stream socket without Nagle's delay; for a tls: address it leads through a
 /// tunnel. Throws ConnectError.
 FileDescriptor connect_to(const Address& address, std::chrono::milliseconds deadline);
 

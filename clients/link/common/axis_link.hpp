@@ -21,12 +21,12 @@ class AxisLink {
   AxisLink& operator=(const AxisLink&) = delete;
   virtual ~AxisLink() = default;
 
-  /// What the link tells of the bench. One that carries no description leaves axes without parameters and no
-  /// faults, and may not know the mode before acquire().
+  /// The description of the bench. A transport without descriptions leaves out parameters and faults, and may
+  /// not know the mode before acquire().
   virtual const v1::BenchDescription& bench() const noexcept = 0;
-  /// Which of its axes this is about.
+  /// The number of the axis.
   virtual std::uint32_t axis() const noexcept = 0;
-  /// The signals that samples carry; the other members of a Sample mean nothing.
+  /// The signals that samples carry; the other members of a Sample are undefined.
   virtual SignalMask known() const noexcept = 0;
   bool knows(std::string_view signal) const noexcept {
     const Signal* const row = find_signal(signal);
@@ -37,11 +37,11 @@ class AxisLink {
   virtual void release() = 0;
   virtual void clear_faults() = 0;
 
-  /// The newest sample, at once.
+  /// The newest sample, without waiting for a tick.
   virtual const Sample& newest() = 0;
-  /// Answers the sample of command.tick; command.axis means nothing, the link is about one. Lockstep: the
-  /// sample of tick + 1. Real time: the first sample that the link brings afterwards. A link that has no
-  /// words for one of the setpoints refuses it.
+  /// Sends the answer to the sample of command.tick; ignores command.axis. Returns in lockstep the sample of
+  /// tick + 1, in real time the first sample that arrives afterwards. A transport that cannot carry a
+  /// set-point refuses the command.
   virtual const Sample& exchange(const Command& command) = 0;
 
   virtual void write_parameter(std::string_view name, double value) = 0;
@@ -49,7 +49,7 @@ class AxisLink {
   virtual void set_load(const LoadChange& change) = 0;
 };
 
-/// For what a link has no words for: refused before anything is sent.
+/// Refuses a request that the transport cannot carry, before sending anything.
 [[noreturn]] inline void refuse(v1::RefusalCode code, std::string_view sentence,
                                 std::string_view field = {}) {
   v1::Refusal refusal;

@@ -9,22 +9,22 @@
 /// What a client asks of a bench over any link, and how the bench turns it down.
 namespace drivebench::link {
 
-/// The bench turned a request down and told why; the link goes on. what() is its sentence.
+/// The bench refused a request; the link goes on. what() is the bench's sentence.
 class Refused : public std::runtime_error {
  public:
   explicit Refused(const v1::Refusal& refusal)
       : std::runtime_error(refusal.message()), code_(refusal.code()), field_(refusal.field()) {}
 
   v1::RefusalCode code() const noexcept { return code_; }
-  const std::string& field() const noexcept { return field_; }  ///< what it is about; may be empty
+  const std::string& field() const noexcept { return field_; }  ///< the refused field; may be empty
 
  private:
   v1::RefusalCode code_;
   std::string field_;
 };
 
-/// What a controller asks of one axis, in answer to the sample of `tick`: voltages, or with GATES_CURRENT
-/// currents. A machine with fewer terminals ignores the others; `f` is the field winding.
+/// A command for an axis, in answer to the sample of `tick`: voltages, or currents with GATES_CURRENT. A
+/// machine ignores terminals that it lacks; `f` is the field winding.
 struct Command {
   std::uint32_t axis = 0;
   std::uint64_t tick = 0;
@@ -53,7 +53,7 @@ struct ParameterChange {
   std::uint64_t at_tick = 0;     ///< 0: as soon as possible
 };
 
-/// A fault to put into an axis; a value of 0 takes it away.
+/// An injected fault; a value of 0 ends it.
 struct FaultInjection {
   std::string name{};
   double value = 0.0;

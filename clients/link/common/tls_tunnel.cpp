@@ -33,7 +33,7 @@ using Tls = std::unique_ptr<SSL, decltype(&SSL_free)>;
 }
 
 Context context_for(const TlsFiles& files) {
-  // A program may end while the thread of a link still uses the library, which must not be torn down then.
+  // The library must not clean up at exit: the thread of a link may still use it.
   OPENSSL_init_crypto(OPENSSL_INIT_NO_ATEXIT, nullptr);
   Context context(SSL_CTX_new(TLS_client_method()), &SSL_CTX_free);
   if (!context) fail("no memory");
@@ -74,7 +74,7 @@ void never_wait(int fd) {
   ::fcntl(fd, F_SETFL, ::fcntl(fd, F_GETFL) | O_NONBLOCK);
 }
 
-/// For this thread: OpenSSL writes to sockets without MSG_NOSIGNAL.
+/// Ignores SIGPIPE in this thread: OpenSSL writes to sockets without MSG_NOSIGNAL.
 void ignore_broken_pipes() {
   sigset_t pipe;
   sigemptyset(&pipe);
@@ -82,7 +82,7 @@ void ignore_broken_pipes() {
   pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
 }
 
-/// Bytes on their way in one direction.
+/// A block of bytes in one direction.
 struct Block {
   std::array<char, 16 * 1024> bytes;
   std::size_t begin = 0;
@@ -117,7 +117,7 @@ class Tunnel {
   }
 
  private:
-  /// False: the connection has ended.
+  /// Returns false at the end of the connection.
   bool carry_in() {
     for (;;) {
       while (!in_.empty()) {
@@ -183,7 +183,7 @@ FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) fail("no socket pair");
   FileDescriptor ours(ends[0]);
   auto tunnel = std::make_unique<Tunnel>(std::move(socket), FileDescriptor(ends[1]), std::move(tls));
-  std::promise<std::string> shaken;  // why not, or nothing
+  std::promise<std::string> shaken;  // the error of the handshake; empty: none
   std::future<std::string> why_not = shaken.get_future();
   std::thread([tunnel = std::move(tunnel), shaken = std::move(shaken), host]() mutable {
     ignore_broken_pipes();

@@ -7,15 +7,15 @@
 
 namespace drivebench::link {
 
-/// Files in PEM. Without `ca` those certificates are trusted that the system trusts.
+/// Files in PEM. Without `ca` the system's certificates are trusted.
 struct TlsFiles {
   std::string ca;           ///< certificates of the authorities that may sign the server's
-  std::string certificate;  ///< our own, for a server that asks for one; empty: none
-  std::string key;          ///< of our certificate
+  std::string certificate;  ///< the client's certificate, if the server needs one; empty: none
+  std::string key;          ///< of the client's certificate
 };
 
-/// Speaks TLS 1.3 over a connected socket to `host`, whose certificate must be its own, and gives a plain
-/// stream socket for it. A thread carries the bytes until one of the ends is closed. Throws ConnectError.
+/// Speaks TLS 1.3 over a connected socket to `host`, whose certificate must bear that name, and returns a
+/// plain stream socket. A thread carries the bytes until one end is closed. Throws ConnectError.
 FileDescriptor tunnel_through_tls(FileDescriptor socket, const std::string& host, const TlsFiles& files,
                                   std::chrono::milliseconds deadline);
 

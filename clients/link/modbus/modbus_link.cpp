@@ -34,7 +34,7 @@ constexpr std::uint16_t address_of(Content content) {
   return row_of(content).address;
 }
 
-/// The registers from the first word of a row on, as `words` holds those from `start` on.
+/// The value of a row in `words`, which hold the registers from `start` on.
 double value_of(const Row& row, std::uint16_t start, std::span<const std::uint16_t> words) {
   return modbus::number_of(row.type,
                            modbus::get(row.type, modbus::WordOrder::kAbcd, &words[row.address - start]));
@@ -50,7 +50,7 @@ constexpr SignalMask kKnown = [] {
   return mask;
 }();
 
-/// In the numbers of the register, where 3 are duties.
+/// The mode in the numbers of the register.
 modbus::CommandMode mode_of(v1::Gates gates) {
   return gates == v1::GATES_CURRENT ? modbus::CommandMode::kCurrent : static_cast<modbus::CommandMode>(gates);
 }
@@ -129,7 +129,7 @@ ModbusLink::~ModbusLink() {
   try {
     release();  // the end of the connection alone keeps the axis for the client that has the key
   } catch (const std::exception&) {
-    return;  // then the lease runs out
+    return;  // the lease runs out
   }
 }
 
@@ -169,7 +169,7 @@ const Sample& ModbusLink::newest() {
 
 const Sample& ModbusLink::exchange(const Command& command) {
   constexpr std::span<const Row> kRows(modbus::map_detail::kMoreCommand);
-  constexpr std::uint16_t kFirst = kRows[2].address;  // behind lease and request
+  constexpr std::uint16_t kFirst = kRows[2].address;  // after lease and request
   static_assert(kRows[2].content == Content::kCommandMode);
   const bool currents = command.gates == v1::GATES_CURRENT;
   std::array<std::uint16_t, kRows.back().end() - kFirst> registers{};
@@ -231,11 +231,11 @@ void ModbusLink::check(int result, std::string_view doing) {
       break;
   }
   const std::string why = ::modbus_strerror(errno);
-  ::modbus_close(modbus_.get());  // a late answer must not pass for the next one's
+  ::modbus_close(modbus_.get());  // a late answer must not pass for that of the next request
   throw LinkError(name_ + " gave no answer about " + std::string(doing) + ": " + why);
 }
 
-/// Exception 6 has many reasons; a register tells which.
+/// Exception 6 has many reasons; a register holds the actual one.
 void ModbusLink::refuse_busy() {
   std::uint16_t why = 0;
   const bool is_read =

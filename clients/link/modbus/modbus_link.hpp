@@ -25,15 +25,15 @@ bool is_modbus_address(std::string_view text) noexcept;
 /// `modbus:HOST[:PORT][?unit=N]`; without a port 1502. Throws AddressError.
 ModbusAddress parse_modbus_address(std::string_view text);
 
-/// A controller of one axis by the registers of protocols/modbus/register_map.hpp: one transaction writes the
-/// command and reads the sample, whose real values the wire has rounded to float32. What does not fit into
-/// one transaction, a part of the truth, is not known.
+/// The link of a controller over the registers of protocols/modbus/register_map.hpp: one transaction writes
+/// the command and reads the sample, with real values as float32. A part of the truth does not fit into the
+/// transaction and is unknown.
 class ModbusLink final : public AxisLink {
  public:
-  /// Connects and reads what the bench says of itself. Throws ConnectError, Refused, LinkError.
+  /// Connects and reads the header of the map. Throws ConnectError, Refused, LinkError.
   explicit ModbusLink(const ModbusAddress& address,
                       std::chrono::milliseconds deadline = std::chrono::seconds(5));
-  /// Gives the axis back if it is still held.
+  /// Releases the axis if it is still held.
   ~ModbusLink() override;
 
   const v1::BenchDescription& bench() const noexcept override { return bench_; }

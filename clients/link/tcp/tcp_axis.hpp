@@ -10,7 +10,7 @@
 
 namespace drivebench::link {
 
-/// One axis over the wire of bench.proto, which carries everything.
+/// The link of a controller over bench.proto, which carries all signals.
 class TcpAxis final : public AxisLink {
  public:
   TcpAxis(std::unique_ptr<Link> link, std::uint32_t axis) : link_(std::move(link)), axis_(axis) {}
@@ -38,7 +38,7 @@ class TcpAxis final : public AxisLink {
   Sample sample_;
 };
 
-/// A message as a plain sample.
+/// Converts a message to a sample.
 Sample plain(const v1::Sample& message);
 
 }  // namespace drivebench::link

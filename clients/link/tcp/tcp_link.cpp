@@ -67,7 +67,7 @@ void Link::hello(const LinkOptions& options) {
 }
 
 void Link::set_deadline(std::chrono::milliseconds deadline) {
-  deadline_ = std::max(deadline, std::chrono::milliseconds(1));  // 0 would mean: wait for ever
+  deadline_ = std::max(deadline, std::chrono::milliseconds(1));  // 0 would wait for ever
   const timeval limit = {.tv_sec = deadline_.count() / 1000, .tv_usec = deadline_.count() % 1000 * 1000};
   ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   ::setsockopt(socket_.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
@@ -213,7 +213,7 @@ std::optional<v1::Samples> Link::next_samples(std::chrono::milliseconds wait) {
     if (ready > 0) {
       receive_some();
     } else {
-      return std::nullopt;  // also when a signal came: the caller may want to end
+      return std::nullopt;  // also after a signal: the caller may want to end
     }
   }
   v1::Samples oldest = std::move(kept_.front());
@@ -277,8 +277,8 @@ void Link::send(const v1::Envelope& request) {
 }
 
 const v1::Envelope& Link::await_answer() {
-  // The socket's own time-out covers silence. A peer that keeps sending something else is caught here; the
-  // clock is only looked at when the answer did not come at once, which keeps it out of the usual exchange.
+  // The socket's time-out covers silence; this deadline covers a peer that keeps sending other messages. The
+  // clock is read only if the answer does not come at once, which saves a call in most exchanges.
   std::optional<Clock::time_point> give_up;
   for (bool first = true;; first = false) {
     while (const v1::Envelope* envelope = next_envelope()) {

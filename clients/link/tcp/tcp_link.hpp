@@ -28,23 +28,23 @@ struct LinkOptions {
 
 /// The client side of the wire (protocols/bench.proto) on one blocking socket, for one thread.
 ///
-/// Every request throws Refused when the bench turns it down, and LinkError when the link fails or no answer
-/// comes in time; after a LinkError the link is closed and stays so. References to answers hold until the
-/// next request, whose arguments must not point into them. Samples of subscriptions that come in between are
-/// kept for next_samples().
+/// Every request throws Refused if the bench refuses it, and LinkError if the link fails or no answer comes
+/// in time; after a LinkError the link stays closed. References to answers are valid until the next request,
+/// whose arguments must not point into them. Samples of subscriptions that arrive meanwhile wait for
+/// next_samples().
 class Link {
  public:
   /// Connects and says hello. Throws AddressError, ConnectError, LinkError, Refused.
   explicit Link(std::string_view address, const LinkOptions& options = {});
-  /// The same over a connected stream socket; `peer` is its name in errors.
+  /// Uses a connected stream socket; `peer` is its name in errors.
   Link(FileDescriptor socket, std::string peer, const LinkOptions& options = {});
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// What the bench said of itself when the link was made.
+  /// The bench's answer to hello.
   const v1::Welcome& welcome() const noexcept { return welcome_; }
   const std::string& peer() const noexcept { return peer_; }
-  /// For all further answers. A lockstep exchange may have to wait for the controllers of other axes.
+  /// Sets the deadline of later answers. A lockstep exchange may wait for the controllers of other axes.
   void set_deadline(std::chrono::milliseconds deadline);
 
   /// Commands in, samples out: see Exchange in bench.proto. Lockstep: tick k runs, sample k+1 comes back.
@@ -63,21 +63,21 @@ class Link {
   /// token is no longer valid.
   std::vector<v1::Notice> take_notices() { return std::exchange(notices_, {}); }
 
-  /// All parameters if no names are given.
+  /// Without names: all parameters.
   const v1::ParameterValues& read_parameters(std::uint32_t axis, std::span<const std::string> names = {});
-  // These give the tick at whose start the request was carried out.
+  // These return the tick at whose start the request took effect.
   std::uint64_t write_parameter(std::uint32_t axis, const ParameterChange& change);
   std::uint64_t inject_fault(std::uint32_t axis, const FaultInjection& fault);
-  /// A blow on the shaft, positive like a machine torque.
+  /// A torque impulse on the shaft, positive like a machine torque.
   std::uint64_t bump_shaft(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick = 0);
   std::uint64_t set_load(std::uint32_t axis, const LoadChange& change);
   std::uint64_t clear_faults(std::uint32_t axis);
 
   const v1::Status& status();
 
-  /// Every `decimation`-th tick from now on; 0 ends the subscription. No signals: all.
+  /// Subscribes to every `decimation`-th tick; 0 ends the subscription. Without signals: all.
   void subscribe(std::uint32_t axis, std::uint32_t decimation, std::span<const std::string> signals = {});
-  /// The oldest samples that were sent and not yet taken; nothing if none come within `wait`.
+  /// The oldest samples not yet taken; nothing if none come within `wait`.
   std::optional<v1::Samples> next_samples(std::chrono::milliseconds wait);
 
   // ---- experiments: see bench.proto ----
@@ -85,13 +85,14 @@ class Link {
   v1::TableInfo upload_table(const v1::UploadTable& rows);
   v1::ExperimentList list_experiments(const std::string& owner);
   v1::ExperimentInfo cancel_experiment(std::uint64_t id, const std::string& owner);
-  /// Begins to receive; until the last ExperimentInfo, which says that the experiment has ended, there may be
-  /// no other request.
+  /// Begins to receive. No other request is allowed before the last ExperimentInfo, which has the state of
+  /// the end.
   v1::ExperimentInfo begin_fetch(const v1::FetchExperiment& wanted);
   /// The next message, an ExperimentData or an ExperimentInfo.
   const v1::Envelope& next_of_fetch();
 
-  /// Samples kept for next_samples() at most; beyond it the oldest messages go, and are counted as dropped.
+  /// The most samples that wait for next_samples(); beyond it the oldest messages are lost and counted as
+  /// dropped.
   static constexpr std::size_t kMaxKeptSamples = 65536;
 
  private:
@@ -114,12 +115,12 @@ class Link {
   std::uint64_t last_id_ = 0;
   std::vector<std::byte> out_;
   FrameReader reader_;
-  std::vector<char> first_block_;  // what the arena starts with: an exchange needs no other memory
+  std::vector<char> first_block_;  // the arena's first block, large enough for an exchange
   google::protobuf::Arena arena_;  // holds one request and its answer
   std::deque<v1::Samples> kept_;
   std::size_t kept_samples_ = 0;
   std::vector<v1::Notice> notices_;
-  std::uint64_t dropped_ = 0;  // samples lost from kept_ since the last one taken
+  std::uint64_t dropped_ = 0;  // samples lost from kept_ since the last call
 };
 
 }  // namespace drivebench::link

@@ -129,7 +129,7 @@ class Observing(CommandTest):
     def test_status_follows_the_bench(self):
         """Catches: a status from the start of the run, or without the state of the axis."""
         said = self.drivebench("status", link=self.link).stdout
-        self.assertSays(said, "lockstep, tick 0", "1 session", "not recording", "axis 0 (servo): idle", "owner nobody",
+        self.assertSays(said, "lockstep, tick 0", "1 session", "not recording", "axis 0 (servo): idle", "owner none",
                         "faults none")
         with self.bench.client() as client:
             client.lease()

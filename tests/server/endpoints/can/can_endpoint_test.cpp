@@ -434,8 +434,8 @@ TEST(CanEndpoint, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
   EXPECT_NE(text.find("cannot accept a CAN client"), std::string::npos) << text;
 }
 
-// Catches: two benches that talk over each other, an owner whose commands go to both, or an axis that
-// is given to a controller which never hears of it.
+// Catches: two benches that send the same identifiers, a controller whose commands reach both, or an axis
+// that is given to a controller without an answer.
 TEST(CanEndpoint, CAN_11_AnotherBenchWithTheSameIdentifiersSilencesThisOne) {
   CanBench bench;
   bench.acquire();
