@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "plant/math/frames.hpp"
+#include "protocols/signals/command.hpp"
 
 /// What a machine shows to the drive and to the shaft, whatever its kind.
 namespace drivebench {
@@ -27,15 +28,6 @@ enum class Field : std::int64_t {
   kNone,          ///< there is none: magnets or a cage
   kOnArmature,    ///< fed from the terminals of the armature; its current can be measured
   kOwnTerminals,  ///< the same with terminals of its own, which a command drives
-};
-
-/// One value for each terminal: phases a, b, c and the field. A machine with fewer terminals leaves the
-/// others at zero; an armature is phase a.
-struct PhaseValues {
-  double a = 0.0;
-  double b = 0.0;
-  double c = 0.0;
-  double field = 0.0;
 };
 
 /// One value for each winding. The stator is in two-phase, power-invariant coordinates; `zero` is the third

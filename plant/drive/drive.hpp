@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "plant/drive/amplifier.hpp"
-#include "plant/drive/command.hpp"
 #include "plant/drive/current_loop.hpp"
 #include "plant/drive/dc_bus.hpp"
 #include "plant/drive/inverter.hpp"
@@ -16,6 +15,7 @@
 #include "plant/drive/terminal_drive.hpp"
 #include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
+#include "protocols/signals/command.hpp"
 
 namespace drivebench {
 

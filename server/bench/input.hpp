@@ -9,17 +9,12 @@
 #include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
 #include "protocols/refusals.hpp"
+#include "protocols/signals/command.hpp"
 
 namespace drivebench {
 
 /// Number of a session; 0: no session.
 using Owner = std::uint64_t;
-
-/// What a controller asks for, in answer to the sample of `answers`.
-struct Command {
-  Tick answers = -1;
-  PhaseCommand phases;
-};
 
 /// What a session does with the lease of an axis.
 enum class LeaseAction : std::uint32_t {

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "plant/drive/command.hpp"
 #include "plant/tick.hpp"
 #include "plant/windings.hpp"
+#include "protocols/signals/command.hpp"
 
 namespace drivebench {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "clients/control/loop/controller.hpp"
-#include "plant/drive/command.hpp"
+#include "protocols/signals/command.hpp"
 #include "protocols/signals/sample.hpp"
 
 namespace drivebench {
