@@ -14,14 +14,14 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import frame, pb
-from wire_test import TWO_AXES, WireTest, until
+from wire_test import PATIENT_TEXT, TWO_AXES, WireTest, until
 
 
 class Senders(WireTest):
     def test_cmd_10_commands_that_no_tick_can_use_are_counted_and_throttled(self):
         """Catches: a flood that takes the time of all others, drives the axis with its last command, or is not
         counted."""
-        server = self.server("--mode", "realtime")
+        server = self.server("--mode", "realtime", text=PATIENT_TEXT)
         owner, watcher = self.client(server), self.client(server)
         owner.lease()
 
@@ -47,9 +47,11 @@ class Senders(WireTest):
         self.assertGreaterEqual(refused, 1)
         self.assertEqual(watcher.tcp_counts()["excess_commands"], refused)
         self.assertEqual(watcher.tcp_counts()["throttled"], 0, "ten at once are allowed")
-        for _ in range(3):
+        for _ in range(30):  # a busy machine reads some bursts slowly enough to be no flood
             refused += burst(1500)
-        until(lambda: watcher.tcp_counts()["throttled"] > 0, "the flood is throttled")
+            if watcher.tcp_counts()["throttled"] > 0:
+                break
+        self.assertGreater(watcher.tcp_counts()["throttled"], 0, "the flood is throttled")
         counts = watcher.tcp_counts()
         self.assertEqual(counts["excess_commands"], refused)
         started = watcher.newest().tick
