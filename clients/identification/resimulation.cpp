@@ -28,7 +28,7 @@ struct Measured {
   double voltage_shift;
   double pole_pairs;
 
-  Measured(const MeasuredData& data, const Experiment& e)
+  Measured(const MeasuredData& data, const Settings& e)
       : shaft(shaft_signals(data, e)), voltage_shift(e.processing.voltage_shift), pole_pairs(e.pole_pairs) {
     const std::size_t phases = e.kind == MotorKind::kDc                      ? 1
                                : e.kind == MotorKind::kBldc || e.three_phase ? 3
@@ -190,7 +190,7 @@ std::complex<double> flux_of(const InductionModel& model, const InductionInstant
 }
 
 Resimulation run_induction(const InductionModel& model, const Measured& m, const MeasuredData& data,
-                           const Experiment& e, const SampleRange& range) {
+                           const Settings& e, const SampleRange& range) {
   if (begins_at_rest(m)) return run(model, {}, m, data, range, true);
   const std::size_t start = range.first;
   const MotorInput in = m.input(static_cast<double>(start));
@@ -215,7 +215,7 @@ void check(const Result& result) {
 
 }  // namespace
 
-Resimulation resimulate(const MeasuredData& data, const Experiment& e, const Result& result) {
+Resimulation resimulate(const MeasuredData& data, const Settings& e, const Result& result) {
   check(result);
   const SampleRange range = window_of(data, e.processing);
   const Measured m(data, e);

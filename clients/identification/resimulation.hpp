@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
 
@@ -36,6 +36,6 @@ struct Resimulation {
 /// with the state that the signals show. Nothing else is measured, except that the angle of a PM or brushless
 /// motor, which turns its frame or commutates it, is the measured one: its voltages were made for that angle.
 /// Throws IdentificationError if an estimate is no value for a motor or the run leaves all bounds.
-Resimulation resimulate(const MeasuredData& data, const Experiment& experiment, const Result& result);
+Resimulation resimulate(const MeasuredData& data, const Settings& settings, const Result& result);
 
 }  // namespace drivebench::identification

@@ -14,20 +14,21 @@
 #include "clients/command/identify/identify_json.hpp"
 #include "clients/command/identify/identify_report.hpp"
 #include "clients/command/identify/identify_server.hpp"
-#include "clients/identification/experiments/named_experiments.hpp"
+#include "clients/identification/identify.hpp"
 #include "clients/identification/motors/motors.hpp"
+#include "clients/identification/named_experiments.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
 
-using identification::Experiment;
 using identification::IdentificationError;
 using identification::LoadModel;
 using identification::MotorKind;
 using identification::MotorName;
 using identification::NamedExperiment;
+using identification::Settings;
 
 int print_list(bool json) {
   if (json) {
@@ -95,7 +96,7 @@ void set_window(const std::string& text, identification::Processing& p) {
 }
 
 /// What the command line says goes before what is known otherwise.
-void apply_options(const IdentifyOptions& o, Experiment& e) {
+void apply_options(const IdentifyOptions& o, Settings& e) {
   identification::Processing& p = e.processing;
   if (o.pole_pairs) e.pole_pairs = *o.pole_pairs;
   if (o.counts_per_revolution) e.counts_per_revolution = *o.counts_per_revolution;
@@ -122,9 +123,9 @@ Measurement measurement(const IdentifyOptions& options, const MotorName& motor,
   return m;
 }
 
-Experiment settings(const IdentifyOptions& options, const MotorName& motor, const NamedExperiment* named,
-                    const Measurement& m) {
-  Experiment e = experiment_of(motor.kind, m.facts, m.data.period_s);
+Settings settings(const IdentifyOptions& options, const MotorName& motor, const NamedExperiment* named,
+                  const Measurement& m) {
+  Settings e = settings_of(motor.kind, m.facts, m.data.period_s);
   if (m.drive.empty())
     e.processing.voltage_shift = usual_processing(motor.kind, m.data.period_s).voltage_shift;
   if (named != nullptr) apply(*named, e);
@@ -142,14 +143,14 @@ void check_foreign(const IdentifyOptions& options, const MotorName& motor, const
     throw UsageError("--pole-pairs is missing: the file does not say how many the motor has");
 }
 
-void compare(const Measurement& m, const Experiment& e, identification::Result& result) {
+void compare(const Measurement& m, const Settings& e, identification::Result& result) {
   auto truth = truth_of(e.kind, m.bench);
   if (truth.empty()) return;
   add_load_truth(m.data, e, truth);
   result.compare(truth);
 }
 
-IdentifyReport identified(const MotorName& motor, Measurement m, const Experiment& e) {
+IdentifyReport identified(const MotorName& motor, Measurement m, const Settings& e) {
   IdentifyReport report{.motor = std::string(motor.name),
                         .source = m.source,
                         .period_s = m.data.period_s,
@@ -234,7 +235,7 @@ int run_identify(const IdentifyOptions& options) {
   Measurement m = measurement(options, motor, named);
   check_foreign(options, motor, m);
   if (!options.data_file.empty()) write(options.data_file, csv_of(m.data));
-  const Experiment e = settings(options, motor, named, m);
+  const Settings e = settings(options, motor, named, m);
   IdentifyReport report;
   try {
     report = identified(motor, m, e);

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "clients/identification/measured_data.hpp"
+#include "clients/identification/data/measured_data.hpp"
 #include "clients/identification/motors/motors.hpp"
 
 namespace drivebench::command {

@@ -4,7 +4,7 @@
 
 #include "clients/command/common/json.hpp"
 #include "clients/command/experiment/experiment_json.hpp"
-#include "clients/identification/experiments/named_experiments.hpp"
+#include "clients/identification/named_experiments.hpp"
 
 namespace drivebench::command {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/identification/measured_data.hpp"
+#include "clients/identification/data/measured_data.hpp"
 
 /// How the columns of any CSV file become signals of the catalogue.
 namespace drivebench::command {

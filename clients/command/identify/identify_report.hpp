@@ -4,9 +4,9 @@
 #include <string>
 
 #include "clients/command/identify/identify_data.hpp"
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/result.hpp"
+#include "clients/identification/data/settings.hpp"
 #include "clients/identification/resimulation.hpp"
-#include "clients/identification/result.hpp"
 
 namespace drivebench::command {
 
@@ -15,7 +15,7 @@ struct IdentifyReport {
   std::string motor;  ///< as the command line names its kind
   std::string source;
   double period_s = 0.0;
-  identification::Experiment settings;
+  identification::Settings settings;
   identification::Result result;
   std::optional<identification::Resimulation> validation;
   std::string validation_problem;  ///< why there is none

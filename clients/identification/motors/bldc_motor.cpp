@@ -1,10 +1,10 @@
 #include "clients/identification/motors/bldc_motor.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <numbers>
 #include <string>
+
+#include "clients/models/bldc_machine.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -19,11 +19,11 @@ struct BldcSignals {
   ShaftSignals shaft;
 };
 
-BldcSignals prepare(const MeasuredData& data, const Experiment& experiment) {
-  const Processing& p = experiment.processing;
+BldcSignals prepare(const MeasuredData& data, const Settings& settings) {
+  const Processing& p = settings.processing;
   const std::size_t n = data.samples();
   BldcSignals s;
-  s.shaft = shaft_signals(data, experiment);
+  s.shaft = shaft_signals(data, settings);
   s.torque.assign(n, 0.0);
   std::array<Series, 3> u;
   std::array<SeriesView, 3> i;
@@ -36,8 +36,9 @@ BldcSignals prepare(const MeasuredData& data, const Experiment& experiment) {
   for (std::size_t k = 0; k < n; ++k) {
     std::array<double, 3> e{};
     for (std::size_t phase = 0; phase < 3; ++phase)
-      e[phase] = back_emf_shape(experiment.pole_pairs * s.shaft.angle[k] -
-                                static_cast<double>(phase) * 2.0 * std::numbers::pi / 3.0);
+      e[phase] = trapezoid_at_turns((settings.pole_pairs * s.shaft.angle[k] -
+                                     static_cast<double>(phase) * 2.0 * std::numbers::pi / 3.0) /
+                                    (2.0 * std::numbers::pi));
     const double mean_e = (e[0] + e[1] + e[2]) / 3.0;
     const double mean_u = (u[0][k] + u[1][k] + u[2][k]) / 3.0;
     for (std::size_t phase = 0; phase < 3; ++phase) {
@@ -58,14 +59,9 @@ BldcSignals prepare(const MeasuredData& data, const Experiment& experiment) {
 
 }  // namespace
 
-double back_emf_shape(double electrical_rad) {
-  const double turns = electrical_rad / (2.0 * std::numbers::pi) - 0.25;
-  return std::clamp(3.0 - 12.0 * std::abs(turns - std::round(turns)), -1.0, 1.0);
-}
-
-Result identify_bldc_motor(const MeasuredData& data, const Experiment& experiment) {
-  const SampleRange range = window_of(data, experiment.processing);
-  const BldcSignals s = prepare(data, experiment);
+Result identify_bldc_motor(const MeasuredData& data, const Settings& settings) {
+  const SampleRange range = window_of(data, settings.processing);
+  const BldcSignals s = prepare(data, settings);
   Regression electrical({"R_S", "L+M", "tau_p"});
   for (std::size_t k = range.first; k < range.end; ++k) {
     for (std::size_t phase = 0; phase < 3; ++phase)

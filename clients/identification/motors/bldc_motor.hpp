@@ -1,12 +1,8 @@
 #pragma once
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
-
-/// e over the electrical angle: 0 at 0, rising to 1 at 30 degrees, falling from 150 degrees. Source: Chiasson
-/// 2005, (10.7)-(10.8); tag BL-02.
-double back_emf_shape(double electrical_rad);
 
 /// R_S, L+M, tau_p, J, f of a brushless DC motor in an isolated star by least squares on
 ///   (L+M) i_k' + R i_k - tau_p w (e_k - e_mean) = u_k - u_mean        k = 1, 2, 3
@@ -15,6 +11,6 @@ double back_emf_shape(double electrical_rad);
 /// has the sense of the terminal voltage: motoring currents are opposite to it. Every product is formed first
 /// and filtered then, as the corners of e would not survive the other order. Source: Chiasson 2005, chapter
 /// 10; tag BL-01.
-Result identify_bldc_motor(const MeasuredData& data, const Experiment& experiment);
+Result identify_bldc_motor(const MeasuredData& data, const Settings& settings);
 
 }  // namespace drivebench::identification

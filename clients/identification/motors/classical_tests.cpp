@@ -5,7 +5,7 @@
 #include <complex>
 #include <numbers>
 
-#include "clients/identification/experiments/signals.hpp"
+#include "clients/identification/data/signals.hpp"
 
 namespace drivebench::identification {
 namespace {

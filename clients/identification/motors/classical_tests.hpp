@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "clients/identification/measured_data.hpp"
-#include "clients/identification/result.hpp"
+#include "clients/identification/data/measured_data.hpp"
+#include "clients/identification/data/result.hpp"
 
 namespace drivebench::identification {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
 
@@ -8,6 +8,6 @@ namespace drivebench::identification {
 ///   L i' + R i + K_T w = v
 ///   J w' + f w - K_T i = 0
 /// with current, voltage and angle through the same filter. Source: Chiasson 2005, 2.7; tags IDN-01..03.
-Result identify_dc_motor(const MeasuredData& data, const Experiment& experiment);
+Result identify_dc_motor(const MeasuredData& data, const Settings& settings);
 
 }  // namespace drivebench::identification

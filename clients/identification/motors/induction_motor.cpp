@@ -43,7 +43,7 @@ double torque_signal(const InductionInstant& s, const InductionParameters& p, do
 }
 
 Mechanical mechanical_parameters(const std::vector<InductionInstant>& instants, const InductionParameters& p,
-                                 double gamma, const MeasuredData& data, const Experiment& e,
+                                 double gamma, const MeasuredData& data, const Settings& e,
                                  const SampleRange& range) {
   Series torque;
   for (const InductionInstant& s : instants)
@@ -58,7 +58,7 @@ Mechanical mechanical_parameters(const std::vector<InductionInstant>& instants, 
           found.index_quarter[1], found.error_index, found.excitation};
 }
 
-void add_mechanical(Result& result, const Mechanical& m, const Experiment& e) {
+void add_mechanical(Result& result, const Mechanical& m, const Settings& e) {
   const double inertia = e.pole_pairs / m.k16;
   const bool viscous = e.load == LoadModel::kViscous;
   result.parameters.push_back({"J", "kg*m^2", inertia, inertia * m.index16 / std::abs(m.k16), {}});
@@ -128,7 +128,7 @@ std::vector<double> induction_indices(const InductionMinimum& m) {
   return reach(m.hessian, {of_r, of_t, of_l, of_sigma, of_m, of_rotor}, 0.5 * m.residual);
 }
 
-Result identify_induction_motor(const MeasuredData& data, const Experiment& e) {
+Result identify_induction_motor(const MeasuredData& data, const Settings& e) {
   const SampleRange range = window_of(data, e.processing);
   const std::vector<InductionInstant> instants = induction_instants(data, e);
   Regression fit(induction_parameter_names());

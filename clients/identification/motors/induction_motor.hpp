@@ -1,6 +1,6 @@
 #pragma once
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 #include "clients/identification/motors/induction_search.hpp"
 
 namespace drivebench::identification {
@@ -28,6 +28,6 @@ std::vector<double> induction_indices(const InductionMinimum& minimum);
 ///   w' = K_16 (phi_x i_y - phi_y i_x) - K_17 {w or 1},   K_16 = n_p/J, K_17 = f/J or tau_L/J,
 /// with the flux phi = (M/L_R) psi worked out from the measured signals (8.123); both sides pass the filter
 /// of the shaft. Tags IMID-01..04.
-Result identify_induction_motor(const MeasuredData& data, const Experiment& experiment);
+Result identify_induction_motor(const MeasuredData& data, const Settings& settings);
 
 }  // namespace drivebench::identification

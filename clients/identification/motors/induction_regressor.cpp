@@ -46,7 +46,7 @@ InductionEquations induction_equations(const InductionInstant& q, double n) noex
           .y = q.bend_y + n * q.i_x * dw + n * w * q.slope_x};
 }
 
-std::vector<InductionInstant> induction_instants(const MeasuredData& data, const Experiment& e) {
+std::vector<InductionInstant> induction_instants(const MeasuredData& data, const Settings& e) {
   const Processing& p = e.processing;
   const double period = data.period_s;
   const ShaftSignals shaft = shaft_signals(data, e);

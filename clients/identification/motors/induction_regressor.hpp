@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
 
@@ -56,7 +56,7 @@ struct InductionEquations {
 InductionEquations induction_equations(const InductionInstant& s, double pole_pairs) noexcept;
 
 /// Every sample of the data as such an instant, filtered as the experiment says.
-std::vector<InductionInstant> induction_instants(const MeasuredData& data, const Experiment& experiment);
+std::vector<InductionInstant> induction_instants(const MeasuredData& data, const Settings& settings);
 
 /// Names K1 .. K15.
 std::vector<std::string> induction_parameter_names();

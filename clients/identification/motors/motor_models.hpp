@@ -1,12 +1,18 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <numbers>
 
-#include "clients/identification/motors/bldc_motor.hpp"
-#include "clients/identification/result.hpp"
+#include "clients/identification/data/result.hpp"
+#include "clients/identification/data/settings.hpp"
+#include "clients/models/bldc_machine.hpp"
+#include "clients/models/dc_machine.hpp"
+#include "clients/models/pm_machine.hpp"
+#include "clients/models/two_phase.hpp"
 
 /// The motors of the identification methods as differential equations, for re-simulation: parameters as
 /// estimated, inputs as measured.
@@ -19,36 +25,36 @@ struct MotorInput {
   double electrical_rad = 0.0;  ///< the measured angle times the pole pairs
 };
 
-/// Amplitudes of a power-invariant transform of three phases; of a two-phase machine as they are. Tag P3-02.
+/// The two-phase equivalent of a star, or the phases of a two-phase machine, as a complex number; and back.
 inline std::complex<double> two_phase_of(const std::array<double, 3>& x, bool three_phase) noexcept {
   if (!three_phase) return {x[0], x[1]};
-  return {std::sqrt(2.0 / 3.0) * (x[0] - 0.5 * (x[1] + x[2])), std::sqrt(0.5) * (x[1] - x[2])};
+  const PhasePair pair = drivebench::two_phase_of(x[0], x[1], x[2]);
+  return {pair.a, pair.b};
 }
 inline std::array<double, 3> phases_of(std::complex<double> x, bool three_phase) noexcept {
   if (!three_phase) return {x.real(), x.imag(), 0.0};
-  const double a = std::sqrt(2.0 / 3.0) * x.real();
-  const double b = std::sqrt(0.5) * x.imag();
-  return {a, b - 0.5 * a, -b - 0.5 * a};
+  return three_phases_of({.a = x.real(), .b = x.imag()});
 }
 
-/// L i' + R i + K_T w = u,   J w' + f w = K_T i. Source: Chiasson 2005, 2.7.
+/// The equations of DcMachineModel.
 struct DcModel {
   using State = std::array<double, 2>;  // i, w
   static constexpr std::size_t kSpeed = 1;
-  double resistance, inductance, constant, inertia, friction;
+  DcMachineModel m;
 
   explicit DcModel(const Result& r)
-      : resistance(r.at("R")),
-        inductance(r.at("L")),
-        constant(r.at("K_T")),
-        inertia(r.at("J")),
-        friction(r.at("f")) {}
+      : m{.resistance_ohm = r.at("R"),
+          .inductance_h = r.at("L"),
+          .torque_constant_nm_per_a = r.at("K_T"),
+          .inertia_kgm2 = r.at("J"),
+          .friction_nms = r.at("f")} {}
   double fastest_rate(double) const noexcept {
-    return resistance / inductance + constant / std::sqrt(inductance * inertia);
+    return m.resistance_ohm / m.inductance_h +
+           m.torque_constant_nm_per_a / std::sqrt(m.inductance_h * m.inertia_kgm2);
   }
   State slope(const State& x, const MotorInput& in) const noexcept {
-    return {(in.u[0] - resistance * x[0] - constant * x[1]) / inductance,
-            (constant * x[0] - friction * x[1]) / inertia};
+    return {(in.u[0] - m.resistance_ohm * x[0] - m.torque_constant_nm_per_a * x[1]) / m.inductance_h,
+            (m.torque_constant_nm_per_a * x[0] - m.friction_nms * x[1]) / m.inertia_kgm2};
   }
   void settle(State&, const State&) const noexcept {}
   std::array<double, 3> currents(const State& x, const MotorInput&) const noexcept {
@@ -59,7 +65,8 @@ struct DcModel {
   }
 };
 
-/// In the stator's frame, phi = (M/L_R) psi_R:
+/// In the four numbers that the terminals show, so not those of InductionMotorModel, in the stator's frame,
+/// phi = (M/L_R) psi_R:
 ///   sigma L_S i' = u - sigma L_S gamma i + (1/T_R - j n_p w) phi,   phi' = -(1/T_R - j n_p w) phi +
 ///   (1 - sigma) L_S/T_R i,   J w' = n_p Im(phi* i) - {f w or tau_L}. Source: Chiasson 2005, (8.4)-(8.6).
 struct InductionModel {
@@ -68,7 +75,7 @@ struct InductionModel {
   double transient_h, gamma, rotor_rate, magnetising_h, inertia, friction = 0.0, load = 0.0, pole_pairs;
   bool three_phase;
 
-  InductionModel(const Result& r, const Experiment& e)
+  InductionModel(const Result& r, const Settings& e)
       : transient_h(r.at("sigma") * r.at("L_S")),
         gamma((r.at("R_S") + (1.0 - r.at("sigma")) * r.at("L_S") / r.at("T_R")) / transient_h),
         rotor_rate(1.0 / r.at("T_R")),
@@ -100,85 +107,89 @@ struct InductionModel {
   }
 };
 
-/// In the magnet's frame, whose angle is the measured one:
-///   L i_d' = u_d - R i_d + n_p w L i_q,   L i_q' = u_q - R i_q - n_p w L i_d - K_m w,
+/// The equations of PmMachineModel in the magnet's frame, whose angle is the measured one, with dry friction:
 ///   J w' = K_m i_q - f w - f_c sgn w; at standstill f_c holds what is smaller. Source: Chiasson 2005,
 ///   (9.104).
 struct PmModel {
   using State = std::array<double, 3>;  // i_d, i_q, w
   static constexpr std::size_t kSpeed = 2;
-  double resistance, inductance, constant, inertia, friction, coulomb, pole_pairs;
-  bool three_phase;
+  PmMachineModel m;
+  double coulomb_nm;
 
-  PmModel(const Result& r, const Experiment& e)
-      : resistance(r.at("R_S")),
-        inductance(r.at("L_S")),
-        constant(r.at("K_m")),
-        inertia(r.at("J")),
-        friction(r.at("f")),
-        coulomb(std::max(0.0, r.at("f_c"))),
-        pole_pairs(e.pole_pairs),
-        three_phase(e.three_phase) {}
+  PmModel(const Result& r, const Settings& settings)
+      : m{.pole_pairs = static_cast<double>(settings.pole_pairs),
+          .resistance_ohm = r.at("R_S"),
+          .inductance_h = r.at("L_S"),
+          .torque_constant_nm_per_a = r.at("K_m"),
+          .friction_nms = r.at("f"),
+          .inertia_kgm2 = r.at("J"),
+          .star = settings.three_phase},
+        coulomb_nm(std::max(0.0, r.at("f_c"))) {}
   double fastest_rate(double speed) const noexcept {
-    return resistance / inductance + pole_pairs * std::abs(speed) +
-           constant / std::sqrt(inductance * inertia);
+    return m.resistance_ohm / m.inductance_h + m.pole_pairs * std::abs(speed) +
+           m.torque_constant_nm_per_a / std::sqrt(m.inductance_h * m.inertia_kgm2);
   }
   State slope(const State& x, const MotorInput& in) const noexcept {
-    const std::complex<double> u = two_phase_of(in.u, three_phase) * std::polar(1.0, -in.electrical_rad);
-    const double omega_e = pole_pairs * x[2];
-    return {(u.real() - resistance * x[0]) / inductance + omega_e * x[1],
-            (u.imag() - resistance * x[1] - constant * x[2]) / inductance - omega_e * x[0],
-            (constant * x[1] - friction * x[2] - friction_torque(x)) / inertia};
+    const std::complex<double> u = two_phase_of(in.u, m.star) * std::polar(1.0, -in.electrical_rad);
+    const double omega_e = m.pole_pairs * x[2];
+    return {
+        (u.real() - m.resistance_ohm * x[0]) / m.inductance_h + omega_e * x[1],
+        (u.imag() - m.resistance_ohm * x[1] - m.torque_constant_nm_per_a * x[2]) / m.inductance_h -
+            omega_e * x[0],
+        (m.torque_constant_nm_per_a * x[1] - m.friction_nms * x[2] - friction_torque_nm(x)) / m.inertia_kgm2};
   }
   /// A shaft that comes to rest within a step stays there if friction can hold it.
   void settle(State& x, const State& before) const noexcept {
-    if (x[2] * before[2] < 0.0 && std::abs(constant * x[1]) <= coulomb) x[2] = 0.0;
+    if (x[2] * before[2] < 0.0 && std::abs(m.torque_constant_nm_per_a * x[1]) <= coulomb_nm) x[2] = 0.0;
   }
   std::array<double, 3> currents(const State& x, const MotorInput& in) const noexcept {
-    return phases_of(std::complex<double>(x[0], x[1]) * std::polar(1.0, in.electrical_rad), three_phase);
+    return phases_of(std::complex<double>(x[0], x[1]) * std::polar(1.0, in.electrical_rad), m.star);
   }
   State state_of(const std::array<double, 3>& i, double speed, const MotorInput& in) const noexcept {
-    const std::complex<double> dq = two_phase_of(i, three_phase) * std::polar(1.0, -in.electrical_rad);
+    const std::complex<double> dq = two_phase_of(i, m.star) * std::polar(1.0, -in.electrical_rad);
     return {dq.real(), dq.imag(), speed};
   }
 
  private:
-  double friction_torque(const State& x) const noexcept {
-    if (x[2] != 0.0) return std::copysign(coulomb, x[2]);
-    return std::clamp(constant * x[1], -coulomb, coulomb);
+  double friction_torque_nm(const State& x) const noexcept {
+    if (x[2] != 0.0) return std::copysign(coulomb_nm, x[2]);
+    return std::clamp(m.torque_constant_nm_per_a * x[1], -coulomb_nm, coulomb_nm);
   }
 };
 
-/// (L+M) i_k' = u_k - u_mean - R i_k + tau_p w (e_k - e_mean),   J w' = -tau_p sum e_k i_k - f w, with e at
-/// the measured angle. Source: Chiasson 2005, chapter 10; tag BL-01.
+/// The equations of BldcMachineModel, with e at the measured angle.
 struct BldcModel {
   using State = std::array<double, 4>;  // i_a, i_b, i_c, w
   static constexpr std::size_t kSpeed = 3;
-  double resistance, inductance, constant, inertia, friction;
+  BldcMachineModel m;
 
   explicit BldcModel(const Result& r)
-      : resistance(r.at("R_S")),
-        inductance(r.at("L+M")),
-        constant(r.at("tau_p")),
-        inertia(r.at("J")),
-        friction(r.at("f")) {}
+      : m{.pole_pairs = 1.0,
+          .resistance_ohm = r.at("R_S"),
+          .torque_constant_nm_per_a = r.at("tau_p"),
+          .friction_nms = r.at("f"),
+          .inertia_kgm2 = r.at("J"),
+          .inductance_h = r.at("L+M")} {}
   double fastest_rate(double) const noexcept {
-    return resistance / inductance + 2.0 * constant / std::sqrt(inductance * inertia);
+    return m.resistance_ohm / m.inductance_h +
+           2.0 * m.torque_constant_nm_per_a / std::sqrt(m.inductance_h * m.inertia_kgm2);
   }
   State slope(const State& x, const MotorInput& in) const noexcept {
     constexpr double kThird = 2.0943951023931953;
     std::array<double, 3> e{};
     for (std::size_t k = 0; k < 3; ++k)
-      e[k] = back_emf_shape(in.electrical_rad - static_cast<double>(k) * kThird);
+      e[k] = trapezoid_at_turns((in.electrical_rad - static_cast<double>(k) * kThird) /
+                                (2.0 * std::numbers::pi));
     const double e_mean = (e[0] + e[1] + e[2]) / 3.0;
     const double u_mean = (in.u[0] + in.u[1] + in.u[2]) / 3.0;
     State dx{};
-    double torque = 0.0;
+    double torque_nm = 0.0;
     for (std::size_t k = 0; k < 3; ++k) {
-      dx[k] = (in.u[k] - u_mean - resistance * x[k] + constant * x[3] * (e[k] - e_mean)) / inductance;
-      torque -= constant * e[k] * x[k];
+      const double emf_v = m.torque_constant_nm_per_a * x[3] * (e[k] - e_mean);
+      dx[k] = (in.u[k] - u_mean - m.resistance_ohm * x[k] + emf_v) / m.inductance_h;
+      torque_nm -= m.torque_constant_nm_per_a * e[k] * x[k];
     }
-    dx[3] = (torque - friction * x[3]) / inertia;
+    dx[3] = (torque_nm - m.friction_nms * x[3]) / m.inertia_kgm2;
     return dx;
   }
   void settle(State&, const State&) const noexcept {}

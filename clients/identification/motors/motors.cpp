@@ -133,12 +133,12 @@ void take_facts(const BenchParameters& bench, std::string_view drive, int subste
   }
 }
 
-Experiment experiment_of(MotorKind kind, const MeasurementFacts& facts, double period_s) {
-  Experiment e{.kind = kind,
-               .pole_pairs = facts.pole_pairs,
-               .three_phase = facts.three_phase,
-               .counts_per_revolution = facts.counts_per_revolution,
-               .half_count = facts.half_count};
+Settings settings_of(MotorKind kind, const MeasurementFacts& facts, double period_s) {
+  Settings e{.kind = kind,
+             .pole_pairs = facts.pole_pairs,
+             .three_phase = facts.three_phase,
+             .counts_per_revolution = facts.counts_per_revolution,
+             .half_count = facts.half_count};
   e.processing = usual_processing(kind, period_s);
   e.processing.voltage_shift = 0.5 * facts.voltage_held_ticks / std::max(1, facts.decimation);
   return e;
@@ -163,7 +163,7 @@ Truth truth_of(MotorKind kind, const BenchParameters& bench) {
   return truth;
 }
 
-void add_load_truth(const MeasuredData& data, const Experiment& e, Truth& truth) {
+void add_load_truth(const MeasuredData& data, const Settings& e, Truth& truth) {
   const auto inertia = truth.find("J");
   const auto friction = truth.find("f");
   if (e.kind != MotorKind::kInduction || inertia == truth.end()) return;

@@ -5,13 +5,13 @@
 #include <string>
 #include <string_view>
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
 
 /// A kind of motor that can be identified, as command lines and motor files name it.
 struct MotorName {
-  std::string_view name;     ///< for people who type: im
+  std::string_view name;     ///< for command lines: im
   std::string_view machine;  ///< in motor files and descriptions of a bench: induction
   std::string_view meaning;
   MotorKind kind;
@@ -50,7 +50,7 @@ struct MeasurementFacts {
 void take_facts(const BenchParameters& bench, std::string_view drive, int substeps, MeasurementFacts& facts);
 
 /// Kind, facts and filters that suit both. `voltage_shift` is half the time that a voltage held.
-Experiment experiment_of(MotorKind kind, const MeasurementFacts& facts, double period_s);
+Settings settings_of(MotorKind kind, const MeasurementFacts& facts, double period_s);
 
 /// What identify() should find on a bench with these parameters, by the names of its estimates. Left out is
 /// what the method cannot mean: M, L_R, R_R of an induction motor are those of equal leakages; a motor with
@@ -60,7 +60,7 @@ std::map<std::string, double, std::less<>> truth_of(MotorKind kind, const BenchP
 
 /// Adds what column `load_nm` of the data knows: tau_L and K17 if the load is constant in the window and the
 /// method looks for one, else K17 for viscous friction.
-void add_load_truth(const MeasuredData& data, const Experiment& experiment,
+void add_load_truth(const MeasuredData& data, const Settings& settings,
                     std::map<std::string, double, std::less<>>& truth);
 
 }  // namespace drivebench::identification

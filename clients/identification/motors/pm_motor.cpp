@@ -13,7 +13,7 @@ struct PmSignals {
   ShaftSignals shaft;
 };
 
-PmSignals prepare(const MeasuredData& data, const Experiment& e) {
+PmSignals prepare(const MeasuredData& data, const Settings& e) {
   const Processing& p = e.processing;
   PmSignals s;
   s.shaft = shaft_signals(data, e);
@@ -53,7 +53,7 @@ void check(Result& result, const PmSignals& s, const SampleRange& range) {
 
 }  // namespace
 
-Result identify_pm_motor(const MeasuredData& data, const Experiment& e) {
+Result identify_pm_motor(const MeasuredData& data, const Settings& e) {
   const SampleRange range = window_of(data, e.processing);
   const PmSignals s = prepare(data, e);
   Result result = {.kind = "pm_synchronous", .method = "PM synchronous motor, least squares in two stages"};

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
 
@@ -11,6 +11,6 @@ namespace drivebench::identification {
 /// In one stage as they stand, or in two: the third one after the others, as J w' + ... = K_m i_q, so that
 /// its indices are not measured by the error of the voltages. Source: Chiasson 2005, (9.104); tags PMID-01,
 /// PMID-02.
-Result identify_pm_motor(const MeasuredData& data, const Experiment& experiment);
+Result identify_pm_motor(const MeasuredData& data, const Settings& settings);
 
 }  // namespace drivebench::identification

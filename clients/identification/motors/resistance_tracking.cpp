@@ -145,10 +145,10 @@ ResistanceTracker::ResistanceTracker(const Options& options) : options_(options)
   if (!(options.known.stator_inductance_h > 0.0 && options.known.leakage_factor > 0.0 &&
         options.known.leakage_factor < 1.0))
     throw IdentificationError("a tracker needs L_S > 0 and 0 < sigma < 1");
-  options_.experiment.processing.from_s = options_.experiment.processing.to_s = 0.0;
-  kept_ = options.window + 2 * options.experiment.processing.edge_samples;
+  options_.settings.processing.from_s = options_.settings.processing.to_s = 0.0;
+  kept_ = options.window + 2 * options.settings.processing.edge_samples;
   data_.period_s = options.period_s;
-  const char* shaft = options.experiment.counts_per_revolution > 0.0 ? "encoder_count" : "angle_rad";
+  const char* shaft = options.settings.counts_per_revolution > 0.0 ? "encoder_count" : "angle_rad";
   for (const char* name : {"i_a_a", "i_b_a", "i_c_a", "u_a_v", "u_b_v", "u_c_v", shaft})
     data_.columns.push_back({name, "", {}});
 }
@@ -162,10 +162,10 @@ std::optional<ResistanceEstimate> ResistanceTracker::push(const Reading& x) {
   since_ = 0;
   for (Column& column : data_.columns)
     column.values.erase(column.values.begin(), column.values.end() - static_cast<std::ptrdiff_t>(kept_));
-  const SampleRange range = window_of(data_, options_.experiment.processing);
-  const std::vector<InductionInstant> instants = induction_instants(data_, options_.experiment);
+  const SampleRange range = window_of(data_, options_.settings.processing);
+  const std::vector<InductionInstant> instants = induction_instants(data_, options_.settings);
   return identify_resistances(std::span(instants).subspan(range.first, range.count()),
-                              options_.experiment.pole_pairs, options_.known);
+                              options_.settings.pole_pairs, options_.known);
 }
 
 }  // namespace drivebench::identification

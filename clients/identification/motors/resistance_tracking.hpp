@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 #include "clients/identification/motors/induction_regressor.hpp"
 
 namespace drivebench::identification {
@@ -41,7 +41,7 @@ ResistanceEstimate identify_resistances(std::span<const InductionInstant> instan
 class ResistanceTracker {
  public:
   struct Options {
-    Experiment experiment{};  ///< processing.from_s and to_s are of no effect
+    Settings settings{};  ///< processing.from_s and to_s are of no effect
     KnownInductances known{};
     double period_s = 0.0;
     std::size_t window = 800;  ///< samples that an estimate goes by

@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "clients/identification/identify.hpp"
 #include "clients/identification/math/elimination.hpp"
 #include "clients/identification/motors/induction_motor.hpp"
 #include "clients/identification/motors/resistance_tracking.hpp"
@@ -35,10 +36,10 @@ std::vector<Measured> start(std::initializer_list<const char*> names) {
   BookBench run(config);
   StartRecorder record = line_recorder(run.period_s(), false);
   run.run_until(0.21, std::ref(record));
-  Experiment e{.kind = MotorKind::kInduction,
-               .pole_pairs = 2,
-               .counts_per_revolution = 2048,
-               .load = LoadModel::kConstant};
+  Settings e{.kind = MotorKind::kInduction,
+             .pole_pairs = 2,
+             .counts_per_revolution = 2048,
+             .load = LoadModel::kConstant};
   e.processing = usual_processing(e.kind, run.period_s());
   e.processing.from_s = 0.005;
   e.processing.to_s = 0.2;
@@ -64,7 +65,7 @@ std::vector<Measured> resistances(double stator_factor, double rotor_factor) {
   run.run_until(1.5);
   StartRecorder record = line_recorder(run.period_s(), false);
   run.run_until(1.75, std::ref(record));
-  Experiment e{.kind = MotorKind::kInduction, .pole_pairs = 2, .counts_per_revolution = 4096};
+  Settings e{.kind = MotorKind::kInduction, .pole_pairs = 2, .counts_per_revolution = 4096};
   e.processing.voltage_shift = 0.0;
   e.processing.current = e.processing.voltage = e.processing.shaft = {.order = 3, .cutoff_hz = 100.0};
   const auto instants = induction_instants(record.data(), e);

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/identification/measured_data.hpp"
+#include "clients/identification/data/measured_data.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "tests/book/book_bench.hpp"
 

@@ -37,8 +37,8 @@ MeasuredData later(const MeasuredData& data, std::size_t first) {
   return out;
 }
 
-Experiment exact(MotorKind kind, int pole_pairs, double voltage_shift, bool three_phase) {
-  Experiment e{.kind = kind, .pole_pairs = pole_pairs, .three_phase = three_phase};
+Settings exact(MotorKind kind, int pole_pairs, double voltage_shift, bool three_phase) {
+  Settings e{.kind = kind, .pole_pairs = pole_pairs, .three_phase = three_phase};
   e.processing = {.voltage_shift = voltage_shift};
   return e;
 }
@@ -63,7 +63,7 @@ MeasuredData dc_data() {
 // voltage that is half a period off, a friction that drives.
 TEST(Resimulation, ADcMotorWithItsTrueParametersDoesWhatItDid) {
   const MeasuredData data = dc_data();
-  const Experiment e = exact(MotorKind::kDc, 1, 0.5, false);
+  const Settings e = exact(MotorKind::kDc, 1, 0.5, false);
   const Resimulation r = resimulate(data, e, result_of("pm_dc", kDc));
   ASSERT_EQ(r.signals.size(), 2U);
   EXPECT_EQ(r.signals[0].name, "i_a_a");
@@ -115,7 +115,7 @@ TEST(Resimulation, AnInductionMotorRunsFromStandstillAndFromTheMiddle) {
   truth.erase("f");
   truth["tau_L"] = 3.7;
   const Result result = result_of("induction", truth);
-  Experiment e = exact(MotorKind::kInduction, 2, 0.0, true);
+  Settings e = exact(MotorKind::kInduction, 2, 0.0, true);
   e.load = LoadModel::kConstant;
   const Resimulation whole = resimulate(record.data(), e, result);
   ASSERT_EQ(whole.signals.size(), 4U);
@@ -176,7 +176,7 @@ TEST(Resimulation, ABrushlessMotorRunsOnVoltagesThatFollowIt) {
 // Kills: a picture of nonsense where the data did not show the motor, and a run that never ends.
 TEST(Resimulation, WhatIsNoMotorIsRefused) {
   const MeasuredData data = dc_data();
-  const Experiment e = exact(MotorKind::kDc, 1, 0.5, false);
+  const Settings e = exact(MotorKind::kDc, 1, 0.5, false);
   auto values = kDc;
   values["J"] = -6e-5;
   EXPECT_THROW(resimulate(data, e, result_of("pm_dc", values)), IdentificationError);

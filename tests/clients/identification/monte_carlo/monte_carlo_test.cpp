@@ -27,7 +27,8 @@ TEST(MonteCarlo, TheTableEqualsTheResultsOfTheExperiments) {
     ADD_FAILURE() << difference;
 }
 
-// Catches numbers that depend on who works them out: a state that trials share, an order of threads.
+// Catches numbers that depend on the thread that works them out: a state that trials share, an order of
+// threads.
 TEST(MonteCarlo, ThreadsDoNotChangeABit) {
   constexpr int kMotors = 2;
   const auto alone = run_trials(motor_draws(), {.motors = kMotors, .noises = 1, .threads = 1});

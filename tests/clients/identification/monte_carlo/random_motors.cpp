@@ -1,4 +1,5 @@
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
+#include "clients/identification/identify.hpp"
 
 #include <algorithm>
 #include <array>
@@ -126,7 +127,7 @@ Recorded run_dc(BenchConfig config, const std::vector<double>& motor) {
     const double u = 12.0 * std::sin(kTurn * (2.0 + 39.0 * t) * t);
     return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = u}};
   });
-  Experiment e{.kind = MotorKind::kDc, .counts_per_revolution = 2000.0};
+  Settings e{.kind = MotorKind::kDc, .counts_per_revolution = 2000.0};
   e.processing = usual_processing(e.kind, run.period_s());
   return {std::move(record.data()), e};
 }
@@ -160,10 +161,10 @@ Recorded run_induction(BenchConfig config, const std::vector<double>& motor, dou
     if (run.sample().speed_rad_s > 0.9 * kLine / pole_pairs)
       end_s = std::min(end_s, std::max(run.now_s() + 0.05, 0.2 + kMarginS));
   }
-  Experiment e{.kind = MotorKind::kInduction,
-               .pole_pairs = pole_pairs,
-               .counts_per_revolution = 2048.0,
-               .load = LoadModel::kConstant};
+  Settings e{.kind = MotorKind::kInduction,
+             .pole_pairs = pole_pairs,
+             .counts_per_revolution = 2048.0,
+             .load = LoadModel::kConstant};
   e.processing = usual_processing(e.kind, run.period_s());
   e.processing.from_s = 0.005;
   e.processing.to_s = run.now_s() - kMarginS;
@@ -196,10 +197,10 @@ Recorded run_pm(BenchConfig config, const std::vector<double>& motor) {
     return PhaseCommand{.gates = Gates::kVoltage,
                         .setpoint = {.a = -u_q * std::sin(angle), .b = u_q * std::cos(angle)}};
   });
-  Experiment e{.kind = MotorKind::kPmSynchronous,
-               .pole_pairs = kPolePairs,
-               .three_phase = false,
-               .counts_per_revolution = kCounts};
+  Settings e{.kind = MotorKind::kPmSynchronous,
+             .pole_pairs = kPolePairs,
+             .three_phase = false,
+             .counts_per_revolution = kCounts};
   e.processing = usual_processing(e.kind, run.period_s());
   return {std::move(record.data()), e};
 }
@@ -229,7 +230,7 @@ Recorded run_bldc(BenchConfig config, const std::vector<double>& motor) {
     const auto phase = [&](int k) { return -u * trapezoid(angle - k * kTurn / 3.0); };
     return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = phase(0), .b = phase(1), .c = phase(2)}};
   });
-  Experiment e{.kind = MotorKind::kBldc, .pole_pairs = 1, .counts_per_revolution = kCounts};
+  Settings e{.kind = MotorKind::kBldc, .pole_pairs = 1, .counts_per_revolution = kCounts};
   e.processing = usual_processing(e.kind, run.period_s());
   e.processing.from_s = 0.02;
   return {std::move(record.data()), e};

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 /// Motors drawn at random and the experiment that each of them goes through.
 namespace drivebench::identification {
@@ -49,7 +49,7 @@ struct Finding {
 /// What an experiment gave, and how to look at it.
 struct Recorded {
   MeasuredData data;
-  Experiment how;
+  Settings how;
 };
 
 /// The experiment on such a motor, on the product's bench with a noise of this number.

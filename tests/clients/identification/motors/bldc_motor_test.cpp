@@ -1,10 +1,12 @@
 #include "clients/identification/motors/bldc_motor.hpp"
+#include "clients/identification/identify.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
+#include "clients/models/bldc_machine.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
 namespace drivebench::identification {
@@ -24,12 +26,12 @@ TEST(BldcMotor, IsIdentifiedFromItsTrapezoids) {
   run.control_until(0.5, [&](const Sample& s) {
     const double u = 25.0 + 10.0 * std::sin(2.0 * std::numbers::pi * 7.0 * run.now_s());
     const auto shape = [&](int k) {
-      return -u * back_emf_shape(s.angle_rad - k * 2.0 * std::numbers::pi / 3.0);
+      return -u * trapezoid_at_turns(s.angle_rad / (2.0 * std::numbers::pi) - k / 3.0);
     };
     record(s);
     return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = shape(0), .b = shape(1), .c = shape(2)}};
   });
-  Experiment e{.kind = MotorKind::kBldc, .pole_pairs = 1};
+  Settings e{.kind = MotorKind::kBldc, .pole_pairs = 1};
   e.processing = usual_processing(MotorKind::kBldc, run.period_s());
   e.processing.from_s = 0.02;
   Result r = identify(record.data(), e);
@@ -48,7 +50,7 @@ TEST(BldcMotor, IsIdentifiedFromItsTrapezoids) {
 
 // BL-02: the corners at 30, 150, 210, 330 degrees. Kills: a shape that leads by 30 degrees.
 TEST(BldcMotor, TheEmfHasItsCorners) {
-  const auto at = [](double degrees) { return back_emf_shape(degrees * std::numbers::pi / 180.0); };
+  const auto at = [](double degrees) { return trapezoid_at_turns(degrees / 360.0); };
   EXPECT_NEAR(at(0.0), 0.0, 1e-12);
   EXPECT_NEAR(at(15.0), 0.5, 1e-12);
   EXPECT_NEAR(at(30.0), 1.0, 1e-12);

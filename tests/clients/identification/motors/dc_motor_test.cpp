@@ -1,4 +1,5 @@
 #include "clients/identification/motors/dc_motor.hpp"
+#include "clients/identification/identify.hpp"
 
 #include <gtest/gtest.h>
 
@@ -41,8 +42,8 @@ double sines(double t) {
 }
 
 /// The voltage of the last of 100 ticks in a millisecond is that of the sample.
-Experiment dc_experiment() {
-  Experiment e{.kind = MotorKind::kDc, .counts_per_revolution = 2000.0};
+Settings dc_experiment() {
+  Settings e{.kind = MotorKind::kDc, .counts_per_revolution = 2000.0};
   e.processing = usual_processing(MotorKind::kDc, 1e-3);
   e.processing.voltage_shift = 0.0;
   return e;
@@ -69,7 +70,7 @@ TEST(DcMotor, SinesOfCurrentTellAllFiveParameters) {
 TEST(DcMotor, BackwardDifferencesLoseTheFriction) {
   Recorder record({"i_a_a", "u_a_v", "encoder_count"}, 1e-5, 100);
   run_dc(sines, 0.0, record);
-  Experiment e = dc_experiment();
+  Settings e = dc_experiment();
   e.processing.backward_differences = true;
   const double error = identify(record.data(), e).at("f") / 4e-4 - 1.0;
   EXPECT_LT(error, -0.5);

@@ -1,4 +1,5 @@
 #include "clients/identification/motors/induction_motor.hpp"
+#include "clients/identification/identify.hpp"
 
 #include <gtest/gtest.h>
 
@@ -30,14 +31,14 @@ MeasuredData start_data(std::int64_t period_ns, bool ideal) {
   return record.data();
 }
 
-Experiment ideal_experiment() {
-  Experiment e{.kind = MotorKind::kInduction, .pole_pairs = 2, .load = LoadModel::kConstant};
+Settings ideal_experiment() {
+  Settings e{.kind = MotorKind::kInduction, .pole_pairs = 2, .load = LoadModel::kConstant};
   e.processing = {.voltage_shift = 0.0, .from_s = 0.005, .to_s = 0.2};
   return e;
 }
 
-Experiment sensor_experiment(double period_s) {
-  Experiment e = ideal_experiment();
+Settings sensor_experiment(double period_s) {
+  Settings e = ideal_experiment();
   e.counts_per_revolution = 2048;
   e.processing = usual_processing(MotorKind::kInduction, period_s);
   e.processing.from_s = 0.005;
@@ -148,9 +149,9 @@ TEST(InductionMotor, SensorsAndFiltersKeepTheParameters) {
 }
 
 // Case 21: backward differences bias R_S by -3 % at 4 kHz and by a fifth of it at 20 kHz; 1 % and 0.5 %.
-// Kills: a "backward" that is central after all, so that nobody sees why it matters.
+// Kills: a "backward" that is central after all, so that the difference does not show.
 TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
-  Experiment e = ideal_experiment();
+  Settings e = ideal_experiment();
   e.processing.backward_differences = true;
   MeasuredData data = start_data(250'000, true);
   put_line_voltages(data, 381.059, 50.0, 1);
@@ -166,7 +167,7 @@ TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
 // that is not applied, a default that does not suit the source.
 TEST(InductionMotor, VoltagesHalfASampleOffAreSeenToFail) {
   const MeasuredData data = start_data(250'000, true);
-  Experiment e = ideal_experiment();
+  Settings e = ideal_experiment();
   expect_percent(identify(data, e).at("R_S"), 9.7, 0.1);
   e.processing.voltage_shift = 0.5;
   EXPECT_LT(identify(data, e).at("R_S"), 0.95 * 9.7);
@@ -179,7 +180,7 @@ TEST(InductionMotor, TheLineStartOfTheExperiment) {
   BookBench run("im-8-5-6");
   Recorder record = line_recorder(run.period_s(), false);
   run.run_until(0.3, std::ref(record));
-  Experiment e = sensor_experiment(run.period_s());
+  Settings e = sensor_experiment(run.period_s());
   e.counts_per_revolution = 4096;
   e.load = LoadModel::kViscous;
   const Result r = identify(record.data(), e);

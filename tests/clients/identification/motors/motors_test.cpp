@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "clients/identification/experiments/named_experiments.hpp"
+#include "clients/identification/named_experiments.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -43,7 +43,7 @@ TEST(Motors, TheTruthOfAnInductionMotorIsThatOfTheBook) {
 }
 
 // A motor whose leakages differ: its terminals are those of one with equal leakages. Kills: the bench's own M
-// and R_R as the truth about a split that nobody can see.
+// and R_R as the truth about a split that no data show.
 TEST(Motors, UnequalLeakagesAreComparedAsEqualOnes) {
   BenchParameters bench = kInduction;
   bench["machine.rotor_inductance_h"] = 2.0 * 0.67;
@@ -54,7 +54,7 @@ TEST(Motors, UnequalLeakagesAreComparedAsEqualOnes) {
   EXPECT_NEAR(truth.find("R_R")->second, 8.6, 1e-9);
 }
 
-// Kills: a truth where the method has another meaning or nobody knows the number.
+// Kills: a truth where the method has another meaning or the number is unknown.
 TEST(Motors, WhatCannotBeMeantHasNoTruth) {
   BenchParameters bench = kInduction;
   bench["thermal.enabled"] = 1.0;
@@ -78,7 +78,7 @@ double shift_of(std::string_view drive, int substeps, int decimation, BenchParam
   MeasurementFacts facts;
   facts.decimation = decimation;
   take_facts(bench, drive, substeps, facts);
-  return experiment_of(MotorKind::kInduction, facts, 1e-4).processing.voltage_shift;
+  return settings_of(MotorKind::kInduction, facts, 1e-4).processing.voltage_shift;
 }
 
 // Half of the time that a voltage held before its sample, in periods of the data. Kills: a shift that forgets
@@ -112,7 +112,7 @@ TEST(Motors, VoltagesThatHideSomethingAreTold) {
 
 // tau_L is what the load was, if it was one number. Kills: a truth for a load that changes within the window.
 TEST(Motors, TheLoadIsATruthIfItIsConstant) {
-  Experiment e = experiment_of(MotorKind::kInduction, {}, 1e-3);
+  Settings e = settings_of(MotorKind::kInduction, {}, 1e-3);
   e.load = LoadModel::kConstant;
   MeasuredData data{.period_s = 1e-3, .columns = {{"load_nm", "N*m", Series(200, 3.7)}}};
   auto truth = truth_of(MotorKind::kInduction, kInduction);
@@ -149,11 +149,11 @@ TEST(Motors, EveryNamedExperimentHasItsFiles) {
 
 // Kills: settings of a named experiment that are not applied, or that take filters away.
 TEST(Motors, ANamedExperimentSetsWindowLoadAndFilters) {
-  Experiment e = experiment_of(MotorKind::kPmSynchronous, {}, 2e-5);
+  Settings e = settings_of(MotorKind::kPmSynchronous, {}, 2e-5);
   apply(*find_experiment("pm", "ramp"), e);
   EXPECT_DOUBLE_EQ(e.processing.shaft.cutoff_hz, 200.0);
   EXPECT_DOUBLE_EQ(e.processing.from_s, 0.005);
-  e = experiment_of(MotorKind::kInduction, {}, 2.5e-4);
+  e = settings_of(MotorKind::kInduction, {}, 2.5e-4);
   apply(*find_experiment("im", "dol-start"), e);
   EXPECT_EQ(e.load, LoadModel::kConstant);
   EXPECT_DOUBLE_EQ(e.processing.current.cutoff_hz, 200.0);

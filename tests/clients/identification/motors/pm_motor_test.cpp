@@ -1,4 +1,5 @@
 #include "clients/identification/motors/pm_motor.hpp"
+#include "clients/identification/identify.hpp"
 
 #include <gtest/gtest.h>
 
@@ -46,8 +47,8 @@ MeasuredData with_commands(MeasuredData data) {
   return data;
 }
 
-Experiment experiment(double current_hz, double voltage_hz, bool two_stage) {
-  Experiment e{
+Settings experiment(double current_hz, double voltage_hz, bool two_stage) {
+  Settings e{
       .kind = MotorKind::kPmSynchronous, .pole_pairs = 50, .three_phase = false, .two_stage = two_stage};
   e.processing.current = e.processing.shaft = {.order = 3, .cutoff_hz = current_hz};
   e.processing.voltage = {.order = 3, .cutoff_hz = voltage_hz};
@@ -81,7 +82,7 @@ TEST(PmMotor, EqualFiltersAndAShiftedVoltageGiveTheTruth) {
 TEST(PmMotor, AnUnshiftedVoltageIsSeenToFail) {
   const MeasuredData reported = start_data(0.0);
   const MeasuredData commanded = with_commands(reported);
-  Experiment e = experiment(500.0, 500.0, false);
+  Settings e = experiment(500.0, 500.0, false);
   e.processing.voltage_shift = -0.5;
   expect_part(identify(commanded, e).at("R_S"), 0.5996, 3e-3);
   e.processing.voltage_shift = 0.0;
@@ -95,7 +96,7 @@ TEST(PmMotor, AnUnshiftedVoltageIsSeenToFail) {
 // nothing of the kind. Kills: a shift in the wrong direction, a half period that is forgotten with commands.
 TEST(PmMotor, CommandedVoltagesAreShiftedByTheirDelay) {
   const MeasuredData data = with_commands(start_data(1.6));
-  Experiment e = experiment(500.0, 500.0, true);
+  Settings e = experiment(500.0, 500.0, true);
   e.processing.voltage_shift = -2.1;
   expect_part(identify(data, e).at("R_S"), 0.6, 1e-2);
   e.processing.voltage_shift = 0.0;

@@ -23,8 +23,8 @@ BenchConfig loaded(double load_nm, double stator_factor, double rotor_factor) {
   return config;
 }
 
-Experiment steady_experiment(bool ideal) {
-  Experiment e{.kind = MotorKind::kInduction, .pole_pairs = 2};
+Settings steady_experiment(bool ideal) {
+  Settings e{.kind = MotorKind::kInduction, .pole_pairs = 2};
   e.processing.voltage_shift = 0.0;
   if (ideal) return e;
   e.counts_per_revolution = 4096;
@@ -89,7 +89,7 @@ TEST(Resistances, AreTrackedWhileTheyDrift) {
   BookBench run(config);
   run.run_until(1.0);
   ResistanceTracker tracker(
-      {.experiment = steady_experiment(false), .known = kKnown, .period_s = run.period_s()});
+      {.settings = steady_experiment(false), .known = kKnown, .period_s = run.period_s()});
   const double from_s = run.now_s();
   const AxisParameters cold = run.bench().axis(0).parameters();
   run.bench().submit({.tick = run.bench().tick(),

@@ -14,7 +14,7 @@ namespace drivebench::identification {
 /// One measured signal.
 struct Column {
   std::string name;  ///< as the signal catalogue has it: i_a_a, u_a_v, encoder_count, ...
-  std::string unit;  ///< SI; empty if nobody said
+  std::string unit;  ///< SI; empty if unknown
   Series values;
 };
 
@@ -30,7 +30,7 @@ struct MeasuredData {
   SeriesView at(std::string_view name) const;
 };
 
-/// A column of somebody else's file.
+/// A column of a foreign file.
 struct ColumnMap {
   std::string name;     ///< of the signal here
   std::string header;   ///< of the column there, with or without its "[unit]"

@@ -1,4 +1,4 @@
-#include "clients/identification/measured_data.hpp"
+#include "clients/identification/data/measured_data.hpp"
 
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ TEST(MeasuredData, AnExportReadsBack) {
   EXPECT_THROW((void)data.at("u_a_v"), IdentificationError);
 }
 
-// Somebody's scope: semicolons, quotes, CRLF, a byte order mark, other names, milliampere, an offset. Kills:
+// A foreign scope: semicolons, quotes, CRLF, a byte order mark, other names, milliampere, an offset. Kills:
 // a factor that is divided by, an offset before the factor.
 TEST(MeasuredData, AColumnMapTakesFilesOfOthers) {
   const MeasuredData data =

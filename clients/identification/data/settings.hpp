@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "clients/identification/experiments/signals.hpp"
+#include "clients/identification/data/measured_data.hpp"
+#include "clients/identification/data/result.hpp"
+#include "clients/identification/data/signals.hpp"
 #include "clients/identification/math/filters.hpp"
-#include "clients/identification/measured_data.hpp"
-#include "clients/identification/result.hpp"
 
 namespace drivebench::identification {
 
@@ -34,7 +34,7 @@ struct Processing {
 enum class LoadModel : std::uint8_t { kViscous, kConstant };
 
 /// All that identify() needs to know beside the data.
-struct Experiment {
+struct Settings {
   MotorKind kind = MotorKind::kInduction;
   int pole_pairs = 1;
   bool three_phase = true;  ///< star with phases a, b, c; else the two phases of a two-phase machine
@@ -49,22 +49,16 @@ struct Experiment {
 /// of an induction motor are taken as those of a line source, all others as those of an amplifier.
 Processing usual_processing(MotorKind kind, double period_s);
 
-/// One call: data and kind give parameters, error indices and a verdict. Columns: i_a_a, i_b_a, i_c_a and
-/// u_a_v, u_b_v, u_c_v (the third ones of three-phase machines only; a DC motor has phase a), encoder_count
-/// or angle_rad. Throws IdentificationError if the data cannot be used at all; if they can but do not excite
-/// the motor, the result says so.
-Result identify(const MeasuredData& data, const Experiment& experiment);
-
 /// The angle of the shaft with its derivatives [rad, rad/s, rad/s^2].
 struct ShaftSignals {
   Series angle;
   Series speed;
   Series acceleration;
 };
-ShaftSignals shaft_signals(const MeasuredData& data, const Experiment& experiment);
+ShaftSignals shaft_signals(const MeasuredData& data, const Settings& settings);
 
 /// Currents or voltages of the two-phase equivalent, as measured: "i", "_a" reads i_a_a, i_b_a, i_c_a.
-TwoPhaseSeries windings(const MeasuredData& data, const Experiment& experiment, char quantity, char unit);
+TwoPhaseSeries windings(const MeasuredData& data, const Settings& settings, char quantity, char unit);
 
 /// First and last + 1 sample that go into the equations; throws if there are fewer than 50.
 struct SampleRange {

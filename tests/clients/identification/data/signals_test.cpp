@@ -1,4 +1,4 @@
-#include "clients/identification/experiments/signals.hpp"
+#include "clients/identification/data/signals.hpp"
 
 #include <gtest/gtest.h>
 

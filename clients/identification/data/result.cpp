@@ -1,4 +1,4 @@
-#include "clients/identification/result.hpp"
+#include "clients/identification/data/result.hpp"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
 
@@ -32,6 +32,6 @@ const NamedExperiment* find_experiment(std::string_view motor, std::string_view 
 std::string experiment_names(std::string_view motor);
 
 /// Puts load model, window and filters of a named experiment into the settings.
-void apply(const NamedExperiment& named, Experiment& experiment) noexcept;
+void apply(const NamedExperiment& named, Settings& settings) noexcept;
 
 }  // namespace drivebench::identification

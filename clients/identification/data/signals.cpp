@@ -1,10 +1,12 @@
-#include "clients/identification/experiments/signals.hpp"
+#include "clients/identification/data/signals.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <string>
+
+#include "clients/models/two_phase.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -95,12 +97,11 @@ double value_at(SeriesView x, double position) noexcept {
 }
 
 TwoPhaseSeries two_phase(SeriesView a, SeriesView b, SeriesView c) {
-  const double along = std::sqrt(2.0 / 3.0);
-  const double across = std::sqrt(0.5);
   TwoPhaseSeries y = {.a = Series(a.size()), .b = Series(a.size())};
   for (std::size_t k = 0; k < a.size(); ++k) {
-    y.a[k] = along * (a[k] - 0.5 * (b[k] + c[k]));
-    y.b[k] = across * (b[k] - c[k]);
+    const PhasePair pair = two_phase_of(a[k], b[k], c[k]);
+    y.a[k] = pair.a;
+    y.b[k] = pair.b;
   }
   return y;
 }

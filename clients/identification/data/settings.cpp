@@ -1,15 +1,11 @@
-#include "clients/identification/experiments/experiment.hpp"
+#include "clients/identification/data/settings.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
-
-#include "clients/identification/motors/bldc_motor.hpp"
-#include "clients/identification/motors/dc_motor.hpp"
-#include "clients/identification/motors/induction_motor.hpp"
-#include "clients/identification/motors/pm_motor.hpp"
+#include <vector>
 
 namespace drivebench::identification {
 
@@ -36,29 +32,7 @@ Processing usual_processing(MotorKind kind, double period_s) {
   return p;
 }
 
-Result identify(const MeasuredData& data, const Experiment& experiment) {
-  if (!(data.period_s > 0.0 && std::isfinite(data.period_s)))
-    throw IdentificationError("the period of the data must be positive");
-  if (experiment.pole_pairs < 1) throw IdentificationError("pole_pairs must be 1 or more");
-  for (const Column& column : data.columns) {
-    if (column.values.size() != data.samples())
-      throw IdentificationError(fmt::format("column {} has {} samples, the first one {}", column.name,
-                                            column.values.size(), data.samples()));
-  }
-  switch (experiment.kind) {
-    case MotorKind::kDc:
-      return identify_dc_motor(data, experiment);
-    case MotorKind::kInduction:
-      return identify_induction_motor(data, experiment);
-    case MotorKind::kPmSynchronous:
-      return identify_pm_motor(data, experiment);
-    case MotorKind::kBldc:
-      break;
-  }
-  return identify_bldc_motor(data, experiment);
-}
-
-ShaftSignals shaft_signals(const MeasuredData& data, const Experiment& e) {
+ShaftSignals shaft_signals(const MeasuredData& data, const Settings& e) {
   const Processing& p = e.processing;
   const SeriesView measured = data.at(e.counts_per_revolution > 0.0 ? "encoder_count" : "angle_rad");
   Series angle = e.counts_per_revolution > 0.0 ? angle_of(measured, e.counts_per_revolution, e.half_count)
@@ -70,7 +44,7 @@ ShaftSignals shaft_signals(const MeasuredData& data, const Experiment& e) {
   return {.angle = std::move(angle), .speed = std::move(speed), .acceleration = std::move(acceleration)};
 }
 
-TwoPhaseSeries windings(const MeasuredData& data, const Experiment& e, char quantity, char unit) {
+TwoPhaseSeries windings(const MeasuredData& data, const Settings& e, char quantity, char unit) {
   const auto column = [&](char phase) { return data.at(fmt::format("{}_{}_{}", quantity, phase, unit)); };
   const SeriesView a = column('a');
   const SeriesView b = column('b');

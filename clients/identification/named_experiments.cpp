@@ -1,4 +1,4 @@
-#include "clients/identification/experiments/named_experiments.hpp"
+#include "clients/identification/named_experiments.hpp"
 
 #include <array>
 
@@ -76,16 +76,16 @@ std::string experiment_names(std::string_view motor) {
   return names;
 }
 
-void apply(const NamedExperiment& named, Experiment& experiment) noexcept {
-  experiment.load = named.load;
-  experiment.processing.from_s = named.from_s;
-  experiment.processing.to_s = named.to_s;
+void apply(const NamedExperiment& named, Settings& settings) noexcept {
+  settings.load = named.load;
+  settings.processing.from_s = named.from_s;
+  settings.processing.to_s = named.to_s;
   const auto set = [](LowPass& filter, double corner_hz) {
     if (corner_hz > 0.0) filter.cutoff_hz = corner_hz;
   };
-  set(experiment.processing.current, named.current_hz);
-  set(experiment.processing.voltage, named.voltage_hz);
-  set(experiment.processing.shaft, named.shaft_hz);
+  set(settings.processing.current, named.current_hz);
+  set(settings.processing.voltage, named.voltage_hz);
+  set(settings.processing.shaft, named.shaft_hz);
 }
 
 }  // namespace drivebench::identification

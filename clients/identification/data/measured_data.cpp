@@ -1,4 +1,4 @@
-#include "clients/identification/measured_data.hpp"
+#include "clients/identification/data/measured_data.hpp"
 
 #include <fmt/format.h>
 
