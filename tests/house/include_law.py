@@ -38,6 +38,9 @@ SYSTEM = {
 # beside the rooms stand above them all.
 ORDERED = {
     "server": ("host", "bench", "config", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
+    "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
+                        "presets"),
+    "clients/identification": ("math", "data", "motors"),
 }
 
 # Files beside rooms that the rooms may include. They count as rooms of their own in the search for circles.
@@ -56,8 +59,6 @@ FOUNDATIONS = {
     "server/endpoints/deadline.hpp",
     "server/endpoints/log_limit.hpp",
     "server/endpoints/transport_report.hpp",
-    "clients/identification/measured_data.hpp",
-    "clients/identification/result.hpp",
 }
 
 # Files in a room that stand above all rooms: they put a machine together from its equations, the rows of parameters and
@@ -66,7 +67,6 @@ ABOVE = re.compile(r"plant/machines/[a-z_]+/[a-z_]+_kind\.cpp$")
 
 # Violations that are being mended: an include from names that begin so to names that begin so.
 KNOWN = (
-    ("clients/identification/experiments/", "clients/identification/motors/"),
 )
 
 Include = namedtuple("Include", "file line target angled")
