@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
     const double before_rad = std::exchange(angle_rad, count * std::numbers::pi / 1000);
     speed_rad_s += 0.05 * ((angle_rad - before_rad) / 1e-4 - speed_rad_s);
     const double i_a = 8.6 * (std::numbers::pi - angle_rad) - 0.12 * speed_rad_s;
-    const link::Command command{.tick = sample.tick(), .gates = v1::GATES_CURRENT, .i_a_a = i_a};
+    const link::AxisCommand command{.tick = sample.tick(), .gates = v1::GATES_CURRENT, .i_a_a = i_a};
     sample = bench.exchange({&command, 1}).samples(0).sample();  // the sensors one tick later
   }
   std::printf("turned by %.3f rad of %.3f\n", angle_rad, std::numbers::pi);

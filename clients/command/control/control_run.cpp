@@ -66,7 +66,7 @@ ControlRow row_of(const Sample& sample, const ControlRun& into, std::int64_t per
   return row;
 }
 
-link::Command command_of(std::uint64_t tick, const control::Setpoint& x, control::Quantity quantity) {
+link::AxisCommand command_of(std::uint64_t tick, const control::Setpoint& x, control::Quantity quantity) {
   if (quantity == control::Quantity::kVoltage) {
     return {
         .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = x.a, .u_b_v = x.b, .u_c_v = x.c, .u_f_v = x.field};

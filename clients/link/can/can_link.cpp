@@ -141,7 +141,7 @@ const Sample& CanLink::newest() {
   return sample_;
 }
 
-can::CommandFrames CanLink::frames_of(const Command& command) const {
+can::CommandFrames CanLink::frames_of(const AxisCommand& command) const {
   const bool wants_more =
       command.u_c_v != 0.0 || command.u_f_v != 0.0 || command.i_c_a != 0.0 || command.i_f_a != 0.0;
   if (wants_more && !profile_.wide) {
@@ -158,7 +158,7 @@ can::CommandFrames CanLink::frames_of(const Command& command) const {
                               .field = currents ? command.i_f_a : command.u_f_v});
 }
 
-const Sample& CanLink::exchange(const Command& command) {
+const Sample& CanLink::exchange(const AxisCommand& command) {
   const can::CommandFrames frames = frames_of(command);
   const auto send = [this, &frames] {
     for (const can::Frame& frame : frames)

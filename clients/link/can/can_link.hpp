@@ -38,7 +38,7 @@ class CanLink final : public AxisLink {
   void release() override;
   void clear_faults() override;
   const Sample& newest() override;
-  const Sample& exchange(const Command& command) override;
+  const Sample& exchange(const AxisCommand& command) override;
   void write_parameter(std::string_view name, double value) override;
   bool can_set_load() const noexcept override { return false; }
   void set_load(const LoadChange& change) override;
@@ -57,7 +57,7 @@ class CanLink final : public AxisLink {
   void take_heartbeat(const can::Values& values);
   void take_reply(const can::Values& values);
   void take_sample();
-  can::CommandFrames frames_of(const Command& command) const;
+  can::CommandFrames frames_of(const AxisCommand& command) const;
   void take_sync_tick(std::uint32_t tick);
   void send_request(can::Request request);
   Reply ask(can::Request request);

@@ -42,7 +42,7 @@ class AxisLink {
   /// Sends the answer to the sample of command.tick; ignores command.axis. Returns in lockstep the sample of
   /// tick + 1, in real time the first sample that arrives afterwards. A transport that cannot carry a
   /// set-point refuses the command.
-  virtual const Sample& exchange(const Command& command) = 0;
+  virtual const Sample& exchange(const AxisCommand& command) = 0;
 
   virtual void write_parameter(std::string_view name, double value) = 0;
   virtual bool can_set_load() const noexcept = 0;

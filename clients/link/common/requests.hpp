@@ -25,7 +25,7 @@ class Refused : public std::runtime_error {
 
 /// A command for an axis, in answer to the sample of `tick`: voltages, or currents with GATES_CURRENT. A
 /// machine ignores terminals that it lacks; `f` is the field winding.
-struct Command {
+struct AxisCommand {
   std::uint32_t axis = 0;
   std::uint64_t tick = 0;
   v1::Gates gates = v1::GATES_OFF;

@@ -167,7 +167,7 @@ const Sample& ModbusLink::newest() {
   return sample_;
 }
 
-const Sample& ModbusLink::exchange(const Command& command) {
+const Sample& ModbusLink::exchange(const AxisCommand& command) {
   constexpr std::span<const Row> kRows(modbus::map_detail::kMoreCommand);
   constexpr std::uint16_t kFirst = kRows[2].address;  // after lease and request
   static_assert(kRows[2].content == Content::kCommandMode);

@@ -44,7 +44,7 @@ class ModbusLink final : public AxisLink {
   void release() override;
   void clear_faults() override;
   const Sample& newest() override;
-  const Sample& exchange(const Command& command) override;
+  const Sample& exchange(const AxisCommand& command) override;
   void write_parameter(std::string_view name, double value) override;
   bool can_set_load() const noexcept override { return false; }
   void set_load(const LoadChange& change) override;

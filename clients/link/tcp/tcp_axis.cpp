@@ -10,8 +10,8 @@ const Sample& TcpAxis::newest() {
   return keep(link_->exchange({}));
 }
 
-const Sample& TcpAxis::exchange(const Command& command) {
-  Command ours = command;
+const Sample& TcpAxis::exchange(const AxisCommand& command) {
+  AxisCommand ours = command;
   ours.axis = axis_;
   return keep(link_->exchange(std::span(&ours, 1)));
 }

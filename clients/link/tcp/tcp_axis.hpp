@@ -23,7 +23,7 @@ class TcpAxis final : public AxisLink {
   void release() override { link_->release(axis_); }
   void clear_faults() override { link_->clear_faults(axis_); }
   const Sample& newest() override;
-  const Sample& exchange(const Command& command) override;
+  const Sample& exchange(const AxisCommand& command) override;
   void write_parameter(std::string_view name, double value) override {
     link_->write_parameter(axis_, {.name = std::string(name), .value = value});
   }

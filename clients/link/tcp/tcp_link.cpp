@@ -73,10 +73,10 @@ void Link::set_deadline(std::chrono::milliseconds deadline) {
   ::setsockopt(socket_.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
 }
 
-const v1::ExchangeReply& Link::exchange(std::span<const Command> commands) {
+const v1::ExchangeReply& Link::exchange(std::span<const AxisCommand> commands) {
   v1::Envelope& request = new_request();
   v1::Exchange& exchange = *request.mutable_exchange();
-  for (const Command& from : commands) {
+  for (const AxisCommand& from : commands) {
     v1::Command& to = *exchange.add_commands();
     to.set_axis(from.axis);
     to.set_tick(from.tick);

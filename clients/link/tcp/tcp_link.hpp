@@ -50,7 +50,7 @@ class Link {
   /// Commands in, samples out: see Exchange in bench.proto. Lockstep: tick k runs, sample k+1 comes back.
   /// Real time: the first sample taken after the commands came in. No commands: the newest sample of every
   /// axis.
-  const v1::ExchangeReply& exchange(std::span<const Command> commands);
+  const v1::ExchangeReply& exchange(std::span<const AxisCommand> commands);
 
   /// The number that Sample.owner shows for this session.
   std::uint64_t acquire(std::uint32_t axis);

@@ -53,7 +53,7 @@ class Controller {
     std::uint64_t tick = newest_tick();
     while (!stop_.load()) {
       const TwoPhase& u = line_voltages()[tick % line_voltages().size()];
-      const link::Command command{
+      const link::AxisCommand command{
           .axis = 0, .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = u.a, .u_b_v = u.b};
       try {
         tick = link_.exchange({&command, 1}).samples(0).sample().tick();

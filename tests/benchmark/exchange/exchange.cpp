@@ -68,7 +68,7 @@ class Controller {
 
  private:
   link::Link link_;
-  link::Command command_{};
+  link::AxisCommand command_{};
   std::uint64_t tick_ = 0;
 };
 

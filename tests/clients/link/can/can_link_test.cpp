@@ -127,7 +127,8 @@ TEST_P(CanLinkOf, SendsEveryFieldOfACommand) {
 // Catches setpoints of phase c or of the field that are left out, are those of another kind, or go to an axis
 // that has neither.
 TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
-  const Command command = {.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_c_v = -2.5, .u_f_v = 24.0};
+  const AxisCommand command = {
+      .tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_c_v = -2.5, .u_f_v = 24.0};
   if (!GetParam().wide) {
     EXPECT_THROW(link().exchange(command), Refused);
     return;

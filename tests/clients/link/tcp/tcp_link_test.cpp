@@ -83,21 +83,21 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
   }));
   Link link(peer.client_end(), "peer");
   for (std::uint64_t tick = 0; tick < 1000; ++tick) {
-    const Command commands[] = {{.axis = 3,
-                                 .tick = tick,
-                                 .gates = v1::GATES_ZERO,
-                                 .u_a_v = 1.5,
-                                 .u_b_v = -2.5,
-                                 .u_c_v = 3.5,
-                                 .u_f_v = -4.5},
-                                {.axis = 4,
-                                 .tick = tick,
-                                 .gates = v1::GATES_CURRENT,
-                                 .u_a_v = 4.0,
-                                 .i_a_a = 5.0,
-                                 .i_b_a = -6.0,
-                                 .i_c_a = 7.0,
-                                 .i_f_a = -8.0}};
+    const AxisCommand commands[] = {{.axis = 3,
+                                     .tick = tick,
+                                     .gates = v1::GATES_ZERO,
+                                     .u_a_v = 1.5,
+                                     .u_b_v = -2.5,
+                                     .u_c_v = 3.5,
+                                     .u_f_v = -4.5},
+                                    {.axis = 4,
+                                     .tick = tick,
+                                     .gates = v1::GATES_CURRENT,
+                                     .u_a_v = 4.0,
+                                     .i_a_a = 5.0,
+                                     .i_b_a = -6.0,
+                                     .i_c_a = 7.0,
+                                     .i_f_a = -8.0}};
     const v1::ExchangeReply& reply = link.exchange(commands);
     ASSERT_EQ(reply.samples_size(), 2);
     EXPECT_EQ(reply.samples(0).axis(), 3U);
