@@ -65,10 +65,6 @@ FOUNDATIONS = {
 # the train, and no file can include them.
 ABOVE = re.compile(r"plant/machines/[a-z_]+/[a-z_]+_kind\.cpp$")
 
-# Violations that are being mended: an include from names that begin so to names that begin so.
-KNOWN = (
-)
-
 Include = namedtuple("Include", "file line target angled")
 LINE = re.compile(r'\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)')
 
@@ -88,10 +84,6 @@ def includes_of(root):
 def within(name, place):
     """Whether a file is, or lies below, a place."""
     return name == place or name.startswith(place + "/")
-
-
-def is_known(include):
-    return any(include.file.startswith(source) and include.target.startswith(target) for source, target in KNOWN)
 
 
 def broken_alone(include, root):
@@ -208,8 +200,6 @@ def violations(root):
     found = list(unordered_rooms(root))
     sound = []
     for include in includes_of(root):
-        if is_known(include):
-            continue
         rule = broken_alone(include, root)
         if not rule and not include.angled and include.target not in GENERATED:
             rule = upward(include) or out_of_order(include)

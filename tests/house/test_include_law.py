@@ -69,7 +69,7 @@ class IncludeLaw(unittest.TestCase):
 
     def test_control_models_and_identification_know_no_link(self):
         for room in ("control", "models", "identification"):
-            self.assert_one(f"clients/{room} may include", {f"clients/{room}/a/b.hpp": ['"clients/link/address.hpp"']})
+            self.assert_one(f"clients/{room} may include", {f"clients/{room}/math/b.hpp": ['"clients/link/address.hpp"']})
         self.assert_one("clients/models may include", {"clients/models/machine.hpp": ['"clients/control/loop/run.hpp"']})
         self.assert_one("clients/link may include", {"clients/link/address.hpp": ['"clients/command/common/json.hpp"']})
 
@@ -101,18 +101,18 @@ class IncludeLaw(unittest.TestCase):
 
     def test_rooms_form_no_circle(self):
         self.assert_one(
-            "the rooms of clients/control form a circle: loop > moves > loop",
+            "the rooms of clients/command form a circle: demo > recording > demo",
             {
-                "clients/control/loop/a.hpp": ['"clients/control/moves/b.hpp"'],
-                "clients/control/moves/c.hpp": ['"clients/control/loop/d.hpp"'],
+                "clients/command/demo/a.hpp": ['"clients/command/recording/b.hpp"'],
+                "clients/command/recording/c.hpp": ['"clients/command/demo/d.hpp"'],
             },
         )
         self.assert_one(
-            "clients/control/gains/b.hpp:1 includes clients/control/moves/c.hpp",
+            "clients/command/control/b.hpp:1 includes clients/command/recording/c.hpp",
             {
-                "clients/control/loop/a.hpp": ['"clients/control/gains/b.hpp"'],
-                "clients/control/gains/b.hpp": ['"clients/control/moves/c.hpp"'],
-                "clients/control/moves/c.hpp": ['"clients/control/loop/a.hpp"'],
+                "clients/command/demo/a.hpp": ['"clients/command/control/b.hpp"'],
+                "clients/command/control/b.hpp": ['"clients/command/recording/c.hpp"'],
+                "clients/command/recording/c.hpp": ['"clients/command/demo/a.hpp"'],
             },
         )
 
