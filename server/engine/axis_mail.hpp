@@ -30,14 +30,19 @@ class CommandMail {
 
   // ---- I/O thread ----
 
-  /// The reason why a command would be refused. `view` holds the axis from its newest sample; lease and
-  /// commands come from here and are never older.
+  /// The reason why a command would be refused. `view` holds the axis from its newest sample, the owner
+  /// included: the end of a lease becomes known with the sample that shows it, so that a session learns who
+  /// took its axis before a command is refused. The last accepted command comes from here and is never older.
   Refused judge(const Command& command, Owner sender, CommandView view) const noexcept {
-    if (const auto newest = from_bench_.take()) seen_ = *newest;
-    if (seen_.owner != view.owner) view.owner = 0;  // the lease has changed since the sample
-    view.newest = seen_.newest;
+    if (const auto newest = from_bench_.take()) {
+      decided_ = newest->decided;
+      if (newest->owner != seen_.owner) before_ = seen_;
+      seen_ = *newest;
+    }
+    const Seen& lease = seen_.owner == view.owner ? seen_ : before_;
+    view.newest = lease.owner == view.owner ? lease.newest : Command{};
     const Refused why = drivebench::judge(command, sender, view);
-    if (why != Refused::kNot || sent_.owner != sender || sent_.number <= seen_.decided) return why;
+    if (why != Refused::kNot || sent_.owner != sender || sent_.number <= decided_) return why;
     // The bench may accept the previous command or see only this one: this one must be valid in both cases.
     view.newest = sent_.command;
     return drivebench::judge(command, sender, view);
@@ -65,11 +70,13 @@ class CommandMail {
 
  private:
   Mailbox<Sent> to_bench_;
-  mutable Mailbox<Seen> from_bench_;  // mutable: reading a mailbox empties it
-  Sent sent_;                         // I/O thread: the last command sent
-  mutable Seen seen_;                 // I/O thread: the last received state
-  Seen told_;                         // tick thread: the last sent state
-  bool is_told_ = false;              // tick thread: no decision since then
+  mutable Mailbox<Seen> from_bench_;   // mutable: reading a mailbox empties it
+  Sent sent_;                          // I/O thread: the last command sent
+  mutable Seen seen_;                  // I/O thread: the last received state
+  mutable Seen before_;                // I/O thread: the last received state of the lease before that one
+  mutable std::uint64_t decided_ = 0;  // I/O thread: number of the last command that the bench has decided
+  Seen told_;                          // tick thread: the last sent state
+  bool is_told_ = false;               // tick thread: no decision since then
 };
 
 /// Parameters of an axis from the tick thread.

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "server/bench/bench.hpp"
+#include "server/engine/axis_mail.hpp"
 #include "server/engine/engine.hpp"
 #include "server/engine/stepped_engine.hpp"
 #include "server/host/asio.hpp"
@@ -200,6 +202,33 @@ TEST(JudgeRealtime, ACommandThatTheBenchRefusedIsForgotten) {
   EXPECT_EQ(bench.send(volts(-2.5)), Refused::kNot) << "three ticks after 0 V";
   bench.turn();
   EXPECT_EQ(bench.engine().newest(0).refused_commands, 1u);
+}
+
+// Catches: a session whose axis is taken by force gets "not the owner" before it learns who took the axis.
+TEST(CommandMail, AnOwnerIsJudgedAsSuchUntilTheSampleShowsTheEndOfItsLease) {
+  constexpr Owner kOther = kMe + 1;
+  Bench bench(servo_bench().setup);
+  CommandMail mail;
+  const auto lease = [&](LeaseAction action, Owner owner) {
+    bench.submit({.tick = bench.tick(), .axis = 0, .owner = owner, .action = action});
+  };
+  lease(LeaseAction::kAcquire, kMe);
+  mail.deliver(bench, 0);
+  bench.step();
+  const CommandView shown = bench.command_view(0);  // what the newest sample shows
+  const Command command{.answers = bench.tick(), .phases = {.gates = Gates::kOff}};
+  EXPECT_EQ(mail.judge(command, kMe, shown), Refused::kNot);
+
+  lease(LeaseAction::kLost, kMe);
+  lease(LeaseAction::kAcquire, kOther);
+  mail.deliver(bench, 0);
+  EXPECT_EQ(mail.judge(command, kMe, shown), Refused::kNot);
+  EXPECT_EQ(mail.judge(command, kOther, shown), Refused::kNotOwner);
+
+  bench.step();
+  const Command next{.answers = bench.tick(), .phases = {.gates = Gates::kOff}};
+  EXPECT_EQ(mail.judge(next, kMe, bench.command_view(0)), Refused::kNotOwner);
+  EXPECT_EQ(mail.judge(next, kOther, bench.command_view(0)), Refused::kNot);
 }
 
 }  // namespace
