@@ -8,15 +8,15 @@
 
 namespace drivebench::identification {
 
-/// An experiment that identifies a motor of the book, and what its data need to become equations.
+/// An experiment that identifies a motor of the book, with the settings of its identification.
 struct NamedExperiment {
   std::string_view motor;  ///< of kMotorNames
   std::string_view name;
   std::string_view file;   ///< in configs/experiments, without .toml
-  std::string_view bench;  ///< in configs/benches, that it is made for
+  std::string_view bench;  ///< in configs/benches
   std::string_view summary;
   LoadModel load = LoadModel::kViscous;
-  double from_s = 0.0;  ///< part of the record that goes into the equations
+  double from_s = 0.0;  ///< start of the part of the record for the equations
   double to_s = 0.0;
   double current_hz = 0.0;  ///< corners of the filters; 0: the usual ones
   double voltage_hz = 0.0;
@@ -25,13 +25,13 @@ struct NamedExperiment {
 
 std::span<const NamedExperiment> named_experiments() noexcept;
 
-/// The one of this motor with this name, or null.
+/// The experiment of this motor with this name, or null.
 const NamedExperiment* find_experiment(std::string_view motor, std::string_view name) noexcept;
 
-/// The names of a motor's experiments, separated by commas, the first one first.
+/// The names of a motor's experiments, separated by commas.
 std::string experiment_names(std::string_view motor);
 
-/// Puts load model, window and filters of a named experiment into the settings.
+/// Sets load model, window and filters from a named experiment.
 void apply(const NamedExperiment& named, Settings& settings) noexcept;
 
 }  // namespace drivebench::identification

@@ -20,7 +20,7 @@ constexpr double kStepOfRate = 0.2;
 constexpr int kMostSteps = 1000;
 constexpr double kBeyondAllBounds = 1e9;  // [A] or [rad/s]
 
-/// The measured signals that drive a model and stand beside it.
+/// The measured inputs of a model, and the measured signals to compare with.
 struct Measured {
   std::vector<Series> u;
   std::vector<SeriesView> i;
@@ -56,8 +56,8 @@ struct Measured {
   }
 
  private:
-  /// Before the first tick of a bench there was no voltage, so that sample 0 shows none: the next two tell
-  /// what it would have been.
+  /// Sample 0 of a bench shows no voltage, because no tick has run: extrapolates it from the next two
+  /// samples.
   void continue_to_begin() {
     if (std::ranges::any_of(u, [](const Series& x) { return x[0] != 0.0; })) return;
     for (Series& x : u)
@@ -72,7 +72,7 @@ double largest(SeriesView x) {
   return most;
 }
 
-/// The first samples have neither speed nor current worth mentioning.
+/// Whether the first samples have negligible speed and currents.
 bool begins_at_rest(const Measured& m) {
   constexpr double kNoCurrent = 0.01;
   constexpr double kNoSpeed = 0.05;  // the filter sees a start some samples early
@@ -105,7 +105,7 @@ typename Model::State stepped(const Model& model, const Measured& m, const typen
   return y;
 }
 
-/// Measured signals of the window, with room for the simulated ones.
+/// The measured signals of the window, with space for the simulated ones.
 Resimulation prepared(const Measured& m, const MeasuredData& data, const SampleRange& range) {
   Resimulation out;
   out.period_s = data.period_s;
@@ -201,7 +201,7 @@ Resimulation run_induction(const InductionModel& model, const Measured& m, const
   return run(model, x, m, data, range, false);
 }
 
-/// What has to be positive for the equations to be those of a motor.
+/// Throws if an estimate is not positive where a motor needs it.
 void check(const Result& result) {
   if (!result.excitation.sufficient)
     throw IdentificationError("no re-simulation: " + result.excitation.verdict);

@@ -7,7 +7,7 @@
 
 namespace drivebench::identification {
 
-/// A measured signal beside what the identified motor does with the measured voltages.
+/// A measured signal and the same signal of the identified motor at the measured voltages.
 struct Resimulated {
   std::string name;  ///< i_a_a, i_b_a, i_c_a or speed_rad_s
   std::string unit;
@@ -18,7 +18,7 @@ struct Resimulated {
                             ///< that is zero
 };
 
-/// The validation of an identification, over the samples that went into the equations.
+/// The validation of an identification over the samples of the equations.
 struct Resimulation {
   double start_s = 0.0;  ///< of the first sample, from the record's first one on
   double period_s = 0.0;

@@ -25,7 +25,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-/// What stands in a message about foreign bytes: short, without control characters.
+/// Untrusted text for a message: short, without control characters.
 std::string shown(std::string_view text) {
   std::string out;
   for (const char c : text.substr(0, kLongestShown))
@@ -56,7 +56,7 @@ std::vector<std::string_view> cells_of(std::string_view line, char separator) {
   }
 }
 
-/// The next line without its end; nothing at the end of the text.
+/// Takes the next line, without its end; nothing at the end of the text.
 std::optional<std::string_view> next_line(std::string_view& text, Cursor& cursor) {
   if (text.empty()) return std::nullopt;
   const std::size_t end = text.find('\n');
@@ -123,7 +123,7 @@ double number_of(std::string_view cell, std::string_view column, const Cursor& c
   return x;
 }
 
-/// One column that is read: where it stands and what becomes of it.
+/// A column to read: its place and its conversion.
 struct Taken {
   std::size_t at;
   double factor;
@@ -149,7 +149,7 @@ std::vector<Taken> choose(const std::vector<Header>& headers, const CsvOptions& 
   return taken;
 }
 
-/// The period that the times keep, each step within 1 % of the mean.
+/// The period of the times; each step must be within 1 % of the mean.
 double period_of(const Series& time_s, std::string_view column, Cursor cursor) {
   if (time_s.size() < 2) cursor.fail(column, "a period needs two rows at least");
   const double period = (time_s.back() - time_s.front()) / static_cast<double>(time_s.size() - 1);

@@ -13,12 +13,12 @@ namespace drivebench::identification {
 
 /// One measured signal.
 struct Column {
-  std::string name;  ///< as the signal catalogue has it: i_a_a, u_a_v, encoder_count, ...
+  std::string name;  ///< from the signal catalogue: i_a_a, u_a_v, encoder_count, ...
   std::string unit;  ///< SI; empty if unknown
   Series values;
 };
 
-/// What was measured, wherever it comes from: equidistant, all columns of one length.
+/// A measurement: equidistant samples, all columns of one length.
 struct MeasuredData {
   double period_s = 0.0;
   std::vector<Column> columns;
@@ -26,14 +26,14 @@ struct MeasuredData {
   std::size_t samples() const noexcept { return columns.empty() ? 0 : columns[0].values.size(); }
   /// The column of this name, or null.
   const Column* find(std::string_view name) const noexcept;
-  /// The same; throws IdentificationError, which lists what there is.
+  /// The column of this name; otherwise throws IdentificationError with the names of all columns.
   SeriesView at(std::string_view name) const;
 };
 
 /// A column of a foreign file.
 struct ColumnMap {
-  std::string name;     ///< of the signal here
-  std::string header;   ///< of the column there, with or without its "[unit]"
+  std::string name;     ///< the signal's name in the catalogue
+  std::string header;   ///< the column's header in the file, with or without its "[unit]"
   double factor = 1.0;  ///< SI value = factor x number in the file + offset
   double offset = 0.0;
 };
@@ -45,15 +45,15 @@ struct CsvOptions {
   /// 1 %.
   double period_s = 0.0;
   std::string time = "time_s";
-  double time_factor = 1.0;  ///< seconds in a unit of that column
+  double time_factor = 1.0;  ///< seconds per unit of the time column
 };
 
-/// Reads comma- or semicolon-separated numbers under a header line; "name [unit]" is split. As `drivebench
-/// export` writes it, or from a real motor. Throws IdentificationError, "source:line: column: rule", at the
-/// first line that is not as it should be; `source` stands for the text in messages.
+/// Reads comma- or semicolon-separated numbers under a header line; "name [unit]" is split. The text comes
+/// from `drivebench export` or a real motor. Throws IdentificationError, "source:line: column: rule", at the
+/// first wrong line; `source` names the text in messages.
 MeasuredData parse_csv(std::string_view text, const std::string& source, const CsvOptions& options = {});
 
-/// The same from a file of at most 2 GiB.
+/// Reads such a file of at most 2 GiB.
 MeasuredData read_csv(const std::filesystem::path& file, const CsvOptions& options = {});
 
 }  // namespace drivebench::identification

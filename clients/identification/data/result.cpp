@@ -24,7 +24,7 @@ nlohmann::json number(double x) {
   return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(nullptr);
 }
 
-/// A key of a motor file with the estimate that it takes.
+/// A key of a motor file and its estimate.
 struct Row {
   const char* key;
   double value;
@@ -167,7 +167,7 @@ std::string to_motor_toml(const Result& r, const MotorFile& file) {
     text += line_of(row);
   if (r.find("J") == nullptr) return text;
   text += "\n[mechanics]\n" + line_of({"inertia_kgm2", r.at("J"), false});
-  // Friction that comes out negative is noise about nothing.
+  // A negative friction is noise around zero.
   if (r.find("f") != nullptr) text += line_of({"viscous_friction_nms", std::max(0.0, r.at("f")), true});
   if (r.find("f_c") != nullptr) {
     const double coulomb = std::max(0.0, r.at("f_c"));

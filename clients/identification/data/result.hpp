@@ -12,7 +12,7 @@
 
 namespace drivebench::identification {
 
-/// One parameter as the data say it is.
+/// The estimate of a parameter.
 struct Estimate {
   std::string name;  ///< the book's: R_S, T_R, L_S, sigma, ...
   std::string unit;
@@ -21,10 +21,10 @@ struct Estimate {
   std::optional<double> truth;  ///< where it is known
 };
 
-/// What became of one experiment.
+/// The result of an identification.
 struct Result {
-  std::string kind;    ///< of machine, as motor files have it: induction, pm_synchronous, pm_dc, bldc
-  std::string method;  ///< one line for people
+  std::string kind;    ///< kind of machine in motor files: induction, pm_synchronous, pm_dc, bldc
+  std::string method;  ///< one line for display
   std::vector<Estimate> parameters{};
   double index_factor = 2.0;  ///< 2 or 1.25
   double error_index = 0.0;   ///< sqrt(E^2/R_y) of the electrical equations, or of all in one stage
@@ -40,14 +40,14 @@ struct Result {
   const Estimate* find(std::string_view name) const noexcept;
   /// Its value; throws IdentificationError if there is none.
   double at(std::string_view name) const;
-  /// The data do not hold this parameter.
+  /// Whether the data do not determine this parameter.
   bool is_unseen(std::string_view name) const noexcept;
   /// Puts the truth beside the estimates of these names.
   void compare(const std::map<std::string, double, std::less<>>& truth);
 };
 
-/// Whether the truth lies within the index of the estimate: what the index promised. Nothing if the truth is
-/// not known or the parameter was not seen.
+/// Whether the truth lies within the index of the estimate. Nothing if the truth is unknown or the parameter
+/// is unseen.
 std::optional<bool> is_inside(const Result& result, const Estimate& estimate) noexcept;
 
 /// A table: parameter, unit, estimate, index in percent, truth, error in percent, whether the index held the
@@ -59,7 +59,7 @@ std::string to_markdown(const Result& result);
 /// ...}; a number that is not finite and the estimate of an unseen parameter are null.
 std::string to_json(const Result& result);
 
-/// What a motor file needs beside the estimates.
+/// The contents of a motor file beside the estimates.
 struct MotorFile {
   std::string name{};
   std::string source{};
@@ -67,9 +67,9 @@ struct MotorFile {
   bool star = true;
 };
 
-/// A file for configs/motors. An induction motor gets equal leakages, L_R = L_S, which its terminals cannot
-/// tell from any other split. Throws IdentificationError if the data did not see every parameter or an
-/// estimate is no value for a motor.
+/// A file for configs/motors. An induction motor gets equal leakages, L_R = L_S, because its terminals do not
+/// show the split. Throws IdentificationError if a parameter is unseen or an estimate is impossible for a
+/// motor.
 std::string to_motor_toml(const Result& result, const MotorFile& file);
 
 }  // namespace drivebench::identification

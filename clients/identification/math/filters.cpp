@@ -145,7 +145,7 @@ Series zero_phase(SeriesView x, const LowPass& filter, double period_s) {
   std::vector<DigitalFilter> sections;
   for (const AnalogFilter& section : butterworth_sections(filter.order, cutoff_rad_s))
     sections.push_back(bilinear(section, period_s, cutoff_rad_s));
-  // Two periods of the corner frequency: what is left of the start has decayed below 1e-3 by then.
+  // After two periods of the corner frequency the transient of the start has decayed below 1e-3.
   const auto wanted = static_cast<std::size_t>(2.0 / (filter.cutoff_hz * period_s)) +
                       3 * static_cast<std::size_t>(filter.order);
   const std::size_t edge = std::min(wanted, x.size() - 1);

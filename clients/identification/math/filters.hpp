@@ -26,15 +26,15 @@ std::vector<std::complex<double>> butterworth_poles(int order);
 /// The Butterworth low-pass, |G|^2 = 1/(1 + (w/w_c)^(2n)), in one piece.
 AnalogFilter butterworth(int order, double cutoff_rad_s);
 
-/// The same as a product of second-order sections (and one of first order): a high order far below the
-/// sampling rate has coefficients that double precision cannot hold in one piece.
+/// The low-pass as a product of second-order sections (and one of first order): at a high order and a corner
+/// far below the sampling rate double precision cannot hold the coefficients of one polynomial.
 std::vector<AnalogFilter> butterworth_sections(int order, double cutoff_rad_s);
 
 /// The trapezoidal rule, s = (2/T)(1 - z^-1)/(1 + z^-1). With `exact_rad_s` the factor 2/T becomes
 /// w/tan(w T/2), so that the response at that frequency is the analog one. Tag FLT-02.
 DigitalFilter bilinear(const AnalogFilter& filter, double period_s, double exact_rad_s = 0.0);
 
-/// The filter as the difference equation that it is, from rest. Source: (2.52); tag FLT-03.
+/// The filter as a difference equation, from rest. Source: (2.52); tag FLT-03.
 class DifferenceEquation {
  public:
   explicit DifferenceEquation(DigitalFilter filter);
@@ -51,7 +51,7 @@ class DifferenceEquation {
 class StateSpaceFilter {
  public:
   explicit StateSpaceFilter(const DigitalFilter& filter);
-  /// The state after this input has been there for ever.
+  /// Sets the steady state of a constant input.
   void settle(double u);
   double step(double u);
 

@@ -30,7 +30,7 @@ std::string list_of(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Names what lies in the directions that the scaled data hardly see.
+/// Names the parameters in the directions that the scaled data hardly determine.
 Excitation judge(const std::vector<std::string>& parameters, const Vector& column_length,
                  const Eigen::JacobiSVD<Matrix>& svd, const ExcitationLimits& limits) {
   Excitation found;
@@ -141,7 +141,7 @@ LeastSquares Regression::solve(const ExcitationLimits& limits) const {
   found.condition = ratio(svd.singularValues());
   found.normal_condition = ratio(raw.singularValues()) * ratio(raw.singularValues());
   found.excitation = judge(parameters_, length, svd, limits);
-  // K = scale V S^-1 U' y; directions that are lost in rounding get no part of it.
+  // K = scale V S^-1 U' y, without directions that are lost in rounding.
   const double floor = 1e-15 * svd.singularValues()(0);
   Matrix inverse = Matrix::Zero(index(n), index(n));
   for (Eigen::Index d = 0; d < index(n); ++d) {

@@ -8,7 +8,7 @@
 
 namespace drivebench::identification {
 
-/// A square matrix by rows, upper triangular: all that least squares needs to know of the data.
+/// An upper triangular matrix by rows: least squares needs no more of the data.
 class Triangle {
  public:
   explicit Triangle(std::size_t size) : size_(size), entries_(size * size, 0.0) {}
@@ -23,18 +23,17 @@ class Triangle {
   std::vector<double> entries_;
 };
 
-/// What the data can tell of the parameters.
+/// Whether the data determine the parameters.
 struct Excitation {
   bool sufficient = true;
-  std::vector<std::string> unseen{};  ///< parameters that the data cannot tell, alone or from each other
-  std::string verdict{};              ///< a sentence for people
+  std::vector<std::string> unseen{};  ///< parameters that the data do not determine, alone or separately
+  std::string verdict{};              ///< a sentence
 };
 
-/// Adds parameters to those that the data do not show, with the reason; names that are there already stay
-/// once.
+/// Adds unseen parameters, without duplicates, and the reason.
 void add_unseen(Excitation& excitation, const std::vector<std::string>& names, const std::string& reason);
 
-/// The verdict on two stages together.
+/// The excitation of two stages together.
 Excitation joined(const Excitation& first, const Excitation& second);
 
 /// y = W K in the sense of least squares.
@@ -43,8 +42,8 @@ struct LeastSquares {
   double residual = 0.0;     ///< E^2(K*), sum of the squared equation errors
   double energy = 0.0;       ///< R_y, sum of y^2
   double error_index = 0.0;  ///< sqrt(E^2/R_y), 0 to 1. Source: Chiasson 2005, (2.40); tag IDN-02
-  /// By how much a parameter can change before E^2 doubles (2.46), and before it is 1.25 E^2 (8.116): an
-  /// order of magnitude of its error, no standard deviation; it does not fall with the length of the record.
+  /// The change of a parameter that doubles E^2 (2.46), or makes it 1.25 E^2 (8.116): an order of magnitude
+  /// of its error, no standard deviation; it does not fall with the length of the record.
   std::vector<double> index_double;
   std::vector<double> index_quarter;
   double condition = 0.0;         ///< of W with columns of unit length: largest over smallest singular value
@@ -52,10 +51,10 @@ struct LeastSquares {
   Excitation excitation;
 };
 
-/// What the verdict goes by.
+/// The limits for the verdict.
 struct ExcitationLimits {
-  double condition = 1e4;  ///< of the scaled W; above it the weakest direction is taken as unseen
-  double part = 0.1;       ///< of a parameter in such a direction, scaled, from which on it is named
+  double condition = 1e4;  ///< of the scaled W; above it the weakest direction counts as unseen
+  double part = 0.1;       ///< smallest scaled part of a parameter in such a direction that makes it unseen
 };
 
 /// Collects the rows of y = W K and keeps their triangular factor only: QR by reflections, so that the
@@ -63,7 +62,7 @@ struct ExcitationLimits {
 class Regression {
  public:
   explicit Regression(std::vector<std::string> parameters);
-  /// One equation, as many coefficients as parameters.
+  /// Adds one equation with a coefficient for each parameter.
   void add(SeriesView coefficients, double y);
   std::size_t rows() const noexcept { return rows_; }
   const std::vector<std::string>& parameters() const noexcept { return parameters_; }
@@ -77,13 +76,14 @@ class Regression {
 
   std::vector<std::string> parameters_;
   std::size_t rows_ = 0;
-  // Rows on their way into the factor, column by column; folding them in changes nothing that can be seen.
+  // Rows that are not in the factor yet, column by column; mutable, because folding them in changes no
+  // result.
   mutable std::vector<double> block_;
   mutable std::size_t filled_;
 };
 
-/// sqrt(limit g' H^-1 g), how far a quantity with gradient g comes on the ellipsoid dK' H dK = limit, for
-/// each row of `gradients`; H symmetric, positive definite, by rows. Infinite where it is not.
+/// sqrt(limit g' H^-1 g), the largest change of a quantity with gradient g on the ellipsoid dK' H dK = limit,
+/// for each row of `gradients`; H is symmetric and positive definite, by rows; infinite otherwise.
 std::vector<double> reach(const std::vector<std::vector<double>>& hessian,
                           const std::vector<std::vector<double>>& gradients, double limit);
 

@@ -88,7 +88,7 @@ Real at(const std::vector<Real>& p, const Real& x) {
 /// Halves an interval (of x/2^b) with one simple root until double precision is reached.
 PositiveRoot refined(const std::vector<Real>& p, Real low, Real high, int b) {
   using boost::multiprecision::ldexp;
-  // An end may be a root of the neighbouring interval: the sign is taken where the first halving falls.
+  // An end may be a root of the neighbouring interval: the sign is taken at the first midpoint.
   PositiveRoot root{};
   root.low = static_cast<double>(ldexp(low, b));
   root.high = static_cast<double>(ldexp(high, b));
@@ -148,7 +148,7 @@ PositiveRoots positive_roots(const WholePolynomial& polynomial) {
     stretch(part.p);
     Part right = {.p = part.p, .at = 2 * part.at + 1, .depth = part.depth + 1};
     shift_by_one(right.p);
-    if (right.p.front() == 0) {  // a root in the very middle
+    if (right.p.front() == 0) {  // a root exactly in the middle
       const Real middle = ldexp(Real(right.at), -right.depth);
       const Real width = ldexp(Real(1), -right.depth - 64);
       found.roots.push_back(refined(real, middle - width, middle + width, b));

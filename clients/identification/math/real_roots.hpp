@@ -8,7 +8,7 @@
 
 namespace drivebench::identification {
 
-/// Whole numbers without limit: what is worked out with them is exact.
+/// Unlimited integers for exact arithmetic.
 using Whole = boost::multiprecision::cpp_int;
 using WholePolynomial = Polynomial<Whole>;
 
@@ -31,8 +31,8 @@ struct PositiveRoots {
 };
 PositiveRoots positive_roots(const WholePolynomial& p);
 
-/// The entries of a factor as whole numbers: all of them times one power of two, after each column was
-/// rounded to 60 bits of its largest entry, which is less than the factor itself is wrong by.
+/// The entries of a factor as whole numbers: each column rounded to 60 bits of its largest entry, which is
+/// less than the error of the factor, and all scaled by one power of two.
 SquareMatrix<Whole> whole_entries(const Triangle& factor);
 
 }  // namespace drivebench::identification

@@ -10,7 +10,7 @@ namespace drivebench::identification {
 using Series = std::vector<double>;
 using SeriesView = std::span<const double>;
 
-/// Data or options from which nothing can be worked out; what() is a sentence for the user.
+/// Data or options that cannot be used; what() is a sentence for the user.
 class IdentificationError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

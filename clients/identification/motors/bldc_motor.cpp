@@ -9,7 +9,7 @@
 namespace drivebench::identification {
 namespace {
 
-/// The equations of three phases: one column a parameter, filtered alike.
+/// The equations of three phases: one column for each parameter, all with the same filter.
 struct BldcSignals {
   std::array<Series, 3> slope;
   std::array<Series, 3> i;

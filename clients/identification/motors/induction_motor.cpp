@@ -12,7 +12,7 @@
 namespace drivebench::identification {
 namespace {
 
-/// An index beyond half of the estimate, or worse: the data do not show the parameter.
+/// With an index above half of the estimate the data do not determine the parameter.
 constexpr double kLargestIndex = 0.5;
 constexpr double kLargestCondition = 1e10;
 

@@ -5,8 +5,7 @@
 
 namespace drivebench::identification {
 
-/// The parameters that the terminals of an induction motor show, and one way to split them between stator and
-/// rotor.
+/// The parameters of an induction motor that its terminals show, and M and R_R for equal leakages.
 struct InductionParameters {
   double stator_resistance_ohm;  ///< R_S = (K_6 - K_4)/K_14
   double rotor_time_constant_s;  ///< T_R = K_8
@@ -19,8 +18,8 @@ struct InductionParameters {
 /// Source: Chiasson 2005, (8.101).
 InductionParameters induction_parameters(double k4, double k6, double k8, double k14) noexcept;
 
-/// sqrt(limit E^2 g' H^-1 g) for R_S, T_R, L_S, sigma, M, R_R: how far each can go until E^2 is 1.25 E^2*,
-/// from the quadratic approximation of E^2 at the minimum. Source: Chiasson 2005, (8.116); tag IMID-03.
+/// sqrt(limit E^2 g' H^-1 g) for R_S, T_R, L_S, sigma, M, R_R: the change that makes E^2 1.25 E^2*, from the
+/// quadratic approximation of E^2 at the minimum. Source: Chiasson 2005, (8.116); tag IMID-03.
 std::vector<double> induction_indices(const InductionMinimum& minimum);
 
 /// R_S, T_R, L_S, sigma by the constrained least squares of (8.97)-(8.100), found globally

@@ -18,7 +18,7 @@
 /// estimated, inputs as measured.
 namespace drivebench::identification {
 
-/// What a model is driven by at an instant.
+/// The inputs of a model at an instant.
 struct MotorInput {
   std::array<double, 3> u{};    ///< [V] a star: against any common point; a two-phase machine or an armature
                                 ///< uses the first two or one
@@ -100,7 +100,7 @@ struct InductionModel {
   std::array<double, 3> currents(const State& x, const MotorInput&) const noexcept {
     return phases_of({x[0], x[1]}, three_phase);
   }
-  /// Without flux; the caller puts it in.
+  /// The state without flux; the caller adds it.
   State state_of(const std::array<double, 3>& i, double speed, const MotorInput&) const noexcept {
     const std::complex<double> current = two_phase_of(i, three_phase);
     return {current.real(), current.imag(), 0.0, 0.0, speed};
@@ -108,7 +108,7 @@ struct InductionModel {
 };
 
 /// The equations of PmMachineModel in the magnet's frame, whose angle is the measured one, with dry friction:
-///   J w' = K_m i_q - f w - f_c sgn w; at standstill f_c holds what is smaller. Source: Chiasson 2005,
+///   J w' = K_m i_q - f w - f_c sgn w; at standstill f_c balances smaller torques. Source: Chiasson 2005,
 ///   (9.104).
 struct PmModel {
   using State = std::array<double, 3>;  // i_d, i_q, w

@@ -30,36 +30,37 @@ const MotorName& motor_name(MotorKind kind) noexcept;
 /// Parameters as a bench describes them, by their names: "machine.stator_resistance_ohm".
 using BenchParameters = std::map<std::string, double, std::less<>>;
 
-/// What is known about a measurement beside its columns.
+/// Facts about a measurement beside its columns.
 struct MeasurementFacts {
   int pole_pairs = 1;
   bool three_phase = true;
   double counts_per_revolution = 0.0;  ///< 0: the angle is measured in rad
   bool half_count = true;              ///< the counts are those of a floor encoder
-  /// How long before the sample the reported voltage held [ticks of the bench]: 1 behind a voltage amplifier,
-  /// 0 where it is the value at the sample.
+  /// The time before the sample during which the reported voltage was constant [ticks of the bench]: 1 behind
+  /// a voltage amplifier, 0 for a value at the sample.
   double voltage_held_ticks = 1.0;
   int decimation = 1;  ///< ticks of the bench in a period of the data
-  std::string note{};  ///< what the voltages do not show; empty: nothing
+  std::string note{};  ///< a limit of the reported voltages; empty: none
 };
 
-/// Pole pairs, encoder and voltages as a bench with this drive ("voltage_amplifier", "source", ...), so many
-/// steps in a tick and these parameters has them. A bench reports the voltage at the end of the tick: behind
-/// a voltage amplifier it held throughout the tick, behind a current amplifier for the last step; a source
-/// and an output filter change it all the time. Phases and decimation stay as they are.
+/// Sets pole pairs, encoder and voltages of a bench with this drive ("voltage_amplifier", "source", ...),
+/// number of steps in a tick and parameters. A bench reports the voltage at the end of the tick: behind a
+/// voltage amplifier it held throughout the tick, behind a current amplifier for the last step; a source and
+/// an output filter change it all the time. Phases and decimation stay unchanged.
 void take_facts(const BenchParameters& bench, std::string_view drive, int substeps, MeasurementFacts& facts);
 
-/// Kind, facts and filters that suit both. `voltage_shift` is half the time that a voltage held.
+/// The settings for this kind, these facts and the usual filters. `voltage_shift` is half of
+/// voltage_held_ticks.
 Settings settings_of(MotorKind kind, const MeasurementFacts& facts, double period_s);
 
-/// What identify() should find on a bench with these parameters, by the names of its estimates. Left out is
-/// what the method cannot mean: M, L_R, R_R of an induction motor are those of equal leakages; a motor with
-/// L_d other than L_q has no L_S; on a shaft with a load of its own there is no J; with a thermal model
-/// resistances do not stay what they are.
+/// The true values of the estimates on a bench with these parameters, by the names of the estimates. It
+/// leaves out values that the method does not define: M, L_R, R_R of an induction motor are those of equal
+/// leakages; a motor with different L_d and L_q has no L_S; a shaft with its own load has no J; with a
+/// thermal model the resistances change.
 std::map<std::string, double, std::less<>> truth_of(MotorKind kind, const BenchParameters& bench);
 
-/// Adds what column `load_nm` of the data knows: tau_L and K17 if the load is constant in the window and the
-/// method looks for one, else K17 for viscous friction.
+/// Adds the truth from column `load_nm`: tau_L and K17 if the load is constant in the window and the method
+/// estimates one, else K17 for viscous friction.
 void add_load_truth(const MeasuredData& data, const Settings& settings,
                     std::map<std::string, double, std::less<>>& truth);
 

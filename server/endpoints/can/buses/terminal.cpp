@@ -84,7 +84,7 @@ void Terminal::poll_later() {
     if (alive.expired() || error) return;
     pollfd state{.fd = fd_, .events = POLLIN, .revents = 0};
     ::poll(&state, 1, 0);
-    // A program that was quick has gone already but left something to read.
+    // A quick program may have closed the terminal already and left bytes to read.
     const bool there = (state.revents & POLLHUP) == 0 || (state.revents & POLLIN) != 0;
     const int fd = there ? ::fcntl(fd_, F_DUPFD_CLOEXEC, 0) : -1;
     if (fd < 0) return poll_later();

@@ -8,7 +8,7 @@
 
 namespace drivebench::can {
 
-/// A pseudo terminal that programs open like a serial device, one at a time, by a link at a path.
+/// A pseudo terminal at a link, which programs open like a serial device, one at a time.
 class Terminal {
  public:
   explicit Terminal(asio::io_context& io) : poll_(io) {}
@@ -17,13 +17,13 @@ class Terminal {
   /// Removes the link.
   ~Terminal();
 
-  /// Takes over a descriptor for what a program writes and reads that has just opened the terminal. The next
-  /// one comes after release().
+  /// Called with a descriptor for the program that has just opened the terminal; the callee owns it. The next
+  /// program comes after release().
   std::function<void(int fd)> on_client;
 
-  /// Makes the terminal and the link; what hinders it, with the cure, or nothing.
+  /// Creates the terminal and the link. Returns the problem with its cure; empty: none.
   std::string open(const std::string& link);
-  /// The program has gone: clears what it has left and waits for the next.
+  /// To be called after the program has left: drops its unread bytes and waits for the next program.
   void release();
 
  private:

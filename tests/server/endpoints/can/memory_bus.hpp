@@ -12,8 +12,8 @@ namespace drivebench::can {
 
 class MemoryBus;
 
-/// A bus inside this process, with the faults of a real one at hand. Every port hears what the others send,
-/// in the order in which it was sent, always from the io_context and never from inside send().
+/// A bus inside this process that can have the faults of a real one. Every port receives the frames of the
+/// others in the order of sending, always from the io_context and never from inside send().
 class MemoryWire {
  public:
   explicit MemoryWire(asio::io_context& io) : io_(io) {}
@@ -24,13 +24,13 @@ class MemoryWire {
   /// A port; must not outlive the wire.
   std::unique_ptr<Bus> connect(std::string name);
 
-  /// kDown: what is sent or under way is lost; kAbsent the same; kUp: all is well again.
+  /// kDown and kAbsent: sent frames and those under way are lost; kUp: the bus works again.
   void set_link(BusState state);
   /// No room for any frame: ports keep the newest of each identifier until there is room again.
   void set_full(bool full);
   /// The next frames are lost; the ports learn of it with the first frame that comes through.
   void lose(std::uint64_t frames) { to_lose_ += frames; }
-  /// What a controller says about the bus (linux/can/error.h), to every port. Bus-off lasts until
+  /// Sends an error frame of the CAN controller (linux/can/error.h) to every port. Bus-off lasts until
   /// set_link(kUp).
   void report(Frame error);
 
@@ -48,7 +48,7 @@ class MemoryWire {
   asio::io_context& io_;
   std::vector<MemoryBus*> ports_;
   std::vector<Passage> under_way_;
-  bool posted_ = false;  ///< deliver() is on its way
+  bool posted_ = false;  ///< deliver() is posted
   BusState link_ = BusState::kUp;
   bool full_ = false;
   std::uint64_t to_lose_ = 0;
