@@ -6,4 +6,6 @@ static int rounded(double value) {
   return whole;
 }
 
-int main() { return rounded(drivebench::cos_sin(0.0).cos) == 1 ? 0 : 1; }
+int main() {
+  return rounded(drivebench::cos_sin(0.0).cos) == 1 ? 0 : 1;
+}
