@@ -19,7 +19,7 @@ struct BldcSignals {
   ShaftSignals shaft;
 };
 
-BldcSignals prepare(const MeasuredData& data, const Settings& settings) {
+BldcSignals phase_signals(const MeasuredData& data, const Settings& settings) {
   const Processing& p = settings.processing;
   const std::size_t n = data.samples();
   BldcSignals s;
@@ -61,7 +61,7 @@ BldcSignals prepare(const MeasuredData& data, const Settings& settings) {
 
 Result identify_bldc_motor(const MeasuredData& data, const Settings& settings) {
   const SampleRange range = window_of(data, settings.processing);
-  const BldcSignals s = prepare(data, settings);
+  const BldcSignals s = phase_signals(data, settings);
   Regression electrical({"R_S", "L+M", "tau_p"});
   for (std::size_t k = range.first; k < range.end; ++k) {
     for (std::size_t phase = 0; phase < 3; ++phase)

@@ -13,7 +13,7 @@ struct PmSignals {
   ShaftSignals shaft;
 };
 
-PmSignals prepare(const MeasuredData& data, const Settings& e) {
+PmSignals dq_signals(const MeasuredData& data, const Settings& e) {
   const Processing& p = e.processing;
   PmSignals s;
   s.shaft = shaft_signals(data, e);
@@ -55,7 +55,7 @@ void check(Result& result, const PmSignals& s, const SampleRange& range) {
 
 Result identify_pm_motor(const MeasuredData& data, const Settings& e) {
   const SampleRange range = window_of(data, e.processing);
-  const PmSignals s = prepare(data, e);
+  const PmSignals s = dq_signals(data, e);
   Result result = {.kind = "pm_synchronous", .method = "PM synchronous motor, least squares in two stages"};
   result.samples = range.count();
   const auto electrical_rows = [&](Regression& fit, std::size_t columns) {
