@@ -32,11 +32,15 @@ class CommandLine {
   Verb<Options> add(CLI::App& parent, const std::string& name, const std::string& description, Run action) {
     CLI::App& sub = *parent.add_subcommand(name, description);
     const auto options = std::make_shared<Options>();
-    if constexpr (requires { options->json; }) sub.add_flag("--json", json_, "print JSON");
-    when_named(sub, [this, options, action] {
-      if constexpr (requires { options->json; }) options->json = json_;
-      return action(*options);
-    });
+    if constexpr (requires { options->json; }) {
+      sub.add_flag("--json", json_, "print JSON");
+      when_named(sub, [this, options, action] {
+        options->json = json_;
+        return action(*options);
+      });
+    } else {
+      when_named(sub, [options, action] { return action(*options); });
+    }
     return {sub, *options};
   }
   template <class Options, class Run>

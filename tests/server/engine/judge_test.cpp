@@ -51,7 +51,7 @@ const Step kRetake{.what = Step::What::kRetake};
 /// as pass before the I/O thread is told.
 class JudgedBench {
  public:
-  explicit JudgedBench(RunMode mode) : mode_(mode), turn_ticks_(mode == RunMode::kFree ? 1024 : 1) {
+  explicit JudgedBench(RunMode mode) : turn_ticks_(mode == RunMode::kFree ? 1024 : 1) {
     BenchConfig config = servo_bench();
     config.mode = mode;
     config.setup.watchdog_ticks = 1'000'000;
@@ -117,7 +117,6 @@ class JudgedBench {
     io_.poll();
   }
 
-  RunMode mode_;
   Tick turn_ticks_;
   asio::io_context io_{1};
   std::unique_ptr<Engine> lockstep_;
