@@ -5,7 +5,7 @@
 namespace drivebench {
 namespace {
 
-// Kills: a gain that reaches the offset, offsets exchanged, a phase or the field forgotten.
+// Catches: a gain that reaches the offset, offsets exchanged, a phase or the field forgotten.
 TEST(Amplifier, TheGainActsBeforeTheOffsetOfEachPhase) {
   const AmplifierParameters p{.gain = 2.0, .offset_a_v = 0.5, .offset_b_v = -1.0, .offset_c_v = 0.25};
   const PhaseValues out = amplified(p, {.a = 3.0, .b = 4.0, .c = -5.0, .field = 6.0});
@@ -15,7 +15,7 @@ TEST(Amplifier, TheGainActsBeforeTheOffsetOfEachPhase) {
   EXPECT_EQ(out.field, 12.0);
 }
 
-// Kills: a limit on one side only, a flag of one phase that another one takes back.
+// Catches: a limit on one side only, a flag of one phase that another one takes back.
 TEST(Amplifier, TheLimitHoldsForEachPhase) {
   LimitedVoltages out = clipped({10.0, -10.0, 7.0}, 10.0);  // exactly the limit is not clipped
   EXPECT_EQ(out.voltage_v.a, 10.0);
@@ -31,7 +31,7 @@ TEST(Amplifier, TheLimitHoldsForEachPhase) {
   }
 }
 
-// Kills: a decay applied to the output instead of to its distance from the input.
+// Catches: a decay applied to the output instead of to its distance from the input.
 TEST(Amplifier, TheFilterGoesTowardsItsInputAndStaysOnIt) {
   EXPECT_EQ(filtered(2.0, 10.0, 1.0), 2.0);
   EXPECT_EQ(filtered(2.0, 10.0, 0.5), 6.0);

@@ -11,7 +11,7 @@
 namespace drivebench {
 namespace {
 
-// Kills: an offset under the gain, noise that the gain scales, a converter where none is.
+// Catches: an offset under the gain, noise that the gain scales, a converter where none is.
 TEST(AnalogChannel, WithoutAConverterItIsTheStraightLine) {
   const AnalogParameters p{.full_scale = 1.0, .gain = 1.1, .offset = -0.25, .noise_rms = 0.5};
   const AnalogReading r = read_analog(p, 70.0, 0.2);
@@ -19,7 +19,7 @@ TEST(AnalogChannel, WithoutAConverterItIsTheStraightLine) {
   EXPECT_FALSE(r.saturated);
 }
 
-// Kills: a step of the wrong size, truncation in place of the nearest step, noise or offset behind the
+// Catches: a step of the wrong size, truncation in place of the nearest step, noise or offset behind the
 // converter.
 TEST(AnalogChannel, TheConverterRoundsWhatGainOffsetAndNoiseHaveMade) {
   const AnalogParameters p{.bits = 10, .full_scale = 64.0, .gain = 2.0, .offset = 0.03, .noise_rms = 0.5};
@@ -33,7 +33,7 @@ TEST(AnalogChannel, TheConverterRoundsWhatGainOffsetAndNoiseHaveMade) {
   }
 }
 
-// Kills: an end that is a step too far, a flag on one side only.
+// Catches: an end that is a step too far, a flag on one side only.
 TEST(AnalogChannel, TheConverterHoldsAtItsEnds) {
   const AnalogParameters p{.bits = 2, .full_scale = 4.0};
   EXPECT_EQ(read_analog(p, 2.9, 0.0).value, 2.0);  // steps of 2 V: -4, -2, 0, 2
@@ -46,7 +46,7 @@ TEST(AnalogChannel, TheConverterHoldsAtItsEnds) {
   EXPECT_TRUE(read_analog(p, -5.1, 0.0).saturated);
 }
 
-// Kills: a current sensor that rounds or scales in another way than the other channels.
+// Catches: a current sensor that rounds or scales in another way than the other channels.
 TEST(AnalogChannel, ACurrentSensorReadsAsAnAnalogChannelDoes) {
   const CurrentSensorParameters sensor{.bits = 12, .full_scale_a = 20.0, .noise_rms_a = 0.1};
   const AnalogParameters channel{
@@ -60,7 +60,7 @@ TEST(AnalogChannel, ACurrentSensorReadsAsAnAnalogChannelDoes) {
   }
 }
 
-// Kills: delays that no ring holds, quarter ticks that would be cut to whole ones.
+// Catches: delays that no ring holds, quarter ticks that would be cut to whole ones.
 TEST(AnalogChannel, ADelayIsNoneHalfATickOrWholeTicksUpToEight) {
   for (const double ticks : {0.0, 0.5, 1.0, 2.0, 7.0, 8.0})
     EXPECT_TRUE(is_sensor_delay(ticks)) << ticks;

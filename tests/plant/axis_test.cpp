@@ -38,7 +38,7 @@ struct LineDecoder {
   }
 };
 
-// Kills: edges lost where ticks, turns, substeps or friction events meet; an encoder state that does not
+// Catches: edges lost where ticks, turns, substeps or friction events meet; an encoder state that does not
 // agree with the list of edges.
 TEST(Axis, TheEdgesOfARandomRunAlwaysAddUpToTheCount) {
   AxisParameters p = servo_axis();
@@ -71,7 +71,7 @@ TEST(Axis, TheEdgesOfARandomRunAlwaysAddUpToTheCount) {
 }
 
 // A magnetised rotor trembles by 1e-17 rad around a boundary of the encoder, which is also where the angle
-// wraps. Kills: an angle of a full turn after -1e-17 rad, and counts that change without an edge.
+// wraps. Catches: an angle of a full turn after -1e-17 rad, and counts that change without an edge.
 TEST(Axis, TremblingAtTheWrapLosesNoEdge) {
   for (const double volts_a : {1.0, 1.01, 3.7, 12.0}) {
     Axis axis(servo_axis(), kServoTiming, 1, 0);
@@ -86,7 +86,7 @@ TEST(Axis, TremblingAtTheWrapLosesNoEdge) {
   }
 }
 
-// Kills: turns counted in the wrong direction, or one wrap per tick only.
+// Catches: turns counted in the wrong direction, or one wrap per tick only.
 TEST(Axis, TheAngleStaysWithinATurnAndTheTurnsAreCounted) {
   for (const double speed_rad_s : {900.0, -900.0, 4e5, -4e5}) {
     AxisParameters p = servo_axis();
@@ -104,7 +104,7 @@ TEST(Axis, TheAngleStaysWithinATurnAndTheTurnsAreCounted) {
   }
 }
 
-// Kills: NaN that reaches a sample, a divergence that is not latched, a state that goes on after it.
+// Catches: NaN that reaches a sample, a divergence that is not latched, a state that goes on after it.
 TEST(Axis, ADivergedStateIsHeldAndLatched) {
   AxisParameters p = servo_axis();
   induction(p).stator_inductance_h = 1e-5;
@@ -130,7 +130,7 @@ TEST(Axis, ADivergedStateIsHeldAndLatched) {
   }
 }
 
-// Kills: a divergence that hides from the check because it is not a number.
+// Catches: a divergence that hides from the check because it is not a number.
 TEST(Axis, AnInfiniteLoadDiverges) {
   Axis axis(servo_axis(), kServoTiming, 1, 0);
   axis.set_load(std::numeric_limits<double>::infinity(), 0, 0);
@@ -139,7 +139,7 @@ TEST(Axis, AnInfiniteLoadDiverges) {
   EXPECT_EQ(axis.sample(1).speed_rad_s, 0.0);
 }
 
-// Kills: constants that are derived once and for all, parameters that act a tick late.
+// Catches: constants that are derived once and for all, parameters that act a tick late.
 TEST(Axis, ANewParameterHoldsFromTheNextAdvanceOn) {
   AxisParameters hot = servo_axis();
   induction(hot).rotor_resistance_ohm *= 1.5;
@@ -166,7 +166,7 @@ TEST(Axis, ANewParameterHoldsFromTheNextAdvanceOn) {
   EXPECT_EQ(changed.sample(12).faults, kShaftHeld);
 }
 
-// Kills: a sample that changes the axis, edges of another run after a restore.
+// Catches: a sample that changes the axis, edges of another run after a restore.
 TEST(Axis, SamplingChangesNothingAndARestoreForgetsTheSegments) {
   Axis axis(servo_axis(), kServoTiming, 1, 0);
   axis.advance(volts(20.0, 10.0), 0);
@@ -179,7 +179,7 @@ TEST(Axis, SamplingChangesNothingAndARestoreForgetsTheSegments) {
   EXPECT_TRUE(axis.last_tick().empty());
 }
 
-// Kills: a substep that is counted twice or left out. Five steps of 25 us against one tick of 25 us five
+// Catches: a substep that is counted twice or left out. Five steps of 25 us against one tick of 25 us five
 // times.
 TEST(Axis, SubstepsOfATickAreTheSameAsShortTicks) {
   Axis one(servo_axis(), kServoTiming, 1, 0);

@@ -25,7 +25,8 @@ Phases commutated(double electrical_rad) {
   return kTable[static_cast<std::size_t>(std::floor((degrees + 30.0) / 60.0)) % 6];
 }
 
-// BL-02, against the printed cases, within a turn and beyond. Kills: a wrong corner, slope, phase order, n_p.
+// BL-02, against the printed cases, within a turn and beyond. Catches: a wrong corner, slope, phase order,
+// n_p.
 TEST(BldcMachine, TheBackEmfIsTheTrapezoidOfTheBook) {
   for (const int pole_pairs : {1, 4}) {
     BldcMachineParameters p = kMotor;
@@ -41,7 +42,7 @@ TEST(BldcMachine, TheBackEmfIsTheTrapezoidOfTheBook) {
 }
 
 // AC-27, BL-02. The midpoint rule over 3600 parts of a turn, whose ends meet the corners, is good to 1e-6.
-// Kills: a trapezoid of another width.
+// Catches: a trapezoid of another width.
 TEST(BldcMachine, RmsAndHarmonicsOfTheBackEmfAreThoseOfTheReference) {
   constexpr int kParts = 3600;
   const BldcMachineConstants c = constants_of(kMotor);
@@ -63,7 +64,7 @@ TEST(BldcMachine, RmsAndHarmonicsOfTheBackEmfAreThoseOfTheReference) {
   EXPECT_NEAR(b7, -0.024813, 1e-6);
 }
 
-// AC-27: 2 tau_p I_p without ripple, at every angle but the instants of commutation. Kills: a wrong sign of
+// AC-27: 2 tau_p I_p without ripple, at every angle but the instants of commutation. Catches: a wrong sign of
 // the torque, emfs in another order than the currents.
 TEST(BldcMachine, TheCommutationTableGivesAConstantTorque) {
   for (const int pole_pairs : {1, 3}) {
@@ -82,7 +83,7 @@ TEST(BldcMachine, TheCommutationTableGivesAConstantTorque) {
   }
 }
 
-// The emf has the sense of the terminal voltage, that of the literature is its negative. Kills: E31, an emf
+// The emf has the sense of the terminal voltage, that of the literature is its negative. Catches: E31, an emf
 // and a torque that are reversed together, which the power balance would not see.
 TEST(BldcMachine, SensesAreThoseOfTheBook) {
   const BldcMachineConstants c = constants_of(kMotor);
@@ -98,7 +99,7 @@ TEST(BldcMachine, SensesAreThoseOfTheBook) {
               -51.28 * std::sqrt(2.0 / 3.0) * 2.0, 1e-9);
 }
 
-// BL-08. Kills: any wrong sign or factor, a torque constant that differs from the emf constant, a wrong
+// BL-08. Catches: any wrong sign or factor, a torque constant that differs from the emf constant, a wrong
 // inverse of the inductances with open phases.
 TEST(BldcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   Random random{std::mt19937_64(21)};
@@ -118,7 +119,7 @@ TEST(BldcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
 }
 
 // The split of a step relies on it: between two whole numbers every emf is straight, at each it has a kink.
-// Kills: corners that are not where the position says.
+// Catches: corners that are not where the position says.
 TEST(BldcMachine, TheBackEmfIsStraightBetweenTwoCornerPositions) {
   BldcMachineParameters p = kMotor;
   p.pole_pairs = 3;
@@ -144,7 +145,7 @@ TEST(BldcMachine, TheBackEmfIsStraightBetweenTwoCornerPositions) {
   EXPECT_EQ(pole_pairs_of(p), 3.0);
 }
 
-// A step that rounding puts on the wrong side of a corner must not see it. Kills: a jump in e.
+// A step that rounding puts on the wrong side of a corner must not see it. Catches: a jump in e.
 TEST(BldcMachine, BothSidesOfACornerGiveTheSameEmf) {
   const BldcMachineConstants c = constants_of(kMotor);
   for (int n = 0; n < 6; ++n) {
@@ -157,8 +158,8 @@ TEST(BldcMachine, BothSidesOfACornerGiveTheSameEmf) {
   }
 }
 
-// BL-02: the slope of the magnet's flux is -e/n_p, its peak 5 pi/12 at angle 0, pi/3 at 30 degrees. Kills: a
-// flux that leads where it lags, a wrong cap.
+// BL-02: the slope of the magnet's flux is -e/n_p, its peak 5 pi/12 at angle 0, pi/3 at 30 degrees. Catches:
+// a flux that leads where it lags, a wrong cap.
 TEST(BldcMachine, TheFluxOfTheMagnetIsTheIntegralOfTheEmf) {
   BldcMachineParameters p = kMotor;
   p.pole_pairs = 2;
@@ -179,7 +180,7 @@ TEST(BldcMachine, TheFluxOfTheMagnetIsTheIntegralOfTheEmf) {
 }
 
 // AC-30, BL-07: with equal copper losses blocks of current on a trapezoid give 2/sqrt(3) of the power of
-// sines on a sine of the same peak. Kills: tau_p taken per pair of phases, losses of the wrong phases.
+// sines on a sine of the same peak. Catches: tau_p taken per pair of phases, losses of the wrong phases.
 TEST(BldcMachine, WithEqualCopperLossesItGivesFifteenPercentMoreThanASineMachine) {
   const PmMachineConstants sine = constants_of(two_phase_equivalent(
       1, {.resistance_ohm = 0.7, .self_inductance_h = 2e-3, .emf_constant_v_s = 0.5128}));
@@ -194,7 +195,7 @@ TEST(BldcMachine, WithEqualCopperLossesItGivesFifteenPercentMoreThanASineMachine
   EXPECT_NEAR(torque_nm(c, state_of(block), now) / torque_nm(sine, sine_current, turned), 1.1547, 1e-4);
 }
 
-// Kills: a factor that reaches the wrong parameter, series impedance that is lost, a time constant of the
+// Catches: a factor that reaches the wrong parameter, series impedance that is lost, a time constant of the
 // wrong inductance, a star that is not declared as one.
 TEST(BldcMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) {
   const BldcMachineParameters p = adjusted(kMotor, {.stator_resistance_factor = 1.5,
@@ -212,7 +213,7 @@ TEST(BldcMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) {
   EXPECT_EQ(connection_of(independent()), Connection::kIndependent);
 }
 
-// Kills: inductances that no windings can have, which make the zero sequence unstable.
+// Catches: inductances that no windings can have, which make the zero sequence unstable.
 TEST(BldcMachine, MutualInductanceMustStayBelowHalfOfTheSelfInductance) {
   std::vector<Problem> found;
   Problems rules(found);

@@ -36,7 +36,7 @@ Phases book_slopes(const BldcMachineParameters& p, const Phases& i, double angle
           scale * (m * v[0] + m * v[1] + (l - m) * v[2])};
 }
 
-// BL-08: 14 V between phases a and b, c open, locked at 60 degrees. Kills: a wrong inductance or resistance
+// BL-08: 14 V between phases a and b, c open, locked at 60 degrees. Catches: a wrong inductance or resistance
 // along a line, a torque without sqrt(2/3).
 TEST(BldcPhases, LockedWithTwoPhasesInSeriesTheCurrentRisesToTheValueOfTheReference) {
   const BldcMachineConstants c = constants_of(kMotor);
@@ -71,7 +71,7 @@ struct BookTurning {
 };
 
 // E32. The three currents of the book's model with its full inductance matrix beside the product, at varying
-// speed and an unbalanced voltage with a common part. Kills: a neutral that is not removed from a star, a
+// speed and an unbalanced voltage with a common part. Catches: a neutral that is not removed from a star, a
 // zero sequence that is lost or has the wrong inductance in independent phases.
 TEST(BldcPhases, StarAndIndependentPhasesFollowTheBooksModelWithAndWithoutTheNeutralVoltage) {
   for (const bool star : {true, false}) {
@@ -112,8 +112,8 @@ TEST(BldcPhases, StarAndIndependentPhasesFollowTheBooksModelWithAndWithoutTheNeu
   }
 }
 
-// BL-02: the neutral of a star ripples by e_p w/3, a triangle with three periods per electrical turn. Kills:
-// a neutral taken as the mean of the terminals, the wrong sign of the ripple.
+// BL-02: the neutral of a star ripples by e_p w/3, a triangle with three periods per electrical turn.
+// Catches: a neutral taken as the mean of the terminals, the wrong sign of the ripple.
 TEST(BldcPhases, TheNeutralRipplesByAThirdOfTheEmf) {
   const BldcMachineConstants c = constants_of(kMotor);
   double highest_v = -1e9;
@@ -133,7 +133,7 @@ TEST(BldcPhases, TheNeutralRipplesByAThirdOfTheEmf) {
 }
 
 // The neutral is what makes each winding obey its own equation: L_S i' - M(...) = u - v_N - R i + e_p w e.
-// Kills: a neutral voltage that does not belong to the currents of the star.
+// Catches: a neutral voltage that does not belong to the currents of the star.
 TEST(BldcPhases, TheNeutralVoltageClosesTheEquationOfEveryPhaseOfAStar) {
   const BldcMachineConstants c = constants_of(kMotor);
   Random random{std::mt19937_64(22)};
@@ -153,7 +153,7 @@ TEST(BldcPhases, TheNeutralVoltageClosesTheEquationOfEveryPhaseOfAStar) {
   }
 }
 
-// Kills: a zero sequence that appears in a star, phases that conduct though they are open, a wrong coupling
+// Catches: a zero sequence that appears in a star, phases that conduct though they are open, a wrong coupling
 // of the phases that are left: open windings are the constraint i' = 0, here solved with the full matrix.
 TEST(BldcPhases, OpenPhasesCarryNothingAndTheOthersObeyTheirEquations) {
   const BldcMachineParameters p = independent();
@@ -183,7 +183,8 @@ TEST(BldcPhases, OpenPhasesCarryNothingAndTheOthersObeyTheirEquations) {
   }
 }
 
-// Kills: an open-circuit voltage of the wrong sign, a star whose current flows across its line or when open.
+// Catches: an open-circuit voltage of the wrong sign, a star whose current flows across its line or when
+// open.
 TEST(BldcPhases, OpenCircuitVoltagesHoldTheCurrentsAtZeroAndAStarObeysItsConduction) {
   const RotorMotion now = motion(0.6, 300.0);
   const BldcMachineConstants c = constants_of(independent());
@@ -248,8 +249,8 @@ DriveRun trapezoidal_drive(double voltage_v) {
   return run;
 }
 
-// AC-28, tolerances of the reference (5 %; half a unit of the last digit for the speeds). Kills: a star with
-// the neutral left in, a drive that turns the wrong way.
+// AC-28, tolerances of the reference (5 %; half a unit of the last digit for the speeds). Catches: a star
+// with the neutral left in, a drive that turns the wrong way.
 TEST(BldcPhases, TheOpenLoopTrapezoidalDriveSynchronisesAsInTheReference) {
   const DriveRun calm = trapezoidal_drive(33.0);
   EXPECT_NEAR(calm.mean_rad_s, 62.83, 0.01);

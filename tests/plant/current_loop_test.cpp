@@ -22,7 +22,7 @@ DriveParameters current_drive(double integral_v_per_as) {
   return p;
 }
 
-// Kills: a clamp on one side, a field that is not clamped, a common part left in a star.
+// Catches: a clamp on one side, a field that is not clamped, a common part left in a star.
 TEST(CurrentLoop, TheCommandIsClampedAndHasNoCommonPartInAStar) {
   const CurrentLoopParameters p{.proportional_v_per_a = 1.0, .limit_a = 5.0};
   const PhaseValues apart =
@@ -39,7 +39,7 @@ TEST(CurrentLoop, TheCommandIsClampedAndHasNoCommonPartInAStar) {
 
 // Closed form: i = K_P i_r/(K_P + R) (1 - exp(-(K_P + R) t/L)). Sampled every 1 us the loop is half a sample
 // late: (K_P + R) h/(2 L) = 0.55 % of the pole, at most 0.2 % of the current.
-// Kills: a loop that runs once a tick, the sign of the error, a gain that misses.
+// Catches: a loop that runs once a tick, the sign of the error, a gain that misses.
 TEST(CurrentLoop, ProportionalHasTheFirstOrderResponse) {
   DriveRig rig(current_drive(0.0), Connection::kArmature, kLoad, 100);
   const double rate_per_s = (kProportional + kLoad.resistance_ohm) / kLoad.inductance_h;
@@ -51,7 +51,7 @@ TEST(CurrentLoop, ProportionalHasTheFirstOrderResponse) {
 }
 
 // With alpha = R/L the pole of the winding cancels: i = i_r (1 - exp(-K_P t/L)), 0.22 ms to 90 %.
-// Kills: an integral with a wrong gain, one that sees the current of one end only.
+// Catches: an integral with a wrong gain, one that sees the current of one end only.
 TEST(CurrentLoop, ProportionalAndIntegralReachTheCommand) {
   DriveRig rig(current_drive(kIntegral), Connection::kArmature, kLoad, 100);
   const double rate_per_s = kProportional / kLoad.inductance_h;
@@ -62,7 +62,7 @@ TEST(CurrentLoop, ProportionalAndIntegralReachTheCommand) {
   }
 }
 
-// Kills: an error taken from one end of the interval.
+// Catches: an error taken from one end of the interval.
 TEST(CurrentLoop, TheIntegralTakesTheMeanError) {
   DriveRig rig(current_drive(kIntegral), Connection::kArmature, kLoad);
   rig.drive.begin_tick(rig.memory, amperes(2.0), {}, 0);
@@ -73,7 +73,7 @@ TEST(CurrentLoop, TheIntegralTakesTheMeanError) {
 
 // 5 A need 210 V of proportional part against the emf of 110 V: clipped at 100 V, the current goes backwards.
 // When the emf is gone the loop must come to 5 A without the integral of that time.
-// Kills: an integral that winds up, a freeze that never lets go, a flag that is not raised.
+// Catches: an integral that winds up, a freeze that never lets go, a flag that is not raised.
 TEST(CurrentLoop, TheIntegralStandsStillWhileTheVoltageIsClipped) {
   DriveRig rig(current_drive(kIntegral), Connection::kArmature, kLoad, 100);
   rig.load.emf_v = {110.0, 0.0, 0.0};
@@ -94,7 +94,7 @@ TEST(CurrentLoop, TheIntegralStandsStillWhileTheVoltageIsClipped) {
 }
 
 // An emf against which phase a is clipped freezes its integral alone.
-// Kills: integrals that run off with a common part which no current can answer.
+// Catches: integrals that run off with a common part which no current can answer.
 TEST(CurrentLoop, InAStarTheIntegralsHaveNoCommonPart) {
   DriveRig rig(current_drive(kIntegral), Connection::kStar, kLoad, 100);
   for (int tick = 0; tick < 100; ++tick)
@@ -111,7 +111,7 @@ TEST(CurrentLoop, InAStarTheIntegralsHaveNoCommonPart) {
   EXPECT_NEAR(integral.a + integral.b + integral.c, 0.0, 1e-9);
 }
 
-// Kills: an integral kept over a time without current control, a voltage mode that loops.
+// Catches: an integral kept over a time without current control, a voltage mode that loops.
 TEST(CurrentLoop, OtherGatesEndTheLoop) {
   DriveRig rig(current_drive(kIntegral), Connection::kArmature, kLoad);
   for (int tick = 0; tick < 50; ++tick)
@@ -125,7 +125,7 @@ TEST(CurrentLoop, OtherGatesEndTheLoop) {
 }
 
 // Gain 0.5 and 3 V of offset: the loop sees both, P and I get rid of them.
-// Kills: a power stage that the loop goes around.
+// Catches: a power stage that the loop goes around.
 TEST(CurrentLoop, TheAmplifierIsWithinTheLoop) {
   DriveParameters p = current_drive(kIntegral);
   p.amplifier.gain = 0.5;

@@ -11,7 +11,7 @@
 namespace drivebench {
 namespace {
 
-// Kills: an ideal sensor that quantises, limits, or loses gain, offset or noise.
+// Catches: an ideal sensor that quantises, limits, or loses gain, offset or noise.
 TEST(CurrentSensor, TheIdealSensorIsTheStraightLine) {
   const CurrentSensorParameters ideal{.bits = 0, .full_scale_a = 1.0, .noise_rms_a = 0.5};
   const AnalogReading r = read_current(ideal, 1.1, -0.25, 70.0, 0.2);
@@ -19,7 +19,7 @@ TEST(CurrentSensor, TheIdealSensorIsTheStraightLine) {
   EXPECT_FALSE(r.saturated);
 }
 
-// Kills: steps of the wrong size (2^bits - 1, or one side only), rounding down in place of to the nearest.
+// Catches: steps of the wrong size (2^bits - 1, or one side only), rounding down in place of to the nearest.
 TEST(CurrentSensor, TheConverterRoundsToTheNearestStep) {
   const CurrentSensorParameters p{.bits = 8, .full_scale_a = 16.0};
   constexpr double kStep_a = 0.125;
@@ -34,7 +34,7 @@ TEST(CurrentSensor, TheConverterRoundsToTheNearestStep) {
   EXPECT_EQ(read_current(p, -1.0, 0.0, 1.0, 0.0).value, -1.0);
 }
 
-// Kills: codes beyond the range, a flag that comes a step early or not at all, an overflowing conversion.
+// Catches: codes beyond the range, a flag that comes a step early or not at all, an overflowing conversion.
 TEST(CurrentSensor, TheConverterStopsAtItsEndsAndSaysSo) {
   const CurrentSensorParameters p{.bits = 12, .full_scale_a = 10.0};
   constexpr double kStep_a = 10.0 / 2048.0;
@@ -58,7 +58,7 @@ TEST(CurrentSensor, TheConverterStopsAtItsEndsAndSaysSo) {
 }
 
 // 20000 draws: the rms estimate scatters by 0.5 %, the mean by 0.7 % of the rms, the correlation by 0.7 %.
-// Kills: a wrong amplitude, one noise for both phases or all ticks.
+// Catches: a wrong amplitude, one noise for both phases or all ticks.
 TEST(CurrentSensor, TheNoiseOfAnAxisHasItsRmsAndDiffersBetweenPhasesAndTicks) {
   AxisParameters p = servo_axis();
   p.sensors.current.noise_rms_a = 0.03;
@@ -81,7 +81,7 @@ TEST(CurrentSensor, TheNoiseOfAnAxisHasItsRmsAndDiffersBetweenPhasesAndTicks) {
   EXPECT_NEAR(sum_next / kDraws, 0.0, 0.03 * 0.03 * 0.03);
 }
 
-// Kills: noise that depends on the order of calls, axes or seeds that share their noise.
+// Catches: noise that depends on the order of calls, axes or seeds that share their noise.
 TEST(CurrentSensor, TheNoiseIsAFunctionOfSeedAxisAndTick) {
   AxisParameters p = servo_axis();
   p.sensors.current.noise_rms_a = 1.0;
@@ -95,7 +95,7 @@ TEST(CurrentSensor, TheNoiseIsAFunctionOfSeedAxisAndTick) {
   EXPECT_NE(Axis(p, kServoTiming, 9, 1).sample(5).i_a_a, axis.sample(5).i_b_a);
 }
 
-// Kills: gains or offsets of the phases exchanged; a saturated converter that the fault word does not show.
+// Catches: gains or offsets of the phases exchanged; a saturated converter that the fault word does not show.
 TEST(CurrentSensor, EachPhaseHasItsOwnGainAndOffsetAndSaturationIsAFaultBit) {
   AxisParameters p = servo_axis();
   p.sensors.current = {

@@ -12,8 +12,8 @@ namespace {
 
 const std::vector<CurvePoint> kPoints{{1.0, 2.0}, {2.0, 4.0}, {4.0, 5.0}, {8.0, 5.5}};
 
-// Numbers small enough for exact arithmetic. Kills: the segment left of a point for that right of it, an end
-// that is held where the line must go on.
+// Numbers small enough for exact arithmetic. Catches: the segment left of a point for that right of it, an
+// end that is held where the line must go on.
 TEST(Curve, GivesValueAndSlopeBetweenAndBeyondItsPoints) {
   const Curve curve(kPoints);
   EXPECT_EQ(curve.value(1.0), 2.0);
@@ -32,7 +32,7 @@ TEST(Curve, GivesValueAndSlopeBetweenAndBeyondItsPoints) {
   EXPECT_EQ(curve.slope(100.0), 0.125);
 }
 
-// Kills: held() that goes on beyond an end, or that starts to hold too early.
+// Catches: held() that goes on beyond an end, or that starts to hold too early.
 TEST(Curve, HoldsItsEndsWhereAskedTo) {
   const Curve curve(kPoints);
   EXPECT_EQ(curve.held(-5.0), 2.0);
@@ -42,7 +42,7 @@ TEST(Curve, HoldsItsEndsWhereAskedTo) {
   EXPECT_EQ(curve.held(9.0), 5.5);
 }
 
-// Kills: an inverse that looks for x among the y, one that forgets the added slope in the search or in the
+// Catches: an inverse that looks for x among the y, one that forgets the added slope in the search or in the
 // segment. Tolerance: a few roundings of numbers below 100.
 TEST(Curve, InverseUndoesValueAlsoWithAnAddedSlope) {
   const Curve curve(kPoints);
@@ -55,7 +55,7 @@ TEST(Curve, InverseUndoesValueAlsoWithAnAddedSlope) {
   }
 }
 
-// Kills: a wrong factor of the triangle, an area that is not summed over the segments, one that forgets the
+// Catches: a wrong factor of the triangle, an area that is not summed over the segments, one that forgets the
 // area before the first point.
 TEST(Curve, AreaIsTheIntegralFromTheFirstPoint) {
   const Curve curve(kPoints);
@@ -71,7 +71,7 @@ TEST(Curve, AreaIsTheIntegralFromTheFirstPoint) {
     EXPECT_NEAR((curve.area(x + 1e-4) - curve.area(x - 1e-4)) / 2e-4, curve.value(x), 1e-9);
 }
 
-// Kills: an empty curve that is read.
+// Catches: an empty curve that is read.
 TEST(Curve, WithoutPointsIsZeroEverywhere) {
   const Curve curve;
   EXPECT_TRUE(curve.empty());
@@ -83,7 +83,7 @@ TEST(Curve, WithoutPointsIsZeroEverywhere) {
   EXPECT_EQ(curve.area(3.0), 0.0);
 }
 
-// Kills: a copy that allocates a table of its own: parameters are copied while the bench runs.
+// Catches: a copy that allocates a table of its own: parameters are copied while the bench runs.
 TEST(Curve, CopiesShareTheirPoints) {
   const Curve curve(kPoints);
   const Curve copy = curve;  // NOLINT(performance-unnecessary-copy-initialization): the copy is the point
@@ -92,7 +92,7 @@ TEST(Curve, CopiesShareTheirPoints) {
   EXPECT_FALSE(copy.empty());
 }
 
-// Kills: a search that leaves the table with a value that is no number.
+// Catches: a search that leaves the table with a value that is no number.
 TEST(Curve, StaysInItsTableForInfinityAndNan) {
   const Curve curve(kPoints);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -104,7 +104,7 @@ TEST(Curve, StaysInItsTableForInfinityAndNan) {
   EXPECT_TRUE(std::isnan(curve.held(std::nan(""))));
 }
 
-// Kills: each rule that is not checked, and a point that is counted from zero.
+// Catches: each rule that is not checked, and a point that is counted from zero.
 TEST(Curve, NamesTheFirstBadPoint) {
   EXPECT_EQ(problem_with_points(kPoints, true), "");
   EXPECT_EQ(problem_with_points({}, false), "has 0 points but must have at least 2");

@@ -22,7 +22,7 @@ double stored_j(double bus_v) {
   return 0.5 * kBus.capacitance_f * bus_v * bus_v;
 }
 
-// Kills: a star whose rails are at the whole link, a default link that does not suit the amplifier.
+// Catches: a star whose rails are at the whole link, a default link that does not suit the amplifier.
 TEST(DcBus, TheLinkIsThatOfTheAmplifierUnlessItIsGiven) {
   BusParameters p;
   EXPECT_EQ(rail_voltage_v(supply_voltage_v(p, 80.0, Connection::kTwoPhase), Connection::kTwoPhase), 80.0);
@@ -33,8 +33,8 @@ TEST(DcBus, TheLinkIsThatOfTheAmplifierUnlessItIsGiven) {
 }
 
 // Random loads and intervals; the balance closes to rounding, whatever the load does. The supply never takes
-// energy back. Kills: energy of one part that is not that of the others, a diode the wrong way round, a brake
-// resistor that gives energy.
+// energy back. Catches: energy of one part that is not that of the others, a diode the wrong way round, a
+// brake resistor that gives energy.
 TEST(DcBus, NoEnergyIsLost) {
   std::mt19937_64 engine(11);
   std::uniform_real_distribution<double> power(-20e3, 20e3);
@@ -66,7 +66,7 @@ TEST(DcBus, NoEnergyIsLost) {
 }
 
 // A constant load of 6 kW against the same equation in steps a hundred times as fine: the midpoint rule is
-// second order. Kills: a supply current of another voltage, a capacitance off by a factor.
+// second order. Catches: a supply current of another voltage, a capacitance off by a factor.
 TEST(DcBus, TheVoltageFollowsTheCircuit) {
   double coarse_v = 300.0;
   double fine_v = 300.0;
@@ -82,7 +82,7 @@ TEST(DcBus, TheVoltageFollowsTheCircuit) {
   EXPECT_LT(coarse_v, 293.0);
 }
 
-// Kills: a supply that is a voltage source both ways, a sagged supply that pulls the link down.
+// Catches: a supply that is a voltage source both ways, a sagged supply that pulls the link down.
 TEST(DcBus, TheSupplyCannotTakeCurrentBack) {
   const BusInterval pumped = bus_after(kBus, 300.0, 350.0, false, -0.5, 10e-6);
   EXPECT_EQ(pumped.supplied_j, 0.0);
@@ -95,7 +95,7 @@ TEST(DcBus, TheSupplyCannotTakeCurrentBack) {
   EXPECT_NEAR(stored_j(dead.voltage_v), stored_j(300.0) - 0.05, 1e-12);
 }
 
-// Kills: a square root of a negative number, a link below zero.
+// Catches: a square root of a negative number, a link below zero.
 TEST(DcBus, AnEmptyLinkStaysAtZero) {
   for (const bool chopper : {false, true}) {
     double bus_v = 20.0;
@@ -109,7 +109,7 @@ TEST(DcBus, AnEmptyLinkStaysAtZero) {
   EXPECT_GT(bus_after(kBus, 300.0, 0.0, false, 0.0, 10e-6).voltage_v, 1.0);  // and charges again
 }
 
-// Kills: a chopper without hysteresis, with exchanged levels, or that needs none to be configured.
+// Catches: a chopper without hysteresis, with exchanged levels, or that needs none to be configured.
 TEST(DcBus, TheChopperHasHysteresis) {
   EXPECT_FALSE(chopper_after(kBus, 400.0, false));
   EXPECT_TRUE(chopper_after(kBus, 400.1, false));
@@ -130,7 +130,7 @@ DriveParameters on_bus(DriveKind kind) {
 
 // A machine that brakes (emf of 200 V against its command) pumps the link up; the chopper comes and goes
 // between its levels. Without chopper, the supply blocked, the link gets exactly what the terminals give,
-// with the gates on and through the diodes. Kills: rails that do not follow the link, energy of the diodes
+// with the gates on and through the diodes. Catches: rails that do not follow the link, energy of the diodes
 // that is lost, a chopper that is not switched by the link.
 TEST(DcBus, WhatTheTerminalsGiveBackIsInTheLink) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kAveraged, DriveKind::kSwitched}) {
@@ -168,7 +168,7 @@ TEST(DcBus, WhatTheTerminalsGiveBackIsInTheLink) {
   }
 }
 
-// Kills: an arc that charges the link.
+// Catches: an arc that charges the link.
 TEST(DcBus, WhatAnArcTakesIsLost) {
   DriveParameters p = on_bus(DriveKind::kAveraged);
   DriveRig rig(p, Connection::kTwoPhase);
@@ -179,7 +179,7 @@ TEST(DcBus, WhatAnArcTakesIsLost) {
   EXPECT_EQ(rig.memory.bus_v, 350.0);
 }
 
-// Kills: a chopper on a stiff link, a stiff link that remembers a voltage.
+// Catches: a chopper on a stiff link, a stiff link that remembers a voltage.
 TEST(DcBus, AStiffLinkIsItsSupply) {
   DriveParameters p = on_bus(DriveKind::kAveraged);
   p.bus.capacitance_f = 0.0;

@@ -32,7 +32,7 @@ void expect_each_row_has_a_member_of_its_own(std::span<const Parameter> rows) {
     EXPECT_EQ(rows[n].get(p), value_of(n)) << rows[n].name;
 }
 
-// Kills: two rows that share a member or a name.
+// Catches: two rows that share a member or a name.
 TEST(DcMachineRows, EachHasAMemberOfItsOwn) {
   expect_each_row_has_a_member_of_its_own<PmDcMachineParameters>(PmDcMachine::kind().rows);
   expect_each_row_has_a_member_of_its_own<LinearDcMachineParameters>(LinearDcMachine::kind().rows);
@@ -41,7 +41,7 @@ TEST(DcMachineRows, EachHasAMemberOfItsOwn) {
   expect_each_row_has_a_member_of_its_own<SeriesDcMachineParameters>(SeriesDcMachine::kind().rows);
 }
 
-// Kills: a curve that goes to another machine, or nowhere.
+// Catches: a curve that goes to another machine, or nowhere.
 TEST(DcMachineRows, TheSaturationCurveIsReadAndWritten) {
   const std::vector<CurvePoint> points{{0.0, 0.0}, {1.0, 2.0}};
   const auto expect = [&points](AxisParameters p, std::span<const CurveParameter> curves) {
@@ -84,7 +84,7 @@ void expect_field_rules() {
   EXPECT_EQ(sentences(p), Sentences{});
 }
 
-// Kills: each rule between the values that is not checked.
+// Catches: each rule between the values that is not checked.
 TEST(DcMachineRows, TheRulesBetweenTheValuesAreSentences) {
   expect_field_rules<SeparateDcMachineParameters>();
   expect_field_rules<ShuntDcMachineParameters>();

@@ -20,7 +20,7 @@ constexpr double kStep_s = 50e-6;
 
 using DcRig = Rig<PmDcMachineState>;
 
-// Kills: any wrong sign or factor, K_b taken for something else than K_T.
+// Catches: any wrong sign or factor, K_b taken for something else than K_T.
 TEST(PmDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   std::mt19937_64 engine(21);
   const auto draw = [&engine](double size) {
@@ -34,7 +34,7 @@ TEST(PmDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   }
 }
 
-// Conventions. Kills: a pair of wrong signs that leaves the balance intact.
+// Conventions. Catches: a pair of wrong signs that leaves the balance intact.
 TEST(PmDcMachine, PositiveVoltageDrivesPositiveCurrentAndThatPositiveTorque) {
   const PmDcMachineConstants c = constants_of(kDcA);
   EXPECT_NEAR(derivative(c, PmDcMachineState{}, motion_of({}), voltage(10.0)).i_a_a, 10.0 / 2e-3, 1e-9);
@@ -50,7 +50,7 @@ struct StepRow {
   int count;
 };
 
-// AC-01: the table of DC-A. Kills: an exchanged or squared constant that conserves energy. Tolerance of the
+// AC-01: the table of DC-A. Catches: an exchanged or squared constant that conserves energy. Tolerance of the
 // reference: 1e-4 relative, one count; plus half of the last digit that the table prints.
 TEST(PmDcMachine, TenVoltStepOfMotorDcAIsTheTableOfTheReference) {
   constexpr auto kTable = std::to_array<StepRow>({
@@ -115,7 +115,7 @@ TEST(PmDcMachine, TenVoltStepOfMotorDcAPeaksAndRisesWhenTheReferenceSays) {
   EXPECT_NEAR(first_time_s(rig, reaches(0.95)), 61.431e-3, 1e-6);
 }
 
-// AC-02. Kills: losses, torque or stored energy that belong to another equation. Along the transient the
+// AC-02. Catches: losses, torque or stored energy that belong to another equation. Along the transient the
 // audit closes to what RK4 at 50 us leaves, 4e-9 J.
 TEST(PmDcMachine, EnergyOfTheTenVoltStepIsLostOrStoredAllTheTime) {
   const PmDcMachineConstants c = constants_of(kDcA);
@@ -128,7 +128,7 @@ TEST(PmDcMachine, EnergyOfTheTenVoltStepIsLostOrStoredAllTheTime) {
   EXPECT_NEAR(stored_energy_j(c, rig.machine, motion_of(rig.shaft)), 0.5 * 2e-3 * 0.701754 * 0.701754, 1e-8);
 }
 
-// Kills: an open armature that drifts, a restriction that leaves current, an emf of the wrong sign.
+// Catches: an open armature that drifts, a restriction that leaves current, an emf of the wrong sign.
 TEST(PmDcMachine, AnOpenArmatureCarriesNothingAndItsEmfKeepsTheCurrentAtZero) {
   const PmDcMachineConstants c = constants_of(kDcA);
   const RotorMotion motion = motion_of({.speed_rad_s = -300.0});
@@ -139,7 +139,7 @@ TEST(PmDcMachine, AnOpenArmatureCarriesNothingAndItsEmfKeepsTheCurrentAtZero) {
   EXPECT_EQ(derivative(c, PmDcMachineState{}, motion, voltage(emf_v)).i_a_a, 0.0);
 }
 
-// Kills: an adjustment that goes to the wrong parameter.
+// Catches: an adjustment that goes to the wrong parameter.
 TEST(PmDcMachine, AdjustmentsChangeResistanceInductanceAndMagnet) {
   const PmDcMachineParameters p = adjusted(kDcA, {.stator_resistance_factor = 1.5,
                                                   .rotor_resistance_factor = 7.0,

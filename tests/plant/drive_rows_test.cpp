@@ -21,7 +21,7 @@ std::vector<std::string> fields(const DriveParameters& p) {
 
 using Fields = std::vector<std::string>;
 
-// Kills: two rows of one member or one name, a row that writes elsewhere than it reads, a default out of
+// Catches: two rows of one member or one name, a row that writes elsewhere than it reads, a default out of
 // range.
 TEST(DriveRows, EveryRowHasAMemberOfItsOwn) {
   std::set<std::string_view> names;
@@ -41,7 +41,7 @@ TEST(DriveRows, EveryRowHasAMemberOfItsOwn) {
   }
 }
 
-// Kills: words in another order than the kinds.
+// Catches: words in another order than the kinds.
 TEST(DriveRows, TheWordsAreThoseOfTheKinds) {
   const auto row = std::find_if(drive_rows().begin(), drive_rows().end(),
                                 [](const Parameter& r) { return r.name == "drive.kind"; });
@@ -53,7 +53,7 @@ TEST(DriveRows, TheWordsAreThoseOfTheKinds) {
   EXPECT_EQ(row->maximum, 4.0);
 }
 
-// Kills: a rule that holds for every kind of drive, or for none.
+// Catches: a rule that holds for every kind of drive, or for none.
 TEST(DriveRows, BrokenRulesBetweenValuesAreNamed) {
   DriveParameters p;
   EXPECT_EQ(fields(p), Fields{});
@@ -66,7 +66,7 @@ TEST(DriveRows, BrokenRulesBetweenValuesAreNamed) {
   EXPECT_EQ(fields(p), Fields{"amplifier.filter_hz"});
 }
 
-// Kills: a chopper that cannot work and is accepted.
+// Catches: a chopper that cannot work and is accepted.
 TEST(DriveRows, BrokenRulesOfTheChopperAreNamed) {
   DriveParameters p;
   p.bus = {.voltage_v = 300.0, .capacitance_f = 1e-3, .chopper_on_v = 400.0, .chopper_off_v = 380.0};
@@ -80,7 +80,7 @@ TEST(DriveRows, BrokenRulesOfTheChopperAreNamed) {
   EXPECT_EQ(fields(p), Fields{"bus.chopper_on_v"});
 }
 
-// Kills: a source without its waveform, a contactor that waits for ever.
+// Catches: a source without its waveform, a contactor that waits for ever.
 TEST(DriveRows, BrokenRulesOfTheSourceAreNamed) {
   DriveParameters p;
   p.source.choose_angle = true;
@@ -95,7 +95,7 @@ TEST(DriveRows, BrokenRulesOfTheSourceAreNamed) {
   EXPECT_EQ(fields(p), Fields{});
 }
 
-// Kills: a dead time that leaves nothing of the carrier period, a rule that forgets the periods in a tick.
+// Catches: a dead time that leaves nothing of the carrier period, a rule that forgets the periods in a tick.
 TEST(DriveRows, TheDeadTimeFitsIntoTheCarrierPeriod) {
   DriveParameters p;
   p.kind = DriveKind::kAveraged;

@@ -25,7 +25,8 @@ double voltage_at(DriveRig& rig, double start_s) {
   return out.mode[0] == TerminalMode::kDriven ? out.start_v.a : 0.0;
 }
 
-// Kills: gain or offset left out, a limit of the wrong height, a flag that sticks, phases that do not exist.
+// Catches: gain or offset left out, a limit of the wrong height, a flag that sticks, phases that do not
+// exist.
 TEST(Drive, TheVoltageAmplifierPutsOutTheLimitedCommand) {
   DriveParameters p = plain_drive();
   p.amplifier.gain = 2.0;
@@ -49,8 +50,8 @@ TEST(Drive, TheVoltageAmplifierPutsOutTheLimitedCommand) {
   EXPECT_EQ(rig.memory.saturated, 0.0);
 }
 
-// Kills: an offset or a stale voltage with the terminals shorted, diodes at the wrong rail, a current command
-// that is taken for volts.
+// Catches: an offset or a stale voltage with the terminals shorted, diodes at the wrong rail, a current
+// command that is taken for volts.
 TEST(Drive, TheGatesDecideWhatHoldsTheTerminals) {
   for (const DriveKind kind :
        {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged, DriveKind::kSwitched}) {
@@ -77,7 +78,7 @@ TEST(Drive, TheGatesDecideWhatHoldsTheTerminals) {
   }
 }
 
-// Kills: a delay rounded to ticks, rounded the wrong way, an edge in the wrong part, a first command too
+// Catches: a delay rounded to ticks, rounded the wrong way, an edge in the wrong part, a first command too
 // early.
 TEST(Drive, ADelayOf1Point6TicksSwitchesWithinTheTick) {
   DriveParameters p = plain_drive();
@@ -94,7 +95,7 @@ TEST(Drive, ADelayOf1Point6TicksSwitchesWithinTheTick) {
   }
 }
 
-// Kills: a ring that is too short or runs over, an injected delay that replaces the other.
+// Catches: a ring that is too short or runs over, an injected delay that replaces the other.
 TEST(Drive, DelaysAddUpToTheLongest) {
   DriveParameters p = plain_drive();
   p.amplifier.delay_ticks = 7.5;
@@ -111,7 +112,7 @@ TEST(Drive, DelaysAddUpToTheLongest) {
 }
 
 // A switched inverter takes a new command when a carrier period begins, not in the middle of a pulse.
-// Kills: a pattern that changes under way, a delay rounded down.
+// Catches: a pattern that changes under way, a delay rounded down.
 TEST(Drive, ASwitchedInverterTakesCommandsWithItsCarrier) {
   DriveParameters p = plain_drive(DriveKind::kSwitched);
   p.amplifier.delay_ticks = 0.3;
@@ -131,7 +132,7 @@ TEST(Drive, ASwitchedInverterTakesCommandsWithItsCarrier) {
 }
 
 // y = u + (y0 - u) exp(-2 pi f t), through edges, clipping and substeps of any length, to rounding.
-// Kills: a filter before the limit, a corner in rad/s, middle or end of the interval off, a state lost
+// Catches: a filter before the limit, a corner in rad/s, middle or end of the interval off, a state lost
 // between intervals.
 TEST(Drive, TheOutputFilterIsExact) {
   DriveParameters p = plain_drive();
@@ -158,7 +159,7 @@ TEST(Drive, TheOutputFilterIsExact) {
   }
 }
 
-// Kills: a filter that goes on by itself while the diodes hold the terminals.
+// Catches: a filter that goes on by itself while the diodes hold the terminals.
 TEST(Drive, WithTheGatesOffTheFilterFollowsTheTerminals) {
   DriveParameters p = plain_drive();
   p.amplifier.filter_hz = 10e3;
@@ -170,7 +171,7 @@ TEST(Drive, WithTheGatesOffTheFilterFollowsTheTerminals) {
   EXPECT_EQ(rig.memory.filtered_v.b, 12.0);
 }
 
-// Kills: faults of the wrong phase or rail, of phases that do not exist, a broken wire that a stuck switch
+// Catches: faults of the wrong phase or rail, of phases that do not exist, a broken wire that a stuck switch
 // heals.
 TEST(Drive, FaultsHoldTheirTerminal) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kAveraged, DriveKind::kSwitched}) {
@@ -201,7 +202,7 @@ TEST(Drive, FaultsHoldTheirTerminal) {
   EXPECT_EQ(two.drive.at(two.memory, 0.0, 1e-6, {}).mode[2], TerminalMode::kDriven);
 }
 
-// Kills: a sag that reaches the rails and not the limit, or stays.
+// Catches: a sag that reaches the rails and not the limit, or stays.
 TEST(Drive, ASagLowersRailsAndLimit) {
   DriveRig rig(plain_drive(), Connection::kStar);
   rig.drive.begin_tick(rig.memory, volts(95.0), {.bus_sag = 0.1}, 0);
@@ -214,7 +215,7 @@ TEST(Drive, ASagLowersRailsAndLimit) {
   EXPECT_EQ(out.start_v.a, 95.0);
 }
 
-// Kills: a field that needs the gates although it has its supply, a lost field that stays, a field without
+// Catches: a field that needs the gates although it has its supply, a lost field that stays, a field without
 // limit.
 TEST(Drive, TheFieldHasItsSupplyOrItsCommand) {
   DriveParameters p = plain_drive();
@@ -240,7 +241,7 @@ TEST(Drive, TheFieldHasItsSupplyOrItsCommand) {
   EXPECT_EQ(field_v(volts(1.0, 0.0, 0.0, 400.0), {}), 300.0);  // a bridge of its own on the whole link
 }
 
-// Kills: corruption of every command or of none, beyond full scale, of the gates, by the same noise in each
+// Catches: corruption of every command or of none, beyond full scale, of the gates, by the same noise in each
 // phase or tick.
 TEST(Drive, CorruptionReplacesSomeSetpointsByNoise) {
   DriveRig rig(plain_drive(), Connection::kIndependent);
@@ -265,7 +266,7 @@ TEST(Drive, CorruptionReplacesSomeSetpointsByNoise) {
   EXPECT_NEAR(product_ab / corrupted, 0.0, 190.0);
 }
 
-// Kills: a trip that a delayed command undoes, or that outlasts its tick by itself.
+// Catches: a trip that a delayed command undoes, or that outlasts its tick by itself.
 TEST(Drive, ATripSwitchesOffForTheRestOfTheTick) {
   for (const DriveKind kind :
        {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged, DriveKind::kSwitched}) {
@@ -308,7 +309,7 @@ bool same_memory(const DriveMemory& x, const DriveMemory& y) {
 }
 
 // A new drive with the memory of another goes on as that one would, to the bit.
-// Kills: something remembered outside of the memory from one tick to the next.
+// Catches: something remembered outside of the memory from one tick to the next.
 TEST(Drive, ADriveWithTheMemoryOfAnotherGoesOnAsTheOther) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged,
                                DriveKind::kSwitched, DriveKind::kSource}) {
@@ -335,7 +336,7 @@ TEST(Drive, ADriveWithTheMemoryOfAnotherGoesOnAsTheOther) {
 }
 
 // Asking twice, or for a shorter interval in between, must not change what comes.
-// Kills: an at() that moves the state.
+// Catches: an at() that moves the state.
 TEST(Drive, ReadingAnIntervalTwiceGivesTheSame) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged,
                                DriveKind::kSwitched, DriveKind::kSource}) {

@@ -55,7 +55,7 @@ std::vector<Edge> closed_form_edges(const Motion& m, int counts, double offset) 
   return edges;
 }
 
-// Random constant accelerations, among them reversals, up to 400 counts per tick. Kills: interpolation that
+// Random constant accelerations, among them reversals, up to 400 counts per tick. Catches: interpolation that
 // is linear or ignores the speeds, boundaries off by a count, edges lost or doubled at node, turn or
 // reversal.
 TEST(EncoderEdges, EdgesComeAtTheClosedFormTimesAtConstantAcceleration) {
@@ -90,7 +90,7 @@ TEST(EncoderEdges, EdgesComeAtTheClosedFormTimesAtConstantAcceleration) {
   EXPECT_GT(total, 300'000u);
 }
 
-// 1e5 counts in a tick, 1.25 ns each, with few and with many counts per turn. Kills: a speed ceiling, an
+// 1e5 counts in a tick, 1.25 ns each, with few and with many counts per turn. Catches: a speed ceiling, an
 // error that grows with the speed.
 TEST(EncoderEdges, AHundredThousandCountsInATickAreAllThere) {
   for (const int counts : {4, 2000, 100'000'000}) {
@@ -117,7 +117,7 @@ TEST(EncoderEdges, AHundredThousandCountsInATickAreAllThere) {
   }
 }
 
-// Kills: one line that changes twice, or both lines at once, on the way.
+// Catches: one line that changes twice, or both lines at once, on the way.
 TEST(EncoderEdges, DecodingTheLinesGivesTheCountAgain) {
   const Encoder encoder({.counts_per_revolution = 400}, kTick_s);
   Motion m{3.0, 300.0, -1.5e5};  // stops after 2 ms and comes back
@@ -142,7 +142,7 @@ TEST(EncoderEdges, DecodingTheLinesGivesTheCountAgain) {
 }
 
 // Segments whose angle turns back once or twice within them, as a stiff machine may do. At each edge the
-// cubic is on the boundary, and between two edges its count is the one they name. Kills: a cut that is left
+// cubic is on the boundary, and between two edges its count is the one they name. Catches: a cut that is left
 // out, a wiggle that passes for monotonic.
 TEST(EncoderEdges, EveryReversalOfASegmentIsSeen) {
   constexpr double kQuantum_rad = kTurn_rad / 2000;

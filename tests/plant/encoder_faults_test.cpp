@@ -82,7 +82,7 @@ void expect_list_and_state_agree(const Shaft& shaft) {
   ASSERT_EQ(shaft.state.direction_changed, shaft.edges[n - 1].direction != shaft.edges[n - 2].direction);
 }
 
-// Random motion through many turns while every fault comes and goes. Kills: an edge that the count has and
+// Random motion through many turns while every fault comes and goes. Catches: an edge that the count has and
 // the list has not, or the reverse; edges out of order; a jump of more than one; last edges of another
 // encoder.
 TEST(EncoderFaults, TheListOfEdgesAddsUpToTheCountWhateverIsInjected) {
@@ -119,8 +119,8 @@ TEST(EncoderFaults, TheListOfEdgesAddsUpToTheCountWhateverIsInjected) {
   EXPECT_GT(edges, 100'000u);
 }
 
-// A fault that touches neither count nor edges sends them through the code for faults. Kills: a sound encoder
-// that is not the one without faults, bit for bit.
+// A fault that touches neither count nor edges sends them through the code for faults. Catches: a sound
+// encoder that is not the one without faults, bit for bit.
 TEST(EncoderFaults, TheCodeForFaultsGivesTheBitsOfTheSoundEncoder) {
   std::mt19937_64 engine(42);
   std::uniform_real_distribution<double> draw(-1.0, 1.0);
@@ -144,7 +144,7 @@ TEST(EncoderFaults, TheCodeForFaultsGivesTheBitsOfTheSoundEncoder) {
   }
 }
 
-// Kills: an option that exchanges something else, or once more with the fault; edges at other times; Z that
+// Catches: an option that exchanges something else, or once more with the fault; edges at other times; Z that
 // moves with the count.
 TEST(EncoderFaults, SwappedLinesCountBackwardsAtTheSameInstants) {
   Shaft sound(0.0);
@@ -168,7 +168,7 @@ TEST(EncoderFaults, SwappedLinesCountBackwardsAtTheSameInstants) {
   }
 }
 
-// Kills: a count that starts anew when the fault comes or goes.
+// Catches: a count that starts anew when the fault comes or goes.
 TEST(EncoderFaults, AFaultThatComesAndGoesLeavesTheCountWhereItIs) {
   Shaft shaft(0.5 * kQuantum_rad);
   shaft.move_counts(21.0);
@@ -183,8 +183,8 @@ TEST(EncoderFaults, AFaultThatComesAndGoesLeavesTheCountWhereItIs) {
   EXPECT_EQ(shaft.state.ahead, 30);
 }
 
-// From each of the four codes, in both directions, the lines exchanged or not. Kills: the wrong line, a line
-// that moves, a count that wanders, edges where only the lost line would have changed.
+// From each of the four codes, in both directions, the lines exchanged or not. Catches: the wrong line, a
+// line that moves, a count that wanders, edges where only the lost line would have changed.
 TEST(EncoderFaults, WithALostLineTheCountGoesToAndFro) {
   for (int variant = 0; variant < 32; ++variant) {
     const int phase = variant % 4;
@@ -214,7 +214,7 @@ TEST(EncoderFaults, WithALostLineTheCountGoesToAndFro) {
   }
 }
 
-// After an earlier fault the lines may be half a period off. Kills: lines that both change at once, a lost
+// After an earlier fault the lines may be half a period off. Catches: lines that both change at once, a lost
 // line that is left high.
 TEST(EncoderFaults, TheLinesFallInWithALostOneEdgeByEdge) {
   Shaft shaft(0.5 * kQuantum_rad);
@@ -235,7 +235,7 @@ TEST(EncoderFaults, TheLinesFallInWithALostOneEdgeByEdge) {
   expect_list_and_state_agree(shaft);
 }
 
-// Kills: a loss that depends on the ticks, that is not made good on the way back, or that the index hides.
+// Catches: a loss that depends on the ticks, that is not made good on the way back, or that the index hides.
 TEST(EncoderFaults, LostPulsesTakeEveryNthCountAway) {
   for (const int every : {2, 5, 100}) {
     Shaft shaft(0.5 * kQuantum_rad);
@@ -255,7 +255,7 @@ TEST(EncoderFaults, LostPulsesTakeEveryNthCountAway) {
   }
 }
 
-// Kills: an extra count that has no edge of its own, that depends on the ticks, or that is kept on the way
+// Catches: an extra count that has no edge of its own, that depends on the ticks, or that is kept on the way
 // back.
 TEST(EncoderFaults, ExtraPulsesDoubleEveryNthCount) {
   for (const int every : {1, 5, 100}) {
@@ -277,7 +277,7 @@ TEST(EncoderFaults, ExtraPulsesDoubleEveryNthCount) {
   }
 }
 
-// 1e12 counts in a tick. Kills: a search through them for edges that are not there, a count that moves.
+// 1e12 counts in a tick. Catches: a search through them for edges that are not there, a count that moves.
 TEST(EncoderFaults, AnEncoderThatLosesEveryCountStandsStill) {
   Shaft shaft(0.5 * kQuantum_rad);
   shaft.faults.encoder_lost_pulses = 1.0;
@@ -288,7 +288,7 @@ TEST(EncoderFaults, AnEncoderThatLosesEveryCountStandsStill) {
   EXPECT_EQ(shaft.state.edges_seen, 0);
 }
 
-// Kills: an index that is latched all the same, counts that are lost with it.
+// Catches: an index that is latched all the same, counts that are lost with it.
 TEST(EncoderFaults, WithoutTheIndexZStaysLowAndTheCountGoesOn) {
   Shaft shaft(398.5 * kQuantum_rad);
   shaft.faults.encoder_index_missing = 1.0;
@@ -305,7 +305,7 @@ TEST(EncoderFaults, WithoutTheIndexZStaysLowAndTheCountGoesOn) {
 }
 
 // The count is that of theta + e sin(theta) at every tick, as closely as the cubic between nodes goes: the
-// error is (turn per substep)^4/384 e = 1e-12 of a turn. Kills: a wrong sign or phase, an angle per
+// error is (turn per substep)^4/384 e = 1e-12 of a turn. Catches: a wrong sign or phase, an angle per
 // electrical turn, an error that stays when the fault is gone.
 TEST(EncoderFaults, EccentricityAddsASineOncePerTurn) {
   constexpr double kEccentricity_rad = 0.08;  // 5.1 counts
@@ -322,7 +322,7 @@ TEST(EncoderFaults, EccentricityAddsASineOncePerTurn) {
   EXPECT_EQ(shaft.state.ahead, 0);
 }
 
-// At theta = 90 degrees 0.08 rad are 5.09 counts. Kills: a jump without edges, edges in the middle of the
+// At theta = 90 degrees 0.08 rad are 5.09 counts. Catches: a jump without edges, edges in the middle of the
 // tick, a jump that falls on the first segment's motion.
 TEST(EncoderFaults, EccentricityThatComesAndGoesJumpsAtTheStartOfTheTick) {
   Shaft shaft(100.5 * kQuantum_rad);

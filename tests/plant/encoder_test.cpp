@@ -14,7 +14,7 @@ namespace {
 
 using namespace encoder_motion;
 
-// SEN-01: the count is never ahead of a rising angle. Kills: rounding to the nearest, truncation towards
+// SEN-01: the count is never ahead of a rising angle. Catches: rounding to the nearest, truncation towards
 // zero.
 TEST(Encoder, TheCountIsTheFloorOfTheAngleAndTheOffsetCentresIt) {
   constexpr double kQuantum_rad = kTurn_rad / 2000;
@@ -32,7 +32,7 @@ TEST(Encoder, TheCountIsTheFloorOfTheAngleAndTheOffsetCentresIt) {
   EXPECT_EQ(centred.count_at(-0.51 * kQuantum_rad, 0), -1);
 }
 
-// Kills: A and B exchanged (the drive would count backwards), a code that is not Gray, a wrong Z.
+// Catches: A and B exchanged (the drive would count backwards), a code that is not Gray, a wrong Z.
 TEST(Encoder, ALeadsBWhenTheCountRisesAndZMarksMultiplesOfN) {
   const Encoder encoder({.counts_per_revolution = 12}, kTick_s);
   constexpr std::array<std::uint32_t, 4> kRising{0, kLevelA, kLevelA | kLevelB, kLevelB};
@@ -43,8 +43,8 @@ TEST(Encoder, ALeadsBWhenTheCountRisesAndZMarksMultiplesOfN) {
   }
 }
 
-// Two edges at one boundary, at times symmetric to the reversal. Kills: a reversal between two nodes that is
-// not seen, a flag that says nothing, a period that is not the time between the two.
+// Two edges at one boundary, at times symmetric to the reversal. Catches: a reversal between two nodes that
+// is not seen, a flag that says nothing, a period that is not the time between the two.
 TEST(Encoder, AReversalWithinATickGivesTwoEdgesAtTheSameBoundary) {
   constexpr int kCounts = 2000;
   constexpr double kQuantum_rad = kTurn_rad / kCounts;
@@ -74,7 +74,7 @@ TEST(Encoder, AReversalWithinATickGivesTwoEdgesAtTheSameBoundary) {
             kReverse | kDirectionChanged | kPeriodValid);
 }
 
-// Kills: a direction that is forgotten from tick to tick, a flag that stays.
+// Catches: a direction that is forgotten from tick to tick, a flag that stays.
 TEST(Encoder, TheDirectionFlagsFollowTheLastTwoEdges) {
   const Encoder encoder({.counts_per_revolution = 2000}, kTick_s);
   constexpr double kQuantum_rad = kTurn_rad / 2000;
@@ -95,7 +95,7 @@ TEST(Encoder, TheDirectionFlagsFollowTheLastTwoEdges) {
   EXPECT_EQ(flags(), kDirectionChanged | kPeriodValid);
 }
 
-// One count in 3.7 ticks, accelerating. Kills: an age or a period that forgets whole ticks or is measured
+// One count in 3.7 ticks, accelerating. Catches: an age or a period that forgets whole ticks or is measured
 // from the wrong end of the tick.
 TEST(Encoder, AgeAndPeriodOfTheLastEdgeSpanTicks) {
   const Encoder encoder({.counts_per_revolution = 2000}, kTick_s);
@@ -122,8 +122,8 @@ TEST(Encoder, AgeAndPeriodOfTheLastEdgeSpanTicks) {
   EXPECT_GT(state.count, 100);
 }
 
-// Kills: an index that latches on the falling side, one turn off, in one direction only, or the first one of
-// several.
+// Catches: an index that latches on the falling side, one turn off, in one direction only, or the first one
+// of several.
 TEST(Encoder, TheIndexLatchesWhereZRisesInBothDirectionsAndAcrossTurns) {
   constexpr int kCounts = 2000;
   constexpr double kQuantum_rad = kTurn_rad / kCounts;
@@ -152,7 +152,7 @@ TEST(Encoder, TheIndexLatchesWhereZRisesInBothDirectionsAndAcrossTurns) {
   EXPECT_EQ(moved(10.5, -7000.0, -1).index_count, -8000);
 }
 
-// Kills: a newest index that is overwritten by an older one when the shaft turns back within the tick.
+// Catches: a newest index that is overwritten by an older one when the shaft turns back within the tick.
 TEST(Encoder, AfterAReversalTheIndexIsTheLastOneInTime) {
   constexpr double kQuantum_rad = kTurn_rad / 2000;
   const Encoder encoder({.counts_per_revolution = 2000}, kTick_s);
@@ -167,7 +167,7 @@ TEST(Encoder, AfterAReversalTheIndexIsTheLastOneInTime) {
   EXPECT_EQ(s.direction, -1);
 }
 
-// Kills: a count, turn or edge in 32 bits.
+// Catches: a count, turn or edge in 32 bits.
 TEST(Encoder, CountsGoOnBeyondThirtyTwoBits) {
   constexpr std::int64_t kTurns = 5'000'000;  // 1e10 counts
   const Encoder encoder({.counts_per_revolution = 2000}, kTick_s);
@@ -181,7 +181,7 @@ TEST(Encoder, CountsGoOnBeyondThirtyTwoBits) {
 }
 
 // Speed and distance to the boundary are both zero at the start: a division by zero in Newton's method.
-// Kills: its return (seen by -fsanitize=float-divide-by-zero, and in the time of the edge).
+// Catches: its return (seen by -fsanitize=float-divide-by-zero, and in the time of the edge).
 TEST(Encoder, AShaftThatStartsFromRestOnABoundaryHasItsEdgeAtTheStart) {
   const Encoder encoder({.counts_per_revolution = 2000}, kTick_s);
   const EncoderState s = followed(encoder, {0.0, 0.0, -2e5});
@@ -190,7 +190,7 @@ TEST(Encoder, AShaftThatStartsFromRestOnABoundaryHasItsEdgeAtTheStart) {
 }
 
 // The end of one tick and the start of the next are the same place, but rounding at the wrap may put them on
-// two sides of a boundary. Kills: a count that changes without an edge.
+// two sides of a boundary. Catches: a count that changes without an edge.
 TEST(Encoder, ACountThatRoundingChangesBetweenTicksStillHasItsEdge) {
   const Encoder encoder({.counts_per_revolution = 2000}, kTick_s);
   for (const double speed_rad_s : {0.0, 1e-3, -1e-3}) {

@@ -21,7 +21,8 @@ double ulps(double x) {
   return static_cast<double>(std::fabs(static_cast<long double>(exponential(x)) - truth) / ulp);
 }
 
-// Kills: a wrong coefficient, a reduction that forgets the low part of log 2, a quotient that is not rounded.
+// Catches: a wrong coefficient, a reduction that forgets the low part of log 2, a quotient that is not
+// rounded.
 TEST(Exponential, StaysBelowOneUlp) {
   std::mt19937_64 engine(20250301);
   for (const double range : {1e-9, 0.35, 2.0, 40.0, 700.0}) {
@@ -33,7 +34,7 @@ TEST(Exponential, StaysBelowOneUlp) {
   }
 }
 
-// Kills: a power of two that wraps, a limit on the wrong side of the last representable result.
+// Catches: a power of two that wraps, a limit on the wrong side of the last representable result.
 TEST(Exponential, OverflowsAndVanishesWhereDoublesEnd) {
   EXPECT_EQ(exponential(0.0), 1.0);
   EXPECT_EQ(exponential(-0.0), 1.0);

@@ -25,7 +25,7 @@ long double exact_ramp(double a) {
 }
 
 // From 1e-12 to 1e3, through the seam of the two formulas at 1/16. There 1 - exp(-a) has lost 1/0.06 of its
-// digits, and 1 - change/a another 1/0.03 of what is left: 2e-15 and 6e-14. Kills: a wrong term of the
+// digits, and 1 - change/a another 1/0.03 of what is left: 2e-15 and 6e-14. Catches: a wrong term of the
 // series, cancellation for small steps, a seam.
 TEST(FirstOrder, TheCoefficientsAreThoseOfTheExponential) {
   double worst_change = 0.0;
@@ -40,7 +40,7 @@ TEST(FirstOrder, TheCoefficientsAreThoseOfTheExponential) {
   EXPECT_LT(worst_ramp, 6e-14);
 }
 
-// Kills: a division by zero, a settled lag that drifts.
+// Catches: a division by zero, a settled lag that drifts.
 TEST(FirstOrder, NoTimeAndNoDifferenceChangeNothing) {
   EXPECT_EQ(lagged(first_order_step(0.0), 3.7, -1.0, 12.0), 3.7);
   EXPECT_EQ(first_order_step(1e300).change, 1.0);
@@ -51,7 +51,7 @@ TEST(FirstOrder, NoTimeAndNoDifferenceChangeNothing) {
 }
 
 // T y' = x - y behind a ramp x = s t from rest: y = s (t - T (1 - exp(-t/T))). In steps of any length, to
-// rounding. Kills: an input that counts at its start, its end or its middle only.
+// rounding. Catches: an input that counts at its start, its end or its middle only.
 TEST(FirstOrder, ARampComesOutAsTheEquationSays) {
   constexpr double kTimeConstant_s = 0.02;
   constexpr double kSlope = 7.0;

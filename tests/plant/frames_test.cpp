@@ -20,7 +20,7 @@ double draw(std::mt19937_64& engine) {
   return std::uniform_real_distribution<double>(-300.0, 300.0)(engine);
 }
 
-// AC-21 of the reference. Kills: the amplitude-invariant factor 2/3 in place of sqrt(2/3), a zero sequence
+// AC-21 of the reference. Catches: the amplitude-invariant factor 2/3 in place of sqrt(2/3), a zero sequence
 // that leaks.
 TEST(Frames, OneHundredVoltsOnPhaseAGiveTheReferenceValues) {
   constexpr ThreePhase kVoltage{.a = 100.0, .b = 0.0, .c = 0.0};
@@ -35,7 +35,7 @@ TEST(Frames, OneHundredVoltsOnPhaseAGiveTheReferenceValues) {
   EXPECT_NEAR(motor.c, -33.3333333333333, 1e-12);
 }
 
-// AC-21. Kills: any other amplitude relation than sqrt(3/2).
+// AC-21. Catches: any other amplitude relation than sqrt(3/2).
 TEST(Frames, TwoHundredEightVoltsLineToLineAreTwoHundredEightVoltsTwoPhasePeak) {
   const double phase_peak = 208.0 * std::sqrt(2.0 / 3.0);
   EXPECT_NEAR(phase_peak, 169.831, 1e-3);
@@ -45,7 +45,7 @@ TEST(Frames, TwoHundredEightVoltsLineToLineAreTwoHundredEightVoltsTwoPhasePeak) 
   }
 }
 
-// Kills: phases b and c exchanged: the machine would turn backwards.
+// Catches: phases b and c exchanged: the machine would turn backwards.
 TEST(Frames, TheSequenceABCTurnsFromPhaseATowardsPhaseB) {
   for (const double angle_rad : {0.1, 1.3, 2.9, -0.7, -2.2}) {
     const TwoPhase two = three_to_two(balanced(10.0, angle_rad));
@@ -53,7 +53,7 @@ TEST(Frames, TheSequenceABCTurnsFromPhaseATowardsPhaseB) {
   }
 }
 
-// Kills: a transform that is not orthogonal, in one direction or in both.
+// Catches: a transform that is not orthogonal, in one direction or in both.
 TEST(Frames, PowerIsTheSameInThreeAndTwoPhasesAndInATurningFrame) {
   std::mt19937_64 engine(7);
   for (int i = 0; i < 1000; ++i) {
@@ -70,7 +70,7 @@ TEST(Frames, PowerIsTheSameInThreeAndTwoPhasesAndInATurningFrame) {
   }
 }
 
-// Kills: a wrong sign or factor in one of a pair of inverses.
+// Catches: a wrong sign or factor in one of a pair of inverses.
 TEST(Frames, EveryTransformIsUndoneByItsInverse) {
   std::mt19937_64 engine(8);
   for (int i = 0; i < 1000; ++i) {
@@ -92,7 +92,7 @@ TEST(Frames, EveryTransformIsUndoneByItsInverse) {
   }
 }
 
-// Kills: a rotation the wrong way round (a round trip would not notice).
+// Catches: a rotation the wrong way round (a round trip would not notice).
 TEST(Frames, AVectorAheadOfTheFrameHasAPositiveQ) {
   const Dq ahead = to_dq({.a = cosine(1.1), .b = sine(1.1)}, cos_sin(0.8));
   EXPECT_NEAR(ahead.d, cosine(0.3), 1e-15);
@@ -102,7 +102,7 @@ TEST(Frames, AVectorAheadOfTheFrameHasAPositiveQ) {
   EXPECT_NEAR(along_q.b, cosine(0.8), 1e-15);
 }
 
-// Kills: mixed-up factors. Vector P3-01 of the reference: i = (3, -1, -2) A.
+// Catches: mixed-up factors. Vector P3-01 of the reference: i = (3, -1, -2) A.
 TEST(Frames, TheReferenceCurrentVectorIsReproduced) {
   const TwoPhase two = three_to_two({.a = 3.0, .b = -1.0, .c = -2.0});
   EXPECT_NEAR(two.a, 3.674235, 1e-6);

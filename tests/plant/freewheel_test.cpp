@@ -26,7 +26,7 @@ Axis axis_with_link(double link_v, InductionMachineState machine = {}, double sp
   return axis;
 }
 
-// Kills: a saturation flag that sticks, or is set by the wrong phase's limit.
+// Catches: a saturation flag that sticks, or is set by the wrong phase's limit.
 TEST(Freewheel, TheSaturationFlagLastsAsLongAsTheClipping) {
   Axis axis = axis_with_link(20.0);
   axis.advance(volts(0.0, 25.0), 0);
@@ -39,7 +39,7 @@ TEST(Freewheel, TheSaturationFlagLastsAsLongAsTheClipping) {
 
 // The current rises by 25 us V/(sigma L_S) = 0.59 A per substep of 100 V, so that 1 A is exceeded at the
 // second of five. Masked, it is a flag and clips nothing; unmasked, the diodes empty the phase within the
-// same tick. Kills: a trip that waits for the next tick, a limit that clips, a flag that latches.
+// same tick. Catches: a trip that waits for the next tick, a limit that clips, a flag that latches.
 TEST(Freewheel, OverCurrentIsAFlagAndUnmaskedTripsWithinTheTick) {
   for (const bool trips : {false, true}) {
     for (const double sign : {1.0, -1.0}) {
@@ -69,7 +69,7 @@ TEST(Freewheel, OverCurrentIsAFlagAndUnmaskedTripsWithinTheTick) {
   }
 }
 
-// Kills: a trip that looks at phase a only, or at the signed current.
+// Catches: a trip that looks at phase a only, or at the signed current.
 TEST(Freewheel, ExactlyTheLimitIsNotAnOverCurrent) {
   AxisParameters p = servo_axis();
   p.drive.amplifier = {.voltage_limit_v = 100.0, .over_current_a = 1.0};
@@ -84,7 +84,7 @@ TEST(Freewheel, ExactlyTheLimitIsNotAnOverCurrent) {
   }
 }
 
-// Kills: currents that ring around zero, pass it, or leave a remainder; a phase that closes again.
+// Catches: currents that ring around zero, pass it, or leave a remainder; a phase that closes again.
 TEST(Freewheel, FreewheelingCurrentsDecayToExactlyZeroAndStayThere) {
   Axis axis = axis_with_link(40.0, kFluxed);
   double last_a = 6.0;
@@ -144,7 +144,7 @@ Freewheel freewheel(double link_v) {
 }
 
 // The stored energy goes to the link, into heat and to the shaft; the closing of the sum is limited by the
-// step at which a phase opens. Kills: diodes with the voltage of the link the wrong way round, energy that
+// step at which a phase opens. Catches: diodes with the voltage of the link the wrong way round, energy that
 // vanishes when a phase opens.
 TEST(Freewheel, FreewheelingReturnsEnergyToTheLink) {
   const Freewheel f = freewheel(40.0);
@@ -153,7 +153,8 @@ TEST(Freewheel, FreewheelingReturnsEnergyToTheLink) {
               1e-4 * f.stored_before_j);
 }
 
-// Kills: an open machine that conducts below the link voltage, a back-emf that is not shown at the terminals.
+// Catches: an open machine that conducts below the link voltage, a back-emf that is not shown at the
+// terminals.
 TEST(Freewheel, ABackEmfBelowTheLinkVoltageDrivesNoCurrent) {
   const InductionMachineState fluxed{.psi_a_wb = 0.05};
   Axis axis = axis_with_link(40.0, fluxed, 200.0);
@@ -176,7 +177,7 @@ TEST(Freewheel, ABackEmfBelowTheLinkVoltageDrivesNoCurrent) {
   EXPECT_NEAR(std::hypot(s.psi_a_wb, s.psi_b_wb), 0.05 * std::exp(-100 * kServoTick_s * 3.9 / 0.014), 1e-8);
 }
 
-// Kills: diodes that never conduct, or conduct so that they feed the machine.
+// Catches: diodes that never conduct, or conduct so that they feed the machine.
 TEST(Freewheel, ABackEmfAboveTheLinkVoltageChargesTheLinkAndBrakes) {
   const InductionMachineState fluxed{.psi_a_wb = 0.05};
   Axis axis = axis_with_link(15.0, fluxed, 200.0);

@@ -25,7 +25,7 @@ MechanicsParameters reference_train() {
           .load_viscous_friction_nms = 1e-2};
 }
 
-// Kills: inertia or friction divided by n in place of n^2, a load torque that is not divided by n.
+// Catches: inertia or friction divided by n in place of n^2, a load torque that is not divided by n.
 // Runge-Kutta errs by (1/160)^4/120 here.
 TEST(Gear, TheTrainOfTheReferenceApproachesItsSpeedAsTheClosedFormSays) {
   const ShaftConstants c = constants_of(reference_train());
@@ -40,7 +40,7 @@ TEST(Gear, TheTrainOfTheReferenceApproachesItsSpeedAsTheClosedFormSays) {
 }
 
 // Thrown upwards it comes back with the same speed to the same place, exactly so at constant acceleration.
-// Kills: an active load that turns round with the motion.
+// Catches: an active load that turns round with the motion.
 TEST(Gear, AHangingMassFallsBackAsFastAsItWasThrown) {
   MechanicsParameters p = reference_train();
   p.viscous_friction_nms = p.load_viscous_friction_nms = 0.0;
@@ -56,8 +56,8 @@ TEST(Gear, AHangingMassFallsBackAsFastAsItWasThrown) {
   EXPECT_NEAR(shaft.x().angle_rad, 0.0, 1e-11);
 }
 
-// 0.5 N·m at the output are 0.05 at the motor. Kills: a passive load that drives, that does not hold, or that
-// holds with n times its torque.
+// 0.5 N·m at the output are 0.05 at the motor. Catches: a passive load that drives, that does not hold, or
+// that holds with n times its torque.
 TEST(Gear, APassiveLoadHoldsOpposesAndNeverDrives) {
   MechanicsParameters p = reference_train();
   p.viscous_friction_nms = p.load_viscous_friction_nms = 0.0;
@@ -80,8 +80,8 @@ TEST(Gear, APassiveLoadHoldsOpposesAndNeverDrives) {
   }
 }
 
-// Kills: stiction in place of Coulomb friction on a turning shaft, or the other way round, and a passive load
-// that is counted in one of them only.
+// Catches: stiction in place of Coulomb friction on a turning shaft, or the other way round, and a passive
+// load that is counted in one of them only.
 TEST(Gear, AStandingShaftBreaksAwayAboveStictionAndPassiveLoadTogether) {
   MechanicsParameters p = reference_train();
   p.viscous_friction_nms = p.load_viscous_friction_nms = 0.0;
@@ -96,7 +96,7 @@ TEST(Gear, AStandingShaftBreaksAwayAboveStictionAndPassiveLoadTogether) {
 }
 
 // J w' = tau - k w^2: w = w_end tanh(t/T), w_end = sqrt(tau/k), T = J/sqrt(tau k), where k is that of the
-// output over n^3. Kills: another power of n, and a fan that drives when it turns backwards.
+// output over n^3. Catches: another power of n, and a fan that drives when it turns backwards.
 TEST(Gear, AFanReachesItsTerminalSpeedAsTheClosedFormSays) {
   MechanicsParameters p = reference_train();
   p.viscous_friction_nms = p.load_viscous_friction_nms = 0.0;
@@ -113,7 +113,7 @@ TEST(Gear, AFanReachesItsTerminalSpeedAsTheClosedFormSays) {
   }
 }
 
-// Kills: an output that forgets whole turns, a lead per radian.
+// Catches: an output that forgets whole turns, a lead per radian.
 TEST(Gear, TheOutputTurnsNTimesSlowerAndTheTableGoesALeadPerTurn) {
   MechanicsParameters p = reference_train();
   p.screw_lead_m = 0.005;
@@ -127,7 +127,7 @@ TEST(Gear, TheOutputTurnsNTimesSlowerAndTheTableGoesALeadPerTurn) {
   EXPECT_EQ(load_side(constants_of(reference_train()), ShaftState{.angle_rad = 1.0}, 0.0).position_m, 0.0);
 }
 
-// Kills: a lead per radian in the inertia that the documents give for a table: 12 kg at 4.77 cm/s.
+// Catches: a lead per radian in the inertia that the documents give for a table: 12 kg at 4.77 cm/s.
 TEST(Gear, ATableOfMassMIsALoadInertiaOfMTimesTheLeadOverTwoPiSquared) {
   constexpr double kMass_kg = 12.0;
   MechanicsParameters p{.gear_ratio = 2.0, .screw_lead_m = 0.01};
@@ -139,7 +139,7 @@ TEST(Gear, ATableOfMassMIsALoadInertiaOfMTimesTheLeadOverTwoPiSquared) {
   EXPECT_NEAR(energy_j(c, x), 0.5 * kMass_kg * (way_m / 0.01) * (way_m / 0.01), 1e-16);
 }
 
-// Kills: a prime mover that creeps up to its speed, passes it, or yields to torques.
+// Catches: a prime mover that creeps up to its speed, passes it, or yields to torques.
 TEST(Gear, APrimeMoverReachesItsSpeedExactlyAtItsAccelerationWhateverTheTorques) {
   MechanicsParameters p = reference_train();
   p.motion = ShaftMotion::kImposed;
@@ -157,7 +157,7 @@ TEST(Gear, APrimeMoverReachesItsSpeedExactlyAtItsAccelerationWhateverTheTorques)
   EXPECT_EQ(shaft.events(), 1);
 }
 
-// Kills: a locked shaft that keeps its speed, turns on, or loses its angle; a lock that does not open.
+// Catches: a locked shaft that keeps its speed, turns on, or loses its angle; a lock that does not open.
 TEST(Gear, ALockedOrBlockedShaftStandsAtOnceWhereItIs) {
   MechanicsParameters p = reference_train();
   for (const bool fault : {false, true}) {
@@ -174,7 +174,7 @@ TEST(Gear, ALockedOrBlockedShaftStandsAtOnceWhereItIs) {
   }
 }
 
-// Kills: an impulse on the rotor alone where load and rotor are one, or one that moves a prime mover.
+// Catches: an impulse on the rotor alone where load and rotor are one, or one that moves a prime mover.
 TEST(Gear, ABumpChangesTheSpeedByItsImpulseOverTheInertia) {
   MechanicsParameters p = reference_train();
   const ShaftState x{.speed_rad_s = 10.0, .angle_rad = 0.5};
@@ -187,8 +187,8 @@ TEST(Gear, ABumpChangesTheSpeedByItsImpulseOverTheInertia) {
   }
 }
 
-// Supplied energy is lost or stored, at every step of a run with every friction and several reversals. Kills:
-// a loss that the motion does not feel or a torque that no loss accounts for.
+// Supplied energy is lost or stored, at every step of a run with every friction and several reversals.
+// Catches: a loss that the motion does not feel or a torque that no loss accounts for.
 TEST(Gear, TheEnergyBalanceHoldsThroughReversalsWithEveryFriction) {
   MechanicsParameters p = reference_train();
   p.coulomb_friction_nm = 0.004;
@@ -209,7 +209,7 @@ TEST(Gear, TheEnergyBalanceHoldsThroughReversalsWithEveryFriction) {
   EXPECT_GE(shaft.events(), 3);
 }
 
-// Kills: a branch that the drive train is not told to look for, and a substep chosen for another shaft.
+// Catches: a branch that the drive train is not told to look for, and a substep chosen for another shaft.
 TEST(Gear, MassesEventsAndTimeConstantFollowTheParameters) {
   MechanicsParameters p = reference_train();
   EXPECT_FALSE(has_two_masses(p));

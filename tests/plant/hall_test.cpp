@@ -17,7 +17,7 @@ std::uint32_t lines_at(double degrees, const HallParameters& p = kHall, const In
   return hall_lines(p, faults, degrees * kDegree_rad);
 }
 
-// BL-03: the commutation angles are 30, 90, ... 330 degrees. Kills: sectors from 0, an order of the codes
+// BL-03: the commutation angles are 30, 90, ... 330 degrees. Catches: sectors from 0, an order of the codes
 // that belongs to the other direction, two lines exchanged, a code that skips a sector in a later or negative
 // turn.
 TEST(Hall, TheLinesChangeAtTheCommutationAnglesInTheOrderOfForwardRotation) {
@@ -31,7 +31,7 @@ TEST(Hall, TheLinesChangeAtTheCommutationAnglesInTheOrderOfForwardRotation) {
   }
 }
 
-// Kills: lines that are not high for half a turn, or not 120 degrees apart.
+// Catches: lines that are not high for half a turn, or not 120 degrees apart.
 TEST(Hall, EachLineIsHighForHalfATurnAndAThirdOfATurnBehindTheOneBefore) {
   for (int line = 0; line < 3; ++line) {
     for (int degree = 0; degree < 360; ++degree) {
@@ -41,7 +41,7 @@ TEST(Hall, EachLineIsHighForHalfATurnAndAThirdOfATurnBehindTheOneBefore) {
   }
 }
 
-// Kills: an offset or a fault of the wrong sign, one that replaces the other.
+// Catches: an offset or a fault of the wrong sign, one that replaces the other.
 TEST(Hall, ADisplacementMovesTheEdgesForward) {
   const HallParameters displaced{.enabled = true, .offset_rad = 10.0 * kDegree_rad};
   EXPECT_EQ(lines_at(39.0, displaced), 5u);
@@ -51,7 +51,7 @@ TEST(Hall, ADisplacementMovesTheEdgesForward) {
   EXPECT_EQ(lines_at(26.0, displaced, fault), 1u);
 }
 
-// Kills: the wrong line stuck, a stuck line that takes the others along, high and low exchanged.
+// Catches: the wrong line stuck, a stuck line that takes the others along, high and low exchanged.
 TEST(Hall, AStuckLineStaysAndTheOthersGoOn) {
   for (int line = 1; line <= 3; ++line) {
     const InjectedFaults low{.hall_stuck_low = static_cast<double>(line)};
@@ -65,7 +65,7 @@ TEST(Hall, AStuckLineStaysAndTheOthersGoOn) {
   }
 }
 
-// Kills: lines of a sensor that is not there.
+// Catches: lines of a sensor that is not there.
 TEST(Hall, ASensorThatIsOffReadsZero) {
   EXPECT_EQ(lines_at(60.0, {}, {.hall_stuck_high = 2.0}), 0u);
 }

@@ -32,7 +32,7 @@ Point random_point(std::mt19937_64& engine) {
           .voltage_v = {draw(80.0), draw(80.0)}};
 }
 
-// Case 1 of the reference table, tolerance 5e-5 relative. Kills: exchanged inductances, a lost square.
+// Case 1 of the reference table, tolerance 5e-5 relative. Catches: exchanged inductances, a lost square.
 TEST(InductionMachine, TheServoMotorHasTheDerivedConstantsOfTheReference) {
   const InductionMachineConstants c = constants_of(kServoMachine);
   const auto expect = [](double value, double reference) { EXPECT_NEAR(value, reference, 5e-5 * reference); };
@@ -47,7 +47,7 @@ TEST(InductionMachine, TheServoMotorHasTheDerivedConstantsOfTheReference) {
   EXPECT_EQ(leakage_factor(kServoMachine), c.sigma);
 }
 
-// The same with all five parameters different, by the definitions of the model. Kills: L_R taken for L_S,
+// The same with all five parameters different, by the definitions of the model. Catches: L_R taken for L_S,
 // which the servo motor (L_R = L_S) cannot show.
 TEST(InductionMachine, RotorAndStatorInductanceAreNotExchanged) {
   const InductionMachineConstants c = constants_of({.pole_pairs = 2,
@@ -64,7 +64,8 @@ TEST(InductionMachine, RotorAndStatorInductanceAreNotExchanged) {
   EXPECT_NEAR(c.torque_constant, 2.0 * 0.49 / 0.4, 1e-15);
 }
 
-// Case 3. The book misprints signs, the power balance does not. Kills: any wrong sign or factor in the model.
+// Case 3. The book misprints signs, the power balance does not. Catches: any wrong sign or factor in the
+// model.
 TEST(InductionMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   std::mt19937_64 engine(11);
   for (int i = 0; i < 10'000; ++i) {
@@ -141,7 +142,7 @@ TEST(InductionMachine, FlippingAnySignBreaksThePowerBalance) {
 }
 
 // Conventions: a positive voltage gives a positive current at standstill, and a current ahead of the flux
-// (from a to b) a positive torque. Kills: a wrong pair of signs that leaves the power balance intact.
+// (from a to b) a positive torque. Catches: a wrong pair of signs that leaves the power balance intact.
 TEST(InductionMachine, PositiveVoltageDrivesPositiveCurrentAndCurrentAheadOfTheFluxPositiveTorque) {
   const InductionMachineConstants c = constants_of(kServoMachine);
   const InductionMachineState slope = derivative(c, {}, turning(0.0), {.voltage_v = {1.0, 2.0}});
@@ -151,7 +152,8 @@ TEST(InductionMachine, PositiveVoltageDrivesPositiveCurrentAndCurrentAheadOfTheF
   EXPECT_LT(torque_nm(c, {.i_a_a = 1.0, .psi_b_wb = 0.1}, turning(0.0)), 0.0);
 }
 
-// Kills: an open phase that drifts, a back-emf of the wrong sign, a current that is left where none can flow.
+// Catches: an open phase that drifts, a back-emf of the wrong sign, a current that is left where none can
+// flow.
 TEST(InductionMachine, TheOpenCircuitVoltageKeepsTheCurrentAtZeroAndAnOpenPhaseKeepsItsOwn) {
   const InductionMachineConstants c = constants_of(kServoMachine);
   const InductionMachineState x{.psi_a_wb = 0.03, .psi_b_wb = -0.05};
@@ -176,8 +178,8 @@ TEST(InductionMachine, TheOpenCircuitVoltageKeepsTheCurrentAtZeroAndAnOpenPhaseK
   EXPECT_NE(derivative(c, x, turning(150.0), none).psi_a_wb, 0.0);
 }
 
-// Kills: a factor that reaches the wrong parameter, series impedance that is lost, an axis that is never told
-// that its machine is a star.
+// Catches: a factor that reaches the wrong parameter, series impedance that is lost, an axis that is never
+// told that its machine is a star.
 TEST(InductionMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) {
   InductionMachineParameters p = adjusted(kServoMachine, {.stator_resistance_factor = 2.0,
                                                           .rotor_resistance_factor = 3.0,
@@ -197,7 +199,7 @@ TEST(InductionMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) 
 }
 
 // At standstill current and flux along one axis have a matrix of slopes; -1/tau is an eigenvalue of it, and
-// the one farther from zero. Kills: a time constant from the current alone, or the slower of the two.
+// the one farther from zero. Catches: a time constant from the current alone, or the slower of the two.
 TEST(InductionMachine, TheFastestTimeConstantIsThatOfCurrentAndFluxTogether) {
   const InductionMachineConstants c = constants_of(kServoMachine);
   const RotorMotion still{.angle_rad = 0.0, .speed_rad_s = 0.0, .electrical = {1.0, 0.0}};

@@ -93,7 +93,7 @@ void expect_same(const Steady& x, const Steady& y, double tolerance) {
 }
 
 // IM-04: torque over slip of IM-A at 60 V two-phase; AC-19, locked. Integrated and from the circuit, to 1e-6;
-// the digits of the reference. Kills: any parameter that enters the dynamics and the steady state
+// the digits of the reference. Catches: any parameter that enters the dynamics and the steady state
 // differently.
 TEST(InductionSteadyState, TorqueOverSlipOfMotorAIsThatOfTheReference) {
   constexpr std::array<std::pair<double, double>, 7> kTable{{{0.1, 0.4392},
@@ -114,8 +114,8 @@ TEST(InductionSteadyState, TorqueOverSlipOfMotorAIsThatOfTheReference) {
   EXPECT_NEAR(circuit(kMotorA, 60.0, 1.759).torque_nm, 2.7529, 5.1e-5);
 }
 
-// P3-08 and P3-10: 208 V line to line. Phase rms is the two-phase length over sqrt(3). Kills: a factor 3/2 or
-// sqrt(3) in currents, torque or power of the star, the wrong sign of a generator.
+// P3-08 and P3-10: 208 V line to line. Phase rms is the two-phase length over sqrt(3). Catches: a factor 3/2
+// or sqrt(3) in currents, torque or power of the star, the wrong sign of a generator.
 TEST(InductionSteadyState, LockedNoLoadAndGeneratorValuesOfMotorBAreThoseOfTheReference) {
   const auto rms = [](const Steady& s) { return s.stator_a / std::numbers::sqrt3; };
   const Steady locked = settled(kMotorB, 208.0, 1.0);
@@ -158,8 +158,8 @@ Turning started(const InductionMachineParameters& p, double inertia_kgm2, double
   return x;
 }
 
-// AC-19, tolerance 0.1 %; and the speeds of IM-B under load, P3-08. Kills: a load that does not slow it down
-// as the circuit says.
+// AC-19, tolerance 0.1 %; and the speeds of IM-B under load, P3-08. Catches: a load that does not slow it
+// down as the circuit says.
 TEST(InductionSteadyState, LoadedMotorsSettleAtTheSpeedsOfTheReference) {
   struct Row {
     double load_nm, speed_rad_s, stator_a, rotor_a;
@@ -183,7 +183,7 @@ TEST(InductionSteadyState, LoadedMotorsSettleAtTheSpeedsOfTheReference) {
 }
 
 // AC-22, P3-08: the line start of IM-B, tolerance half a unit of the last digit of the reference's
-// simulation. Kills: an inertia, a pole-pair number or a peak value that is off.
+// simulation. Catches: an inertia, a pole-pair number or a peak value that is off.
 TEST(InductionSteadyState, LineStartOfMotorBIsThatOfTheReference) {
   double t95_s = 0.0;
   double peak_rad_s = 0.0;
@@ -227,7 +227,7 @@ TEST(InductionSteadyState, LineStartOfMotorBIsThatOfTheReference) {
 
 // AC-25, P3-11: IM-C on one phase, the other shorted; tolerances half a unit of the last digit of the
 /// reference's
-// simulation, 0.2 % for the speed. Kills: a negative sequence that brakes too much or not at all.
+// simulation, 0.2 % for the speed. Catches: a negative sequence that brakes too much or not at all.
 TEST(InductionSteadyState, OnOnePhaseMotorCRunsButDoesNotStart) {
   const double peak_v = 120.0 * std::numbers::sqrt2;
   const InductionMachineConstants c = constants_of(kMotorC);
@@ -267,7 +267,8 @@ TEST(InductionSteadyState, OnOnePhaseMotorCRunsButDoesNotStart) {
 }
 
 // IM-05: (M, L_R, R_R) -> (k M, k^2 L_R, k^2 R_R) is the same machine at its terminals, and so is the one
-// made of what the terminals tell. Kills: an equation in which one of the three is forgotten or stands alone.
+// made of what the terminals tell. Catches: an equation in which one of the three is forgotten or stands
+// alone.
 TEST(InductionSteadyState, MachinesWithScaledRotorsAreIndistinguishableAtTheTerminals) {
   const InductionMachineParameters twin = terminal_equivalent({.pole_pairs = 2,
                                                                .stator_resistance_ohm = 2.9,

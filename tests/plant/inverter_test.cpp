@@ -29,7 +29,7 @@ DriveParameters inverter(DriveKind kind, double dead_time_s = 0.0) {
 }
 
 // A vector of up to V/sqrt(3) = 173.2 V passes at every angle; in the corners of the hexagon 2 V/3 = 200 V
-// do. Kills: a limit of half the link (no injection), a circle instead of the hexagon, a flag without
+// do. Catches: a limit of half the link (no injection), a circle instead of the hexagon, a flag without
 // clipping.
 TEST(Inverter, TheHexagonIsTheLimitOfAStar) {
   const double inner_v = kBus_v / std::numbers::sqrt3;
@@ -48,8 +48,8 @@ TEST(Inverter, TheHexagonIsTheLimitOfAStar) {
   }
 }
 
-// Kills: phases clipped one by one (which turns the vector), a shift that is not common, terminals beyond the
-// rails.
+// Catches: phases clipped one by one (which turns the vector), a shift that is not common, terminals beyond
+// the rails.
 TEST(Inverter, ALimitedVectorKeepsItsAngle) {
   std::mt19937_64 engine(4);
   std::uniform_real_distribution<double> length(0.0, 900.0);
@@ -75,7 +75,7 @@ TEST(Inverter, ALimitedVectorKeepsItsAngle) {
   }
 }
 
-// Kills: a winding of its own that gets half the link, an injection between windings that have no common
+// Catches: a winding of its own that gets half the link, an injection between windings that have no common
 // point.
 TEST(Inverter, AWindingBetweenTwoLegsHasTheWholeLink) {
   const LimitedVoltages out = bridge_voltages(Connection::kIndependent, kBus_v, {299.0, -400.0, 10.0});
@@ -85,7 +85,7 @@ TEST(Inverter, AWindingBetweenTwoLegsHasTheWholeLink) {
   EXPECT_TRUE(out.saturated);
 }
 
-// Kills: a pulse as long as the dead time that is still switched, a duty outside of 0 .. 1, a division by a
+// Catches: a pulse as long as the dead time that is still switched, a duty outside of 0 .. 1, a division by a
 // link of 0 V.
 TEST(Inverter, PulsesThatVanishInTheDeadTimeAreLeftOut) {
   EXPECT_EQ(duty(0.0, 150.0, 0.1), 0.5);
@@ -99,7 +99,7 @@ TEST(Inverter, PulsesThatVanishInTheDeadTimeAreLeftOut) {
   EXPECT_EQ(duty(0.0, 0.0, 0.0), 0.5);
 }
 
-// Kills: an error that helps the current, one of a single rail, a jump at zero current, an error of a leg
+// Catches: an error that helps the current, one of a single rail, a jump at zero current, an error of a leg
 // that does not switch.
 TEST(Inverter, TheDeadTimeTakesVoltageFromTheCurrent) {
   constexpr double kPart = 0.02;
@@ -148,7 +148,7 @@ Times times_of(const SwitchingPattern& pattern, double period_s) {
   return times;
 }
 
-// Kills: edges lost or exchanged by the sorting, pulses off the middle, a dead time of the wrong length,
+// Catches: edges lost or exchanged by the sorting, pulses off the middle, a dead time of the wrong length,
 // terminals that are marked as another one.
 TEST(Inverter, EveryPulseIsCentredAndHasItsLength) {
   std::mt19937_64 engine(7);
@@ -170,7 +170,7 @@ TEST(Inverter, EveryPulseIsCentredAndHasItsLength) {
   }
 }
 
-// Kills: edges at one instant of which only one is taken.
+// Catches: edges at one instant of which only one is taken.
 TEST(Inverter, TerminalsSwitchTogetherAtEqualVoltages) {
   const Times times = times_of(SwitchingPattern({30.0, 30.0, 30.0}, 3, 150.0, 0.0, 100e-6), 100e-6);
   for (const double high_s : times.high_s)
@@ -178,7 +178,7 @@ TEST(Inverter, TerminalsSwitchTogetherAtEqualVoltages) {
   EXPECT_LE(times.edges, 6);
 }
 
-// Kills: a search that only goes forwards, or depends on where it starts.
+// Catches: a search that only goes forwards, or depends on where it starts.
 TEST(Inverter, TheHintOfTheSearchChangesNothing) {
   const SwitchingPattern pattern({30.0, -60.0, 100.0}, 3, 150.0, 2e-6, 100e-6);
   for (double instant_s = 0.0; instant_s < 100e-6; instant_s += 0.37e-6) {
@@ -216,7 +216,7 @@ Means means(DriveKind kind, Connection connection, double dead_time_s, int pwm_p
 // At a constant command the ripple has no mean: what is left of the difference are the last ones of 20 time
 // constants. The mean of the switched terminal voltages must be that of the averaged ones with the dead-time
 // error of -sign(i) 2 U_rail t_d/T_pwm; the currents (3 A and more) stay beyond their ripple of 0.4 A.
-// Kills: a dead time with the wrong sign or half its effect, a lost edge, a rail of the wrong connection.
+// Catches: a dead time with the wrong sign or half its effect, a lost edge, a rail of the wrong connection.
 TEST(Inverter, TheSwitchedInverterAveragesToTheAveragedOne) {
   const Phases command_v{40.0, -55.0, 15.0};
   for (const Connection connection : {Connection::kStar, Connection::kIndependent, Connection::kTwoPhase}) {
@@ -239,7 +239,7 @@ TEST(Inverter, TheSwitchedInverterAveragesToTheAveragedOne) {
 }
 
 // Bipolar, duty D = 0.55: the current of a winding rises by (U - u) D T/L = 0.7425 A and falls again, about
-// its mean of 6 A. The resistance bends the ramps by T R/L = 2.5 % at most. Kills: a ripple of another
+// its mean of 6 A. The resistance bends the ramps by T R/L = 2.5 % at most. Catches: a ripple of another
 // frequency or height, one that drifts, a switched voltage between 0 and one rail.
 TEST(Inverter, TheRippleStaysWithinItsBound) {
   DriveRig rig(inverter(DriveKind::kSwitched), Connection::kArmature,
@@ -253,7 +253,7 @@ TEST(Inverter, TheRippleStaysWithinItsBound) {
   EXPECT_NEAR(0.5 * (rig.highest_a + rig.lowest_a), 6.0, 0.01);
 }
 
-// Kills: a zero-voltage command that switches, gates off that drive, edges beyond the tick.
+// Catches: a zero-voltage command that switches, gates off that drive, edges beyond the tick.
 TEST(Inverter, TheEdgesOfATickAreThoseOfItsPeriods) {
   DriveParameters p = inverter(DriveKind::kSwitched, 1e-6);
   p.inverter.pwm_periods_per_tick = 4;
@@ -276,7 +276,7 @@ TEST(Inverter, TheEdgesOfATickAreThoseOfItsPeriods) {
   EXPECT_EQ(out.rail_v, 150.0);
 }
 
-// Kills: terminals that do not exist but are at a rail.
+// Catches: terminals that do not exist but are at a rail.
 TEST(Inverter, TerminalsThatDoNotExistAreAtZero) {
   for (const DriveKind kind : {DriveKind::kAveraged, DriveKind::kSwitched}) {
     DriveRig rig(inverter(kind, 1e-6), Connection::kTwoPhase);

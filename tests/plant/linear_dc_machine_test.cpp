@@ -29,7 +29,7 @@ double time_constant_s(const LinearDcMachineParameters& p) {
   return kSlide.inertia_kgm2 / (bl * bl / p.resistance_ohm + kSlide.friction_nms);
 }
 
-// Kills: any wrong sign or factor, also with the field the other way round.
+// Catches: any wrong sign or factor, also with the field the other way round.
 TEST(LinearDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   std::mt19937_64 engine(22);
   const auto draw = [&engine](double size) {
@@ -45,7 +45,7 @@ TEST(LinearDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   }
 }
 
-// DC-03. Kills: a lost factor B or l. The loop inductance shifts nothing once the bar is steady: 40 time
+// DC-03. Catches: a lost factor B or l. The loop inductance shifts nothing once the bar is steady: 40 time
 // constants, the rest is rounding. Energy: RK4 at a twentieth of L/R leaves 3e-11 of it.
 TEST(LinearDcMachine, ReachesTheSteadySpeedOfTheReference) {
   const PmDcMachineConstants c = constants_of(kBar);
@@ -69,7 +69,7 @@ double lag_m_s(double inductance_h) {
   return steady_speed_m_s(p) * (1.0 - 1.0 / std::numbers::e) - rig.shaft.speed_rad_s;
 }
 
-// DC-03: without the inductance the bar is of first order, with the time constant m/(B^2 l^2/R + f). Kills:
+// DC-03: without the inductance the bar is of first order, with the time constant m/(B^2 l^2/R + f). Catches:
 // an inductance that acts where it should not. The lag is of first order in L; what the next order adds to
 // the ratio is 6 (L/R)/(23 ms), 2e-3 of it with 4 uH.
 TEST(LinearDcMachine, TendsToTheBarOfTheBookAsTheInductanceGoesToZero) {
@@ -79,7 +79,7 @@ TEST(LinearDcMachine, TendsToTheBarOfTheBookAsTheInductanceGoesToZero) {
   EXPECT_NEAR(lag_m_s(4e-7) / lag, 0.1, 4e-4);
 }
 
-// Kills: an emf or a force that keeps its sign when the field is turned round. The bar then runs the other
+// Catches: an emf or a force that keeps its sign when the field is turned round. The bar then runs the other
 // way, as fast.
 TEST(LinearDcMachine, TurningTheFieldRoundTurnsTheMotionRound) {
   LinearDcMachineParameters p = kBar;
@@ -93,7 +93,7 @@ TEST(LinearDcMachine, TurningTheFieldRoundTurnsTheMotionRound) {
   EXPECT_EQ(mirrored.machine.i_a_a, rig.machine.i_a_a);
 }
 
-// Kills: an open loop that carries current, an emf of the wrong sign, an adjustment of the wrong parameter.
+// Catches: an open loop that carries current, an emf of the wrong sign, an adjustment of the wrong parameter.
 TEST(LinearDcMachine, OpensAndAdjustsAsTheOtherArmaturesDo) {
   const PmDcMachineConstants c = constants_of(kBar);
   const RotorMotion motion = motion_of({.speed_rad_s = 3.0});

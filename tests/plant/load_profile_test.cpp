@@ -29,7 +29,7 @@ std::vector<Problem> problems_of(const MechanicsParameters& p) {
   return found;
 }
 
-// Kills: a profile that goes on along its last slope, starts before its first point, or is shifted in time.
+// Catches: a profile that goes on along its last slope, starts before its first point, or is shifted in time.
 TEST(LoadProfile, ItFollowsItsPointsAndHoldsTheValuesOfItsEnds) {
   MechanicsParameters p;
   EXPECT_EQ(profile_load_nm(p, 5.0), 0.0);
@@ -43,7 +43,7 @@ TEST(LoadProfile, ItFollowsItsPointsAndHoldsTheValuesOfItsEnds) {
   EXPECT_EQ(profile_load_nm(p, 1e6), -0.75);
 }
 
-// Kills: a curve that is written to another place than it is read from.
+// Catches: a curve that is written to another place than it is read from.
 TEST(LoadProfile, TheTableOfCurvesReachesIt) {
   ASSERT_EQ(mechanics_curves().size(), 1u);
   const CurveParameter& curve = mechanics_curves()[0];
@@ -55,7 +55,7 @@ TEST(LoadProfile, TheTableOfCurvesReachesIt) {
   EXPECT_EQ(profile_load_nm(p.mechanics, 0.5), 1.5);
 }
 
-// Kills: a row that reads one member and writes another, two rows for one member.
+// Catches: a row that reads one member and writes another, two rows for one member.
 TEST(MechanicsRows, EachRowReadsWhatItWritesAndTouchesNothingElse) {
   std::set<std::string_view> seen;
   for (const Parameter& row : mechanics_rows()) {
@@ -73,7 +73,7 @@ TEST(MechanicsRows, EachRowReadsWhatItWritesAndTouchesNothingElse) {
   EXPECT_EQ(seen.size(), 16u);  // every member of MechanicsParameters but the profile
 }
 
-// Recordings and configurations of older benches hold these four. Kills: another name, unit, range or
+// Recordings and configurations of older benches hold these four. Catches: another name, unit, range or
 // liveness.
 TEST(MechanicsRows, TheRowsOfTheFirstVersionStay) {
   const auto is = [](std::string_view name, std::string_view unit, double minimum, double maximum,
@@ -92,7 +92,7 @@ TEST(MechanicsRows, TheRowsOfTheFirstVersionStay) {
   is("mechanics.static_friction_nm", "N*m", 0.0, 1e6, false);
 }
 
-// Kills: words in another order than the enumeration, a motion that cannot be written while running.
+// Catches: words in another order than the enumeration, a motion that cannot be written while running.
 TEST(MechanicsRows, TheMotionIsAChoiceOfThreeWords) {
   const Parameter& row = row_named("mechanics.motion");
   ASSERT_EQ(row.words.size(), 3u);
@@ -108,7 +108,8 @@ TEST(MechanicsRows, TheMotionIsAChoiceOfThreeWords) {
   EXPECT_EQ(p.mechanics.motion, ShaftMotion::kImposed);
 }
 
-// The state of a running shaft fits one ratio and one kind of shaft. Kills: a gear that jumps while it turns.
+// The state of a running shaft fits one ratio and one kind of shaft. Catches: a gear that jumps while it
+// turns.
 TEST(MechanicsRows, ParametersThatShapeTheStateAreNotLive) {
   for (const std::string_view name : {"mechanics.gear_ratio", "mechanics.shaft_stiffness_nm",
                                       "mechanics.backlash_rad", "mechanics.screw_lead_m"}) {
@@ -116,7 +117,7 @@ TEST(MechanicsRows, ParametersThatShapeTheStateAreNotLive) {
   }
 }
 
-// Kills: rules between the values that are not checked, and rules for values that are right.
+// Catches: rules between the values that are not checked, and rules for values that are right.
 TEST(MechanicsRows, AProblemNamesTheValueThatDoesNotFitTheOthers) {
   const auto named = [](const MechanicsParameters& p) {
     std::set<std::string> fields;

@@ -31,7 +31,7 @@ Sample run(Axis& axis, Tick from, Tick to) {
   return axis.sample(to);
 }
 
-// Kills: friction that pushes, stiction that holds above its limit or lets go below it.
+// Catches: friction that pushes, stiction that holds above its limit or lets go below it.
 TEST(Mechanics, TheFrictionBranchFollowsTheMotionAndAtRestTheDrivingTorque) {
   const ShaftConstants c = constants_of(MechanicsParameters{
       .inertia_kgm2 = 1.0, .coulomb_friction_nm = kCoulomb_nm, .static_friction_nm = kStatic_nm});
@@ -49,7 +49,7 @@ TEST(Mechanics, TheFrictionBranchFollowsTheMotionAndAtRestTheDrivingTorque) {
               0.7 - 0.2 - kCoulomb_nm, 1e-15);
 }
 
-// w = w0 exp(-f t/J). Kills: a wrong factor of the viscous friction.
+// w = w0 exp(-f t/J). Catches: a wrong factor of the viscous friction.
 TEST(Mechanics, ViscousFrictionSlowsExponentially) {
   Axis axis = shaft_with(1e-3, 0.0, 0.0);
   spin(axis, 80.0);
@@ -58,7 +58,7 @@ TEST(Mechanics, ViscousFrictionSlowsExponentially) {
   EXPECT_NEAR(s.angle_rad, 80.0 * 0.2 * (1.0 - std::exp(-0.5)), 1e-9);
 }
 
-// Kills: stiction that is only Coulomb friction, breakaway in the wrong direction, Coulomb friction that
+// Catches: stiction that is only Coulomb friction, breakaway in the wrong direction, Coulomb friction that
 // keeps the static value once the shaft turns.
 TEST(Mechanics, AShaftBreaksAwayOnlyAboveTheStaticFriction) {
   for (const double sign : {1.0, -1.0}) {
@@ -76,7 +76,7 @@ TEST(Mechanics, AShaftBreaksAwayOnlyAboveTheStaticFriction) {
   }
 }
 
-// From w0 the shaft stops after J w0/tau_C, having turned J w0^2/(2 tau_C). Kills: a stop that is missed,
+// From w0 the shaft stops after J w0/tau_C, having turned J w0^2/(2 tau_C). Catches: a stop that is missed,
 // chatters or creeps, a stop at the end of the substep in place of its instant.
 TEST(Mechanics, CoulombFrictionStopsTheShaftAtTheClosedFormTimeAndAngleAndHoldsIt) {
   constexpr double kSpeed_rad_s = 7.7;
@@ -98,7 +98,7 @@ TEST(Mechanics, CoulombFrictionStopsTheShaftAtTheClosedFormTimeAndAngleAndHoldsI
   }
 }
 
-// With viscous friction f the speed crosses zero in a curve, after (J/f) log(1 + f w0/tau_C). Kills: a stop
+// With viscous friction f the speed crosses zero in a curve, after (J/f) log(1 + f w0/tau_C). Catches: a stop
 // that leaves the remainder of the estimated crossing in the speed.
 TEST(Mechanics, BothFrictionsTogetherStopTheShaftAtExactlyZero) {
   constexpr double kViscous_nms = 4e-3;
@@ -118,7 +118,7 @@ TEST(Mechanics, BothFrictionsTogetherStopTheShaftAtExactlyZero) {
   ASSERT_EQ(axis.last_tick().size(), 6u);
 }
 
-// Kills: a stop that falls within a substep and is only seen at its end; 0.4 of a substep here.
+// Catches: a stop that falls within a substep and is only seen at its end; 0.4 of a substep here.
 TEST(Mechanics, TheStopIsLocatedWithinTheSubstep) {
   Axis axis = shaft_with(0.0, kCoulomb_nm, kStatic_nm);
   constexpr double kStop_s = 35e-6;
@@ -131,7 +131,7 @@ TEST(Mechanics, TheStopIsLocatedWithinTheSubstep) {
 }
 
 // An opposing load above the static friction turns the shaft round: decelerated by load and friction, then
-// accelerated by load less friction. Below it the shaft stops and stays. Kills: friction that keeps its old
+// accelerated by load less friction. Below it the shaft stops and stays. Catches: friction that keeps its old
 // direction after the reversal.
 TEST(Mechanics, AnOpposingLoadReversesTheShaftOnlyIfItExceedsTheStaticFriction) {
   constexpr double kSpeed_rad_s = 5.0;
@@ -149,7 +149,7 @@ TEST(Mechanics, AnOpposingLoadReversesTheShaftOnlyIfItExceedsTheStaticFriction) 
   }
 }
 
-// Kills: a step that acts a tick early or late.
+// Catches: a step that acts a tick early or late.
 TEST(Mechanics, ALoadStepActsFromItsTickOn) {
   LoadTorque load;
   EXPECT_EQ(load.at(0), 0.0);
@@ -164,7 +164,7 @@ TEST(Mechanics, ALoadStepActsFromItsTickOn) {
   EXPECT_NEAR(run(axis, 50, 51).speed_rad_s, -0.3 / kInertia_kgm2 * kServoTick_s, 1e-12);
 }
 
-// Kills: a ramp that starts from zero, ends a tick early or late, or jumps when it is replaced on the way.
+// Catches: a ramp that starts from zero, ends a tick early or late, or jumps when it is replaced on the way.
 TEST(Mechanics, ALoadRampGoesFromThePresentValueToTheTargetInItsTicks) {
   LoadTorque load;
   load.go_to(0.2, 0, 0);

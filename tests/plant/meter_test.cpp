@@ -52,7 +52,7 @@ MeterFigures measured(const Steady& s, double step_s, int periods = 6) {
 }
 
 // The blocked-rotor point of motor IM-B (P3-08): 208 V line to line, 8.41 A, power factor 0.2546. Six periods
-// of 60 Hz in 100 ms: the sums are exact for sines, what is left is rounding. Kills: chords in place of
+// of 60 Hz in 100 ms: the sums are exact for sines, what is left is rounding. Catches: chords in place of
 // the trapezoidal rule (1.2e-4 at 100 us), line-to-line voltages, a factor 3/2, a power of one phase.
 TEST(Meter, TheBlockedRotorTestReadsToRoundingAtAnyStep) {
   const double lag_rad = std::acos(0.25455);
@@ -67,7 +67,7 @@ TEST(Meter, TheBlockedRotorTestReadsToRoundingAtAnyStep) {
   }
 }
 
-// Kills: a number of phases that is not that of the machine, a sign that turns with the phase order, a lead
+// Catches: a number of phases that is not that of the machine, a sign that turns with the phase order, a lead
 // that reads as a lag, a negative power that loses its sign.
 TEST(Meter, InductiveIsPositiveInEveryConnectionAndEitherDirection) {
   for (const Connection connection :
@@ -86,8 +86,8 @@ TEST(Meter, InductiveIsPositiveInEveryConnectionAndEitherDirection) {
   }
 }
 
-// In a star the common voltage of the terminals moves the neutral only; independent windings see it. Kills: a
-// voltage of the star against the middle of the link, a zero sequence that is lost where it counts.
+// In a star the common voltage of the terminals moves the neutral only; independent windings see it. Catches:
+// a voltage of the star against the middle of the link, a zero sequence that is lost where it counts.
 TEST(Meter, ACommonVoltageCountsOnlyWhereTheWindingsSeeIt) {
   const MeterFigures star = measured({Connection::kStar, 100.0, 5.0, 0.3, 50.0, 30.0}, 50e-6);
   EXPECT_NEAR(star.voltage_v, std::sqrt(5000.0), 1e-9);
@@ -98,8 +98,8 @@ TEST(Meter, ACommonVoltageCountsOnlyWhereTheWindingsSeeIt) {
 }
 
 // A bridge: the voltage jumps between the intervals and the current is a triangle between 2 A and 6 A, whose
-// corners are the only nodes. Closed forms: mean square 16 + 4/3 A², rms voltage 50 V. Kills: the trapezoidal
-// rule for the current (20 A²), an end of the interval taken for the start of the next.
+// corners are the only nodes. Closed forms: mean square 16 + 4/3 A², rms voltage 50 V. Catches: the
+// trapezoidal rule for the current (20 A²), an end of the interval taken for the start of the next.
 TEST(Meter, TheRippleOfABridgeIsIntegratedExactlyFromCornerToCorner) {
   MeterSums sums;
   for (int n = 0; n < 10; ++n) {
@@ -112,7 +112,7 @@ TEST(Meter, TheRippleOfABridgeIsIntegratedExactlyFromCornerToCorner) {
   EXPECT_NEAR(f.power_w, 100.0, 1e-11);  // 4 A at a mean of 25 V
 }
 
-// Kills: a division by zero, a root of a negative number.
+// Catches: a division by zero, a root of a negative number.
 TEST(Meter, NothingReadsAsZeroAndADirectCurrentHasNoReactivePower) {
   EXPECT_EQ(figures_of({}, Connection::kStar).power_factor, 0.0);
   MeterSums sums;

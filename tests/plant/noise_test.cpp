@@ -24,7 +24,7 @@ double correlation(First first, Second second) {
   return sum / static_cast<double>(kCount);
 }
 
-// Kills: a wrong scale in Box-Muller (variance), an angle or radius of a wrong law (skewness, kurtosis).
+// Catches: a wrong scale in Box-Muller (variance), an angle or radius of a wrong law (skewness, kurtosis).
 // The tolerances are five standard errors: 1/sqrt(n) times 1, sqrt(2), sqrt(15) (raw third moment) and
 // sqrt(96).
 TEST(Noise, GaussianHasTheMomentsOfTheNormalLaw) {
@@ -47,7 +47,7 @@ TEST(Noise, GaussianHasTheMomentsOfTheNormalLaw) {
   EXPECT_NEAR(fourths / n, 3.0, error * std::sqrt(96.0));
 }
 
-// Kills: right moments with a wrong shape, for example tails cut off. Kolmogorov-Smirnov at the 1e-6
+// Catches: right moments with a wrong shape, for example tails cut off. Kolmogorov-Smirnov at the 1e-6
 // level: 2.69/sqrt(n).
 TEST(Noise, GaussianFollowsTheNormalDistributionFunction) {
   std::vector<double> values(kCount);
@@ -65,7 +65,7 @@ TEST(Noise, GaussianFollowsTheNormalDistributionFunction) {
   EXPECT_LT(values.front(), -4.0);
 }
 
-// Kills: bits of the word that are used twice or not at all. Chi-square, 255 degrees of freedom, 6 standard
+// Catches: bits of the word that are used twice or not at all. Chi-square, 255 degrees of freedom, 6 standard
 // deviations.
 TEST(Noise, UniformFillsTheUnitIntervalEvenly) {
   std::array<double, 256> coarse{};
@@ -86,7 +86,7 @@ TEST(Noise, UniformFillsTheUnitIntervalEvenly) {
   }
 }
 
-// Kills: a hash that adds its arguments, so that neighbours in seed, channel or tick repeat or shift one
+// Catches: a hash that adds its arguments, so that neighbours in seed, channel or tick repeat or shift one
 // another.
 TEST(Noise, NeighboursAreUncorrelated) {
   const auto base = [](std::uint64_t tick) { return gaussian_noise(100, 4, tick); };
@@ -103,7 +103,7 @@ TEST(Noise, NeighboursAreUncorrelated) {
   }
 }
 
-// Kills: an argument bit that the hash drops or hardly mixes. 64 bits of difference scatter by 4 around 32.
+// Catches: an argument bit that the hash drops or hardly mixes. 64 bits of difference scatter by 4 around 32.
 TEST(Noise, EveryArgumentBitFlipsHalfOfTheWord) {
   for (unsigned bit = 0; bit < 64; ++bit) {
     const std::uint64_t flip = std::uint64_t{1} << bit;
@@ -119,7 +119,7 @@ TEST(Noise, EveryArgumentBitFlipsHalfOfTheWord) {
   }
 }
 
-// Kills: hidden state. A recording replayed from the middle must see the noise it saw.
+// Catches: hidden state. A recording replayed from the middle must see the noise it saw.
 TEST(Noise, ValuesDoNotDependOnTheOrderOfTheCalls) {
   std::vector<double> forward;
   for (std::uint64_t tick = 0; tick < 1000; ++tick)
@@ -130,7 +130,7 @@ TEST(Noise, ValuesDoNotDependOnTheOrderOfTheCalls) {
   }
 }
 
-// Kills: a changed constant or round. The values are part of the recording format: replay needs them for
+// Catches: a changed constant or round. The values are part of the recording format: replay needs them for
 // ever.
 TEST(Noise, GivesTheSameBitsOnEveryMachine) {
   EXPECT_EQ(uniform_noise(0, 0, 0), 0x1.87b6a2ad9c72dp-1);
@@ -144,7 +144,7 @@ TEST(Noise, GivesTheSameBitsOnEveryMachine) {
   EXPECT_EQ(gaussian_noise(kEverything, kEverything, kEverything), -0x1.4ed501c42fd17p+0);
 }
 
-// Kills: the half-open interval turned round: log(0) or a uniform value of 1.
+// Catches: the half-open interval turned round: log(0) or a uniform value of 1.
 TEST(Noise, TheExtremeWordsStayInTheirRange) {
   EXPECT_EQ(noise_detail::unit_interval(0), 0.0);
   EXPECT_EQ(noise_detail::unit_interval(kEverything), 1.0 - 0x1p-53);

@@ -142,7 +142,7 @@ void expect_floating_voltages(const AxisParameters& p, const Machine& m, double 
   }
 }
 
-// Kills: a floating terminal that does not feel the saliency.
+// Catches: a floating terminal that does not feel the saliency.
 TEST(OpenPhase, AnOpenPhaseOfASalientMachineSeesTheCurrentOfTheOthers) {
   const PmMachineParameters p{.pole_pairs = 3,
                               .stator_resistance_ohm = 0.4,
@@ -172,7 +172,7 @@ constexpr WoundRotorMachineParameters kWound{.pole_pairs = 2,
                                              .mutual_inductance_h = 0.12,
                                              .star = true};
 
-// Kills: a floating terminal that does not feel the slope of the field current.
+// Catches: a floating terminal that does not feel the slope of the field current.
 TEST(OpenPhase, AnOpenPhaseOfAWoundRotorMachineSeesTheFieldChange) {
   AxisParameters p = turned_axis(kWound);
   p.drive.source.field_v = 40.0;
@@ -192,7 +192,7 @@ TEST(OpenPhase, AnOpenPhaseOfAWoundRotorMachineSeesTheFieldChange) {
 }
 
 // The open winding has no current: its voltage is the slope of its flux, here over two ticks of 1 us (1e-6 of
-// it). Kills: a floating terminal that does not feel the saturation that the others cause.
+// it). Catches: a floating terminal that does not feel the saturation that the others cause.
 TEST(OpenPhase, AnOpenPhaseOfASaturatedMachineShowsTheSlopeOfItsFlux) {
   const SaturatedInductionMachineParameters machine{
       .pole_pairs = 2,
@@ -234,7 +234,7 @@ Phases emf_v(double electrical_rad, double speed_rad_s) {
 }
 
 // With i_p' = -i_q' the mutual fluxes of the two cancel in the third, whose emf is left: the neutral is where
-// the two have it. Kills: a star whose trapezoids are taken for sines.
+// the two have it. Catches: a star whose trapezoids are taken for sines.
 TEST(OpenPhase, AnOpenPhaseOfABrushlessStarShowsItsEmfAboveTheNeutral) {
   BldcMachineParameters machine = kBrushless;
   machine.star = true;
@@ -249,7 +249,7 @@ TEST(OpenPhase, AnOpenPhaseOfABrushlessStarShowsItsEmfAboveTheNeutral) {
   }
 }
 
-// L_S i_p' - M i_q' = u_p - R i_p - emf_p, and what is open has emf - M (i_p' + i_q'). Kills: independent
+// L_S i_p' - M i_q' = u_p - R i_p - emf_p, and what is open has emf - M (i_p' + i_q'). Catches: independent
 // phases that do not couple where one is open.
 TEST(OpenPhase, AnOpenPhaseOfThreeIndependentOnesSeesTheMutualInductance) {
   BldcMachineParameters machine = kBrushless;
@@ -271,8 +271,8 @@ TEST(OpenPhase, AnOpenPhaseOfThreeIndependentOnesSeesTheMutualInductance) {
 }
 
 // At standstill the field, switched on, induces M/L_F u_F along phase a: sqrt(3/2) of that between a and the
-// others, against two rails of 5 V, below which nothing flows. Kills: diodes that ask for the emf of rotation
-// alone.
+// others, against two rails of 5 V, below which nothing flows. Catches: diodes that ask for the emf of
+// rotation alone.
 TEST(OpenPhase, AFieldThatRisesFeedsTheDiodesAtStandstill) {
   for (const double field_v : {55.0, 70.0}) {
     AxisParameters p = turned_axis(kWound);

@@ -29,12 +29,12 @@ const Parameter* find_of_servo(std::string_view name) {
   return find_parameter(servo_axis(), name);
 }
 
-// Kills: a limit that excludes the machine of the book.
+// Catches: a limit that excludes the machine of the book.
 TEST(Parameters, TheServoMotorHasNoProblems) {
   EXPECT_TRUE(problems(servo_axis()).empty());
 }
 
-// Kills: a check that stops at the first problem.
+// Catches: a check that stops at the first problem.
 TEST(Parameters, EveryWrongParameterIsListedAtOnce) {
   for (AxisParameters p : all_kinds()) {
     std::set<std::string> expected;
@@ -53,7 +53,7 @@ TEST(Parameters, EveryWrongParameterIsListedAtOnce) {
   }
 }
 
-// An empty configuration is all zeros. Kills: the division by L_R L_S = 0 (seen by
+// An empty configuration is all zeros. Catches: the division by L_R L_S = 0 (seen by
 // -fsanitize=float-divide-by-zero) and the noise of a leakage factor that is not a number.
 TEST(Parameters, AnAxisOfZerosIsRefusedByEachRequiredParameter) {
   const std::vector<Problem> found = problems(AxisParameters{});
@@ -65,7 +65,7 @@ TEST(Parameters, AnAxisOfZerosIsRefusedByEachRequiredParameter) {
     EXPECT_EQ(problem.rule.find("sigma"), std::string::npos) << problem.rule;
 }
 
-// Kills: a machine without leakage, whose equations divide by zero, or with a negative one.
+// Catches: a machine without leakage, whose equations divide by zero, or with a negative one.
 TEST(Parameters, ALeakageFactorOfZeroOrLessIsRefusedByName) {
   AxisParameters p = servo_axis();
   for (const double mutual_h : {0.014, 0.015}) {
@@ -79,7 +79,7 @@ TEST(Parameters, ALeakageFactorOfZeroOrLessIsRefusedByName) {
   EXPECT_TRUE(problems(p).empty());
 }
 
-// Kills: rules between parameters that are not checked.
+// Catches: rules between parameters that are not checked.
 TEST(Parameters, StictionBelowCoulombFrictionAndCountsThatAreNoMultipleOfFourAreRefused) {
   AxisParameters p = servo_axis();
   p.mechanics.coulomb_friction_nm = 0.02;
@@ -94,7 +94,8 @@ TEST(Parameters, StictionBelowCoulombFrictionAndCountsThatAreNoMultipleOfFourAre
   EXPECT_TRUE(problems(p).empty());
 }
 
-// Kills: a limit that is open where it should be closed, NaN that passes a comparison, fractions of integers.
+// Catches: a limit that is open where it should be closed, NaN that passes a comparison, fractions of
+// integers.
 TEST(Parameters, TheLimitsBelongToTheRangeAndNothingElsePasses) {
   for (const AxisParameters& p : all_kinds()) {
     for (const Parameter& row : axis_parameters(p)) {
@@ -113,7 +114,7 @@ TEST(Parameters, TheLimitsBelongToTheRangeAndNothingElsePasses) {
   }
 }
 
-// Kills: a row that reads one member and writes another, two rows for one member or with one name.
+// Catches: a row that reads one member and writes another, two rows for one member or with one name.
 TEST(Parameters, EachRowReadsWhatItWritesAndTouchesNothingElse) {
   for (const AxisParameters& fresh : all_kinds()) {
     std::set<std::string_view> seen;
@@ -134,7 +135,7 @@ TEST(Parameters, EachRowReadsWhatItWritesAndTouchesNothingElse) {
   EXPECT_EQ(find_of_servo(""), nullptr);
 }
 
-// Kills: a parameter that the encoder or the converter has copied at the start, declared writable while
+// Catches: a parameter that the encoder or the converter has copied at the start, declared writable while
 // running.
 TEST(Parameters, ParametersThatAreFixedAtTheStartAreNotLive) {
   for (const std::string_view name : {"machine.pole_pairs", "encoder.counts_per_revolution",
@@ -144,7 +145,7 @@ TEST(Parameters, ParametersThatAreFixedAtTheStartAreNotLive) {
   EXPECT_TRUE(find_of_servo("machine.rotor_resistance_ohm")->live);
 }
 
-// Kills: a sentence without the value or the limits.
+// Catches: a sentence without the value or the limits.
 TEST(Parameters, ARuleNamesTheValueTheLimitsAndTheUnit) {
   const Parameter& row = *find_of_servo("machine.rotor_resistance_ohm");
   EXPECT_EQ(problem_with(row, -3.5), "is -3.5 but must lie between 1e-06 and 1e+06 ohm");

@@ -59,7 +59,7 @@ struct ThreePhaseDrive {
   double angle_rad = 0.0;
 };
 
-// PM3-01 in phase quantities, (3L/2) i_k' = u_k - R i_k + K w sin(n_p theta - (k - 1) 120 degrees). Kills:
+// PM3-01 in phase quantities, (3L/2) i_k' = u_k - R i_k + K w sin(n_p theta - (k - 1) 120 degrees). Catches:
 // wrong factors of the two-phase equivalent, a common voltage that acts, phases in the wrong order. Both sums
 // are the same but for rounding: 1e-9.
 TEST(PmEquivalence, TheThreePhaseStarMovesAsItsTwoPhaseEquivalent) {
@@ -114,7 +114,7 @@ struct StepperDrive {
 };
 
 // A hybrid stepper by its tooth geometry: 50 rotor teeth, flux lambda_M cos and sin(50 theta) of the magnet
-// through the phases, torque i·d(flux)/d(theta). Kills: K_m that does not hold n_p, an angle of the shaft
+// through the phases, torque i·d(flux)/d(theta). Catches: K_m that does not hold n_p, an angle of the shaft
 // where the electrical one belongs. In flux linkages the Runge-Kutta steps are others: the steps are so short
 // that their errors are below the tolerance.
 TEST(PmEquivalence, TheStepperIsThePmMachineWithItsTeethAsPolePairs) {
@@ -165,7 +165,7 @@ constexpr WoundRotorMachineParameters kWound{.pole_pairs = 2,
                                              .mutual_inductance_h = 0.12,
                                              .star = true};
 
-// SM-01 to SM-02. Kills: n_p missing in the torque or the emf of one of the two.
+// SM-01 to SM-02. Catches: n_p missing in the torque or the emf of one of the two.
 TEST(PmEquivalence, TheWoundRotorWithItsFieldCurrentHeldIsAPmMachine) {
   constexpr double kField_a = 3.0;
   const WoundRotorMachineConstants wound = constants_of(kWound);
@@ -232,8 +232,8 @@ WoundCurrents currents_of(const WoundThreePhaseDrive& x) {
           .field_a = field_a};
 }
 
-// WR3-01 in phase quantities and flux linkages. Kills: sqrt(3/2) of the field current lost or applied to R_F
-// or M, a field that does not see the stator. Here too the steps are so short that only rounding is left.
+// WR3-01 in phase quantities and flux linkages. Catches: sqrt(3/2) of the field current lost or applied to
+// R_F or M, a field that does not see the stator. Here too the steps are so short that only rounding is left.
 TEST(PmEquivalence, TheThreePhaseWoundRotorMovesAsItsTwoPhaseEquivalent) {
   constexpr double kInertia_kgm2 = 5e-3;
   constexpr double kStep_s = 2e-6;

@@ -47,7 +47,7 @@ class Points {
   std::mt19937_64 engine_{9};
 };
 
-// The book misprints signs, the power balance does not. Kills: any wrong sign or factor in slope, torque,
+// The book misprints signs, the power balance does not. Catches: any wrong sign or factor in slope, torque,
 // energy or losses, with a round rotor, a salient one and detent torque, with one or all phases open.
 TEST(PmMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   Points points;
@@ -63,8 +63,8 @@ TEST(PmMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   }
 }
 
-// AC-26. Kills: a power balance that would let (7.81) pass as it is printed. Its back emf has the wrong sign,
-// so that the emf takes in what the shaft should get: twice K_m w i_q is missing.
+// AC-26. Catches: a power balance that would let (7.81) pass as it is printed. Its back emf has the wrong
+// sign, so that the emf takes in what the shaft should get: twice K_m w i_q is missing.
 TEST(PmMachine, ThePrintedSignsOf7Point81CreateEnergy) {
   const PmMachineConstants c = constants_of(kStepper);
   const auto printed = [&](const Point& p) -> PmMachineState {
@@ -83,7 +83,7 @@ TEST(PmMachine, ThePrintedSignsOf7Point81CreateEnergy) {
   EXPECT_GT(caught, 990);  // the others have next to no torque or speed
 }
 
-// AC-26: v_1 = -K w sin theta with K = sqrt(2/3) K_m. Kills: an emf of the wrong sign or axis; a star that
+// AC-26: v_1 = -K w sin theta with K = sqrt(2/3) K_m. Catches: an emf of the wrong sign or axis; a star that
 // forgets the factor; a current that flows all the same.
 TEST(PmMachine, TheOpenStarShowsMinusKSpeedSine) {
   const double phase_emf_constant = 0.155;
@@ -103,7 +103,7 @@ TEST(PmMachine, TheOpenStarShowsMinusKSpeedSine) {
   }
 }
 
-// The test vector of PM3-01, to its eight digits. Kills: a wrong factor of the transform, an angle of the
+// The test vector of PM3-01, to its eight digits. Catches: a wrong factor of the transform, an angle of the
 // wrong sign.
 TEST(PmMachine, TheTorqueOfThreePhaseCurrentsIsThatOfTheTestVector) {
   const PmMachineConstants c = constants_of({.pole_pairs = 1,
@@ -137,7 +137,7 @@ Inductance inductance_slope_h(const PmMachineParameters& p, double angle_rad) {
 }
 
 // Case 35. The coenergy at constant current, i·L(theta) i/2 + i·psi(theta), by a fourth-order difference.
-// Kills: the torque as exercise 11 prints it, a lost factor 2 or n_p of the reluctance torque.
+// Catches: the torque as exercise 11 prints it, a lost factor 2 or n_p of the reluctance torque.
 TEST(PmMachine, TheTorqueOfASalientRotorIsTheDerivativeOfTheCoenergy) {
   PmMachineParameters parameters = kSalient;
   parameters.detent_torque_nm = 0.0;
@@ -183,7 +183,7 @@ PmMachineState constrained_slope(const Inductance& l, TwoPhase v, TwoPhase line)
   return {.i_a_a = m[0][3] / m[0][0], .i_b_a = m[1][3] / m[1][1]};
 }
 
-// Kills: an open phase that takes a component of the slope of all phases, which is right only for a round
+// Catches: an open phase that takes a component of the slope of all phases, which is right only for a round
 // rotor; a constraint voltage that does work.
 TEST(PmMachine, AnOpenPhaseOfASalientMachineObeysTheConstrainedEquations) {
   const PmMachineConstants c = constants_of(kSalient);
@@ -215,7 +215,7 @@ TEST(PmMachine, AnOpenPhaseOfASalientMachineObeysTheConstrainedEquations) {
   }
 }
 
-// Kills: a projection that keeps the wrong part of the current.
+// Catches: a projection that keeps the wrong part of the current.
 TEST(PmMachine, TheRestrictedStateKeepsTheCurrentAlongTheLineOnly) {
   const PmMachineConstants c = constants_of(kSalient);
   const RotorMotion motion = motion_at(c, 0.3, 10.0);
@@ -232,7 +232,7 @@ TEST(PmMachine, TheRestrictedStateKeepsTheCurrentAlongTheLineOnly) {
   EXPECT_EQ(none.i_b_a, 0.0);
 }
 
-// Kills: an adjustment that takes the wrong factor or leaves one inductance behind.
+// Catches: an adjustment that takes the wrong factor or leaves one inductance behind.
 TEST(PmMachine, HeatSeriesImpedanceAndMagnetChangeTheirOwnParameters) {
   const PmMachineParameters p = adjusted(kSalient, {.stator_resistance_factor = 1.5,
                                                     .rotor_resistance_factor = 7.0,
@@ -250,7 +250,7 @@ TEST(PmMachine, HeatSeriesImpedanceAndMagnetChangeTheirOwnParameters) {
   EXPECT_EQ(connection_of(two_phase_equivalent(2, {1.0, 1e-3, 0.1})), Connection::kStar);
 }
 
-// Kills: a flux that is not that behind the emf: d(psi)/dt is the open-circuit voltage.
+// Catches: a flux that is not that behind the emf: d(psi)/dt is the open-circuit voltage.
 TEST(PmMachine, TheEmfIsTheRateOfTheRotorFlux) {
   const PmMachineConstants c = constants_of(kSalient);
   constexpr double kSpeed_rad_s = 40.0;

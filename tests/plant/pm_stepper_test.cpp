@@ -42,8 +42,8 @@ Drive advanced_drive(const PmMachineConstants& c, Drive x, const TerminalInput& 
   return x;
 }
 
-// Kills: a line that lets a little of the other direction through from step to step; an open stator in which
-// a current builds up while the rotor turns.
+// Catches: a line that lets a little of the other direction through from step to step; an open stator in
+// which a current builds up while the rotor turns.
 TEST(PmStepper, CurrentsOfOpenPhasesStayExactlyZeroWhileTheRotorTurns) {
   for (const double inductance_q_h : {1.5e-3, 2.5e-3}) {
     PmMachineParameters parameters = kStepper;
@@ -74,8 +74,8 @@ void expect_steps(const PmMachineParameters& parameters, std::span<const TwoPhas
   }
 }
 
-// ST-01. Kills: torque or emf without n_p in the angle; a detent torque with another period or sign than four
-// stable places in an electrical turn.
+// ST-01. Catches: torque or emf without n_p in the angle; a detent torque with another period or sign than
+// four stable places in an electrical turn.
 TEST(PmStepper, AStepperGoes1Point8DegreesInAFullStepWithAndWithoutDetentTorque) {
   constexpr auto kVoltages =
       std::to_array<TwoPhase>({{1.1, 0.0}, {0.0, 1.1}, {-1.1, 0.0}, {0.0, -1.1}, {1.1, 0.0}});
@@ -88,7 +88,7 @@ TEST(PmStepper, AStepperGoes1Point8DegreesInAFullStepWithAndWithoutDetentTorque)
   expect_steps(five_teeth, kVoltages, 18.0);
 }
 
-// ST-03. Kills: phases of different strength, which full steps do not show.
+// ST-03. Catches: phases of different strength, which full steps do not show.
 TEST(PmStepper, AStepperGoes0Point9DegreesInAHalfStep) {
   constexpr auto kVoltages = std::to_array<TwoPhase>({{1.1, 0.0},
                                                       {1.1, 1.1},
@@ -102,7 +102,7 @@ TEST(PmStepper, AStepperGoes0Point9DegreesInAHalfStep) {
   expect_steps(kStepper, kVoltages, 0.9);
 }
 
-// Kills: a detent torque of the wrong sign or period. Without current the rotor goes to the nearest full
+// Catches: a detent torque of the wrong sign or period. Without current the rotor goes to the nearest full
 // step.
 TEST(PmStepper, DetentTorqueHoldsTheRotorAtTheFullSteps) {
   PmMachineParameters parameters = kStepper;
@@ -116,7 +116,7 @@ TEST(PmStepper, DetentTorqueHoldsTheRotorAtTheFullSteps) {
 }
 
 // Case 33, a held current of 1 A in phase b with the rotor at phase a: peak of 3.460 degrees at 7.96 ms.
-// Kills: a wrong factor of the torque, which the rest positions do not show.
+// Catches: a wrong factor of the torque, which the rest positions do not show.
 TEST(PmStepper, AStepperOnAHeldCurrentOvershootsAsInTheReference) {
   const PmMachineConstants c = constants_of(kStepper);
   struct Shaft {
@@ -150,7 +150,7 @@ double steps_made(double voltage_v, double steps_per_s) {
   return x.angle_rad / (1.8 * kRadPerDegree);
 }
 
-// ST-04 and case 34: a rotor that falls out of step loses whole electrical turns, four steps each. Kills: a
+// ST-04 and case 34: a rotor that falls out of step loses whole electrical turns, four steps each. Catches: a
 // back emf that does not brake, and an integration whose error adds up over the steps.
 TEST(PmStepper, TooFastAStepperLosesFourStepsAtATime) {
   EXPECT_NEAR(steps_made(1.1, 200.0), 40.0, 1e-6);

@@ -44,8 +44,8 @@ void expect_energy_kept(const typename Machine::Parameters& p, const Start& star
   EXPECT_NEAR(unaccounted_j(rig, c, load), 0.0, start.tolerance * exchanged_j);
 }
 
-// Kills: an energy that balances at an instant but not over the time in which the rotor turns; a torque or a
-// loss of another equation. The steps are so short that their error is below the tolerance.
+// Catches: an energy that balances at an instant but not over the time in which the rotor turns; a torque or
+// a loss of another equation. The steps are so short that their error is below the tolerance.
 TEST(PowerBalance, EveryMachineKeepsItsEnergyAlongAStart) {
   expect_energy_kept<InductionMachine>(induction_motors::kMotorA,
                                        {.peak_v = 60.0,
@@ -105,7 +105,7 @@ TEST(PowerBalance, EveryMachineKeepsItsEnergyAlongAStart) {
       {.peak_v = 240.0, .inertia_kgm2 = 0.5, .step_s = 50e-6, .steps = 20'000, .tolerance = 1e-9});
 }
 
-// The same where a curve or a trapezoid has kinks, at which Runge-Kutta steps lose their order. Kills: an
+// The same where a curve or a trapezoid has kinks, at which Runge-Kutta steps lose their order. Catches: an
 // energy that jumps at a point of the curve, an emf whose corners are not those of the torque.
 TEST(PowerBalance, MachinesWithKinksKeepTheirEnergyToo) {
   expect_energy_kept<SaturatedInductionMachine>(

@@ -8,7 +8,7 @@
 namespace drivebench {
 namespace {
 
-// Kills: sine and cosine exchanged, the pole pairs left out, an angle that turns the other way.
+// Catches: sine and cosine exchanged, the pole pairs left out, an angle that turns the other way.
 TEST(Resolver, ADecoderFindsThePolePairsTimesTheAngle) {
   const ResolverParameters p{.pole_pairs = 3, .amplitude_v = 4.0};
   for (double angle_rad = -0.1; angle_rad < 6.4; angle_rad += 0.05) {
@@ -20,7 +20,7 @@ TEST(Resolver, ADecoderFindsThePolePairsTimesTheAngle) {
   }
 }
 
-// Kills: an amplitude error on both windings, or on the other one.
+// Catches: an amplitude error on both windings, or on the other one.
 TEST(Resolver, EachWindingHasItsOwnAmplitude) {
   const ResolverParameters p{.amplitude_v = 2.0, .sine_gain = 1.1, .cosine_gain = 0.9};
   const ResolverVoltages v = resolver_voltages(p, 0.6);

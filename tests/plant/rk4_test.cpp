@@ -25,7 +25,7 @@ struct Nested {
   Pair d;
 };
 
-// Kills: a member of a nested state that is skipped, taken twice or exchanged with another.
+// Catches: a member of a nested state that is skipped, taken twice or exchanged with another.
 TEST(Rk4, EveryMemberOfANestedStateAdvancesByItsOwnSlope) {
   constexpr Nested kState{{1.0, 2.0}, {3.0}, 4.0, {5.0, 6.0}};
   constexpr Nested kSlope{{10.0, 20.0}, {30.0}, 40.0, {50.0, 60.0}};
@@ -39,7 +39,7 @@ TEST(Rk4, EveryMemberOfANestedStateAdvancesByItsOwnSlope) {
 }
 
 // x' = 4t^3 makes the step Simpson's rule, which is exact for cubics; y' = y gives the Taylor polynomial of
-// degree four. Kills: wrong weights, a stage at the wrong time.
+// degree four. Catches: wrong weights, a stage at the wrong time.
 TEST(Rk4, OneStepIsSimpsonsRuleAndTheFourthTaylorPolynomial) {
   struct State {
     double t;
@@ -76,8 +76,8 @@ DriveState after_two_milliseconds(int steps) {
 }
 
 // The error of a method of order 4 falls by 2^4 when the step halves; at 40 to 10 us the next order of the
-// error leaves a few percent. Kills: wrong stage weights, a stage that does not see one of the states (order
-// 1 to 3: ratio 2 to 8).
+// error leaves a few percent. Catches: wrong stage weights, a stage that does not see one of the states
+// (order 1 to 3: ratio 2 to 8).
 TEST(Rk4, HalvingTheStepDividesTheErrorOfTheMotorBySixteen) {
   const DriveState exact = after_two_milliseconds(6400);
   const auto errors = [&exact](int steps) {

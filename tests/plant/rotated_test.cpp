@@ -7,7 +7,7 @@
 namespace drivebench {
 namespace {
 
-// Kills: a wrong coefficient, a turn in the wrong direction. The tolerance is the first term left out.
+// Catches: a wrong coefficient, a turn in the wrong direction. The tolerance is the first term left out.
 TEST(Rotated, IsTheCosineAndSineOfTheSum) {
   for (double start = -3.0; start < 3.0; start += 0.37) {
     for (double by = -0.8; by <= 0.8; by += 0.05) {
@@ -19,7 +19,7 @@ TEST(Rotated, IsTheCosineAndSineOfTheSum) {
   }
 }
 
-// Kills: a series that does not begin with 1, which would move a rotor that stands.
+// Catches: a series that does not begin with 1, which would move a rotor that stands.
 TEST(Rotated, ByNothingIsTheStart) {
   const CosSin start = cos_sin(0.7);
   const CosSin same = rotated(start, 0.0);

@@ -88,7 +88,7 @@ TerminalInput blocked_input(int n, Random& random) {
   return u;
 }
 
-// The law itself: flux along the sum of the currents, as long as the curve says. Kills: an inverse of the
+// The law itself: flux along the sum of the currents, as long as the curve says. Catches: an inverse of the
 // wrong leakages, a flux along the stator current, a chord taken for a slope.
 TEST(SaturatedInductionMachine, MagnetisingFluxAndCurrentLieOnTheCurveInOneDirection) {
   const SaturatedInductionMachineParameters p = saturating();
@@ -114,7 +114,7 @@ int segment(const Curve& curve, double flux_wb) {
   return n;
 }
 
-// Kills: any wrong sign or factor, an energy that is not that of the curve, a constraint that does work.
+// Catches: any wrong sign or factor, an energy that is not that of the curve, a constraint that does work.
 TEST(SaturatedInductionMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   const SaturatedInductionMachineParameters p = saturating();
   const SaturatedInductionMachineConstants c = constants_of(p);
@@ -151,7 +151,7 @@ struct Pair {
 };
 
 // A line start with a spell of an open phase and one of open terminals, both models turned by the linear one.
-// Kills: leakages or resistances of the wrong side, a constraint solved with the wrong inductance.
+// Catches: leakages or resistances of the wrong side, a constraint solved with the wrong inductance.
 TEST(SaturatedInductionMachine, AStraightCurveMakesItTheLinearMachine) {
   const SaturatedInductionMachineConstants c = constants_of(straight());
   const InductionMachineConstants linear = constants_of(kLinear);
@@ -197,7 +197,7 @@ TwoPhase current_slope(const SaturatedInductionMachineConstants& c, const Satura
   return {(to.a - from.a) / (2.0 * kStep_s), (to.b - from.b) / (2.0 * kStep_s)};
 }
 
-// The constraint in the bent part of the curve. Kills: a slope of the flux taken as its chord, a cross term
+// The constraint in the bent part of the curve. Catches: a slope of the flux taken as its chord, a cross term
 // between the conducting and the open direction that is left out.
 TEST(SaturatedInductionMachine, AnOpenDirectionKeepsItsCurrentAndTheOtherObeysItsVoltage) {
   const SaturatedInductionMachineParameters p = saturating();
@@ -231,7 +231,7 @@ TEST(SaturatedInductionMachine, AnOpenDirectionKeepsItsCurrentAndTheOtherObeysIt
   EXPECT_GT(judged, 1'950);
 }
 
-// Currents that cancel leave no flux whose direction one could ask for. Kills: an inductance of zero there.
+// Currents that cancel leave no flux whose direction one could ask for. Catches: an inductance of zero there.
 TEST(SaturatedInductionMachine, AnOpenDirectionKeepsItsCurrentWhereNoFluxMagnetises) {
   SaturatedInductionMachineParameters p = saturating();
   p.stator_leakage_h = 1.0 / 512.0;  // powers of two cancel exactly
@@ -245,7 +245,7 @@ TEST(SaturatedInductionMachine, AnOpenDirectionKeepsItsCurrentWhereNoFluxMagneti
   EXPECT_NEAR(current_slope(c, x, slope).b, 0.0, 1e-3);
 }
 
-// Kills: an open-circuit voltage of the wrong sign or of the unsaturated machine.
+// Catches: an open-circuit voltage of the wrong sign or of the unsaturated machine.
 TEST(SaturatedInductionMachine, TheOpenCircuitVoltageKeepsTheCurrentAtZero) {
   const SaturatedInductionMachineConstants c = constants_of(saturating());
   const RotorMotion now = motion(150.0);
@@ -281,7 +281,7 @@ TEST(SaturatedInductionMachine, ItStartsFromNoFluxAndPositiveVoltageDrivesPositi
 }
 
 // At synchronous speed the rotor carries nothing and the stator all of the magnetising current, so the
-// terminal voltage follows from a point of the curve. Kills: a curve that is read along the wrong axis.
+// terminal voltage follows from a point of the curve. Catches: a curve that is read along the wrong axis.
 TEST(SaturatedInductionMachine, NoLoadCurrentFollowsTheCurve) {
   const SaturatedInductionMachineParameters p = saturating();
   const SaturatedInductionMachineConstants c = constants_of(p);
@@ -307,7 +307,7 @@ TEST(SaturatedInductionMachine, NoLoadCurrentFollowsTheCurve) {
   }
 }
 
-// Kills: a factor that reaches the wrong parameter, a time constant that forgets saturation.
+// Catches: a factor that reaches the wrong parameter, a time constant that forgets saturation.
 TEST(SaturatedInductionMachine, AdjustmentsTimeConstantAndConnectionFollowTheParameters) {
   SaturatedInductionMachineParameters p = adjusted(saturating(), {.stator_resistance_factor = 2.0,
                                                                   .rotor_resistance_factor = 3.0,
@@ -339,7 +339,7 @@ TEST(SaturatedInductionMachine, AdjustmentsTimeConstantAndConnectionFollowThePar
   }
 }
 
-// Kills: a curve that would be read below its first point.
+// Catches: a curve that would be read below its first point.
 TEST(SaturatedInductionMachine, TheCurveMustBeginAtTheOriginAndRise) {
   const auto rule = [](Curve curve) {
     SaturatedInductionMachineParameters p = saturating();

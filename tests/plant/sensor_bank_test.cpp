@@ -15,7 +15,7 @@ namespace {
 
 using namespace sensor_point;
 
-// Kills: a channel that shows another one's quantity, is left out, or swallows its gain.
+// Catches: a channel that shows another one's quantity, is left out, or swallows its gain.
 TEST(SensorBank, EveryIdealChannelShowsItsOwnQuantity) {
   const SensorBank bank = bank_of(all_on());
   SensorMemory m;
@@ -38,7 +38,7 @@ TEST(SensorBank, EveryIdealChannelShowsItsOwnQuantity) {
   EXPECT_EQ(r.faults, 0u);
 }
 
-// Kills: a sensor that is off and still speaks, or one that hides the true voltages of the bench.
+// Catches: a sensor that is off and still speaks, or one that hides the true voltages of the bench.
 TEST(SensorBank, AChannelThatIsOffReadsZeroButVoltagesAndBusAreTheTrueOnes) {
   SensorParameters p;
   p.voltage = {.bits = 3, .gain = 2.0, .offset = 1.0, .noise_rms = 1.0, .delay_ticks = 4.0};
@@ -60,7 +60,7 @@ TEST(SensorBank, AChannelThatIsOffReadsZeroButVoltagesAndBusAreTheTrueOnes) {
   EXPECT_FALSE(bank.follows());
 }
 
-// Kills: noise or offset on the wire of a phase that does not exist.
+// Catches: noise or offset on the wire of a phase that does not exist.
 TEST(SensorBank, TerminalsThatTheMachineDoesNotHaveReadZero) {
   SensorParameters p = all_on();
   p.current.noise_rms_a = p.voltage.noise_rms = 1.0;
@@ -82,7 +82,7 @@ TEST(SensorBank, TerminalsThatTheMachineDoesNotHaveReadZero) {
   }
 }
 
-// Kills: gains and offsets of the phases or windings exchanged, a first reading that is not defined.
+// Catches: gains and offsets of the phases or windings exchanged, a first reading that is not defined.
 TEST(SensorBank, BeforeTheFirstTickZerosGoThroughGainsAndOffsets) {
   SensorParameters p = all_on();
   p.current.offset_a_a = 0.1;
@@ -111,7 +111,7 @@ TEST(SensorBank, BeforeTheFirstTickZerosGoThroughGainsAndOffsets) {
   EXPECT_EQ(r.i_c_a, 12.3);
 }
 
-// Kills: a ring that is too short, a delay that is one tick off, a delay of one section on another.
+// Catches: a ring that is too short, a delay that is one tick off, a delay of one section on another.
 TEST(SensorBank, ADelayOfWholeTicksShowsThatTick) {
   for (int delay = 0; delay <= kMaxSensorDelayTicks; ++delay) {
     SensorParameters p = all_on();
@@ -131,7 +131,7 @@ TEST(SensorBank, ADelayOfWholeTicksShowsThatTick) {
   }
 }
 
-// A plant that has stopped (diverged) holds its last outputs. Kills: old ticks that come round again.
+// A plant that has stopped (diverged) holds its last outputs. Catches: old ticks that come round again.
 TEST(SensorBank, WithoutNewTicksTheReadingsStay) {
   SensorParameters p;
   p.current.delay_ticks = 2.0;
@@ -143,7 +143,7 @@ TEST(SensorBank, WithoutNewTicksTheReadingsStay) {
     EXPECT_EQ(bank.readings(m, {}, tick).i_a_a, 18.0);
 }
 
-// Kills: one noise for two channels, noise that depends on the order of calls, a channel number that moves.
+// Catches: one noise for two channels, noise that depends on the order of calls, a channel number that moves.
 TEST(SensorBank, TheNoiseIsThatOfSeedChannelAndTick) {
   SensorParameters p = all_on();
   p.current.noise_rms_a = 2.0;
@@ -162,7 +162,8 @@ TEST(SensorBank, TheNoiseIsThatOfSeedChannelAndTick) {
   }
 }
 
-// Kills: a fault on the wrong phase, one that the gain of the sensor scales, an offset on the field current.
+// Catches: a fault on the wrong phase, one that the gain of the sensor scales, an offset on the field
+// current.
 TEST(SensorBank, FaultsOfCurrentSensorsActOnTheirReadings) {
   SensorParameters p;
   p.current.gain_a = 2.0;
@@ -189,7 +190,7 @@ TEST(SensorBank, FaultsOfCurrentSensorsActOnTheirReadings) {
   }
 }
 
-// Kills: a burst that replaces the noise of the sensor, that reaches the field current, or that stays.
+// Catches: a burst that replaces the noise of the sensor, that reaches the field current, or that stays.
 TEST(SensorBank, ANoiseBurstAddsToTheNoiseOfThePhases) {
   SensorParameters p;
   p.current.noise_rms_a = 0.5;
@@ -206,7 +207,7 @@ TEST(SensorBank, ANoiseBurstAddsToTheNoiseOfThePhases) {
   EXPECT_EQ(bank.readings(m, {}, 1).i_a_a, before.i_a_a);
 }
 
-// Kills: an open winding that takes the other one along or its offset with it.
+// Catches: an open winding that takes the other one along or its offset with it.
 TEST(SensorBank, FaultsOfTachometerAndResolverActOnTheirReadings) {
   SensorParameters p = all_on();
   p.tachometer.analog.offset = 0.3;
@@ -226,7 +227,7 @@ TEST(SensorBank, FaultsOfTachometerAndResolverActOnTheirReadings) {
   EXPECT_EQ(r.resolver_cos_v, 0.0);
 }
 
-// Kills: a voltage at the end of its converter that is reported as a current, a flag that is never set.
+// Catches: a voltage at the end of its converter that is reported as a current, a flag that is never set.
 TEST(SensorBank, AConverterAtItsEndIsReportedForCurrentsAndForTheRest) {
   SensorParameters p = all_on();
   p.current.bits = p.bus.bits = 8;
@@ -242,7 +243,7 @@ TEST(SensorBank, AConverterAtItsEndIsReportedForCurrentsAndForTheRest) {
   EXPECT_EQ(flags(99.0, -101.0), kSensorSaturated);
 }
 
-// Kills: a start at which filters and delays still show zeros.
+// Catches: a start at which filters and delays still show zeros.
 TEST(SensorBank, ASettledBankReadsAsIfItHadBeenThereForever) {
   SensorParameters p = all_on();
   p.bus.filter_hz = 5.0;
@@ -261,8 +262,8 @@ TEST(SensorBank, ASettledBankReadsAsIfItHadBeenThereForever) {
   }
 }
 
-// A window of 3 ticks. Kills: figures that run within the window, a window that is a tick too long, one that
-// carries the last one's sums.
+// A window of 3 ticks. Catches: figures that run within the window, a window that is a tick too long, one
+// that carries the last one's sums.
 TEST(SensorBank, TheMeterShowsEachWholeWindowUntilTheNext) {
   SensorParameters p;
   p.meter = {.enabled = true, .window_s = 3.0 * kTick_s};

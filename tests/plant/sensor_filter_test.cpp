@@ -14,7 +14,7 @@ namespace {
 using namespace sensor_point;
 
 // A ramp, so that the middle is known; nodes even, odd, and cut by events on both sides of the middle, at it,
-// and an ulp beside it. Kills: the start or end of the interval in place of its middle, an interval that is
+// and an ulp beside it. Catches: the start or end of the interval in place of its middle, an interval that is
 // not found, a value of the tick before.
 TEST(SensorFilter, HalfATickShowsTheMiddleOfTheLastTick) {
   SensorParameters p;
@@ -39,7 +39,7 @@ TEST(SensorFilter, HalfATickShowsTheMiddleOfTheLastTick) {
   }
 }
 
-// Kills: a middle taken from the tick's ends, across a voltage that jumps.
+// Catches: a middle taken from the tick's ends, across a voltage that jumps.
 TEST(SensorFilter, HalfATickOfAVoltageThatJumpsIsWhatItWasThen) {
   SensorParameters p = all_on();
   p.voltage.delay_ticks = 0.5;
@@ -54,8 +54,8 @@ TEST(SensorFilter, HalfATickOfAVoltageThatJumpsIsWhatItWasThen) {
 }
 
 // y' = (x - y)/T behind x = 7 + s t: closed form to rounding, in even steps, in steps that events cut, and
-// with the sample in the middle of the tick. Kills: a corner in rad/s, Euler or trapezoidal steps, a step of
-// the usual length where another one was, a middle without its filter.
+// with the sample in the middle of the tick. Catches: a corner in rad/s, Euler or trapezoidal steps, a step
+// of the usual length where another one was, a middle without its filter.
 TEST(SensorFilter, TheFilterIsExactForStraightLinesInAnySteps) {
   constexpr double kSlope = 2e3;
   constexpr double kCorner_hz = 800.0;
@@ -84,7 +84,7 @@ TEST(SensorFilter, TheFilterIsExactForStraightLinesInAnySteps) {
 }
 
 // Each section with another corner: a step of 1 settles to 1 - exp(-w t), in steps of the usual length and
-// others. Kills: the coefficients of one section used for the next, a channel without its filter.
+// others. Catches: the coefficients of one section used for the next, a channel without its filter.
 TEST(SensorFilter, EverySectionHasItsOwnFilter) {
   SensorParameters p = all_on();
   p.tachometer.gain_vs_per_rad = 1.0;
@@ -125,8 +125,8 @@ TEST(SensorFilter, EverySectionHasItsOwnFilter) {
 }
 
 // At 50 rad/s the resolver's sine lags by atan(w T) and shrinks to 1/sqrt(1 + (w T)²), and the speed passes
-// unchanged. Between nodes the sine counts as straight: (w h)²/12 = 2e-8. Kills: the angle of the interval's
-// end at its start, sine and cosine that share one memory.
+// unchanged. Between nodes the sine counts as straight: (w h)²/12 = 2e-8. Catches: the angle of the
+// interval's end at its start, sine and cosine that share one memory.
 TEST(SensorFilter, AFilteredResolverLagsAsTheFilterSays) {
   SensorParameters p = all_on();
   p.resolver.analog.filter_hz = 20.0;

@@ -34,7 +34,7 @@ std::vector<Problem> problems_of(const AxisParameters& p) {
   return found;
 }
 
-// Kills: a row that reads or writes another row's member, one name twice, a default outside of its limits.
+// Catches: a row that reads or writes another row's member, one name twice, a default outside of its limits.
 TEST(SensorRows, EveryRowHasAMemberOfItsOwn) {
   std::set<std::string_view> names;
   for (const Parameter& row : sensor_rows()) {
@@ -54,7 +54,7 @@ TEST(SensorRows, EveryRowHasAMemberOfItsOwn) {
   }
 }
 
-// The sections and keys that a client finds. Kills: a section that is left out of the table, a key of a
+// The sections and keys that a client finds. Catches: a section that is left out of the table, a key of a
 // section that is spelt in another way than in the others.
 TEST(SensorRows, EveryAnalogSectionHasTheSameKeys) {
   for (const std::string section :
@@ -71,7 +71,7 @@ TEST(SensorRows, EveryAnalogSectionHasTheSameKeys) {
     row_of(name);
 }
 
-// What configurations and clients of the first version rely on. Kills: a range or a liveness that moved.
+// What configurations and clients of the first version rely on. Catches: a range or a liveness that moved.
 TEST(SensorRows, TheRowsOfTheFirstVersionStay) {
   const Parameter& counts = row_of("encoder.counts_per_revolution");
   EXPECT_EQ(counts.minimum, 4);
@@ -93,7 +93,7 @@ TEST(SensorRows, TheRowsOfTheFirstVersionStay) {
   EXPECT_EQ(row_of("current_sensor.noise_rms_a").minimum, 0);
 }
 
-// Kills: a delay that no history holds, in any section.
+// Catches: a delay that no history holds, in any section.
 TEST(SensorRows, ADelayIsRefusedUnlessTheHistoryHoldsIt) {
   EXPECT_TRUE(problems_of(usable()).empty());
   for (const std::string section : {"current_sensor", "voltage_sensor", "neutral_sensor", "bus_sensor",
@@ -110,7 +110,7 @@ TEST(SensorRows, ADelayIsRefusedUnlessTheHistoryHoldsIt) {
   }
 }
 
-// Kills: a rule that is not applied, or applied to a sensor that is off.
+// Catches: a rule that is not applied, or applied to a sensor that is off.
 TEST(SensorRows, BrokenRulesBetweenValuesAreNamed) {
   const auto field = [](const AxisParameters& p) {
     const std::vector<Problem> found = problems_of(p);

@@ -40,8 +40,8 @@ SeriesCircuit circuit(const SeriesDcMachineConstants& c, const Rig<SeriesDcMachi
   return series_circuit(c, rig.machine);
 }
 
-// Kills: any wrong sign or factor, losses of a resistor that is not there, an energy that does not belong to
-// the curve; for the switch open and closed, the terminals connected and open.
+// Catches: any wrong sign or factor, losses of a resistor that is not there, an energy that does not belong
+// to the curve; for the switch open and closed, the terminals connected and open.
 TEST(SeriesDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   for (const SeriesDcMachineParameters& p :
        {kSeries, saturated(kSeries), divided(kSeries, false), divided(kSeries, true),
@@ -59,7 +59,7 @@ TEST(SeriesDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   }
 }
 
-// Conventions, and what the state means. Kills: a linkage that is not shared out by the inductances.
+// Conventions, and what the state means. Catches: a linkage that is not shared out by the inductances.
 TEST(SeriesDcMachine, OneCurrentFlowsThroughBothWindingsUnlessTheSwitchIsClosed) {
   const RotorMotion motion = motion_of({});
   const SeriesDcMachineConstants open = constants_of(kSeries);
@@ -75,8 +75,8 @@ TEST(SeriesDcMachine, OneCurrentFlowsThroughBothWindingsUnlessTheSwitchIsClosed)
   EXPECT_NEAR(rotor_flux_wb(closed, x, motion).a, 0.97, 1e-12);
 }
 
-// Kills: a general branch that is another model than the simple one: a straight curve is the inductance, and
-// a resistor that is not connected does nothing. Rounding alone.
+// Catches: a general branch that is another model than the simple one: a straight curve is the inductance,
+// and a resistor that is not connected does nothing. Rounding alone.
 TEST(SeriesDcMachine, AStraightCurveOrAnOpenSwitchChangesNothing) {
   SeriesDcMachineParameters straight = kSeries;
   straight.field_inductance_h = 0.0;
@@ -93,7 +93,7 @@ TEST(SeriesDcMachine, AStraightCurveOrAnOpenSwitchChangesNothing) {
   }
 }
 
-// DC-08: tau = K_m L_f V^2/(R + R_f + K_m L_f w)^2. Kills: a field resistance that is not in the loop, a
+// DC-08: tau = K_m L_f V^2/(R + R_f + K_m L_f w)^2. Catches: a field resistance that is not in the loop, a
 // torque that follows the sign of the voltage. At each speed until the current is steady.
 TEST(SeriesDcMachine, SteadyTorqueFollowsTheSpeedAsInTheReferenceWhateverTheSignOfTheVoltage) {
   const SeriesDcMachineConstants c = constants_of(kSeries);
@@ -110,7 +110,7 @@ TEST(SeriesDcMachine, SteadyTorqueFollowsTheSpeedAsInTheReferenceWhateverTheSign
   }
 }
 
-// DC-08: no finite speed without a load. Kills: an emf that grows although the field dies. With all of the
+// DC-08: no finite speed without a load. Catches: an emf that grows although the field dies. With all of the
 // voltage in the emf i = V/(K_m L_f w), so that w^3 grows by 3 V^2/(K_m L_f J) in a second; the resistance
 // holds back a little.
 TEST(SeriesDcMachine, RunsAwayWithoutALoad) {
@@ -125,7 +125,7 @@ TEST(SeriesDcMachine, RunsAwayWithoutALoad) {
   EXPECT_GT(rig.shaft.speed_rad_s, 1300.0);
 }
 
-// DC-08 with the switch closed. Kills: R_p in the wrong place or with the wrong current. Steady:
+// DC-08 with the switch closed. Catches: R_p in the wrong place or with the wrong current. Steady:
 // i_f = i R_p/(R_p + R_f), i = V/(R + R_p R_f/(R_p + R_f) + K_m L_f w R_p/(R_p + R_f)).
 TEST(SeriesDcMachine, TheWeakenedFieldTakesItsShareOfTheCurrent) {
   const SeriesDcMachineConstants c = constants_of(divided(kSeries, true));
@@ -139,7 +139,7 @@ TEST(SeriesDcMachine, TheWeakenedFieldTakesItsShareOfTheCurrent) {
   }
 }
 
-// DC-08: the book's limit of no armature inductance, i = (v + R_p i_f - K_m lambda_f w)/(R + R_p). Kills: a
+// DC-08: the book's limit of no armature inductance, i = (v + R_p i_f - K_m lambda_f w)/(R + R_p). Catches: a
 // derivative of the linkage that forgets the armature. What is left is of the order of L: L i'/(R + R_p).
 TEST(SeriesDcMachine, TheWeakenedMachineTendsToThatOfTheBookWithoutArmatureInductance) {
   for (const double inductance_h : {1e-4, 1e-5}) {
@@ -158,7 +158,7 @@ TEST(SeriesDcMachine, TheWeakenedMachineTendsToThatOfTheBookWithoutArmatureInduc
   }
 }
 
-// The switch. Kills: a flux that jumps, an opening that makes energy, a closing that changes a current.
+// The switch. Catches: a flux that jumps, an opening that makes energy, a closing that changes a current.
 TEST(SeriesDcMachine, OpeningTheSwitchKeepsTheLinkageAndBurnsTheRestAndClosingItChangesNothing) {
   for (const SeriesDcMachineParameters& p : {kSeries, saturated(kSeries)}) {
     const SeriesDcMachineConstants open = constants_of(divided(p, false));
@@ -192,8 +192,8 @@ TEST(SeriesDcMachine, OpeningTheSwitchKeepsTheLinkageAndBurnsTheRestAndClosingIt
   }
 }
 
-// Kills: energy that is made or lost along a transient, also over the kinks of the curve and with the switch
-// moving; what the arcs take is the only gap. RK4 leaves 0.5 mJ of the 110 kJ drawn, at the kinks.
+// Catches: energy that is made or lost along a transient, also over the kinks of the curve and with the
+// switch moving; what the arcs take is the only gap. RK4 leaves 0.5 mJ of the 110 kJ drawn, at the kinks.
 TEST(SeriesDcMachine, EnergyIsAccountedForWhileTheSwitchMoves) {
   const SeriesDcMachineConstants open = constants_of(divided(saturated(kSeries), false));
   const SeriesDcMachineConstants closed = constants_of(divided(saturated(kSeries), true));
@@ -212,8 +212,8 @@ TEST(SeriesDcMachine, EnergyIsAccountedForWhileTheSwitchMoves) {
   EXPECT_GT(burnt_j, 1.0);
 }
 
-// Open terminals. Kills: a field current that stops although R_p lets it circulate, or that lives on although
-// nothing does; a voltage of open terminals that drives a current.
+// Open terminals. Catches: a field current that stops although R_p lets it circulate, or that lives on
+// although nothing does; a voltage of open terminals that drives a current.
 TEST(SeriesDcMachine, WithOpenTerminalsTheFieldCurrentCirculatesThroughTheResistorOrDies) {
   const SeriesDcMachineConstants open = constants_of(divided(kSeries, false));
   const SeriesDcMachineConstants closed = constants_of(divided(kSeries, true));
@@ -237,7 +237,7 @@ TEST(SeriesDcMachine, WithOpenTerminalsTheFieldCurrentCirculatesThroughTheResist
   EXPECT_EQ(restricted(open, flowing, motion_of(rig.shaft), voltage(0.0)).linkage_wb, flowing.linkage_wb);
 }
 
-// Kills: an adjustment of the wrong winding or of R_p, a substep that is too long for the divided circuit.
+// Catches: an adjustment of the wrong winding or of R_p, a substep that is too long for the divided circuit.
 // Its two rates are the eigenvalues of -[[(R+R_p)/L, -R_p/L], [-R_p/L_f, (R_p+R_f)/L_f]]: the bound is their
 // sum.
 TEST(SeriesDcMachine, AdjustsEachWindingByItsFactorAndBoundsItsFastestTimeConstant) {

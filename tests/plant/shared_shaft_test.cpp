@@ -40,9 +40,9 @@ PairState pair_step(const PairState& x, double u1, double u2, double ratio, doub
   });
 }
 
-// Both are the same Runge-Kutta method on the same equations: what remains is rounding. Kills: a machine that
-// does not see the other's torque or speed, stages that are out of step, a torque counted twice, the gear the
-// wrong way round.
+// Both are the same Runge-Kutta method on the same equations: what remains is rounding. Catches: a machine
+// that does not see the other's torque or speed, stages that are out of step, a torque counted twice, the
+// gear the wrong way round.
 TEST(SharedShaft, TwoMachinesAreOneSystem) {
   for (const double ratio : {1.0, 2.5}) {
     AxisParameters p = dc_axis();
@@ -76,7 +76,7 @@ struct Audit {
 };
 
 // What both drives supply is lost in the windings and in friction or stored. The sums are trapezoids over
-// 5 us: 1e-4 of the supplied energy. Kills: a coupling that creates or destroys energy.
+// 5 us: 1e-4 of the supplied energy. Catches: a coupling that creates or destroys energy.
 TEST(SharedShaft, MotorAndLoadMachineConserveEnergy) {
   AxisParameters p = dc_axis();
   p.mechanics = {.inertia_kgm2 = 6e-5,
@@ -147,7 +147,7 @@ AxisParameters idle_axis() {
 }
 
 // A machine alone on its shaft and one with an idle partner take the same steps and search for the same
-// events: what remains is rounding, which the corners pass on. Kills: an event that is cut where a straight
+// events: what remains is rounding, which the corners pass on. Catches: an event that is cut where a straight
 // line has it, one of the second machine that is settled in the first, a shaft whose dry friction is looked
 // at before the events of the machines.
 TEST(SharedShaft, AnIdlePartnerChangesNothing) {
@@ -195,8 +195,8 @@ AxisParameters geared_axis(bool elastic) {
 }
 
 // The rotor that is blocked stands; the other one stands with it on a rigid shaft, and on an elastic one
-// winds it up by n tau/K, with the stall torque of 10 A. Kills: a fault of the second axis that is not looked
-// at, one that stops the rotor of the first, one that outlives its fault.
+// winds it up by n tau/K, with the stall torque of 10 A. Catches: a fault of the second axis that is not
+// looked at, one that stops the rotor of the first, one that outlives its fault.
 TEST(SharedShaft, EitherRotorCanBeBlocked) {
   for (const bool elastic : {false, true}) {
     Axis first(geared_axis(elastic), kTiming, 1, 0);
@@ -229,7 +229,7 @@ TEST(SharedShaft, EitherRotorCanBeBlocked) {
 }
 
 // An impulse on the second rotor: on a rigid shaft it is one of 1/n on the first, of J1 + J2/n^2; on an
-// elastic one the load alone takes it. Kills: a blow that lands on the rotor of the first, one without the
+// elastic one the load alone takes it. Catches: a blow that lands on the rotor of the first, one without the
 // ratio.
 TEST(SharedShaft, ABumpOnTheOutputActsOnTheOutput) {
   Axis rigid(geared_axis(false), kTiming, 1, 0);
@@ -241,7 +241,7 @@ TEST(SharedShaft, ABumpOnTheOutputActsOnTheOutput) {
   EXPECT_NEAR(elastic.sample(0).load_speed_rad_s, 0.003 / 3e-4, 1e-12);
 }
 
-// Kills: a pair of which one goes on after the other has diverged.
+// Catches: a pair of which one goes on after the other has diverged.
 TEST(SharedShaft, WhereOneDivergesBothAreHeld) {
   AxisParameters bad = dc_axis();
   std::get<PmDcMachineParameters>(bad.machine).armature_inductance_h = 1e-7;  // far too fast for the step

@@ -28,7 +28,7 @@ ThreePhase at_angle(const SourceParameters& p, Connection connection, double ang
   return source_voltages(p, constants_of(p, connection), 100.0, angle_rad);
 }
 
-// Kills: phases in the wrong order or at the wrong angle, a phase that a machine does not have.
+// Catches: phases in the wrong order or at the wrong angle, a phase that a machine does not have.
 TEST(Source, ThePhasesFollowEachOther) {
   const SourceParameters p;
   for (double angle = -4.0; angle < 4.0; angle += 0.3) {
@@ -43,7 +43,7 @@ TEST(Source, ThePhasesFollowEachOther) {
   }
 }
 
-// Kills: factors exchanged, an offset with the wrong sign, one that only sines have.
+// Catches: factors exchanged, an offset with the wrong sign, one that only sines have.
 TEST(Source, AnUnbalancedSetHasItsFactorsAndOffsets) {
   SourceParameters p;
   p.amplitude_factor_b = 0.9;
@@ -60,7 +60,7 @@ TEST(Source, AnUnbalancedSetHasItsFactorsAndOffsets) {
 }
 
 // Tag BL-02: corners every 60 degrees, rms sqrt(7/9), fundamental 1.215854.
-// Kills: a corner at another angle, a slope that misses the flat top, a half wave of the wrong sign.
+// Catches: a corner at another angle, a slope that misses the flat top, a half wave of the wrong sign.
 TEST(Source, TheTrapezoidIsThatOfTheBrushlessMotor) {
   const auto degrees = [](double x) { return trapezoid(x * kPi / 180.0); };
   EXPECT_NEAR(degrees(0.0), 0.0, 1e-15);
@@ -82,7 +82,8 @@ TEST(Source, TheTrapezoidIsThatOfTheBrushlessMotor) {
   EXPECT_NEAR(fundamental, 1.215854, 1e-6);
 }
 
-// Kills: a table over the angle instead of the period, one that is not repeated, or not for negative angles.
+// Catches: a table over the angle instead of the period, one that is not repeated, or not for negative
+// angles.
 TEST(Source, ATableIsReadOverThePeriod) {
   SourceParameters p;
   p.waveform = Waveform::kTable;
@@ -135,7 +136,7 @@ const Points kTrapezoidPoints{{0.0, 0.0},       {1.0 / 12, 1.0},   {5.0 / 12, 1.
                               {7.0 / 12, -1.0}, {11.0 / 12, -1.0}, {1.0, 0.0}};
 
 // Between corners a piecewise linear voltage has the area that Simpson's rule gives: what is left is rounding
-// of 1e-15 in 400 ticks. Across a corner the area is off by up to 2.5e-7 V s. Kills: a corner that is no
+// of 1e-15 in 400 ticks. Across a corner the area is off by up to 2.5e-7 V s. Catches: a corner that is no
 // edge, or at the wrong place for a phase or a direction.
 TEST(Source, PiecesEndAtTheCornersOfTheWaveform) {
   DriveParameters p = plain_drive(DriveKind::kSource);
@@ -150,8 +151,8 @@ TEST(Source, PiecesEndAtTheCornersOfTheWaveform) {
 }
 
 // A table that starts later than 0, ends before 1, and has different values there jumps at the end of the
-// period. An instant is known to 1e-13 s, and so is the area of a jump of 100 V to 1e-11. Kills: a jump that
-// lies within a piece, or whose two sides are mixed up at the ends of the pieces.
+// period. An instant is known to 1e-13 s, and so is the area of a jump of 100 V to 1e-11. Catches: a jump
+// that lies within a piece, or whose two sides are mixed up at the ends of the pieces.
 TEST(Source, PiecesEndAtTheJumpOfATable) {
   DriveParameters p = plain_drive(DriveKind::kSource);
   p.source.waveform = Waveform::kTable;
@@ -161,7 +162,7 @@ TEST(Source, PiecesEndAtTheJumpOfATable) {
     EXPECT_LT(largest_area_error(p, saw, frequency), 1e-9) << frequency;
 }
 
-// Kills: a tick with more pieces than it can record.
+// Catches: a tick with more pieces than it can record.
 TEST(Source, AFineTableOrAFastWaveformHasNoCorners) {
   SourceParameters p;
   p.waveform = Waveform::kTable;
@@ -183,7 +184,7 @@ TEST(Source, AFineTableOrAFastWaveformHasNoCorners) {
   EXPECT_FALSE(has_corners(p, kRigTick_s));
 }
 
-// Kills: values of the wrong instant of an interval, a phase that starts anew at each tick.
+// Catches: values of the wrong instant of an interval, a phase that starts anew at each tick.
 TEST(Source, TheValuesOfAnIntervalAreExact) {
   DriveParameters p = source_drive(100.0, 50.0);
   p.source.phase_rad = 0.4;
@@ -199,7 +200,7 @@ TEST(Source, TheValuesOfAnIntervalAreExact) {
   EXPECT_NEAR(out.end_v.c, 100.0 * std::cos(start_rad + 2.0 * kPi * 50.0 * 8e-6 + kThird), 1e-10);
 }
 
-// Kills: a frequency step that moves the phase, an amplitude or phase step that waits, phase_rad counted
+// Catches: a frequency step that moves the phase, an amplitude or phase step that waits, phase_rad counted
 // twice.
 TEST(Source, StepsActFromTheNextTickWithAContinuousPhase) {
   DriveParameters p = source_drive(100.0, 50.0);
@@ -223,7 +224,7 @@ TEST(Source, StepsActFromTheNextTickWithAContinuousPhase) {
   EXPECT_NEAR(start_v(), 60.0 * std::cos(phase + 1.0), 1e-10);
 }
 
-// Kills: a DC source that turns, or is taken as varying.
+// Catches: a DC source that turns, or is taken as varying.
 TEST(Source, AtFrequencyZeroItIsDirectCurrent) {
   DriveRig rig(source_drive(24.0, 0.0), Connection::kArmature, {.resistance_ohm = 8.0, .inductance_h = 1e-3});
   for (int tick = 0; tick < 100; ++tick)
@@ -260,7 +261,7 @@ double closing_instant_s(double angle_rad, double frequency_hz) {
   return -1.0;
 }
 
-// Kills: a contactor that closes at the tick, at the angle of another phase, or one turn late.
+// Catches: a contactor that closes at the tick, at the angle of another phase, or one turn late.
 TEST(Source, TheContactorClosesAtItsAngle) {
   const double omega = 2.0 * kPi * 50.0;
   for (const double angle : {0.2, 0.5 * kPi, 3.0, 5.5}) {
@@ -272,7 +273,7 @@ TEST(Source, TheContactorClosesAtItsAngle) {
   EXPECT_NEAR(closing_instant_s(omega * 40 * kRigTick_s, 50.0), 40 * kRigTick_s, 1e-15);
 }
 
-// Kills: a contactor that stays, one that a trip cannot open, one that does not close again.
+// Catches: a contactor that stays, one that a trip cannot open, one that does not close again.
 TEST(Source, AnOpenContactorLeavesTheTerminalsOpen) {
   DriveParameters p = source_drive(100.0, 50.0);
   DriveRig rig(p, Connection::kStar);
@@ -291,7 +292,7 @@ TEST(Source, AnOpenContactorLeavesTheTerminalsOpen) {
   EXPECT_EQ(DriveRig(p, Connection::kStar).memory.contactor_closed, 0.0);
 }
 
-// Kills: a source that obeys gates or voltages, one that a sag does not reach.
+// Catches: a source that obeys gates or voltages, one that a sag does not reach.
 TEST(Source, CommandsDoNothingAndASagLowersTheAmplitude) {
   DriveRig rig(source_drive(100.0, 50.0), Connection::kStar);
   InjectedFaults faults;
@@ -322,7 +323,7 @@ DriveRig started(int substeps) {
   return rig;
 }
 
-// Kills: a capacitor that misses current, has the wrong sign, or charges while nothing flows.
+// Catches: a capacitor that misses current, has the wrong sign, or charges while nothing flows.
 TEST(Source, TheStartCapacitorHoldsTheChargeThatHasPassed) {
   for (const int substeps : {10, 40}) {
     const DriveRig rig = started(substeps);
@@ -335,7 +336,7 @@ TEST(Source, TheStartCapacitorHoldsTheChargeThatHasPassed) {
 }
 
 // Against half the substep the error must fall by about eight: a quarter or more better than second order.
-// Kills: a current or a charge that is held over the interval, or continued by a line only.
+// Catches: a current or a charge that is held over the interval, or continued by a line only.
 TEST(Source, TheStartCapacitorIsThirdOrderAccurate) {
   const double reference_v = started(160).memory.start_capacitor.voltage_v;
   const double reference_a = started(160).current_a[1];
@@ -348,7 +349,7 @@ TEST(Source, TheStartCapacitorIsThirdOrderAccurate) {
 }
 
 // In the steady state the current is that of the impedance R + R_b + j(w L - 1/(w C)).
-// Kills: a resistance left out, a capacitor fed from the wrong phase.
+// Catches: a resistance left out, a capacitor fed from the wrong phase.
 TEST(Source, TheStartCapacitorIsInSeriesWithPhaseA) {
   DriveRig rig = started(10);
   double highest_a = 0.0;
@@ -361,7 +362,8 @@ TEST(Source, TheStartCapacitorIsInSeriesWithPhaseA) {
   EXPECT_NEAR(highest_a, 170.0 / std::hypot(2.9 + kStartResistance_ohm, reactance_ohm), 1e-3);
 }
 
-// An event of the machine may leave an interval of rounding size. Kills: a slope taken from such an interval.
+// An event of the machine may leave an interval of rounding size. Catches: a slope taken from such an
+// interval.
 TEST(Source, AnIntervalOfNoLengthLeavesTheSlopeOfTheCurrent) {
   SourceParameters p;
   p.start_capacitance_f = kStartCapacitance_f;
@@ -372,7 +374,7 @@ TEST(Source, AnIntervalOfNoLengthLeavesTheSlopeOfTheCurrent) {
   EXPECT_NEAR(after.voltage_v, 3.0, 1e-12);
 }
 
-// Kills: a switch that leaves the capacitor in, one that loses its charge.
+// Catches: a switch that leaves the capacitor in, one that loses its charge.
 TEST(Source, TheStartSwitchShortsPhaseB) {
   DriveRig rig = started(10);
   DriveParameters p = source_drive(170.0, 50.0);

@@ -19,7 +19,7 @@ void expect_rows_of_their_own(AxisParameters p, std::span<const Parameter> rows)
     EXPECT_EQ(rows[n].get(p), value_of(n)) << rows[n].name;
 }
 
-// Kills: two rows for one member, a row for a member of another kind.
+// Catches: two rows for one member, a row for a member of another kind.
 TEST(SynchronousRows, EachRowHasAMemberOfItsOwn) {
   AxisParameters p;
   p.machine = PmMachineParameters{};
@@ -28,7 +28,7 @@ TEST(SynchronousRows, EachRowHasAMemberOfItsOwn) {
   expect_rows_of_their_own(p, WoundRotorMachine::kind().rows);
 }
 
-// Kills: a machine without any torque that is let through, or a reluctance machine that is not.
+// Catches: a machine without any torque that is let through, or a reluctance machine that is not.
 TEST(SynchronousRows, AMachineWithoutMagnetMustBeSalient) {
   std::vector<Problem> found;
   Problems rules(found);
@@ -40,7 +40,7 @@ TEST(SynchronousRows, AMachineWithoutMagnetMustBeSalient) {
   EXPECT_NE(found[0].rule.find("0.002"), std::string::npos) << found[0].rule;
 }
 
-// Kills: a coupling above 1, which would make the stored energy negative; a crash on inductances of zero,
+// Catches: a coupling above 1, which would make the stored energy negative; a crash on inductances of zero,
 // whose own rows complain already.
 TEST(SynchronousRows, TheFieldCannotLinkMoreThanAllOfTheStatorFlux) {
   std::vector<Problem> found;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr TachometerParameters kTachometer{.gain_vs_per_rad = 0.03, .ripple = 0.05, .ripple_per_turn = 22};
 
-// DC-04: the voltage of an open generator. Kills: a voltage that forgets the direction.
+// DC-04: the voltage of an open generator. Catches: a voltage that forgets the direction.
 TEST(Tachometer, TheVoltageFollowsTheSpeedWithItsSign) {
   constexpr TachometerParameters p{.gain_vs_per_rad = 0.03};
   EXPECT_EQ(tachometer_v(p, 1.0, 200.0), 0.03 * 200.0);
@@ -19,7 +19,7 @@ TEST(Tachometer, TheVoltageFollowsTheSpeedWithItsSign) {
   EXPECT_EQ(tachometer_v(p, 1.0, 0.0), 0.0);
 }
 
-// Kills: a ripple in volts in place of a part of the voltage, one per turn, one that shifts the mean.
+// Catches: a ripple in volts in place of a part of the voltage, one per turn, one that shifts the mean.
 TEST(Tachometer, TheRippleHasItsAmplitudeItsPeriodAndNoMean) {
   constexpr double kTurn_rad = 2.0 * std::numbers::pi;
   for (const double speed_rad_s : {100.0, -30.0}) {

@@ -29,7 +29,7 @@ TerminalCircuit connected(Connection connection, const TerminalDrive& drive, con
   return connect(connection, drive, faults, current_a, WindingVoltagesOf(ask), open);
 }
 
-// Kills: a common voltage of the terminals that reaches the windings of a star.
+// Catches: a common voltage of the terminals that reaches the windings of a star.
 TEST(Terminals, ACommonVoltageDoesNothingToAStar) {
   TerminalSet open = 0;
   const TerminalCircuit x = connected(Connection::kStar, driven(60.0, -20.0, -40.0), {}, {}, {}, open);
@@ -40,8 +40,8 @@ TEST(Terminals, ACommonVoltageDoesNothingToAStar) {
   EXPECT_EQ(y.start_v.a, 90.0);
 }
 
-// The voltage of a line is that between its two terminals, over sqrt(2). Kills: a line with the wrong sign or
-// between the wrong phases, a floating terminal that still has a say.
+// The voltage of a line is that between its two terminals, over sqrt(2). Catches: a line with the wrong sign
+// or between the wrong phases, a floating terminal that still has a say.
 TEST(Terminals, AnOpenPhaseLeavesTheLineBetweenTheOtherTwo) {
   constexpr double kV[3] = {50.0, -30.0, 10.0};
   for (int k = 0; k < 3; ++k) {
@@ -62,7 +62,7 @@ TEST(Terminals, AnOpenPhaseLeavesTheLineBetweenTheOtherTwo) {
   }
 }
 
-// Kills: diodes that feed the machine, a phase forgotten.
+// Catches: diodes that feed the machine, a phase forgotten.
 TEST(Terminals, CurrentsFlowThroughTheDiodesAgainstTheRails) {
   TerminalSet open = 0;
   const PhaseValues current{.a = 3.0, .b = -2.0, .c = -1.0};
@@ -74,8 +74,8 @@ TEST(Terminals, CurrentsFlowThroughTheDiodesAgainstTheRails) {
   EXPECT_EQ(open, 0u);
 }
 
-// The emf between two terminals must exceed the whole link. Kills: a rectifier that compares with half of it,
-// that takes the wrong pair, or that never starts.
+// The emf between two terminals must exceed the whole link. Catches: a rectifier that compares with half of
+// it, that takes the wrong pair, or that never starts.
 TEST(Terminals, AStarRectifiesOnceTheEmfBetweenTwoTerminalsExceedsTheLink) {
   for (const double peak : {99.0, 101.0}) {
     TerminalSet open = 7;
@@ -93,8 +93,8 @@ TEST(Terminals, AStarRectifiesOnceTheEmfBetweenTwoTerminalsExceedsTheLink) {
   }
 }
 
-// With a and b in series across the link the third terminal sits at its emf above the neutral. Kills: a third
-// diode that conducts too early or never.
+// With a and b in series across the link the third terminal sits at its emf above the neutral. Catches: a
+// third diode that conducts too early or never.
 TEST(Terminals, TheThirdDiodeOfAStarConductsWhenItsTerminalPassesARail) {
   for (const double emf_c : {90.0, 120.0}) {
     TerminalSet open = 4;
@@ -108,7 +108,7 @@ TEST(Terminals, TheThirdDiodeOfAStarConductsWhenItsTerminalPassesARail) {
   }
 }
 
-// Kills: a short that leaves a voltage between its terminals, or one that the circuit does not report.
+// Catches: a short that leaves a voltage between its terminals, or one that the circuit does not report.
 TEST(Terminals, AShortPutsBothTerminalsAtOneVoltage) {
   InjectedFaults faults;
   faults.phase_short = 2.0;  // b - c
@@ -126,7 +126,7 @@ TEST(Terminals, AShortPutsBothTerminalsAtOneVoltage) {
   EXPECT_EQ(circuit.start.voltage_v.b, 5.0);
 }
 
-// Kills: a terminal that a machine does not have, but that counts as open.
+// Catches: a terminal that a machine does not have, but that counts as open.
 TEST(Terminals, TerminalsThatDoNotExistAreNotOpen) {
   for (const Connection connection : {Connection::kTwoPhase, Connection::kArmature}) {
     TerminalSet open = 7;  // as at the start
@@ -138,7 +138,7 @@ TEST(Terminals, TerminalsThatDoNotExistAreNotOpen) {
   }
 }
 
-// Kills: bridges of single windings that share their conduction.
+// Catches: bridges of single windings that share their conduction.
 TEST(Terminals, EachBridgeOfItsOwnFloatsByItself) {
   TerminalSet open = 3;
   const WindingValues emf{.stator = {120.0, 80.0}};

@@ -12,7 +12,7 @@ constexpr ThermalParameters kMotor{
 constexpr double kTick_s = 100e-6;
 
 // 100 s of 40 W in 1e6 ticks against the closed form. A tick closes 1.7e-7 of the gap and rounds at 2.8e-14
-// K, as if the settled temperature were wrong by 1.7e-7 K at most. Kills: an Euler step (7e-7 K), a loss in
+// K, as if the settled temperature were wrong by 1.7e-7 K at most. Catches: an Euler step (7e-7 K), a loss in
 // watts, heat that forgets the ambient temperature.
 TEST(Thermal, AMillionTicksEndWhereTheClosedFormDoes) {
   ThermalState state{.temperature_k = 298.0};
@@ -21,7 +21,7 @@ TEST(Thermal, AMillionTicksEndWhereTheClosedFormDoes) {
   EXPECT_NEAR(state.temperature_k, 298.0 - 60.0 * std::expm1(-100.0 / 600.0), 2e-7);
 }
 
-// Steps of a third of the time constant and of three of them. Kills: any step but the exponential one.
+// Steps of a third of the time constant and of three of them. Catches: any step but the exponential one.
 TEST(Thermal, LongStepsAreExactToo) {
   for (const double step_s : {200.0, 1800.0}) {
     ThermalState state{.temperature_k = 350.0};
@@ -32,7 +32,7 @@ TEST(Thermal, LongStepsAreExactToo) {
   }
 }
 
-// Kills: a drift of a body that has nothing to do.
+// Catches: a drift of a body that has nothing to do.
 TEST(Thermal, AColdMotorStaysAtTheAmbientTemperatureToTheLastBit) {
   ThermalState state{.temperature_k = kMotor.ambient_k};
   for (int n = 0; n < 1'000'000; ++n)
@@ -40,8 +40,8 @@ TEST(Thermal, AColdMotorStaysAtTheAmbientTemperatureToTheLastBit) {
   EXPECT_EQ(state.temperature_k, kMotor.ambient_k);
 }
 
-// Copper grows by 39.3 % in 100 K, aluminium by 40.3 %. Kills: coefficients exchanged, ambient for reference,
-// factors of a motor whose heat is not modelled.
+// Copper grows by 39.3 % in 100 K, aluminium by 40.3 %. Catches: coefficients exchanged, ambient for
+// reference, factors of a motor whose heat is not modelled.
 TEST(Thermal, ResistancesGrowFromTheReferenceTemperature) {
   ThermalParameters p = kMotor;
   p.reference_k = 293.0;

@@ -140,7 +140,7 @@ struct Turning {
   double speed_rad_s;
 };
 
-// The test vector of P3-01. Kills: a transform with another factor, a rotor seen from the wrong side.
+// The test vector of P3-01. Catches: a transform with another factor, a rotor seen from the wrong side.
 TEST(ThreePhaseInduction, TorqueAndFluxesOfTheTestVectorAreThoseOfTheReference) {
   InductionMachineParameters p = kMotorA;
   p.pole_pairs = 1;
@@ -214,18 +214,18 @@ void expect_same_phase_currents(bool open_c) {
   EXPECT_GT(std::abs(x.speed_rad_s - (open_c ? 100.0 : 0.0)), 5.0);
 }
 
-// Both integrate with steps of 2 us, of which RK4 makes errors of 1e-11 A. Kills: two-phase values that are
+// Both integrate with steps of 2 us, of which RK4 makes errors of 1e-11 A. Catches: two-phase values that are
 // not the equivalents of the phases, a neutral that is left in, a wrong sense of rotation.
 TEST(ThreePhaseInduction, PhaseCurrentsAreThoseOfTheFullThreePhaseModel) {
   expect_same_phase_currents(false);
 }
 
-// Kills: an open phase that still takes part, a line across the one in which the current flows.
+// Catches: an open phase that still takes part, a line across the one in which the current flows.
 TEST(ThreePhaseInduction, WithOneWireBrokenTheCurrentsAreThoseOfTheConstrainedModel) {
   expect_same_phase_currents(true);
 }
 
-// AC-20, AC-21. Kills: a transform that keeps amplitudes, a neutral with a factor sqrt(3).
+// AC-20, AC-21. Catches: a transform that keeps amplitudes, a neutral with a factor sqrt(3).
 TEST(ThreePhaseInduction, TransformAndLeakageHaveTheValuesOfTheReference) {
   const TwoPhase u = plane({kPhasePeakB_v, -0.5 * kPhasePeakB_v, -0.5 * kPhasePeakB_v});
   EXPECT_NEAR(kPhasePeakB_v, 169.831, 5e-4);
@@ -252,7 +252,7 @@ TEST(ThreePhaseInduction, TransformAndLeakageHaveTheValuesOfTheReference) {
   EXPECT_EQ(connection_of(kMotorA), Connection::kStar);
 }
 
-// Case 3 with the power of three phases, common voltage included. Kills: a transform that is not power
+// Case 3 with the power of three phases, common voltage included. Catches: a transform that is not power
 // invariant.
 TEST(ThreePhaseInduction, ThePowerOfThePhasesIsStoredLostOrDelivered) {
   std::mt19937_64 engine(41);

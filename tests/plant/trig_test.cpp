@@ -41,7 +41,7 @@ double cos_sin_ulps(double angle_rad) {
   return ::testing::AssertionFailure() << std::hexfloat << actual << " is not " << expected;
 }
 
-// Kills: a wrong coefficient, a wrong part of pi/2, a reduction that forgets its low word.
+// Catches: a wrong coefficient, a wrong part of pi/2, a reduction that forgets its low word.
 TEST(Trig, SineAndCosineStayBelowOneUlpUpToAMillionRadians) {
   std::mt19937_64 engine(20250101);
   for (const double range_rad : {1e-8, 0.79, 3.2, 100.0, 1e4, 1e6, kLargestAngle_rad}) {
@@ -53,7 +53,7 @@ TEST(Trig, SineAndCosineStayBelowOneUlpUpToAMillionRadians) {
   }
 }
 
-// Kills: a reduction with too few parts of pi/2: what cancels next to a multiple of pi/2 leaves no correct
+// Catches: a reduction with too few parts of pi/2: what cancels next to a multiple of pi/2 leaves no correct
 // digits.
 TEST(Trig, SineAndCosineStayBelowOneUlpNextToEveryMultipleOfHalfPi) {
   double worst = 0.0;
@@ -67,7 +67,7 @@ TEST(Trig, SineAndCosineStayBelowOneUlpNextToEveryMultipleOfHalfPi) {
   EXPECT_TRUE(same_bits(cosine(0x1.6c6cbc45dc8dep+5), -0x1.6d61b58c99c43p-61));
 }
 
-// Kills: a lost sign of zero, an underflow that turns a tiny angle's sine into zero.
+// Catches: a lost sign of zero, an underflow that turns a tiny angle's sine into zero.
 TEST(Trig, SineOfTinyAnglesIsTheAngleWithItsSign) {
   for (const double tiny_rad : {0.0, 0x1p-1074, 0x1p-1022, 1e-200, 1e-9}) {
     EXPECT_TRUE(same_bits(sine(tiny_rad), tiny_rad));
@@ -76,7 +76,7 @@ TEST(Trig, SineOfTinyAnglesIsTheAngleWithItsSign) {
   }
 }
 
-// Kills: a range check that lets NaN or infinity through to arithmetic whose NaN bits differ between
+// Catches: a range check that lets NaN or infinity through to arithmetic whose NaN bits differ between
 // processors.
 TEST(Trig, AnglesBeyondTheRangeGiveTheQuietNan) {
   for (const double angle_rad : {std::nextafter(kLargestAngle_rad, kInfinity), 1e300, kInfinity, kNan}) {
@@ -87,7 +87,7 @@ TEST(Trig, AnglesBeyondTheRangeGiveTheQuietNan) {
   EXPECT_TRUE(std::isfinite(sine(-kLargestAngle_rad)));
 }
 
-// Kills: a wrong table entry, swapped quadrants, a missing part of the quotient.
+// Catches: a wrong table entry, swapped quadrants, a missing part of the quotient.
 TEST(Trig, Arctangent2StaysBelowTwoUlpInEveryQuadrant) {
   std::mt19937_64 engine(20250102);
   std::uniform_real_distribution<double> coordinate(-2.0, 2.0);
@@ -105,7 +105,7 @@ TEST(Trig, Arctangent2StaysBelowTwoUlpInEveryQuadrant) {
   EXPECT_LT(worst, 1.6);  // 1.47 measured over 7e7 points
 }
 
-// Kills: overflow or underflow in the quotient or its correction.
+// Catches: overflow or underflow in the quotient or its correction.
 TEST(Trig, Arctangent2IsRightAtTheEndsOfTheNumberRange) {
   for (const double y : {0x1p-1074, 1e-310, 2.3e-308, 3e-300, 0.5, 1e308, 1.79e308}) {
     for (const double x : {0x1p-1074, 1e-310, 2.3e-308, 3e-300, 0.5, 1e308, 1.79e308}) {
@@ -125,7 +125,7 @@ TEST(Trig, Arctangent2IsRightAtTheEndsOfTheNumberRange) {
   }
 }
 
-// Kills: taking -0 for 0, NaN from 0/0 or infinity/infinity. Expected values are those of IEEE 754,
+// Catches: taking -0 for 0, NaN from 0/0 or infinity/infinity. Expected values are those of IEEE 754,
 // section 9.2.1.
 TEST(Trig, Arctangent2FollowsIeeeForZerosInfinitiesAndNan) {
   struct Case {
@@ -148,7 +148,7 @@ TEST(Trig, Arctangent2FollowsIeeeForZerosInfinitiesAndNan) {
   EXPECT_TRUE(std::isnan(arctangent2(1.0, kNan)));
 }
 
-// Kills: a wrong coefficient, an exponent off by one at sqrt(1/2), cancellation next to 1.
+// Catches: a wrong coefficient, an exponent off by one at sqrt(1/2), cancellation next to 1.
 TEST(Trig, LogarithmStaysBelowOneUlp) {
   std::mt19937_64 engine(20250103);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -163,7 +163,7 @@ TEST(Trig, LogarithmStaysBelowOneUlp) {
   EXPECT_LT(worst, 0.9);  // 0.84 measured over 1.5e7 arguments
 }
 
-// Kills: reading the exponent of a number that has no logarithm.
+// Catches: reading the exponent of a number that has no logarithm.
 TEST(Trig, LogarithmTakesTheSpecialValues) {
   EXPECT_TRUE(same_bits(logarithm(1.0), 0.0));
   EXPECT_EQ(logarithm(0.0), -kInfinity);
@@ -173,8 +173,8 @@ TEST(Trig, LogarithmTakesTheSpecialValues) {
   EXPECT_TRUE(same_bits(logarithm(kNan), kNan));
 }
 
-// Kills: a compiler, flag or processor that contracts, reorders or widens: the bits are part of the recording
-// format.
+// Catches: a compiler, flag or processor that contracts, reorders or widens: the bits are part of the
+// recording format.
 TEST(Trig, GivesTheSameBitsOnEveryMachine) {
   struct Circle {
     double angle_rad;
@@ -202,7 +202,7 @@ TEST(Trig, GivesTheSameBitsOnEveryMachine) {
   EXPECT_TRUE(same_bits(logarithm(0.70710678), -0x1.62e4300c77ae8p-2));
 }
 
-// Kills: the same as above, with enough arguments that a single fused operation in any branch shows.
+// Catches: the same as above, with enough arguments that a single fused operation in any branch shows.
 TEST(Trig, AHashOfManyResultsIsTheSameOnEveryMachine) {
   std::uint64_t hash = 0;
   const auto add = [&hash](double value) {

@@ -53,9 +53,9 @@ double frequency_rad_s(double damping_nms) {
   return std::sqrt(kStiffness_nm * kMobility - decay_per_s * decay_per_s);
 }
 
-// twist = x0 exp(-d t) (cos w t + d/w sin w t) with d = D m/2, w^2 = K m - d^2, m = 1/(n^2 J1) + 1/J2. Kills:
-// a wrong power of n in the reaction on the rotor, a wrong sign of the damping. Runge-Kutta at w h = 0.02
-// errs by 1e-7 of the amplitude after 20 periods.
+// twist = x0 exp(-d t) (cos w t + d/w sin w t) with d = D m/2, w^2 = K m - d^2, m = 1/(n^2 J1) + 1/J2.
+// Catches: a wrong power of n in the reaction on the rotor, a wrong sign of the damping. Runge-Kutta at w h =
+// 0.02 errs by 1e-7 of the amplitude after 20 periods.
 TEST(TwoMass, TheTwistVibratesAsTheClosedFormSays) {
   constexpr double kDamping_nms = 2e-3;
   const double d = 0.5 * kDamping_nms * kMobility;
@@ -73,15 +73,15 @@ TEST(TwoMass, TheTwistVibratesAsTheClosedFormSays) {
               1.0 / std::sqrt(kStiffness_nm * kMobility), 1e-17);
 }
 
-// Kills: poles of an overdamped shaft taken for those of a soft one: d = 437.5, w0^2 = 43750, poles at 56 and
-// 819.
+// Catches: poles of an overdamped shaft taken for those of a soft one: d = 437.5, w0^2 = 43750, poles at 56
+// and 819.
 TEST(TwoMass, ALotOfDampingShortensTheFastestTimeConstant) {
   const double d = 437.5;
   EXPECT_NEAR(fastest_time_constant_s(elastic_train(1.0, 0.0)), 1.0 / (d + std::sqrt(d * d - 43750.0)),
               1e-17);
 }
 
-// Kills: a locked rotor that the shaft moves, or that holds the load as well.
+// Catches: a locked rotor that the shaft moves, or that holds the load as well.
 TEST(TwoMass, BehindALockedRotorTheLoadSwingsAlone) {
   MechanicsParameters p = elastic_train(0.0, 0.0);
   p.motion = ShaftMotion::kLocked;
@@ -94,8 +94,8 @@ TEST(TwoMass, BehindALockedRotorTheLoadSwingsAlone) {
   EXPECT_NEAR(shaft.x().load_speed_rad_s, 0.01 * w, 1e-9);
 }
 
-// Kills: torque or load that acts on the wrong mass. Without friction and once the vibration is gone the two
-// masses turn as one.
+// Catches: torque or load that acts on the wrong mass. Without friction and once the vibration is gone the
+// two masses turn as one.
 TEST(TwoMass, AStiffShaftTurnsAsARigidOne) {
   MechanicsParameters p = elastic_train(1.0, 0.0);
   p.shaft_stiffness_nm = 2e4;
@@ -108,8 +108,8 @@ TEST(TwoMass, AStiffShaftTurnsAsARigidOne) {
   EXPECT_NEAR(elastic.x().load_speed_rad_s, rigid.x().speed_rad_s / kRatio, 1e-9);
 }
 
-// Across the play at 1 rad/s: 10 ms of free flight, half a period of contact, and back at -1 rad/s. Kills: a
-// shaft that bears within its play, teeth that meet at the whole play, teeth that stick, contact that gives
+// Across the play at 1 rad/s: 10 ms of free flight, half a period of contact, and back at -1 rad/s. Catches:
+// a shaft that bears within its play, teeth that meet at the whole play, teeth that stick, contact that gives
 // or takes energy or momentum, a border seen at the end of a step only.
 TEST(TwoMass, AcrossTheBacklashItFliesFreelyAndBouncesElasticallyWithoutDamping) {
   for (const double sign : {1.0, -1.0}) {
@@ -133,7 +133,7 @@ TEST(TwoMass, AcrossTheBacklashItFliesFreelyAndBouncesElasticallyWithoutDamping)
 }
 
 // The teeth part where spring and damper cancel, before the shaft has sprung back: x' = v exp(-d t) (cos w t
-// - d/w sin w t) at tan w t = -D w/(K - D d). Kills: damping that pulls the teeth together, teeth that part
+// - d/w sin w t) at tan w t = -D w/(K - D d). Catches: damping that pulls the teeth together, teeth that part
 // at the border only, an impact that loses nothing.
 TEST(TwoMass, DampedTeethPartWhereTheyWouldPullAndLoseTheEnergyThatTheClosedFormSays) {
   constexpr double kDamping_nms = 0.1;
@@ -156,7 +156,7 @@ TEST(TwoMass, DampedTeethPartWhereTheyWouldPullAndLoseTheEnergyThatTheClosedForm
   EXPECT_NEAR(shaft.lost_j(), lost_j, 1e-12);
 }
 
-// Kills: teeth that wait for the border when they are pressed together again before the shaft has sprung
+// Catches: teeth that wait for the border when they are pressed together again before the shaft has sprung
 // back, and an event that repeats itself at once.
 TEST(TwoMass, TeethThatAreApartMeetWhereTheShaftIsWhenTheyArePressedAgain) {
   constexpr double kDamping_nms = 2.0;
@@ -173,7 +173,7 @@ TEST(TwoMass, TeethThatAreApartMeetWhereTheShaftIsWhenTheyArePressedAgain) {
   EXPECT_EQ(shaft.events(), 1);
 }
 
-// Kills: sides of the play exchanged in settled(), a quantity that is not set exactly, a settled state that
+// Catches: sides of the play exchanged in settled(), a quantity that is not set exactly, a settled state that
 // the next branch takes for the old one.
 TEST(TwoMass, ASettledEventLeavesTheBranchItEnded) {
   const ShaftConstants c = constants_of(elastic_train(0.1, kPlay_rad));
@@ -198,7 +198,7 @@ TEST(TwoMass, ASettledEventLeavesTheBranchItEnded) {
   EXPECT_EQ(settled(c, moving(1.0, 2.0, 0.0), 1).load_speed_rad_s, 0.0);
 }
 
-// Kills: a passive load that the shaft creeps past, or that does not act on the load but on the rotor.
+// Catches: a passive load that the shaft creeps past, or that does not act on the load but on the rotor.
 TEST(TwoMass, APassiveLoadHoldsTheOutputWhileTheShaftIsWoundUp) {
   MechanicsParameters p = elastic_train(0.2, 0.0);
   p.passive_load_nm = 1.0;
@@ -212,7 +212,7 @@ TEST(TwoMass, APassiveLoadHoldsTheOutputWhileTheShaftIsWoundUp) {
   EXPECT_NEAR(shaft.x().load_speed_rad_s, shaft.x().speed_rad_s / kRatio, 1e-6);
 }
 
-// Kills: a load that stands against the torque of the shaft alone, or turns the wrong way when it yields.
+// Catches: a load that stands against the torque of the shaft alone, or turns the wrong way when it yields.
 TEST(TwoMass, AnActiveLoadBeyondThePassiveOneTurnsAStandingOutputBackwards) {
   MechanicsParameters p = elastic_train(0.0, 0.0);
   p.passive_load_nm = 1.0;
@@ -224,7 +224,7 @@ TEST(TwoMass, AnActiveLoadBeyondThePassiveOneTurnsAStandingOutputBackwards) {
   }
 }
 
-// Kills: stiction of the rotor that compares the torque of the machine alone, without that of the shaft.
+// Catches: stiction of the rotor that compares the torque of the machine alone, without that of the shaft.
 TEST(TwoMass, AWoundUpShaftPullsTheRotorOutOfItsStiction) {
   MechanicsParameters p = elastic_train(0.2, 0.0);
   p.coulomb_friction_nm = 0.01;
@@ -237,7 +237,7 @@ TEST(TwoMass, AWoundUpShaftPullsTheRotorOutOfItsStiction) {
   }
 }
 
-// Kills: a prime mover that the shaft slows down, a load that does not follow, a twist without the ratio.
+// Catches: a prime mover that the shaft slows down, a load that does not follow, a twist without the ratio.
 TEST(TwoMass, APrimeMoverCarriesTheLoadThroughTheShaft) {
   MechanicsParameters p = elastic_train(0.5, 0.0);
   p.motion = ShaftMotion::kImposed;
@@ -253,14 +253,14 @@ TEST(TwoMass, APrimeMoverCarriesTheLoadThroughTheShaft) {
               (3.0 + shaft.x().angle_rad) / kRatio - shaft.x().twist_rad, 1e-14);
 }
 
-// Kills: a bump that the load feels at once.
+// Catches: a bump that the load feels at once.
 TEST(TwoMass, ABumpMovesTheRotorAlone) {
   const TwoMassState after = bumped(constants_of(elastic_train(0.0, 0.0)), moving(1.0, 0.0, 0.0), 1e-3);
   EXPECT_NEAR(after.speed_rad_s, 14.0, 1e-13);
   EXPECT_EQ(after.load_speed_rad_s, 1.0);
 }
 
-// Kills: any torque that no loss accounts for, a loss that the motion does not feel, teeth that pull, teeth
+// Catches: any torque that no loss accounts for, a loss that the motion does not feel, teeth that pull, teeth
 // that bear within the play, a mass that stands against more than its friction.
 TEST(TwoMass, TheEnergyBalanceHoldsAndTheTeethOnlyPushInARandomRunWithAllOfIt) {
   MechanicsParameters p = elastic_train(0.05, kPlay_rad);
@@ -297,7 +297,7 @@ TEST(TwoMass, TheEnergyBalanceHoldsAndTheTeethOnlyPushInARandomRunWithAllOfIt) {
   EXPECT_GT(pieces_apart, 100);
 }
 
-// Pressed against one side by a constant torque the bounces die out. Kills: teeth that chatter for ever.
+// Pressed against one side by a constant torque the bounces die out. Catches: teeth that chatter for ever.
 TEST(TwoMass, PressedTogetherTheTeethComeToRestAgainstEachOther) {
   MechanicsParameters p = elastic_train(0.05, kPlay_rad);
   p.load_viscous_friction_nms = 0.1;

@@ -43,7 +43,7 @@ class RandomStates {
   std::mt19937_64 engine_;
 };
 
-// Kills: any wrong sign or factor in either equation, an energy that is not the integral of i_f over
+// Catches: any wrong sign or factor in either equation, an energy that is not the integral of i_f over
 // lambda_f, a saturation curve that is not odd.
 TEST(SeparateDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   for (const SeparateDcMachineConstants& c : {constants_of(kSeparate), constants_of(saturated(kSeparate))}) {
@@ -71,7 +71,7 @@ TEST(ShuntDcMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   }
 }
 
-// Conventions. Kills: a pair of wrong signs that leaves the balance intact.
+// Conventions. Catches: a pair of wrong signs that leaves the balance intact.
 TEST(SeparateDcMachine, CurrentAndFieldOfOneSignGivePositiveTorque) {
   const SeparateDcMachineConstants c = constants_of(kSeparate);
   const SeparateDcMachineState slope = derivative(c, {}, motion_of({}), voltage(10.0, 3.0));
@@ -83,7 +83,7 @@ TEST(SeparateDcMachine, CurrentAndFieldOfOneSignGivePositiveTorque) {
   EXPECT_EQ(rotor_flux_wb(c, {.i_a_a = 2.0, .field_flux_wb = -40.0}, motion_of({})).a, -40.0);
 }
 
-// Kills: a curve that is read on its left side, where its line goes on through negative values.
+// Catches: a curve that is read on its left side, where its line goes on through negative values.
 TEST(FieldWinding, ASaturationCurveIsOdd) {
   const FieldWinding field = field_winding(0.0, wound_saturation(), 0.25);
   for (const double flux_wb : {8.0, 16.0, 30.0, 47.0, 60.0}) {
@@ -100,7 +100,7 @@ TEST(FieldWinding, ASaturationCurveIsOdd) {
   EXPECT_EQ(smallest_inductance_h(0.0, wound_saturation()), 6.0 / 1.6);
 }
 
-// Kills: a saturated branch that is another model than the linear one. Rounding alone, in 1 s of transient.
+// Catches: a saturated branch that is another model than the linear one. Rounding alone, in 1 s of transient.
 TEST(WoundDcMachine, AStraightSaturationCurveIsTheFieldInductance) {
   const Curve straight({{0.0, 0.0}, {0.5, 10.0}, {1.0, 20.0}});
   SeparateDcMachineParameters separate = kSeparate;
@@ -126,7 +126,7 @@ TEST(WoundDcMachine, AStraightSaturationCurveIsTheFieldInductance) {
   EXPECT_NEAR(d.shaft.speed_rad_s, e.shaft.speed_rad_s, 1e-9);
 }
 
-// DC-06: V_S/(K_m lambda_f) without a load, i = (V_S - K_m lambda_f w)/R with one. Kills: a field current
+// DC-06: V_S/(K_m lambda_f) without a load, i = (V_S - K_m lambda_f w)/R with one. Catches: a field current
 // taken for the flux, a saturation that has no effect. 20 s are 30 of the slowest time constants.
 TEST(SeparateDcMachine, RunsAtTheSpeedOfItsVoltageOverItsFlux) {
   for (const SeparateDcMachineParameters& p : {kSeparate, saturated(kSeparate)}) {
@@ -146,7 +146,7 @@ TEST(SeparateDcMachine, RunsAtTheSpeedOfItsVoltageOverItsFlux) {
   }
 }
 
-// DC-06: the field dies with L_f/R_f, and as it does the shaft runs away. Kills: a field that does not die,
+// DC-06: the field dies with L_f/R_f, and as it does the shaft runs away. Catches: a field that does not die,
 // an emf that does not follow it.
 TEST(SeparateDcMachine, RunsAwayWhenItLosesItsField) {
   const SeparateDcMachineConstants c = constants_of(kSeparate);
@@ -165,7 +165,7 @@ TEST(SeparateDcMachine, RunsAwayWhenItLosesItsField) {
   EXPECT_GT(rig.shaft.speed_rad_s, 2.0 * 200.0);
 }
 
-// DC-05 and DC-06. Kills: a sawtooth of wrong height, sign or period; a coupling that is on by itself; one
+// DC-05 and DC-06. Catches: a sawtooth of wrong height, sign or period; a coupling that is on by itself; one
 // with a mean. The gap in the power balance is the term itself, as the book's equations are not reciprocal.
 TEST(SeparateDcMachine, FieldCouplingIsTheSawtoothOfTheCommutatorTimesTheChangeOfTheField) {
   SeparateDcMachineParameters p = kSeparate;
@@ -192,7 +192,7 @@ TEST(SeparateDcMachine, FieldCouplingIsTheSawtoothOfTheCommutatorTimesTheChangeO
   EXPECT_NEAR(sum, 0.0, 1e-9);
 }
 
-// Kills: an open armature that drifts, a restriction that takes the field current as well, an adjustment of
+// Catches: an open armature that drifts, a restriction that takes the field current as well, an adjustment of
 // the wrong parameter.
 TEST(SeparateDcMachine, OpensItsArmatureAloneAndAdjustsEachWindingByItsFactor) {
   const SeparateDcMachineConstants c = constants_of(kSeparate);
@@ -252,15 +252,15 @@ double distance_rad_s(double inductance_h) {
   return worst;
 }
 
-// DC-09. Kills: a wrong factor K_m/(J R), a field that is not fed by the terminals. The distance is of first
-// order in L: 10 times less inductance, 10 times less of it, but for the next order.
+// DC-09. Catches: a wrong factor K_m/(J R), a field that is not fed by the terminals. The distance is of
+// first order in L: 10 times less inductance, 10 times less of it, but for the next order.
 TEST(ShuntDcMachine, TendsToTheReducedModelOfTheBookAsTheArmatureInductanceGoesToZero) {
   const double distance = distance_rad_s(1e-3);
   EXPECT_LT(distance, 2.0);
   EXPECT_NEAR(distance_rad_s(1e-4) / distance, 0.1, 0.001);
 }
 
-// Kills: an adjusting resistor that acts elsewhere, a terminal current without that of the field.
+// Catches: an adjusting resistor that acts elsewhere, a terminal current without that of the field.
 TEST(ShuntDcMachine, DrawsArmatureAndFieldCurrentAndRunsFasterWithAWeakerField) {
   ShuntDcMachineParameters p = kShunt;
   for (const double adjusting_ohm : {0.0, 20.0, 80.0}) {
@@ -287,8 +287,8 @@ Rig<ShuntDcMachineState> excited(const ShuntDcMachineConstants& c, double speed_
   return rig;
 }
 
-// Open terminals. Kills: a loop current of the wrong sign (nothing would build up, or the wrong way round), a
-// terminal current. The machine excites itself above the speed (R + R_F)/(K_m 32 H) = 104.7 rad/s of the
+// Open terminals. Catches: a loop current of the wrong sign (nothing would build up, or the wrong way round),
+// a terminal current. The machine excites itself above the speed (R + R_F)/(K_m 32 H) = 104.7 rad/s of the
 // steepest part of the curve, until the emf is the voltage drop of the loop.
 TEST(ShuntDcMachine, WithOpenTerminalsExcitesItselfAboveItsCriticalSpeedUntilItSaturates) {
   const ShuntDcMachineConstants c = constants_of(saturated(kShunt));
@@ -308,7 +308,7 @@ TEST(ShuntDcMachine, WithOpenTerminalsExcitesItselfAboveItsCriticalSpeedUntilItS
   EXPECT_LT(std::abs(excited(c, -160.0, 5.0).machine.field_flux_wb), 1e-6);
 }
 
-// Kills: energy from nowhere while the machine excites itself and brakes the shaft by it. What RK4 leaves
+// Catches: energy from nowhere while the machine excites itself and brakes the shaft by it. What RK4 leaves
 // where the loop crosses a kink of the curve is 1e-5 J of 2560 J.
 TEST(ShuntDcMachine, WithOpenTerminalsTheEnergyOfTheShaftGoesIntoFieldAndLosses) {
   const ShuntDcMachineConstants c = constants_of(saturated(kShunt));
@@ -323,7 +323,7 @@ TEST(ShuntDcMachine, WithOpenTerminalsTheEnergyOfTheShaftGoesIntoFieldAndLosses)
   EXPECT_NEAR(unaccounted_j(rig, c, kShaft), before_j, 1e-4);
 }
 
-// Kills: an opening that makes energy, or that changes the linkage of the loop; a voltage of open terminals
+// Catches: an opening that makes energy, or that changes the linkage of the loop; a voltage of open terminals
 // that drives a current.
 TEST(ShuntDcMachine, OpeningTheTerminalsKeepsTheLinkageOfTheLoopAndMakesNoEnergy) {
   for (const ShuntDcMachineConstants& c : {constants_of(kShunt), constants_of(saturated(kShunt))}) {
@@ -345,8 +345,8 @@ TEST(ShuntDcMachine, OpeningTheTerminalsKeepsTheLinkageOfTheLoopAndMakesNoEnergy
   }
 }
 
-// Kills: an adjustment of the wrong winding or of the adjusting resistor, a field that is forgotten when the
-// substep is chosen.
+// Catches: an adjustment of the wrong winding or of the adjusting resistor, a field that is forgotten when
+// the substep is chosen.
 TEST(ShuntDcMachine, AdjustsEachWindingByItsFactor) {
   const ShuntDcMachineParameters p = adjusted(kShunt, {.stator_resistance_factor = 1.5,
                                                        .rotor_resistance_factor = 2.0,

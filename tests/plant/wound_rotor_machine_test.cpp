@@ -43,8 +43,8 @@ class Points {
   std::mt19937_64 engine_{61};
 };
 
-// Kills: any wrong sign or factor in slope, torque, energy or losses, with one or all stator phases open too:
-// a machine whose field does not feel what the stator feels of it.
+// Catches: any wrong sign or factor in slope, torque, energy or losses, with one or all stator phases open
+// too: a machine whose field does not feel what the stator feels of it.
 TEST(WoundRotorMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
   Points points;
@@ -57,7 +57,7 @@ TEST(WoundRotorMachine, InputPowerIsStoredLostOrDeliveredInRandomStates) {
   }
 }
 
-// SM-03 with the corrections of E27, the equations along and across the field solved for the slopes. Kills:
+// SM-03 with the corrections of E27, the equations along and across the field solved for the slopes. Catches:
 // n_p missing in the torque or in one of the speed voltages, M in place of M/L_S, R_F of the wrong sign.
 TEST(WoundRotorMachine, SlopesAndTorqueAreThoseOfTheEquationsAlongTheField) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
@@ -92,7 +92,7 @@ TEST(WoundRotorMachine, SlopesAndTorqueAreThoseOfTheEquationsAlongTheField) {
   }
 }
 
-// Kills: a coupling from the field to the stator that is not the one back: d(i_F')/du_a = d(i_a')/du_F.
+// Catches: a coupling from the field to the stator that is not the one back: d(i_F')/du_a = d(i_a')/du_F.
 TEST(WoundRotorMachine, StatorAndFieldCoupleReciprocally) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
   Points points;
@@ -113,8 +113,8 @@ TEST(WoundRotorMachine, StatorAndFieldCoupleReciprocally) {
   }
 }
 
-// Kills: an open stator that still weighs on the field; a voltage of the open windings without the part that
-// a changing field current induces.
+// Catches: an open stator that still weighs on the field; a voltage of the open windings without the part
+// that a changing field current induces.
 TEST(WoundRotorMachine, WithAnOpenStatorTheFieldIsACoilWhoseFluxInducesTheVoltage) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
   constexpr double kSpeed_rad_s = 50.0;
@@ -155,8 +155,8 @@ TEST(WoundRotorMachine, WithAnOpenStatorTheFieldIsACoilWhoseFluxInducesTheVoltag
               1e-12);
 }
 
-// Kills: an open phase that takes a component of the slope of all phases, or a field that still sees the part
-// of the stator that is open. The applied voltages come back along the line, R i + d(flux)/dt holds
+// Catches: an open phase that takes a component of the slope of all phases, or a field that still sees the
+// part of the stator that is open. The applied voltages come back along the line, R i + d(flux)/dt holds
 // everywhere.
 TEST(WoundRotorMachine, AnOpenPhaseObeysTheEquationsOfTheTwoCircuitsThatAreLeft) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
@@ -190,7 +190,7 @@ TEST(WoundRotorMachine, AnOpenPhaseObeysTheEquationsOfTheTwoCircuitsThatAreLeft)
   }
 }
 
-// Kills: a stator current that is cut off and takes its share of the field flux with it.
+// Catches: a stator current that is cut off and takes its share of the field flux with it.
 TEST(WoundRotorMachine, CuttingTheStatorCurrentLeavesTheFluxOfTheField) {
   const WoundRotorMachineConstants c = constants_of(kMachine);
   const RotorMotion motion = motion_at(c, 0.3, 0.0);
@@ -213,7 +213,7 @@ TEST(WoundRotorMachine, CuttingTheStatorCurrentLeavesTheFluxOfTheField) {
   }
 }
 
-// Kills: a time constant from one winding alone, or the slower of the two of the coupled windings. At
+// Catches: a time constant from one winding alone, or the slower of the two of the coupled windings. At
 // standstill the slopes of stator current along the field and of the field current are a matrix; -1/tau is an
 // eigenvalue of it, and the one farther from zero.
 TEST(WoundRotorMachine, TheFastestTimeConstantIsThatOfTheCoupledWindings) {
@@ -228,7 +228,7 @@ TEST(WoundRotorMachine, TheFastestTimeConstantIsThatOfTheCoupledWindings) {
   EXPECT_GT(-rate, 0.5 * -(of_stator.i_a_a + of_field.i_field_a));
 }
 
-// Kills: an adjustment that takes the wrong factor.
+// Catches: an adjustment that takes the wrong factor.
 TEST(WoundRotorMachine, HeatAndSeriesImpedanceChangeTheirOwnParameters) {
   const WoundRotorMachineParameters p = adjusted(kMachine, {.stator_resistance_factor = 2.0,
                                                             .rotor_resistance_factor = 3.0,

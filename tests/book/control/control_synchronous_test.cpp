@@ -300,7 +300,7 @@ TEST(BldcControl, TwoHundredVoltsAreTooLittle) {
   EXPECT_GT(seen.clipped_samples, 1000);
 }
 
-// Catches PI loops that wind up at the commutations, an emf of the wrong sign, a lead that forgets the tick
+// Catches: PI loops that wind up at the commutations, an emf of the wrong sign, a lead that forgets the tick
 // of delay: 350 rad/s behind a switched inverter with dead time. The table has 0.107 rad with 1000 V/A.
 TEST(BldcControl, TheMoveSucceedsBehindAnInverter) {
   for (const char* preset : {"book/10.6-inverter", "book/10.6-inverter-hall"}) {

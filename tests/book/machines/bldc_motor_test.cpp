@@ -15,7 +15,7 @@ BenchConfig bldc_config() {
 }
 
 // AC-28: trapezoids of 33 V at 10 Hz pull the motor in from rest, and it follows them with a current below
-// 11 A. Kills: an emf of the wrong sign (the motor turns backwards or not at all), a neutral that is not
+// 11 A. Catches: an emf of the wrong sign (the motor turns backwards or not at all), a neutral that is not
 // removed.
 TEST(BookBldcMotor, TrapezoidsOf33VoltsPullTheMotorIn) {
   BookBench run("bldc");
@@ -40,7 +40,7 @@ TEST(BookBldcMotor, TrapezoidsOf33VoltsPullTheMotorIn) {
 }
 
 // The 200 V of the book's exercise drive more than 300 A through the windings: with its limit of 10 A the
-// drive trips at once. Kills: an over-current check of two phases only, a trip that can be missed.
+// drive trips at once. Catches: an over-current check of two phases only, a trip that can be missed.
 TEST(BookBldcMotor, TwoHundredVoltsTrip) {
   BenchConfig config = bldc_config();
   config.setup.axes[0].parameters.drive.source.amplitude_v = 200.0;
@@ -68,8 +68,9 @@ ThreePhase commutation(double angle_rad) {
 // AC-27 on the bench bldc, its shaft turned slowly and the currents of the commutation table for 1 A from a
 // stiff current amplifier: 2 tau_p I_p = 1.0256 N m, but for the currents that the emf drives through the
 // loop's gain, (i_r K_P + e_p w (e_k - mean e))/(K_P + R); of sum e^2 - (sum e)^2/3 they take between 2 and
-// 8/3. 1e-4; a degree on both sides of each commutation, in which the currents change, is left out. Kills: a
-// table or a trapezoid that is turned by a sector, phases in another order, currents that do not sum to zero.
+// 8/3. 1e-4; a degree on both sides of each commutation, in which the currents change, is left out. Catches:
+// a table or a trapezoid that is turned by a sector, phases in another order, currents that do not sum to
+// zero.
 TEST(BookBldcMotor, CommutatedCurrentsGiveAConstantTorque) {
   BenchConfig config = bldc_config();
   config.setup.substeps = 50;  // 2 us: the current loop has 1000 V/A
@@ -163,7 +164,7 @@ Move move(double voltage_v) {
 }
 
 // AC-29: with 250 V the move stays within 0.122 rad (10 %) and ends within 1e-3; with 200 V the emf stops it
-// at 388.98 rad/s. Kills: a commutation against the emf, current control that ignores the limit.
+// at 388.98 rad/s. Catches: a commutation against the emf, current control that ignores the limit.
 TEST(BookBldcMotor, TheMoveNeedsMoreThan200Volts) {
   const Move enough = move(250.0);
   EXPECT_NEAR(enough.worst_rad, 0.122, 0.0122);

@@ -26,8 +26,8 @@ BenchConfig current_driven(double proportional_v_per_a, double integral_v_per_as
 }
 
 // AC-04: 1 A is reached and gives KT i/f = 175 rad/s at 14.25 V. 4 A would need 57 V: the amplifier saturates
-// after 0.159 s and the motor settles where 40 V take it. 0.2 %. Kills: a current loop with a lasting error,
-// one that winds up, a voltage limit that is not kept.
+// after 0.159 s and the motor settles where 40 V take it. 0.2 %. Catches: a current loop with a lasting
+// error, one that winds up, a voltage limit that is not kept.
 TEST(BookCurrentLoop, TheCurrentAmplifierHoldsOneAmpereAndSaturatesAtFour) {
   for (const double wanted_a : {1.0, 4.0}) {
     BookBench run(current_driven(20.0, 20000.0));
@@ -92,7 +92,7 @@ Complex response(double k_p, double alpha) {
 }
 
 // AC-05, problem 2.9: 0.5 % and 0.1 degree of the reference, and 2e-4 of the transfer function: the loop
-// holds its voltage for 2 us, half of which are 1e-4 rad of the sine. Kills: a
+// holds its voltage for 2 us, half of which are 1e-4 rad of the sine. Catches: a
 // gain or an integral off by a few parts in a thousand, a current that is delayed by a tick, a back emf that
 // the loop does not see.
 TEST(BookCurrentLoop, ASineOfOneAmpereFollowsTheTransferFunction) {
@@ -112,7 +112,8 @@ TEST(BookCurrentLoop, ASineOfOneAmpereFollowsTheTransferFunction) {
 // Section 9.1.4, the bench dc-9-1-4 as it is: 22 A turn the motor by K_T i/J = 12 222 rad/s^2, with which not
 // even an ideal amplifier does 0.9 pi within 30 ms. While the emf rises the PI loop stays behind by its rate
 // over K_I: i = i_r/(1 + K_T^2/(J K_I)), 1e-3 once the start is over. Rise time and lag cost 2.5 % of the
-// speed. Kills: a limit of current or voltage that is not kept, a constant or inertia that is not the book's.
+// speed. Catches: a limit of current or voltage that is not kept, a constant or inertia that is not the
+// book's.
 TEST(BookCurrentLoop, TheMotorOf914CannotFollowTheStepper) {
   BookBench run("dc-9-1-4");
   double largest_a = 0.0;

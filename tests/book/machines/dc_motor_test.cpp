@@ -9,7 +9,7 @@ namespace drivebench {
 namespace {
 
 // AC-01, the bench dc-a: 10 V from rest. The closed form is the matrix exponential of the book's equations;
-// 0.1 %, the count within one. Kills: a DC source, a constant or an encoder that is not the book's.
+// 0.1 %, the count within one. Catches: a DC source, a constant or an encoder that is not the book's.
 TEST(BookDcMotor, TenVoltsFromRestFollowTheClosedForm) {
   BookBench run("dc-a");
   run.run_until(0.5);
@@ -20,7 +20,7 @@ TEST(BookDcMotor, TenVoltsFromRestFollowTheClosedForm) {
 }
 
 // AC-01 and AC-02, the same run sampled every 20 us, so that the peak of the current shows (0.1 %) and the
-// trapezoidal sums are good to 1e-6: they account for all of the 4.4127 J drawn. Kills: a torque and an emf
+// trapezoidal sums are good to 1e-6: they account for all of the 4.4127 J drawn. Catches: a torque and an emf
 // with different constants, friction that the shaft does not feel, a substep that loses energy.
 TEST(BookDcMotor, TheEnergyOfTenVoltsIsLostOrStored) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dc-a.toml");
@@ -54,8 +54,8 @@ TEST(BookDcMotor, TheEnergyOfTenVoltsIsLostOrStored) {
 }
 
 // AC-03: at a constant speed the backward difference takes two neighbouring values, less than 2 pi/(N T) from
-// the mean speed of the interval. Kills: a count that is rounded instead of cut, a prime mover whose speed is
-// not exactly the one imposed.
+// the mean speed of the interval. Catches: a count that is rounded instead of cut, a prime mover whose speed
+// is not exactly the one imposed.
 TEST(BookDcMotor, TheBackwardDifferenceTakesTwoValuesAtConstantSpeed) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dc-a.toml");
   AxisParameters& p = config.setup.axes[0].parameters;
@@ -86,7 +86,7 @@ TEST(BookDcMotor, TheBackwardDifferenceTakesTwoValuesAtConstantSpeed) {
 // = f w/k, and 220 V = R i + k w.
 constexpr double kUnloaded_rad_s = 220.0 / (1.15 + 3.0 * 1e-3 / 1.15);
 
-// DC-06: without its field a separately excited motor runs away. Kills: a loss of field without effect.
+// DC-06: without its field a separately excited motor runs away. Catches: a loss of field without effect.
 TEST(BookDcMotor, WithoutItsFieldASeparatelyExcitedMotorRunsAway) {
   BookBench run("dc-separate");
   run.run_until(4.0);
@@ -100,8 +100,8 @@ TEST(BookDcMotor, WithoutItsFieldASeparatelyExcitedMotorRunsAway) {
   EXPECT_NE(run.sample().injected, 0u);
 }
 
-// The other DC benches run and reach the values of their equations. Kills: a bench file that does not start,
-// a field winding at the wrong terminal.
+// The other DC benches run and reach the values of their equations. Catches: a bench file that does not
+// start, a field winding at the wrong terminal.
 TEST(BookDcMotor, TheOtherDcBenchesComeToTheirSpeeds) {
   BookBench shunt("dc-shunt");
   shunt.run_until(3.0);

@@ -49,7 +49,7 @@ double balanced_rad_s(const InductionMachineParameters& servo, double load_nm) {
 
 // As it is shipped, the load machine first idle, then braking, then driving: speed and torques are those
 // where the circuit of the servo meets K_T i and friction; 1e-3, of which the held voltages take 2e-4. Both
-// axes turn as one. Kills: a load machine whose torque has the wrong sign or does not reach the shaft, a
+// axes turn as one. Catches: a load machine whose torque has the wrong sign or does not reach the shaft, a
 // torque that is counted twice, friction and inertia of one rotor only.
 TEST(BookDynamometer, TheServoBalancesTheTorqueOfTheLoadMachine) {
   BookBench run("dynamometer");
@@ -92,7 +92,7 @@ double stored_j(const InductionMachineParameters& p, const Sample& motor, const 
 
 // The same bench with a power analyser on each axis, which reads the energy of every 50 ms exactly: from rest
 // to a shaft that brakes and then drives, the energy of both drives is lost in the windings and in friction
-// or is stored. 1e-4: the losses of rotor and friction are sums over samples 125 us apart. Kills: a shaft
+// or is stored. 1e-4: the losses of rotor and friction are sums over samples 125 us apart. Catches: a shaft
 // that loses energy between the two machines, a meter that ignores negative power.
 TEST(BookDynamometer, TheEnergyOfBothDrivesIsLostOrStored) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/dynamometer.toml");

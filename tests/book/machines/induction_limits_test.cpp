@@ -42,7 +42,7 @@ double fastest_s(double friction_nms, bool braking) {
 }
 
 // Case 11: 1 %. With the listed friction the run-up takes 0.647 s, which makes the move of 0.38 s infeasible.
-// Kills: a flux, leakage or speed voltage that is off at high speed.
+// Catches: a flux, leakage or speed voltage that is off at high speed.
 TEST(BookInductionLimits, TheFastestRunUpAndBrakingTakeTheTimesOfTheReference) {
   EXPECT_NEAR(fastest_s(0.0, false), 0.3124, 3.1e-3);
   EXPECT_NEAR(fastest_s(kServoFriction_nms, false), 0.647, 6.5e-3);
@@ -101,7 +101,7 @@ FluxErrors flux_errors(double rate_hz) {
 }
 
 // Case 17, exercises 19 to 22 of chapter 8: 5 %. The rectangular observers lag by half a sample; the polar
-// one of the bundled controller does not. Kills: currents, flux or speed of the plant that do not belong
+// one of the bundled controller does not. Catches: currents, flux or speed of the plant that do not belong
 // together.
 TEST(BookInductionLimits, TheFluxObserversErrAsInTheReference) {
   const FluxErrors at_10_khz = flux_errors(10e3);

@@ -23,7 +23,7 @@ double rotor_a(const Sample& s) {
 
 // AC-19, the bench im-a with friction-free 0, 0.2 and 0.5 N m: closed form of the equivalent circuit, 0.1 %;
 // the rotor current of the first case is 0 to 1e-3 of the stator's.
-// Kills: a two-phase source whose phase b does not follow by a quarter, a load with the wrong sign.
+// Catches: a two-phase source whose phase b does not follow by a quarter, a load with the wrong sign.
 TEST(BookInductionLine, TheTwoPhaseMotorSettlesAtTheSpeedOfItsEquivalentCircuit) {
   struct Case {
     double load_nm, speed_rad_s, current_a, rotor_a;
@@ -52,7 +52,7 @@ struct DirectStart {
   bool over_current = false;
 };
 
-// AC-22, the bench im-b: 208 V line to line from rest. Times 2 %, the rest 0.2 %. Kills: a source of line
+// AC-22, the bench im-b: 208 V line to line from rest. Times 2 %, the rest 0.2 %. Catches: a source of line
 // instead of phase voltage, a factor sqrt(3/2) lost between phases and two-phase quantities, an over-current
 // check of two phases only.
 TEST(BookInductionLine, TheThreePhaseMotorStartsFromTheLine) {
@@ -104,7 +104,7 @@ Reading measured(bool blocked) {
 }
 
 // AC-23: no-load and blocked-rotor test as the book evaluates them. L_S comes out right, R_R 15 % low and
-// sigma 3.5 % low: the magnetising branch is left out of the blocked test. 0.3 percentage points. Kills: a
+// sigma 3.5 % low: the magnetising branch is left out of the blocked test. 0.3 percentage points. Catches: a
 // power analyser that mixes up line and phase, or is wrong by more than 1e-3.
 TEST(BookInductionLine, TheNoLoadAndBlockedRotorTestsGiveTheBooksParameters) {
   const Reading no_load = measured(false);
@@ -127,8 +127,8 @@ TEST(BookInductionLine, TheNoLoadAndBlockedRotorTestsGiveTheBooksParameters) {
 }
 
 // AC-21, the motor im-b behind three amplifiers, its rotor locked: (100, 0, 0) V lift the neutral to a third,
-// the windings see (66.667, -33.333, -33.333) V, and at rest the currents are in that ratio. Kills: a neutral
-// that stays at zero or follows the vector, a common voltage that drives a current.
+// the windings see (66.667, -33.333, -33.333) V, and at rest the currents are in that ratio. Catches: a
+// neutral that stays at zero or follows the vector, a common voltage that drives a current.
 TEST(BookInductionLine, OnePhaseAtHundredVoltsLiftsTheNeutralByAThird) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/im-b.toml");
   AxisParameters& p = config.setup.axes[0].parameters;
@@ -152,8 +152,8 @@ TEST(BookInductionLine, OnePhaseAtHundredVoltsLiftsTheNeutralByAThird) {
 }
 
 // AC-25: IM-C on one phase, the other shorted, from synchronous speed under 0.8 N m: mean speed by
-// superposition of both rotating fields, 0.2 %; at rest there is no starting torque. Kills: a phase b that is
-// connected to the source, a torque at rest.
+// superposition of both rotating fields, 0.2 %; at rest there is no starting torque. Catches: a phase b that
+// is connected to the source, a torque at rest.
 TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/im-c.toml");
   AxisParameters& p = config.setup.axes[0].parameters;
@@ -190,8 +190,8 @@ TEST(BookInductionLine, OnePhaseKeepsTheMotorRunningButDoesNotStartIt) {
 }
 
 // P3-12, the bench im-c as shipped: the capacitor makes the current of phase b lead, so that the motor turns
-// from b to a; the switch shorts phase b near synchronism, and the motor keeps running under 0.8 N m. Kills:
-// a capacitor that gives no phase shift or the wrong one, a switch that does nothing.
+// from b to a; the switch shorts phase b near synchronism, and the motor keeps running under 0.8 N m.
+// Catches: a capacitor that gives no phase shift or the wrong one, a switch that does nothing.
 TEST(BookInductionLine, TheCapacitorStartsTheSinglePhaseMotor) {
   BookBench run("im-c");
   run.run_until(0.2);
@@ -204,7 +204,7 @@ TEST(BookInductionLine, TheCapacitorStartsTheSinglePhaseMotor) {
   EXPECT_NEAR(speed.mean(), -184.31, 0.4);
 }
 
-// The starts of 8.5.5 and 8.5.6. Kills: an amplitude that is not the one declared.
+// The starts of 8.5.5 and 8.5.6. Catches: an amplitude that is not the one declared.
 TEST(BookInductionLine, TheMotorsOfTheIdentificationStartAsInTheBook) {
   BookBench first("im-8-5-5");
   Spread speed;

@@ -25,7 +25,7 @@ PhaseCommand line_voltage(Tick tick, double peak_v) {
           .setpoint = {.a = peak_v * std::cos(angle_rad), .b = peak_v * std::sin(angle_rad)}};
 }
 
-// These tests do not read the files. Kills: a servo bench for one of the transports with another motor,
+// These tests do not read the files. Catches: a servo bench for one of the transports with another motor,
 // amplifier or sensor than the tested one.
 TEST(BookInductionModel, EveryServoBenchHasTheMotorOfTheseTests) {
   AxisParameters tested = servo_axis();
@@ -40,7 +40,7 @@ TEST(BookInductionModel, EveryServoBenchHasTheMotorOfTheseTests) {
 }
 
 // IMO-07 of the reference: 80 V (two-phase amplitude), 60 Hz, no load. The tolerances are half a unit of the
-// last digit given, but 0.1 rad/s for the final speed. Kills: a wrong pole-pair number, mutual inductance,
+// last digit given, but 0.1 rad/s for the final speed. Catches: a wrong pole-pair number, mutual inductance,
 // inertia or friction in any place of the model.
 TEST(BookInductionModel, LineStartReachesTheSpeedFluxAndCurrentsOfTheReference) {
   Axis axis(servo_axis(), {.period_s = kStep_s, .substeps = 1}, 1, 0);
@@ -67,7 +67,7 @@ TEST(BookInductionModel, LineStartReachesTheSpeedFluxAndCurrentsOfTheReference) 
   EXPECT_EQ(s.faults, 0u);
 }
 
-// Kills: a phase order that only changes the direction.
+// Catches: a phase order that only changes the direction.
 TEST(BookInductionModel, ExchangedPhasesTurnTheMotorBackwards) {
   Axis axis(servo_axis(), {.period_s = kStep_s, .substeps = 1}, 1, 0);
   for (Tick tick = 0; tick < 20'000; ++tick) {
@@ -80,7 +80,7 @@ TEST(BookInductionModel, ExchangedPhasesTurnTheMotorBackwards) {
 }
 
 // IM-05: (M, L_R, R_R) -> (k M, k^2 L_R, k^2 R_R) is the same machine at its terminals, its flux k times as
-// large. Kills: an equation in which one of the three is missing or stands alone.
+// large. Catches: an equation in which one of the three is missing or stands alone.
 TEST(BookInductionModel, MachinesWithScaledRotorsAreIndistinguishableAtTheTerminals) {
   constexpr double kScale = 1.37;
   AxisParameters scaled = servo_axis();

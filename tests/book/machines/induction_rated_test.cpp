@@ -75,7 +75,7 @@ Rated rated(const Circle& machine) {
 
 // AC-24, P3-05 and P3-06: the ratios of Figs 7.16 and 7.17 by their formulas, 1e-3; the slips of best power
 // factor and of most torque are searched for, not taken from them; the motors of Leonhard measured there are
-// within 15 %. Kills: a leakage factor that enters current and torque differently, a rotor resistance that
+// within 15 %. Catches: a leakage factor that enters current and torque differently, a rotor resistance that
 // changes more than the slips.
 TEST(BookInductionRated, TheRatedRatiosFollowFromTheLeakageFactor) {
   struct Case {
@@ -104,7 +104,7 @@ TEST(BookInductionRated, TheRatedRatiosFollowFromTheLeakageFactor) {
 }
 
 // Problem 7.17: the motor IM-A at 80 V rms a phase; the vectors are sqrt(3) times that. Half a unit of the
-// last digit of the reference. Kills: a torque without n_p, a phase quantity that is not the vector over
+// last digit of the reference. Catches: a torque without n_p, a phase quantity that is not the vector over
 // sqrt(3).
 TEST(BookInductionRated, TheCircleOfMotorAIsThatOfProblem717) {
   const Circle machine(motor_of("im-a"));
@@ -126,7 +126,7 @@ TEST(BookInductionRated, TheCircleOfMotorAIsThatOfProblem717) {
 }
 
 // AC-25: pull-out slip and torque of one rotating field of IM-C on a single phase, whose vector is half of
-// 120 V times sqrt(2), with n_p = 1 as printed. Kills: a field of the wrong size.
+// 120 V times sqrt(2), with n_p = 1 as printed. Catches: a field of the wrong size.
 TEST(BookInductionRated, OneFieldOfMotorCHasThePullOutOfTheReference) {
   const Circle machine(motor_of("im-c"));
   const Rated found = rated(machine);
@@ -135,7 +135,7 @@ TEST(BookInductionRated, OneFieldOfMotorCHasThePullOutOfTheReference) {
   EXPECT_NEAR(vector_v * vector_v * machine.torque_nm(found.pull_slip) / 2.0, 1.2874, 5e-5);
 }
 
-// AC-20: the leakage of the motors as shipped, 1e-4, and kappa^2 = 1 - sigma. Kills: a motor file with an
+// AC-20: the leakage of the motors as shipped, 1e-4, and kappa^2 = 1 - sigma. Catches: a motor file with an
 // inductance that is not the book's.
 TEST(BookInductionRated, TheShippedMotorsHaveTheLeakageOfTheReference) {
   for (const auto& [bench, sigma] : {std::pair{"im-a", 0.30158}, {"im-b", 0.14967}, {"im-c", 0.111364}}) {

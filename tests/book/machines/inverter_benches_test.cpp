@@ -61,7 +61,7 @@ class CurrentControl {
 // Bench bm500 as shipped, 5 A across the field and then -5 A: acceleration and torque are K_m i_q/J and K_m
 // i_q (0.3 %: the sampled current is the mean of the period, its ripple makes no torque), encoder and
 // resolver follow the shaft, and the braking energy of the shaft is in the capacitor of the link. 1 % of that
-// energy: the supply's part is a sum of samples. Kills: an inductance or a torque of the phases instead of
+// energy: the supply's part is a sum of samples. Catches: an inductance or a torque of the phases instead of
 // the two-phase equivalent, a link that the motor does not charge, sensors of another angle.
 TEST(BookInverterBenches, TheBm500TurnsCurrentIntoTorqueAndBrakesIntoTheLink) {
   BookBench run("bm500");
@@ -116,8 +116,8 @@ double no_load_rad_s(double volts, double dead_time_s) {
 
 // Without load the motor of 9.2.3 runs at u_q/K_m; 0.2 %: while a voltage stands still for a tick the rotor
 // turns by up to 0.2 rad. The dead time of the bench, 1 us of 100 at 320 V, is an error of 3.2 V in each leg,
-// whose fundamental is 4/pi of that and sqrt(3/2) larger in two phases. Kills: a hexagon or a modulation with
-// another gain, a K_m that does not make the emf, a dead time that costs more than it can.
+// whose fundamental is 4/pi of that and sqrt(3/2) larger in two phases. Catches: a hexagon or a modulation
+// with another gain, a K_m that does not make the emf, a dead time that costs more than it can.
 TEST(BookInverterBenches, TheBm500RunsAtItsVoltageOverKm) {
   for (const double volts : {10.0, 20.0, 80.0}) {
     EXPECT_NEAR(no_load_rad_s(volts, 0.0) * kTorqueConstant, volts, 2e-3 * volts);
@@ -128,7 +128,7 @@ TEST(BookInverterBenches, TheBm500RunsAtItsVoltageOverKm) {
 
 // AC-26 on the bench bm500: the shaft turned at 300 rad/s with all gates off, no current flows and the
 // terminals show v_k = -K w sin(n_p theta - (k-1) 2 pi/3) with K = sqrt(2/3) K_m, which is K_m w (-sin, cos)
-// in two phases: its length to 1e-6, its angle to the rotor's turn in a substep. Kills: the signs of
+// in two phases: its length to 1e-6, its angle to the rotor's turn in a substep. Catches: the signs of
 // (7.81), an emf of the wrong axis or size, diodes that conduct against a link of 320 V.
 TEST(BookInverterBenches, TheOpenTerminalsOfTheBm500ShowItsEmf) {
   BenchConfig config = load_config(std::string(DRIVEBENCH_CONFIGS) + "/benches/bm500.toml");
@@ -191,7 +191,7 @@ double speed_at(double duty, double load_nm) {
 // (e_p w - U)(e_k - mean e)/R, whose mean torque is tau_p (U - e_p w)/R (sum e^2 - (sum e)^2/3) with
 // the means 7/3 and 1/3; friction and load take it. Unloaded the ripple of the currents cancels the dead
 // times (0.1 %); 1 N m needs currents that keep their sign, and each leg loses 400 V 1 us/100 us = 4 V (0.5
-// %: the inductances of 4 ms are left out). Kills: a neutral that is not removed, an emf of another size, a
+// %: the inductances of 4 ms are left out). Catches: a neutral that is not removed, an emf of another size, a
 // duty of the wrong link, a dead time of the wrong sign or size.
 TEST(BookInverterBenches, TheBldcRunsAtItsDuty) {
   const auto expected = [](double volts, double load_nm) {

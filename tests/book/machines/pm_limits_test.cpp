@@ -105,7 +105,7 @@ double second_transition(double limit_a, double sign) {
   });
 }
 
-// Case 29, K_m = 0.162. 0.2 %; the search has a grid of 20 000 angles. Kills: an inductance or a speed
+// Case 29, K_m = 0.162. 0.2 %; the search has a grid of 20 000 angles. Catches: an inductance or a speed
 // voltage off by a factor, n_p in the wrong place.
 TEST(BookPmLimits, TheTransitionSpeedsOfTheBm500AreThoseOfTheReference) {
   EXPECT_NEAR(first_transition(22.05, 1.0), 591.5, 1.2);
@@ -121,7 +121,7 @@ TEST(BookPmLimits, TheTransitionSpeedsOfTheBm500AreThoseOfTheReference) {
   EXPECT_NEAR(first_transition(22.05, -1.0, listed), 476.0, 1.0);
 }
 
-// Case 30. 0.2 %. Kills: a torque that does not agree with the voltages that it takes.
+// Case 30. 0.2 %. Catches: a torque that does not agree with the voltages that it takes.
 TEST(BookPmLimits, TheLargestTorquesOfTheBm500AreThoseOfTheReference) {
   struct Case {
     double limit_a, speed_rad_s, motoring_nm, braking_nm;

@@ -172,8 +172,8 @@ std::string scientific(double x) {
   return text.data();
 }
 
-// Every shipped motor keeps 1e-6 at its default substep. Kills: a method of lower order, inputs that are held
-// over a step although they change, a default substep that does not resolve the motor.
+// Every shipped motor keeps 1e-6 at its default substep. Catches: a method of lower order, inputs that are
+// held over a step although they change, a default substep that does not resolve the motor.
 TEST(StepSize, EveryMotorIsExactAtItsDefaultSubstep) {
   std::printf(
       "| motor | tick | default substep | error | at half of it | at twice |\n|---|---|---|---|---|---|\n");

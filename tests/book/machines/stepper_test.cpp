@@ -23,8 +23,8 @@ PhaseValues half_step(int n, double volts) {
   return {.a = volts * s[0], .b = volts * s[1]};
 }
 
-// Case 33: 1.8 degrees a full step, 0.9 a half step, exactly. Kills: a phase order or a number of pole pairs
-// that is not the book's.
+// Case 33: 1.8 degrees a full step, 0.9 a half step, exactly. Catches: a phase order or a number of pole
+// pairs that is not the book's.
 TEST(BookStepper, StepsAreExact) {
   for (const int stride : {2, 1}) {
     BookBench run(stepper_config());
@@ -38,7 +38,7 @@ TEST(BookStepper, StepsAreExact) {
 }
 
 // Case 33: driven by currents of 1 A the rotor swings to 3.460 degrees at 7.96 ms and rings at 73.0 Hz: only
-// a current source leaves the oscillation undamped. 1 %. Kills: a torque or inertia off by a factor, a
+// a current source leaves the oscillation undamped. 1 %. Catches: a torque or inertia off by a factor, a
 // current loop that brakes.
 TEST(BookStepper, ACurrentStepRings) {
   BenchConfig config = stepper_config();
@@ -94,7 +94,7 @@ long steps_made(double rate_hz, double volts) {
 }
 
 // Case 34: at 1.1 V the motor follows 200 steps a second and falls out of step at 400; it loses whole
-// electrical turns, four steps each. Kills: damping that is not the windings' own.
+// electrical turns, four steps each. Catches: damping that is not the windings' own.
 TEST(BookStepper, TheMotorFallsOutOfStepByWholeElectricalTurns) {
   EXPECT_EQ(steps_made(200.0, 1.1), 40);
   const long made = steps_made(400.0, 1.1);
@@ -102,7 +102,7 @@ TEST(BookStepper, TheMotorFallsOutOfStepByWholeElectricalTurns) {
   EXPECT_EQ((40 - made) % 4, 0);
 }
 
-// The bench stepper: its source steps the motor by itself, 200 steps a second. Kills: a table that is read
+// The bench stepper: its source steps the motor by itself, 200 steps a second. Catches: a table that is read
 // with the wrong period or phase.
 TEST(BookStepper, TheBenchStepsByItself) {
   BookBench run("stepper");

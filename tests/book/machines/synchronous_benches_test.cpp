@@ -29,7 +29,7 @@ PhaseCommand volts(double a, double b) {
 }
 
 // The static test of 9.3 on the bench pm-9-3: along phase a the rotor stays, and the current is the answer of
-// R_S and 4 ms to a step that is 1.6 ticks late and has passed the output filter; 1e-6 A. Kills: a delay of
+// R_S and 4 ms to a step that is 1.6 ticks late and has passed the output filter; 1e-6 A. Catches: a delay of
 // whole ticks, a filter of another corner, an inductance that is not L_S, a rotor that turns without torque.
 TEST(BookSynchronousBenches, TheMotorOf93AnswersAVoltageStepAtStandstill) {
   BookBench run("pm-9-3");
@@ -50,7 +50,7 @@ TEST(BookSynchronousBenches, TheMotorOf93AnswersAVoltageStepAtStandstill) {
 }
 
 // Across the magnet the shaft breaks away where K_m i_b is the friction; the ramp rises by 2 uV a tick, 1e-4.
-// Kills: static friction that does not hold, or of the wrong size.
+// Catches: static friction that does not hold, or of the wrong size.
 TEST(BookSynchronousBenches, TheMotorOf93BreaksAwayAtItsStaticFriction) {
   BookBench run("pm-9-3");
   double broke_a = 0.0;
@@ -63,8 +63,8 @@ TEST(BookSynchronousBenches, TheMotorOf93BreaksAwayAtItsStaticFriction) {
 }
 
 // With the current along the magnet decoupled away, u_q = R_S i_q + K_m w and K_m i_q = f w + f_c: speed and
-// current to 1e-3; half of that are the voltages that stand still for a tick. Kills: a friction that is lost
-// while the shaft turns, an emf or a torque without K_m.
+// current to 1e-3; half of that are the voltages that stand still for a tick. Catches: a friction that is
+// lost while the shaft turns, an emf or a torque without K_m.
 TEST(BookSynchronousBenches, TheMotorOf93RunsAgainstItsFriction) {
   for (const double u_q : {3.0, 6.0}) {
     BookBench run("pm-9-3");
@@ -100,7 +100,7 @@ double voltage_v(const Sample& s) {
 
 // The bench wound-rotor as it is: the field current rises with L_F/R_F = 0.15 s to 40 V/40 ohm while the
 // prime mover comes up by 500 rad/s^2, and the open stator shows n_p w M i_F at 50 Hz; the field takes 40 W.
-// 1e-6, where all is steady. Kills: an excitation without its resistance, an open stator that carries
+// 1e-6, where all is steady. Catches: an excitation without its resistance, an open stator that carries
 // current, a prime mover that slips.
 TEST(BookSynchronousBenches, TheWoundRotorGeneratesItsOpenVoltage) {
   BookBench run("wound-rotor");
@@ -121,7 +121,7 @@ TEST(BookSynchronousBenches, TheWoundRotorGeneratesItsOpenVoltage) {
 // The contactor is closed at four different load angles, and the shaft keeps its synchronous speed: the
 // currents and the torque settle at I = (U - j w M i_F e)/(R_S + j w L_S) and tau w = Re(E I*), as a motor or
 // a generator, with the field current as before. 1e-4 of the short-circuit current, as the source is followed
-// in steps of 50 us. Kills: a contactor that stays open, synchronous reactance or emf of the wrong sign, a
+// in steps of 50 us. Catches: a contactor that stays open, synchronous reactance or emf of the wrong sign, a
 // power that is not delivered to the shaft.
 TEST(BookSynchronousBenches, TheWoundRotorOnTheLineFollowsItsPhasorDiagram) {
   double least_nm = 0.0;

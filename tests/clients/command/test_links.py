@@ -76,7 +76,7 @@ class Links(unittest.TestCase):
             self.assertEqual(server.verdict["ticks"], first["samples"] + second["first_tick"])
             return first, server.verdict["state_hash"], refused
 
-    # Catches a link that costs a tick, a count or a bit: float32 is float32 on CAN FD and on Modbus.
+    # Catches: a link that costs a tick, a count or a bit: float32 is float32 on CAN FD and on Modbus.
     def test_every_link_with_floats_gives_the_same_run(self):
         can, can_hash = self.hash_of_two_moves(*multicast("true"))
         _, slcan_hash = self.hash_of_two_moves(*slcan("true"))
@@ -88,13 +88,13 @@ class Links(unittest.TestCase):
         self.assertIsNone(can["peak_voltage_v"])
         self.assertEqual(over_modbus["angle_source"], "truth")
 
-    # Catches scaled integers that are read in other units than they were written in.
+    # Catches: scaled integers that are read in other units than they were written in.
     def test_classic_frames_give_the_same_run_on_every_bus(self):
         _, first = self.hash_of_two_moves(*multicast("false"))
         _, second = self.hash_of_two_moves(*slcan("false"))
         self.assertEqual(first, second)
 
-    # Catches two controllers of one axis, and an exit code of 0 for the one that was turned away.
+    # Catches: two controllers of one axis, and an exit code of 0 for the one that was turned away.
     def test_an_axis_that_is_taken_is_refused_on_every_link(self):
         for text, link_of in (multicast("true"), modbus()):
             with Server(text=text) as server, server.client() as owner:
@@ -103,7 +103,7 @@ class Links(unittest.TestCase):
                 self.assertEqual(done.returncode, 1, done.stderr)
                 self.assertIn("another session holds the lease of the axis", done.stderr)
 
-    # Catches a fault that is overlooked because the link has no names for it, and a clear that does nothing.
+    # Catches: a fault that is overlooked because the link has no names for it, and a clear that does nothing.
     def test_a_latched_fault_is_seen_and_cleared(self):
         for text, link_of in (multicast("true"), multicast("false"), modbus()):
             with Server(text=text) as server:
@@ -117,7 +117,7 @@ class Links(unittest.TestCase):
                 self.assertIn("--clear", done.stderr)
                 self.control(link_of(server), "--clear")
 
-    # Catches an option that a link cannot serve and that is passed over.
+    # Catches: an option that a link cannot serve and that is passed over.
     def test_what_a_link_cannot_do_is_refused(self):
         text, link_of = multicast("true")
         with Server(text=text) as server:
@@ -131,7 +131,7 @@ class Links(unittest.TestCase):
             self.assertEqual(done.returncode, 3)
             self.assertIn("agree on fd", done.stderr)
 
-    # Catches a trace that other programs cannot read, or that misses what the bench says.
+    # Catches: a trace that other programs cannot read, or that misses what the bench says.
     def test_can_log_writes_the_heartbeats(self):
         text, link_of = multicast("true")
         with Server(text=text) as server, tempfile.TemporaryDirectory() as folder:
@@ -143,7 +143,7 @@ class Links(unittest.TestCase):
             for line in lines:
                 self.assertRegex(line, r"^\(\d+\.\d{6}\) udp_multicast 701##1")
 
-    # Catches the last burst before a bus breaks, which is what one wants to see, lost with it.
+    # Catches: the last burst before a bus breaks, which is what one wants to see, lost with it.
     def test_can_log_keeps_what_came_before_the_bus_broke(self):
         with tempfile.TemporaryDirectory() as folder:
             out = pathlib.Path(folder) / "bus.log"
@@ -152,7 +152,7 @@ class Links(unittest.TestCase):
             self.assertIn("was closed", done.stderr)
             self.assertEqual(len(out.read_text(encoding="utf-8").splitlines()), 1000)
 
-    # Catches a trace that grows in memory as long as the bus is never silent.
+    # Catches: a trace that grows in memory as long as the bus is never silent.
     def test_can_log_writes_although_the_bus_is_never_silent(self):
         with tempfile.TemporaryDirectory() as folder:
             out = pathlib.Path(folder) / "bus.log"
@@ -177,7 +177,7 @@ class Links(unittest.TestCase):
             _, err = logging.communicate(timeout=PATIENCE_S)
             return subprocess.CompletedProcess(logging.args, logging.returncode, "", err)
 
-    # Catches a description that is not printed, or of another bench.
+    # Catches: a description that is not printed, or of another bench.
     def test_descriptions_of_interfaces(self):
         for arguments, part in ((["dbc", str(BENCHES / "servo-can.toml")], "BO_ "),
                                 (["can-table", str(BENCHES / "servo-can.toml")], "| "),
@@ -189,7 +189,7 @@ class Links(unittest.TestCase):
         self.assertEqual(run("dbc", str(BENCHES / "servo-can.toml"), "--bus", "2").returncode, 2)
         self.assertEqual(run("dbc", "no-such-bench").returncode, 2)
 
-    # Catches a status that keeps the other ways in to itself.
+    # Catches: a status that keeps the other ways in to itself.
     def test_status_tells_of_every_transport(self):
         text, link_of = multicast("true")
         text += "\n[modbus]\nport = 0\nallow_writes = true\n"
@@ -203,7 +203,7 @@ class Links(unittest.TestCase):
             self.assertEqual((modbus_["name"], modbus_["state"]), ("modbus " + server.ready["modbus"], "up"))
             self.assertRegex(run("status", "--link", link).stdout, r"(?m)^can udp_multicast:.*: up\n  sent \d+,")
 
-    # Catches a subcommand that --help does not list.
+    # Catches: a subcommand that --help does not list.
     def test_the_help_lists_every_interface_command(self):
         text = run("--help").stdout
         for name in ("dbc", "can-table", "modbus-map", "can-log", "can ", "export"):

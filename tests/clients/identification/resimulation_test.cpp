@@ -59,7 +59,7 @@ MeasuredData dc_data() {
 }
 
 // The plant's DC motor and the model with the same parameters differ by the edges of the square wave that the
-// interpolation of the voltage rounds: 0.2 % of the current (R + 10 %: 8 %). Kills: a sign of the emf, a
+// interpolation of the voltage rounds: 0.2 % of the current (R + 10 %: 8 %). Catches: a sign of the emf, a
 // voltage that is half a period off, a friction that drives.
 TEST(Resimulation, ADcMotorWithItsTrueParametersDoesWhatItDid) {
   const MeasuredData data = dc_data();
@@ -77,7 +77,7 @@ TEST(Resimulation, ADcMotorWithItsTrueParametersDoesWhatItDid) {
   EXPECT_GT(worst_fit(resimulate(data, e, result_of("pm_dc", wrong))), 0.02);
 }
 
-// The fit numbers are those of the book: rms of the difference, and over the rms about the mean. Kills: a
+// The fit numbers are those of the book: rms of the difference, and over the rms about the mean. Catches: a
 // norm about zero, which flatters signals with a mean.
 TEST(Resimulation, TheFitIsMeasuredAboutTheMean) {
   const Resimulation r = resimulate(dc_data(), exact(MotorKind::kDc, 1, 0.0, false), result_of("pm_dc", kDc));
@@ -97,8 +97,8 @@ TEST(Resimulation, TheFitIsMeasuredAboutTheMean) {
 }
 
 // The start of 8.5.5 with the true parameters, all 0.2 s from standstill: 0.1 %. From its middle on, where
-// the flux is what (8.123) makes of the signals: 1 %. Kills: a flux with the wrong sign or frame, a load that
-// helps, a voltage of the tick before in the place of the sample's.
+// the flux is what (8.123) makes of the signals: 1 %. Catches: a flux with the wrong sign or frame, a load
+// that helps, a voltage of the tick before in the place of the sample's.
 TEST(Resimulation, AnInductionMotorRunsFromStandstillAndFromTheMiddle) {
   BenchConfig config = bench_config("im-8-5-5");
   BookBench run(config);
@@ -126,7 +126,7 @@ TEST(Resimulation, AnInductionMotorRunsFromStandstillAndFromTheMiddle) {
   EXPECT_LT(worst_fit(half), 1e-2);
 }
 
-// The PM motor of 9.3, driven both ways through its friction in dq, true angle: 0.3 %. Kills: a frame that
+// The PM motor of 9.3, driven both ways through its friction in dq, true angle: 0.3 %. Catches: a frame that
 // turns the wrong way, friction that drives after a change of direction, cross-coupling with one sign twice.
 TEST(Resimulation, APmMotorRunsBothWaysThroughItsFriction) {
   BenchConfig config = bench_config("pm-9-3");
@@ -151,8 +151,8 @@ TEST(Resimulation, APmMotorRunsBothWaysThroughItsFriction) {
   EXPECT_LT(worst_fit(r), 3e-3);
 }
 
-// The brushless motor on voltages that follow it, held for 0.1 ms: 1 %, what interpolating them costs. Kills:
-// the sign of e, one phase's emf in another.
+// The brushless motor on voltages that follow it, held for 0.1 ms: 1 %, what interpolating them costs.
+// Catches: the sign of e, one phase's emf in another.
 TEST(Resimulation, ABrushlessMotorRunsOnVoltagesThatFollowIt) {
   BenchConfig config = bench_config("bldc-servo");
   config.setup.axes[0].parameters.drive.kind = DriveKind::kVoltage;
@@ -173,7 +173,7 @@ TEST(Resimulation, ABrushlessMotorRunsOnVoltagesThatFollowIt) {
   EXPECT_LT(worst_fit(r), 1e-2);
 }
 
-// Kills: a picture of nonsense where the data did not show the motor, and a run that never ends.
+// Catches: a picture of nonsense where the data did not show the motor, and a run that never ends.
 TEST(Resimulation, WhatIsNoMotorIsRefused) {
   const MeasuredData data = dc_data();
   const Settings e = exact(MotorKind::kDc, 1, 0.5, false);

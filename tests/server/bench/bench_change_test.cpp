@@ -31,7 +31,7 @@ double resistance_of(const Bench& bench) {
 
 // ---- ramps ----
 
-// Kills: a ramp that starts early, jumps at its end, is not linear, or starts from the value at submission.
+// Catches: a ramp that starts early, jumps at its end, is not linear, or starts from the value at submission.
 TEST(BenchRamp, IsLinearFromThePresentValueAndEndsExactly) {
   Bench bench(servo_setup());
   submit(bench, write(kResistance, 4.9), 3);
@@ -48,7 +48,7 @@ TEST(BenchRamp, IsLinearFromThePresentValueAndEndsExactly) {
                                        from + way * 0.75, 5.9, 5.9, 5.9}));
 }
 
-// Kills: a parameter with two ramps at a time, or a step that the old ramp undoes.
+// Catches: a parameter with two ramps at a time, or a step that the old ramp undoes.
 TEST(BenchRamp, ANewWriteTakesThePlaceOfTheRamp) {
   Bench bench(servo_setup());
   submit(bench, write(kResistance, 11.9, 8));
@@ -77,7 +77,7 @@ std::vector<std::uint32_t> live_rows() {
   return rows;
 }
 
-// Kills: a seventeenth ramp that overwrites memory or another ramp; room that is never given back; ramps of
+// Catches: a seventeenth ramp that overwrites memory or another ramp; room that is never given back; ramps of
 // one axis that take the room of another.
 TEST(BenchRamp, SixteenAtATimeOfAnAxis) {
   BenchSetup setup = servo_setup();
@@ -101,8 +101,8 @@ TEST(BenchRamp, SixteenAtATimeOfAnAxis) {
   EXPECT_EQ(bench.sample(0).refused_commands, 0u) << "the answer tells of it";
 }
 
-// Static friction may not be below Coulomb friction. Kills: a rule that only the first value of a ramp keeps,
-// a rule that stops all other ramps too, a scheduled write whose refusal leaves no trace.
+// Static friction may not be below Coulomb friction. Catches: a rule that only the first value of a ramp
+// keeps, a rule that stops all other ramps too, a scheduled write whose refusal leaves no trace.
 TEST(BenchRamp, StopsWhereItWouldBreakARule) {
   Bench bench(servo_setup());
   submit(bench, write("mechanics.static_friction_nm", 0.02));
@@ -119,7 +119,7 @@ TEST(BenchRamp, StopsWhereItWouldBreakARule) {
   EXPECT_EQ(bench.sample(0).refused_commands, 2u);
 }
 
-// Kills: values that make the plant diverge, rows from a damaged file that read past the table, an integer
+// Catches: values that make the plant diverge, rows from a damaged file that read past the table, an integer
 // that goes through a half.
 TEST(BenchRamp, HostileWritesAreRefused) {
   Bench bench(servo_setup());
@@ -142,7 +142,7 @@ TEST(BenchRamp, HostileWritesAreRefused) {
   EXPECT_EQ(bench.sample(0).faults, 0u);
 }
 
-// Kills: a change that is not counted, or that is counted without end.
+// Catches: a change that is not counted, or that is counted without end.
 TEST(BenchRamp, ChangesAreCounted) {
   Bench bench(servo_setup());
   const std::uint64_t start = bench.parameter_changes(0);
@@ -157,7 +157,7 @@ TEST(BenchRamp, ChangesAreCounted) {
 
 // ---- faults and bumps ----
 
-// Kills: a fault that acts on another row, early, on another axis, or that does not go away.
+// Catches: a fault that acts on another row, early, on another axis, or that does not go away.
 TEST(BenchFault, IsInForceFromItsTickToItsEnd) {
   BenchSetup setup = servo_setup();
   setup.axes.push_back(setup.axes[0]);
@@ -172,7 +172,7 @@ TEST(BenchFault, IsInForceFromItsTickToItsEnd) {
   }
 }
 
-// Kills: a row or value from a damaged file that is believed.
+// Catches: a row or value from a damaged file that is believed.
 TEST(BenchFault, HostileFaultsAndBumpsAreRefused) {
   Bench bench(servo_setup());
   EXPECT_EQ(submit(bench, InjectFault{.row = kInjectableFaultCount, .value = 1.0}), Refused::kOutOfRange);
@@ -190,7 +190,7 @@ TEST(BenchFault, HostileFaultsAndBumpsAreRefused) {
   EXPECT_EQ(bench.sample(0).refused_commands, 1u);
 }
 
-// J w = impulse; what is left after a tick of viscous friction is 1 - 1.6e-4 of it. Kills: a bump that is
+// J w = impulse; what is left after a tick of viscous friction is 1 - 1.6e-4 of it. Catches: a bump that is
 // lost, doubled or has the wrong sign.
 TEST(BenchBump, ChangesTheSpeedByItsImpulse) {
   Bench bench(servo_setup());
@@ -201,7 +201,7 @@ TEST(BenchBump, ChangesTheSpeedByItsImpulse) {
   EXPECT_NEAR(bench.sample(0).speed_rad_s, -2.0, 1e-3);
 }
 
-// The answers go on, so that a controller in lockstep is not stopped; only the drive gets nothing. Kills: a
+// The answers go on, so that a controller in lockstep is not stopped; only the drive gets nothing. Catches: a
 // lost command that feeds the watchdog or reaches the plant, a lease that runs out although its holder talks,
 // a bench that stops.
 TEST(BenchFault, CMD_02_CommandLossKeepsCommandsFromTheDriveAndTheWatchdogSeesIt) {
@@ -233,7 +233,7 @@ TEST(BenchFault, CMD_02_CommandLossKeepsCommandsFromTheDriveAndTheWatchdogSeesIt
   EXPECT_EQ(bench.sample(0).u_a_v, 9.0);
 }
 
-// Kills: a copy that feeds the watchdog, that reaches the drive after a newer command, or that is not
+// Catches: a copy that feeds the watchdog, that reaches the drive after a newer command, or that is not
 // counted; an axis that is armed by a link which sends each command twice.
 TEST(BenchFault, CMD_06_CopiesThatTheLinkMakesAreRefusedAndCounted) {
   BenchSetup setup = servo_setup();
@@ -283,7 +283,7 @@ Command amperes(Tick answers, PhaseValues i) {
   return {.answers = answers, .phases = {.gates = Gates::kCurrent, .setpoint = i}};
 }
 
-// Kills: currents that a voltage amplifier takes for volts; a refusal that is not counted.
+// Catches: currents that a voltage amplifier takes for volts; a refusal that is not counted.
 TEST(BenchSetpoint, CurrentsAreForCurrentAmplifiersOnly) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   const Command command = amperes(0, {.a = 1.0});
@@ -304,7 +304,7 @@ TEST(BenchSetpoint, CurrentsAreForCurrentAmplifiersOnly) {
   EXPECT_NEAR(current.sample(0).true_i_b_a, 0.0, 0.05);
 }
 
-// Kills: a check of two set-points of the four.
+// Catches: a check of two set-points of the four.
 TEST(BenchSetpoint, AllFourMustBeFinite) {
   Bench bench = owned_bench(current_setup(), kOwner);
   for (double PhaseValues::*member :
@@ -337,8 +337,8 @@ void turn(Bench& bench, std::uint32_t axis, double amplitude_v) {
                                              amplitude_v * std::sin(angle))});
 }
 
-// Kills: a second axis that stands still, turns on its own, or is advanced twice; a bump or a load on it that
-// moves neither.
+// Catches: a second axis that stands still, turns on its own, or is advanced twice; a bump or a load on it
+// that moves neither.
 TEST(BenchSharedShaft, BothAxesTurnAsOne) {
   Bench bench(dynamometer());
   submit_lease(bench, LeaseAction::kAcquire, kOwner);
@@ -365,7 +365,7 @@ TEST(BenchSharedShaft, BothAxesTurnAsOne) {
 }
 
 // The second rotor turns with the output of a gear of ratio 4, whose inertia is 16 times that of the rotor.
-// Kills: a blow on the second axis that lands on the rotor of the first, a blocked rotor there that turns.
+// Catches: a blow on the second axis that lands on the rotor of the first, a blocked rotor there that turns.
 TEST(BenchSharedShaft, ABlowAndALockOnTheSecondAxisActAtTheOutput) {
   BenchSetup setup = dynamometer();
   setup.axes[0].parameters.mechanics.gear_ratio = 4.0;
@@ -381,7 +381,7 @@ TEST(BenchSharedShaft, ABlowAndALockOnTheSecondAxisActAtTheOutput) {
   EXPECT_EQ(bench.sample(1).speed_rad_s, 0.0);
 }
 
-// Kills: a state of the pair that is not saved, a state of two free axes that is taken for it.
+// Catches: a state of the pair that is not saved, a state of two free axes that is taken for it.
 TEST(BenchSharedShaft, IsSavedAndRestored) {
   Bench original(dynamometer());
   submit_lease(original, LeaseAction::kAcquire, kOwner);

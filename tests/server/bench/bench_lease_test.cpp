@@ -11,8 +11,8 @@ namespace {
 constexpr Owner kOwner = 7;
 constexpr Owner kOther = 8;
 
-// Last command in tick 10, watchdog of 5: held in ticks 11 to 14, safe from tick 15 on. Kills: an off-by-one,
-// a fault that clears itself, a hold at zero volts.
+// Last command in tick 10, watchdog of 5: held in ticks 11 to 14, safe from tick 15 on. Catches: an
+// off-by-one, a fault that clears itself, a hold at zero volts.
 TEST(BenchLease, CMD_02_LIMIT_07_TheWatchdogActsExactlyItsTicksAfterTheLastCommand) {
   for (const SafeAction action : {SafeAction::kFreewheel, SafeAction::kZeroVoltage}) {
     for (const int delay : {0, 1}) {
@@ -43,7 +43,8 @@ TEST(BenchLease, CMD_02_LIMIT_07_TheWatchdogActsExactlyItsTicksAfterTheLastComma
   }
 }
 
-// Kills: a latch that commands, other clients or time can undo; a clear that leaves the old voltage in force.
+// Catches: a latch that commands, other clients or time can undo; a clear that leaves the old voltage in
+// force.
 TEST(BenchLease, CMD_03_CMD_04_ATimeoutIsLatchedUntilItsOwnerClearsIt) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 3;
@@ -71,7 +72,7 @@ TEST(BenchLease, CMD_03_CMD_04_ATimeoutIsLatchedUntilItsOwnerClearsIt) {
   EXPECT_EQ(bench.sample(0).faults, 0u);  // the silence counts from the new command
 }
 
-// Kills: late ticks that starve the watchdog, or that reset it.
+// Catches: late ticks that starve the watchdog, or that reset it.
 TEST(BenchLease, OS_05_LateTicksNeitherFeedNorStarveTheWatchdog) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 4;
@@ -92,7 +93,7 @@ TEST(BenchLease, OS_05_LateTicksNeitherFeedNorStarveTheWatchdog) {
   EXPECT_EQ(bench.sample(0).faults, kCommandTimeout);
 }
 
-// Kills: an axis without commands that times out all the same.
+// Catches: an axis without commands that times out all the same.
 TEST(BenchLease, AnOwnerThatNeverCommandedIsIdleNotTimedOut) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   step(bench, 500);
@@ -101,7 +102,7 @@ TEST(BenchLease, AnOwnerThatNeverCommandedIsIdleNotTimedOut) {
   EXPECT_EQ(bench.sample(0).owner, kOwner);
 }
 
-// Kills: a second writer, commands without a lease, a lease for owner 0.
+// Catches: a second writer, commands without a lease, a lease for owner 0.
 TEST(BenchLease, OWN_01_OWN_02_OnlyTheOwnerCommands) {
   Bench bench(servo_setup());
   EXPECT_EQ(submit_volts(bench, kOwner, 1.0), Refused::kNotOwner);
@@ -122,8 +123,8 @@ TEST(BenchLease, OWN_01_OWN_02_OnlyTheOwnerCommands) {
   EXPECT_EQ(bench.sample(0).refused_commands, 3u);
 }
 
-// Acquired at tick 0, renewed at 60, lease of 100: the owner of tick 159, not of 160. Kills: an off-by-one, a
-// renewal that is ignored, an expiry without its fault.
+// Acquired at tick 0, renewed at 60, lease of 100: the owner of tick 159, not of 160. Catches: an off-by-one,
+// a renewal that is ignored, an expiry without its fault.
 TEST(BenchLease, OWN_03_LIMIT_08_ALeaseExpiresExactlyItsTicksAfterItsLastRenewal) {
   for (const bool by_command : {false, true}) {
     BenchSetup setup = servo_setup();
@@ -151,7 +152,7 @@ TEST(BenchLease, OWN_03_LIMIT_08_ALeaseExpiresExactlyItsTicksAfterItsLastRenewal
   }
 }
 
-// Kills: an idle owner that leaves a fault behind, a lease that refused commands keep alive.
+// Catches: an idle owner that leaves a fault behind, a lease that refused commands keep alive.
 TEST(BenchLease, AnUnusedLeaseEndsWithoutAFault) {
   BenchSetup setup = servo_setup();
   setup.lease_ticks = 50;
@@ -165,7 +166,8 @@ TEST(BenchLease, AnUnusedLeaseEndsWithoutAFault) {
   EXPECT_EQ(state_of(bench), ControlState::kIdle);
 }
 
-// Kills: a release that is a fault, a lost session that is none, a voltage that stays in force after either.
+// Catches: a release that is a fault, a lost session that is none, a voltage that stays in force after
+// either.
 TEST(BenchLease, AReleaseIsNoFaultALostControllerIsOne) {
   for (const LeaseAction action : {LeaseAction::kRelease, LeaseAction::kLost}) {
     Bench bench = owned_bench(servo_setup(), kOwner);
@@ -181,7 +183,7 @@ TEST(BenchLease, AReleaseIsNoFaultALostControllerIsOne) {
   }
 }
 
-// Kills: a run that ends with voltage on the motor, a lease that outlives the run, a tick of safe action
+// Catches: a run that ends with voltage on the motor, a lease that outlives the run, a tick of safe action
 // on a bench without a controller.
 TEST(BenchLease, DismissingTheControllersEndsTheRunWithATickOfSafeAction) {
   BenchSetup setup = servo_setup();
@@ -198,7 +200,7 @@ TEST(BenchLease, DismissingTheControllersEndsTheRunWithATickOfSafeAction) {
   EXPECT_EQ(bench.tick(), 2);
 }
 
-// Kills: a load scheduled by one controller that hits the next one, and loads of the configuration that go
+// Catches: a load scheduled by one controller that hits the next one, and loads of the configuration that go
 // with the first.
 TEST(BenchLease, TheScheduleOfAControllerEndsWithItsLease) {
   Bench bench = owned_bench(servo_setup(), kOwner);
@@ -211,7 +213,7 @@ TEST(BenchLease, TheScheduleOfAControllerEndsWithItsLease) {
   EXPECT_EQ(bench.sample(0).load_nm, 0.25);
 }
 
-// A recording may hold such an input. Kills: a schedule that is shortened by what it is running, and
+// A recording may hold such an input. Catches: a schedule that is shortened by what it is running, and
 // a count below zero.
 TEST(BenchLease, AScheduledReleaseTakesTheRestOfItsOwnersScheduleAlong) {
   Bench bench = owned_bench(servo_setup(), kOwner);
@@ -231,7 +233,7 @@ TEST(BenchLease, AScheduledReleaseTakesTheRestOfItsOwnersScheduleAlong) {
 }
 
 // In lockstep time passes only with commands: a controller must be able to watch the motor run down after a
-// trip. Kills: gates that a latched axis lets through, and a latched axis whose time stands still.
+// trip. Catches: gates that a latched axis lets through, and a latched axis whose time stands still.
 TEST(BenchLease, ALatchedAxisTakesOnlyCommandsWithTheGatesOff) {
   BenchSetup setup = servo_setup();
   setup.watchdog_ticks = 2;

@@ -62,7 +62,7 @@ bool same_samples(const Bench& a, const Bench& b) {
 }
 
 // The tick of the save lies within a load ramp and a parameter ramp, before scheduled inputs, under a fault
-// and after a live write. Kills: any piece of state that is not saved, and any that depends on the past of
+// and after a live write. Catches: any piece of state that is not saved, and any that depends on the past of
 // the process.
 TEST(BenchState, DET_05_ARestoredBenchContinuesBitForBitForAMillionTicks) {
   Bench original(rich_setup());
@@ -103,7 +103,7 @@ TEST(BenchState, DET_05_ARestoredBenchContinuesBitForBitForAMillionTicks) {
   EXPECT_EQ(copy.sample(0).faults & kDiverged, 0u);
 }
 
-// Kills: a latched fault, a held command or a half-spent watchdog that a restore forgets.
+// Catches: a latched fault, a held command or a half-spent watchdog that a restore forgets.
 TEST(BenchState, DET_05_SilenceAndFaultsAreRestoredToo) {
   BenchSetup setup = servo_setup(1);
   setup.watchdog_ticks = 10;
@@ -124,8 +124,8 @@ TEST(BenchState, DET_05_SilenceAndFaultsAreRestoredToo) {
   }
 }
 
-// One bit of every byte, and every kind of wrong length. Kills: a part of the state that the digest does not
-// cover, a restore that has already begun when it notices.
+// One bit of every byte, and every kind of wrong length. Catches: a part of the state that the digest does
+// not cover, a restore that has already begun when it notices.
 TEST(BenchState, DamagedBytesAreRefusedAndChangeNothing) {
   Bench original(rich_setup());
   run_to(original, 300);
@@ -149,7 +149,7 @@ TEST(BenchState, DamagedBytesAreRefusedAndChangeNothing) {
   EXPECT_TRUE(other.restore(saved));
 }
 
-// Kills: a state that is taken for that of a bench with another motor, timing or seed.
+// Catches: a state that is taken for that of a bench with another motor, timing or seed.
 TEST(BenchState, AStateOfAnotherSetupIsRefused) {
   Bench original(rich_setup());
   run_to(original, 300);
@@ -179,7 +179,7 @@ TEST(BenchState, AStateOfAnotherSetupIsRefused) {
   }
 }
 
-// Kills: anything random, uninitialised or dependent on an address in a run; a hash that forgets the past.
+// Catches: anything random, uninitialised or dependent on an address in a run; a hash that forgets the past.
 TEST(BenchState, TheSameInputsGiveTheSameHashAndOneBitAnother) {
   const std::uint64_t hash = hash_at(rich_setup(), 3000);
   EXPECT_EQ(hash_at(rich_setup(), 3000), hash);
@@ -188,8 +188,8 @@ TEST(BenchState, TheSameInputsGiveTheSameHashAndOneBitAnother) {
   EXPECT_NE(hash_at(rich_setup(), 3000, one_bit), hash);
 }
 
-// An input that came and left no trace in the present state is still in the samples so far. Kills: a hash of
-// the present state only.
+// An input that came and left no trace in the present state is still in the samples so far. Catches: a hash
+// of the present state only.
 TEST(BenchState, TheHashCoversThePast) {
   Bench a(servo_setup());
   Bench b(servo_setup());
@@ -205,7 +205,7 @@ TEST(BenchState, TheHashCoversThePast) {
   EXPECT_NE(a.state_hash(), scheduled.state_hash());
 }
 
-// Kills: noise that is on where it is not asked for, and a seed that does not reach it.
+// Catches: noise that is on where it is not asked for, and a seed that does not reach it.
 TEST(BenchState, TheSeedMattersOnlyWhereThereIsNoise) {
   for (const bool noise : {false, true}) {
     BenchSetup setup = rich_setup();
@@ -216,7 +216,7 @@ TEST(BenchState, TheSeedMattersOnlyWhereThereIsNoise) {
   }
 }
 
-// Kills: a digest that is blind to order, to zeros, to a lane or to the length.
+// Catches: a digest that is blind to order, to zeros, to a lane or to the length.
 TEST(Digest, EveryBitAndTheOrderCount) {
   const auto digest_of = [](const std::vector<std::uint64_t>& words) {
     Digest digest;

@@ -15,7 +15,7 @@ namespace {
 constexpr Owner kOwner = 7;
 constexpr Owner kOther = 8;
 
-// Kills: a command that acts a tick early or late, a sample that names the wrong command or age.
+// Catches: a command that acts a tick early or late, a sample that names the wrong command or age.
 TEST(Bench, TheCommandDelayIsExactlyItsTicks) {
   for (const int delay : {0, 1}) {
     Bench bench = owned_bench(servo_setup(delay), kOwner);
@@ -36,7 +36,7 @@ TEST(Bench, TheCommandDelayIsExactlyItsTicks) {
   }
 }
 
-// Kills: a freewheeling tick between the safe action and the first command of a delayed bench.
+// Catches: a freewheeling tick between the safe action and the first command of a delayed bench.
 TEST(Bench, TheSafeActionLastsUntilTheFirstCommandIsInForce) {
   BenchSetup setup = servo_setup(1);
   setup.axes[0].on_link_loss = SafeAction::kZeroVoltage;
@@ -57,8 +57,8 @@ TEST(Bench, TheSafeActionLastsUntilTheFirstCommandIsInForce) {
   EXPECT_EQ(bench.sample(0).u_a_v, 4.0);
 }
 
-// Kills: the newest answer overtaken by an older one, a tick whose command can be replaced, answers from the
-// future.
+// Catches: the newest answer overtaken by an older one, a tick whose command can be replaced, answers from
+// the future.
 TEST(Bench, CMD_06_CMD_07_StaleDuplicateAndFutureAnswersAreRefusedAndCounted) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   step(bench, 10);
@@ -77,7 +77,7 @@ TEST(Bench, CMD_06_CMD_07_StaleDuplicateAndFutureAnswersAreRefusedAndCounted) {
   EXPECT_EQ(bench.sample(0).refused_commands, 4u);
 }
 
-// Kills: NaN in the plant, a refusal that is not counted or that feeds the watchdog or the lease.
+// Catches: NaN in the plant, a refusal that is not counted or that feeds the watchdog or the lease.
 TEST(Bench, CMD_11_CMD_12_ACommandThatIsNotFiniteNeverReachesThePlant) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   Bench silent = owned_bench(servo_setup(), kOwner);
@@ -104,7 +104,7 @@ TEST(Bench, CMD_11_CMD_12_ACommandThatIsNotFiniteNeverReachesThePlant) {
   EXPECT_EQ(bench.sample(0).refused_commands, 5u);
 }
 
-// Kills: a load that makes the plant diverge.
+// Catches: a load that makes the plant diverge.
 TEST(Bench, ALoadThatIsNotFiniteIsRefused) {
   Bench bench(servo_setup());
   const LoadChange load{.load_nm = std::numeric_limits<double>::quiet_NaN(), .ramp_ticks = 0};
@@ -113,7 +113,7 @@ TEST(Bench, ALoadThatIsNotFiniteIsRefused) {
   EXPECT_EQ(bench.sample(0).faults, 0u);
 }
 
-// Kills: an overrun that some axes survive, or that goes away.
+// Catches: an overrun that some axes survive, or that goes away.
 TEST(Bench, AnOverrunLatchesEveryAxis) {
   BenchSetup setup = servo_setup();
   setup.axes.push_back(setup.axes[0]);
@@ -134,7 +134,7 @@ TEST(Bench, AnOverrunLatchesEveryAxis) {
   EXPECT_EQ(bench.sample(1).faults, kBenchOverrun);
 }
 
-// Kills: a trip whose state the sample does not show, or that a command undoes.
+// Catches: a trip whose state the sample does not show, or that a command undoes.
 TEST(Bench, AnOverCurrentTripIsAFaultUntilCleared) {
   BenchSetup setup = servo_setup();
   setup.axes[0].parameters.drive.amplifier.over_current_a = 1.0;
@@ -158,7 +158,7 @@ Refused submit_load(Bench& bench, Tick tick, double load_nm, Tick ramp_ticks = 0
   return bench.submit({.tick = tick, .axis = 0, .owner = 0, .action = load});
 }
 
-// Kills: an input that acts a tick early or late, or in the order of arrival in place of that of the ticks.
+// Catches: an input that acts a tick early or late, or in the order of arrival in place of that of the ticks.
 TEST(Bench, ScheduledInputsActAtTheirTickInOrder) {
   Bench bench(servo_setup());
   submit_load(bench, 30, 0.3);
@@ -177,7 +177,7 @@ TEST(Bench, ScheduledInputsActAtTheirTickInOrder) {
   }
 }
 
-// Kills: a queue that grows, overwrites or forgets to make room.
+// Catches: a queue that grows, overwrites or forgets to make room.
 TEST(Bench, TheScheduleIsBoundedAndMakesRoomAgain) {
   Bench bench(servo_setup());
   for (std::size_t i = 0; i < Bench::kMaxScheduled; ++i) {
@@ -194,7 +194,7 @@ TEST(Bench, TheScheduleIsBoundedAndMakesRoomAgain) {
   EXPECT_EQ(bench.sample(0).load_nm, 0.7);
 }
 
-// Kills: a parameter write that acts at submission, on another row, or not at all.
+// Catches: a parameter write that acts at submission, on another row, or not at all.
 TEST(Bench, AParameterWriteActsAtItsTick) {
   Bench bench(servo_setup());
   const std::string name = "machine.rotor_resistance_ohm";
@@ -213,7 +213,7 @@ class Listener final : public BenchObserver {
   std::vector<std::pair<std::uint32_t, std::uint64_t>> samples;
 };
 
-// Kills: samples or inputs that the recorder does not see, or sees twice; a late input with its old tick.
+// Catches: samples or inputs that the recorder does not see, or sees twice; a late input with its old tick.
 TEST(Bench, TheObserverSeesEveryInputWithItsTickAndEverySample) {
   Listener listener;
   BenchSetup setup = servo_setup();

@@ -48,7 +48,7 @@ Refused submit(Bench& bench, const Action& action) {
   return bench.submit({.tick = bench.tick(), .axis = 0, .owner = kOwner, .action = action});
 }
 
-// Kills: a solver that gains energy under what is legal, however brutal, and a loss that never ends.
+// Catches: a solver that gains energy under what is legal, however brutal, and a loss that never ends.
 TEST(BrutalPlant, CMD_15_AMillionStepsOfEachStayFinite) {
   Bench turning = running_bench();
   ASSERT_GT(turning.sample(0).speed_rad_s, 100.0);

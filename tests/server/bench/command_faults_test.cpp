@@ -29,7 +29,7 @@ std::uint64_t bits(double value) {
   return std::bit_cast<std::uint64_t>(value);
 }
 
-// Kills: a loss that changes the voltage, that is counted wrongly, or that must be cleared.
+// Catches: a loss that changes the voltage, that is counted wrongly, or that must be cleared.
 TEST(CommandFaults, CMD_01_LostCommandsHoldTheVoltageAndTheStreamGoesOn) {
   Bench bench = owned_bench(watched_setup(), kOwner);
   std::uint64_t missed = 0;
@@ -49,8 +49,8 @@ TEST(CommandFaults, CMD_01_LostCommandsHoldTheVoltageAndTheStreamGoesOn) {
   }
 }
 
-// Kills: a late command that is thrown away, waits for a tick of its own or acts twice; the older one of two
-// that wins.
+// Catches: a late command that is thrown away, waits for a tick of its own or acts twice; the older one of
+// two that wins.
 TEST(CommandFaults, CMD_05_ALateCommandActsInTheNextTickAndTheNewestWins) {
   Bench bench = owned_bench(watched_setup(), kOwner);
   ASSERT_EQ(submit_answer(bench, 0, 1.0), Refused::kNot);
@@ -69,7 +69,7 @@ TEST(CommandFaults, CMD_05_ALateCommandActsInTheNextTickAndTheNewestWins) {
   EXPECT_EQ(state_of(bench), ControlState::kHold) << "none is left over for this tick";
 }
 
-// Kills: a stuck sender that keeps the axis alive by repeating one command.
+// Catches: a stuck sender that keeps the axis alive by repeating one command.
 TEST(CommandFaults, CMD_06_CMD_08_ARepeatedCommandFeedsNoWatchdog) {
   Bench bench = owned_bench(watched_setup(), kOwner);
   ASSERT_EQ(submit_answer(bench, 0, 1.0), Refused::kNot);
@@ -85,7 +85,7 @@ TEST(CommandFaults, CMD_06_CMD_08_ARepeatedCommandFeedsNoWatchdog) {
   EXPECT_EQ(bench.sample(0).refused_commands, static_cast<std::uint64_t>(kWatchdog));
 }
 
-// Kills: a controller that holds its voltage and is taken for dead.
+// Catches: a controller that holds its voltage and is taken for dead.
 TEST(CommandFaults, CMD_08_ASteadyVoltageWithARunningCounterIsACommand) {
   Bench bench = owned_bench(watched_setup(), kOwner);
   for (Tick i = 0; i < 10 * kWatchdog; ++i) {
@@ -96,7 +96,7 @@ TEST(CommandFaults, CMD_08_ASteadyVoltageWithARunningCounterIsACommand) {
   EXPECT_EQ(bench.sample(0).missed_commands, 0u);
 }
 
-// Kills: an old command that undoes a newer one, however far it was overtaken.
+// Catches: an old command that undoes a newer one, however far it was overtaken.
 TEST(CommandFaults, CMD_07_OvertakenCommandsAreDroppedAndCounted) {
   for (Tick distance = 1; distance <= 8; ++distance) {
     Bench bench = owned_bench(watched_setup(), kOwner);
@@ -109,7 +109,7 @@ TEST(CommandFaults, CMD_07_OvertakenCommandsAreDroppedAndCounted) {
   }
 }
 
-// Kills: a queue of old commands that is played back, or a burst that leaves something behind.
+// Catches: a queue of old commands that is played back, or a burst that leaves something behind.
 TEST(CommandFaults, CMD_09_CMD_10_OfABurstTheNewestActsOnce) {
   for (const int delay : {0, 1}) {
     BenchSetup setup = watched_setup(delay);
@@ -130,8 +130,8 @@ TEST(CommandFaults, CMD_09_CMD_10_OfABurstTheNewestActsOnce) {
   }
 }
 
-// Kills: one setpoint of the four that is not looked at; a refusal that changes what is in force or feeds the
-// watchdog; a check that takes a negative zero or a denormal for wrong, or flushes it.
+// Catches: one setpoint of the four that is not looked at; a refusal that changes what is in force or feeds
+// the watchdog; a check that takes a negative zero or a denormal for wrong, or flushes it.
 TEST(CommandFaults, CMD_11_EveryFieldIsCheckedAndLegalOdditiesPass) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (double PhaseValues::*field :

@@ -17,7 +17,7 @@ BenchSetup limited_setup(OnExcess on_excess, double slew_per_s) {
   return setup;
 }
 
-// Kills: a finite accident (1e308) that passes for a voltage, a limit that refuses itself.
+// Catches: a finite accident (1e308) that passes for a voltage, a limit that refuses itself.
 TEST(CommandRules, CMD_11_NumbersBeyondEveryDriveAreRefusedByEveryAxis) {
   for (double PhaseValues::*field :
        {&PhaseValues::a, &PhaseValues::b, &PhaseValues::c, &PhaseValues::field}) {
@@ -34,7 +34,7 @@ TEST(CommandRules, CMD_11_NumbersBeyondEveryDriveAreRefusedByEveryAxis) {
   }
 }
 
-// Kills: an excess that is limited where it should be refused, a refusal that feeds the watchdog, a limit
+// Catches: an excess that is limited where it should be refused, a refusal that feeds the watchdog, a limit
 // that is not the drive's.
 TEST(CommandRules, CMD_13_VoltageBeyondTheLinkIsLimitedOrRefusedAsConfigured) {
   Bench limiting = owned_bench(limited_setup(OnExcess::kSaturate, 0.0), kOwner);
@@ -53,8 +53,8 @@ TEST(CommandRules, CMD_13_VoltageBeyondTheLinkIsLimitedOrRefusedAsConfigured) {
   EXPECT_EQ(refusing.sample(0).faults, 0u);
 }
 
-// 8000 V/s are 1 V in a tick of 125 us. Kills: a step that gets through, a limit per second taken for one per
-// tick, a flag that stays, a refused step that bars the next command.
+// 8000 V/s are 1 V in a tick of 125 us. Catches: a step that gets through, a limit per second taken for one
+// per tick, a flag that stays, a refused step that bars the next command.
 TEST(CommandRules, CMD_13_AStepBeyondTheSlewRateIsSlowedOrRefusedAsConfigured) {
   Bench slowing = owned_bench(limited_setup(OnExcess::kSaturate, 8000.0), kOwner);
   for (int i = 1; i <= 4; ++i) {
@@ -86,9 +86,9 @@ TEST(CommandRules, CMD_13_AStepBeyondTheSlewRateIsSlowedOrRefusedAsConfigured) {
   EXPECT_EQ(ramped.sample(0).u_a_v, 10.0);
 }
 
-// The limit counts from what drives the axis, and without a controller that is its safe action. Kills: a next
-// controller that asks for 0 V and gets the voltage of the one before; one that gets its whole set-point in a
-// tick because the one before had it.
+// The limit counts from what drives the axis, and without a controller that is its safe action. Catches: a
+// next controller that asks for 0 V and gets the voltage of the one before; one that gets its whole set-point
+// in a tick because the one before had it.
 TEST(CommandRules, CMD_13_TheSlewLimitCountsFromTheSafeAction) {
   struct Case {
     SafeAction action;

@@ -60,7 +60,7 @@ struct Reference {
   }
 };
 
-// Kills: any state, count or voltage that depends on more than which commands came in which tick.
+// Catches: any state, count or voltage that depends on more than which commands came in which tick.
 TEST(ControlStates, STATE_01_AgreeWithTheReferenceInEveryPatternOfLosses) {
   std::mt19937_64 random(19);
   const auto chance = [&random](double p) { return std::bernoulli_distribution(p)(random); };

@@ -31,7 +31,7 @@ std::vector<Input> one_of_each() {
           input_with(ShaftBump{.impulse_nms = -1e-3})};
 }
 
-// Kills: a field that packing loses, exchanges or narrows; a kind without its pair of functions.
+// Catches: a field that packing loses, exchanges or narrows; a kind without its pair of functions.
 TEST(Input, EveryKindSurvivesPackingWordForWord) {
   const std::vector<Input> inputs = one_of_each();
   ASSERT_EQ(inputs.size(), std::variant_size_v<decltype(Input::action)>);
@@ -67,7 +67,7 @@ TEST(Input, EveryKindSurvivesPackingWordForWord) {
   EXPECT_EQ(std::get<ShaftBump>(unpack(pack(inputs[9])).action).impulse_nms, -1e-3);
 }
 
-// Kills: words of the stack in a packed input, which would make equal states hash differently.
+// Catches: words of the stack in a packed input, which would make equal states hash differently.
 TEST(Input, UnusedWordsAreZero) {
   for (const Input& input : one_of_each()) {
     const PackedInput packed = pack(input);
@@ -83,7 +83,7 @@ TEST(Input, UnusedWordsAreZero) {
   }
 }
 
-// Kills: a kind from a damaged file that reads past the table.
+// Catches: a kind from a damaged file that reads past the table.
 TEST(Input, AnUnknownKindIsAClearWithoutAnOwner) {
   for (const std::uint64_t kind : {std::uint64_t{10}, std::numeric_limits<std::uint64_t>::max()}) {
     const Input input = unpack({.tick = 4, .axis = 1, .owner = 0, .kind = kind, .words = {1, 2, 3, 4, 5, 6}});
@@ -92,7 +92,7 @@ TEST(Input, AnUnknownKindIsAClearWithoutAnOwner) {
   }
 }
 
-// Kills: a limit that is not kept, a sign that a fault has no use for, half a phase.
+// Catches: a limit that is not kept, a sign that a fault has no use for, half a phase.
 TEST(Input, FaultsAreCheckedByTheirTable) {
   const auto problem = [](const char* name, double value) {
     return problem_with(kInjectableFaults[find_injectable_fault(name)], value);

@@ -45,7 +45,7 @@ double current_a(const Bench& bench) {
 
 // With all terminals at one potential: L i' = -R i - emf turns with the electrical speed, whose steady
 // magnitude is K w/|R + j n_p w L|, 24 A here and K/(n_p L) = 25 A at high speed; the heat R i^2 comes from
-// the shaft. Tolerance: the speed falls by 0.2 % in the 0.2 s. Kills: a short circuit that frees the shaft,
+// the shaft. Tolerance: the speed falls by 0.2 % in the 0.2 s. Catches: a short circuit that frees the shaft,
 // or holds the voltages.
 TEST(SafeAction, STATE_02_ZeroVoltageIsAnActiveShortCircuitThatBrakes) {
   const Bench bench = abandoned_magnet(SafeAction::kZeroVoltage, 100.0);
@@ -58,7 +58,7 @@ TEST(SafeAction, STATE_02_ZeroVoltageIsAnActiveShortCircuitThatBrakes) {
               kMagnet.stator_resistance_ohm * expected_a * expected_a, 1.0);
 }
 
-// Kills: gates off as an open circuit, whatever the emf; diodes that conduct against the link.
+// Catches: gates off as an open circuit, whatever the emf; diodes that conduct against the link.
 TEST(SafeAction, STATE_02_FreewheelConductsIntoTheLinkWhenTheEmfExceedsIt) {
   const Bench below = abandoned_magnet(SafeAction::kFreewheel, 60.0);
   EXPECT_EQ(current_a(below), 0.0);
@@ -72,7 +72,7 @@ TEST(SafeAction, STATE_02_FreewheelConductsIntoTheLinkWhenTheEmfExceedsIt) {
   EXPECT_GT(lost_j, stored_j) << "what the link has gained came from the shaft, and the copper took its part";
 }
 
-// Kills: set-points that turn on, fade or change in a bit; a hold that outlasts its clear, or that drives a
+// Catches: set-points that turn on, fade or change in a bit; a hold that outlasts its clear, or that drives a
 // tripped axis.
 TEST(SafeAction, STATE_02_HoldKeepsTheLastVoltagesUntilItIsClearedOrTheAxisTrips) {
   BenchSetup setup = servo_setup(1);
@@ -102,7 +102,7 @@ TEST(SafeAction, STATE_02_HoldKeepsTheLastVoltagesUntilItIsClearedOrTheAxisTrips
 }
 
 // The last commands turn by 0.05 rad in a tick. In tick m of n of the ramp the magnitude is 1 - m/n and the
-// angle 0.05 (m - m^2/2n) further; tolerance: rounding. Kills: a frequency that stays or is not known at
+// angle 0.05 (m - m^2/2n) further; tolerance: rounding. Catches: a frequency that stays or is not known at
 // all, a ramp of the wrong length, voltages that jump when it begins or ends.
 TEST(SafeAction, STATE_02_QuickStopRampsMagnitudeAndFrequencyToZeroAndThenFreewheels) {
   constexpr Tick kRamp = 400;
@@ -131,7 +131,7 @@ TEST(SafeAction, STATE_02_QuickStopRampsMagnitudeAndFrequencyToZeroAndThenFreewh
   EXPECT_EQ(current_a(bench), 0.0);
 }
 
-// Kills: an armature whose voltage is turned, a field winding that the ramp takes away.
+// Catches: an armature whose voltage is turned, a field winding that the ramp takes away.
 TEST(SafeAction, AQuickStopOfAnArmatureBrakesAgainstItsField) {
   LastCommands last;
   follow(last, {.gates = Gates::kVoltage, .setpoint = {.a = 12.0, .field = 5.0}}, Connection::kArmature,
@@ -145,8 +145,8 @@ TEST(SafeAction, AQuickStopOfAnArmatureBrakesAgainstItsField) {
   EXPECT_EQ(act_safely(last, SafeAction::kQuickStop, false, Connection::kArmature, 4).gates, Gates::kOff);
 }
 
-// Six steps of 60 degrees, 20 ticks each, are 0.0524 rad per tick. Kills: a mean over so few commands that it
-// sees only the standstill between two steps.
+// Six steps of 60 degrees, 20 ticks each, are 0.0524 rad per tick. Catches: a mean over so few commands that
+// it sees only the standstill between two steps.
 TEST(SafeAction, TheFrequencyOfBlockCommutationIsThatOfItsSteps) {
   LastCommands last;
   constexpr double kStep_rad = std::numbers::pi / 3.0;
@@ -159,7 +159,7 @@ TEST(SafeAction, TheFrequencyOfBlockCommutationIsThatOfItsSteps) {
   EXPECT_NEAR(last.turn_rad_per_tick, kStep_rad / 20.0, 0.2 * kStep_rad / 20.0);
 }
 
-// Kills: an axis that is driven by the first frame of a controller that is only starting, a row of commands
+// Catches: an axis that is driven by the first frame of a controller that is only starting, a row of commands
 // that goes on behind a bad one or behind a silence.
 TEST(SafeAction, STATE_01_OnlyARowOfGoodCommandsArmsAnAxis) {
   BenchSetup setup = servo_setup();
@@ -190,7 +190,7 @@ TEST(SafeAction, STATE_01_OnlyARowOfGoodCommandsArmsAnAxis) {
   EXPECT_EQ(bench.sample(0).u_a_v, 2.0);
 }
 
-// Kills: a clear that starts what trips at once again; a cause that stays for ever.
+// Catches: a clear that starts what trips at once again; a cause that stays for ever.
 TEST(SafeAction, CMD_04_AFaultIsNotClearedWhileItsCauseLasts) {
   const std::size_t loss = find_injectable_fault("command_loss");
   const auto inject = [](Bench& bench, double value) {

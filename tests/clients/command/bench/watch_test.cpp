@@ -9,7 +9,7 @@ std::string shown(std::string_view name, const Sample& sample) {
   return shown_value(*find_signal(name), sample);
 }
 
-// Catches the rounding noise of a model at rest shown as 8.5e-170, and a small value that means something
+// Catches: the rounding noise of a model at rest shown as 8.5e-170, and a small value that means something
 // shown as 0.
 TEST(Watch, ShowsAMagnitudeFarBelowTheUsualRangeAsZero) {
   EXPECT_EQ(shown("speed_rad_s", {.speed_rad_s = 8.5e-170}), "0");

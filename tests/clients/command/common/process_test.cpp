@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Catches a lost line, a wrong exit code, and a signal that looks like success.
+// Catches: a lost line, a wrong exit code, and a signal that looks like success.
 TEST(Process, GivesLinesAndTheExitCode) {
   Process echo({"/bin/sh", "-c", "printf 'one\\ntwo\\n'; exit 7"});
   EXPECT_EQ(echo.read_line(Process::in(10s)), "one");
@@ -30,7 +30,7 @@ TEST(Process, GivesLinesAndTheExitCode) {
   EXPECT_EQ(missing.wait(Process::in(10s)), 127);
 }
 
-// Catches a line of another kind, or no JSON at all, that passes for the server's.
+// Catches: a line of another kind, or no JSON at all, that passes for the server's.
 TEST(ServerReady, ReadsOnlyTheServersOwnLines) {
   const std::string ready =
       R"({"event":"ready","tcp":"127.0.0.1:7300","unix":"","mode":"lockstep","bench":"servo"})";

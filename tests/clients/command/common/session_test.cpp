@@ -15,7 +15,7 @@
 namespace drivebench::command {
 namespace {
 
-// Catches a link of another kind that is taken for the name of a host.
+// Catches: a link of another kind that is taken for the name of a host.
 TEST(Links, OnlyControlGoesOverCanAndModbus) {
   for (const char* address : {"can:socketcan:vcan0", "modbus:127.0.0.1:1"}) {
     EXPECT_THROW(run_status({.link = {.address = address, .token = {}}}), UsageError);
@@ -33,7 +33,7 @@ TEST(Links, OnlyControlGoesOverCanAndModbus) {
   EXPECT_THROW(run_can_log({.address = "tcp:127.0.0.1:7300", .out_file = {}}), UsageError);
 }
 
-// Catches a latched fault that is overlooked, or one that is not latched taken for it.
+// Catches: a latched fault that is overlooked, or one that is not latched taken for it.
 TEST(Links, LatchedFaultsAreKnownWithOrWithoutADescription) {
   v1::BenchDescription bench;
   EXPECT_EQ(latched_text(bench, {.state = 1, .faults = 2}), "");

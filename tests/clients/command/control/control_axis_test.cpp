@@ -7,7 +7,7 @@
 namespace drivebench::command {
 namespace {
 
-// Catches a preset that is run on a bench it was not made for.
+// Catches: a preset that is run on a bench it was not made for.
 TEST(Mismatches, NameKindsRateCountsPolePairsAndVoltage) {
   const control::Requirements& needs = control::find_preset("book/8.2.2")->needs;
   v1::BenchDescription bench;
@@ -41,7 +41,7 @@ TEST(Mismatches, NameKindsRateCountsPolePairsAndVoltage) {
   EXPECT_EQ(mismatches(bench, 0, needs, 8000.0, kAllSignals).size(), 6U);
 }
 
-// Catches a gain that changes the controller but not what it is checked against.
+// Catches: a gain that changes the controller but not what it is checked against.
 TEST(Mismatches, GainsThatDescribeTheAxisChangeWhatIsNeeded) {
   const control::Preset& preset = *control::find_preset("book/8.2.2");
   const std::vector<control::Gain> gains = {

@@ -11,7 +11,7 @@
 namespace drivebench::command {
 namespace {
 
-// Catches a key that one side writes and the other does not read.
+// Catches: a key that one side writes and the other does not read.
 TEST(ControlReport, IsReadFromTheJsonThatWasWritten) {
   ControlReport report;
   report.preset = "p";
@@ -27,7 +27,7 @@ TEST(ControlReport, IsReadFromTheJsonThatWasWritten) {
   EXPECT_EQ(read->exchange_p99_us, 20.5);
 }
 
-// Catches a peak taken with its sign, over the wrong samples, or a lost tick that is not counted.
+// Catches: a peak taken with its sign, over the wrong samples, or a lost tick that is not counted.
 TEST(ControlRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples) {
   ControlRun run;
   run.counts_per_rad = 10.0;
@@ -68,7 +68,8 @@ TEST(ControlRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples
   EXPECT_EQ(report.exchange_max_us, 200.0);
 }
 
-// Catches a report that passes off the encoder's angle for the truth, or shows a value that was not measured.
+// Catches: a report that passes off the encoder's angle for the truth, or shows a value that was not
+// measured.
 TEST(ControlRunSummary, SaysWhatItsNumbersRestOn) {
   ControlRun run;
   run.counts_per_rad = 2.0;

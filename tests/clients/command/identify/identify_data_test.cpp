@@ -102,7 +102,7 @@ class IdentifyFiles : public testing::Test {
   fs::path folder_;
 };
 
-// Catches the wrong axis, a period in ticks, a truth or settings that do not come from the file.
+// Catches: the wrong axis, a period in ticks, a truth or settings that do not come from the file.
 TEST_F(IdentifyFiles, ARecordingBringsItsSamplesAndItsConfiguration) {
   const std::string file = recording("r.mcap", 10);
   const Measurement first = read_recording(file, "");
@@ -135,7 +135,7 @@ std::string refusal(const std::string& file, const std::string& axis = {}) {
   return "none";
 }
 
-// Catches samples with a hole that pass for equidistant, and files that are no recordings.
+// Catches: samples with a hole that pass for equidistant, and files that are no recordings.
 TEST_F(IdentifyFiles, ARecordingThatCannotBeUsedIsRefused) {
   EXPECT_NE(refusal(recording("hole.mcap", 10, 104)).find("tick 105 comes after tick 103"),
             std::string::npos);
@@ -147,7 +147,7 @@ TEST_F(IdentifyFiles, ARecordingThatCannotBeUsedIsRefused) {
             std::string::npos);
 }
 
-// Catches a recording cut short by a crash that yields nothing.
+// Catches: a recording cut short by a crash that yields nothing.
 TEST_F(IdentifyFiles, OfACutRecordingWhatIsThereIsUsed) {
   const std::string file = recording("r.mcap", 3000);
   fs::resize_file(file, fs::file_size(file) / 2);
@@ -156,7 +156,7 @@ TEST_F(IdentifyFiles, OfACutRecordingWhatIsThereIsUsed) {
   EXPECT_LT(m.data.samples(), 3000U);
 }
 
-// Catches a configuration of garbage in a recording that ends the command.
+// Catches: a configuration of garbage in a recording that ends the command.
 TEST(IdentifyData, AConfigurationThatIsNoneSaysNothing) {
   for (const char* text : {"", "[[axis", "axis = 3", "[[axis]]\nname = 5\n", "[axis]\nname = \"a\"\n"}) {
     Measurement m;
@@ -166,7 +166,7 @@ TEST(IdentifyData, AConfigurationThatIsNoneSaysNothing) {
   }
 }
 
-// Catches settings of the request that the truth does not know, and a parameter that changes on the way.
+// Catches: settings of the request that the truth does not know, and a parameter that changes on the way.
 TEST(IdentifyData, ADescriptionIsThatOfTheExperiment) {
   v1::BenchDescription bench;
   bench.set_substeps(5);
@@ -207,7 +207,7 @@ TEST(IdentifyData, ADescriptionIsThatOfTheExperiment) {
   EXPECT_DOUBLE_EQ(m.facts.voltage_held_ticks, 1.0);
 }
 
-// Catches a column that does not read back as it was, or a header that the reader does not know.
+// Catches: a column that does not read back as it was, or a header that the reader does not know.
 TEST(IdentifyData, CsvReadsBack) {
   const identification::MeasuredData data = {
       .period_s = 1e-4,

@@ -15,7 +15,7 @@ namespace {
 using identification::ColumnMap;
 using identification::CsvOptions;
 
-// Catches a header cut at its own sign, an exponent taken for an offset, a sign that is lost.
+// Catches: a header cut at its own sign, an exponent taken for an offset, a sign that is lost.
 TEST(IdentifyMap, AColumnHasHeaderSignalFactorAndOffset) {
   ColumnMap column = parse_column("I_A=i_a_a");
   EXPECT_EQ(column.header, "I_A");
@@ -41,7 +41,7 @@ std::string refusal(const std::string& text) {
   return "none";
 }
 
-// Catches a wrong column that is read as something else, and a refusal that does not tell the rule.
+// Catches: a wrong column that is read as something else, and a refusal that does not tell the rule.
 TEST(IdentifyMap, AWrongColumnIsRefusedWithTheRule) {
   EXPECT_NE(refusal("I_A").find("should be HEADER=SIGNAL"), std::string::npos);
   EXPECT_NE(refusal("=i_a_a").find("HEADER=SIGNAL"), std::string::npos);
@@ -54,7 +54,7 @@ TEST(IdentifyMap, AWrongColumnIsRefusedWithTheRule) {
   EXPECT_EQ(refusal(std::string("I\x1b[2J=x")).find('\x1b'), std::string::npos);
 }
 
-// Catches a key of the file that does nothing.
+// Catches: a key of the file that does nothing.
 TEST(IdentifyMap, AFileMapsColumnsAndTime) {
   const CsvOptions csv = parse_column_map(R"(
 time = "t [ms]"
@@ -83,7 +83,7 @@ angle_rad = { factor = 0.017453292519943295 }
   EXPECT_EQ(parse_column_map("period_s = 1e-4\n[columns]\ni_a_a = \"x\"\n", "m").period_s, 1e-4);
 }
 
-// Catches a column-map file whose mistakes are passed over, or told one at a time.
+// Catches: a column-map file whose mistakes are passed over, or told one at a time.
 TEST(IdentifyMap, EverythingWrongInAFileIsToldAtOnce) {
   try {
     parse_column_map(
@@ -102,7 +102,7 @@ TEST(IdentifyMap, EverythingWrongInAFileIsToldAtOnce) {
   }
 }
 
-// Catches a command line that does not go before the file.
+// Catches: a command line that does not go before the file.
 TEST(IdentifyMap, OptionsJoin) {
   IdentifyOptions options;
   options.maps = {"I=i_a_a", "U=u_a_v*2"};

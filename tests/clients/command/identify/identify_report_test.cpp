@@ -29,7 +29,7 @@ IdentifyReport some_report() {
   return report;
 }
 
-// Catches a table that shows what was not seen, or says nothing about how good the index was.
+// Catches: a table that shows what was not seen, or says nothing about how good the index was.
 TEST(IdentifyReport, TheTextTellsEstimateIndexTruthErrorAndVerdict) {
   const std::string text = identify_text(some_report());
   for (const char* part :
@@ -39,7 +39,7 @@ TEST(IdentifyReport, TheTextTellsEstimateIndexTruthErrorAndVerdict) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
 }
 
-// Catches a picture without the measured or without the re-simulated signals, and a report that links to
+// Catches: a picture without the measured or without the re-simulated signals, and a report that links to
 // none.
 TEST(IdentifyReport, PictureAndMarkdownShowTheValidation) {
   IdentifyReport report = some_report();
@@ -56,7 +56,7 @@ TEST(IdentifyReport, PictureAndMarkdownShowTheValidation) {
   EXPECT_NE(identify_text(report).find("no re-simulation: J"), std::string::npos);
 }
 
-// Catches a key that clients read under another name, and a number that JSON does not have.
+// Catches: a key that clients read under another name, and a number that JSON does not have.
 TEST(IdentifyReport, JsonHasParametersSettingsAndValidation) {
   const nlohmann::json json = nlohmann::json::parse(identify_json(some_report()));
   EXPECT_EQ(json["parameters"]["R"]["estimate"], 2.02);

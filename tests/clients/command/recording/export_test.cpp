@@ -117,7 +117,7 @@ class CommandFiles : public testing::Test {
   fs::path folder_;
 };
 
-// Catches rows of another axis or tick, a rounded value, a lost sign, a wrong time.
+// Catches: rows of another axis or tick, a rounded value, a lost sign, a wrong time.
 TEST_F(CommandFiles, ExportWritesTheChosenSamplesExactly) {
   ExportOptions options = {.recording = write_recording("r.mcap", true), .out_file = path("out.csv")};
   options.signals = {"encoder_count", "i_a_a"};
@@ -132,7 +132,7 @@ TEST_F(CommandFiles, ExportWritesTheChosenSamplesExactly) {
             "3,0.000375000,-15,0.30000000000000004\n");
 }
 
-// Catches a recording cut short by a crash that yields nothing, or passes for whole.
+// Catches: a recording cut short by a crash that yields nothing, or passes for whole.
 TEST_F(CommandFiles, ExportOfACutRecordingWritesWhatIsThereAndSaysSo) {
   ExportOptions options = {.recording = write_recording("r.mcap", false), .out_file = path("out.csv")};
   options.signals = {"tick"};
@@ -141,7 +141,7 @@ TEST_F(CommandFiles, ExportOfACutRecordingWritesWhatIsThereAndSaysSo) {
             "tick,time_s,tick [1]\n0,0.000000000,0\n1,0.000125000,1\n2,0.000250000,2\n3,0.000375000,3\n");
 }
 
-// Catches an exit code of 0 for a wrong name or file.
+// Catches: an exit code of 0 for a wrong name or file.
 TEST_F(CommandFiles, ExportRefusesWhatIsNotThere) {
   const std::string recording = write_recording("r.mcap", true);
   EXPECT_THROW(run_export({.recording = recording, .out_file = path("o"), .axis = "c"}), UsageError);
@@ -151,7 +151,8 @@ TEST_F(CommandFiles, ExportRefusesWhatIsNotThere) {
   EXPECT_THROW(run_export({.recording = path("text"), .out_file = path("o")}), UsageError);
 }
 
-// Catches a frame of the wrong axis, tick or order, a command that is lost, and a profile that is not heeded.
+// Catches: a frame of the wrong axis, tick or order, a command that is lost, and a profile that is not
+// heeded.
 TEST_F(CommandFiles, ExportWritesTheFramesOfARun) {
   ExportOptions options = {.recording = write_lockstep_run("r.mcap"), .out_file = path("out.log")};
   options.format = "candump";
@@ -188,7 +189,7 @@ TEST_F(CommandFiles, ExportWritesTheFramesOfARun) {
             "(0.000125) vcan0 080##10100000001\n");
 }
 
-// Catches a trace begun with a profile that cannot be.
+// Catches: a trace begun with a profile that cannot be.
 TEST_F(CommandFiles, ExportRefusesAProfileThatCannotBe) {
   ExportOptions options = {.recording = write_lockstep_run("r.mcap"), .out_file = path("out.log")};
   options.format = "candump";

@@ -31,7 +31,7 @@ std::vector<Point> line_of(const std::string& svg) {
   return points;
 }
 
-// Catches a picture that thins out its values and loses the one peak that mattered.
+// Catches: a picture that thins out its values and loses the one peak that mattered.
 TEST(SvgPlot, APeakOfOneSampleAmongManyIsDrawn) {
   std::vector<double> x;
   std::vector<double> y;
@@ -49,7 +49,7 @@ TEST(SvgPlot, APeakOfOneSampleAmongManyIsDrawn) {
   EXPECT_NEAR(static_cast<double>(line.back().x), 7080.0, 20.0);
 }
 
-// Catches a title that breaks the picture, and a value range of nothing that divides by zero.
+// Catches: a title that breaks the picture, and a value range of nothing that divides by zero.
 TEST(SvgPlot, TextsAreEscapedAndConstantsHaveARange) {
   const std::string svg = svg_of("a < b & c", "t", {0.0, 1.0}, {{"0 & 1", {{"x", {0.0, 0.0}}}}});
   EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);

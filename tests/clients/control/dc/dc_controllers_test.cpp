@@ -63,7 +63,7 @@ const StepMove kRest({.distance_rad = 0.0, .speed_rad_s = 0.0, .duration_s = 1.0
 
 constexpr ServoGains kTriple = ServoGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kFriction);
 
-// Catches a gain with f/J of the wrong sign or in other units: the book's numbers for r = 100.
+// Catches: a gain with f/J of the wrong sign or in other units: the book's numbers for r = 100.
 TEST(DcStateFeedback, HasTheBooksGains) {
   EXPECT_DOUBLE_EQ(kTriple.integral_per_s3, 1e6);
   EXPECT_DOUBLE_EQ(kTriple.proportional_per_s2, 3e4);
@@ -74,7 +74,7 @@ TEST(DcStateFeedback, HasTheBooksGains) {
   EXPECT_EQ(kDouble.integral_per_s3, 0.0);
 }
 
-// AC-10. Catches a pole away from its place, an integral that is too slow: e = (τ_L/J)·t²/2·e^(−rt), peak
+// AC-10. Catches: a pole away from its place, an integral that is too slow: e = (τ_L/J)·t²/2·e^(−rt), peak
 // 0.015789 rad at 20 ms, then nothing, with half an ampere of feedback. 1 %: the speed is half a sample old.
 TEST(DcStateFeedback, AConstantLoadIsForgotten) {
   DcStateFeedback controller({.axis = kAxis, .position = kTriple});
@@ -97,7 +97,7 @@ TEST(DcStateFeedback, AConstantLoadIsForgotten) {
 }
 
 // AC-10, with the speed of an observer that knows nothing of the load: twice the peak, 0.034 rad. 10 %.
-// Catches an observer without the bias it must have.
+// Catches: an observer without the bias it must have.
 TEST(DcStateFeedback, TheObserversBiasDoublesThePeak) {
   DcStateFeedback controller({.axis = observed(500.0), .position = kTriple});
   double peak_rad = 0.0;
@@ -110,7 +110,7 @@ TEST(DcStateFeedback, TheObserversBiasDoublesThePeak) {
   EXPECT_NEAR(last_rad, 0.0, 1e-5);
 }
 
-// AC-11. Catches an offset measured the wrong way: e = −θ0·e^(−x)·(1 + x − x²), overshoot 0.02489 rad at 30
+// AC-11. Catches: an offset measured the wrong way: e = −θ0·e^(−x)·(1 + x − x²), overshoot 0.02489 rad at 30
 // ms, first current −2.571 A. 2 %.
 TEST(DcStateFeedback, AnInitialOffsetOvershootsAsTheTriplePoleSays) {
   DcStateFeedback controller({.axis = kAxis, .position = kTriple});
@@ -132,7 +132,7 @@ TEST(DcStateFeedback, AnInitialOffsetOvershootsAsTheTriplePoleSays) {
   EXPECT_NEAR(overshoot_s, 0.030, 0.001);
 }
 
-// AC-12. Catches an integral that is there all the same, a speed gain with the wrong sign: without it
+// AC-12. Catches: an integral that is there all the same, a speed gain with the wrong sign: without it
 // τ_L/(J·K1) = 0.058333 rad stay, with the observer (τ_L/J)·(1 + K2·l1/p²)/K1 = 0.10314 rad.
 TEST(DcStateFeedback, WithoutAnIntegralALoadLeavesAnError) {
   const ServoGains gains = ServoGains::placed(placed_polynomial<2>({100.0, 100.0}), kFriction);
@@ -146,7 +146,7 @@ TEST(DcStateFeedback, WithoutAnIntegralALoadLeavesAnError) {
   }
 }
 
-// AC-13. Catches feed-forward that nested loops do not have and gains in the wrong loop: 500 rad/s² are
+// AC-13. Catches: feed-forward that nested loops do not have and gains in the wrong loop: 500 rad/s² are
 // missed by a·Σr r.../r³ = 0.15 rad, a constant load by nothing.
 TEST(DcNestedLoops, LagAnAccelerationAndForgetALoad) {
   const DcNestedGains gains = DcNestedGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kDcA);
@@ -164,7 +164,7 @@ TEST(DcNestedLoops, LagAnAccelerationAndForgetALoad) {
   EXPECT_NEAR(lag_rad, 0.0, 1e-5);
 }
 
-// CTL-04 with the integral in the speed loop as well: a/K_thI. Catches an integral in the wrong place.
+// CTL-04 with the integral in the speed loop as well: a/K_thI. Catches: an integral in the wrong place.
 TEST(DcNestedLoops, WithBothIntegralsTheLagIsTheAccelerationOverTheAngleIntegral) {
   DcNestedGains gains = DcNestedGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kDcA);
   gains.speed_integral_a_per_rad = 5.0;
@@ -175,7 +175,7 @@ TEST(DcNestedLoops, WithBothIntegralsTheLagIsTheAccelerationOverTheAngleIntegral
   EXPECT_NEAR(lag_rad, 500.0 / gains.angle_integral_per_s2, 0.003);
 }
 
-// SPD-01: K·K_T/J = 100. Catches a feed-forward that a proportional loop does not have: a step to 100 rad/s
+// SPD-01: K·K_T/J = 100. Catches: a feed-forward that a proportional loop does not have: a step to 100 rad/s
 // leaves f·ω_0/(f + K·K_T) = 6.25 rad/s.
 TEST(DcSpeedLoop, AConstantSpeedIsMissedByTheFrictionsShare) {
   DcSpeedLoop controller({.axis = kAxis, .proportional_as_per_rad = 0.0857143});
@@ -188,7 +188,7 @@ TEST(DcSpeedLoop, AConstantSpeedIsMissedByTheFrictionsShare) {
   EXPECT_NEAR(100.0 - speed_rad_s, 6.25, 0.001);
 }
 
-// Catches a current that is fed back: the open loop lets every offset stand and the load take all, 85.897
+// Catches: a current that is fed back: the open loop lets every offset stand and the load take all, 85.897
 // rad/s after 0.6 s (problem 2.19).
 TEST(DcOpenLoop, LeavesALoadToTheShaft) {
   DcOpenLoop controller({.axis = kAxis});
@@ -197,7 +197,7 @@ TEST(DcOpenLoop, LeavesALoadToTheShaft) {
   EXPECT_NEAR(speed_rad_s, -85.897, 0.01);
 }
 
-// CTL-03. Catches a slip in the quartic's coefficients: the book's numbers for four poles at 300.
+// CTL-03. Catches: a slip in the quartic's coefficients: the book's numbers for four poles at 300.
 TEST(DcVoltageFeedback, HasTheGainsOfFourPolesAt300) {
   const DcVoltageGains gains =
       DcVoltageGains::placed(placed_polynomial<4>({300.0, 300.0, 300.0, 300.0}), kDcA);
@@ -212,7 +212,7 @@ TEST(DcVoltageFeedback, HasTheGainsOfFourPolesAt300) {
   EXPECT_NE(p.problems()[0].find("unstable"), std::string::npos);
 }
 
-// CTL-03. Catches an error with the wrong sign or in the wrong unit, one at a time; the loop would be stable
+// CTL-03. Catches: an error with the wrong sign or in the wrong unit, one at a time; the loop would be stable
 // all the same. v = v_ref + L·(...).
 TEST(DcVoltageFeedback, EveryErrorHasItsOwnVoltage) {
   const DcVoltageGains gains =
@@ -235,8 +235,8 @@ constexpr DcMachineModel kUnit = {.resistance_ohm = 1.0,
                                   .inertia_kgm2 = 1.0,
                                   .friction_nms = 1.0};
 
-// AC-18. Catches a design formula that is off: K_t = 29, K = 400, a = 5 for −10, −10 ± j10, and 400 A at once
-// for a radian. The limit of a < 1 at K = 1 is that of the book's PI without tachometer.
+// AC-18. Catches: a design formula that is off: K_t = 29, K = 400, a = 5 for −10, −10 ± j10, and 400 A at
+// once for a radian. The limit of a < 1 at K = 1 is that of the book's PI without tachometer.
 TEST(DcTachometerLoop, IsDesignedAsTheBookDoesIt) {
   const DcTachometerGains gains =
       DcTachometerGains::placed(placed_polynomial(10.0, std::sqrt(0.5), std::sqrt(200.0)), kUnit);
@@ -275,7 +275,7 @@ void run_unit(const DcTachometerGains& gains, const StepMove& move, double durat
   }
 }
 
-// AC-18. Catches a proportional loop that tracks a ramp: with K = 1 it follows a turn of ω_0 with the error
+// AC-18. Catches: a proportional loop that tracks a ramp: with K = 1 it follows a turn of ω_0 with the error
 // ω_0/K, while the PI follows without.
 TEST(DcTachometerLoop, AProportionalLoopFollowsARampWithAnError) {
   const StepMove ramp({.distance_rad = 0.0, .speed_rad_s = 0.3, .duration_s = 100.0});
@@ -287,8 +287,8 @@ TEST(DcTachometerLoop, AProportionalLoopFollowsARampWithAnError) {
   EXPECT_NEAR(last_rad, 0.0, 1e-4);
 }
 
-// CTL-06. Catches a speed that is fed back as the derivative of the error: a step of the reference then gives
-// another zero and another overshoot than 32.77 % at 0.221 s. 2 %: 1 kHz for poles at 14 rad/s.
+// CTL-06. Catches: a speed that is fed back as the derivative of the error: a step of the reference then
+// gives another zero and another overshoot than 32.77 % at 0.221 s. 2 %: 1 kHz for poles at 14 rad/s.
 TEST(DcTachometerLoop, AStepOvershootsByAThird) {
   const StepMove step({.distance_rad = 1.0, .speed_rad_s = 0.0, .duration_s = 10.0});
   double peak_rad = 0.0;
@@ -304,7 +304,7 @@ TEST(DcTachometerLoop, AStepOvershootsByAThird) {
   EXPECT_NEAR(peak_s, 0.221, 0.003);
 }
 
-// CTL-07. Catches a sine that is followed with an error, a compensator of another frequency: the error is a
+// CTL-07. Catches: a sine that is followed with an error, a compensator of another frequency: the error is a
 // sum of two dying oscillations (the print has 4.7 for 4.458). 1 kHz moves it by a thousandth.
 TEST(DcSineLoop, TheErrorOfAKnownSineDies) {
   DcSineLoopParameters p = {
@@ -327,7 +327,7 @@ TEST(DcSineLoop, TheErrorOfAKnownSineDies) {
   EXPECT_EQ(p.problems().size(), 1u);
 }
 
-// CUR-01. Catches a regulator that winds up: half a second against the limit, then the voltage leaves it at
+// CUR-01. Catches: a regulator that winds up: half a second against the limit, then the voltage leaves it at
 // once, and a command beyond the current limit is cut before the error is taken.
 TEST(DcCurrentRegulator, DoesNotWindUpAtItsLimits) {
   DcCurrentRegulator regulator({.proportional_v_per_a = 20.0, .integral_v_per_as = 20000.0}, 5.0, 40.0, 1e-4);
@@ -343,7 +343,7 @@ TEST(DcCurrentRegulator, DoesNotWindUpAtItsLimits) {
   EXPECT_EQ(proportional.step(-9.0, 3.0), -8.0);
 }
 
-// Catches an integral of the law that runs on while the current stands at its limit: a load that the limit
+// Catches: an integral of the law that runs on while the current stands at its limit: a load that the limit
 // cannot hold, gone after 0.2 s, may not leave a long way back.
 TEST(DcStateFeedback, ItsIntegralStandsStillAtTheLimit) {
   DcAxisParameters axis = kAxis;
@@ -358,7 +358,7 @@ TEST(DcStateFeedback, ItsIntegralStandsStillAtTheLimit) {
   EXPECT_FALSE(controller.saturated());
 }
 
-// Catches an integral that runs on while the voltage of the controller's own current loop holds the current
+// Catches: an integral that runs on while the voltage of the controller's own current loop holds the current
 // back.
 TEST(DcStateFeedback, ItsIntegralStandsStillAtTheVoltageLimit) {
   DcAxisParameters axis = kAxis;
@@ -374,7 +374,7 @@ TEST(DcStateFeedback, ItsIntegralStandsStillAtTheVoltageLimit) {
   EXPECT_EQ(controller.update({}, {}, 1).a, 0.0);
 }
 
-// Catches an oscillator that is driven on while the current stands at its limit.
+// Catches: an oscillator that is driven on while the current stands at its limit.
 TEST(DcSineLoop, IsNotDrivenBeyondTheLimit) {
   DcSineLoopParameters p = {
       .axis = kAxis, .loop = {.gain_a_s_per_rad = -0.6, .zero_per_s = -0.25, .angular_frequency_rad_s = 1.0}};
@@ -388,7 +388,7 @@ TEST(DcSineLoop, IsNotDrivenBeyondTheLimit) {
   }
 }
 
-// Catches nested loops that are taken although they cannot work: an integral in front of everything else.
+// Catches: nested loops that are taken although they cannot work: an integral in front of everything else.
 TEST(DcNestedLoops, UnstableGainsAreReported) {
   DcNestedLoopsParameters p = {
       .axis = kAxis, .loops = DcNestedGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kDcA)};
@@ -400,7 +400,7 @@ TEST(DcNestedLoops, UnstableGainsAreReported) {
   EXPECT_NE(p.problems()[0].find("unstable"), std::string::npos);
 }
 
-// Catches a current loop at a sample rate that cannot hold it: K_P·T/L of 2 or more.
+// Catches: a current loop at a sample rate that cannot hold it: K_P·T/L of 2 or more.
 TEST(DcAxis, ACurrentLoopTooFastForTheSamplesIsReported) {
   DcOpenLoopParameters p = {.axis = kAxis};
   p.axis.drive = DcDrive::kOwnRegulator;

@@ -35,7 +35,7 @@ double factor_of_one_step(FluxStep kind, double rate_hz) {
   return std::norm(complex_of(b.flux_wb()) - complex_of(a.flux_wb())) / before;
 }
 
-// Case 16: 0.1 %. Catches a decay or a rotation of the wrong size, and an Euler that is exact.
+// Case 16: 0.1 %. Catches: a decay or a rotation of the wrong size, and an Euler that is exact.
 TEST(StationaryFluxObserver, EulerMultipliesTheErrorByTheDerivedFactor) {
   EXPECT_NEAR(factor_of_one_step(FluxStep::kEuler, 330.0), 11.77, 0.0118);
   EXPECT_NEAR(factor_of_one_step(FluxStep::kEuler, 1000.0), 1.800, 0.0018);
@@ -47,7 +47,7 @@ TEST(StationaryFluxObserver, EulerMultipliesTheErrorByTheDerivedFactor) {
   }
 }
 
-// Case 16: 1 Hz. Catches a limit without its half: at this rate the factor is one.
+// Case 16: 1 Hz. Catches: a limit without its half: at this rate the factor is one.
 TEST(StationaryFluxObserver, EulerNeedsARateThatRisesWithTheSpeed) {
   const double least_hz = least_euler_rate_hz(kServoMotor.machine, kLine_rad_s);
   EXPECT_NEAR(least_hz, 2435.0, 1.0);
@@ -55,14 +55,14 @@ TEST(StationaryFluxObserver, EulerNeedsARateThatRisesWithTheSpeed) {
   EXPECT_NEAR(least_euler_rate_hz(kServoMotor.machine, rad_s(8000.0)), 11477.0, 1.0);
 }
 
-// Catches an exponential of the real part only: exp(-2ηT) at every rate, 330 Hz included.
+// Catches: an exponential of the real part only: exp(-2ηT) at every rate, 330 Hz included.
 TEST(StationaryFluxObserver, ExactStepsDecayAtTheRotorRateAtAnyRate) {
   const double eta = kServoMotor.machine.flux_decay_per_s();
   for (const double rate_hz : {330.0, 1e3, 10e3})
     EXPECT_NEAR(factor_of_one_step(FluxStep::kExact, rate_hz), std::exp(-2.0 * eta / rate_hz), 1e-12);
 }
 
-// Catches an input that is not divided by the rate: with a current that turns as fast as the rotor the flux
+// Catches: an input that is not divided by the rate: with a current that turns as fast as the rotor the flux
 // stands at M·i in the rotor's frame, here at standstill.
 TEST(StationaryFluxObserver, BothDiscretisationsComeToRestAtMTimesI) {
   for (const FluxStep kind : {FluxStep::kEuler, FluxStep::kExact}) {
@@ -74,7 +74,7 @@ TEST(StationaryFluxObserver, BothDiscretisationsComeToRestAtMTimesI) {
   }
 }
 
-// Catches a slip of the wrong sign and an angle without the pole pairs: the same as the polar observer that
+// Catches: a slip of the wrong sign and an angle without the pole pairs: the same as the polar observer that
 // is told the speed.
 TEST(PositionFluxObserver, AgreesWithThePolarObserverWithoutBeingToldTheSpeed) {
   PositionFluxObserver position(kServoMotor.machine, 125e-6);
@@ -110,7 +110,7 @@ double verghese_sanders_rate_per_s(const InductionMotorModel& motor, double gain
   return -std::log(left) / (kSteps * kPeriod_s);
 }
 
-// Case 18: 1 %. Catches a gain of the wrong sign and a correction without its leakage part. M is assumed.
+// Case 18: 1 %. Catches: a gain of the wrong sign and a correction without its leakage part. M is assumed.
 TEST(VergheseSandersObserver, ErrorRatesOfTheTextsExample) {
   const InductionMotorModel motor = {.machine = {.pole_pairs = 2.0,
                                                  .mutual_inductance_h = 0.0806,
@@ -127,7 +127,7 @@ TEST(VergheseSandersObserver, ErrorRatesOfTheTextsExample) {
   EXPECT_NEAR(VergheseSandersObserver(motor, 0.9, 1e-4).error_decay_per_s(), 64.2, 0.642);
 }
 
-// Catches gains that do not belong to the rates, and an error that does not turn back with the rotor: along
+// Catches: gains that do not belong to the rates, and an error that does not turn back with the rotor: along
 // the eigenvector (c1, r1) the error is exp(-(R_R·t - j·n_p·θ·L_R)·r1) of itself, however the speed changes.
 TEST(MartinRouchonObserver, ErrorFollowsItsClosedForm) {
   constexpr double kR1_per_h = 60.0;

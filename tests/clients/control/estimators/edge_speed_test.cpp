@@ -26,7 +26,7 @@ void turn(double speed_rad_s, int samples, Visitor visit) {
   }
 }
 
-// Catches a count taken for an edge, the age added instead of taken off: at a constant speed, slow or fast,
+// Catches: a count taken for an edge, the age added instead of taken off: at a constant speed, slow or fast,
 // either way, the speed is exact where the backward difference would be wrong by up to 31.4 rad/s.
 TEST(EdgeSpeed, IsExactAtConstantSpeed) {
   for (const double speed_rad_s : {2.0, 17.5, 122.807, -3.0, -400.0}) {
@@ -39,8 +39,8 @@ TEST(EdgeSpeed, IsExactAtConstantSpeed) {
   }
 }
 
-// Catches a shaft that stands and is still said to turn: with no edge for an age the speed is below one count
-// over that age.
+// Catches: a shaft that stands and is still said to turn: with no edge for an age the speed is below one
+// count over that age.
 TEST(EdgeSpeed, FadesWhenNoEdgeComes) {
   EdgeSpeed estimator(2000.0, kPeriod_s);
   estimator.step(0, 0.0, 1);
@@ -53,7 +53,7 @@ TEST(EdgeSpeed, FadesWhenNoEdgeComes) {
   EXPECT_LT(estimator.step(2, 1.0, 1), kCount_rad / 0.99);
 }
 
-// Catches an edge crossed to and fro that counts as a way of one count each.
+// Catches: an edge crossed to and fro that counts as a way of one count each.
 TEST(EdgeSpeed, ShakingOnOneEdgeIsNoSpeed) {
   EdgeSpeed estimator(2000.0, kPeriod_s);
   estimator.step(0, 0.0, 1);

@@ -13,7 +13,7 @@ namespace {
 constexpr double kFriction = 4e-4 / 6e-5;
 constexpr auto kAllWays = {Discretisation::kEuler, Discretisation::kTrapezoidal, Discretisation::kExact};
 
-// Catches a series that stops too early or a squaring too few: the exponential of a matrix with known one.
+// Catches: a series that stops too early or a squaring too few: the exponential of a matrix with known one.
 TEST(SmallMatrix, ExponentialOfADampedRotationAndOfANilpotentMatrix) {
   const Matrix<2, 2> turned = exponential(Matrix<2, 2>{{{-1.0, 20.0}, {-20.0, -1.0}}});
   EXPECT_NEAR(turned[0][0], std::exp(-1.0) * std::cos(20.0), 1e-13);
@@ -23,7 +23,7 @@ TEST(SmallMatrix, ExponentialOfADampedRotationAndOfANilpotentMatrix) {
   EXPECT_NEAR(shifted[1][2], 4.0, 1e-13);
 }
 
-// Catches an elimination without pivoting and a wrong sign in the recursion for the polynomial.
+// Catches: an elimination without pivoting and a wrong sign in the recursion for the polynomial.
 TEST(SmallMatrix, SolvesAndHasItsCharacteristicPolynomial) {
   const Matrix<3, 3> a = {{{0.0, 2.0, 1.0}, {1.0, 0.0, 3.0}, {2.0, 1.0, 0.0}}};
   const Matrix<3, 1> b = {{{7.0}, {10.0}, {4.0}}};
@@ -37,7 +37,7 @@ TEST(SmallMatrix, SolvesAndHasItsCharacteristicPolynomial) {
   EXPECT_NEAR(c[2], -13.0, 1e-14);
 }
 
-// AC-06. Catches a discretisation under another's name: p = 500 at 0.5 ms goes to 0.75, 0.77778 and e^-0.25,
+// AC-06. Catches: a discretisation under another's name: p = 500 at 0.5 ms goes to 0.75, 0.77778 and e^-0.25,
 // double, so the polynomial is (z - that)^2.
 TEST(LinearObserver, EachDiscretisationPutsThePolesWhereItShould) {
   const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
@@ -55,7 +55,7 @@ TEST(LinearObserver, EachDiscretisationPutsThePolesWhereItShould) {
   }
 }
 
-// Catches a stability report that looks at the continuous observer: Euler is stable for pT < 2 alone.
+// Catches: a stability report that looks at the continuous observer: Euler is stable for pT < 2 alone.
 TEST(LinearObserver, EulerLosesAFastPoleAndTheOthersDoNot) {
   const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
   const LinearSystem<2, 1> system = shaft_observer(gains, kFriction);
@@ -75,7 +75,7 @@ LinearObserver<2, 1> after_constant_speed(Discretisation how, std::int64_t perio
   return observer;
 }
 
-// Catches an injection or an input that is off by a sample: at constant speed no way may have an error, with
+// Catches: an injection or an input that is off by a sample: at constant speed no way may have an error, with
 // samples lost or without.
 TEST(LinearObserver, ConstantSpeedIsSeenWithoutError) {
   for (const Discretisation how : kAllWays) {
@@ -87,7 +87,7 @@ TEST(LinearObserver, ConstantSpeedIsSeenWithoutError) {
   }
 }
 
-// Catches a gap that is bridged without its inputs: three steps at once are three steps on a line.
+// Catches: a gap that is bridged without its inputs: three steps at once are three steps on a line.
 TEST(LinearObserver, LostSamplesArePutOnALine) {
   const auto gains = ShaftObserverGains::placed(std::array{300.0, 400.0}, kFriction);
   for (const Discretisation how : kAllWays) {
@@ -103,7 +103,7 @@ TEST(LinearObserver, LostSamplesArePutOnALine) {
   }
 }
 
-// EST-04. Catches a claim that the position can be seen from the speed: its error stays for ever, whatever
+// EST-04. Catches: a claim that the position can be seen from the speed: its error stays for ever, whatever
 // the gains, and nothing but the exact way could even notice.
 TEST(LinearObserver, ThePositionCannotBeObservedFromTheSpeed) {
   for (const Discretisation how : kAllWays) {

@@ -16,7 +16,7 @@ constexpr double kPeriod_s = 125e-6;
 constexpr InductionMachineModel kServo = kServoMotor.machine;
 constexpr double kFriction_per_s = kServo.friction_rate_per_s();
 
-// Catches the printed l2, which has r1·r2 twice and no r1·r3: the characteristic polynomial must have the
+// Catches: the printed l2, which has r1·r2 twice and no r1·r3: the characteristic polynomial must have the
 // wanted roots.
 TEST(LoadTorqueObserver, GainsPlaceThreePoles) {
   const LoadObserverGains g = LoadObserverGains::placed(300.0, 500.0, 800.0, kFriction_per_s);
@@ -30,7 +30,7 @@ TEST(LoadTorqueObserver, GainsPlaceThreePoles) {
   EXPECT_NEAR(poles[2], -300.0, 1e-6);
 }
 
-// Catches a load with the wrong sign, and one that the speed does not feel (as the slides print it, which
+// Catches: a load with the wrong sign, and one that the speed does not feel (as the slides print it, which
 // cannot converge): the error of a free observer obeys the Euler recursion with z = 1 - r·T.
 TEST(LoadTorqueObserver, ErrorObeysItsCharacteristicPolynomial) {
   LoadTorqueObserver observer(kServo, LoadObserverGains::placed(300.0, 500.0, 800.0, kFriction_per_s),
@@ -48,7 +48,7 @@ TEST(LoadTorqueObserver, ErrorObeysItsCharacteristicPolynomial) {
   }
 }
 
-// Catches a scale without the inertia: a machine that accelerates less than its torque would have it shows
+// Catches: a scale without the inertia: a machine that accelerates less than its torque would have it shows
 // the difference as load, 0.1 N·m, to the Euler error of half a period.
 TEST(LoadTorqueObserver, FindsTheLoad) {
   LoadTorqueObserver observer(kServo, LoadObserverGains::placed(300.0, 500.0, 800.0, kFriction_per_s),
@@ -66,7 +66,7 @@ TEST(LoadTorqueObserver, FindsTheLoad) {
   EXPECT_NEAR(observer.speed_rad_s(), speed_rad_s, 1e-6 * speed_rad_s);
 }
 
-// Catches a decay that depends on the speed: two observers of the flux come together as exp(-ηt) while the
+// Catches: a decay that depends on the speed: two observers of the flux come together as exp(-ηt) while the
 // shaft turns by any angle.
 TEST(RotorFrameObserver, FluxErrorDecaysAtTheRotorRateWhateverTheShaftDoes) {
   const LoadObserverGains gains = LoadObserverGains::placed(300.0, 500.0, 800.0, kFriction_per_s);
@@ -83,8 +83,8 @@ TEST(RotorFrameObserver, FluxErrorDecaysAtTheRotorRateWhateverTheShaftDoes) {
   EXPECT_NEAR(b.rotor_frame_flux_wb().b - a.rotor_frame_flux_wb().b, 0.01 * left, 1e-12);
 }
 
-// Catches a transform the wrong way round: currents that stand still in the rotor's frame build up M·i there,
-// and the flux in the stator's frame lies along the current.
+// Catches: a transform the wrong way round: currents that stand still in the rotor's frame build up M·i
+// there, and the flux in the stator's frame lies along the current.
 TEST(RotorFrameObserver, FluxLiesAlongACurrentThatTurnsWithTheRotor) {
   RotorFrameObserver observer(kServo, LoadObserverGains::placed(300.0, 500.0, 800.0, kFriction_per_s),
                               kPeriod_s);
@@ -97,9 +97,9 @@ TEST(RotorFrameObserver, FluxLiesAlongACurrentThatTurnsWithTheRotor) {
   EXPECT_NEAR(observer.flux_wb(shaft_rad).b, 0.0468 * std::sin(3.0 * shaft_rad), 1e-10);
 }
 
-// Catches a torque or slip from the wrong axis, and an observer that turns its flux with the true speed only:
-// a machine in the same Euler steps, already turning at 20 rad/s when the observer starts at rest, must be
-// found in all four states. What is left is the flux error, which has decayed by exp(-0.2·η).
+// Catches: a torque or slip from the wrong axis, and an observer that turns its flux with the true speed
+// only: a machine in the same Euler steps, already turning at 20 rad/s when the observer starts at rest, must
+// be found in all four states. What is left is the flux error, which has decayed by exp(-0.2·η).
 TEST(CoupledObserver, FindsAllFourStates) {
   CoupledObserver observer(kServo, {.angle_per_s = 1.8e3, .speed_per_s2 = 8e5}, kPeriod_s);
   PolarFluxObserver machine(kServo, kPeriod_s);

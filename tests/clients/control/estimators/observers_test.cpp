@@ -16,14 +16,14 @@ constexpr InductionMachineModel kServo = {.pole_pairs = 3.0,
                                           .inertia_kgm2 = 1.1e-4};
 constexpr double kPeriodS = 125e-6;
 
-// Catches a swapped M, L_R or J: the derived constants of the servo machine (case 1 of the reference).
+// Catches: a swapped M, L_R or J: the derived constants of the servo machine (case 1 of the reference).
 TEST(MachineModel, HasTheDerivedConstantsOfTheServoMachine) {
   EXPECT_NEAR(kServo.flux_decay_per_s(), 278.571, 278.571 * 5e-5);
   EXPECT_NEAR(kServo.acceleration_per_wb_a(), 22792.2, 22792.2 * 5e-5);
   EXPECT_NEAR(kServo.friction_rate_per_s(), 1.2727, 1e-4);
 }
 
-// Catches a wrong sign in either transform: to_ab must undo to_dq, and d must lie along the angle.
+// Catches: a wrong sign in either transform: to_ab must undo to_dq, and d must lie along the angle.
 TEST(Frames, DirectAxisLiesAlongTheAngleAndTheTransformsAreInverse) {
   const Direction direction = Direction::at(0.7);
   const DirectQuadrature along = direction.to_dq({.a = 2.0 * std::cos(0.7), .b = 2.0 * std::sin(0.7)});
@@ -34,7 +34,7 @@ TEST(Frames, DirectAxisLiesAlongTheAngleAndTheTransformsAreInverse) {
   EXPECT_NEAR(back.b, -0.25, 1e-15);
 }
 
-// Catches [−π, π) for (−π, π] and a wrap that only takes off one turn.
+// Catches: [−π, π) for (−π, π] and a wrap that only takes off one turn.
 TEST(Frames, WrappedAnglesLieAboveMinusPiUpToPi) {
   constexpr double kPi = std::numbers::pi;
   EXPECT_EQ(wrapped(kPi), kPi);
@@ -44,7 +44,7 @@ TEST(Frames, WrappedAnglesLieAboveMinusPiUpToPi) {
   EXPECT_NEAR(wrapped(-0.5 - 20.0 * kPi), -0.5, 1e-13);
 }
 
-// Catches a wrong η or M: with i_d held, ψ goes to M·i_d and the distance shrinks by 1 − ηT a sample,
+// Catches: a wrong η or M: with i_d held, ψ goes to M·i_d and the distance shrinks by 1 − ηT a sample,
 // whatever the speed.
 TEST(PolarFluxObserver, FluxApproachesItsSteadyValueAtTheRotorRate) {
   PolarFluxObserver observer(kServo, kPeriodS);
@@ -59,7 +59,7 @@ TEST(PolarFluxObserver, FluxApproachesItsSteadyValueAtTheRotorRate) {
   }
 }
 
-// Catches n_p·ω or slip forgotten: the flux turns at n_p·ω + η·M·i_q/ψ, here over several turns.
+// Catches: n_p·ω or slip forgotten: the flux turns at n_p·ω + η·M·i_q/ψ, here over several turns.
 TEST(PolarFluxObserver, FluxTurnsAtElectricalSpeedPlusSlip) {
   PolarFluxObserver observer(kServo, kPeriodS);
   for (int k = 0; k < 4000; ++k)
@@ -74,15 +74,15 @@ TEST(PolarFluxObserver, FluxTurnsAtElectricalSpeedPlusSlip) {
   EXPECT_NEAR(wrapped(observer.angle_rad() - 0.1 * (3.0 * 70.0 + slip_rad_s)), 0.0, 1e-9);
 }
 
-// Catches a division by no flux: the first sample of a cold machine divides by 1e-3 Wb, not by 1e-4 Wb.
+// Catches: a division by no flux: the first sample of a cold machine divides by 1e-3 Wb, not by 1e-4 Wb.
 TEST(PolarFluxObserver, ColdMachineDividesByOneMilliweber) {
   PolarFluxObserver observer(kServo, kPeriodS);
   observer.step({.d = 0.0, .q = 1.0}, 0.0);
   EXPECT_NEAR(observer.angle_rad(), kPeriodS * kServo.flux_decay_per_s() * 0.0117 / 1e-3, 1e-15);
 }
 
-// Catches exchanged gains: the book's l1 and l2 are the poles −806.5 and −994.7, and placing those gives them
-// back.
+// Catches: exchanged gains: the book's l1 and l2 are the poles −806.5 and −994.7, and placing those gives
+// them back.
 TEST(SpeedObserver, BookGainsPlaceTheDerivedPoles) {
   const double friction_rate_per_s = kServo.friction_rate_per_s();
   const SpeedObserverGains placed = SpeedObserverGains::placed(806.5, 994.7, friction_rate_per_s);
@@ -90,7 +90,7 @@ TEST(SpeedObserver, BookGainsPlaceTheDerivedPoles) {
   EXPECT_NEAR(placed.speed_per_s2, 8e5, 100.0);
 }
 
-// Catches a wrong sign or a mixed-up state in the observer: a free observation error obeys
+// Catches: a wrong sign or a mixed-up state in the observer: a free observation error obeys
 // e(k+2) − (z1 + z2)·e(k+1) + z1·z2·e(k) = 0 with the Euler poles z = 1 − r·T (0.899 and 0.876 at 8 kHz).
 TEST(SpeedObserver, ErrorDecaysWithTheEulerPoles) {
   const double friction_rate_per_s = kServo.friction_rate_per_s();
@@ -112,7 +112,7 @@ TEST(SpeedObserver, ErrorDecaysWithTheEulerPoles) {
   EXPECT_LT(std::abs(now), 1e-4 * angle_rad);
 }
 
-// Catches a torque that is not fed forward: with the true acceleration known, a ramp of speed is followed
+// Catches: a torque that is not fed forward: with the true acceleration known, a ramp of speed is followed
 // without a lag beyond the Euler error of half a period.
 TEST(SpeedObserver, FollowsAKnownAccelerationWithoutLag) {
   SpeedObserver observer({.angle_per_s = 1.8e3, .speed_per_s2 = 8e5}, 0.0, kPeriodS);
@@ -125,7 +125,7 @@ TEST(SpeedObserver, FollowsAKnownAccelerationWithoutLag) {
   EXPECT_NEAR(observer.speed_rad_s(), acceleration_rad_s2 * t_s, acceleration_rad_s2 * kPeriodS);
 }
 
-// Catches a difference that ignores the periods gone by, or starts with the absolute count.
+// Catches: a difference that ignores the periods gone by, or starts with the absolute count.
 TEST(BackwardDifference, IsCountsPerElapsedTimeAndStartsAtZero) {
   BackwardDifference difference(2000, kPeriodS);
   EXPECT_EQ(difference.step(123'456, 1), 0.0);

@@ -43,7 +43,7 @@ ShaftEstimatorParameters with(ShaftSpeed source, const ShaftObserverGains& gains
   return {.counts_per_revolution = counts, .source = source, .observer = gains, .discretisation = how};
 }
 
-// AC-06. Catches a load that enters with the wrong sign or a wrong l1: an unknown constant load makes ω̂ read
+// AC-06. Catches: a load that enters with the wrong sign or a wrong l1: an unknown constant load makes ω̂ read
 // l1·τ_L/(J·p²) = 2.3178 rad/s high; 1 %, and 0.2 rad/s with the real encoder.
 TEST(ShaftObserver, AnUnknownLoadLeavesAKnownSpeedError) {
   const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
@@ -57,7 +57,7 @@ TEST(ShaftObserver, AnUnknownLoadLeavesAKnownSpeedError) {
   }
 }
 
-// AC-07. Catches a friction that the open-loop copy forgets: without injection the pulse leaves
+// AC-07. Catches: a friction that the open-loop copy forgets: without injection the pulse leaves
 // (τ_L/f)(1 − e^(−t f/J)) = 42.58 rad/s, which dies with J/f alone; p = 500 is back within 0.1 rad/s 50 ms
 // after. Truth: 168.757 and 129.219 rad/s.
 TEST(ShaftObserver, WithoutInjectionALoadPulseIsForgottenAsSlowlyAsTheShaftForgets) {
@@ -80,7 +80,7 @@ TEST(ShaftObserver, WithoutInjectionALoadPulseIsForgottenAsSlowlyAsTheShaftForge
   EXPECT_LT(std::abs(placed.speed_error()), 0.1);
 }
 
-// AC-08. Catches l3 with the wrong size or sign, a load without its sign: τ̂_L/τ_L = 1 − e^(−pt)(1 + pt +
+// AC-08. Catches: l3 with the wrong size or sign, a load without its sign: τ̂_L/τ_L = 1 − e^(−pt)(1 + pt +
 // p²t²/2) at 10, 20, 30 and 50 ms, 3 %; with the real encoder within 0.001 N·m more.
 TEST(LoadObserver, SeesALoadStepAsATripleLag) {
   const auto gains = ShaftObserverGains::placed(std::array{200.0, 200.0, 200.0}, kFriction);
@@ -103,7 +103,7 @@ TEST(LoadObserver, SeesALoadStepAsATripleLag) {
   }
 }
 
-// AC-08, the problem as printed. Catches a load observer with l3 > 0 that is taken: it must be reported, and
+// AC-08, the problem as printed. Catches: a load observer with l3 > 0 that is taken: it must be reported, and
 // does run away.
 TEST(LoadObserver, APositiveThirdGainIsReportedAndRunsAway) {
   auto gains = ShaftObserverGains::placed(std::array{200.0, 200.0, 200.0}, kFriction);
@@ -120,7 +120,7 @@ TEST(LoadObserver, APositiveThirdGainIsReportedAndRunsAway) {
   EXPECT_GT(std::abs(seen.estimator.now().load_rad_s2 * 6e-5), 10.0);
 }
 
-// Catches a stability report that forgets the sample rate: p = 500 at 200 Hz has pT = 2.5.
+// Catches: a stability report that forgets the sample rate: p = 500 at 200 Hz has pT = 2.5.
 TEST(ShaftObserver, TooFastForTheSampleRateIsReported) {
   const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
   const auto problems = with(ShaftSpeed::kObserver, gains, Discretisation::kEuler).problems(kFriction, 5e-3);
@@ -131,7 +131,7 @@ TEST(ShaftObserver, TooFastForTheSampleRateIsReported) {
 }
 
 // Quality of an observer against the backward difference (EST-02): p = 100, 0.1 A after 0.2 s, T = 0.5 ms;
-// the reference has 0.006 and 2.78 rad/s rms. Catches an observer that lets the counts through.
+// the reference has 0.006 and 2.78 rad/s rms. Catches: an observer that lets the counts through.
 TEST(ShaftObserver, IsHundredsOfTimesQuieterThanTheBackwardDifference) {
   const auto rms = [](ShaftSpeed source) {
     const auto gains = ShaftObserverGains::placed(std::array{100.0, 100.0}, kFriction);
@@ -150,7 +150,7 @@ TEST(ShaftObserver, IsHundredsOfTimesQuieterThanTheBackwardDifference) {
   EXPECT_NEAR(rms(ShaftSpeed::kBackwardDifference), 2.78, 0.3);
 }
 
-// Catches an angle that is counted from zero and not from the first sample.
+// Catches: an angle that is counted from zero and not from the first sample.
 TEST(ShaftEstimator, TheFirstSampleIsAngleZero) {
   const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
   ShaftEstimator estimator(with(ShaftSpeed::kObserver, gains, Discretisation::kEuler, 2000.0), kFriction,
@@ -160,7 +160,7 @@ TEST(ShaftEstimator, TheFirstSampleIsAngleZero) {
   EXPECT_NEAR(estimator.update({.encoder_count = 54221}, 0.0, 1).angle_rad, -0.314159, 1e-6);
 }
 
-// Catches a tachometer read with its gain the wrong way up.
+// Catches: a tachometer read with its gain the wrong way up.
 TEST(ShaftEstimator, ReadsATachometer) {
   ShaftEstimatorParameters p = with(ShaftSpeed::kTachometer, {}, Discretisation::kEuler, 2000.0);
   EXPECT_FALSE(p.problems(kFriction, 1e-4).empty());

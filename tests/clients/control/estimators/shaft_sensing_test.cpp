@@ -12,7 +12,7 @@ namespace {
 
 constexpr SpeedObserverGains kGains = SpeedObserverGains::placed(500.0, 500.0, 0.0);
 
-// Catches a position that begins at count 0, and a disc that begins at the first sample.
+// Catches: a position that begins at count 0, and a disc that begins at the first sample.
 TEST(ShaftSensing, CountsThePositionFromTheFirstSampleAndTheDiscFromZero) {
   ShaftSensing shaft(2000.0, kGains, 0.0, 1e-4);
   shaft.measure(5500, 1, 0.0);
@@ -24,7 +24,7 @@ TEST(ShaftSensing, CountsThePositionFromTheFirstSampleAndTheDiscFromZero) {
   EXPECT_NEAR(shaft.disc_rad(), -0.5 * std::numbers::pi, 1e-12);
 }
 
-// Catches an observer that stands still over lost samples: at constant speed a gap of ten periods changes
+// Catches: an observer that stands still over lost samples: at constant speed a gap of ten periods changes
 // nothing.
 TEST(ShaftSensing, CarriesTheSpeedOverAGap) {
   ShaftSensing shaft(2000.0, kGains, 0.0, 1e-4);
@@ -38,7 +38,8 @@ TEST(ShaftSensing, CarriesTheSpeedOverAGap) {
   EXPECT_NEAR(shaft.speed_rad_s(), speed, 1e-6);
 }
 
-// Catches an observer without the torque: under a constant acceleration that it is told the speed has no lag.
+// Catches: an observer without the torque: under a constant acceleration that it is told the speed has no
+// lag.
 TEST(ShaftSensing, FollowsAnAccelerationThatItIsTold) {
   ShaftSensing shaft(1e9, kGains, 0.0, 1e-4);  // no steps to speak of
   for (int k = 0; k < 1000; ++k) {
@@ -49,7 +50,7 @@ TEST(ShaftSensing, FollowsAnAccelerationThatItIsTold) {
   EXPECT_NEAR(shaft.speed_rad_s(), 1000.0 * 0.0999, 0.2);
 }
 
-// Catches a transform that is not power-invariant, or not the inverse of the other.
+// Catches: a transform that is not power-invariant, or not the inverse of the other.
 TEST(ThreePhase, IsPowerInvariantAndInvertible) {
   const PhasePair x = two_phase_of(208.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3,
                                    -104.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3,

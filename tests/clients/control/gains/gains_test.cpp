@@ -20,7 +20,7 @@ std::string refusal(const Preset& preset, const Gain& gain) {
   return "";
 }
 
-// Catches an override that is dropped, or that lands in another number.
+// Catches: an override that is dropped, or that lands in another number.
 TEST(Gains, OverridesTakeTheirPlaceAndNoOther) {
   const RunTiming timing = {.sample_rate_hz = 8000.0, .prepare_s = 0.1, .hold_s = 0.2};
   const RunTiming changed = with_gains(timing, std::vector<Gain>{{"run.hold_s", 0.5}});
@@ -29,7 +29,7 @@ TEST(Gains, OverridesTakeTheirPlaceAndNoOther) {
   EXPECT_EQ(changed.sample_rate_hz, 8000.0);
 }
 
-// Catches a row of a gain table that reaches another member than it names: every gain of every preset, made
+// Catches: a row of a gain table that reaches another member than it names: every gain of every preset, made
 // with its own value, must give the same run.
 TEST(Gains, EveryGainOfEveryPresetTakesItsOwnValueAndRefusesNaN) {
   for (const Preset& preset : presets()) {
@@ -43,7 +43,7 @@ TEST(Gains, EveryGainOfEveryPresetTakesItsOwnValueAndRefusesNaN) {
   }
 }
 
-// Catches a refusal that does not say which gain, which value and which rule.
+// Catches: a refusal that does not say which gain, which value and which rule.
 TEST(Gains, WrongNamesAndValuesAreRefusedInWords) {
   const Preset& book = *find_preset("book/8.2.2");
   EXPECT_EQ(refusal(book, {"current.proportional_v_per_a", -1.0}),

@@ -21,7 +21,7 @@ PhasePair current_rates(const InductionMotorModel& motor, PhasePair i, PhasePair
           .b = eta_beta * psi.b - beta_w * psi.a - gamma * i.b + u.b / sigma_ls};
 }
 
-// Catches any wrong sign or factor of the decoupling: in random states the machine's own equations, in the
+// Catches: any wrong sign or factor of the decoupling: in random states the machine's own equations, in the
 // other frame, must answer with exactly the rates that were asked for.
 TEST(DecoupledVoltage, BringsAboutTheRatesThatWereAskedFor) {
   std::mt19937 random(8);
@@ -47,7 +47,7 @@ TEST(DecoupledVoltage, BringsAboutTheRatesThatWereAskedFor) {
   }
 }
 
-// Catches voltages that lag: the middle of the period they are held in is where they belong.
+// Catches: voltages that lag: the middle of the period they are held in is where they belong.
 TEST(HeldVoltage, IsTurnedHalfAPeriodAheadAndLimitedPerPhase) {
   InductionState x;
   x.speed_rad_s = 800.0;  // 0.15 rad in half a period
@@ -59,7 +59,7 @@ TEST(HeldVoltage, IsTurnedHalfAPeriodAheadAndLimitedPerPhase) {
   EXPECT_TRUE(limited.saturated);
 }
 
-// Catches an error with the wrong sign: an ampere missing on one axis adds σ·L_S·p volts there and nothing
+// Catches: an error with the wrong sign: an ampere missing on one axis adds σ·L_S·p volts there and nothing
 // elsewhere.
 TEST(DecoupledCurrentLoop, AddsTheErrorTimesItsPole) {
   const DecoupledCurrentLoop loop(kServoDrive, 2500.0);

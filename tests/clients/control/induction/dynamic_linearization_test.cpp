@@ -17,7 +17,7 @@ constexpr double kEta = kServo.flux_decay_per_s();
 constexpr double kEtaM = kEta * kServo.mutual_inductance_h;
 constexpr double kMu = kServo.acceleration_per_wb_a();
 
-// Catches gains at the wrong power of s, or friction counted twice: with α' = w_q and ω' = α - (f/J)·ω the
+// Catches: gains at the wrong power of s, or friction counted twice: with α' = w_q and ω' = α - (f/J)·ω the
 // angle error obeys s⁴ + (K3 + f/J)·s³ + (K2 + K3·f/J)·s² + K1·s + K0.
 TEST(VoltageLinearization, GainsPlaceBothLoops) {
   const double f = kServo.friction_rate_per_s();
@@ -33,7 +33,7 @@ TEST(VoltageLinearization, GainsPlaceBothLoops) {
     EXPECT_NEAR(std::abs(pole + 300.0), 0.0, 0.05);
 }
 
-// Catches a flux rate that is left out or has the wrong sign: without feedback, a rising flux and i_q
+// Catches: a flux rate that is left out or has the wrong sign: without feedback, a rising flux and i_q
 // flowing, the voltages must bring about the α' and ψ'' that the references ask for by feed-forward.
 TEST(VoltageLinearization, LinearisesWhileTheFluxChanges) {
   const VoltageLinearizationParameters no_feedback{};
@@ -58,7 +58,7 @@ TEST(VoltageLinearization, LinearisesWhileTheFluxChanges) {
   EXPECT_NEAR(kEtaM * i_d_rate - kEta * flux_rate_wb_s, 0.0, 1e-6);
 }
 
-// Catches a wrong term in c': against the difference of c along ψ + ψ'·t + ψ''·t²/2.
+// Catches: a wrong term in c': against the difference of c along ψ + ψ'·t + ψ''·t²/2.
 TEST(DirectIntegrator, SpeedFactorKnowsItsRate) {
   const double flux_wb = 0.03, rate_wb_s = -0.2, second_wb_s2 = 15.0, h_s = 1e-6;
   InductionMachineModel m = kServo;
@@ -72,7 +72,7 @@ TEST(DirectIntegrator, SpeedFactorKnowsItsRate) {
   EXPECT_NEAR((c_at(h_s) - c_at(-h_s)) / (2.0 * h_s), factor.c_per_s, 1e-5 * std::abs(factor.c_per_s));
 }
 
-// Catches a c that is not the derivative of y: y' = c·ω must be dy/dt of y = ρ - g·ω by the machine's own
+// Catches: a c that is not the derivative of y: y' = c·ω must be dy/dt of y = ρ - g·ω by the machine's own
 // equations, whatever i_q is.
 TEST(DirectIntegrator, SpeedFactorBelongsToItsOutput) {
   InductionMachineModel m = kServo;
@@ -88,7 +88,7 @@ TEST(DirectIntegrator, SpeedFactorBelongsToItsOutput) {
   }
 }
 
-// Catches a singularity at the wrong place: -0.988 Wb/s at rated flux, -0.052 Wb/s at 0.017 Wb, and
+// Catches: a singularity at the wrong place: -0.988 Wb/s at rated flux, -0.052 Wb/s at 0.017 Wb, and
 // -n_p²·ψ³/(2·J·R_R) in between.
 TEST(DirectIntegrator, IsSingularWhenTheFluxFallsTooFast) {
   InductionMachineModel m = kServo;
@@ -101,7 +101,7 @@ TEST(DirectIntegrator, IsSingularWhenTheFluxFallsTooFast) {
   }
 }
 
-// Catches a wrong sign in the 2×2 inverse: in random states the machine's α' and S' must come out as asked
+// Catches: a wrong sign in the 2×2 inverse: in random states the machine's α' and S' must come out as asked
 // for.
 TEST(QuadratureIntegrator, BringsAboutTheRatesThatWereAskedFor) {
   std::mt19937 random(29);
@@ -119,7 +119,7 @@ TEST(QuadratureIntegrator, BringsAboutTheRatesThatWereAskedFor) {
   }
 }
 
-// Catches a law that does not rest: steady torque needs i_d = ψ/M and a constant i_q.
+// Catches: a law that does not rest: steady torque needs i_d = ψ/M and a constant i_q.
 TEST(QuadratureIntegrator, SteadyOperationTakesTheSteadyCurrents) {
   InductionState x;
   x.flux_wb = 0.0455;
@@ -129,7 +129,7 @@ TEST(QuadratureIntegrator, SteadyOperationTakesTheSteadyCurrents) {
   EXPECT_NEAR(command.i_q_rate_a_s, 0.0, 1e-9);
 }
 
-// Catches a singularity that goes unnoticed: without torque the controller says so and asks for finite
+// Catches: a singularity that goes unnoticed: without torque the controller says so and asks for finite
 // currents.
 TEST(QuadratureIntegrator, SaysThatItIsSingularWithoutTorque) {
   QuadratureIntegratorController controller(kServoDrive,

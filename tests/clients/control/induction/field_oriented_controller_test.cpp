@@ -33,7 +33,7 @@ FieldOrientedController magnetised(const ControllerParameters& p, double* peak_f
   return controller;
 }
 
-// Catches a wrong factor before the reference current (the book prints α_ref/ψ_d0, a factor μ = 22792 too
+// Catches: a wrong factor before the reference current (the book prints α_ref/ψ_d0, a factor μ = 22792 too
 // much), a wrong count-to-angle scale, and the sign of the position error.
 TEST(FieldOrientedController, QuadratureReferenceIsTheWantedAccelerationOverMuPsi) {
   const double per_ampere = 22792.2 * 0.0117 * 5.5 / std::numbers::sqrt2;
@@ -50,7 +50,7 @@ TEST(FieldOrientedController, QuadratureReferenceIsTheWantedAccelerationOverMuPs
               1e-4);  // 2.1 A a count
 }
 
-// Catches the printed "− f·ω": with the reference at the estimated speed, what is left is +f·ω of torque.
+// Catches: the printed "− f·ω": with the reference at the estimated speed, what is left is +f·ω of torque.
 TEST(FieldOrientedController, FrictionIsFedForwardWithAPlusSign) {
   ControllerParameters p = book();
   p.machine.friction_nms = 0.01;
@@ -66,7 +66,7 @@ TEST(FieldOrientedController, FrictionIsFedForwardWithAPlusSign) {
   EXPECT_NEAR(torque_nm, 0.01 * 24000.0 * rad_per_count, 1e-9);
 }
 
-// Catches an i_d reference above 0.98 of the amplifier's limit and its integrator winding up there: the flux
+// Catches: an i_d reference above 0.98 of the amplifier's limit and its integrator winding up there: the flux
 // would overshoot by 3.6 percent. The 1.5 percent that are left gather between the end of the clip and the
 // rated flux.
 TEST(FieldOrientedController, FluxBuildsUpAtTheClipWithoutOvershoot) {
@@ -79,7 +79,7 @@ TEST(FieldOrientedController, FluxBuildsUpAtTheClipWithoutOvershoot) {
   EXPECT_NEAR(peak_flux_wb, book().rated_flux_wb(), 0.02 * book().rated_flux_wb());
 }
 
-// Catches position wind-up: ten samples at the 8 A clip would leave 1.3 A behind.
+// Catches: position wind-up: ten samples at the 8 A clip would leave 1.3 A behind.
 TEST(FieldOrientedController, PositionIntegratorStandsStillWhileItsReferenceIsClipped) {
   FieldOrientedController controller = magnetised(book());
   const Measurement at_rest = {.encoder_count = 0, .i_a_a = book().rated_direct_current_a, .i_b_a = 0.0};
@@ -91,7 +91,7 @@ TEST(FieldOrientedController, PositionIntegratorStandsStillWhileItsReferenceIsCl
   EXPECT_NEAR(updated(controller, at_rest, {}).i_q_reference_a, 0.0, 1e-9);
 }
 
-// Catches outer integrators that run on while the amplifier is at its limit, where their error cannot be
+// Catches: outer integrators that run on while the amplifier is at its limit, where their error cannot be
 // worked off.
 TEST(FieldOrientedController, PositionIntegratorStandsStillWhileTheVoltageIsAtItsLimit) {
   ControllerParameters p = book();
@@ -112,7 +112,7 @@ TEST(FieldOrientedController, PositionIntegratorStandsStillWhileTheVoltageIsAtIt
   EXPECT_GT(reference_with(0.0, false), before_a);  // and it runs again
 }
 
-// Catches a controller that works only from count 0: everything must depend on the distance from the start
+// Catches: a controller that works only from count 0: everything must depend on the distance from the start
 // count.
 TEST(FieldOrientedController, StartCountDoesNotMatter) {
   FieldOrientedController here(book());
@@ -127,7 +127,7 @@ TEST(FieldOrientedController, StartCountDoesNotMatter) {
   }
 }
 
-// Catches observers that stand still over lost samples: at 70 rad/s each lost period turns the flux by 1.5
+// Catches: observers that stand still over lost samples: at 70 rad/s each lost period turns the flux by 1.5
 // degrees.
 TEST(FieldOrientedController, FluxAngleIsCarriedOverLostSamples) {
   const auto angle_after = [](std::int64_t stride) {

@@ -19,7 +19,7 @@ FluxTarget target(const FluxReferenceParameters& p, const Reference& r) {
   return FluxReference(p, kServoMotor.machine, kPeriod_s).step(r);
 }
 
-// Catches an exchanged L_R/M: 586 and 701 rad/s at 80 V, 439 and 526 at 60 V.
+// Catches: an exchanged L_R/M: 586 and 701 rad/s at 80 V, 439 and 526 at 60 V.
 TEST(FluxReference, BaseSpeedsOfBookAndSlides) {
   const InductionMachineModel& m = kServoMotor.machine;
   EXPECT_NEAR(base_speed_of_book_rad_s(m, kRatedFluxWb, 80.0), 586.0, 1.0);
@@ -28,7 +28,7 @@ TEST(FluxReference, BaseSpeedsOfBookAndSlides) {
   EXPECT_NEAR(base_speed_of_slides_rad_s(m, kRatedFluxWb, 60.0), 526.0, 1.0);
 }
 
-// Catches a flux that weakens at one sign of the speed only, or that jumps at the base speed.
+// Catches: a flux that weakens at one sign of the speed only, or that jumps at the base speed.
 TEST(FluxReference, WeakeningKeepsSpeedTimesFlux) {
   EXPECT_EQ(target(kWeakening, {.speed_rad_s = 249.9}).flux_wb, kRatedFluxWb);
   EXPECT_NEAR(target(kWeakening, {.speed_rad_s = 250.001}).flux_wb, kRatedFluxWb, 1e-6);
@@ -38,7 +38,7 @@ TEST(FluxReference, WeakeningKeepsSpeedTimesFlux) {
   }
 }
 
-// Catches a wrong sign in a derivative, or a feed-forward that forgets that a falling flux needs less than
+// Catches: a wrong sign in a derivative, or a feed-forward that forgets that a falling flux needs less than
 // ψ/M: against differences along a cubic speed, which err by its fourth derivative.
 TEST(FluxReference, WeakeningKnowsItsRates) {
   const auto at = [](double t_s) {
@@ -56,7 +56,7 @@ TEST(FluxReference, WeakeningKnowsItsRates) {
   EXPECT_NEAR(eta * (0.0117 * now.i_d_a - now.flux_wb), now.rate_wb_s, 1e-12);
 }
 
-// Catches the feed-forward that exercise 15 goes without.
+// Catches: the feed-forward that exercise 15 goes without.
 TEST(FluxReference, FeedForwardCanBeLeftToTheLoop) {
   FluxReferenceParameters p = kWeakening;
   EXPECT_NEAR(target(p, {}).i_d_a, 5.5 / std::numbers::sqrt2, 1e-12);
@@ -65,7 +65,7 @@ TEST(FluxReference, FeedForwardCanBeLeftToTheLoop) {
   EXPECT_EQ(target(p, {}).flux_wb, kRatedFluxWb);
 }
 
-// Catches shares that are exchanged or not under a root, and a flux that jumps with its current: it follows
+// Catches: shares that are exchanged or not under a root, and a flux that jumps with its current: it follows
 // at η, over lost samples too.
 TEST(FluxReference, OptimumFollowsItsCurrentAsTheMachineDoes) {
   const auto table = std::make_shared<const OptimumTorqueTable>(

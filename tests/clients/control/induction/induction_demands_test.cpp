@@ -13,7 +13,7 @@ namespace {
 constexpr MoveAllowance kAmplifier = {.voltage_v = 80.0, .current_a = 6.0};
 constexpr VectorLimits kLimits = {.voltage_v = 80.0, .current_a = 6.0};
 
-// Catches a wrong sign or a missing leakage in the voltages: at the optimum torque the demands of steady
+// Catches: a wrong sign or a missing leakage in the voltages: at the optimum torque the demands of steady
 // operation must come out exactly at the limit that is in force, by equations that do not know of it.
 TEST(InductionDemands, OptimumOperationStandsAtItsLimits) {
   const SteadyInductionModel m = SteadyInductionModel::of(kServoMotor);
@@ -60,7 +60,7 @@ std::optional<Exceeded> exceeded(double friction_nms, FluxPolicy policy) {
                         InductionDemands(motor, kAmplifier));
 }
 
-// Case 11. Catches a check that lets the infeasible move pass, or refuses the one that the book made: its
+// Case 11. Catches: a check that lets the infeasible move pass, or refuses the one that the book made: its
 // friction takes the torque above the optimum, constant flux takes the voltage above 80 V long before the top
 // speed, standard weakening takes the current above 6 A when braking.
 TEST(InductionDemands, SaysWhichMovesCannotBeMadeAndWhy) {

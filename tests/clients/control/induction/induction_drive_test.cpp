@@ -12,7 +12,7 @@ namespace {
 constexpr double kPeriod_s = 125e-6;
 constexpr double kRadPerCount = 2.0 * std::numbers::pi / 2000.0;
 
-// Catches parameters with which σ is not positive, and a rule that names no gain.
+// Catches: parameters with which σ is not positive, and a rule that names no gain.
 TEST(InductionDrive, LeakageMustBePositive) {
   EXPECT_TRUE(kServoDrive.problems().empty());
   InductionDriveParameters p = kServoDrive;
@@ -21,7 +21,7 @@ TEST(InductionDrive, LeakageMustBePositive) {
   EXPECT_EQ(p.problems()[0].substr(0, 27), "machine.mutual_inductance_h");
 }
 
-// Catches angles that count from anywhere but the first sample, at counts that a double cannot hold.
+// Catches: angles that count from anywhere but the first sample, at counts that a double cannot hold.
 TEST(InductionFeedback, TheFirstSampleIsAngleZero) {
   constexpr std::int64_t kFar = -9'007'199'254'740'993;
   InductionFeedback feedback(kServoDrive);
@@ -29,7 +29,7 @@ TEST(InductionFeedback, TheFirstSampleIsAngleZero) {
   EXPECT_NEAR(feedback.sample({.encoder_count = kFar + 3}, 1).angle_rad, 3.0 * kRadPerCount, 1e-15);
 }
 
-// Catches observers that stand still over lost samples: 70 rad/s for five periods a gap, as with every
+// Catches: observers that stand still over lost samples: 70 rad/s for five periods a gap, as with every
 // sample.
 TEST(InductionFeedback, LostSamplesAreBridged) {
   const auto state_after = [](std::int64_t stride, auto feedback) {
@@ -53,7 +53,7 @@ TEST(InductionFeedback, LostSamplesAreBridged) {
                state_after(5, LoadedInductionFeedback(kServoDrive, 300.0)));
 }
 
-// Catches the bias of an observer that knows no load, and its absence where the load is observed: a motor
+// Catches: the bias of an observer that knows no load, and its absence where the load is observed: a motor
 // that holds 0.25 N·m at rest looks to the one as if it turned at (l1/l2)·τ_L/J = 5.1 rad/s.
 TEST(LoadedInductionFeedback, SpeedIsNotBiasedByALoad) {
   InductionFeedback plain(kServoDrive);
@@ -75,7 +75,7 @@ TEST(LoadedInductionFeedback, SpeedIsNotBiasedByALoad) {
   EXPECT_NEAR(loaded.load_nm(), 0.25, 0.01);  // the current is a sample behind its flux, a degree
 }
 
-// Catches a clip that forgets that an earlier one had already hit.
+// Catches: a clip that forgets that an earlier one had already hit.
 TEST(Clipped, RemembersAnyLimit) {
   bool at_limit = false;
   EXPECT_EQ(clipped(-3.0, 2.0, at_limit), -2.0);

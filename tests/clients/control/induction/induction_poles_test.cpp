@@ -28,7 +28,7 @@ void expect_poles(const std::vector<std::complex<double>>& found,
   }
 }
 
-// Case 2, gains of 8.2.2. Catches a gain at the wrong power of s and a flux loop without M.
+// Case 2, gains of 8.2.2. Catches: a gain at the wrong power of s and a flux loop without M.
 TEST(InductionPoles, OfFieldOrientedControl) {
   expect_poles(mechanical_poles(
                    {.integral_per_s3 = 1.07e6, .proportional_per_s2 = 7.04e5, .derivative_per_s = 1.07e3}),
@@ -40,7 +40,7 @@ TEST(InductionPoles, OfFieldOrientedControl) {
                {{-2493.0, 0.0}, {-70.3, 0.0}});
 }
 
-// Case 2, gains of 8.2.5. Catches the same where the flux loop is faster than 4 kHz can sample: z = 1 -
+// Case 2, gains of 8.2.5. Catches: the same where the flux loop is faster than 4 kHz can sample: z = 1 -
 // 32830/4000 lies far outside the unit circle, which is what makes it limit-cycle.
 TEST(InductionPoles, OfInputOutputLinearisation) {
   expect_poles(

@@ -21,7 +21,7 @@ InputOutputController controller_with(TorqueDivisor divisor) {
   return {kServoDrive, p, kFlux};
 }
 
-// Catches the division by the wrong flux: at half flux linearisation asks for twice the current,
+// Catches: the division by the wrong flux: at half flux linearisation asks for twice the current,
 // field-oriented control for what would do at full flux.
 TEST(InputOutputController, DividesByTheEstimatedFlux) {
   const double alpha_rad_s2 = 100.0;
@@ -37,7 +37,7 @@ TEST(InputOutputController, DividesByTheEstimatedFlux) {
   EXPECT_NEAR(telemetry_of(field_oriented, "i_q_ref_a"), per_wb / 0.0455, 1e-6);
 }
 
-// Catches a division by no flux: a cold machine is taken for one with 1 mWb.
+// Catches: a division by no flux: a cold machine is taken for one with 1 mWb.
 TEST(InputOutputController, ColdMachineDividesByOneMilliweber) {
   InputOutputController controller = controller_with(TorqueDivisor::kEstimatedFlux);
   controller.update({}, {.acceleration_rad_s2 = 100.0});
@@ -45,7 +45,7 @@ TEST(InputOutputController, ColdMachineDividesByOneMilliweber) {
               100.0 / kServoMotor.machine.acceleration_per_wb_a() / 1e-3, 1e-9);
 }
 
-// Catches wind-up while a reference is clipped: fifty samples at the 8 A clip must leave nothing behind.
+// Catches: wind-up while a reference is clipped: fifty samples at the 8 A clip must leave nothing behind.
 TEST(InputOutputController, AngleIntegratorStandsStillWhileItsReferenceIsClipped) {
   InductionDriveParameters strong = kServoDrive;
   strong.voltage_limit_v = 1000.0;
@@ -61,7 +61,7 @@ TEST(InputOutputController, AngleIntegratorStandsStillWhileItsReferenceIsClipped
   EXPECT_NEAR(telemetry_of(controller, "i_q_ref_a"), 0.0, 1e-9);
 }
 
-// Catches wind-up while the amplifier is at its limit, here because of a direct current that is 10 A too
+// Catches: wind-up while the amplifier is at its limit, here because of a direct current that is 10 A too
 // high; and an integrator that does not run again afterwards.
 TEST(InputOutputController, AngleIntegratorStandsStillWhileTheVoltageIsAtItsLimit) {
   InputOutputController controller = controller_with(TorqueDivisor::kFluxReference);
@@ -78,7 +78,7 @@ TEST(InputOutputController, AngleIntegratorStandsStillWhileTheVoltageIsAtItsLimi
   EXPECT_GT(reference_after(i_d_a, 20), before_a);
 }
 
-// Catches feedback gains on the wrong error: the response to a step of the reference by one count of a very
+// Catches: feedback gains on the wrong error: the response to a step of the reference by one count of a very
 // fine encoder, on a machine that gives exactly the currents asked for, is that of s³ + K2·s² + K1·s + K0,
 // to the 3 % that Euler steps and one sample of delay take at 50 kHz.
 TEST(InputOutputController, AngleLoopHasItsThreePoles) {

@@ -29,7 +29,7 @@ constexpr double kSpeed2_rad_s = 200.0;
 
 constexpr double kTableTolerance = 0.002;  // the table is printed to four digits, the case allows 0.2 %
 
-// Case 1. Catches a swapped inductance or a leakage without its square: the derived constants to 5e-5.
+// Case 1. Catches: a swapped inductance or a leakage without its square: the derived constants to 5e-5.
 TEST(InductionMotorModel, HasTheDerivedConstantsOfTheServoMotor) {
   EXPECT_NEAR(kServoMotor.leakage(), 0.30158, 0.30158 * 5e-5);
   EXPECT_NEAR(kServoMotor.leakage_inductance_h(), 4.2221e-3, 4.2221e-3 * 5e-5);
@@ -39,7 +39,7 @@ TEST(InductionMotorModel, HasTheDerivedConstantsOfTheServoMotor) {
   EXPECT_NEAR(kServoMotor.torque_nm_per_a2(), 0.029334, 0.029334 * 5e-5);
 }
 
-// Case 12. Catches a voltage limit compared with its own square (the printed algorithm), a generator that is
+// Case 12. Catches: a voltage limit compared with its own square (the printed algorithm), a generator that is
 // the motor mirrored, and a crossing that is not tried.
 TEST(OptimumTorque, TableOfTheServoMotor) {
   struct Row {
@@ -64,7 +64,7 @@ TEST(OptimumTorque, TableOfTheServoMotor) {
   }
 }
 
-// Catches a limit reported as the other one: current, both, voltage with rising speed, and 4.0922 A and
+// Catches: a limit reported as the other one: current, both, voltage with rising speed, and 4.0922 A and
 // 1.4745 A of direct current in the last two.
 TEST(OptimumTorque, SaysWhichLimitIsInForce) {
   const TorquePoint slow = optimum_torque(kServo, kLimits, rad_s(2000.0), TorqueSign::kMotoring);
@@ -100,8 +100,8 @@ double brute_force_nm(const SteadyInductionModel& m, const VectorLimits& limits,
   return sign * best;
 }
 
-// Catches any error of the closed forms that is the same in all of them: a search over currents, which cannot
-// find more and finds all but what its grid of 1/1200 leaves out.
+// Catches: any error of the closed forms that is the same in all of them: a search over currents, which
+// cannot find more and finds all but what its grid of 1/1200 leaves out.
 TEST(OptimumTorque, BruteForceFindsNoMoreAndNearlyAsMuch) {
   for (const double speed_rpm : {0.0, 2990.0, 3150.0, 4000.0, 6000.0, 8000.0}) {
     for (const TorqueSign sign : {TorqueSign::kMotoring, TorqueSign::kGenerating}) {
@@ -118,7 +118,7 @@ TEST(OptimumTorque, BruteForceFindsNoMoreAndNearlyAsMuch) {
   EXPECT_LE(searched, closed * 0.99);
 }
 
-// Case 14: 0.2 %. Catches the printed + sign of the δ² coefficient in (8.74), (8.75).
+// Case 14: 0.2 %. Catches: the printed + sign of the δ² coefficient in (8.74), (8.75).
 TEST(OptimumTorque, TheVoltageHasOneExtremumForMotoring) {
   const auto positive = [](const SteadyInductionModel& m, double speed_rad_s) {
     const std::vector<double> found = voltage_extrema(m, speed_rad_s);
@@ -136,8 +136,8 @@ TEST(OptimumTorque, TheVoltageHasOneExtremumForMotoring) {
   EXPECT_NEAR(positive(m, 300.0), std::sqrt((1.0 + a * a) / (1.0 + m.leakage * m.leakage * a * a)), 1e-6);
 }
 
-// Case 15: 0.2 %. Catches a generator that takes the global optimum of the voltage, which the current forbids
-// here, or a crossing instead of the local optimum.
+// Case 15: 0.2 %. Catches: a generator that takes the global optimum of the voltage, which the current
+// forbids here, or a crossing instead of the local optimum.
 TEST(OptimumTorque, Example2TakesTheLocalOptimum) {
   constexpr auto kPrintedData = std::to_array({-69.05, -21.12, -8.237, 5.457});
   const std::vector<double> extrema = voltage_extrema(kExample2, kSpeed2_rad_s);
@@ -160,7 +160,7 @@ TEST(OptimumTorque, Example2TakesTheLocalOptimum) {
   EXPECT_NEAR(motoring.torque_nm, 3.701, 3.701 * kTableTolerance);
 }
 
-// Case 15: the numbers of the text belong to a leakage of 0.15. Catches a leakage that is not the only
+// Case 15: the numbers of the text belong to a leakage of 0.15. Catches: a leakage that is not the only
 // difference.
 TEST(OptimumTorque, Example2AsPrintedHasAnotherLeakage) {
   SteadyInductionModel rounded = kExample2;
@@ -183,7 +183,7 @@ TEST(OptimumTorque, Example2AsPrintedHasAnotherLeakage) {
   EXPECT_NEAR(two_thirds_nm(crossings[0]), -0.8, 0.05);
 }
 
-// Case 13: 0.1 %, 0.2 %. Catches a wrong sign of the speed term; the text's 2990 and 5410 rpm only hold to
+// Case 13: 0.1 %, 0.2 %. Catches: a wrong sign of the speed term; the text's 2990 and 5410 rpm only hold to
 // 2 % and 4 %, and 5409 with a leakage of 1 - M/L.
 TEST(OptimumTorque, BaseSpeeds) {
   const double motoring_rpm = rpm(base_speed_rad_s(kServo, kLimits, TorqueSign::kMotoring));
@@ -201,7 +201,7 @@ TEST(OptimumTorque, BaseSpeeds) {
   EXPECT_EQ(base_speed_rad_s(kServo, {.voltage_v = 5.0, .current_a = 6.0}, TorqueSign::kMotoring), 0.0);
 }
 
-// Catches base speeds that do not belong to the optimum: below them the current alone limits, just above
+// Catches: base speeds that do not belong to the optimum: below them the current alone limits, just above
 // both.
 TEST(OptimumTorque, TheLimitChangesAtTheBaseSpeeds) {
   for (const TorqueSign sign : {TorqueSign::kMotoring, TorqueSign::kGenerating}) {
@@ -229,7 +229,7 @@ double fastest_s(double friction_nms, TorqueSign sign) {
   return time_s;
 }
 
-// Case 11: 1 %. Catches friction with the wrong sign, and a table that is off where it matters: with the
+// Case 11: 1 %. Catches: friction with the wrong sign, and a table that is off where it matters: with the
 // listed friction 0.38 s are out of reach, with 6e-5 just not.
 TEST(OptimumTorqueTable, GivesTheFastestRunUpAndBraking) {
   EXPECT_NEAR(fastest_s(0.0, TorqueSign::kMotoring), 0.3124, 3.1e-3);
@@ -239,8 +239,8 @@ TEST(OptimumTorqueTable, GivesTheFastestRunUpAndBraking) {
   EXPECT_NEAR(fastest_s(1.4e-4, TorqueSign::kGenerating), 0.1616, 1.6e-3);
 }
 
-// Catches a table read between the wrong rows, or off its end: linear between 512 intervals errs by less than
-// 1e-3 N·m at the kinks, and nothing lies above the end.
+// Catches: a table read between the wrong rows, or off its end: linear between 512 intervals errs by less
+// than 1e-3 N·m at the kinks, and nothing lies above the end.
 TEST(OptimumTorqueTable, ReadsWhatTheSolverSays) {
   const double top_rad_s = rad_s(8000.0);
   const OptimumTorqueTable table(kServo, kLimits, top_rad_s);

@@ -24,7 +24,7 @@ InductionMachineModel with_friction(double friction_nms) {
   return m;
 }
 
-// Catches an inertia or a torque table that is off: the shares 0.892 and 0.768 and the 312.4 rad of the
+// Catches: an inertia or a torque table that is off: the shares 0.892 and 0.768 and the 312.4 rad of the
 // reference, to its last digit.
 TEST(TorqueOptimalMove, TakesTheSharesOfTheReference) {
   const TorqueOptimalMove move(kBookMove, optimum(), with_friction(0.0));
@@ -35,7 +35,7 @@ TEST(TorqueOptimalMove, TakesTheSharesOfTheReference) {
   EXPECT_NEAR(move.duration_s(), 0.645, 1e-12);
 }
 
-// Catches a jump at the joints or at the end: before 0 and after the end nothing moves.
+// Catches: a jump at the joints or at the end: before 0 and after the end nothing moves.
 TEST(TorqueOptimalMove, RestsBeforeAndAfter) {
   const TorqueOptimalMove move(kBookMove, optimum(), with_friction(0.0));
   EXPECT_EQ(move.at(-0.1).speed_rad_s, 0.0);
@@ -47,7 +47,7 @@ TEST(TorqueOptimalMove, RestsBeforeAndAfter) {
   EXPECT_NEAR(move.at(0.645 - 1e-6).speed_rad_s, 0.0, 1e-6);
 }
 
-// Catches a wrong coefficient of the quintic: each column is the derivative of the one before it, within and
+// Catches: a wrong coefficient of the quintic: each column is the derivative of the one before it, within and
 // across the steps of 0.5 ms. A central difference over 2·10 µs errs by |x'''|·h²/6.
 TEST(TorqueOptimalMove, EveryColumnIsTheDerivativeOfTheOneBeforeIt) {
   const TorqueOptimalMove move(kBookMove, optimum(), with_friction(6e-5));
@@ -62,7 +62,7 @@ TEST(TorqueOptimalMove, EveryColumnIsTheDerivativeOfTheOneBeforeIt) {
   }
 }
 
-// Catches friction with the wrong sign or left out: amid a phase the torque is the share of the optimum.
+// Catches: friction with the wrong sign or left out: amid a phase the torque is the share of the optimum.
 TEST(TorqueOptimalMove, TorqueIsTheShareOfTheOptimumPlusFriction) {
   const InductionMachineModel machine = with_friction(6e-5);
   const TorqueOptimalMove move(kBookMove, optimum(), machine);
@@ -79,7 +79,7 @@ TEST(TorqueOptimalMove, TorqueIsTheShareOfTheOptimumPlusFriction) {
             TorqueOptimalMove(kBookMove, optimum(), with_friction(0.0)).motoring_share());
 }
 
-// Case 11. Catches a move that hides its infeasibility: with the listed friction 0.38 s need more than the
+// Case 11. Catches: a move that hides its infeasibility: with the listed friction 0.38 s need more than the
 // optimum torque, and no torque within reason makes it in 50 ms.
 TEST(TorqueOptimalMove, ListedFrictionNeedsMoreThanTheOptimum) {
   const TorqueOptimalMove move(kBookMove, optimum(), kServoMotor.machine);
@@ -89,7 +89,7 @@ TEST(TorqueOptimalMove, ListedFrictionNeedsMoreThanTheOptimum) {
   EXPECT_THROW(TorqueOptimalMove(sudden, optimum(), kServoMotor.machine), std::invalid_argument);
 }
 
-// Catches a ramp longer than half a phase, which would never reach its torque.
+// Catches: a ramp longer than half a phase, which would never reach its torque.
 TEST(TorqueOptimalMove, RampsMustFit) {
   EXPECT_TRUE(kBookMove.problems().empty());
   TorqueMoveParameters p = kBookMove;

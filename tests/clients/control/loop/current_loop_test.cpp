@@ -9,7 +9,7 @@ constexpr CurrentGains kBookGains = {.proportional_v_per_a = 6.4, .integral_v_pe
 constexpr double kPeriodS = 125e-6;
 const Direction kAlongPhaseA = Direction::at(0.0);
 
-// Catches exchanged axes and an integral without its period: a constant error gives a staircase of K_I·T·e.
+// Catches: exchanged axes and an integral without its period: a constant error gives a staircase of K_I·T·e.
 TEST(CurrentLoop, IsProportionalPlusIntegralOnEachAxis) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);
   for (int k = 0; k < 100; ++k) {
@@ -20,7 +20,7 @@ TEST(CurrentLoop, IsProportionalPlusIntegralOnEachAxis) {
   }
 }
 
-// Catches wind-up: after any time at the limit, the first sample with the opposite error must answer as if
+// Catches: wind-up: after any time at the limit, the first sample with the opposite error must answer as if
 // nothing had been.
 TEST(CurrentLoop, IntegratorsStandStillWhileAPhaseIsAtItsLimit) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);
@@ -33,7 +33,7 @@ TEST(CurrentLoop, IntegratorsStandStillWhileAPhaseIsAtItsLimit) {
   EXPECT_EQ(loop.step({.d = 0.0, .q = -1.0}, kAlongPhaseA).voltage_v.b, -6.4);
 }
 
-// Catches a limit in dq: an amplifier limits its phases, so at 45 degrees a vector of 1.4 times the limit is
+// Catches: a limit in dq: an amplifier limits its phases, so at 45 degrees a vector of 1.4 times the limit is
 // still possible.
 TEST(CurrentLoop, LimitHoldsPerPhaseAndNotPerAxis) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);

@@ -132,7 +132,7 @@ Outcome run(const char* preset_name, const Circumstances& c = {}) {
   return seen;
 }
 
-// Case 4. Catches any wrong sign, gain, frame or order in the whole controller. The table has 1.49
+// Case 4. Catches: any wrong sign, gain, frame or order in the whole controller. The table has 1.49
 // counts, 73.6 rad/s, 5.46 A.
 TEST(Run, BookMoveStaysWithinTwoCounts) {
   const Outcome seen = run("book/8.2.2");
@@ -145,7 +145,7 @@ TEST(Run, BookMoveStaysWithinTwoCounts) {
   EXPECT_EQ(seen.samples, 200 + 584 + 240);
 }
 
-// Case 5. Catches a controller that needs its output in force at once (the table has 1.62 counts, 5.75 A).
+// Case 5. Catches: a controller that needs its output in force at once (the table has 1.62 counts, 5.75 A).
 TEST(Run, OneSampleOfDelayStaysWithinTwoCounts) {
   const Outcome seen = run("book/8.2.2", {.delay_one_sample = true});
   EXPECT_LE(seen.peak_error_counts, 2.0);
@@ -153,7 +153,7 @@ TEST(Run, OneSampleOfDelayStaysWithinTwoCounts) {
   EXPECT_NEAR(seen.peak_current_a, 5.75, 0.3);
 }
 
-// Case 5. Catches a gain or an observer that has 8 kHz built in (the table has 1.58 counts, 5.67 A).
+// Case 5. Catches: a gain or an observer that has 8 kHz built in (the table has 1.58 counts, 5.67 A).
 TEST(Run, HalfTheSampleRateStaysWithinTwoCounts) {
   const Outcome seen = run("book/8.2.2-4khz");
   EXPECT_LE(seen.peak_error_counts, 2.0);
@@ -161,7 +161,7 @@ TEST(Run, HalfTheSampleRateStaysWithinTwoCounts) {
   EXPECT_NEAR(seen.peak_current_a, 5.67, 0.3);
 }
 
-// Case 5. Catches a missing K1 or K0 path: a load at the start of the move (the table's 2.22 counts, 6.57 A)
+// Case 5. Catches: a missing K1 or K0 path: a load at the start of the move (the table's 2.22 counts, 6.57 A)
 // and amid it.
 TEST(Run, LoadStepStaysWithinThreeCounts) {
   const Outcome at_start = run("book/8.2.2", {.load_from_s = 0.0});
@@ -173,14 +173,14 @@ TEST(Run, LoadStepStaysWithinThreeCounts) {
   EXPECT_LE(run("book/8.2.2", {.delay_one_sample = true, .load_from_s = 0.0365}).peak_error_counts, 3.0);
 }
 
-// Case 5. Catches an observer that does not tolerate a warm rotor (the table has 2.56 counts).
+// Case 5. Catches: an observer that does not tolerate a warm rotor (the table has 2.56 counts).
 TEST(Run, RotorResistanceOffByHalfStaysWithinThreeAndAHalfCounts) {
   const Outcome seen = run("book/8.2.2", {.rotor_resistance_factor = 1.5});
   EXPECT_LE(seen.peak_error_counts, 3.5);
   EXPECT_NEAR(seen.peak_error_counts, 2.56, 0.2);
 }
 
-// Case 6. Catches a difference over the wrong time (bound one count per period) and an observer without its
+// Case 6. Catches: a difference over the wrong time (bound one count per period) and an observer without its
 // torque input.
 TEST(Run, ObserverIsTwentyTimesQuieterThanTheBackwardDifference) {
   const Outcome seen = run("book/8.2.2");
@@ -213,7 +213,7 @@ TEST(Run, CircularClipWithBackwardDifferenceRunsAway) {
             0.95 * seen.peak_error_counts);  // still growing when the run ends
 }
 
-// Catches a result that hangs on where within a count the shaft happens to stand: the true error may change
+// Catches: a result that hangs on where within a count the shaft happens to stand: the true error may change
 // by the count that no encoder shows, not by more (1.03 to 2.05 over a fine sweep).
 TEST(Run, StartWithinACountMovesTheErrorByLessThanThatCount) {
   for (int tenth = 0; tenth < 10; ++tenth) {
@@ -224,7 +224,7 @@ TEST(Run, StartWithinACountMovesTheErrorByLessThanThatCount) {
   }
 }
 
-// Catches a trajectory and observers on the controller's own clock: one sample in forty does not arrive. A
+// Catches: a trajectory and observers on the controller's own clock: one sample in forty does not arrive. A
 // controller that is not told falls behind by 25 samples and 39 counts; that half shows that the case is hard
 // enough to mean something.
 TEST(Run, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
@@ -234,7 +234,7 @@ TEST(Run, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
   EXPECT_GT(run("book/8.2.2", {.lose_every = 40, .tell_lost = false}).peak_error_counts, 20.0);
 }
 
-// Catches phases that are off by one sample, and a runner that lets go of the machine after the end.
+// Catches: phases that are off by one sample, and a runner that lets go of the machine after the end.
 TEST(Run, PhasesLastWhatTheirTimingSaysAndTheEndKeepsHolding) {
   control::Run move = find_preset("book/8.2.2")->make({});
   std::array<int, 4> samples{};
@@ -249,7 +249,7 @@ TEST(Run, PhasesLastWhatTheirTimingSaysAndTheEndKeepsHolding) {
   EXPECT_NEAR(move.time_s(), 899.0 / 8000.0, 1e-12);
 }
 
-// Catches a build-up too short for the claim in the preset, judged by the true flux.
+// Catches: a build-up too short for the claim in the preset, judged by the true flux.
 TEST(Run, FluxStandsAtItsRatedValueWhenTheMoveStarts) {
   control::Run move = find_preset("book/8.2.2")->make({});
   State x{};

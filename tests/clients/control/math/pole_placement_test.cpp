@@ -7,7 +7,7 @@
 namespace drivebench::control {
 namespace {
 
-// Catches a coefficient with a missing or double product: the sums of products of 2, 3 and 5 are known.
+// Catches: a coefficient with a missing or double product: the sums of products of 2, 3 and 5 are known.
 TEST(PolePlacement, CoefficientsAreTheSumsOfProductsOfThePoles) {
   EXPECT_EQ(placed_polynomial<1>({7.0}), (Polynomial<1>{7.0}));
   EXPECT_EQ(placed_polynomial<3>({2.0, 3.0, 5.0}), (Polynomial<3>{10.0, 31.0, 30.0}));
@@ -16,7 +16,7 @@ TEST(PolePlacement, CoefficientsAreTheSumsOfProductsOfThePoles) {
   EXPECT_EQ(placed_polynomial(10.0, 0.5, 20.0), (Polynomial<3>{30.0, 600.0, 4000.0}));
 }
 
-// Catches a Routh table that takes the wrong rows: the book's own loops, of which s^3 + s^2 + 1 has roots at
+// Catches: a Routh table that takes the wrong rows: the book's own loops, of which s^3 + s^2 + 1 has roots at
 // 0.23 +- j0.79 (the print has a minus there), and a loop with as many unstable roots as stable ones.
 TEST(PolePlacement, RouthTellsStableLoopsFromUnstableOnes) {
   EXPECT_TRUE(is_hurwitz(Polynomial<3>{300.0, 3e4, 1e6}));
@@ -28,7 +28,7 @@ TEST(PolePlacement, RouthTellsStableLoopsFromUnstableOnes) {
   EXPECT_FALSE(is_hurwitz(Polynomial<2>{3.0, 0.0}));
 }
 
-// Catches a Jury recursion that divides or reverses wrongly: (z - 0.5)(z - 0.9)(z + 0.3) and the same with
+// Catches: a Jury recursion that divides or reverses wrongly: (z - 0.5)(z - 0.9)(z + 0.3) and the same with
 // one root outside.
 TEST(PolePlacement, JuryTellsRootsInsideTheUnitCircle) {
   EXPECT_TRUE(is_schur(Polynomial<3>{-1.1, 0.03, 0.135}));

@@ -7,7 +7,7 @@
 namespace drivebench::control {
 namespace {
 
-// Catches coefficients read from the wrong end and lost complex roots: (x - 2)·(x² + 2x + 5), -1 ± 2j.
+// Catches: coefficients read from the wrong end and lost complex roots: (x - 2)·(x² + 2x + 5), -1 ± 2j.
 TEST(Polynomial, RootsOfACubic) {
   double nearest_real = 1e9;
   std::complex<double> sum = 0.0;
@@ -22,7 +22,7 @@ TEST(Polynomial, RootsOfACubic) {
   EXPECT_LT(std::abs(sum), 1e-12);
 }
 
-// Catches an iteration without scaling, whose squares overflow, and a small root that is lost beside a large
+// Catches: an iteration without scaling, whose squares overflow, and a small root that is lost beside a large
 // one.
 TEST(Polynomial, RootsMayBeLargeAndFarApart) {
   const std::vector<double> found = real_roots(std::array{3e120 * 7e110, 3e120 + 7e110, 1.0});
@@ -31,7 +31,7 @@ TEST(Polynomial, RootsMayBeLargeAndFarApart) {
   EXPECT_NEAR(found[1], -7e110, 7e110 * 1e-9);
 }
 
-// Catches a division by a root at zero, a zero leading coefficient, and a filter that lets complex roots
+// Catches: a division by a root at zero, a zero leading coefficient, and a filter that lets complex roots
 // pass: x²·(x + 1)·(x² + 1) has the real roots -1, 0 and 0.
 TEST(Polynomial, RealRootsOnlyWithTheirMultiplicity) {
   const std::vector<double> found = real_roots(std::array{0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0});
@@ -41,7 +41,7 @@ TEST(Polynomial, RealRootsOnlyWithTheirMultiplicity) {
   EXPECT_EQ(found[2], 0.0);
 }
 
-// Catches a tolerance that drops a double root because it was found as a pair beside the axis: (x - 3)²·(x +
+// Catches: a tolerance that drops a double root because it was found as a pair beside the axis: (x - 3)²·(x +
 // 1).
 TEST(Polynomial, ADoubleRootStaysReal) {
   const std::vector<double> found = real_roots(std::array{9.0, 3.0, -5.0, 1.0});

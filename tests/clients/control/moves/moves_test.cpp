@@ -35,7 +35,7 @@ void expect_derivatives(const Trajectory& move, double from_s, double to_s, bool
   }
 }
 
-// Catches a wrong coefficient in any of the curves, up or down.
+// Catches: a wrong coefficient in any of the curves, up or down.
 TEST(Moves, EverySpeedIsTheSlopeOfItsAngleAndSoOn) {
   const JerkContinuousMove smooth(kTimes);
   const TrapezoidalMove straight(kTimes);
@@ -61,7 +61,7 @@ TEST(Moves, EverySpeedIsTheSlopeOfItsAngleAndSoOn) {
                      0.0, 0.2, true);
 }
 
-// Catches a ramp that does not end where the next part begins, and a move that is not at rest outside.
+// Catches: a ramp that does not end where the next part begins, and a move that is not at rest outside.
 TEST(Moves, ArriveAtTheirDistanceWithUnequalRamps) {
   std::vector<std::unique_ptr<Trajectory>> moves;
   moves.push_back(std::make_unique<JerkContinuousMove>(kTimes));
@@ -80,7 +80,7 @@ TEST(Moves, ArriveAtTheirDistanceWithUnequalRamps) {
   }
 }
 
-// TRJ-02. Catches a curve that is merely smooth: α peaks at 1.875·ω_m/t1 halfway, j at 5.7735·ω_m/t1² at x =
+// TRJ-02. Catches: a curve that is merely smooth: α peaks at 1.875·ω_m/t1 halfway, j at 5.7735·ω_m/t1² at x =
 // 0.2113, and the jerk is 0 at all corners.
 TEST(JerkContinuousMove, HasThePeaksOfItsPolynomial) {
   const JerkContinuousMove move(kTimes);
@@ -97,7 +97,7 @@ TEST(JerkContinuousMove, HasThePeaksOfItsPolynomial) {
   }
 }
 
-// Catches a speed that falls back to rest at the end of the ramp, an angle that goes on for ever.
+// Catches: a speed that falls back to rest at the end of the ramp, an angle that goes on for ever.
 TEST(SpeedRamp, KeepsItsSpeed) {
   const SpeedRamp ramp({.speed_rad_s = 120.0, .ramp_s = 0.2, .cruise_s = 0.1});
   EXPECT_NEAR(ramp.at(0.1).speed_rad_s, 60.0, 1e-12);
@@ -106,7 +106,7 @@ TEST(SpeedRamp, KeepsItsSpeed) {
   EXPECT_NEAR(ramp.at(5.0).angle_rad, 24.0, 1e-12);
 }
 
-// AC-09. Catches v_ref without its inductive part, i_ref without friction: the table of TRJ-01 for DC-A and
+// AC-09. Catches: v_ref without its inductive part, i_ref without friction: the table of TRJ-01 for DC-A and
 // half a turn, 0.1 % (the table's digits where they are fewer).
 TEST(CubicMove, NeedsTheBooksCurrentsAndVoltagesOfDcA) {
   constexpr DcMachineModel kDcA = {.resistance_ohm = 2.0,
@@ -143,8 +143,8 @@ TEST(CubicMove, NeedsTheBooksCurrentsAndVoltagesOfDcA) {
   }
 }
 
-// Catches a sine that a controller does not get back: the current of the reference must be 1 A·sin(Ωt), and a
-// shaft without friction is no special case.
+// Catches: a sine that a controller does not get back: the current of the reference must be 1 A·sin(Ωt), and
+// a shaft without friction is no special case.
 TEST(SineTorqueMove, GivesTheCurrentOfASine) {
   constexpr double kRate = 4e-4 / 6e-5;
   constexpr double kPerAmpere = 0.07 / 6e-5;

@@ -14,7 +14,7 @@ constexpr TrajectoryParameters kProfileA = {
 constexpr TrajectoryParameters kUnequalRamps = {
     .distance_rad = -7.0, .ramp_up_s = 0.2, .cruise_s = 0.05, .ramp_down_s = 0.4};
 
-// Catches ω_max = θ_f/t1 (the printed misprint) and a wrong c1 or c2.
+// Catches: ω_max = θ_f/t1 (the printed misprint) and a wrong c1 or c2.
 TEST(Trajectory, ProfileAHasThePeaksOfTheTable) {
   EXPECT_NEAR(kProfileA.duration_s(), 0.073, 1e-15);
   EXPECT_NEAR(kProfileA.max_speed_rad_s(), 73.06, 0.005);
@@ -28,7 +28,7 @@ TEST(Trajectory, ProfileAHasThePeaksOfTheTable) {
   EXPECT_NEAR(trajectory_at(kProfileA, 0.030).angle_rad, 0.5 * kProfileA.max_speed_rad_s() * 0.030, 1e-14);
 }
 
-// Catches an end that is off by the rounding of three pieces, and a reference that moves on after the end.
+// Catches: an end that is off by the rounding of three pieces, and a reference that moves on after the end.
 TEST(Trajectory, RestsAtZeroBeforeAndExactlyAtTheDistanceAfter) {
   for (const TrajectoryParameters& p : {kProfileA, kUnequalRamps}) {
     for (const double t_s : {-1.0, 0.0}) {
@@ -44,7 +44,7 @@ TEST(Trajectory, RestsAtZeroBeforeAndExactlyAtTheDistanceAfter) {
   }
 }
 
-// Catches a wrong sign in the mirrored ramp: each column must be the derivative of the one before it, across
+// Catches: a wrong sign in the mirrored ramp: each column must be the derivative of the one before it, across
 // the joints too. A central difference over 2·10 µs errs by |x'''|·h²/6; the jerk steps at the joints, which
 // the last tolerance leaves out.
 TEST(Trajectory, EveryColumnIsTheDerivativeOfTheOneBeforeIt) {
@@ -70,7 +70,7 @@ TEST(Trajectory, EveryColumnIsTheDerivativeOfTheOneBeforeIt) {
   }
 }
 
-// Catches a check that stops at the first problem, and one that NaN passes.
+// Catches: a check that stops at the first problem, and one that NaN passes.
 TEST(Trajectory, NamesEveryProblemAtOnce) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(kProfileA.problems().empty());

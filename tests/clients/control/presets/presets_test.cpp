@@ -9,7 +9,7 @@
 namespace drivebench::control {
 namespace {
 
-// Catches a preset whose numbers break its own rules, two of the same name, and one that says nothing of
+// Catches: a preset whose numbers break its own rules, two of the same name, and one that says nothing of
 // itself.
 TEST(Presets, AreAllUsableAndNamedOnce) {
   std::set<std::string_view> names;
@@ -27,8 +27,8 @@ TEST(Presets, AreAllUsableAndNamedOnce) {
   }
 }
 
-// Catches a mistyped gain: the closed-loop polynomials of the book's gains must have the poles of exercise 14
-// (case 2), mechanical −534.24 ± j645.73 and −1.52, flux −5479.75 and −13.68, to 0.2 %.
+// Catches: a mistyped gain: the closed-loop polynomials of the book's gains must have the poles of exercise
+// 14 (case 2), mechanical −534.24 ± j645.73 and −1.52, flux −5479.75 and −13.68, to 0.2 %.
 TEST(Presets, BookGainsHaveTheClosedLoopPolesOfExercise14) {
   const ControllerParameters& c = kServoController;
   const double pair_sum = 2.0 * 534.24;
@@ -43,7 +43,7 @@ TEST(Presets, BookGainsHaveTheClosedLoopPolesOfExercise14) {
   EXPECT_NEAR(c.rated_flux_wb(), 0.0455, 5e-5);
 }
 
-// Catches a suggestion that is not the obvious one, and a lookup that takes it silently.
+// Catches: a suggestion that is not the obvious one, and a lookup that takes it silently.
 TEST(Presets, MisspeltNameFindsNothingButSuggestsTheNearest) {
   EXPECT_EQ(find_preset("book/8.2.2-4kHz"), nullptr);
   EXPECT_EQ(nearest_preset_name("book/8.2.2-4kHz"), "book/8.2.2-4khz");
@@ -51,7 +51,7 @@ TEST(Presets, MisspeltNameFindsNothingButSuggestsTheNearest) {
   EXPECT_EQ(nearest_preset_name("backward-difference"), "book/8.2.2-backward-difference");
 }
 
-// Catches a check that stops at the first problem.
+// Catches: a check that stops at the first problem.
 TEST(ControllerParameters, NamesEveryProblemAtOnce) {
   ControllerParameters broken = kServoController;
   broken.machine.inertia_kgm2 = 0.0;

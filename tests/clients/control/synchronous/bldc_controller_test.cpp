@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180.0;
 
-// AC-27. Catches a sector of the table with a wrong sign or turned by 60 degrees: over the whole turn the
+// AC-27. Catches: a sector of the table with a wrong sign or turned by 60 degrees: over the whole turn the
 // torque -tau Σ e_k c_k is 2 tau without ripple, and the currents sum to 0.
 TEST(Commutation, GivesAConstantTorque) {
   double square = 0.0;
@@ -26,7 +26,7 @@ TEST(Commutation, GivesAConstantTorque) {
   EXPECT_NEAR(std::sqrt(square / 3600.0), 0.88192, 1e-5);
 }
 
-// Catches sectors that do not wrap: angles of many turns in both directions.
+// Catches: sectors that do not wrap: angles of many turns in both directions.
 TEST(Commutation, KnowsItsSectorInEveryTurn) {
   for (int turn = -3; turn <= 3; ++turn) {
     for (int sector = 0; sector < 6; ++sector) {
@@ -37,7 +37,7 @@ TEST(Commutation, KnowsItsSectorInEveryTurn) {
   }
 }
 
-// Catches a sector that is no row of the table: an estimate of the angle that runs away ended the program.
+// Catches: a sector that is no row of the table: an estimate of the angle that runs away ended the program.
 TEST(Commutation, HasARowForEveryAngle) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (const double angle :
@@ -48,7 +48,7 @@ TEST(Commutation, HasARowForEveryAngle) {
   }
 }
 
-// Catches a Hall line in another place than its sensor: line k is high from -30 to 150 degrees after
+// Catches: a Hall line in another place than its sensor: line k is high from -30 to 150 degrees after
 // (k - 1) 120 degrees.
 TEST(Commutation, ReadsHallLinesAsTheEncoderSays) {
   for (int degree = -25; degree < 335; degree += 10) {
@@ -80,8 +80,8 @@ constexpr BldcParameters kServo = {.machine = {.pole_pairs = 1.0,
                                    .speed_observer = SpeedObserverGains::placed(500.0, 500.0, 10.0),
                                    .angle_lead_samples = 0.0};
 
-// BL-04. Catches a factor 2 in the torque of two phases, and poles in the wrong order: I_p is J/(2 tau) times
-// the acceleration, and 150, 7500, 125000 are three poles at -50.
+// BL-04. Catches: a factor 2 in the torque of two phases, and poles in the wrong order: I_p is J/(2 tau)
+// times the acceleration, and 150, 7500, 125000 are three poles at -50.
 TEST(BldcController, AsksForTheCurrentOfItsAcceleration) {
   BldcController controller(kServo);
   const Setpoint out = controller.update({}, {.angle_rad = 0.01, .acceleration_rad_s2 = 100.0});
@@ -93,7 +93,7 @@ TEST(BldcController, AsksForTheCurrentOfItsAcceleration) {
   EXPECT_NEAR(next.b - out.b, 2e-4 / (2.0 * 0.5128) * 125000.0 * 0.01 * 1e-4, 1e-12);
 }
 
-// Catches an integral that winds up at the current limit, and a torque out of nothing when the Hall lines
+// Catches: an integral that winds up at the current limit, and a torque out of nothing when the Hall lines
 // are broken.
 TEST(BldcController, StopsAtItsLimitsAndWithoutASector) {
   BldcParameters p = kServo;
@@ -111,7 +111,7 @@ TEST(BldcController, StopsAtItsLimitsAndWithoutASector) {
   EXPECT_EQ(broken.c, 0.0);
 }
 
-// Catches an emf fed forward with the wrong sign, and a common voltage that costs headroom: turning without
+// Catches: an emf fed forward with the wrong sign, and a common voltage that costs headroom: turning without
 // current, the voltages between the terminals are those of -e_p w e.
 TEST(BldcController, FeedsTheEmfForward) {
   BldcParameters p = kServo;

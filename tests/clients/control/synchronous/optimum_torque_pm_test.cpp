@@ -38,7 +38,7 @@ void expect_ratio(double value, double expected, double tolerance) {
   EXPECT_NEAR(value, expected, tolerance * std::abs(expected));
 }
 
-// Case 29. Catches the 2·K_m·K_m·I of the print (E19), the sign of its root between motor and brake, and the
+// Case 29. Catches: the 2·K_m·K_m·I of the print (E19), the sign of its root between motor and brake, and the
 // exchanged labels of the second speeds (E21).
 TEST(PmTransitions, AreThoseOfTheBm500) {
   const PmTransitions small = transition_speeds(kBm500, kSmall);
@@ -68,7 +68,7 @@ TEST(PmTransitions, AreThoseOfTheBm500) {
   expect_ratio(listed_large.second_braking_rad_s.at(0), 464.4, kTwoPerMille);
 }
 
-// Catches a second speed that is there for every weak machine: with n_p·L·I below K_m there are two of
+// Catches: a second speed that is there for every weak machine: with n_p·L·I below K_m there are two of
 // motoring or none, and none of braking (condition (9.94); parameters of the reference's own).
 TEST(PmTransitions, AWeakFieldHasTwoSecondSpeedsOrNone) {
   PmMachineModel p = bm500(0.42);
@@ -83,7 +83,7 @@ TEST(PmTransitions, AWeakFieldHasTwoSecondSpeedsOrNone) {
   EXPECT_THROW(transition_speeds(p, {.voltage_v = 67.0, .current_a = 67.4}), std::invalid_argument);
 }
 
-// Catches transition speeds and torques that do not belong together: on both sides of each speed another
+// Catches: transition speeds and torques that do not belong together: on both sides of each speed another
 // limit is in force.
 TEST(PmTransitions, AreWhereTheLimitInForceChanges) {
   const PmTransitions t = transition_speeds(kBm500, kLarge);
@@ -100,7 +100,7 @@ TEST(PmTransitions, AreWhereTheLimitInForceChanges) {
   EXPECT_EQ(limit(t.second_braking_rad_s[0] + 0.1, -1.0), LimitInForce::kVoltage);
 }
 
-// Case 30 and its table. Catches n_p in the wrong place, motoring and braking exchanged.
+// Case 30 and its table. Catches: n_p in the wrong place, motoring and braking exchanged.
 TEST(PmOptimum, HasTheTorquesOfTheTable) {
   expect_ratio(torque(kBm500, kSmall, 300.0, 1.0), 3.572, kTwoPerMille);  // 3.564 at 22 A
   expect_ratio(torque(kBm500, {kVoltage_v, 22.0}, 300.0, 1.0), 3.564, kTwoPerMille);
@@ -151,7 +151,7 @@ double by_trying(const PmMachineModel& p, const PmLimits& limits, double speed_r
   return any ? best : std::nan("");
 }
 
-// The self-check. Catches a branch of the optimum that holds for the machines of the book alone: 400 random
+// The self-check. Catches: a branch of the optimum that holds for the machines of the book alone: 400 random
 // machines and speeds of both signs against a search over both limits. The search has a grid of 4000 angles,
 // at most 2 % of a limit where they meet at a flat angle.
 TEST(PmOptimum, IsWhatASearchFinds) {
@@ -185,7 +185,7 @@ TEST(PmOptimum, IsWhatASearchFinds) {
   EXPECT_GT(found, 300);
 }
 
-// Catches the root of the larger |i_d|, and one that does not reach the limit.
+// Catches: the root of the larger |i_d|, and one that does not reach the limit.
 TEST(PmOptimum, DirectCurrentIsTheSmallestThatTheVoltageAllows) {
   EXPECT_EQ(direct_current_within_voltage_a(kBm500, kVoltage_v, 300.0, 20.0), 0.0);
   for (const double speed : {-1000.0, 900.0}) {
@@ -196,7 +196,7 @@ TEST(PmOptimum, DirectCurrentIsTheSmallestThatTheVoltageAllows) {
   }
 }
 
-// Catches rows that are off by one, and a torque of the wrong sign for negative speeds: between its points
+// Catches: rows that are off by one, and a torque of the wrong sign for negative speeds: between its points
 // i_q is within 0.02 A of 67, and braking is braking in both directions.
 TEST(PmTorqueTable, IsTheOptimumBetweenItsPointsToo) {
   const PmTorqueTable table(kBm500, kLarge, 1000.0, 501);

@@ -34,7 +34,7 @@ constexpr PmVoltageParameters kServo = {.machine = kStepper,
                                         .feedback = kPrinted,
                                         .speed_observer = {.angle_per_s = 5272.0, .speed_per_s2 = 7.0e6}};
 
-// Catches a misprint among the references: they must satisfy the machine's own equations, with slopes that
+// Catches: a misprint among the references: they must satisfy the machine's own equations, with slopes that
 // are those of the currents along the 1.8 mm move. Central differences over 2 us: 1e-5.
 TEST(PmReferences, SatisfyTheMachine) {
   const TrajectoryParameters move = {
@@ -64,7 +64,7 @@ TEST(PmReferences, SatisfyTheMachine) {
   }
 }
 
-// Case 26. Catches n_p left out of the lead angle: i_d at 141.4 and 314.2 rad/s, and no other i_d takes less
+// Case 26. Catches: n_p left out of the lead angle: i_d at 141.4 and 314.2 rad/s, and no other i_d takes less
 // voltage there.
 TEST(PmReferences, TheLeadAngleTakesTheLeastVoltage) {
   EXPECT_NEAR(optimal_direct_current_a(kStepper, 141.37), -2.527, 1e-3);
@@ -87,7 +87,7 @@ Setpoint answer(double i_d_a, double i_q_a, double reference_rad = 0.0, double s
                            {.angle_rad = reference_rad, .speed_rad_s = speed_rad_s}, 1);
 }
 
-// E14. Catches v with the wrong sign or divided by L_S: at standstill the answer to an error is L_S·K times
+// E14. Catches: v with the wrong sign or divided by L_S: at standstill the answer to an error is L_S·K times
 // it and opposes it.
 TEST(PmVoltageController, FeedsBackLTimesK) {
   const double l = kStepper.inductance_h;
@@ -101,7 +101,7 @@ TEST(PmVoltageController, FeedsBackLTimesK) {
   EXPECT_NEAR(answer(0.0, 0.0, 0.0, 1.0).b, expected, 1e-9);
 }
 
-// Catches an integral that runs on while a phase is clipped, or does not run at all.
+// Catches: an integral that runs on while a phase is clipped, or does not run at all.
 TEST(PmVoltageController, FreezesItsIntegralAtTheLimit) {
   PmVoltageParameters p = kServo;
   p.voltage_limit_v = 40.0;
@@ -150,7 +150,7 @@ std::vector<std::complex<double>> quadrature_poles(const PmMachineModel& m, cons
   return poles;
 }
 
-// E15, E16. Catches a mistyped gain, and k23, k24 that do not belong to the printed poles: as printed, with
+// E15, E16. Catches: a mistyped gain, and k23, k24 that do not belong to the printed poles: as printed, with
 // k11 and k22 exchanged and k25 ten times as large, and the gains of the 3000 rpm run with both inertias.
 // Two in a thousand of the largest part of a pole.
 TEST(PmVoltageController, GainsHaveTheirPoles) {
@@ -181,7 +181,8 @@ TEST(PmVoltageController, GainsHaveTheirPoles) {
   expect_poles(quadrature_poles(without_table, run), -24664.0, -3.4, -101.0, 893.0);
 }
 
-// PMO-01. Catches the observer of another machine: its poles are -2645 +- j313.5, the book has both at -2646.
+// PMO-01. Catches: the observer of another machine: its poles are -2645 +- j313.5, the book has both at
+// -2646.
 TEST(PmVoltageController, TheSpeedObserverHasTheBooksPoles) {
   const double l1 = gain("book/9.1.4", "speed_observer.angle_per_s");
   const double rate = kStepper.friction_rate_per_s();
@@ -191,7 +192,7 @@ TEST(PmVoltageController, TheSpeedObserverHasTheBooksPoles) {
   EXPECT_NEAR(std::sqrt(product - half * half), 313.5, 1.0);
 }
 
-// E17, E18. Catches 25 teeth for 50 and a torque constant of a phase: 3000 rpm are 2500 electrical turns a
+// E17, E18. Catches: 25 teeth for 50 and a torque constant of a phase: 3000 rpm are 2500 electrical turns a
 // second (the print has 1.57 kHz), and the emf at 2000 rpm is 39.8 V (the print has 41).
 TEST(PmVoltageController, KnowsTheMachineOfTheBook) {
   EXPECT_NEAR(gain("book/9.7-3000rpm", "machine.pole_pairs") * 3000.0 / 60.0, 2500.0, 1e-9);
@@ -199,7 +200,7 @@ TEST(PmVoltageController, KnowsTheMachineOfTheBook) {
               39.8, 0.05);
 }
 
-// Catches a two-phase vector at the terminals of a star, and a lead of the wrong sign or in mechanical
+// Catches: a two-phase vector at the terminals of a star, and a lead of the wrong sign or in mechanical
 // angle: at speed the currents stand n_p·ω·T/2 ahead of the quadrature axis.
 TEST(PmCurrentController, PutsTheCurrentAheadOfTheQuadratureAxis) {
   const PmCurrentParameters p = {
@@ -232,7 +233,7 @@ TEST(PmCurrentController, PutsTheCurrentAheadOfTheQuadratureAxis) {
   EXPECT_NEAR(out.a, ahead_a, 1e-3);
 }
 
-// Catches a reference beyond the circle, and an integral that runs on there.
+// Catches: a reference beyond the circle, and an integral that runs on there.
 TEST(PmCurrentController, KeepsTheCurrentWithinItsLimit) {
   PmCurrentParameters p = {.machine = kStepper,
                            .sample_rate_hz = 1e4,
@@ -250,7 +251,7 @@ TEST(PmCurrentController, KeepsTheCurrentWithinItsLimit) {
   EXPECT_NEAR(controller.update({}, {}).b, 0.0, 1e-9);
 }
 
-// Catches a speed loop that gives full torque at small errors, and parameters that make no table.
+// Catches: a speed loop that gives full torque at small errors, and parameters that make no table.
 TEST(PmSpeedController, IsProportionalBelowItsLimits) {
   PmSpeedParameters p = {.machine = {.pole_pairs = 4.0,
                                      .resistance_ohm = 0.25,

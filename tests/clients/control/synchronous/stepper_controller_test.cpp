@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kQuarter_rad = 0.5 * std::numbers::pi;
 
-// ST-01, ST-03. Catches a sequence in the other direction, and two phases on at a full step: the vector of
+// ST-01, ST-03. Catches: a sequence in the other direction, and two phases on at a full step: the vector of
 // the pattern points at the angle where the rotor rests, with a length of 1, or √2 with two phases on.
 TEST(StepPattern, PointsWhereTheRotorRests) {
   const auto expect_at = [](PhasePair x, double angle_rad, double length) {
@@ -32,7 +32,7 @@ TEST(StepPattern, PointsWhereTheRotorRests) {
   expect_at(step_pattern(StepMode::kMicro, 4.0, 0.13 * kQuarter_rad), 0.25 * kQuarter_rad, 1.0);
 }
 
-// Catches a step counted twice or never by the rounding of a sample time, and a train that goes on.
+// Catches: a step counted twice or never by the rounding of a sample time, and a train that goes on.
 TEST(StepTrain, TakesItsFirstStepAtOnceAndStopsAtTheLast) {
   const StepTrain train({.step_rad = 0.1, .steps = 3.0, .rate_hz = 10.0});
   EXPECT_EQ(train.at(-1e-6).angle_rad, 0.0);
@@ -44,7 +44,7 @@ TEST(StepTrain, TakesItsFirstStepAtOnceAndStopsAtTheLast) {
   EXPECT_EQ((StepTrainParameters{.step_rad = 0.1, .steps = 2.5, .rate_hz = 1.0}).problems().size(), 1u);
 }
 
-// Catches an angle that jumps where the speed does.
+// Catches: an angle that jumps where the speed does.
 TEST(SpeedSteps, HaveTheAngleOfTheirSpeeds) {
   const SpeedSteps steps({.first_rad_s = 100.0, .first_s = 0.5, .second_rad_s = -20.0, .second_s = 1.0});
   EXPECT_EQ(steps.at(-1e-9).speed_rad_s, 0.0);
@@ -56,7 +56,7 @@ TEST(SpeedSteps, HaveTheAngleOfTheirSpeeds) {
   EXPECT_NEAR(steps.duration_s(), 1.5, 1e-12);
 }
 
-// Catches a run that throws the rotor to another full step when it begins: 30 counts are 1.5 electrical
+// Catches: a run that throws the rotor to another full step when it begins: 30 counts are 1.5 electrical
 // turns and 270 degrees further is where the magnet stands.
 TEST(StepperController, StartsAtTheStepWhereTheRotorStands) {
   const StepperParameters p = {

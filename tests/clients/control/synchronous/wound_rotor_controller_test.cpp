@@ -49,7 +49,7 @@ Slopes machine(double i_d, double i_q, double i_field, double speed_rad_s, doubl
           .field = (l * field_v - m * d_v) / determinant};
 }
 
-// Catches a coupling of field and d axis that is left in, or undone with the wrong sign: at standstill and
+// Catches: a coupling of field and d axis that is left in, or undone with the wrong sign: at standstill and
 // turning, each current goes to its reference with the bandwidth, and the others stay.
 TEST(WoundRotorController, DrivesEachCurrentAlone) {
   for (const std::int64_t counts : {0, 10}) {
@@ -77,7 +77,7 @@ TEST(WoundRotorController, DrivesEachCurrentAlone) {
   }
 }
 
-// Catches n_p left out of the torque (E27), and a torque per ampere of the field that is wanted instead of
+// Catches: n_p left out of the torque (E27), and a torque per ampere of the field that is wanted instead of
 // the one that is there.
 TEST(WoundRotorController, DividesTheTorqueByTheFieldThatIsThere) {
   WoundRotorController controller(kServo);
@@ -87,7 +87,7 @@ TEST(WoundRotorController, DividesTheTorqueByTheFieldThatIsThere) {
   EXPECT_NEAR(controller.telemetry()[2], 0.02 / (2.0 * 0.8 * 0.05), 1e-12);
 }
 
-// Catches weakening that begins at the wrong speed or is the same in one direction only.
+// Catches: weakening that begins at the wrong speed or is the same in one direction only.
 TEST(WoundRotorController, WeakensTheFieldAboveTheBaseSpeed) {
   for (const std::int64_t counts : {-26, 26, 5}) {
     WoundRotorController controller(kServo);
@@ -99,7 +99,7 @@ TEST(WoundRotorController, WeakensTheFieldAboveTheBaseSpeed) {
   }
 }
 
-// Catches a voltage limit that takes from d and q alike: at the limit the d axis keeps what it needs.
+// Catches: a voltage limit that takes from d and q alike: at the limit the d axis keeps what it needs.
 TEST(WoundRotorController, GivesTheDirectAxisTheVoltageFirst) {
   WoundRotorParameters p = kServo;
   p.voltage_limit_v = 100.0;
@@ -111,7 +111,7 @@ TEST(WoundRotorController, GivesTheDirectAxisTheVoltageFirst) {
   EXPECT_NEAR(std::hypot(out.a, out.b), 100.0, 1e-9);
 }
 
-// Catches a machine whose inductances no magnet circuit can have.
+// Catches: a machine whose inductances no magnet circuit can have.
 TEST(WoundRotorParameters, KnowTheLargestMutualInductance) {
   WoundRotorParameters p = kServo;
   EXPECT_TRUE(p.problems().empty());

@@ -64,7 +64,7 @@ double slope_of(const std::function<double(const State&)>& f, const State& x, co
 
 constexpr Reference kWanted = {.speed_rad_s = 130.0, .acceleration_rad_s2 = 40.0, .jerk_rad_s3 = 7.0};
 
-// CTL-08. Catches a term of the decoupling that is missing or has the wrong sign: the book prints one wrong.
+// CTL-08. Catches: a term of the decoupling that is missing or has the wrong sign: the book prints one wrong.
 // dω/dt's slope must be v1 and the flux must have its rate, in any state.
 TEST(SeparateDc, BothChainsAreLinear) {
   const SeparateDcParameters p = {.axis = axis_of(kSeparate),
@@ -91,7 +91,7 @@ TEST(SeparateDc, BothChainsAreLinear) {
   }
 }
 
-// CTL-08 at the limit of the field supply. Catches an armature that reckons with the field voltage it asked
+// CTL-08 at the limit of the field supply. Catches: an armature that reckons with the field voltage it asked
 // for.
 TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
   SeparateDcParameters p = {.axis = axis_of(kSeparate),
@@ -117,7 +117,7 @@ TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
   EXPECT_NEAR(slope_of(acceleration, x, slope), v1, 1e-5 * std::abs(v1));
 }
 
-// CTL-09. Catches a slip in the third derivative of the energy (the book's second line is misprinted): z3'
+// CTL-09. Catches: a slip in the third derivative of the energy (the book's second line is misprinted): z3'
 // must be what the energy loop wants.
 TEST(SeparateDc, TheFieldAloneMakesTheEnergyAChainOfThree) {
   const double v_a0 = 220.0;
@@ -152,7 +152,8 @@ TEST(SeparateDc, TheFieldAloneMakesTheEnergyAChainOfThree) {
   }
 }
 
-// CTL-10. Catches the armature's own inductance forgotten or torque taken linear in the current: 2·K_m·L_f·i.
+// CTL-10. Catches: the armature's own inductance forgotten or torque taken linear in the current:
+// 2·K_m·L_f·i.
 TEST(SeriesDc, TheAccelerationIsAChainOfTwo) {
   const SeriesDcParameters p = {.axis = axis_of(kSeries),
                                 .least_current_a = 0.5,
@@ -171,8 +172,8 @@ TEST(SeriesDc, TheAccelerationIsAChainOfTwo) {
   }
 }
 
-// CTL-10. Catches a start that never begins (a division by no current) and a brake that reverses the current:
-// the torque would be positive again.
+// CTL-10. Catches: a start that never begins (a division by no current) and a brake that reverses the
+// current: the torque would be positive again.
 TEST(SeriesDc, StartsFromNoCurrentAndNeverReversesIt) {
   SeriesDcController controller({.axis = axis_of(kSeries),
                                  .least_current_a = 0.5,
@@ -184,7 +185,7 @@ TEST(SeriesDc, StartsFromNoCurrentAndNeverReversesIt) {
   EXPECT_LT(controller.update({.tachometer_v = 300.0, .i_a_a = 2.0}, kWanted, 1).a, 0.0);
 }
 
-// CTL-11. Catches R_p with the wrong sign, a torque that does not come: with the resistor across the field
+// CTL-11. Catches: R_p with the wrong sign, a torque that does not come: with the resistor across the field
 // the current that follows must give v1, and v1 stays between what the two fluxes stand for.
 TEST(SeriesDc, TheWeakenedMotorGetsItsAcceleration) {
   WoundDcModel m = kSeries;
@@ -210,7 +211,7 @@ TEST(SeriesDc, TheWeakenedMotorGetsItsAcceleration) {
   EXPECT_EQ(p.problems().size(), 1u);
 }
 
-// Catches an integral that goes on while the acceleration or the field voltage stands at its limit: what
+// Catches: an integral that goes on while the acceleration or the field voltage stands at its limit: what
 // follows must be what a fresh controller does.
 TEST(SeriesDc, TheWeakenedMotorsIntegralStandsStillAtTheLimitOfItsFlux) {
   WeakenedSeriesDcParameters p = {.axis = axis_of(kSeries),
@@ -261,8 +262,8 @@ State shunt_slope(const WoundDcModel& m, const State& x, double u, double load_n
           .flux = u - m.field_resistance_ohm * x.flux / 23.0};
 }
 
-// CTL-12. Catches a slip in α or β (the reference gives both): along the reduced machine z1' = z2 − τ_L/J and
-// z2' = α + β·u + (K_m²/(J·R))·λ²·τ_L/J, for any voltage and load.
+// CTL-12. Catches: a slip in α or β (the reference gives both): along the reduced machine z1' = z2 − τ_L/J
+// and z2' = α + β·u + (K_m²/(J·R))·λ²·τ_L/J, for any voltage and load.
 TEST(ShuntDc, TheExactChainIsThatOfTheReducedMachine) {
   for (const State& x : {State{0.0, 100.0, 8.0}, State{0.0, 40.0, 20.0}, State{0.0, -30.0, 5.0}}) {
     for (const double u : {0.0, 80.0, -120.0}) {
@@ -285,8 +286,8 @@ TEST(ShuntDc, TheExactChainIsThatOfTheReducedMachine) {
   EXPECT_NEAR(rest.flux, 0.0, 1e-9);
 }
 
-// CTL-13. Catches a voltage that does not give the wanted acceleration, and a shunt current taken for that of
-// the armature.
+// CTL-13. Catches: a voltage that does not give the wanted acceleration, and a shunt current taken for that
+// of the armature.
 TEST(ShuntDc, InputAndOutputAreLinear) {
   const ShuntDcParameters p = {
       .axis = axis_of(kSeparate), .speed_proportional_per_s = 10.0, .speed_integral_per_s2 = 25.0};
@@ -296,7 +297,7 @@ TEST(ShuntDc, InputAndOutputAreLinear) {
   EXPECT_NEAR(shunt_slope(kSeparate, x, u, 0.0).w, 40.0 + 10.0 * 40.0, 1e-9);
 }
 
-// Catches a curve that is not odd, a slope beside its piece, and a last piece that ends.
+// Catches: a curve that is not odd, a slope beside its piece, and a last piece that ends.
 TEST(FieldCurve, IsOddAndGoesOn) {
   constexpr FieldCurve kCurve = {.points = {{{0.0, 0.0}, {0.5, 10.0}, {1.0, 15.0}}}, .count = 3};
   EXPECT_DOUBLE_EQ(kCurve.flux_wb(0.25), 5.0);
@@ -329,7 +330,7 @@ struct SensorlessRun {
   }
 };
 
-// EST-05, EST-06. Catches gains with K_m on the wrong side: the polynomial must have its roots where they
+// EST-05, EST-06. Catches: gains with K_m on the wrong side: the polynomial must have its roots where they
 // were placed. And the speed must come from the current alone, the load as well if it is asked for.
 TEST(SeriesDcObserver, SeesSpeedAndLoadInTheCurrent) {
   const auto gains = SeriesDcObserverGains::placed(std::array{40.0, 50.0, 60.0}, kSeries);
@@ -352,7 +353,7 @@ TEST(SeriesDcObserver, SeesSpeedAndLoadInTheCurrent) {
   EXPECT_NEAR(observer.load_nm(), 1.2, 0.005);
 }
 
-// Catches a voltage that is taken a sample too late: at 2000 V/s that would be 0.2 V, and 0.16 rad/s.
+// Catches: a voltage that is taken a sample too late: at 2000 V/s that would be 0.2 V, and 0.16 rad/s.
 TEST(SeriesDcObserver, KnowsTheVoltageOfTheSampleBefore) {
   SeriesDcObserver observer(kSeries, SeriesDcObserverGains::placed(std::array{40.0, 50.0, 60.0}, kSeries),
                             0.5, 1e-4, Discretisation::kTrapezoidal);
@@ -367,7 +368,7 @@ TEST(SeriesDcObserver, KnowsTheVoltageOfTheSampleBefore) {
   EXPECT_LT(peak_rad_s, 0.1);
 }
 
-// EST-05. Catches a load that an observer without one finds all the same, and a speed that is wrong then.
+// EST-05. Catches: a load that an observer without one finds all the same, and a speed that is wrong then.
 TEST(SeriesDcObserver, WithoutALoadItSeesTheSpeedAlone) {
   const auto gains = SeriesDcObserverGains::placed(std::array{50.0, 60.0}, kSeries);
   SeriesDcObserver observer(kSeries, gains, 0.5, 1e-4, Discretisation::kTrapezoidal);
@@ -378,7 +379,7 @@ TEST(SeriesDcObserver, WithoutALoadItSeesTheSpeedAlone) {
   EXPECT_TRUE(observer.stable());
 }
 
-// Catches a logarithm of no current: the estimates stand still, and go on from there.
+// Catches: a logarithm of no current: the estimates stand still, and go on from there.
 TEST(SeriesDcObserver, StandsStillWithoutCurrent) {
   SeriesDcObserver observer(kSeries, SeriesDcObserverGains::placed(std::array{40.0, 40.0, 40.0}, kSeries),
                             0.5, 1e-4, Discretisation::kEuler);

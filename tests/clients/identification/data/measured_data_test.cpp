@@ -18,7 +18,7 @@ std::string refusal(std::string_view text, const CsvOptions& options = {}) {
   return "";
 }
 
-// What `drivebench export` writes. Kills: units left in names, a period from two rows instead of all.
+// What `drivebench export` writes. Catches: units left in names, a period from two rows instead of all.
 TEST(MeasuredData, AnExportReadsBack) {
   const MeasuredData data = parse_csv(
       "tick,time_s,i_a_a [A],encoder_count "
@@ -33,7 +33,7 @@ TEST(MeasuredData, AnExportReadsBack) {
   EXPECT_THROW((void)data.at("u_a_v"), IdentificationError);
 }
 
-// A foreign scope: semicolons, quotes, CRLF, a byte order mark, other names, milliampere, an offset. Kills:
+// A foreign scope: semicolons, quotes, CRLF, a byte order mark, other names, milliampere, an offset. Catches:
 // a factor that is divided by, an offset before the factor.
 TEST(MeasuredData, AColumnMapTakesFilesOfOthers) {
   const MeasuredData data =
@@ -45,7 +45,7 @@ TEST(MeasuredData, AColumnMapTakesFilesOfOthers) {
   EXPECT_EQ(data.period_s, 1e-3);
 }
 
-// Each refusal names line, column and rule. Kills: a broken file that is read as a short one or as zeros.
+// Each refusal names line, column and rule. Catches: a broken file that is read as a short one or as zeros.
 TEST(MeasuredData, HostileFilesAreRefusedWithLineColumnAndRule) {
   const CsvOptions fast{.period_s = 1e-3};
   EXPECT_EQ(refusal(""), "x.csv:1: the first line must name the columns; it is empty");
@@ -82,7 +82,7 @@ TEST(MeasuredData, HostileFilesAreRefusedWithLineColumnAndRule) {
   EXPECT_THROW((void)read_csv("/nowhere/x.csv"), IdentificationError);
 }
 
-// 20 000 files of random pieces: each is read or refused, nothing else happens. Kills: an index beyond a
+// 20 000 files of random pieces: each is read or refused, nothing else happens. Catches: an index beyond a
 // line.
 TEST(MeasuredData, RandomFilesAreReadOrRefused) {
   std::mt19937 engine(9);

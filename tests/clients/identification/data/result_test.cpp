@@ -19,7 +19,7 @@ Result some_result() {
   return r;
 }
 
-// Kills: a truth beside the wrong parameter, a number that JSON does not have, the form that clients read.
+// Catches: a truth beside the wrong parameter, a number that JSON does not have, the form that clients read.
 TEST(IdentificationResult, AsJson) {
   Result r = some_result();
   r.compare({{"R_S", 10.0}, {"unknown", 1.0}});
@@ -32,7 +32,7 @@ TEST(IdentificationResult, AsJson) {
   EXPECT_EQ(json["identifiable"], true);
 }
 
-// An index that held the truth says so, one that did not too. Kills: a comparison of the relative with the
+// An index that held the truth says so, one that did not too. Catches: a comparison of the relative with the
 // absolute, a verdict without truth.
 TEST(IdentificationResult, TellsWhetherTheIndexHeldTheTruth) {
   Result r = some_result();
@@ -51,7 +51,7 @@ TEST(IdentificationResult, TellsWhetherTheIndexHeldTheTruth) {
   EXPECT_EQ(is_inside(r, *r.find("R_S")), std::nullopt);
 }
 
-// Kills: a number in the table that the data do not hold.
+// Catches: a number in the table that the data do not hold.
 TEST(IdentificationResult, UnseenParametersShowNoNumber) {
   Result r = some_result();
   r.excitation = {.sufficient = false, .unseen = {"L_S"}, .verdict = "not identifiable: L_S"};
@@ -75,7 +75,7 @@ BenchConfig bench_of(const Result& r, const MotorFile& file) {
 }
 
 // The bench reads the motor file that identification writes, for every kind, with names that need quoting.
-// Kills: a key that the bench does not know, negative friction, a reserved character in a name.
+// Catches: a key that the bench does not know, negative friction, a reserved character in a name.
 TEST(IdentificationResult, TheBenchReadsTheMotorFile) {
   const BenchConfig im =
       bench_of(some_result(), {.name = "a \"motor\"\n", .source = "C:\\x", .pole_pairs = 2});

@@ -16,7 +16,7 @@ Series sine(double rad_per_sample, double phase_rad, std::size_t count = 400) {
 }
 
 // A central difference is the derivative at its sample, a backward one half a period before: errors a^2/6 and
-// a^2/24 of a sine of a radians per sample. Kills: a difference that is taken to belong to another instant.
+// a^2/24 of a sine of a radians per sample. Catches: a difference that is taken to belong to another instant.
 TEST(Signals, DifferencesBelongToTheirInstants) {
   constexpr double kStep = 0.05;
   const Series x = sine(kStep, 0.3);
@@ -34,7 +34,7 @@ TEST(Signals, DifferencesBelongToTheirInstants) {
   EXPECT_THROW(central_difference(Series{1.0, 2.0}, 1.0), IdentificationError);
 }
 
-// The ends of a parabola's derivative are exact. Kills: ends copied from their neighbours.
+// The ends of a parabola's derivative are exact. Catches: ends copied from their neighbours.
 TEST(Signals, TheEndsOfACentralDifferenceAreOfSecondOrder) {
   Series x;
   for (int k = 0; k < 6; ++k)
@@ -44,7 +44,7 @@ TEST(Signals, TheEndsOfACentralDifferenceAreOfSecondOrder) {
   EXPECT_NEAR(slope.back(), 7.0, 1e-12);
 }
 
-// A cubic is interpolated exactly, later for positive shifts and earlier for negative ones. Kills: a shift
+// A cubic is interpolated exactly, later for positive shifts and earlier for negative ones. Catches: a shift
 // the wrong way, its fraction counted from the wrong sample.
 TEST(Signals, AShiftByPartsOfASampleIsExactForACubic) {
   const auto cubic = [](double t) { return 1.0 - 0.3 * t + 0.02 * t * t - 1e-3 * t * t * t; };
@@ -58,8 +58,8 @@ TEST(Signals, AShiftByPartsOfASampleIsExactForACubic) {
   }
 }
 
-// The book's vector of P3-01, and a frame that turns with the field sees constants. Kills: the transform with
-// factor 2/3, a frame that turns backwards.
+// The book's vector of P3-01, and a frame that turns with the field sees constants. Catches: the transform
+// with factor 2/3, a frame that turns backwards.
 TEST(Signals, ThreePhasesAndTurningFrames) {
   const TwoPhaseSeries book = two_phase(Series{3.0}, Series{-1.0}, Series{-2.0});
   EXPECT_NEAR(book.a[0], 3.674235, 1e-6);
@@ -75,7 +75,7 @@ TEST(Signals, ThreePhasesAndTurningFrames) {
   }
 }
 
-// Kills: radians per count with the wrong resolution, the half count in the wrong direction.
+// Catches: radians per count with the wrong resolution, the half count in the wrong direction.
 TEST(Signals, CountsBecomeAngles) {
   const Series angle = angle_of(Series{0.0, 500.0, -1000.0}, 2000.0, true);
   EXPECT_NEAR(angle[0], std::numbers::pi / 2000.0, 1e-12);

@@ -15,7 +15,7 @@ using InX1 = Polynomial<double>;
 using InX2 = Polynomial<InX1>;
 
 // Case 25: a = x2^2 + x2 + x1, b = -x1 x2^2 + x2 + 1: r = (3 + x1^2) x1^2, and its roots are the common zeros
-// of the text. Kills: Sylvester's rows with a sign or a shift wrong.
+// of the text. Catches: Sylvester's rows with a sign or a shift wrong.
 TEST(Elimination, TheBooksExample) {
   const InX1 x1(std::vector<double>{0.0, 1.0});
   const InX2 a(std::vector<InX1>{x1, 1, 1});
@@ -40,7 +40,7 @@ TEST(Elimination, TheBooksExample) {
 }
 
 // Both leading coefficients vanish at x1 = 0 though a = x1 x2 + 1 and b = x1 x2 + 2 have no common zero: the
-// resultant is zero there all the same. Kills: the belief that the converse needs no condition.
+// resultant is zero there all the same. Catches: the belief that the converse needs no condition.
 TEST(Elimination, VanishingLeadingCoefficientsAreZerosToo) {
   const InX1 x1(std::vector<double>{0.0, 1.0});
   const InX1 r = resultant(InX2(std::vector<InX1>{1, x1}), InX2(std::vector<InX1>{2, x1}));
@@ -49,7 +49,7 @@ TEST(Elimination, VanishingLeadingCoefficientsAreZerosToo) {
 }
 
 // Exact for matrices that elimination in doubles gets wrong: rows of Hilbert-like whole numbers, and a zero
-// pivot. Kills: a division on the way, a sign of odd sizes.
+// pivot. Catches: a division on the way, a sign of odd sizes.
 TEST(Elimination, DeterminantsWithoutDivision) {
   EXPECT_EQ(determinant(SquareMatrix<double>{{0, 1, 0}, {1, 0, 0}, {0, 0, 5}}), -5.0);
   EXPECT_EQ(determinant(SquareMatrix<Whole>{{2, 3, 1, 7}, {4, 1, 5, 2}, {6, 4, 6, 9}, {1, 1, 1, 1}}),
@@ -65,7 +65,7 @@ WholePolynomial with_roots(std::initializer_list<int> roots) {
   return p;
 }
 
-// Positive roots with their direction; negative, zero and complex ones do not count. Kills: a lost part of
+// Positive roots with their direction; negative, zero and complex ones do not count. Catches: a lost part of
 // the interval, a bound below the largest root.
 TEST(RealRoots, AllPositiveRootsAndNoOthers) {
   const WholePolynomial complex_pair(std::vector<Whole>{Whole(5), Whole(-4), Whole(1)});  // 2 +- j
@@ -82,7 +82,7 @@ TEST(RealRoots, AllPositiveRootsAndNoOthers) {
   EXPECT_TRUE(positive_roots(complex_pair).roots.empty());
 }
 
-// Wilkinson's polynomial to degree 20: its roots to the last bit, where doubles are off by 0.5. Kills:
+// Wilkinson's polynomial to degree 20: its roots to the last bit, where doubles are off by 0.5. Catches:
 // arithmetic that rounds.
 TEST(RealRoots, WilkinsonsPolynomial) {
   const PositiveRoots found =
@@ -92,7 +92,7 @@ TEST(RealRoots, WilkinsonsPolynomial) {
     EXPECT_DOUBLE_EQ(found.roots[k].value, static_cast<double>(k + 1));
 }
 
-// Kills: a double root that is taken for none or for one without a word.
+// Catches: a double root that is taken for none or for one without a word.
 TEST(RealRoots, ADoubleRootIsConfessed) {
   EXPECT_FALSE(positive_roots(with_roots({3, 3})).complete);
   const WholePolynomial third(

@@ -35,7 +35,7 @@ std::complex<double> response(const DigitalFilter& f, double rad_s, double perio
 }
 
 // FLT-01: |G|^2 = 1/(1 + (w/w_c)^2n) at 0.6 and 2 w_c for every order, to rounding; the book's values to
-// their four digits. Kills: poles of the right half plane, an odd order without its real pole.
+// their four digits. Catches: poles of the right half plane, an odd order without its real pole.
 TEST(Filters, TheButterworthLowPassHasItsGainForAnyOrder) {
   for (int order = 1; order <= 12; ++order) {
     const AnalogFilter f = butterworth(order, 100.0);
@@ -50,7 +50,7 @@ TEST(Filters, TheButterworthLowPassHasItsGainForAnyOrder) {
   EXPECT_NEAR(std::abs(response(butterworth(4, 1.0), 2.0)), 0.0624, 5e-5);
 }
 
-// AC-17: order 3, 100 Hz at 5 kHz; 1e-5 of the coefficients, b_0 to its six digits. Kills: prewarping where
+// AC-17: order 3, 100 Hz at 5 kHz; 1e-5 of the coefficients, b_0 to its six digits. Catches: prewarping where
 // none is asked for and the other way round, a denominator that is not normalised.
 TEST(Filters, TheBilinearFilterHasTheBooksCoefficients) {
   const AnalogFilter f = butterworth(3, 2.0 * kPi * 100.0);
@@ -68,7 +68,7 @@ TEST(Filters, TheBilinearFilterHasTheBooksCoefficients) {
   EXPECT_NEAR(std::abs(response(plain, 2.0 * kPi * 99.869, 2e-4)), std::sqrt(0.5), 1e-5);
 }
 
-// FLT-03: both realisations of the same filter give the same output to 1e-12 of it. Kills: a row of the
+// FLT-03: both realisations of the same filter give the same output to 1e-12 of it. Catches: a row of the
 // companion matrix in the wrong order, an output vector without its -b_0 a_i.
 TEST(Filters, StateSpaceAndDifferenceEquationAgree) {
   const DigitalFilter filter = bilinear(butterworth(3, 2.0 * kPi * 100.0), 2e-4);
@@ -83,8 +83,8 @@ TEST(Filters, StateSpaceAndDifferenceEquationAgree) {
 }
 
 // FLT-04: in the middle the gain is |G|^2 and the phase nothing, at the corner half the amplitude; 1e-4 is
-// what is left of the ends. A constant and a ramp pass unchanged up to the ends. Kills: one pass only, passes
-// that start from rest.
+// what is left of the ends. A constant and a ramp pass unchanged up to the ends. Catches: one pass only,
+// passes that start from rest.
 TEST(Filters, TheZeroPhaseFilterHasNoPhaseAndHalfTheAmplitudeAtItsCorner) {
   constexpr double kPeriod = 1e-3;
   Series sine(4000);
@@ -101,7 +101,7 @@ TEST(Filters, TheZeroPhaseFilterHasNoPhaseAndHalfTheAmplitudeAtItsCorner) {
     ASSERT_NEAR(straight[k], ramp[k], 1e-3) << k;  // of 40, by odd reflection and a settled start
 }
 
-// A tenth-order filter far below the sampling rate: the sections hold it to 1e-6. Kills: one polynomial for
+// A tenth-order filter far below the sampling rate: the sections hold it to 1e-6. Catches: one polynomial for
 // the whole, whose coefficients cancel to nothing.
 TEST(Filters, AHighOrderFarBelowTheSamplingRateStaysAccurate) {
   Series one(20000, 1.0);
@@ -109,7 +109,7 @@ TEST(Filters, AHighOrderFarBelowTheSamplingRateStaysAccurate) {
     ASSERT_NEAR(x, 1.0, 1e-6);
 }
 
-// Kills: a filter above the Nyquist frequency that is silently something else.
+// Catches: a filter above the Nyquist frequency that is silently something else.
 TEST(Filters, ACornerAboveHalfTheSamplingRateIsRefused) {
   const Series x(100, 1.0);
   EXPECT_THROW(zero_phase(x, {.order = 3, .cutoff_hz = 500.0}, 1e-3), IdentificationError);

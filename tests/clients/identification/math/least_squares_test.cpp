@@ -10,8 +10,8 @@ namespace drivebench::identification {
 namespace {
 
 // A line through points with a known answer: estimate, E^2 and both indices by hand. R_W = [4 6; 6 14], E^2
-// = 1.8 and (R_W^-1)_22 = 4/20. Kills: an index without its square root, E^2/n in its place, R_y without the
-// mean.
+// = 1.8 and (R_W^-1)_22 = 4/20. Catches: an index without its square root, E^2/n in its place, R_y without
+// the mean.
 TEST(LeastSquares, ALineByHand) {
   Regression fit({"offset", "slope"});
   const double y[] = {0.0, 2.0, 1.0, 4.0};
@@ -30,7 +30,7 @@ TEST(LeastSquares, ALineByHand) {
   EXPECT_TRUE(found.excitation.sufficient);
 }
 
-// E^2 really doubles at the index: the others are free to follow. Kills: an index along the axis, which is
+// E^2 really doubles at the index: the others are free to follow. Catches: an index along the axis, which is
 // too short.
 TEST(LeastSquares, TheErrorDoublesAtTheIndex) {
   std::mt19937 engine(3);
@@ -52,7 +52,7 @@ TEST(LeastSquares, TheErrorDoublesAtTheIndex) {
 }
 
 // Columns of lengths 1 and 1e9 whose angle is 1e-6: the normal equations have a condition of 1e30 and no
-// digit left; QR with scaled columns keeps six. Kills: normal equations, a condition of unscaled columns.
+// digit left; QR with scaled columns keeps six. Catches: normal equations, a condition of unscaled columns.
 TEST(LeastSquares, ReflectionsKeepTheDigits) {
   Regression fit({"small", "large"});
   for (int k = 0; k < 1000; ++k) {
@@ -69,7 +69,7 @@ TEST(LeastSquares, ReflectionsKeepTheDigits) {
 }
 
 // b and c only as their sum: both are named, a is not, and a parameter without any data neither escapes.
-// Kills: a verdict that blames all or none.
+// Catches: a verdict that blames all or none.
 TEST(LeastSquares, TheVerdictNamesWhatTheDataCannotTell) {
   Regression fit({"a", "b", "c"});
   Regression silent({"a", "b"});
@@ -88,8 +88,8 @@ TEST(LeastSquares, TheVerdictNamesWhatTheDataCannotTell) {
   EXPECT_NEAR(found.estimate[0], 1.0, 1e-12);
 }
 
-// Folding blocks must not change the answer: 10 000 rows against the closed form of a mean. Kills: rows lost
-// at the border of a block, rows counted twice.
+// Folding blocks must not change the answer: 10 000 rows against the closed form of a mean. Catches: rows
+// lost at the border of a block, rows counted twice.
 TEST(LeastSquares, LongRecordsAreFoldedIntoTheFactor) {
   Regression fit({"mean"});
   for (int k = 0; k < 10007; ++k)
@@ -101,7 +101,7 @@ TEST(LeastSquares, LongRecordsAreFoldedIntoTheFactor) {
   EXPECT_EQ(fit.rows(), 10007U);
 }
 
-// Kills: an answer from nothing, NaN that goes round as a result.
+// Catches: an answer from nothing, NaN that goes round as a result.
 TEST(LeastSquares, TooFewOrBrokenDataAreRefused) {
   Regression fit({"a", "b"});
   fit.add(std::array{1.0, 2.0}, 1.0);

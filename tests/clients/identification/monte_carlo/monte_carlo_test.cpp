@@ -16,8 +16,8 @@ const std::vector<Trials>& shown() {
   return trials;
 }
 
-// Catches a change of plant, sensors, filters or regression that the table does not have, and a table written
-// by hand.
+// Catches: a change of plant, sensors, filters or regression that the table does not have, and a table
+// written by hand.
 TEST(MonteCarlo, TheTableEqualsTheResultsOfTheExperiments) {
   std::ifstream file(DRIVEBENCH_IDENTIFICATION, std::ios::binary);
   ASSERT_TRUE(file) << DRIVEBENCH_IDENTIFICATION;
@@ -27,7 +27,7 @@ TEST(MonteCarlo, TheTableEqualsTheResultsOfTheExperiments) {
     ADD_FAILURE() << difference;
 }
 
-// Catches numbers that depend on the thread that works them out: a state that trials share, an order of
+// Catches: numbers that depend on the thread that works them out: a state that trials share, an order of
 // threads.
 TEST(MonteCarlo, ThreadsDoNotChangeABit) {
   constexpr int kMotors = 2;
@@ -42,7 +42,7 @@ TEST(MonteCarlo, ThreadsDoNotChangeABit) {
   }
 }
 
-// Catches noise that is the same in every experiment: another noise moves every estimate, by less than a
+// Catches: noise that is the same in every experiment: another noise moves every estimate, by less than a
 // tenth.
 TEST(MonteCarlo, EachExperimentHasItsOwnNoise) {
   for (const Trials& kind : shown()) {
@@ -54,7 +54,7 @@ TEST(MonteCarlo, EachExperimentHasItsOwnNoise) {
   }
 }
 
-// Catches a comparison that is content with another number, another text, a row less or a row more, and a
+// Catches: a comparison that is content with another number, another text, a row less or a row more, and a
 // summary that counts wrong: of the errors 1, 2, 2, 4 % with an index of 3 % and one estimate taken back the
 // median is 2 %, the worst 4 %, three of four are covered.
 TEST(MonteCarlo, DifferencesAreFound) {

@@ -13,8 +13,8 @@ namespace drivebench::identification {
 namespace {
 
 // The motor of chapter 10 on voltages in the shape of its emf, 25 +- 10 V at 7 Hz, true angle, 20 kHz: 1 % of
-// the electrical and 2 % of the mechanical parameters, f 5 %. Kills: the sign of e, phases that do not follow
-// by 120 degrees, a torque with half its phases.
+// the electrical and 2 % of the mechanical parameters, f 5 %. Catches: the sign of e, phases that do not
+// follow by 120 degrees, a torque with half its phases.
 TEST(BldcMotor, IsIdentifiedFromItsTrapezoids) {
   BenchConfig config = bench_config("bldc-servo");
   set_rate(config, 50'000, 5);
@@ -48,7 +48,7 @@ TEST(BldcMotor, IsIdentifiedFromItsTrapezoids) {
   EXPECT_TRUE(r.excitation.sufficient) << r.excitation.verdict;
 }
 
-// BL-02: the corners at 30, 150, 210, 330 degrees. Kills: a shape that leads by 30 degrees.
+// BL-02: the corners at 30, 150, 210, 330 degrees. Catches: a shape that leads by 30 degrees.
 TEST(BldcMotor, TheEmfHasItsCorners) {
   const auto at = [](double degrees) { return trapezoid_at_turns(degrees / 360.0); };
   EXPECT_NEAR(at(0.0), 0.0, 1e-12);

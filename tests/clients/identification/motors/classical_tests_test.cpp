@@ -26,8 +26,8 @@ MeterReading reading(bool held) {
           .reactive_var = s.meter_q_var};
 }
 
-// AC-23, 0.3 percentage points: L_S right, R_R 15 % and sigma 3.5 % low, M 0.3 % high. Kills: power per phase
-// for power of all, w for 2 w of the leakage.
+// AC-23, 0.3 percentage points: L_S right, R_R 15 % and sigma 3.5 % low, M 0.3 % high. Catches: power per
+// phase for power of all, w for 2 w of the leakage.
 TEST(ClassicalTests, GiveWhatTheBookSays) {
   Result r = classical_induction_tests(1.85, reading(false), reading(true), 60.0);
   r.compare({{"L_S", 0.244}, {"R_R", 2.1}, {"M", 0.225}, {"sigma", 1.0 - 0.225 * 0.225 / (0.244 * 0.244)}});
@@ -38,7 +38,7 @@ TEST(ClassicalTests, GiveWhatTheBookSays) {
   EXPECT_NEAR(error("sigma"), -3.5, 0.3);
 }
 
-// Kills: a resistance of two phases taken for that of one; division by no current.
+// Catches: a resistance of two phases taken for that of one; division by no current.
 TEST(ClassicalTests, ResistanceFromTwoPhasesInSeries) {
   EXPECT_DOUBLE_EQ(dc_resistance_ohm(7.4, 2.0), 1.85);
   EXPECT_THROW(dc_resistance_ohm(7.4, 0.0), IdentificationError);
@@ -46,7 +46,7 @@ TEST(ClassicalTests, ResistanceFromTwoPhasesInSeries) {
 }
 
 // DC-A held at standstill, 2 V at 5 ms, 10 kHz: R to 0.1 %, L to 1 % (what central differences lose of a time
-// constant of ten samples). Kills: a voltage half a period off, L/R in the place of L.
+// constant of ten samples). Catches: a voltage half a period off, L/R in the place of L.
 TEST(ClassicalTests, AStepAtStandstillGivesResistanceAndInductance) {
   BenchConfig config = bench_config("dc-a-voltage");
   config.setup.axes[0].parameters.mechanics.motion = ShaftMotion::kLocked;

@@ -49,7 +49,7 @@ Settings dc_experiment() {
   return e;
 }
 
-// AC-15: R, K_T 0.5 %, L 1 %, J 2 %, f 10 %, error index 0.001 to 0.005. Kills: differences late by half a
+// AC-15: R, K_T 0.5 %, L 1 %, J 2 %, f 10 %, error index 0.001 to 0.005. Catches: differences late by half a
 // sample, currents without the filter of the voltage, a row with a sign wrong.
 TEST(DcMotor, SinesOfCurrentTellAllFiveParameters) {
   Recorder record({"i_a_a", "u_a_v", "encoder_count"}, 1e-5, 100);
@@ -65,7 +65,7 @@ TEST(DcMotor, SinesOfCurrentTellAllFiveParameters) {
   EXPECT_TRUE(r.excitation.sufficient) << r.excitation.verdict;
 }
 
-// AC-15, negative: backward differences beside unshifted signals lose friction, about -73 %. Kills: an
+// AC-15, negative: backward differences beside unshifted signals lose friction, about -73 %. Catches: an
 // alignment that does nothing.
 TEST(DcMotor, BackwardDifferencesLoseTheFriction) {
   Recorder record({"i_a_a", "u_a_v", "encoder_count"}, 1e-5, 100);
@@ -78,7 +78,7 @@ TEST(DcMotor, BackwardDifferencesLoseTheFriction) {
 }
 
 // AC-15 with exact derivatives: 1e-6 and better. i = sin(at) + sin(bt), w from the equation of motion, v from
-// that of the circuit. Kills: an equation that is not the motor's.
+// that of the circuit. Catches: an equation that is not the motor's.
 TEST(DcMotor, ExactDerivativesGiveExactParameters) {
   constexpr double kL = 2e-3, kR = 2.0, kT = 0.07, kJ = 6e-5, kF = 4e-4;
   Regression fit({"L", "R", "K_T", "J", "f"});
@@ -104,7 +104,7 @@ TEST(DcMotor, ExactDerivativesGiveExactParameters) {
 
 // AC-16: a constant current, after the transient of J/f = 0.15 s. 437.5 rad/s and 35.625 V to 0.1 %,
 // condition of R_W beyond 1e10; all five parameters are named: R and K_T as well as K_T and f stand beside
-// constants, L and J beside nothing. Kills: numbers printed for what the data do not hold.
+// constants, L and J beside nothing. Catches: numbers printed for what the data do not hold.
 TEST(DcMotor, AConstantCurrentIdentifiesNothing) {
   Recorder record({"i_a_a", "u_a_v", "encoder_count"}, 1e-5, 100);
   const BookBench run = run_dc([](double) { return 2.5; }, 3.0, record);
@@ -119,7 +119,8 @@ TEST(DcMotor, AConstantCurrentIdentifiesNothing) {
   EXPECT_THROW(to_motor_toml(r, {.name = "x"}), IdentificationError);
 }
 
-// Kills: a record without samples in its window that gives a motor all the same; columns of different length.
+// Catches: a record without samples in its window that gives a motor all the same; columns of different
+// length.
 TEST(DcMotor, DataThatCannotBeUsedAreRefused) {
   MeasuredData data{.period_s = 1e-3,
                     .columns = {{"i_a_a", "A", Series(80, 0.0)}, {"u_a_v", "V", Series(80, 0.0)}}};

@@ -47,7 +47,7 @@ Settings sensor_experiment(double period_s) {
 }
 
 // Case 22: the equations hold at 200 random states with the model's own derivatives, to 1e-10 of the largest
-// term. Kills: any of the 15 columns with a sign, a factor n_p or a signal wrong.
+// term. Catches: any of the 15 columns with a sign, a factor n_p or a signal wrong.
 TEST(InductionMotor, EveryColumnOfTheRegressorFitsTheModel) {
   using Complex = std::complex<double>;
   constexpr Complex j(0.0, 1.0);
@@ -96,7 +96,7 @@ TEST(InductionMotor, EveryColumnOfTheRegressorFitsTheModel) {
   }
 }
 
-// Case 23: the table of 8.5.6, 0.2 % and the text's rounding. Kills: sigma for 1 - sigma, T_R in the wrong
+// Case 23: the table of 8.5.6, 0.2 % and the text's rounding. Catches: sigma for 1 - sigma, T_R in the wrong
 // place, J = K_16 n_p.
 TEST(InductionMotor, TheTextsTableConvertsToItsParameters) {
   const InductionParameters p = induction_parameters(519.7, 1848.3, 0.1311, 259.5);
@@ -109,7 +109,8 @@ TEST(InductionMotor, TheTextsTableConvertsToItsParameters) {
 }
 
 // Case 19: 4 kHz, true signals, central differences: 0.1 % of the truth, one minimum with positive parameters
-// and the proof that there is no other. Kills: a wrong derivative, a search that stops at the first minimum.
+// and the proof that there is no other. Catches: a wrong derivative, a search that stops at the first
+// minimum.
 TEST(InductionMotor, IdealDataGiveTheTruthAndOneMinimum) {
   MeasuredData data = start_data(250'000, true);
   put_line_voltages(data, 381.059, 50.0, 1);
@@ -128,7 +129,8 @@ TEST(InductionMotor, IdealDataGiveTheTruthAndOneMinimum) {
 
 // Case 20: encoder of 2048 counts, 12-bit currents, 200 and 100 Hz. The tolerances are the case's about the
 // truth; the reference's own K_17, 314, is 7 % low as its torque did not pass the filter of the speed: 10 %
-// holds both. The index holds the true error. Kills: a filter with phase, different filters in one equation.
+// holds both. The index holds the true error. Catches: a filter with phase, different filters in one
+// equation.
 TEST(InductionMotor, SensorsAndFiltersKeepTheParameters) {
   const Result r = identify(start_data(250'000, false), sensor_experiment(2.5e-4));
   expect_percent(r.at("R_S"), 9.7, 1.5);
@@ -149,7 +151,7 @@ TEST(InductionMotor, SensorsAndFiltersKeepTheParameters) {
 }
 
 // Case 21: backward differences bias R_S by -3 % at 4 kHz and by a fifth of it at 20 kHz; 1 % and 0.5 %.
-// Kills: a "backward" that is central after all, so that the difference does not show.
+// Catches: a "backward" that is central after all, so that the difference does not show.
 TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
   Settings e = ideal_experiment();
   e.processing.backward_differences = true;
@@ -163,8 +165,8 @@ TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
   expect_percent(identify(often, e).at("R_S"), 9.64, 0.5);
 }
 
-// Half a sample between voltages and currents is enough to lose 5 % and more of R_S at 4 kHz. Kills: a shift
-// that is not applied, a default that does not suit the source.
+// Half a sample between voltages and currents is enough to lose 5 % and more of R_S at 4 kHz. Catches: a
+// shift that is not applied, a default that does not suit the source.
 TEST(InductionMotor, VoltagesHalfASampleOffAreSeenToFail) {
   const MeasuredData data = start_data(250'000, true);
   Settings e = ideal_experiment();
@@ -174,7 +176,7 @@ TEST(InductionMotor, VoltagesHalfASampleOffAreSeenToFail) {
 }
 
 // The start of 8.5.6 without load: 4096 counts, viscous friction. The reference's own run: R_S 5.10, T_R
-// 0.1297; 2 % of the truth for the electrical ones. Kills: the other load model, one motor's filters that
+// 0.1297; 2 % of the truth for the electrical ones. Catches: the other load model, one motor's filters that
 // another cannot stand.
 TEST(InductionMotor, TheLineStartOfTheExperiment) {
   BookBench run("im-8-5-6");
@@ -191,8 +193,8 @@ TEST(InductionMotor, TheLineStartOfTheExperiment) {
   expect_percent(r.at("J"), 0.0021, 4.0);
 }
 
-// A motor that runs without load carries no current in its rotor: T_R must not come out as a number. Kills: a
-// minimum of noise that is printed as a parameter.
+// A motor that runs without load carries no current in its rotor: T_R must not come out as a number. Catches:
+// a minimum of noise that is printed as a parameter.
 TEST(InductionMotor, WithoutLoadNothingIsIdentified) {
   BenchConfig config = bench_config("im-8-5-5");
   config.axes[0].events = {{.tick = 0, .action = LoadChange{.load_nm = 0.0, .ramp_ticks = 0}}};
@@ -208,7 +210,7 @@ TEST(InductionMotor, WithoutLoadNothingIsIdentified) {
 
 // Noise of 0.073 A on currents of 20 A: the second derivative makes so much of it that R_S is known to half
 // its value only. A minimum with the parameters of a motor is there, the truth lies within its indices, and
-// the verdict names R_S. Kills: a verdict that does not look at the indices.
+// the verdict names R_S. Catches: a verdict that does not look at the indices.
 TEST(InductionMotor, WhatDrownsInNoiseIsNamed) {
   MeasuredData data = start_data(250'000, true);
   std::mt19937 engine(2);

@@ -42,7 +42,7 @@ Triangle some_data(double noise, unsigned seed) {
 }
 
 // Every minimum is one: no point around it has a smaller error, and its Hessian is that of the error (1e-4,
-// second differences). Kills: a maximum taken for a minimum, a projection onto the wrong columns, a mixed
+// second differences). Catches: a maximum taken for a minimum, a projection onto the wrong columns, a mixed
 // term of the Hessian without E.
 TEST(InductionSearch, MinimaAreMinimaAndHessiansAreSecondDerivatives) {
   for (const double noise : {0.01, 0.5}) {
@@ -200,7 +200,7 @@ Polynomial<Residue> remainder(std::vector<Residue> p, const std::vector<Residue>
 
 // The book's elimination by resultants has degree 104 as it says, and is divisible by the polynomial of
 // degree 42 whose roots the search takes: every stationary point of the one is a root of the other. Exact, in
-// residues of a prime of 61 bits, so that a false division passes with a probability of 1e-17. Kills: any
+// residues of a prime of 61 bits, so that a false division passes with a probability of 1e-17. Catches: any
 // coefficient of either.
 TEST(InductionSearch, TheEliminationOfTheBookHasTheSameRoots) {
   const Triangle factor = some_data(0.3, 4);

@@ -21,7 +21,7 @@ const BenchParameters kInduction = {{"machine.pole_pairs", 2},
                                     {"mechanics.inertia_kgm2", 0.011},
                                     {"encoder.counts_per_revolution", 2048}};
 
-// The numbers of 8.5.5, five digits. Kills: T_R upside down, sigma for 1 - sigma, K_16 without the pole
+// The numbers of 8.5.5, five digits. Catches: T_R upside down, sigma for 1 - sigma, K_16 without the pole
 // pairs.
 TEST(Motors, TheTruthOfAnInductionMotorIsThatOfTheBook) {
   const auto truth = truth_of(MotorKind::kInduction, kInduction);
@@ -42,8 +42,8 @@ TEST(Motors, TheTruthOfAnInductionMotorIsThatOfTheBook) {
   expect("K16", 181.82);
 }
 
-// A motor whose leakages differ: its terminals are those of one with equal leakages. Kills: the bench's own M
-// and R_R as the truth about a split that no data show.
+// A motor whose leakages differ: its terminals are those of one with equal leakages. Catches: the bench's own
+// M and R_R as the truth about a split that no data show.
 TEST(Motors, UnequalLeakagesAreComparedAsEqualOnes) {
   BenchParameters bench = kInduction;
   bench["machine.rotor_inductance_h"] = 2.0 * 0.67;
@@ -54,7 +54,7 @@ TEST(Motors, UnequalLeakagesAreComparedAsEqualOnes) {
   EXPECT_NEAR(truth.find("R_R")->second, 8.6, 1e-9);
 }
 
-// Kills: a truth where the method has another meaning or the number is unknown.
+// Catches: a truth where the method has another meaning or the number is unknown.
 TEST(Motors, WhatCannotBeMeantHasNoTruth) {
   BenchParameters bench = kInduction;
   bench["thermal.enabled"] = 1.0;
@@ -81,8 +81,8 @@ double shift_of(std::string_view drive, int substeps, int decimation, BenchParam
   return settings_of(MotorKind::kInduction, facts, 1e-4).processing.voltage_shift;
 }
 
-// Half of the time that a voltage held before its sample, in periods of the data. Kills: a shift that forgets
-// decimation, or that follows the motor's kind in the place of the drive's.
+// Half of the time that a voltage held before its sample, in periods of the data. Catches: a shift that
+// forgets decimation, or that follows the motor's kind in the place of the drive's.
 TEST(Motors, TheVoltageShiftFollowsTheDrive) {
   EXPECT_DOUBLE_EQ(shift_of("source", 5, 1), 0.0);
   EXPECT_DOUBLE_EQ(shift_of("voltage_amplifier", 5, 1), 0.5);
@@ -92,7 +92,7 @@ TEST(Motors, TheVoltageShiftFollowsTheDrive) {
   EXPECT_DOUBLE_EQ(shift_of("voltage_amplifier", 1, 1, {{"amplifier.filter_hz", 1e4}}), 0.0);
 }
 
-// Kills: a warning that is not given where the voltages cannot be what the method takes them for, or that
+// Catches: a warning that is not given where the voltages cannot be what the method takes them for, or that
 // stays.
 TEST(Motors, VoltagesThatHideSomethingAreTold) {
   MeasurementFacts facts;
@@ -110,7 +110,8 @@ TEST(Motors, VoltagesThatHideSomethingAreTold) {
   EXPECT_FALSE(facts.note.empty());
 }
 
-// tau_L is what the load was, if it was one number. Kills: a truth for a load that changes within the window.
+// tau_L is what the load was, if it was one number. Catches: a truth for a load that changes within the
+// window.
 TEST(Motors, TheLoadIsATruthIfItIsConstant) {
   Settings e = settings_of(MotorKind::kInduction, {}, 1e-3);
   e.load = LoadModel::kConstant;
@@ -125,7 +126,7 @@ TEST(Motors, TheLoadIsATruthIfItIsConstant) {
   EXPECT_FALSE(truth.contains("tau_L"));
 }
 
-// Kills: a named experiment without its file or bench, a motor without any, one name twice.
+// Catches: a named experiment without its file or bench, a motor without any, one name twice.
 TEST(Motors, EveryNamedExperimentHasItsFiles) {
   const std::filesystem::path configs = DRIVEBENCH_CONFIGS;
   std::set<std::string> names;
@@ -147,7 +148,7 @@ TEST(Motors, EveryNamedExperimentHasItsFiles) {
   EXPECT_EQ(motor_name(MotorKind::kBldc).name, "bldc");
 }
 
-// Kills: settings of a named experiment that are not applied, or that take filters away.
+// Catches: settings of a named experiment that are not applied, or that take filters away.
 TEST(Motors, ANamedExperimentSetsWindowLoadAndFilters) {
   Settings e = settings_of(MotorKind::kPmSynchronous, {}, 2e-5);
   apply(*find_experiment("pm", "ramp"), e);

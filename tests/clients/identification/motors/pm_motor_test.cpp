@@ -62,8 +62,8 @@ void expect_part(double value, double truth, double part) {
 }
 
 // Case 31: true signals, one filter for all, voltage advanced by half a period: 0.3 % of R_S, L_S, K_m, 1 %
-// of J about the reference's numbers. The speeds are the reference's as well. Kills: a sign of the coupling,
-// the emf in the d row.
+// of J about the reference's numbers. The speeds are the reference's as well. Catches: a sign of the
+// coupling, the emf in the d row.
 TEST(PmMotor, EqualFiltersAndAShiftedVoltageGiveTheTruth) {
   const MeasuredData data = start_data(0.0);
   EXPECT_NEAR(data.at("speed_rad_s")[500], 15.9, 0.2);
@@ -78,7 +78,7 @@ TEST(PmMotor, EqualFiltersAndAShiftedVoltageGiveTheTruth) {
 
 // Case 31, negative: commands hold from their sample on, so their middle lies half a period after it.
 // Ignored, R_S comes out as 0.48 (5 %); with the bench's means, whose middle lies before their sample, as
-// 0.72. Kills: a shift that does nothing.
+// 0.72. Catches: a shift that does nothing.
 TEST(PmMotor, AnUnshiftedVoltageIsSeenToFail) {
   const MeasuredData reported = start_data(0.0);
   const MeasuredData commanded = with_commands(reported);
@@ -93,7 +93,8 @@ TEST(PmMotor, AnUnshiftedVoltageIsSeenToFail) {
 }
 
 // Commands that reach the terminals 1.6 periods late: shifted by 1.6 + 0.5 they give R_S to 1 %, unshifted
-// nothing of the kind. Kills: a shift in the wrong direction, a half period that is forgotten with commands.
+// nothing of the kind. Catches: a shift in the wrong direction, a half period that is forgotten with
+// commands.
 TEST(PmMotor, CommandedVoltagesAreShiftedByTheirDelay) {
   const MeasuredData data = with_commands(start_data(1.6));
   Settings e = experiment(500.0, 500.0, true);
@@ -104,8 +105,8 @@ TEST(PmMotor, CommandedVoltagesAreShiftedByTheirDelay) {
 }
 
 // Case 32: the text's filters, 500 and 100 Hz. Both ways give the same parameters (1e-3), and in two stages
-// the mechanical indices no longer measure the error of the voltages: more than five times smaller. Kills: a
-// second stage with the first one's error.
+// the mechanical indices no longer measure the error of the voltages: more than five times smaller. Catches:
+// a second stage with the first one's error.
 TEST(PmMotor, TwoStagesShrinkTheMechanicalIndices) {
   const MeasuredData data = start_data(0.0);
   const Result one = identify(data, experiment(500.0, 100.0, false));
@@ -118,7 +119,7 @@ TEST(PmMotor, TwoStagesShrinkTheMechanicalIndices) {
 }
 
 // At constant speed friction, its two kinds and inertia cannot be told apart, and the verdict names them.
-// Kills: a verdict on one stage only.
+// Catches: a verdict on one stage only.
 TEST(PmMotor, AConstantSpeedShowsNoMechanics) {
   const std::size_t n = 2000;
   MeasuredData data{.period_s = kPeriod,

@@ -43,8 +43,8 @@ ResistanceEstimate steady_state(double load_nm, double stator_factor, double rot
 }
 
 // Case 24: 4096 counts, 12 bit, 100 Hz; 1 % of the reference's numbers, which lie within 0.6 % of the truth.
-// The linear three-parameter fit is singular here. Kills: a resultant of another degree, the root at 1/T_R <
-// 0.
+// The linear three-parameter fit is singular here. Catches: a resultant of another degree, the root at 1/T_R
+// < 0.
 TEST(Resistances, AreFoundInSteadyState) {
   const ResistanceEstimate nominal = steady_state(3.7, 1.0, 1.0, false);
   EXPECT_NEAR(nominal.stator_resistance_ohm, 9.648, 0.0965);
@@ -58,7 +58,7 @@ TEST(Resistances, AreFoundInSteadyState) {
 }
 
 // Without errors of measurement the answer is the truth to 1e-5, down to a seventh of the load: nothing else
-// is in the equations. Kills: a term of the equations that sensors would hide.
+// is in the equations. Catches: a term of the equations that sensors would hide.
 TEST(Resistances, AreExactWithoutErrorsOfMeasurement) {
   for (const double load_nm : {3.7, 0.5}) {
     const ResistanceEstimate found = steady_state(load_nm, 1.0, 1.0, true);
@@ -67,8 +67,8 @@ TEST(Resistances, AreExactWithoutErrorsOfMeasurement) {
   }
 }
 
-// Case 24, negative: without load T_R is named as unseen, with and without sensors. Kills: a time constant of
-// 700 s that is passed on.
+// Case 24, negative: without load T_R is named as unseen, with and without sensors. Catches: a time constant
+// of 700 s that is passed on.
 TEST(Resistances, WithoutLoadTheRotorIsNotIdentifiable) {
   for (const bool ideal : {true, false}) {
     const Excitation excitation = steady_state(0.0, 1.0, 1.0, ideal).excitation;
@@ -82,8 +82,8 @@ TEST(Resistances, WithoutLoadTheRotorIsNotIdentifiable) {
 }
 
 // On line: the rotor warms by 20 % over 2 s of bench time and the tracker follows, no estimate further than 3
-// % from the truth in the middle of its window. Kills: a window that keeps old samples, a shaft or a phase in
-// the wrong column.
+// % from the truth in the middle of its window. Catches: a window that keeps old samples, a shaft or a phase
+// in the wrong column.
 TEST(Resistances, AreTrackedWhileTheyDrift) {
   BenchConfig config = loaded(3.7, 1.0, 1.0);
   BookBench run(config);
@@ -112,7 +112,7 @@ TEST(Resistances, AreTrackedWhileTheyDrift) {
   EXPECT_LT(last, 0.88 * 0.67 / 8.6);
 }
 
-// Kills: a tracker that divides by an inductance of zero.
+// Catches: a tracker that divides by an inductance of zero.
 TEST(Resistances, ATrackerWithoutInductancesIsRefused) {
   EXPECT_THROW(ResistanceTracker({.period_s = 1e-3}), IdentificationError);
   EXPECT_THROW(ResistanceTracker({.known = kKnown}), IdentificationError);

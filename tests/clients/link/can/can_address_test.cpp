@@ -9,7 +9,7 @@
 namespace drivebench::link {
 namespace {
 
-// Catches a back end, channel or default port that is taken apart at the wrong place.
+// Catches: a back end, channel or default port that is taken apart at the wrong place.
 TEST(CanAddress, ReadsEveryBackEnd) {
   const auto read = [](const char* text) { return to_string(parse_can_address(text)); };
   EXPECT_EQ(read("can:socketcan:vcan0"), "can:socketcan:vcan0");
@@ -21,7 +21,7 @@ TEST(CanAddress, ReadsEveryBackEnd) {
   EXPECT_EQ(read("can:socketcand:localhost"), "can:socketcand:localhost:29536");
 }
 
-// Catches a key that is read and not used, or used for another.
+// Catches: a key that is read and not used, or used for another.
 TEST(CanAddress, ReadsEveryKey) {
   const CanAddress a = parse_can_address(
       "can:socketcan:can0?node=17&fd=0&extended=1&command=0x1234500&current_unit_a=0.01&bus=x&bit_rate="
@@ -40,7 +40,7 @@ TEST(CanAddress, ReadsEveryKey) {
   EXPECT_EQ(plain.node, 1U);
 }
 
-// Catches an address that would speak on another bus, or with other frames, than was meant.
+// Catches: an address that would speak on another bus, or with other frames, than was meant.
 TEST(CanAddress, RefusesWhatIsNone) {
   for (const std::string text : {"can:",
                                  "can:vcan0",

@@ -63,7 +63,7 @@ can::Frame frame_of(std::uint32_t id, std::vector<std::uint8_t> data) {
   return frame;
 }
 
-// Catches an adapter that is not opened, a frame cut in two by the network and lost, an answer taken for a
+// Catches: an adapter that is not opened, a frame cut in two by the network and lost, an answer taken for a
 // frame, and a bus that ends unnoticed.
 TEST(CanBus, SlcanOpensTheAdapterAndExchangesFrames) {
   const Listener listener;
@@ -84,7 +84,8 @@ TEST(CanBus, SlcanOpensTheAdapterAndExchangesFrames) {
   EXPECT_THROW(bus->receive(Clock::now() + 5s), LinkError);
 }
 
-// Catches a session that is not opened in the server's order, and frames that come with the last answer lost.
+// Catches: a session that is not opened in the server's order, and frames that come with the last answer
+// lost.
 TEST(CanBus, SocketcandOpensASessionAndExchangesFrames) {
   const Listener listener;
   auto opening = std::async(std::launch::async, [&listener] {
@@ -102,7 +103,7 @@ TEST(CanBus, SocketcandOpensASessionAndExchangesFrames) {
   EXPECT_EQ(hear(peer, ">"), "< send 201 2 01 20 >");
 }
 
-// Catches a server that speaks something else and is believed.
+// Catches: a server that speaks something else and is believed.
 TEST(CanBus, SocketcandRefusesAnotherProtocol) {
   const Listener listener;
   auto opening = std::async(std::launch::async, [&listener] {
@@ -118,7 +119,7 @@ TEST(CanBus, SocketcandRefusesAnotherProtocol) {
   }
 }
 
-// Catches own frames that come back, frames of another bus, and a lost flag of an FD frame.
+// Catches: own frames that come back, frames of another bus, and a lost flag of an FD frame.
 TEST(CanBus, MulticastIsABusPerPort) {
   const std::string place = "can:udp_multicast:239.74.163.77:" + std::to_string(20'000 + ::getpid() % 20'000);
   std::unique_ptr<CanBus> one;
@@ -136,7 +137,7 @@ TEST(CanBus, MulticastIsABusPerPort) {
   EXPECT_FALSE(one->receive(Clock::now() + 20ms).has_value());
 }
 
-// Catches a missing interface or terminal that is noticed only when the first frame is sent.
+// Catches: a missing interface or terminal that is noticed only when the first frame is sent.
 TEST(CanBus, WhatIsNotThereIsNoConnection) {
   for (const char* text : {"can:socketcan:nosuch0", "can:slcan:/dev/null", "can:slcan:/nowhere/tty",
                            "can:socketcand:127.0.0.1:1"}) {

@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(Profiles, WideCanLink, testing::Values(Kind{false, true
 class WideClassicCanLink : public CanLinkOf {};
 INSTANTIATE_TEST_SUITE_P(Profile, WideClassicCanLink, testing::Values(Kind{false, true}));
 
-// Catches a mode, period or first sample that is made up rather than received, and the truth that CAN does
+// Catches: a mode, period or first sample that is made up rather than received, and the truth that CAN does
 // not carry passed off as known.
 TEST_P(CanLinkOf, LearnsTheBenchFromItsFrames) {
   bench_->sample.tick = 5;
@@ -114,7 +114,7 @@ TEST_P(CanLinkOf, LearnsTheBenchFromItsFrames) {
   }
 }
 
-// Catches a field of a command in the wrong place, unit or not at all.
+// Catches: a field of a command in the wrong place, unit or not at all.
 TEST_P(CanLinkOf, SendsEveryFieldOfACommand) {
   link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 12.5, .u_b_v = -3.25});
   EXPECT_EQ(narrow(bench_->command), (std::vector<double>{0.0, 12.5, -3.25, 1.0}));
@@ -124,8 +124,8 @@ TEST_P(CanLinkOf, SendsEveryFieldOfACommand) {
   EXPECT_EQ(narrow(bench_->command), (std::vector<double>{2.0, 1.25, -2.5, 4.0}));
 }
 
-// Catches setpoints of phase c or of the field that are left out, are those of another kind, or go to an axis
-// that has neither.
+// Catches: setpoints of phase c or of the field that are left out, are those of another kind, or go to an
+// axis that has neither.
 TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
   const AxisCommand command = {
       .tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_c_v = -2.5, .u_f_v = 24.0};
@@ -139,7 +139,7 @@ TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
   EXPECT_EQ(bench_->command, (std::vector<double>{1.0, 0.0, 0.0, 4.0, 0.5, -1.5}));
 }
 
-// Catches a signal of a wide axis that its frames carry and that the link drops.
+// Catches: a signal of a wide axis that its frames carry and that the link drops.
 TEST_P(WideCanLink, LearnsTheRestOfASample) {
   bench_->sample.i_c_a = -1.5;
   bench_->sample.i_f_a = 2.5;
@@ -158,7 +158,7 @@ TEST_P(WideCanLink, LearnsTheRestOfASample) {
   EXPECT_EQ(sample.injected, 0x1234567U);
 }
 
-// Catches currents of phase c, or the voltage of the tachometer, of one tick taken together with the others
+// Catches: currents of phase c, or the voltage of the tachometer, of one tick taken together with the others
 // of another.
 TEST_P(WideClassicCanLink, ASampleNeedsItsPhasesFrame) {
   link();
@@ -176,7 +176,7 @@ TEST_P(WideClassicCanLink, ASampleNeedsItsPhasesFrame) {
   EXPECT_EQ(link().newest().tachometer_v, 3.5);
 }
 
-// Catches a tick or count that falls back when its low bits start again.
+// Catches: a tick or count that falls back when its low bits start again.
 TEST_P(CanLinkOf, CarriesTicksAndCountsOverTheEndOfTheirBits) {
   const std::uint64_t first = address_.profile.fd ? 0xFFFFFFFEU : 0xF003FFFEU;
   bench_->sample.tick = first;
@@ -189,7 +189,7 @@ TEST_P(CanLinkOf, CarriesTicksAndCountsOverTheEndOfTheirBits) {
   EXPECT_EQ(link().newest().encoder_count, std::int64_t{std::numeric_limits<std::int32_t>::max()} + 3);
 }
 
-// Catches a lockstep that stands still, or runs a tick twice, after a frame was lost on either way.
+// Catches: a lockstep that stands still, or runs a tick twice, after a frame was lost on either way.
 TEST_P(CanLinkOf, LockstepSurvivesLostFrames) {
   std::uint64_t tick = link().newest().tick;
   for (const Message lost :
@@ -206,7 +206,7 @@ TEST_P(CanLinkOf, LockstepSurvivesLostFrames) {
   EXPECT_EQ(bench_->sample.tick, tick);
 }
 
-// Catches an acquire or release that hangs or fails because a frame was lost.
+// Catches: an acquire or release that hangs or fails because a frame was lost.
 TEST_P(CanLinkOf, RequestsSurviveLostFrames) {
   lose(Message::kRequest, 3);
   link();
@@ -215,7 +215,7 @@ TEST_P(CanLinkOf, RequestsSurviveLostFrames) {
   EXPECT_EQ(bench_->lease, 0.0);
 }
 
-// Catches an axis that stays taken by a controller that is gone.
+// Catches: an axis that stays taken by a controller that is gone.
 TEST_P(CanLinkOf, GivesTheAxisBackAtItsEnd) {
   link();
   const can::Profile profile = address_.profile;
@@ -229,7 +229,7 @@ TEST_P(CanLinkOf, GivesTheAxisBackAtItsEnd) {
   EXPECT_TRUE(released);
 }
 
-// Catches a count of one tick taken together with the currents of another.
+// Catches: a count of one tick taken together with the currents of another.
 TEST_P(ClassicCanLink, CurrentsWithoutTheirEncoderFrameAreNoSample) {
   link();
   bench_->sample.tick = 9;
@@ -241,7 +241,7 @@ TEST_P(ClassicCanLink, CurrentsWithoutTheirEncoderFrameAreNoSample) {
   EXPECT_EQ(link().newest().tick, 9U);
 }
 
-// Catches a refusal that is taken for another, or for a dead link.
+// Catches: a refusal that is taken for another, or for a dead link.
 TEST_P(CanLinkOf, RefusalsHaveTheirCodes) {
   const std::vector<std::pair<double, v1::RefusalCode>> codes = {
       {2.0, v1::REFUSAL_OWNED},     {3.0, v1::REFUSAL_NOT_FINITE}, {4.0, v1::REFUSAL_LATCHED},
@@ -265,7 +265,7 @@ TEST_P(CanLinkOf, RefusalsHaveTheirCodes) {
   }
 }
 
-// Catches a lease that is lost without a word.
+// Catches: a lease that is lost without a word.
 TEST_P(CanLinkOf, ALostLeaseIsARefusal) {
   link();
   bench_->lease = 8;
@@ -277,7 +277,7 @@ TEST_P(CanLinkOf, ALostLeaseIsARefusal) {
   }
 }
 
-// Catches a controller that gives up because the bench refused another controller on the bus.
+// Catches: a controller that gives up because the bench refused another controller on the bus.
 TEST_P(CanLinkOf, RefusalsOfOthersAreTheirs) {
   link();
   bench_->put_reply(0.0, 1.0, 0.0, 7.0, 0.0);   // another controller commanded without the lease
@@ -287,7 +287,7 @@ TEST_P(CanLinkOf, RefusalsOfOthersAreTheirs) {
   EXPECT_EQ(link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0}).tick, 1U);
 }
 
-// Catches frames of another node, of no node or about the bus that pass for the bench's.
+// Catches: frames of another node, of no node or about the bus that pass for the bench's.
 TEST_P(CanLinkOf, IgnoresWhatIsNotForIt) {
   link();
   can::Profile profile = address_.profile;
@@ -308,7 +308,7 @@ TEST_P(CanLinkOf, IgnoresWhatIsNotForIt) {
   EXPECT_EQ(link().newest().tick, 0U);
 }
 
-// Catches a link that waits for ever, or does not say for what.
+// Catches: a link that waits for ever, or does not say for what.
 TEST_P(CanLinkOf, SilenceIsAnErrorThatNamesWhatWasWaitedFor) {
   link();
   bench_->loses = [](const can::Frame&) { return true; };
@@ -323,7 +323,7 @@ TEST_P(CanLinkOf, SilenceIsAnErrorThatNamesWhatWasWaitedFor) {
   EXPECT_NE(failure_of(connect).find("heartbeat"), std::string::npos);
 }
 
-// Catches a link that waits without a word for frames that come in another form.
+// Catches: a link that waits without a word for frames that come in another form.
 TEST_P(CanLinkOf, FramesOfTheOtherProfileAreNamed) {
   can::Profile other = address_.profile;
   other.fd = !other.fd;
@@ -336,7 +336,7 @@ TEST_P(CanLinkOf, FramesOfTheOtherProfileAreNamed) {
   EXPECT_NE(what.find("do both ends agree on fd"), std::string::npos) << what;
 }
 
-// Catches frames that are read by another version's table.
+// Catches: frames that are read by another version's table.
 TEST_P(CanLinkOf, RefusesAnotherVersionOfTheTable) {
   bench_->coming.clear();
   bench_->version = can::kWideVersion + 1;
@@ -344,14 +344,14 @@ TEST_P(CanLinkOf, RefusesAnotherVersionOfTheTable) {
   EXPECT_NE(failure_of([this] { link(); }).find("version"), std::string::npos);
 }
 
-// Catches a bench that ends and is waited for.
+// Catches: a bench that ends and is waited for.
 TEST_P(CanLinkOf, ABenchThatStopsEndsTheLink) {
   link();
   bench_->put(Message::kHeartbeat, {4.0, bench_->version, 0.0, 0.0, 125.0});
   EXPECT_NE(failure_of([this] { link().newest(); }).find("stopped"), std::string::npos);
 }
 
-// Catches real time taken for lockstep, and a controller that works through old samples.
+// Catches: real time taken for lockstep, and a controller that works through old samples.
 TEST_P(CanLinkOf, RealTimeGoesOnWithTheNewestSample) {
   bench_->lockstep = bench_->sends_sync = false;
   for (bench_->sample.tick = 100; bench_->sample.tick < 103; ++bench_->sample.tick)
@@ -367,7 +367,7 @@ TEST_P(CanLinkOf, RealTimeGoesOnWithTheNewestSample) {
             114U);
 }
 
-// Catches a request that CAN has no frame for and that does nothing.
+// Catches: a request that CAN has no frame for and that does nothing.
 TEST_P(CanLinkOf, SaysWhatItCannotDo) {
   EXPECT_FALSE(link().can_set_load());
   EXPECT_THROW(link().set_load({.load_nm = 1.0}), Refused);

@@ -17,7 +17,7 @@ std::string round_trip(std::string_view text) {
   return to_string(parse_address(text));
 }
 
-// Catches a form of address that is taken apart at the wrong place.
+// Catches: a form of address that is taken apart at the wrong place.
 TEST(Address, ReadsEveryForm) {
   EXPECT_EQ(round_trip("tcp:127.0.0.1:7300"), "tcp:127.0.0.1:7300");
   EXPECT_EQ(round_trip("127.0.0.1:81"), "tcp:127.0.0.1:81");
@@ -34,7 +34,7 @@ TEST(Address, ReadsEveryForm) {
   EXPECT_FALSE(parse_address("tcp:bench").tls);
 }
 
-// Catches an address that would connect somewhere else than written, or a path that is cut off.
+// Catches: an address that would connect somewhere else than written, or a path that is cut off.
 TEST(Address, RefusesWhatIsNone) {
   for (const std::string text : {"", "tcp:", ":7300", "host:", "host:0", "host:65536", "host:12x", "unix:",
                                  "/run/bench.sock", "http://host:80", "tls:", "tls:a?ca=", "tls:a?b=c",
@@ -45,7 +45,7 @@ TEST(Address, RefusesWhatIsNone) {
   EXPECT_NO_THROW(parse_address("unix:/" + std::string(106, 'a')));
 }
 
-// Catches a connection that is reported as made when nothing listens, and a socket left non-blocking.
+// Catches: a connection that is reported as made when nothing listens, and a socket left non-blocking.
 TEST(Address, ConnectsOnlyWhereSomebodyListens) {
   const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in here = {};

@@ -111,7 +111,7 @@ v1::RefusalCode refusal_of(const std::function<void()>& action) {
   return v1::REFUSAL_UNSPECIFIED;
 }
 
-// Catches a port or unit read from the wrong place.
+// Catches: a port or unit read from the wrong place.
 TEST(ModbusAddress, ReadsHostPortAndUnit) {
   const ModbusAddress a = parse_modbus_address("modbus:host:1503?unit=7");
   EXPECT_EQ(a.host + " " + a.port, "host 1503");
@@ -125,7 +125,7 @@ TEST(ModbusAddress, ReadsHostPortAndUnit) {
   }
 }
 
-// Catches a register at the wrong address, a word order the wrong way round, a sign or a 64-bit value cut
+// Catches: a register at the wrong address, a word order the wrong way round, a sign or a 64-bit value cut
 // off.
 TEST(ModbusLink, ReadsAndCommandsByTheMap) {
   FakeServer server;
@@ -154,7 +154,7 @@ TEST(ModbusLink, ReadsAndCommandsByTheMap) {
   EXPECT_THROW(link.set_load({}), Refused);
 }
 
-// Catches currents sent for voltages or as duties, a phase or the field in another's place, a sensor behind
+// Catches: currents sent for voltages or as duties, a phase or the field in another's place, a sensor behind
 // the first block that is not read, truth that is not read and passed off as known.
 TEST(ModbusLink, CommandsEveryTerminalAndReadsEverySensor) {
   FakeServer server;
@@ -193,7 +193,7 @@ TEST(ModbusLink, CommandsEveryTerminalAndReadsEverySensor) {
     EXPECT_FALSE(link.knows(name)) << name;
 }
 
-// Catches an axis that stays taken by a controller that is gone.
+// Catches: an axis that stays taken by a controller that is gone.
 TEST(ModbusLink, GivesTheAxisBackAtItsEnd) {
   FakeServer server;
   {
@@ -204,7 +204,7 @@ TEST(ModbusLink, GivesTheAxisBackAtItsEnd) {
   EXPECT_EQ(server.get(401, modbus::Type::kUnsigned16), 2U);
 }
 
-// Catches the sample of the tick itself taken for the next one.
+// Catches: the sample of the tick itself taken for the next one.
 TEST(ModbusLink, RealTimeWaitsForTheNextTick) {
   FakeServer server;
   ModbusLink link(server.address);
@@ -212,7 +212,7 @@ TEST(ModbusLink, RealTimeWaitsForTheNextTick) {
   EXPECT_EQ(link.exchange({.tick = 0, .gates = v1::GATES_OFF}).tick, 1U);
 }
 
-// Catches an exception that is taken for another, or a reason that is not asked for.
+// Catches: an exception that is taken for another, or a reason that is not asked for.
 TEST(ModbusLink, ExceptionsHaveTheirMeaning) {
   FakeServer server;
   ModbusLink link(server.address);
@@ -236,7 +236,7 @@ TEST(ModbusLink, ExceptionsHaveTheirMeaning) {
   }
 }
 
-// Catches a bench that allows no writes found out only in the middle of a move.
+// Catches: a bench that allows no writes found out only in the middle of a move.
 TEST(ModbusLink, ABenchWithoutWritesRefusesTheLease) {
   FakeServer server;
   server.put(27, modbus::Type::kUnsigned16, 0);
@@ -244,7 +244,7 @@ TEST(ModbusLink, ABenchWithoutWritesRefusesTheLease) {
   EXPECT_EQ(refusal_of([&link] { link.acquire(); }), v1::REFUSAL_READ_ONLY);
 }
 
-// Catches another device taken for a bench, and a silent one waited for.
+// Catches: another device taken for a bench, and a silent one waited for.
 TEST(ModbusLink, WhatIsNoBenchIsAnError) {
   FakeServer server;
   server.put(1, modbus::Type::kUnsigned16, modbus::kMapVersion + 1);

@@ -48,7 +48,7 @@ std::string message_of(const std::function<void()>& action) {
   return "no error";
 }
 
-// Catches a Hello without its name or a welcome that is lost when the arena is reset.
+// Catches: a Hello without its name or a welcome that is lost when the arena is reset.
 TEST(Link, KeepsTheWelcomeOverLaterRequests) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     v1::Envelope answer = answer_to(request);
@@ -61,7 +61,7 @@ TEST(Link, KeepsTheWelcomeOverLaterRequests) {
   EXPECT_EQ(link.welcome().bench().name(), "bench of me");
 }
 
-// Catches a field of a command that is not sent, and an answer that belongs to another request.
+// Catches: a field of a command that is not sent, and an answer that belongs to another request.
 TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     v1::Envelope answer = answer_to(request);
@@ -115,7 +115,7 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
   }
 }
 
-// Catches a field of a change that is not sent, or sent as another one.
+// Catches: a field of a change that is not sent, or sent as another one.
 TEST(Link, SendsEveryFieldOfAChange) {
   std::vector<v1::Envelope> requests;
   FakePeer peer(welcoming([&requests](const v1::Envelope& request) {
@@ -149,7 +149,7 @@ TEST(Link, SendsEveryFieldOfAChange) {
   EXPECT_EQ(requests[2].shaft_bump().DebugString(), bump.DebugString());
 }
 
-// Catches a refusal that looks like an answer, and a link that gives up after one.
+// Catches: a refusal that looks like an answer, and a link that gives up after one.
 TEST(Link, ThrowsARefusalWithItsCodeAndFieldAndGoesOn) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     v1::Envelope answer = answer_to(request);
@@ -174,7 +174,7 @@ TEST(Link, ThrowsARefusalWithItsCodeAndFieldAndGoesOn) {
   EXPECT_EQ(link.status().tick(), 1U);
 }
 
-// Catches samples that are taken for the answer, lost or reordered.
+// Catches: samples that are taken for the answer, lost or reordered.
 TEST(Link, KeepsSamplesThatComeBeforeAnAnswer) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     v1::Envelope answer = answer_to(request);
@@ -216,7 +216,7 @@ TEST(Link, OWN_04_KeepsWhatItIsToldUnasked) {
   EXPECT_EQ(message_of([&] { link.status(); }), "the bench ended the session: smoke");
 }
 
-// Catches a queue without bound, and losses without a count.
+// Catches: a queue without bound, and losses without a count.
 TEST(Link, DropsTheOldestSamplesAndCountsThem) {
   constexpr int kPerMessage = 1024;
   constexpr auto kMessages = static_cast<int>(Link::kMaxKeptSamples / kPerMessage) + 3;
@@ -237,7 +237,7 @@ TEST(Link, DropsTheOldestSamplesAndCountsThem) {
   EXPECT_EQ(link.next_samples(0ms)->dropped(), 0U);
 }
 
-// Catches a client that hangs on a dead server, and one that takes a late answer for the next request's.
+// Catches: a client that hangs on a dead server, and one that takes a late answer for the next request's.
 TEST(Link, GivesUpOnASilentPeerAndStaysClosed) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     return request.has_status_request() ? std::string(1, '\0') : std::string();
@@ -249,7 +249,7 @@ TEST(Link, GivesUpOnASilentPeerAndStaysClosed) {
   EXPECT_EQ(message_of([&] { link.next_samples(1ms); }), "the link to the bench is closed");
 }
 
-// Catches a peer that keeps the link waiting for ever with samples.
+// Catches: a peer that keeps the link waiting for ever with samples.
 TEST(Link, GivesUpWhenOnlySamplesCome) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()), 0);
@@ -264,7 +264,7 @@ TEST(Link, GivesUpWhenOnlySamplesCome) {
   sender.join();
 }
 
-// Catches trust in what comes: another protocol, an oversized frame, another kind, another id, the end.
+// Catches: trust in what comes: another protocol, an oversized frame, another kind, another id, the end.
 TEST(Link, NamesWhatIsWrongWithAPeer) {
   const auto talk = [](FakePeer::Answer answer) {
     FakePeer peer(std::move(answer));
@@ -296,7 +296,7 @@ TEST(Link, NamesWhatIsWrongWithAPeer) {
             "it speaks protocol 2, this program speaks 1");
 }
 
-// Catches an answer of exactly the size cap that does not fit, and one that comes in pieces.
+// Catches: an answer of exactly the size cap that does not fit, and one that comes in pieces.
 TEST(Link, TakesAnswersUpToTheCap) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     v1::Envelope answer = answer_to(request);
