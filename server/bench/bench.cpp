@@ -78,7 +78,8 @@ Refused Bench::submit(const Input& input) noexcept {
 void Bench::apply_due() noexcept {
   while (due_ < scheduled_ && schedule_[due_].tick <= tick_) {
     const Input input = unpack(schedule_[due_++]);
-    // The answer was given when the input was scheduled: a refusal now is counted (a command counts itself).
+    // The client has had its answer since the input was scheduled, so a refusal is only counted. Commands
+    // count theirs.
     if (apply(input) != Refused::kNot && !std::holds_alternative<Command>(input.action)) {
       ++axes_[input.axis].control.refused;
     }
@@ -254,7 +255,8 @@ void Bench::take_command(Control& c) noexcept {
   if (setup_.command_delay_ticks == 0 && c.state == ControlState::kRun) c.in_force = c.newest;
 }
 
-/// Refuses the copies of a command that the injected fault of the link makes: their tick is answered.
+/// Refuses the copies of a command that the injected fault of the link makes: the command itself answered the
+/// tick.
 void Bench::refuse_copies(AxisRuntime& a) noexcept {
   const double copies = a.axis.injected().command_duplication;
   if (copies == 0.0) return;

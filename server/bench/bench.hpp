@@ -69,8 +69,8 @@ struct TickedSample {
   Sample sample;
 };
 
-/// Is told of each input and each sample, in order, inside the tick: must neither wait, allocate, lock nor
-/// throw.
+/// Receives each input and each sample in order, inside the tick: its methods must not wait, allocate, lock
+/// or throw.
 class BenchObserver {
  public:
   virtual ~BenchObserver() = default;
@@ -103,7 +103,7 @@ class Bench {
   /// The number of parameter changes of an axis since the start of the bench.
   std::uint64_t parameter_changes(std::size_t axis) const noexcept { return axes_[axis].parameter_changes; }
 
-  /// What judge() needs to know of an axis for a command in the present tick.
+  /// The view of an axis with which judge() decides on a command in the present tick.
   CommandView command_view(std::size_t axis) const noexcept;
 
   Tick tick() const noexcept { return tick_; }

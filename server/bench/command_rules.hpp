@@ -22,7 +22,7 @@ struct CommandRules {
 /// The largest magnitude of a set-point [V] or [A]; every axis refuses larger numbers as accidents.
 inline constexpr double kMaxSetpoint = 1e6;
 
-/// What decides whether an axis takes a command.
+/// The state of an axis that decides whether it takes a command.
 struct CommandView {
   Owner owner = 0;   ///< of the lease of the axis
   Tick tick = 0;     ///< of the newest sample

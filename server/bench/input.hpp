@@ -30,7 +30,7 @@ struct LoadChange {
   Tick ramp_ticks;
 };
 
-/// A parameter to change, already checked against its limits; the rules between values are looked at when it
+/// A parameter to change, already checked against its limits. The rules between values are checked when it
 /// acts.
 struct ParameterWrite {
   std::uint32_t row;  ///< of axis_parameters() of the axis
@@ -54,7 +54,7 @@ struct LateTick {};     ///< the tick of this input started late; concerns the w
 struct Overrun {};      ///< late beyond the limit: safe action on every axis
 /// A command for this axis was turned away before it reached the bench.
 struct RefusedCommand {
-  bool bad_values = false;  ///< for what it asked, not for when or by whom
+  bool bad_values = false;  ///< for its values, not for its time or its sender
 };
 
 using Action = std::variant<ClearFaults, Command, LeaseAction, LoadChange, ParameterWrite, LateTick, Overrun,
@@ -94,11 +94,10 @@ constexpr bool are_bad_values(Refused why) noexcept {
   return why == Refused::kNotFinite || why == Refused::kWrongDrive || why == Refused::kBeyondDrive;
 }
 
-/// Whether all setpoints are finite numbers.
+/// Whether all set-points are finite numbers.
 bool is_finite(const PhaseCommand& command) noexcept;
 
-/// Whether a drive of this kind knows what to do with the setpoints: only a current-mode amplifier takes
-/// currents.
+/// Whether a drive of this kind takes set-points of this kind: only a current-mode amplifier takes currents.
 constexpr bool suits(DriveKind drive, Gates gates) noexcept {
   return gates != Gates::kCurrent || drive == DriveKind::kCurrent;
 }
@@ -108,7 +107,7 @@ std::string problem_with(const InjectableFault& fault, double value);
 /// Whether problem_with() finds a problem; for the tick: no text, no allocation.
 bool breaks_a_rule(const InjectableFault& fault, double value) noexcept;
 
-/// Ticks that clients may name lie up to here: what a double holds exactly.
+/// The last tick that a client may name: a double holds every integer up to here exactly.
 inline constexpr std::uint64_t kMaxTick = std::uint64_t{1} << 53;
 
 /// Largest amounts, in both directions, that configurations and clients may ask for.
