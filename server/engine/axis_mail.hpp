@@ -31,8 +31,9 @@ class CommandMail {
   // ---- I/O thread ----
 
   /// The reason why a command would be refused. `view` holds the axis from its newest sample, the owner
-  /// included: the end of a lease becomes known with the sample that shows it, so that a session learns who
-  /// took its axis before a command is refused. The last accepted command comes from here and is never older.
+  /// included: the end of a lease becomes known with the sample that shows it, so that a session learns of
+  /// the new owner before its command is refused. The last accepted command comes from here and is never
+  /// older.
   Refused judge(const Command& command, Owner sender, CommandView view) const noexcept {
     if (const auto newest = from_bench_.take()) {
       decided_ = newest->decided;

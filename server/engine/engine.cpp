@@ -41,7 +41,7 @@ void Engine::take(std::uint32_t axis, Owner by, const std::string& reason, Answe
                 listener(taken);
             });
   }
-  // Behind the other in the same queue: no request comes between the two, but one may have come before both.
+  // Follows the other in the same queue: no request comes between the two, but one may have come before both.
   request({.tick = 0, .axis = axis, .owner = by, .action = LeaseAction::kAcquire}, std::move(answer));
 }
 

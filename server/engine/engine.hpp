@@ -83,7 +83,7 @@ class Engine {
   Tick tick() const { return static_cast<Tick>(newest_[0].tick); }
   const BenchConfig& config() const { return config_; }
   const Recorder* recorder() const { return recorder_.get(); }
-  /// Sentences for people: what the operating system did not grant.
+  /// Sentences for people about the rights that the operating system did not grant.
   const std::vector<std::string>& notes() const { return notes_; }
 
   /// For the supervisor, which watches the ticks from another thread.

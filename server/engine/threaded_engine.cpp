@@ -197,7 +197,7 @@ class ThreadedEngine final : public Engine {
       command_mail_[axis].deliver(bench_, axis);
   }
 
-  /// Before the samples that show them, so that a session finds the parameters as its answer says.
+  /// Comes before the samples of the tick, so that a session finds the parameters that its answer promises.
   void send_parameters() noexcept {
     for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
       ParameterMail& mail = parameter_mail_[i];
@@ -252,7 +252,7 @@ class ThreadedEngine final : public Engine {
     answer_outcomes();
     on_tick();
   }
-  // Answers wait for the samples of their tick, so that a session finds newest() as its answer says.
+  // Answers wait for the samples of their tick, so that newest() shows a session the tick of its answer.
   void handle(const RequestOutcome& outcome) { outcomes_.push_back(outcome); }
   void handle(const AxisEdges& e) { edges_[e.axis] = e.edges; }
   void handle(const RunEnded&) {

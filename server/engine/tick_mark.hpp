@@ -1,7 +1,7 @@
 #pragma once
 
-// The guard that tests preload (tests/adversity/guard) defines them, and ends a program that allocates,
-// locks, waits or enters the kernel between the two. Without the guard they are null.
+// The guard that tests preload (tests/adversity/guard) defines these two, and ends a program that allocates,
+// locks, waits or enters the kernel between them. Without the guard they are null.
 extern "C" {
 [[gnu::weak]] void drivebench_tick_begins() noexcept;
 [[gnu::weak]] void drivebench_tick_ends() noexcept;

@@ -7,10 +7,10 @@
 
 namespace drivebench {
 
-/// What the tick thread and the supervisor tell each other.
+/// The messages between the tick thread and the supervisor.
 class Watch {
  public:
-  /// The arithmetic is looked at once in a second of ticks.
+  /// The arithmetic is checked once in a second of ticks.
   explicit Watch(std::int64_t period_ns) noexcept
       : look_ticks_(period_ns < 1'000'000'000 ? static_cast<std::uint32_t>(1'000'000'000 / period_ns) : 1) {}
 
@@ -27,7 +27,7 @@ class Watch {
     return arithmetic_resets_.load(std::memory_order_relaxed);
   }
 
-  /// From the supervisor: the I/O thread stands still, so that no command can arrive.
+  /// Supervisor: the I/O thread stands still, so that no command can arrive.
   void abandon() noexcept { abandoned_.store(true, std::memory_order_relaxed); }
   /// Tick thread: whether abandon() was called since the last time.
   bool take_abandoned() noexcept {
