@@ -14,9 +14,9 @@ namespace drivebench {
 
 /// Decides whether a token opens a session, and slows guessing down.
 ///
-/// After a wrong token no token from the same address is looked at for half a second, after the next wrong
-/// one for twice as long, up to half a minute. So an address has at most two guesses a minute in the long
-/// run, over any number of connections. A right token ends the wait.
+/// After a wrong token the server reads no token from the same address for half a second, after the next
+/// wrong one for twice as long, up to half a minute. So an address has at most two guesses a minute in the
+/// long run, over any number of connections. A right token ends the wait.
 class Admission {
  public:
   using Time = ServerClock::time_point;
@@ -34,7 +34,7 @@ class Admission {
 
   struct Decision {
     bool admitted = false;
-    bool looked_at = true;  ///< false: the address must wait, the token was not looked at
+    bool looked_at = true;  ///< false: the address must wait, and the token was not read
     Grant grant{};          ///< of the user; without a name if no token is asked for
     std::string why_not{};  ///< one sentence
   };
@@ -43,15 +43,15 @@ class Admission {
 
   /// Puts these grants in place of those before.
   void replace(std::vector<Grant> grants) { grants_ = std::move(grants); }
-  /// What an earlier grant is now; null: it holds no more.
+  /// The present form of an earlier grant; null: it is no longer valid.
   const Grant* renewed(const Grant& earlier, WallTime wall) const;
 
   std::size_t addresses_that_wait() const noexcept { return guesses_.size(); }
 
  private:
   struct Guesses {
-    ServerClock::duration wait{};  ///< after the last one
-    Time until{};                  ///< no token is looked at before
+    ServerClock::duration wait{};  ///< after the last wrong token
+    Time until{};                  ///< no token is read before
   };
 
   void make_room(Time now);

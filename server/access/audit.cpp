@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-/// Name and details of an input in the log; without a name it is not written.
+/// Name and details of an input in the log; an input without a name is not written.
 class Description {
  public:
   Description(const Engine& engine, const Input& input) : engine_(engine), input_(input) {
@@ -189,7 +189,7 @@ void Audit::fail() {
   const bool is_news = !std::exchange(failing_, true);
   if (is_news) spdlog::error("the audit log cannot be written: {}", std::generic_category().message(errno));
   if (on_failure_ != AuditFailure::kSafe || engine_ == nullptr) return;
-  // The loss is noted as well, which fails as well; by then these leases are gone from seen_.
+  // The log fails for these losses too and calls fail() again, but by then the leases are gone from seen_.
   for (std::uint32_t axis = 0; axis < seen_.size(); ++axis) {
     const Owner owner = std::exchange(seen_[axis].holder, Owner{0});
     if (owner == 0) continue;

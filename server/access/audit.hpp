@@ -20,14 +20,14 @@ namespace drivebench {
 using AuditDetail = std::pair<std::string_view, std::variant<std::string, double, std::uint64_t>>;
 
 /// The audit log: the client, the action and the result, one JSON object a line. It observes the inputs on
-/// their way to the engine and the samples on their way back, so all transports look alike to it. Everything
+/// their way to the engine and the samples on their way back, so it treats all transports alike. Everything
 /// happens on the I/O thread.
 ///
 /// Refusals (of requests, tokens, connections) are written at most ten times a second after the first
 /// hundred, so that a stranger cannot fill the disk; the next line says how many were left out.
 class Audit {
  public:
-  /// Throws std::runtime_error if the file cannot be had.
+  /// Throws std::runtime_error if the file cannot be opened.
   explicit Audit(const AuditConfig& config);
 
   /// Writes the events of this bench from now on. If the configuration says so, all controllers lose their

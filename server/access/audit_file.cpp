@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-/// Opens without blocking, so that a pipe without a reader is turned down instead of holding the server up.
+/// Opens without blocking, so that a pipe without a reader is an error and does not hold the server up.
 int open_at(const std::filesystem::path& path) {
   constexpr int kFlags = O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
   const int file = ::open(path.c_str(), kFlags, S_IRUSR | S_IWUSR);
@@ -41,7 +41,7 @@ bool AuditFile::append(std::string line) noexcept {
   const std::string_view text = line;
   if (torn_ && ::write(file_, "\n", 1) == 1) torn_ = false;
   if (torn_) return false;
-  // The second time only after a part, to learn what is wrong.
+  // A second call follows only a partial one: it writes the rest, or sets errno.
   for (std::string_view rest = text; !rest.empty();) {
     const ssize_t written = ::write(file_, rest.data(), rest.size());
     if (written <= 0) return false;

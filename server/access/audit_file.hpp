@@ -11,8 +11,8 @@ namespace drivebench {
 /// it.
 class AuditFile {
  public:
-  /// Opens or makes it, for its owner only. Throws std::runtime_error if it is not a regular file, a link, or
-  /// one that other users may read or write.
+  /// Opens the file, or creates it for its owner only. Throws std::runtime_error if it is a link, not a
+  /// regular file, or a file that other users may read or write.
   explicit AuditFile(std::filesystem::path path);
   ~AuditFile();
   AuditFile(const AuditFile&) = delete;
@@ -21,7 +21,7 @@ class AuditFile {
   /// Appends a line; false if the system did not take all of it, with errno saying why. The next line
   /// then begins on a line of its own.
   bool append(std::string line) noexcept;
-  /// Opens the path anew, after a rotation; false, and the old one stays, if that does not work.
+  /// Opens the path anew, after a rotation. If that fails, returns false and keeps the old file.
   bool reopen() noexcept;
 
  private:

@@ -9,9 +9,9 @@
 
 namespace drivebench {
 
-/// What a transport holds when one of its clients holds the lease of an axis: the owner number under which
-/// the bench knows the client. The bench alone grants and ends leases; a seat asks for them, remembers what
-/// was granted, and notices that a lease has ended.
+/// The place of a transport for the client that holds the lease of an axis: it keeps the owner number under
+/// which the bench knows the client. The bench alone grants and ends leases; a seat asks for them, remembers
+/// what was granted, and notices that a lease has ended.
 ///
 /// A seat is empty (owner() is 0) until a lease is granted, and again once the lease was released, lost,
 /// taken by force or has run out. The transport says when the client last gave a sign of life and how much
@@ -24,7 +24,7 @@ class Seat {
 
   /// Number of the holder; 0: the seat is empty.
   Owner owner() const noexcept { return owner_; }
-  /// Whether the bench still knows the lease. One that has ended stays in the seat until notice_end().
+  /// Whether the lease still holds in the bench. An ended lease stays in the seat until notice_end().
   bool is_held() const { return owner_ != 0 && engine_.owner(axis_) == owner_; }
   /// Whether a request of this seat has no answer yet, and whether one of these is for a new lease.
   bool is_asking() const noexcept { return asking_ > 0; }
@@ -33,8 +33,8 @@ class Seat {
   /// The number under which `client` asks for the lease: that of the seat, else a new one.
   Owner number_for(const Client& client) const { return owner_ != 0 ? owner_ : engine_.new_owner(client); }
 
-  /// Acquires, renews or releases the lease. When `answer` is called, the seat is as the bench has decided.
-  /// `from` as in Engine::request(). The seat must live until then.
+  /// Acquires, renews or releases the lease. When `answer` is called, the seat already follows the decision
+  /// of the bench. `from` as in Engine::request(). The seat must live until then.
   void ask(LeaseAction action, Owner number, Engine::Answer answer, const Client* from = nullptr);
   /// Takes the axis from whichever client holds it.
   void take(Owner number, const std::string& reason, Engine::Answer answer);
