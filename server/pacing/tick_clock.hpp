@@ -12,8 +12,8 @@
 namespace drivebench {
 
 /// Starts each tick of a run when it is due. In real time it counts how late the ticks are and gives the
-/// bench the input for a late one: LateTick beyond a period, Overrun beyond max_lateness, after which time
-/// begins anew.
+/// bench the input for a late one: LateTick beyond a period, Overrun beyond max_lateness, after which the due
+/// times begin anew.
 class TickClock {
  public:
   TickClock(RunMode mode, const BenchConfig& config, std::unique_ptr<Pacer> pacer) noexcept
@@ -25,7 +25,7 @@ class TickClock {
   /// Returns when the next tick of the bench is due.
   void wait_for_tick(Bench& bench) noexcept;
 
-  /// Of all ticks so far; empty outside real time. For the thread that runs the ticks.
+  /// The latenesses of all ticks so far; empty outside real time. For the tick thread only.
   const LatenessHistogram& lateness() const noexcept { return lateness_; }
   /// The largest lateness so far; for every thread.
   std::int64_t worst_lateness_ns() const noexcept { return worst_ns_.load(std::memory_order_relaxed); }
