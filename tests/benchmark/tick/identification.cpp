@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "clients/identification/identify.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
