@@ -9,7 +9,7 @@
 namespace drivebench::can {
 namespace {
 
-// A bench that heard another with its identifiers stays silent until it has not for this long.
+// After a frame of another bench with its identifiers a bench stays silent for this long.
 constexpr auto kConflictPause = std::chrono::seconds(10);
 // As fine as the shortest time-out of the configuration.
 constexpr auto kTimerPeriod = std::chrono::milliseconds(10);
@@ -39,7 +39,7 @@ constexpr std::uint64_t not_negative(std::int64_t value) noexcept {
   return value > 0 ? static_cast<std::uint64_t>(value) : 0;
 }
 
-/// Of a field that holds an unsigned number.
+/// The value of a field that holds an unsigned number.
 constexpr std::uint64_t unsigned_of(double value) noexcept {
   return value > 0.0 ? static_cast<std::uint64_t>(value) : 0;
 }
@@ -102,7 +102,7 @@ Endpoint::Node* Endpoint::find_node(std::uint32_t id) {
 
 void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
   if (measure_latency_ && stamp_ns > 0) {
-    measure_latency_ = false;  // now and then: asking the time costs a system call on some machines
+    measure_latency_ = false;  // once per timer: reading the time is a system call on some machines
     const auto now = std::chrono::system_clock::now().time_since_epoch();
     latency_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() - stamp_ns;
     worst_latency_ns_ = std::max(worst_latency_ns_, latency_ns_);
@@ -118,7 +118,7 @@ void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
     if (!found.row->per_node || node != nullptr) note_conflict(frame);
     return;
   }
-  if (node == nullptr || !transmitting_) return;  // the answer would not be sent
+  if (node == nullptr || !transmitting_) return;  // no answer could be sent
   const Values values = decode(*found.row, config_.profile, frame);
   switch (found.row->message) {
     case Message::kCommand:
@@ -184,7 +184,7 @@ void Endpoint::note_client(const std::string& peer, std::string_view why) {
 }
 
 void Endpoint::acquire(Node& node, std::uint32_t controller) {
-  notice_end(node);  // in lockstep there may have been no tick since the lease ended
+  notice_end(node);  // in lockstep no tick may have run since the lease ended
   const bool known = node.controller == controller && (node.seat.owner() != 0 || node.seat.is_acquiring());
   if (engine_->config().mode == RunMode::kFree) {
     return turn_away(node, Request::kAcquire, controller, Refused::kWrongMode);
@@ -192,7 +192,7 @@ void Endpoint::acquire(Node& node, std::uint32_t controller) {
   if (node.seat.is_acquiring() && !known) {
     return turn_away(node, Request::kAcquire, controller, Refused::kBusy, "another controller asks for it");
   }
-  if (node.seat.is_acquiring()) return;  // asked again before the answer came
+  if (node.seat.is_acquiring()) return;  // the same controller asks again before the answer
   if (node.seat.owner() != 0 && !known) {
     return turn_away(node, Request::kAcquire, controller, Refused::kOwned);
   }
@@ -209,7 +209,7 @@ void Endpoint::on_acquired(Node& node, std::uint32_t controller, Refused refused
     log_refusal(node, "the lease", sentence_of(refused));
     return reply(node, Request::kAcquire, refused, controller, 0, tick);
   }
-  if (!transmitting_) return lose(node, "another bench has its identifiers");  // since it was asked
+  if (!transmitting_) return lose(node, "another bench has its identifiers");  // noticed since the request
   if (node.lease == 0) {
     node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
     node.commanded_at = -1;
@@ -218,7 +218,7 @@ void Endpoint::on_acquired(Node& node, std::uint32_t controller, Refused refused
   node.monitored = false;
   node.seat.hear(Clock::now());
   reply(node, Request::kAcquire, refused, controller, node.lease, tick);
-  // The controller needs these to begin; in lockstep there is no tick that would send them.
+  // The controller needs these frames to begin; in lockstep no tick would send them.
   const Sample& newest = engine_->newest(node.axis);
   send_state(node, newest);
   send_sensors(node, newest);
@@ -271,7 +271,7 @@ void Endpoint::note_conflict(const Frame& frame) {
   if (!transmitting_) return;
   for (Node& node : nodes_) {
     if (node.seat.owner() != 0) lose(node, "another bench has its identifiers");
-    send_heartbeat(node, kStopped);  // so that the other one notices as well
+    send_heartbeat(node, kStopped);  // so that the other bench notices as well
   }
   transmitting_ = false;
 }
@@ -303,7 +303,7 @@ void Endpoint::on_timer() {
   const Clock::time_point now = Clock::now();
   if (!transmitting_ && now - conflict_ > kConflictPause) transmitting_ = true;
   measure_latency_ = true;
-  // First for all nodes: an axis that loses its lease may begin the next tick for the others.
+  // All nodes before look_after(): if an axis loses its lease there, the next tick may begin for the others.
   const Tick tick = engine_->tick();
   for (Node& node : nodes_) {
     notice_end(node);
@@ -319,8 +319,8 @@ void Endpoint::on_timer() {
     send_heartbeat(node, kOperational);
 }
 
-/// Takes the lease from a controller that is gone. In lockstep a controller that has commanded the present
-/// tick may be silent: it waits for the others.
+/// Takes the lease from a controller that has gone. In lockstep a controller that has commanded the present
+/// tick may be silent: it waits for the other axes.
 void Endpoint::look_after(Node& node, Clock::time_point now) {
   if (node.seat.owner() == 0) return;
   const std::chrono::milliseconds heartbeat_limit(config_.controller_timeout_ms);

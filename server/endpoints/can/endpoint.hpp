@@ -21,8 +21,8 @@
 namespace drivebench::can {
 
 /// The native profile on one bus: sends samples, state and heartbeats of every axis, and lets one controller
-/// at a time command each axis. The controller proves itself by the lease number that it was given. No frame
-/// can do more than a session over TCP.
+/// at a time command each axis. A controller shows its right with the lease number that the bench gave it. No
+/// frame can do more than a session over TCP.
 class Endpoint {
  public:
   Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus);
@@ -31,13 +31,13 @@ class Endpoint {
   void serve(Engine& engine, Audit* audit = nullptr);
   TransportReport report() const;
   std::string name() const { return bus_->name(); }
-  /// Says that it stops, and falls silent. The engine takes the leases back.
+  /// Sends that it stops, and nothing afterwards. The engine takes the leases back.
   void close();
 
  private:
   using Clock = ServerClock;
 
-  /// What waits for the command of its tick.
+  /// The set-points of phase c and the field, which wait for the command of their tick.
   struct PhaseSetpoints {
     Tick answers = -1;
     unsigned mode = 0;
@@ -45,7 +45,7 @@ class Endpoint {
     double field = 0.0;
   };
 
-  /// An axis as this bus sees it.
+  /// An axis on this bus.
   struct Node {
     std::uint32_t axis = 0;
     std::uint32_t id = 0;
@@ -53,12 +53,12 @@ class Endpoint {
     Seat seat;               ///< of the controller on this bus
     std::uint8_t lease = 0;  ///< its lease number; 0 while the seat is empty
     std::uint8_t last_lease = 0;
-    std::uint32_t controller = 0;  ///< number that the controller gives itself
+    std::uint32_t controller = 0;  ///< the number that the controller has chosen
     bool monitored = false;        ///< the controller sends heartbeats
-    bool spoke = false;            ///< the controller commanded since the timer last looked
+    bool spoke = false;            ///< the controller has commanded since the last timer
     Tick commanded_at = -1;        ///< tick in which the bench took its newest command
-    bool waits = false;            ///< it had commanded the present tick when the timer last looked
-    PhaseSetpoints phases{};       ///< of the controller
+    bool waits = false;            ///< at the last timer the controller had commanded the present tick
+    PhaseSetpoints phases{};       ///< from the controller
     std::uint64_t faults = 0;      ///< last sent
     std::uint64_t injected = 0;    ///< last sent
     std::int64_t index_tick = -1;
@@ -80,10 +80,10 @@ class Endpoint {
   void act(Node& node, Request request, std::uint32_t controller);
   bool is_for(const Node& node, const MessageRow& row);
   Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
-  /// Turns a command away before it reaches the bench, which counts it.
+  /// Refuses a command before it reaches the bench, and has the bench count it.
   void refuse(const Node& node, Owner sender, Refused refused, const Setpoints& given,
               std::string_view why = {});
-  /// Turns a request away before it reaches the bench.
+  /// Refuses a request before it reaches the bench.
   void turn_away(const Node& node, Request request, std::uint32_t controller, Refused refused,
                  std::string_view why = {});
   void note_client(const std::string& peer, std::string_view why);
@@ -121,7 +121,7 @@ class Endpoint {
   std::vector<Node> nodes_;
   std::vector<Frame> together_;  ///< frames of one tick, to be sent in one go
   bool collecting_ = false;
-  Clock::time_point conflict_{};  ///< when a frame of another bench last came
+  Clock::time_point conflict_{};  ///< time of the last frame of another bench
   Clock::time_point next_heartbeat_{};
   bool closed_ = false;
   bool transmitting_ = true;  ///< no other bench has our identifiers
@@ -129,11 +129,11 @@ class Endpoint {
   std::array<std::uint64_t, kFrameProblems> problems_{};
   std::uint64_t commands_ = 0;
   std::uint64_t refused_ = 0;
-  std::uint64_t turned_away_ = 0;  ///< clients of the bus, and those cut off
+  std::uint64_t turned_away_ = 0;  ///< clients of the bus that were refused or cut off
   std::uint64_t conflicts_ = 0;
   std::uint64_t heartbeats_lost_ = 0;
-  bool measure_latency_ = false;  ///< of the next frame that has a stamp
-  std::int64_t latency_ns_ = 0;   ///< from the kernel's stamp to here, newest measured
+  bool measure_latency_ = false;  ///< on the next frame that has a stamp
+  std::int64_t latency_ns_ = 0;   ///< from the kernel's stamp to on_frame(), the newest
   std::int64_t worst_latency_ns_ = 0;
   LogLimit refusal_log_;
   LogLimit loss_log_;

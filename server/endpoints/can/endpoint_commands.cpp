@@ -1,4 +1,4 @@
-// What the endpoint does with commands.
+// Takes or refuses commands.
 #include "server/endpoints/can/endpoint.hpp"
 
 namespace drivebench::can {
@@ -6,7 +6,7 @@ namespace {
 
 constexpr unsigned kLastMode = kCurrentMode;
 
-/// Whether a command in this mode says how much.
+/// Whether a command in this mode has set-points.
 constexpr bool has_setpoints(unsigned mode) noexcept {
   return mode == static_cast<unsigned>(Gates::kVoltage) || mode == kDutyMode || mode == kCurrentMode;
 }
@@ -18,7 +18,8 @@ Gates gates_of(unsigned mode) noexcept {
 
 }  // namespace
 
-/// On a bus with wide axes match() also finds frames that this one does not have.
+/// Whether the node has this frame: on a bus with wide axes match() also finds frames that a narrow axis
+/// lacks.
 bool Endpoint::is_for(const Node& node, const MessageRow& row) {
   if (row.width != Width::kWide || node.wide()) return true;
   const bool has_narrow = find_message(row.message, config_.profile.fd) != nullptr;
@@ -33,7 +34,7 @@ Tick Endpoint::answered_by(const Node& node, const MessageRow& row, const Setpoi
 
 void Endpoint::on_phase_command(Node& node, const MessageRow& row, const Values& values) {
   const Setpoints given = setpoints_in(row, values);
-  // Without the lease it is ignored here: the command that follows is refused, and answered.
+  // Ignored without the lease: the bench refuses the command that follows, and answers it.
   if (node.seat.owner() == 0 || given.lease != node.lease) return;
   node.spoke = true;
   node.phases = {
@@ -44,7 +45,8 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   ++commands_;
   Setpoints given = setpoints_in(row, values);
   const Tick answers = answered_by(node, row, given);
-  // Without the lease the command goes to the bench as that of no owner, which counts and refuses it.
+  // Without the lease the command goes to the bench without an owner, so that the bench refuses and counts
+  // it.
   const Owner owner = given.lease == node.lease ? node.seat.owner() : 0;
   if (owner != 0) node.spoke = true;
   if (given.mode > kLastMode) {

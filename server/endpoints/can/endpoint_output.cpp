@@ -1,4 +1,4 @@
-// What the endpoint sends.
+// Sends samples, state and answers.
 #include <algorithm>
 
 #include "server/endpoints/can/endpoint.hpp"
@@ -34,7 +34,7 @@ void Endpoint::on_tick() {
   }
 }
 
-/// The newest sample that is due; a bench that runs ahead of this thread skips some.
+/// Sends the newest sample that is due; if the bench runs ahead of this thread, some are skipped.
 void Endpoint::on_newest() {
   std::optional<std::uint64_t> tick;
   collecting_ = true;

@@ -31,11 +31,11 @@ MakeBus make_udp_multicast_bus;
 ///
 /// With the first two, each client sees an adapter of its own on a common bus; frames flow between the
 /// commands O or L and C. A slow client gets the newest frame of each identifier. With the third the bench is
-/// the client and sets the bit rates of the configuration; adapters support only some of them.
+/// the client and sets the bit rates of the configuration; an adapter supports only some of them.
 MakeBus make_slcan_bus;
 
 /// A server of the protocol of socketcand, for python-can and SavvyCAN: config names a loopback address (the
-/// protocol knows no password) and a port. Every client in raw mode gets the frames of the bench and of the
+/// protocol has no password) and a port. Every client in raw mode gets the frames of the bench and of the
 /// other clients; a client that reads nothing for 2 s is cut off.
 ///
 /// The server has one bus, which has every name. Raw and control mode, echo and statistics work; the jobs and

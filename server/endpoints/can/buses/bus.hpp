@@ -24,7 +24,7 @@ enum class BusState : std::uint8_t { kUp, kWarning, kPassive, kDown, kAbsent };
 struct BusStatus {
   BusState state = BusState::kAbsent;
   std::uint64_t sent = 0;
-  std::uint64_t confirmed = 0;  ///< seen on the bus, where the back end can tell
+  std::uint64_t confirmed = 0;  ///< frames seen on the bus, where the back end reports them
   std::uint64_t received = 0;
   std::uint64_t send_dropped = 0;     ///< replaced by a newer frame with the same identifier, or given up
   std::uint64_t receive_dropped = 0;  ///< lost before the bench read them, as far as the system tells
@@ -32,36 +32,37 @@ struct BusStatus {
   std::uint64_t malformed = 0;  ///< bytes from the transport that were no frame
 };
 
-/// One connection to a CAN bus, on the I/O thread. Nothing here waits or throws once it is made.
+/// One connection to a CAN bus, on the I/O thread. After the constructor no method waits or throws.
 class Bus {
  public:
   virtual ~Bus() = default;
 
-  /// Sends a frame, or keeps it until there is room: at most one per identifier, the newest.
+  /// Sends a frame, or keeps it until the transport has room: at most one per identifier, the newest.
   virtual void send(const Frame& frame) = 0;
-  /// The same for several frames in this order, in one system call where that can be done.
+  /// Sends several frames in this order, in one system call where the back end can.
   virtual void send_together(std::span<const Frame> frames) {
     for (const Frame& frame : frames)
       send(frame);
   }
-  /// Only data and remote frames with these identifiers need to be delivered, whether with 11 or 29 bits, so
+  /// The bus needs to deliver only data and remote frames with these identifiers, of 11 and of 29 bits, so
   /// that look-alikes can be counted; the kernel filters where it can.
   virtual void set_filter(const std::vector<std::uint32_t>& ids) = 0;
   virtual const BusStatus& status() const noexcept = 0;
-  /// What it is connected to, for people: "socketcan:vcan0".
+  /// Back end and channel, for people: "socketcan:vcan0".
   virtual std::string name() const = 0;
 
-  /// A frame of another sender, remote frames included, error frames never. `stamp_ns` is the time of its
-  /// arrival on CLOCK_REALTIME as the kernel has it, or 0.
+  /// Called with each data or remote frame of another sender, never with error frames. `stamp_ns` is the time
+  /// of its arrival on CLOCK_REALTIME by the kernel, or 0.
   std::function<void(const Frame& frame, std::int64_t stamp_ns)> on_frame;
-  /// After status().state has changed.
+  /// Called after status().state has changed.
   std::function<void()> on_state;
-  /// For back ends that have clients: one was refused or cut off; its address, and why.
+  /// Called by back ends with clients when they refuse a client or cut it off, with its address and the
+  /// reason.
   std::function<void(const std::string& peer, std::string_view why)> on_refused;
 };
 
-/// Opens the bus that the configuration names. Throws std::runtime_error that names the interface if it
-/// cannot be had and is required; one that is not required is tried again and again.
+/// Opens the bus that the configuration names. Throws std::runtime_error that names the interface if a
+/// required bus cannot be opened; the other buses try again until they open.
 std::unique_ptr<Bus> open_bus(boost::asio::io_context& io, const CanConfig& config);
 
 }  // namespace drivebench::can

@@ -8,7 +8,7 @@ std::unique_ptr<Bus> open_bus(boost::asio::io_context& io, const CanConfig& conf
   for (const BusMaker& maker : kBusMakers) {
     if (maker.backend == config.backend) return maker.make(io, config);
   }
-  std::abort();  // the configuration knows no other
+  std::abort();  // the configuration accepts no other back end
 }
 
 }  // namespace drivebench::can

@@ -25,7 +25,7 @@ namespace drivebench::can {
 namespace {
 
 constexpr auto kProbeEvery = std::chrono::milliseconds(100);
-constexpr int kFramesPerRead = 32;  // then others on the I/O thread have their turn
+constexpr int kFramesPerRead = 32;  // then other handlers on the I/O thread have their turn
 constexpr std::size_t kFramesPerSend = 16;
 
 void set_option(int fd, int level, int name, const void* value, std::size_t size, const char* what) {
@@ -50,8 +50,8 @@ bool is_hardware(const std::string& interface) {
   return std::filesystem::exists("/sys/class/net/" + interface + "/device", no_such_place);
 }
 
-/// When the frame came, on CLOCK_REALTIME. A controller's own stamp is better than the system's if it counts
-/// from the same epoch; many count from when they were plugged in.
+/// The arrival of the frame on CLOCK_REALTIME. A controller's own stamp is better than the system's if it
+/// counts from the same epoch; many controllers count from the moment when they were plugged in.
 std::int64_t stamp_of(const scm_timestamping& stamps) {
   const auto ns = [](const timespec& t) { return std::int64_t{1'000'000'000} * t.tv_sec + t.tv_nsec; };
   const std::int64_t system = ns(stamps.ts[0]);
@@ -60,8 +60,8 @@ std::int64_t stamp_of(const scm_timestamping& stamps) {
   return hardware != 0 && (system == 0 || std::abs(system - hardware) < kNear_ns) ? hardware : system;
 }
 
-/// How long to wait for room: not less than the longest classic frame takes, 8 bytes with all the bits that
-/// can be stuffed, nor so short that a bus without listeners takes a core.
+/// The wait for room: at least the time of the longest classic frame, 8 bytes with the most stuff bits, and
+/// long enough that a bus without listeners does not take a core.
 std::chrono::nanoseconds retry_after(const CanConfig& config) {
   const std::chrono::nanoseconds frame(135 * std::int64_t{1'000'000'000} / config.bit_rate);
   return std::max<std::chrono::nanoseconds>(frame, std::chrono::milliseconds(1));
@@ -115,8 +115,8 @@ void SocketCanBus::set_options(int fd) {
 }
 
 void SocketCanBus::set_buffer(int fd) {
-  // 100 ms of the shortest frames there are: 47 bits, of an FD frame at least 29 at the nominal rate. The
-  // kernel charges a frame about 1 KiB, and doubles what is asked for.
+  // 100 ms of the shortest frames: 47 bits, or for FD 29 bits at the nominal rate. The kernel charges about 1
+  // KiB for a frame, and doubles the requested size.
   const std::int64_t frames = config_.bit_rate / 10 / (config_.profile.fd ? 29 : 47) + 1;
   const int bytes = static_cast<int>(std::clamp<std::int64_t>(frames * 1024 / 2, 1 << 18, 1 << 24));
   if (::setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) == 0) return;
@@ -130,7 +130,7 @@ void SocketCanBus::set_buffer(int fd) {
 }
 
 void SocketCanBus::apply_filter(int fd) const {
-  if (!filtered_) return;  // the kernel's default: everything
+  if (!filtered_) return;  // the kernel's default passes every frame
   set_option(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filter_.data(), filter_.size() * sizeof(can_filter),
              "CAN_RAW_FILTER");
 }
@@ -196,7 +196,7 @@ void SocketCanBus::close() {
 
 void SocketCanBus::set_state(BusState state) {
   if (std::exchange(status_.state, state) == state || !on_state) return;
-  // Never from inside send(): the listener may send.
+  // Never called from inside send(), because the listener may send.
   asio::post(io_, [this, alive = std::weak_ptr(alive_)] {
     if (!alive.expired() && on_state) on_state();
   });
@@ -209,7 +209,7 @@ void SocketCanBus::wait() {
                      [this, alive = std::weak_ptr(alive_)](const boost::system::error_code& error) {
                        if (alive.expired() || error || !stream_.is_open()) return;
                        read();
-                       if (stream_.is_open()) wait();  // reports at once what is still there
+                       if (stream_.is_open()) wait();  // calls back at once if frames are left
                      });
 }
 
@@ -276,7 +276,7 @@ void SocketCanBus::fail(int error) {
     case EINTR:
       return;
     case ENODEV:
-    case ENXIO:  // this socket is dead for ever, whatever gets the name
+    case ENXIO:  // a later interface of this name does not revive the socket
       close();
       set_state(BusState::kAbsent);
       return probe_later();
@@ -285,7 +285,7 @@ void SocketCanBus::fail(int error) {
   }
 }
 
-/// Off the bus. The socket is silent from now on and works again when the interface does.
+/// Notes that the interface is down. The socket is silent until the interface works again.
 void SocketCanBus::go_down() {
   if (status_.state == BusState::kDown) return;
   retry_.cancel();
@@ -301,7 +301,7 @@ void SocketCanBus::send(const Frame& frame) {
     ++status_.send_dropped;
     return;
   }
-  // In order: behind those that wait already.
+  // Keeps the order: waiting frames go first.
   const Sent sent = pending_.empty() ? transmit(frame) : Sent::kFull;
   if (sent == Sent::kLost) ++status_.send_dropped;
   if (sent != Sent::kFull) return;
@@ -328,7 +328,7 @@ void SocketCanBus::send_together(std::span<const Frame> frames) {
       frames = frames.subspan(static_cast<std::size_t>(sent));
     }
   }
-  // What is left, and what the first of it has run into, one by one.
+  // One by one: the rest, and the error of its first frame.
   Bus::send_together(frames);
 }
 
@@ -339,9 +339,9 @@ SocketCanBus::Sent SocketCanBus::transmit(const Frame& frame) {
     return Sent::kYes;
   }
   const int error = errno;
-  // The interface's queue or the socket's share of it. poll() says writable all the same.
+  // The queue of the interface or the socket's share of it is full, although poll() reports it as writable.
   if (error == ENOBUFS || error == EAGAIN) return Sent::kFull;
-  if (error != EINVAL && error != EMSGSIZE) fail(error);  // those two are about the frame
+  if (error != EINVAL && error != EMSGSIZE) fail(error);  // these two are errors of the frame
   return Sent::kLost;
 }
 
@@ -390,7 +390,7 @@ void SocketCanBus::probe() {
   const int fd = stream_.native_handle();
   ifreq request = request_for(config_.channel);
   const bool works = ::ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & kWorks) == kWorks;
-  // While it was down, it may have been made a classic one.
+  // A user may have made the interface classic while it was down.
   if (works && interface_problem(fd).empty()) {
     set_state(BusState::kUp);
   } else {

@@ -33,7 +33,7 @@ class SocketCanBus final : public Bus {
  private:
   enum class Sent : std::uint8_t { kYes, kFull, kLost };
 
-  /// Opens and binds a socket; what hinders it, with the cure, or nothing.
+  /// Opens and binds a socket. Returns the problem with its cure; empty: none.
   std::string open();
   std::string interface_problem(int fd) const;
   void set_options(int fd);
@@ -64,12 +64,12 @@ class SocketCanBus final : public Bus {
   asio::posix::stream_descriptor stream_;
   ServerTimer retry_;
   ServerTimer probe_;
-  SendQueue pending_;  ///< what the interface had no room for
+  SendQueue pending_;  ///< frames for which the interface had no room
   std::vector<can_filter> filter_;
   bool filtered_ = false;
   int index_ = 0;                  ///< of the interface that the socket is bound to
-  std::uint32_t lost_before_ = 0;  ///< the socket's own count
-  std::string problem_;            ///< last one logged
+  std::uint32_t lost_before_ = 0;  ///< the socket's count of lost frames at the last look
+  std::string problem_;            ///< the last one in the log
   std::shared_ptr<const bool> alive_ =
       std::make_shared<const bool>();  ///< for handlers that outlive the object
 };

@@ -30,8 +30,8 @@ std::size_t data_size(const Frame& frame) {
   return frame.remote ? 0 : frame.size;
 }
 
-/// python-can 4.1.0 loses the first character of what is left of its buffer when that ends inside an element,
-/// so each frame has a blank before it, which readers skip.
+/// python-can 4.1.0 loses the first character of the rest of its buffer if the buffer ends inside an element.
+/// So each frame begins with a blank, which readers skip.
 void append_with_blank(std::string& out, const Frame& frame) {
   out += ' ';
   append_socketcand_frame(out, frame, realtime_s());
@@ -41,7 +41,7 @@ struct SocketcandClient : std::enable_shared_from_this<SocketcandClient> {
   SocketcandClient(asio::io_context& io, int fd, BusStatus& status)
       : peer(io, fd, status, append_with_blank), statistics(io) {}
 
-  /// One that does not read its answers is cut off.
+  /// Sends an answer; cuts off a client that does not read its answers.
   void answer(std::string_view text) {
     if (peer.answer(text)) return;
     peer.on_stall();

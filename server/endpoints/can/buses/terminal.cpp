@@ -48,8 +48,8 @@ std::string Terminal::open(const std::string& link) {
   return problem;
 }
 
-/// Whether a path may be replaced: a link of a server that crashed points nowhere, anything else belongs to
-/// another program.
+/// Makes the link. It replaces only a link that points nowhere, which a crashed server left; any other file
+/// belongs to another program.
 std::string Terminal::make_link() {
   std::error_code error;
   const bool is_link = std::filesystem::is_symlink(std::filesystem::symlink_status(link_, error));
@@ -64,8 +64,8 @@ void Terminal::release() {
   poll_later();
 }
 
-/// Makes the terminal raw again and forgets bytes that were not read. Opening and closing it has the effect,
-/// too, that the kernel from now on says whether a program has it open.
+/// Makes the terminal raw again and drops unread bytes. Because it opens and closes the terminal, the kernel
+/// afterwards reports whether a program has it open.
 bool Terminal::renew() {
   const int fd = ::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return false;

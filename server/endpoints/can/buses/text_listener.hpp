@@ -10,15 +10,15 @@
 
 namespace drivebench::can {
 
-/// Where a bus listens.
+/// The address at which a bus listens.
 struct HostPort {
   std::string address;
   std::uint16_t port = 0;  ///< 0: chosen by the system
 };
-/// Takes "127.0.0.1:3333" or "[::1]:3333" apart; what is wrong with it, or nothing.
+/// Splits "127.0.0.1:3333" or "[::1]:3333". Returns the problem; empty: none.
 std::string parse_host_port(const std::string& text, HostPort& out);
 
-/// Address and port of the other end of a socket; for one that has gone, nothing.
+/// Address and port of the other end of a socket; empty if it has gone.
 std::string peer_of(int fd);
 
 /// Accepts TCP clients of a bus from this computer.
@@ -31,9 +31,9 @@ class TextListener {
   /// Takes over the descriptor of a client.
   std::function<void(int fd)> on_client;
 
-  /// Starts to listen; what hinders it, with the cure, or nothing.
+  /// Starts to listen. Returns the problem with its cure; empty: none.
   std::string open(const HostPort& where);
-  /// The one it listens on.
+  /// The port on which it listens.
   std::uint16_t port() const;
 
  private:

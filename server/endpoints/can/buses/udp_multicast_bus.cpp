@@ -25,7 +25,7 @@ namespace {
 
 using Clock = ServerClock;
 
-// A receiver that left its buffer as the kernel made it has room for 160 datagrams.
+// A receiver with the kernel's default buffer has room for 160 datagrams.
 constexpr double kBurst = 64;
 constexpr double kFramesPerAnswer = 8;
 constexpr auto kRetryPeriod = std::chrono::milliseconds(1);
@@ -80,7 +80,7 @@ bool set_int(int fd, int level, int option, int value) {
   return ::setsockopt(fd, level, option, &value, sizeof value) == 0;
 }
 
-/// Joins on the interface, or on the one that the routes name if it is 0.
+/// Joins the group on the interface; 0: on the interface of the routes.
 bool join(int fd, const Address& group, unsigned interface) {
   if (group.family() == AF_INET) {
     ip_mreqn request{};
@@ -96,9 +96,9 @@ bool join(int fd, const Address& group, unsigned interface) {
          errno == EADDRINUSE;
 }
 
-/// Frames stay on this computer. With IPv4 they go over the loopback interface, where every program hears
-/// them whatever the routes are. IPv6 has no multicast there: they go where the routes say, and no further
-/// than the copy for this computer.
+/// Keeps frames on this computer. With IPv4 they go over the loopback interface, where every program hears
+/// them whatever the routes are. Loopback has no IPv6 multicast: with IPv6 they take the interface of the
+/// routes, and the hop limit of 0 leaves only the copy for this computer.
 bool confine(int fd, const Address& group, unsigned loopback) {
   if (group.family() == AF_INET6) return set_int(fd, IPPROTO_IPV6, IPV6_MULTICAST_HOPS, 0);
   ip_mreqn request{};
@@ -106,7 +106,7 @@ bool confine(int fd, const Address& group, unsigned loopback) {
   Address source;
   source.v4().sin_family = AF_INET;
   source.v4().sin_addr.s_addr =
-      htonl(INADDR_LOOPBACK);  // a route may have none for lo, and then it is 0.0.0.0
+      htonl(INADDR_LOOPBACK);  // a route over lo may have no source, which gives 0.0.0.0
   return ::setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &request, sizeof request) == 0 &&
          set_int(fd, IPPROTO_IP, IP_MULTICAST_TTL, 0) && ::bind(fd, source.raw(), source.size()) == 0;
 }
@@ -137,7 +137,7 @@ class UdpMulticastBus final : public VirtualBus {
   void flush_later();
 
   Address group_;
-  Address own_;  ///< address that the frames of this bus come from
+  Address own_;  ///< the source address of the frames of this bus
   asio::posix::stream_descriptor in_;
   asio::posix::stream_descriptor out_;
 
@@ -146,10 +146,10 @@ class UdpMulticastBus final : public VirtualBus {
   double allowance_ = kBurst;  ///< frames that may be sent now
   Clock::time_point allowed_at_ = Clock::now();
 
-  std::vector<Address> hosts_;  ///< that count as this computer
+  std::vector<Address> hosts_;  ///< the addresses of this computer
   Clock::time_point hosts_at_{};
   LogLimit stranger_log_;
-  std::uint32_t lost_before_ = 0;  ///< the socket's own count
+  std::uint32_t lost_before_ = 0;  ///< the socket's count of lost frames at the last look
 };
 
 // ---- opening ----
@@ -188,7 +188,7 @@ std::string UdpMulticastBus::parse_group() {
 std::string UdpMulticastBus::open_sender(unsigned loopback) {
   const int fd = ::socket(group_.family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0 || !adopt(out_, fd)) return reason();
-  // Its own port tells the frames of this bus from all others, which come from the port of the group.
+  // The sender has a port of its own, so that the receiver can tell the frames of this bus from all others.
   own_ = {};
   own_.storage.ss_family = group_.family();
   socklen_t size = sizeof own_.storage;
@@ -205,12 +205,12 @@ std::string UdpMulticastBus::open_receiver(unsigned loopback) {
   const int fd = ::socket(group_.family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0 || !adopt(in_, fd)) return reason();
   set_int(fd, SOL_SOCKET, SO_REUSEADDR, 1);
-  // Bound to the group, so that nothing else that comes to this port gets in.
+  // Bound to the group, so that the socket gets no other datagrams for this port.
   if (::bind(fd, group_.raw(), group_.size()) != 0) {
     return reason() + " (a program that uses this port without sharing it? ss -ulpn 'sport = :" +
            std::to_string(config_.port) + "')";
   }
-  // Other programs send where the routes say, if there are any; with IPv6 this one does so, too.
+  // Other programs send on the interface of the routes, if a route exists; so does this program with IPv6.
   const bool is_v4 = group_.family() == AF_INET;
   join(fd, group_, is_v4 ? 0 : loopback);
   if (!join(fd, group_, is_v4 ? loopback : 0)) return reason() + " (joining the group)";
@@ -272,7 +272,7 @@ void UdpMulticastBus::take(const msghdr& message, std::size_t size) {
 }
 
 void UdpMulticastBus::note_losses(const msghdr& message, std::int64_t& stamp_ns) {
-  auto* header = const_cast<msghdr*>(&message);  // the macros want it so
+  auto* header = const_cast<msghdr*>(&message);  // the macros take no const pointer
   for (cmsghdr* each = CMSG_FIRSTHDR(header); each != nullptr; each = CMSG_NXTHDR(header, each)) {
     if (each->cmsg_level != SOL_SOCKET) continue;
     if (each->cmsg_type == SO_TIMESTAMPNS) {
@@ -289,7 +289,8 @@ void UdpMulticastBus::note_losses(const msghdr& message, std::int64_t& stamp_ns)
 }
 
 /// Every computer of the local network can send to a multicast group. Frames of other computers are dropped.
-/// Programs here send from 0.0.0.0 if the route goes over lo; from elsewhere the kernel does not let that in.
+/// Programs of this computer send from 0.0.0.0 if the route goes over lo; the kernel drops such frames of
+/// other computers.
 bool UdpMulticastBus::is_from_here(const Address& sender) {
   if (sender.family() == AF_INET && sender.v4().sin_addr.s_addr == htonl(INADDR_ANY)) return true;
   const auto is_known = [&] {
@@ -313,14 +314,14 @@ void UdpMulticastBus::send(const Frame& frame) {
   if (!is_up()) {
     ++status_.send_dropped;
   } else if (!pending_.empty()) {
-    status_.send_dropped += pending_.push(frame);  // in order
+    status_.send_dropped += pending_.push(frame);  // keeps the order
   } else if (!transmit(frame)) {
     status_.send_dropped += pending_.push(frame);
     flush_later();
   }
 }
 
-/// Sends the frame if it may be sent now; false if it must wait.
+/// Sends the frame if the rate allows it; false if it must wait.
 bool UdpMulticastBus::transmit(const Frame& frame) {
   const Clock::time_point now = Clock::now();
   const double elapsed_s = std::chrono::duration<double>(now - allowed_at_).count();
