@@ -137,7 +137,7 @@ std::uint64_t AxisDesk::input_bits(Content content) const {
     case Content::kSetpointField:
       return real(command_.field);
     default:
-      return 0;  // a request reads as none
+      return 0;  // a request register reads as no request
   }
 }
 
@@ -186,7 +186,7 @@ void AxisDesk::watch() {
   });
 }
 
-/// The seat is, or is about to be, empty.
+/// Forgets the holder of a seat that is empty or about to be.
 void AxisDesk::forget_holder() {
   key_ = 0;
   holder_ = 0;
@@ -198,7 +198,7 @@ void AxisDesk::forget_holder() {
   on_lease_change();
 }
 
-/// The engine may answer at once or with a later tick.
+/// Sends the input to the engine, which may answer at once or with a later tick.
 std::shared_ptr<AxisDesk::Asked> AxisDesk::send(const Input& input) {
   auto asked = std::make_shared<Asked>();
   engine_.request(input, answer_into(asked), input.owner == 0 ? &kAnyClient : nullptr);

@@ -24,17 +24,18 @@ namespace drivebench::modbus {
 /// Number of a connection; 0 is none.
 using Visitor = std::uint64_t;
 
-/// One axis as Modbus sees it: registers and coils, the lease behind its key, and the state machine behind
-/// the control word.
+/// One axis on Modbus: registers and coils, the lease behind its key, and the state machine behind the
+/// control word.
 ///
 /// The lease belongs to the connection that wrote the key last. When that connection ends, the lease stays
 /// for the key until the lease time of the bench has passed by the wall clock. A holder that is connected but
-/// silent for idle_timeout_ms loses the lease as well: in lockstep the bench would wait for it for ever.
+/// silent for idle_timeout_ms loses the lease as well: otherwise a bench in lockstep would wait for it for
+/// ever.
 class AxisDesk {
  public:
   AxisDesk(asio::io_context& io, Engine& engine, const RegisterMap& map, std::uint32_t axis);
 
-  /// Called when the lease has changed hands or is gone, so that no exchange goes on waiting for it.
+  /// Called when the lease has a new owner or has ended, so that no exchange waits for it any longer.
   std::function<void()> on_lease_change;
   /// Address and port of a connection, for the audit log; may be empty.
   std::function<std::string(Visitor)> name_of_visitor;
@@ -42,7 +43,7 @@ class AxisDesk {
   std::uint32_t axis() const noexcept { return axis_; }
   const RegisterMap& map() const noexcept { return map_; }
 
-  /// Puts the registers asked for to words[0..count).
+  /// Writes the registers of the range to words[0..count).
   void read(const RegisterMap::Range& range, Visitor visitor, std::span<std::uint16_t> words) const;
   bool coil(std::size_t address, Visitor visitor) const;
   bool discrete_input(std::size_t address) const {
@@ -60,18 +61,18 @@ class AxisDesk {
   asio::awaitable<Outcome> write_coils(std::size_t address, std::size_t count, std::uint8_t bits,
                                        Visitor visitor);
 
-  /// A write was turned away for its values: a command in it counts as refused.
+  /// Notes that a write was refused for its values: a command in it counts as refused.
   void count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words, Visitor visitor);
-  /// A write was refused, as last_refusal is to say.
+  /// Notes a refused write, for the register last_refusal.
   void note_refusal(Visitor visitor, Refused why) noexcept;
 
   /// Whether this connection holds the lease.
   bool holds(Visitor visitor) const noexcept;
-  /// Whether process data of this connection would be in time, but for a command that this tick has already.
+  /// Whether process data of this connection come in time but find that the tick has its command already.
   bool has_answered_tick(Visitor visitor) const {
     return holds(visitor) && engine_.check(axis_, seat_.owner(), gates_off()) == Refused::kStale;
   }
-  /// A request of this connection came in.
+  /// Notes that a request of this connection has arrived.
   void spoke(Visitor visitor);
   /// A holder that waits for its tick is not silent.
   void set_waiting(Visitor visitor, bool waiting) noexcept {
@@ -82,7 +83,7 @@ class AxisDesk {
  private:
   using Clock = ServerClock;
 
-  /// What the registers of the command block hold.
+  /// The content of the registers of the command block.
   struct CommandInput {
     CommandMode mode = CommandMode::kOff;
     std::uint32_t counter = 0;
@@ -91,7 +92,7 @@ class AxisDesk {
     float c = 0.0f;
     float field = 0.0f;
   };
-  /// What the writable registers of the process data hold.
+  /// The content of the writable registers of the process data.
   struct ProcessInput {
     std::uint16_t control_word = 0;
     ReferenceMode mode = ReferenceMode::kVoltage;
@@ -124,13 +125,13 @@ class AxisDesk {
   static Engine::Answer answer_into(std::shared_ptr<Asked> asked);
 
   std::uint64_t bits_of(const Row& row, Visitor visitor) const;
-  /// Of a register that shows what was written; 0 if it is another one.
+  /// The bits of a register that shows the last write to it; 0 for other registers.
   std::uint64_t input_bits(Content content) const;
   std::uint64_t header_bits(const Row& row) const;
   const Parameter& parameter(const Row& row) const {
     return axis_parameters(engine_.parameters(axis_))[parameter_rows_[row.index]];
   }
-  /// What the bench takes for this tick in any state.
+  /// The command that the bench takes for this tick in any state.
   Command gates_off() const { return {.answers = engine_.tick(), .phases = {}}; }
   Command command_of(const CommandInput& input) const;
   Command command_of(const ProcessInput& input, DriveState state) const;
@@ -153,15 +154,15 @@ class AxisDesk {
 
   Seat seat_;
   std::uint16_t key_ = 0;  ///< of the holder
-  Visitor holder_ = 0;     ///< 0: the connection has ended, the key still counts
+  Visitor holder_ = 0;     ///< 0: the connection has ended, and the key keeps the lease
   bool waiting_ = false;   ///< the holder waits for its tick
   ServerTimer timer_;
 
   CommandInput command_;
   ProcessInput process_;
-  DriveState state_ = DriveState::kSwitchOnDisabled;  ///< never kFault, which the sample tells
+  DriveState state_ = DriveState::kSwitchOnDisabled;  ///< never kFault, which the sample shows
   Refused last_refusal_ = Refused::kNot;
-  Refused holders_refusal_ = Refused::kNot;  ///< the last one of the holder
+  Refused holders_refusal_ = Refused::kNot;  ///< the last refusal of the holder
   LogLimit lapsed_log_;
 };
 

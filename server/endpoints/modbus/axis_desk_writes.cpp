@@ -1,4 +1,4 @@
-// How an axis carries out what is written to its registers and coils.
+// Carries out the writes to the registers and coils of an axis.
 #include <cmath>
 #include <vector>
 
@@ -54,7 +54,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write(RegisterMap::Range range,
   return range.first >= kCommandStart ? write_command(written, visitor) : write_process(written, visitor);
 }
 
-/// Hands a command to the bench, which counts it if it refuses it.
+/// Gives a command to the bench, which counts it if it refuses it.
 AxisDesk::Outcome AxisDesk::command(const Command& command) {
   const Refused why = engine_.command(axis_, seat_.owner(), command);
   if (why != Refused::kNot) return refuse(why);
@@ -84,12 +84,12 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
   if (const auto bits = written[Content::kReferenceB]) input.b = static_cast<std::int16_t>(*bits);
   if (const auto bits = written[Content::kReferenceC]) input.c = static_cast<std::int16_t>(*bits);
   if (const auto bits = written[Content::kReferenceField]) input.field = static_cast<std::int16_t>(*bits);
-  // First of all, so that nothing is cleared by a write that the bench then does not take.
+  // Checked first, so that a write that the bench refuses clears no fault.
   const Owner owner = holds(visitor) ? seat_.owner() : 0;
   if (const Refused why = engine_.check(axis_, owner, gates_off()); why != Refused::kNot) {
     engine_.command(axis_, owner, gates_off());  // so that it is counted
     Outcome outcome = refuse(why);
-    // The client chose no tick here; that this one has its command already is for it to wait out.
+    // Process data name no tick: if this tick already has its command, the client must try again.
     if (why == Refused::kStale) outcome.exception = Exception::kBusy;
     co_return outcome;
   }
@@ -100,7 +100,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
     const Input clear{.tick = 0, .axis = axis_, .owner = seat_.owner(), .action = ClearFaults{}};
     const Refused why = co_await ask(clear);
     if (why != Refused::kNot) co_return refuse(why);
-    if (!holds(visitor)) co_return refuse(Refused::kNotOwner);  // lost meanwhile
+    if (!holds(visitor)) co_return refuse(Refused::kNotOwner);  // the lease ended during the wait
     state = DriveState::kSwitchOnDisabled;
   }
   const Command wanted = command_of(input, state);
@@ -154,7 +154,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
     if (engine_.config().mode == RunMode::kFree) {
       co_return refuse(Refused::kWrongMode);
     }
-    // All or nothing: with a command that is refused the lease does not change hands either.
+    // All or nothing: a refused command leaves the lease with its connection.
     if (commands && had_lease && key == key_ &&
         engine_.check(axis_, seat_.owner(), command_of(input)) != Refused::kNot) {
       co_return refuse(engine_.command(axis_, seat_.owner(), command_of(input)));  // so that it is counted
@@ -177,7 +177,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
     co_return command(command_of(input));
   }
   const Refused why = engine_.command(axis_, owner, command_of(input));
-  if (!had_lease && holds(visitor)) {  // a lease that came with this command goes with it
+  if (!had_lease && holds(visitor)) {  // this command brought the lease
     forget_holder();
     seat_.give_back();
   }
@@ -233,17 +233,17 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, V
   }
   for (std::size_t i = 0; i < changes.size(); ++i) {
     if (engine_.try_parameter(axis_, changes[i].row, changes[i].after).empty()) continue;
-    while (i-- > 0)  // back the way they came
+    while (i-- > 0)  // undoes them in reverse order
       engine_.try_parameter(axis_, changes[i].row, changes[i].before);
     co_return refuse(Refused::kOutOfRange);
   }
-  // All on their way before any is waited for: the bench takes them together, in one tick.
+  // Sends all before it waits for an answer: the bench takes them together, in one tick.
   const Owner owner = holds(visitor) ? seat_.owner() : 0;
   std::vector<std::shared_ptr<Asked>> asked;
   for (const Change& change : changes) {
     asked.push_back(
         send({.tick = 0, .axis = axis_, .owner = owner, .action = ParameterWrite{change.row, change.after}}));
-    if (asked.back()->answer == Refused::kBusy) break;  // no room; what follows must not overtake it
+    if (asked.back()->answer == Refused::kBusy) break;  // no room: the later ones must not overtake it
   }
   if (asked.back()->answer == Refused::kBusy) {
     for (std::size_t i = changes.size(); i-- > asked.size() - 1;)

@@ -9,9 +9,10 @@
 namespace drivebench::modbus {
 namespace {
 
-// Answers are sent together while requests are waiting, up to this size.
+// Answers go out together while requests wait, up to this size.
 constexpr std::size_t kMaxQueued = 8 * kMaxAdu;
-// A command that the bench takes pays for itself and for reading its sample: there is at most one a tick.
+// An accepted command gives back the tokens for itself and for the read of its sample: a tick takes at most
+// one.
 constexpr double kPaidByCommand = 2.0;
 
 std::string name_of(const asio::ip::tcp::endpoint& peer) {
@@ -106,7 +107,7 @@ void Connection::end() {
   close();
 }
 
-/// Sends what is queued. Most often the kernel takes it at once.
+/// Sends the queued answers. Most often the kernel takes them at once.
 asio::awaitable<bool> Connection::flush() {
   boost::system::error_code error;
   std::size_t sent = 0;
@@ -144,7 +145,7 @@ void Connection::refuse(Bytes adu, Exception exception) {
   reply(adu, pdu);
 }
 
-/// False: the connection is to end, after what is queued has been sent.
+/// False: the connection ends once the queued answers are sent.
 asio::awaitable<bool> Connection::answer(Bytes adu) {
   ++shared_.counts.requests;
   last_request_ = Clock::now();
@@ -160,7 +161,7 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
     co_return true;
   }
   AxisDesk* const desk = desk_of(adu[6]);
-  // Without a desk any map does: it serves only to check the form of the frame.
+  // Without a desk any map will do: it serves only to check the form of the frame.
   const PduCheck check =
       validate(adu.subspan(kMbapSize), desk != nullptr ? desk->map() : shared_.desks.front()->map());
   if (check.action == PduCheck::Action::kClose) {
@@ -261,7 +262,7 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
 void Connection::note_refused_write(AxisDesk& desk, Refused why) {
   ++shared_.counts.refused_writes;
   desk.note_refusal(number_, why);
-  // Only writes to the axis of another client are audited; other mistakes concern the owner alone.
+  // Audits only writes to the axis of another client; other mistakes concern the owner alone.
   const bool is_foreign = why == Refused::kNotOwner || why == Refused::kOwned;
   if (is_foreign) audit("forbidden", sentence_of(why), desk.axis());
   if (!shared_.refused_writes_log.allow()) return;
@@ -274,8 +275,8 @@ bool Connection::is_peer_gone() {
   return ::poll(&socket, 1, 0) > 0;
 }
 
-/// Until the tick after `before`, or kBusy: an exchange is answered with the first sample after its command,
-/// and in real time process data that come twice within a tick count for two.
+/// Waits for the tick after `before`; kBusy: it never comes. So an exchange gets the first sample after its
+/// command, and in real time two process data within a tick count as two.
 asio::awaitable<Exception> Connection::wait_for_tick(AxisDesk& desk, Tick before) {
   if (shared_.engine.tick() != before) co_return Exception::kNone;
   const bool sent = co_await flush();  // earlier answers must not wait with this request
@@ -286,13 +287,13 @@ asio::awaitable<Exception> Connection::wait_for_tick(AxisDesk& desk, Tick before
     boost::system::error_code cancelled;
     waker_.expires_after(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms));
     co_await waker_.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
-    // Nothing is read meanwhile, so only this look tells that the owner is dead.
+    // This coroutine reads nothing during the wait, so only this check finds a peer that has gone.
     if (!cancelled && open_ && is_peer_gone()) close();
   }
   waiting_ = false;
   desk.set_waiting(number_, false);
   desk.spoke(number_);
-  // Without a tick the lease has gone, so the tick may never come.
+  // If no tick has run, the lease has ended and the tick may never come.
   co_return shared_.engine.tick() != before ? Exception::kNone : Exception::kBusy;
 }
 

@@ -21,7 +21,7 @@
 
 namespace drivebench::modbus {
 
-/// What all connections share.
+/// The parts that all connections share.
 struct Shared {
   Engine& engine;
   ReplyBuilder& replies;
@@ -33,7 +33,7 @@ struct Shared {
   struct Counts {
     std::uint64_t requests = 0;
     std::uint64_t exceptions = 0;
-    std::uint64_t refused_writes = 0;  ///< for want of the lease, a latched fault, staleness, value
+    std::uint64_t refused_writes = 0;  ///< without the lease, latched, stale, or a wrong value
     std::uint64_t throttled = 0;
     std::uint64_t cut = 0;  ///< connections: malformed frames, time-outs, floods, no free connection
     std::uint64_t turned_away = 0;
@@ -43,7 +43,8 @@ struct Shared {
   LogLimit turned_away_log;
 };
 
-/// One client. Requests are answered in the order they came; an error ends this connection and nothing else.
+/// The connection of one client. It answers requests in their order; an error ends this connection and
+/// nothing else.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   using Clock = ServerClock;
@@ -55,7 +56,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   /// After run(): its leases begin to lapse.
   void end();
 
-  /// A tick has run or a lease has changed hands: an exchange that waits for that goes on.
+  /// After a tick or a change of a lease: continues an exchange that waits for it.
   void wake() {
     if (waiting_) waker_.cancel();
   }

@@ -28,7 +28,7 @@ std::vector<std::uint8_t> Identification::answer(std::span<const std::uint8_t> p
   std::size_t end = known;
   if (first >= known) {
     if (code == kIndividual) return {};
-    first = 0;  // as the specification wants it
+    first = 0;  // the specification asks for it
   }
   if (code == kIndividual) end = first + 1;
   std::vector<std::uint8_t> answer{

@@ -8,12 +8,12 @@
 
 namespace drivebench::modbus {
 
-/// What function 43/14 tells of this device: the basic and the regular objects.
+/// The answers to function 43/14: the basic and the regular objects of this device.
 class Identification {
  public:
   explicit Identification(const std::string& bench);
 
-  /// The PDU that answers a valid request PDU of function 43/14; empty if an object is asked for by itself
+  /// The PDU that answers a valid request PDU of function 43/14; empty if the request names a single object
   /// that does not exist.
   std::vector<std::uint8_t> answer(std::span<const std::uint8_t> pdu) const;
 

@@ -9,11 +9,11 @@
 
 namespace drivebench::modbus {
 
-/// Which row of axis_parameters() each parameter in the map of an axis is: the parameters of the first map
-/// keep their places, others follow in the order of the table, which depends on the kind of machine.
+/// The row in axis_parameters() of each parameter in the map of an axis. The parameters of the first map keep
+/// their places; the others follow in the order of the table, which depends on the kind of machine.
 std::vector<std::uint32_t> parameter_rows(const AxisParameters& axis);
 
-/// The parameters of an axis as the register map wants them, in that order.
+/// The parameters of an axis for the register map, in that order.
 std::vector<ParameterInfo> parameter_infos(const AxisParameters& axis);
 
 /// The maps of all axes.

@@ -15,9 +15,9 @@ namespace {
 
 using asio::ip::tcp;
 
-// After an accept that failed for want of descriptors the server pauses instead of spinning.
+// The pause after an accept that failed for lack of descriptors.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-// A peer that vanished silently is given up after this time: the kernel probes an idle peer every second.
+// The kernel probes an idle peer every second, and ends the connection after this time without an answer.
 constexpr int kUserTimeoutMs = 3000;
 
 void tune(tcp::socket& socket) {
@@ -127,9 +127,9 @@ void ModbusServer::start(tcp::socket socket) {
   asio::co_spawn(io_, run(std::move(connection)), asio::detached);
 }
 
-/// When there are as many connections as there may be, the one that has been silent for longest goes, if its
-/// silence is longer than idle_timeout_ms: then it has lost its leases. Otherwise the peer with the most
-/// connections, if it has more than the newcomer's would have, gives up its idlest one without a lease.
+/// At the limit of connections, cuts the one that has been silent for longest if its silence exceeds
+/// idle_timeout_ms: it has lost its leases. Otherwise, if a peer has more connections than the newcomer would
+/// have, cuts the longest silent connection without a lease of the peer with the most.
 bool ModbusServer::make_room(const asio::ip::address& newcomer) {
   const auto longest =
       std::min_element(connections_.begin(), connections_.end(),

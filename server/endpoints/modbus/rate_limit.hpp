@@ -18,8 +18,8 @@ class RateLimit {
   /// 0: no limit.
   explicit RateLimit(std::uint32_t requests_per_s) : rate_(requests_per_s) {}
 
-  /// A request came. Beyond the rate it is to be refused, and when that has gone on for another second's
-  /// worth of requests the connection is to be cut.
+  /// Counts a request. Beyond the rate the answer is kRefuse, and after another second's worth of requests
+  /// kCut.
   Answer charge(const asio::ip::address& peer, Clock::time_point now) {
     if (rate_ == 0.0) return Answer::kServe;
     forget_full_buckets(now);
@@ -50,7 +50,7 @@ class RateLimit {
     bucket.tokens = std::min(bucket.tokens + elapsed_s * rate_, rate_);
     bucket.filled = now;
   }
-  /// A full bucket is as good as none, and two seconds fill any.
+  /// A full bucket need not be stored, and every bucket is full after two seconds.
   void forget_full_buckets(Clock::time_point now) {
     if (buckets_.size() < kManyPeers) return;
     std::erase_if(buckets_,

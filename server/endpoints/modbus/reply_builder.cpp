@@ -23,7 +23,7 @@ ReplyBuilder::ReplyBuilder() : registers_(65'536), coils_(kCoils.size()), discre
   if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, sockets_.data()) != 0) {
     throw std::runtime_error(std::string("no socket pair for Modbus: ") + std::strerror(errno));
   }
-  // No call of modbus_reply() selects, but were one to, a descriptor above would be written out of bounds.
+  // modbus_reply() does not call select(); if it did, a larger descriptor would write out of bounds.
   const bool selectable = std::max(sockets_[0], sockets_[1]) < FD_SETSIZE;
   // The address is needed by the constructor only; nothing is connected.
   context_.reset(selectable ? modbus_new_tcp("127.0.0.1", 1502) : nullptr);
@@ -34,7 +34,7 @@ ReplyBuilder::ReplyBuilder() : registers_(65'536), coils_(kCoils.size()), discre
                                         : "too many open files before Modbus could start");
   }
   modbus_set_socket(context_.get(), sockets_[0]);
-  modbus_set_response_timeout(context_.get(), 0, 1);  // what it would sleep before some exceptions
+  modbus_set_response_timeout(context_.get(), 0, 1);  // its sleep before some exceptions
   modbus_set_byte_timeout(context_.get(), 0, 1);
   mapping_ = {.nb_bits = static_cast<int>(coils_.size()),
               .start_bits = 0,
@@ -61,7 +61,7 @@ std::span<const std::uint8_t> ReplyBuilder::reply(std::span<const std::uint8_t> 
   std::copy(adu.begin(), adu.end(), request_.begin());
   std::size_t length = adu.size();
   const bool exchanges = request_[kMbapSize] == MODBUS_FC_WRITE_AND_READ_REGISTERS;
-  if (exchanges) {  // libmodbus would read back the raw words; the rest is a read, which begins the same
+  if (exchanges) {  // libmodbus would read back the raw words; the request begins like a read
     length = kMbapSize + kReadPdu;
     request_[4] = 0;
     request_[5] = kReadPdu + 1;

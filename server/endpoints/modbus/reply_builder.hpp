@@ -17,14 +17,14 @@ namespace drivebench::modbus {
 /// socket pair, so that it never sees, waits for or selects on the socket of a client.
 class ReplyBuilder {
  public:
-  /// Throws std::runtime_error if the system has no socket pair below descriptor 1024 to give.
+  /// Throws std::runtime_error if the system gives no socket pair below descriptor 1024.
   ReplyBuilder();
   ~ReplyBuilder();
   ReplyBuilder(const ReplyBuilder&) = delete;
   ReplyBuilder& operator=(const ReplyBuilder&) = delete;
 
-  /// What a request reads, by address as it came; to be filled in where it will look. What it writes lands
-  /// here as well and is of no account.
+  /// The values that a request reads, by the address in the request; the caller fills them in. libmodbus
+  /// stores its writes here too, and nothing reads those.
   std::span<std::uint16_t> registers() noexcept { return registers_; }
   std::span<std::uint8_t> coils() noexcept { return coils_; }
   std::span<std::uint8_t> discrete_inputs() noexcept { return discrete_inputs_; }
