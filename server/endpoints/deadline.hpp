@@ -15,14 +15,15 @@ class Deadline {
  public:
   explicit Deadline(const asio::any_io_executor& executor) : timer_(executor) {}
 
-  /// Calls `on_over` after so long, in place of the one before. It keeps the owner of this object alive.
+  /// Calls `on_over` after this time and drops the callback of an earlier set(). `on_over` must keep the
+  /// owner of this object alive.
   template <class OnOver>
   void set(ServerClock::duration limit, OnOver on_over) {
     timer_.expires_after(limit);
     timer_.async_wait([this, on_over = std::move(on_over)](const boost::system::error_code& error) mutable {
       if (error) return;
       const ServerClock::duration late = ServerClock::now() - timer_.expiry();
-      if (late < ServerClock::duration::zero()) return;  // set anew or called off meanwhile
+      if (late < ServerClock::duration::zero()) return;  // set again or called off meanwhile
       if (late > kPause) return set(late, std::move(on_over));
       on_over();
     });

@@ -7,10 +7,10 @@
 
 namespace drivebench {
 
-/// At most one log line per 10 s from one source; counts the lines that it held back.
+/// At most one log line per 10 s from one source; counts the lines that it holds back.
 class LogLimit {
  public:
-  /// Whether to log now. If so, held_back() tells how many lines were held back since the last one.
+  /// Whether to log now. If so, held_back() is the number of lines held back since the last one.
   bool allow() noexcept {
     const auto now = ServerClock::now();
     if (last_ != Time{} && now - last_ < std::chrono::seconds(10)) {

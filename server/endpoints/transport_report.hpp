@@ -11,7 +11,7 @@ namespace drivebench {
 /// State and counts of a transport, for the status of the bench.
 struct TransportReport {
   std::string name;   ///< for example "can socketcan:vcan0"
-  std::string state;  ///< "up", or what is wrong
+  std::string state;  ///< "up", or the problem
   std::vector<std::pair<std::string_view, std::uint64_t>> counts;
 };
 

@@ -16,9 +16,9 @@ namespace {
 using asio::ip::tcp;
 using UnixProtocol = asio::local::stream_protocol;
 
-// After an accept that failed for want of descriptors the server pauses instead of spinning.
+// The pause after an accept that failed for lack of descriptors.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-// A peer that vanished silently is given up after this time: the kernel probes an idle peer every second.
+// The kernel probes an idle peer every second, and ends the connection after this time without an answer.
 constexpr int kUserTimeoutMs = 3000;
 constexpr int kSendBufferBytes = 64 * 1024;
 constexpr std::ptrdiff_t kMaxSilentSessions = 32;
@@ -61,7 +61,7 @@ void tune(UnixProtocol::socket& socket) {
   socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
 }
 
-/// Removes the socket file of a server that is gone; throws if the path is anything else.
+/// Removes the socket file of a server that has gone; throws if the path is anything else.
 void make_way(asio::io_context& io, const std::string& path) {
   const std::filesystem::file_status status = std::filesystem::symlink_status(path);
   if (!std::filesystem::exists(status)) return;

@@ -23,13 +23,13 @@ class StreamServer {
   /// Address and port that the system gave, "127.0.0.1:7300".
   std::string tcp_address() const;
 
-  /// Starts accepting clients of this run and telling them about its ticks. `transports` gives the
-  /// reports of the other transports; `experiments` and `audit` may be null.
+  /// Starts to accept clients of this run and to send them its ticks. `transports` returns the reports of the
+  /// other transports; `experiments` and `audit` may be null.
   void serve(Engine& engine, std::function<std::vector<TransportReport>()> transports,
              Experiments* experiments, Audit* audit = nullptr);
 
-  /// Takes over a changed tokens file and ends the sessions whose token holds no more. Throws
-  /// std::runtime_error if the file would begin or cease to ask for tokens.
+  /// Applies a changed tokens file and ends the sessions whose token is no longer valid. Throws
+  /// std::runtime_error if the change would turn tokens on or off.
   void replace_grants(TcpConfig now);
 
   /// Stops accepting and ends every session; bytes that a peer did not take at once are lost.

@@ -56,7 +56,7 @@ std::string name_in(const X509* certificate) {
   return printable({reinterpret_cast<const char*>(utf8), static_cast<std::size_t>(size)});
 }
 
-/// The name in the certificate of a peer; empty: it has shown none.
+/// The name in the certificate of a peer; empty: the peer has no certificate.
 std::string subject_of(SSL* tls) {
   const std::unique_ptr<X509, decltype(&X509_free)> certificate(SSL_get1_peer_certificate(tls), &X509_free);
   return name_in(certificate.get());
@@ -93,7 +93,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
         ignored);
   }
 
-  /// Ends everything that is under way if it is not done by then.
+  /// Closes both ends after this time, unless called off.
   void limit(std::chrono::milliseconds limit) {
     deadline.set(limit, [self = shared_from_this()] {
       self->was_late = true;
@@ -147,9 +147,9 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   Stream stream;
   asio::local::stream_protocol::socket inside;
   Deadline deadline;
-  std::string refused_subject;  ///< in a certificate that does not hold
+  std::string refused_subject;  ///< the name in a refused certificate
   bool was_late = false;        ///< a limit has ended it
-  OnDeaf on_deaf;               ///< of a peer that has been let in
+  OnDeaf on_deaf;               ///< set once the peer has its session
 
  private:
   template <class To>
@@ -166,7 +166,7 @@ TlsDoor::TlsDoor(asio::io_context& io, const TlsConfig& config)
     : io_(io), context_(std::make_unique<Context>()) {
   asio::ssl::context& tls = context_->tls;
   SSL_CTX_set_min_proto_version(tls.native_handle(), TLS1_3_VERSION);
-  // No resumption: each connection shows its certificate, which may have been revoked since.
+  // No resumption: each connection shows its certificate, because it may have been revoked meanwhile.
   SSL_CTX_set_num_tickets(tls.native_handle(), 0);
   SSL_CTX_set_session_cache_mode(tls.native_handle(), SSL_SESS_CACHE_OFF);
   boost::system::error_code error;

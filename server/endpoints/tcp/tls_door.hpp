@@ -10,12 +10,11 @@
 
 namespace drivebench {
 
-/// The way in for clients that speak TLS: shakes hands, and puts a plain stream behind it, so that a session
-/// knows nothing of it. TLS 1.3 and nothing older. At most kMaxHandshakes peers may be shaking hands, each
-/// for kHandshakeLimit.
+/// Accepts clients that speak TLS 1.3 and gives each session a plain stream, so that a session needs no TLS.
+/// At most kMaxHandshakes handshakes run at a time, each for at most kHandshakeLimit.
 ///
-/// Behind the door each peer is one end of a pair of unix sockets; this object carries bytes between it and
-/// the other end, one block at a time in each direction, so that a peer that does not read is noticed as
+/// The session has one end of a pair of unix sockets. This object carries bytes between the other end and the
+/// peer, one block at a time in each direction, so that the server notices a peer that does not read as
 /// without TLS.
 class TlsDoor {
  public:
@@ -29,10 +28,10 @@ class TlsDoor {
   using PlainSocket = asio::generic::stream_protocol::socket;
   /// Called when a client takes nothing for Outbox::kNoProgressLimit, before it is cut off.
   using OnDeaf = std::function<void()>;
-  /// Takes a client after the handshake, with the name in its certificate (empty: it showed none).
+  /// Takes a client after the handshake, with the name in its certificate (empty: no certificate).
   using LetIn = std::function<OnDeaf(PlainSocket, const std::string& subject)>;
 
-  /// Called for every peer that was turned away, with the reason. The log has a limited number of them.
+  /// Called for every refused peer, with the reason. The log has a limited number of them.
   std::function<void(const std::string& peer, const std::string& why)> on_turned_away;
 
   /// Shakes hands with a peer and hands its plain socket to `let_in`.

@@ -12,15 +12,15 @@
 
 namespace drivebench {
 
-/// The sessions that a tick concerns; all others cost it nothing. Sessions whose exchange waits for the tick
-/// are answered first. Of the sessions with subscriptions a few are served in a turn, with a pause between
-/// turns, so that many viewers get more samples in a message instead of making a controller wait.
+/// The sessions that a tick concerns; the others cost no time in a tick. Sessions whose exchange waits for
+/// the tick are answered first. Of the sessions with subscriptions a few are served in a turn, with a pause
+/// between turns, so that many viewers get more samples in a message instead of making a controller wait.
 class Audience {
  public:
   /// The part of a session that sends samples.
   class Viewer {
    public:
-    /// Sends the samples that wait; false if there are none, or the peer takes nothing now.
+    /// Sends the waiting samples; false if none wait, or the peer takes nothing now.
     virtual bool send_samples() = 0;
 
    protected:
@@ -29,7 +29,7 @@ class Audience {
   /// The part of a session that answers exchanges.
   class Waiter {
    public:
-    /// The newest sample is that of the tick it waits for.
+    /// Called when the newest sample is that of the tick for which this session waits.
     virtual void on_newest() = 0;
 
    protected:
@@ -38,27 +38,27 @@ class Audience {
 
   Audience(asio::io_context& io, Engine& engine) : engine_(engine), next_turn_(io) {}
 
-  /// Until remove_subscriber().
+  /// Serves the viewer until remove_subscriber().
   void add_subscriber(Viewer& viewer);
   void remove_subscriber(const Viewer& viewer);
-  /// Until the next on_newest(), or remove_waiting().
+  /// Keeps the session until the next on_newest() or remove_waiting().
   void add_waiting(Waiter& waiter);
   void remove_waiting(const Waiter& waiter);
-  /// Samples from now on, kept as long as a subscription holds them.
+  /// The samples from now on; the feed lives as long as a subscription holds it.
   std::shared_ptr<const SampleFeed> feed(std::uint32_t axis, std::uint32_t decimation);
 
-  /// As Engine calls its listeners.
+  /// The engine calls these like its listeners.
   void on_tick();
   void on_newest();
 
-  /// Sends the samples that wait to all subscribers that take them.
+  /// Sends the waiting samples to all subscribers that take them.
   void send_all();
 
  private:
   static constexpr int kSessionsPerTurn = 4;
   static constexpr auto kPause = std::chrono::microseconds(500);
   static constexpr std::size_t kTicksBehind =
-      32;  ///< without time for turns; then all subscribers are served
+      32;  ///< after so many ticks without time for a turn, serves all subscribers
 
   void drop_unread_feeds();
   void take_turn();
@@ -67,7 +67,7 @@ class Audience {
   std::vector<std::shared_ptr<SampleFeed>> feeds_;
   std::vector<Viewer*> subscribers_;
   std::vector<Waiter*> waiting_;
-  std::vector<Waiter*> answered_;  // those that on_newest() answers just now
+  std::vector<Waiter*> answered_;  // the sessions that on_newest() is answering
   std::size_t ticks_behind_ = 0;   // since on_newest()
   std::size_t next_ = 0;           // of subscribers_, in the next turn
   ServerTimer next_turn_;

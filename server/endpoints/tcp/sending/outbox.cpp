@@ -90,7 +90,7 @@ void Outbox::close() noexcept {
   socket_.shutdown(Socket::shutdown_both, ignored);
   socket_.close(ignored);
   forget(waiting_);
-  chunks_.clear();  // a write that was under way touches them no more
+  chunks_.clear();  // no write reads them any longer
 }
 
 }  // namespace drivebench

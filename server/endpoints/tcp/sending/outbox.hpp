@@ -17,8 +17,8 @@ namespace drivebench {
 
 /// The bytes that wait in all outboxes of a server.
 struct OutboxPool {
-  /// Each outbox may hold as much as the others leave free of this, so that among many peers that do not read
-  /// each gets little.
+  /// Each outbox may hold as many bytes as the others leave free of these, so that each of many peers that do
+  /// not read gets little memory.
   static constexpr std::size_t kMaxBytes = std::size_t{16} * 1024 * 1024;
   std::size_t bytes = 0;
 };
@@ -30,7 +30,8 @@ class Outbox {
  public:
   using Socket = asio::generic::stream_protocol::socket;
 
-  /// Bytes that may wait; above them the peer is cut off. The lower limit holds however full the pool is.
+  /// The most waiting bytes; above it the outbox cuts the peer off. The lower limit holds however full the
+  /// pool is.
   static constexpr std::size_t kMaxQueued = std::size_t{1024} * 1024;
   static constexpr std::size_t kAlwaysQueued = std::size_t{64} * 1024;
   static constexpr auto kNoProgressLimit = std::chrono::seconds(2);
@@ -54,7 +55,7 @@ class Outbox {
 
   /// Closes the socket and reports the reason, unless it is closed already.
   void cut(std::string_view why);
-  /// The same for a peer that took nothing for kNoProgressLimit.
+  /// Cuts off a peer that took nothing for kNoProgressLimit.
   void cut_deaf();
   /// Shuts the socket down; queued bytes are lost.
   void close() noexcept;

@@ -12,14 +12,14 @@ namespace drivebench {
 /// The newest samples of an axis, or every n-th of them, kept once for all subscriptions to them.
 class SampleFeed {
  public:
-  /// So many samples wait for a reader; when there are more, it loses the oldest.
+  /// The most samples that wait for a reader; then it loses the oldest.
   static constexpr std::size_t kDepth = 256;
 
   /// Position of a reader in the feed.
   struct Reader {
     std::uint64_t next;     ///< number of the sample that it reads next
     std::uint64_t skipped;  ///< the feed's count of skipped samples at its last read
-    std::uint64_t dropped;  ///< samples that it has lost and has not been told of
+    std::uint64_t dropped;  ///< lost samples of which the reader does not know yet
   };
 
   /// Samples whose tick is a multiple of `decimation`, 1 or more, after the tick `now`.
@@ -29,9 +29,9 @@ class SampleFeed {
   std::uint32_t axis() const noexcept { return axis_; }
   std::uint32_t decimation() const noexcept { return decimation_; }
 
-  /// After each tick.
+  /// Called after each tick.
   void take(const Sample& newest);
-  /// A reader of the samples from now on.
+  /// A new reader, for the samples from now on.
   Reader reader() const noexcept { return {.next = taken_, .skipped = skipped_, .dropped = 0}; }
   /// The next samples for the reader: as many as lie in one piece, and at most `at_most`. Empty if it has
   /// read all.

@@ -9,7 +9,7 @@
 namespace drivebench {
 namespace {
 
-/// The checks below refuse the request if the answer is no.
+/// Each check below refuses the request if it returns false.
 bool is_tick(Dialogue& dialogue, std::uint64_t ticks, const char* field) {
   if (ticks <= kMaxTick) return true;
   dialogue.refuse(dialogue.id(), v1::REFUSAL_OUT_OF_RANGE,

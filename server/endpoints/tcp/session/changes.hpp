@@ -3,8 +3,7 @@
 #include "server/endpoints/tcp/session/dialogue.hpp"
 #include "server/endpoints/tcp/session/leases.hpp"
 
-/// Requests that change an axis: each is checked, and then put to the bench under the owner number of the
-/// session.
+/// Requests that change an axis: the session checks each and sends it to the bench under its owner number.
 namespace drivebench {
 
 void write_parameter(Dialogue& dialogue, Leases& leases, const v1::WriteParameter& request);

@@ -18,27 +18,27 @@
 
 namespace drivebench {
 
-/// What all sessions share.
+/// The parts that all sessions share.
 struct SessionContext {
   Engine& engine;
   Admission admission;
   Audience& audience;
   std::function<std::size_t()> session_count;
   std::function<std::vector<TransportReport>()> transports;  ///< reports of all transports
-  Experiments* experiments;                                  ///< null: this bench keeps none
+  Experiments* experiments;                                  ///< null: this bench has no experiments
   Audit* audit = nullptr;                                    ///< null: no audit log is kept
 
   struct Counts {
     std::uint64_t turned_away = 0;      ///< connections, by a limit
     std::uint64_t tls_refused = 0;      ///< connections that did not get through the TLS handshake
-    std::uint64_t malformed = 0;        ///< sessions that sent what no client of this protocol does
+    std::uint64_t malformed = 0;        ///< sessions that broke the protocol
     std::uint64_t wrong_tokens = 0;     ///< hellos
     std::uint64_t excess_commands = 0;  ///< exchanges, in real time, that no tick can use
-    std::uint64_t throttled = 0;        ///< times that a session was not read for a while
-    std::uint64_t cut = 0;              ///< sessions that took or said nothing
+    std::uint64_t throttled = 0;        ///< pauses in reading a session
+    std::uint64_t cut = 0;              ///< sessions whose peer read nothing or was silent
   } counts{};
   std::shared_ptr<OutboxPool> outboxes = std::make_shared<OutboxPool>();
-  v1::Envelope reply{};              ///< the message that a session is writing just now
+  v1::Envelope reply{};              ///< the message that a session is writing
   std::vector<std::byte> scratch{};  ///< its bytes
   LogLimit wrong_token_log{};
 };

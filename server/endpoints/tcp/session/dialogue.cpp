@@ -53,7 +53,7 @@ void Dialogue::done(std::uint64_t id, Tick tick) {
 void Dialogue::refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field) {
   v1::Refusal& refusal = *begin_reply(id).mutable_refusal();
   refusal.set_code(code);
-  refusal.set_message(utf8(message));  // it may hold the name of a file
+  refusal.set_message(utf8(message));  // a file name in it may not be UTF-8
   refusal.set_field(field);
   send_reply();
 }

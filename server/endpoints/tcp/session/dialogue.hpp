@@ -14,11 +14,11 @@
 
 namespace drivebench {
 
-/// What the parts of a session have in common: the client, the request that is being answered, and the way
-/// back to the client.
+/// The common ground of the parts of a session: the client, the present request, and the way back to the
+/// client.
 class Dialogue {
  public:
-  /// `keep_alive` gives the session, which must live until the bench has answered it.
+  /// `keep_alive` returns the session, which must live until the bench has answered its requests.
   Dialogue(Outbox::Socket socket, Client client, SessionContext& context,
            std::function<std::shared_ptr<void>()> keep_alive);
 
@@ -28,19 +28,20 @@ class Dialogue {
   SessionContext& context() noexcept { return context_; }
   Engine& engine() const noexcept { return context_.engine; }
   std::size_t axis_count() const { return context_.engine.config().axes.size(); }
-  /// The number under which the bench knows the session: every `done` tells it. 0: it has asked for no lease.
+  /// The number of the session in the bench, which every `done` carries. 0: the session has asked for no
+  /// lease.
   Owner owner() const noexcept { return owner_; }
   void set_owner(Owner owner) noexcept { owner_ = owner; }
   std::shared_ptr<void> keep_alive() const { return keep_alive_(); }
 
-  /// The request that is being answered, and its id.
+  /// The present request and its id.
   v1::Envelope& request() noexcept { return request_; }
   std::uint64_t id() const noexcept { return request_.id(); }
 
   /// An empty message that answers the request with this id; send_reply() sends it.
   v1::Envelope& begin_reply(std::uint64_t id);
   void send_reply();
-  /// For frames that are written without an Envelope: send_scratch() sends what stands in scratch().
+  /// For frames without an Envelope: send_scratch() sends the content of scratch().
   std::vector<std::byte>& scratch() noexcept { return context_.scratch; }
   void send_scratch();
 
@@ -48,7 +49,7 @@ class Dialogue {
   void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
   void refuse(std::uint64_t id, Refused why, const char* field);
   void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);
-  /// A line in the audit log, if one is kept.
+  /// Writes a line in the audit log, if the bench has one.
   void audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details);
 
   /// Whether the bench has this axis; if not, refuses the request.
@@ -69,7 +70,7 @@ class Dialogue {
   std::size_t bytes_in_turn_ = 0;
 };
 
-/// How TCP says why the bench refused a request.
+/// The code on TCP for a refusal of the bench.
 v1::RefusalCode code_of(Refused why) noexcept;
 
 }  // namespace drivebench

@@ -7,16 +7,15 @@
 
 namespace drivebench {
 
-/// Counts the exchanges of a session that no tick can use, in real time: kAtOnce may come together, and one
-/// more with every tick. Beyond that the session is not read for a while.
+/// Limits the exchanges of a session that no tick can use, in real time: kAtOnce may come together, and one
+/// more with every tick. Beyond that the server pauses in reading the session.
 class ExcessLimit {
  public:
   explicit ExcessLimit(Dialogue& dialogue) : dialogue_(dialogue) {}
 
-  /// The session has sent an exchange that no tick can use.
+  /// Counts an exchange that no tick can use.
   void charge();
-  /// How long the session is not to be read, so that it sends at most about twice as many exchanges as there
-  /// are ticks.
+  /// The pause in reading the session, so long that it sends at most about two exchanges a tick.
   ServerClock::duration pause();
 
  private:

@@ -54,7 +54,7 @@ std::optional<std::vector<std::uint32_t>> Exchanges::axes_of(const v1::Exchange&
   return axes;
 }
 
-/// Hands all commands to the bench or none: a command that was taken would bar its axis from the next try.
+/// Gives the bench all commands or none: after an accepted command its axis would refuse the next try.
 bool Exchanges::are_taken(const v1::Exchange& r) {
   const Owner owner = dialogue_.owner();
   for (const v1::Command& command : r.commands()) {
@@ -89,7 +89,7 @@ void Exchanges::abandon(std::uint32_t axis) {
 }
 
 void Exchanges::reply(std::uint64_t id, std::span<const std::uint32_t> axes) {
-  subscriptions_.send_samples();  // those of a tick come before the answer that tells of it
+  subscriptions_.send_samples();  // the samples of a tick come before the answer with that tick
   views_.clear();
   for (const std::uint32_t axis : axes)
     views_.push_back({axis, &engine_.newest(axis)});

@@ -14,13 +14,14 @@
 
 namespace drivebench {
 
-/// The exchanges of a session: commands in, the samples of their tick out. One may wait for its tick.
+/// The exchanges of a session: commands in, the samples of their tick out. One exchange may wait for its
+/// tick.
 class Exchanges final : public Audience::Waiter {
  public:
   Exchanges(Dialogue& dialogue, const Leases& leases, Subscriptions& subscriptions);
 
   void exchange(const v1::Exchange& request);
-  /// A tick has run: answers the exchange that waits for it.
+  /// After a tick: answers the exchange that waits for it.
   void on_newest() override;
   /// Refuses an exchange that waits for a tick of this axis: the session no longer holds it, so the tick
   /// might never come.
@@ -34,7 +35,7 @@ class Exchanges final : public Audience::Waiter {
     std::vector<std::uint32_t> axes;
   };
 
-  /// The axes of the commands, or nothing: then the request has been refused.
+  /// The axes of the commands; nothing after it has refused the request.
   std::optional<std::vector<std::uint32_t>> axes_of(const v1::Exchange& request);
   bool are_taken(const v1::Exchange& request);
   void reply(std::uint64_t id, std::span<const std::uint32_t> axes);

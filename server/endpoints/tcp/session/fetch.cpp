@@ -17,10 +17,10 @@ using google::protobuf::io::CodedOutputStream;
 /// Bytes of rows or of the recording in one message; small enough that a client's memory comes from its
 /// heap.
 constexpr std::size_t kChunkBytes = std::size_t{64} * 1024;
-/// Bytes that a session sends before others have their turn.
+/// The most bytes of a session in a turn.
 constexpr std::size_t kTurnBytes = 8 * kChunkBytes;
-/// Size of the socket's send buffer during a fetch, if the system allows it: the next message is made while
-/// the client reads this one.
+/// Size of the socket's send buffer during a fetch, if the system allows it: the server makes the next
+/// message while the client reads this one.
 constexpr int kFetchBufferBytes = 512 * 1024;
 constexpr auto kInfoInterval = std::chrono::milliseconds(200);
 constexpr std::uint32_t kLengthDelimited = 2;
@@ -36,8 +36,8 @@ std::size_t tag_size(int field, std::size_t length) {
          CodedOutputStream::VarintSize32(static_cast<std::uint32_t>(length));
 }
 
-/// Makes `out` a frame with an ExperimentData of so many bytes. The caller fills the span that it returns, so
-/// that the data are copied once, from the file.
+/// Begins in `out` a frame with an ExperimentData of so many bytes. The caller reads the file into the
+/// returned span, which saves a copy.
 std::span<std::byte> begin_data_frame(std::vector<std::byte>& out, std::uint64_t request, std::uint64_t id,
                                       std::uint64_t first, std::size_t bytes) {
   v1::Envelope envelope;
@@ -91,7 +91,7 @@ void Fetch::start(Experiments& experiments, const v1::FetchExperiment& r) {
                         .row_bytes = r.recording() ? 1 : 8 * static_cast<std::size_t>(info.signals_size()),
                         .file = nullptr,
                         .last_info = ServerClock::now(),
-                        .send_buffer_bytes = size.value() / 2};  // Linux tells twice what was asked for
+                        .send_buffer_bytes = size.value() / 2};  // Linux reports twice the requested size
   socket.set_option(asio::socket_base::send_buffer_size(kFetchBufferBytes), ignored);
   send_info(dialogue_, dialogue_.id(), *experiment);
   go_on();
@@ -115,7 +115,7 @@ void Fetch::end() {
   under_way_.reset();
 }
 
-/// Sends one message; false when there is nothing more to send now.
+/// Sends one message; false if no more can be sent now.
 bool Fetch::send_some(std::size_t& budget) {
   const v1::ExperimentInfo info = dialogue_.context().experiments->info_of(*under_way_->experiment);
   const std::uint64_t there = under_way_->recording ? info.recording_bytes() : info.rows();
@@ -148,7 +148,7 @@ void Fetch::send_rows(const v1::ExperimentInfo& info, std::uint64_t there) {
   dialogue_.send_scratch();
 }
 
-/// Everything so far has been sent: tells now and then how the experiment goes, and that it has ended.
+/// After all present data: sends the state of the experiment at intervals, and at its end.
 void Fetch::send_state(const v1::ExperimentInfo& info) {
   UnderWay& f = *under_way_;
   const auto now = ServerClock::now();

@@ -10,26 +10,26 @@
 
 namespace drivebench {
 
-/// Brings the data of an experiment to the client as far as the socket takes them. A session fetches one
+/// Sends the data of an experiment to the client as fast as the socket takes them. A session fetches one
 /// experiment at a time.
 class Fetch {
  public:
   explicit Fetch(Dialogue& dialogue) : dialogue_(dialogue) {}
 
   void begin(const v1::FetchExperiment& request);
-  /// When the socket has room again, or an experiment may have gone on: sends more.
+  /// Sends more. Called when the socket has room again, or an experiment may have more data.
   void go_on();
-  /// The session is over.
+  /// Called at the end of the session.
   void drop() { under_way_.reset(); }
 
  private:
   struct UnderWay {
-    std::uint64_t id;  ///< of the request
+    std::uint64_t id;  ///< the id of the request
     std::shared_ptr<const Experiment> experiment;
     bool recording;
     std::uint64_t next;                ///< row, or byte of the recording
     std::size_t row_bytes;             ///< 1 for a recording
-    std::unique_ptr<FileReader> file;  ///< opened when there is something to read
+    std::unique_ptr<FileReader> file;  ///< opened for the first data
     ServerClock::time_point last_info;
     int send_buffer_bytes;  ///< of the socket, before and after
   };

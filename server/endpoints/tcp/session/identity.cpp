@@ -7,8 +7,8 @@
 namespace drivebench {
 namespace {
 
-/// The address at which wrong tokens are counted: without the port; of IPv6 the network, which is what one
-/// computer has. All unix sockets are one address.
+/// The address for the count of wrong tokens: without the port; for IPv6 the network, because one computer
+/// has a whole network. All unix sockets are one address.
 std::string address_of(const Client& client) {
   if (client.transport != "tcp") return client.transport;
   std::string address = client.peer.substr(0, client.peer.rfind(':'));
@@ -50,7 +50,7 @@ bool Identity::admit(const v1::Hello& hello) {
       hello.token(), address_of(client), ServerClock::now(), std::chrono::system_clock::now());
   if (decision.admitted) {
     grant_ = decision.grant;
-    if (!grant_.name.empty()) client.subject = grant_.name;  // else the name of the certificate stays
+    if (!grant_.name.empty()) client.subject = grant_.name;  // otherwise the name of the certificate stays
     return true;
   }
   ++context.counts.wrong_tokens;
@@ -78,7 +78,7 @@ bool Identity::may_ask() {
   return false;
 }
 
-/// The slot is a wall time, but once the timer runs no jump of the wall clock moves it.
+/// The slot ends at a wall time, but a jump of the wall clock does not move a running timer.
 void Identity::watch_slot() {
   slot_timer_.cancel();
   if (!grant_.until) return;

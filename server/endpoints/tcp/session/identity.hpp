@@ -12,14 +12,14 @@ class Identity {
  public:
   explicit Identity(Dialogue& dialogue);
 
-  /// Called with a sentence when the grant holds no more.
+  /// Called with a sentence when the grant is no longer valid.
   std::function<void(const std::string&)> on_end;
 
-  /// Looks at the token of a hello; refuses the hello if the token opens nothing.
+  /// Checks the token of a hello; refuses the hello if no grant has this token.
   bool admit(const v1::Hello& hello);
   /// Whether the role allows the request; if not, refuses it.
   bool may_ask();
-  /// After a change of the tokens file: ends the session if its grant is gone or means something else.
+  /// Called after a change of the tokens file: ends the session if its grant has gone or changed.
   void look_again();
   /// Ends the session when the time of the grant is over.
   void watch_slot();

@@ -41,7 +41,7 @@ void Leases::take(const v1::LeaseRequest& r, Engine::Answer answer) {
                                 std::to_string(r.reason().size()),
                             "reason");
   }
-  // The new owner's number is newer than that of the owner before, so that numbers tell the order.
+  // A new owner has a larger number than the owner before, so that the numbers show the order.
   const bool may_hold = std::any_of(seats_.begin(), seats_.end(),
                                     [](const Seat& seat) { return seat.is_asking() || seat.owner() != 0; });
   if (dialogue_.owner() == 0 || !may_hold) dialogue_.set_owner(engine_.new_owner(dialogue_.client()));
@@ -91,8 +91,8 @@ Engine::Answer Leases::answer_for(std::uint32_t axis, const char* field, std::fu
   };
 }
 
-/// Tells the holder of the axis. The lease may have been renewed this tick, of which nothing is known yet, so
-/// this is the latest end that it can have.
+/// Names the holder of the axis. The holder may have renewed the lease in this tick, which is not known yet,
+/// so the sentence gives the latest possible end.
 void Leases::refuse_owned(std::uint64_t id, std::uint32_t axis) {
   const Client* const holder = engine_.client(engine_.owner(axis));
   const std::string name = holder == nullptr ? "another client" : name_of(*holder);

@@ -20,16 +20,16 @@ class Leases {
 
   /// Acquires, renews, releases, or takes by force.
   void lease(const v1::LeaseRequest& request);
-  /// An administrator has taken an axis from a session, this one or another.
+  /// Called when an administrator has taken an axis from this session or another one.
   void on_taken(const Taken& taken);
-  /// The session is over: its leases end as lost ones, and so does one that is granted from now on.
+  /// Called at the end of the session: its leases end as lost, and so does any lease granted afterwards.
   void lose_all();
 
-  /// Whether the session may change things at this axis; if not, refuses the request.
+  /// Whether the session may change this axis; if not, refuses the request.
   bool may_change(std::uint32_t axis);
   /// Why the session does not hold the axis, for a refusal.
   std::string not_owner_of(std::uint32_t axis) const;
-  /// Asks the bench under the owner number of the session; the client has the answer.
+  /// Sends the input to the bench under the owner number of the session, and the answer to the client.
   void ask(const Input& input, const char* field);
 
  private:

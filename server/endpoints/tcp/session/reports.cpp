@@ -31,7 +31,7 @@ std::string_view word_of(Connection connection) noexcept {
   return kWords[static_cast<std::size_t>(connection)];
 }
 
-/// The word of a choice that holds; empty if there is no such parameter.
+/// The word of a parameter with choices; empty if the parameter does not exist.
 std::string_view word_of(const AxisParameters& p, std::string_view name) {
   const Parameter* const row = find_parameter(p, name);
   return row == nullptr ? std::string_view{} : row->words[static_cast<std::size_t>(row->get(p))];
@@ -164,7 +164,7 @@ void report_status(Dialogue& dialogue) {
   for (std::uint32_t axis = 0; axis < dialogue.axis_count(); ++axis) {
     std::array<std::byte, kMaxSampleBytes> bytes;
     Sample now = engine.newest(axis);
-    now.owner = engine.owner(axis);  // in lockstep it may have changed while time stood still
+    now.owner = engine.owner(axis);  // in lockstep the owner may have changed since the sample
     const std::size_t size = encode_sample(now, kAllSignals, bytes.data());
     v1::AxisSample& sample = *status.add_axes();
     sample.set_axis(axis);

@@ -3,13 +3,13 @@
 #include "bench.pb.h"
 #include "server/endpoints/tcp/session/dialogue.hpp"
 
-/// What a session tells about the bench.
+/// The reports of a session about the bench.
 namespace drivebench {
 
-/// The description in a Welcome, with the parameter values of now.
+/// The description in a Welcome, with the present parameter values.
 v1::BenchDescription describe(const Engine& engine);
 
-/// Answers with the parameters that were asked for, or with all of the axis.
+/// Answers with the requested parameters, or with all parameters of the axis.
 void report_parameters(Dialogue& dialogue, const v1::ReadParameters& request);
 /// Answers with the state of bench, axes and transports.
 void report_status(Dialogue& dialogue);

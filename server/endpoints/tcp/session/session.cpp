@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kProtocolVersion = 1;
 
-/// False: not an Envelope, or one that is nested more deeply than any of ours.
+/// False: the frame is not an Envelope, or is nested more deeply than any valid one.
 bool parse(std::span<const std::byte> frame, v1::Envelope& envelope) {
   constexpr int kMaxNesting = 16;
   google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(frame.data()),
@@ -78,8 +78,8 @@ asio::awaitable<void> Session::run() {
   close();
 }
 
-/// Answers the requests that have come, up to the limits of a turn: a client that asks for much at once does
-/// not keep the others waiting.
+/// Answers the requests that have arrived, up to the limits of a turn, so that the other clients need not
+/// wait for a client with many requests.
 Session::Turn Session::take_turn() {
   dialogue_.begin_turn();
   for (int n = 0; n < kRequestsPerTurn && dialogue_.bytes_in_turn() < kReplyBytesPerTurn; ++n) {
@@ -104,7 +104,7 @@ bool Session::end_malformed(v1::RefusalCode code, const std::string& sentence, c
   return false;
 }
 
-/// A peer that stops within a frame is gone, or never meant to send the rest.
+/// Cuts off a peer that is silent within a frame: it has gone, or never meant to send the rest.
 void Session::watch_for_silence() {
   if (!greeted_) return;
   if (!reader_.in_a_frame()) return silence_.call_off();
@@ -116,7 +116,7 @@ bool Session::handle(std::span<const std::byte> frame) {
   constexpr std::size_t kOrdinaryFrame = 4096;
   v1::Envelope& request = dialogue_.request();
   if (last_frame_ > kOrdinaryFrame)
-    request = v1::Envelope();  // it keeps the memory of the largest frame so far
+    request = v1::Envelope();  // the old one keeps the memory of its largest frame
   last_frame_ = frame.size();
   if (!parse(frame, request)) {
     request.Clear();

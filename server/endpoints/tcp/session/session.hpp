@@ -25,34 +25,34 @@ namespace drivebench {
 /// This class cuts the stream into frames and gives each request to the part that answers it.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  /// `client` without a subject, which hello tells.
+  /// `client` has no subject yet; hello gives it.
   Session(Outbox::Socket socket, Client client, SessionContext& context);
 
   /// Reads and answers until the peer or an error ends the session, then gives its leases back.
   asio::awaitable<void> run();
 
-  /// An experiment may have gone on.
+  /// Called when an experiment may have more data.
   void on_experiments() { fetch_.go_on(); }
-  /// An administrator has taken an axis from a session, this one or another.
+  /// Called when an administrator has taken an axis from this session or another one.
   void on_taken(const Taken& taken) { leases_.on_taken(taken); }
-  /// The tokens file has changed.
+  /// Called when the tokens file has changed.
   void on_new_grants();
-  /// The peer takes nothing, as the TLS door has found.
+  /// Called by the TLS door when the peer takes nothing.
   void on_deaf() { dialogue_.outbox().cut_deaf(); }
 
   bool greeted() const noexcept { return greeted_; }
-  /// Refuses the connection itself, before anything was read.
+  /// Refuses the connection before it reads any byte.
   void turn_away(std::string_view sentence);
   void close();
 
  private:
   static constexpr auto kHelloLimit = std::chrono::seconds(2);
   static constexpr auto kFrameLimit = std::chrono::seconds(2);  ///< of silence within a frame
-  /// A turn of this session ends after this much; then the others have theirs.
+  /// The most requests of this session in a turn; then the other sessions have theirs.
   static constexpr int kRequestsPerTurn = 64;
   static constexpr std::size_t kReplyBytesPerTurn = std::size_t{16} * 1024;
 
-  /// How far the frames that have come were answered.
+  /// How many of the received frames a turn has answered.
   enum class Turn { kAll, kMoreToCome, kOver };
   Turn take_turn();
   bool handle(std::span<const std::byte> frame);
@@ -74,7 +74,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::size_t last_frame_ = 0;
   Deadline silence_;  // runs until hello, and while a frame is not whole
   bool greeted_ = false;
-  bool over_ = false;  // the peer is gone
+  bool over_ = false;  // the peer has gone
   std::string why_ended_ = "the peer left";
 };
 

@@ -16,7 +16,7 @@ class Subscriptions final : public Audience::Viewer {
   explicit Subscriptions(Dialogue& dialogue) : dialogue_(dialogue) {}
 
   void subscribe(const v1::Subscribe& request);
-  /// Sends the samples that wait; false if there are none, or the peer takes nothing now.
+  /// Sends the waiting samples; false if none wait, or the peer takes nothing now.
   bool send_samples() override;
 
  private:

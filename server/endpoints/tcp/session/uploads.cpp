@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMaxTables = 64;
 
-/// The rows of a message, which come after this time. Throws BadRequest.
+/// The rows of a message, which must be later than `last_s`. Throws BadRequest.
 std::vector<SignalTable::Row> rows_of(const v1::UploadTable& r, double last_s) {
   std::vector<SignalTable::Row> rows;
   rows.reserve(static_cast<std::size_t>(r.times_s_size()));
@@ -45,7 +45,8 @@ void Uploads::upload(const v1::UploadTable& r) {
   with_experiments(dialogue_, [&](Experiments& experiments) { append(experiments, r); });
 }
 
-/// Throws BadRequest if the rows cannot be taken for what they say about themselves.
+/// Throws BadRequest if the numbers of times and values differ, the table does not exist, or the session has
+/// too many tables.
 void Uploads::check(const v1::UploadTable& r) const {
   if (r.times_s_size() != r.values_size()) {
     throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, "values",

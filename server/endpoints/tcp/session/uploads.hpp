@@ -9,7 +9,7 @@
 
 namespace drivebench {
 
-/// The tables that a session has uploaded for its experiments. They go with it.
+/// The tables that a session has uploaded for its experiments. They end with the session.
 class Uploads {
  public:
   explicit Uploads(Dialogue& dialogue) : dialogue_(dialogue) {}
