@@ -77,7 +77,7 @@ BenchConfig configure(const Options& o) {
   if (!o.experiments.empty()) config.experiments.folder = o.experiments;
   if (!o.audit.empty()) config.audit.file = o.audit;
   if (o.command_delay_ticks >= 0) config.setup.command_delay_ticks = o.command_delay_ticks;
-  // Written so that NaN is refused, which CLI11 lets pass.
+  // Refuses NaN too, which CLI11 lets pass.
   if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
     throw std::runtime_error("--duration: a lockstep run ends when its controller does");
   }

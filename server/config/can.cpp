@@ -85,14 +85,14 @@ std::string listener_of(const CanConfig& bus) {
   return bus.port == 0 ? "" : bus.channel + ':' + std::to_string(bus.port);
 }
 
-/// What a section may say of channel and port with each back end.
+/// The rules for channel and port of each back end.
 struct ChannelRules {
   can::Backend backend;
   bool (*is_channel)(const std::string& channel);
-  std::string_view channel_rule;  ///< what a channel must be
+  std::string_view channel_rule;  ///< the form of a channel, for refusals
   std::int64_t least_port;
   std::string (*place)(const CanConfig& bus);
-  std::string_view same_port;  ///< why two buses may not have one port; empty: their channels clash instead
+  std::string_view same_port;  ///< the rule for ports; empty: the rule for channels is enough
 };
 constexpr auto kChannelRules = std::to_array<ChannelRules>({
     {can::Backend::kSocketCan, [](const std::string& channel) { return is_interface(channel); },

@@ -40,8 +40,8 @@ struct TcpConfig {
   std::uint32_t max_sessions = 256;
 };
 
-/// Section [[can]]: a bus that controllers share with the bench. What channel and port are depends on the
-/// back end; those that listen do so on a loopback address, because none of them knows a password.
+/// Section [[can]]: a bus that controllers share with the bench. The meaning of channel and port depends on
+/// the back end. A back end that listens does so on a loopback address, because no back end has a password.
 struct CanConfig {
   can::Backend backend = can::Backend::kUdpMulticast;
   std::string channel{can::row_of(can::Backend::kUdpMulticast).default_channel};
