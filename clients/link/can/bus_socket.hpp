@@ -14,10 +14,10 @@
 #include "clients/link/common/address.hpp"
 #include "clients/link/common/file_descriptor.hpp"
 
-/// What the buses share that are sockets of whole frames.
+/// The common parts of the buses that are sockets of whole frames.
 namespace drivebench::link {
 
-/// Why the last system call failed.
+/// The reason why the last system call failed.
 inline std::string reason() {
   return std::generic_category().message(errno);
 }
@@ -33,8 +33,8 @@ void set_option(const FileDescriptor& fd, int level, int name, const T& value) {
   if (::setsockopt(fd.get(), level, name, &value, sizeof value) != 0) throw ConnectError(reason());
 }
 
-/// The size of a datagram that comes before the deadline; 0 if none does. `receive` gives what recv() gave
-/// for these flags.
+/// The size of a datagram that comes before the deadline; 0 if none comes. `receive` calls recv() with the
+/// flags and returns its result.
 template <class Receive>
 std::size_t receive_datagram(const std::string& name, CanBus::Clock::time_point until, Receive receive) {
   using Clock = CanBus::Clock;

@@ -12,8 +12,8 @@
 
 namespace drivebench::link {
 
-/// The client side of a back end of can::kBackends. Each has a file of its own and stands in the table of
-/// can_bus.cpp, by which addresses are read and buses opened.
+/// The client side of a back end of can::kBackends. Each kind has a file of its own and a row in the table of
+/// can_bus.cpp, which reads addresses and opens buses.
 struct CanBusKind {
   can::Backend backend;
   /// Sets the channel, and the port if there is one. Gives the rule that the text breaks; empty: none.

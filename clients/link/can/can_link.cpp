@@ -133,7 +133,7 @@ void CanLink::set_load(const LoadChange&) {
 }
 
 const Sample& CanLink::newest() {
-  constexpr int kMostWaiting = 10'000;  // on a bus that never falls silent
+  constexpr int kMostWaiting = 10'000;  // bounds the loop on a bus that is never silent
   for (int i = 0; i < kMostWaiting && receive(Clock::time_point::min()); ++i) {
   }
   await(

@@ -12,8 +12,8 @@
 
 namespace drivebench::link {
 
-/// What a controller of one axis needs of a link over any transport. Requests throw Refused and LinkError
-/// as those of Link do; references to samples hold until the next call.
+/// The link of a controller to one axis over any transport. Requests throw Refused and LinkError as those of
+/// Link do; references to samples hold until the next call.
 class AxisLink {
  public:
   AxisLink() = default;

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-/// What a client asks of a bench over any link, and how the bench turns it down.
+/// The requests of a client over any link, and the refusal of the bench.
 namespace drivebench::link {
 
 /// The bench refused a request; the link goes on. what() is the bench's sentence.
