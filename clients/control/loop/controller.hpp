@@ -11,8 +11,8 @@
 
 namespace drivebench::control {
 
-/// What the bench says about tick k, of any machine. What an axis or a link does not have stays zero; what is
-/// there must be finite: a wire on which NaN means "nothing yet" is its reader's business.
+/// The measurement of tick k, for any machine. A value that the axis or the link lacks stays zero. Every
+/// value must be finite: the reader of a wire on which NaN means "no value yet" replaces it.
 struct Measurement {
   std::int64_t encoder_count = 0;
   double edge_age_s = 0.0;     ///< since the last edge
@@ -25,7 +25,7 @@ struct Measurement {
   double i_f_a = 0.0;  ///< field winding
 };
 
-/// What the amplifier is asked for: voltages or currents.
+/// The quantity that the controller commands: voltages or currents.
 enum class Quantity { kVoltage, kCurrent };
 
 /// One value for each terminal for tick k, in volts or amperes; an armature is phase a. Terminals that the
@@ -49,15 +49,14 @@ class Controller {
   }
 
   Quantity quantity() const noexcept { return quantity_; }
-  /// Since the first sample, from the encoder.
+  /// The angle since the first sample, from the encoder.
   double angle_rad() const noexcept { return seen_.angle_rad; }
-  /// As the controller's estimator has it.
+  /// The speed of the controller's estimator.
   double speed_rad_s() const noexcept { return seen_.speed_rad_s; }
-  /// At least one terminal stood at its limit in the last sample.
+  /// Whether at least one terminal stood at its limit in the last sample.
   bool saturated() const noexcept { return seen_.saturated; }
 
-  /// What else it knows, of the last sample: names with units (like "i_q_ref_a") and values in the same
-  /// order.
+  /// Further values of the last sample: names with units (like "i_q_ref_a"), and values in the same order.
   std::span<const std::string_view> telemetry_names() const noexcept {
     return std::span(telemetry_names_).first(telemetry_count_);
   }
@@ -76,7 +75,7 @@ class Controller {
     double speed_rad_s = 0.0;
     bool saturated = false;
   };
-  /// What a sample has shown, told at the end of every step(); one value for each name.
+  /// Stores the results of a sample at the end of every step(), with one value for each name.
   void tell(const Seen& seen, std::initializer_list<double> telemetry) noexcept;
 
  private:

@@ -11,7 +11,7 @@ std::int64_t samples_in(double duration_s, double rate_hz) noexcept {
   return std::llround(duration_s * rate_hz);
 }
 
-/// Of the whole run.
+/// The number of samples of the whole run.
 std::int64_t checked_samples(double duration_s, double rate_hz) {
   constexpr double kMostSamples = 1e9;
   if (!(duration_s <= kLongestRun_s)) {

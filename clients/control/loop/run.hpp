@@ -15,8 +15,8 @@ namespace drivebench::control {
 /// The times of a run.
 struct RunTiming {
   double sample_rate_hz;  ///< the controller's; not a gain of its own
-  double prepare_s;       ///< standing still before the move: flux build-up, alignment
-  double hold_s;          ///< what the end of the trajectory asks for is kept up, so that it can be judged
+  double prepare_s;       ///< at rest before the move: flux build-up, alignment
+  double hold_s;          ///< the end of the trajectory holds this long, so that it can be judged
 
   static constexpr std::tuple kGains{gain("run.prepare_s", &RunTiming::prepare_s, GainRule::kPause),
                                      gain("run.hold_s", &RunTiming::hold_s, GainRule::kPause)};
@@ -42,12 +42,12 @@ class Run {
   /// bench's time when samples are lost. After the end it keeps holding.
   Setpoint step(const Measurement& m, std::int64_t periods = 1) noexcept;
 
-  /// Of the last sample stepped.
+  /// The phase of the last sample.
   RunPhase phase() const noexcept { return phase_; }
   bool done() const noexcept { return phase_ == RunPhase::kDone; }
   const Reference& reference() const noexcept { return reference_; }
   const Controller& controller() const noexcept { return *controller_; }
-  /// Since the start of the trajectory; negative while preparing.
+  /// The time since the start of the trajectory; negative before it.
   double time_s() const noexcept { return static_cast<double>(sample_ - prepare_samples_) * period_s_; }
 
   const Trajectory& trajectory() const noexcept { return *trajectory_; }

@@ -17,7 +17,7 @@ class ServoLoop {
     return r.acceleration_rad_s2 + gains_.integral_per_s3 * integral_rad_s_ +
            gains_.proportional_per_s2 * error_rad_ + gains_.derivative_per_s * (r.speed_rad_s - speed_rad_s);
   }
-  /// Not while something stands at its limit.
+  /// To be called only while no value stands at its limit.
   void integrate() noexcept { integral_rad_s_ += period_s_ * error_rad_; }
 
  private:

@@ -19,7 +19,7 @@ inline Setpoint terminal_values(PhasePair x, bool star) noexcept {
   return {.a = a, .b = b, .c = c};
 }
 
-/// Each phase within plus and minus the limit, as an amplifier does it; the field is left as it is.
+/// Each phase within plus and minus the limit, as in an amplifier; the field is unchanged.
 inline Setpoint clipped(const Setpoint& x, double limit) noexcept {
   return {.a = std::clamp(x.a, -limit, limit),
           .b = std::clamp(x.b, -limit, limit),
