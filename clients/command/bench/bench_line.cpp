@@ -80,7 +80,7 @@ void add_take(CommandLine& line) {
   sub.add_option("--reason", o.reason, "what the session is told, and what the audit log keeps")->required();
 }
 
-/// A verb that prints what the server makes of a bench file.
+/// A verb that prints a description of a bench file by the server.
 Verb<PrintOptions> add_print(CommandLine& line, const std::string& name, const std::string& description) {
   const Verb<PrintOptions> verb = line.add<PrintOptions>(name, description, run_print);
   verb.options.what = name;

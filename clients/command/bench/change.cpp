@@ -14,8 +14,8 @@
 namespace drivebench::command {
 namespace {
 
-/// An open link and the axis that was named, whose lease is held meanwhile: only its owner may change it. A
-/// free run has no owners.
+/// An open link and the lease of the chosen axis: only the owner may change an axis. A free run has no
+/// owners.
 class HeldAxis {
  public:
   HeldAxis(const LinkChoice& choice, std::string_view axis, std::string_view subcommand)

@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// What is usually looked at: the terminals that the machine has.
+/// The default signals: those of the terminals that the machine has.
 std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
   std::vector<std::string> names = {"tick", "state", "faults", "injected", "encoder_count", "i_a_a"};
   if (axis.phases() >= 2) names.emplace_back("i_b_a");
@@ -160,7 +160,7 @@ std::string shown_value(const Signal& signal, const Sample& sample) {
 }
 
 int run_watch(const WatchOptions& options) {
-  signals_named(options.signals);  // a wrong name is told before a bench is looked for
+  signals_named(options.signals);  // reports a wrong name before it looks for a bench
   link::Link bench_link = open_link(options.link, "watch");
   const v1::BenchDescription& bench = bench_link.welcome().bench();
   const std::uint32_t axis = axis_number(bench, options.axis);
@@ -177,7 +177,7 @@ int run_watch(const WatchOptions& options) {
   const Sample present = plain(status.axes(static_cast<int>(axis)).sample());
   view.show(present, 0);
   if (options.count == 1) return kExitOk;
-  // A lockstep without a controller is told at once, any other silence after a second.
+  // Reports a lockstep without a controller at once, any other silence after a second.
   auto patience = bench.mode() == v1::MODE_LOCKSTEP && !is_driven(status) ? 0ms : 1000ms;
   bool is_silent = false;
   for (std::uint64_t shown = 1; !interrupted();) {

@@ -21,7 +21,7 @@ bool is_virtual(const CanInterface& interface) {
   return interface.kind == "vcan" || interface.kind == "vxcan";
 }
 
-/// `ip link set` lines that change what can be changed only while the interface is down.
+/// `ip link set` lines for a change that the kernel allows only while the interface is down.
 std::string while_down(const CanInterface& interface, std::string_view change) {
   return fmt::format("{0}ip link set {1} {2}; ip link set {1} up",
                      interface.up ? fmt::format("ip link set {} down; ", interface.name) : "", interface.name,
@@ -33,7 +33,7 @@ std::string make_virtual(std::string_view name) {
       "modprobe vcan; ip link add dev {0} type vcan; ip link set {0} mtu 72; ip link set {0} up", name);
 }
 
-/// Half of what follows the sample point, which is what newer kernels choose by themselves.
+/// Half of the bit after the sample point, the default of newer kernels.
 std::uint32_t good_sjw(const CanBitTiming& timing) {
   const double after = timing.quanta * (1.0 - timing.sample_point);
   return static_cast<std::uint32_t>(std::clamp(after / 2.0 + 0.25, 1.0, 128.0));

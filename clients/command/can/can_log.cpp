@@ -72,7 +72,7 @@ int run_can_log(const CanLogOptions& options) {
   }
   const link::CanAddress address = link::parse_can_address(options.address);
   const auto bus = link::open_can_bus(address, 5s);
-  // A trace names an interface; a bus that is none has the name of its back end.
+  // A trace names an interface; any other bus has the name of its back end.
   Trace trace(options.out_file, address.backend == can::Backend::kSocketCan
                                     ? address.channel
                                     : std::string(can::name_of(address.backend)));
@@ -80,7 +80,7 @@ int run_can_log(const CanLogOptions& options) {
   try {
     follow(*bus, options, trace);
   } catch (const link::LinkError&) {
-    trace.finish();  // what came before the bus broke is often why it did
+    trace.finish();  // the last frames often show why the bus broke
     throw;
   }
   trace.finish();

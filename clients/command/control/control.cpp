@@ -57,7 +57,7 @@ void refuse_latched_faults(link::AxisLink& bench) {
   }
 }
 
-/// Leased, without latched faults and at rest, or an exception that says what to do.
+/// Leases the axis and brings it to rest without latched faults, or throws with the cure.
 void prepare(link::AxisLink& bench, const ControlOptions& options, double counts_per_revolution) {
   bench.acquire();
   if (options.clear_faults) {
@@ -71,7 +71,7 @@ void prepare(link::AxisLink& bench, const ControlOptions& options, double counts
   if (bench.bench().mode() == v1::MODE_LOCKSTEP) refuse_latched_faults(bench);
 }
 
-/// Open before the move, so that a report is not lost to a folder that does not exist.
+/// Opened before the move, so that a missing folder does not cost the report.
 std::ofstream opened(const std::string& file) {
   std::ofstream out;
   if (!file.empty()) out.open(file, std::ios::binary);
@@ -146,7 +146,7 @@ int run_control(const ControlOptions& options) {
     if (!options.loads.empty()) axis->set_load({.load_nm = load_before_nm});
     axis->release();
   } catch (const link::Refused&) {
-    // The lease may have been what was lost; the report says so.
+    // The lease may have ended; the report gives the reason.
   } catch (const link::LinkError& error) {
     if (done.failure.empty()) done.failure = error.what();
   }

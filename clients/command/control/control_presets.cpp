@@ -71,7 +71,7 @@ std::vector<control::Gain> gains_with(const control::Preset& preset,
 int run_list(const ControlOptions& options) {
   if (!options.list) {
     const control::Preset& preset = chosen_preset(options.preset);
-    if (!options.overrides.empty()) made(preset, options.overrides);  // refuses what cannot be
+    if (!options.overrides.empty()) made(preset, options.overrides);  // refuses impossible gains
     if (options.json) {
       fmt::print("{}\n", gains_json(gains_with(preset, options.overrides)));
     } else {

@@ -20,10 +20,10 @@
 namespace drivebench::command {
 namespace {
 
-/// What a recorded run should have done, sample by sample; nothing without a preset.
+/// The plan of a recorded run, sample by sample; empty without a preset.
 struct Plan {
   std::vector<control::Reference> references;
-  double counts_per_rad = 0.0;  ///< 0: not known
+  double counts_per_rad = 0.0;  ///< 0: unknown
 };
 
 std::vector<double> column(const RecordedRun& run, const std::function<double(const Answered&)>& value) {
@@ -42,7 +42,7 @@ std::vector<double> column(const Plan& plan, double control::Reference::*member)
   return values;
 }
 
-/// Those of the series that are not zero throughout.
+/// The series that are not zero throughout.
 Panel panel_of(std::string label, std::vector<Series> series) {
   std::erase_if(series, [](const Series& each) {
     return std::ranges::all_of(each.values, [](double value) { return value == 0.0; });

@@ -35,7 +35,7 @@ std::string time_stamp() {
   return fmt::format("{}-{}", text, ::getpid());
 }
 
-/// The controller as a process of its own against the server at this address.
+/// Runs the controller as a process of its own against the server at this address.
 void control(const std::string& address, DemoRun& run) {
   Process controller({own_executable().string(), "control", "--json", "--link", address});
   const auto report = controller.await(Process::in(60s), parse_control);
@@ -51,7 +51,7 @@ void control(const std::string& address, DemoRun& run) {
   }
 }
 
-/// A server of its own on a free port, one move, the server's verdict.
+/// Starts a server on a free port, makes one move, and takes the server's verdict.
 DemoRun run_mode(const std::string& mode, int command_delay_ticks, const fs::path& recording) {
   DemoRun run;
   run.recording = recording.string();

@@ -29,7 +29,7 @@ std::filesystem::path folder_in(const char* variable) {
   return folder == nullptr ? "" : folder;
 }
 
-/// The secret of this user: made once, kept in a file that no other user can read.
+/// The secret of this user, created once and kept in a file that no other user can read.
 std::string own_secret() {
   const std::filesystem::path base = folder_in("XDG_CONFIG_HOME");
   const std::filesystem::path home = folder_in("HOME");
@@ -116,7 +116,7 @@ void ExperimentClient::with_link(const std::function<void(link::Link&)>& action)
       broken.reset();
       return action(*link_);
     } catch (const NotLetIn&) {
-      throw;  // a wrong token stays wrong, and each try makes other clients at this address wait
+      throw;  // a wrong token stays wrong, and each try delays the other clients at this address
     } catch (const link::LinkError& error) {
       link_.reset();
       const bool nobody_there = dynamic_cast<const link::ConnectError*>(&error) != nullptr;

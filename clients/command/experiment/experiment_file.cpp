@@ -120,7 +120,7 @@ class MessageReader {
     if (node.kind != ConfigNode::Kind::kScalar) {
       return report(node, key, "must be a single value");
     }
-    // Set or Add, as the field wants it.
+    // Set for a single field, Add for a repeated one.
     const auto put = [&](auto set, auto add, auto value) {
       if (field.is_repeated()) {
         (reflection->*add)(&message, &field, value);

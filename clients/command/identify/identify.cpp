@@ -54,7 +54,7 @@ const MotorName& chosen_motor(const std::string& name) {
   return *motor;
 }
 
-/// The experiment that was named; null if it is a file of the user's.
+/// The chosen experiment; null for a file of the user.
 const NamedExperiment* chosen_experiment(const MotorName& motor, const std::string& choice) {
   for (const NamedExperiment& each : identification::named_experiments()) {
     if (each.motor == motor.name && (choice.empty() || each.name == choice)) return &each;
@@ -95,7 +95,7 @@ void set_window(const std::string& text, identification::Processing& p) {
     throw UsageError(fmt::format("--window '{}' ends before it begins", printable(text)));
 }
 
-/// What the command line says goes before what is known otherwise.
+/// Applies the options of the command line, which override the settings of the experiment.
 void apply_options(const IdentifyOptions& o, Settings& e) {
   identification::Processing& p = e.processing;
   if (o.pole_pairs) e.pole_pairs = *o.pole_pairs;
@@ -175,14 +175,14 @@ void write(const std::string& path, const std::string& text) {
   out.flush();
 }
 
-/// The picture as the Markdown file beside it would name it.
+/// The path of the picture relative to the Markdown file.
 std::string relative_plot(const IdentifyOptions& options) {
   if (options.plot_file.empty()) return {};
   const std::filesystem::path folder = std::filesystem::absolute(options.markdown_file).parent_path();
   return std::filesystem::absolute(options.plot_file).lexically_relative(folder).generic_string();
 }
 
-/// Files that were asked for. What cannot be made is told when the others are there.
+/// Writes the requested files. Reports a file that it cannot write after it has written the others.
 int write_files(const IdentifyOptions& options, const IdentifyReport& report, const Measurement& m) {
   std::string problems;
   const auto attempt = [&](const std::string& path, const auto& text) {

@@ -23,7 +23,7 @@ namespace {
 using identification::BenchParameters;
 using identification::MeasuredData;
 
-/// How a recording names its configuration.
+/// The name of the configuration in a recording.
 constexpr std::string_view kConfiguration = "bench.toml";
 
 /// The samples of one axis as columns, tick by tick.
@@ -103,7 +103,7 @@ void take_scalars(const ConfigNode& section, BenchParameters& parameters) {
   }
 }
 
-/// Of a machine in a configuration: whose third terminal there is.
+/// Whether a machine of a configuration has a third phase.
 bool has_three_phases(const std::string& machine, const BenchParameters& parameters) {
   const auto star = parameters.find("machine.star");
   return machine == "bldc" || (star != parameters.end() && star->second != 0.0);
@@ -176,7 +176,7 @@ void take_configuration(std::string_view toml, const std::string& axis, Measurem
     if (section.key == "machine") m.machine = text_of(section, "kind");
     if (section.key == "drive" && child_of(section, "kind") != nullptr) m.drive = text_of(section, "kind");
   }
-  // What changes while the bench runs has no one value.
+  // A value that changes during the run is unknown.
   if (const ConfigNode* const changes = child_of(*found, "set")) {
     for (const ConfigNode& change : changes->children)
       m.bench.erase(text_of(change, "parameter"));

@@ -14,33 +14,33 @@ namespace drivebench::command {
 
 struct IdentifyOptions;
 
-/// Signals of a motor, and all that is known about them.
+/// Signals of a motor, and the known facts about them.
 struct Measurement {
   identification::MeasuredData data{};
   identification::MeasurementFacts facts{};
-  identification::BenchParameters bench{};  ///< empty: the truth is not known
+  identification::BenchParameters bench{};  ///< empty: the truth is unknown
   std::string source{};                     ///< one line for people
-  std::string machine{};                    ///< its kind; empty: not known
+  std::string machine{};                    ///< its kind; empty: unknown
   std::string motor{};                      ///< its name
-  std::string drive{};                      ///< its kind; empty: not known
+  std::string drive{};                      ///< its kind; empty: unknown
   int substeps = 1;                         ///< integration steps of the bench in a tick
   std::optional<v1::ExperimentInfo> experiment{};
 };
 
-/// What a bench says about one of its axes, and a request changes about it: its settings hold, what its
-/// events change is not known.
+/// Takes the facts about an axis from the description of its bench and from the request: settings of the
+/// request override the description, and a value that its events change is unknown.
 void take_description(const v1::BenchDescription& bench, std::uint32_t axis, const v1::RunExperiment& request,
                       Measurement& measurement);
 
-/// Samples of one axis of a recording, with what its configuration says. Throws UsageError if there are none,
-/// or if ticks are missing between the first and the last of them.
+/// Samples of one axis of a recording, with the facts in its configuration. Throws UsageError if the axis has
+/// no samples, or if ticks are missing between the first and the last one.
 Measurement read_recording(const std::string& file, const std::string& axis);
 
-/// A CSV file; the facts stay what they are by default. Throws UsageError "file:line: column: rule".
+/// A CSV file; all facts keep their defaults. Throws UsageError "file:line: column: rule".
 Measurement read_foreign(const IdentifyOptions& options);
 
-/// What the configuration that recordings carry says about one axis (empty: the first): `bench`, `machine`,
-/// `motor`, `drive`, `substeps`. Nothing if the text is none.
+/// Takes `bench`, `machine`, `motor`, `drive` and `substeps` of one axis (empty: the first) from the
+/// configuration in a recording. Takes nothing if the text is not a configuration.
 void take_configuration(std::string_view toml, const std::string& axis, Measurement& measurement);
 
 /// The data as CSV, as `drivebench export` writes them.

@@ -40,7 +40,7 @@ bool is_wanted(std::string_view name) {
   return std::ranges::find(kWanted, name) != kWanted.end();
 }
 
-/// Where the factor of SIGNAL*FACTOR+OFFSET ends: at a sign that belongs to no exponent.
+/// The end of the factor in SIGNAL*FACTOR+OFFSET: a sign that belongs to no exponent.
 std::size_t end_of_factor(std::string_view text) {
   for (std::size_t k = 1; k < text.size(); ++k) {
     if ((text[k] == '+' || text[k] == '-') && text[k - 1] != 'e' && text[k - 1] != 'E') return k;

@@ -6,7 +6,7 @@
 
 #include "clients/identification/data/measured_data.hpp"
 
-/// How the columns of any CSV file become signals of the catalogue.
+/// Maps the columns of any CSV file to signals of the catalogue.
 namespace drivebench::command {
 
 struct IdentifyOptions;
@@ -14,11 +14,11 @@ struct IdentifyOptions;
 /// `HEADER=SIGNAL`, `HEADER=SIGNAL*FACTOR`, `HEADER=SIGNAL*FACTOR+OFFSET`. Throws UsageError with the rule.
 identification::ColumnMap parse_column(std::string_view text);
 
-/// A column-map file: `time`, `time_factor` or `period_s`, and [columns] with SIGNAL = "HEADER" or
-/// SIGNAL = { header = "HEADER", factor = 1e-3, offset = 0.0 }. Throws ConfigError with everything wrong.
+/// A column-map file: `time`, `time_factor` or `period_s`, and [columns] with SIGNAL = "HEADER" or SIGNAL = {
+/// header = "HEADER", factor = 1e-3, offset = 0.0 }. Throws ConfigError with all problems.
 identification::CsvOptions parse_column_map(std::string_view text, const std::string& file);
 
-/// All --map options and what stands beside them: each is a column, or the name of a column-map file. Throws
+/// The CSV options of the command line. Each --map is a column, or the name of a column-map file. Throws
 /// UsageError.
 identification::CsvOptions csv_options(const IdentifyOptions& options);
 

@@ -28,7 +28,7 @@ std::string filter_text(const LowPass& filter) {
   return filter.cutoff_hz > 0.0 ? fmt::format("{:g} Hz", filter.cutoff_hz) : std::string("none");
 }
 
-/// How the data became equations, for the reader of the table below.
+/// The settings of the identification as text, for the reader of the table below.
 std::string settings_text(const IdentifyReport& r) {
   const Processing& p = r.settings.processing;
   std::string text = fmt::format(

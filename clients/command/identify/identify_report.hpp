@@ -10,7 +10,7 @@
 
 namespace drivebench::command {
 
-/// What became of an identification.
+/// The outcome of an identification.
 struct IdentifyReport {
   std::string motor;  ///< as the command line names its kind
   std::string source;
@@ -18,14 +18,14 @@ struct IdentifyReport {
   identification::Settings settings;
   identification::Result result;
   std::optional<identification::Resimulation> validation;
-  std::string validation_problem;  ///< why there is none
+  std::string validation_problem;  ///< the reason if there is no validation
   std::optional<v1::ExperimentInfo> experiment;
 };
 
 /// For a terminal: a line on the data, the table, verdict, validation and notes.
 std::string identify_text(const IdentifyReport& report);
 
-/// The same with a Markdown table; `plot` is the picture's file, beside this one, or empty.
+/// The same text with a Markdown table; `plot` is the picture's path relative to the file, or empty.
 std::string identify_markdown(const IdentifyReport& report, const std::string& plot);
 
 /// Measured and re-simulated currents and speed as an SVG picture.

@@ -23,7 +23,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A folder that goes with this object.
+/// A folder that is deleted with this object.
 class OwnFolder {
  public:
   OwnFolder() {
@@ -77,8 +77,8 @@ class OwnServer {
   std::string address_;
 };
 
-/// Why the bench behind the link does not fit; empty: it fits. Throws what is wrong with a link that was
-/// named on the command line.
+/// The reason why the bench behind the link does not fit; empty: it fits. Throws the error of a link that the
+/// command line names.
 std::string why_not(const IdentifyOptions& options, const WantedExperiment& wanted) {
   try {
     link::Link link = open_link(options.server.link, "identify");
@@ -95,14 +95,14 @@ std::string why_not(const IdentifyOptions& options, const WantedExperiment& want
                          axis.machine_kind(), wanted.machine);
     link.list_experiments("");  // without an owner: a bench that keeps no experiments refuses
   } catch (const std::runtime_error& error) {
-    // Nothing answers, or another program, or a bench that refuses.
+    // No program answers, or another program, or a bench that refuses.
     if (options.link_was_named) throw;
     return error.what();
   }
   return {};
 }
 
-/// The signals that identification needs, beside those that the file asks for.
+/// Adds the signals that identification needs to those of the file.
 void add_signals(v1::RunExperiment& request, const v1::AxisDescription& axis) {
   std::vector<std::string> needed = {"encoder_count", "angle_rad", "load_nm"};
   for (unsigned k = 0; k < std::max(1U, axis.phases()); ++k) {

@@ -26,7 +26,7 @@
 namespace drivebench::command {
 namespace {
 
-/// All but the tick, which begins every row, if none is named.
+/// The named signals; without names all but the tick, which begins every row.
 std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
   std::vector<const Signal*> signals = signals_named(names);
   if (!names.empty()) return signals;
@@ -63,16 +63,16 @@ struct Exported {
   std::string other_axes;
 };
 
-/// Where the messages of an axis are found, by channel.
+/// Finds the messages of an axis by their channel.
 class AxisChannels {
  public:
-  /// Without a name the axis is the first that comes.
+  /// Without a name it takes the first axis in the file.
   explicit AxisChannels(std::string axis) : axis_(std::move(axis)) {}
 
   struct Place {
     bool is_sample;
     bool is_wanted;
-    std::uint32_t number;  ///< of the axis: a tick brings the samples of all, in their order
+    std::uint32_t number;  ///< of the axis: a tick has the samples of all axes in their order
   };
   const Place& find(const McapReader& reader, std::uint16_t channel) {
     const auto known = places_.find(channel);
@@ -93,21 +93,21 @@ class AxisChannels {
   std::map<std::uint16_t, Place> places_;
 };
 
-/// Refuses an axis of which there is no sample.
+/// Refuses an axis without samples.
 void check_axis(const MappedSeries& files, const std::string& axis) {
   if (axis.empty()) return;
   McapSeries reader(files.segments());
   AxisChannels channels(axis);
   for (McapMessage message; reader.next(message);) {
     if (channels.find(reader.reader(), message.header.channel).is_wanted)
-      return;  // as a rule the first tick has it
+      return;  // usually in the first tick
   }
   throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}{}", axis,
                                channels.others().empty() ? "none" : channels.others(),
                                reader.problem() ? ", and is not whole: " + reader.problem()->what : ""));
 }
 
-/// Refuses what would cost the output file what it held, or the recording itself.
+/// Refuses an export that would overwrite the recording, or replace the output file without data.
 void check_files(const McapSeries& reader, const MappedSeries& files, const ExportOptions& options) {
   refuse_other_files(reader, options.recording);
   check_axis(files, options.axis);
@@ -117,7 +117,7 @@ void check_files(const McapSeries& reader, const MappedSeries& files, const Expo
   }
 }
 
-/// Hands every message that can be read to `take`, and what `take` has left in `text` to the file.
+/// Gives every readable message to `take`, and writes the text that `take` leaves in `text` to the file.
 template <class Take>
 void for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
                       std::string& text, Output& out, Take take) {
@@ -134,7 +134,7 @@ void for_each_message(McapSeries& reader, const ExportOptions& options, std::uin
   }
 }
 
-/// Everything that can be read, row by row.
+/// Exports every readable sample, row by row.
 Exported export_rows(McapSeries& reader, const ExportOptions& options,
                      const std::vector<const Signal*>& signals, std::uint64_t file_size, Output& out) {
   Exported done;
@@ -142,7 +142,7 @@ Exported export_rows(McapSeries& reader, const ExportOptions& options,
   std::string text;
   for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
     if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
-    if (!done.has_header) text += csv_header(signals);  // when there is something to head
+    if (!done.has_header) text += csv_header(signals);  // only above a first row
     done.has_header = true;
     const std::optional<Sample> sample = decode_sample(message.payload);
     if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
@@ -167,20 +167,20 @@ bool is_lockstep(const MappedSeries& files) {
   return verdict.mode() == v1::MODE_LOCKSTEP;
 }
 
-/// The interface, profile and nodes that the frames shall have.
+/// The interface, profile and nodes of the frames.
 link::CanAddress can_address_of(const ExportOptions& options) {
   return link::parse_can_address(fmt::format("can:socketcan:{}?node={}{}{}{}", options.interface,
                                              options.node_base, options.classic ? "&fd=0" : "",
                                              options.profile.empty() ? "" : "&", options.profile));
 }
 
-/// The frames of all axes, or of the one that was named.
+/// Exports the frames of all axes, or of the named one.
 Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files,
                        Output& out) {
   Exported done;
   CandumpText frames(can_address_of(options), is_lockstep(files));
   AxisChannels channels(options.axis);
-  std::optional<std::uint32_t> only;  // the axis that was named, once a sample of it came
+  std::optional<std::uint32_t> only;  // the named axis, from its first sample on
   for_each_message(reader, options, files.size(), frames.text(), out, [&](const McapMessage& message) {
     const auto& place = channels.find(reader.reader(), message.header.channel);
     const double time_s = static_cast<double>(message.header.log_time_ns) * 1e-9;
@@ -215,7 +215,7 @@ int run_export(const ExportOptions& options) {
   const MappedSeries files = open_recording(options.recording);
   McapSeries reader(files.segments());
   const std::vector<const Signal*> signals = chosen_signals(options.signals);
-  if (!is_csv) can_address_of(options);  // refuses what is wrong before the file is made
+  if (!is_csv) can_address_of(options);  // refuses wrong options before it creates the file
   if (!is_csv && !options.signals.empty()) throw UsageError("--signals chooses columns of CSV");
   if (options.from_tick > options.to_tick) {
     throw UsageError(fmt::format("--from {} is behind --to {}", options.from_tick, options.to_tick));

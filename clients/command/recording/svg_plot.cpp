@@ -19,7 +19,7 @@ constexpr double kPanelHeight = 120.0;
 constexpr double kGap = 14.0;
 constexpr double kBottom = 40.0;
 constexpr double kPixelsPerPoint = 2.0;  // keeps a file small
-// Told apart by the colour-blind too (Okabe and Ito).
+// Colours that colour-blind readers distinguish too (Okabe and Ito).
 constexpr std::array<std::string_view, 6> kColours = {"#0072b2", "#d55e00", "#009e73",
                                                       "#cc79a7", "#e69f00", "#000000"};
 
@@ -37,7 +37,7 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-/// What an axis shows: from a multiple of the step to another.
+/// The range of an axis of the plot: from a multiple of the step to another.
 struct Scale {
   double low = 0.0;
   double high = 1.0;
@@ -110,8 +110,8 @@ void append_grid(std::string& svg, const Scale& x, const Scale& y, double top_px
   }
 }
 
-/// Of the values that share a pixel the smallest and the largest, in the order they come. Tenths of pixels
-/// and steps from point to point keep the text short.
+/// Draws the smallest and the largest of the values in a pixel, in their order. Tenths of pixels and steps
+/// from point to point keep the text short.
 void append_line(std::string& svg, const std::vector<double>& x, const Series& series, const Scale& x_scale,
                  const Scale& y_scale, std::string_view colour) {
   const auto out = std::back_inserter(svg);
