@@ -56,8 +56,8 @@ std::string listed(const std::vector<ConfigProblem>& problems) {
   return text;
 }
 
-// A dotted key nests a table per dot. Short lines keep that, and the recursion over it, from filling the
-// stack.
+// A dotted key nests a table per dot. The limit on the line bounds the nesting, and with it the recursion on
+// the stack.
 constexpr std::size_t kMaxLineBytes = 1000;
 
 int line_of(const toml::source_region& source) {

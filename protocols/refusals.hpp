@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <string_view>
 
-/// Why the bench refuses a request, and how each protocol says so: one table. Includes nothing but std.
+/// The reasons of refusals and their codes in each protocol: one table. Includes nothing but std.
 namespace drivebench {
 
-/// Why the bench did not do what a request asked for; in the order of the rows of kRefusals.
+/// The reason why the bench refused a request, in the order of the rows of kRefusals.
 enum class Refused : std::uint32_t {
   kNot,
   kNotOwner,
@@ -137,7 +137,7 @@ inline constexpr auto kRefusals = [] {
        "the command answers a sample that is too old, already answered or not taken yet"},
       {R::kBusy,          "busy",              T::kBusy,        C::kBusy,        M::kBusy,        E::kBusy,
        "too many requests are waiting for the bench"},
-      // The next two are said over CAN alone: elsewhere a codec refuses such a request.
+      // Only CAN uses the next two: elsewhere a codec refuses such a request.
       {R::kMalformed,     "malformed",         T::kMalformed,   C::kMalformed,   M::kNone,        E::kIllegalValue,
        "a field of the frame has a value that means nothing"},
       {R::kIncomplete,    "incomplete",        T::kMalformed,   C::kIncomplete,  M::kNone,        E::kIllegalValue,
@@ -178,7 +178,7 @@ constexpr std::string_view sentence_of(Refused why) noexcept {
   return refusal_row(why).sentence;
 }
 
-/// What a code of a protocol means: `column` is its member of a row. A code that no row has means
+/// The meaning of a code of a protocol: `column` is its member of a row. A code that no row has means
 /// `otherwise`.
 template <class Code>
 constexpr const RefusalRow& refusal_meant_by(Code RefusalRow::*column, Code code,
@@ -227,7 +227,7 @@ inline constexpr CodeList kModbus =
 
 }  // namespace refusals_detail
 
-/// What the DBC file says of the field `result`, and the register map of last_refusal.
+/// The meaning of the field `result` in the DBC file, and of last_refusal in the register map.
 inline constexpr std::string_view kCanResultMeaning(refusals_detail::kCan.text.data(),
                                                     refusals_detail::kCan.size);
 inline constexpr std::string_view kLastRefusalMeaning(refusals_detail::kModbus.text.data(),

@@ -8,7 +8,7 @@
 /// The back ends of a CAN bus, for the configuration of the server and for the links of clients.
 namespace drivebench::can {
 
-/// What carries the frames of a bus.
+/// The transport that carries the frames of a bus.
 enum class Backend : std::uint8_t { kSocketCan, kUdpMulticast, kSlcan, kSocketcand };
 
 struct BackendRow {
@@ -16,7 +16,7 @@ struct BackendRow {
   std::string_view name;             ///< in configurations and in links
   std::string_view default_channel;  ///< empty: the channel must be named
   std::uint16_t default_port;        ///< 0: the back end has no port
-  double frames_per_s;               ///< what a bench sends at most, whatever the bit rate allows; 0: any
+  double frames_per_s;  ///< the most that a bench sends, whatever the bit rate allows; 0: no limit
 };
 
 /// Beyond 8000 datagrams/s the buffers of receivers lose some.

@@ -63,7 +63,7 @@ constexpr Field code(std::string_view name, std::uint16_t start, std::uint8_t bi
                      std::string_view meaning) {
   return {name, "1", start, bits, Encoding::kCode, Unit::kNone, signal, meaning};
 }
-/// Of the numbers that the meaning lists: "0 this, 1 that". What follows a colon explains.
+/// A field whose meaning lists its numbers: "0 this, 1 that". The text after a colon explains.
 constexpr Field choice(std::string_view name, std::uint16_t start, std::string_view signal,
                        std::string_view meaning) {
   return {name, "enum", start, 8, Encoding::kCode, Unit::kNone, signal, meaning};

@@ -36,9 +36,9 @@ struct Request {
   Function function{};
   RegisterMap::Range read{};       ///< 3, 4, 23
   RegisterMap::Range write{};      ///< 6, 16, 22, 23
-  std::uint16_t read_address = 0;  ///< as it came: 1 to 4, 23
+  std::uint16_t read_address = 0;  ///< as received: 1 to 4, 23
   std::uint16_t read_count = 0;
-  std::uint16_t write_address = 0;  ///< as it came: 5, 6, 15, 16, 22, 23
+  std::uint16_t write_address = 0;  ///< as received: 5, 6, 15, 16, 22, 23
   std::uint16_t write_count = 0;
   std::span<const std::uint8_t> data{};  ///< the written words or packed bits; 22: the two masks
 };

@@ -16,7 +16,7 @@ enum class SignalType {
   kReal,      ///< double on the wire
 };
 
-/// Where a signal comes from. A controller on a real bench gets status and sensors, never the truth.
+/// The origin of a signal. A controller on a real bench gets status and sensors, never the truth.
 enum class SignalKind { kStatus, kSensor, kTruth };
 
 /// One row of the catalogue.
@@ -35,7 +35,7 @@ struct Signal {
 
 namespace catalogue_detail {
 
-constexpr double kAnyTick = 9.007199254740992e15;  // 2^53: what a double holds exactly
+constexpr double kAnyTick = 9.007199254740992e15;  // 2^53: a double holds every integer up to here
 
 constexpr Signal signal(std::string_view name, std::string_view unit, SignalKind kind, double minimum,
                         double maximum, std::uint64_t Sample::*member, std::string_view meaning) {

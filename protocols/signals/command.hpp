@@ -4,7 +4,7 @@
 
 namespace drivebench {
 
-/// What the gates do during a tick; the numbers are those of Gates in bench.proto.
+/// The state of the gates during a tick; the numbers are those of Gates in bench.proto.
 enum class Gates : std::int64_t {
   kOff = 0,          ///< freewheel: currents flow through the diodes into the DC link until they are zero
   kVoltage = 1,      ///< the commanded voltages
@@ -21,14 +21,14 @@ struct PhaseValues {
   double field = 0.0;
 };
 
-/// What the drive is to do in one tick, throughout which it holds. In a star the voltages are those of the
+/// The command that the drive carries out for one whole tick. In a star the voltages are those of the
 /// terminals against the middle of the DC link: a common part does nothing.
 struct PhaseCommand {
   Gates gates = Gates::kOff;
   PhaseValues setpoint{};  ///< [V], or [A] with Gates::kCurrent
 };
 
-/// What a controller asks of an axis, in answer to the sample of one tick.
+/// The command of a controller for an axis, in answer to the sample of one tick.
 struct Command {
   std::int64_t answers = -1;  ///< the tick; -1: none
   PhaseCommand phases{};
