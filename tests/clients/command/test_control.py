@@ -97,7 +97,7 @@ class Gains(ControlTest):
 
 
 class Compare(ControlTest):
-    def test_the_references_own_recording_differs_by_nothing(self):
+    def test_the_references_own_recording_has_no_difference(self):
         """Would catch: samples and commands joined a tick apart, and a second move that is taken for the first."""
         file, report = self.recording("own", moves=2)
         seen = self.json_of("--compare", file, "--threshold", 0)
@@ -108,7 +108,7 @@ class Compare(ControlTest):
         self.assertAlmostEqual(seen["tracking"]["peak_error_counts"], report["peak_error_counts"], delta=1e-9)
         self.assertIsNone(seen["with"])
 
-    def test_other_gains_are_found_out(self):
+    def test_other_gains_are_noticed(self):
         """Would catch: a comparison that is always content. At the first tick the reference asks for K_P times 5.88 A."""
         file, _ = self.recording("stiff", "--gain", "current.proportional_v_per_a=7")
         seen = self.json_of("--compare", file, "--threshold", 0.5, code=FAILED)
@@ -118,7 +118,7 @@ class Compare(ControlTest):
         self.assertEqual(seen["terminals"]["c"]["largest"], 0.0)
         self.json_of("--compare", file, "--threshold", 0, "--gain", "current.proportional_v_per_a=7")
 
-    def test_a_controller_of_ones_own(self):
+    def test_a_controller_of_the_user_is_compared(self):
         """Would catch: a comparison that needs a recording of the reference. 10 V on phase a, nothing else, for 40 ms."""
         file = self.folder / "mine.mcap"
         with Server("--record", str(file)) as server, server.client() as client:
@@ -137,7 +137,7 @@ class Compare(ControlTest):
         self.assertIn("the recording does not hold the whole run", self.control("--compare", file).stdout)
         self.json_of("--compare", file, "--threshold", 1000, code=FAILED)
 
-    def test_a_recording_that_lost_its_end_is_not_as_good_as_a_whole_one(self):
+    def test_a_recording_without_its_end_fails(self):
         """Would catch: a regression run that passes because the bench died in it: its samples until then do not differ."""
         held = ("--gain", "run.hold_s=0.5")
         file, _ = self.recording("own", *held)
@@ -157,7 +157,7 @@ class Compare(ControlTest):
         done = self.control("--json", "--compare", cut, "--threshold", 0, *held)
         self.assertEqual((json.loads(done.stdout)["whole"], "not whole" in done.stderr), (True, True))
 
-    def test_two_recordings_beside_each_other(self):
+    def test_two_recordings_are_compared_tick_by_tick(self):
         """Would catch: runs that are laid beside each other at the wrong tick; the load comes 25 + 36.5 ms after the start."""
         plain, _ = self.recording("plain")
         loaded, _ = self.recording("loaded", "--load", "0.1@0.0365")
@@ -168,7 +168,7 @@ class Compare(ControlTest):
         same = self.json_of("--compare", plain, "--with", plain)["with"]
         self.assertEqual((same["commands"]["largest"], same["angle_rad"]["largest"]), (0.0, 0.0))
 
-    def test_what_cannot_be_compared_is_refused(self):
+    def test_incomparable_recordings_are_refused(self):
         """Would catch: a recording of another rate, axis or kind that gives numbers which mean nothing."""
         file, _ = self.recording("own")
         for arguments, fact in ((["--compare", file, "--preset", "book/8.2.2-4khz"], "is sampled at 8000 Hz, the preset at 4000 Hz"),
@@ -199,7 +199,7 @@ class Plot(ControlTest):
         self.assertEqual(sum(each.tag.endswith("path") for each in picture.iter()), 2 + 1 + 2 + 2)
         self.assertEqual(self.plot(file, "--panels", "angle").stdout.count("<path"), 1)
 
-    def test_what_cannot_be_drawn_is_refused(self):
+    def test_an_impossible_picture_is_refused(self):
         """Would catch: an empty picture with an exit code of 0."""
         file, _ = self.recording("own")
         for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),

@@ -104,7 +104,7 @@ class Links(unittest.TestCase):
                 self.assertIn("another session holds the lease of the axis", done.stderr)
 
     # Catches: a fault that is overlooked because the link has no names for it, and a clear that does nothing.
-    def test_a_latched_fault_is_seen_and_cleared(self):
+    def test_a_latched_fault_is_reported_and_cleared(self):
         for text, link_of in (multicast("true"), multicast("false"), modbus()):
             with Server(text=text) as server:
                 with server.client() as owner:
@@ -118,7 +118,7 @@ class Links(unittest.TestCase):
                 self.control(link_of(server), "--clear")
 
     # Catches: an option that a link cannot serve and that is passed over.
-    def test_what_a_link_cannot_do_is_refused(self):
+    def test_a_request_that_the_link_cannot_carry_is_refused(self):
         text, link_of = multicast("true")
         with Server(text=text) as server:
             link = link_of(server)
@@ -178,7 +178,7 @@ class Links(unittest.TestCase):
             return subprocess.CompletedProcess(logging.args, logging.returncode, "", err)
 
     # Catches: a description that is not printed, or of another bench.
-    def test_descriptions_of_interfaces(self):
+    def test_descriptions_of_interfaces_are_printed(self):
         for arguments, part in ((["dbc", str(BENCHES / "servo-can.toml")], "BO_ "),
                                 (["can-table", str(BENCHES / "servo-can.toml")], "| "),
                                 (["modbus-map", str(BENCHES / "servo-modbus.toml")], "| "),
@@ -190,7 +190,7 @@ class Links(unittest.TestCase):
         self.assertEqual(run("dbc", "no-such-bench").returncode, 2)
 
     # Catches: a status that keeps the other ways in to itself.
-    def test_status_tells_of_every_transport(self):
+    def test_status_lists_every_transport(self):
         text, link_of = multicast("true")
         text += "\n[modbus]\nport = 0\nallow_writes = true\n"
         with Server(text=text) as server:

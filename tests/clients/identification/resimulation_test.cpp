@@ -61,7 +61,7 @@ MeasuredData dc_data() {
 // The plant's DC motor and the model with the same parameters differ by the edges of the square wave that the
 // interpolation of the voltage rounds: 0.2 % of the current (R + 10 %: 8 %). Catches: a sign of the emf, a
 // voltage that is half a period off, a friction that drives.
-TEST(Resimulation, ADcMotorWithItsTrueParametersDoesWhatItDid) {
+TEST(Resimulation, ADcMotorWithItsTrueParametersRepeatsItsRun) {
   const MeasuredData data = dc_data();
   const Settings e = exact(MotorKind::kDc, 1, 0.5, false);
   const Resimulation r = resimulate(data, e, result_of("pm_dc", kDc));
@@ -174,7 +174,7 @@ TEST(Resimulation, ABrushlessMotorRunsOnVoltagesThatFollowIt) {
 }
 
 // Catches: a picture of nonsense where the data did not show the motor, and a run that never ends.
-TEST(Resimulation, WhatIsNoMotorIsRefused) {
+TEST(Resimulation, ImpossibleParametersAreRefused) {
   const MeasuredData data = dc_data();
   const Settings e = exact(MotorKind::kDc, 1, 0.5, false);
   auto values = kDc;

@@ -103,7 +103,7 @@ std::string cure_of(const Hardware& hardware) {
 }
 
 // Catches: a field of the kernel's answer read from the wrong place or in the wrong unit.
-TEST(CanCheck, ReadsWhatTheDriverTells) {
+TEST(CanCheck, ReadsTheAnswerOfTheDriver) {
   const CanInterface interface = parse_link_message(Hardware{}.message()).value();
   EXPECT_EQ(interface.name, "can0");
   EXPECT_TRUE(interface.is_can && interface.up);
@@ -142,14 +142,14 @@ TEST(CanCheck, EachProblemHasItsCure) {
 }
 
 // Catches: classic CAN called a problem where it was asked for.
-TEST(CanCheck, ClassicIsNoProblemWhereItWillDo) {
+TEST(CanCheck, ClassicCanIsNoProblemIfRequested) {
   const Hardware hardware{.mtu = 16, .mode = 0};
   const std::vector<CanFinding> found = can_findings(parse_link_message(hardware.message()).value(), true);
   EXPECT_TRUE(std::none_of(found.begin(), found.end(), [](const auto& each) { return each.problem; }));
 }
 
 // Catches: reading past a message that is cut short or lies about its lengths.
-TEST(CanCheck, DamagedAnswersAreSurvived) {
+TEST(CanCheck, DamagedAnswersDoNoHarm) {
   const Bytes whole = Hardware{}.message();
   for (std::size_t size = 0; size < whole.size(); ++size)
     EXPECT_FALSE(parse_link_message(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size))));
@@ -163,7 +163,7 @@ TEST(CanCheck, DamagedAnswersAreSurvived) {
 }
 
 // Catches: an interface that is not there taken for one without problems.
-TEST(CanCheck, WhatIsNotThereCannotBeHad) {
+TEST(CanCheck, AMissingInterfaceIsAnError) {
   EXPECT_FALSE(read_can_interface("nosuchcan0"));
   EXPECT_FALSE(read_can_interface(""));
   EXPECT_FALSE(read_can_interface("a_name_that_is_far_too_long"));

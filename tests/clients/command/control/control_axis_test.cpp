@@ -42,7 +42,7 @@ TEST(Mismatches, NameKindsRateCountsPolePairsAndVoltage) {
 }
 
 // Catches: a gain that changes the controller but not what it is checked against.
-TEST(Mismatches, GainsThatDescribeTheAxisChangeWhatIsNeeded) {
+TEST(Mismatches, GainsThatDescribeTheAxisChangeTheRequirements) {
   const control::Preset& preset = *control::find_preset("book/8.2.2");
   const std::vector<control::Gain> gains = {
       {"counts_per_revolution", 4000.0}, {"machine.pole_pairs", 2.0}, {"voltage_limit_v", 60.0}};

@@ -70,7 +70,7 @@ TEST(ControlRunSummary, TakesPeaksOverAllAndFinalErrorsOverTheLastHundredSamples
 
 // Catches: a report that passes off the encoder's angle for the truth, or shows a value that was not
 // measured.
-TEST(ControlRunSummary, SaysWhatItsNumbersRestOn) {
+TEST(ControlRunSummary, NamesTheSourceOfItsNumbers) {
   ControlRun run;
   run.counts_per_rad = 2.0;
   run.rows = {

@@ -43,7 +43,7 @@ std::string problems_of(const std::string& text) {
 
 // Catches: a key that is read into another field, a whole number that a real one does not take, a lost
 // default.
-TEST(ExperimentFile, IsTheRequestThatItSays) {
+TEST(ExperimentFile, GivesTheRequestWithItsValues) {
   const ExperimentFile file = parse_experiment(kGood, "e.toml");
   EXPECT_EQ(file.axis, "dc-a");
   const v1::RunExperiment& r = file.request;
@@ -62,7 +62,7 @@ TEST(ExperimentFile, IsTheRequestThatItSays) {
 }
 
 // Catches: a mistake that is passed over, told with another line, or the only one that is told.
-TEST(ExperimentFile, TellsEverythingThatIsWrongWithItsLines) {
+TEST(ExperimentFile, ReportsEveryProblemWithItsLine) {
   const auto with = [](const std::string& from, const std::string& to) {
     std::string text = kGood;
     return problems_of(text.replace(text.find(from), from.size(), to));
@@ -147,7 +147,7 @@ v1::ExperimentData rows_of(std::uint64_t first_tick, const std::vector<double>& 
 }
 
 // Catches: rows that a second connection brings again and that are written twice, a hole that is not noticed.
-TEST_F(Csv, RowsAreWrittenOnceWhateverComesTwice) {
+TEST_F(Csv, RepeatedRowsAreWrittenOnce) {
   v1::ExperimentInfo info;
   info.add_signals("i_a_a");
   info.add_signals("encoder_count");

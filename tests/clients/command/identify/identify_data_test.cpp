@@ -136,7 +136,7 @@ std::string refusal(const std::string& file, const std::string& axis = {}) {
 }
 
 // Catches: samples with a hole that pass for equidistant, and files that are no recordings.
-TEST_F(IdentifyFiles, ARecordingThatCannotBeUsedIsRefused) {
+TEST_F(IdentifyFiles, AnUnusableRecordingIsRefused) {
   EXPECT_NE(refusal(recording("hole.mcap", 10, 104)).find("tick 105 comes after tick 103"),
             std::string::npos);
   EXPECT_NE(refusal(write("text.mcap", "time,i\n1,2\n")).find("is not a recording"), std::string::npos);
@@ -148,7 +148,7 @@ TEST_F(IdentifyFiles, ARecordingThatCannotBeUsedIsRefused) {
 }
 
 // Catches: a recording cut short by a crash that yields nothing.
-TEST_F(IdentifyFiles, OfACutRecordingWhatIsThereIsUsed) {
+TEST_F(IdentifyFiles, ACutRecordingGivesItsSamples) {
   const std::string file = recording("r.mcap", 3000);
   fs::resize_file(file, fs::file_size(file) / 2);
   const Measurement m = read_recording(file, "");
@@ -157,7 +157,7 @@ TEST_F(IdentifyFiles, OfACutRecordingWhatIsThereIsUsed) {
 }
 
 // Catches: a configuration of garbage in a recording that ends the command.
-TEST(IdentifyData, AConfigurationThatIsNoneSaysNothing) {
+TEST(IdentifyData, AnInvalidConfigurationGivesNoFacts) {
   for (const char* text : {"", "[[axis", "axis = 3", "[[axis]]\nname = 5\n", "[axis]\nname = \"a\"\n"}) {
     Measurement m;
     take_configuration(text, "a", m);
@@ -167,7 +167,7 @@ TEST(IdentifyData, AConfigurationThatIsNoneSaysNothing) {
 }
 
 // Catches: settings of the request that the truth does not know, and a parameter that changes on the way.
-TEST(IdentifyData, ADescriptionIsThatOfTheExperiment) {
+TEST(IdentifyData, TheDescriptionAndTheRequestGiveTheFacts) {
   v1::BenchDescription bench;
   bench.set_substeps(5);
   v1::AxisDescription& axis = *bench.add_axes();

@@ -84,7 +84,7 @@ angle_rad = { factor = 0.017453292519943295 }
 }
 
 // Catches: a column-map file whose mistakes are passed over, or told one at a time.
-TEST(IdentifyMap, EverythingWrongInAFileIsToldAtOnce) {
+TEST(IdentifyMap, AllProblemsOfAFileAreReportedAtOnce) {
   try {
     parse_column_map(
         "tiem = \"t\"\nperiod_s = 0.0\ntime_factor = \"x\"\n[columns]\nspeed = \"n\"\ni_a_a = 3\n"
@@ -103,7 +103,7 @@ TEST(IdentifyMap, EverythingWrongInAFileIsToldAtOnce) {
 }
 
 // Catches: a command line that does not go before the file.
-TEST(IdentifyMap, OptionsJoin) {
+TEST(IdentifyMap, TheCommandLineOverridesTheFile) {
   IdentifyOptions options;
   options.maps = {"I=i_a_a", "U=u_a_v*2"};
   options.time = "zeit";

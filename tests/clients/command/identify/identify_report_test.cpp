@@ -30,7 +30,7 @@ IdentifyReport some_report() {
 }
 
 // Catches: a table that shows what was not seen, or says nothing about how good the index was.
-TEST(IdentifyReport, TheTextTellsEstimateIndexTruthErrorAndVerdict) {
+TEST(IdentifyReport, TheTextHasEstimateIndexTruthErrorAndVerdict) {
   const std::string text = identify_text(some_report());
   for (const char* part :
        {"R      ohm                  2.02     1.49 %            2        1 %  inside the index\n",

@@ -133,7 +133,7 @@ TEST_F(CommandFiles, ExportWritesTheChosenSamplesExactly) {
 }
 
 // Catches: a recording cut short by a crash that yields nothing, or passes for whole.
-TEST_F(CommandFiles, ExportOfACutRecordingWritesWhatIsThereAndSaysSo) {
+TEST_F(CommandFiles, ExportOfACutRecordingWritesItsSamplesAndReportsTheCut) {
   ExportOptions options = {.recording = write_recording("r.mcap", false), .out_file = path("out.csv")};
   options.signals = {"tick"};
   EXPECT_EQ(run_export(options), kExitCutShort);
@@ -142,7 +142,7 @@ TEST_F(CommandFiles, ExportOfACutRecordingWritesWhatIsThereAndSaysSo) {
 }
 
 // Catches: an exit code of 0 for a wrong name or file.
-TEST_F(CommandFiles, ExportRefusesWhatIsNotThere) {
+TEST_F(CommandFiles, ExportRefusesAMissingFileAxisOrSignal) {
   const std::string recording = write_recording("r.mcap", true);
   EXPECT_THROW(run_export({.recording = recording, .out_file = path("o"), .axis = "c"}), UsageError);
   EXPECT_THROW(run_export({.recording = recording, .out_file = path("o"), .signals = {"volts"}}), UsageError);
@@ -190,7 +190,7 @@ TEST_F(CommandFiles, ExportWritesTheFramesOfARun) {
 }
 
 // Catches: a trace begun with a profile that cannot be.
-TEST_F(CommandFiles, ExportRefusesAProfileThatCannotBe) {
+TEST_F(CommandFiles, ExportRefusesAnImpossibleProfile) {
   ExportOptions options = {.recording = write_lockstep_run("r.mcap"), .out_file = path("out.log")};
   options.format = "candump";
   options.profile = "current_unit_a=0";

@@ -76,7 +76,7 @@ TEST(DcStateFeedback, HasTheBooksGains) {
 
 // AC-10. Catches: a pole away from its place, an integral that is too slow: e = (τ_L/J)·t²/2·e^(−rt), peak
 // 0.015789 rad at 20 ms, then nothing, with half an ampere of feedback. 1 %: the speed is half a sample old.
-TEST(DcStateFeedback, AConstantLoadIsForgotten) {
+TEST(DcStateFeedback, AConstantLoadLeavesNoError) {
   DcStateFeedback controller({.axis = kAxis, .position = kTriple});
   double peak_rad = 0.0;
   double peak_s = 0.0;
@@ -112,7 +112,7 @@ TEST(DcStateFeedback, TheObserversBiasDoublesThePeak) {
 
 // AC-11. Catches: an offset measured the wrong way: e = −θ0·e^(−x)·(1 + x − x²), overshoot 0.02489 rad at 30
 // ms, first current −2.571 A. 2 %.
-TEST(DcStateFeedback, AnInitialOffsetOvershootsAsTheTriplePoleSays) {
+TEST(DcStateFeedback, AnInitialOffsetOvershootsAsATriplePole) {
   DcStateFeedback controller({.axis = kAxis, .position = kTriple});
   const StepMove offset({.distance_rad = -0.1, .speed_rad_s = 0.0, .duration_s = 1.0});
   double first_a = 0.0;
@@ -148,7 +148,7 @@ TEST(DcStateFeedback, WithoutAnIntegralALoadLeavesAnError) {
 
 // AC-13. Catches: feed-forward that nested loops do not have and gains in the wrong loop: 500 rad/s² are
 // missed by a·Σr r.../r³ = 0.15 rad, a constant load by nothing.
-TEST(DcNestedLoops, LagAnAccelerationAndForgetALoad) {
+TEST(DcNestedLoops, LagAnAccelerationAndRemoveALoad) {
   const DcNestedGains gains = DcNestedGains::placed(placed_polynomial<3>({100.0, 100.0, 100.0}), kDcA);
   EXPECT_NEAR(gains.speed_proportional_as_per_rad, 0.251429, 1e-6);
   EXPECT_NEAR(gains.angle_proportional_per_s, 102.2727, 1e-4);
@@ -190,7 +190,7 @@ TEST(DcSpeedLoop, AConstantSpeedIsMissedByTheFrictionsShare) {
 
 // Catches: a current that is fed back: the open loop lets every offset stand and the load take all, 85.897
 // rad/s after 0.6 s (problem 2.19).
-TEST(DcOpenLoop, LeavesALoadToTheShaft) {
+TEST(DcOpenLoop, DoesNotCompensateALoad) {
   DcOpenLoop controller({.axis = kAxis});
   double speed_rad_s = 0.0;
   run(controller, kRest, 0.6, kLoad_nm, [&](double, double, double, double w) { speed_rad_s = w; });
@@ -214,7 +214,7 @@ TEST(DcVoltageFeedback, HasTheGainsOfFourPolesAt300) {
 
 // CTL-03. Catches: an error with the wrong sign or in the wrong unit, one at a time; the loop would be stable
 // all the same. v = v_ref + L·(...).
-TEST(DcVoltageFeedback, EveryErrorHasItsOwnVoltage) {
+TEST(DcVoltageFeedback, EveryErrorGivesTheVoltageOfItsGain) {
   const DcVoltageGains gains =
       DcVoltageGains::placed(placed_polynomial<4>({300.0, 300.0, 300.0, 300.0}), kDcA);
   const auto voltage = [&gains](const Measurement& m, const Reference& r) {
@@ -237,7 +237,7 @@ constexpr DcMachineModel kUnit = {.resistance_ohm = 1.0,
 
 // AC-18. Catches: a design formula that is off: K_t = 29, K = 400, a = 5 for −10, −10 ± j10, and 400 A at
 // once for a radian. The limit of a < 1 at K = 1 is that of the book's PI without tachometer.
-TEST(DcTachometerLoop, IsDesignedAsTheBookDoesIt) {
+TEST(DcTachometerLoop, HasTheDesignOfTheBook) {
   const DcTachometerGains gains =
       DcTachometerGains::placed(placed_polynomial(10.0, std::sqrt(0.5), std::sqrt(200.0)), kUnit);
   EXPECT_NEAR(gains.speed_as_per_rad, 29.0, 1e-12);
@@ -306,7 +306,7 @@ TEST(DcTachometerLoop, AStepOvershootsByAThird) {
 
 // CTL-07. Catches: a sine that is followed with an error, a compensator of another frequency: the error is a
 // sum of two dying oscillations (the print has 4.7 for 4.458). 1 kHz moves it by a thousandth.
-TEST(DcSineLoop, TheErrorOfAKnownSineDies) {
+TEST(DcSineLoop, TheErrorOfAKnownSineVanishes) {
   DcSineLoopParameters p = {
       .axis = kAxis, .loop = {.gain_a_s_per_rad = -0.6, .zero_per_s = -0.25, .angular_frequency_rad_s = 1.0}};
   p.axis.machine = kUnit;

@@ -76,7 +76,7 @@ TEST(StationaryFluxObserver, BothDiscretisationsComeToRestAtMTimesI) {
 
 // Catches: a slip of the wrong sign and an angle without the pole pairs: the same as the polar observer that
 // is told the speed.
-TEST(PositionFluxObserver, AgreesWithThePolarObserverWithoutBeingToldTheSpeed) {
+TEST(PositionFluxObserver, AgreesWithThePolarObserverWithoutTheSpeed) {
   PositionFluxObserver position(kServoMotor.machine, 125e-6);
   PolarFluxObserver polar(kServoMotor.machine, 125e-6);
   double shaft_rad = 0.0;

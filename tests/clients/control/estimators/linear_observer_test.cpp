@@ -39,7 +39,7 @@ TEST(SmallMatrix, SolvesAndHasItsCharacteristicPolynomial) {
 
 // AC-06. Catches: a discretisation under another's name: p = 500 at 0.5 ms goes to 0.75, 0.77778 and e^-0.25,
 // double, so the polynomial is (z - that)^2.
-TEST(LinearObserver, EachDiscretisationPutsThePolesWhereItShould) {
+TEST(LinearObserver, EachDiscretisationPlacesItsPoles) {
   const auto gains = ShaftObserverGains::placed(std::array{500.0, 500.0}, kFriction);
   EXPECT_NEAR(gains.angle_per_s, 993.3333, 1e-4);
   EXPECT_NEAR(gains.speed_per_s2, 243377.78, 0.01);
@@ -77,7 +77,7 @@ LinearObserver<2, 1> after_constant_speed(Discretisation how, std::int64_t perio
 
 // Catches: an injection or an input that is off by a sample: at constant speed no way may have an error, with
 // samples lost or without.
-TEST(LinearObserver, ConstantSpeedIsSeenWithoutError) {
+TEST(LinearObserver, ConstantSpeedLeavesNoError) {
   for (const Discretisation how : kAllWays) {
     for (const std::int64_t periods : {1, 3}) {
       const auto observer = after_constant_speed(how, periods, 200);

@@ -60,7 +60,7 @@ TEST(ShaftObserver, AnUnknownLoadLeavesAKnownSpeedError) {
 // AC-07. Catches: a friction that the open-loop copy forgets: without injection the pulse leaves
 // (τ_L/f)(1 − e^(−t f/J)) = 42.58 rad/s, which dies with J/f alone; p = 500 is back within 0.1 rad/s 50 ms
 // after. Truth: 168.757 and 129.219 rad/s.
-TEST(ShaftObserver, WithoutInjectionALoadPulseIsForgottenAsSlowlyAsTheShaftForgets) {
+TEST(ShaftObserver, WithoutInjectionTheErrorOfALoadPulseDecaysWithTheShaft) {
   Watched open(
       with(ShaftSpeed::kObserver, {.angle_per_s = 0.0, .speed_per_s2 = 0.0}, Discretisation::kTrapezoidal),
       1e-4);
@@ -82,7 +82,7 @@ TEST(ShaftObserver, WithoutInjectionALoadPulseIsForgottenAsSlowlyAsTheShaftForge
 
 // AC-08. Catches: l3 with the wrong size or sign, a load without its sign: τ̂_L/τ_L = 1 − e^(−pt)(1 + pt +
 // p²t²/2) at 10, 20, 30 and 50 ms, 3 %; with the real encoder within 0.001 N·m more.
-TEST(LoadObserver, SeesALoadStepAsATripleLag) {
+TEST(LoadObserver, FollowsALoadStepWithATripleLag) {
   const auto gains = ShaftObserverGains::placed(std::array{200.0, 200.0, 200.0}, kFriction);
   EXPECT_NEAR(gains.load_per_s3, -8e6, 1e-3);
   const double times_s[] = {0.010, 0.020, 0.030, 0.050};

@@ -40,7 +40,7 @@ TEST(ShaftSensing, CarriesTheSpeedOverAGap) {
 
 // Catches: an observer without the torque: under a constant acceleration that it is told the speed has no
 // lag.
-TEST(ShaftSensing, FollowsAnAccelerationThatItIsTold) {
+TEST(ShaftSensing, FollowsAKnownAcceleration) {
   ShaftSensing shaft(1e9, kGains, 0.0, 1e-4);  // no steps to speak of
   for (int k = 0; k < 1000; ++k) {
     const double t = 1e-4 * k;

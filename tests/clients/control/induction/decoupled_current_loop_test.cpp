@@ -23,7 +23,7 @@ PhasePair current_rates(const InductionMotorModel& motor, PhasePair i, PhasePair
 
 // Catches: any wrong sign or factor of the decoupling: in random states the machine's own equations, in the
 // other frame, must answer with exactly the rates that were asked for.
-TEST(DecoupledVoltage, BringsAboutTheRatesThatWereAskedFor) {
+TEST(DecoupledVoltage, GivesTheRequestedRates) {
   std::mt19937 random(8);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   const InductionMachineModel& m = kServoMotor.machine;

@@ -59,7 +59,7 @@ TEST(VoltageLinearization, LinearisesWhileTheFluxChanges) {
 }
 
 // Catches: a wrong term in c': against the difference of c along ψ + ψ'·t + ψ''·t²/2.
-TEST(DirectIntegrator, SpeedFactorKnowsItsRate) {
+TEST(DirectIntegrator, RateOfTheSpeedFactorIsItsDerivative) {
   const double flux_wb = 0.03, rate_wb_s = -0.2, second_wb_s2 = 15.0, h_s = 1e-6;
   InductionMachineModel m = kServo;
   m.friction_nms = 0.01;
@@ -103,7 +103,7 @@ TEST(DirectIntegrator, IsSingularWhenTheFluxFallsTooFast) {
 
 // Catches: a wrong sign in the 2×2 inverse: in random states the machine's α' and S' must come out as asked
 // for.
-TEST(QuadratureIntegrator, BringsAboutTheRatesThatWereAskedFor) {
+TEST(QuadratureIntegrator, GivesTheRequestedRates) {
   std::mt19937 random(29);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   for (int k = 0; k < 100; ++k) {
@@ -131,7 +131,7 @@ TEST(QuadratureIntegrator, SteadyOperationTakesTheSteadyCurrents) {
 
 // Catches: a singularity that goes unnoticed: without torque the controller says so and asks for finite
 // currents.
-TEST(QuadratureIntegrator, SaysThatItIsSingularWithoutTorque) {
+TEST(QuadratureIntegrator, ReportsASingularityWithoutTorque) {
   QuadratureIntegratorController controller(kServoDrive,
                                             {.current_pole_per_s = 2500.0,
                                              .angle_pole_per_s = 200.0,

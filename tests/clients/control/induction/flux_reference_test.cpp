@@ -40,7 +40,7 @@ TEST(FluxReference, WeakeningKeepsSpeedTimesFlux) {
 
 // Catches: a wrong sign in a derivative, or a feed-forward that forgets that a falling flux needs less than
 // ψ/M: against differences along a cubic speed, which err by its fourth derivative.
-TEST(FluxReference, WeakeningKnowsItsRates) {
+TEST(FluxReference, RatesOfWeakeningAreItsDerivatives) {
   const auto at = [](double t_s) {
     return Reference{.speed_rad_s = -300.0 - 900.0 * t_s + 4e3 * t_s * t_s,
                      .acceleration_rad_s2 = -900.0 + 8e3 * t_s,

@@ -76,7 +76,7 @@ TEST(LoadedInductionFeedback, SpeedIsNotBiasedByALoad) {
 }
 
 // Catches: a clip that forgets that an earlier one had already hit.
-TEST(Clipped, RemembersAnyLimit) {
+TEST(Clipped, KeepsTheReportOfAnEarlierLimit) {
   bool at_limit = false;
   EXPECT_EQ(clipped(-3.0, 2.0, at_limit), -2.0);
   EXPECT_EQ(clipped(1.0, 2.0, at_limit), 1.0);

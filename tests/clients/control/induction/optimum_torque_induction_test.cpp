@@ -241,7 +241,7 @@ TEST(OptimumTorqueTable, GivesTheFastestRunUpAndBraking) {
 
 // Catches: a table read between the wrong rows, or off its end: linear between 512 intervals errs by less
 // than 1e-3 N·m at the kinks, and nothing lies above the end.
-TEST(OptimumTorqueTable, ReadsWhatTheSolverSays) {
+TEST(OptimumTorqueTable, AgreesWithTheSolver) {
   const double top_rad_s = rad_s(8000.0);
   const OptimumTorqueTable table(kServo, kLimits, top_rad_s);
   for (const TorqueSign sign : {TorqueSign::kMotoring, TorqueSign::kGenerating}) {

@@ -235,7 +235,7 @@ TEST(Run, LostSamplesDoNotPutTheTrajectoryOffTheBenchsTime) {
 }
 
 // Catches: phases that are off by one sample, and a runner that lets go of the machine after the end.
-TEST(Run, PhasesLastWhatTheirTimingSaysAndTheEndKeepsHolding) {
+TEST(Run, PhasesLastTheirTimesAndTheEndHolds) {
   control::Run move = find_preset("book/8.2.2")->make({});
   std::array<int, 4> samples{};
   for (int k = 0; k < 1100; ++k) {

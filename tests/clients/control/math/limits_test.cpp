@@ -25,7 +25,7 @@ TEST(Limits, TheFirstExceededLimitIsNamedWithItsTime) {
 }
 
 // Catches: < for <=, and an end of the move that is stepped over: 0.6 s lies on no multiple of 0.35 s.
-TEST(Limits, ADemandAtItsLimitIsAllowedAndTheEndIsLookedAt) {
+TEST(Limits, ADemandAtItsLimitIsAllowedAndTheEndIsChecked) {
   EXPECT_FALSE(first_exceeded(0.6, 0.1, ramps));
   const auto at_end = first_exceeded(0.61, 0.35, ramps);
   ASSERT_TRUE(at_end);
@@ -42,7 +42,7 @@ TEST(Limits, ADemandThatIsNotANumberIsExceeded) {
 }
 
 // Catches: a check that takes years over a move that a typing error made long.
-TEST(Limits, AVeryLongMoveIsLookedAtAMillionTimes) {
+TEST(Limits, AVeryLongMoveIsCheckedAMillionTimes) {
   int looks = 0;
   EXPECT_FALSE(first_exceeded(1e12, 1e-4, [&looks](double) {
     ++looks;

@@ -27,7 +27,7 @@ TEST(Commutation, GivesAConstantTorque) {
 }
 
 // Catches: sectors that do not wrap: angles of many turns in both directions.
-TEST(Commutation, KnowsItsSectorInEveryTurn) {
+TEST(Commutation, HasTheSameSectorsInEveryTurn) {
   for (int turn = -3; turn <= 3; ++turn) {
     for (int sector = 0; sector < 6; ++sector) {
       const double middle = (360.0 * turn + 60.0 * sector) * kDegree_rad;
@@ -50,7 +50,7 @@ TEST(Commutation, HasARowForEveryAngle) {
 
 // Catches: a Hall line in another place than its sensor: line k is high from -30 to 150 degrees after
 // (k - 1) 120 degrees.
-TEST(Commutation, ReadsHallLinesAsTheEncoderSays) {
+TEST(Commutation, GivesTheSameSectorFromHallLinesAndEncoder) {
   for (int degree = -25; degree < 335; degree += 10) {
     std::uint64_t lines = 0;
     for (int k = 0; k < 3; ++k) {
@@ -82,7 +82,7 @@ constexpr BldcParameters kServo = {.machine = {.pole_pairs = 1.0,
 
 // BL-04. Catches: a factor 2 in the torque of two phases, and poles in the wrong order: I_p is J/(2 tau)
 // times the acceleration, and 150, 7500, 125000 are three poles at -50.
-TEST(BldcController, AsksForTheCurrentOfItsAcceleration) {
+TEST(BldcController, CommandsTheCurrentOfItsAcceleration) {
   BldcController controller(kServo);
   const Setpoint out = controller.update({}, {.angle_rad = 0.01, .acceleration_rad_s2 = 100.0});
   const double expected = 2e-4 / (2.0 * 0.5128) * (100.0 + 7500.0 * 0.01);

@@ -154,7 +154,7 @@ double by_trying(const PmMachineModel& p, const PmLimits& limits, double speed_r
 // The self-check. Catches: a branch of the optimum that holds for the machines of the book alone: 400 random
 // machines and speeds of both signs against a search over both limits. The search has a grid of 4000 angles,
 // at most 2 % of a limit where they meet at a flat angle.
-TEST(PmOptimum, IsWhatASearchFinds) {
+TEST(PmOptimum, AgreesWithASearch) {
   std::mt19937 engine(20051);
   const auto between = [&engine](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(engine);

@@ -194,7 +194,7 @@ TEST(PmVoltageController, TheSpeedObserverHasTheBooksPoles) {
 
 // E17, E18. Catches: 25 teeth for 50 and a torque constant of a phase: 3000 rpm are 2500 electrical turns a
 // second (the print has 1.57 kHz), and the emf at 2000 rpm is 39.8 V (the print has 41).
-TEST(PmVoltageController, KnowsTheMachineOfTheBook) {
+TEST(PmVoltageController, HasTheMachineOfTheBook) {
   EXPECT_NEAR(gain("book/9.7-3000rpm", "machine.pole_pairs") * 3000.0 / 60.0, 2500.0, 1e-9);
   EXPECT_NEAR(gain("book/9.1.4", "machine.torque_constant_nm_per_a") * 2000.0 / 60.0 * 2.0 * std::numbers::pi,
               39.8, 0.05);

@@ -79,7 +79,7 @@ TEST(WoundRotorController, DrivesEachCurrentAlone) {
 
 // Catches: n_p left out of the torque (E27), and a torque per ampere of the field that is wanted instead of
 // the one that is there.
-TEST(WoundRotorController, DividesTheTorqueByTheFieldThatIsThere) {
+TEST(WoundRotorController, DividesTheTorqueByThePresentField) {
   WoundRotorController controller(kServo);
   controller.update({.i_f_a = 0.5}, {.acceleration_rad_s2 = 100.0});
   EXPECT_NEAR(controller.telemetry()[2], 0.02 * 100.0 / (2.0 * 0.8 * 0.5), 1e-12);
@@ -112,7 +112,7 @@ TEST(WoundRotorController, GivesTheDirectAxisTheVoltageFirst) {
 }
 
 // Catches: a machine whose inductances no magnet circuit can have.
-TEST(WoundRotorParameters, KnowTheLargestMutualInductance) {
+TEST(WoundRotorParameters, LimitTheMutualInductance) {
   WoundRotorParameters p = kServo;
   EXPECT_TRUE(p.problems().empty());
   p.machine.mutual_inductance_h = 0.85;

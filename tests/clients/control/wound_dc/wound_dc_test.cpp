@@ -93,7 +93,7 @@ TEST(SeparateDc, BothChainsAreLinear) {
 
 // CTL-08 at the limit of the field supply. Catches: an armature that reckons with the field voltage it asked
 // for.
-TEST(SeparateDc, TheArmatureKnowsTheLimitOfTheField) {
+TEST(SeparateDc, TheArmatureUsesTheLimitedFieldVoltage) {
   SeparateDcParameters p = {.axis = axis_of(kSeparate),
                             .flux = {.rated_flux_wb = 20.0, .base_speed_rad_s = 1000.0},
                             .flux_per_s = 50.0,
@@ -298,7 +298,7 @@ TEST(ShuntDc, InputAndOutputAreLinear) {
 }
 
 // Catches: a curve that is not odd, a slope beside its piece, and a last piece that ends.
-TEST(FieldCurve, IsOddAndGoesOn) {
+TEST(FieldCurve, IsOddAndContinuesBeyondItsLastPoint) {
   constexpr FieldCurve kCurve = {.points = {{{0.0, 0.0}, {0.5, 10.0}, {1.0, 15.0}}}, .count = 3};
   EXPECT_DOUBLE_EQ(kCurve.flux_wb(0.25), 5.0);
   EXPECT_DOUBLE_EQ(kCurve.flux_wb(-0.75), -12.5);
@@ -332,7 +332,7 @@ struct SensorlessRun {
 
 // EST-05, EST-06. Catches: gains with K_m on the wrong side: the polynomial must have its roots where they
 // were placed. And the speed must come from the current alone, the load as well if it is asked for.
-TEST(SeriesDcObserver, SeesSpeedAndLoadInTheCurrent) {
+TEST(SeriesDcObserver, FindsSpeedAndLoadFromTheCurrent) {
   const auto gains = SeriesDcObserverGains::placed(std::array{40.0, 50.0, 60.0}, kSeries);
   const Polynomial<3> c = characteristic_polynomial(series_dc_observer(kSeries, gains).error_matrix());
   EXPECT_NEAR(c[0], 150.0, 1e-9);
@@ -354,7 +354,7 @@ TEST(SeriesDcObserver, SeesSpeedAndLoadInTheCurrent) {
 }
 
 // Catches: a voltage that is taken a sample too late: at 2000 V/s that would be 0.2 V, and 0.16 rad/s.
-TEST(SeriesDcObserver, KnowsTheVoltageOfTheSampleBefore) {
+TEST(SeriesDcObserver, UsesTheVoltageOfTheSampleBefore) {
   SeriesDcObserver observer(kSeries, SeriesDcObserverGains::placed(std::array{40.0, 50.0, 60.0}, kSeries),
                             0.5, 1e-4, Discretisation::kTrapezoidal);
   SensorlessRun motor;
@@ -369,7 +369,7 @@ TEST(SeriesDcObserver, KnowsTheVoltageOfTheSampleBefore) {
 }
 
 // EST-05. Catches: a load that an observer without one finds all the same, and a speed that is wrong then.
-TEST(SeriesDcObserver, WithoutALoadItSeesTheSpeedAlone) {
+TEST(SeriesDcObserver, WithoutALoadItFindsTheSpeedAlone) {
   const auto gains = SeriesDcObserverGains::placed(std::array{50.0, 60.0}, kSeries);
   SeriesDcObserver observer(kSeries, gains, 0.5, 1e-4, Discretisation::kTrapezoidal);
   SensorlessRun motor = {.load_nm = 0.0};

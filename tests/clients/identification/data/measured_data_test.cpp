@@ -35,7 +35,7 @@ TEST(MeasuredData, AnExportReadsBack) {
 
 // A foreign scope: semicolons, quotes, CRLF, a byte order mark, other names, milliampere, an offset. Catches:
 // a factor that is divided by, an offset before the factor.
-TEST(MeasuredData, AColumnMapTakesFilesOfOthers) {
+TEST(MeasuredData, AColumnMapReadsFilesOfOtherPrograms) {
   const MeasuredData data =
       parse_csv("\xEF\xBB\xBF\"CH1 [mV]\"; CH2 ;note\r\n 100;+1;3\r\n200;2;4\r\n\r\n", "x.csv",
                 {.columns = {{"i_a_a", "CH1", 0.01, -1.0}, {"u_a_v", "CH2", 1.0, 0.0}}, .period_s = 1e-3});

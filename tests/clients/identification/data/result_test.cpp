@@ -34,7 +34,7 @@ TEST(IdentificationResult, AsJson) {
 
 // An index that held the truth says so, one that did not too. Catches: a comparison of the relative with the
 // absolute, a verdict without truth.
-TEST(IdentificationResult, TellsWhetherTheIndexHeldTheTruth) {
+TEST(IdentificationResult, ReportsWhetherTheIndexHeldTheTruth) {
   Result r = some_result();
   r.compare({{"R_S", 9.79}, {"L_S", 0.69}});
   EXPECT_EQ(is_inside(r, *r.find("R_S")), true);

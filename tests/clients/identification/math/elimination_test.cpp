@@ -93,7 +93,7 @@ TEST(RealRoots, WilkinsonsPolynomial) {
 }
 
 // Catches: a double root that is taken for none or for one without a word.
-TEST(RealRoots, ADoubleRootIsConfessed) {
+TEST(RealRoots, ADoubleRootIsReported) {
   EXPECT_FALSE(positive_roots(with_roots({3, 3})).complete);
   const WholePolynomial third(
       std::vector<Whole>{Whole(-1), Whole(3)});  // 1/3 is never the middle of an interval

@@ -70,7 +70,7 @@ TEST(LeastSquares, ReflectionsKeepTheDigits) {
 
 // b and c only as their sum: both are named, a is not, and a parameter without any data neither escapes.
 // Catches: a verdict that blames all or none.
-TEST(LeastSquares, TheVerdictNamesWhatTheDataCannotTell) {
+TEST(LeastSquares, TheVerdictNamesTheParametersThatTheDataLeaveOpen) {
   Regression fit({"a", "b", "c"});
   Regression silent({"a", "b"});
   for (int k = 0; k < 300; ++k) {

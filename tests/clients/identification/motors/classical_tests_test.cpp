@@ -28,7 +28,7 @@ MeterReading reading(bool held) {
 
 // AC-23, 0.3 percentage points: L_S right, R_R 15 % and sigma 3.5 % low, M 0.3 % high. Catches: power per
 // phase for power of all, w for 2 w of the leakage.
-TEST(ClassicalTests, GiveWhatTheBookSays) {
+TEST(ClassicalTests, GiveTheErrorsOfTheBook) {
   Result r = classical_induction_tests(1.85, reading(false), reading(true), 60.0);
   r.compare({{"L_S", 0.244}, {"R_R", 2.1}, {"M", 0.225}, {"sigma", 1.0 - 0.225 * 0.225 / (0.244 * 0.244)}});
   const auto error = [&](const char* name) { return 100.0 * (r.at(name) / *r.find(name)->truth - 1.0); };

@@ -51,7 +51,7 @@ Settings dc_experiment() {
 
 // AC-15: R, K_T 0.5 %, L 1 %, J 2 %, f 10 %, error index 0.001 to 0.005. Catches: differences late by half a
 // sample, currents without the filter of the voltage, a row with a sign wrong.
-TEST(DcMotor, SinesOfCurrentTellAllFiveParameters) {
+TEST(DcMotor, SinesOfCurrentIdentifyAllFiveParameters) {
   Recorder record({"i_a_a", "u_a_v", "encoder_count"}, 1e-5, 100);
   run_dc(sines, 0.0, record);
   const Result r = identify(record.data(), dc_experiment());
@@ -121,7 +121,7 @@ TEST(DcMotor, AConstantCurrentIdentifiesNothing) {
 
 // Catches: a record without samples in its window that gives a motor all the same; columns of different
 // length.
-TEST(DcMotor, DataThatCannotBeUsedAreRefused) {
+TEST(DcMotor, UnusableDataAreRefused) {
   MeasuredData data{.period_s = 1e-3,
                     .columns = {{"i_a_a", "A", Series(80, 0.0)}, {"u_a_v", "V", Series(80, 0.0)}}};
   EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // 40 samples are left

@@ -167,7 +167,7 @@ TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
 
 // Half a sample between voltages and currents is enough to lose 5 % and more of R_S at 4 kHz. Catches: a
 // shift that is not applied, a default that does not suit the source.
-TEST(InductionMotor, VoltagesHalfASampleOffAreSeenToFail) {
+TEST(InductionMotor, VoltagesHalfASampleOffBiasTheResistance) {
   const MeasuredData data = start_data(250'000, true);
   Settings e = ideal_experiment();
   expect_percent(identify(data, e).at("R_S"), 9.7, 0.1);
@@ -211,7 +211,7 @@ TEST(InductionMotor, WithoutLoadNothingIsIdentified) {
 // Noise of 0.073 A on currents of 20 A: the second derivative makes so much of it that R_S is known to half
 // its value only. A minimum with the parameters of a motor is there, the truth lies within its indices, and
 // the verdict names R_S. Catches: a verdict that does not look at the indices.
-TEST(InductionMotor, WhatDrownsInNoiseIsNamed) {
+TEST(InductionMotor, TheVerdictNamesAParameterHiddenByNoise) {
   MeasuredData data = start_data(250'000, true);
   std::mt19937 engine(2);
   std::normal_distribution<double> noise(0.0, 0.073);

@@ -55,7 +55,7 @@ TEST(Motors, UnequalLeakagesAreComparedAsEqualOnes) {
 }
 
 // Catches: a truth where the method has another meaning or the number is unknown.
-TEST(Motors, WhatCannotBeMeantHasNoTruth) {
+TEST(Motors, AParameterWithoutOneMeaningHasNoTruth) {
   BenchParameters bench = kInduction;
   bench["thermal.enabled"] = 1.0;
   EXPECT_FALSE(truth_of(MotorKind::kInduction, bench).contains("R_S"));
@@ -94,7 +94,7 @@ TEST(Motors, TheVoltageShiftFollowsTheDrive) {
 
 // Catches: a warning that is not given where the voltages cannot be what the method takes them for, or that
 // stays.
-TEST(Motors, VoltagesThatHideSomethingAreTold) {
+TEST(Motors, UnsuitableVoltagesGiveANote) {
   MeasurementFacts facts;
   take_facts({}, "current_amplifier", 5, facts);
   EXPECT_FALSE(facts.note.empty());

@@ -79,7 +79,7 @@ TEST(PmMotor, EqualFiltersAndAShiftedVoltageGiveTheTruth) {
 // Case 31, negative: commands hold from their sample on, so their middle lies half a period after it.
 // Ignored, R_S comes out as 0.48 (5 %); with the bench's means, whose middle lies before their sample, as
 // 0.72. Catches: a shift that does nothing.
-TEST(PmMotor, AnUnshiftedVoltageIsSeenToFail) {
+TEST(PmMotor, AnUnshiftedVoltageBiasesTheResistance) {
   const MeasuredData reported = start_data(0.0);
   const MeasuredData commanded = with_commands(reported);
   Settings e = experiment(500.0, 500.0, false);

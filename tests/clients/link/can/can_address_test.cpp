@@ -41,7 +41,7 @@ TEST(CanAddress, ReadsEveryKey) {
 }
 
 // Catches: an address that would speak on another bus, or with other frames, than was meant.
-TEST(CanAddress, RefusesWhatIsNone) {
+TEST(CanAddress, RefusesInvalidTexts) {
   for (const std::string text : {"can:",
                                  "can:vcan0",
                                  "can:socketcan",

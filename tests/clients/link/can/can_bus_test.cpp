@@ -138,7 +138,7 @@ TEST(CanBus, MulticastIsABusPerPort) {
 }
 
 // Catches: a missing interface or terminal that is noticed only when the first frame is sent.
-TEST(CanBus, WhatIsNotThereIsNoConnection) {
+TEST(CanBus, AMissingTransportIsAConnectError) {
   for (const char* text : {"can:socketcan:nosuch0", "can:slcan:/dev/null", "can:slcan:/nowhere/tty",
                            "can:socketcand:127.0.0.1:1"}) {
     EXPECT_THROW(open_can_bus(parse_can_address(text), 1s), ConnectError) << text;

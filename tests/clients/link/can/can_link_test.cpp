@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(Profile, WideClassicCanLink, testing::Values(Kind{false
 
 // Catches: a mode, period or first sample that is made up rather than received, and the truth that CAN does
 // not carry passed off as known.
-TEST_P(CanLinkOf, LearnsTheBenchFromItsFrames) {
+TEST_P(CanLinkOf, TakesModePeriodAndSampleFromTheFrames) {
   bench_->sample.tick = 5;
   bench_->sample.encoder_count = -40;
   bench_->sample.i_a_a = 1.5;
@@ -140,7 +140,7 @@ TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
 }
 
 // Catches: a signal of a wide axis that its frames carry and that the link drops.
-TEST_P(WideCanLink, LearnsTheRestOfASample) {
+TEST_P(WideCanLink, TakesEverySignalOfTheFrames) {
   bench_->sample.i_c_a = -1.5;
   bench_->sample.i_f_a = 2.5;
   bench_->sample.hall_lines = 6;
@@ -278,7 +278,7 @@ TEST_P(CanLinkOf, ALostLeaseIsARefusal) {
 }
 
 // Catches: a controller that gives up because the bench refused another controller on the bus.
-TEST_P(CanLinkOf, RefusalsOfOthersAreTheirs) {
+TEST_P(CanLinkOf, IgnoresRefusalsOfOtherControllers) {
   link();
   bench_->put_reply(0.0, 1.0, 0.0, 7.0, 0.0);   // another controller commanded without the lease
   bench_->put_reply(1.0, 2.0, 77.0, 0.0, 0.0);  // or asked for it
@@ -288,7 +288,7 @@ TEST_P(CanLinkOf, RefusalsOfOthersAreTheirs) {
 }
 
 // Catches: frames of another node, of no node or about the bus that pass for the bench's.
-TEST_P(CanLinkOf, IgnoresWhatIsNotForIt) {
+TEST_P(CanLinkOf, IgnoresFramesOfOtherNodes) {
   link();
   can::Profile profile = address_.profile;
   FakeCanBench other(profile, kNode + 1);
@@ -309,7 +309,7 @@ TEST_P(CanLinkOf, IgnoresWhatIsNotForIt) {
 }
 
 // Catches: a link that waits for ever, or does not say for what.
-TEST_P(CanLinkOf, SilenceIsAnErrorThatNamesWhatWasWaitedFor) {
+TEST_P(CanLinkOf, SilenceIsAnErrorThatNamesTheMissingFrame) {
   link();
   bench_->loses = [](const can::Frame&) { return true; };
   const std::string what = failure_of([this] { link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE}); });
@@ -368,7 +368,7 @@ TEST_P(CanLinkOf, RealTimeGoesOnWithTheNewestSample) {
 }
 
 // Catches: a request that CAN has no frame for and that does nothing.
-TEST_P(CanLinkOf, SaysWhatItCannotDo) {
+TEST_P(CanLinkOf, RefusesRequestsWithoutAFrame) {
   EXPECT_FALSE(link().can_set_load());
   EXPECT_THROW(link().set_load({.load_nm = 1.0}), Refused);
   EXPECT_THROW(link().write_parameter("machine.pole_pairs", 3.0), Refused);

@@ -35,7 +35,7 @@ TEST(Address, ReadsEveryForm) {
 }
 
 // Catches: an address that would connect somewhere else than written, or a path that is cut off.
-TEST(Address, RefusesWhatIsNone) {
+TEST(Address, RefusesInvalidTexts) {
   for (const std::string text : {"", "tcp:", ":7300", "host:", "host:0", "host:65536", "host:12x", "unix:",
                                  "/run/bench.sock", "http://host:80", "tls:", "tls:a?ca=", "tls:a?b=c",
                                  "tls:a?key=k", "tls:a?certificate=c&ca=d", "tcp:a?ca=b"}) {
@@ -46,7 +46,7 @@ TEST(Address, RefusesWhatIsNone) {
 }
 
 // Catches: a connection that is reported as made when nothing listens, and a socket left non-blocking.
-TEST(Address, ConnectsOnlyWhereSomebodyListens) {
+TEST(Address, ConnectsOnlyToAListeningSocket) {
   const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in here = {};
   here.sin_family = AF_INET;

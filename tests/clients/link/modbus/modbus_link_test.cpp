@@ -245,7 +245,7 @@ TEST(ModbusLink, ABenchWithoutWritesRefusesTheLease) {
 }
 
 // Catches: another device taken for a bench, and a silent one waited for.
-TEST(ModbusLink, WhatIsNoBenchIsAnError) {
+TEST(ModbusLink, AnotherDeviceOrASilentOneIsAnError) {
   FakeServer server;
   server.put(1, modbus::Type::kUnsigned16, modbus::kMapVersion + 1);
   EXPECT_THROW(ModbusLink(server.address), LinkError);

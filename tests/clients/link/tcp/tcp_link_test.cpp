@@ -196,7 +196,7 @@ TEST(Link, KeepsSamplesThatComeBeforeAnAnswer) {
 }
 
 // Catches: a notice that is taken for the answer or lost, and a link that goes on when its session has ended.
-TEST(Link, OWN_04_KeepsWhatItIsToldUnasked) {
+TEST(Link, OWN_04_KeepsNoticesForTheCaller) {
   FakePeer peer(welcoming([](const v1::Envelope& request) {
     v1::Envelope notice;
     notice.mutable_notice()->set_kind(request.id() == 2 ? v1::Notice::KIND_LEASE_TAKEN
@@ -265,7 +265,7 @@ TEST(Link, GivesUpWhenOnlySamplesCome) {
 }
 
 // Catches: trust in what comes: another protocol, an oversized frame, another kind, another id, the end.
-TEST(Link, NamesWhatIsWrongWithAPeer) {
+TEST(Link, NamesTheMistakeOfAPeer) {
   const auto talk = [](FakePeer::Answer answer) {
     FakePeer peer(std::move(answer));
     return message_of([&] { Link(peer.client_end(), "it", {.deadline = 2s}); });
