@@ -33,7 +33,7 @@ TEST(Curve, GivesValueAndSlopeBetweenAndBeyondItsPoints) {
 }
 
 // Catches: held() that goes on beyond an end, or that starts to hold too early.
-TEST(Curve, HoldsItsEndsWhereAskedTo) {
+TEST(Curve, HeldKeepsTheValuesOfTheEnds) {
   const Curve curve(kPoints);
   EXPECT_EQ(curve.held(-5.0), 2.0);
   EXPECT_EQ(curve.held(1.0), 2.0);

@@ -132,7 +132,7 @@ DriveParameters on_bus(DriveKind kind) {
 // between its levels. Without chopper, the supply blocked, the link gets exactly what the terminals give,
 // with the gates on and through the diodes. Catches: rails that do not follow the link, energy of the diodes
 // that is lost, a chopper that is not switched by the link.
-TEST(DcBus, WhatTheTerminalsGiveBackIsInTheLink) {
+TEST(DcBus, EnergyFromTheTerminalsChargesTheLink) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kAveraged, DriveKind::kSwitched}) {
     DriveRig rig(on_bus(kind), Connection::kIndependent, {.resistance_ohm = 20.0, .inductance_h = 50e-3});
     rig.load.emf_v = {200.0, -200.0, 150.0};
@@ -169,7 +169,7 @@ TEST(DcBus, WhatTheTerminalsGiveBackIsInTheLink) {
 }
 
 // Catches: an arc that charges the link.
-TEST(DcBus, WhatAnArcTakesIsLost) {
+TEST(DcBus, AnArcDoesNotChargeTheLink) {
   DriveParameters p = on_bus(DriveKind::kAveraged);
   DriveRig rig(p, Connection::kTwoPhase);
   rig.memory.bus_v = 350.0;  // the supply is blocked

@@ -310,7 +310,7 @@ bool same_memory(const DriveMemory& x, const DriveMemory& y) {
 
 // A new drive with the memory of another goes on as that one would, to the bit.
 // Catches: something remembered outside of the memory from one tick to the next.
-TEST(Drive, ADriveWithTheMemoryOfAnotherGoesOnAsTheOther) {
+TEST(Drive, ADriveWithTheMemoryOfAnotherContinuesItsRun) {
   for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kCurrent, DriveKind::kAveraged,
                                DriveKind::kSwitched, DriveKind::kSource}) {
     const DriveParameters p = with_everything(kind);

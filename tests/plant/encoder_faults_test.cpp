@@ -169,7 +169,7 @@ TEST(EncoderFaults, SwappedLinesCountBackwardsAtTheSameInstants) {
 }
 
 // Catches: a count that starts anew when the fault comes or goes.
-TEST(EncoderFaults, AFaultThatComesAndGoesLeavesTheCountWhereItIs) {
+TEST(EncoderFaults, TheCountContinuesWhenAFaultBeginsOrEnds) {
   Shaft shaft(0.5 * kQuantum_rad);
   shaft.move_counts(21.0);
   EXPECT_EQ(shaft.state.count, 21);
@@ -216,7 +216,7 @@ TEST(EncoderFaults, WithALostLineTheCountGoesToAndFro) {
 
 // After an earlier fault the lines may be half a period off. Catches: lines that both change at once, a lost
 // line that is left high.
-TEST(EncoderFaults, TheLinesFallInWithALostOneEdgeByEdge) {
+TEST(EncoderFaults, ALostLineChangesTheOthersOneEdgeAtATime) {
   Shaft shaft(0.5 * kQuantum_rad);
   shaft.move_counts(1.0);
   shaft.faults.encoder_swapped = 1.0;

@@ -52,7 +52,7 @@ TEST(FirstOrder, NoTimeAndNoDifferenceChangeNothing) {
 
 // T y' = x - y behind a ramp x = s t from rest: y = s (t - T (1 - exp(-t/T))). In steps of any length, to
 // rounding. Catches: an input that counts at its start, its end or its middle only.
-TEST(FirstOrder, ARampComesOutAsTheEquationSays) {
+TEST(FirstOrder, ARampFollowsTheEquation) {
   constexpr double kTimeConstant_s = 0.02;
   constexpr double kSlope = 7.0;
   double y = 0.0;

@@ -113,7 +113,7 @@ TEST(Meter, TheRippleOfABridgeIsIntegratedExactlyFromCornerToCorner) {
 }
 
 // Catches: a division by zero, a root of a negative number.
-TEST(Meter, NothingReadsAsZeroAndADirectCurrentHasNoReactivePower) {
+TEST(Meter, NoCurrentReadsAsZeroAndADirectCurrentHasNoReactivePower) {
   EXPECT_EQ(figures_of({}, Connection::kStar).power_factor, 0.0);
   MeterSums sums;
   add_interval(sums, Connection::kTwoPhase, 1e-3, {{}, {}}, {{}, {}});

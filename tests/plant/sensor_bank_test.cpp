@@ -244,7 +244,7 @@ TEST(SensorBank, AConverterAtItsEndIsReportedForCurrentsAndForTheRest) {
 }
 
 // Catches: a start at which filters and delays still show zeros.
-TEST(SensorBank, ASettledBankReadsAsIfItHadBeenThereForever) {
+TEST(SensorBank, ASettledBankReadsTheConstantStateBefore) {
   SensorParameters p = all_on();
   p.bus.filter_hz = 5.0;
   p.current.delay_ticks = 8.0;

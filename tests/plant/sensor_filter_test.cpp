@@ -40,7 +40,7 @@ TEST(SensorFilter, HalfATickShowsTheMiddleOfTheLastTick) {
 }
 
 // Catches: a middle taken from the tick's ends, across a voltage that jumps.
-TEST(SensorFilter, HalfATickOfAVoltageThatJumpsIsWhatItWasThen) {
+TEST(SensorFilter, HalfATickAfterAJumpShowsTheVoltageOfThatInstant) {
   SensorParameters p = all_on();
   p.voltage.delay_ticks = 0.5;
   const SensorBank bank = bank_of(p);

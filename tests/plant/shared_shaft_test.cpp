@@ -242,7 +242,7 @@ TEST(SharedShaft, ABumpOnTheOutputActsOnTheOutput) {
 }
 
 // Catches: a pair of which one goes on after the other has diverged.
-TEST(SharedShaft, WhereOneDivergesBothAreHeld) {
+TEST(SharedShaft, IfOneAxisDivergesBothAreHeld) {
   AxisParameters bad = dc_axis();
   std::get<PmDcMachineParameters>(bad.machine).armature_inductance_h = 1e-7;  // far too fast for the step
   Axis first(dc_axis(), kTiming, 1, 0);

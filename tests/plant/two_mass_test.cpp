@@ -175,7 +175,7 @@ TEST(TwoMass, TeethThatAreApartMeetWhereTheShaftIsWhenTheyArePressedAgain) {
 
 // Catches: sides of the play exchanged in settled(), a quantity that is not set exactly, a settled state that
 // the next branch takes for the old one.
-TEST(TwoMass, ASettledEventLeavesTheBranchItEnded) {
+TEST(TwoMass, ASettledEventBelongsToTheNextBranch) {
   const ShaftConstants c = constants_of(elastic_train(0.1, kPlay_rad));
   const double half_rad = 0.5 * kPlay_rad;
   const auto branch = [&](const TwoMassState& x) { return branch_of(c, x, 0.0, 0.0, false); };

@@ -76,7 +76,7 @@ class TheMove(unittest.TestCase):
         self.assertLessEqual(hot["peak_error_counts"], 3.5)
         self.assertGreater(hot["peak_error_counts"], 2.0)
 
-    def test_case_6_the_observer_knows_the_speed_far_better_than_the_difference_of_counts(self):
+    def test_case_6_the_observer_is_far_quieter_than_the_difference_of_counts(self):
         """Catches: an observer that lags or is fed the wrong sample, and an encoder that is not floor(theta N/2 pi)."""
         file = self.folder / "move.csv"
         with Server() as server:

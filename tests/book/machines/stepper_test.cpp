@@ -104,7 +104,7 @@ TEST(BookStepper, TheMotorFallsOutOfStepByWholeElectricalTurns) {
 
 // The bench stepper: its source steps the motor by itself, 200 steps a second. Catches: a table that is read
 // with the wrong period or phase.
-TEST(BookStepper, TheBenchStepsByItself) {
+TEST(BookStepper, TheSourceOfTheBenchStepsTheMotor) {
   BookBench run("stepper");
   run.run_until(1.0);
   const double before_rad = run.sample().angle_rad;

@@ -157,7 +157,7 @@ TEST(CanCodec, ACodeSaturates) {
 
 // Catches: a current that changes its sign beyond the range, the pattern of "no value" sent for a number, and
 // rounding towards 0.
-TEST(CanCodec, AScaledNumberRoundsSaturatesAndKnowsNoValue) {
+TEST(CanCodec, AScaledNumberRoundsSaturatesAndHasACodeForNoValue) {
   const auto raw = [](double value) { return raw_of(Message::kCurrents, false, "i_a", value); };
   EXPECT_EQ(raw(0.0014), 1u);
   EXPECT_EQ(raw(0.0016), 2u);

@@ -77,7 +77,7 @@ TEST(CanSlcan, CutsAStreamIntoLines) {
 }
 
 // Catches: an adapter that is set to another bit rate than the bench.
-TEST(CanSlcan, KnowsTheBitRatesOfAdapters) {
+TEST(CanSlcan, HasTheBitRatesOfAdapters) {
   EXPECT_EQ(slcan_bit_rate(1'000'000), "S8");
   EXPECT_EQ(slcan_bit_rate(125'000), "S4");
   EXPECT_EQ(slcan_bit_rate(800'000), std::nullopt);

@@ -96,7 +96,7 @@ TEST(CanMsgpack, TakesAnyOrderUnknownKeysAndWideNumbers) {
 }
 
 // Catches: other defaults than python-can's, which takes an identifier for extended by default.
-TEST(CanMsgpack, KnowsTheDefaultsOfPythonCan) {
+TEST(CanMsgpack, HasTheDefaultsOfPythonCan) {
   EXPECT_EQ(unpack("\x81" + key("arbitration_id") + "\x07"), (Frame{.id = 7, .extended = true}));
   EXPECT_EQ(unpack("\x80"), std::nullopt);
 }

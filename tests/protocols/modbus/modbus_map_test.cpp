@@ -301,7 +301,7 @@ TEST(ModbusFraming, FramesComeOutWholeHoweverTheStreamWasCut) {
 }
 
 // Catches: a reader that waits for the announced bytes of a bad header before it refuses.
-TEST(ModbusFraming, ABadHeaderIsKnownByItsSixBytes) {
+TEST(ModbusFraming, ABadHeaderIsRecognisedFromItsFirstSixBytes) {
   const auto error_of = [](std::initializer_list<std::uint8_t> header) {
     MbapReader reader;
     std::copy(header.begin(), header.end(), reader.free_space().begin());

@@ -75,7 +75,7 @@ TEST(Catalogue, EveryRowHasANameAUnitAndAMeaning) {
 }
 
 // Catches: truth that a controller of a real bench could not know, offered as a sensor; or a sensor hidden.
-TEST(Catalogue, SensorsAreKnownAndTruthIsNot) {
+TEST(Catalogue, NoTruthIsMarkedAsSensor) {
   const auto visible = [](std::string_view name) { return find_signal(name)->kind != SignalKind::kTruth; };
   for (const char* name : {"tick", "state", "faults", "injected", "encoder_count", "edge_period_s", "i_a_a",
                            "u_b_v", "i_c_a", "u_f_v", "u_n_v", "hall_lines", "meter_pf"})
