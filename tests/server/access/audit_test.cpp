@@ -231,7 +231,7 @@ TEST_F(AuditTest, SEC_07_WithoutALogEveryControllerLosesItsAxis) {
 }
 
 // Catches: a run that ends with its log, although the configuration lets it go on.
-TEST_F(AuditTest, SEC_07_ALogThatFailsMayJustBeCounted) {
+TEST_F(AuditTest, SEC_07_AFailingLogMayOnlyBeCounted) {
   audit =
       std::make_unique<Audit>(AuditConfig{.file = folder_ / "other", .on_failure = AuditFailure::kContinue});
   audit->watch(*engine);

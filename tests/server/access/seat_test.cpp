@@ -45,7 +45,7 @@ class SeatTest : public testing::Test {
 };
 
 // Catches: a seat that is taken although the bench refused, or empty although the bench granted.
-TEST_F(SeatTest, TheSeatIsAsTheBenchDecided) {
+TEST_F(SeatTest, TheSeatFollowsTheDecisionOfTheBench) {
   EXPECT_EQ(anna_.owner(), 0u);
   EXPECT_FALSE(anna_.is_held());
   EXPECT_EQ(acquire(anna_, kAnna), Refused::kNot);
@@ -123,7 +123,7 @@ TEST_F(SeatTest, TakingByForceEmptiesTheSeatOfTheOldHolderAlone) {
 }
 
 // Catches: a client that is told that it lost an axis by force, although its own lease had ended before.
-TEST_F(SeatTest, TakingByForceIsNoNewsToASeatWhoseLeaseHasEnded) {
+TEST_F(SeatTest, ASeatWhoseLeaseHasEndedNoticesNoTakingByForce) {
   acquire(anna_, kAnna);
   engine_->request({.tick = 0, .axis = 0, .owner = anna_.owner(), .action = LeaseAction::kLost},
                    [](Refused, Tick) {});

@@ -79,7 +79,7 @@ std::vector<std::uint32_t> live_rows() {
 
 // Catches: a seventeenth ramp that overwrites memory or another ramp; room that is never given back; ramps of
 // one axis that take the room of another.
-TEST(BenchRamp, SixteenAtATimeOfAnAxis) {
+TEST(BenchRamp, AnAxisHasAtMostSixteenAtATime) {
   BenchSetup setup = servo_setup();
   setup.axes.push_back(setup.axes[0]);
   Bench bench(setup);

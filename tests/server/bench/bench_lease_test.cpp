@@ -168,7 +168,7 @@ TEST(BenchLease, AnUnusedLeaseEndsWithoutAFault) {
 
 // Catches: a release that is a fault, a lost session that is none, a voltage that stays in force after
 // either.
-TEST(BenchLease, AReleaseIsNoFaultALostControllerIsOne) {
+TEST(BenchLease, AReleaseIsNoFaultAndALostControllerIsAFault) {
   for (const LeaseAction action : {LeaseAction::kRelease, LeaseAction::kLost}) {
     Bench bench = owned_bench(servo_setup(), kOwner);
     submit_volts(bench, kOwner, 5.0);
@@ -215,7 +215,7 @@ TEST(BenchLease, TheScheduleOfAControllerEndsWithItsLease) {
 
 // A recording may hold such an input. Catches: a schedule that is shortened by what it is running, and
 // a count below zero.
-TEST(BenchLease, AScheduledReleaseTakesTheRestOfItsOwnersScheduleAlong) {
+TEST(BenchLease, AScheduledReleaseDropsTheRestOfItsOwnersSchedule) {
   Bench bench = owned_bench(servo_setup(), kOwner);
   const auto schedule = [&bench](Tick tick, Owner owner, const auto& action) {
     bench.submit({.tick = tick, .axis = 0, .owner = owner, .action = action});

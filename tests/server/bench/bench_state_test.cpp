@@ -180,7 +180,7 @@ TEST(BenchState, AStateOfAnotherSetupIsRefused) {
 }
 
 // Catches: anything random, uninitialised or dependent on an address in a run; a hash that forgets the past.
-TEST(BenchState, TheSameInputsGiveTheSameHashAndOneBitAnother) {
+TEST(BenchState, TheSameInputsGiveTheSameHashAndOneChangedBitAnotherHash) {
   const std::uint64_t hash = hash_at(rich_setup(), 3000);
   EXPECT_EQ(hash_at(rich_setup(), 3000), hash);
   EXPECT_NE(hash_at(rich_setup(), 2999), hash);
@@ -190,7 +190,7 @@ TEST(BenchState, TheSameInputsGiveTheSameHashAndOneBitAnother) {
 
 // An input that came and left no trace in the present state is still in the samples so far. Catches: a hash
 // of the present state only.
-TEST(BenchState, TheHashCoversThePast) {
+TEST(BenchState, TheHashCoversEarlierSamples) {
   Bench a(servo_setup());
   Bench b(servo_setup());
   b.submit({.tick = 2, .axis = 0, .owner = 0, .action = LoadChange{0.0, 3}});

@@ -210,7 +210,7 @@ TEST(ConfigCan, EveryMessageHasAKey) {
 }
 
 // Catches: a hexadecimal identifier that reads as another number, and such a number outside of [can.ids].
-TEST(ConfigCan, IdentifiersAndNothingElseMayBeHexadecimal) {
+TEST(ConfigCan, OnlyIdentifiersMayBeHexadecimal) {
   const auto state_id = [](const std::string& number) {
     const can::Profile profile = bus_of(kUdp + "[can.ids]\nstate = " + number + "\n").profile;
     return profile.base_ids[static_cast<std::size_t>(can::Message::kState)];

@@ -339,7 +339,7 @@ TEST_P(Seats, AVanishedClientLatchesTheLossAndAReleaseDoesNot) {
 }
 
 // Catches: a transport whose client still holds, renews or commands an axis that an administrator has taken.
-TEST_P(Seats, AnAxisThatIsTakenByForceIsGone) {
+TEST_P(Seats, AClientLosesAnAxisThatIsTakenByForce) {
   const auto holder = client();
   ASSERT_TRUE(holder->acquire());
   const Owner before = owner();
@@ -375,7 +375,7 @@ TEST_P(Seats, ALeaseThatTheBenchEndedCanBeAcquiredAnew) {
 
 // Catches: a bench in lockstep that waits for ever for an idle holder, or a time-out that meets a holder that
 // renews.
-TEST_P(Seats, AnIdleHolderLosesTheLeaseWhereItsLifeDoesNotShowOtherwise) {
+TEST_P(Seats, AnIdleHolderLosesTheLeaseUnlessItsConnectionShowsItsEnd) {
   const auto holder = client();
   ASSERT_TRUE(holder->acquire());
   for (int i = 0; i < 5; ++i) {

@@ -55,7 +55,7 @@ class EngineRequests : public testing::Test {
 };
 
 // Catches: an axis taken from its owner while the queue has no room to give it to the new one.
-TEST_F(EngineRequests, OWN_04_AnAxisIsTakenAndGivenOrNeither) {
+TEST_F(EngineRequests, OWN_04_TakingAnAxisDoesBothStepsOrNone) {
   for (const std::size_t filled : {kRequestsThatWait - 1, kRequestsThatWait, 2 * kRequestsThatWait}) {
     fill(filled);
     answers_.clear();
@@ -72,7 +72,7 @@ TEST_F(EngineRequests, OWN_04_AnAxisIsTakenAndGivenOrNeither) {
 }
 
 // Catches: a lease that is asked for after its end and granted before it, so that its owner loses it at once.
-TEST_F(EngineRequests, AnEndThatWaitsIsNotOvertaken) {
+TEST_F(EngineRequests, NoRequestOvertakesAWaitingEndOfALease) {
   fill(kRequestsThatWait);
   engine().request(lease(LeaseAction::kRelease), noted());
   stepped_.tick();  // makes room that the I/O thread does not know of
@@ -86,7 +86,7 @@ TEST_F(EngineRequests, AnEndThatWaitsIsNotOvertaken) {
 }
 
 // Catches: a queue of lease ends without a bound, sent by sessions that hold no lease.
-TEST_F(EngineRequests, OneEndOfALeaseWaitsForEachOwner) {
+TEST_F(EngineRequests, AtMostOneEndOfALeaseWaitsForEachOwner) {
   fill(kRequestsThatWait);
   for (int i = 0; i < 1000; ++i)
     engine().request(lease(LeaseAction::kRelease, 0, kStranger), noted());

@@ -176,7 +176,7 @@ TEST_P(Judge, CMD_13_TheAnswerToACommandIsWhatTheBenchDoes) {
 
 // The bench takes the newest command before a tick, so that it may never see the one before that. Catches: a
 // command judged only by one that the bench does not get.
-TEST(JudgeRealtime, ACommandThatTakesThePlaceOfAnotherMustHoldWithoutIt) {
+TEST(JudgeRealtime, ANewerCommandMustBeValidWithoutTheOneItReplaces) {
   JudgedBench bench(RunMode::kRealtime);
   const std::vector<Step> ramp = {volts(0), kTurn, volts(0.9), kTurn, volts(1.8), kTurn, kTurn};
   for (const Step& step : ramp)
@@ -204,7 +204,7 @@ TEST(JudgeRealtime, ACommandThatTheBenchRefusedIsForgotten) {
 }
 
 // Catches: a session whose axis is taken by force gets "not the owner" before it learns who took the axis.
-TEST(CommandMail, AnOwnerIsJudgedAsSuchUntilTheSampleShowsTheEndOfItsLease) {
+TEST(CommandMail, AnOwnerStaysOwnerUntilTheSampleShowsTheEndOfItsLease) {
   constexpr Owner kOther = kMe + 1;
   Bench bench(servo_bench().setup);
   CommandMail mail;

@@ -48,7 +48,7 @@ struct SlowDiskRun {
 };
 
 // Catches: a tick that runs without its command, or does not run with it; on_tick before the sample is there.
-TEST(LockstepEngine, ATickRunsWhenItsCommandIsThere) {
+TEST(LockstepEngine, ATickRunsWhenItsCommandHasArrived) {
   const auto engine = make_lockstep_engine(servo_bench());
   std::vector<Tick> seen;
   engine->on_tick.add([&] { seen.push_back(engine->tick()); });
@@ -184,7 +184,7 @@ TEST(LockstepEngine, TheOwnerIsKnownBeforeTheNextTick) {
 }
 
 // Catches: check() and command() that do not agree, or a check that leaves a trace in the state.
-TEST(LockstepEngine, CheckSaysWhatCommandWouldAnswer) {
+TEST(LockstepEngine, CheckGivesTheAnswerOfCommand) {
   const auto engine = make_lockstep_engine(servo_bench());
   ask(*engine, lease(LeaseAction::kAcquire));
   engine->command(0, kMe, voltage(0, 1.0, 0.0));

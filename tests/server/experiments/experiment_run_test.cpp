@@ -102,7 +102,7 @@ TEST(ExperimentRun, BeginsWithTheRequestedSpeedAndHasItsEvents) {
 }
 
 // Catches: commands that a latched bench refuses, so that its lease runs out and the counters grow.
-TEST(ExperimentRun, GoesOnBehindATrip) {
+TEST(ExperimentRun, ContinuesAfterATrip) {
   v1::RunExperiment r = good();
   r.set_ticks(20'000);  // 2.5 s: longer than the lease
   v1::NamedValue& limit = *r.add_settings();

@@ -140,7 +140,7 @@ TEST(LatenessHistogram, EveryLatenessHasABucket) {
 }
 
 // Catches: a refusal of the operating system that no note tells of.
-TEST(EnterRealtime, OS_07_SaysWhatWasNotGranted) {
+TEST(EnterRealtime, OS_07_ReportsRightsThatWereNotGranted) {
   std::vector<std::string> notes;
   std::thread([&notes] { notes = enter_realtime({.cpu = 1023, .priority = 1000}); }).join();
   const auto said = [&notes](const std::string& text) {

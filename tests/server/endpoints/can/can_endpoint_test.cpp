@@ -75,7 +75,7 @@ TEST(CanEndpoint, ClassicFramesCarryTheSameSampleInScaledIntegers) {
 }
 
 // CMD-11, CMD-06, CMD-07. Catches: a refusal without its reason, or one that the bench does not count.
-TEST(CanEndpoint, EveryRefusedCommandSaysWhyAndIsCounted) {
+TEST(CanEndpoint, EveryRefusedCommandGetsAReasonAndIsCounted) {
   CanBench bench;
   const std::uint8_t lease = bench.acquire();
   const auto refused = [&] { return bench.engine().newest(0).refused_commands; };
@@ -101,7 +101,7 @@ TEST(CanEndpoint, EveryRefusedCommandSaysWhyAndIsCounted) {
 }
 
 // Catches: duties taken as volts, in either variant; a duty beyond 1 that is not clipped by the amplifier.
-TEST(CanEndpoint, DutiesAreShareOfTheBusVoltage) {
+TEST(CanEndpoint, DutiesAreSharesOfTheBusVoltage) {
   CanBench fd;
   const std::uint8_t lease = fd.acquire();
   fd.command(0, 0.5, -0.25, lease, 3.0);
@@ -266,7 +266,7 @@ TEST(CanEndpoint, TwoAxesWaitForEachOther) {
 
 // Catches: monitoring that begins before the first heartbeat, or never; a lost heartbeat without
 // effect.
-TEST(CanEndpoint, CAN_12_AHeartbeatThatStaysAwayLosesTheLeaseAndARestartAtOnce) {
+TEST(CanEndpoint, CAN_12_AMissingHeartbeatEndsTheLeaseAndARestartEndsItAtOnce) {
   CanBench bench;
   std::uint8_t lease = bench.acquire();
   bench.command(0, 1.0, 0.0, lease);
@@ -296,7 +296,7 @@ TEST(CanEndpoint, CAN_12_AHeartbeatThatStaysAwayLosesTheLeaseAndARestartAtOnce) 
 }
 
 // Catches: a time-out that is looked at with each heartbeat of the bench only.
-TEST(CanEndpoint, AHeartbeatIsMissedByABenchThatSendsNone) {
+TEST(CanEndpoint, ABenchWithoutHeartbeatsNoticesAMissingOne) {
   BenchConfig config = servo_bench();
   config.can.emplace_back();
   config.can.front().heartbeat_ms = 0;
@@ -312,7 +312,7 @@ TEST(CanEndpoint, AHeartbeatIsMissedByABenchThatSendsNone) {
 
 // Catches: malformed commands of another controller that end the owner's row of good commands, or bar its
 // clear.
-TEST(CanEndpoint, AStrangersMalformedCommandIsNotTheOwners) {
+TEST(CanEndpoint, AMalformedCommandOfAnotherControllerDoesNotCountForTheOwner) {
   BenchConfig config = servo_bench();
   config.setup.arming_commands = 3;
   config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.5;

@@ -100,7 +100,7 @@ TEST(CanOutput, AChangeOfTheFaultWordIsSentOnce) {
 }
 
 // Catches: state frames at another rate than asked for.
-TEST(CanOutput, StateComesEverySoManyTicks) {
+TEST(CanOutput, StateComesAtItsConfiguredInterval) {
   CanBench bench;
   const std::uint8_t lease = bench.acquire();
   int states = 0;

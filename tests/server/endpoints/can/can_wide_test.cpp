@@ -48,7 +48,7 @@ INSTANTIATE_TEST_SUITE_P(Profiles, WideAxis, testing::Bool(),
                          [](const auto& fd) { return fd.param ? "Fd" : "Classic"; });
 
 // Catches: a phase c that does not reach the machine or does not come back; Hall lines that are lost.
-TEST_P(WideAxis, PhaseCGoesInAndComesBack) {
+TEST_P(WideAxis, PhaseCIsCommandedAndReported) {
   CanBench bench(on_bus(star_bench(), profile_of(GetParam())));
   const std::uint8_t lease = bench.acquire();
   ASSERT_NE(lease, 0);
@@ -206,7 +206,7 @@ TEST_P(WideAxis, DetailsComeWithTheStateAndWithAnInjectedFault) {
 }
 
 // Catches: an axis that is given other frames because its neighbour is wide, or that obeys its neighbour's.
-TEST_P(WideAxis, ANarrowNeighbourStaysAsItWas) {
+TEST_P(WideAxis, ANarrowAxisKeepsItsFramesBesideAWideOne) {
   BenchConfig config = servo_bench(2);
   config.setup.axes[1].parameters = star_bench().setup.axes[0].parameters;
   CanBench bench(on_bus(config, profile_of(GetParam())));

@@ -39,7 +39,7 @@ class MemoryBusTest : public testing::Test {
 };
 
 // Catches: frames heard by their sender, from inside send(), or in another order on another port.
-TEST_F(MemoryBusTest, EveryOtherPortHearsInTheOrderOfSending) {
+TEST_F(MemoryBusTest, EveryOtherPortReceivesInTheOrderOfSending) {
   ports_[0].bus->send(data_frame(1));
   ports_[1].bus->send(data_frame(2));
   ports_[0].bus->send(data_frame(3));
@@ -140,7 +140,7 @@ TEST_F(MemoryBusTest, CAN_06_ErrorFramesChangeTheState) {
 }
 
 // Catches: losses that are not counted, or that are told before the kernel would tell them.
-TEST_F(MemoryBusTest, CAN_07_LostFramesAreToldWithTheNextOne) {
+TEST_F(MemoryBusTest, CAN_07_LostFramesAreReportedWithTheNextOne) {
   wire_.lose(2);
   bench_.send(data_frame(1));
   bench_.send(data_frame(2));

@@ -96,7 +96,7 @@ TEST_F(SocketCan, CAN_02_CAN_03_ALinkThatGoesDownAndUpAgain) {
 }
 
 // Catches: a state told from inside send(), where the listener may send again.
-TEST_F(SocketCan, CAN_02_SendingFindsTheLinkDownAndTellsLater) {
+TEST_F(SocketCan, CAN_02_SendingNoticesALinkThatIsDownAndReportsItLater) {
   open(config());
   ASSERT_TRUE(set("down"));
   bus_->send(data_frame(0x101));
@@ -232,7 +232,7 @@ TEST_F(SocketCan, CAN_08_ForeignIdentifiersDoNotWakeTheBench) {
 
 // Catches: look-alikes with 29 bits, remote and FD frames that vanish instead of being counted, or that lose
 // what tells them apart.
-TEST_F(SocketCan, CAN_09_LookAlikesAreToldApart) {
+TEST_F(SocketCan, CAN_09_LookAlikesAreCountedByKind) {
   open(config());
   bus_->set_filter({0x101});
   const Peer peer(interface_);

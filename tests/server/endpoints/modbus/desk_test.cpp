@@ -188,7 +188,7 @@ TEST(ModbusDesk, LastRefusalShowsTheOwnerTheRefusalOfItsOwnWrite) {
 }
 
 // Catches: a release together with a request that is silently not carried out.
-TEST(ModbusDesk, AReleaseTakesNoOtherRequest) {
+TEST(ModbusDesk, AReleaseWithAnotherRequestIsRefused) {
   ModbusBench bench;
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);

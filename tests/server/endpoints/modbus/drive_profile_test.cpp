@@ -103,7 +103,7 @@ TEST(Modbus, AFaultIsResetByTheRisingBit) {
 }
 
 // Catches: faults that are cleared by a write whose answer says that nothing was done.
-TEST(Modbus, AFaultResetThatComesTooLateClearsNothing) {
+TEST(Modbus, ALateFaultResetClearsNothing) {
   BenchConfig config = modbus_bench_config(2);
   config.setup.axes[0].parameters.drive.amplifier.over_current_a = 0.01;
   config.setup.axes[0].parameters.drive.amplifier.over_current_trip = true;
@@ -129,7 +129,7 @@ TEST(Modbus, AFaultResetThatComesTooLateClearsNothing) {
 }
 
 // Catches: a control word written during a fault that leaves the drive in it after the fault is gone.
-TEST(Modbus, AFaultThatWasClearedByRegisterIsGone) {
+TEST(Modbus, AFaultClearedByRegisterEndsTheStateFault) {
   BenchConfig config = modbus_bench_config();
   config.setup.lease_ticks = 50'000'000 / config.setup.period_ns;
   ModbusBench bench(config);

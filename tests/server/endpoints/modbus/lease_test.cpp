@@ -225,7 +225,7 @@ TEST(Modbus, AnExchangeShowsTheTickThatItCaused) {
 }
 
 // Catches: modes with another meaning than the map says.
-TEST(Modbus, EveryModeDoesWhatItSays) {
+TEST(Modbus, EveryModeHasItsMeaningInTheMap) {
   ModbusBench bench;
   Client client(bench.port());
   ASSERT_EQ(client.write(400, {7}), 0);

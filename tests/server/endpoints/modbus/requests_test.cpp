@@ -119,7 +119,7 @@ TEST(Modbus, MB_01_EveryFunctionCodeIsAnswered) {
 }
 
 // Catches: device identification that clients cannot walk through.
-TEST(Modbus, MB_01_TheDeviceSaysWhatItIs) {
+TEST(Modbus, MB_01_TheDeviceIdentifiesItself) {
   ModbusBench bench;
   Client client(bench.port());
   const Bytes basic = client.ask({43, 14, 1, 0});

@@ -210,7 +210,7 @@ TEST(Modbus, MB_10_APeerThatTakesNothingIsCutOff) {
 }
 
 // Catches: connections beyond the cap that are kept, or that push out a connection that is at work.
-TEST(Modbus, AFullHouseTurnsAwayOrTurnsOutTheIdle) {
+TEST(Modbus, AFullServerRefusesAClientOrCutsAnIdleOne) {
   BenchConfig config = modbus_bench_config();
   config.modbus.max_connections = 2;
   config.modbus.idle_timeout_ms = 1'000'000;

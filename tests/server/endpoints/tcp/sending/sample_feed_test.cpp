@@ -48,7 +48,7 @@ TEST(SampleFeed, LIMIT_03_256SamplesWaitAndOneMorePushesOutTheOldest) {
 }
 
 // Catches: samples of the wrong ticks, or samples from before the reader came.
-TEST(SampleFeed, EveryNthFromTheTickOfTheReader) {
+TEST(SampleFeed, AReaderGetsEveryNthTickFromItsStartOn) {
   SampleFeed feed(0, 8, 5);
   SampleFeed::Reader first = feed.reader();
   take(feed, 6, 40);
