@@ -49,25 +49,25 @@ class IncludeLaw(unittest.TestCase):
     def test_the_file_and_the_line_are_named(self):
         self.assert_one("plant/axis.hpp:2: ", {"plant/axis.hpp": ["<cmath>", '"server/host/clock.hpp"']})
 
-    def test_the_plant_sees_signals_alone(self):
+    def test_the_plant_includes_signals_alone(self):
         self.assert_one("plant may include plant and protocols/signals alone", {"plant/axis.hpp": ['"protocols/framing.hpp"']})
         self.assert_one("plant may not include bench.pb.h", {"plant/axis.hpp": ['"bench.pb.h"']})
         self.assert_one("plant may not include <unistd.h>", {"plant/axis.hpp": ["<unistd.h>"]})
 
-    def test_protocols_see_themselves_alone(self):
+    def test_protocols_include_themselves_alone(self):
         self.assert_one("protocols may include protocols alone", {"protocols/framing.hpp": ['"plant/axis.hpp"']})
         self.assert_one("protocols may not include <sys/socket.h>", {"protocols/framing.cpp": ["<sys/socket.h>"]})
 
-    def test_signals_see_the_standard_library_alone(self):
+    def test_signals_include_the_standard_library_alone(self):
         self.assert_one("protocols/signals may not include <fmt/format.h>", {"protocols/signals/sample.hpp": ["<fmt/format.h>"]})
         self.assert_one("protocols/signals may include", {"protocols/signals/sample.hpp": ['"protocols/framing.hpp"']})
 
-    def test_server_and_clients_do_not_see_each_other(self):
+    def test_server_and_clients_do_not_include_each_other(self):
         self.assert_one("server may include", {"server/main.cpp": ['"clients/link/address.hpp"']})
         self.assert_one("clients may include", {"clients/link/address.hpp": ['"server/host/clock.hpp"']})
         self.assert_one("clients may include", {"clients/link/address.hpp": ['"plant/axis.hpp"']})
 
-    def test_control_models_and_identification_know_no_link(self):
+    def test_control_models_and_identification_include_no_link(self):
         for room in ("control", "models", "identification"):
             self.assert_one(f"clients/{room} may include", {f"clients/{room}/math/b.hpp": ['"clients/link/address.hpp"']})
         self.assert_one("clients/models may include", {"clients/models/machine.hpp": ['"clients/control/loop/run.hpp"']})

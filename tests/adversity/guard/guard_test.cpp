@@ -216,7 +216,7 @@ class BadTap final : public Tap {
 };
 
 // Catches: a guard that sees nothing.
-TEST(TickGuard, TheGuardSeesEveryMisdeed) {
+TEST(TickGuard, TheGuardReportsEveryForbiddenCall) {
   const Guard guard;
   for (const Misdeed& misdeed : kMisdeeds) {
     BadTap tap(misdeed);

@@ -135,7 +135,7 @@ class Readers(WireTest):
         self.assertEqual({each["count"] + each["lost"] for each in seen}, {tick})
         return tick
 
-    def test_tcp_12_tcp_20_readers_that_rest_catch_up_and_know_their_gaps(self):
+    def test_tcp_12_tcp_20_readers_that_rest_catch_up_and_learn_of_their_gaps(self):
         """Catches: a gap that is reported twice or never; a reader that stays behind forever; one that delays the others,
         or for which the server stores more and more."""
         server = self.server(unix=True)

@@ -181,7 +181,7 @@ class Slcan(VirtualBusTest):
             line.close()
 
     # Catches: frames that only one of several clients receives, or that come back to their sender.
-    def test_clients_hear_each_other(self):
+    def test_clients_receive_frames_of_each_other(self):
         with Echo("slcan", "tcp:127.0.0.1:0") as echo:
             one, other = Line(echo.port), Line(echo.port)
             for line in (one, other):
@@ -305,7 +305,7 @@ class Socketcand(VirtualBusTest):
             line.close()
 
     # Catches: frames for clients that have not asked for them; commands before a bus is open.
-    def test_clients_hear_each_other_in_raw_mode(self):
+    def test_clients_receive_frames_of_each_other_in_raw_mode(self):
         with Echo("socketcand", "127.0.0.1") as echo:
             one = self.client(echo, "< open can0 >", "< rawmode >")
             other = self.client(echo, "< open can0 >", "< rawmode >")
