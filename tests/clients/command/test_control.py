@@ -16,7 +16,7 @@ except ImportError as missing:
 
 COMMAND = SERVER.with_name("drivebench")
 OK, FAILED, USAGE = 0, 1, 2
-NOBODY = "tcp:127.0.0.1:1"
+CLOSED_PORT = "tcp:127.0.0.1:1"
 
 
 class ControlTest(unittest.TestCase):
@@ -48,10 +48,10 @@ class ControlTest(unittest.TestCase):
 
 class Gains(ControlTest):
     def refusal(self, *arguments):
-        return self.control("--link", NOBODY, *arguments, code=USAGE).stderr
+        return self.control("--link", CLOSED_PORT, *arguments, code=USAGE).stderr
 
     def test_a_wrong_gain_is_refused_before_anything_is_connected(self):
-        """Would catch: a misspelt gain that is ignored, a refusal that does not say which number breaks which rule."""
+        """Catches: a misspelt gain that is ignored, a refusal that does not say which number breaks which rule."""
         self.assertIn("no gain 'current.prop'; did you mean current.proportional_v_per_a?", self.refusal("--gain", "current.prop=7"))
         self.assertIn("position.derivative_per_s = -3 must not be negative", self.refusal("--gain", "position.derivative_per_s=-3"))
         both = self.refusal("--gain", "move.ramp_up_s=0", "--gain", "machine.inertia_kgm2=-1")
@@ -61,12 +61,12 @@ class Gains(ControlTest):
         self.assertIn("not a number", self.refusal("--gain", "move.ramp_up_s=nan"))
 
     def test_a_move_beyond_the_limits_is_refused_before_anything_is_connected(self):
-        """Would catch: a limit that is met amid the move, a refusal that does not say which and when."""
+        """Catches: a limit that is met amid the move, a refusal that does not say which and when."""
         said = self.refusal("--preset", "book/2.18", "--gain", "move.ramp_up_s=0.02", "--gain", "move.ramp_down_s=0.02")
         self.assertRegex(said, r"armature current of \d\.\d+ A at 0\.0\d+ s is above the limit of 5 A")
 
     def test_gains_are_shown_as_they_would_be_used(self):
-        """Would catch: a list of gains that is not that of the preset, or that leaves an override out."""
+        """Catches: a list of gains that is not that of the preset, or that leaves an override out."""
         gains = self.json_of("--gains", "--gain", "run.hold_s=0.25")
         self.assertEqual(gains["run.hold_s"], 0.25)
         self.assertEqual(gains["current.proportional_v_per_a"], 6.4)
@@ -78,7 +78,7 @@ class Gains(ControlTest):
             self.assertRegex(said, rf"(?m)^  {name} +\S+$")
 
     def test_a_gain_changes_the_run(self):
-        """Would catch: an override that stops at the list. The rate as a gain makes one preset the other, bit for bit."""
+        """Catches: an override that stops at the list. The rate as a gain makes one preset the other, bit for bit."""
         hashes = []
         for arguments in (["--preset", "book/8.2.2-4khz"], ["--gain", "sample_rate_hz=4000"],
                           ["--gain", "sample_rate_hz=4000", "--gain", "position.proportional_per_s2=6e5"]):
@@ -90,7 +90,7 @@ class Gains(ControlTest):
         self.assertNotEqual(hashes[0], hashes[2])
 
     def test_a_gain_that_describes_the_axis_is_checked_against_it(self):
-        """Would catch: a controller told of 4000 counts that runs on an encoder of 2000."""
+        """Catches: a controller told of 4000 counts that runs on an encoder of 2000."""
         with Server() as server:
             done = self.control("--link", "tcp:%s:%d" % server.address, "--gain", "counts_per_revolution=4000", code=USAGE)
         self.assertIn("encoder.counts_per_revolution is 2000 on the bench, 4000 in the preset", done.stderr)
@@ -98,7 +98,7 @@ class Gains(ControlTest):
 
 class Compare(ControlTest):
     def test_the_references_own_recording_has_no_difference(self):
-        """Would catch: samples and commands joined a tick apart, and a second move that is taken for the first."""
+        """Catches: samples and commands joined a tick apart, and a second move that is taken for the first."""
         file, report = self.recording("own", moves=2)
         seen = self.json_of("--compare", file, "--threshold", 0)
         self.assertEqual((seen["first_tick"], seen["samples"], seen["whole"]), (0, 1024, True))
@@ -109,7 +109,7 @@ class Compare(ControlTest):
         self.assertIsNone(seen["with"])
 
     def test_other_gains_are_noticed(self):
-        """Would catch: a comparison that is always content. At the first tick the reference asks for K_P times 5.88 A."""
+        """Catches: a comparison that is always content. At the first tick the reference asks for K_P times 5.88 A."""
         file, _ = self.recording("stiff", "--gain", "current.proportional_v_per_a=7")
         seen = self.json_of("--compare", file, "--threshold", 0.5, code=FAILED)
         self.assertEqual(seen["commands"]["first_tick_beyond"], 0)
@@ -119,7 +119,7 @@ class Compare(ControlTest):
         self.json_of("--compare", file, "--threshold", 0, "--gain", "current.proportional_v_per_a=7")
 
     def test_a_controller_of_the_user_is_compared(self):
-        """Would catch: a comparison that needs a recording of the reference. 10 V on phase a, nothing else, for 40 ms."""
+        """Catches: a comparison that needs a recording of the reference. 10 V on phase a, nothing else, for 40 ms."""
         file = self.folder / "mine.mcap"
         with Server("--record", str(file)) as server, server.client() as client:
             client.lease()
@@ -138,7 +138,7 @@ class Compare(ControlTest):
         self.json_of("--compare", file, "--threshold", 1000, code=FAILED)
 
     def test_a_recording_without_its_end_fails(self):
-        """Would catch: a regression run that passes because the bench died in it: its samples until then do not differ."""
+        """Catches: a regression run that passes because the bench died in it: its samples until then do not differ."""
         held = ("--gain", "run.hold_s=0.5")
         file, _ = self.recording("own", *held)
         cut = self.folder / "cut.mcap"
@@ -158,7 +158,7 @@ class Compare(ControlTest):
         self.assertEqual((json.loads(done.stdout)["whole"], "not whole" in done.stderr), (True, True))
 
     def test_two_recordings_are_compared_tick_by_tick(self):
-        """Would catch: runs that are laid beside each other at the wrong tick; the load comes 25 + 36.5 ms after the start."""
+        """Catches: runs that are laid beside each other at the wrong tick; the load comes 25 + 36.5 ms after the start."""
         plain, _ = self.recording("plain")
         loaded, _ = self.recording("loaded", "--load", "0.1@0.0365")
         seen = self.json_of("--compare", loaded, "--with", plain)["with"]
@@ -169,7 +169,7 @@ class Compare(ControlTest):
         self.assertEqual((same["commands"]["largest"], same["angle_rad"]["largest"]), (0.0, 0.0))
 
     def test_incomparable_recordings_are_refused(self):
-        """Would catch: a recording of another rate, axis or kind that gives numbers which mean nothing."""
+        """Catches: a recording of another rate, axis or kind that gives numbers which mean nothing."""
         file, _ = self.recording("own")
         for arguments, fact in ((["--compare", file, "--preset", "book/8.2.2-4khz"], "is sampled at 8000 Hz, the preset at 4000 Hz"),
                                 (["--compare", file, "--axis", "b"], "no samples of axis 'b'; the recording has servo"),
@@ -187,7 +187,7 @@ class Plot(ControlTest):
         return done
 
     def test_a_recording_becomes_a_picture(self):
-        """Would catch: a panel that is not drawn, a picture that is no XML, lines of terminals that the machine does not have."""
+        """Catches: a panel that is not drawn, a picture that is no XML, lines of terminals that the machine does not have."""
         file, _ = self.recording("own")
         out = self.folder / "own.svg"
         self.plot(file, "--preset", "book/8.2.2", "--title", "a & b", "--out", out)
@@ -200,7 +200,7 @@ class Plot(ControlTest):
         self.assertEqual(self.plot(file, "--panels", "angle").stdout.count("<path"), 1)
 
     def test_an_impossible_picture_is_refused(self):
-        """Would catch: an empty picture with an exit code of 0."""
+        """Catches: an empty picture with an exit code of 0."""
         file, _ = self.recording("own")
         for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),
                                 ([__file__], "is not a recording"), ([file, "--preset", "book/8"], "did you mean book/8.2.2"),

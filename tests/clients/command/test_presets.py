@@ -76,7 +76,7 @@ class Presets(unittest.TestCase):
         return "tcp:%s:%d" % server.address
 
     def test_every_preset_runs_on_the_bench_it_names(self):
-        """Would catch: a preset that fits its own bench no more, a terminal that never gets its command."""
+        """Catches: a preset that fits its own bench no more, a terminal that never gets its command."""
         for preset in presets():
             if preset["samples"] > LONG:
                 continue  # the benches of these run others as well
@@ -89,7 +89,7 @@ class Presets(unittest.TestCase):
                     self.assertLessEqual(report["peak_command_voltage_v"], preset["voltage_limit_v"] * 1.001)
 
     def test_each_kind_of_machine_runs_the_same_over_can_and_modbus(self):
-        """Would catch: a terminal, a current or a sensor that a link leaves out or changes. Both carry float32, so both runs
+        """Catches: a terminal, a current or a sensor that a link leaves out or changes. Both carry float32, so both runs
         are one, bit for bit; TCP carries doubles."""
         for preset in short_ones(presets()):
             with self.subTest(f"{preset['name']}, {preset['machine_kind']}, {preset['commands']}"):
@@ -106,7 +106,7 @@ class Presets(unittest.TestCase):
                 self.assertAlmostEqual(modbus["peak_speed_rad_s"], tcp["peak_speed_rad_s"], delta=0.05 * tcp["peak_speed_rad_s"])
 
     def test_each_kind_of_machine_runs_in_real_time(self):
-        """Would catch: a trajectory on the client's clock, a lost sample that is not counted. How well it
+        """Catches: a trajectory on the client's clock, a lost sample that is not counted. How well it
         tracks is not asked: this machine may be busy, and the client lose as many samples as it likes."""
         for preset in short_ones(presets()):
             with self.subTest(preset["name"]):

@@ -63,7 +63,7 @@ class Notification(WireTest):
 
     def test_a_missing_manager_costs_a_line_and_nothing_else(self):
         """Catches: a bench that ends because no manager listens, or a name longer than an address that overruns it."""
-        for name in (self.folder() + "/nobody", "@" + "x" * 300, "/" + "x" * 107, "relative", "vsock:2:1"):
+        for name in (self.folder() + "/missing", "@" + "x" * 300, "/" + "x" * 107, "relative", "vsock:2:1"):
             with self.subTest(name=name):
                 server = self.started(name)
                 with server.client() as client:
