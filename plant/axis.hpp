@@ -46,7 +46,7 @@ class Axis {
   void set_load(double target_nm, Tick tick, Tick ramp_ticks) noexcept {
     state_.load.go_to(target_nm, tick, ramp_ticks);
   }
-  /// A blow on the rotor: its speed jumps.
+  /// A bump of the rotor: its speed jumps.
   void bump(double impulse_nms) noexcept;
   /// The same on the output of its gear or shaft.
   void bump_output(double impulse_nms) noexcept;

@@ -169,7 +169,7 @@ struct McapMetadata {
   McapMapView entries;
 };
 
-/// Why reading stopped before the end of a whole file.
+/// The reason why reading stopped before the end of a whole file.
 struct McapProblem {
   enum class Kind {
     kNotMcap,      ///< The file does not begin like an MCAP file of major version 0.

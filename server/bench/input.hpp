@@ -16,7 +16,7 @@ namespace drivebench {
 /// Number of a session; 0: no session.
 using Owner = std::uint64_t;
 
-/// What a session does with the lease of an axis.
+/// An action of a session on the lease of an axis.
 enum class LeaseAction : std::uint32_t {
   kAcquire = 1,
   kRenew = 2,
@@ -44,7 +44,7 @@ struct InjectFault {
   double value;
 };
 
-/// A blow on the shaft: an angular impulse, all of it at once.
+/// A bump of the shaft: an angular impulse, all of it at once.
 struct ShaftBump {
   double impulse_nms;  ///< positive like a machine torque
 };
@@ -102,7 +102,7 @@ constexpr bool suits(DriveKind drive, Gates gates) noexcept {
   return gates != Gates::kCurrent || drive == DriveKind::kCurrent;
 }
 
-/// Why the fault cannot have this value: a sentence with value and rule, or empty if it can.
+/// The reason why the fault cannot have this value: a sentence with value and rule, or empty if it can.
 std::string problem_with(const InjectableFault& fault, double value);
 /// Whether problem_with() finds a problem; for the tick: no text, no allocation.
 bool breaks_a_rule(const InjectableFault& fault, double value) noexcept;

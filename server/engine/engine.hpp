@@ -91,10 +91,10 @@ class Engine {
 
   /// The parameters in force at newest(), including writes without an answer yet.
   const AxisParameters& parameters(std::size_t axis) const { return parameters_[axis]; }
-  /// Why a parameter cannot be written at once. Empty: it can, and counts as written; the caller sends the
-  /// input.
+  /// The reason why a parameter cannot be written at once. Empty: it can, and counts as written; the caller
+  /// sends the input.
   std::string try_parameter(std::size_t axis, std::uint32_t row, double value);
-  /// Why the parameter cannot have this value, whatever the values of the others.
+  /// The reason why the parameter cannot have this value, whatever the values of the others.
   std::string problem_with_value(std::size_t axis, std::uint32_t row, double value) const;
   /// The configuration_hash() of the configuration.
   std::uint64_t configuration_hash() const { return configuration_hash_; }

@@ -10,7 +10,7 @@
 
 namespace drivebench {
 
-/// How the bench answered a request.
+/// The answer of the bench to a request.
 struct RequestOutcome {
   Refused refused;
   Tick tick;

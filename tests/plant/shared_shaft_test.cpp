@@ -229,7 +229,7 @@ TEST(SharedShaft, EitherRotorCanBeBlocked) {
 }
 
 // An impulse on the second rotor: on a rigid shaft it is one of 1/n on the first, of J1 + J2/n^2; on an
-// elastic one the load alone takes it. Catches: a blow that lands on the rotor of the first, one without the
+// elastic one the load alone takes it. Catches: a bump that lands on the rotor of the first, one without the
 // ratio.
 TEST(SharedShaft, ABumpOnTheOutputActsOnTheOutput) {
   Axis rigid(geared_axis(false), kTiming, 1, 0);

@@ -108,7 +108,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
     inside.close(ignored);
   }
 
-  /// Why the handshake failed.
+  /// The reason why the handshake failed.
   std::string why_refused(const boost::system::error_code& error) {
     if (was_late) return "no handshake within " + std::to_string(kHandshakeLimit.count()) + " s";
     const long verdict = SSL_get_verify_result(stream.native_handle());

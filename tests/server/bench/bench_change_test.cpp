@@ -365,8 +365,8 @@ TEST(BenchSharedShaft, BothAxesTurnAsOne) {
 }
 
 // The second rotor turns with the output of a gear of ratio 4, whose inertia is 16 times that of the rotor.
-// Catches: a blow on the second axis that lands on the rotor of the first, a blocked rotor there that turns.
-TEST(BenchSharedShaft, ABlowAndALockOnTheSecondAxisActAtTheOutput) {
+// Catches: a bump on the second axis that lands on the rotor of the first, a blocked rotor there that turns.
+TEST(BenchSharedShaft, ABumpAndALockOnTheSecondAxisActAtTheOutput) {
   BenchSetup setup = dynamometer();
   setup.axes[0].parameters.mechanics.gear_ratio = 4.0;
   setup.axes[0].parameters.mechanics.viscous_friction_nms = 0.0;

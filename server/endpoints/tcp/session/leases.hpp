@@ -27,7 +27,7 @@ class Leases {
 
   /// Whether the session may change this axis; if not, refuses the request.
   bool may_change(std::uint32_t axis);
-  /// Why the session does not hold the axis, for a refusal.
+  /// The reason why the session does not hold the axis, for a refusal.
   std::string not_owner_of(std::uint32_t axis) const;
   /// Sends the input to the bench under the owner number of the session, and the answer to the client.
   void ask(const Input& input, const char* field);

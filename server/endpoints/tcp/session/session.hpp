@@ -52,7 +52,7 @@ class Session : public std::enable_shared_from_this<Session> {
   static constexpr int kRequestsPerTurn = 64;
   static constexpr std::size_t kReplyBytesPerTurn = std::size_t{16} * 1024;
 
-  /// How many of the received frames a turn has answered.
+  /// The progress of a turn through the received frames.
   enum class Turn { kAll, kMoreToCome, kOver };
   Turn take_turn();
   bool handle(std::span<const std::byte> frame);

@@ -28,7 +28,7 @@ struct Manners {
   double forces = 0.0;    ///< takes an axis by force
   double steals = 0.0;    ///< commands an axis of another owner
   double clears = 0.0;
-  double changes = 0.0;  ///< load, parameter, fault, blow
+  double changes = 0.0;  ///< load, parameter, fault, bump
   double asks = 0.0;     ///< status, parameters, newest samples
   double wild = 0.0;     ///< of commands and changes: with absurd values
   double lost = 0.0;     ///< of commands: never sent
