@@ -11,7 +11,7 @@
 namespace drivebench::can {
 
 /// The set-points of a command: voltages, duties or currents, depending on the mode.
-struct Setpoints {
+struct CommandFields {
   std::uint64_t tick = 0;  ///< of the sample that the command answers
   unsigned mode = 0;
   unsigned lease = 0;
@@ -23,7 +23,7 @@ struct Setpoints {
 
 namespace command_detail {
 
-/// The fields of commands in the order of the members of Setpoints.
+/// The fields of commands in the order of the members of CommandFields.
 inline constexpr auto kNames =
     std::to_array<std::string_view>({"tick", "mode", "lease", "u_a", "u_b", "u_c", "u_f"});
 
@@ -52,7 +52,7 @@ inline const Places& places_in(const MessageRow& row) noexcept {
 }  // namespace command_detail
 
 /// The set-points in the values of a command or a phase_command; `tick` holds only low bits.
-inline Setpoints setpoints_in(const MessageRow& row, const Values& values) noexcept {
+inline CommandFields setpoints_in(const MessageRow& row, const Values& values) noexcept {
   command_detail::Numbers n{};
   const command_detail::Places& places = command_detail::places_in(row);
   for (std::size_t i = 0; i < n.size(); ++i)
@@ -76,7 +76,7 @@ struct CommandFrames {
 };
 
 inline CommandFrames encode_command(const Profile& profile, std::uint32_t node, bool wide,
-                                    const Setpoints& s) noexcept {
+                                    const CommandFields& s) noexcept {
   const command_detail::Numbers n = {static_cast<double>(s.tick),
                                      static_cast<double>(s.mode),
                                      static_cast<double>(s.lease),

@@ -88,7 +88,7 @@ struct Row {
 };
 
 /// The codes of the request register in the command block.
-enum class LeaseRequest : std::uint16_t { kNone = 0, kClearFaults = 1, kRelease = 2, kRenew = 3 };
+enum class AxisRequest : std::uint16_t { kNone = 0, kClearFaults = 1, kRelease = 2, kRenew = 3 };
 
 /// The codes of the mode register in the command block.
 enum class CommandMode : std::uint16_t { kOff = 0, kVoltage = 1, kZeroVoltage = 2, kDuty = 3, kCurrent = 4 };

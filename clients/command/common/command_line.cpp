@@ -31,7 +31,7 @@ int CommandLine::run(int argc, char** argv) {
     return fail(kExitUsage, "usage", error.what());
   } catch (const link::ConnectError& error) {
     return fail(kExitNoConnect, "connect", error.what());
-  } catch (const link::Refused& refused) {
+  } catch (const link::RefusalError& refused) {
     return fail(kExitFailed, "refused", refused.what(), refused.field());
   } catch (const std::exception& error) {
     return fail(kExitFailed, "failed", error.what());

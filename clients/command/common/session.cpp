@@ -39,7 +39,7 @@ link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
   try {
     return link::Link(choice.address,
                       {.client = fmt::format("drivebench {}", subcommand), .token = choice.token});
-  } catch (const link::Refused& refused) {
+  } catch (const link::RefusalError& refused) {
     throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
   }
 }
@@ -58,7 +58,7 @@ std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_
   try {
     if (is_can) return std::make_unique<link::CanLink>(link::parse_can_address(choice.address));
     return std::make_unique<link::ModbusLink>(link::parse_modbus_address(choice.address));
-  } catch (const link::Refused& refused) {
+  } catch (const link::RefusalError& refused) {
     throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
   }
 }

@@ -44,7 +44,7 @@ void apply_settings(link::AxisLink& bench, const std::vector<ParameterSetting>& 
   for (const ParameterSetting& setting : settings) {
     try {
       bench.write_parameter(setting.name, setting.value);
-    } catch (const link::Refused& refused) {
+    } catch (const link::RefusalError& refused) {
       throw UsageError(fmt::format("--set {}: {}", setting.name, refused.what()));
     }
   }
@@ -145,7 +145,7 @@ int run_control(const ControlOptions& options) {
   try {
     if (!options.loads.empty()) axis->set_load({.load_nm = load_before_nm});
     axis->release();
-  } catch (const link::Refused&) {
+  } catch (const link::RefusalError&) {
     // The lease may have ended; the report gives the reason.
   } catch (const link::LinkError& error) {
     if (done.failure.empty()) done.failure = error.what();

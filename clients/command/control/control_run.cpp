@@ -187,7 +187,7 @@ ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<L
   const Clock::time_point started = Clock::now();
   try {
     exchange_all(bench, run, loads, into);
-  } catch (const link::Refused& refused) {
+  } catch (const link::RefusalError& refused) {
     into.failure = fmt::format("the bench refused: {}", refused.what());
     if (refused.code() == v1::REFUSAL_LATCHED) {
       const std::string latched = latched_text(bench.bench(), bench.newest());

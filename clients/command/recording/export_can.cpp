@@ -44,7 +44,7 @@ void CandumpText::add(const v1::Input& input, double time_s) {
   end_tick();
   const v1::Command& command = input.command();
   const bool currents = command.gates() == v1::GATES_CURRENT;
-  const can::Setpoints setpoints{
+  const can::CommandFields setpoints{
       .tick = command.tick(),
       .mode = currents ? can::kCurrentMode : static_cast<unsigned>(command.gates()),
       .lease = static_cast<unsigned>(input.owner() & 0xFF),

@@ -12,8 +12,8 @@
 
 namespace drivebench::link {
 
-/// The link of a controller to one axis over any transport. Requests throw Refused and LinkError as those of
-/// Link do; references to samples hold until the next call.
+/// The link of a controller to one axis over any transport. Requests throw RefusalError and LinkError as
+/// those of Link do; references to samples hold until the next call.
 class AxisLink {
  public:
   AxisLink() = default;
@@ -56,7 +56,7 @@ class AxisLink {
   refusal.set_code(code);
   refusal.set_message(std::string(sentence));
   refusal.set_field(std::string(field));
-  throw Refused(refusal);
+  throw RefusalError(refusal);
 }
 
 }  // namespace drivebench::link

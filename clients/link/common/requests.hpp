@@ -10,9 +10,9 @@
 namespace drivebench::link {
 
 /// The bench refused a request; the link goes on. what() is the bench's sentence.
-class Refused : public std::runtime_error {
+class RefusalError : public std::runtime_error {
  public:
-  explicit Refused(const v1::Refusal& refusal)
+  explicit RefusalError(const v1::Refusal& refusal)
       : std::runtime_error(refusal.message()), code_(refusal.code()), field_(refusal.field()) {}
 
   v1::RefusalCode code() const noexcept { return code_; }

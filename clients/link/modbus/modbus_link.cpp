@@ -141,11 +141,11 @@ void ModbusLink::acquire() {
 
 void ModbusLink::release() {
   holds_axis_ = false;
-  write(address_of(Content::kRequest), static_cast<std::uint16_t>(modbus::LeaseRequest::kRelease));
+  write(address_of(Content::kRequest), static_cast<std::uint16_t>(modbus::AxisRequest::kRelease));
 }
 
 void ModbusLink::clear_faults() {
-  write(address_of(Content::kRequest), static_cast<std::uint16_t>(modbus::LeaseRequest::kClearFaults));
+  write(address_of(Content::kRequest), static_cast<std::uint16_t>(modbus::AxisRequest::kClearFaults));
 }
 
 void ModbusLink::write_parameter(std::string_view name, double) {

@@ -30,7 +30,7 @@ ModbusAddress parse_modbus_address(std::string_view text);
 /// transaction and is unknown.
 class ModbusLink final : public AxisLink {
  public:
-  /// Connects and reads the header of the map. Throws ConnectError, Refused, LinkError.
+  /// Connects and reads the header of the map. Throws ConnectError, RefusalError, LinkError.
   explicit ModbusLink(const ModbusAddress& address,
                       std::chrono::milliseconds deadline = std::chrono::seconds(5));
   /// Releases the axis if it is still held.

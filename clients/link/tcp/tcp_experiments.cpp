@@ -40,7 +40,7 @@ const v1::Envelope& Link::next_of_fetch() {
   if (!socket_.is_open()) throw LinkError("the link to " + peer_ + " is closed");
   arena_.Reset();
   const v1::Envelope& answer = await_answer();
-  if (answer.kind_case() == Kind::kRefusal) throw Refused(answer.refusal());
+  if (answer.kind_case() == Kind::kRefusal) throw RefusalError(answer.refusal());
   if (answer.kind_case() != Kind::kExperimentData && answer.kind_case() != Kind::kExperimentInfo) {
     fail("sent something else than the data of an experiment");
   }

@@ -195,7 +195,7 @@ std::optional<v1::Samples> Link::next_samples(std::chrono::milliseconds wait) {
   arena_.Reset();
   while (kept_.empty()) {
     if (const v1::Envelope* envelope = next_envelope()) {
-      if (envelope->kind_case() == Kind::kRefusal) throw Refused(envelope->refusal());
+      if (envelope->kind_case() == Kind::kRefusal) throw RefusalError(envelope->refusal());
       if (envelope->kind_case() == Kind::kNotice) {
         keep(envelope->notice());
         continue;
@@ -251,7 +251,7 @@ v1::Envelope& Link::new_request() {
 const v1::Envelope& Link::ask(v1::Envelope& request, Kind expected) {
   send(request);
   const v1::Envelope& answer = await_answer();
-  if (answer.kind_case() == Kind::kRefusal) throw Refused(answer.refusal());
+  if (answer.kind_case() == Kind::kRefusal) throw RefusalError(answer.refusal());
   if (answer.kind_case() != expected) {
     fail("answered with " + name_of(answer.kind_case()) + " where " + name_of(expected) + " was due");
   }

@@ -28,13 +28,13 @@ struct LinkOptions {
 
 /// The client side of the wire (protocols/bench.proto) on one blocking socket, for one thread.
 ///
-/// Every request throws Refused if the bench refuses it, and LinkError if the link fails or no answer comes
-/// in time; after a LinkError the link stays closed. References to answers are valid until the next request,
-/// whose arguments must not point into them. Samples of subscriptions that arrive meanwhile wait for
+/// Every request throws RefusalError if the bench refuses it, and LinkError if the link fails or no answer
+/// comes in time; after a LinkError the link stays closed. References to answers are valid until the next
+/// request, whose arguments must not point into them. Samples of subscriptions that arrive meanwhile wait for
 /// next_samples().
 class Link {
  public:
-  /// Connects and says hello. Throws AddressError, ConnectError, LinkError, Refused.
+  /// Connects and says hello. Throws AddressError, ConnectError, LinkError, RefusalError.
   explicit Link(std::string_view address, const LinkOptions& options = {});
   /// Uses a connected stream socket; `peer` is its name in errors.
   Link(FileDescriptor socket, std::string peer, const LinkOptions& options = {});

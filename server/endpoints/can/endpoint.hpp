@@ -79,9 +79,9 @@ class Endpoint {
   void on_acquired(Node& node, std::uint32_t controller, Refused refused, Tick tick);
   void act(Node& node, Request request, std::uint32_t controller);
   bool is_for(const Node& node, const MessageRow& row);
-  Tick answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const;
+  Tick answered_by(const Node& node, const MessageRow& row, const CommandFields& given) const;
   /// Refuses a command before it reaches the bench, and has the bench count it.
-  void refuse(const Node& node, Owner sender, Refused refused, const Setpoints& given,
+  void refuse(const Node& node, Owner sender, Refused refused, const CommandFields& given,
               std::string_view why = {});
   /// Refuses a request before it reaches the bench.
   void turn_away(const Node& node, Request request, std::uint32_t controller, Refused refused,

@@ -27,13 +27,13 @@ bool Endpoint::is_for(const Node& node, const MessageRow& row) {
   return false;
 }
 
-Tick Endpoint::answered_by(const Node& node, const MessageRow& row, const Setpoints& given) const {
+Tick Endpoint::answered_by(const Node& node, const MessageRow& row, const CommandFields& given) const {
   const Field& tick = row.fields[index_of(row, "tick")];
   return unwrap(given.tick, tick.bits, static_cast<std::int64_t>(engine_->newest(node.axis).tick));
 }
 
 void Endpoint::on_phase_command(Node& node, const MessageRow& row, const Values& values) {
-  const Setpoints given = setpoints_in(row, values);
+  const CommandFields given = setpoints_in(row, values);
   // Ignored without the lease: the bench refuses the command that follows, and answers it.
   if (node.seat.owner() == 0 || given.lease != node.lease) return;
   node.spoke = true;
@@ -43,7 +43,7 @@ void Endpoint::on_phase_command(Node& node, const MessageRow& row, const Values&
 
 void Endpoint::on_command(Node& node, const MessageRow& row, const Values& values) {
   ++commands_;
-  Setpoints given = setpoints_in(row, values);
+  CommandFields given = setpoints_in(row, values);
   const Tick answers = answered_by(node, row, given);
   // Without the lease the command goes to the bench without an owner, so that the bench refuses and counts
   // it.
@@ -80,7 +80,7 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   engine_->advance();
 }
 
-void Endpoint::refuse(const Node& node, Owner sender, Refused refused, const Setpoints& given,
+void Endpoint::refuse(const Node& node, Owner sender, Refused refused, const CommandFields& given,
                       std::string_view why) {
   if (why.empty()) why = sentence_of(refused);
   ++refused_;

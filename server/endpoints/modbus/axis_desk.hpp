@@ -111,7 +111,7 @@ class AxisDesk {
   asio::awaitable<Outcome> write_process(Written written, Visitor visitor);
   asio::awaitable<Outcome> write_command(Written written, Visitor visitor);
   asio::awaitable<Outcome> write_parameters(Written written, Visitor visitor);
-  asio::awaitable<Outcome> carry_out(LeaseRequest request, Visitor visitor);
+  asio::awaitable<Outcome> carry_out(AxisRequest request, Visitor visitor);
   asio::awaitable<Refused> take_lease(std::uint16_t key, bool renew, Visitor visitor);
   /// An input on its way to the bench.
   struct Asked {

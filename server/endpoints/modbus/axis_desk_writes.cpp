@@ -129,9 +129,9 @@ Command AxisDesk::command_of(const CommandInput& input) const {
 
 asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visitor visitor) {
   const auto key = written[Content::kLeaseKey];
-  const auto request = static_cast<LeaseRequest>(written[Content::kRequest].value_or(0));
+  const auto request = static_cast<AxisRequest>(written[Content::kRequest].value_or(0));
   const bool commands = written[Content::kCounter].has_value();
-  const bool gives_back = key == 0u || request == LeaseRequest::kRelease;
+  const bool gives_back = key == 0u || request == AxisRequest::kRelease;
   CommandInput input = command_;
   if (const auto mode = written[Content::kCommandMode]) input.mode = static_cast<CommandMode>(*mode);
   if (const auto counter = written[Content::kCounter]) input.counter = static_cast<std::uint32_t>(*counter);
@@ -142,9 +142,9 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   const auto is_beyond = [](float duty) { return std::abs(duty) > 1.0f; };
   const bool beyond =
       is_beyond(input.a) || is_beyond(input.b) || is_beyond(input.c) || is_beyond(input.field);
-  const bool asks_more = request != LeaseRequest::kNone && request != LeaseRequest::kRelease;
+  const bool asks_more = request != AxisRequest::kNone && request != AxisRequest::kRelease;
   if ((input.mode == CommandMode::kDuty && beyond) || (key == 0u && asks_more) ||
-      (commands && (gives_back || request == LeaseRequest::kClearFaults))) {
+      (commands && (gives_back || request == AxisRequest::kClearFaults))) {
     count_refused(written.range, written.words, visitor);
     co_return refuse(Refused::kOutOfRange);
   }
@@ -168,7 +168,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   if (!commands) {
     if (!holds(visitor)) co_return refuse(Refused::kNotOwner);
     command_ = input;
-    const LeaseRequest wanted = gives_back ? LeaseRequest::kRelease : request;
+    const AxisRequest wanted = gives_back ? AxisRequest::kRelease : request;
     co_return co_await carry_out(wanted, visitor);
   }
   const Owner owner = holds(visitor) ? seat_.owner() : 0;
@@ -184,21 +184,21 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   co_return refuse(why);
 }
 
-asio::awaitable<AxisDesk::Outcome> AxisDesk::carry_out(LeaseRequest request, Visitor visitor) {
+asio::awaitable<AxisDesk::Outcome> AxisDesk::carry_out(AxisRequest request, Visitor visitor) {
   if (!holds(visitor)) co_return refuse(Refused::kNotOwner);
-  if (request == LeaseRequest::kNone) co_return Outcome{};
+  if (request == AxisRequest::kNone) co_return Outcome{};
   const Owner owner = seat_.owner();
   Refused why = Refused::kNot;
-  if (request == LeaseRequest::kRelease) {
+  if (request == AxisRequest::kRelease) {
     why = co_await ask(LeaseAction::kRelease, owner);
-  } else if (request == LeaseRequest::kRenew) {
+  } else if (request == AxisRequest::kRenew) {
     why = co_await ask(LeaseAction::kRenew, owner);
   } else {
     why = co_await ask({.tick = 0, .axis = axis_, .owner = owner, .action = ClearFaults{}});
   }
   if (why != Refused::kNot) co_return refuse(why);
-  if (request == LeaseRequest::kRelease && seat_.owner() == 0) forget_holder();
-  if (request == LeaseRequest::kClearFaults) state_ = DriveState::kSwitchOnDisabled;
+  if (request == AxisRequest::kRelease && seat_.owner() == 0) forget_holder();
+  if (request == AxisRequest::kClearFaults) state_ = DriveState::kSwitchOnDisabled;
   co_return Outcome{};
 }
 
@@ -208,9 +208,9 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_coils(std::size_t address, st
   for (std::size_t i = 0; i < count && outcome.exception == Exception::kNone; ++i) {
     const bool on = (bits >> i & 1) != 0;
     const bool is_lease = address + i == static_cast<std::size_t>(Coil::kLease);
-    const LeaseRequest request = is_lease ? (on ? LeaseRequest::kRenew : LeaseRequest::kRelease)
-                                 : on     ? LeaseRequest::kClearFaults
-                                          : LeaseRequest::kNone;
+    const AxisRequest request = is_lease ? (on ? AxisRequest::kRenew : AxisRequest::kRelease)
+                                : on     ? AxisRequest::kClearFaults
+                                         : AxisRequest::kNone;
     outcome = co_await carry_out(request, visitor);
   }
   co_return outcome;

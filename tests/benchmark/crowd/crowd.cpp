@@ -136,7 +136,7 @@ void allow_descriptors(rlim_t count) {
 void expect_full(const std::string& address) {
   try {
     const link::Link one_more(address);
-  } catch (const link::Refused& refused) {
+  } catch (const link::RefusalError& refused) {
     return;  // refused with a reason
   }
   throw std::runtime_error("a session beyond max_sessions was taken");

@@ -58,7 +58,7 @@ class Controller {
       try {
         tick = link_.exchange({&command, 1}).samples(0).sample().tick();
         ++exchanges_;
-      } catch (const link::Refused&) {  // on a busy machine a command may come too late for the watchdog
+      } catch (const link::RefusalError&) {  // on a busy machine a command may come too late for the watchdog
         ++timeouts_;
         link_.clear_faults(0);
         tick = newest_tick();

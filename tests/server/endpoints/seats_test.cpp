@@ -195,10 +195,10 @@ class CanClient final : public SeatClient {
   bool command(float u_a_v) override {
     const Tick before = world_.engine->tick();
     result_.reset();
-    const can::Setpoints setpoints{.tick = static_cast<std::uint64_t>(before),
-                                   .mode = 1,
-                                   .lease = static_cast<unsigned>(lease_),
-                                   .a = static_cast<double>(u_a_v)};
+    const can::CommandFields setpoints{.tick = static_cast<std::uint64_t>(before),
+                                       .mode = 1,
+                                       .lease = static_cast<unsigned>(lease_),
+                                       .a = static_cast<double>(u_a_v)};
     for (const can::Frame& frame : can::encode_command(profile_, 1, false, setpoints))
       bus_->send(frame);
     world_.settle();

@@ -130,7 +130,7 @@ TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
   const AxisCommand command = {
       .tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_c_v = -2.5, .u_f_v = 24.0};
   if (!GetParam().wide) {
-    EXPECT_THROW(link().exchange(command), Refused);
+    EXPECT_THROW(link().exchange(command), RefusalError);
     return;
   }
   link().exchange(command);
@@ -258,7 +258,7 @@ TEST_P(CanLinkOf, RefusalsHaveTheirCodes) {
           link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0});
         }
         ADD_FAILURE() << result << " was no refusal";
-      } catch (const Refused& refused) {
+      } catch (const RefusalError& refused) {
         EXPECT_EQ(refused.code(), code) << result;
       }
     }
@@ -272,7 +272,7 @@ TEST_P(CanLinkOf, ALostLeaseIsARefusal) {
   try {
     link().exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0, .u_b_v = 1.0});
     ADD_FAILURE();
-  } catch (const Refused& refused) {
+  } catch (const RefusalError& refused) {
     EXPECT_EQ(refused.code(), v1::REFUSAL_NOT_OWNER);
   }
 }
@@ -370,8 +370,8 @@ TEST_P(CanLinkOf, RealTimeGoesOnWithTheNewestSample) {
 // Catches: a request that CAN has no frame for and that does nothing.
 TEST_P(CanLinkOf, RefusesRequestsWithoutAFrame) {
   EXPECT_FALSE(link().can_set_load());
-  EXPECT_THROW(link().set_load({.load_nm = 1.0}), Refused);
-  EXPECT_THROW(link().write_parameter("machine.pole_pairs", 3.0), Refused);
+  EXPECT_THROW(link().set_load({.load_nm = 1.0}), RefusalError);
+  EXPECT_THROW(link().write_parameter("machine.pole_pairs", 3.0), RefusalError);
 }
 
 }  // namespace

@@ -105,7 +105,7 @@ class FakeServer {
 v1::RefusalCode refusal_of(const std::function<void()>& action) {
   try {
     action();
-  } catch (const Refused& refused) {
+  } catch (const RefusalError& refused) {
     return refused.code();
   }
   return v1::REFUSAL_UNSPECIFIED;
@@ -151,7 +151,7 @@ TEST(ModbusLink, ReadsAndCommandsByTheMap) {
   link.release();
   EXPECT_EQ(server.get(401, modbus::Type::kUnsigned16), 2U);
   EXPECT_TRUE(link.knows("angle_rad"));
-  EXPECT_THROW(link.set_load({}), Refused);
+  EXPECT_THROW(link.set_load({}), RefusalError);
 }
 
 // Catches: currents sent for voltages or as duties, a phase or the field in another's place, a sensor behind

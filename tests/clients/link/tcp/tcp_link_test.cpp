@@ -166,7 +166,7 @@ TEST(Link, ThrowsARefusalWithItsCodeAndFieldAndGoesOn) {
   try {
     link.write_parameter(0, {.name = "x", .value = 5.0});
     ADD_FAILURE() << "no refusal";
-  } catch (const Refused& refused) {
+  } catch (const RefusalError& refused) {
     EXPECT_EQ(refused.code(), v1::REFUSAL_OUT_OF_RANGE);
     EXPECT_STREQ(refused.what(), "it is 5 but must be 4");
     EXPECT_EQ(refused.field(), "machine.x");

@@ -97,7 +97,7 @@ class CanBench {
              .b = u_b},
             node);
   }
-  void command(const Setpoints& setpoints, std::uint32_t node = 1) {
+  void command(const CommandFields& setpoints, std::uint32_t node = 1) {
     received.clear();
     for (const Frame& frame : encode_command(profile_, node, is_wide(node), setpoints))
       controller_->send(frame);
