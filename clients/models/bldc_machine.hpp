@@ -5,7 +5,7 @@
 
 namespace drivebench {
 
-/// What a client believes about a brushless DC machine with trapezoidal emf, an isolated star:
+/// A client's model of a brushless DC machine with trapezoidal emf, an isolated star:
 ///   (L_S + M)·di_k/dt = u_k − v_N − R_S·i_k + e_p·ω·e(n_p·θ − (k−1)·120°)
 ///   J·dω/dt = −τ_p·Σ e_k·i_k − f·ω − τ_L        with τ_p = e_p
 /// The emf has the sense of the terminal voltage, so that a motor takes currents of the sign opposite to e.

@@ -2,9 +2,8 @@
 
 namespace drivebench {
 
-/// What a client believes about a two-phase induction machine, as far as field-oriented control needs it. It
-/// is the client's own copy: the machine that it drives may differ (a warm rotor), and no client knows the
-/// true one.
+/// A client's model of a two-phase induction machine, as far as field-oriented control needs it. The driven
+/// machine may differ from it (a warm rotor), and no client has the true values.
 struct InductionMachineModel {
   double pole_pairs;
   double mutual_inductance_h;

@@ -2,8 +2,8 @@
 
 namespace drivebench {
 
-/// What a client believes about a synchronous machine with permanent magnets and a round rotor, two
-/// phases or the power-invariant two-phase equivalent of a star:
+/// A client's model of a synchronous machine with permanent magnets and a round rotor, two phases or the
+/// power-invariant two-phase equivalent of a star:
 ///   L_S·di_d/dt = −R_S·i_d + n_p·ω·L_S·i_q + u_d
 ///   L_S·di_q/dt = −R_S·i_q − n_p·ω·L_S·i_d − K_m·ω + u_q
 ///   J·dω/dt = K_m·i_q − f·ω − τ_L

@@ -43,7 +43,7 @@ struct FieldCurve {
   }
 };
 
-/// What a client believes about a DC machine with a wound field: torque K_m·λ_f·i, back-emf K_m·λ_f·ω.
+/// A client's model of a DC machine with a wound field: torque K_m·λ_f·i, back-emf K_m·λ_f·ω.
 struct WoundDcModel {
   double armature_resistance_ohm;     ///< R
   double armature_inductance_h;       ///< L

@@ -2,8 +2,8 @@
 
 namespace drivebench {
 
-/// What a client believes about a synchronous machine with a field winding, in the frame of the field, two
-/// phases or the two-phase equivalent of a star:
+/// A client's model of a synchronous machine with a field winding, in the frame of the field, two phases or
+/// the two-phase equivalent of a star:
 ///   u_d = R_S·i_d + L_S·di_d/dt + M·di_F/dt − n_p·ω·L_S·i_q
 ///   u_q = R_S·i_q + L_S·di_q/dt + n_p·ω·(L_S·i_d + M·i_F)
 ///   u_F = R_F·i_F + L_F·di_F/dt + M·di_d/dt

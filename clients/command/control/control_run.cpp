@@ -75,7 +75,7 @@ link::AxisCommand command_of(std::uint64_t tick, const control::Setpoint& x, con
       .tick = tick, .gates = v1::GATES_CURRENT, .i_a_a = x.a, .i_b_a = x.b, .i_c_a = x.c, .i_f_a = x.field};
 }
 
-/// Why the run cannot go on with this sample; empty if it can.
+/// The reason why the run cannot continue with this sample; empty: it can.
 std::string obstacle(const link::AxisLink& bench, const Sample& sample, const control::Measurement& m,
                      bool is_first) {
   if (interrupted()) return "interrupted";

@@ -13,13 +13,13 @@
 
 namespace drivebench::control {
 
-/// How an armature gets the current that a law asks for.
+/// The regulator of the armature current.
 enum class DcDrive {
-  kCurrentAmplifier,  ///< the bench's amplifier takes it as its command
-  kOwnRegulator,      ///< CUR-01 of the controller turns it into a voltage
+  kCurrentAmplifier,  ///< the amplifier of the bench, which takes the current as its command
+  kOwnRegulator,      ///< CUR-01 of the controller, which turns the current into a voltage
 };
 
-/// What all controllers of a DC motor with permanent magnets have.
+/// The common parameters of the controllers of a DC motor with permanent magnets.
 struct DcAxisParameters {
   DcMachineModel machine;
   double sample_rate_hz;

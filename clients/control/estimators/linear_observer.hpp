@@ -10,7 +10,7 @@
 
 namespace drivebench::control {
 
-/// How a differential equation becomes a recursion.
+/// The method that turns a differential equation into a recursion.
 enum class Discretisation {
   kEuler,        ///< forward: pole −p goes to 1 − pT, stable for pT < 2
   kTrapezoidal,  ///< pole −p goes to (1 − pT/2)/(1 + pT/2), always stable
@@ -90,7 +90,7 @@ class LinearObserver {
       last_[k] = u[k];
   }
 
-  /// What the error is multiplied with from sample to sample.
+  /// The matrix by which the error is multiplied from sample to sample.
   const Matrix<N, N>& transition() const noexcept { return transition_; }
   /// Whether the error dies out at this sample rate.
   bool stable() const { return is_schur(characteristic_polynomial(transition_)); }

@@ -14,7 +14,7 @@
 
 namespace drivebench::control {
 
-/// Where a controller has its speed from.
+/// The source of a controller's speed.
 enum class ShaftSpeed {
   kBackwardDifference,  ///< EST-01
   kObserver,            ///< EST-02
@@ -41,7 +41,7 @@ struct ShaftEstimatorParameters {
       std::tuple{gain("tachometer.vs_per_rad", &ShaftEstimatorParameters::tachometer_vs_per_rad)});
 };
 
-/// The shaft as a controller sees it.
+/// The estimate of the shaft in a controller.
 struct ShaftEstimate {
   double angle_rad = 0.0;    ///< measured, since the first sample
   double speed_rad_s = 0.0;  ///< by the chosen source

@@ -18,8 +18,8 @@ struct Gain {
 /// The longest a run may last, with all that stands before and after its move.
 inline constexpr double kLongestRun_s = 3600.0;
 
-/// What a gain must be, beside finite. A duration is positive and a pause may be 0; neither is longer than
-/// the longest run.
+/// The rule for a gain, which must be finite besides. A duration is positive and a pause may be 0; neither is
+/// longer than the longest run.
 enum class GainRule { kAny, kPositive, kNotNegative, kDuration, kPause };
 
 /// One row of the gain table of a parameter struct P: a number, its name and its rule.
@@ -82,7 +82,7 @@ void for_each_gain(P& p, const Visit& see) {
   std::apply([&](const auto&... row) { (row.visit(p, {}, see), ...); }, kGainsOf<std::remove_const_t<P>>);
 }
 
-/// What is wrong with this number, a sentence; empty if nothing is.
+/// The problem of this number as a sentence; empty: none.
 std::string problem_with_gain(std::string_view name, double value, GainRule rule);
 
 /// Every number of p that breaks the rule of its row, one sentence each. A parameter struct has

@@ -10,7 +10,7 @@
 #include "clients/models/wound_dc_machine.hpp"
 #include "clients/models/wound_rotor_machine.hpp"
 
-// The gain tables of the machine models: clients/models knows nothing of gains.
+// The gain tables of the machine models: clients/models has no gains.
 namespace drivebench::control {
 
 template <>

@@ -8,8 +8,8 @@
 
 namespace drivebench::control {
 
-/// What the references of a move may ask for; a move that asks for more is refused before it starts. Usually
-/// the limits of the amplifier; more where a run has to show what happens beyond them.
+/// The most that the references of a move may demand; a move that demands more is refused before it starts.
+/// Usually the limits of the amplifier; more where a run has to show what happens beyond them.
 struct MoveAllowance {
   double voltage_v;
   double current_a;

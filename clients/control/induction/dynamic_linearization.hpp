@@ -87,7 +87,7 @@ struct QuadratureIntegratorParameters {
   std::vector<std::string> problems() const { return range_problems(*this); }
 };
 
-/// What the law asks of the currents: a value for one, a rate for the other.
+/// The demand of the law on the currents: a value for one, a rate for the other.
 struct QuadratureIntegratorCommand {
   double i_d_a;
   double i_q_rate_a_s;

@@ -11,8 +11,8 @@
 
 namespace drivebench::control {
 
-/// What a reference takes of the machine if it is followed: i_d,ref from the flux reference, i_q,ref from the
-/// acceleration and friction, and the voltages of both,
+/// The currents and voltages of a machine that follows a reference: i_d,ref from the flux reference, i_q,ref
+/// from the acceleration and friction, and the voltages of both,
 ///   u_d = R_S·i_d − σ·L_S·ω_S·i_q + (M/L_R)·dψ/dt     u_q = R_S·i_q + σ·L_S·ω_S·i_d + (M/L_R)·ω_S·ψ
 /// with ω_S = n_p·ω + η·M·i_q/ψ. Lengths of the two-phase vectors; the voltage across σ·L_S that changes the
 /// currents themselves is left out, since references may step. Source: Chiasson 2005, (8.9).

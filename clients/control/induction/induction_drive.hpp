@@ -14,8 +14,8 @@
 
 namespace drivebench::control {
 
-/// What the linearising controllers of an induction machine share: the machine, its encoder and amplifier,
-/// and the observer that stands for speed and flux.
+/// The common parameters of the linearising controllers of an induction machine: the machine, its encoder and
+/// amplifier, and the observer that stands for speed and flux.
 struct InductionDriveParameters {
   InductionMotorModel motor;
   double sample_rate_hz;
@@ -41,7 +41,7 @@ struct InductionDriveParameters {
   constexpr double direct_reference_limit_a() const noexcept { return 0.98 * current_limit_a; }
 };
 
-/// An induction machine as its controller sees it at a sample.
+/// The state of an induction machine in its controller at a sample.
 struct InductionState {
   double angle_rad = 0.0;  ///< measured, since the first sample
   double speed_rad_s = 0.0;
@@ -72,9 +72,9 @@ class InductionFeedback {
   std::int64_t start_count_ = 0;
 };
 
-/// The same for machines under load, where a speed observer that knows no load is off by (l1/l2)·τ_L/J, 5
-/// rad/s for the servo motor at 0.25 N·m, and turns the flux away: flux from the shaft angle (IMO-08), which
-/// needs no speed, and speed from the load-torque observer (IMO-09) with three poles at load_pole_per_s.
+/// The same for machines under load, where a speed observer without a load is off by (l1/l2)·τ_L/J, 5 rad/s
+/// for the servo motor at 0.25 N·m, and turns the flux away: flux from the shaft angle (IMO-08), which needs
+/// no speed, and speed from the load-torque observer (IMO-09) with three poles at load_pole_per_s.
 class LoadedInductionFeedback {
  public:
   LoadedInductionFeedback(const InductionDriveParameters& p, double load_pole_per_s) noexcept;

@@ -7,7 +7,7 @@
 
 namespace drivebench::control {
 
-/// What the amplifier can give, as lengths of the two-phase vectors: |u| ≤ voltage_v, |i| ≤ current_a.
+/// The limits of the amplifier, as lengths of the two-phase vectors: |u| ≤ voltage_v, |i| ≤ current_a.
 struct VectorLimits {
   double voltage_v;
   double current_a;

@@ -9,7 +9,7 @@
 
 namespace drivebench::control {
 
-/// What a move needs of one quantity at one instant, and how much there is. Both texts must be literals.
+/// The demand of a move for one quantity at one instant, and its limit. Both texts must be literals.
 struct Demand {
   std::string_view quantity;  ///< like "stator voltage"
   double value;               ///< its magnitude is judged
@@ -17,7 +17,7 @@ struct Demand {
   std::string_view unit;  ///< like "V"
 };
 
-/// Where a move first asks for more than there is.
+/// The first demand of a move beyond its limit.
 struct Exceeded {
   Demand demand;
   double time_s;  ///< since the start of the move

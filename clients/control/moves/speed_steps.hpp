@@ -9,8 +9,8 @@
 
 namespace drivebench::control {
 
-/// A speed from one moment to the next, for so long, and then another: what a drive is asked for that has to
-/// show how fast it can be.
+/// Two constant speeds, one after the other, with a step between: shows how fast a drive can change its
+/// speed.
 struct SpeedStepsParameters {
   double first_rad_s;
   double first_s;  ///< how long

@@ -8,7 +8,7 @@
 
 namespace drivebench::control {
 
-/// What a controller should follow at one instant.
+/// The reference for a controller at one instant.
 struct Reference {
   double angle_rad = 0.0;
   double speed_rad_s = 0.0;
@@ -16,7 +16,7 @@ struct Reference {
   double jerk_rad_s3 = 0.0;
 };
 
-/// References over time: rest before 0, and after duration_s() what the last instant asks for.
+/// References over time: rest before 0, and after duration_s() the reference of the last instant.
 class Trajectory {
  public:
   Trajectory() = default;

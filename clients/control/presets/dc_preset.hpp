@@ -15,7 +15,7 @@
 #include "clients/control/wound_dc/separate_dc_control.hpp"
 #include "clients/control/wound_dc/series_dc_control.hpp"
 
-/// How the presets of DC machines are put together, and the limits that are checked before a move.
+/// The construction of the presets of DC machines, and the limits that are checked before a move.
 namespace drivebench::control {
 
 using DcDemands = std::array<Demand, 2>;
@@ -54,8 +54,7 @@ inline DcDemands demands_of(const SeriesDcParameters& p, const Reference& r) noe
       p.axis.voltage_limit_v);
 }
 
-/// Refuses a move that asks for more than there is. Laws that are not told the acceleration ask for nothing
-/// in advance.
+/// Refuses a move that demands more than a limit. A law without the acceleration has no demand in advance.
 template <class P>
 void refuse_beyond_limits(const P& p, const Trajectory& move, double period_s) {
   const auto check = [&move, period_s](const auto& what) {
@@ -71,7 +70,7 @@ void refuse_beyond_limits(const P& p, const Trajectory& move, double period_s) {
   }
 }
 
-/// What the controller measures beside counts and armature current.
+/// The signal that the controller measures beside counts and armature current.
 template <class P>
 constexpr std::string_view signal_of(const P& p) noexcept {
   if (p.axis.shaft.source == ShaftSpeed::kEdges) return "edge_age_s";

@@ -17,7 +17,7 @@
 
 namespace drivebench::control {
 
-/// What an axis must be for a preset to fit. The sample rate is that of the run.
+/// The requirements of a preset on its axis. The sample rate is that of the run.
 struct Requirements {
   std::string_view machine_kind;           ///< as bench files and descriptions have it, like "induction"
   double counts_per_revolution;            ///< 0: the encoder does not matter
@@ -26,12 +26,12 @@ struct Requirements {
   Quantity quantity = Quantity::kVoltage;  ///< kCurrent needs a current amplifier
   /// A second kind that it fits, if any: the same equations under another name.
   std::string_view other_kind{};
-  /// What it measures beside counts and the currents of the phases, which not every link carries: "i_f_a",
-  /// "hall_lines", "tachometer_v", "edge_age_s"; empty: nothing.
+  /// The signal that the controller measures beside counts and phase currents, which not every link carries:
+  /// "i_f_a", "hall_lines", "tachometer_v", "edge_age_s"; empty: nothing.
   std::string_view signal{};
 };
 
-/// A controller and a run that belong together, with where their numbers come from.
+/// A controller and a run that belong together, with the source of their numbers.
 struct Preset {
   std::string_view name;  ///< "book/8.2.2"
   std::string_view source;
@@ -88,7 +88,7 @@ inline Run run_at(double sample_rate_hz, std::unique_ptr<Controller> controller,
   return {std::move(controller), std::move(move), with(timing, &RunTiming::sample_rate_hz, sample_rate_hz)};
 }
 
-/// A cubic move under a controller of p, refused where `demands` ask for more than is allowed.
+/// A cubic move under a controller of p, refused where `demands` exceed the allowance.
 template <class ControllerType, class P, class Demands>
 Run cubic_run(const P& p, const TrajectoryParameters& path, const MoveAllowance& allowed,
               const RunTiming& timing, const Demands& demands) {

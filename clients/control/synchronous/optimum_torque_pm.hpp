@@ -14,7 +14,7 @@ struct PmLimits {
   double current_a;
 };
 
-/// What keeps the torque from growing.
+/// The limit that bounds the torque.
 enum class LimitInForce { kCurrent, kBoth, kVoltage };
 
 struct PmOptimum {

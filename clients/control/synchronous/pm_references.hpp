@@ -6,7 +6,7 @@
 
 namespace drivebench::control {
 
-/// What a PM machine carries while it follows a trajectory without error.
+/// Currents and voltages of a PM machine that follows a trajectory without error.
 struct PmReferences {
   DirectQuadrature current_a;
   DirectQuadrature slope_a_per_s;  ///< of the currents

@@ -39,9 +39,9 @@ struct StepperParameters {
   double step_rad() const noexcept;
 };
 
-/// What stands on the phases, for an amplitude of 1, so that the rotor of a stepping motor rests at an
-/// electrical angle; the angle is rounded to the nearest step. Source: Chiasson 2005, 9.4 and problem 9.10
-/// (ST-01, ST-03).
+/// The phase values, for an amplitude of 1, at which the rotor of a stepping motor rests at an electrical
+/// angle; the angle is rounded to the nearest step. Source: Chiasson 2005, 9.4 and problem 9.10 (ST-01,
+/// ST-03).
 PhasePair step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept;
 
 /// A stepping motor without feedback: the phases are those at which the rotor rests at the angle of the

@@ -68,7 +68,7 @@ WoundRotorController::Voltages WoundRotorController::voltages(const Currents& i,
                                 m.field_inductance_h * slope(error.field, integral_as_.field) +
                                 m.mutual_inductance_h * slope_d;
   const double field_v = std::clamp(wanted_field_v, -p_.field_voltage_limit_v, p_.field_voltage_limit_v);
-  // What the field does in the end, so that the d axis stays where it is.
+  // The slope of the field under its limited voltage, which the d axis must balance.
   const double slope_field =
       (field_v - m.field_resistance_ohm * i.field - m.mutual_inductance_h * slope_d) / m.field_inductance_h;
   const double omega_rad_s = m.pole_pairs * shaft_.speed_rad_s();

@@ -10,7 +10,7 @@
 
 namespace drivebench::control {
 
-/// Where a series motor's controller has its speed from.
+/// The source of the speed of a series motor's controller.
 enum class SeriesDcSpeed {
   kShaft,    ///< the estimator of the axis
   kCurrent,  ///< SeriesDcObserver, without any sensor on the shaft

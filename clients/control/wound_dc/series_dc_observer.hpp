@@ -14,7 +14,7 @@ namespace drivebench::control {
 struct SeriesDcObserverGains {
   double flux_per_s;         ///< l1
   double speed_per_s2;       ///< l2 [rad/s²]
-  double load_per_s3 = 0.0;  ///< l3 [rad/s³]; 0: it knows no load (EST-05)
+  double load_per_s3 = 0.0;  ///< l3 [rad/s³]; 0: no load is estimated (EST-05)
 
   /// Poles −p1, −p2, without a load: l1 = Σp − f/J, l2 = (l1·f/J − p1·p2)/K_m.
   static constexpr SeriesDcObserverGains placed(const std::array<double, 2>& p_per_s,

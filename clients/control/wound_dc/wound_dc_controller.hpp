@@ -14,7 +14,7 @@
 
 namespace drivebench::control {
 
-/// What all controllers of a DC machine with a wound field have. They control its speed.
+/// The common parameters of the controllers of a DC machine with a wound field. They control its speed.
 struct WoundDcAxisParameters {
   WoundDcModel machine;
   double sample_rate_hz;
@@ -46,10 +46,10 @@ std::vector<std::string> wound_dc_problems(const P& p, const Polynomial<N>& loop
   return found;
 }
 
-/// The machine as a controller sees it at a sample.
+/// The state of the machine in a controller at a sample.
 struct WoundDcState {
   double speed_rad_s;
-  double load_rad_s2;  ///< load over inertia, if the estimator knows it
+  double load_rad_s2;  ///< load over inertia, if the estimator has it
   double armature_a;
   double field_a;
   double flux_wb;

@@ -12,7 +12,7 @@ namespace drivebench::identification {
 
 enum class MotorKind : std::uint8_t { kDc, kInduction, kPmSynchronous, kBldc };
 
-/// How the data become equations. Whatever stands in one equation should have passed the same filter and
+/// The processing of data into equations. All terms of an equation should have passed the same filter and
 /// belong to the same instant: a mismatch is the largest bias of all.
 struct Processing {
   LowPass current{};  ///< of currents and what is derived from them
@@ -20,20 +20,20 @@ struct Processing {
   LowPass shaft{};  ///< of the angle, before its differences
   /// Backward differences are late by half a period; they are here to show what that does.
   bool backward_differences = false;
-  /// By how many periods the voltages are to be advanced. An amplifier of the bench, and many drives, report
-  /// the mean of the period before the sample: 0.5. The bench reports the voltage of a line source at the
-  /// sample itself: 0. Commands that arrive d periods late and hold for one: -d - 0.5.
+  /// The advance of the voltages in periods. An amplifier of the bench, and many drives, report the mean of
+  /// the period before the sample: 0.5. The bench reports the voltage of a line source at the sample itself:
+  /// 0. Commands that arrive d periods late and hold for one: -d - 0.5.
   double voltage_shift = 0.5;
   double from_s = 0.0;  ///< part of the record that goes into the equations, from its first sample on; the
                         ///< filters see all
   double to_s = 0.0;    ///< 0: to the end
-  std::size_t edge_samples = 20;  ///< left out at both ends of the record, where the filters know less
+  std::size_t edge_samples = 20;  ///< left out at both ends of the record, where the filters have less data
 };
 
-/// What opposes the torque of an induction motor in the equation of motion.
+/// The load that opposes the torque of an induction motor in the equation of motion.
 enum class LoadModel : std::uint8_t { kViscous, kConstant };
 
-/// All that identify() needs to know beside the data.
+/// The input of identify() beside the data.
 struct Settings {
   MotorKind kind = MotorKind::kInduction;
   int pole_pairs = 1;

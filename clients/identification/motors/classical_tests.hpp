@@ -7,7 +7,7 @@
 
 namespace drivebench::identification {
 
-/// What a power analyser reads on a symmetric star: rms per phase, active and reactive power of all three
+/// The reading of a power analyser on a symmetric star: rms per phase, active and reactive power of all three
 /// phases.
 struct MeterReading {
   double voltage_v = 0.0;

@@ -9,7 +9,7 @@
 
 namespace drivebench::identification {
 
-/// What tracking takes as known of the motor: inductances do not drift with temperature.
+/// The known parameters of the motor for tracking: inductances do not drift with temperature.
 struct KnownInductances {
   double stator_inductance_h = 0.0;  ///< L_S
   double leakage_factor = 0.0;       ///< sigma; beta M = (1 - sigma)/sigma
