@@ -33,7 +33,7 @@ class Axis {
                            const PhaseCommand& second_command, Tick tick) noexcept;
 
   /// Sensors and truth at the start of `tick`, after the advance that led there: a pure function of state and
-  /// tick. What the bench knows of commands, leases and late ticks is not in it.
+  /// tick. The bench's state of commands, leases and late ticks is not in it.
   Sample sample(Tick tick) const noexcept;
 
   /// Changes parameters while running; they hold from the next advance on. The kind of machine stays.

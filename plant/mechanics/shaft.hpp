@@ -8,7 +8,7 @@
 
 namespace drivebench {
 
-/// Who decides about the speed of the shaft.
+/// The source of the motion of the shaft.
 enum class ShaftMotion : std::int64_t {
   kFree,     ///< the torques
   kLocked,   ///< nothing: it stands
