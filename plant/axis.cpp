@@ -68,8 +68,8 @@ void wrap_angle(AxisState& state) noexcept {
   }
 }
 
-/// What decays for hundreds of time constants becomes so small that processors take a hundred times as long
-/// for it.
+/// Sets values to zero that have decayed for hundreds of time constants: processors take a hundred times as
+/// long for numbers so small.
 void forget_negligible(AxisState& state) noexcept {
   constexpr double kNegligible = 1e-200;
   const auto kept = [](double x) { return std::abs(x) < kNegligible ? 0.0 : x; };

@@ -15,7 +15,7 @@
 
 namespace drivebench {
 
-/// How an axis is stepped; the same for its whole life.
+/// The timing of an axis; the same for its whole life.
 struct AxisTiming {
   double period_s = 0.0;  ///< T
   int substeps = 1;       ///< integration steps per tick, at most kMaxSubsteps

@@ -23,7 +23,8 @@ struct ThermalState {
 /// One step of T_th θ' = ambient + R_th P - θ under the mean power P = loss_j/period_s. Exact.
 void advance(const ThermalParameters& p, ThermalState& state, double loss_j, double period_s) noexcept;
 
-/// What the temperature does to the resistances: factors 1 + coefficient (θ - reference); 1 if not enabled.
+/// The effect of the temperature on the resistances: factors 1 + coefficient (θ - reference); 1 if not
+/// enabled.
 Adjustment thermal_adjustment(const ThermalParameters& p, const ThermalState& state) noexcept;
 
 }  // namespace drivebench

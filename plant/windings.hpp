@@ -5,12 +5,12 @@
 #include "plant/math/frames.hpp"
 #include "protocols/signals/command.hpp"
 
-/// What a machine shows to the drive and to the shaft, whatever its kind.
+/// The windings of a machine for the drive and the shaft, whatever its kind.
 namespace drivebench {
 
 struct MachineKind;  // plant/parameters/machine_kind.hpp
 
-/// How the windings of a stator meet the terminals.
+/// The connection of the windings of a stator to the terminals.
 enum class Connection : std::int64_t {
   kTwoPhase,     ///< windings a and b, each between the legs of a bridge of its own
   kStar,         ///< windings a, b, c of an isolated star: the neutral floats
@@ -46,7 +46,7 @@ enum class Conduction : std::int64_t {
   kNone,  ///< none: the stator is open
 };
 
-/// What is connected to the windings.
+/// The circuit that is connected to the windings.
 struct TerminalInput {
   TwoPhase voltage_v{};  ///< of the stator
   double zero_v = 0.0;   ///< of the zero sequence; independent phases only
@@ -83,7 +83,7 @@ struct RotorMotion {
   CosSin electrical;  ///< of n_p times the angle
 };
 
-/// What differs from the nameplate: heat, faults, and what is in series with the stator.
+/// The differences from the nameplate: heat, faults, and an impedance in series with the stator.
 struct Adjustment {
   double stator_resistance_factor = 1.0;
   double rotor_resistance_factor = 1.0;  ///< rotor cage, or field winding

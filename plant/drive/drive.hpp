@@ -19,7 +19,7 @@
 
 namespace drivebench {
 
-/// What stands between the command and the terminals.
+/// The kind of circuit between the command and the terminals.
 enum class DriveKind : std::int64_t {
   kVoltage,   ///< a linear voltage amplifier per phase
   kCurrent,   ///< the same under an inner current loop at every substep
@@ -79,7 +79,7 @@ class Drive {
                   Tick tick) noexcept;
 
   /// Switches the gates off (a source: opens the contactor) for the rest of the tick: over-current trip. Call
-  /// it after each begin_tick() while the trip lasts: delayed commands and contactors know nothing of it.
+  /// it after each begin_tick() while the trip lasts: delayed commands and contactors do not depend on it.
   void switch_off(DriveMemory& m) noexcept;
 
   /// The next instant after start_s, from the start of the tick, at which the voltages jump or bend; infinity
@@ -88,7 +88,7 @@ class Drive {
     return has_edges_ ? edge_after(m, start_s) : std::numeric_limits<double>::infinity();
   }
 
-  /// What the terminals see from start_s on for duration_s, which crosses no edge. `current_a` are the
+  /// The state of the terminals from start_s on for duration_s, which crosses no edge. `current_a` are the
   /// terminal currents at start_s.
   TerminalDrive at(DriveMemory& m, double start_s, double duration_s,
                    const PhaseValues& current_a) const noexcept {
@@ -121,7 +121,7 @@ class Drive {
   bool follows() const noexcept { return follows_; }
 
  private:
-  /// What a command comes to in this tick.
+  /// The effect of a command in this tick.
   struct Order {
     Gates gates = Gates::kOff;   ///< kCurrent only with a current loop
     PhaseValues setpoint{};      ///< [V] behind gain and offset, or [A] within the limit

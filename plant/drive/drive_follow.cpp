@@ -1,4 +1,4 @@
-// What an interval leaves behind in the drive: filter, current loop, link and starting capacitor.
+// The state of the drive after an interval: filter, current loop, link and starting capacitor.
 #include "plant/drive/drive.hpp"
 #include "plant/drive/phases.hpp"
 #include "plant/math/exponential.hpp"

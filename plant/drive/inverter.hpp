@@ -66,7 +66,7 @@ class SwitchingPattern {
   /// The commutation that ends a segment; beyond the period after the last one.
   double end_s(std::size_t segment) const noexcept { return segments_[segment].until_s; }
 
-  /// What the first `terminals` are connected to during a segment.
+  /// The connection of the first `terminals` during a segment.
   void put(std::size_t segment, int terminals, double rail_v, TerminalDrive& out) const noexcept {
     const std::uint64_t passed = segments_[segment].passed;
     for (int k = 0; k < terminals; ++k) {
@@ -81,7 +81,7 @@ class SwitchingPattern {
   static constexpr std::uint64_t kBits = 3;  ///< for the commutations that a terminal has passed: 0 to 4
   static constexpr std::uint64_t kHigh = 2;  ///< of them make the upper switch closed
 
-  // What a terminal is connected to after so many commutations: lower switch, dead time, upper switch, dead
+  // The connection of a terminal after so many commutations: lower switch, dead time, upper switch, dead
   // time, lower switch.
   static constexpr std::array<TerminalMode, 8> kMode{TerminalMode::kDriven, TerminalMode::kDiodes,
                                                      TerminalMode::kDriven, TerminalMode::kDiodes,

@@ -34,7 +34,7 @@ struct SourceParameters {
   Curve table;           ///< kTable: value over the fraction of a period, 0 .. 1
 };
 
-/// What the waveforms need of the parameters.
+/// The constants of the waveforms, derived from the parameters.
 struct SourceConstants {
   ThreePhase factor;      ///< amplitude of the phase over that of phase a; 0 without a terminal
   ThreePhase offset_rad;  ///< phase less that of phase a

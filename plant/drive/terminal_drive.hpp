@@ -7,15 +7,15 @@
 
 namespace drivebench {
 
-/// What holds a terminal during an interval.
+/// The connection of a terminal during an interval.
 enum class TerminalMode : std::int64_t {
   kDriven,  ///< a voltage
   kDiodes,  ///< the diodes of a leg with both switches off: the current flows into a rail until it is zero
   kOpen,    ///< a broken wire: the current dies in an arc at the rail voltage and does not come back
 };
 
-/// What the drive does to the terminals during an interval within a tick. Voltages of a star are against the
-/// middle of the DC link, those of the other connections across the winding.
+/// The connection of all terminals to the drive during an interval within a tick. Voltages of a star are
+/// against the middle of the DC link, those of the other connections across the winding.
 struct TerminalDrive {
   std::array<TerminalMode, 3> mode{};
   bool constant = true;   ///< the voltages stay as they are at the start

@@ -33,7 +33,7 @@ Phases winding_phases(Connection connection, const WindingValues& x) noexcept {
   return {plane.a + zero, plane.b + zero, plane.c + zero};
 }
 
-/// What is worked out for each terminal before the windings are asked.
+/// The values of each terminal that are computed before those of the windings.
 struct Work {
   Connection connection;
   const TerminalDrive& drive;
@@ -76,7 +76,7 @@ int conducting_count(const Work& w) noexcept {
   return (w.conducts(0) ? 1 : 0) + (w.conducts(1) ? 1 : 0) + (w.conducts(2) ? 1 : 0);
 }
 
-/// What the circuit, as it is known so far, does to the windings.
+/// The input of the windings from the part of the circuit that is decided so far.
 TerminalInput circuit_input(const Work& w, const Phases& v) noexcept {
   TerminalInput u = open_input(w.connection, w.open);
   const WindingVoltages across = winding_voltages(w.connection, values(v));

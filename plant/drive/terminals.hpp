@@ -17,7 +17,7 @@ constexpr TerminalSet all_terminals(Connection connection) noexcept {
   return (TerminalSet{1} << terminal_count(connection)) - 1;
 }
 
-/// What the windings see during an interval, from what the drive does to the terminals.
+/// The circuit of the windings during an interval, derived from the connection of the terminals to the drive.
 struct TerminalCircuit {
   TerminalInput start{};
   TerminalInput middle{};  ///< the voltages of start if `constant`

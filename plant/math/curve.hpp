@@ -47,8 +47,8 @@ class Curve {
   std::shared_ptr<const Table> table_;
 };
 
-/// What is wrong with points of a curve (fewer than two, not finite, x not rising), naming the first bad one;
-/// empty if nothing is. `rising`: y must rise as well.
+/// The problem of the points of a curve (fewer than two, not finite, x not rising) with the first bad one;
+/// empty: none. `rising`: y must rise as well.
 std::string problem_with_points(const std::vector<CurvePoint>& points, bool rising);
 
 }  // namespace drivebench

@@ -66,9 +66,9 @@ constexpr ThreePhase two_to_three(TwoPhase x) noexcept {
 
 /// Stator frame to a frame at the given electrical angle, counted positive from phase a to phase b:
 ///   x_d = x_a·cos + x_b·sin,   x_q = −x_a·sin + x_b·cos
-/// What the angle is decides the name of the frame. dq: the angle of the flux the frame follows (the rotor
-/// flux of an induction machine, the magnet of a PM machine). xy: the rotor's electrical angle n_p·theta; for
-/// an induction machine this rotor frame is not dq, and its x and y are the members d and q here. For a PM
+/// The angle decides the name of the frame. dq: the angle of the flux the frame follows (the rotor flux of an
+/// induction machine, the magnet of a PM machine). xy: the rotor's electrical angle n_p·theta; for an
+/// induction machine this rotor frame is not dq, and its x and y are the members d and q here. For a PM
 /// machine the two are one.
 constexpr Dq to_dq(TwoPhase x, CosSin angle) noexcept {
   return {.d = x.a * angle.cos + x.b * angle.sin, .q = x.b * angle.cos - x.a * angle.sin};

@@ -61,7 +61,7 @@ constexpr State advanced(const State& x, double factor, const State& slope) noex
   return rk4_detail::zip([factor](double a, double k) { return a + factor * k; }, x, slope);
 }
 
-/// Where in a step a stage of Runge-Kutta stands, for inputs that change within it.
+/// The place of a Runge-Kutta stage in its step, for inputs that change within it.
 enum class StepPoint { kStart, kMiddle, kEnd };
 
 template <class F, class State>

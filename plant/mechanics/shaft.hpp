@@ -8,7 +8,7 @@
 
 namespace drivebench {
 
-/// The source of the motion of the shaft.
+/// The cause of the motion of the shaft.
 enum class ShaftMotion : std::int64_t {
   kFree,     ///< the torques
   kLocked,   ///< nothing: it stands
@@ -48,7 +48,7 @@ double profile_load_nm(const MechanicsParameters& p, double time_s) noexcept;
 /// One over the fastest rate of the mechanics, infinity if there is none: sets the substep.
 double fastest_time_constant_s(const MechanicsParameters& p) noexcept;
 
-/// What the equations use, derived once from the parameters.
+/// The constants that the equations use, derived once from the parameters.
 struct ShaftConstants {
   // The rotor; of a rigid shaft all that turns, seen from the rotor: J1 + J2/n^2, f1 + f2/n^2.
   double inertia_kgm2 = 0.0;
@@ -209,7 +209,7 @@ inline ShaftState settled(const ShaftConstants& c, const ShaftState& x, int) noe
 /// Output and table, `turns_rad` being the whole turns of the rotor.
 LoadSide load_side(const ShaftConstants& c, const ShaftState& x, double turns_rad) noexcept;
 double energy_j(const ShaftConstants& c, const ShaftState& x) noexcept;  ///< kinetic
-/// What friction, fan and passive load dissipate.
+/// The power that friction, fan and passive load dissipate.
 double losses_w(const ShaftConstants& c, const ShaftState& x, const ShaftBranch& branch) noexcept;
 
 /// The torque that the elastic shaft gives to the load: K (twist - contact) + D twist' while the teeth touch.

@@ -19,13 +19,13 @@ double twist_speed_rad_s(const ShaftConstants& c, const TwoMassState& x) noexcep
   return c.per_ratio * x.speed_rad_s - x.load_speed_rad_s;
 }
 
-/// How far the shaft is twisted beyond the backlash; negative within it.
+/// The twist of the shaft beyond the backlash; negative within it.
 double beyond_rad(const ShaftConstants& c, const TwoMassState& x) noexcept {
   return std::abs(x.twist_rad) - c.half_backlash_rad;
 }
 
-/// What presses the teeth together: spring and damper; negative where they would have to pull. Zero within
-/// its own rounding, so that a state settled() at zero is seen as such.
+/// The torque that presses the teeth together, of spring and damper; negative where they would have to pull.
+/// Zero within its own rounding, so that a state settled() at zero is seen as such.
 double pressure_nm(const ShaftConstants& c, const TwoMassState& x) noexcept {
   constexpr double kRounding = 0x1p-44;
   const double pressure =
@@ -131,7 +131,7 @@ double losses_w(const ShaftConstants& c, const TwoMassState& x, const ShaftBranc
   const double rotor_nm = c.friction_nms * x.speed_rad_s + c.dry_nm * branch.direction;
   const double load_nms = c.load_friction_nms + c.load_fan_nms2 * std::abs(x.load_speed_rad_s);
   const double load_nm = load_nms * x.load_speed_rad_s + c.load_dry_nm * branch.load_direction;
-  // What the shaft takes less what its spring stores.
+  // The power into the shaft less that into its spring.
   const double spring_nm = side_of(x) * c.stiffness_nm * std::max(beyond_rad(c, x), 0.0);
   const double shaft_w = (shaft_torque_nm(c, x, branch) - spring_nm) * twist_speed_rad_s(c, x);
   return rotor_nm * x.speed_rad_s + load_nm * x.load_speed_rad_s + shaft_w;

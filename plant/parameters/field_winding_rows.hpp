@@ -2,7 +2,7 @@
 
 #include "plant/parameters/rows.hpp"
 
-/// What the tables of the DC machines with a field winding have in common.
+/// The common rows of the tables of the DC machines with a field winding.
 namespace drivebench::field_winding_rows {
 
 template <class Kind>

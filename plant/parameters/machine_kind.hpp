@@ -14,7 +14,7 @@ namespace drivebench {
 
 class Train;
 
-/// What a kind of machine tells about itself beside its equations. Each machine states it in its folder, in
+/// The description of a kind of machine beside its equations. Each machine states it in its folder, in
 /// <kind>_kind.cpp.
 struct MachineKind {
   std::string_view name;  ///< machine.kind of configurations

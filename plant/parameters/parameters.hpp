@@ -11,9 +11,9 @@
 
 namespace drivebench {
 
-/// Where the values of nearly every machine lie. The ranges are wide, from motors for models to those of
-/// mills and ships: a value outside is allowed, and more likely in the wrong unit (mH for H, rpm for rad/s)
-/// than meant.
+/// The range in which the values of nearly every machine lie. The ranges are wide, from motors for models to
+/// those of mills and ships: a value outside is allowed, and more likely in the wrong unit (mH for H, rpm for
+/// rad/s) than meant.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -63,8 +63,7 @@ std::span<const CurveParameter> axis_curves(const AxisParameters& p) noexcept;
 /// The row with this name, or null.
 const Parameter* find_parameter(const AxisParameters& p, std::string_view name) noexcept;
 
-/// What is wrong with writing `value` to this parameter: empty if nothing is, otherwise a sentence with value
-/// and rule.
+/// The problem of writing `value` to this parameter, as a sentence with value and rule; empty: none.
 std::string problem_with(const Parameter& parameter, double value);
 
 /// Everything that is wrong with the parameters: each value by its limits, the points of the curves, then the

@@ -8,8 +8,7 @@
 
 #include "plant/parameters/parameters.hpp"
 
-/// How the tables of the sections are written: one row for each member, found by its path from
-/// AxisParameters.
+/// The form of the tables of the sections: one row for each member, found by its path from AxisParameters.
 namespace drivebench {
 
 enum Trait : unsigned { kReal = 0, kInteger = 1, kLive = 2, kRequired = 4 };

@@ -26,7 +26,7 @@ constexpr bool is_sensor_delay(double ticks) noexcept {
   return ticks == 0.5 || ticks == static_cast<double>(static_cast<int>(ticks));
 }
 
-/// What a channel says and whether its converter was at its end.
+/// The reading of a channel, and whether its converter was at its end.
 struct AnalogReading {
   double value;
   bool saturated;

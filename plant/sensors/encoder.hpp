@@ -119,7 +119,7 @@ class Encoder {
     int size;
   };
 
-  /// What faults make of a sound encoder.
+  /// A sound encoder under the injected faults.
   struct View {
     bool swapped;
     std::int64_t lost_line;  ///< 1: A, 2: B
@@ -130,7 +130,8 @@ class Encoder {
 
     /// The segment as the disc sees it.
     AngleSegment seen(const AngleSegment& segment) const noexcept;
-    /// What a decoder makes of the count of a sound encoder, but for a constant. Steps by two at most.
+    /// The count that a decoder shows for the count of a sound encoder, but for a constant. Steps by two at
+    /// most.
     std::int64_t shown(std::int64_t count) const noexcept;
     /// No count has an edge.
     bool is_still() const noexcept { return lost_of == 1; }

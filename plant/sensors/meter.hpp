@@ -22,8 +22,8 @@ struct MeterSums {
   double ticks = 0.0;
 };
 
-/// What the display shows. Voltage and current are root mean squares over time and phases (of a star line to
-/// neutral), so that S = (number of phases) U I. An inductive load takes positive reactive power.
+/// The display. Voltage and current are root mean squares over time and phases (of a star line to neutral),
+/// so that S = (number of phases) U I. An inductive load takes positive reactive power.
 struct MeterFigures {
   double voltage_v = 0.0;
   double current_a = 0.0;

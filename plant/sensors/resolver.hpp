@@ -21,7 +21,8 @@ struct ResolverVoltages {
   double cosine_v;
 };
 
-/// What the windings induce, without the offsets, which are those of the demodulators behind them.
+/// The voltages induced in the windings, without the offsets, which are those of the demodulators behind
+/// them.
 inline ResolverVoltages resolver_voltages(const ResolverParameters& p, double angle_rad) noexcept {
   const CosSin turned = cos_sin(p.pole_pairs * angle_rad);
   return {.sine_v = p.amplitude_v * p.sine_gain * turned.sin,

@@ -14,7 +14,7 @@ constexpr std::size_t at(Channel c) noexcept {
   return static_cast<std::size_t>(c);
 }
 
-/// Where the history keeps a tick.
+/// The place of a tick in the history.
 constexpr std::size_t slot_of(Tick tick) noexcept {
   constexpr Tick kSlots = kMaxSensorDelayTicks + 1;
   return static_cast<std::size_t>((tick + kSlots) % kSlots);

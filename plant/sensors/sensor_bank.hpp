@@ -33,7 +33,7 @@ enum class Channel : std::size_t {
 inline constexpr std::size_t kChannelCount = 14;
 using AnalogValues = std::array<double, kChannelCount>;
 
-/// What there is to measure at one instant.
+/// The measurable quantities at one instant.
 struct Measurable {
   PhaseValues current_a{};
   PhaseValues voltage_v{};
@@ -44,7 +44,7 @@ struct Measurable {
   double speed_rad_s = 0.0;
 };
 
-/// What the analog channels and the power analyser remember. 8-byte members only.
+/// The memory of the analog channels and of the power analyser. 8-byte members only.
 struct SensorMemory {
   AnalogValues filtered{};              ///< behind the anti-alias filters
   AnalogValues half_tick{};             ///< in the middle of the last tick

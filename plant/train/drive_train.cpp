@@ -5,7 +5,7 @@
 namespace drivebench {
 namespace {
 
-/// What the source's own impedance takes of its voltage on average over an interval.
+/// The mean voltage across the source's own impedance over an interval.
 double series_drop_v(const SourceParameters& source, double duration_s, double from_a, double to_a) noexcept {
   return 0.5 * source.resistance_ohm * (from_a + to_a) + source.inductance_h * (to_a - from_a) / duration_s;
 }

@@ -56,7 +56,7 @@ class DriveTrain final : public Train {
     Shaft shaft;
   };
 
-  /// What is worked out at the start of a piece.
+  /// The values that are computed at the start of a piece.
   struct Piece {
     State from{};
     State stage{};
@@ -102,8 +102,8 @@ class DriveTrain final : public Train {
   void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;
   /// Whether every terminal conducts; if so, the circuit has its voltage.
   bool conduct(const AxisCore& core, const AxisState& state) noexcept;
-  /// What open windings show where `u` lets the others carry current: of most machines what they would show
-  /// without any, else the machine has floating_voltages().
+  /// The voltages of open windings where `u` lets the others carry current: in most machines those without
+  /// any current, else the machine has floating_voltages().
   WindingValues floating_v(const State& x, const RotorMotion& motion, const TerminalInput& u) const noexcept;
   /// The same with all terminals open.
   WindingValues open_v(const State& x, const RotorMotion& motion) const noexcept;

@@ -2,7 +2,7 @@
 
 #include "plant/train/drive_train.hpp"
 
-// Where a drive train meets its terminals.
+// The terminals of a drive train.
 namespace drivebench {
 
 template <class Machine, class Shaft>

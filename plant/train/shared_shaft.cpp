@@ -56,7 +56,7 @@ Shaft SharedShaft::stepped(const Shaft& from, double duration_s, const ShaftBran
   return advanced(from, duration_s / 6.0, sum);
 }
 
-/// What may end a piece: the shaft, then the first machine, then the second.
+/// The events that may end a piece: of the shaft, then of the first machine, then of the second.
 template <class Shaft>
 auto SharedShaft::events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch) const noexcept
     -> Events {

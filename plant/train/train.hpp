@@ -43,7 +43,7 @@ struct AxisCore {
   }
 };
 
-/// What a machine shows at one instant.
+/// The true values of a machine at one instant.
 struct MachineTruth {
   WindingValues current_a{};
   double torque_nm = 0.0;

@@ -137,8 +137,8 @@ WindingValues open_circuit_voltages(const BldcMachineConstants& c, const BldcMac
 WindingValues winding_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
-/// What open windings show while the others carry the currents that `u` lets flow: in a star their currents
-/// cancel there.
+/// The voltages of open windings while the others carry the currents that `u` lets flow, which cancel there
+/// in a star.
 inline WindingValues floating_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
                                        const RotorMotion& motion, const TerminalInput& u) noexcept {
   return c.star ? open_circuit_voltages(c, x, motion) : winding_voltages(c, x, motion, u);

@@ -122,8 +122,8 @@ WindingValues open_circuit_voltages(const PmMachineConstants& c, const PmMachine
 WindingValues winding_voltages(const PmMachineConstants& c, const PmMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
-/// What open windings show while the others carry the currents that `u` lets flow: those of a round machine
-/// do not notice.
+/// The voltages of open windings while the others carry the currents that `u` lets flow; those of a round
+/// machine do not depend on these currents.
 inline WindingValues floating_voltages(const PmMachineConstants& c, const PmMachineState& x,
                                        const RotorMotion& motion, const TerminalInput& u) noexcept {
   return c.saliency_h != 0.0 ? winding_voltages(c, x, motion, u) : open_circuit_voltages(c, x, motion);

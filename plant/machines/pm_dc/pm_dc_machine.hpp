@@ -55,7 +55,7 @@ PmDcMachineState restricted(const PmDcMachineConstants& c, const PmDcMachineStat
 WindingValues open_circuit_voltages(const PmDcMachineConstants& c, const PmDcMachineState& x,
                                     const RotorMotion& motion) noexcept;
 
-/// What the magnets give, on axis a: K, the flux linkage that the brushes see.
+/// The flux linkage of the magnets at the brushes, on axis a: K.
 TwoPhase rotor_flux_wb(const PmDcMachineConstants& c, const PmDcMachineState& x,
                        const RotorMotion& motion) noexcept;
 

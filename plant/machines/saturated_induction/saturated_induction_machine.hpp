@@ -148,7 +148,7 @@ WindingValues winding_voltages(const SaturatedInductionMachineConstants& c,
                                const SaturatedInductionMachineState& x, const RotorMotion& motion,
                                const TerminalInput& u) noexcept;
 
-/// What open windings show while the others carry the currents that `u` lets flow.
+/// The voltages of open windings while the others carry the currents that `u` lets flow.
 inline WindingValues floating_voltages(const SaturatedInductionMachineConstants& c,
                                        const SaturatedInductionMachineState& x, const RotorMotion& motion,
                                        const TerminalInput& u) noexcept {

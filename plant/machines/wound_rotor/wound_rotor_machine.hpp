@@ -101,7 +101,7 @@ WindingValues open_circuit_voltages(const WoundRotorMachineConstants& c, const W
 WindingValues winding_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
-/// What open windings show while the others carry the currents that `u` lets flow.
+/// The voltages of open windings while the others carry the currents that `u` lets flow.
 inline WindingValues floating_voltages(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                                        const RotorMotion& motion, const TerminalInput& u) noexcept {
   return winding_voltages(c, x, motion, u);
