@@ -206,7 +206,7 @@ double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
 }
 
-/// The value of one count of a setpoint in a classic command whose mode gives duties or currents; 0 in the
+/// The value of one count of a set-point in a classic command whose mode gives duties or currents; 0 in the
 /// other modes.
 double setpoint_unit(const Profile& profile, double mode) noexcept {
   if (mode == double{kDutyMode}) return kDutyUnit;

@@ -1,4 +1,4 @@
-// Changes around a controller: parameters on a ramp, injected faults, bumps, current setpoints, two axes on
+// Changes around a controller: parameters on a ramp, injected faults, bumps, current set-points, two axes on
 // one shaft.
 #include <gtest/gtest.h>
 
@@ -267,7 +267,7 @@ TEST(BenchFault, CMD_06_CopiesThatTheLinkMakesAreRefusedAndCounted) {
   EXPECT_EQ(state_of(arming), ControlState::kRun);
 }
 
-// ---- setpoints ----
+// ---- set-points ----
 
 BenchSetup current_setup() {
   BenchSetup setup = servo_setup();

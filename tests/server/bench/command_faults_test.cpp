@@ -130,7 +130,7 @@ TEST(CommandFaults, CMD_09_CMD_10_OfABurstTheNewestActsOnce) {
   }
 }
 
-// Catches: one setpoint of the four that is not looked at; a refusal that changes what is in force or feeds
+// Catches: one set-point of the four that is not checked; a refusal that changes what is in force or feeds
 // the watchdog; a check that takes a negative zero or a denormal for wrong, or flushes it.
 TEST(CommandFaults, CMD_11_EveryFieldIsCheckedAndLegalOdditiesPass) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();

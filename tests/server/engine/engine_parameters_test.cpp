@@ -1,4 +1,4 @@
-// Events of the configuration, parameters and setpoints as the engines handle them.
+// Events of the configuration, parameters and set-points as the engines handle them.
 #include <gtest/gtest.h>
 
 #include <cmath>

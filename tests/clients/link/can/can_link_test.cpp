@@ -124,7 +124,7 @@ TEST_P(CanLinkOf, SendsEveryFieldOfACommand) {
   EXPECT_EQ(narrow(bench_->command), (std::vector<double>{2.0, 1.25, -2.5, 4.0}));
 }
 
-// Catches: setpoints of phase c or of the field that are left out, are those of another kind, or go to an
+// Catches: set-points of phase c or of the field that are left out, are those of another kind, or go to an
 // axis that has neither.
 TEST_P(CanLinkOf, SendsPhaseCAndTheFieldOfAWideAxis) {
   const AxisCommand command = {

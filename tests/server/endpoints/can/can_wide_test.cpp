@@ -71,7 +71,7 @@ TEST_P(WideAxis, PhaseCIsCommandedAndReported) {
 }
 
 // Catches: half of a command that is taken for the whole, in either variant; a refusal that the bench does
-// not count; a command without setpoints that is held up for them.
+// not count; a command without set-points that is held up for them.
 TEST_P(WideAxis, ACommandWithoutPhaseCIsIncomplete) {
   CanBench bench(on_bus(star_bench(), profile_of(GetParam())));
   const std::uint8_t lease = bench.acquire();
@@ -101,7 +101,7 @@ TEST_P(WideAxis, ACommandWithoutPhaseCIsIncomplete) {
   EXPECT_EQ(bench.engine().newest(0).refused_commands, 3u);
 }
 
-// Catches: setpoints of another tick, mode or controller, or of one that is gone, that are put together with
+// Catches: set-points of another tick, mode or controller, or of one that is gone, that are put together with
 // a command.
 TEST(ClassicWideAxis, SetpointsAreKeptForTheirCommandAlone) {
   CanBench bench(on_bus(star_bench(), classic()));
