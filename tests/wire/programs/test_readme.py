@@ -31,7 +31,7 @@ NOT_RUN = {
     "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH]":
         "a synopsis; test_commands.py tries each option",
     "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
-    "drivebench can check can0       # what is wrong with bit timing, state or queue, and the line that cures it":
+    "drivebench can check can0       # the problems of bit timing, state and queue, each with the line that cures it":
         "needs an adapter; can_check_test and test_socketcan.py try it",
 }
 
