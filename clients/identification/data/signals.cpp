@@ -73,15 +73,6 @@ Series backward_difference(SeriesView x, double period_s) {
   return y;
 }
 
-Series midpoints(SeriesView x) {
-  need(x, 2);
-  Series y(x.size());
-  for (std::size_t k = 1; k < x.size(); ++k)
-    y[k] = 0.5 * (x[k] + x[k - 1]);
-  y[0] = x[0];
-  return y;
-}
-
 Series advanced(SeriesView x, double samples) {
   if (samples == 0.0 || x.empty()) return {x.begin(), x.end()};
   const Cubic cubic(samples);

@@ -11,8 +11,6 @@ Series central_difference(SeriesView x, double period_s);
 Series second_difference(SeriesView x, double period_s);
 /// (x_k - x_(k-1))/T: the derivative half a period before the sample. The first repeats the second.
 Series backward_difference(SeriesView x, double period_s);
-/// (x_k + x_(k-1))/2: what is to stand beside a backward difference.
-Series midpoints(SeriesView x);
 
 /// The signal `samples` periods later, x(t + samples T), by the cubic through the four samples around that
 /// instant; beyond its ends the record stays at its last value. A voltage that is the mean of the period

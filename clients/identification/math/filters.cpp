@@ -63,15 +63,6 @@ std::vector<AnalogFilter> butterworth_sections(int order, double cutoff_rad_s) {
   return sections;
 }
 
-AnalogFilter butterworth(int order, double cutoff_rad_s) {
-  AnalogFilter whole = {.numerator = {1.0}, .denominator = {1.0}};
-  for (const AnalogFilter& section : butterworth_sections(order, cutoff_rad_s)) {
-    whole.numerator = product(whole.numerator, section.numerator);
-    whole.denominator = product(whole.denominator, section.denominator);
-  }
-  return whole;
-}
-
 DigitalFilter bilinear(const AnalogFilter& filter, double period_s, double exact_rad_s) {
   const double rate =
       exact_rad_s > 0.0 ? exact_rad_s / std::tan(0.5 * exact_rad_s * period_s) : 2.0 / period_s;
@@ -84,19 +75,6 @@ DigitalFilter bilinear(const AnalogFilter& filter, double period_s, double exact
   for (double& x : digital.a)
     x /= first;
   return digital;
-}
-
-DifferenceEquation::DifferenceEquation(DigitalFilter filter)
-    : filter_(std::move(filter)), inputs_(filter_.b.size(), 0.0), outputs_(filter_.a.size(), 0.0) {}
-
-double DifferenceEquation::step(double u) {
-  std::rotate(inputs_.rbegin(), inputs_.rbegin() + 1, inputs_.rend());
-  std::rotate(outputs_.rbegin(), outputs_.rbegin() + 1, outputs_.rend());
-  inputs_[0] = u;
-  outputs_[0] = 0.0;
-  outputs_[0] = std::inner_product(inputs_.begin(), inputs_.end(), filter_.b.begin(), 0.0) -
-                std::inner_product(outputs_.begin() + 1, outputs_.end(), filter_.a.begin() + 1, 0.0);
-  return outputs_[0];
 }
 
 StateSpaceFilter::StateSpaceFilter(const DigitalFilter& filter)

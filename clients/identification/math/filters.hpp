@@ -23,28 +23,14 @@ struct DigitalFilter {
 /// Source: Chiasson 2005, 2.8; tag FLT-01.
 std::vector<std::complex<double>> butterworth_poles(int order);
 
-/// The Butterworth low-pass, |G|^2 = 1/(1 + (w/w_c)^(2n)), in one piece.
-AnalogFilter butterworth(int order, double cutoff_rad_s);
-
-/// The low-pass as a product of second-order sections (and one of first order): at a high order and a corner
-/// far below the sampling rate double precision cannot hold the coefficients of one polynomial.
+/// The Butterworth low-pass, |G|^2 = 1/(1 + (w/w_c)^(2n)), as a product of second-order sections (and one of
+/// first order): at a high order and a corner far below the sampling rate double precision cannot hold the
+/// coefficients of one polynomial.
 std::vector<AnalogFilter> butterworth_sections(int order, double cutoff_rad_s);
 
 /// The trapezoidal rule, s = (2/T)(1 - z^-1)/(1 + z^-1). With `exact_rad_s` the factor 2/T becomes
 /// w/tan(w T/2), so that the response at that frequency is the analog one. Tag FLT-02.
 DigitalFilter bilinear(const AnalogFilter& filter, double period_s, double exact_rad_s = 0.0);
-
-/// The filter as a difference equation, from rest. Source: (2.52); tag FLT-03.
-class DifferenceEquation {
- public:
-  explicit DifferenceEquation(DigitalFilter filter);
-  double step(double u);
-
- private:
-  DigitalFilter filter_;
-  std::vector<double> inputs_;
-  std::vector<double> outputs_;
-};
 
 /// The filter in controllable canonical form: x_n(k+1) = u - a_n x_1 - ... - a_1 x_n, the other states shift,
 /// y = sum (b_i - b_0 a_i) x_(n+1-i) + b_0 u. Source: (2.54); tag FLT-03.
