@@ -97,8 +97,8 @@ struct Match {
 };
 
 /// Finds the message that a frame carries and checks its form. In the FD profile, messages of both variants
-/// may also come in classic frames. On a bus with wide axes the size tells the sensors and commands of wide
-/// axes from those of narrow ones.
+/// may also come in classic frames. On a bus with wide axes the size distinguishes the sensors and commands
+/// of wide axes from those of narrow ones.
 Match match(const Profile& profile, const Frame& frame) noexcept;
 
 /// An edge of the encoder in the message `edges`.

@@ -13,7 +13,7 @@
 #include "protocols/mcap/mcap_format.hpp"
 
 /// Recordings: MCAP files (https://mcap.dev/spec, major version 0), written as indexed, uncompressed,
-/// checksummed chunks and read sequentially. Neither class knows files: the writer hands bytes to a sink, the
+/// checksummed chunks and read sequentially. Neither class uses files: the writer hands bytes to a sink, the
 /// reader reads a span of bytes.
 namespace drivebench {
 

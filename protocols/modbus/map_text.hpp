@@ -15,7 +15,7 @@ struct FaultInput {
 };
 
 /// The maps of the axes as a CSV table for spreadsheets and PLC tools: one line for each value, coil and
-/// discrete input. The first column tells the table of an address, and the axis where axes have different
+/// discrete input. The first column names the table of an address, and the axis where axes have different
 /// kinds of machines.
 std::string map_csv(std::span<const RegisterMap> maps, std::span<const FaultInput> faults);
 

@@ -35,7 +35,7 @@ class Admission {
   struct Decision {
     bool admitted = false;
     bool looked_at = true;  ///< false: the address must wait, and the token was not read
-    Grant grant{};          ///< of the user; without a name if no token is asked for
+    Grant grant{};          ///< of the user; without a name if the server needs no token
     std::string why_not{};  ///< one sentence
   };
   /// `address` is where the peer comes from, without its port.

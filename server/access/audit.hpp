@@ -57,7 +57,7 @@ class Audit {
   void fail();
 
   struct Seen {
-    Owner holder = 0;  ///< of the axis, as the answered requests tell
+    Owner holder = 0;  ///< of the axis, by the answered requests
     std::uint64_t state = 0;
     std::uint64_t faults = 0;
   };

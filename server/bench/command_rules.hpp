@@ -39,7 +39,7 @@ constexpr double largest_step(const CommandRules& rules, std::int64_t period_ns)
 }
 
 /// The reason why an axis refuses a command of `sender`. In this order: the sender must hold the lease; the
-/// values must be finite, no accident, of a kind that the drive knows and, with OnExcess::kRefuse, within its
+/// values must be finite, no accident, of a kind that the drive takes and, with OnExcess::kRefuse, within its
 /// limits; the command must answer a sample that has been taken and not been answered; with OnExcess::kRefuse
 /// its set-points must be near enough to those of the command before; under a latched fault the gates must be
 /// off.

@@ -91,7 +91,7 @@ CanLink::CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::st
 CanLink::~CanLink() {
   if (lease_ == 0) return;
   try {
-    send_request(Request::kRelease);  // CAN has no connection whose end the bench could see
+    send_request(Request::kRelease);  // CAN has no connection whose end would release it
   } catch (const LinkError&) {
     return;  // the lease runs out
   }

@@ -22,7 +22,7 @@ class AxisLink {
   virtual ~AxisLink() = default;
 
   /// The description of the bench. A transport without descriptions leaves out parameters and faults, and may
-  /// not know the mode before acquire().
+  /// leave out the mode before acquire().
   virtual const v1::BenchDescription& bench() const noexcept = 0;
   /// The number of the axis.
   virtual std::uint32_t axis() const noexcept = 0;

@@ -56,7 +56,7 @@ class Link {
   std::uint64_t acquire(std::uint32_t axis);
   void renew(std::uint32_t axis);
   void release(std::uint32_t axis);
-  /// Acquires the axis from the session that holds it, which is told the reason. Needs the role of an
+  /// Acquires the axis from the session that holds it, which gets the reason. Needs the role of an
   /// administrator.
   std::uint64_t take(std::uint32_t axis, const std::string& reason);
   /// The notices of the bench since the last call: an administrator took an axis from this session, or its

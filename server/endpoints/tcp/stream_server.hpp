@@ -12,8 +12,7 @@
 
 namespace drivebench {
 
-/// Accepts clients on TCP, with TLS if it is configured, and on a unix socket, and tells them about every
-/// tick.
+/// Accepts clients on TCP, with TLS if it is configured, and on a unix socket, and serves them at every tick.
 class StreamServer {
  public:
   /// Listens at once; throws std::runtime_error that names the address if that fails.

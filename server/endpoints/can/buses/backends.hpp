@@ -29,7 +29,7 @@ MakeBus make_udp_multicast_bus;
 ///   pty:PATH           a terminal, with a link to it at PATH
 ///   /dev/ttyACM0@BAUD  a serial adapter, at 115200 baud unless it says otherwise
 ///
-/// With the first two, each client sees an adapter of its own on a common bus; frames flow between the
+/// With the first two, each client gets an adapter of its own on a common bus; frames flow between the
 /// commands O or L and C. A slow client gets the newest frame of each identifier. With the third the bench is
 /// the client and sets the bit rates of the configuration; an adapter supports only some of them.
 MakeBus make_slcan_bus;

@@ -27,7 +27,7 @@ struct BusStatus {
   std::uint64_t confirmed = 0;  ///< frames seen on the bus, where the back end reports them
   std::uint64_t received = 0;
   std::uint64_t send_dropped = 0;     ///< replaced by a newer frame with the same identifier, or given up
-  std::uint64_t receive_dropped = 0;  ///< lost before the bench read them, as far as the system tells
+  std::uint64_t receive_dropped = 0;  ///< lost before the bench read them, as far as the system reports it
   std::uint64_t error_frames = 0;
   std::uint64_t malformed = 0;  ///< bytes from the transport that were no frame
 };

@@ -31,7 +31,7 @@ std::uint16_t stamp_ms() {
                                     60'000);
 }
 
-/// A client with the adapter that it sees.
+/// A client with its emulated adapter.
 struct Client {
   Client(asio::io_context& io, int fd, BusStatus& status)
       : peer(io, fd, status, [this](std::string& out, const Frame& frame) {

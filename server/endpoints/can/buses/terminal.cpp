@@ -16,7 +16,7 @@
 namespace drivebench::can {
 namespace {
 
-// The kernel does not tell when a terminal is opened.
+// The kernel does not report the opening of a terminal.
 constexpr auto kPollPeriod = std::chrono::milliseconds(20);
 
 }  // namespace

@@ -188,7 +188,8 @@ std::string UdpMulticastBus::parse_group() {
 std::string UdpMulticastBus::open_sender(unsigned loopback) {
   const int fd = ::socket(group_.family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0 || !adopt(out_, fd)) return reason();
-  // The sender has a port of its own, so that the receiver can tell the frames of this bus from all others.
+  // The sender has a port of its own, so that the receiver can distinguish the frames of this bus from all
+  // others.
   own_ = {};
   own_.storage.ss_family = group_.family();
   socklen_t size = sizeof own_.storage;

@@ -40,9 +40,9 @@ class SampleFeed {
  private:
   std::uint32_t axis_;
   std::uint32_t decimation_;
-  std::uint64_t last_tick_;  // seen
+  std::uint64_t last_tick_;  // the newest
   std::uint64_t taken_ = 0;
-  std::uint64_t skipped_ = 0;  // samples of ticks that this thread did not see
+  std::uint64_t skipped_ = 0;  // samples of ticks that did not reach this thread
   std::vector<Sample> ring_;   // sample n at n modulo kDepth
 };
 
