@@ -41,7 +41,7 @@ Json parameters_of(const v1::AxisDescription& axis) {
   return rows;
 }
 
-const char* name_of(v1::SignalDescription::Kind kind) {
+const char* kind_name(v1::SignalDescription::Kind kind) {
   if (kind == v1::SignalDescription::KIND_STATUS) return "status";
   if (kind == v1::SignalDescription::KIND_SENSOR) return "sensor";
   return "truth";
@@ -76,7 +76,7 @@ std::string describe_json(const v1::Welcome& welcome) {
   for (const v1::SignalDescription& s : bench.signals()) {
     out["signals"].push_back({{"name", s.name()},
                               {"unit", s.unit()},
-                              {"kind", name_of(s.kind())},
+                              {"kind", kind_name(s.kind())},
                               {"minimum", s.minimum()},
                               {"maximum", s.maximum()},
                               {"meaning", s.meaning()}});
