@@ -145,12 +145,12 @@ void print_verdict(const Options& o, const Verdict& v) {
         {"realtime_valid", v.realtime_valid()},
         {"gaps", v.gaps},
         {"state_hash", fmt::format("{:016x}", v.state_hash)},
-        {"recording", o.record},
+        {"recording", v.recording},
         {"sentence", v.sentence()}};
     return print_line(verdict);
   }
   print_line(fmt::format("{}; state hash {:016x}", v.sentence(), v.state_hash));
-  if (!o.record.empty()) print_line(fmt::format("recorded in {}", o.record));
+  if (!v.recording.empty()) print_line(fmt::format("recorded in {}", v.recording));
 }
 
 RecordingOptions recording_options(const Options& o, const BenchConfig& config) {
@@ -242,8 +242,9 @@ void note_start(Audit& audit, const Engine& engine) {
 
 void note_end(Audit& audit, const Engine& engine, const Verdict& verdict) {
   if (engine.recorder() != nullptr) {
-    audit.note({.name = "recording_stopped",
-                .details = {{"file", engine.recorder()->file()}, {"gaps", verdict.gaps}}});
+    audit.note(
+        {.name = "recording_stopped",
+         .details = {{"file", verdict.recording}, {"gaps", verdict.gaps}, {"remarks", verdict.remarks}}});
   }
   audit.note({.name = "stop", .details = {{"ticks", verdict.ticks}, {"late_ticks", verdict.late_ticks}}});
 }

@@ -114,7 +114,8 @@ void Audit::on_tick() {
   if (recorder == nullptr || recorder->gaps() == seen_gaps_) return;
   if (!may_write_refusal()) return;
   seen_gaps_ = recorder->gaps();
-  note({.name = "recording_lost", .details = {{"file", recorder->file()}, {"gaps", seen_gaps_}}});
+  note({.name = "recording_lost",
+        .details = {{"file", recorder->file()}, {"gaps", seen_gaps_}, {"remarks", recorder->remarks()}}});
 }
 
 void Audit::watch_axis(std::uint32_t axis) {

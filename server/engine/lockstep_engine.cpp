@@ -74,14 +74,10 @@ class LockstepEngine final : public Engine {
 
   Verdict stop() override {
     bench_.dismiss_controllers();
-    Verdict verdict{.mode = RunMode::kLockstep,
-                    .ticks = static_cast<std::uint64_t>(bench_.tick()),
-                    .state_hash = bench_.state_hash()};
-    if (recorder_) {
-      recorder_->finish(verdict);
-      verdict.gaps = recorder_->gaps();
-    }
-    return verdict;
+    const Verdict verdict{.mode = RunMode::kLockstep,
+                          .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                          .state_hash = bench_.state_hash()};
+    return recorder_ ? recorder_->finish(verdict) : verdict;
   }
 
   Owner owner(std::size_t axis) const override { return bench_.owner(axis); }

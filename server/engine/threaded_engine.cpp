@@ -127,16 +127,12 @@ class ThreadedEngine final : public Engine {
     stop_.store(true);
     if (thread_.joinable()) thread_.join();
     bench_.dismiss_controllers();
-    Verdict verdict{.mode = config_.mode,
-                    .ticks = static_cast<std::uint64_t>(bench_.tick()),
-                    .late_ticks = bench_.sample(0).late_ticks,
-                    .lateness = clock_.lateness(),
-                    .state_hash = bench_.state_hash()};
-    if (recorder_) {
-      recorder_->finish(verdict);
-      verdict.gaps = recorder_->gaps();
-    }
-    return verdict;
+    const Verdict verdict{.mode = config_.mode,
+                          .ticks = static_cast<std::uint64_t>(bench_.tick()),
+                          .late_ticks = bench_.sample(0).late_ticks,
+                          .lateness = clock_.lateness(),
+                          .state_hash = bench_.state_hash()};
+    return recorder_ ? recorder_->finish(verdict) : verdict;
   }
 
   std::uint64_t state_hash() const override { return 0; }

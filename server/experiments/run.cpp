@@ -29,6 +29,7 @@ class ExperimentRun {
       : plan_(plan),
         progress_(progress),
         published_(published),
+        recording_(files.recording.string()),
         rows_(files.rows, plan.signals, progress.rows),
         recorder_(files.recording, plan.config,
                   {RecordingAttachment{kExperimentAttachment, "application/protobuf", request}},
@@ -117,19 +118,27 @@ class ExperimentRun {
                         .late_ticks = bench_.sample(0).late_ticks,
                         .lateness = clock_.lateness(),
                         .state_hash = bench_.state_hash()};
-    recorder_.finish(outcome_.verdict);
-    outcome_.verdict.gaps = recorder_.gaps();
-    if (outcome_.verdict.gaps > 0 && outcome_.state != v1::EXPERIMENT_STATE_FAILED) {
-      fail(recorder_.lacks_room() ? "the recording ended: its disk is full, or has less than " +
-                                        std::to_string(kDiskReserveBytes >> 20) + " MiB left"
-                                  : "the recording lost entries");
-    }
+    outcome_.verdict = recorder_.finish(outcome_.verdict);
+    const std::string problem = problem_of_recording();
+    if (!problem.empty() && outcome_.state != v1::EXPERIMENT_STATE_FAILED) fail(problem);
     return std::move(outcome_);
+  }
+
+  std::string problem_of_recording() const {
+    if (recorder_.lacks_room()) {
+      return "the recording ended: its disk is full, or has less than " +
+             std::to_string(kDiskReserveBytes >> 20) + " MiB left";
+    }
+    if (outcome_.verdict.recording != recording_) {
+      return "another program removed, moved or changed the recording";
+    }
+    return outcome_.verdict.gaps > 0 ? "the recording lost entries" : "";
   }
 
   const ExperimentPlan& plan_;
   RunProgress& progress_;
   const std::function<void()>& published_;
+  std::string recording_;
   RowWriter rows_;
   Recorder recorder_;
   Bench bench_;

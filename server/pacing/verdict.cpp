@@ -26,8 +26,10 @@ std::string timing(const Verdict& v) {
 }  // namespace
 
 std::string Verdict::sentence() const {
-  if (gaps == 0) return timing(*this);
-  return timing(*this) + fmt::format("; the recording lost {} entries and does not replay", gaps);
+  std::string sentence = timing(*this);
+  if (gaps > 0) sentence += fmt::format("; the recording lost {} entries and does not replay", gaps);
+  if (!remarks.empty()) sentence += "; " + remarks;
+  return sentence;
 }
 
 }  // namespace drivebench

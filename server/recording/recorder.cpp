@@ -32,10 +32,10 @@ std::size_t recorder_ring_entries(const BenchConfig& config) noexcept {
 
 Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
                    std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options)
-    : file_(file.string()),
-      ring_(recorder_ring_entries(config)),
+    : ring_(recorder_ring_entries(config)),
       room_for_tick_(config.axes.size() + kInputsPerLook),
       writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)) {
+  tell_state();
   if (options.own_thread) thread_ = std::thread([this] { run(); });
 }
 
@@ -93,17 +93,36 @@ void Recorder::tell_state() noexcept {
   gaps_.fetch_add(writer_->take_lost(), std::memory_order_relaxed);
   lacks_room_.store(writer_->lacks_room(), std::memory_order_relaxed);
   is_over_.store(writer_->is_over(), std::memory_order_relaxed);
+  const std::lock_guard lock(mutex_);
+  file_ = writer_->file();
+  remarks_ = writer_->remarks();
 }
 
-void Recorder::finish(const Verdict& verdict) {
+std::string Recorder::file() const {
+  const std::lock_guard lock(mutex_);
+  return file_;
+}
+
+std::string Recorder::remarks() const {
+  const std::lock_guard lock(mutex_);
+  return remarks_;
+}
+
+Verdict Recorder::finish(const Verdict& verdict) {
   stop_.store(true);
   if (thread_.joinable()) thread_.join();
   drain(ring_.capacity());
   tell_state();
   Verdict final_verdict = verdict;
   final_verdict.gaps = gaps();
+  final_verdict.recording = file();
+  final_verdict.remarks = remarks();
   writer_->finish(final_verdict);
   tell_state();
+  final_verdict.gaps = gaps();
+  final_verdict.recording = file();
+  final_verdict.remarks = remarks();
+  return final_verdict;
 }
 
 }  // namespace drivebench

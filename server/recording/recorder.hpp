@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <initializer_list>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <variant>
@@ -74,11 +75,14 @@ class Recorder final : public BenchObserver {
   bool is_over() const noexcept { return is_over_.load(std::memory_order_relaxed); }
   /// Whether it has ended because the disk is full or has less than its reserve.
   bool lacks_room() const noexcept { return lacks_room_.load(std::memory_order_relaxed); }
-  const std::string& file() const noexcept { return file_; }
+  /// The present name of the recording's first file that is still there; empty if none is.
+  std::string file() const;
+  /// What disks and other programs have done to the files, in a sentence; empty: nothing.
+  std::string remarks() const;
 
-  /// Drains the ring, writes the verdict and closes the file; afterwards gaps(), is_over() and lacks_room()
-  /// are final.
-  void finish(const Verdict& verdict);
+  /// Drains the ring, writes the verdict and closes the file; afterwards the state above is final. Returns
+  /// the verdict with what became of the recording.
+  Verdict finish(const Verdict& verdict);
 
  private:
   void count_gap(bool lost) noexcept;
@@ -86,7 +90,6 @@ class Recorder final : public BenchObserver {
   bool drain(std::size_t most) noexcept;
   void tell_state() noexcept;
 
-  std::string file_;
   SpscRing<RecordedEntry> ring_;
   std::size_t room_for_tick_;
   std::unique_ptr<RecordingWriter> writer_;
@@ -94,6 +97,9 @@ class Recorder final : public BenchObserver {
   std::atomic<bool> is_over_{false};
   std::atomic<bool> lacks_room_{false};
   std::atomic<bool> stop_{false};
+  mutable std::mutex mutex_;  // guards the two strings; no tick takes it
+  std::string file_;
+  std::string remarks_;
   std::thread thread_;
 };
 

@@ -9,8 +9,16 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <string>
 
 namespace drivebench {
+
+/// What other programs have done to a file while it was written.
+struct FileFate {
+  enum class Kind { kKept, kMoved, kRemoved, kChanged };
+  Kind kind = Kind::kKept;
+  std::string path{};  ///< of a moved file; empty: unknown
+};
 
 /// The file operations of the recorder. Each is the system call of its name and sets errno; tests use disks
 /// that fill, fail, stall or forget.
@@ -24,6 +32,8 @@ class RecordingFile {
   virtual int close() noexcept = 0;
   /// Free space on the disk [bytes].
   virtual std::uint64_t free_bytes() noexcept { return std::numeric_limits<std::uint64_t>::max(); }
+  /// Whether the file still has this name and this size; without a name only the size counts.
+  virtual FileFate fate(const std::string& /*path*/, std::uint64_t /*size*/) { return {}; }
 };
 
 using CreateRecordingFile = std::function<std::unique_ptr<RecordingFile>(const std::filesystem::path&)>;

@@ -1,5 +1,6 @@
 #include "server/recording/recording_writer.hpp"
 
+#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -31,7 +32,15 @@ std::span<const std::byte> bytes_of(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
-constexpr std::array<const char*, 5> kStepNames{"open", "write", "sync", "close", "memory"};
+constexpr std::array<const char*, 7> kStepNames{"open",
+                                                "write",
+                                                "sync",
+                                                "close",
+                                                "memory",
+                                                "another program removed it",
+                                                "another program emptied or changed it"};
+/// Beyond this length further remarks are only logged.
+constexpr std::size_t kMaxRemarkBytes = 1000;
 
 /// Errors that a new file would have as well.
 bool is_of_space(int error) noexcept {
@@ -70,15 +79,17 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const BenchC
                             "cannot create the recording " + first_ + ": less than " +
                                 std::to_string(options_.reserve_bytes >> 20) + " MiB are free on its disk");
   }
-  attempt([&] { begin(std::move(made)); });
+  attempt([&] { begin(first_, std::move(made)); });
 }
 
 RecordingWriter::~RecordingWriter() = default;
 
-void RecordingWriter::begin(std::unique_ptr<RecordingFile> file) {
+void RecordingWriter::begin(const std::string& path, std::unique_ptr<RecordingFile> file) {
   mcap_.reset();
   file_ = std::move(file);
-  whole_bytes_ = unwritten_ = unsynced_ = segment_samples_ = 0;
+  path_ = path;
+  if (name_.empty()) name_ = path;
+  whole_bytes_ = unwritten_ = unsynced_ = segment_samples_ = segment_entries_ = 0;
   was_synced_ = is_ending_ = false;
   samples_.clear();
   mcap_.emplace([this](std::span<const std::byte> bytes) { write_all(bytes); },
@@ -120,8 +131,8 @@ void RecordingWriter::go_on() noexcept {
 }
 
 void RecordingWriter::begin_next() {
-  ++number_;
-  begin(options_.create(segment_path(first_, number_)));
+  const std::string path = segment_path(first_, ++number_);
+  begin(path, options_.create(path));
 }
 
 void RecordingWriter::write(const RecordedEntry& entry) noexcept {
@@ -143,7 +154,7 @@ void RecordingWriter::write(const RecordedEntry& entry) noexcept {
 }
 
 void RecordingWriter::put(const TickedSample& entry) {
-  ++unwritten_;
+  count_entry();
   const auto room = mcap_->begin_message(
       header(samples_[entry.axis], sequences_[entry.axis]++, entry.sample.tick), kMaxSampleBytes);
   mcap_->end_message(encode_sample(entry.sample, kAllSignals, room.data()));
@@ -151,13 +162,13 @@ void RecordingWriter::put(const TickedSample& entry) {
 }
 
 void RecordingWriter::put(const ReceivedInput& entry) {
-  ++unwritten_;
+  count_entry();
   encode_input(entry.received, entry.input, tables_, input_);
   add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
 }
 
 void RecordingWriter::put(const Verdict& verdict) {
-  ++unwritten_;
+  count_entry();
   v1::Verdict message;
   encode_verdict(verdict, message);
   add(verdict_, 0, verdict.ticks, message);
@@ -217,14 +228,39 @@ void RecordingWriter::end_if_room_is_short() {
   is_over_ = lacks_room_ = true;
   options_.continues_after_errors = false;  // also if the end of this file cannot be written
   end_file();
-  spdlog::error("recording {}: less than {} MiB are free on its disk; it ends here",
-                segment_path(first_, number_), options_.reserve_bytes >> 20);
+  remark(fmt::format("{}: less than {} MiB are free on its disk, it ends here", path_,
+                     options_.reserve_bytes >> 20));
 }
 
 void RecordingWriter::sync() {
   if (file_->sync() != 0) throw DiskError{Step::kSync, errno};
   was_synced_ = true;
   unsynced_ = 0;
+  look_at_file();
+}
+
+/// Notices what other programs have done to the current file. A finished one belongs to the user.
+void RecordingWriter::look_at_file() {
+  const FileFate fate = file_->fate(path_, whole_bytes_);
+  switch (fate.kind) {
+    case FileFate::Kind::kKept:
+      return;
+    case FileFate::Kind::kRemoved:
+      throw DiskError{Step::kRemoved, 0};
+    case FileFate::Kind::kChanged:
+      throw DiskError{Step::kChanged, 0};
+    case FileFate::Kind::kMoved:
+      break;
+  }
+  remark(path_ + ": another program moved it" + (fate.path.empty() ? "" : " to " + fate.path));
+  if (name_ == path_ && !fate.path.empty()) name_ = fate.path;
+  path_ = fate.path;
+}
+
+void RecordingWriter::remark(const std::string& what) {
+  spdlog::error("recording {}", what);
+  if (remarks_.size() > kMaxRemarkBytes) return;
+  remarks_ += (remarks_.empty() ? "" : "; ") + what;
 }
 
 void RecordingWriter::end_file() {
@@ -252,7 +288,8 @@ void RecordingWriter::finish(const Verdict& verdict) noexcept {
 void RecordingWriter::fail(Step step, int error) noexcept {
   // After a failed write the earlier chunks stay readable; after a failed sync that is unknown.
   const bool is_unsure = step == Step::kSync || step == Step::kClose;
-  const std::uint64_t lost = unwritten_ + (is_unsure ? unsynced_ : 0);
+  const bool is_gone = step == Step::kRemoved || step == Step::kChanged;
+  const std::uint64_t lost = is_gone ? segment_entries_ : unwritten_ + (is_unsure ? unsynced_ : 0);
   is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
              (number_ > 1 && !was_synced_);
   lacks_room_ = lacks_room_ || is_of_space(error);
@@ -260,12 +297,14 @@ void RecordingWriter::fail(Step step, int error) noexcept {
   lost_ += std::max<std::uint64_t>(lost, is_ending_ || !is_over_ ? 1 : 0);
   if (step == Step::kWrite)
     file_->truncate(whole_bytes_);  // if this fails the torn chunk stays, and readers report it
-  unwritten_ = unsynced_ = 0;
+  unwritten_ = unsynced_ = segment_entries_ = 0;
   is_ending_ = false;
   try {
-    spdlog::error("recording {}: {}: {}; {}", segment_path(first_, number_),
-                  kStepNames[static_cast<std::size_t>(step)], std::strerror(error),
-                  is_over_ ? "it ends here" : "it goes on in a new file");
+    const std::string file = step == Step::kOpen ? segment_path(first_, number_) : path_;
+    remark(fmt::format("{}: {}{}{}, {}", file, kStepNames[static_cast<std::size_t>(step)],
+                       error == 0 ? "" : ": ", error == 0 ? "" : std::strerror(error),
+                       is_over_ ? "it ends here" : "it goes on in a new file"));
+    if (is_gone && name_ == path_) name_.clear();
   } catch (const std::exception&) {
     return;  // the loss is counted
   }

@@ -48,6 +48,10 @@ class RecordingWriter {
   /// The number of entries given to write() that may not be on the disk; each is returned once.
   std::uint64_t take_lost() noexcept { return std::exchange(lost_, 0); }
   std::size_t files() const noexcept { return number_; }
+  /// The present name of the first file that is still there; empty if none is.
+  const std::string& file() const noexcept { return name_; }
+  /// What disks and other programs have done to the files; empty: nothing.
+  const std::string& remarks() const noexcept { return remarks_; }
 
  private:
   struct Attachment {
@@ -56,11 +60,15 @@ class RecordingWriter {
     std::string data;
   };
 
-  /// The steps that a disk can refuse.
-  enum class Step { kOpen, kWrite, kSync, kClose, kMemory };
+  /// The steps that a disk can refuse, and the ends that another program can bring to a file.
+  enum class Step { kOpen, kWrite, kSync, kClose, kMemory, kRemoved, kChanged };
   struct DiskError;
 
-  void begin(std::unique_ptr<RecordingFile> file);
+  void begin(const std::string& path, std::unique_ptr<RecordingFile> file);
+  void count_entry() noexcept {
+    ++unwritten_;
+    ++segment_entries_;
+  }
   void put(const TickedSample& entry);
   void put(const ReceivedInput& entry);
   void put(const Verdict& verdict);
@@ -71,6 +79,8 @@ class RecordingWriter {
   void begin_next();
   void go_on() noexcept;
   void sync();
+  void look_at_file();
+  void remark(const std::string& what);
   void end_file();
   void end_if_room_is_short();
   bool is_full(const RecordedEntry& last) const;
@@ -91,10 +101,13 @@ class RecordingWriter {
   Clock::time_point last_sync_ = Clock::now();
   std::uint64_t lost_ = 0;
   std::uint64_t unlooked_bytes_ = 0;  // written since the last check of the free space
+  std::string name_;
+  std::string remarks_;
   bool is_over_ = false;
   bool lacks_room_ = false;
 
   // State of the current file.
+  std::string path_;  // its present name; empty: unknown
   std::unique_ptr<RecordingFile> file_;
   std::optional<McapWriter> mcap_;
   std::uint16_t inputs_ = 0;
@@ -104,6 +117,7 @@ class RecordingWriter {
   std::uint64_t unwritten_ = 0;    // entries in the chunk that is being filled
   std::uint64_t unsynced_ = 0;     // entries written since the last sync
   std::uint64_t segment_samples_ = 0;
+  std::uint64_t segment_entries_ = 0;
   bool was_synced_ = false;
   bool is_ending_ = false;
 };

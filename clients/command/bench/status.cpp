@@ -46,11 +46,11 @@ int run_status(const StatusOptions& options) {
                status.worst_lateness_s() * 1e6);
   }
   if (status.state_hash() != 0) fmt::print("state hash {:016x}\n", status.state_hash());
-  if (status.recording().empty()) {
+  if (status.recording().empty() && status.recording_gaps() == 0) {
     fmt::print("not recording\n");
   } else {
-    fmt::print("recording {}, {} gaps{}\n", status.recording(), status.recording_gaps(),
-               status.recording_over() ? "; it has ended: its disk is full or does not work" : "");
+    fmt::print("recording {}, {} gaps{}\n", status.recording().empty() ? "is gone" : status.recording(),
+               status.recording_gaps(), status.recording_over() ? "; it has ended, see the notes" : "");
   }
   for (const v1::AxisSample& each : status.axes()) {
     const v1::Sample& s = each.sample();

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Recordings in several files, on the command line."""
+"""Recordings in several files, and files that other programs remove or move."""
 import csv
 import json
 import os
@@ -16,8 +16,9 @@ except ImportError:
     sys.exit(77)
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+from recording import Recording
 from wire_client import BENCHES, PATIENCE_S, SERVER, guarded
-from wire_test import WireTest
+from wire_test import WireTest, until
 
 DRIVEBENCH = SERVER.with_name("drivebench")
 
@@ -96,6 +97,77 @@ class Series(WireTest):
                 self.assertEqual(done.stdout, "")
         self.assertEqual(self.client(server, unix=True).status().sessions, 1, "the first server goes on")
         self.assertEqual(server.stop(), 0)
+
+
+class Watched(WireTest):
+    """What other programs do to a recording while a server writes it."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="drivebench-watched-")
+        self.addCleanup(folder.cleanup)
+        self.file = pathlib.Path(folder.name) / "run.mcap"
+
+    def recording(self, mode):
+        """A server in this mode that has written a chunk, and a client of it."""
+        server = self.server("--mode", mode, "--record", str(self.file))
+        client = self.client(server)
+        if mode == "lockstep":
+            client.lease()
+            for tick in range(900):
+                client.step(tick, 1.0)
+        until(lambda: Recording(self.file.read_bytes()).messages.get("/servo/sample", 0) >= 800, "the recorder writes")
+        return server, client
+
+    def assertNoted(self, client, *facts):
+        def found():
+            notes = " ".join(client.status().notes)
+            return all(fact in notes for fact in facts)
+        until(found, f"the status says {facts}")
+
+    def test_rec_13_a_removed_or_emptied_recording_is_no_success(self):
+        """Catches: "recorded in", 0 gaps and exit code 0 for a recording that is gone."""
+        for mode in ("realtime", "lockstep"):
+            for act, said in ((self.remove, "another program removed it"),
+                              (self.empty, "another program emptied or changed it")):
+                with self.subTest(mode=mode, said=said):
+                    server, client = self.recording(mode)
+                    act()
+                    self.assertNoted(client, "run.mcap", said)
+                    status = client.status()
+                    self.assertGreaterEqual(status.recording_gaps, 800)
+                    self.assertEqual(status.recording, str(self.file.with_name("run.2.mcap")))
+                    self.assertEqual(server.stop(), 1)
+                    self.assertIn(said, server.verdict["sentence"])
+                    self.assertFalse(server.verdict["exact"])
+                    self.assertEqual(server.verdict["recording"], str(self.file.with_name("run.2.mcap")))
+                for file in self.file.parent.iterdir():
+                    file.unlink()
+
+    def test_rec_13_a_recording_that_is_removed_at_the_end_is_no_success(self):
+        """Catches: a last look before the last write."""
+        server, _ = self.recording("lockstep")
+        self.remove()
+        self.assertEqual(server.stop(), 1)
+        self.assertEqual(server.verdict["recording"], "")
+        self.assertIn("another program removed it", server.verdict["sentence"])
+
+    def test_rec_13_a_moved_recording_is_reported_under_its_new_name(self):
+        """Catches: a moved file that counts as lost, or is reported where it is no more."""
+        server, client = self.recording("realtime")
+        moved = self.file.with_name("kept.mcap")
+        self.file.rename(moved)
+        self.assertNoted(client, f"another program moved it to {moved}")
+        self.assertEqual(client.status().recording, str(moved))
+        self.assertEqual(server.stop(), 0)
+        self.assertEqual(server.verdict["recording"], str(moved))
+        done = subprocess.run([SERVER, "--replay", moved], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+    def remove(self):
+        self.file.unlink()
+
+    def empty(self):
+        os.truncate(self.file, 0)
 
 
 if __name__ == "__main__":

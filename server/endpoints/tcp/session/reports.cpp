@@ -160,6 +160,8 @@ void report_status(Dialogue& dialogue) {
     status.set_recording(utf8(recorder->file()));
     status.set_recording_gaps(recorder->gaps());
     status.set_recording_over(recorder->is_over());
+    if (const std::string remarks = recorder->remarks(); !remarks.empty())
+      status.add_notes("recording: " + utf8(remarks));
   }
   for (std::uint32_t axis = 0; axis < dialogue.axis_count(); ++axis) {
     std::array<std::byte, kMaxSampleBytes> bytes;
