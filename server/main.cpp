@@ -4,13 +4,13 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "server/access/audit.hpp"
+#include "server/command_line.hpp"
 #include "server/config/config.hpp"
 #include "server/config/plausible.hpp"
 #include "server/endpoints/tcp/stream_server.hpp"
@@ -31,31 +31,8 @@ namespace {
 
 enum ExitCode { kOk = 0, kFailed = 1, kUnusable = 2, kTooLate = 3 };
 
-struct Options {
-  std::string config;
-  std::string mode;
-  std::string replay;
-  std::string record;
-  std::string unix_path;
-  int port = -1;
-  int command_delay_ticks = -1;
-  double duration_s = 0.0;
-  std::int64_t fail_on_late = -1;
-  bool json = false;
-  bool check_config = false;
-  bool allow_overload = false;
-  bool allow_odd = false;
-  std::string experiments;
-  std::string audit;
-  double file_s = 0.0;         ///< plant time in each file of a recording; 0: no limit
-  std::uint64_t file_mib = 0;  ///< size of each file of a recording; 0: no limit
-  bool require_realtime = false;
-  std::string print;  ///< prints the description of an interface instead of a run
-  std::size_t bus = 1;
-};
-
 /// Loads the bench file; implausible values are refused unless --allow-odd accepts them.
-BenchConfig load_plausible(const Options& o) {
+BenchConfig load_plausible(const ServerOptions& o) {
   std::vector<ConfigProblem> odd;
   BenchConfig config = load_config(o.config, odd);
   if (odd.empty()) return config;
@@ -65,7 +42,7 @@ BenchConfig load_plausible(const Options& o) {
 }
 
 /// The configuration of the file with the changes of the command line.
-BenchConfig configure(const Options& o) {
+BenchConfig configure(const ServerOptions& o) {
   BenchConfig config = load_plausible(o);
   if (!o.mode.empty()) {
     change_mode(config, o.mode == "realtime" ? RunMode::kRealtime
@@ -82,6 +59,7 @@ BenchConfig configure(const Options& o) {
     throw std::runtime_error("--duration: a lockstep run ends when its controller does");
   }
   if (!(o.file_s <= 1e9)) throw std::runtime_error("--record-file-s: must be at most 1e9 s");
+  if (!(o.chunk_ms <= 1e4)) throw std::runtime_error("--record-chunk-ms: must be at most 1e4 ms");
   if (!(o.duration_s <= 1e9)) throw std::runtime_error("--duration: must be at most 1e9 s");
   if (config.mode == RunMode::kRealtime && config.setup.command_delay_ticks == 0) {
     throw std::runtime_error(
@@ -90,7 +68,7 @@ BenchConfig configure(const Options& o) {
   return config;
 }
 
-void print_ready(const Options& o, const BenchConfig& config, const StreamServer& server,
+void print_ready(const ServerOptions& o, const BenchConfig& config, const StreamServer& server,
                  const Transports& transports) {
   if (o.json) {
     const nlohmann::json ready{{"event", "ready"},
@@ -111,7 +89,7 @@ void print_ready(const Options& o, const BenchConfig& config, const StreamServer
 }
 
 /// In real time every bus must be able to carry its frames.
-void check_bus_loads(const Options& o, const BenchConfig& config) {
+void check_bus_loads(const ServerOptions& o, const BenchConfig& config) {
   if (config.mode != RunMode::kRealtime) return;
   for (const std::string& overload : bus_overloads(config)) {
     if (!o.allow_overload) throw std::runtime_error(overload + "; --allow-overload starts all the same");
@@ -130,7 +108,7 @@ nlohmann::json lateness_rows(const LatenessHistogram& lateness) {
   return rows;
 }
 
-void print_verdict(const Options& o, const Verdict& v) {
+void print_verdict(const ServerOptions& o, const Verdict& v) {
   if (o.json) {
     const nlohmann::json verdict{
         {"event", "verdict"},
@@ -153,11 +131,12 @@ void print_verdict(const Options& o, const Verdict& v) {
   if (!v.recording.empty()) print_line(fmt::format("recorded in {}", v.recording));
 }
 
-RecordingOptions recording_options(const Options& o, const BenchConfig& config) {
+RecordingOptions recording_options(const ServerOptions& o, const BenchConfig& config) {
   const double ticks = o.file_s * 1e9 / static_cast<double>(config.setup.period_ns);
   return {
       .file_ticks = o.file_s > 0.0 ? std::max<std::uint64_t>(static_cast<std::uint64_t>(ticks + 0.5), 1) : 0,
       .file_bytes = o.file_mib << 20,
+      .chunk_ns = static_cast<std::int64_t>(o.chunk_ms * 1e6),
       .continues_after_errors = true,
       .reserve_bytes = kDiskReserveBytes};
 }
@@ -172,7 +151,7 @@ void require_realtime(const BenchConfig& config) {
   if (!notes.empty()) throw std::runtime_error("--require-rt: " + notes.front());
 }
 
-std::unique_ptr<Engine> make_engine(const Options& o, const BenchConfig& config, asio::io_context& io) {
+std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& config, asio::io_context& io) {
   std::unique_ptr<Recorder> recorder;
   if (!o.record.empty()) {
     recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
@@ -206,8 +185,8 @@ void set_log_level(LogLevel level) {
 
 /// At each SIGHUP reads the bench file again and applies only its tokens and log level. Opens the audit log
 /// again, so that a moved file is replaced by a new one.
-asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const Options& o, StreamServer& server,
-                                       Audit* audit) {
+asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const ServerOptions& o,
+                                       StreamServer& server, Audit* audit) {
   for (;;) {
     co_await hangups.async_wait(asio::use_awaitable);
     std::string result = "done";
@@ -249,7 +228,7 @@ void note_end(Audit& audit, const Engine& engine, const Verdict& verdict) {
   audit.note({.name = "stop", .details = {{"ticks", verdict.ticks}, {"late_ticks", verdict.late_ticks}}});
 }
 
-void print_checked(const Options& o, const BenchConfig& config) {
+void print_checked(const ServerOptions& o, const BenchConfig& config) {
   if (o.json) {
     const nlohmann::json checked{{"event", "checked"},
                                  {"bench", config.name},
@@ -262,14 +241,14 @@ void print_checked(const Options& o, const BenchConfig& config) {
                          name_of(config.mode)));
 }
 
-int exit_code(const Options& o, const Verdict& verdict) {
+int exit_code(const ServerOptions& o, const Verdict& verdict) {
   if (verdict.gaps > 0) return kFailed;
   const bool too_late =
       o.fail_on_late >= 0 && verdict.late_ticks > static_cast<std::uint64_t>(o.fail_on_late);
   return too_late ? kTooLate : kOk;
 }
 
-int serve(const Options& o, const BenchConfig& config) {
+int serve(const ServerOptions& o, const BenchConfig& config) {
   set_log_level(config.log_level);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
@@ -324,7 +303,7 @@ int serve(const Options& o, const BenchConfig& config) {
   return broken ? kFailed : exit_code(o, verdict);
 }
 
-int use_bench(const Options& o) {
+int use_bench(const ServerOptions& o) {
   const BenchConfig config = configure(o);
   if (!o.print.empty()) {
     fmt::print("{}", interface_text(config, o.print, o.bus));
@@ -337,52 +316,8 @@ int use_bench(const Options& o) {
 }
 
 int run(int argc, char** argv) {
-  Options o;
-  CLI::App app(
-      "drivebench-server: emulates electric drives in deterministic real time and serves them to "
-      "controllers.");
-  app.set_version_flag("--version", std::string(build_id()));
-  auto* config = app.add_option("config", o.config, "bench file (TOML)");
-  auto* replay =
-      app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server");
-  config->excludes(replay);
-  app.add_option("--mode", o.mode, "instead of the mode in the bench file")
-      ->check(CLI::IsMember({"realtime", "lockstep", "free"}));
-  app.add_option("--port", o.port, "TCP port; 0: chosen by the system")->check(CLI::Range(0, 65535));
-  app.add_option("--unix", o.unix_path, "also listen on this unix socket");
-  app.add_option("--record", o.record, "write an MCAP recording to this new file");
-  app.add_option("--record-file-s", o.file_s,
-                 "a new file after this much plant time [s]: FILE.mcap, FILE.2.mcap ...")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--record-file-mib", o.file_mib, "a new file after this many MiB")
-      ->check(CLI::PositiveNumber);
-  app.add_flag("--require-rt", o.require_realtime,
-               "do not start without real-time scheduling and locked memory");
-  app.add_option("--duration", o.duration_s, "stop after this much plant time [s] (realtime and free)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--command-delay-ticks", o.command_delay_ticks, "0 or 1, instead of the bench file's")
-      ->check(CLI::Range(0, 1));
-  app.add_option("--fail-on-late", o.fail_on_late, "exit 3 if more ticks than this were late")
-      ->check(CLI::NonNegativeNumber);
-  app.add_flag("--json", o.json, "print JSON lines");
-  app.add_flag("--check-config", o.check_config, "only check the bench file");
-  app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
-  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines");
-  app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
-  app.add_flag("--allow-overload", o.allow_overload,
-               "in real time: start with a CAN bus that cannot carry all frames");
-  app.add_option("--print", o.print, "only print a description of an interface")
-      ->check(CLI::IsMember({"dbc", "can-table", "modbus-map", "modbus-csv"}));
-  app.add_option("--bus", o.bus, "which [[can]] section --print is about, from 1 on");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kOk : kUnusable;
-  }
-  if (o.config.empty() && o.replay.empty()) {
-    fmt::print(stderr, "a bench file is needed, for example configs/benches/servo.toml; see --help\n");
-    return kUnusable;
-  }
+  ServerOptions o;
+  if (const std::optional<bool> done = read_command_line(argc, argv, o)) return *done ? kOk : kUnusable;
   return o.replay.empty() ? use_bench(o) : replay_command(o.replay, o.json);
 }
 

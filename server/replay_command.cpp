@@ -12,10 +12,12 @@
 namespace drivebench {
 namespace {
 
+using Result = ReplayReport::Result;
+
 nlohmann::json as_json(const ReplayReport& report) {
-  using Result = ReplayReport::Result;
   nlohmann::json json{{"equal", report.result == Result::kEqual},
                       {"usable", report.result != Result::kUnusable},
+                      {"ends_early", report.result == Result::kEqualWithoutEnd},
                       {"ticks", report.ticks},
                       {"samples", report.samples},
                       {"inputs", report.inputs},
@@ -33,6 +35,34 @@ nlohmann::json as_json(const ReplayReport& report) {
   return json;
 }
 
+std::string verdict_of(const ReplayReport& report) {
+  switch (report.result) {
+    case Result::kEqual:
+      return "equal, bit for bit";
+    case Result::kEqualWithoutEnd:
+      return fmt::format("equal up to tick {}; the recording has no end", report.ticks);
+    case Result::kDifferent:
+      return "DIFFERENT";
+    case Result::kUnusable:
+      break;
+  }
+  return "cannot be replayed";
+}
+
+int exit_code_of(Result result) {
+  switch (result) {
+    case Result::kEqual:
+      return 0;
+    case Result::kEqualWithoutEnd:
+      return 3;
+    case Result::kDifferent:
+      return 1;
+    case Result::kUnusable:
+      break;
+  }
+  return 2;
+}
+
 }  // namespace
 
 int replay_command(const std::string& file, bool json) {
@@ -45,25 +75,15 @@ int replay_command(const std::string& file, bool json) {
   if (json) {
     print_line(as_json(report));
   } else {
-    const char* const verdict = report.result == ReplayReport::Result::kEqual       ? "equal, bit for bit"
-                                : report.result == ReplayReport::Result::kDifferent ? "DIFFERENT"
-                                                                                    : "cannot be replayed";
     print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {})",
-                           file, verdict, report.ticks, report.samples, report.inputs, report.state_hash,
+                           file, verdict_of(report), report.ticks, report.samples, report.inputs,
+                           report.state_hash,
                            report.recorded_by.empty() ? "an unknown program"
                            : report.same_build        ? report.recorded_by
                                                       : report.recorded_by + ", not by this build"));
     if (!report.problem.empty()) print_line("  " + report.problem);
   }
-  switch (report.result) {
-    case ReplayReport::Result::kEqual:
-      return 0;
-    case ReplayReport::Result::kDifferent:
-      return 1;
-    case ReplayReport::Result::kUnusable:
-      break;
-  }
-  return 2;
+  return exit_code_of(report.result);
 }
 
 }  // namespace drivebench

@@ -36,6 +36,7 @@ inline constexpr std::uint64_t kDiskReserveBytes = std::uint64_t{64} << 20;
 struct RecordingOptions {
   std::uint64_t file_ticks = 0;  ///< a new file begins after this many ticks; 0: never
   std::uint64_t file_bytes = 0;  ///< a new file begins after the chunk that reaches this size; 0: never
+  std::int64_t chunk_ns = 0;     ///< plant time in a chunk, the most that a kill loses; 0: the default
   bool continues_after_errors = false;  ///< goes on in a new file after a disk error, unless the disk is full
   std::uint64_t reserve_bytes = 0;      ///< the recording ends before less than this is free on its disk
   CreateRecordingFile create{};         ///< empty: create_recording_file
@@ -48,7 +49,8 @@ std::size_t recorder_ring_entries(const BenchConfig& config) noexcept;
 
 /// Writes every sample and every input of a run to MCAP files, on a thread of its own behind a bounded ring.
 /// The tick only copies into the ring; when the ring is full the entry is lost and counted. The thread writes
-/// the entries after every 100 ms of plant time (1 s in free mode) and syncs the file every second.
+/// the entries after every 100 ms of plant time (1 s in free mode) by default and syncs the file every
+/// second.
 class Recorder final : public BenchObserver {
  public:
   /// Creates the file; throws std::system_error if it exists or cannot be created.

@@ -21,7 +21,8 @@ namespace {
 
 /// The interval in plant time, so that the same run gives the same file, byte for byte. A free run takes some
 /// milliseconds for a second of it.
-std::int64_t flush_interval_ns(RunMode mode) {
+std::int64_t chunk_ns(const RecordingOptions& options, RunMode mode) {
+  if (options.chunk_ns > 0) return options.chunk_ns;
   return mode == RunMode::kFree ? 1'000'000'000 : 100'000'000;
 }
 constexpr auto kSyncInterval = std::chrono::seconds(1);
@@ -63,7 +64,7 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const BenchC
       options_(options),
       tables_(parameter_tables(config.setup)),
       flush_ticks_(static_cast<std::uint64_t>(
-          std::max<std::int64_t>(flush_interval_ns(config.mode) / config.setup.period_ns, 1))),
+          std::max<std::int64_t>(chunk_ns(options, config.mode) / config.setup.period_ns, 1))),
       sequences_(config.axes.size()) {
   for (const RecordingAttachment& a : attachments)
     attachments_.push_back({std::string(a.name), std::string(a.media_type), std::string(a.data)});

@@ -52,7 +52,10 @@ class Replayer {
   ReplayReport run(void (*on_progress)(double)) {
     bool more = true;
     for (McapMessage message; more && series_.next(message);) {
-      if (series_.problem()) break;  // in an earlier file
+      if (series_.problem()) {
+        unusable(series_.problem()->what);  // in an earlier file: what follows it has no beginning
+        break;
+      }
       if (!bench_ && !build_bench()) break;
       const std::string_view topic = reader().channels().at(message.header.channel).topic;
       if (has_verdict_) {
@@ -117,6 +120,13 @@ class Replayer {
     return false;
   }
 
+  /// As after a kill or on a full disk: what is there is equal.
+  void end_early(const std::string& why) {
+    report_.result = ReplayReport::Result::kEqualWithoutEnd;
+    report_.ticks = report_.samples / config_.axes.size() - 1;
+    report_.problem = "the recording has no end: " + why;
+  }
+
   bool feed(std::span<const std::byte> payload) {
     v1::Input message;
     std::optional<Input> input;
@@ -176,12 +186,13 @@ class Replayer {
       report_.state_hash = bench_->state_hash();
     }
     if (stopped_) return;
-    if (series_.problem()) {
-      unusable(series_.problem()->what);
-    } else if (!bench_) {
-      unusable("it holds no samples");
+    const McapProblem* const problem = series_.problem() ? &*series_.problem() : nullptr;
+    if (problem != nullptr && problem->kind != McapProblem::Kind::kTruncated) {
+      unusable(problem->what);
+    } else if (!bench_ || report_.samples < config_.axes.size()) {
+      unusable(problem != nullptr ? problem->what : "it holds no samples");
     } else if (!has_verdict_) {
-      unusable("it ends without a verdict");
+      end_early(problem != nullptr ? problem->what : "it holds no verdict");
     } else if (verdict_.ticks() != report_.ticks ||
                report_.samples != (report_.ticks + 1) * config_.axes.size()) {
       different(fmt::format("its verdict speaks of {} ticks but there are {} samples of {} ticks",
@@ -189,6 +200,8 @@ class Replayer {
     } else if (verdict_.state_hash() != report_.state_hash) {
       different(fmt::format("all samples are equal but the state hash was {:016x} and replays as {:016x}",
                             verdict_.state_hash(), report_.state_hash));
+    } else if (problem != nullptr) {
+      end_early(problem->what);
     } else {
       report_.result = ReplayReport::Result::kEqual;
     }

@@ -21,12 +21,14 @@ struct ReplayDifference {
 /// The result of a replay.
 struct ReplayReport {
   enum class Result {
-    kEqual,      ///< every sample and the state hash are equal, bit for bit
-    kDifferent,  ///< see difference and problem
-    kUnusable,   ///< not a recording of a run, or one that lost entries: see problem
+    kEqual,            ///< every sample and the state hash are equal, bit for bit
+    kEqualWithoutEnd,  ///< every sample is equal; the recording ends before its run did, or before its own
+                       ///< end
+    kDifferent,        ///< see difference and problem
+    kUnusable,         ///< not a recording of a run, damaged, or one that lost entries: see problem
   };
   Result result = Result::kUnusable;
-  std::uint64_t ticks = 0;
+  std::uint64_t ticks = 0;  ///< without an end: up to the last one that has all its samples
   std::uint64_t samples = 0;
   std::uint64_t inputs = 0;
   std::uint64_t state_hash = 0;

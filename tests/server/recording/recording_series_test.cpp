@@ -125,11 +125,17 @@ TEST(RecordingSeries, REC_11_EveryFileIsNeededInItsPlace) {
   ASSERT_EQ(s.size(), 4u);
   using Segments = std::vector<std::span<const std::byte>>;
   EXPECT_EQ(replay(s, nullptr).result, ReplayReport::Result::kEqual);
-  for (const Segments& wrong :
-       {Segments{s[0], s[1], s[3]}, Segments{s[1], s[2], s[3]}, Segments{s[0], s[2], s[1], s[3]},
-        Segments{s[0], s[1], s[1], s[2], s[3]}, Segments{s[0], s[1], s[2]}, Segments{s[3]}}) {
+  for (const Segments& wrong : {Segments{s[0], s[1], s[3]}, Segments{s[1], s[2], s[3]},
+                                Segments{s[0], s[2], s[1], s[3]}, Segments{s[0], s[1], s[1], s[2], s[3]},
+                                Segments{s[3]}, Segments{s[0], s[1].first(s[1].size() - 300), s[2], s[3]}}) {
     const ReplayReport report = replay(wrong, nullptr);
     EXPECT_EQ(report.result, ReplayReport::Result::kUnusable) << report.problem;
+  }
+  for (const Segments& short_of_its_end :
+       {Segments{s[0], s[1], s[2]}, Segments{s[0], s[1], s[2].first(s[2].size() - 300)}}) {
+    const ReplayReport report = replay(short_of_its_end, nullptr);
+    EXPECT_EQ(report.result, ReplayReport::Result::kEqualWithoutEnd) << report.problem;
+    EXPECT_EQ(report.ticks, 299u);
   }
 }
 

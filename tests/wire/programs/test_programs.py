@@ -20,6 +20,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from command_test import (
     CUT_SHORT, DRIVEBENCH, FAILED, NO_CONNECT, OK, SERVO, TOO_LATE, USAGE, CommandTest, environment, link_of, until)
+from recording import Recording
 from wire_client import PATIENCE_S, REPOSITORY, SERVER, Server
 
 
@@ -75,11 +76,12 @@ class Recordings(CommandTest):
         difference = self.json_of("replay", "flipped.mcap", code=FAILED)["first_difference"]
         self.assertEqual((difference["tick"], difference["axis"], difference["signal"]), (500, "servo", "speed_rad_s"))
 
-    def test_replay_of_a_damaged_or_cut_file_is_2(self):
-        """Catches: a recording that lost its end or its checksum, and passes."""
+    def test_replay_of_a_damaged_file_is_2_and_of_a_cut_one_3(self):
+        """Catches: a recording that lost its end or its checksum, and passes; one without its end that counts as damaged."""
         whole = bytearray(self.whole.read_bytes())
         cut = self.written("cut.mcap", whole[:-100])
-        self.assertSays(self.drivebench("replay", cut, code=USAGE).stdout, "cannot be replayed", "the file ends")
+        self.assertSays(self.drivebench("replay", cut, code=CUT_SHORT).stdout, "equal up to tick 1024; the recording has no end",
+                        "the file ends")
         whole[len(whole) // 2] ^= 0x10
         damaged = self.written("damaged.mcap", whole)
         self.assertSays(self.drivebench("replay", damaged, code=USAGE).stdout, "CRC32")
@@ -128,7 +130,20 @@ class Recordings(CommandTest):
         bench.process.kill()
         bench.process.wait()
         self.assertGreater(self.json_of("export", "killed.mcap", "--out", "k.csv", code=CUT_SHORT)["rows"], 500)
-        self.drivebench("replay", "killed.mcap", code=USAGE)
+        self.assertRegex(self.drivebench("replay", "killed.mcap", code=CUT_SHORT).stdout,
+                         r"equal up to tick \d+; the recording has no end")
+
+    def test_rec_01_a_killed_server_loses_the_configured_chunk_at_most(self):
+        """Catches: a chunk that the option does not change; a replay that refuses what a killed server left."""
+        for chunk_ms, last in ((100, 799), (5, 999)):
+            file = self.folder / f"{chunk_ms}.mcap"
+            bench = self.server("--record", str(file), "--record-chunk-ms", str(chunk_ms))
+            self.drivebench("control", link=link_of(bench))  # 1024 ticks
+            until(lambda at=file, n=last: Recording(at.read_bytes()).messages.get("/servo/sample", 0) > n, "they are written")
+            bench.process.kill()
+            bench.process.wait()
+            found = self.json_of("replay", file, code=CUT_SHORT)
+            self.assertEqual((found["equal"], found["usable"], found["ends_early"], found["ticks"]), (False, True, True, last))
 
     def test_export_refuses_before_it_overwrites(self):
         """Catches: a file that a mistake on the command line empties: once, the recording itself. A range without

@@ -57,7 +57,7 @@ class Series(WireTest):
             ticks = [int(row[0]) for row in list(csv.reader(file))[1:]]
         self.assertEqual(ticks, list(range(12_001)))
         (self.folder / "run.4.mcap").unlink()
-        self.assertIn("verdict", self.replayed("run.mcap", code=2)["problem"])
+        self.assertIn("verdict", self.replayed("run.mcap", code=3)["problem"])
         (self.folder / "run.2.mcap").write_bytes((self.folder / "run.2.mcap").read_bytes()[:-200])
         self.assertEqual(self.run_of(DRIVEBENCH, "export", "run.mcap", "--out", "cut.csv").returncode, 3)
 

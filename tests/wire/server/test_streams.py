@@ -285,7 +285,7 @@ class Ending(WireTest):
         folder = self.server().folder
         file = folder / "cut.mcap"
         server = self.server("--record", str(file), before=lambda: resource.setrlimit(
-            resource.RLIMIT_FSIZE, (100_000, 100_000)))
+            resource.RLIMIT_FSIZE, (300_000, 300_000)))
         client = self.client(server)
         client.lease()
         for tick in range(3000):
@@ -293,7 +293,7 @@ class Ending(WireTest):
         self.assertEqual(server.stop(), 1)
         self.assertGreater(server.verdict["gaps"], 0)
         self.assertFalse(server.verdict["exact"])
-        self.assertEqual(self.replayed(file)[0], 2)
+        self.assertEqual(self.replayed(file)[0], 3)
 
     def test_rec_07_a_recording_is_never_overwritten(self):
         """Catches: an older measurement that a newer one overwrites."""

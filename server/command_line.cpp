@@ -1,0 +1,63 @@
+#include "server/command_line.hpp"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+
+#include "server/host/build_id.hpp"
+
+namespace drivebench {
+
+std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
+  CLI::App app(
+      "drivebench-server: emulates electric drives in deterministic real time and serves them to "
+      "controllers.");
+  app.set_version_flag("--version", std::string(build_id()));
+  auto* config = app.add_option("config", o.config, "bench file (TOML)");
+  auto* replay =
+      app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server");
+  config->excludes(replay);
+  app.add_option("--mode", o.mode, "instead of the mode in the bench file")
+      ->check(CLI::IsMember({"realtime", "lockstep", "free"}));
+  app.add_option("--port", o.port, "TCP port; 0: chosen by the system")->check(CLI::Range(0, 65535));
+  app.add_option("--unix", o.unix_path, "also listen on this unix socket");
+  app.add_option("--record", o.record, "write an MCAP recording to this new file");
+  app.add_option("--record-file-s", o.file_s,
+                 "a new file after this much plant time [s]: FILE.mcap, FILE.2.mcap ...")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--record-file-mib", o.file_mib, "a new file after this many MiB")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--record-chunk-ms", o.chunk_ms,
+                 "write after this much plant time [ms], the most that a kill costs; 100, in free mode 1000")
+      ->check(CLI::Range(1.0, 10'000.0));
+  app.add_flag("--require-rt", o.require_realtime,
+               "do not start without real-time scheduling and locked memory");
+  app.add_option("--duration", o.duration_s, "stop after this much plant time [s] (realtime and free)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--command-delay-ticks", o.command_delay_ticks, "0 or 1, instead of the bench file's")
+      ->check(CLI::Range(0, 1));
+  app.add_option("--fail-on-late", o.fail_on_late, "exit 3 if more ticks than this were late")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--json", o.json, "print JSON lines");
+  app.add_flag("--check-config", o.check_config, "only check the bench file");
+  app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
+  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines");
+  app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
+  app.add_flag("--allow-overload", o.allow_overload,
+               "in real time: start with a CAN bus that cannot carry all frames");
+  app.add_option("--print", o.print, "only print a description of an interface")
+      ->check(CLI::IsMember({"dbc", "can-table", "modbus-map", "modbus-csv"}));
+  app.add_option("--bus", o.bus, "which [[can]] section --print is about, from 1 on");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0;
+  }
+  if (o.config.empty() && o.replay.empty()) {
+    fmt::print(stderr, "a bench file is needed, for example configs/benches/servo.toml; see --help\n");
+    return false;
+  }
+  return std::nullopt;
+}
+
+}  // namespace drivebench
