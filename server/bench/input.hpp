@@ -83,6 +83,12 @@ PackedInput pack(const Input& input) noexcept;
 /// The input; a kind that does not exist gives ClearFaults without an owner, which every axis refuses.
 Input unpack(const PackedInput& packed) noexcept;
 
+/// Whether an action may be given for a later tick. All others act in the tick in which they come.
+inline bool may_be_scheduled(const Action& action) noexcept {
+  return std::holds_alternative<LoadChange>(action) || std::holds_alternative<ParameterWrite>(action) ||
+         std::holds_alternative<InjectFault>(action) || std::holds_alternative<ShaftBump>(action);
+}
+
 /// Whether the input gives a lease up.
 inline bool ends_lease(const Input& input) noexcept {
   const auto* const action = std::get_if<LeaseAction>(&input.action);

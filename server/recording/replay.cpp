@@ -61,7 +61,7 @@ class Replayer {
       if (has_verdict_) {
         more = unusable("something follows its verdict");
       } else if (topic == kInputTopic) {
-        more = feed(message.payload);
+        more = feed(message.header, message.payload);
       } else if (topic == kVerdictTopic) {
         more = judge(message.payload);
       } else if (const auto axis = axes_.find(topic); axis != axes_.end()) {
@@ -127,16 +127,34 @@ class Replayer {
     report_.problem = "the recording has no end: " + why;
   }
 
-  bool feed(std::span<const std::byte> payload) {
+  /// Why the input cannot have come here; empty: it can.
+  std::string problem_of_place(const McapMessageHeader& header, const v1::Input& message,
+                               const Input& input) const {
+    const Tick now = bench_->tick();
+    const std::uint64_t received = message.received_tick();
+    if (received > static_cast<std::uint64_t>(now)) {
+      return fmt::format("samples between tick {} and an input of tick {} are missing", now, received);
+    }
+    const std::string which = fmt::format("it is damaged: an input among those of tick {} ", now);
+    if (received < static_cast<std::uint64_t>(now)) return which + fmt::format("came at tick {}", received);
+    if (header.log_time_ns != received * static_cast<std::uint64_t>(config_.setup.period_ns)) {
+      return which + fmt::format("has the time {} ns", header.log_time_ns);
+    }
+    const std::uint64_t latest = may_be_scheduled(input.action) ? kMaxTick : received;
+    if (message.tick() < received || message.tick() > latest) {
+      return which + fmt::format("says that it acts at tick {}", message.tick());
+    }
+    return {};
+  }
+
+  bool feed(const McapMessageHeader& header, std::span<const std::byte> payload) {
     v1::Input message;
     std::optional<Input> input;
     if (message.ParseFromArray(payload.data(), static_cast<int>(payload.size())))
       input = decode_input(message, tables_);
     if (!input) return unusable(fmt::format("an input at tick {} cannot be read", bench_->tick()));
-    if (static_cast<Tick>(message.received_tick()) != bench_->tick()) {
-      return unusable(fmt::format("samples between tick {} and an input of tick {} are missing",
-                                  bench_->tick(), message.received_tick()));
-    }
+    const std::string problem = problem_of_place(header, message, *input);
+    if (!problem.empty()) return unusable(problem);
     bench_->submit(*input);
     ++report_.inputs;
     return true;

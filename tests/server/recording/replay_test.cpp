@@ -190,7 +190,11 @@ TEST(Replay, REC_01_REC_09_ATruncatedRecordingIsEqualUpToItsLastWholeTick) {
   const Bytes recording = record(1700);  // two chunks of 100 ms and a rest
   std::mt19937 random(7);
   std::vector<std::uint64_t> last;
-  for (std::size_t size = 0; size < recording.size(); size += 1 + random() % 2000) {
+  std::vector<std::size_t> sizes;
+  for (std::size_t size = 0; size < recording.size(); size += 1 + random() % 20'000)
+    sizes.push_back(size);
+  sizes.push_back(recording.size() - 1);
+  for (const std::size_t size : sizes) {
     const ReplayReport report = replayed(cut(recording, size));
     EXPECT_FALSE(report.problem.empty());
     if (report.samples == 0) {
@@ -250,6 +254,51 @@ TEST(Replay, ADroppedInputIsADifference) {
     }));
     EXPECT_TRUE(harmless || report.result != Result::kEqual) << "input " << dropped;
   }
+}
+
+/// The recording with its n-th input changed.
+Bytes with_input(const Bytes& recording, std::size_t n, const std::function<void(Entry&, v1::Input&)>& edit) {
+  std::size_t seen = 0;
+  return rewritten(recording, [&](Entry& entry) {
+    if (entry.topic != kInputTopic || seen++ != n) return true;
+    v1::Input input;
+    EXPECT_TRUE(input.ParseFromArray(entry.payload.data(), static_cast<int>(entry.payload.size())));
+    edit(entry, input);
+    entry.payload.resize(input.ByteSizeLong());
+    EXPECT_TRUE(input.SerializeToArray(entry.payload.data(), static_cast<int>(entry.payload.size())));
+    return true;
+  });
+}
+
+// Catches: a tick of an input that is written and never read, so that a recording says of a command that it
+// acted at another tick than the one in which it did, and replays as equal.
+TEST(Replay, REC_14_AnInputThatDoesNotFitItsPlaceIsDamage) {
+  const Bytes recording = record(20);
+  std::size_t changed = 0;
+  for (std::size_t n = 0; n < 30; ++n) {
+    std::uint64_t received = 0;
+    bool may_wait = false;
+    with_input(recording, n, [&](Entry&, v1::Input& input) {
+      received = input.received_tick();
+      may_wait = input.has_load() || input.has_parameter() || input.has_inject() || input.has_bump();
+      EXPECT_TRUE(may_wait || input.tick() == received);
+    });
+    const auto refused = [&](const char* what, const std::function<void(Entry&, v1::Input&)>& edit) {
+      const ReplayReport report = replayed(with_input(recording, n, edit));
+      EXPECT_EQ(report.result, Result::kUnusable) << what << " of input " << n;
+      EXPECT_NE(report.problem.find("tick"), std::string::npos) << report.problem;
+      ++changed;
+    };
+    refused("its arrival", [](Entry&, v1::Input& i) { i.set_received_tick(i.received_tick() + 1); });
+    refused("the time", [](Entry& e, v1::Input&) { e.header.log_time_ns += 1; });
+    refused("its own tick", [](Entry&, v1::Input& i) { i.set_tick(~std::uint64_t{0}); });
+    if (received > 0) {
+      refused("its arrival", [](Entry&, v1::Input& i) { i.set_received_tick(i.received_tick() - 1); });
+      refused("its own tick", [](Entry&, v1::Input& i) { i.set_tick(i.received_tick() - 1); });
+    }
+    if (!may_wait) refused("its own tick", [](Entry&, v1::Input& i) { i.set_tick(i.received_tick() + 1); });
+  }
+  EXPECT_GT(changed, 150u);
 }
 
 // Catches: samples of one axis that are missing, doubled or swapped and not counted.
