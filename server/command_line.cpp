@@ -7,6 +7,14 @@
 #include "server/host/build_id.hpp"
 
 namespace drivebench {
+namespace {
+
+/// As a script gives it whose variable is not set.
+std::string not_empty(const std::string& value) {
+  return value.empty() ? "must not be empty" : "";
+}
+
+}  // namespace
 
 std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   CLI::App app(
@@ -15,21 +23,26 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   app.set_version_flag("--version", std::string(build_id()));
   auto* config = app.add_option("config", o.config, "bench file (TOML)");
   auto* replay =
-      app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server");
+      app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server")
+          ->check(not_empty);
   config->excludes(replay);
   app.add_option("--mode", o.mode, "instead of the mode in the bench file")
       ->check(CLI::IsMember({"realtime", "lockstep", "free"}));
   app.add_option("--port", o.port, "TCP port; 0: chosen by the system")->check(CLI::Range(0, 65535));
-  app.add_option("--unix", o.unix_path, "also listen on this unix socket");
-  app.add_option("--record", o.record, "write an MCAP recording to this new file");
+  app.add_option("--unix", o.unix_path, "also listen on this unix socket")->check(not_empty);
+  auto* record =
+      app.add_option("--record", o.record, "write an MCAP recording to this new file")->check(not_empty);
   app.add_option("--record-file-s", o.file_s,
                  "a new file after this much plant time [s]: FILE.mcap, FILE.2.mcap ...")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->needs(record);
   app.add_option("--record-file-mib", o.file_mib, "a new file after this many MiB")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->needs(record);
   app.add_option("--record-chunk-ms", o.chunk_ms,
                  "write after this much plant time [ms], the most that a kill costs; 100, in free mode 1000")
-      ->check(CLI::Range(1.0, 10'000.0));
+      ->check(CLI::Range(1.0, 10'000.0))
+      ->needs(record);
   app.add_flag("--require-rt", o.require_realtime,
                "do not start without real-time scheduling and locked memory");
   app.add_option("--duration", o.duration_s, "stop after this much plant time [s] (realtime and free)")
@@ -40,8 +53,9 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
       ->check(CLI::NonNegativeNumber);
   app.add_flag("--json", o.json, "print JSON lines");
   app.add_flag("--check-config", o.check_config, "only check the bench file");
-  app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them");
-  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines");
+  app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them")
+      ->check(not_empty);
+  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines")->check(not_empty);
   app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");

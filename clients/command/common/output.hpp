@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -12,6 +15,13 @@
 #include "clients/command/common/errors.hpp"
 
 namespace drivebench::command {
+
+/// Throws UsageError if the name promises a format that is not written.
+inline void check_suffix(const std::string& path, std::initializer_list<std::string_view> right) {
+  const std::string suffix = std::filesystem::path(path).extension().string();
+  if (suffix.empty() || std::ranges::find(right, suffix) != right.end()) return;
+  throw UsageError(fmt::format("cannot write {}: the name must end with {}", path, fmt::join(right, ", ")));
+}
 
 /// Standard output or a file. Throws UsageError if the file cannot be created, std::runtime_error if a write
 /// fails.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "clients/command/common/errors.hpp"
+#include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/experiment/experiment_client.hpp"
 #include "clients/command/experiment/experiment_data.hpp"
@@ -18,6 +19,10 @@ constexpr const char* kName = "experiment";
 
 bool is_recording(const std::string& file) {
   return file.ends_with(".mcap");
+}
+
+void check_out_file(const ExperimentOptions& options) {
+  check_suffix(options.out_file, {".csv", ".txt", ".mcap"});
 }
 
 v1::ExperimentInfo fetch_into(ExperimentClient& client, const ExperimentOptions& options, std::uint64_t id,
@@ -70,6 +75,7 @@ ExperimentFile load(const std::string& file) {
 }  // namespace
 
 int run_experiment_run(const ExperimentOptions& options) {
+  check_out_file(options);
   ExperimentFile file = load(options.file);
   ExperimentClient client(options.server, kName);
   catch_interrupts();
@@ -106,6 +112,7 @@ int run_experiment_list(const ExperimentOptions& options) {
 }
 
 int run_experiment_fetch(const ExperimentOptions& options) {
+  check_out_file(options);
   ExperimentClient client(options.server, kName);
   catch_interrupts();
   const v1::ExperimentInfo info = fetch_into(client, options, options.id, true);

@@ -61,6 +61,7 @@ struct Exported {
   bool has_header = false;
   std::uint64_t rows = 0;  ///< or frames
   std::string other_axes;
+  std::string problem;  ///< of the recording; empty: none
 };
 
 /// Finds the messages of an axis by their channel.
@@ -117,21 +118,42 @@ void check_files(const McapSeries& reader, const MappedSeries& files, const Expo
   }
 }
 
+/// The end of a recording, as its last message tells it.
+struct End {
+  std::optional<v1::Verdict> verdict{};
+
+  void look_at(const McapReader& reader, const McapMessage& message) {
+    if (reader.channels().at(message.header.channel).topic != "/verdict") return;
+    verdict.emplace().ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()));
+  }
+};
+
+/// Why the recording is not the whole run; empty: it is.
+std::string problem_of(const McapSeries& reader, const End& end) {
+  if (reader.problem()) return reader.problem()->what;
+  if (!end.verdict) return "it has no end: it holds no verdict";
+  if (end.verdict->gaps() > 0) return fmt::format("it lost {} entries while recording", end.verdict->gaps());
+  return {};
+}
+
 /// Gives every readable message to `take`, and writes the text that `take` leaves in `text` to the file.
 template <class Take>
-void for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
-                      std::string& text, Output& out, Take take) {
+End for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
+                     std::string& text, Output& out, Take take) {
   constexpr std::size_t kPiece = 1U << 16;
   Progress progress("export");
   std::uint64_t seen_bytes = 0;
+  End end;
   for (McapMessage message; reader.next(message);) {
     seen_bytes += message.payload.size() + 31;  // a message record's own bytes, for the progress only
+    end.look_at(reader.reader(), message);
     take(message);
     if (text.size() <= kPiece) continue;
     out.write(text);
     text.clear();
     progress.update(static_cast<double>(seen_bytes) / static_cast<double>(file_size), options.recording);
   }
+  return end;
 }
 
 /// Exports every readable sample, row by row.
@@ -140,7 +162,7 @@ Exported export_rows(McapSeries& reader, const ExportOptions& options,
   Exported done;
   AxisChannels channels(options.axis);
   std::string text;
-  for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
+  const End end = for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
     if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
     if (!done.has_header) text += csv_header(signals);  // only above a first row
     done.has_header = true;
@@ -151,6 +173,7 @@ Exported export_rows(McapSeries& reader, const ExportOptions& options,
   });
   out.write(text);
   out.flush();
+  done.problem = problem_of(reader, end);
   done.axis = channels.axis();
   done.other_axes = channels.others();
   return done;
@@ -159,12 +182,10 @@ Exported export_rows(McapSeries& reader, const ExportOptions& options,
 /// Whether the recording ends with the verdict of a lockstep run.
 bool is_lockstep(const MappedSeries& files) {
   McapSeries reader(files.segments());
-  v1::Verdict verdict;
-  for (McapMessage message; reader.next(message);) {
-    if (reader.reader().channels().at(message.header.channel).topic != "/verdict") continue;
-    verdict.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()));
-  }
-  return verdict.mode() == v1::MODE_LOCKSTEP;
+  End end;
+  for (McapMessage message; reader.next(message);)
+    end.look_at(reader.reader(), message);
+  return end.verdict && end.verdict->mode() == v1::MODE_LOCKSTEP;
 }
 
 /// The interface, profile and nodes of the frames.
@@ -181,7 +202,7 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
   CandumpText frames(can_address_of(options), is_lockstep(files));
   AxisChannels channels(options.axis);
   std::optional<std::uint32_t> only;  // the named axis, from its first sample on
-  for_each_message(reader, options, files.size(), frames.text(), out, [&](const McapMessage& message) {
+  const auto take = [&](const McapMessage& message) {
     const auto& place = channels.find(reader.reader(), message.header.channel);
     const double time_s = static_cast<double>(message.header.log_time_ns) * 1e-9;
     if (place.is_sample) {
@@ -198,10 +219,12 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
       if (!options.axis.empty() && input.axis() != only) return;
       frames.add(input, time_s);
     }
-  });
+  };
+  const End end = for_each_message(reader, options, files.size(), frames.text(), out, take);
   frames.finish();
   out.write(frames.text());
   out.flush();
+  done.problem = problem_of(reader, end);
   done.rows = frames.frames();
   done.axis = options.axis.empty() ? "*" : options.axis;
   done.other_axes = channels.others();
@@ -221,22 +244,23 @@ int run_export(const ExportOptions& options) {
     throw UsageError(fmt::format("--from {} is behind --to {}", options.from_tick, options.to_tick));
   }
   check_files(reader, files, options);
+  check_suffix(options.out_file, {is_csv ? ".csv" : ".log", ".txt"});
   Output out(options.out_file);
   const Exported done = is_csv ? export_rows(reader, options, signals, files.size(), out)
                                : export_frames(reader, options, files, out);
 
-  const std::string problem = reader.problem() ? reader.problem()->what : "";
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
   if (options.json) {
-    fmt::print(told, "{}\n",
-               Json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", problem}}
-                   .dump());
+    fmt::print(
+        told, "{}\n",
+        Json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}}
+            .dump());
   } else {
     fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_csv ? "samples" : "frames",
                done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);
   }
-  if (!problem.empty()) {
-    fmt::print(stderr, "drivebench: the recording is not whole: {}\n", problem);
+  if (!done.problem.empty()) {
+    fmt::print(stderr, "drivebench: the recording is not whole: {}\n", done.problem);
     return kExitCutShort;
   }
   if (is_csv && !done.other_axes.empty() && options.axis.empty()) {

@@ -7,7 +7,7 @@
 
 namespace drivebench::command {
 
-/// The exit code for a recording that ends early; its content was written.
+/// The exit code for a recording that has no end or lost entries; its content was written.
 inline constexpr int kExitCutShort = 3;
 
 struct ExportOptions {

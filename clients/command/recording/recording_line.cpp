@@ -11,6 +11,7 @@ void add_replay(CommandLine& line) {
   const auto [sub, o] =
       line.add<ReplayOptions>("replay", "re-simulate a recording and compare it bit for bit", run_replay);
   sub.add_option("FILE", o.recording, "an MCAP recording")->required();
+  sub.footer("Exit code 3: the recording has no end; what it holds is equal.");
 }
 
 void add_export(CommandLine& line) {
@@ -30,7 +31,7 @@ void add_export(CommandLine& line) {
   sub.add_option("--signals", o.signals, "names, separated by commas")->delimiter(',');
   sub.add_option("--from", o.from_tick, "first tick")->check(not_negative());
   sub.add_option("--to", o.to_tick, "last tick")->check(not_negative());
-  sub.footer("Exit code 3: the recording ends early; what it holds was written.");
+  sub.footer("Exit code 3: the recording has no end or lost entries; what it holds was written.");
 }
 
 }  // namespace

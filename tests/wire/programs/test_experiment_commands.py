@@ -90,6 +90,10 @@ class Commands(WireTest):
         self.assertEqual([(e["id"], e["label"], e["state"]) for e in listed], [(number, "steps", "completed")])
         self.assertIn("(not yours)", self.drivebench("list", owner=None).stdout)
         self.assertEqual(self.drivebench("fetch", str(number), owner=None).returncode, 1)
+        for words in (("fetch", str(number)), ("run", str(toml))):
+            refused = self.drivebench(*words, "--out", "data.parquet")
+            self.assertEqual((refused.returncode, (self.path / "data.parquet").exists()), (2, False))
+            self.assertIn("data.parquet: the name must end with .csv, .txt, .mcap", refused.stderr)
         toml.write_text(toml.read_text(encoding="utf-8").replace("ticks = 160", 'mode = "realtime"\nticks = 800000'))
         detached = json.loads(self.drivebench("run", str(toml), "--json", "--detach").stdout)
         self.assertEqual(self.drivebench("cancel", str(detached["id"])).returncode, 0)

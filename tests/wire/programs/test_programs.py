@@ -158,6 +158,7 @@ class Recordings(CommandTest):
                                 ((copy, "--out", "precious.csv", "--axis", "second"), "the recording has servo"),
                                 ((copy, "--out", "precious.csv", "--format", "candump", "--axis", "second"), "has servo"),
                                 ((copy, "--out", "precious.csv", "--from", "10", "--to", "5"), "--from 10 is behind --to 5"),
+                                ((copy, "--out", "precious.parquet"), "precious.parquet: the name must end with .csv, .txt"),
                                 ((copy, "--out", "none/out.csv"), "cannot write")):
             self.assertSays(self.json_of("export", *arguments, code=USAGE)["error"]["message"], fact)
         self.assertEqual((self.folder / copy).read_bytes(), self.whole.read_bytes())
@@ -257,7 +258,12 @@ class Serving(CommandTest):
                 ([SERVO, "--mode", "free", "--duration", "1e300"], "--duration"),
                 ([SERVO, "--fail-on-late", "-1"], "--fail-on-late"), ([SERVO, "--replay", "r.mcap"], "--replay"),
                 (["--replay", "none.mcap"], "none.mcap"), ([SERVO, "--record", "none/r.mcap"], "none/r.mcap"),
-                ([SERVO, "--unix", "none/socket"], "none/socket")):
+                ([SERVO, "--unix", "none/socket"], "none/socket"),
+                *(([SERVO, option, ""], f"{option}: must not be empty")
+                  for option in ("--record", "--unix", "--experiments", "--audit")), (["--replay", ""], "must not be empty"),
+                *(([SERVO, option, "1"], f"{option} requires --record")
+                  for option in ("--record-file-s", "--record-file-mib", "--record-chunk-ms")),
+                ([SERVO, "--record", "r.mcap", "--record-chunk-ms", "nan"], "--record-chunk-ms")):
             done = self.drivebench_server(*arguments, *([] if "--port" in arguments else ["--port", "0"]), code=USAGE)
             self.assertSays(done.stderr, fact)
             self.assertEqual(done.stdout, "")

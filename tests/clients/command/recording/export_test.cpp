@@ -7,6 +7,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <span>
 #include <sstream>
 
@@ -86,8 +87,19 @@ class CommandFiles : public testing::Test {
     return path(name);
   }
 
-  /// Two axes, ticks 0 to 3, axis "a" with currents that need 17 digits.
-  std::string write_recording(const std::string& name, bool whole) const {
+  static void add_verdict(McapWriter& writer, std::optional<std::uint64_t> gaps) {
+    if (!gaps) return;
+    v1::Verdict verdict;
+    verdict.set_gaps(*gaps);
+    const std::string message = verdict.SerializeAsString();
+    writer.add_message({.channel = writer.add_channel("/verdict", 0, "protobuf")},
+                       std::as_bytes(std::span(message)));
+  }
+
+  /// Two axes, ticks 0 to 3, axis "a" with currents that need 17 digits. A whole one has a verdict with these
+  /// gaps, or none.
+  std::string write_recording(const std::string& name, bool whole,
+                              std::optional<std::uint64_t> gaps = 0) const {
     std::string file;
     McapWriter writer(
         [&file](std::span<const std::byte> bytes) {
@@ -108,6 +120,7 @@ class CommandFiles : public testing::Test {
       }
     }
     writer.flush();
+    if (whole) add_verdict(writer, gaps);
     if (whole) writer.finish();
     std::ofstream(path(name), std::ios::binary) << file;
     return path(name);
@@ -130,6 +143,41 @@ TEST_F(CommandFiles, ExportWritesTheChosenSamplesExactly) {
             "1,0.000125000,-5,0.1\n"
             "2,0.000250000,-10,0.2\n"
             "3,0.000375000,-15,0.30000000000000004\n");
+}
+
+// Catches: the recording of a full disk, or one with holes, that passes for the whole run.
+TEST_F(CommandFiles, REC_15_ExportOfARecordingWithoutAVerdictOrWithLossesSaysSo) {
+  for (const char* format : {"csv", "candump"}) {
+    ExportOptions options = {.out_file = path("out.txt"), .format = format};
+    options.recording = write_recording("r.mcap", true);
+    EXPECT_EQ(run_export(options), kExitOk);
+    options.recording = write_recording("r.mcap", true, std::nullopt);
+    EXPECT_EQ(run_export(options), kExitCutShort);
+    EXPECT_FALSE(text_of("out.txt").empty());
+    options.recording = write_recording("r.mcap", true, 7);
+    EXPECT_EQ(run_export(options), kExitCutShort);
+  }
+}
+
+// Catches: CSV in a file whose name promises another format, and a file that is emptied before that is
+// noticed.
+TEST_F(CommandFiles, REC_15_ExportRefusesASuffixOfAnotherFormat) {
+  const std::string recording = write_recording("r.mcap", true);
+  const auto refusal = [&](const char* format, const char* name) {
+    try {
+      run_export({.recording = recording, .out_file = path(name), .format = format});
+      return std::string();
+    } catch (const UsageError& error) {
+      EXPECT_FALSE(fs::exists(path(name)));
+      return std::string(error.what());
+    }
+  };
+  for (const char* name : {"e.parquet", "e.csv.gz", "e.log", "e.mcap"})
+    EXPECT_NE(refusal("csv", name).find("the name must end with .csv, .txt"), std::string::npos);
+  EXPECT_NE(refusal("candump", "e.csv").find("the name must end with .log, .txt"), std::string::npos);
+  for (const char* name : {"e.csv", "e.txt", "e"})
+    EXPECT_EQ(refusal("csv", name), "");
+  EXPECT_EQ(refusal("candump", "e.log"), "");
 }
 
 // Catches: a recording cut short by a crash that yields nothing, or passes for whole.
