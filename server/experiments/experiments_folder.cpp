@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -49,6 +50,31 @@ std::string_view rule_broken_by(const v1::StoredExperiment& stored, std::uint64_
   return {};
 }
 
+[[noreturn]] void refuse_folder(const std::filesystem::path& folder, const std::string& why) {
+  throw std::runtime_error("cannot keep experiments in " + folder.string() + ": " + why);
+}
+
+/// A folder that the server makes is its user's alone, from the first moment on.
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  const std::filesystem::path last = folder.has_filename() ? folder : folder.parent_path();  // not "kept/"
+  if (last.has_parent_path()) std::filesystem::create_directories(last.parent_path(), ignored);
+  if (::mkdir(last.c_str(), S_IRWXU) != 0 && errno != EEXIST) {
+    refuse_folder(folder, std::generic_category().message(errno));
+  }
+}
+
+/// A user that may write into the folder may replace what clients have stored. A group may be meant to.
+void check_rights(const std::filesystem::path& folder) {
+  struct stat status = {};
+  if (::stat(folder.c_str(), &status) != 0) refuse_folder(folder, std::generic_category().message(errno));
+  if ((status.st_mode & S_IWOTH) != 0) refuse_folder(folder, "every user may write into it: chmod 700 it");
+  if ((status.st_mode & S_IWGRP) != 0) spdlog::warn("the group of {} may write into it", folder.string());
+  if (status.st_uid != ::geteuid() && status.st_uid != 0) {
+    spdlog::warn("{} belongs to user {}, which may write into it", folder.string(), status.st_uid);
+  }
+}
+
 }  // namespace
 
 void write_whole(const std::filesystem::path& file, const std::string& bytes) {
@@ -72,20 +98,16 @@ std::filesystem::path Experiments::file_of(std::uint64_t id, std::string_view en
 }
 
 void Experiments::lock_folder() {
-  std::error_code error;
-  if (std::filesystem::create_directories(folder_, error)) {
-    std::filesystem::permissions(folder_, std::filesystem::perms::owner_all, error);
-  }
+  make_folder(folder_);
+  check_rights(folder_);
   const std::string file = (folder_ / "lock").string();
   lock_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) {
-    throw std::runtime_error("cannot keep experiments in " + folder_.string() + ": " +
-                             std::generic_category().message(errno));
+    refuse_folder(folder_, std::generic_category().message(errno));
   }
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     ::close(lock_);
-    throw std::runtime_error("cannot keep experiments in " + folder_.string() + ": another server does" +
-                             holder_of_file(file));
+    refuse_folder(folder_, "another server does" + holder_of_file(file));
   }
 }
 

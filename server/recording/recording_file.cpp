@@ -75,7 +75,7 @@ class SystemFile final : public RecordingFile {
 
 std::unique_ptr<RecordingFile> create_recording_file(const std::filesystem::path& path) {
   // O_APPEND: a file that another program empties stays shorter than what was written, and fate() sees it.
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0) {
     const int error = errno;
     throw std::system_error(error, std::generic_category(),

@@ -38,8 +38,8 @@ class RecordingFile {
 
 using CreateRecordingFile = std::function<std::unique_ptr<RecordingFile>(const std::filesystem::path&)>;
 
-/// Creates a file and brings its name to the disk; throws std::system_error if the file exists or cannot be
-/// created.
+/// Creates a file that only the server's user can read and brings its name to the disk; throws
+/// std::system_error if the file exists or cannot be created.
 std::unique_ptr<RecordingFile> create_recording_file(const std::filesystem::path& path);
 
 /// Syncs the folder of a file: without it a power cut can delete the file, even a synced one.

@@ -1,5 +1,6 @@
 // What other programs do to the files of a recording while it is written.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <functional>
@@ -120,6 +121,15 @@ TEST(RecordingFiles, REC_13_AMovedFileIsReportedUnderItsNewName) {
     EXPECT_EQ(run.remarks,
               run.file().string() + ": another program moved it to " + run.beside("kept.mcap").string());
   }
+}
+
+// Catches: a recording that other users of the computer can read.
+TEST(RecordingFiles, SEC_10_OnlyTheServersUserReadsARecording) {
+  const TestFolder folder;
+  const mode_t before = ::umask(0);
+  const Recorder recorder(folder / "run.mcap", servo_bench());
+  ::umask(before);
+  EXPECT_EQ(fs::status(folder / "run.mcap").permissions(), fs::perms::owner_read | fs::perms::owner_write);
 }
 
 // Catches: a file that lost one of two names, and is looked for under it each second.

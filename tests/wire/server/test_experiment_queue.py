@@ -195,7 +195,22 @@ class Folder(ExperimentTest):
         self.assertFalse((folder / "14.experiment.new").exists())
         self.assertEqual(self.whole(client, request(100)).info.id, 15)
 
-    def test_only_its_user_can_read_the_secret(self):
+    def test_sec_10_a_folder_that_every_user_may_write_is_refused(self):
+        """Catches: experiments that any user of the computer can read or replace."""
+        folder = pathlib.Path(self.kept.name)
+        for mode in (0o777, 0o1777, 0o702):
+            folder.chmod(mode)
+            with self.assertRaisesRegex(RuntimeError, "every user may write into it: chmod 700 it"):
+                self.start()
+            self.assertEqual(list(folder.iterdir()), [])
+        folder.chmod(0o770)
+        server = self.start()
+        self.assertIn("may write into it", server.errors())
+        self.assertEqual(server.stop(), 0)
+        server = self.server("--experiments", str(folder / "made" / "kept") + "/", before=lambda: os.umask(0))
+        self.assertEqual((folder / "made" / "kept").stat().st_mode & 0o777, 0o700)
+
+    def test_sec_10_only_its_user_can_read_the_files(self):
         """Catches: a file that is readable by other users, or opened by one, before its rights are set."""
         folder = pathlib.Path(self.kept.name)
         server = self.start(before=lambda: os.umask(0))
@@ -206,7 +221,7 @@ class Folder(ExperimentTest):
             self.whole(self.client(server), request(100))
             self.assertEqual(eavesdropper.read(), b"")
         self.assertIn(OWNER.encode(), (folder / "1.experiment").read_bytes())
-        for name in ("1.experiment", "1.rows"):
+        for name in ("1.experiment", "1.rows", "1.mcap", "lock"):
             self.assertEqual((folder / name).stat().st_mode & 0o777, 0o600, name)
 
 
