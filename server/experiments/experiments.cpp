@@ -80,6 +80,11 @@ Experiments::Pointer Experiments::known(const v1::RunExperiment& request) const 
 }
 
 void Experiments::check_room() const {
+  if (last_id_ >= kMaxExperimentId) {
+    throw BadRequest(
+        v1::REFUSAL_BUSY, "id",
+        fmt::format("the folder has a file with number {}, the largest that there may be", last_id_));
+  }
   const auto waiting = std::count_if(all_.begin(), all_.end(), [](const auto& each) {
     return each.second->info.state() == v1::EXPERIMENT_STATE_QUEUED;
   });

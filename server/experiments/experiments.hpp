@@ -90,7 +90,7 @@ class Experiments {
   std::filesystem::path file_of(std::uint64_t id, std::string_view ending) const;
   void lock_folder();
   void load();
-  Pointer load_one(const std::filesystem::path& file) const;
+  Pointer load_one(const std::filesystem::path& file, std::uint64_t id) const;
   void store(const Experiment& experiment, const v1::ExperimentInfo& info) const;
   void try_to_store(const Experiment& experiment, const v1::ExperimentInfo& info) const;
   void keep_new(const Pointer& experiment);

@@ -11,6 +11,8 @@
 #include <charconv>
 #include <cstdio>
 #include <fstream>
+#include <limits>
+#include <optional>
 #include <set>
 #include <system_error>
 
@@ -28,13 +30,16 @@ constexpr std::size_t kMaxStoredBytes = std::size_t{4} * 1024 * 1024;
 constexpr auto kEndings =
     std::to_array<std::string_view>({".experiment", ".rows", ".mcap", ".experiment.new"});
 
-/// The id in the name of an experiment file; 0 for other files.
-std::uint64_t id_of(const std::filesystem::path& file) {
+/// The number in the name of an experiment file, at most the largest that the type holds; nothing for other
+/// files.
+std::optional<std::uint64_t> number_in(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
-  std::uint64_t id = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
   const std::string_view ending(end, name.data() + name.size());
-  return error == std::errc{} && std::ranges::find(kEndings, ending) != kEndings.end() ? id : 0;
+  if (error == std::errc::invalid_argument || std::ranges::find(kEndings, ending) == kEndings.end())
+    return {};
+  return error == std::errc{} ? number : std::numeric_limits<std::uint64_t>::max();
 }
 
 /// The rule that the file of this experiment breaks; empty: none. Other code relies on these rules.
@@ -114,8 +119,14 @@ void Experiments::lock_folder() {
 void Experiments::load() {
   std::set<std::uint64_t> found;
   for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
-    const std::uint64_t id = id_of(entry.path());
-    if (id != 0) found.insert(id);
+    const std::optional<std::uint64_t> number = number_in(entry.path());
+    if (!number) continue;
+    if (*number > 0 && *number <= kMaxExperimentId) {
+      found.insert(*number);
+    } else {
+      spdlog::warn("{} is not an experiment: its number must lie between 1 and {}", entry.path().string(),
+                   kMaxExperimentId);
+    }
   }
   std::vector<std::pair<std::filesystem::file_time_type, Pointer>> ended;
   for (const std::uint64_t id : found) {
@@ -127,7 +138,7 @@ void Experiments::load() {
       continue;
     }
     std::filesystem::remove(file_of(id, ".experiment.new"), ignored);
-    if (Pointer experiment = load_one(file)) {
+    if (Pointer experiment = load_one(file, id)) {
       all_[id] = experiment;
       ended.emplace_back(std::filesystem::last_write_time(file, ignored), std::move(experiment));
     }
@@ -139,20 +150,20 @@ void Experiments::load() {
     keep_ended(*experiment);
 }
 
-Experiments::Pointer Experiments::load_one(const std::filesystem::path& file) const {
+Experiments::Pointer Experiments::load_one(const std::filesystem::path& file, std::uint64_t id) const {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   v1::StoredExperiment stored;
   std::ifstream in(file, std::ios::binary);
   const bool is_read = !error && size <= kMaxStoredBytes && stored.ParseFromIstream(&in);
   const std::string_view rule =
-      is_read ? rule_broken_by(stored, id_of(file)) : "it must be a StoredExperiment of 4 MiB at most";
+      is_read ? rule_broken_by(stored, id) : "it must be a StoredExperiment of 4 MiB at most";
   if (!rule.empty()) {
     spdlog::warn("{} is not an experiment: {}", file.string(), rule);
     return nullptr;
   }
   auto experiment = std::make_shared<Experiment>();
-  experiment->id = id_of(file);
+  experiment->id = id;
   experiment->is_stored = true;
   experiment->request = stored.request();
   experiment->info = stored.info();

@@ -195,6 +195,23 @@ class Folder(ExperimentTest):
         self.assertFalse((folder / "14.experiment.new").exists())
         self.assertEqual(self.whole(client, request(100)).info.id, 15)
 
+    def test_rec_16_a_number_beyond_every_experiment_is_refused_by_name(self):
+        """Catches: a stray file after whose number the next one wraps to 0, and whose data the server deletes."""
+        folder = pathlib.Path(self.kept.name)
+        strays = ("18446744073709551615.rows", "99999999999999999999999.mcap", "1000000000001.experiment", "0.rows")
+        for name in strays:
+            (folder / name).write_bytes(b"precious")
+        server = self.start()
+        self.assertEqual(self.whole(self.client(server), request(100)).info.id, 1)
+        for name in strays:
+            self.assertIn(f"/{name} is not an experiment: its number must lie between 1 and 1000000000000", server.errors())
+            self.assertEqual((folder / name).read_bytes(), b"precious")
+        self.assertEqual(server.stop(), 0)
+        (folder / "1000000000000.experiment").write_bytes(b"")
+        client = self.client(self.start())
+        self.assertRefused(client.ask(run_experiment=request(100)), pb.REFUSAL_BUSY, "id")
+        self.assertEqual([e.id for e in client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments], [1])
+
     def test_sec_10_a_folder_that_every_user_may_write_is_refused(self):
         """Catches: experiments that any user of the computer can read or replace."""
         folder = pathlib.Path(self.kept.name)
