@@ -260,7 +260,8 @@ class Connections(WireTest):
         self.assertRefused(old.ask(clear_faults=pb.ClearFaults()), pb.REFUSAL_NOT_OWNER)
 
     def test_own_01_of_two_simultaneous_requests_one_gets_the_axis(self):
-        """Catches: two owners, or none, when two clients ask at the same moment."""
+        """Catches: two owners, or none, when the requests of two clients are under way at the same time. (LeaseRace sends
+        them from several threads.)"""
         for mode, races in (("lockstep", 300), ("realtime", 60)):
             server = self.server("--mode", mode)
             both = [self.client(server), self.client(server)]

@@ -140,9 +140,10 @@ TEST(ThreadedEngine, RequestsAreAnsweredInOrderWithTheirTick) {
     EXPECT_EQ(answered[static_cast<std::size_t>(n)], n);
 }
 
-// Catches: two owners of an axis, or none, when one leaves while two ask; a session that can release the
-// lease of another.
-TEST(ThreadedEngine, OWN_01_TenThousandRacesHaveOneWinnerEach) {
+// Catches: two owners of an axis, or none, when one leaves while two requests wait; a session that can
+// release the lease of another. One thread asks for both: lease_race_test.cpp has clients on threads of their
+// own.
+TEST(ThreadedEngine, OWN_01_OfTwoRequestsInTheQueueTheFirstGetsTheAxis) {
   BenchConfig config = servo_bench();
   config.mode = RunMode::kFree;
   asio::io_context io(1);
