@@ -2,24 +2,10 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
+#include "server/access/address.hpp"
 
 namespace drivebench {
 namespace {
-
-/// The address for the count of wrong tokens: without the port; for IPv6 the network, because one computer
-/// has a whole network. All unix sockets are one address.
-std::string address_of(const Client& client) {
-  if (client.transport != "tcp") return client.transport;
-  std::string address = client.peer.substr(0, client.peer.rfind(':'));
-  boost::system::error_code error;
-  const asio::ip::address_v6 v6 = asio::ip::make_address_v6(address, error);
-  if (error) return address;
-  if (v6.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, v6).to_string();
-  asio::ip::address_v6::bytes_type bytes = v6.to_bytes();
-  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
-  return asio::ip::address_v6(bytes).to_string();
-}
 
 Role role_needed_for(const v1::Envelope& request) {
   switch (request.kind_case()) {
