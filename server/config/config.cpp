@@ -58,6 +58,11 @@ bool is_loopback(const std::string& address) noexcept {
   return ::inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
+std::uint32_t sessions_of_address(const TcpConfig& tcp) noexcept {
+  const std::uint32_t share = is_loopback(tcp.address) ? tcp.max_sessions : (tcp.max_sessions + 1) / 2;
+  return tcp.max_sessions_of_address.value_or(share);
+}
+
 bool is_multicast(const std::string& address) noexcept {
   in_addr v4{};
   in6_addr v6{};

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,6 +39,7 @@ struct TcpConfig {
   bool asks_for_token = false;  ///< Hello must carry one of the tokens in the tokens file
   std::vector<Grant> grants;    ///< the entries of the tokens file
   std::uint32_t max_sessions = 256;
+  std::optional<std::uint32_t> max_sessions_of_address;  ///< none: sessions_of_address() says how many
 };
 
 /// Section [[can]]: a bus that controllers share with the bench. The meaning of channel and port depends on
@@ -175,6 +177,9 @@ std::vector<AxisEvent> in_order(std::vector<AxisEvent> events);
 bool is_address(const std::string& text) noexcept;
 /// Whether only this computer can reach the address.
 bool is_loopback(const std::string& address) noexcept;
+/// The most sessions of one address. Unless configured, half of all; on a loopback address, where all clients
+/// are of this computer, all.
+std::uint32_t sessions_of_address(const TcpConfig& tcp) noexcept;
 /// Whether the address is that of a multicast group.
 bool is_multicast(const std::string& address) noexcept;
 

@@ -48,6 +48,9 @@ void read_tcp(StrictTable table, const std::filesystem::path& folder, TcpConfig&
   tcp.grants = read_grants(table, folder);
   tcp.max_sessions =
       static_cast<std::uint32_t>(table.integer("max_sessions", 1, 10'000).value_or(tcp.max_sessions));
+  if (const auto most = table.integer("max_sessions_of_address", 1, 10'000)) {
+    tcp.max_sessions_of_address = static_cast<std::uint32_t>(*most);
+  }
   table.finish();
 }
 

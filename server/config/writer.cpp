@@ -75,6 +75,9 @@ void append_service(std::string& text, const RealtimeConfig& realtime, const Tcp
   append(text, "port", std::to_string(tcp.port));
   if (!tcp.unix_path.empty()) append(text, "unix_path", in_quotes(tcp.unix_path));
   append(text, "max_sessions", std::to_string(tcp.max_sessions));
+  if (tcp.max_sessions_of_address) {
+    append(text, "max_sessions_of_address", std::to_string(*tcp.max_sessions_of_address));
+  }
 }
 
 void append_can(std::string& text, const CanConfig& bus) {

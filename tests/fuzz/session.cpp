@@ -124,7 +124,7 @@ class World {
     peer.socket = ends[0];
     auto session = std::make_shared<Session>(
         Outbox::Socket(asio::local::stream_protocol::socket(io_, asio::local::stream_protocol(), ends[1])),
-        Client{"unix", "peer", ""}, context_);
+        Client{"unix", "peer", ""}, context_, context_.places.enter("unix").number);
     peer.session = session;
     asio::co_spawn(
         io_, [session]() { return session->run(); }, asio::detached);

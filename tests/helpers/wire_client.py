@@ -116,11 +116,14 @@ class Server:
         self.verdict = next((line for line in lines if line["event"] == "verdict"), None)
         return self.process.returncode
 
-    def raw(self, receive_buffer=None, unix=False):
+    def raw(self, receive_buffer=None, unix=False, source=None):
+        """A connection; `source` is an address of this computer other than 127.0.0.1."""
         s = socket.socket(socket.AF_UNIX if unix else socket.AF_INET, socket.SOCK_STREAM)
         if receive_buffer:
             s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         s.settimeout(PATIENCE_S)
+        if source:
+            s.bind((source, 0))
         s.connect(self.unix_path if unix else self.address)
         if not unix:
             s.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -4,10 +4,10 @@
 #include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 
+#include "server/access/address.hpp"
 #include "server/host/holder.hpp"
 
 namespace drivebench {
@@ -21,7 +21,6 @@ constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 // The kernel probes an idle peer every second, and ends the connection after this time without an answer.
 constexpr int kUserTimeoutMs = 3000;
 constexpr int kSendBufferBytes = 64 * 1024;
-constexpr std::ptrdiff_t kMaxSilentSessions = 32;
 
 tcp::endpoint endpoint_of(const TcpConfig& config) {
   const std::string address = config.address == "localhost" ? "127.0.0.1" : config.address;
@@ -118,7 +117,10 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
                                   .session_count = [this] { return sessions_.size(); },
                                   .transports = all_reports,
                                   .experiments = experiments,
-                                  .audit = audit});
+                                  .audit = audit,
+                                  .places = Places({.sessions = config_.max_sessions,
+                                                    .sessions_of_address = sessions_of_address(config_)},
+                                                   config_.asks_for_token)});
   // By index: a session may be added while another one answers; none is removed.
   if (experiments != nullptr) {
     experiments->on_change = [this] {
@@ -132,19 +134,8 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
     for (std::size_t i = 0; i < sessions_.size(); ++i)
       sessions_[i]->on_taken(taken);
   });
-  if (door_) watch_door();
   asio::co_spawn(io_, accept_from(tcp_), asio::detached);
   if (unix_.is_open()) asio::co_spawn(io_, accept_from(unix_), asio::detached);
-}
-
-void StreamServer::watch_door() {
-  door_->on_turned_away = [this](const std::string& peer, const std::string& why) {
-    ++context_->counts.tls_refused;
-    const Client client{.transport = "tcp", .peer = peer, .subject = {}};
-    if (context_->audit != nullptr) {
-      context_->audit->note({.name = "tls_refused", .client = &client, .result = why});
-    }
-  };
 }
 
 StreamServer::~StreamServer() {
@@ -185,23 +176,43 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
 
 void StreamServer::receive(tcp::socket socket) {
   Client client = peer_of(socket);
+  const Places::Entry entry = context_->places.enter(address_of(client));
   if (!door_) {
-    start(Socket(std::move(socket)), std::move(client));
+    start(Socket(std::move(socket)), std::move(client), entry);
     return;
   }
-  const std::string peer = client.peer;
-  door_->receive(std::move(socket), peer, [this, client](Socket plain, const std::string& subject) {
-    const std::weak_ptr<Session> session =
-        start(std::move(plain), {.transport = client.transport, .peer = client.peer, .subject = subject});
+  if (entry.number == 0) return refuse_tls(client, entry.number, entry.why_not);
+  const auto let_in = [this, client, entry](Socket plain, const std::string& subject) {
+    const std::weak_ptr<Session> session = start(
+        std::move(plain), {.transport = client.transport, .peer = client.peer, .subject = subject}, entry);
     return [session] {
       if (const auto still_here = session.lock()) still_here->on_deaf();
     };
-  });
+  };
+  context_->places.on_displaced(
+      entry.number,
+      door_->receive(std::move(socket),
+                     {.on_first_bytes = [this, entry] { context_->places.heard(entry.number); },
+                      .on_refused = [this, client, entry](
+                                        const std::string& why) { refuse_tls(client, entry.number, why); },
+                      .let_in = let_in}));
+}
+
+/// A peer has not got through the TLS handshake.
+void StreamServer::refuse_tls(const Client& client, Places::Number place, const std::string& why) {
+  context_->places.leave(place);
+  ++context_->counts.tls_refused;
+  if (context_->audit != nullptr) {
+    context_->audit->note({.name = "tls_refused", .client = &client, .result = why});
+  }
+  if (!tls_log_.allow()) return;
+  spdlog::warn("{}: no TLS: {} ({} more since the last such line)", client.peer, why, tls_log_.held_back());
 }
 
 void StreamServer::receive(UnixProtocol::socket socket) {
   Client client = peer_of(socket);
-  start(Socket(std::move(socket)), std::move(client));
+  const Places::Entry entry = context_->places.enter(address_of(client));
+  start(Socket(std::move(socket)), std::move(client), entry);
 }
 
 TransportReport StreamServer::report() const {
@@ -227,25 +238,15 @@ void StreamServer::replace_grants(TcpConfig now) {
     sessions_[i]->on_new_grants();
 }
 
-std::shared_ptr<Session> StreamServer::start(Socket socket, Client client) {
-  auto session = std::make_shared<Session>(std::move(socket), client, *context_);
-  const auto silent =
-      std::count_if(sessions_.begin(), sessions_.end(), [](const auto& other) { return !other->greeted(); });
-  std::string why_not;
-  if (sessions_.size() >= config_.max_sessions) {
-    why_not = "this bench serves " + std::to_string(config_.max_sessions) + " sessions at most";
-  } else if (silent >= kMaxSilentSessions) {
-    why_not = "too many sessions have not said hello yet";
-  }
-  if (!why_not.empty()) {
-    ++context_->counts.turned_away;
-    if (context_->audit != nullptr) {
-      context_->audit->note({.name = "limit", .client = &client, .result = why_not});
-    }
-    session->turn_away(why_not);
-    session->close();
+std::shared_ptr<Session> StreamServer::start(Socket socket, Client client, const Places::Entry& entry) {
+  auto session = std::make_shared<Session>(std::move(socket), std::move(client), *context_, entry.number);
+  if (entry.number == 0) {
+    session->turn_away(entry.why_not);
     return session;
   }
+  context_->places.on_displaced(entry.number, [weak = std::weak_ptr(session)](const std::string& why) {
+    if (const auto still_here = weak.lock()) still_here->turn_away(why);
+  });
   sessions_.push_back(session);
   asio::co_spawn(io_, run(session), asio::detached);
   return session;

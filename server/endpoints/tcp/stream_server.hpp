@@ -41,8 +41,8 @@ class StreamServer {
   asio::awaitable<void> accept_from(Acceptor& acceptor);
   void receive(asio::ip::tcp::socket socket);
   void receive(asio::local::stream_protocol::socket socket);
-  std::shared_ptr<Session> start(Socket socket, Client client);
-  void watch_door();
+  std::shared_ptr<Session> start(Socket socket, Client client, const Places::Entry& entry);
+  void refuse_tls(const Client& client, Places::Number place, const std::string& why);
   TransportReport report() const;
   asio::awaitable<void> run(std::shared_ptr<Session> session);
 
@@ -53,6 +53,7 @@ class StreamServer {
   asio::ip::tcp::acceptor tcp_;
   asio::local::stream_protocol::acceptor unix_;
   std::optional<TlsDoor> door_;
+  LogLimit tls_log_;
   std::vector<std::shared_ptr<Session>> sessions_;
 };
 

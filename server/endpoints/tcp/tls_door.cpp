@@ -1,7 +1,6 @@
 #include "server/endpoints/tcp/tls_door.hpp"
 
 #include <openssl/x509.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include <array>
@@ -110,6 +109,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
 
   /// The reason why the handshake failed.
   std::string why_refused(const boost::system::error_code& error) {
+    if (!why_ended.empty()) return why_ended;
     if (was_late) return "no handshake within " + std::to_string(kHandshakeLimit.count()) + " s";
     const long verdict = SSL_get_verify_result(stream.native_handle());
     return (verdict == X509_V_OK ? error.message() : X509_verify_cert_error_string(verdict)) +
@@ -148,6 +148,7 @@ class TlsDoor::Passage : public std::enable_shared_from_this<Passage> {
   asio::local::stream_protocol::socket inside;
   Deadline deadline;
   std::string refused_subject;  ///< the name in a refused certificate
+  std::string why_ended;        ///< another peer got its place
   bool was_late = false;        ///< a limit has ended it
   OnDeaf on_deaf;               ///< set once the peer has its session
 
@@ -186,38 +187,41 @@ TlsDoor::TlsDoor(asio::io_context& io, const TlsConfig& config)
 
 TlsDoor::~TlsDoor() = default;
 
-void TlsDoor::turn_away(const std::string& peer, const std::string& why) {
-  if (on_turned_away) on_turned_away(peer, why);
-  if (!log_.allow()) return;
-  spdlog::warn("{}: no TLS: {} ({} more since the last such line)", peer, why, log_.held_back());
-}
-
-void TlsDoor::receive(asio::ip::tcp::socket socket, const std::string& peer, LetIn let_in) {
-  if (handshakes_ >= kMaxHandshakes) {
-    return turn_away(peer, std::to_string(kMaxHandshakes) + " others are shaking hands");
-  }
+TlsDoor::End TlsDoor::receive(asio::ip::tcp::socket socket, Guest guest) {
   auto passage = std::make_shared<Passage>(std::move(socket), *context_);
-  ++handshakes_;
-  asio::co_spawn(io_, shake_hands(std::move(passage), peer, std::move(let_in)), asio::detached);
+  const std::weak_ptr<Passage> weak = passage;
+  asio::co_spawn(io_, shake_hands(std::move(passage), std::move(guest)), asio::detached);
+  return [weak](const std::string& why) {
+    const auto still_here = weak.lock();
+    if (!still_here) return;
+    still_here->why_ended = why;
+    still_here->close();
+  };
 }
 
-asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, std::string peer, LetIn let_in) {
+asio::awaitable<void> TlsDoor::shake_hands(std::shared_ptr<Passage> passage, Guest guest) {
   boost::system::error_code error;
   passage->limit(kHandshakeLimit);
-  co_await passage->stream.async_handshake(Stream::server, asio::redirect_error(asio::use_awaitable, error));
+  co_await passage->stream.lowest_layer().async_wait(asio::socket_base::wait_read,
+                                                     asio::redirect_error(asio::use_awaitable, error));
+  if (!error) {
+    guest.on_first_bytes();
+    co_await passage->stream.async_handshake(Stream::server,
+                                             asio::redirect_error(asio::use_awaitable, error));
+  }
   passage->deadline.call_off();
-  --handshakes_;
   if (error) {
-    turn_away(peer, passage->why_refused(error));
+    guest.on_refused(passage->why_refused(error));
     passage->close();
     co_return;
   }
   try {
     auto [inside, outside] = socket_pair(io_);
     passage->inside = std::move(inside);
-    passage->on_deaf = let_in(PlainSocket(std::move(outside)), subject_of(passage->stream.native_handle()));
+    passage->on_deaf =
+        guest.let_in(PlainSocket(std::move(outside)), subject_of(passage->stream.native_handle()));
   } catch (const std::exception& problem) {
-    spdlog::error("{}: a client could not be taken: {}", peer, problem.what());
+    guest.on_refused(problem.what());
     passage->close();
     co_return;
   }

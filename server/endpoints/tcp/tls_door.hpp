@@ -5,20 +5,18 @@
 #include <string>
 
 #include "server/config/config.hpp"
-#include "server/endpoints/log_limit.hpp"
 #include "server/host/asio.hpp"
 
 namespace drivebench {
 
 /// Accepts clients that speak TLS 1.3 and gives each session a plain stream, so that a session needs no TLS.
-/// At most kMaxHandshakes handshakes run at a time, each for at most kHandshakeLimit.
+/// A handshake may take kHandshakeLimit.
 ///
 /// The session has one end of a pair of unix sockets. This object carries bytes between the other end and the
 /// peer, one block at a time in each direction, so that the server notices a peer that does not read as
 /// without TLS.
 class TlsDoor {
  public:
-  static constexpr int kMaxHandshakes = 32;
   static constexpr auto kHandshakeLimit = std::chrono::seconds(2);
 
   /// Throws std::runtime_error that names the file if one of them cannot be used.
@@ -31,23 +29,25 @@ class TlsDoor {
   /// Takes a client after the handshake, with the name in its certificate (empty: no certificate).
   using LetIn = std::function<OnDeaf(PlainSocket, const std::string& subject)>;
 
-  /// Called for every refused peer, with the reason. The log has a limited number of them.
-  std::function<void(const std::string& peer, const std::string& why)> on_turned_away;
+  struct Guest {
+    std::function<void()> on_first_bytes;
+    std::function<void(const std::string& why)> on_refused;  ///< instead of let_in
+    LetIn let_in;
+  };
+  /// Ends a handshake, with the reason for on_refused.
+  using End = std::function<void(const std::string& why)>;
 
   /// Shakes hands with a peer and hands its plain socket to `let_in`.
-  void receive(asio::ip::tcp::socket socket, const std::string& peer, LetIn let_in);
+  End receive(asio::ip::tcp::socket socket, Guest guest);
 
  private:
   class Passage;
 
-  asio::awaitable<void> shake_hands(std::shared_ptr<Passage> passage, std::string peer, LetIn let_in);
-  void turn_away(const std::string& peer, const std::string& why);
+  asio::awaitable<void> shake_hands(std::shared_ptr<Passage> passage, Guest guest);
 
   struct Context;
   asio::io_context& io_;
   std::unique_ptr<Context> context_;
-  int handshakes_ = 0;
-  LogLimit log_;
 };
 
 }  // namespace drivebench

@@ -84,8 +84,12 @@ TEST(Config, CanonicalTextReadsBackBitForBit) {
   config.setup.watchdog_ticks = 7;
   config.setup.lease_ticks = 8'001;
   config.realtime = {.pacer = PacerKind::kSleep, .max_lateness_ns = 1'234'567, .cpu = 3, .priority = 0};
-  config.tcp = {
-      .address = "::1", .port = 0, .unix_path = "/run/a \"b\" \\c", .grants = {}, .max_sessions = 2};
+  config.tcp = {.address = "::1",
+                .port = 0,
+                .unix_path = "/run/a \"b\" \\c",
+                .grants = {},
+                .max_sessions = 2,
+                .max_sessions_of_address = 1};
   config.axes[0].motor = "mötor \"x\"";
   config.axes[0].events = {
       {.tick = 3, .action = LoadChange{.load_nm = -0.1, .ramp_ticks = 0}},

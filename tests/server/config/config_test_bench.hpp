@@ -166,6 +166,7 @@ inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
   EXPECT_EQ(x.tcp.port, y.tcp.port);
   EXPECT_EQ(x.tcp.unix_path, y.tcp.unix_path);
   EXPECT_EQ(x.tcp.max_sessions, y.tcp.max_sessions);
+  EXPECT_EQ(x.tcp.max_sessions_of_address, y.tcp.max_sessions_of_address);
   ASSERT_EQ(x.can.size(), y.can.size());
   for (std::size_t i = 0; i < x.can.size(); ++i)
     expect_equal(x.can[i], y.can[i]);

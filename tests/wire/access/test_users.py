@@ -146,6 +146,28 @@ class Roles(UsersTest):
         self.assertIn("16001", answer.refusal.message)
 
 
+class Reserve(UsersTest):
+    def test_own_04_limit_02_viewers_keep_no_administrator_out(self):
+        """Catches: a crowd of viewers, or of operators, that leaves no place for the administrator that must take an axis
+        by force; a refusal that says nothing."""
+        server = self.server_for(text=SERVO_TEXT.replace("[tcp]", "[tcp]\nmax_sessions = 4"), unix=True)
+        otto, *_ = [self.user(server, "otto")] + [self.user(server, "vera") for _ in range(3)]
+        self.assertDone(otto.lease())
+
+        def turned_away(name, **options):
+            refusal = self.client(server, hello=False, **options).hello(f"{name}-secret")
+            self.assertRefused(refusal, pb.REFUSAL_BUSY, "session")
+        turned_away("vera")
+        for _ in range(7):
+            self.user(server, "olga")
+        self.user(server, "vera", unix=True)
+        for name, options in (("olga", {}), ("vera", {"unix": True}), ("vera", {})):
+            turned_away(name, **options)
+        adam = self.user(server, "adam")
+        self.assertDone(adam.ask(lease=pb.LeaseRequest(action=TAKE, reason="the bench is full")))
+        self.assertEqual((adam.status().sessions, adam.tcp_counts()["turned_away"]), (13, 4))
+
+
 class Force(UsersTest):
     def test_own_04_own_05_an_administrator_takes_a_driven_axis(self):
         """Catches: an owner that is not told, an axis that changes hands while it is driven, an old owner that goes

@@ -9,6 +9,7 @@
 #include "bench.pb.h"
 #include "server/access/admission.hpp"
 #include "server/access/audit.hpp"
+#include "server/access/places.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
 #include "server/endpoints/tcp/sending/outbox.hpp"
@@ -27,6 +28,7 @@ struct SessionContext {
   std::function<std::vector<TransportReport>()> transports;  ///< reports of all transports
   Experiments* experiments;                                  ///< null: this bench has no experiments
   Audit* audit = nullptr;                                    ///< null: no audit log is kept
+  Places places{{}, false};
 
   struct Counts {
     std::uint64_t turned_away = 0;      ///< connections, by a limit

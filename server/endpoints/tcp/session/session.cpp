@@ -24,7 +24,7 @@ bool parse(std::span<const std::byte> frame, v1::Envelope& envelope) {
 
 }  // namespace
 
-Session::Session(Outbox::Socket socket, Client client, SessionContext& context)
+Session::Session(Outbox::Socket socket, Client client, SessionContext& context, Places::Number place)
     : dialogue_(std::move(socket), std::move(client), context, [this] { return shared_from_this(); }),
       identity_(dialogue_),
       subscriptions_(dialogue_),
@@ -32,6 +32,7 @@ Session::Session(Outbox::Socket socket, Client client, SessionContext& context)
       exchanges_(dialogue_, leases_, subscriptions_),
       uploads_(dialogue_),
       fetch_(dialogue_),
+      place_(place),
       reader_(kMaxRequestFrame),
       silence_(dialogue_.socket().get_executor()) {
   reader_.set_max_payload(kMaxFrameBeforeHello);
@@ -59,6 +60,7 @@ asio::awaitable<void> Session::run() {
     const std::span<std::byte> space = reader_.free_space();
     const std::size_t count = co_await socket.async_read_some(
         asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
+    if (!greeted_ && count > 0) dialogue_.context().places.heard(place_);
     reader_.received(count);
     while ((turn = take_turn()) == Turn::kMoreToCome)
       co_await asio::post(socket.get_executor(), asio::use_awaitable);
@@ -204,6 +206,8 @@ bool Session::greet(const v1::Hello& hello) {
     return true;
   }
   if (!identity_.admit(hello)) return false;
+  const std::string full = dialogue_.context().places.admit(place_, identity_.grant().role);
+  if (!full.empty()) return end_without_place(full);
   greeted_ = true;
   silence_.call_off();
   reader_.set_max_payload(kMaxRequestFrame);
@@ -229,8 +233,19 @@ void Session::on_new_grants() {
   if (greeted_ && !over_) identity_.look_again();
 }
 
-void Session::turn_away(std::string_view sentence) {
-  dialogue_.refuse(0, v1::REFUSAL_BUSY, std::string(sentence), "session");
+/// Refuses the request and ends the session with it; always false.
+bool Session::end_without_place(const std::string& sentence) {
+  ++dialogue_.context().counts.turned_away;
+  dialogue_.audit("limit", sentence, {});
+  dialogue_.refuse(dialogue_.id(), v1::REFUSAL_BUSY, sentence, "session");
+  return false;
+}
+
+void Session::turn_away(const std::string& sentence) {
+  if (!dialogue_.socket().is_open()) return;
+  dialogue_.request().Clear();
+  end_without_place(sentence);
+  close();
 }
 
 void Session::end(const std::string& sentence) {
@@ -245,6 +260,7 @@ void Session::close() {
   audience.remove_waiting(exchanges_);
   identity_.stop_watching();
   silence_.call_off();
+  dialogue_.context().places.leave(place_);
   dialogue_.outbox().close();
 }
 

@@ -25,8 +25,8 @@ namespace drivebench {
 /// This class cuts the stream into frames and gives each request to the part that answers it.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  /// `client` has no subject yet; hello gives it.
-  Session(Outbox::Socket socket, Client client, SessionContext& context);
+  /// `client` has no subject yet; hello gives it. `place` is the number of its place among the strangers.
+  Session(Outbox::Socket socket, Client client, SessionContext& context, Places::Number place);
 
   /// Reads and answers until the peer or an error ends the session, then gives its leases back.
   asio::awaitable<void> run();
@@ -40,9 +40,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Called by the TLS door when the peer takes nothing.
   void on_deaf() { dialogue_.outbox().cut_deaf(); }
 
-  bool greeted() const noexcept { return greeted_; }
-  /// Refuses the connection before it reads any byte.
-  void turn_away(std::string_view sentence);
+  /// Refuses the connection because it has no place, and ends it.
+  void turn_away(const std::string& sentence);
   void close();
 
  private:
@@ -59,6 +58,7 @@ class Session : public std::enable_shared_from_this<Session> {
   bool dispatch();
   bool greet(const v1::Hello& hello);
   void welcome();
+  bool end_without_place(const std::string& sentence);
   bool end_malformed(v1::RefusalCode code, const std::string& sentence, const char* field);
   void watch_for_silence();
   void end(const std::string& sentence);
@@ -70,6 +70,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Exchanges exchanges_;
   Uploads uploads_;
   Fetch fetch_;
+  Places::Number place_;
   FrameReader reader_;
   std::size_t last_frame_ = 0;
   Deadline silence_;  // runs until hello, and while a frame is not whole
