@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "plant/parameters/parameters.hpp"
+#include "server/access/address.hpp"
 #include "server/host/wall_time.hpp"
 
 namespace drivebench {
@@ -112,7 +113,7 @@ void Audit::on_tick() {
     watch_axis(axis);
   const Recorder* const recorder = engine_->recorder();
   if (recorder == nullptr || recorder->gaps() == seen_gaps_) return;
-  if (!may_write_refusal()) return;
+  if (!budget_.take("recording_lost", {}, ServerClock::now())) return;
   seen_gaps_ = recorder->gaps();
   note({.name = "recording_lost",
         .details = {{"file", recorder->file()}, {"gaps", seen_gaps_}, {"remarks", recorder->remarks()}}});
@@ -143,17 +144,15 @@ void Audit::watch_axis(std::uint32_t axis) {
   seen.faults = now.faults;
 }
 
-bool Audit::may_write_refusal() {
-  const ServerClock::time_point now = ServerClock::now();
-  const double elapsed_s = std::chrono::duration<double>(now - std::exchange(refilled_, now)).count();
-  refusals_left_ = std::min(refusals_left_ + kRefusalsPerSecond * elapsed_s, kRefusalsAtOnce);
-  if (refusals_left_ < 1.0) return false;
-  refusals_left_ -= 1.0;
-  return true;
+bool Audit::may_write(const Event& refusal) {
+  const Client* const client = refusal.client;
+  if (client != nullptr && !client->subject.empty()) return true;
+  const std::string address = client == nullptr ? std::string() : address_of(*client);
+  return budget_.take(refusal.name, address, ServerClock::now());
 }
 
 void Audit::note(Event event) {
-  if (event.result != "done" && !may_write_refusal()) {
+  if (event.result != "done" && !may_write(event)) {
     ++left_out_;
     return;
   }

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/access/audit_budget.hpp"
 #include "server/access/audit_file.hpp"
 #include "server/engine/engine.hpp"
 #include "server/host/clock.hpp"
@@ -23,8 +24,8 @@ using AuditDetail = std::pair<std::string_view, std::variant<std::string, double
 /// their way to the engine and the samples on their way back, so it treats all transports alike. Everything
 /// happens on the I/O thread.
 ///
-/// Refusals (of requests, tokens, connections) are written at most ten times a second after the first
-/// hundred, so that a stranger cannot fill the disk; the next line says how many were left out.
+/// What a known subject does is always written. Refusals of unknown clients (their requests, tokens,
+/// connections) have a budget, so that they cannot fill the disk; the next line says how many were left out.
 class Audit {
  public:
   /// Throws std::runtime_error if the file cannot be opened.
@@ -53,7 +54,7 @@ class Audit {
   void on_taken(const Taken& taken);
   void on_tick();
   void watch_axis(std::uint32_t axis);
-  bool may_write_refusal();
+  bool may_write(const Event& refusal);
   void fail();
 
   struct Seen {
@@ -67,14 +68,10 @@ class Audit {
   Engine* engine_ = nullptr;
   std::vector<Seen> seen_;  // by axis
   std::uint64_t seen_gaps_ = 0;
-  double refusals_left_ = kRefusalsAtOnce;
-  ServerClock::time_point refilled_{};
+  AuditBudget budget_;
   std::uint64_t left_out_ = 0;
   std::uint64_t lost_ = 0;
   bool failing_ = false;
-
-  static constexpr double kRefusalsAtOnce = 100.0;
-  static constexpr double kRefusalsPerSecond = 10.0;
 };
 
 }  // namespace drivebench

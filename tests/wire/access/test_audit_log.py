@@ -187,6 +187,29 @@ class AuditLog(UsersTest):
         self.assertIn("bench.toml", bad_bench["result"])
         self.assertEqual(server.errors().count("everything stays as it is"), 2)
 
+    def test_sec_07_a_flood_of_guesses_leaves_no_line_of_a_user_out(self):
+        """Catches: strangers that guess tokens from a few addresses until what a user may not do, a refused reload, or the
+        guess of another address leaves no line; a log that they fill."""
+        server = self.server_for(USERS, "--audit", str(self.folder_with("") / "audit"))
+        log = pathlib.Path(server.process.args[-1])
+        vera, began = self.user(server, "vera"), time.monotonic()
+        for n in range(600):
+            self.guess(server, "wrong", source=f"127.0.0.{2 + n % 3}")
+        for _ in range(150):
+            self.assertRefused(vera.lease(), pb.REFUSAL_FORBIDDEN, "lease")
+        self.guess(server, "wrong", source="127.0.0.9")
+        self.write_tokens(server.tokens, "no tokens")
+        server.process.send_signal(signal.SIGHUP)
+        until(lambda: self.audited(log, "reload"), "the reload is logged")
+        self.assertNotEqual(self.audited(log, "reload")[0]["result"], "done")
+        self.assertEqual([line["subject"] for line in self.audited(log, "forbidden")], ["vera"] * 150)
+        guessed = [line["peer"].split(":")[0] for line in self.audited(log, "authentication")]
+        self.assertEqual(guessed.count("127.0.0.9"), 1)
+        for source in ("127.0.0.2", "127.0.0.3", "127.0.0.4"):
+            self.assertLessEqual(guessed.count(source), 101 + 2 * (time.monotonic() - began), source)
+        left_out = sum(line["details"].get("left_out_before", 0) for line in self.lines(log))
+        self.assertEqual(left_out, 601 - len(guessed))
+
     def test_sec_07_a_full_log_stops_the_bench_only_if_the_file_says_so(self):
         """Catches: a bench that drives on without its log although the file forbids it, or stops although the file allows
         it."""

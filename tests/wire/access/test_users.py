@@ -59,9 +59,9 @@ class UsersTest(WireTest):
     def user(self, server, name, **options):
         return self.client(server, token=f"{name}-secret", **options)
 
-    def guess(self, server, token):
-        client = self.client(server, hello=False)
-        return client.hello(token, "guess")
+    def guess(self, server, token, **options):
+        with server.client(hello=False, **options) as client:
+            return client.hello(token, "guess")
 
 
 class Roles(UsersTest):
