@@ -205,8 +205,7 @@ void StreamServer::refuse_tls(const Client& client, Places::Number place, const 
   if (context_->audit != nullptr) {
     context_->audit->note({.name = "tls_refused", .client = &client, .result = why});
   }
-  if (!tls_log_.allow()) return;
-  spdlog::warn("{}: no TLS: {} ({} more since the last such line)", client.peer, why, tls_log_.held_back());
+  context_->log.note(client, "no TLS", why);
 }
 
 void StreamServer::receive(UnixProtocol::socket socket) {

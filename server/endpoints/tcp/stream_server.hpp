@@ -53,7 +53,6 @@ class StreamServer {
   asio::ip::tcp::acceptor tcp_;
   asio::local::stream_protocol::acceptor unix_;
   std::optional<TlsDoor> door_;
-  LogLimit tls_log_;
   std::vector<std::shared_ptr<Session>> sessions_;
 };
 

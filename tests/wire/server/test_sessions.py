@@ -2,6 +2,7 @@
 """Sessions of the server: hello, frames, foreign protocols, leases."""
 import os
 import pathlib
+import re
 import socket
 import struct
 import sys
@@ -143,7 +144,30 @@ class Hello(WireTest):
         counts = here.tcp_counts()
         self.assertEqual((counts["malformed"], counts["cut"]), (80, 0), "no connection was closed for its silence")
         self.assertAudited(server.audit, "malformed", 80)
-        self.assertLessEqual(len(server.errors().splitlines()), 1 + (time.monotonic() - began) // 10, "a line in 10 s")
+        said = server.errors().splitlines()
+        self.assertRegex(said[0], r"tcp 127\.0\.0\.1:\d+: malformed: a frame .* \(0 more since the last such line\)$")
+        self.assertLessEqual(len(said), 1 + (time.monotonic() - began) // 10, "a line in 10 s")
+
+    def test_tcp_04_each_transport_and_kind_of_refusal_has_its_line(self):
+        """Catches: refused clients of which the log has no line, a line for each, or one flood that hides another."""
+        began = time.monotonic()
+        server = self.server(text=SERVO_TEXT.replace("[tcp]", "[tcp]\nmax_sessions = 1"), unix=True)
+        for options in ({}, {"unix": True}):
+            silent = self.client(server, hello=False, **options)
+            for _ in range(20):
+                client = self.client(server, hello=False, **options)
+                client.send_bytes(b"GET / HTTP/1.1\r\n\r\n")
+                self.assertTrue(client.is_closed())
+            self.assertTrue(silent.is_closed())
+        self.client(server)
+        for _ in range(20):
+            self.assertTrue(self.client(server, hello=False).is_closed())
+        said, most = server.errors(), 1 + (time.monotonic() - began) // 10
+        for line in ("tcp .*: malformed: ", "unix .*: malformed: ", "tcp .*: cut off: no hello", "unix .*: cut off: no hello",
+                     "tcp .*: turned away: this bench serves 1 session"):
+            count = len(re.findall(line, said))
+            self.assertGreaterEqual(count, 1, line)
+            self.assertLessEqual(count, most, line)
 
     def test_tcp_07_unknown_fields_are_ignored_and_the_last_scalar_counts(self):
         """Catches: a server that refuses the additions of newer clients, or takes the first of two values."""

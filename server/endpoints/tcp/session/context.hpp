@@ -10,9 +10,9 @@
 #include "server/access/admission.hpp"
 #include "server/access/audit.hpp"
 #include "server/access/places.hpp"
-#include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
 #include "server/endpoints/tcp/sending/outbox.hpp"
+#include "server/endpoints/tcp/session/refusal_log.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine/engine.hpp"
 #include "server/experiments/experiments.hpp"
@@ -42,7 +42,7 @@ struct SessionContext {
   std::shared_ptr<OutboxPool> outboxes = std::make_shared<OutboxPool>();
   v1::Envelope reply{};              ///< the message that a session is writing
   std::vector<std::byte> scratch{};  ///< its bytes
-  LogLimit wrong_token_log{};
+  RefusalLog log{};
 };
 
 }  // namespace drivebench

@@ -70,6 +70,12 @@ void Dialogue::notify(v1::Notice::Kind kind, const std::string& sentence, std::u
   send_reply();
 }
 
+void Dialogue::report(std::string_view event, std::string_view kind, std::string_view why,
+                      std::vector<AuditDetail> details) {
+  context_.log.note(client_, kind, why);
+  audit(event, why, std::move(details));
+}
+
 void Dialogue::audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details) {
   if (context_.audit == nullptr) return;
   context_.audit->note({.name = event, .client = &client_, .result = result, .details = std::move(details)});

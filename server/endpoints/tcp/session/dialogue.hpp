@@ -49,6 +49,9 @@ class Dialogue {
   void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
   void refuse(std::uint64_t id, Refused why, const char* field);
   void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);
+  /// Writes a refusal into the log, with its kind, and into the audit log, as this event.
+  void report(std::string_view event, std::string_view kind, std::string_view why,
+              std::vector<AuditDetail> details = {});
   /// Writes a line in the audit log, if the bench has one.
   void audit(std::string_view event, std::string_view result, std::vector<AuditDetail> details);
 

@@ -26,7 +26,7 @@ ServerClock::duration ExcessLimit::pause() {
   refill();
   if (left_ >= 0.0) return {};
   if (dialogue_.context().counts.throttled++ % 1000 == 0) {
-    dialogue_.audit("limit", "too many commands: throttled", {});
+    dialogue_.report("limit", "throttled", "too many commands");
   }
   const double pause_ns = -left_ * static_cast<double>(dialogue_.engine().config().setup.period_ns);
   return std::min<ServerClock::duration>(std::chrono::nanoseconds(static_cast<std::int64_t>(pause_ns)),

@@ -1,7 +1,5 @@
 #include "server/endpoints/tcp/session/identity.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include "server/access/address.hpp"
 
 namespace drivebench {
@@ -40,11 +38,7 @@ bool Identity::admit(const v1::Hello& hello) {
     return true;
   }
   ++context.counts.wrong_tokens;
-  if (context.wrong_token_log.allow()) {
-    spdlog::warn("{}: {} ({} more since the last such line)", name_of(client), decision.why_not,
-                 context.wrong_token_log.held_back());
-  }
-  dialogue_.audit("authentication", decision.why_not, {{"client", hello.client()}});
+  dialogue_.report("authentication", "not admitted", decision.why_not, {{"client", hello.client()}});
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_UNAUTHENTICATED, decision.why_not, "token");
   return false;
 }
@@ -55,7 +49,7 @@ bool Identity::may_ask() {
   const auto* kind =
       v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(dialogue_.request().kind_case()));
   const std::string field = kind == nullptr ? "kind" : kind->name();
-  dialogue_.audit("forbidden", "the role does not allow it", {{"request", field}});
+  dialogue_.report("forbidden", "forbidden", "the role does not allow it", {{"request", field}});
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_FORBIDDEN,
                    "this session is that of " + (grant_.name.empty() ? "an unnamed user" : grant_.name) +
                        ", a " + std::string(name_of(grant_.role)) + "; this request needs the role " +

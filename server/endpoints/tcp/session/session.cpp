@@ -45,7 +45,7 @@ Session::Session(Outbox::Socket socket, Client client, SessionContext& context, 
   dialogue_.outbox().on_cut = [this](std::string_view why) {
     ++dialogue_.context().counts.cut;
     why_ended_ = why;
-    dialogue_.audit("limit", why, {});
+    dialogue_.report("limit", "cut off", why);
   };
 }
 
@@ -101,7 +101,7 @@ Session::Turn Session::take_turn() {
 bool Session::end_malformed(v1::RefusalCode code, const std::string& sentence, const char* field) {
   ++dialogue_.context().counts.malformed;
   why_ended_ = sentence;
-  dialogue_.audit("malformed", sentence, {});
+  dialogue_.report("malformed", "malformed", sentence);
   dialogue_.refuse(dialogue_.id(), code, sentence, field);
   return false;
 }
@@ -236,7 +236,7 @@ void Session::on_new_grants() {
 /// Refuses the request and ends the session with it; always false.
 bool Session::end_without_place(const std::string& sentence) {
   ++dialogue_.context().counts.turned_away;
-  dialogue_.audit("limit", sentence, {});
+  dialogue_.report("limit", "turned away", sentence);
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_BUSY, sentence, "session");
   return false;
 }
