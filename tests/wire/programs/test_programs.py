@@ -256,7 +256,10 @@ class Serving(CommandTest):
                 ([SERVO, "--mode", "free", "--duration", "0"], "--duration"),
                 ([SERVO, "--mode", "free", "--duration", "nan"], "--duration"),
                 ([SERVO, "--mode", "free", "--duration", "1e300"], "--duration"),
-                ([SERVO, "--fail-on-late", "-1"], "--fail-on-late"), ([SERVO, "--replay", "r.mcap"], "--replay"),
+                ([SERVO, "--fail-on-late", "-1"], "--fail-on-late"), ([SERVO, "--duration", "-1"], "-1 is not a number from 1e-09 to 1e+09"),
+                ([SERVO, "--record-file-s", "1e400"], "1e400 is not a number from"),
+                ([SERVO, "--record-file-mib", "-1"], "-1 is not a whole number from 1 to"),
+                ([SERVO, "--bus", "-1"], "-1 is not a whole number from 1 to 8"), ([SERVO, "--replay", "r.mcap"], "--replay"),
                 (["--replay", "none.mcap"], "none.mcap"), ([SERVO, "--record", "none/r.mcap"], "none/r.mcap"),
                 ([SERVO, "--unix", "none/socket"], "none/socket"),
                 *(([SERVO, option, ""], f"{option}: must not be empty")
