@@ -1,6 +1,5 @@
 #include "protocols/text.hpp"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 
@@ -25,6 +24,22 @@ std::size_t size_of_first(std::string_view text) noexcept {
   return size;
 }
 
+/// Whether this valid character is one that is_plain() forbids.
+bool is_harmful(std::string_view character) noexcept {
+  const auto byte = [character](std::size_t i) { return static_cast<unsigned char>(character[i]); };
+  const unsigned lead = byte(0);
+  if (character.size() == 1) return lead < 0x20 || lead == 0x7F;
+  if (character.size() == 2) {
+    const unsigned point = (lead & 0x1Fu) << 6 | (byte(1) & 0x3Fu);
+    return point < 0xA0 || point == 0x61C;  // C1 controls; the Arabic letter mark
+  }
+  if (character.size() == 4) return false;
+  const unsigned point = (lead & 0x0Fu) << 12 | (byte(1) & 0x3Fu) << 6 | (byte(2) & 0x3Fu);
+  // Marks of direction; separators of lines, embeddings and overrides; isolates.
+  return point == 0x200E || point == 0x200F || (point >= 0x2028 && point <= 0x202E) ||
+         (point >= 0x2066 && point <= 0x2069);
+}
+
 }  // namespace
 
 std::string utf8(std::string_view text, std::size_t most) {
@@ -39,13 +54,25 @@ std::string utf8(std::string_view text, std::size_t most) {
   return result;
 }
 
+bool is_plain(std::string_view text) noexcept {
+  while (!text.empty()) {
+    const std::size_t size = size_of_first(text);
+    if (size == 0 || is_harmful(text.substr(0, size))) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
 std::string printable(std::string_view text) {
   constexpr std::size_t kMost = 160;
-  std::string result = utf8(text, kMost);
-  const bool is_cut = result.size() < text.size();
-  const auto controls = [](char c) { return (c >= 0 && c < 0x20) || c == 0x7F; };
-  std::replace_if(result.begin(), result.end(), controls, '?');
-  return is_cut ? result + "..." : result;
+  const std::string whole = utf8(text, kMost);
+  std::string result;
+  for (std::string_view rest = whole; !rest.empty();) {
+    const std::string_view first = rest.substr(0, size_of_first(rest));
+    result += is_harmful(first) ? "?" : first;
+    rest.remove_prefix(first.size());
+  }
+  return whole.size() < text.size() ? result + "..." : result;
 }
 
 std::string hexadecimal(std::int64_t value) {

@@ -10,7 +10,11 @@ namespace drivebench {
 /// refuse a protobuf message with a string that is not valid UTF-8.
 std::string utf8(std::string_view text, std::size_t most = std::string_view::npos);
 
-/// The text for one line of a terminal: valid UTF-8 without control characters, cut after 160 bytes.
+/// Whether the text is valid UTF-8 without characters that move a terminal's cursor or make a name look like
+/// another: control characters, line separators, changes of the direction of writing.
+bool is_plain(std::string_view text) noexcept;
+
+/// The text for one line of a terminal: plain, with '?' for each other character, cut after 160 bytes.
 std::string printable(std::string_view text);
 
 /// In hexadecimal with prefix: 0x1a.

@@ -48,10 +48,6 @@ std::string advice(std::string_view key, const std::vector<std::string>& known) 
   return "; known here: " + joined(known, "");
 }
 
-bool is_control(char c) {
-  return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
-}
-
 bool belongs_to_identifier(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
          c == '-';
@@ -115,11 +111,9 @@ std::optional<double> StrictTable::real(std::string_view key, double minimum, do
 std::optional<std::string> StrictTable::text(std::string_view key, std::size_t most) {
   const std::string* value = scalar<std::string>(key, "text in quotes");
   if (value == nullptr) return std::nullopt;
-  if (!value->empty() && value->size() <= most && std::none_of(value->begin(), value->end(), is_control)) {
-    return *value;
-  }
+  if (!value->empty() && value->size() <= most && is_plain(*value)) return *value;
   report(key, "is \"" + printable(*value) + "\" but must be text of 1 to " + std::to_string(most) +
-                  " bytes without control characters");
+                  " bytes without control characters or changes of direction");
   return std::nullopt;
 }
 

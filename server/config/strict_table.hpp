@@ -27,7 +27,7 @@ class StrictTable {
                                                   std::int64_t maximum);
   std::optional<double> real(std::string_view key);
   std::optional<double> real(std::string_view key, double minimum, double maximum);
-  /// Text without control characters, not empty, of at most `most` bytes.
+  /// Plain text, not empty, of at most `most` bytes.
   std::optional<std::string> text(std::string_view key, std::size_t most);
   /// Letters, digits, '.', '_' and '-', at most 64 of them.
   std::optional<std::string> identifier(std::string_view key);

@@ -18,12 +18,11 @@ constexpr std::size_t kMinOwner = 8;
 constexpr std::size_t kMaxOwner = 100;
 
 void check_text(std::string_view value, std::size_t most, const std::string& field) {
-  const bool plain = std::none_of(value.begin(), value.end(),
-                                  [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-  if (value.size() <= most && plain) return;
+  if (value.size() <= most && is_plain(value)) return;
   throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, field,
-                   fmt::format("{} has {} bytes but must have at most {} and no control characters", field,
-                               value.size(), most));
+                   fmt::format("{} has {} bytes but must have at most {}, without control characters or "
+                               "changes of direction",
+                               field, value.size(), most));
 }
 
 void check_names(const v1::RunExperiment& r) {

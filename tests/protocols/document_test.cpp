@@ -53,9 +53,14 @@ TEST(Document, AnyBytesBecomeTextThatProtobufTakes) {
   EXPECT_GT(unchanged, 1000);
 }
 
-// Catches: a printed text that breaks the line or moves the terminal's cursor; a text without an end.
+// Catches: a printed text that breaks the line, moves the terminal's cursor or turns the direction of
+// writing, so that a name looks like another; a letter of a language from right to left that is lost; a text
+// without an end.
 TEST(Document, APrintedTextIsOneLine) {
   EXPECT_EQ(printable("a\n\x1b[2J\x7f\u00e4"), "a??[2J?\u00e4");
+  EXPECT_EQ(printable("\u009b2J\u202eanna\u2066\u200f\u061c\u2028"), "?2J?anna????");
+  EXPECT_EQ(printable("\u00a0\u05d0\u0627\u2019\u202f\U0001f600"),
+            "\u00a0\u05d0\u0627\u2019\u202f\U0001f600");
   EXPECT_EQ(printable(std::string(160, 'x')), std::string(160, 'x'));
   EXPECT_EQ(printable(std::string(161, 'x')), std::string(160, 'x') + "...");
 }

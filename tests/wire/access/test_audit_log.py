@@ -60,7 +60,7 @@ class AuditLog(UsersTest):
         otto.ask(shaft_bump=pb.ShaftBump(impulse_nms=1e-4))
         vera.ask(clear_faults=pb.ClearFaults())
         vera.lease()
-        adam.ask(lease=pb.LeaseRequest(action=TAKE, reason="test \x1b[31m\n"))
+        adam.ask(lease=pb.LeaseRequest(action=TAKE, reason="test {\"ä\"}"))
         adam.ask(clear_faults=pb.ClearFaults())
         adam.lease(pb.LeaseRequest.ACTION_RELEASE)
         run = adam.ask(run_experiment=pb.RunExperiment(
@@ -85,7 +85,7 @@ class AuditLog(UsersTest):
             ("reload", "", True), ("recording_stopped", "", True), ("stop", "", True)])
         by_name = {line["event"]: line for line in said}
         self.assertRegex(by_name["start"]["details"]["configuration_hash"], "^[0-9a-f]{16}$")
-        self.assertEqual(by_name["take"]["details"]["reason"], "test \x1b[31m\n")
+        self.assertEqual(by_name["take"]["details"]["reason"], "test {\"ä\"}")
         self.assertRegex(by_name["take"]["details"]["from"], r"^otto \(tcp 127")
         self.assertEqual(by_name["armed"]["details"]["state"], "run")
         self.assertEqual(by_name["parameter"]["details"]["name"], "machine.rotor_resistance_ohm")

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "protocols/text.hpp"
+
 namespace drivebench {
 
 Leases::Leases(Dialogue& dialogue)
@@ -39,6 +41,12 @@ void Leases::take(const v1::LeaseRequest& r, Engine::Answer answer) {
     return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
                             "taking an axis by force needs a reason of 1 to 200 bytes, not of " +
                                 std::to_string(r.reason().size()),
+                            "reason");
+  }
+  if (!is_plain(r.reason())) {
+    return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                            "the reason is \"" + printable(r.reason()) +
+                                "\" but may hold no control characters and no changes of direction",
                             "reason");
   }
   // A new owner has a larger number than the owner before, so that the numbers show the order.
