@@ -53,6 +53,7 @@ class Places(WireTest):
         over.set()
         for crowd in crowds:
             crowd.join()
+        self.assertMemoryBelow(server, 128 * 1024)
 
     def test_limit_02_an_address_has_a_share_of_the_sessions(self):
         """Catches: one computer that takes the places of all the others; a share that counts the sessions of the unix
