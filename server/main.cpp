@@ -57,7 +57,6 @@ BenchConfig configure(const ServerOptions& o) {
   if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
     throw std::runtime_error("--duration: a lockstep run ends when its controller does");
   }
-  if (!(o.chunk_ms <= 1e4)) throw std::runtime_error("--record-chunk-ms: must be at most 1e4 ms");
   if (config.mode == RunMode::kRealtime && config.setup.command_delay_ticks == 0) {
     throw std::runtime_error(
         "--command-delay-ticks 0: in real time a command holds from the next tick on, 1");
