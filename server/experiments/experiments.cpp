@@ -245,7 +245,11 @@ v1::ExperimentList Experiments::list(const std::string& owner) const {
 
 std::shared_ptr<SignalTable> Experiments::new_table() {
   std::erase_if(tables_, [](const auto& table) { return table.expired(); });
-  auto table = std::make_shared<SignalTable>(folder_);
+  if (tables_.size() >= kMaxTables) {
+    throw BadRequest(v1::REFUSAL_BUSY, "table",
+                     fmt::format("all sessions together have {} tables, as many as may be", kMaxTables));
+  }
+  auto table = std::make_shared<SignalTable>(file_of(++last_table_, kTableEnding));
   tables_.push_back(table);
   return table;
 }

@@ -72,7 +72,8 @@ class Experiments {
   std::filesystem::path rows_file(std::uint64_t id) const { return file_of(id, ".rows"); }
   std::filesystem::path recording_file(std::uint64_t id) const { return file_of(id, ".mcap"); }
 
-  /// A new table for a session. Throws std::system_error.
+  /// A new table for a session. Throws BadRequest if all sessions together have too many, and
+  /// std::system_error.
   std::shared_ptr<SignalTable> new_table();
   /// The most rows of all tables of a session.
   std::uint64_t max_table_rows() const { return config_.experiments.table_rows; }
@@ -86,6 +87,11 @@ class Experiments {
 
   /// The number of sessions that can have the largest tables at the same time.
   static constexpr std::uint64_t kSharesOfTables = 4;
+  /// The most tables of all sessions, each of which is a file.
+  static constexpr std::size_t kMaxTables = 1024;
+
+  /// Of the tables, whose numbers are no ids.
+  static constexpr std::string_view kTableEnding = ".table";
 
   std::filesystem::path file_of(std::uint64_t id, std::string_view ending) const;
   void lock_folder();
@@ -117,6 +123,7 @@ class Experiments {
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  // for posted handlers; I/O thread only
   std::atomic<bool> notified_{false};
   std::vector<std::weak_ptr<SignalTable>> tables_;        // of all sessions
+  std::uint64_t last_table_ = 0;                          // the number in the name of its file
   std::map<std::uint64_t, std::vector<Answer>> answers_;  // by id, until the experiment is on the disk
 
   // Guards the members below. Never locked in a tick of the live bench, nor during a disk access.

@@ -30,15 +30,15 @@ constexpr std::size_t kMaxStoredBytes = std::size_t{4} * 1024 * 1024;
 constexpr auto kEndings =
     std::to_array<std::string_view>({".experiment", ".rows", ".mcap", ".experiment.new"});
 
-/// The number in the name of an experiment file, at most the largest that the type holds; nothing for other
-/// files.
-std::optional<std::uint64_t> number_in(const std::filesystem::path& file) {
+/// The number in the name of a file with one of these endings, at most the largest that the type holds;
+/// nothing for other files.
+std::optional<std::uint64_t> number_in(const std::filesystem::path& file,
+                                       std::span<const std::string_view> endings) {
   const std::string name = file.filename().string();
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
   const std::string_view ending(end, name.data() + name.size());
-  if (error == std::errc::invalid_argument || std::ranges::find(kEndings, ending) == kEndings.end())
-    return {};
+  if (error == std::errc::invalid_argument || std::ranges::find(endings, ending) == endings.end()) return {};
   return error == std::errc{} ? number : std::numeric_limits<std::uint64_t>::max();
 }
 
@@ -118,8 +118,11 @@ void Experiments::lock_folder() {
 
 void Experiments::load() {
   std::set<std::uint64_t> found;
+  std::vector<std::filesystem::path> old_tables;  // of sessions that a crash has ended
   for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
-    const std::optional<std::uint64_t> number = number_in(entry.path());
+    const auto table = number_in(entry.path(), {&kTableEnding, 1});
+    if (table && *table > 0 && *table <= kMaxExperimentId) old_tables.push_back(entry.path());
+    const std::optional<std::uint64_t> number = number_in(entry.path(), kEndings);
     if (!number) continue;
     if (*number > 0 && *number <= kMaxExperimentId) {
       found.insert(*number);
@@ -127,6 +130,10 @@ void Experiments::load() {
       spdlog::warn("{} is not an experiment: its number must lie between 1 and {}", entry.path().string(),
                    kMaxExperimentId);
     }
+  }
+  for (const std::filesystem::path& table : old_tables) {
+    std::error_code ignored;
+    std::filesystem::remove(table, ignored);
   }
   std::vector<std::pair<std::filesystem::file_time_type, Pointer>> ended;
   for (const std::uint64_t id : found) {

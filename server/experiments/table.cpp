@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <system_error>
 #include <utility>
 
@@ -17,28 +16,38 @@ namespace {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
-/// A file without a name. Not O_TMPFILE, which some file systems do not support.
-int nameless_file(const std::filesystem::path& folder) {
-  std::string name = (folder / "table-XXXXXX").string();
-  const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
-  if (descriptor < 0) fail("cannot keep a table in " + folder.string());
-  ::unlink(name.c_str());
-  return descriptor;
-}
+/// A file, as long as it is open.
+class OpenFile {
+ public:
+  OpenFile(const std::filesystem::path& file, int flags)
+      : descriptor_(::open(file.c_str(), flags | O_CLOEXEC, 0600)) {
+    if (descriptor_ < 0) fail("cannot keep a table in " + file.string());
+  }
+  ~OpenFile() { ::close(descriptor_); }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  int descriptor() const noexcept { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
 
 }  // namespace
 
-SignalTable::SignalTable(const std::filesystem::path& folder) : descriptor_(nameless_file(folder)) {}
+SignalTable::SignalTable(std::filesystem::path file) : file_(std::move(file)) {
+  const OpenFile made(file_, O_WRONLY | O_CREAT | O_EXCL);
+}
 
 SignalTable::~SignalTable() {
-  ::close(descriptor_);
+  ::unlink(file_.c_str());
 }
 
 void SignalTable::append(std::span<const Row> rows) {
+  const OpenFile file(file_, O_WRONLY);
   std::span<const std::byte> left = std::as_bytes(rows);
   auto offset = static_cast<off_t>(size_ * sizeof(Row));
   while (!left.empty()) {
-    const ssize_t written = ::pwrite(descriptor_, left.data(), left.size(), offset);
+    const ssize_t written = ::pwrite(file.descriptor(), left.data(), left.size(), offset);
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) fail("cannot keep the rows of a table");
     left = left.subspan(static_cast<std::size_t>(written));
@@ -54,7 +63,8 @@ TableView::TableView(const SignalTable& table) {
   // A real-time server locks its mappings, for which the kernel reads the whole file: 160 MB in 50 ms, while
   // the I/O thread waits. The kernel does not read a mapping without access, and after munlock() a run reads
   // only the pages it needs.
-  mapping_ = ::mmap(nullptr, bytes, PROT_NONE, MAP_SHARED, table.descriptor_, 0);
+  const OpenFile file(table.file_, O_RDONLY);
+  mapping_ = ::mmap(nullptr, bytes, PROT_NONE, MAP_SHARED, file.descriptor(), 0);
   if (mapping_ == MAP_FAILED) fail("cannot map a table");
   ::munlock(mapping_, bytes);
   if (::mprotect(mapping_, bytes, PROT_READ) != 0) {

@@ -10,8 +10,8 @@
 
 namespace drivebench {
 
-/// Points of a signal over time in a nameless file, which is deleted with the object. One thread adds rows;
-/// other threads read them only afterwards.
+/// Points of a signal over time in a file, which is open only while it is read or written and which the
+/// object deletes. One thread adds rows; other threads read them only afterwards.
 class SignalTable {
  public:
   struct Row {
@@ -19,8 +19,8 @@ class SignalTable {
     double value;
   };
 
-  /// Throws std::system_error if the folder refuses a file.
-  explicit SignalTable(const std::filesystem::path& folder);
+  /// Throws std::system_error if the file is there already or cannot be made.
+  explicit SignalTable(std::filesystem::path file);
   ~SignalTable();
   SignalTable(const SignalTable&) = delete;
   SignalTable& operator=(const SignalTable&) = delete;
@@ -33,7 +33,7 @@ class SignalTable {
 
  private:
   friend class TableView;
-  int descriptor_;
+  std::filesystem::path file_;
   std::uint64_t size_ = 0;
   double last_time_s_ = 0.0;
 };

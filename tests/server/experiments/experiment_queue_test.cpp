@@ -1,6 +1,7 @@
 // The queue of experiments and its folder, in process, with disks that stand still or are full.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <fstream>
@@ -155,6 +156,39 @@ TEST_F(ExperimentQueue, AFullDiskRefusesAndLeavesNothing) {
   ASSERT_NE(kept->experiment, nullptr);
   EXPECT_EQ(kept->experiment->id, 2u);
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "1.experiment"));
+}
+
+std::ptrdiff_t files_in(const std::filesystem::path& folder) {
+  return std::distance(std::filesystem::directory_iterator(folder), {});
+}
+
+// Catches: tables that hold a descriptor each, of which 16 sessions with 64 tables take all; no bound for all
+// sessions together; files that stay behind a table, or behind a server that was killed; a file of another
+// name that is taken for one of these.
+TEST_F(ExperimentQueue, LIMIT_11_TablesHoldNoDescriptorsAndLeaveNoFiles) {
+  for (const char* left : {"7.table", "table.csv", "7.table.txt"})
+    std::ofstream(folder_.path() / left) << "left by a server that was killed";
+  start();
+  EXPECT_EQ(files_in(folder_.path()), 3) << "the lock and the two others";
+  const std::ptrdiff_t descriptors = files_in("/proc/self/fd");
+  const std::array rows = {SignalTable::Row{.time_s = 0.0, .value = 1.0}};
+  std::vector<std::shared_ptr<SignalTable>> tables;
+  for (int i = 0; i < 1024; ++i)
+    tables.emplace_back(experiments_->new_table())->append(rows);
+  EXPECT_EQ(files_in("/proc/self/fd"), descriptors);
+  try {
+    experiments_->new_table();
+    FAIL() << "a table too many";
+  } catch (const BadRequest& bad) {
+    EXPECT_EQ(bad.code(), v1::REFUSAL_BUSY);
+    EXPECT_EQ(bad.field(), "table");
+    EXPECT_STREQ(bad.what(), "all sessions together have 1024 tables, as many as may be");
+  }
+  const TableView view(*tables.back());
+  tables.clear();
+  EXPECT_EQ(files_in(folder_.path()), 3);
+  EXPECT_EQ(view.at(1.0, false), 1.0) << "an experiment reads on after its session";
+  EXPECT_NE(experiments_->new_table(), nullptr);
 }
 
 // Catches: a request that is sent again before the disk has it, and then runs twice or is never answered.

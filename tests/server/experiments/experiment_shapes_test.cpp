@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "server/experiments/shapes.hpp"
+#include "tests/server/recording/run_config.hpp"
 
 namespace drivebench {
 namespace {
@@ -187,7 +188,8 @@ TEST(ExperimentShapes, ShapesAdd) {
 
 // Catches: a table whose second part overwrites its first, or that shows rows before they are written.
 TEST(ExperimentShapes, TablesOnDiskReadBackTheAppendedRows) {
-  SignalTable table(std::filesystem::temp_directory_path());
+  const TestFolder folder;
+  SignalTable table(folder / "1.table");
   const std::vector<SignalTable::Row> first = {{0.0, 1.0}, {1.0, 2.0}};
   const std::vector<SignalTable::Row> second = {{2.0, 3.0}};
   table.append(first);
@@ -215,7 +217,8 @@ TEST(ExperimentShapes, AMappedTableIsReadWhereItIsNeeded) {
   std::vector<SignalTable::Row> rows(std::size_t{1} << 20);  // 16 MiB
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] = {.time_s = static_cast<double>(i), .value = static_cast<double>(i % 7)};
-  SignalTable table(std::filesystem::temp_directory_path());
+  const TestFolder folder;
+  SignalTable table(folder / "1.table");
   table.append(rows);
   if (::mlockall(MCL_FUTURE) != 0) GTEST_SKIP() << "memory cannot be locked: " << std::strerror(errno);
   const std::size_t before = resident_bytes();
