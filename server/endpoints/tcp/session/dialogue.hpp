@@ -14,8 +14,8 @@
 
 namespace drivebench {
 
-/// The common ground of the parts of a session: the client, the present request, and the way back to the
-/// client.
+/// The common ground of the parts of a session: the client, the id of the present request, and the way back
+/// to the client.
 class Dialogue {
  public:
   /// `keep_alive` returns the session, which must live until the bench has answered its requests.
@@ -34,9 +34,9 @@ class Dialogue {
   void set_owner(Owner owner) noexcept { owner_ = owner; }
   std::shared_ptr<void> keep_alive() const { return keep_alive_(); }
 
-  /// The present request and its id.
-  v1::Envelope& request() noexcept { return request_; }
-  std::uint64_t id() const noexcept { return request_.id(); }
+  /// The id of the present request.
+  std::uint64_t id() const noexcept { return id_; }
+  void begin_request(std::uint64_t id) noexcept { id_ = id; }
 
   /// An empty message that answers the request with this id; send_reply() sends it.
   v1::Envelope& begin_reply(std::uint64_t id);
@@ -68,7 +68,7 @@ class Dialogue {
   Client client_;
   SessionContext& context_;
   std::function<std::shared_ptr<void>()> keep_alive_;
-  v1::Envelope request_;
+  std::uint64_t id_ = 0;
   Owner owner_ = 0;
   std::size_t bytes_in_turn_ = 0;
 };

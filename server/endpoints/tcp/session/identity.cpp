@@ -43,11 +43,10 @@ bool Identity::admit(const v1::Hello& hello) {
   return false;
 }
 
-bool Identity::may_ask() {
-  const Role needed = role_needed_for(dialogue_.request());
+bool Identity::may_ask(const v1::Envelope& request) {
+  const Role needed = role_needed_for(request);
   if (grant_.role >= needed) return true;
-  const auto* kind =
-      v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(dialogue_.request().kind_case()));
+  const auto* kind = v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(request.kind_case()));
   const std::string field = kind == nullptr ? "kind" : kind->name();
   dialogue_.report("forbidden", "forbidden", "the role does not allow it", {{"request", field}});
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_FORBIDDEN,

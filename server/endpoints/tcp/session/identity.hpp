@@ -18,7 +18,7 @@ class Identity {
   /// Checks the token of a hello; refuses the hello if no grant has this token.
   bool admit(const v1::Hello& hello);
   /// Whether the role allows the request; if not, refuses it.
-  bool may_ask();
+  bool may_ask(const v1::Envelope& request);
   /// Called after a change of the tokens file: ends the session if its grant has gone or changed.
   void look_again();
   /// Ends the session when the time of the grant is over.

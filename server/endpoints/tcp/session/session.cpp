@@ -1,26 +1,16 @@
 #include "server/endpoints/tcp/session/session.hpp"
 
-#include <google/protobuf/io/coded_stream.h>
-
 #include "protocols/descriptor_set.hpp"
 #include "server/endpoints/tcp/session/changes.hpp"
 #include "server/endpoints/tcp/session/experiment_requests.hpp"
 #include "server/endpoints/tcp/session/reports.hpp"
+#include "server/endpoints/tcp/session/request_bounds.hpp"
 #include "server/host/build_id.hpp"
 
 namespace drivebench {
 namespace {
 
 constexpr std::uint32_t kProtocolVersion = 1;
-
-/// False: the frame is not an Envelope, or is nested more deeply than any valid one.
-bool parse(std::span<const std::byte> frame, v1::Envelope& envelope) {
-  constexpr int kMaxNesting = 16;
-  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(frame.data()),
-                                            static_cast<int>(frame.size()));
-  in.SetRecursionLimit(kMaxNesting);
-  return envelope.ParseFromCodedStream(&in) && in.ConsumedEntireMessage();
-}
 
 }  // namespace
 
@@ -90,7 +80,7 @@ Session::Turn Session::take_turn() {
     if (frame && handle(*frame)) continue;
     if (frame) return Turn::kOver;
     if (reader_.error().empty()) return Turn::kAll;
-    dialogue_.request().Clear();
+    dialogue_.begin_request(0);
     end_malformed(v1::REFUSAL_MALFORMED, std::string(reader_.error()), "frame");
     return Turn::kOver;
   }
@@ -115,25 +105,27 @@ void Session::watch_for_silence() {
 }
 
 bool Session::handle(std::span<const std::byte> frame) {
-  constexpr std::size_t kOrdinaryFrame = 4096;
-  v1::Envelope& request = dialogue_.request();
-  if (last_frame_ > kOrdinaryFrame)
-    request = v1::Envelope();  // the old one keeps the memory of its largest frame
-  last_frame_ = frame.size();
-  if (!parse(frame, request)) {
-    request.Clear();
-    return end_malformed(v1::REFUSAL_MALFORMED, "the frame is not an Envelope", "frame");
-  }
-  if (!greeted_ && request.kind_case() != v1::Envelope::kHello) {
+  using Outcome = FrameReading::Outcome;
+  v1::Envelope request;  // its memory goes back with the answer
+  const FrameReading reading = read_request(frame, request);
+  dialogue_.begin_request(reading.id);
+  const bool is_envelope = reading.outcome != Outcome::kNoEnvelope;
+  if (is_envelope && !greeted_ && reading.kind != v1::Envelope::kHello) {
     return end_malformed(v1::REFUSAL_UNAUTHENTICATED, "the first message must be hello", "kind");
   }
-  if (greeted_ && !identity_.may_ask()) return true;
-  return dispatch();
+  if (!is_envelope || (!greeted_ && reading.outcome == Outcome::kRefused)) {
+    return end_malformed(reading.code, reading.sentence, reading.field.c_str());
+  }
+  if (reading.outcome == Outcome::kRefused) {
+    dialogue_.refuse(reading.id, reading.code, reading.sentence, reading.field.c_str());
+    return true;
+  }
+  if (greeted_ && !identity_.may_ask(request)) return true;
+  return dispatch(request);
 }
 
 /// False: the session is over.
-bool Session::dispatch() {
-  const v1::Envelope& request = dialogue_.request();
+bool Session::dispatch(const v1::Envelope& request) {
   switch (request.kind_case()) {
     case v1::Envelope::kExchange:
       exchanges_.exchange(request.exchange());
@@ -183,8 +175,7 @@ bool Session::dispatch() {
     case v1::Envelope::kCancelExperiment:
       cancel_experiment(dialogue_, request.cancel_experiment());
       break;
-    default:
-      dialogue_.refuse(request.id(), v1::REFUSAL_MALFORMED, "not a request", "kind");
+    default:  // read_request() has refused it
       break;
   }
   return true;
@@ -243,7 +234,7 @@ bool Session::end_without_place(const std::string& sentence) {
 
 void Session::turn_away(const std::string& sentence) {
   if (!dialogue_.socket().is_open()) return;
-  dialogue_.request().Clear();
+  dialogue_.begin_request(0);
   end_without_place(sentence);
   close();
 }

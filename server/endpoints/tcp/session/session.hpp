@@ -55,7 +55,7 @@ class Session : public std::enable_shared_from_this<Session> {
   enum class Turn { kAll, kMoreToCome, kOver };
   Turn take_turn();
   bool handle(std::span<const std::byte> frame);
-  bool dispatch();
+  bool dispatch(const v1::Envelope& request);
   bool greet(const v1::Hello& hello);
   void welcome();
   bool end_without_place(const std::string& sentence);
@@ -72,7 +72,6 @@ class Session : public std::enable_shared_from_this<Session> {
   Fetch fetch_;
   Places::Number place_;
   FrameReader reader_;
-  std::size_t last_frame_ = 0;
   Deadline silence_;  // runs until hello, and while a frame is not whole
   bool greeted_ = false;
   bool over_ = false;  // the peer has gone
