@@ -199,6 +199,15 @@ def channel_of(parts, message):
 
 # ---- the wire ----
 
+# What RequestBounds.TCP_05_ASearchFindsNoFrameThatTakesMuch has found, as programs of request_program.hpp.
+WORST_REQUESTS = {
+    "worst-without-bounds": "c31154a6a00fd68a9f4e30219be7e58e",
+    "worst-memory": "ee57214f299e6c7284a584988b1f9a95f4e40c121720182e",
+    "worst-allocations": "3f6741063ac27b5f55a1f08d687b6eee444b1f99e1712088f6653b07240c31891f0a56bf5c641a99d95cad92da5b05b38d28e53e061bc9ae"
+        "0844930e44c3bb72e84c6f5e7a49558632c8ce7688880099c41d10c4761a321a3e9d00f73af2bcb22ee0645dc7dc18b208443b0e45c3bb72",
+}
+
+
 def make_messages():
     extreme = pb.Sample()
     for field in pb.Sample.DESCRIPTOR.fields:
@@ -221,6 +230,9 @@ def make_messages():
     }
     for name, message in requests.items():
         put("envelope", name, message.SerializeToString())
+        put("request", name, b"\0" + message.SerializeToString())
+    for name, program in WORST_REQUESTS.items():
+        put("request", name, b"\1" + bytes.fromhex(program))
     stream = b"".join(frame(requests[name].SerializeToString()) for name in ("hello", "lease", "exchange"))
     put("frame_reader", "bytewise", bytes([255, 1, 1]) + stream)
     put("frame_reader", "odd-cuts", bytes([255, 4, 3, 5, 200, 1]) + stream * 3)
