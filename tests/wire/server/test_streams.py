@@ -132,11 +132,13 @@ class Subscriptions(WireTest):
         self.assertEqual(dropped, ticks - 256 - before)
 
     def test_tcp_10_tcp_11_limit_04_a_reader_that_stops_is_cut_and_the_others_go_on(self):
-        """Catches: a dead viewer that is fed forever, or one that stops the bench."""
+        """Catches: a dead viewer that is fed forever, or one that stops the bench; memory that grows with their number
+        beyond the 16 MiB that wait for all of them together."""
         server = self.server(unix=True)
         owner, viewer = self.client(server), self.client(server)
-        stopped = [self.client(server, receive_buffer=4096) for _ in range(4)]
-        stopped += [self.client(server, unix=True) for _ in range(4)]  # where no timeout of TCP helps
+        stopped = [self.client(server, receive_buffer=4096) for _ in range(25)]
+        stopped += [self.client(server, unix=True) for _ in range(25)]  # where no timeout of TCP helps
+        memory_kib = server.memory_kib()
         owner.lease()
         for client in stopped:
             client.ask(subscribe=pb.Subscribe(decimation=1))
@@ -154,6 +156,7 @@ class Subscriptions(WireTest):
         self.assertEqual(viewer.newest().tick, 3000)
         ticks = [s.tick for message in viewer.samples for s in message.samples]
         self.assertEqual(ticks, list(range(1, 3001)))
+        self.assertMemoryBelow(server, memory_kib + 20 * 1024)
 
     def test_limit_04_a_reader_that_rests_for_a_second_stays(self):
         """Catches: a viewer that is cut because it rested for a second."""
