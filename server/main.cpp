@@ -12,7 +12,7 @@
 #include "server/access/audit.hpp"
 #include "server/command_line.hpp"
 #include "server/config/config.hpp"
-#include "server/config/plausible.hpp"
+#include "server/config/sections/plausible.hpp"
 #include "server/endpoints/tcp/stream_server.hpp"
 #include "server/endpoints/transports.hpp"
 #include "server/engine/engine.hpp"

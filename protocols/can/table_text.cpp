@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "protocols/can/codec.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "protocols/text.hpp"
 

@@ -6,11 +6,11 @@
 
 #include "protocols/text.hpp"
 #include "server/bench/digest.hpp"
-#include "server/config/can.hpp"
 #include "server/config/config.hpp"
-#include "server/config/curves.hpp"
-#include "server/config/events.hpp"
-#include "server/config/parameters.hpp"
+#include "server/config/sections/can.hpp"
+#include "server/config/sections/curves.hpp"
+#include "server/config/sections/events.hpp"
+#include "server/config/sections/parameters.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

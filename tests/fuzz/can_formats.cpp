@@ -4,10 +4,10 @@
 #include <array>
 #include <string>
 
-#include "protocols/can/msgpack.hpp"
-#include "protocols/can/slcan.hpp"
-#include "protocols/can/socketcand.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/msgpack.hpp"
+#include "protocols/can/formats/slcan.hpp"
+#include "protocols/can/formats/socketcand.hpp"
+#include "protocols/can/formats/text.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace drivebench::can {

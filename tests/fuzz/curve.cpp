@@ -3,7 +3,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "server/config/curves.hpp"
+#include "server/config/sections/curves.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

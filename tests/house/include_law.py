@@ -54,10 +54,18 @@ FOUNDATIONS = {
     "plant/tick.hpp",
     "plant/windings.hpp",
     "plant/machines/field_winding.hpp",
+    "protocols/can/frame.hpp",
     "protocols/refusals.hpp",
     "protocols/text.hpp",
+    "server/config/config.hpp",
+    "server/config/grants.hpp",
+    "server/config/strict_table.hpp",
+    "server/config/words.hpp",
     "server/endpoints/deadline.hpp",
     "server/endpoints/log_limit.hpp",
+    "server/endpoints/tcp/session/context.hpp",
+    "server/endpoints/tcp/session/dialogue.hpp",
+    "server/endpoints/tcp/session/refusal_log.hpp",
     "server/endpoints/transport_report.hpp",
 }
 

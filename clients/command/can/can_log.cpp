@@ -12,7 +12,7 @@
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/link/can/can_bus.hpp"
-#include "protocols/can/candump.hpp"
+#include "protocols/can/formats/candump.hpp"
 
 namespace drivebench::command {
 namespace {

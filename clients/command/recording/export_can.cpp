@@ -5,9 +5,9 @@
 #include <array>
 
 #include "clients/command/common/errors.hpp"
-#include "protocols/can/candump.hpp"
 #include "protocols/can/codec.hpp"
 #include "protocols/can/command.hpp"
+#include "protocols/can/formats/candump.hpp"
 
 namespace drivebench::command {
 namespace {

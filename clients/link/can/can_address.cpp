@@ -9,8 +9,8 @@
 #include "clients/link/can/can_bus_kind.hpp"
 #include "clients/link/common/address.hpp"
 #include "protocols/can/codec.hpp"
-#include "protocols/can/slcan.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/slcan.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::link {
 namespace {

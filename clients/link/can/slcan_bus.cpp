@@ -4,7 +4,7 @@
 #include "clients/link/can/bus_socket.hpp"
 #include "clients/link/can/can_bus_kind.hpp"
 #include "clients/link/can/text_bus.hpp"
-#include "protocols/can/slcan.hpp"
+#include "protocols/can/formats/slcan.hpp"
 
 namespace drivebench::link {
 namespace {

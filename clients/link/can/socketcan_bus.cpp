@@ -7,7 +7,7 @@
 
 #include "clients/link/can/bus_socket.hpp"
 #include "clients/link/can/can_bus_kind.hpp"
-#include "protocols/can/kernel_frame.hpp"
+#include "protocols/can/formats/kernel_frame.hpp"
 
 namespace drivebench::link {
 namespace {

@@ -4,7 +4,7 @@
 #include "clients/link/can/can_bus_kind.hpp"
 #include "clients/link/can/text_bus.hpp"
 #include "clients/link/common/address.hpp"
-#include "protocols/can/socketcand.hpp"
+#include "protocols/can/formats/socketcand.hpp"
 
 namespace drivebench::link {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "clients/link/can/bus_socket.hpp"
 #include "clients/link/can/can_bus_kind.hpp"
-#include "protocols/can/msgpack.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/msgpack.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::link {
 namespace {

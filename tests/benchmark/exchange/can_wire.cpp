@@ -1,5 +1,5 @@
 #include "tests/benchmark/exchange/can_wire.hpp"
-#include "protocols/can/kernel_frame.hpp"
+#include "protocols/can/formats/kernel_frame.hpp"
 
 #include <arpa/inet.h>
 #include <linux/can/raw.h>
@@ -11,7 +11,7 @@
 #include <chrono>
 #include <cstring>
 
-#include "protocols/can/msgpack.hpp"
+#include "protocols/can/formats/msgpack.hpp"
 #include "tests/benchmark/harness/machine.hpp"
 
 namespace drivebench::speed {

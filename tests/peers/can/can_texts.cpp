@@ -11,8 +11,8 @@
 
 #include "protocols/can/codec.hpp"
 #include "protocols/can/dbc.hpp"
+#include "protocols/can/formats/text.hpp"
 #include "protocols/can/table_text.hpp"
-#include "protocols/can/text.hpp"
 #include "protocols/text.hpp"
 
 namespace {

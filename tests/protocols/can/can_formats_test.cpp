@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "protocols/can/candump.hpp"
-#include "protocols/can/slcan.hpp"
-#include "protocols/can/socketcand.hpp"
+#include "protocols/can/formats/candump.hpp"
+#include "protocols/can/formats/slcan.hpp"
+#include "protocols/can/formats/socketcand.hpp"
 #include "tests/protocols/can/can_frames.hpp"
 
 namespace drivebench::can {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "protocols/can/kernel_frame.hpp"
+#include "protocols/can/formats/kernel_frame.hpp"
 
 namespace drivebench::can {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "protocols/can/msgpack.hpp"
+#include "protocols/can/formats/msgpack.hpp"
 #include "tests/protocols/can/can_frames.hpp"
 
 namespace drivebench::can {

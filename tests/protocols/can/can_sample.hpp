@@ -3,7 +3,7 @@
 #include <string>
 
 #include "protocols/can/codec.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::can {
 

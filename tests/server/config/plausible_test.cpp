@@ -1,5 +1,5 @@
 // Values that keep the rules and are probably mistakes.
-#include "server/config/plausible.hpp"
+#include "server/config/sections/plausible.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/config/parameters.hpp"
+#include "server/config/sections/parameters.hpp"
 #include "server/config/words.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 

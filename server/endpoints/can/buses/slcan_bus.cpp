@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "protocols/can/slcan.hpp"
+#include "protocols/can/formats/slcan.hpp"
 #include "server/endpoints/can/buses/slcan_device.hpp"
 #include "server/endpoints/can/buses/terminal.hpp"
 #include "server/endpoints/can/buses/text_listener.hpp"

@@ -11,8 +11,8 @@
 #include <chrono>
 #include <optional>
 
-#include "protocols/can/slcan.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/slcan.hpp"
+#include "protocols/can/formats/text.hpp"
 #include "server/endpoints/can/buses/text_peer.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 #include "server/endpoints/log_limit.hpp"

@@ -1,5 +1,5 @@
 #include "server/endpoints/can/buses/socketcan_bus.hpp"
-#include "protocols/can/kernel_frame.hpp"
+#include "protocols/can/formats/kernel_frame.hpp"
 #include "server/endpoints/can/buses/backends.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "protocols/can/socketcand.hpp"
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/socketcand.hpp"
+#include "protocols/can/formats/text.hpp"
 #include "server/endpoints/can/buses/text_listener.hpp"
 #include "server/endpoints/can/buses/text_peer.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"

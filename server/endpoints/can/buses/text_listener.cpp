@@ -7,7 +7,7 @@
 #include <chrono>
 #include <optional>
 
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 #include "server/config/config.hpp"
 
 namespace drivebench::can {

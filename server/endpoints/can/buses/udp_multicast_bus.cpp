@@ -15,7 +15,7 @@
 #include <span>
 
 #include "protocols/can/budget.hpp"
-#include "protocols/can/msgpack.hpp"
+#include "protocols/can/formats/msgpack.hpp"
 #include "server/endpoints/can/buses/send_queue.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 #include "server/endpoints/log_limit.hpp"

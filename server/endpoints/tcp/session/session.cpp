@@ -1,10 +1,10 @@
 #include "server/endpoints/tcp/session/session.hpp"
 
 #include "protocols/descriptor_set.hpp"
-#include "server/endpoints/tcp/session/changes.hpp"
-#include "server/endpoints/tcp/session/experiment_requests.hpp"
-#include "server/endpoints/tcp/session/reports.hpp"
 #include "server/endpoints/tcp/session/request_bounds.hpp"
+#include "server/endpoints/tcp/session/requests/changes.hpp"
+#include "server/endpoints/tcp/session/requests/experiment_requests.hpp"
+#include "server/endpoints/tcp/session/requests/reports.hpp"
 #include "server/host/build_id.hpp"
 
 namespace drivebench {

@@ -10,12 +10,12 @@
 #include "protocols/framing.hpp"
 #include "server/endpoints/deadline.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
-#include "server/endpoints/tcp/session/exchanges.hpp"
-#include "server/endpoints/tcp/session/fetch.hpp"
 #include "server/endpoints/tcp/session/identity.hpp"
-#include "server/endpoints/tcp/session/leases.hpp"
-#include "server/endpoints/tcp/session/subscriptions.hpp"
-#include "server/endpoints/tcp/session/uploads.hpp"
+#include "server/endpoints/tcp/session/requests/exchanges.hpp"
+#include "server/endpoints/tcp/session/requests/fetch.hpp"
+#include "server/endpoints/tcp/session/requests/leases.hpp"
+#include "server/endpoints/tcp/session/requests/subscriptions.hpp"
+#include "server/endpoints/tcp/session/requests/uploads.hpp"
 
 namespace drivebench {
 

@@ -1,5 +1,5 @@
 #include "tests/server/endpoints/can/memory_bus.hpp"
-#include "protocols/can/kernel_frame.hpp"
+#include "protocols/can/formats/kernel_frame.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 
 #include <algorithm>

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "protocols/can/kernel_frame.hpp"
+#include "protocols/can/formats/kernel_frame.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 #include "server/endpoints/can/buses/socketcan_bus.hpp"
 

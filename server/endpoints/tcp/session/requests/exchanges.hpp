@@ -8,9 +8,9 @@
 #include "protocols/sample_codec.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
-#include "server/endpoints/tcp/session/excess_limit.hpp"
-#include "server/endpoints/tcp/session/leases.hpp"
-#include "server/endpoints/tcp/session/subscriptions.hpp"
+#include "server/endpoints/tcp/session/requests/excess_limit.hpp"
+#include "server/endpoints/tcp/session/requests/leases.hpp"
+#include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 
 namespace drivebench {
 

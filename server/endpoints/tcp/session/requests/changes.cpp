@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/changes.hpp"
+#include "server/endpoints/tcp/session/requests/changes.hpp"
 
 #include <cmath>
 

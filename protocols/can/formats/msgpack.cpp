@@ -1,11 +1,11 @@
-#include "protocols/can/msgpack.hpp"
+#include "protocols/can/formats/msgpack.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <string_view>
 
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::can {
 namespace {

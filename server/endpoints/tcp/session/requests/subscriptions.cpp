@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/subscriptions.hpp"
+#include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 
 #include <utility>
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "server/endpoints/tcp/session/dialogue.hpp"
-#include "server/endpoints/tcp/session/leases.hpp"
+#include "server/endpoints/tcp/session/requests/leases.hpp"
 
 /// Requests that change an axis: the session checks each and sends it to the bench under its owner number.
 namespace drivebench {

@@ -1,9 +1,9 @@
-#include "protocols/can/socketcand.hpp"
+#include "protocols/can/formats/socketcand.hpp"
 
 #include <algorithm>
 #include <cstdint>
 
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::can {
 namespace {

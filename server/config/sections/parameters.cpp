@@ -1,4 +1,4 @@
-#include "server/config/parameters.hpp"
+#include "server/config/sections/parameters.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/config/curves.hpp"
-#include "server/config/plausible.hpp"
+#include "server/config/sections/curves.hpp"
+#include "server/config/sections/plausible.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

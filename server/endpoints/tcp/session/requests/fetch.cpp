@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/fetch.hpp"
+#include "server/endpoints/tcp/session/requests/fetch.hpp"
 
 #include <fmt/format.h>
 #include <google/protobuf/io/coded_stream.h>
@@ -7,7 +7,7 @@
 #include <span>
 
 #include "protocols/framing.hpp"
-#include "server/endpoints/tcp/session/experiment_requests.hpp"
+#include "server/endpoints/tcp/session/requests/experiment_requests.hpp"
 
 namespace drivebench {
 namespace {

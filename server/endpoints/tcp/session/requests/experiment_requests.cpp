@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/experiment_requests.hpp"
+#include "server/endpoints/tcp/session/requests/experiment_requests.hpp"
 
 namespace drivebench {
 

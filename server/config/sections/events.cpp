@@ -1,4 +1,4 @@
-#include "server/config/events.hpp"
+#include "server/config/sections/events.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,8 @@
 
 #include "protocols/text.hpp"
 #include "server/bench/ramps.hpp"
-#include "server/config/axis.hpp"
-#include "server/config/parameters.hpp"
+#include "server/config/sections/axis.hpp"
+#include "server/config/sections/parameters.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "server/config/axis.hpp"
+#include "server/config/sections/axis.hpp"
 #include "server/config/strict_table.hpp"
 
 namespace drivebench {

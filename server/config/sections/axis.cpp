@@ -1,12 +1,12 @@
-#include "server/config/axis.hpp"
+#include "server/config/sections/axis.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "protocols/text.hpp"
-#include "server/config/events.hpp"
-#include "server/config/parameters.hpp"
+#include "server/config/sections/events.hpp"
+#include "server/config/sections/parameters.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {

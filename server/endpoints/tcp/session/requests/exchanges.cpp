@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/exchanges.hpp"
+#include "server/endpoints/tcp/session/requests/exchanges.hpp"
 
 #include <algorithm>
 #include <numeric>

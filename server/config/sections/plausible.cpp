@@ -1,4 +1,4 @@
-#include "server/config/plausible.hpp"
+#include "server/config/sections/plausible.hpp"
 
 #include <string>
 #include <variant>

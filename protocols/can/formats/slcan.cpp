@@ -1,9 +1,9 @@
-#include "protocols/can/slcan.hpp"
+#include "protocols/can/formats/slcan.hpp"
 
 #include <algorithm>
 #include <span>
 
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::can {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/reports.hpp"
+#include "server/endpoints/tcp/session/requests/reports.hpp"
 
 #include <array>
 #include <optional>

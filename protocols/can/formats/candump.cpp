@@ -1,8 +1,8 @@
-#include "protocols/can/candump.hpp"
+#include "protocols/can/formats/candump.hpp"
 
 #include <cstdint>
 
-#include "protocols/can/text.hpp"
+#include "protocols/can/formats/text.hpp"
 
 namespace drivebench::can {
 namespace {

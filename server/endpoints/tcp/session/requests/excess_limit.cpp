@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/excess_limit.hpp"
+#include "server/endpoints/tcp/session/requests/excess_limit.hpp"
 
 #include <algorithm>
 #include <cstdint>

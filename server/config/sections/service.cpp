@@ -1,4 +1,4 @@
-#include "server/config/service.hpp"
+#include "server/config/sections/service.hpp"
 
 #include <system_error>
 

@@ -1,4 +1,4 @@
-#include "server/config/curves.hpp"
+#include "server/config/sections/curves.hpp"
 
 #include <charconv>
 #include <cmath>

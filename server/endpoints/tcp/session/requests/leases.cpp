@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/leases.hpp"
+#include "server/endpoints/tcp/session/requests/leases.hpp"
 
 #include <algorithm>
 

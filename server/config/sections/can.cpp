@@ -1,4 +1,4 @@
-#include "server/config/can.hpp"
+#include "server/config/sections/can.hpp"
 
 #include <algorithm>
 #include <array>

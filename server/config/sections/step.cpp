@@ -1,4 +1,4 @@
-#include "server/config/step.hpp"
+#include "server/config/sections/step.hpp"
 
 #include <algorithm>
 #include <cmath>

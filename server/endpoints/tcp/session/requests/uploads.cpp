@@ -1,10 +1,10 @@
-#include "server/endpoints/tcp/session/uploads.hpp"
+#include "server/endpoints/tcp/session/requests/uploads.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "server/endpoints/tcp/session/experiment_requests.hpp"
+#include "server/endpoints/tcp/session/requests/experiment_requests.hpp"
 
 namespace drivebench {
 namespace {
