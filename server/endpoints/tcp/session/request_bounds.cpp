@@ -169,8 +169,11 @@ class FrameCount {
       const auto number = static_cast<std::uint32_t>(tag >> 3);
       const auto wire = static_cast<WireType>(tag & 7);
       if (wire == kGroupEnd) return number == group;
+      // A frame with too many fields is refused: only its end and its id are still of interest.
+      const bool is_id = depth == 0 && number == v1::Envelope::kIdFieldNumber;
+      const bool is_known = type != nullptr && (fields_ < kMaxRequestFields || is_id);
       const FieldDescriptor* const field =
-          type == nullptr ? nullptr : type->FindFieldByNumber(static_cast<int>(number));
+          is_known ? type->FindFieldByNumber(static_cast<int>(number)) : nullptr;
       if (!one_field(field, number, wire, end, depth)) return false;
     }
     return group == 0;
@@ -258,6 +261,9 @@ std::optional<FrameReading> problem_with(const FrameCount& count) {
     return refusal(v1::REFUSAL_OUT_OF_RANGE,
                    fmt::format("the request has {} {} but may have {}", there, what, most), field);
   };
+  if (count.fields() > kMaxRequestFields) {
+    return too_many(count.fields(), "fields", kMaxRequestFields, "frame");
+  }
   for (std::size_t row = 0; row < kBounds.size(); ++row) {
     const Bound& bound = kBounds[row];
     if (count.elements(row) <= bound.most) continue;
@@ -266,9 +272,6 @@ std::optional<FrameReading> problem_with(const FrameCount& count) {
   }
   if (count.unknown() > kMaxUnknownFields) {
     return too_many(count.unknown(), "fields that this server does not know", kMaxUnknownFields, "frame");
-  }
-  if (count.fields() > kMaxRequestFields) {
-    return too_many(count.fields(), "fields", kMaxRequestFields, "frame");
   }
   return std::nullopt;
 }
