@@ -288,9 +288,9 @@ bool is_request(v1::Envelope::KindCase kind) noexcept {
 }
 
 FrameReading read_request(std::span<const std::byte> frame, v1::Envelope& request) {
-  const FrameReading no_envelope{.outcome = FrameReading::Outcome::kNoEnvelope,
-                                 .sentence = "the frame is not an Envelope",
-                                 .field = "frame"};
+  FrameReading no_envelope{.outcome = FrameReading::Outcome::kNoEnvelope,
+                           .sentence = "the frame is not an Envelope",
+                           .field = "frame"};
   const FrameCount count(frame);
   if (!count.is_envelope()) return no_envelope;
   if (std::optional<FrameReading> problem = problem_with(count)) return *std::move(problem);
