@@ -15,7 +15,8 @@ namespace drivebench {
 /// A connection is a stranger until its hello is accepted; then it is a session. For strangers there are
 /// kStrangers places. When all are taken, a new stranger gets the place of another one: of the address that
 /// has the most of them; there of one that has sent nothing yet, if any; of these the oldest. So a crowd from
-/// one address costs other addresses nothing, and a client that says hello at once always has its place.
+/// one address costs other addresses nothing; a client of the same address keeps its place unless kStrangers
+/// newer ones come before the server reads its hello.
 ///
 /// For sessions there are as many places as the configuration says, and a share of them for each address.
 /// Beyond both, kReserve more: half of them for operators and clients on the unix socket, all of them for

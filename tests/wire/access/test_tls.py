@@ -201,15 +201,15 @@ class Plain(TlsTest):
         self.assertEqual(set(others), {"no handshake within 2 s"})
 
     def test_sec_05_a_flood_of_silent_peers_delays_no_handshake(self):
-        """Catches: 200 silent peers, always renewed, for which a client must wait or which take its place."""
+        """Catches: 200 silent peers of another address, always renewed, for which a client must wait or which take its place."""
         server = self.tls_server()
         over = threading.Event()
 
         def flood():
-            crowd = [server.raw() for _ in range(200)]
+            crowd = [server.raw(source="127.0.0.2") for _ in range(200)]
             while not over.is_set():
                 crowd.pop(0).close()
-                crowd.append(server.raw())
+                crowd.append(server.raw(source="127.0.0.2"))
             for each in crowd:
                 each.close()
         crowd = threading.Thread(target=flood)
