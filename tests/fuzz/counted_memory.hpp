@@ -50,6 +50,14 @@ void* operator new(std::size_t size) {
   ++count.calls;
   return memory;
 }
+/// The library's would call the one above; a sanitizer's does not.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  try {
+    return operator new(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
 void operator delete(void* memory) noexcept {
   if (memory == nullptr) return;
   drivebench::fuzz::counted_memory().live -= ::malloc_usable_size(memory);
