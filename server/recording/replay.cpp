@@ -120,7 +120,7 @@ class Replayer {
     return false;
   }
 
-  /// As after a kill or on a full disk: what is there is equal.
+  /// As after a kill or on a full disk; the part in the file is equal.
   void end_early(const std::string& why) {
     report_.result = ReplayReport::Result::kEqualWithoutEnd;
     report_.ticks = report_.samples / config_.axes.size() - 1;
