@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <barrier>
+#include <chrono>
 #include <functional>
+#include <random>
 #include <thread>
 #include <vector>
 
@@ -87,6 +89,22 @@ bool wins(link::Link& link) {
   }
 }
 
+/// A different moment in each race. The thread that closes a gate goes on before those that sleep at it, so
+/// the last winner, which comes last, would win each race of a quiet machine.
+class HeadStart {
+ public:
+  explicit HeadStart(std::size_t client) : random_(client) {}
+  void wait() {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(random_() % kLongest_us);
+    while (std::chrono::steady_clock::now() < end) {
+    }
+  }
+
+ private:
+  static constexpr unsigned kLongest_us = 500;
+  std::minstd_rand random_;
+};
+
 // Catches: an axis with two owners, or none, when clients on several threads and transports ask at the same
 // moment.
 TEST(LeaseRace, OWN_01_OfFourThreadsThatAskAtOnceOneGetsTheAxis) {
@@ -95,10 +113,12 @@ TEST(LeaseRace, OWN_01_OfFourThreadsThatAskAtOnceOneGetsTheAxis) {
   std::barrier gate(kClients);
   std::vector<std::atomic<int>> winners(kRaces);
   std::atomic<int> losers_who_won_later{0};
-  on_threads(server, [&](std::size_t, link::Link& link) {
+  on_threads(server, [&](std::size_t client, link::Link& link) {
+    HeadStart head_start(client + 1);
     bool has_lost = false;
     for (std::atomic<int>& won : winners) {
       gate.arrive_and_wait();
+      head_start.wait();
       const bool is_mine = wins(link);
       if (is_mine) ++won;
       if (is_mine && has_lost) ++losers_who_won_later;
