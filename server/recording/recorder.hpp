@@ -79,7 +79,7 @@ class Recorder final : public BenchObserver {
   bool lacks_room() const noexcept { return lacks_room_.load(std::memory_order_relaxed); }
   /// The present name of the recording's first file that is still there; empty if none is.
   std::string file() const;
-  /// What disks and other programs have done to the files, in a sentence; empty: nothing.
+  /// The damage by disks and other programs, in a sentence; empty: none.
   std::string remarks() const;
 
   /// Drains the ring, writes the verdict and closes the file; afterwards the state above is final. Returns

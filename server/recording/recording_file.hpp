@@ -13,7 +13,7 @@
 
 namespace drivebench {
 
-/// What other programs have done to a file while it was written.
+/// The change of a file by other programs while it was written.
 struct FileFate {
   enum class Kind { kKept, kMoved, kRemoved, kChanged };
   Kind kind = Kind::kKept;

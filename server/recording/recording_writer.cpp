@@ -284,20 +284,31 @@ void RecordingWriter::finish(const Verdict& verdict) noexcept {
   });
 }
 
+/// Whether another program removed or emptied the file that this step could not go on with.
+bool RecordingWriter::has_lost_file(Step step) noexcept {
+  if (step != Step::kWrite && step != Step::kSync) return false;
+  try {
+    const FileFate::Kind fate = file_->fate(path_, whole_bytes_).kind;
+    return fate == FileFate::Kind::kRemoved || fate == FileFate::Kind::kChanged;
+  } catch (const std::exception&) {
+    return false;  // no memory for the name of a file that was moved
+  }
+}
+
 /// Gives up the current file. A failed sync is not repeated: the system may have dropped the pages, and
 /// reports that only once.
 void RecordingWriter::fail(Step step, int error) noexcept {
   // After a failed write the earlier chunks stay readable; after a failed sync that is unknown.
   const bool is_unsure = step == Step::kSync || step == Step::kClose;
-  const bool is_gone = step == Step::kRemoved || step == Step::kChanged;
+  if (step == Step::kWrite)
+    file_->truncate(whole_bytes_);  // if this fails the torn chunk stays, and readers report it
+  const bool is_gone = step == Step::kRemoved || step == Step::kChanged || has_lost_file(step);
   const std::uint64_t lost = is_gone ? segment_entries_ : unwritten_ + (is_unsure ? unsynced_ : 0);
   is_over_ = !options_.continues_after_errors || step == Step::kOpen || is_of_space(error) ||
              (number_ > 1 && !was_synced_);
   lacks_room_ = lacks_room_ || is_of_space(error);
   // A file without its end or its beginning does not replay even if no entry is missing.
   lost_ += std::max<std::uint64_t>(lost, is_ending_ || !is_over_ ? 1 : 0);
-  if (step == Step::kWrite)
-    file_->truncate(whole_bytes_);  // if this fails the torn chunk stays, and readers report it
   unwritten_ = unsynced_ = segment_entries_ = 0;
   is_ending_ = false;
   try {

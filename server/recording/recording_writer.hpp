@@ -50,7 +50,7 @@ class RecordingWriter {
   std::size_t files() const noexcept { return number_; }
   /// The present name of the first file that is still there; empty if none is.
   const std::string& file() const noexcept { return name_; }
-  /// What disks and other programs have done to the files; empty: nothing.
+  /// The damage by disks and other programs, in a sentence; empty: none.
   const std::string& remarks() const noexcept { return remarks_; }
 
  private:
@@ -80,6 +80,7 @@ class RecordingWriter {
   void go_on() noexcept;
   void sync();
   void look_at_file();
+  bool has_lost_file(Step step) noexcept;
   void remark(const std::string& what);
   void end_file();
   void end_if_room_is_short();

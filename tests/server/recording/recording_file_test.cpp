@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <cerrno>
 #include <fstream>
 #include <functional>
+#include <memory>
 
 #include "protocols/mcap/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
@@ -95,6 +97,46 @@ TEST(RecordingFiles, REC_13_AFileThatIsRemovedAtTheVeryEndIsLost) {
   EXPECT_EQ(run.lost, WatchedRecording::kTicks + 1) << "with the verdict";
   EXPECT_EQ(run.name, "");
   EXPECT_TRUE(says(run.remarks, "another program removed it, it ends here")) << run.remarks;
+}
+
+/// A real file whose writes fail as soon as it has no name.
+class BrittleFile final : public RecordingFile {
+ public:
+  explicit BrittleFile(const fs::path& path) : path_(path), file_(create_recording_file(path)) {}
+  ssize_t write(std::span<const std::byte> bytes) noexcept override {
+    if (fs::exists(path_)) return file_->write(bytes);
+    errno = EIO;
+    return -1;
+  }
+  int truncate(std::uint64_t size) noexcept override { return file_->truncate(size); }
+  int sync() noexcept override { return file_->sync(); }
+  int close() noexcept override { return file_->close(); }
+  FileFate fate(const std::string& path, std::uint64_t size) override { return file_->fate(path, size); }
+
+ private:
+  fs::path path_;
+  std::unique_ptr<RecordingFile> file_;
+};
+
+// Catches: a removed file that the disk refuses before anybody looks at it, of which only the refused bytes
+// count as lost.
+TEST(RecordingFiles, REC_13_ARemovedFileThatCannotBeWrittenIsLostWhole) {
+  const TestFolder folder;
+  const CreateRecordingFile brittle = [](const fs::path& path) {
+    return std::make_unique<BrittleFile>(path);
+  };
+  RecordingWriter writer(folder / "run.mcap", servo_bench(), {},
+                         {.continues_after_errors = true, .create = brittle});
+  const auto start = RecordingWriter::Clock::now();
+  constexpr std::uint64_t kTicks = 4 * kTicksPerSecond;
+  constexpr std::uint64_t kRemoved = 3 * kTicksPerSecond + 400;  // long before the next look
+  for (std::uint64_t tick = 0; tick < kTicks; ++tick) {
+    if (tick == kRemoved) fs::remove(folder / "run.mcap");
+    writer.write(TickedSample(0, {.tick = tick}));
+    if (tick % 8 == 0) writer.sync_if_due(start + std::chrono::microseconds(125) * tick);
+  }
+  writer.finish({.ticks = kTicks});
+  EXPECT_EQ(writer.take_lost() + WatchedRecording::samples_in(folder / "run.2.mcap"), kTicks);
 }
 
 // Catches: a file that is taken for the recording because it has its name.
