@@ -33,6 +33,10 @@ std::shared_ptr<const SampleFeed> Audience::feed(std::uint32_t axis, std::uint32
   for (const auto& feed : feeds_) {
     if (feed->axis() == axis && feed->decimation() == decimation) return feed;
   }
+  if (decimation > 1) {
+    const auto decimated = std::ranges::count_if(feeds_, [](const auto& f) { return f->decimation() > 1; });
+    if (static_cast<std::size_t>(decimated) == kMostDecimatedFeeds) return nullptr;
+  }
   return feeds_.emplace_back(std::make_shared<SampleFeed>(axis, decimation, engine_.newest(axis).tick));
 }
 

@@ -44,7 +44,11 @@ class Audience {
   /// Keeps the session until the next on_newest() or remove_waiting().
   void add_waiting(Waiter& waiter);
   void remove_waiting(const Waiter& waiter);
-  /// The samples from now on; the feed lives as long as a subscription holds it.
+  /// The most feeds of every n-th sample, n above 1, that all subscriptions together have: a feed takes 0.1
+  /// MB.
+  static constexpr std::size_t kMostDecimatedFeeds = 128;
+  /// The samples from now on; the feed lives as long as a subscription holds it. Null: kMostDecimatedFeeds
+  /// are read, and this would be one more.
   std::shared_ptr<const SampleFeed> feed(std::uint32_t axis, std::uint32_t decimation);
 
   /// The engine calls these like its listeners.

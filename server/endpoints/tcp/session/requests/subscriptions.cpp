@@ -1,5 +1,7 @@
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "protocols/sample_codec.hpp"
@@ -19,9 +21,20 @@ void Subscriptions::subscribe(const v1::Subscribe& r) {
     mask |= SignalMask{1} << (signal - kSignals.data());
   }
   Audience& audience = dialogue_.context().audience;
-  std::erase_if(subscriptions_, [&](const Subscription& s) { return s.axis == r.axis(); });
+  std::shared_ptr<const SampleFeed> feed;
   if (r.decimation() > 0) {
-    std::shared_ptr<const SampleFeed> feed = audience.feed(r.axis(), r.decimation());
+    feed = audience.feed(r.axis(), r.decimation());
+    if (feed == nullptr) {
+      return dialogue_.refuse(
+          dialogue_.id(), v1::REFUSAL_BUSY,
+          fmt::format("the sessions subscribe to {} different decimations, the most that the server keeps "
+                      "samples for; 1 is always possible",
+                      Audience::kMostDecimatedFeeds),
+          "decimation");
+    }
+  }
+  std::erase_if(subscriptions_, [&](const Subscription& s) { return s.axis == r.axis(); });
+  if (feed != nullptr) {
     const SampleFeed::Reader reader = feed->reader();
     subscriptions_.push_back({.axis = r.axis(), .mask = mask, .feed = std::move(feed), .reader = reader});
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <vector>
 
 #include "tests/server/recording/run_config.hpp"
 
@@ -24,6 +25,24 @@ TEST(Audience, AFeedEndsWithItsLastReader) {
   second.reset();
   audience.on_tick();
   EXPECT_TRUE(kept.expired()) << "after the next tick";
+  engine->stop();
+}
+
+// Catches: a viewer that makes the server keep 0.1 MB for every number that it thinks of; a limit that shuts
+// out those who want every sample, or a decimation that is there; places that are not given back.
+TEST(Audience, LIMIT_03_FeedsOfManyDecimationsHaveAnEnd) {
+  asio::io_context io(1);
+  const std::unique_ptr<Engine> engine = make_lockstep_engine(servo_bench());
+  Audience audience(io, *engine);
+  std::vector<std::shared_ptr<const SampleFeed>> feeds;
+  for (std::uint32_t n = 0; n < Audience::kMostDecimatedFeeds; ++n)
+    feeds.push_back(audience.feed(0, n + 2));
+  EXPECT_NE(feeds.back(), nullptr);
+  EXPECT_EQ(audience.feed(0, 1000), nullptr);
+  EXPECT_EQ(audience.feed(0, 2), feeds.front());
+  EXPECT_NE(audience.feed(0, 1), nullptr);
+  feeds.pop_back();
+  EXPECT_NE(audience.feed(0, 1000), nullptr);
   engine->stop();
 }
 
