@@ -173,6 +173,11 @@ static_assert([] {
   return refusal_row(Refused::kTooManyRamps).refused == Refused::kTooManyRamps;
 }());
 
+/// Whether the sender did not hold the lease: such a request is no part of the run.
+constexpr bool lacks_lease(Refused why) noexcept {
+  return why == Refused::kNotOwner || why == Refused::kOwned;
+}
+
 /// The reason for people; empty for kNot.
 constexpr std::string_view sentence_of(Refused why) noexcept {
   return refusal_row(why).sentence;

@@ -30,8 +30,12 @@ class Seat {
   bool is_asking() const noexcept { return asking_ > 0; }
   bool is_acquiring() const noexcept { return acquiring_ > 0; }
 
-  /// The number under which `client` asks for the lease: that of the seat, else a new one.
-  Owner number_for(const Client& client) const { return owner_ != 0 ? owner_ : engine_.new_owner(client); }
+  /// The number under which `client` asks for the lease: that of the seat, else a new one. A request that
+  /// will be refused uses none up and has 0: the numbers that samples show depend only on granted leases.
+  Owner number_for(const Client& client) const {
+    if (owner_ != 0) return owner_;
+    return engine_.may_be_acquired(axis_) ? engine_.new_owner(client) : 0;
+  }
 
   /// Acquires, renews or releases the lease. When `answer` is called, the seat already follows the decision
   /// of the bench. `from` as in Engine::request(). The seat must live until then.

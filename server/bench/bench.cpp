@@ -33,10 +33,6 @@ constexpr bool expects_commands(ControlState state) noexcept {
   return state == ControlState::kReady || is_driven(state);
 }
 
-bool concerns_all_axes(const Input& input) noexcept {
-  return std::holds_alternative<LateTick>(input.action) || std::holds_alternative<Overrun>(input.action);
-}
-
 }  // namespace
 
 Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
@@ -57,6 +53,12 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
 }
 
 Refused Bench::submit(const Input& input) noexcept {
+  if (input.axis >= axes_.size()) return Refused::kUnknownAxis;
+  const Refused why = check_sender(input, owner(input.axis));
+  return why == Refused::kNot ? repeat(input) : why;
+}
+
+Refused Bench::repeat(const Input& input) noexcept {
   if (input.axis >= axes_.size()) return Refused::kUnknownAxis;
   if (input.tick <= tick_) {
     Input now = input;
@@ -104,7 +106,7 @@ Refused Bench::apply(const Input& input) noexcept {
 
 Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
   if (const auto* command = std::get_if<Command>(&input.action)) {
-    const Refused refused = accept(input.axis, *command, input.owner);
+    const Refused refused = accept(input.axis, *command, input.owner);  // kNotOwner: only in repeat()
     if (refused != Refused::kNot) ++a.control.refused;
     if (refused != Refused::kNot && refused != Refused::kNotOwner) {
       count_bad_command(a.control, are_bad_values(refused));

@@ -86,8 +86,12 @@ class Bench {
   explicit Bench(const BenchSetup& setup, BenchObserver* observer = nullptr);
 
   /// Takes an input. An input for a later tick waits in the schedule (at most kMaxScheduled); every other
-  /// acts at the start of the current tick, and its tick is set to that.
+  /// acts at the start of the current tick, and its tick is set to that. An input without the lease that it
+  /// needs is no part of the run: it changes no state, and the observer does not see it.
   Refused submit(const Input& input) noexcept;
+  /// Takes an input of a recording, with the lease or without: earlier builds recorded commands without the
+  /// lease, and counted them in the state.
+  Refused repeat(const Input& input) noexcept;
 
   /// Runs one tick: due inputs, commands, plant, sensors.
   void step() noexcept;

@@ -110,6 +110,17 @@ Input unpack(const PackedInput& packed) noexcept {
   return input;
 }
 
+Refused check_sender(const Input& input, Owner holder) noexcept {
+  if (concerns_all_axes(input)) return Refused::kNot;
+  const auto* const lease = std::get_if<LeaseAction>(&input.action);
+  if (lease != nullptr && *lease == LeaseAction::kAcquire) {
+    if (holder != 0 && holder != input.owner) return Refused::kOwned;
+    return input.owner == 0 ? Refused::kNotOwner : Refused::kNot;
+  }
+  if (input.owner == 0) return may_be_scheduled(input.action) ? Refused::kNot : Refused::kNotOwner;
+  return input.owner == holder ? Refused::kNot : Refused::kNotOwner;
+}
+
 bool is_finite(const PhaseCommand& command) noexcept {
   const PhaseValues& x = command.setpoint;
   return std::isfinite(x.a) && std::isfinite(x.b) && std::isfinite(x.c) && std::isfinite(x.field);

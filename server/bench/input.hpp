@@ -52,9 +52,9 @@ struct ShaftBump {
 struct ClearFaults {};  ///< by the owner only
 struct LateTick {};     ///< the tick of this input started late; concerns the whole bench
 struct Overrun {};      ///< late beyond the limit: safe action on every axis
-/// A command for this axis was turned away before it reached the bench.
+/// A command of the controller was turned away before it reached the bench.
 struct RefusedCommand {
-  bool bad_values = false;  ///< for its values, not for its time or its sender
+  bool bad_values = false;  ///< for its values, not for its time
 };
 
 using Action = std::variant<ClearFaults, Command, LeaseAction, LoadChange, ParameterWrite, LateTick, Overrun,
@@ -88,6 +88,16 @@ inline bool may_be_scheduled(const Action& action) noexcept {
   return std::holds_alternative<LoadChange>(action) || std::holds_alternative<ParameterWrite>(action) ||
          std::holds_alternative<InjectFault>(action) || std::holds_alternative<ShaftBump>(action);
 }
+
+/// Whether the input concerns the whole bench: the clock sends it, not a client.
+inline bool concerns_all_axes(const Input& input) noexcept {
+  return std::holds_alternative<LateTick>(input.action) || std::holds_alternative<Overrun>(input.action);
+}
+
+/// The reason why the sender has no right to the input while `holder` holds the lease of its axis; 0: no
+/// session does. Loads, parameters, faults and bumps may also come without an owner: from the configuration,
+/// from an experiment, or from a client of a free run.
+Refused check_sender(const Input& input, Owner holder) noexcept;
 
 /// Whether the input gives a lease up.
 inline bool ends_lease(const Input& input) noexcept {

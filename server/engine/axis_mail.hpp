@@ -80,6 +80,24 @@ class CommandMail {
   bool is_told_ = false;               // tick thread: no decision since then
 };
 
+/// The lease of an axis on the I/O thread, which knows the requests that the bench has yet to take.
+class LeaseMail {
+ public:
+  /// The holder once these requests have acted; `shown` is the holder in the newest sample.
+  Owner holder(Owner shown) const noexcept { return in_flight_ == 0 ? shown : holder_; }
+  /// A request that makes this owner the holder is on its way; 0: one that ends the lease.
+  void send(Owner next) noexcept {
+    holder_ = next;
+    ++in_flight_;
+  }
+  /// The bench has answered the first of them, and the newest sample shows the effect.
+  void answered() noexcept { --in_flight_; }
+
+ private:
+  std::uint64_t in_flight_ = 0;
+  Owner holder_ = 0;
+};
+
 /// Parameters of an axis from the tick thread.
 struct ParameterMail {
   static constexpr std::size_t kMaxParameters = 256;

@@ -76,6 +76,8 @@ class Engine {
 
   /// The owner of the axis, as far as the I/O thread knows; 0: none.
   virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
+  /// Whether a new controller that asks for the lease now would get it.
+  virtual bool may_be_acquired(std::uint32_t axis) { return owner(axis) == 0; }
 
   const Sample& newest(std::size_t axis) const { return newest_[axis]; }
   /// The encoder edges of the tick before newest(), if a bus of the configuration sends edges.

@@ -39,6 +39,7 @@ class ThreadedEngine final : public Engine {
         bench_(config_.setup, &tap_),
         command_mail_(config_.axes.size()),
         parameter_mail_(config_.axes.size()),
+        lease_mail_(config_.axes.size()),
         wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         clock_(config_.mode, config_, std::move(pacer)) {
     schedule_events(config_, bench_);
@@ -83,7 +84,7 @@ class ThreadedEngine final : public Engine {
     const Refused why = check(axis, owner, command);
     if (why == Refused::kNot) {
       command_mail_[axis].send(owner, command);
-    } else {
+    } else if (!lacks_lease(why)) {
       request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{are_bad_values(why)}},
               [](Refused, Tick) {});
     }
@@ -98,7 +99,14 @@ class ThreadedEngine final : public Engine {
     refuse_to_take(axis, by, Refused::kBusy, answer);
   }
 
+  bool may_be_acquired(std::uint32_t axis) override { return holder_of(axis) == 0 && has_room(); }
+
   void submit(const Input& input, Answer answer) override {
+    // Here, so that clients without the lease do not fill the ring; changes are checked by their sessions.
+    if (input.axis < lease_mail_.size() && !may_be_scheduled(input.action)) {
+      const Refused why = check_sender(input, holder_of(input.axis));
+      if (why != Refused::kNot) return answer(has_room() ? why : Refused::kBusy, tick());
+    }
     const bool ends = ends_lease(input);
     // Lease actions do not overtake the ends of leases that wait.
     const bool has_to_wait = std::holds_alternative<LeaseAction>(input.action) && !ends_.empty();
@@ -107,7 +115,7 @@ class ThreadedEngine final : public Engine {
       ends_.push_back({input, std::move(answer)});
       return;
     }
-    // Refused commands, which sessions without a lease may send without end, leave half of the ring free.
+    // Refused commands, which a controller may send without end, leave half of the ring free.
     if (std::holds_alternative<RefusedCommand>(input.action) && requests_.room() <= kRequestCapacity / 2) {
       return answer(Refused::kBusy, tick());
     }
@@ -120,7 +128,12 @@ class ThreadedEngine final : public Engine {
     if (writes) parameter_mail_[input.axis].in_flight += taken ? 1 : 0;
     if (writes && !taken) show_parameters(input.axis);  // without the refused write
     if (!taken) return answer(Refused::kBusy, tick());
-    answers_.push_back({std::move(answer), writes ? std::optional(input.axis) : std::nullopt});
+    const auto* const lease = std::get_if<LeaseAction>(&input.action);
+    const bool passes = lease != nullptr && *lease != LeaseAction::kRenew;
+    if (passes) lease_mail_[input.axis].send(*lease == LeaseAction::kAcquire ? input.owner : 0);
+    answers_.push_back({.answer = std::move(answer),
+                        .written_axis = writes ? std::optional(input.axis) : std::nullopt,
+                        .passed_axis = passes ? std::optional(input.axis) : std::nullopt});
   }
 
   Verdict stop() override {
@@ -211,6 +224,10 @@ class ThreadedEngine final : public Engine {
 
   // ---- I/O thread ----
 
+  bool has_room() noexcept { return ends_.empty() && requests_.room() > 0; }
+  /// The holder of the lease once the requests on their way have acted.
+  Owner holder_of(std::uint32_t axis) const noexcept { return lease_mail_[axis].holder(newest_[axis].owner); }
+
   void await_wake() {
     wake_.async_wait(
         asio::posix::stream_descriptor::wait_read, [this](const boost::system::error_code& error) {
@@ -265,6 +282,7 @@ class ThreadedEngine final : public Engine {
         --parameter_mail_[*waiting.written_axis].in_flight;
         show_parameters(*waiting.written_axis);
       }
+      if (waiting.passed_axis) lease_mail_[*waiting.passed_axis].answered();
       waiting.answer(outcomes_.front().refused, outcomes_.front().tick);
     }
   }
@@ -292,6 +310,7 @@ class ThreadedEngine final : public Engine {
   struct Waiting {
     Answer answer;
     std::optional<std::uint32_t> written_axis;  // of a parameter
+    std::optional<std::uint32_t> passed_axis;   // whose lease the request passes on
   };
 
   /// The end of a lease that found the ring full; its sender does not try again, so it waits here.
@@ -313,6 +332,7 @@ class ThreadedEngine final : public Engine {
   Bench bench_;
   std::deque<CommandMail> command_mail_;
   std::deque<ParameterMail> parameter_mail_;
+  std::vector<LeaseMail> lease_mail_;
   asio::posix::stream_descriptor wake_;
   std::atomic<bool> wake_pending_{false};
   std::deque<LeaseEnd> ends_;            // at most one for each axis and owner

@@ -155,7 +155,7 @@ class Replayer {
     if (!input) return unusable(fmt::format("an input at tick {} cannot be read", bench_->tick()));
     const std::string problem = problem_of_place(header, message, *input);
     if (!problem.empty()) return unusable(problem);
-    bench_->submit(*input);
+    bench_->repeat(*input);
     ++report_.inputs;
     return true;
   }

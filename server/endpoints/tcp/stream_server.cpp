@@ -223,6 +223,7 @@ TransportReport StreamServer::report() const {
                      {"tls_refused", counts.tls_refused},
                      {"malformed", counts.malformed},
                      {"wrong_tokens", counts.wrong_tokens},
+                     {"not_owner", counts.not_owner},
                      {"excess_commands", counts.excess_commands},
                      {"throttled", counts.throttled},
                      {"cut", counts.cut}}};

@@ -113,7 +113,7 @@ TEST_F(SeatTest, TakingByForceEmptiesTheSeatOfTheOldHolderAlone) {
     noticed = {anna_.notice_taken(taken), bert_.notice_taken(taken), other_axis.notice_taken(taken)};
   });
   Refused answer = Refused::kBusy;
-  bert_.take(bert_.number_for(kBert), "maintenance", [&](Refused refused, Tick) { answer = refused; });
+  bert_.take(engine_->new_owner(kBert), "maintenance", [&](Refused refused, Tick) { answer = refused; });
   EXPECT_EQ(answer, Refused::kNot);
   EXPECT_EQ(noticed, (std::vector<bool>{true, false, false}));
   EXPECT_EQ(anna_.owner(), 0u);

@@ -120,7 +120,58 @@ TEST(BenchLease, OWN_01_OWN_02_OnlyTheOwnerCommands) {
   EXPECT_EQ(bench.submit({.tick = 0, .axis = 1, .owner = kOwner, .action = LeaseAction::kAcquire}),
             Refused::kUnknownAxis);
   bench.step();
-  EXPECT_EQ(bench.sample(0).refused_commands, 3u);
+  EXPECT_EQ(bench.sample(0).refused_commands, 0u);
+}
+
+/// Counts the inputs that a recorder would get.
+class InputCount final : public BenchObserver {
+ public:
+  void on_input(Tick, const Input&) noexcept override { ++inputs; }
+  void on_sample(std::uint32_t, const Sample&) noexcept override {}
+  std::uint64_t inputs = 0;
+};
+
+// Catches: an input of a session without the lease that is recorded, that changes or counts something in the
+// state, or that waits in the schedule.
+TEST(BenchLease, OWN_02_OWN_09_InputsWithoutTheLeaseAreNoPartOfTheRun) {
+  InputCount alone_count;
+  InputCount crowded_count;
+  Bench alone(servo_setup(), &alone_count);
+  Bench crowded(servo_setup(), &crowded_count);
+  const auto crowd = [&crowded] {
+    for (const Action& action : std::initializer_list<Action>{
+             volts_in_answer_to(crowded.tick(), 9.0), volts_in_answer_to(-7, 9.0), RefusedCommand{true},
+             ClearFaults{}, LeaseAction::kRenew, LeaseAction::kRelease, LeaseAction::kLost,
+             LoadChange{.load_nm = 1.0, .ramp_ticks = 0}, ParameterWrite{.row = 0, .value = 1.0},
+             InjectFault{.row = 0, .value = 1.0}, ShaftBump{1.0}}) {
+      for (const Tick later : {0, 5}) {
+        EXPECT_EQ(
+            crowded.submit({.tick = crowded.tick() + later, .axis = 0, .owner = kOther, .action = action}),
+            Refused::kNotOwner);
+      }
+    }
+    EXPECT_EQ(submit_volts(crowded, 0, 9.0), Refused::kNotOwner);
+    EXPECT_EQ(submit_lease(crowded, LeaseAction::kAcquire, 0),
+              crowded.owner(0) == 0 ? Refused::kNotOwner : Refused::kOwned);
+  };
+  crowd();
+  for (Bench* bench : {&alone, &crowded})
+    submit_lease(*bench, LeaseAction::kAcquire, kOwner);
+  for (int i = 0; i < 20; ++i) {
+    crowd();
+    EXPECT_EQ(submit_lease(crowded, LeaseAction::kAcquire, kOther), Refused::kOwned);
+    for (Bench* bench : {&alone, &crowded}) {
+      submit_volts(*bench, kOwner, 5.0);
+      EXPECT_EQ(submit_volts(*bench, kOwner, 5.0), Refused::kStale) << "the owner's own are counted";
+      bench->step();
+    }
+  }
+  for (Bench* bench : {&alone, &crowded})
+    submit_lease(*bench, LeaseAction::kRelease, kOwner);
+  crowd();
+  EXPECT_EQ(crowded.sample(0).refused_commands, 20u);
+  EXPECT_EQ(crowded_count.inputs, alone_count.inputs);
+  EXPECT_EQ(crowded.state_hash(), alone.state_hash());
 }
 
 // Acquired at tick 0, renewed at 60, lease of 100: the owner of tick 159, not of 160. Catches: an off-by-one,

@@ -98,7 +98,7 @@ TEST(Bench, CMD_11_CMD_12_ACommandThatIsNotFiniteNeverReachesThePlant) {
   EXPECT_EQ(bench.sample(0).missed_commands, 1u);
   EXPECT_EQ(bench.sample(0).true_i_a_a, silent.sample(0).true_i_a_a);
   EXPECT_EQ(submit_volts(bench, kOwner, 3.0), Refused::kNot);  // its tick is not used up
-  EXPECT_EQ(bench.submit({.tick = bench.tick(), .axis = 0, .owner = 0, .action = RefusedCommand{}}),
+  EXPECT_EQ(bench.submit({.tick = bench.tick(), .axis = 0, .owner = kOwner, .action = RefusedCommand{}}),
             Refused::kNot);
   bench.step();
   EXPECT_EQ(bench.sample(0).refused_commands, 5u);

@@ -3,11 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "bench.pb.h"
 #include "server/access/admission.hpp"
+#include "server/access/allowance.hpp"
 #include "server/access/audit.hpp"
 #include "server/access/places.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
@@ -35,6 +38,7 @@ struct SessionContext {
     std::uint64_t tls_refused = 0;      ///< connections that did not get through the TLS handshake
     std::uint64_t malformed = 0;        ///< sessions that broke the protocol
     std::uint64_t wrong_tokens = 0;     ///< hellos
+    std::uint64_t not_owner = 0;        ///< requests without the lease, which are no part of the run
     std::uint64_t excess_commands = 0;  ///< exchanges, in real time, that no tick can use
     std::uint64_t throttled = 0;        ///< pauses in reading a session
     std::uint64_t cut = 0;              ///< sessions whose peer read nothing or was silent
@@ -43,6 +47,7 @@ struct SessionContext {
   v1::Envelope reply{};              ///< the message that a session is writing
   std::vector<std::byte> scratch{};  ///< its bytes
   RefusalLog log{};
+  std::map<std::string, Allowance> forbidden{};  ///< by user: requests that the role does not allow
 };
 
 }  // namespace drivebench

@@ -59,7 +59,13 @@ void Dialogue::refuse(std::uint64_t id, v1::RefusalCode code, const std::string&
 }
 
 void Dialogue::refuse(std::uint64_t id, Refused why, const char* field) {
+  if (lacks_lease(why)) note_not_owner(why);
   refuse(id, code_of(why), std::string(sentence_of(why)), field);
+}
+
+void Dialogue::note_not_owner(Refused why) {
+  ++context_.counts.not_owner;
+  context_.log.note(client_, "not the owner", sentence_of(why));
 }
 
 void Dialogue::notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis) {

@@ -48,6 +48,8 @@ class Dialogue {
   void done(std::uint64_t id, Tick tick);
   void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
   void refuse(std::uint64_t id, Refused why, const char* field);
+  /// Counts and logs a request without the lease of its axis.
+  void note_not_owner(Refused why);
   void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);
   /// Writes a refusal into the log, with its kind, and into the audit log, as this event.
   void report(std::string_view event, std::string_view kind, std::string_view why,

@@ -61,6 +61,7 @@ bool Exchanges::are_taken(const v1::Exchange& r) {
     if (engine_.check(command.axis(), owner, *decode_command(command)) == Refused::kNot) continue;
     const Refused why = engine_.command(command.axis(), owner, *decode_command(command));
     excess_.charge();
+    if (lacks_lease(why)) dialogue_.note_not_owner(why);
     const std::string sentence =
         why == Refused::kNotOwner ? leases_.not_owner_of(command.axis()) : std::string(sentence_of(why));
     dialogue_.refuse(dialogue_.id(), code_of(why),

@@ -31,7 +31,9 @@ void Leases::lease(const v1::LeaseRequest& r) {
   };
   Engine::Answer answer = answer_for(r.axis(), "axis", on_done);
   if (takes) return take(r, std::move(answer));
-  if (dialogue_.owner() == 0) dialogue_.set_owner(engine_.new_owner(dialogue_.client()));
+  if (dialogue_.owner() == 0 && action == LeaseAction::kAcquire) {
+    dialogue_.set_owner(seats_[r.axis()].number_for(dialogue_.client()));
+  }
   seats_[r.axis()].ask(action, dialogue_.owner(), std::move(answer), &dialogue_.client());
 }
 
@@ -102,6 +104,7 @@ Engine::Answer Leases::answer_for(std::uint32_t axis, const char* field, std::fu
 /// Names the holder of the axis. The holder may have renewed the lease in this tick, which is not known yet,
 /// so the sentence gives the latest possible end.
 void Leases::refuse_owned(std::uint64_t id, std::uint32_t axis) {
+  dialogue_.note_not_owner(Refused::kOwned);
   const Client* const holder = engine_.client(engine_.owner(axis));
   const std::string name = holder == nullptr ? "another client" : name_of(*holder);
   const Tick end = engine_.tick() + engine_.config().setup.lease_ticks;
