@@ -144,15 +144,15 @@ void Audit::watch_axis(std::uint32_t axis) {
   seen.faults = now.faults;
 }
 
-bool Audit::may_write(const Event& refusal) {
-  const Client* const client = refusal.client;
+bool Audit::may_write(const Event& event) {
+  const Client* const client = event.client;
   if (client != nullptr && !client->subject.empty()) return true;
   const std::string address = client == nullptr ? std::string() : address_of(*client);
-  return budget_.take(refusal.name, address, ServerClock::now());
+  return budget_.take(event.name, address, ServerClock::now());
 }
 
 void Audit::note(Event event) {
-  if (event.result != "done" && !may_write(event)) {
+  if ((event.result != "done" || event.is_repeatable) && !may_write(event)) {
     ++left_out_;
     return;
   }

@@ -24,8 +24,9 @@ using AuditDetail = std::pair<std::string_view, std::variant<std::string, double
 /// their way to the engine and the samples on their way back, so it treats all transports alike. Everything
 /// happens on the I/O thread.
 ///
-/// What a known subject does is always written. Refusals of unknown clients (their requests, tokens,
-/// connections) have a budget, so that they cannot fill the disk; the next line says how many were left out.
+/// Every action of a known subject is written; Identity slows a user down whose role forbids it. Refusals of
+/// unknown clients (their requests, tokens, connections) have a budget, so that they cannot fill the disk;
+/// the next line says how many were left out.
 class Audit {
  public:
   /// Throws std::runtime_error if the file cannot be opened.
@@ -41,6 +42,7 @@ class Audit {
     const Client* client = nullptr;
     std::string_view result = "done";  ///< anything else is the reason of a refusal
     std::vector<AuditDetail> details{};
+    bool is_repeatable = false;  ///< the client can do it as often as it likes: has the budget of a refusal
   };
   void note(Event event);
 
@@ -54,7 +56,7 @@ class Audit {
   void on_taken(const Taken& taken);
   void on_tick();
   void watch_axis(std::uint32_t axis);
-  bool may_write(const Event& refusal);
+  bool may_write(const Event& event);
   void fail();
 
   struct Seen {

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The audit log: every change with its user, and every refused client."""
+import contextlib
 import json
 import os
 import pathlib
@@ -20,7 +21,7 @@ except ImportError:
 
 from test_users import TAKE, USERS, UsersTest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
-from wire_client import PATIENCE_S, pb
+from wire_client import PATIENCE_S, frame, pb
 from wire_test import SERVO_TEXT, until
 
 
@@ -195,20 +196,39 @@ class AuditLog(UsersTest):
         vera, began = self.user(server, "vera"), time.monotonic()
         for n in range(600):
             self.guess(server, "wrong", source=f"127.0.0.{2 + n % 3}")
-        for _ in range(150):
+        for _ in range(120):
             self.assertRefused(vera.lease(), pb.REFUSAL_FORBIDDEN, "lease")
         self.guess(server, "wrong", source="127.0.0.9")
         self.write_tokens(server.tokens, "no tokens")
         server.process.send_signal(signal.SIGHUP)
         until(lambda: self.audited(log, "reload"), "the reload is logged")
         self.assertNotEqual(self.audited(log, "reload")[0]["result"], "done")
-        self.assertEqual([line["subject"] for line in self.audited(log, "forbidden")], ["vera"] * 150)
+        self.assertEqual([line["subject"] for line in self.audited(log, "forbidden")], ["vera"] * 120)
         guessed = [line["peer"].split(":")[0] for line in self.audited(log, "authentication")]
         self.assertEqual(guessed.count("127.0.0.9"), 1)
         for source in ("127.0.0.2", "127.0.0.3", "127.0.0.4"):
             self.assertLessEqual(guessed.count(source), 101 + 2 * (time.monotonic() - began), source)
         left_out = sum(line["details"].get("left_out_before", 0) for line in self.lines(log))
         self.assertEqual(left_out, 601 - len(guessed))
+
+    def test_sec_07_a_user_that_asks_for_what_is_forbidden_has_to_wait(self):
+        """Catches: a viewer that fills the disk with lines of refusals, over many sessions or new ones; a wait of those who ask
+        for nothing forbidden."""
+        server = self.server_for(USERS, "--audit", str(self.folder_with("") / "audit"))
+        log, began = pathlib.Path(server.process.args[-1]), time.monotonic()
+        request = frame(pb.Envelope(id=2, lease=pb.LeaseRequest()).SerializeToString())
+        for n in range(40):
+            noisy = self.user(server, "vera")
+            noisy.socket.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                noisy.send_bytes(request * 2000)
+            if n % 2:
+                noisy.close()
+        until(lambda: len(self.audited(log, "forbidden")) > 100, "the first ones have their lines")
+        for user in ("vera", "otto"):
+            self.assertEqual(self.user(server, user).newest().tick, 0)
+        owed = 40  # each session may ask once before it waits
+        self.assertLessEqual(len(self.audited(log, "forbidden")), 100 + 10 * (time.monotonic() - began) + owed)
 
     def test_sec_07_a_full_log_stops_the_bench_only_if_the_file_says_so(self):
         """Catches: a bench that drives on without its log although the file forbids it, or stops although the file allows

@@ -1,5 +1,8 @@
 #include "server/endpoints/tcp/session/identity.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "server/access/address.hpp"
 
 namespace drivebench {
@@ -46,6 +49,8 @@ bool Identity::admit(const v1::Hello& hello) {
 bool Identity::may_ask(const v1::Envelope& request) {
   const Role needed = role_needed_for(request);
   if (grant_.role >= needed) return true;
+  forbidden().use();
+  asked_forbidden_ = true;
   const auto* kind = v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(request.kind_case()));
   const std::string field = kind == nullptr ? "kind" : kind->name();
   dialogue_.report("forbidden", "forbidden", "the role does not allow it", {{"request", field}});
@@ -55,6 +60,20 @@ bool Identity::may_ask(const v1::Envelope& request) {
                        std::string(name_of(needed)),
                    field.c_str());
   return false;
+}
+
+Allowance& Identity::forbidden() {
+  auto& of_users = dialogue_.context().forbidden;
+  return of_users.try_emplace(grant_.name, kForbidden, ServerClock::now()).first->second;
+}
+
+bool Identity::must_pause() {
+  return asked_forbidden_ && forbidden().left(ServerClock::now()) < 0.0;
+}
+
+ServerClock::duration Identity::pause() {
+  if (!std::exchange(asked_forbidden_, false)) return {};
+  return std::min<ServerClock::duration>(forbidden().wait(ServerClock::now()), kLongestPause);
 }
 
 /// The slot ends at a wall time, but a jump of the wall clock does not move a running timer.

@@ -1,15 +1,23 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <string>
 
+#include "server/access/allowance.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
 
 namespace drivebench {
 
 /// The user behind a session: the grant of the token, what its role allows, and when its time ends.
+///
+/// The audit log has a line for every request that the role forbids. A user whose sessions together ask for
+/// more than kForbidden waits: the server pauses in reading the sessions that asked.
 class Identity {
  public:
+  static constexpr Allowance::Rate kForbidden{.at_once = 100.0, .per_s = 10.0};
+  static constexpr auto kLongestPause = std::chrono::seconds(10);
+
   explicit Identity(Dialogue& dialogue);
 
   /// Called with a sentence when the grant is no longer valid.
@@ -19,6 +27,10 @@ class Identity {
   bool admit(const v1::Hello& hello);
   /// Whether the role allows the request; if not, refuses it.
   bool may_ask(const v1::Envelope& request);
+  /// Whether the session has asked for what its user may not ask for now.
+  bool must_pause();
+  /// The pause for the forbidden requests since the last call.
+  ServerClock::duration pause();
   /// Called after a change of the tokens file: ends the session if its grant has gone or changed.
   void look_again();
   /// Ends the session when the time of the grant is over.
@@ -28,8 +40,11 @@ class Identity {
   const Grant& grant() const noexcept { return grant_; }
 
  private:
+  Allowance& forbidden();
+
   Dialogue& dialogue_;
   Grant grant_;
+  bool asked_forbidden_ = false;
   ServerTimer slot_timer_;
 };
 

@@ -52,14 +52,13 @@ asio::awaitable<void> Session::run() {
         asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
     if (!greeted_ && count > 0) dialogue_.context().places.heard(place_);
     reader_.received(count);
-    while ((turn = take_turn()) == Turn::kMoreToCome)
+    while ((turn = take_turn()) == Turn::kMoreToCome) {
       co_await asio::post(socket.get_executor(), asio::use_awaitable);
+      if (const auto pause = due_pause(); pause > pause.zero()) co_await rest(timer, pause);
+    }
     watch_for_silence();
-    const ServerClock::duration pause = exchanges_.excess().pause();
-    if (turn == Turn::kOver || pause == ServerClock::duration::zero()) continue;
-    timer.expires_after(pause);
-    boost::system::error_code cancelled;
-    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
+    if (turn == Turn::kOver) continue;
+    if (const auto pause = due_pause(); pause > pause.zero()) co_await rest(timer, pause);
   }
   timer.cancel();
   if (greeted_) dialogue_.audit("session_ended", "done", {{"reason", why_ended_}});
@@ -70,12 +69,27 @@ asio::awaitable<void> Session::run() {
   close();
 }
 
+/// The pause of a session that asked for more than it may.
+ServerClock::duration Session::due_pause() {
+  return std::max(exchanges_.excess().pause(), identity_.pause());
+}
+
+/// Does not read the session for a while.
+asio::awaitable<void> Session::rest(ServerTimer& timer, ServerClock::duration pause) {
+  silence_.call_off();
+  timer.expires_after(pause);
+  boost::system::error_code cancelled;
+  co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
+  watch_for_silence();
+}
+
 /// Answers the requests that have arrived, up to the limits of a turn, so that the other clients need not
 /// wait for a client with many requests.
 Session::Turn Session::take_turn() {
   dialogue_.begin_turn();
   for (int n = 0; n < kRequestsPerTurn && dialogue_.bytes_in_turn() < kReplyBytesPerTurn; ++n) {
     if (!dialogue_.socket().is_open()) return Turn::kOver;
+    if (identity_.must_pause()) break;
     const auto frame = reader_.next();
     if (frame && handle(*frame)) continue;
     if (frame) return Turn::kOver;

@@ -54,6 +54,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// The progress of a turn through the received frames.
   enum class Turn { kAll, kMoreToCome, kOver };
   Turn take_turn();
+  ServerClock::duration due_pause();
+  asio::awaitable<void> rest(ServerTimer& timer, ServerClock::duration pause);
   bool handle(std::span<const std::byte> frame);
   bool dispatch(const v1::Envelope& request);
   bool greet(const v1::Hello& hello);

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "server/access/allowance.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
 #include "server/host/clock.hpp"
 
@@ -11,7 +12,7 @@ namespace drivebench {
 /// more with every tick. Beyond that the server pauses in reading the session.
 class ExcessLimit {
  public:
-  explicit ExcessLimit(Dialogue& dialogue) : dialogue_(dialogue) {}
+  explicit ExcessLimit(Dialogue& dialogue);
 
   /// Counts an exchange that no tick can use.
   void charge();
@@ -22,11 +23,8 @@ class ExcessLimit {
   static constexpr double kAtOnce = 1000.0;
   static constexpr auto kLongestPause = std::chrono::seconds(1);
 
-  void refill();
-
   Dialogue& dialogue_;
-  double left_ = kAtOnce;
-  ServerClock::time_point refilled_ = ServerClock::now();
+  Allowance allowance_;
 };
 
 }  // namespace drivebench
