@@ -2,31 +2,21 @@
 
 #include <chrono>
 #include <cstdint>
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "server/access/guess_limit.hpp"
 #include "server/config/grants.hpp"
 #include "server/host/clock.hpp"
 
 namespace drivebench {
 
-/// Decides whether a token opens a session, and slows guessing down.
-///
-/// After a wrong token the server reads no token from the same address for half a second, after the next
-/// wrong one for twice as long, up to half a minute. So an address has at most two guesses a minute in the
-/// long run, over any number of connections. A right token ends the wait.
+/// Decides whether a token opens a session; GuessLimit slows guessing down.
 class Admission {
  public:
   using Time = ServerClock::time_point;
   using WallTime = std::chrono::system_clock::time_point;
-
-  static constexpr auto kFirstWait = std::chrono::milliseconds(500);
-  static constexpr auto kLongestWait = std::chrono::seconds(30);
-  /// An address that has been quiet for so long after its wait begins anew.
-  static constexpr auto kForgotten = std::chrono::minutes(10);
-  static constexpr std::size_t kMaxAddresses = 1024;
 
   /// Without `asks_for_token` every session is that of an administrator.
   Admission(bool asks_for_token, std::vector<Grant> grants)
@@ -46,19 +36,12 @@ class Admission {
   /// The present form of an earlier grant; null: it is no longer valid.
   const Grant* renewed(const Grant& earlier, WallTime wall) const;
 
-  std::size_t addresses_that_wait() const noexcept { return guesses_.size(); }
+  std::size_t addresses_that_wait() const noexcept { return guesses_.addresses_that_wait(); }
 
  private:
-  struct Guesses {
-    ServerClock::duration wait{};  ///< after the last wrong token
-    Time until{};                  ///< no token is read before
-  };
-
-  void make_room(Time now);
-
   bool asks_;
   std::vector<Grant> grants_;
-  std::map<std::string, Guesses> guesses_;  // by address
+  GuessLimit guesses_;
 };
 
 }  // namespace drivebench

@@ -2,7 +2,10 @@
 
 #include <spdlog/spdlog.h>
 
+#include <utility>
+
 #include "plant/faults.hpp"
+#include "server/access/address.hpp"
 #include "server/endpoints/modbus/map_info.hpp"
 
 namespace drivebench::modbus {
@@ -188,8 +191,9 @@ void AxisDesk::watch() {
 
 /// Forgets the holder of a seat that is empty or about to be.
 void AxisDesk::forget_holder() {
-  key_ = 0;
+  key_ = last_wrong_key_ = 0;
   holder_ = 0;
+  holder_name_.clear();
   timer_.cancel();
   command_ = {};
   process_ = {};
@@ -205,9 +209,9 @@ std::shared_ptr<AxisDesk::Asked> AxisDesk::send(const Input& input) {
   return asked;
 }
 
-asio::awaitable<Refused> AxisDesk::ask(LeaseAction action, Owner number) {
+asio::awaitable<Refused> AxisDesk::ask(LeaseAction action, Owner number, const Client* from) {
   auto asked = std::make_shared<Asked>();
-  seat_.ask(action, number, answer_into(asked));
+  seat_.ask(action, number, answer_into(asked), from);
   return answer_to(std::move(asked));
 }
 
@@ -229,22 +233,63 @@ asio::awaitable<Refused> AxisDesk::answer_to(std::shared_ptr<Asked> asked) {
   co_return asked->answer.value_or(Refused::kBusy);
 }
 
+Client AxisDesk::client_of(Visitor visitor) const {
+  return {.transport = "modbus", .peer = name_of_visitor ? name_of_visitor(visitor) : "", .subject = {}};
+}
+
+/// Whether this is the key of the holder: the only place that compares keys. The holder's own connection
+/// never waits for the guesses of others at its address, and a client that repeats one wrong key learns
+/// nothing new.
+bool AxisDesk::opens(std::uint16_t key, Visitor visitor) {
+  if (holder_ == visitor) return key == key_;
+  if (key == last_wrong_key_) return false;
+  const std::string address = address_of(client_of(visitor));
+  const auto now = Clock::now();
+  if (guesses_.wait_of(address, now) > GuessLimit::Duration{}) {
+    ++unread_keys_;
+    return false;
+  }
+  if (key == key_) {
+    guesses_.note_right(address);
+    return true;
+  }
+  guesses_.note_wrong(address, now);
+  last_wrong_key_ = key;
+  const std::chrono::duration<double> wait = guesses_.wait_of(address, now);
+  if (wait.count() > 0.0 && guess_log_.allow()) {
+    spdlog::warn(
+        "modbus: a wrong key for axis {} from {}: the next one is read in {:.1f} s ({} more since the last "
+        "such line)",
+        axis_, address, wait.count(), guess_log_.held_back());
+  }
+  return false;
+}
+
+/// A connection that follows an ended one of the same address is that of a client that connects for each
+/// request.
+void AxisDesk::note_takeover(const Client& by) {
+  const Client before{.transport = "modbus", .peer = std::exchange(holder_name_, by.peer), .subject = {}};
+  if (before.peer.empty() || (holder_ == 0 && address_of(before) == address_of(by))) return;
+  if (on_takeover) on_takeover(by, before.peer);
+}
+
+/// Takes the lease for a key that opens it, or a new one.
 asio::awaitable<Refused> AxisDesk::take_lease(std::uint16_t key, bool renew, Visitor visitor) {
   if (seat_.notice_end()) forget_holder();
   if (seat_.owner() == 0) {
-    const Client client{
-        .transport = "modbus", .peer = name_of_visitor ? name_of_visitor(visitor) : "", .subject = {}};
-    const Refused why = co_await ask(LeaseAction::kAcquire, seat_.number_for(client));
+    const Client client = client_of(visitor);
+    const Refused why = co_await ask(LeaseAction::kAcquire, seat_.number_for(client), &client);
     if (why != Refused::kNot) co_return why;
     key_ = key;
-  } else if (key != key_) {
-    co_return Refused::kOwned;
   } else if (renew) {
     const Refused why = co_await ask(LeaseAction::kRenew, seat_.owner());
     if (why != Refused::kNot) co_return why;
   }
   const bool changes_hands = holder_ != visitor;
-  if (changes_hands) waiting_ = false;
+  if (changes_hands) {
+    waiting_ = false;
+    note_takeover(client_of(visitor));
+  }
   holder_ = visitor;
   seat_.hear(Clock::now());
   watch();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "protocols/modbus/drive_profile.hpp"
 #include "protocols/modbus/pdu.hpp"
 #include "protocols/modbus/register_map.hpp"
+#include "server/access/guess_limit.hpp"
 #include "server/access/seat.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/endpoints/log_limit.hpp"
@@ -37,8 +39,10 @@ class AxisDesk {
 
   /// Called when the lease has a new owner or has ended, so that no exchange waits for it any longer.
   std::function<void()> on_lease_change;
-  /// Address and port of a connection, for the audit log; may be empty.
+  /// Address and port of a connection, for the limit of guesses and the logs; empty for one that has ended.
   std::function<std::string(Visitor)> name_of_visitor;
+  /// Called when a connection takes the lease from another one that is still there or has another address.
+  std::function<void(const Client& by, const std::string& from)> on_takeover;
 
   std::uint32_t axis() const noexcept { return axis_; }
   const RegisterMap& map() const noexcept { return map_; }
@@ -61,7 +65,7 @@ class AxisDesk {
   asio::awaitable<Outcome> write_coils(std::size_t address, std::size_t count, std::uint8_t bits,
                                        Visitor visitor);
 
-  /// Notes that a write was refused for its values: a command in it counts as refused.
+  /// Notes that a write was refused for its values: a command of the owner in it counts as refused.
   void count_refused(const RegisterMap::Range& range, std::span<const std::uint16_t> words, Visitor visitor);
   /// Notes a refused write, for the register last_refusal.
   void note_refusal(Visitor visitor, Refused why) noexcept;
@@ -79,9 +83,15 @@ class AxisDesk {
     if (holder_ == visitor) waiting_ = waiting;
   }
   void connection_ended(Visitor visitor);
+  /// Keys that were not compared, because their address had to wait.
+  std::uint64_t unread_keys() const noexcept { return unread_keys_; }
+  Owner owner() const noexcept { return seat_.owner(); }
 
  private:
   using Clock = ServerClock;
+
+  /// A program with a wrong key in its settings does not hold up another one at its address.
+  static constexpr unsigned kMistakes = 3;
 
   /// The content of the registers of the command block.
   struct CommandInput {
@@ -113,6 +123,9 @@ class AxisDesk {
   asio::awaitable<Outcome> write_parameters(Written written, Visitor visitor);
   asio::awaitable<Outcome> carry_out(AxisRequest request, Visitor visitor);
   asio::awaitable<Refused> take_lease(std::uint16_t key, bool renew, Visitor visitor);
+  bool opens(std::uint16_t key, Visitor visitor);
+  Client client_of(Visitor visitor) const;
+  void note_takeover(const Client& by);
   /// An input on its way to the bench.
   struct Asked {
     std::optional<Refused> answer;
@@ -121,7 +134,7 @@ class AxisDesk {
   std::shared_ptr<Asked> send(const Input& input);
   asio::awaitable<Refused> answer_to(std::shared_ptr<Asked> asked);
   asio::awaitable<Refused> ask(Input input) { return answer_to(send(input)); }
-  asio::awaitable<Refused> ask(LeaseAction action, Owner number);
+  asio::awaitable<Refused> ask(LeaseAction action, Owner number, const Client* from = nullptr);
   static Engine::Answer answer_into(std::shared_ptr<Asked> asked);
 
   std::uint64_t bits_of(const Row& row, Visitor visitor) const;
@@ -153,9 +166,13 @@ class AxisDesk {
   std::chrono::nanoseconds idle_timeout_;
 
   Seat seat_;
-  std::uint16_t key_ = 0;  ///< of the holder
-  Visitor holder_ = 0;     ///< 0: the connection has ended, and the key keeps the lease
-  bool waiting_ = false;   ///< the holder waits for its tick
+  std::uint16_t key_ = 0;             ///< of the holder
+  std::uint16_t last_wrong_key_ = 0;  ///< of this lease; 0: none
+  GuessLimit guesses_{kMistakes};
+  std::uint64_t unread_keys_ = 0;
+  Visitor holder_ = 0;       ///< 0: the connection has ended, and the key keeps the lease
+  std::string holder_name_;  ///< address and port of its connection, also after its end
+  bool waiting_ = false;     ///< the holder waits for its tick
   ServerTimer timer_;
 
   CommandInput command_;
@@ -164,6 +181,7 @@ class AxisDesk {
   Refused last_refusal_ = Refused::kNot;
   Refused holders_refusal_ = Refused::kNot;  ///< the last refusal of the holder
   LogLimit lapsed_log_;
+  LogLimit guess_log_;
 };
 
 }  // namespace drivebench::modbus

@@ -41,9 +41,11 @@ void AxisDesk::count_refused(const RegisterMap::Range& range, std::span<const st
                              Visitor visitor) {
   const Written written{range, words};
   if (!written[Content::kCounter] && range.first >= kCommandStart) return;  // process data always command
-  const bool has_key = seat_.is_held() && written[Content::kLeaseKey] == key_;
-  const Owner sender = has_key || holds(visitor) ? seat_.owner() : 0;
-  engine_.request({.tick = 0, .axis = axis_, .owner = sender, .action = RefusedCommand{true}},
+  const auto key = written[Content::kLeaseKey];
+  const bool is_owner =
+      holds(visitor) || (key && seat_.is_held() && opens(static_cast<std::uint16_t>(*key), visitor));
+  if (!is_owner) return;
+  engine_.request({.tick = 0, .axis = axis_, .owner = seat_.owner(), .action = RefusedCommand{true}},
                   [](Refused, Tick) {});
 }
 
@@ -154,16 +156,15 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
     if (engine_.config().mode == RunMode::kFree) {
       co_return refuse(Refused::kWrongMode);
     }
+    const bool is_open = !had_lease || opens(static_cast<std::uint16_t>(*key), visitor);
     // All or nothing: a refused command leaves the lease with its connection.
-    if (commands && had_lease && key == key_ &&
+    if (commands && had_lease && is_open &&
         engine_.check(axis_, seat_.owner(), command_of(input)) != Refused::kNot) {
       co_return refuse(engine_.command(axis_, seat_.owner(), command_of(input)));  // so that it is counted
     }
-    const Refused why = co_await take_lease(static_cast<std::uint16_t>(*key), !commands, visitor);
-    if (why != Refused::kNot) {
-      if (commands) engine_.command(axis_, 0, command_of(input));  // so that it is counted
-      co_return refuse(why);
-    }
+    Refused why = Refused::kOwned;
+    if (is_open) why = co_await take_lease(static_cast<std::uint16_t>(*key), !commands, visitor);
+    if (why != Refused::kNot) co_return refuse(why);
   }
   if (!commands) {
     if (!holds(visitor)) co_return refuse(Refused::kNotOwner);

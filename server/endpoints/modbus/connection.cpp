@@ -262,9 +262,10 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
 void Connection::note_refused_write(AxisDesk& desk, Refused why) {
   ++shared_.counts.refused_writes;
   desk.note_refusal(number_, why);
-  // Audits only writes to the axis of another client; other mistakes concern the owner alone.
-  const bool is_foreign = why == Refused::kNotOwner || why == Refused::kOwned;
-  if (is_foreign) audit("forbidden", sentence_of(why), desk.axis());
+  if (lacks_lease(why)) {  // other mistakes concern the owner alone
+    ++shared_.counts.not_owner;
+    audit("forbidden", sentence_of(why), desk.axis());
+  }
   if (!shared_.refused_writes_log.allow()) return;
   spdlog::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_,
                desk.axis(), sentence_of(why), shared_.refused_writes_log.held_back());

@@ -34,6 +34,7 @@ struct Shared {
     std::uint64_t requests = 0;
     std::uint64_t exceptions = 0;
     std::uint64_t refused_writes = 0;  ///< without the lease, latched, stale, or a wrong value
+    std::uint64_t not_owner = 0;       ///< of these, those without the lease, which are no part of the run
     std::uint64_t throttled = 0;
     std::uint64_t cut = 0;  ///< connections: malformed frames, time-outs, floods, no free connection
     std::uint64_t turned_away = 0;
@@ -41,6 +42,7 @@ struct Shared {
   LogLimit refused_writes_log;
   LogLimit cut_log;
   LogLimit turned_away_log;
+  LogLimit takeover_log;
 };
 
 /// The connection of one client. It answers requests in their order; an error ends this connection and

@@ -64,7 +64,7 @@ void ModbusServer::serve(Engine& engine, Audit* audit) {
   }
   identification_.emplace(engine.config().name);
   maps_ = modbus::maps_of(engine.config());
-  shared_.emplace(modbus::Shared{engine, replies_, rate_, *identification_, audit, {}, {}, {}, {}, {}});
+  shared_.emplace(modbus::Shared{engine, replies_, rate_, *identification_, audit, {}, {}, {}, {}, {}, {}});
   // By index: a connection may be added while another one answers.
   const auto wake_all = [this] {
     for (std::size_t i = 0; i < connections_.size(); ++i)
@@ -74,6 +74,9 @@ void ModbusServer::serve(Engine& engine, Audit* audit) {
     shared_->desks.push_back(std::make_unique<modbus::AxisDesk>(io_, engine, maps_[axis], axis));
     shared_->desks.back()->on_lease_change = wake_all;
     shared_->desks.back()->name_of_visitor = [this](modbus::Visitor visitor) { return name_of(visitor); };
+    shared_->desks.back()->on_takeover = [this, axis](const Client& by, const std::string& from) {
+      note_takeover(axis, by, from);
+    };
   }
   engine.on_newest.add(wake_all);
   asio::co_spawn(io_, accept(), asio::detached);
@@ -84,6 +87,21 @@ std::string ModbusServer::name_of(modbus::Visitor visitor) const {
       std::find_if(connections_.begin(), connections_.end(),
                    [visitor](const auto& connection) { return connection->number() == visitor; });
   return found == connections_.end() ? std::string() : (*found)->peer_name();
+}
+
+void ModbusServer::note_takeover(std::uint32_t axis, const Client& by, const std::string& from) {
+  if (shared_->takeover_log.allow()) {
+    spdlog::warn("modbus: {} took axis {} from {} with its key ({} more since the last such line)", by.peer,
+                 axis, from, shared_->takeover_log.held_back());
+  }
+  if (shared_->audit == nullptr) return;
+  shared_->audit->note({.name = "take",
+                        .axis = axis,
+                        .client = &by,
+                        .details = {{"reason", "it wrote the key of the lease"},
+                                    {"from", from},
+                                    {"owner", shared_->desks[axis]->owner()}},
+                        .is_repeatable = true});
 }
 
 asio::awaitable<void> ModbusServer::accept() {
@@ -180,10 +198,17 @@ TransportReport ModbusServer::report() const {
                          .counts = {}};
   if (!shared_) return report;
   const modbus::Shared::Counts& counts = shared_->counts;
-  report.counts = {{"connections", connections_.size()}, {"requests", counts.requests},
-                   {"exceptions", counts.exceptions},    {"refused_writes", counts.refused_writes},
-                   {"throttled", counts.throttled},      {"cut", counts.cut},
-                   {"turned_away", counts.turned_away}};
+  report.counts = {{"connections", connections_.size()},
+                   {"requests", counts.requests},
+                   {"exceptions", counts.exceptions},
+                   {"refused_writes", counts.refused_writes},
+                   {"not_owner", counts.not_owner},
+                   {"throttled", counts.throttled},
+                   {"cut", counts.cut},
+                   {"turned_away", counts.turned_away},
+                   {"unread_keys", 0}};
+  for (const auto& desk : shared_->desks)
+    report.counts.back().second += desk->unread_keys();
   return report;
 }
 

@@ -37,6 +37,7 @@ class ModbusServer {
  private:
   asio::awaitable<void> accept();
   std::string name_of(modbus::Visitor visitor) const;
+  void note_takeover(std::uint32_t axis, const Client& by, const std::string& from);
   bool make_room(const asio::ip::address& newcomer);
   asio::awaitable<void> run(std::shared_ptr<modbus::Connection> connection);
 

@@ -71,7 +71,7 @@ TEST_F(AdmissionTest, SEC_04_TheTableOfAddressesIsBounded) {
   for (int peer = 0; peer < 10'000; ++peer) {
     try_with("wrong", "peer " + std::to_string(peer));
     now += 1ms;
-    ASSERT_LE(admission.addresses_that_wait(), Admission::kMaxAddresses);
+    ASSERT_LE(admission.addresses_that_wait(), GuessLimit::kMaxAddresses);
   }
   EXPECT_FALSE(try_with("wrong", "peer 9999").looked_at) << "the newest addresses still wait";
 }

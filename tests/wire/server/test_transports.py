@@ -11,7 +11,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 import dbc_drive  # noqa: E402
 from dbc_drive import open_loop_voltages  # noqa: E402
 from drive_test import DriveTest, in_own_network, run_all, with_bus  # noqa: E402
-from wire_client import pb  # noqa: E402
+from wire_client import PATIENCE_S, pb  # noqa: E402
 
 GROUP = "239.74.163.2"
 UDP = 'backend = "udp_multicast"'
@@ -103,6 +103,85 @@ class ModbusRival:
         assert not self.client.write_register(400, 0, slave=1).isError()
 
 
+class TcpStranger:
+    """A session without the lease that asks for all that changes a run. Every request is refused."""
+
+    def __init__(self, test, server):
+        self.client = server.client()
+        test.addCleanup(self.client.close)
+        self.asked = 0
+
+    def disturb(self, tick, is_free):
+        lease, axis = pb.LeaseRequest, {"axis": 0}
+        wanted = [{"exchange": pb.Exchange(commands=[pb.Command(tick=at, gates=1, u_a_v=volts)])}
+                  for at, volts in ((tick, 9.0), (tick, float("nan")), (0, 9.0)) for _ in range(100)]
+        wanted += [{"lease": lease(action=action)} for action in
+                   [lease.ACTION_RENEW, lease.ACTION_RELEASE] + [lease.ACTION_ACQUIRE] * (not is_free)]
+        wanted += [{"clear_faults": pb.ClearFaults(**axis)}, {"set_load": pb.SetLoad(load_nm=1.0)},
+                   {"set_load": pb.SetLoad(load_nm=1.0, at_tick=tick + 5)}, {"shaft_bump": pb.ShaftBump(impulse_nms=1.0)},
+                   {"inject_fault": pb.InjectFault(name="bus_sag", value=0.5)},
+                   {"write_parameter": pb.WriteParameter(name="machine.rotor_resistance_ohm", value=9.0)}]
+        for number in [self.client.send(**each) for each in wanted]:
+            refusal = self.client.answer_to(number).refusal
+            assert refusal.code in (pb.REFUSAL_NOT_OWNER, pb.REFUSAL_OWNED), refusal
+        self.asked += len(wanted)
+
+
+class CanStranger:
+    """A controller without the lease number that sends each of its frames."""
+
+    def __init__(self, test, dbc):
+        bus = can.Bus(interface="udp_multicast", channel=GROUP, fd=True)
+        test.addCleanup(bus.shutdown)
+        self.drive = dbc_drive.Drive(bus, dbc)
+        self.asked = 0
+
+    def disturb(self, tick, is_free):
+        command = self.drive.message("command")
+        short = can.Message(arbitration_id=command.arbitration_id, is_extended_id=False, is_fd=True, data=command.data[:12])
+        self.drive.bus.send(short)
+        while self.drive.bus.recv(PATIENCE_S).data != short.data:  # comes back, and the DBC file cannot decode it
+            pass
+        for lease, mode in ((0, 1), (255, 1), (255, 9)):
+            self.drive.lease = lease
+            self.drive.command(tick, 9.0, 9.0, mode=mode)
+            reply = self.drive.await_message("reply")
+            assert (reply["request"], reply["result"]) == (0, 7 if mode == 9 else 1), reply
+            self.asked += 1 if mode == 1 else 0
+        for what in ["renew", "release", "clear_faults"] + ["acquire"] * (not is_free):
+            try:
+                self.drive.request(what, controller=99, lease=255)
+                raise AssertionError(f"{what} was granted")
+            except dbc_drive.Refused as refused:
+                assert refused.code in (1, 2), refused
+            self.asked += 1
+
+
+class ModbusStranger:
+    """A connection without the key that writes to every block."""
+
+    def __init__(self, test, address):
+        from pymodbus.client import ModbusTcpClient
+
+        host, port = address.rsplit(":", 1)
+        self.client = ModbusTcpClient(host, port=int(port))
+        assert self.client.connect()
+        test.addCleanup(self.client.close)
+        self.asked = 0
+
+    def disturb(self, tick, is_free):
+        command = list(struct.unpack(">7H", struct.pack(">HIff", 1, tick & 0xFFFFFFFF, 9.0, 9.0)))
+        malformed = list(struct.unpack(">7H", struct.pack(">HIff", 1, tick & 0xFFFFFFFF, float("nan"), 9.0)))
+        wanted = [(402, command), (101, [6]), (401, [1]), (401, [2]), (1002, [0x40A0, 0])]
+        if not is_free:
+            wanted += [(400, [8]), (400, [8, 0] + command)]
+        for address, words in wanted + [(402, malformed), (400, [8, 0] + malformed), (122, [9])]:
+            answer = self.client.write_registers(address, words, slave=1)
+            assert answer.isError() and answer.exception_code in (3, 6), (address, answer)
+        assert self.client.write_coil(0, True, slave=1).isError()
+        self.asked += len(wanted) + 1
+
+
 class Transports(DriveTest):
     # OWN-01, OWN-02. Catches: two transports that hold an axis at once, or a refusal that is not counted.
     def test_three_transports_take_turns_on_one_axis(self):
@@ -140,9 +219,7 @@ class Transports(DriveTest):
         self.assertEqual(problems, [])
         self.assertTrue(all(refusals.values()), refusals)
 
-        with server.client() as viewer:
-            counts = {report.name.split(" ")[0]: {count.name: count.value for count in report.counts}
-                      for report in viewer.status().transports}
+        counts = self.counts_of(server)
         self.assertGreaterEqual(counts["can"]["refused"], refusals["can"])
         self.assertGreaterEqual(counts["modbus"]["refused_writes"], refusals["modbus"])
         self.assertIn("refused", server.errors())
@@ -155,6 +232,46 @@ class Transports(DriveTest):
         self.assertTrue(all(len(volts) == 1 for volts in volts_of_owner.values()), volts_of_owner)
         self.assertEqual(set().union(*volts_of_owner.values()), set(VOLTS.values()))
 
+
+    def counts_of(self, server):
+        """The counts of the transports, by the kind of transport."""
+        with server.client() as viewer:
+            return {report.name.split(" ")[0]: {count.name: count.value for count in report.counts}
+                    for report in viewer.status().transports}
+
+    # Catches: a request without the lease that is recorded, that changes the state or its hash, or that uses up an owner
+    # number; a transport that does not count its own; refusals without a line in the log, or with a line for each.
+    def test_own_09_a_run_is_the_same_whatever_clients_without_the_lease_send(self):
+        text = with_bus([UDP]) + MODBUS
+        dbc = self.text_of("dbc", text)
+        contents, verdicts = {}, {}
+        for crowded in (False, True):
+            recording = self.folder / f"{crowded}.mcap"
+            server = self.server("--record", str(recording), text=text)
+            strangers = {"tcp": TcpStranger(self, server), "can": CanStranger(self, dbc),
+                         "modbus": ModbusStranger(self, server.ready["modbus"])} if crowded else {}
+            tick = 0
+            for owner in (TcpRival(self, server), ModbusRival(self, server.ready["modbus"]), TcpRival(self, server)):
+                for stranger in strangers.values():
+                    stranger.disturb(tick, is_free=True)
+                self.assertTrue(owner.acquire())
+                for _ in range(10):
+                    for stranger in strangers.values():
+                        stranger.disturb(tick, is_free=False)
+                    tick = owner.step(tick, 5.0, -1.0)
+                owner.release()
+            counts = self.counts_of(server)
+            for name, stranger in strangers.items():
+                self.assertEqual(counts[name]["not_owner"], stranger.asked, name)
+            for name, start in zip(strangers, ("] tcp", "] udp_multicast", "] modbus")):
+                lines = server.errors().count(start)
+                self.assertTrue(0 < lines < strangers[name].asked / 10, server.errors())
+            self.assertEqual(server.stop(), 0, server.errors())
+            verdicts[crowded] = (server.verdict["ticks"], server.verdict["state_hash"])
+            contents[crowded] = recording.read_bytes()
+        self.assertEqual(verdicts[True], verdicts[False])
+        self.assertEqual(len(contents[True]), len(contents[False]))
+        self.assertEqual(contents[True], contents[False])
 
     # OWN-04. Catches: an owner on a bus that cannot be removed, or one that keeps the axis because its bus does not
     # tell it.

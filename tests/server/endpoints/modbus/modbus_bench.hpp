@@ -225,12 +225,13 @@ inline BenchConfig tripping_bench_config() {
 /// A lockstep (or real-time) bench with its Modbus server on a thread of its own.
 class ModbusBench {
  public:
-  explicit ModbusBench(const BenchConfig& config = modbus_bench_config())
+  explicit ModbusBench(const BenchConfig& config = modbus_bench_config(), Audit* audit = nullptr)
       : server_(io_, config.modbus),
         engine_(config.mode == RunMode::kLockstep
                     ? make_lockstep_engine(config)
                     : make_threaded_engine(config, nullptr, io_, std::nullopt)) {
-    server_.serve(*engine_);
+    if (audit != nullptr) audit->watch(*engine_);
+    server_.serve(*engine_, audit);
     const std::string address = server_.address();
     port_ = static_cast<std::uint16_t>(std::stoul(address.substr(address.rfind(':') + 1)));
     thread_ = std::thread([this] { io_.run(); });

@@ -196,7 +196,7 @@ TEST(Modbus, MB_10_LIMIT_06_AFrameThatDripsIsCutOff) {
 // Catches: a peer that does not read its answers and makes the server keep them all, or wait for it.
 TEST(Modbus, MB_10_APeerThatTakesNothingIsCutOff) {
   BenchConfig config = modbus_bench_config();
-  config.modbus.frame_timeout_ms = 50;
+  config.modbus.frame_timeout_ms = 500;
   ModbusBench bench(config);
   Client deaf(bench.port());
   Bytes requests;
@@ -206,7 +206,7 @@ TEST(Modbus, MB_10_APeerThatTakesNothingIsCutOff) {
   }
   while (deaf.send(requests) && bench.count("cut") == 0)
     EXPECT_TRUE(still_serves(bench));
-  bench.until([&] { return bench.count("cut") == 1; });
+  bench.until([&] { return bench.count("cut") > 0; });
 }
 
 // Catches: connections beyond the cap that are kept, or that push out a connection that is at work.

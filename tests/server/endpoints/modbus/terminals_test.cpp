@@ -78,8 +78,8 @@ TEST(ModbusTerminals, ADutyIsOfTheHalfLinkInAStar) {
   EXPECT_EQ(client.read_one(410), 8);
 }
 
-// Catches: currents taken for voltages or duties, by command and by process data; a refusal without its
-// reason.
+// CMD-11. Catches: currents taken for voltages or duties, by command and by process data; a current that is
+// no number and not refused; a refusal without its reason.
 TEST(ModbusTerminals, CurrentsAreForCurrentAmplifiers) {
   ModbusBench bench(star_config(DriveKind::kCurrent));
   Client client(bench.port());
@@ -98,6 +98,15 @@ TEST(ModbusTerminals, CurrentsAreForCurrentAmplifiers) {
   EXPECT_EQ(static_cast<std::int16_t>(client.read_one(131)), std::lround(100.0 * bench.newest().i_c_a));
   EXPECT_EQ(client.read(101, 3), (Words{0x0f, count(-1.0), count(-0.5)})) << "the same registers";
   EXPECT_EQ(client.write(122, {2}), 3) << "references that do not exist";
+  const auto tick = static_cast<std::uint32_t>(bench.newest().tick);
+  for (std::size_t terminal = 0; terminal < 4; ++terminal) {
+    for (const float bad : {std::nanf(""), HUGE_VALF, -HUGE_VALF, 1e38f}) {
+      std::array<float, 4> currents{1.0f, 0.5f, -1.5f, 0.0f};
+      currents[terminal] = bad;
+      EXPECT_EQ(client.write(422, command_words(4, tick, currents)), 3);
+    }
+  }
+  EXPECT_EQ(bench.newest().tick, tick);
 
   ModbusBench voltages(star_config());
   Client other(voltages.port());
