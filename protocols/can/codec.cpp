@@ -68,8 +68,7 @@ struct Key {
   bool wide;
   std::uint8_t size;
   std::uint8_t row;
-  std::uint8_t first_node;
-  std::uint8_t last_node;
+  bool per_node;
 };
 
 constexpr std::uint64_t bytes_mask(unsigned first, unsigned count) {
@@ -104,15 +103,13 @@ constexpr auto kKeys = [] {
     for (std::size_t i = 0; i < kMessages.size(); ++i) {
       const MessageRow& row = kMessages[i];
       if ((row.width == Width::kWide) != wide) continue;
-      const IdRange nodes = ids_of(row, 0);
       keys[n++] = {.message = row.message,
                    .in_classic = is_in(row, false),
                    .in_fd = is_in(row, true),
                    .wide = wide,
                    .size = row.size,
                    .row = static_cast<std::uint8_t>(i),
-                   .first_node = static_cast<std::uint8_t>(nodes.first),
-                   .last_node = static_cast<std::uint8_t>(nodes.last)};
+                   .per_node = row.per_node};
     }
   }
   return keys;
@@ -367,9 +364,10 @@ std::string_view name_of(FrameProblem problem) noexcept {
 Match match(const Profile& profile, const Frame& frame) noexcept {
   if (frame.error) return {nullptr, 0, FrameProblem::kError};
   const Key* found = nullptr;
+  const std::uint32_t max_node = profile.max_node();
   for (const Key& key : kKeys) {
     const std::uint32_t node = frame.id - profile.base_ids[static_cast<std::size_t>(key.message)];
-    if (node < key.first_node || node > key.last_node) continue;
+    if (key.per_node ? node < 1 || node > max_node : node != 0) continue;
     if (!(profile.fd ? key.in_fd : key.in_classic) || (key.wide && !profile.wide)) continue;
     if (found != nullptr && (key.message != found->message || key.size != frame.size)) continue;
     found = &key;

@@ -165,7 +165,7 @@ std::string attributes(std::string_view bench, const Profile& profile, std::span
 
 std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes) {
   const std::vector<Entry> entries = entries_of(profile, axes);
-  std::string text = "VERSION \"" + std::to_string(version_of(axes)) + "\"\n\nNS_ :\n\nBS_:\n\n";
+  std::string text = "VERSION \"" + std::to_string(version_of(profile, axes)) + "\"\n\nNS_ :\n\nBS_:\n\n";
   text += "BU_: Bench Controller\n\n";
   std::string about;
   std::string values;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocols/can/table.hpp"
@@ -11,7 +12,9 @@
 namespace drivebench::can {
 
 inline constexpr std::size_t kMessageCount = static_cast<std::size_t>(Message::kDetails) + 1;
+/// The largest node id; as in CANopen. The 11-bit identifiers of IdSet::kFree have room for fewer nodes.
 inline constexpr std::uint32_t kMaxNode = 127;
+inline constexpr std::uint32_t kMaxFreeNode = 15;
 
 /// Whether a message exists in a variant of the profile.
 constexpr bool is_in(const MessageRow& row, bool fd) noexcept {
@@ -23,22 +26,33 @@ struct IdRange {
   std::uint32_t last;
 };
 /// The identifiers that a message has over all nodes.
-constexpr IdRange ids_of(const MessageRow& row, std::uint32_t base_id) noexcept {
-  return row.per_node ? IdRange{base_id + 1, base_id + kMaxNode} : IdRange{base_id, base_id};
+constexpr IdRange ids_of(const MessageRow& row, std::uint32_t base_id, std::uint32_t max_node) noexcept {
+  return row.per_node ? IdRange{base_id + 1, base_id + max_node} : IdRange{base_id, base_id};
 }
+
+using BaseIds = std::array<std::uint32_t, kMessageCount>;
+/// The default identifiers, by Message. With 29 bits IdSet::kFree has the same numbers 12 bits higher: room
+/// for all nodes, and no identifier below 0x800, which some programs take for one of 11 bits.
+constexpr BaseIds default_ids(IdSet set, bool extended) noexcept {
+  BaseIds ids{};
+  for (const MessageRow& row : kMessages) {
+    ids[static_cast<std::size_t>(row.message)] =
+        set == IdSet::kCanopen ? row.canopen_id : row.free_id << (extended ? 12U : 0U);
+  }
+  return ids;
+}
+
+/// The names of the sets in configurations and addresses, by IdSet.
+inline constexpr std::array<std::string_view, 2> kIdSetNames = {"free", "canopen"};
 
 /// The settings on which both ends of a bus must agree.
 struct Profile {
   bool fd = true;         ///< FD frames with float32; otherwise classic frames with scaled integers
   bool extended = false;  ///< 29-bit identifiers
-  bool wide = false;      ///< wide axes are on the bus: their messages have identifiers too
+  IdSet id_set = IdSet::kFree;
+  bool wide = false;  ///< wide axes are on the bus: their messages have identifiers too
   /// By Message; messages of an axis add the node id.
-  std::array<std::uint32_t, kMessageCount> base_ids = [] {
-    std::array<std::uint32_t, kMessageCount> ids{};
-    for (const MessageRow& row : kMessages)
-      ids[static_cast<std::size_t>(row.message)] = row.base_id;
-    return ids;
-  }();
+  BaseIds base_ids = default_ids(IdSet::kFree, false);
   // The values of one count of scaled fields.
   double current_unit_a = 1e-3;
   double voltage_unit_v = 1e-2;
@@ -46,6 +60,15 @@ struct Profile {
   double speed_unit_rad_s = 1e-1;
   double edge_time_unit_s = 1e-6;
 
+  /// Takes the default identifiers of a set.
+  void choose_ids(IdSet set, bool with_29_bits) noexcept {
+    id_set = set;
+    extended = with_29_bits;
+    base_ids = default_ids(set, with_29_bits);
+  }
+  std::uint32_t max_node() const noexcept {
+    return id_set == IdSet::kFree && !extended ? kMaxFreeNode : kMaxNode;
+  }
   double unit_of(Unit unit) const noexcept {
     switch (unit) {
       case Unit::kCurrent:

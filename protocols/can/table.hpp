@@ -13,11 +13,15 @@
 /// over this table. Little-endian throughout.
 namespace drivebench::can {
 
-/// The table version of a narrow axis; its heartbeat carries the number. An identifier or field never changes
-/// its meaning within a version.
-inline constexpr std::uint8_t kProfileVersion = 1;
-/// The table version of a wide axis.
-inline constexpr std::uint8_t kWideVersion = 2;
+/// The sets of default identifiers. `kFree` keeps clear of every identifier that CANopen (CiA 301)
+/// predefines; `kCanopen` are those of CANopen's predefined connection set.
+enum class IdSet : std::uint8_t { kFree, kCanopen };
+
+/// The version of the profile; the heartbeat of an axis carries the number. An identifier or field never
+/// changes its meaning within a version.
+constexpr std::uint8_t version_of(IdSet ids, bool wide_axis) noexcept {
+  return static_cast<std::uint8_t>((ids == IdSet::kCanopen ? 1 : 3) + (wide_axis ? 1 : 0));
+}
 
 enum class Message : std::uint8_t {
   kSync,
@@ -57,7 +61,8 @@ struct MessageRow {
   Variant variant;
   Width width;
   Sender sender;
-  std::uint32_t base_id;  ///< messages of an axis add the node id
+  std::uint32_t free_id;     ///< IdSet::kFree with 11 bits; messages of an axis add the node id
+  std::uint32_t canopen_id;  ///< IdSet::kCanopen
   bool per_node;
   std::uint8_t size;  ///< bytes
   std::span<const Field> fields;
@@ -192,14 +197,14 @@ inline constexpr auto kStateFd = std::to_array<Field>({
     real("speed", "rad/s", 32, "speed_rad_s", "speed, positive from a to b"),
     real("bus_voltage", "V", 64, "bus_voltage_v", "voltage of the DC link"),
     flags("faults", 96, 32, "faults", "fault word"),
-    counter("refused", 128, 16, "refused_commands", "commands that were refused"),
+    counter("refused", 128, 16, "refused_commands", "refused commands of the controller"),
     counter("late_ticks", 144, 16, "late_ticks", "ticks of the bench that started after their time"),
 });
 inline constexpr auto kCounters = std::to_array<Field>({
     counter("command_tick", 0, 16, "command_tick",
             "low bits of the tick that the command in force answered; all ones in state 0: none yet"),
     counter("missed", 16, 16, "missed_commands", "commands that were owed and did not come"),
-    counter("refused", 32, 16, "refused_commands", "commands that were refused"),
+    counter("refused", 32, 16, "refused_commands", "refused commands of the controller"),
     counter("late_ticks", 48, 8, "late_ticks", "ticks of the bench that started after their time"),
     choice("state", 56, "state", "0 idle, 1 run, 2 hold, 3 timeout, 4 fault, 5 ready"),
 });
@@ -270,9 +275,10 @@ inline constexpr std::size_t kMaxFields = 18;
 inline constexpr std::size_t kEdgesPerFrame = 26;
 inline constexpr std::size_t kFirstEdgeByte = 12;
 
-/// Sorted by base id. Node ids are 1..127 as in the predefined connection set of CANopen, and SYNC,
-/// emergency, heartbeat and process data have its identifiers. phase_command, phases and details use
-/// identifiers that it leaves free or gives to SDO, which the bench does not speak.
+/// Sorted by free_id, so that on a busy bus the commands come before the samples and these before the state.
+/// CiA 301 predefines 0x000, 0x080..0x67F and 0x700..0x77F. Of the rest this table leaves out 0x001 (CiA 304:
+/// global failsafe command), 0x6E0..0x6FF (restricted by CiA 301), 0x7DF..0x7EF (diagnosis of vehicles; LSS
+/// of CiA 305) and above. The encoder frame is below the currents frame, which ends a sample.
 inline constexpr auto kMessages = [] {
   using namespace table_detail;
   using enum Message;
@@ -282,49 +288,53 @@ inline constexpr auto kMessages = [] {
   constexpr std::span kAllSensors(table_detail::kSensors);
   constexpr std::span kWholeCommand(kCommandFd);
   return std::to_array<MessageRow>({
-      {kSync, "sync", kBoth, kAny, kBench, 0x080, false, 5, table_detail::kSync,
+      {kSync, "sync", kBoth, kAny, kBench, 0x008, 0x080, false, 5, table_detail::kSync,
        "a tick begins; sent after the samples of its start"},
-      {kFault, "fault", kBoth, kAny, kBench, 0x080, true, 8, table_detail::kFault,
+      {kFault, "fault", kBoth, kAny, kBench, 0x010, 0x080, true, 8, table_detail::kFault,
        "the fault word has changed"},
-      {kPhaseCommand, "phase_command", kClassic, kWide, kController, 0x100, true, 8,
+      {kPhaseCommand, "phase_command", kClassic, kWide, kController, 0x020, 0x100, true, 8,
        table_detail::kPhaseCommand,
        "setpoints of phase c and of the field; they are kept and take effect with the command of the same "
        "tick, "
        "mode and lease, which follows"},
-      {kCurrents, "currents", kClassic, kAny, kBench, 0x180, true, 8, table_detail::kCurrents,
-       "phase currents of a sample; follows the encoder frame of the same tick"},
-      {kSensors, "sensors", kFd, kNarrow, kBench, 0x180, true, 32, kAllSensors.first(kNarrowSensorFields),
-       "all sensors of a sample"},
-      {kSensors, "sensors", kFd, kWide, kBench, 0x180, true, 64, kAllSensors, "all sensors of a sample"},
-      {kCommand, "command", kClassic, kAny, kController, 0x200, true, 8, table_detail::kCommand,
+      {kCommand, "command", kClassic, kAny, kController, 0x030, 0x200, true, 8, table_detail::kCommand,
        "set-points of the amplifier"},
-      {kCommand, "command", kFd, kNarrow, kController, 0x200, true, 16,
+      {kCommand, "command", kFd, kNarrow, kController, 0x030, 0x200, true, 16,
        kWholeCommand.first(kNarrowCommandFields), "set-points of the amplifier"},
-      {kCommand, "command", kFd, kWide, kController, 0x200, true, 24, kWholeCommand,
+      {kCommand, "command", kFd, kWide, kController, 0x030, 0x200, true, 24, kWholeCommand,
        "set-points of the amplifier"},
-      {kEncoder, "encoder", kClassic, kAny, kBench, 0x280, true, 8, table_detail::kEncoder,
+      {kEncoder, "encoder", kClassic, kAny, kBench, 0x040, 0x280, true, 8, table_detail::kEncoder,
        "encoder count and edge times; flags and tick stand in the currents frame that follows"},
-      {kRequest, "request", kBoth, kAny, kController, 0x300, true, 8, table_detail::kRequest,
-       "takes, renews or gives back the lease, or clears faults"},
-      {kReply, "reply", kBoth, kAny, kBench, 0x380, true, 8, table_detail::kReply,
-       "the answer to a request, or why a command was refused"},
-      {kState, "state", kClassic, kAny, kBench, 0x400, true, 8, table_detail::kState, "state of the drive"},
-      {kState, "state", kFd, kAny, kBench, 0x400, true, 20, table_detail::kStateFd, "state of the drive"},
-      {kCounters, "counters", kClassic, kAny, kBench, 0x480, true, 8, table_detail::kCounters,
-       "what became of the commands"},
-      {kIndex, "index", kBoth, kAny, kBench, 0x500, true, 8, table_detail::kIndex, "the index line rose"},
-      {kEdges, "edges", kFd, kAny, kBench, 0x580, true, 64, table_detail::kEdges,
-       "the edges of the encoder lines A and B within a tick"},
-      {kPhases, "phases", kClassic, kWide, kBench, 0x600, true, 8, table_detail::kPhases,
+      {kPhases, "phases", kClassic, kWide, kBench, 0x050, 0x600, true, 8, table_detail::kPhases,
        "the other currents of a sample and the Hall lines; stands between the encoder frame and the currents "
        "frame of the same tick"},
-      {kControllerHeartbeat, "controller_heartbeat", kBoth, kAny, kController, 0x680, true, 1,
+      {kCurrents, "currents", kClassic, kAny, kBench, 0x060, 0x180, true, 8, table_detail::kCurrents,
+       "phase currents of a sample; follows the encoder frame of the same tick"},
+      {kSensors, "sensors", kFd, kNarrow, kBench, 0x060, 0x180, true, 32,
+       kAllSensors.first(kNarrowSensorFields), "all sensors of a sample"},
+      {kSensors, "sensors", kFd, kWide, kBench, 0x060, 0x180, true, 64, kAllSensors,
+       "all sensors of a sample"},
+      {kRequest, "request", kBoth, kAny, kController, 0x070, 0x300, true, 8, table_detail::kRequest,
+       "takes, renews or gives back the lease, or clears faults"},
+      {kReply, "reply", kBoth, kAny, kBench, 0x680, 0x380, true, 8, table_detail::kReply,
+       "the answer to a request, or why a command was refused"},
+      {kState, "state", kClassic, kAny, kBench, 0x690, 0x400, true, 8, table_detail::kState,
+       "state of the drive"},
+      {kState, "state", kFd, kAny, kBench, 0x690, 0x400, true, 20, table_detail::kStateFd,
+       "state of the drive"},
+      {kCounters, "counters", kClassic, kAny, kBench, 0x6A0, 0x480, true, 8, table_detail::kCounters,
+       "what became of the commands"},
+      {kIndex, "index", kBoth, kAny, kBench, 0x6B0, 0x500, true, 8, table_detail::kIndex,
+       "the index line rose"},
+      {kEdges, "edges", kFd, kAny, kBench, 0x6C0, 0x580, true, 64, table_detail::kEdges,
+       "the edges of the encoder lines A and B within a tick"},
+      {kControllerHeartbeat, "controller_heartbeat", kBoth, kAny, kController, 0x780, 0x680, true, 1,
        table_detail::kControllerHeartbeat, "the controller lives; once seen, it is monitored"},
-      {kHeartbeat, "heartbeat", kBoth, kAny, kBench, 0x700, true, 8, table_detail::kHeartbeat,
+      {kHeartbeat, "heartbeat", kBoth, kAny, kBench, 0x790, 0x700, true, 8, table_detail::kHeartbeat,
        "the bench lives"},
-      {kDetails, "details", kClassic, kWide, kBench, 0x780, true, 8, table_detail::kDetails,
+      {kDetails, "details", kClassic, kWide, kBench, 0x7A0, 0x780, true, 8, table_detail::kDetails,
        "voltages, temperature, speed sensors and injected faults, a page at a time"},
-      {kDetails, "details", kFd, kWide, kBench, 0x780, true, 48, kDetailsFd,
+      {kDetails, "details", kFd, kWide, kBench, 0x7A0, 0x780, true, 48, kDetailsFd,
        "voltages, power analyser and injected faults"},
   });
 }();

@@ -29,7 +29,7 @@ for message in can.LogReader("run.log"):
 ```
 
 * cantools: `candump can0 | python3 -m cantools decode bench.dbc`.
-* Wireshark opens `run.log` as it is; `tshark -r run.log -Y "can.id == 0x181" -x` prints identifiers and bytes, to be read with the tables above.
+* Wireshark opens `run.log` as it is; `tshark -r run.log -Y "can.id == 0x061" -x` prints identifiers and bytes, to be read with the tables above.
 )";
 
 std::string hex(std::uint32_t value, int digits) {
@@ -270,8 +270,8 @@ std::vector<const MessageRow*> rows_of(const Profile& profile, std::span<const B
   return rows;
 }
 
-unsigned version_of(std::span<const BusAxis> axes) {
-  return std::ranges::any_of(axes, &BusAxis::wide) ? kWideVersion : kProfileVersion;
+unsigned version_of(const Profile& profile, std::span<const BusAxis> axes) {
+  return version_of(profile.id_set, std::ranges::any_of(axes, &BusAxis::wide));
 }
 
 std::string number_text(double value, int digits) {
@@ -284,7 +284,8 @@ std::string number_text(double value, int digits) {
 std::string table_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes) {
   const std::vector<const MessageRow*> rows = rows_of(profile, axes);
   std::string text = "# CAN messages of " + std::string(bench) + "\n\nVersion " +
-                     std::to_string(version_of(axes)) + " of the profile. " + conventions_text(profile);
+                     std::to_string(version_of(profile, axes)) + " of the profile. " +
+                     conventions_text(profile);
   text += identifiers_text(profile, axes, rows);
   text += "## Fields\n\n";
   for (const MessageRow* row : rows)

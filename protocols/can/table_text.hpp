@@ -35,7 +35,7 @@ std::vector<const MessageRow*> rows_of(const Profile& profile);
 /// The rows that these axes use; without axes, those of one narrow axis.
 std::vector<const MessageRow*> rows_of(const Profile& profile, std::span<const BusAxis> axes);
 /// The lowest version that covers all these axes.
-unsigned version_of(std::span<const BusAxis> axes);
+unsigned version_of(const Profile& profile, std::span<const BusAxis> axes);
 
 /// The number, rounded to `digits` digits.
 std::string number_text(double value, int digits);

@@ -218,7 +218,11 @@ BenchConfig parse(std::string_view text, const std::string& name, const std::fil
     const bool wide = std::any_of(axes.begin(), axes.end(), [](const AxisReading& axis) {
       return terminals_of(axis.setup.parameters).is_wide();
     });
-    config.can = read_can(root, wide);
+    std::vector<std::uint32_t> nodes;
+    nodes.reserve(axes.size());
+    for (const AxisReading& axis : axes)
+      nodes.push_back(axis.config.can_node);
+    config.can = read_can(root, nodes, wide);
     read_modbus(root.table("modbus"), config.modbus);
     read_experiments(root.table("experiments"), folder, config.experiments);
     read_audit(root.table("audit"), folder, config.audit);

@@ -88,6 +88,7 @@ void append_can(std::string& text, const CanConfig& bus) {
   append(text, "required", boolean(bus.required));
   append(text, "fd", boolean(bus.profile.fd));
   append(text, "extended", boolean(bus.profile.extended));
+  append(text, "identifiers", in_quotes(can::kIdSetNames[static_cast<std::size_t>(bus.profile.id_set)]));
   append(text, "bit_rate", std::to_string(bus.bit_rate));
   append(text, "data_bit_rate", std::to_string(bus.data_bit_rate));
   append(text, "sample_every_ticks", std::to_string(bus.sample_every_ticks));

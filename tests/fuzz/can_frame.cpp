@@ -17,7 +17,7 @@ constexpr std::size_t kHead = 6;
 Profile profile_of(unsigned flags) {
   Profile profile;
   profile.fd = (flags & 1) != 0;
-  profile.extended = (flags & 2) != 0;
+  profile.choose_ids((flags & 128) != 0 ? IdSet::kCanopen : IdSet::kFree, (flags & 2) != 0);
   profile.wide = (flags & 64) != 0;
   return profile;
 }

@@ -53,10 +53,10 @@ class Drive:
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0:
             message = self.bus.recv(left)
-            if message is None or message.is_error_frame:
+            if message is None or message.is_error_frame or message.is_remote_frame:
                 continue
             frame = self.by_id.get((message.arbitration_id, bool(message.is_extended_id)))
-            if frame is None:
+            if frame is None or len(message.data) != frame.size:  # of another device
                 continue
             name = frame.name.removeprefix(self.axis + "_")
             values = {key: value.raw_value if value.signal.is_float else float(value.phys_value)

@@ -73,7 +73,8 @@ void CandumpText::end_tick() {
 
 std::uint32_t CandumpText::node(std::uint32_t axis) const {
   const std::uint64_t node = std::uint64_t{address_.node} + axis;
-  if (node > can::kMaxNode) throw UsageError(fmt::format("axis {} would have node id {}", axis, node));
+  if (node > address_.profile.max_node())
+    throw UsageError(fmt::format("axis {} would have node id {}", axis, node));
   return static_cast<std::uint32_t>(node);
 }
 

@@ -14,7 +14,7 @@ constexpr std::int64_t kLongestGap = 64;
 
 std::vector<std::string> InductionDriveParameters::problems() const {
   std::vector<std::string> found = range_problems(*this);
-  if (motor.leakage() <= 0.0) {  // a number that is none has been told already
+  if (motor.leakage() <= 0.0) {  // not for NaN, which was reported before
     found.emplace_back("machine.mutual_inductance_h must be below the root of both inductances' product");
   }
   return found;

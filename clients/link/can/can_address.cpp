@@ -1,10 +1,12 @@
 #include "clients/link/can/can_address.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "clients/link/can/can_bus_kind.hpp"
 #include "clients/link/common/address.hpp"
@@ -91,13 +93,29 @@ bool read_unit(std::string_view text, std::string_view key, std::string_view val
   return false;
 }
 
+can::IdSet id_set_named(std::string_view text, std::string_view name) {
+  const auto found = std::ranges::find(can::kIdSetNames, name);
+  if (found == can::kIdSetNames.end()) bad(text, "identifiers must be free or canopen");
+  return static_cast<can::IdSet>(found - can::kIdSetNames.begin());
+}
+
+/// Reads the keys that choose the default identifiers; other keys change some of these. False: another key.
+bool read_choice(std::string_view text, std::string_view key, std::string_view value, can::Profile& profile) {
+  if (key == "extended") {
+    profile.choose_ids(profile.id_set, read_switch(text, key, value));
+  } else if (key == "identifiers") {
+    profile.choose_ids(id_set_named(text, value), profile.extended);
+  } else {
+    return false;
+  }
+  return true;
+}
+
 void read_key(std::string_view text, std::string_view key, std::string_view value, CanAddress& address) {
   if (key == "node") {
     address.node = whole(value).value_or(0);
   } else if (key == "fd") {
     address.profile.fd = read_switch(text, key, value);
-  } else if (key == "extended") {
-    address.profile.extended = read_switch(text, key, value);
   } else if (key == "bus") {
     address.bus = value;
   } else if (key == "bit_rate") {
@@ -108,8 +126,8 @@ void read_key(std::string_view text, std::string_view key, std::string_view valu
     if (!can::slcan_data_bit_rate(address.data_bit_rate)) bad(text, "adapters have no such data bit rate");
   } else if (!read_id(text, key, value, address.profile) && !read_unit(text, key, value, address.profile)) {
     bad(text, "there is no key '" + std::string(key) +
-                  "'; there are node, fd, extended, bus, bit_rate, data_bit_rate, the names of messages and "
-                  "of units");
+                  "'; there are node, fd, extended, identifiers, bus, bit_rate, data_bit_rate, the names of "
+                  "messages and of units");
   }
 }
 
@@ -126,12 +144,15 @@ CanAddress parse_can_address(std::string_view text) {
   address.backend = backend_named(text, name);
   const std::string rule = bus_kind(address.backend).read_channel(channel, address);
   if (!rule.empty()) bad(text, rule);
+  std::vector<std::pair<std::string_view, std::string_view>> changes;
   for (std::string_view rest = keys; !rest.empty();) {
     const auto [pair, after] = split(rest, '&');
     const auto [key, value] = split(pair, '=');
-    read_key(text, key, value, address);
+    if (!read_choice(text, key, value, address.profile)) changes.emplace_back(key, value);
     rest = after;
   }
+  for (const auto& [key, value] : changes)
+    read_key(text, key, value, address);
   const std::array<std::uint32_t, 1> nodes = {address.node};
   for (const can::ProfileProblem& problem : can::problems(address.profile, nodes)) {
     bad(text, problem.field + " " + problem.rule);

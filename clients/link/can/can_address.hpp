@@ -27,8 +27,8 @@ struct CanAddress {
 bool is_can_address(std::string_view text) noexcept;
 
 /// `can:BACKEND:CHANNEL[?KEY=VALUE&...]`, for example `can:socketcan:vcan0?node=2&fd=0&command=0x210`. Keys:
-/// node, fd, extended, bus, bit_rate, data_bit_rate, the names of the messages (their base identifiers) and
-/// of the units of can::Profile. Throws AddressError.
+/// node, fd, extended, identifiers (free, canopen), bus, bit_rate, data_bit_rate, the names of the messages
+/// (their base identifiers) and of the units of can::Profile. Throws AddressError.
 CanAddress parse_can_address(std::string_view text);
 
 /// Without keys: "can:socketcan:vcan0".

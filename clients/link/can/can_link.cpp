@@ -4,7 +4,8 @@
 #include <array>
 #include <random>
 #include <utility>
-#include <vector>
+
+#include "clients/link/can/can_versions.hpp"
 
 namespace drivebench::link {
 namespace {
@@ -55,18 +56,10 @@ std::uint32_t as_code(double value) {
   return static_cast<std::uint32_t>(value);
 }
 
-std::vector<std::uint32_t> bench_ids(const CanAddress& address) {
-  std::vector<std::uint32_t> ids;
-  for (const can::MessageRow& row : can::kMessages) {
-    if (row.sender == can::Sender::kBench) ids.push_back(address.profile.id_of(row, address.node));
-  }
-  return ids;
-}
-
 }  // namespace
 
 CanLink::CanLink(const CanAddress& address, const CanLinkOptions& options)
-    : CanLink(open_can_bus(address, options.deadline, bench_ids(address)), address, to_string(address),
+    : CanLink(open_can_bus(address, options.deadline, heard_ids(address)), address, to_string(address),
               options) {}
 
 CanLink::CanLink(std::unique_ptr<CanBus> bus, const CanAddress& address, std::string name,
@@ -247,6 +240,7 @@ void CanLink::await(const std::string& what, Done done, Repeat repeat) {
         text += "; its frames have another form (" + std::string(can::name_of(misfit_)) +
                 "): do both ends agree on fd, extended and the identifiers?";
       }
+      if (other_version_ != 0) text += "; it " + other_version_text(other_version_, profile_);
       throw LinkError(text);
     }
     if (received) continue;
@@ -261,7 +255,12 @@ bool CanLink::receive(Clock::time_point until) {
   const can::Match match = can::match(profile_, *frame);
   const bool is_mine = match.row != nullptr && match.row->sender == can::Sender::kBench &&
                        (!match.row->per_node || match.node == node_);
-  if (!is_mine) return true;
+  if (!is_mine) {
+    if (bench_.period_s() == 0.0) {
+      other_version_ = other_version_in(*frame, profile_, node_).value_or(other_version_);
+    }
+    return true;
+  }
   if (match.ok()) {
     take(*match.row, can::decode(*match.row, profile_, *frame));
   } else {
@@ -321,13 +320,12 @@ void CanLink::take_heartbeat(const can::Values& values) {
     return values[index_of(Message::kHeartbeat, true, name)];
   };
   const unsigned version = as_code(field("profile"));
-  if (version != can::kProfileVersion && version != can::kWideVersion) {
-    throw LinkError(name_ + " speaks version " + std::to_string(version) +
-                    " of the frame table, this program " + "versions " +
-                    std::to_string(can::kProfileVersion) + " and " + std::to_string(can::kWideVersion));
+  const bool is_wide = version == can::version_of(profile_.id_set, true);
+  if (!is_wide && version != can::version_of(profile_.id_set, false)) {
+    throw LinkError(name_ + " " + other_version_text(version, profile_));
   }
   if (as_code(field("state")) == kStopped) throw LinkError(name_ + " has stopped");
-  profile_.wide = version == can::kWideVersion;
+  profile_.wide = is_wide;
   known_ = signals_in(profile_);
   bench_.set_period_s(field("period_us") * 1e-6);
 }

@@ -85,6 +85,7 @@ class CanLink final : public AxisLink {
   bool has_state_ = false;
   bool has_counters_ = false;
   can::FrameProblem misfit_ = can::FrameProblem::kNone;  // the last problem of a frame of the bench
+  unsigned other_version_ = 0;  // of a bench that sends its heartbeat with the identifiers of the other set
   std::uint64_t commanded_tick_ = 0;
   std::optional<can::Result> command_result_;    // of the command for it, if the bench refused it
   can::Request asked_ = can::Request::kCommand;  // the request that waits for an answer; kCommand: none

@@ -176,7 +176,7 @@ void read_ids(StrictTable ids, can::Profile& profile) {
   const std::uint32_t largest = profile.extended ? can::kMaxExtendedId : can::kMaxStandardId;
   for (std::size_t i = 0; i < kCanMessages.size(); ++i) {
     const can::MessageRow& row = *kCanMessages[i];
-    const auto id = ids.hexadecimal_integer(row.name, 0, largest - (row.per_node ? can::kMaxNode : 0));
+    const auto id = ids.hexadecimal_integer(row.name, 0, largest - (row.per_node ? profile.max_node() : 0));
     profile.base_ids[i] = static_cast<std::uint32_t>(id.value_or(profile.base_ids[i]));
   }
   for (const can::ProfileProblem& problem : can::problems(profile)) {
@@ -196,9 +196,18 @@ void read_units(StrictTable units, can::Profile& profile) {
   units.finish();
 }
 
-void read_profile(StrictTable& table, CanConfig& bus) {
+void read_profile(StrictTable& table, std::span<const std::uint32_t> nodes, CanConfig& bus) {
   bus.profile.fd = table.boolean("fd").value_or(bus.profile.fd);
-  bus.profile.extended = table.boolean("extended").value_or(bus.profile.extended);
+  const bool extended = table.boolean("extended").value_or(bus.profile.extended);
+  const std::size_t set = table.choice("identifiers", can::kIdSetNames).value_or(0);
+  bus.profile.choose_ids(static_cast<can::IdSet>(set), extended);
+  for (const std::uint32_t node : nodes) {
+    if (node <= bus.profile.max_node()) continue;
+    table.report("identifiers", "is \"free\", which has room for nodes 1 to " +
+                                    std::to_string(bus.profile.max_node()) + ", but an axis has node " +
+                                    std::to_string(node) +
+                                    ": extended = true and identifiers = \"canopen\" have room for 127");
+  }
   bus.edges = table.boolean("edges").value_or(bus.edges);
   if (bus.edges && !bus.profile.fd) {
     table.report("edges", "is true but must be false without fd = true: the edges of a tick need 64 bytes");
@@ -232,7 +241,7 @@ constexpr auto kBackendWords = [] {
 
 }  // namespace
 
-std::vector<CanConfig> read_can(StrictTable& root, bool wide) {
+std::vector<CanConfig> read_can(StrictTable& root, std::span<const std::uint32_t> nodes, bool wide) {
   std::vector<CanConfig> buses;
   for (StrictTable& table : root.tables("can", kMaxCanBuses)) {
     CanConfig bus;
@@ -249,7 +258,7 @@ std::vector<CanConfig> read_can(StrictTable& root, bool wide) {
       table.integer("port", 0, 65535);
     }
     bus.required = table.boolean("required").value_or(bus.required);
-    read_profile(table, bus);
+    read_profile(table, nodes, bus);
     read_rates(table, bus);
     read_times(table, bus);
     table.finish();

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -11,8 +13,9 @@
 
 namespace drivebench {
 
-/// Reads all [[can]] sections. `wide`: the bench has a wide axis, whose frames need identifiers too.
-std::vector<CanConfig> read_can(StrictTable& root, bool wide);
+/// Reads all [[can]] sections. `nodes`: of the axes. `wide`: the bench has a wide axis, whose frames need
+/// identifiers too.
+std::vector<CanConfig> read_can(StrictTable& root, std::span<const std::uint32_t> nodes, bool wide);
 
 /// A row for each Message. Rows of one message have the same name and the same use of the node id.
 inline constexpr auto kCanMessages = [] {

@@ -9,14 +9,8 @@
 namespace drivebench::can {
 namespace {
 
-// After a frame of another bench with its identifiers a bench stays silent for this long.
-constexpr auto kConflictPause = std::chrono::seconds(10);
 // As fine as the shortest time-out of the configuration.
 constexpr auto kTimerPeriod = std::chrono::milliseconds(10);
-// States of a heartbeat.
-constexpr double kBootUp = 0.0;
-constexpr double kStopped = 4.0;
-constexpr double kOperational = 5.0;
 
 std::string_view name_of(BusState state) noexcept {
   switch (state) {
@@ -115,10 +109,11 @@ void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
   Node* const node = find_node(found.node);
   if (node != nullptr && !is_for(*node, *found.row)) return;
   if (from_bench(found)) {
-    if (!found.row->per_node || node != nullptr) note_conflict(frame);
+    if (!found.row->per_node || node != nullptr) note_conflict(frame, node);
     return;
   }
-  if (node == nullptr || !transmitting_) return;  // no answer could be sent
+  if (node == nullptr) return;
+  if (node->conflict.is_silent() && node->seat.owner() == 0) return;  // no answer could be sent
   const Values values = decode(*found.row, config_.profile, frame);
   switch (found.row->message) {
     case Message::kCommand:
@@ -197,10 +192,11 @@ void Endpoint::acquire(Node& node, std::uint32_t controller) {
     return turn_away(node, Request::kAcquire, controller, Refused::kOwned);
   }
   node.controller = controller;
-  node.seat.ask(LeaseAction::kAcquire, node.seat.number_for(client_of(controller)),
-                [this, &node, controller](Refused refused, Tick tick) {
-                  on_acquired(node, controller, refused, tick);
-                });
+  const Client client = client_of(controller);
+  node.seat.ask(
+      LeaseAction::kAcquire, node.seat.number_for(client),
+      [this, &node, controller](Refused refused, Tick tick) { on_acquired(node, controller, refused, tick); },
+      &client);
 }
 
 void Endpoint::on_acquired(Node& node, std::uint32_t controller, Refused refused, Tick tick) {
@@ -209,8 +205,11 @@ void Endpoint::on_acquired(Node& node, std::uint32_t controller, Refused refused
     log_refusal(node, "the lease", sentence_of(refused));
     return reply(node, Request::kAcquire, refused, controller, 0, tick);
   }
-  if (!transmitting_) return lose(node, "another bench has its identifiers");  // noticed since the request
-  if (node.lease == 0) {
+  const bool is_new = node.lease == 0;
+  if (is_new && node.conflict.is_silent()) {  // since the request
+    return lose(node, "another bench has its identifiers");
+  }
+  if (is_new) {
     node.lease = node.last_lease = static_cast<std::uint8_t>(node.last_lease % 255 + 1);
     node.commanded_at = -1;
   }
@@ -261,21 +260,6 @@ void Endpoint::log_loss(const Node& node, std::string_view why) {
                loss_log_.held_back());
 }
 
-void Endpoint::note_conflict(const Frame& frame) {
-  ++conflicts_;
-  conflict_ = Clock::now();
-  if (conflict_log_.allow()) {
-    spdlog::error("{}: ID_CONFLICT: another bench sends with identifier {:#x}; this one falls silent here",
-                  bus_->name(), frame.id);
-  }
-  if (!transmitting_) return;
-  for (Node& node : nodes_) {
-    if (node.seat.owner() != 0) lose(node, "another bench has its identifiers");
-    send_heartbeat(node, kStopped);  // so that the other bench notices as well
-  }
-  transmitting_ = false;
-}
-
 void Endpoint::on_state() {
   const BusState state = bus_->status().state;
   if (state == last_state_) return;
@@ -301,7 +285,7 @@ void Endpoint::arm_timer() {
 
 void Endpoint::on_timer() {
   const Clock::time_point now = Clock::now();
-  if (!transmitting_ && now - conflict_ > kConflictPause) transmitting_ = true;
+  look_at_conflicts(now);
   measure_latency_ = true;
   // All nodes before look_after(): if an axis loses its lease there, the next tick may begin for the others.
   const Tick tick = engine_->tick();
@@ -336,7 +320,7 @@ void Endpoint::look_after(Node& node, Clock::time_point now) {
 TransportReport Endpoint::report() const {
   const BusStatus& status = bus_->status();
   TransportReport report{.name = "can " + bus_->name(),
-                         .state = transmitting_ ? std::string(name_of(status.state)) : "ID_CONFLICT",
+                         .state = has_conflict() ? "ID_CONFLICT" : std::string(name_of(status.state)),
                          .counts = {{"sent", status.sent},
                                     {"confirmed", status.confirmed},
                                     {"received", status.received},
@@ -346,6 +330,7 @@ TransportReport Endpoint::report() const {
                                     {"malformed", status.malformed},
                                     {"commands", commands_},
                                     {"refused", refused_},
+                                    {"not_owner", not_owner_},
                                     {"turned_away", turned_away_},
                                     {"conflicts", conflicts_},
                                     {"heartbeats_lost", heartbeats_lost_},

@@ -13,6 +13,7 @@
 #include "server/access/seat.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/endpoints/can/buses/bus.hpp"
+#include "server/endpoints/can/conflict.hpp"
 #include "server/endpoints/log_limit.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine/engine.hpp"
@@ -36,6 +37,11 @@ class Endpoint {
 
  private:
   using Clock = ServerClock;
+
+  // States of a heartbeat.
+  static constexpr double kBootUp = 0.0;
+  static constexpr double kStopped = 4.0;
+  static constexpr double kOperational = 5.0;
 
   /// The set-points of phase c and the field, which wait for the command of their tick.
   struct PhaseSetpoints {
@@ -64,6 +70,7 @@ class Endpoint {
     std::int64_t index_tick = -1;
     std::int64_t edges_tick = -1;
     std::optional<Sample> due{};  ///< a sample that is to be sent
+    Conflict conflict{};
 
     bool wide() const noexcept { return terminals.is_wide(); }
   };
@@ -80,7 +87,7 @@ class Endpoint {
   void act(Node& node, Request request, std::uint32_t controller);
   bool is_for(const Node& node, const MessageRow& row);
   Tick answered_by(const Node& node, const MessageRow& row, const CommandFields& given) const;
-  /// Refuses a command before it reaches the bench, and has the bench count it.
+  /// Refuses a command before it reaches the bench, which counts it if the owner sent it.
   void refuse(const Node& node, Owner sender, Refused refused, const CommandFields& given,
               std::string_view why = {});
   /// Refuses a request before it reaches the bench.
@@ -90,7 +97,10 @@ class Endpoint {
   void log_refusal(const Node& node, std::string_view what, std::string_view why);
   void log_loss(const Node& node, std::string_view why);
   void lose(Node& node, const char* why);
-  void note_conflict(const Frame& frame);
+  void note_conflict(const Frame& frame, Node* node);
+  void fall_silent(Node& node, Clock::time_point now);
+  void look_at_conflicts(Clock::time_point now);
+  bool has_conflict() const;
 
   void on_tick();
   void on_newest();
@@ -101,6 +111,7 @@ class Endpoint {
 
   bool lockstep() const { return engine_->config().mode == RunMode::kLockstep; }
   Node* find_node(std::uint32_t id);
+  void put(const Node& node, const Frame& frame);
   void put(const Frame& frame);
   void send(Message message, const Node& node, std::span<const double> values);
   void send_sample(Message message, const Node& node, const Sample& sample, Page page = Page{});
@@ -121,14 +132,14 @@ class Endpoint {
   std::vector<Node> nodes_;
   std::vector<Frame> together_;  ///< frames of one tick, to be sent in one go
   bool collecting_ = false;
-  Clock::time_point conflict_{};  ///< time of the last frame of another bench
+  Conflict sync_conflict_;
   Clock::time_point next_heartbeat_{};
   bool closed_ = false;
-  bool transmitting_ = true;  ///< no other bench has our identifiers
   BusState last_state_ = BusState::kAbsent;
   std::array<std::uint64_t, kFrameProblems> problems_{};
   std::uint64_t commands_ = 0;
-  std::uint64_t refused_ = 0;
+  std::uint64_t refused_ = 0;      ///< commands and requests
+  std::uint64_t not_owner_ = 0;    ///< of these, those without the lease, which are no part of the run
   std::uint64_t turned_away_ = 0;  ///< clients of the bus that were refused or cut off
   std::uint64_t conflicts_ = 0;
   std::uint64_t heartbeats_lost_ = 0;

@@ -34,7 +34,7 @@ Tick Endpoint::answered_by(const Node& node, const MessageRow& row, const Comman
 
 void Endpoint::on_phase_command(Node& node, const MessageRow& row, const Values& values) {
   const CommandFields given = setpoints_in(row, values);
-  // Ignored without the lease: the bench refuses the command that follows, and answers it.
+  // Ignored without the lease: the command that follows is refused and answered.
   if (node.seat.owner() == 0 || given.lease != node.lease) return;
   node.spoke = true;
   node.phases = {
@@ -45,8 +45,7 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   ++commands_;
   CommandFields given = setpoints_in(row, values);
   const Tick answers = answered_by(node, row, given);
-  // Without the lease the command goes to the bench without an owner, so that the bench refuses and counts
-  // it.
+  // 0: without the lease the bench refuses the command.
   const Owner owner = given.lease == node.lease ? node.seat.owner() : 0;
   if (owner != 0) node.spoke = true;
   if (given.mode > kLastMode) {
@@ -84,8 +83,10 @@ void Endpoint::refuse(const Node& node, Owner sender, Refused refused, const Com
                       std::string_view why) {
   if (why.empty()) why = sentence_of(refused);
   ++refused_;
-  engine_->request({.tick = 0, .axis = node.axis, .owner = sender, .action = RefusedCommand{true}},
-                   [](Refused, Tick) {});
+  if (sender != 0) {
+    engine_->request({.tick = 0, .axis = node.axis, .owner = sender, .action = RefusedCommand{true}},
+                     [](Refused, Tick) {});
+  }
   log_refusal(node, "a command", why);
   reply(node, Request::kCommand, refused, 0, static_cast<std::uint8_t>(given.lease),
         static_cast<std::int64_t>(given.tick));

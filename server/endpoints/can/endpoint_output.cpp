@@ -5,8 +5,11 @@
 
 namespace drivebench::can {
 
+void Endpoint::put(const Node& node, const Frame& frame) {
+  if (!node.conflict.is_silent() && !closed_) put(frame);
+}
+
 void Endpoint::put(const Frame& frame) {
-  if (!transmitting_ || closed_) return;
   if (collecting_) {
     together_.push_back(frame);
   } else {
@@ -16,12 +19,12 @@ void Endpoint::put(const Frame& frame) {
 
 void Endpoint::send(Message message, const Node& node, std::span<const double> values) {
   const MessageRow* const row = find_message(message, config_.profile.fd, node.wide());
-  put(encode(*row, config_.profile, node.id, values));
+  put(node, encode(*row, config_.profile, node.id, values));
 }
 
 void Endpoint::send_sample(Message message, const Node& node, const Sample& sample, Page page) {
   const MessageRow* const row = find_message(message, config_.profile.fd, node.wide());
-  put(encode_sample(*row, config_.profile, node.id, sample, page));
+  put(node, encode_sample(*row, config_.profile, node.id, sample, page));
 }
 
 void Endpoint::on_tick() {
@@ -115,26 +118,31 @@ void Endpoint::send_edges(Node& node) {
       put_edge(frame, i, {.time = static_cast<std::uint16_t>(packed & 0x7FFFu), .down = down});
       count += down ? -1 : 1;
     }
-    put(frame);
+    put(node, frame);
     sent += size;
     if (size == 0) break;
   }
 }
 
 void Endpoint::send_sync(std::uint64_t tick) {
-  send(Message::kSync, nodes_.front(), std::array{static_cast<double>(tick), lockstep() ? 1.0 : 0.0});
+  const bool has_samples =  // SYNC says that they are out
+      std::ranges::any_of(nodes_, [](const Node& node) { return !node.conflict.is_silent(); });
+  if (!has_samples || sync_conflict_.is_silent() || closed_) return;
+  const MessageRow& row = *find_message(Message::kSync, config_.profile.fd);
+  put(encode(row, config_.profile, 0, std::array{static_cast<double>(tick), lockstep() ? 1.0 : 0.0}));
 }
 
 void Endpoint::send_heartbeat(const Node& node, double state) {
   const double period_us = static_cast<double>(engine_->config().setup.period_ns) * 1e-3;
   send(Message::kHeartbeat, node,
-       std::array{state, static_cast<double>(node.wide() ? kWideVersion : kProfileVersion),
+       std::array{state, static_cast<double>(version_of(config_.profile.id_set, node.wide())),
                   static_cast<double>(engine_->newest(node.axis).state), static_cast<double>(node.lease),
                   period_us});
 }
 
 void Endpoint::reply(const Node& node, Request request, Refused refused, std::uint32_t controller,
                      std::uint8_t lease, std::int64_t tick) {
+  if (lacks_lease(refused)) ++not_owner_;
   send(Message::kReply, node,
        std::array{static_cast<double>(request), static_cast<double>(refusal_row(refused).can),
                   static_cast<double>(controller), static_cast<double>(lease), static_cast<double>(tick)});

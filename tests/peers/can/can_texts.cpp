@@ -55,13 +55,13 @@ int main(int argc, char** argv) {
   if (argc != 5) return 2;
   Profile profile;
   profile.fd = std::strcmp(argv[2], "fd") == 0;
-  profile.extended = std::strcmp(argv[3], "extended") == 0;
+  profile.choose_ids(IdSet::kFree, std::strcmp(argv[3], "extended") == 0);
   if (profile.extended) profile.base_ids[static_cast<std::size_t>(Message::kCommand)] = 0x12340000;
   profile.edge_time_unit_s = 2.5e-7;
   profile.wide = std::strcmp(argv[4], "wide") == 0;
   const std::vector<BusAxis> axes = {{"servo", 1, profile.wide},
                                      {"2nd \"load\" drive with a long name", 2, false},
-                                     {"2nd \"load\" drive too", 127, profile.wide}};
+                                     {"2nd \"load\" drive too", kMaxFreeNode, profile.wide}};
   if (std::strcmp(argv[1], "dbc") == 0)
     std::fputs(dbc_text("Zwei \"Achsen\" \xC3\xA4", profile, axes).c_str(), stdout);
   else if (std::strcmp(argv[1], "table") == 0)

@@ -19,7 +19,7 @@ except ImportError as missing:
 BUILT = pathlib.Path(os.environ["DRIVEBENCH_SERVER"]).parent
 VARIANTS = [(kind, ids, width) for kind in ("classic", "fd") for ids in ("standard", "extended")
             for width in ("narrow", "wide")]
-NODES = {"servo": 1, "_2nd__load_": 2, "node127": 127}
+NODES = {"servo": 1, "_2nd__load_": 2, "node15": 15}
 
 
 def texts(what, *variant):
@@ -68,7 +68,7 @@ class Dbc(unittest.TestCase):
             for node in NODES:
                 self.assertIn(f"{node}_heartbeat", names)
             self.assertEqual([node for node in NODES if f"{node}_details" in names],
-                             ["servo", "node127"] if width == "wide" else [])
+                             ["servo", "node15"] if width == "wide" else [])
             self.assertEqual([ecu.name for ecu in matrix.ecus], ["Bench", "Controller"])
             self.assertEqual(matrix.frame_by_name("servo_command").transmitters, ["Controller"])
             self.assertEqual(matrix.frame_by_name("servo_command").signals[0].receivers, ["Bench"])

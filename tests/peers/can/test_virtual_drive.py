@@ -100,23 +100,27 @@ class VirtualDrive(DriveTest):
             self.assertEqual(drive.step(tick, 1.0, 0.0)[0], tick + 1)
         self.assertEqual(server.stop(), 0)
 
+    def place_of(self, server):
+        """Address and port that the system gave the first bus of the bench."""
+        return re.search(r"[^:]+:\d+$", server.ready["can"][0])[0]
+
     # Catches: a terminal that python-can's slcan driver cannot talk to.
     def test_the_motor_starts_over_slcan(self):
         pty = self.folder / "can.pty"
         self.open_loop(['backend = "slcan"', f'channel = "pty:{pty}"'],
                        lambda _: can.Bus(interface="slcan", channel=str(pty), bitrate=1_000_000, sleep_after_open=0),
                        False)
-        self.open_loop(['backend = "slcan"', 'channel = "tcp:127.0.0.1:29600"'],
-                       lambda _: can.Bus(interface="slcan", channel="socket://127.0.0.1:29600", bitrate=1_000_000,
-                                         sleep_after_open=0), False)
+        self.open_loop(['backend = "slcan"', 'channel = "tcp:127.0.0.1:0"'],
+                       lambda server: can.Bus(interface="slcan", channel="socket://" + self.place_of(server),
+                                              bitrate=1_000_000, sleep_after_open=0), False)
 
     # Catches: a socketcand server that does not suit a client written from the protocol's description.
     def test_the_motor_starts_over_socketcand_by_hand(self):
-        text = with_bus(['backend = "socketcand"', 'channel = "127.0.0.1"', "port = 29700", "fd = false"])
+        text = with_bus(['backend = "socketcand"', 'channel = "127.0.0.1"', "port = 0", "fd = false"])
         dbc = self.text_of("dbc", text)
         recording = self.folder / "run.mcap"
         server = self.server("--record", str(recording), text=text)
-        with SocketcandBus(("127.0.0.1", 29700)) as bus:
+        with SocketcandBus(self.place_of(server).split(":")) as bus:
             counts = dbc_drive.open_loop_start(dbc_drive.Drive(bus, dbc, fd=False), TICKS)
         self.assertEqual(server.stop(), 0, server.errors())
         self.assertCountsRecorded(counts, recording)
@@ -183,17 +187,47 @@ class VirtualDrive(DriveTest):
         self.assertIn("bus 1 must carry", server.errors())
         self.assertEqual(server.stop(), 0)
 
-    # CAN-11. Catches: two benches on one bus that both go on sending.
+    # CAN-11. Catches: two benches on one bus that both go on sending, or notice each other once and forget it.
     def test_two_benches_with_the_same_node_both_notice(self):
         text = with_bus([UDP])
         first, second = self.server(text=text), self.server(text=text)
         for server in (first, second):
-            client = server.client()
-            self.addCleanup(client.close)
-            end = time.monotonic() + PATIENCE_S
-            while client.status().transports[0].state != "ID_CONFLICT":
-                self.assertLess(time.monotonic(), end, "no conflict was noticed")
-                time.sleep(0.02)
+            self.await_state(server, lambda bus: bus["state"] == "ID_CONFLICT" and bus["conflicts"] >= 2)
+
+    # CAN-15. Catches: a node scan of CANopen that a running drive notices, or that silences a bench which was given the
+    # identifiers of CANopen.
+    def test_can_15_a_drive_goes_on_after_a_node_scan(self):
+        for lines, conflicts in (([], 0), (['identifiers = "canopen"'], 1)):
+            with self.subTest(lines=lines):
+                text = with_bus([UDP, "fd = false", *lines], STAR)
+                server = self.server(text=text)
+                with can.Bus(interface="udp_multicast", channel=GROUP, fd=True) as bus:
+                    drive = dbc_drive.Drive(bus, self.text_of("dbc", text), fd=False)
+                    tick, *_ = drive.acquire()
+                    for node in range(1, 128):
+                        bus.send(can.Message(arbitration_id=0x700 + node, is_remote_frame=True, dlc=1,
+                                             is_extended_id=False))
+                        bus.send(can.Message(arbitration_id=0x600 + node, data=bytes.fromhex("4000100000000000"),
+                                             is_extended_id=False))
+                        tick, *_ = drive.step(tick, 10.0, 0.0)
+                    self.assertEqual(tick, 127)
+                    self.await_state(server, lambda bus: bus["conflicts"] == conflicts)
+                    self.assertEqual(drive.request("renew")["result"], 0, "the controller has its lease")
+                self.assertEqual(server.stop(), 0, server.errors())
+                self.assertTrue(server.verdict["exact"])
+
+    def await_state(self, server, is_reached):
+        """Waits until the state and the counts of the bus are as asked for."""
+        client = server.client()
+        self.addCleanup(client.close)
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            bus = client.status().transports[0]
+            seen = {"state": bus.state, **{count.name: count.value for count in bus.counts}}
+            if is_reached(seen):
+                return
+            self.assertLess(time.monotonic(), end, seen)
+            time.sleep(0.02)
 
 
 class SocketcandBus:

@@ -97,7 +97,7 @@ TEST(CanCodec, AFrameCarriesItsIdentifierAndKind) {
   Profile profile = profile_of(true);
   const MessageRow& row = *find_message(Message::kSensors, true);
   Frame frame = encode_sample(row, profile, 5, a_sample());
-  EXPECT_EQ(frame.id, 0x185u);
+  EXPECT_EQ(frame.id, 0x065u);
   EXPECT_EQ(frame.size, 32);
   EXPECT_TRUE(frame.fd && frame.bit_rate_switch && !frame.extended && !frame.remote && !frame.error);
 
@@ -107,7 +107,7 @@ TEST(CanCodec, AFrameCarriesItsIdentifierAndKind) {
   EXPECT_EQ(frame.id, 0x1ABCDE7Fu);
   EXPECT_TRUE(frame.extended);
 
-  EXPECT_EQ(sent(Message::kSync, false).id, 0x080u) << "has no node";
+  EXPECT_EQ(sent(Message::kSync, false).id, 0x008u) << "has no node";
   EXPECT_FALSE(sent(Message::kSync, false).fd || sent(Message::kSync, false).bit_rate_switch);
 }
 

@@ -22,13 +22,15 @@ FrameProblem problem_of(const Profile& profile, const Frame& frame) {
 // Catches: a message that is taken for another, or for another node's, at the ends of the ranges.
 TEST(CanMatch, EveryMessageOfEveryNodeIsRecognised) {
   for (const bool fd : {false, true}) {
-    for (const MessageRow& row : kMessages) {
-      if (find_message(row.message, fd) != &row) continue;
-      for (std::uint32_t node = 1; node <= kMaxNode; ++node) {
-        const Match found = match(profile_of(fd), a_frame(row.message, fd, node));
-        EXPECT_TRUE(found.ok()) << row.name;
-        EXPECT_EQ(found.row, &row) << row.name;
-        EXPECT_EQ(found.node, row.per_node ? node : 0);
+    for (const Profile& profile : every_id_set(fd)) {
+      for (const MessageRow& row : kMessages) {
+        if (find_message(row.message, fd) != &row) continue;
+        for (std::uint32_t node = 1; node <= profile.max_node(); ++node) {
+          const Match found = match(profile, encode(row, profile, node, Values{}));
+          EXPECT_TRUE(found.ok()) << row.name;
+          EXPECT_EQ(found.row, &row) << row.name;
+          EXPECT_EQ(found.node, row.per_node ? node : 0);
+        }
       }
     }
   }
@@ -36,21 +38,41 @@ TEST(CanMatch, EveryMessageOfEveryNodeIsRecognised) {
 
 // Catches: identifiers next to ours that are taken for ours; node 0, which no axis has.
 TEST(CanMatch, OtherIdentifiersAreForeign) {
-  std::size_t ours = 0;
-  for (std::uint32_t id = 0; id <= kMaxStandardId; ++id) {
-    Frame frame;
-    frame.id = id;
-    frame.size = 8;
-    const Match found = match(profile_of(false), frame);
-    EXPECT_EQ(found.row == nullptr, found.problem == FrameProblem::kForeign);
-    if (found.row != nullptr) ++ours;
+  const auto id_frame = [](std::uint32_t id) { return Frame{.id = id, .size = 8}; };
+  for (const Profile& profile : every_id_set(false)) {
+    if (profile.extended) continue;
+    std::size_t ours = 0;
+    for (std::uint32_t id = 0; id <= kMaxStandardId; ++id) {
+      const Match found = match(profile, id_frame(id));
+      EXPECT_EQ(found.row == nullptr, found.problem == FrameProblem::kForeign);
+      if (found.row != nullptr) ++ours;
+    }
+    EXPECT_EQ(ours, 1 + 11 * profile.max_node());
   }
-  EXPECT_EQ(ours, 1 + 11 * kMaxNode);
-  for (const std::uint32_t id : {0x000u, 0x07Fu, 0x100u, 0x180u, 0x200u, 0x581u, 0x601u, 0x700u, 0x780u}) {
-    Frame frame;
-    frame.id = id;
-    frame.size = 8;
-    EXPECT_EQ(problem_of(profile_of(false), frame), FrameProblem::kForeign) << id;
+  for (const std::uint32_t id : {0x000u, 0x001u, 0x010u, 0x051u, 0x080u, 0x6A0u, 0x6C1u, 0x790u, 0x7A1u})
+    EXPECT_EQ(problem_of(profile_of(false), id_frame(id)), FrameProblem::kForeign) << id;
+  for (const std::uint32_t id : {0x000u, 0x07Fu, 0x100u, 0x180u, 0x200u, 0x581u, 0x601u, 0x700u, 0x780u})
+    EXPECT_EQ(problem_of(with_ids(IdSet::kCanopen, profile_of(false)), id_frame(id)), FrameProblem::kForeign)
+        << id;
+}
+
+// Catches: a default identifier that a CANopen device uses, in any kind of frame: NMT, SYNC, TIME, EMCY, the
+// process data and SDO of 127 nodes, heartbeats and guarding, LSS, GFC of CiA 304, diagnosis of vehicles.
+TEST(CanMatch, CAN_15_NoFrameOfCanopenHasADefaultIdentifier) {
+  std::vector<std::uint32_t> theirs = {0x000, 0x001, 0x080, 0x100, 0x7E4, 0x7E5, 0x7DF};
+  for (std::uint32_t node = 1; node <= 127; ++node) {
+    for (std::uint32_t function = 0x080; function <= 0x600; function += 0x080)
+      theirs.push_back(function + node);
+    theirs.push_back(0x700 + node);
+  }
+  for (std::uint32_t id = 0x7E0; id <= 0x7EF; ++id)
+    theirs.push_back(id);
+  for (const bool fd : {false, true}) {
+    const Profile profile = with_wide_axes(profile_of(fd));
+    for (const std::uint32_t id : theirs) {
+      for (std::uint8_t size = 0; size <= 8; ++size)
+        EXPECT_EQ(match(profile, {.id = id, .size = size}).row, nullptr) << id;
+    }
   }
 }
 
@@ -86,8 +108,10 @@ TEST(CanMatch, WrongFormsAreDistinguished) {
   }
 
   Profile extended = classic;
-  extended.extended = true;
-  EXPECT_EQ(problem_of(extended, good), FrameProblem::kWrongFormat);
+  extended.choose_ids(IdSet::kCanopen, true);
+  EXPECT_EQ(problem_of(extended, encode(*find_message(Message::kCommand, false),
+                                        with_ids(IdSet::kCanopen, classic), 1, Values{})),
+            FrameProblem::kWrongFormat);
 }
 
 // Catches: an FD frame of a length that another message has; a classic frame taken for an FD message; a short
@@ -144,24 +168,29 @@ bool has(const std::vector<ProfileProblem>& found, std::string_view field) {
   return std::ranges::any_of(found, [&](const ProfileProblem& problem) { return problem.field == field; });
 }
 
-std::vector<ProfileProblem> with_id(Message message, std::uint32_t id, bool extended = false) {
+std::vector<ProfileProblem> with_id(Message message, std::uint32_t id, bool extended = false,
+                                    IdSet set = IdSet::kFree) {
   Profile profile = profile_of(true);
-  profile.extended = extended;
+  profile.choose_ids(set, extended);
   profile.base_ids[static_cast<std::size_t>(message)] = id;
   return problems(profile);
 }
 
 // Catches: identifiers that overlap or do not fit, noticed on the bus only; a refusal of the default profile.
 TEST(CanProfile, IdentifiersMustFitAndKeepApart) {
-  EXPECT_TRUE(problems(profile_of(false)).empty());
-  EXPECT_TRUE(problems(profile_of(true)).empty());
-  EXPECT_TRUE(with_id(Message::kHeartbeat, 0x7FF - 127).empty());
-  EXPECT_TRUE(has(with_id(Message::kHeartbeat, 0x7FF - 126), "ids.heartbeat"));
+  for (const bool fd : {false, true}) {
+    for (const Profile& profile : every_id_set(fd))
+      EXPECT_TRUE(problems(profile).empty());
+  }
+  EXPECT_TRUE(with_id(Message::kHeartbeat, 0x7FF - 15).empty());
+  EXPECT_TRUE(has(with_id(Message::kHeartbeat, 0x7FF - 14), "ids.heartbeat"));
+  EXPECT_TRUE(with_id(Message::kHeartbeat, 0x7FF - 127, false, IdSet::kCanopen).empty());
+  EXPECT_TRUE(has(with_id(Message::kHeartbeat, 0x7FF - 126, false, IdSet::kCanopen), "ids.heartbeat"));
   EXPECT_TRUE(with_id(Message::kSync, 0x7FF).empty()) << "no node is added to it";
   EXPECT_TRUE(has(with_id(Message::kSync, 0x800), "ids.sync"));
-  EXPECT_TRUE(has(with_id(Message::kSync, 0x81), "ids.fault"));
-  EXPECT_TRUE(has(with_id(Message::kState, 0x380 + 126), "ids.state")) << "the last of reply";
-  EXPECT_TRUE(with_id(Message::kEncoder, 0x200).empty()) << "no message of this variant";
+  EXPECT_TRUE(has(with_id(Message::kSync, 0x11), "ids.fault"));
+  EXPECT_TRUE(has(with_id(Message::kState, 0x680 + 14), "ids.state")) << "the last of reply";
+  EXPECT_TRUE(with_id(Message::kEncoder, 0x030).empty()) << "no message of this variant";
   EXPECT_TRUE(with_id(Message::kState, kMaxExtendedId - 127, true).empty());
   EXPECT_TRUE(has(with_id(Message::kState, kMaxExtendedId - 126, true), "ids.state"));
   EXPECT_TRUE(has(with_id(Message::kState, 0xFFFF'FFFF, true), "ids.state"));
@@ -184,7 +213,10 @@ TEST(CanProfile, UnitsMustBePositiveNumbers) {
 
 // Catches: two axes that answer to one node, and nodes that no identifier has room for.
 TEST(CanProfile, NodesMustDifferAndBeInRange) {
-  const Profile profile;
+  Profile profile;
+  EXPECT_TRUE(problems(profile, std::to_array<std::uint32_t>({1, 15})).empty());
+  EXPECT_EQ(problems(profile, std::to_array<std::uint32_t>({0, 16, 128})).size(), 3u);
+  profile.choose_ids(IdSet::kFree, true);
   EXPECT_TRUE(problems(profile, std::to_array<std::uint32_t>({1, 127})).empty());
   EXPECT_EQ(problems(profile, std::to_array<std::uint32_t>({0, 128})).size(), 2u);
   EXPECT_EQ(problems(profile, std::to_array<std::uint32_t>({3, 4, 3})).size(), 1u);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "protocols/can/codec.hpp"
 #include "protocols/can/formats/text.hpp"
@@ -11,6 +12,23 @@ inline Profile profile_of(bool fd) {
   Profile profile;
   profile.fd = fd;
   return profile;
+}
+
+inline Profile with_ids(IdSet set, Profile profile) {
+  profile.choose_ids(set, profile.extended);
+  return profile;
+}
+
+/// Every set of default identifiers, with 11 and with 29 bits.
+inline std::vector<Profile> every_id_set(bool fd) {
+  std::vector<Profile> profiles;
+  for (const IdSet set : {IdSet::kFree, IdSet::kCanopen}) {
+    for (const bool extended : {false, true}) {
+      profiles.push_back(profile_of(fd));
+      profiles.back().choose_ids(set, extended);
+    }
+  }
+  return profiles;
 }
 
 /// The same on a bus that has wide axes as well.

@@ -124,25 +124,25 @@ TEST(CanTexts, TheDbcFileHasTheseLines) {
   const std::vector<BusAxis> axes = {{"servo", 1}, {"7th axis", 2}, {"7th-axis", 3}};
   std::string text = dbc_text("bench \"one\"", profile, axes);
   EXPECT_TRUE(contains(text,
-                       "BO_ 385 servo_currents: 8 Bench\n SG_ i_a : 0|16@1- (0.001,0) [-32.767|32.767] "
+                       "BO_ 97 servo_currents: 8 Bench\n SG_ i_a : 0|16@1- (0.001,0) [-32.767|32.767] "
                        "\"A\" Controller\n"));
   EXPECT_TRUE(contains(text, " SG_ bus_voltage : 16|16@1+ (0.1,0) [0|6553.4] \"V\" Controller\n"));
-  EXPECT_TRUE(contains(text, "BO_ 514 _7th_axis_command: 8 Controller\n"));
-  EXPECT_TRUE(contains(text, "BO_ 515 node3_command: 8 Controller\n"));
-  EXPECT_TRUE(contains(text, "BO_ 128 sync: 5 Bench\n"));
-  EXPECT_TRUE(contains(text, "VAL_ 513 mode 0 \"gates off\" 1 \"voltages\" 2 \"zero voltage\" 3 \"duties"));
-  EXPECT_TRUE(contains(text, "BA_ \"VFrameFormat\" BO_ 513 0;\n"));
+  EXPECT_TRUE(contains(text, "BO_ 50 _7th_axis_command: 8 Controller\n"));
+  EXPECT_TRUE(contains(text, "BO_ 51 node3_command: 8 Controller\n"));
+  EXPECT_TRUE(contains(text, "BO_ 8 sync: 5 Bench\n"));
+  EXPECT_TRUE(contains(text, "VAL_ 49 mode 0 \"gates off\" 1 \"voltages\" 2 \"zero voltage\" 3 \"duties"));
+  EXPECT_TRUE(contains(text, "BA_ \"VFrameFormat\" BO_ 49 0;\n"));
   EXPECT_TRUE(contains(text, "BA_ \"DBName\" \"bench 'one'\";\n"));
   EXPECT_FALSE(contains(text, "SIG_VALTYPE_"));
 
   profile = Profile{};
-  profile.extended = true;
+  profile.choose_ids(IdSet::kFree, true);
   text = dbc_text("bench", profile, axes);
-  EXPECT_TRUE(contains(text, "BO_ 2147484033 servo_sensors: 32 Bench\n"));
-  EXPECT_TRUE(contains(text, "SIG_VALTYPE_ 2147484033 i_a : 1;\n"));
-  EXPECT_TRUE(contains(text, "BA_ \"VFrameFormat\" BO_ 2147484033 15;\n"));
+  EXPECT_TRUE(contains(text, "BO_ 2147876865 servo_sensors: 32 Bench\n"));
+  EXPECT_TRUE(contains(text, "SIG_VALTYPE_ 2147876865 i_a : 1;\n"));
+  EXPECT_TRUE(contains(text, "BA_ \"VFrameFormat\" BO_ 2147876865 15;\n"));
   EXPECT_TRUE(contains(text,
-                       "CM_ SG_ 2147484033 i_a \"measured current of phase a, into the machine; NaN: no "
+                       "CM_ SG_ 2147876865 i_a \"measured current of phase a, into the machine; NaN: no "
                        "value\";\n"));
 }
 
@@ -151,9 +151,9 @@ TEST(CanTexts, TheTableHasTheseLines) {
   Profile profile;
   profile.fd = false;
   const std::string text = table_text("bench", profile, std::vector<BusAxis>{{"servo", 1}, {"load", 9}});
-  EXPECT_TRUE(contains(text, "| command | controller | 0x201 | 0x209 |\n"));
+  EXPECT_TRUE(contains(text, "| command | controller | 0x031 | 0x039 |\n"));
   EXPECT_TRUE(contains(text, "| 2-3 | i_b | int16 x 0.001 | A | -32.767 to 32.767 | 0x8000 | measured"));
-  EXPECT_TRUE(contains(text, "| currents | `181#DC0512FDE8032301` | i_a 1.5 A, i_b -0.75 A, tick 1000, "));
+  EXPECT_TRUE(contains(text, "| currents | `061#DC0512FDE8032301` | i_a 1.5 A, i_b -0.75 A, tick 1000, "));
 }
 
 }  // namespace

@@ -120,7 +120,7 @@ TEST(CanMatch, OnABusWithWideAxesEveryMessageIsRecognised) {
   for (const bool fd : {false, true}) {
     for (const MessageRow& row : kMessages) {
       if (!is_in(row, fd)) continue;
-      for (std::uint32_t node = 1; node <= kMaxNode; ++node) {
+      for (std::uint32_t node = 1; node <= kMaxFreeNode; ++node) {
         const Match found =
             match(with_wide_axes(profile_of(fd)), encode(row, profile_of(fd), node, Values{}));
         EXPECT_TRUE(found.ok()) << row.name;
@@ -150,7 +150,7 @@ TEST(CanMatch, WithoutWideAxesTheirIdentifiersAreFree) {
               FrameProblem::kWrongSize);
   }
   Profile profile = with_wide_axes(profile_of(false));
-  profile.base_ids[static_cast<std::size_t>(Message::kState)] = 0x110;
+  profile.base_ids[static_cast<std::size_t>(Message::kState)] = 0x024;
   const MessageRow& state = *find_message(Message::kState, false);
   const Match found = match(profile, encode(state, profile, 1, Values{}));
   EXPECT_EQ(found.row, &state);
@@ -168,9 +168,9 @@ TEST(CanProfile, IdentifiersOfWideAxesAreCheckedToo) {
     profile.base_ids[static_cast<std::size_t>(message)] = id;
     return problems(profile);
   };
-  EXPECT_TRUE(with_id(Message::kIndex, 0x780, false).empty());
-  EXPECT_EQ(with_id(Message::kIndex, 0x780, true).at(0).field, "ids.details");
-  EXPECT_TRUE(with_id(Message::kSensors, 0x600, true).empty());
+  EXPECT_TRUE(with_id(Message::kIndex, 0x7A0, false).empty());
+  EXPECT_EQ(with_id(Message::kIndex, 0x7A0, true).at(0).field, "ids.details");
+  EXPECT_TRUE(with_id(Message::kSensors, 0x050, true).empty());
   EXPECT_EQ(with_id(Message::kSensors, 0x7FF, true).size(), 1u) << "once, not for both kinds of axes";
 }
 
@@ -210,23 +210,23 @@ TEST(CanTexts, TheDbcFileListsTheSignalsOfEachAxis) {
   profile.fd = false;
   const std::vector<BusAxis> axes = {{"servo", 1, false}, {"bldc", 2, true}};
   std::string text = dbc_text("bench", profile, axes);
-  EXPECT_TRUE(contains(text, "VERSION \"2\"\n"));
+  EXPECT_TRUE(contains(text, "VERSION \"4\"\n"));
   EXPECT_FALSE(contains(text, "servo_details"));
   EXPECT_FALSE(contains(text, "servo_phase"));
-  EXPECT_TRUE(contains(text, "BO_ 258 bldc_phase_command: 8 Controller\n SG_ u_c : 0|16@1- (0.01,0)"));
-  EXPECT_TRUE(contains(text, "BO_ 1538 bldc_phases: 8 Bench\n"));
-  EXPECT_TRUE(contains(text, "BO_ 1922 bldc_details: 8 Bench\n SG_ page M : 0|8@1+ (1,0) [0|255] \"\""));
+  EXPECT_TRUE(contains(text, "BO_ 34 bldc_phase_command: 8 Controller\n SG_ u_c : 0|16@1- (0.01,0)"));
+  EXPECT_TRUE(contains(text, "BO_ 82 bldc_phases: 8 Bench\n"));
+  EXPECT_TRUE(contains(text, "BO_ 1954 bldc_details: 8 Bench\n SG_ page M : 0|8@1+ (1,0) [0|255] \"\""));
   EXPECT_TRUE(contains(text, " SG_ u_b m0 : 32|16@1- (0.01,0) [-327.67|327.67] \"V\" Controller\n"));
   EXPECT_TRUE(contains(text, " SG_ injected m3 : 16|32@1+ (1,0)"));
-  EXPECT_TRUE(contains(text, "VAL_ 1922 page 0 \"phase voltages\" 1 \"field and neutral\""));
+  EXPECT_TRUE(contains(text, "VAL_ 1954 page 0 \"phase voltages\" 1 \"field and neutral\""));
   text = dbc_text("bench", profile, std::span(axes).first(1));
-  EXPECT_TRUE(contains(text, "VERSION \"1\"\n"));
+  EXPECT_TRUE(contains(text, "VERSION \"3\"\n"));
 
   profile.fd = true;
   text = dbc_text("bench", profile, axes);
-  EXPECT_TRUE(contains(text, "BO_ 385 servo_sensors: 32 Bench\n"));
-  EXPECT_TRUE(contains(text, "BO_ 386 bldc_sensors: 64 Bench\n"));
-  EXPECT_TRUE(contains(text, "BO_ 514 bldc_command: 24 Controller\n"));
+  EXPECT_TRUE(contains(text, "BO_ 97 servo_sensors: 32 Bench\n"));
+  EXPECT_TRUE(contains(text, "BO_ 98 bldc_sensors: 64 Bench\n"));
+  EXPECT_TRUE(contains(text, "BO_ 50 bldc_command: 24 Controller\n"));
 }
 
 // Catches: a frame of a wide axis shown for all axes, a page without an example.
@@ -234,16 +234,16 @@ TEST(CanTexts, TheTableMarksTheFramesOfWideAxes) {
   Profile profile;
   const std::vector<BusAxis> axes = {{"servo", 1, false}, {"bldc", 2, true}};
   std::string text = table_text("bench", profile, axes);
-  EXPECT_TRUE(contains(text, "Version 2 of the profile."));
-  EXPECT_TRUE(contains(text, "| sensors (narrow axis) | bench | 0x181 | - |\n"));
-  EXPECT_TRUE(contains(text, "| sensors (wide axis) | bench | - | 0x182 |\n"));
-  EXPECT_TRUE(contains(text, "| command (wide axis) | `202##1E8030000"));
+  EXPECT_TRUE(contains(text, "Version 4 of the profile."));
+  EXPECT_TRUE(contains(text, "| sensors (narrow axis) | bench | 0x061 | - |\n"));
+  EXPECT_TRUE(contains(text, "| sensors (wide axis) | bench | - | 0x062 |\n"));
+  EXPECT_TRUE(contains(text, "| command (wide axis) | `032##1E8030000"));
   profile.fd = false;
   text = table_text("bench", profile, axes);
-  EXPECT_TRUE(contains(text, "| phases | bench | - | 0x602 |\n"));
+  EXPECT_TRUE(contains(text, "| phases | bench | - | 0x052 |\n"));
   EXPECT_TRUE(
       contains(text, "| 2-3 | u_a | page 0: int16 x 0.01 | V | -327.67 to 327.67 | 0x8000 | voltage at"));
-  EXPECT_TRUE(contains(text, "| details | `782#03E8200000000000` | page 3, tick 232, injected 32 |\n"));
+  EXPECT_TRUE(contains(text, "| details | `7A2#03E8200000000000` | page 3, tick 232, injected 32 |\n"));
 }
 
 }  // namespace

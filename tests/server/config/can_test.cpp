@@ -48,6 +48,8 @@ TEST(ConfigCan, EachRuleOfABusIsKept) {
       {kUdp + "required = 1\n", ":23: can.required is 1 but must be true or false"},
       {kUdp + "fd = \"yes\"\n", ":23: can.fd is \"yes\" but must be true or false"},
       {kUdp + "extended = 29\n", ":23: can.extended is 29 but must be true or false"},
+      {kUdp + "identifiers = \"CANopen\"\n",
+       ":23: can.identifiers is \"CANopen\" but must be one of \"free\", \"canopen\""},
       {kUdp + "edges = 1\n", ":23: can.edges is 1 but must be true or false"},
       {kUdp + "fd = false\nedges = true\n", ":24: can.edges is true but must be false without fd = true"},
       {kUdp + "bit_rate = 9999\n", ":23: can.bit_rate is 9999 but must lie between 10000 and 1000000"},
@@ -169,21 +171,23 @@ TEST(ConfigCan, DefaultsDependOnTheBackEnd) {
 TEST(ConfigCan, EachRuleOfTheIdentifiersIsKept) {
   const std::string ids = kUdp + "[can.ids]\n";
   const std::vector<Case> cases = {
-      {ids + "state = 1921\n", ":24: can.ids.state is 1921 but must lie between 0 and 1920"},
-      {ids + "state = 0x781\n", ":24: can.ids.state is 0x781 but must lie between 0x0 and 0x780"},
+      {ids + "state = 2033\n", ":24: can.ids.state is 2033 but must lie between 0 and 2032"},
+      {ids + "state = 0x7f1\n", ":24: can.ids.state is 0x7f1 but must lie between 0x0 and 0x7f0"},
       {ids + "sync = 0x800\n", ":24: can.ids.sync is 0x800 but must lie between 0x0 and 0x7ff"},
-      {ids + "state = -1\n", ":24: can.ids.state is -1 but must lie between 0 and 1920"},
+      {ids + "state = -1\n", ":24: can.ids.state is -1 but must lie between 0 and 2032"},
       {ids + "state = 0b1\n",
        ":24: can.ids.state is a number that is not decimal but must be a whole number"},
       {ids + "state = \"0x1\"\n", ":24: can.ids.state is \"0x1\" but must be a whole number"},
-      {ids + "state = 0x280\nencoder = 0x400\nreply = 0x280\n",
-       ":24: can.ids.state is 0x280 but must keep its identifiers apart from those of ids.reply"},
-      {ids + "sync = 0x7ff\nstate = 0x200\n",
-       ":25: can.ids.state is 0x200 but must keep its identifiers apart"},
-      {ids + "state = 0x1ff\n", ":24: can.ids.state is 0x1ff but must keep its identifiers apart"},
-      {ids + "sync = 0x181\n",
-       "can.ids.sensors is 0x180 but must keep its identifiers apart from those of ids.sync"},
+      {ids + "state = 0x040\nencoder = 0x690\nreply = 0x040\n",
+       ":24: can.ids.state is 0x40 but must keep its identifiers apart from those of ids.reply"},
+      {ids + "sync = 0x7ff\nstate = 0x030\n",
+       ":25: can.ids.state is 0x30 but must keep its identifiers apart"},
+      {ids + "state = 0x06f\n", ":24: can.ids.state is 0x6f but must keep its identifiers apart"},
+      {ids + "sync = 0x061\n",
+       "can.ids.sensors is 0x60 but must keep its identifiers apart from those of ids.sync"},
       {ids + "stat = 1\n", ":24: can.ids.stat is not a known key; did you mean \"state\"?"},
+      {kUdp + "identifiers = \"canopen\"\n[can.ids]\nstate = 0x781\n",
+       ":25: can.ids.state is 0x781 but must lie between 0x0 and 0x780"},
       {kUdp + "extended = true\n[can.ids]\nstate = 0x1fffff81\n",
        ":25: can.ids.state is 0x1fffff81 but must lie between 0x0 and 0x1fffff80"},
   };
@@ -193,9 +197,9 @@ TEST(ConfigCan, EachRuleOfTheIdentifiersIsKept) {
         << c.lines << "  gave: " << found;
   }
   // Messages of the other variant take no room.
-  EXPECT_EQ(problems_of(with_can(ids + "encoder = 0x580\n")), "none");
-  EXPECT_NE(problems_of(with_can(kUdp + "fd = false\n[can.ids]\nstate = 0x280\n")), "none");
-  EXPECT_EQ(problems_of(with_can(kUdp + "fd = false\n[can.ids]\nedges = 0x280\n")), "none");
+  EXPECT_EQ(problems_of(with_can(ids + "encoder = 0x6c0\n")), "none");
+  EXPECT_NE(problems_of(with_can(kUdp + "fd = false\n[can.ids]\nstate = 0x040\n")), "none");
+  EXPECT_EQ(problems_of(with_can(kUdp + "fd = false\n[can.ids]\nedges = 0x040\n")), "none");
 }
 
 // Catches: a message without a key, and a key that changes another message.
@@ -204,6 +208,7 @@ TEST(ConfigCan, EveryMessageHasAKey) {
     const std::string name(row.name);
     const CanConfig bus = bus_of(kUdp + "extended = true\n[can.ids]\n" + name + " = 0x12345\n");
     can::Profile expected;
+    expected.choose_ids(can::IdSet::kFree, true);
     expected.base_ids[static_cast<std::size_t>(row.message)] = 0x12345;
     EXPECT_EQ(bus.profile.base_ids, expected.base_ids) << name;
   }
@@ -285,7 +290,7 @@ TEST(ConfigCan, TablesBelongToTheBusAboveThem) {
   ASSERT_EQ(config.can.size(), 2u);
   const auto state = static_cast<std::size_t>(can::Message::kState);
   EXPECT_EQ(config.can[0].profile.base_ids[state], 0x600u);
-  EXPECT_EQ(config.can[1].profile.base_ids[state], 0x400u);
+  EXPECT_EQ(config.can[1].profile.base_ids[state], 0x690u);
   EXPECT_EQ(config.can[0].profile.current_unit_a, 0.5);
   EXPECT_EQ(config.can[1].profile.current_unit_a, 0.25);
 
@@ -303,6 +308,31 @@ TEST(ConfigCan, TablesBelongToTheBusAboveThem) {
   EXPECT_EQ(axes.axes[0].can_node, 1u);
   EXPECT_EQ(axes.axes[1].can_node, 9u);
   EXPECT_EQ(axes.axes[2].can_node, 3u);
+}
+
+// Catches: a set of identifiers that is read and not used, or taken for the other; a node that its
+// identifiers have no room for, noticed on the bus only.
+TEST(ConfigCan, TheSetOfIdentifiersIsChosen) {
+  const auto ids = [](const std::string& lines) { return bus_of(kUdp + lines).profile.base_ids; };
+  EXPECT_EQ(ids(""), can::default_ids(can::IdSet::kFree, false));
+  EXPECT_EQ(ids("identifiers = \"free\"\n"), can::default_ids(can::IdSet::kFree, false));
+  EXPECT_EQ(ids("extended = true\n"), can::default_ids(can::IdSet::kFree, true));
+  EXPECT_EQ(ids("identifiers = \"canopen\"\n"), can::default_ids(can::IdSet::kCanopen, false));
+  EXPECT_EQ(ids("extended = true\nidentifiers = \"canopen\"\n"),
+            can::default_ids(can::IdSet::kCanopen, true));
+  EXPECT_EQ(bus_of(kUdp + "identifiers = \"canopen\"\n").profile.id_set, can::IdSet::kCanopen);
+
+  const auto with_node = [](const std::string& node, const std::string& lines) {
+    std::string text = with_can(lines);
+    const std::string name = "[[axis]]\n";
+    return problems_of(text.insert(text.find(name) + name.size(), "can_node = " + node + "\n"));
+  };
+  EXPECT_EQ(with_node("15", kUdp), "none");
+  EXPECT_NE(with_node("16", kUdp).find("can.identifiers is \"free\", which has room for nodes 1 to 15"),
+            std::string::npos)
+      << with_node("16", kUdp);
+  EXPECT_EQ(with_node("127", kUdp + "extended = true\n"), "none");
+  EXPECT_EQ(with_node("127", kUdp + "identifiers = \"canopen\"\n"), "none");
 }
 
 // Catches: a list of words that is not in the order of the enumeration.

@@ -104,6 +104,7 @@ inline void expect_equal(const CanConfig& x, const CanConfig& y) {
   EXPECT_EQ(x.required, y.required);
   EXPECT_EQ(x.profile.fd, y.profile.fd);
   EXPECT_EQ(x.profile.extended, y.profile.extended);
+  EXPECT_EQ(x.profile.id_set, y.profile.id_set);
   EXPECT_EQ(x.profile.base_ids, y.profile.base_ids);
   const auto units = [](const can::Profile& p) {
     return std::bit_cast<std::array<std::uint64_t, 5>>(std::array{

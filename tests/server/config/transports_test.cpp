@@ -87,7 +87,7 @@ BenchConfig busy_bench() {
                 .heartbeat_ms = 0,
                 .controller_timeout_ms = 60'000,
                 .idle_timeout_ms = 86'400'000};
-  bus.profile.extended = true;
+  bus.profile.choose_ids(can::IdSet::kCanopen, true);
   bus.profile.current_unit_a = 1.0 / 3.0;
   bus.profile.voltage_unit_v = 1e-12;
   bus.profile.bus_voltage_unit_v = 1e6;

@@ -210,31 +210,34 @@ TEST_F(CommandFiles, ExportWritesTheFramesOfARun) {
   options.profile = "current_unit_a=0.01";
   EXPECT_EQ(run_export(options), kExitOk);
   EXPECT_EQ(text_of("out.log"),
-            "(0.000000) vcan0 405#0000000000000000\n"
-            "(0.000000) vcan0 485#FFFF000000000000\n"
-            "(0.000000) vcan0 285#0000000000000000\n"
-            "(0.000000) vcan0 185#0000000000000000\n"
-            "(0.000000) vcan0 406#0000000000000000\n"
-            "(0.000000) vcan0 486#FFFF000000000000\n"
-            "(0.000000) vcan0 286#0000000000000000\n"
-            "(0.000000) vcan0 186#0000000000000000\n"
-            "(0.000000) vcan0 080#0000000001\n"
-            "(0.000000) vcan0 206#E803FFFF00000109\n"
-            "(0.000125) vcan0 085#0400000001000000\n"
-            "(0.000125) vcan0 285#FBFFFFFF00000000\n"
-            "(0.000125) vcan0 185#6400000001000000\n"
-            "(0.000125) vcan0 086#0400000001000000\n"
-            "(0.000125) vcan0 286#FBFFFFFF00000000\n"
-            "(0.000125) vcan0 186#6400000001000000\n"
-            "(0.000125) vcan0 080#0100000001\n");
+            "(0.000000) vcan0 695#0000000000000000\n"
+            "(0.000000) vcan0 6A5#FFFF000000000000\n"
+            "(0.000000) vcan0 045#0000000000000000\n"
+            "(0.000000) vcan0 065#0000000000000000\n"
+            "(0.000000) vcan0 696#0000000000000000\n"
+            "(0.000000) vcan0 6A6#FFFF000000000000\n"
+            "(0.000000) vcan0 046#0000000000000000\n"
+            "(0.000000) vcan0 066#0000000000000000\n"
+            "(0.000000) vcan0 008#0000000001\n"
+            "(0.000000) vcan0 036#E803FFFF00000109\n"
+            "(0.000125) vcan0 015#0400000001000000\n"
+            "(0.000125) vcan0 045#FBFFFFFF00000000\n"
+            "(0.000125) vcan0 065#6400000001000000\n"
+            "(0.000125) vcan0 016#0400000001000000\n"
+            "(0.000125) vcan0 046#FBFFFFFF00000000\n"
+            "(0.000125) vcan0 066#6400000001000000\n"
+            "(0.000125) vcan0 008#0100000001\n");
   options.axis = "b";
   options.from_tick = 1;
   options.classic = false;
   EXPECT_EQ(run_export(options), kExitOk);
   EXPECT_EQ(text_of("out.log"),
-            "(0.000125) vcan0 086##10400000001000000\n"
-            "(0.000125) vcan0 186##1010000000000803F00000000FBFFFFFF0000000000000000FFFFFFFF00000000\n"
-            "(0.000125) vcan0 080##10100000001\n");
+            "(0.000125) vcan0 016##10400000001000000\n"
+            "(0.000125) vcan0 066##1010000000000803F00000000FBFFFFFF0000000000000000FFFFFFFF00000000\n"
+            "(0.000125) vcan0 008##10100000001\n");
+  options.profile = "identifiers=canopen";
+  EXPECT_EQ(run_export(options), kExitOk);
+  EXPECT_NE(text_of("out.log").find(" 186##1"), std::string::npos);
 }
 
 // Catches: a trace begun with a profile that cannot be.
@@ -248,6 +251,10 @@ TEST_F(CommandFiles, ExportRefusesAnImpossibleProfile) {
   options.signals = {"i_a_a"};
   EXPECT_THROW(run_export(options), UsageError);
   options.signals = {};
+  options.node_base = 15;  // and 16 for the second axis
+  EXPECT_THROW(run_export(options), UsageError);
+  options.profile = "extended=1";
+  EXPECT_EQ(run_export(options), kExitOk);
   options.node_base = 127;
   EXPECT_THROW(run_export(options), UsageError);
 }

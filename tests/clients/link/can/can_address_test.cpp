@@ -24,7 +24,7 @@ TEST(CanAddress, ReadsEveryBackEnd) {
 // Catches: a key that is read and not used, or used for another.
 TEST(CanAddress, ReadsEveryKey) {
   const CanAddress a = parse_can_address(
-      "can:socketcan:can0?node=17&fd=0&extended=1&command=0x1234500&current_unit_a=0.01&bus=x&bit_rate="
+      "can:socketcan:can0?node=17&fd=0&command=0x1234500&extended=1&current_unit_a=0.01&bus=x&bit_rate="
       "500000&data_bit_rate=2000000");
   EXPECT_EQ(a.node, 17U);
   EXPECT_FALSE(a.profile.fd);
@@ -35,6 +35,11 @@ TEST(CanAddress, ReadsEveryKey) {
   EXPECT_EQ(a.bus, "x");
   EXPECT_EQ(a.bit_rate, 500'000U);
   EXPECT_EQ(a.data_bit_rate, 2'000'000U);
+  const auto ids = [](const char* text) { return parse_can_address(text).profile.base_ids; };
+  EXPECT_EQ(ids("can:socketcan:can0"), can::default_ids(can::IdSet::kFree, false));
+  EXPECT_EQ(ids("can:socketcan:can0?identifiers=free&extended=1"), can::default_ids(can::IdSet::kFree, true));
+  EXPECT_EQ(ids("can:socketcan:can0?identifiers=canopen&node=127"),
+            can::default_ids(can::IdSet::kCanopen, false));
   const CanAddress plain = parse_can_address("can:socketcan:can0");
   EXPECT_TRUE(plain.profile.fd);
   EXPECT_EQ(plain.node, 1U);
@@ -54,12 +59,15 @@ TEST(CanAddress, RefusesInvalidTexts) {
                                  "can:slcan:tcp:host:99999",
                                  "can:socketcand:",
                                  "can:socketcan:c?node=0",
-                                 "can:socketcan:c?node=128",
+                                 "can:socketcan:c?node=16",
+                                 "can:socketcan:c?node=128&extended=1",
+                                 "can:socketcan:c?node=128&identifiers=canopen",
+                                 "can:socketcan:c?identifiers=cia301",
                                  "can:socketcan:c?node=x",
                                  "can:socketcan:c?fd=yes",
                                  "can:socketcan:c?speed=1",
-                                 "can:socketcan:c?command=0x7F0",
-                                 "can:socketcan:c?command=0x180",
+                                 "can:socketcan:c?command=0x7F1",
+                                 "can:socketcan:c?command=0x060",
                                  "can:socketcan:c?command=",
                                  "can:socketcan:c?current_unit_a=0",
                                  "can:socketcan:c?current_unit_a=1V",

@@ -119,9 +119,20 @@ TEST(CanBus, SocketcandRefusesAnotherProtocol) {
   }
 }
 
+/// A port that is free at present.
+std::uint16_t free_udp_port() {
+  const FileDescriptor probe(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  sockaddr_in here{};
+  here.sin_family = AF_INET;
+  socklen_t size = sizeof(here);
+  EXPECT_EQ(::bind(probe.get(), reinterpret_cast<const sockaddr*>(&here), size), 0);
+  EXPECT_EQ(::getsockname(probe.get(), reinterpret_cast<sockaddr*>(&here), &size), 0);
+  return ntohs(here.sin_port);
+}
+
 // Catches: own frames that come back, frames of another bus, and a lost flag of an FD frame.
 TEST(CanBus, MulticastIsABusPerPort) {
-  const std::string place = "can:udp_multicast:239.74.163.77:" + std::to_string(20'000 + ::getpid() % 20'000);
+  const std::string place = "can:udp_multicast:239.74.163.77:" + std::to_string(free_udp_port());
   std::unique_ptr<CanBus> one;
   std::unique_ptr<CanBus> two;
   try {

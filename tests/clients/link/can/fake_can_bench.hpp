@@ -18,9 +18,7 @@ class FakeCanBench final : public CanBus {
  public:
   /// Its axis is wide if the profile is.
   FakeCanBench(const can::Profile& its_profile, std::uint32_t its_node)
-      : profile(its_profile),
-        node(its_node),
-        version(its_profile.wide ? can::kWideVersion : can::kProfileVersion) {
+      : profile(its_profile), node(its_node), version(can::version_of(its_profile.id_set, its_profile.wide)) {
     heartbeat();
   }
 

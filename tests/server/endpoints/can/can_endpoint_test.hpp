@@ -126,6 +126,7 @@ class CanBench {
   Engine& engine() { return *engine_; }
   Endpoint& endpoint() { return *endpoint_; }
   MemoryWire& wire() { return wire_; }
+  asio::io_context& io() { return io_; }
   const Profile& profile() const { return profile_; }
 
   std::vector<Received> received;

@@ -16,7 +16,7 @@ TEST(CanOutput, TheFirstHeartbeatIsTheBootUp) {
     const auto heartbeat = bench.newest(Message::kHeartbeat, node);
     ASSERT_TRUE(heartbeat);
     EXPECT_EQ((*heartbeat)["state"], 0.0);
-    EXPECT_EQ((*heartbeat)["profile"], kProfileVersion);
+    EXPECT_EQ((*heartbeat)["profile"], version_of(IdSet::kFree, false));
     EXPECT_EQ((*heartbeat)["period_us"], 125.0);
   }
   bench.received.clear();
