@@ -4,8 +4,9 @@ import os
 import pathlib
 import socket
 import subprocess
-import sys
 import unittest
+
+from own_network import in_own_network
 
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 PROGRAMS = pathlib.Path(os.environ.get("DRIVEBENCH_SERVER", REPOSITORY / "build/release/bin/drivebench-server")).parent
@@ -104,15 +105,7 @@ class Line:
 
 def run_all():
     """Runs the tests of the program; its exit code."""
-    if os.environ.get("DRIVEBENCH_OWN_NETWORK") != "1":
-        # A network of its own, so that a bench on this computer is left alone: only loopback, and a multicast route.
-        command = ("ip link set lo up && ip route add 239.0.0.0/8 dev lo && "
-                   "DRIVEBENCH_OWN_NETWORK=1 exec \"$0\" \"$@\"")
-        done = subprocess.run(["unshare", "-rn", "true"], capture_output=True, check=False)
-        if done.returncode != 0:
-            print("skipped: no network namespaces here (unshare -rn does not work)")
-            return 77
-        os.execvp("unshare", ["unshare", "-rn", "sh", "-c", command, sys.executable, *sys.argv])
+    in_own_network()  # so that a bench on this computer is left alone
     try:
         import can  # noqa: F401
     except ImportError:

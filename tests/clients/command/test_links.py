@@ -1,6 +1,5 @@
 """The reference controller over every link of the real server, and what the command says of interfaces."""
 import json
-import os
 import pathlib
 import socket
 import subprocess
@@ -9,10 +8,11 @@ import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+from free_port import free_udp_port  # noqa: E402
 from wire_client import BENCHES, PATIENCE_S, SERVER, Server, pb  # noqa: E402
 
 COMMAND = SERVER.with_name("drivebench")
-PORT = 20000 + os.getpid() % 20000  # of the multicast bus: one bus for each port
+PORT = free_udp_port()  # of the multicast bus: one bus for each port
 
 
 def run(*arguments):
@@ -141,7 +141,7 @@ class Links(unittest.TestCase):
             lines = out.read_text(encoding="utf-8").splitlines()
             self.assertEqual(len(lines), 2)
             for line in lines:
-                self.assertRegex(line, r"^\(\d+\.\d{6}\) udp_multicast 701##1")
+                self.assertRegex(line, r"^\(\d+\.\d{6}\) udp_multicast 791##1")
 
     # Catches: the last burst before a bus breaks, which is what one wants to see, lost with it.
     def test_can_log_keeps_what_came_before_the_bus_broke(self):

@@ -1,6 +1,5 @@
 """Every preset of the reference controllers on the real server: over TCP, and one of each kind over CAN FD, Modbus and in real time."""
 import json
-import os
 import pathlib
 import re
 import subprocess
@@ -9,13 +8,14 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
+    from free_port import free_udp_port
     from wire_client import BENCHES, PATIENCE_S, SERVER, Server
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
 
 COMMAND = SERVER.with_name("drivebench")
-PORT = 20000 + os.getpid() % 20000  # of the multicast bus: one bus for each port
+PORT = free_udp_port()  # of the multicast bus: one bus for each port
 CAN = f"can:udp_multicast:239.74.163.2:{PORT}?fd=1"
 LONG = 30_000  # samples, two seconds over TCP
 WAYS_IN = f"""

@@ -123,7 +123,7 @@ class PythonCan(KernelPeer):
                 log = self.candump(f"fd_{fd}.log")
                 with Bus() as bus:
                     counts = dbc_drive.open_loop_start(dbc_drive.Drive(bus, dbc, fd=fd), TICKS)
-                self.await_line(log, r" 381#(?:#.)?0300[0-9A-F]{12}")  # the answer to release
+                self.await_line(log, r" 681#(?:#.)?0300[0-9A-F]{12}")  # the answer to release
                 self.assertIn("no problems", self.drivebench("can", "check", "vcan0").stdout)
                 self.finish(server, recording)
                 self.assertEqual([tick for tick, _ in counts], list(range(TICKS + 1)))
@@ -175,18 +175,18 @@ class CanUtils(KernelPeer):
                 server, dbc, recording = self.bench(fd)
                 log = self.candump(f"fd_{fd}.log")
                 begin = " {}#" + ("#." if fd else "")
-                self.cansend(fd, "301", bytes([1, 0, 5, 0, 0, 0, 0, 0]))  # controller 5 asks for the axis
-                (lease,) = bytes.fromhex(self.await_line(log, begin.format("381") + "010005000000(..).."))
+                self.cansend(fd, "071", bytes([1, 0, 5, 0, 0, 0, 0, 0]))  # controller 5 asks for the axis
+                (lease,) = bytes.fromhex(self.await_line(log, begin.format("681") + "010005000000(..).."))
                 for tick in range(CANSEND_TICKS):
-                    self.await_line(log, begin.format("080") + tick.to_bytes(4, "little").hex().upper() + "01")
+                    self.await_line(log, begin.format("008") + tick.to_bytes(4, "little").hex().upper() + "01")
                     u_a, u_b = 20.0 + tick, -10.5
                     if fd:
                         data = struct.pack("<IffBBxx", tick, u_a, u_b, 1, lease)
                     else:
                         data = struct.pack("<hhHBB", round(100 * u_a), round(100 * u_b), tick, 1, lease)
-                    self.cansend(fd, "201", data)
-                self.cansend(fd, "301", bytes([3, lease, 5, 0, 0, 0, 0, 0]))
-                self.await_line(log, begin.format("381") + "030005000000....")
+                    self.cansend(fd, "031", data)
+                self.cansend(fd, "071", bytes([3, lease, 5, 0, 0, 0, 0, 0]))
+                self.await_line(log, begin.format("681") + "030005000000....")
                 self.finish(server, recording)
                 self.assertLogRecorded(log, dbc, recording, CANSEND_TICKS)
                 rows = self.recorded(recording)

@@ -59,14 +59,14 @@ class CanUtils(DriveTest):
         self.addCleanup(listener.communicate)
         self.addCleanup(listener.kill)
         seen = {}
-        while "701" not in seen:  # the heartbeat of node 1: candump and the bench are connected
+        while "791" not in seen:  # the heartbeat of node 1: candump and the bench are connected
             self.next_frame(listener, seen)
-        self.assertEqual(len(seen["701"]), 16)
-        shell("cansend vcan0 301#0100050000000000")  # controller 5 asks for the axis
-        while "381" not in seen:
+        self.assertEqual(len(seen["791"]), 16)
+        shell("cansend vcan0 071#0100050000000000")  # controller 5 asks for the axis
+        while "681" not in seen:
             self.next_frame(listener, seen)
-        self.assertEqual(seen["301"], "0100050000000000")
-        self.assertEqual(seen["381"][:4], "0100")  # the request is done
+        self.assertEqual(seen["071"], "0100050000000000")
+        self.assertEqual(seen["681"][:4], "0100")  # the request is done
 
     def next_frame(self, listener, seen):
         line = listener.stdout.readline()

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The buses without kernel CAN against clients that we did not write: python-can over udp_multicast, slcan and
 socketcand, and clients by hand. The other end is bus_echo, which answers every frame under the next identifier."""
+import contextlib
 import os
 import pathlib
 import socket
@@ -139,8 +140,11 @@ class Slcan(VirtualBusTest):
                 self.assertEqual(echo.counters()["malformed"], 0)
 
     def terminals_open(self, echo):
-        links = pathlib.Path(f"/proc/{echo.process.pid}/fd").iterdir()
-        return sum("ptmx" in os.readlink(link) for link in links)
+        names = []
+        for link in pathlib.Path(f"/proc/{echo.process.pid}/fd").iterdir():
+            with contextlib.suppress(FileNotFoundError):  # closed since the folder was read
+                names.append(os.readlink(link))
+        return sum("ptmx" in name for name in names)
 
     def read(self, terminal):
         text = b""
