@@ -57,6 +57,7 @@ void AxisAccount::see(const Sample& s, std::uint64_t late_ticks, bool stalled) {
     check_state(s);
     check_owner(s);
   }
+  if (!whole || s.owner != before_.owner) held_since_ = s.tick;
   seen_ = true;
   before_ = s;
   history_.add(s);
@@ -83,7 +84,8 @@ void AxisAccount::check_counters(const Sample& s) {
   if (skipped_ || ((s.injected | before_.injected) >> kRow & 1) != 0) {
     copies_ += (s.tick - before_.tick) * static_cast<std::uint64_t>(kInjectableFaults[kRow].maximum);
   }
-  require(s.refused_commands <= commands_ + copies_ + scheduled_, "every refusal has a request");
+  require(s.refused_commands + without_lease_ <= commands_ + copies_ + scheduled_,
+          "every counted refusal has a request of the controller");
   const bool missed = s.missed_commands != before_.missed_commands;
   require(!missed || !late_now_, "a late tick misses no command");
   require(!missed || is(before_, ControlState::kRun) || is(before_, ControlState::kHold) ||
@@ -191,6 +193,14 @@ void AxisAccount::check_quiet(const std::string& transport, Time awake) {
 void AxisAccount::gone(Owner owner, bool asks) {
   leases_.erase(owner);
   leaving_.push_back({.owner = owner, .asks = asks});
+}
+
+/// In real time the bench counts only what it takes under the lease, which may have ended on the way.
+void AxisAccount::command_refused(Owner owner, std::uint64_t sent) {
+  const auto lease = leases_.find(owner);
+  const bool was_held =
+      before_.owner == owner && held_since_ <= sent && lease != leases_.end() && !lease->second.gave_back;
+  if (lockstep_ || was_held) ++refusals_told_;
 }
 
 void AxisAccount::command_sent(Owner owner, Tick answers) {

@@ -49,6 +49,7 @@ class AxisAccount {
   void came_by_force(Owner owner) {
     if (before_.owner != owner) by_force_.insert(owner);
   }
+  std::uint64_t tick() const { return before_.tick; }
   void command_sent() { ++commands_; }
   /// An owner sent a command, as the answer to this tick.
   void command_sent(Owner owner, Tick answers);
@@ -56,7 +57,10 @@ class AxisAccount {
   void told(const v1::Sample& sample, bool in_status) {
     require(history_.agrees(sample, in_status), "a client gets samples as they were");
   }
-  void command_refused() { ++refusals_told_; }
+  /// The owner got a command refused that it had sent at this tick.
+  void command_refused(Owner owner, std::uint64_t sent);
+  /// A client without the lease got its command refused, which the bench must not count.
+  void command_without_lease() { ++without_lease_; }
   /// A client on a transport without reported owners has sent something: it may keep the axis until then, in
   /// times of Scene::awake().
   void may_keep(const std::string& transport, Time until);
@@ -89,6 +93,7 @@ class AxisAccount {
   Report broken_;
   bool seen_ = false;
   Sample before_{};
+  std::uint64_t held_since_ = 0;  ///< tick since which the owner is the same, in every sample
   History history_;
   std::uint64_t late_before_ = 0;
   bool late_now_ = false;
@@ -110,6 +115,7 @@ class AxisAccount {
   std::uint64_t commands_ = 0;
   std::uint64_t copies_ = 0;  ///< of commands, perhaps made by the injected fault
   std::uint64_t refusals_told_ = 0;
+  std::uint64_t without_lease_ = 0;
   std::uint64_t clears_unknown_ = 0;
   std::uint64_t scheduled_ = 0;
 };

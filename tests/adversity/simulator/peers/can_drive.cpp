@@ -80,8 +80,8 @@ void CanDrive::disturb() {
       return scene_.schedule.after(length, [this] { wire_.set_link(can::BusState::kUp); });
     }
     case 4: {
-      can::Frame noise{};  // never an identifier that only a bench sends
-      noise.id = 0x600 + static_cast<std::uint32_t>(random_.below(0x80));
+      can::Frame noise{};  // of a CANopen device: never an identifier of the bench
+      noise.id = 0x080 + static_cast<std::uint32_t>(random_.below(0x600));
       noise.size = static_cast<std::uint8_t>(random_.below(9));
       for (std::uint8_t& byte : noise.data)
         byte = static_cast<std::uint8_t>(random_.below(256));

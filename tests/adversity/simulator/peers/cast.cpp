@@ -86,6 +86,27 @@ Manners babbler() {
       .name = "babbler", .quality = {.torn = 0.5}, .takes = 0.1, .asks = 0.1, .babbles = 0.1, .leaves = 0.05};
 }
 
+Manners glutton() {
+  return {.name = "glutton", .quality = {.torn = 0.2}, .asks = 0.2, .gorges = 0.3, .leaves = 0.01};
+}
+
+Manners guest() {
+  return {.name = "guest",
+          .token = kGuestToken,
+          .turn = 10 * kMillisecond,
+          .takes = 0.3,
+          .steals = 0.5,
+          .clears = 0.3,
+          .changes = 0.3,
+          .asks = 0.2,
+          .every = 8};
+}
+
+/// Begins when the others are in: after its first guesses no token from their address is read.
+Manners guesser() {
+  return {.name = "guesser", .token = "a guess", .begins = 3 * kSecond, .turn = 2 * kMillisecond};
+}
+
 Manners silent() {
   return {.name = "silent", .turn = 100 * kMillisecond, .greets = false, .leaves = 0.01};
 }
@@ -127,6 +148,11 @@ BenchConfig draw_bench(Random& random) {
   config.realtime.max_lateness_ns = 100 * kMillisecond;
   config.tcp.port = 0;
   config.tcp.max_sessions = static_cast<std::uint32_t>(random.between(6, 12));
+  config.tcp.asks_for_token = random.chance(0.3);
+  if (config.tcp.asks_for_token) {
+    config.tcp.grants = {{.name = "laboratory", .role = Role::kAdmin, .hash = hash_of_token(kAdminToken)},
+                         {.name = "guest", .role = Role::kViewer, .hash = hash_of_token(kGuestToken)}};
+  }
   config.can.clear();
   if (random.chance(0.35)) config.can.push_back(draw_bus(random));
   config.modbus = {};
@@ -145,11 +171,12 @@ std::vector<Manners> draw_clients(Random& random, const BenchConfig& config) {
   viewer.every = static_cast<std::uint32_t>(std::max<Time>(5 * kMillisecond / period, 1));
   viewer.read_every = 5 * kMillisecond;
   viewer.gets_all = true;
+  viewer.gets_in = true;
   viewer.asks = 0.05;
   std::vector<Manners> clients{viewer, honest(random, period)};
   const std::uint64_t others = 1 + random.below(5);
   for (std::uint64_t i = 0; i < others; ++i) {
-    switch (random.below(7)) {
+    switch (random.below(8)) {
       case 0:
         clients.push_back(sloppy(random, period));
         break;
@@ -166,6 +193,9 @@ std::vector<Manners> draw_clients(Random& random, const BenchConfig& config) {
         clients.push_back(silent());
         break;
       case 5:
+        clients.push_back(glutton());
+        break;
+      case 6:
         clients.push_back(leaver(random, period));
         break;
       default:
@@ -173,6 +203,11 @@ std::vector<Manners> draw_clients(Random& random, const BenchConfig& config) {
         break;
     }
   }
+  if (!config.tcp.asks_for_token) return clients;
+  for (Manners& client : clients)
+    client.token = kAdminToken;
+  clients.push_back(guest());
+  if (random.chance(0.5)) clients.push_back(guesser());
   return clients;
 }
 

@@ -6,6 +6,10 @@
 
 namespace drivebench::simulator {
 
+/// Of the subjects of benches that ask for tokens.
+inline constexpr const char* kAdminToken = "the token of the laboratory";
+inline constexpr const char* kGuestToken = "the token of a guest";
+
 /// The bench of a seed: one of configs/benches or several servo axes, its time, its watchdog and its lease.
 BenchConfig draw_bench(Random& random);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "plant/faults.hpp"
+#include "server/endpoints/tcp/session/identity.hpp"
 
 namespace drivebench::simulator {
 namespace {
@@ -11,6 +12,8 @@ constexpr std::size_t kReadCapacity = std::size_t{256} * 1024;
 /// The server ends a session that does not say hello within 2 s.
 constexpr Time kHelloLimit = 2 * kSecond;
 constexpr Time kSlack = 50 * kMillisecond;
+/// A client that must get in may need some attempts, if newer connections take its place.
+constexpr Time kGetsInWithin = 2 * kSecond;
 /// By then the server has noticed every closed connection.
 constexpr Time kSettled = 500 * kMillisecond;
 /// Messages that come later may be unread at the end.
@@ -44,11 +47,16 @@ void StreamClient::forget() {
 
 void StreamClient::take_turn() {
   if (scene_.ending) return;
+  if (scene_.schedule.now() < manners_.begins)
+    return scene_.schedule.at(manners_.begins, [this] { take_turn(); });
   act();
   scene_.schedule.after(manners_.turn + random_.between(0, manners_.turn / 4), [this] { take_turn(); });
 }
 
 void StreamClient::act() {
+  if (!greeted_ && !outside_since_) outside_since_ = scene_.awake();
+  scene_.require(!manners_.gets_in || !outside_since_ || scene_.awake() < *outside_since_ + kGetsInWithin,
+                 "a client gets in beside any crowd");
   if (!wire_ || !wire_->is_open()) {
     connect();
     return;
@@ -66,6 +74,7 @@ void StreamClient::act() {
     wire_->stop_until(until);
   }
   if (!greeted_) return;
+  if (manners_.gorges > 0 && random_.chance(manners_.gorges)) gorge();
   if (random_.chance(manners_.shuts)) {
     scene_.note("half closes", number_);
     for (AxisAccount& axis : scene_.axes)
@@ -104,6 +113,7 @@ void StreamClient::connect() {
     hello.mutable_hello()->set_protocol_min(1);
     hello.mutable_hello()->set_protocol_max(1);
     hello.mutable_hello()->set_client(manners_.name);
+    hello.mutable_hello()->set_token(manners_.token);
     ask(hello);
   }
   read();
@@ -164,9 +174,12 @@ void StreamClient::on_frame(std::span<const std::byte> frame) {
   const Asked asked = found->second;
   asked_.erase(found);
   if (asked.action == v1::LeaseRequest::ACTION_TAKE) scene_.axes[asked.axis].force_ends();
+  scene_.require(asked.kind != v1::Envelope::KIND_NOT_SET || answer_.kind_case() == v1::Envelope::kRefusal,
+                 "a frame with more than a request may have is refused");
   switch (answer_.kind_case()) {
     case v1::Envelope::kWelcome:
       greeted_ = true;
+      outside_since_.reset();
       nag();
       for (std::uint32_t axis = 0; manners_.every > 0 && axis < axis_count(); ++axis) {
         v1::Envelope request;
@@ -235,13 +248,21 @@ void StreamClient::on_refusal(const Asked& asked, const v1::Refusal& refusal) {
                  "a refusal says why");
   scene_.note("is refused", number_, static_cast<std::uint64_t>(refusal.code()),
               static_cast<std::uint64_t>(asked.kind));
+  if (refusal.code() == v1::REFUSAL_FORBIDDEN) {
+    ++scene_.forbidden;
+    ++forbidden_;
+  }
   if (refusal.code() == v1::REFUSAL_NOT_OWNER) leased_[asked.axis] = false;
   if (refusal.code() == v1::REFUSAL_LATCHED) latched_[asked.axis] = true;
-  const bool counted = refusal.code() == v1::REFUSAL_NOT_OWNER || refusal.code() == v1::REFUSAL_LATCHED ||
-                       refusal.code() == v1::REFUSAL_STALE || refusal.code() == v1::REFUSAL_NOT_FINITE;
+  const bool counted = refusal.code() == v1::REFUSAL_LATCHED || refusal.code() == v1::REFUSAL_STALE ||
+                       refusal.code() == v1::REFUSAL_NOT_FINITE;
   // An exchange that waited was valid on arrival.
   const bool robbed = refusal.message().find("was taken by") != std::string::npos;
-  if (asked.counts && counted && !robbed && !scene_.time_waited) scene_.axes[asked.axis].command_refused();
+  const bool without_lease = refusal.code() == v1::REFUSAL_NOT_OWNER;
+  if (asked.counts && without_lease) scene_.axes[asked.axis].command_without_lease();
+  if (asked.counts && counted && !robbed && !scene_.time_waited) {
+    scene_.axes[asked.axis].command_refused(owner_, asked.sent);
+  }
   if (asked.kind == v1::Envelope::kExchange && manners_.controls) {
     v1::Envelope request;
     request.mutable_exchange();  // asks for the newest tick
@@ -301,6 +322,7 @@ void StreamClient::check_end() {
   if (!wire_ || !wire_->is_open() || raw_ || !greeted_) return;
   const bool lockstep = scene_.engine->config().mode == RunMode::kLockstep;
   for (const auto& [id, asked] : asked_) {
+    if (static_cast<double>(forbidden_) > Identity::kForbidden.at_once / 2) break;  // the server may pause
     // In lockstep it may wait for the command of another one.
     scene_.require(lockstep && asked.kind == v1::Envelope::kExchange, "every request has an answer");
   }

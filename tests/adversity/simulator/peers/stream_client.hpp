@@ -16,7 +16,9 @@ namespace drivebench::simulator {
 /// How a client behaves. Chances are per turn, unless they say something else.
 struct Manners {
   const char* name = "";
+  const char* token = "";
   Quality quality{};
+  Time begins = 0;
   Time turn = 20 * kMillisecond;  ///< time between its turns
   Time read_every = 3 * kMillisecond;
   std::size_t read_most = 65536;  ///< bytes at a time
@@ -35,11 +37,13 @@ struct Manners {
   double twice = 0.0;    ///< of commands
   double wrong_tick = 0.0;
   double babbles = 0.0;     ///< sends random bytes
+  double gorges = 0.0;      ///< sends a frame whose message would take megabytes
   double stops = 0.0;       ///< its network stands still for up to 3 s
   double leaves = 0.0;      ///< disconnects without a release
   double shuts = 0.0;       ///< closes its sending side
   std::uint32_t every = 0;  ///< ticks; subscribes to samples; 0: not
   bool gets_all = false;    ///< and may lose none
+  bool gets_in = false;     ///< the server must give it a session within seconds, beside any crowd
 };
 
 /// A client on the stream socket: a controller, a viewer, or a nuisance.
@@ -60,6 +64,7 @@ class StreamClient final : public Player {
     v1::LeaseRequest::Action action;
     bool counts;         ///< a command for one axis, that is counted if it is refused
     std::uint64_t tick;  ///< that a command answers
+    std::uint64_t sent;  ///< tick of the axis when a command was sent
   };
   struct Subscription {
     std::uint32_t every = 0;
@@ -89,6 +94,7 @@ class StreamClient final : public Player {
   void lease(std::uint32_t axis, v1::LeaseRequest::Action action);
   void clear(std::uint32_t axis);
   void babble();
+  void gorge();
   std::uint64_t ask(v1::Envelope& request, std::uint32_t axis = 0, bool counts = false);
   bool asks_for_lease(std::uint32_t axis) const;
   void send(const v1::Envelope& request);
@@ -105,6 +111,7 @@ class StreamClient final : public Player {
   std::shared_ptr<Wire> wire_;
   std::uint64_t connection_ = 0;  ///< number of the present one
   Time connected_at_ = 0;
+  std::optional<Time> outside_since_;  ///< in times of Scene::awake(); none: it has a session
   std::optional<FrameReader> reader_;
   bool greeted_ = false;
   bool raw_ = false;  ///< it sent random bytes: its state at the server is unknown
@@ -115,6 +122,7 @@ class StreamClient final : public Player {
   std::vector<bool> latched_;          ///< by axis, from the newest sample
   std::vector<Subscription> samples_;  ///< by axis
   std::map<std::uint64_t, Asked> asked_;
+  std::uint64_t forbidden_ = 0;  ///< of its requests, in all its sessions
   std::uint64_t last_id_ = 0;
   std::uint64_t last_look_ = 0;  ///< id of the last request for the status
   std::size_t sessions_when_asked_ = 0;

@@ -6,6 +6,7 @@
 #include "plant/injected_faults.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "tests/adversity/simulator/peers/stream_client.hpp"
+#include "tests/fuzz/request_program.hpp"
 
 namespace drivebench::simulator {
 namespace {
@@ -28,7 +29,12 @@ double StreamClient::value(double usual) {
 std::uint64_t StreamClient::ask(v1::Envelope& request, std::uint32_t axis, bool counts) {
   request.set_id(++last_id_);
   const std::uint64_t tick = counts ? request.exchange().commands(0).tick() : 0;
-  asked_[last_id_] = {request.kind_case(), axis, request.lease().action(), counts, tick};
+  asked_[last_id_] = {request.kind_case(),
+                      axis,
+                      request.lease().action(),
+                      counts,
+                      tick,
+                      counts ? scene_.axes[axis].tick() : 0};
   send(request);
   return last_id_;
 }
@@ -184,6 +190,26 @@ void StreamClient::babble() {
     axis.clear_unanswered();
   }
   wire_->send(bytes);
+}
+
+/// A frame from which a parser without bounds makes 3 to 14 MB.
+void StreamClient::gorge() {
+  using fuzz::wire::repeated;
+  using fuzz::wire::tagged;
+  const std::string empty = fuzz::wire::varint(0);
+  const std::string harmonics = tagged(1, 2, tagged(1, 2, tagged(4, 2, "")));
+  const std::array<std::string, 6> frames{
+      tagged(v1::Envelope::kSamples, 2, repeated(tagged(3, 2, ""), 32'000)),
+      tagged(v1::Envelope::kExchange, 2, repeated(tagged(1, 2, ""), 30'000)),
+      tagged(v1::Envelope::kSubscribe, 2, repeated(tagged(3, 2, ""), 30'000)),
+      repeated(tagged(v1::Envelope::kRunExperiment, 2, harmonics), 5'000),
+      repeated(tagged(v1::Envelope::kLease, 2, "") + tagged(v1::Envelope::kSubscribe, 2, ""), 15'000),
+      tagged(v1::Envelope::kStatusRequest, 2, "") + repeated(tagged(2000, 0, empty), 21'000),
+  };
+  const std::uint64_t which = random_.below(frames.size());
+  asked_[++last_id_] = {};
+  scene_.note("gorges", number_, which, last_id_);
+  wire_->send(framed(tagged(1, 0, fuzz::wire::varint(last_id_)) + frames[which]));
 }
 
 }  // namespace drivebench::simulator

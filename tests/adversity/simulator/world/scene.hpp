@@ -50,7 +50,8 @@ struct Scene {
   std::function<std::size_t()> connected;  ///< stream clients that the server has not left
   /// A disk has stood still; meanwhile refused commands in lockstep are not counted.
   bool time_waited = false;
-  bool ending = false;  ///< every player finishes its requests
+  std::uint64_t forbidden = 0;  ///< requests of known users that were answered so
+  bool ending = false;          ///< every player finishes its requests
   Failure failure;
 };
 

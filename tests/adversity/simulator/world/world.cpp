@@ -4,13 +4,16 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 
 #include "protocols/mcap/mcap.hpp"
 #include "server/engine/stepped_engine.hpp"
 #include "server/recording/replay.hpp"
 #include "tests/adversity/simulator/peers/can_drive.hpp"
 #include "tests/adversity/simulator/peers/cast.hpp"
+#include "tests/adversity/simulator/peers/crowd.hpp"
 #include "tests/adversity/simulator/peers/modbus_client.hpp"
+#include "tests/fuzz/counted_memory.hpp"
 
 namespace drivebench::simulator {
 namespace {
@@ -20,6 +23,9 @@ constexpr auto kEpoch = std::chrono::hours(1);
 
 /// Longer than every request under way, and than a stall that has just begun.
 constexpr Time kTimeToSettle = 600 * kMillisecond;
+
+/// The most that a turn of the I/O takes.
+constexpr std::size_t kMostOfATurn = std::size_t{2} << 20;
 
 /// The step of the server's clock.
 constexpr Time kClockStep = 5 * kMillisecond;
@@ -59,8 +65,13 @@ World::World(std::uint64_t seed, bool prints, const std::string& folder)
         std::ranges::count_if(players_, [](const auto& player) { return player->has_session(); }));
   };
   engine_->on_tick.add([this] { on_tick(); });
+  if (config_.tcp.asks_for_token) {
+    config_.audit.file = folder + "/audit.jsonl";
+    audit_ = std::make_unique<Audit>(config_.audit);
+    audit_->watch(*engine_);
+  }
   server_->serve(
-      *engine_, [] { return std::vector<TransportReport>(); }, nullptr);
+      *engine_, [] { return std::vector<TransportReport>(); }, nullptr, audit_.get());
   open_transports();
   cast();
 }
@@ -99,6 +110,7 @@ void World::cast() {
   };
   for (const Manners& manners : draw_clients(scene_.random, config_))
     add(std::make_unique<StreamClient>(scene_, ++number, manners), manners.name);
+  if (scene_.random.chance(0.2)) add(std::make_unique<Crowd>(scene_), "crowd");
   if (can_) {
     const auto axis = static_cast<std::uint32_t>(scene_.random.below(scene_.axes.size()));
     add(std::make_unique<CanDrive>(scene_, *bus_, config_.can.front().profile, axis), "CAN board");
@@ -181,7 +193,8 @@ void World::poll() {
   io_next_ = scene_.schedule.now() + io_every_;
   if (scene_.schedule.now() >= clock_next_) turn_clock();
   io_.restart();
-  io_.poll();
+  const fuzz::Taken taken = fuzz::taken_by([this] { io_.poll(); });
+  scene_.require(taken.peak_bytes < kMostOfATurn, "whatever clients send takes little memory");
   for (std::size_t axis = 0; axis < scene_.axes.size(); ++axis)
     scene_.axes[axis].io_done(engine_->owner(axis));
 }
@@ -246,6 +259,7 @@ void World::finish() {
   scene_.require(verdict.ticks == static_cast<std::uint64_t>(ticks_), "every tick ran once");
   scene_.require(verdict.late_ticks == late_ticks_, "the verdict counts all late ticks");
   check_recording(verdict);
+  if (audit_) check_audit();
   if (can_) can_->close();
   if (modbus_) modbus_->close();
   server_->close();
@@ -261,6 +275,7 @@ std::unique_ptr<Recorder> World::make_recorder() {
   if (random.chance(0.2)) faults.write_error = 0.01;
   if (random.chance(0.2)) faults.sync_error = 0.1;
   if (random.chance(0.2)) faults.capacity = 100'000 + random.below(3'000'000);
+  if (random.chance(0.3)) faults.meddling = 0.01;
   disk_ = std::make_unique<FakeDisk>(random.fork(), faults);
   RecordingOptions options;
   options.create = disk_->creator();
@@ -277,6 +292,7 @@ std::unique_ptr<Recorder> World::make_recorder() {
 /// The recorder runs; now and then its disk stands still for seconds.
 void World::record() {
   Time next = 5 * kMillisecond;
+  disk_->meddle();
   while (recorder_->work()) {
   }
   if (!scene_.ending && scene_.random.chance(0.0005)) {
@@ -298,6 +314,8 @@ void World::check_recording(const Verdict& verdict) {
   scene_.note("recording", files.size(), verdict.gaps, disk_->failed());
   scene_.require(verdict.gaps == 0 || disk_->failed() || (disk_stalled_ && !scene_.time_waited),
                  "a disk without faults loses nothing, nor does a slow one in lockstep");
+  scene_.require(verdict.gaps > 0 || !disk_->lost_a_file(),
+                 "a recording that another program removed is lost");
   if (verdict.gaps == 0) {
     const ReplayReport report = replay(files, nullptr);
     scene_.require(report.result == ReplayReport::Result::kEqual,
@@ -317,6 +335,27 @@ void World::check_recording(const Verdict& verdict) {
   }
   scene_.require(samples + verdict.gaps >= (verdict.ticks + 1) * config_.axes.size(),
                  "every loss of a recording is counted");
+}
+
+/// Every forbidden request of a known user has its line; wrong tokens have no more than their budget.
+void World::check_audit() {
+  std::uint64_t forbidden = 0;
+  std::uint64_t wrong_tokens = 0;
+  std::ifstream file(config_.audit.file);
+  for (std::string line; std::getline(file, line);) {
+    if (line.find(R"("event":"forbidden")") != std::string::npos) ++forbidden;
+    if (line.find(R"("event":"authentication")") != std::string::npos) ++wrong_tokens;
+  }
+  const double seconds = static_cast<double>(scene_.schedule.now()) / static_cast<double>(kSecond);
+  scene_.note("audit", 0, forbidden, wrong_tokens);
+  const double most = Identity::kForbidden.at_once + Identity::kForbidden.per_s * seconds + 1;
+  scene_.require(static_cast<double>(forbidden) <= most,
+                 "a user that asks for what is forbidden has to wait");
+  scene_.require(forbidden >= scene_.forbidden && audit_->lost() == 0,
+                 "the audit log has every forbidden request of a known user");
+  scene_.require(static_cast<double>(wrong_tokens) <=
+                     AuditBudget::kOfAddress.at_once + AuditBudget::kOfAddress.per_s * seconds + 1,
+                 "the audit log has a budget for wrong tokens");
 }
 
 }  // namespace drivebench::simulator

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/access/audit.hpp"
 #include "server/endpoints/can/endpoint.hpp"
 #include "server/endpoints/modbus/modbus_server.hpp"
 #include "server/endpoints/tcp/stream_server.hpp"
@@ -46,6 +47,7 @@ class World {
   std::unique_ptr<Recorder> make_recorder();
   void record();
   void check_recording(const Verdict& verdict);
+  void check_audit();
   void open_transports();
   void cast();
   int connect_modbus();
@@ -67,6 +69,7 @@ class World {
   std::unique_ptr<can::MemoryWire> bus_;
   std::unique_ptr<can::Endpoint> can_;
   std::unique_ptr<Engine> engine_;
+  std::unique_ptr<Audit> audit_;  ///< of benches with tokens
   Recorder* recorder_ = nullptr;  ///< of the engine; null: this seed records nothing
   std::function<void()> tick_;
   VirtualPacer* pacer_ = nullptr;
