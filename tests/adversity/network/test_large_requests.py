@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Requests as large as a frame may be, from many sessions at once."""
+import contextlib
 import os
 import pathlib
 import resource
@@ -71,6 +72,39 @@ class LargeRequests(WireTest):
             until(lambda: owner.newest().tick > before, "the ticks go on")
         self.assertEqual(owner.status().sessions, 256)
         self.assertMemoryBelow(server, 64 * MIB_IN_KIB)
+
+    def test_tcp_05_tcp_11_the_worst_of_all_together_stays_below_128_mib(self):
+        """Catches: bounds that hold one by one, but not together: a decimation for each viewer, half a frame for each session,
+        answers that nobody reads, a queue full of the largest experiments, tables, a crowd at the door, a recording."""
+        with tempfile.TemporaryDirectory(prefix="drivebench-worst-") as folder:
+            server = self.server("--mode", "realtime", "--experiments", f"{folder}/experiments", "--record", f"{folder}/run.mcap",
+                                 text=PATIENT_TEXT)
+            owner, guests = self.client(server), [self.client(server, receive_buffer=4096) for _ in range(255)]
+            self.assertDone(owner.lease())
+            self.drive(owner, 1.0)
+            shapes = pb.ExperimentInput(kind=pb.INPUT_KIND_PHASE_VOLTAGES, shapes=[pb.Shape(channel=pb.CHANNEL_A,
+                multisine=pb.Shape.Multisine(amplitude=0.01, base_hz=1.0, harmonics=range(1, 1001)))])
+            queued = 0
+            for n, guest in enumerate(guests):
+                for _ in range(4):
+                    answer = guest.ask(upload_table=pb.UploadTable(times_s=[float(t) for t in range(4000)], values=[1.0] * 4000))
+                    self.assertIn(answer.WhichOneof("kind"), ("table_info", "refusal"))
+                answer = guest.ask(run_experiment=request(ticks=400_000, mode=pb.MODE_REALTIME, owner=f"guest number {n}", input=shapes))
+                queued += answer.WhichOneof("kind") == "experiment_info"
+            self.assertGreater(queued, 30)
+            crowd = [server.raw(source="127.0.0.2") for _ in range(100)]
+            for n, guest in enumerate(guests):
+                guest.send(subscribe=pb.Subscribe(decimation=n + 1))
+            for guest in guests:
+                guest.socket.setblocking(False)
+                unread = frame(pb.Envelope(id=8, list_experiments=pb.ListExperiments()).SerializeToString()) * 64
+                with contextlib.suppress(OSError):  # the server takes no more, or has cut it
+                    guest.send_bytes(unread + frame(self.FRAMES["rows of a table"])[:-1])
+            before = owner.newest().tick
+            until(lambda: owner.newest().tick > before + 20_000, "the ticks go on")
+            for each in crowd:
+                each.close()
+            self.assertMemoryBelow(server, 128 * MIB_IN_KIB)
 
     def test_tcp_18_limit_11_uploaded_tables_hold_no_descriptors(self):
         """Catches: 16 sessions with 64 tables each, after which nobody can connect; tables that outlive a server that was

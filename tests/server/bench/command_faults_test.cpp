@@ -1,11 +1,13 @@
 // Faults of a stream of commands: lost, late, doubled, overtaken, in a burst, not numbers.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
+#include "protocols/signals/catalogue.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
 namespace drivebench {
@@ -130,33 +132,88 @@ TEST(CommandFaults, CMD_09_CMD_10_OfABurstTheNewestActsOnce) {
   }
 }
 
-// Catches: one set-point of the four that is not checked; a refusal that changes what is in force or feeds
-// the watchdog; a check that takes a negative zero or a denormal for wrong, or flushes it.
-TEST(CommandFaults, CMD_11_EveryFieldIsCheckedAndLegalOdditiesPass) {
+/// A bench whose drive takes set-points of this kind.
+BenchSetup setup_for(Gates gates) {
+  BenchSetup setup = watched_setup();
+  if (gates != Gates::kCurrent) return setup;
+  DriveParameters& drive = setup.axes[0].parameters.drive;
+  drive.kind = DriveKind::kCurrent;
+  drive.amplifier.voltage_limit_v = 80.0;
+  drive.current_loop = {.proportional_v_per_a = 50.0, .integral_v_per_as = 5e4, .limit_a = 6.0};
+  setup.substeps = 7;  // of 17.9 us
+  return setup;
+}
+
+Refused submit_setpoint(Bench& bench, Gates gates, const PhaseValues& setpoint) {
+  const Command command{.answers = bench.tick(), .phases = {.gates = gates, .setpoint = setpoint}};
+  return bench.submit({.tick = bench.tick(), .axis = 0, .owner = kOwner, .action = command});
+}
+
+constexpr auto kSetpoints =
+    std::to_array({&PhaseValues::a, &PhaseValues::b, &PhaseValues::c, &PhaseValues::field});
+
+// Catches: a voltage or a current that is not checked; a refusal that changes what is in force, that feeds
+// the watchdog, or that leaves a trace in a current, a voltage or the loop that controls a current.
+TEST(CommandFaults, CMD_11_NoVoltageOrCurrentThatIsNoNumberReachesThePlant) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  for (double PhaseValues::*field :
-       {&PhaseValues::a, &PhaseValues::b, &PhaseValues::c, &PhaseValues::field}) {
-    Bench bench = owned_bench(watched_setup(), kOwner);
-    ASSERT_EQ(submit_volts(bench, kOwner, 3.0, 4.0), Refused::kNot);
-    bench.step();
-    for (const double bad : {std::nan(""), -std::nan(""), kInfinity, -kInfinity}) {
-      Command command = volts_in_answer_to(bench.tick(), 1.0, 2.0);
-      command.phases.setpoint.*field = bad;
-      EXPECT_EQ(bench.submit({.tick = bench.tick(), .axis = 0, .owner = kOwner, .action = command}),
-                Refused::kNotFinite);
-      bench.step();
-      EXPECT_EQ(state_of(bench), ControlState::kHold);
-      EXPECT_EQ(bench.sample(0).u_a_v, 3.0);
-      EXPECT_EQ(bench.sample(0).u_b_v, 4.0);
+  for (const Gates gates : {Gates::kVoltage, Gates::kCurrent}) {
+    for (double PhaseValues::*field : kSetpoints) {
+      Bench bench = owned_bench(setup_for(gates), kOwner);
+      Bench silent = owned_bench(setup_for(gates), kOwner);
+      for (Bench* b : {&bench, &silent}) {
+        ASSERT_EQ(submit_setpoint(*b, gates, {.a = 3.0, .b = -2.0}), Refused::kNot);
+        b->step();
+      }
+      for (const double bad : {std::nan(""), -std::nan(""), kInfinity, -kInfinity, 1e308, -1e308}) {
+        PhaseValues setpoint{.a = 1.0, .b = 2.0};
+        setpoint.*field = bad;
+        EXPECT_EQ(submit_setpoint(bench, gates, setpoint),
+                  std::isfinite(bad) ? Refused::kBeyondDrive : Refused::kNotFinite);
+        EXPECT_FALSE(bench.has_command(0));
+        bench.step();
+        silent.step();
+        EXPECT_EQ(state_of(bench), ControlState::kHold);
+        for (const Signal& signal : kSignals) {
+          if (signal.type != SignalType::kReal) continue;
+          EXPECT_EQ(bits(bench.sample(0).*signal.as_real), bits(silent.sample(0).*signal.as_real))
+              << signal.name;
+        }
+      }
+      EXPECT_GT(std::abs(bench.sample(0).true_i_a_a), 0.1) << "currents that a trace would change";
+      EXPECT_EQ(bench.sample(0).missed_commands, 6u);
+      EXPECT_EQ(bench.sample(0).refused_commands, 6u);
     }
-    EXPECT_EQ(bench.sample(0).missed_commands, 4u);
-    EXPECT_EQ(bench.sample(0).refused_commands, 4u);
   }
-  Bench bench = owned_bench(watched_setup(), kOwner);
-  for (const double odd : {-0.0, std::numeric_limits<double>::denorm_min(), -1e-310}) {
-    ASSERT_EQ(submit_volts(bench, kOwner, odd, odd), Refused::kNot);
-    bench.step();
-    EXPECT_EQ(bench.sample(0).u_a_v, odd);  // the mean over a tick has no negative zero
+}
+
+/// Keeps the set-points of the last command as a recorder gets them.
+class LastSetpoints final : public BenchObserver {
+ public:
+  void on_input(Tick, const Input& input) noexcept override {
+    if (const auto* command = std::get_if<Command>(&input.action)) values = command->phases.setpoint;
+  }
+  void on_sample(std::uint32_t, const Sample&) noexcept override {}
+  PhaseValues values{};
+};
+
+// Catches: a check that takes a negative zero or a denormal for wrong, or flushes it.
+TEST(CommandFaults, CMD_11_NegativeZerosAndDenormalsAreLegalAndKeepTheirBits) {
+  for (const Gates gates : {Gates::kVoltage, Gates::kCurrent}) {
+    for (double PhaseValues::*field : kSetpoints) {
+      LastSetpoints last;
+      Bench bench = owned_bench(setup_for(gates), kOwner, &last);
+      for (const double odd : {-0.0, std::numeric_limits<double>::denorm_min(), -1e-310}) {
+        PhaseValues setpoint{};
+        setpoint.*field = odd;
+        ASSERT_EQ(submit_setpoint(bench, gates, setpoint), Refused::kNot);
+        EXPECT_EQ(bits(last.values.*field), bits(odd));
+        bench.step();
+        EXPECT_EQ(state_of(bench), ControlState::kRun);
+        EXPECT_TRUE(std::isfinite(bench.sample(0).true_i_a_a));
+        const double applied_v = gates == Gates::kVoltage ? setpoint.a : bench.sample(0).u_a_v;
+        EXPECT_EQ(bench.sample(0).u_a_v, applied_v);  // the mean over a tick has no negative zero
+      }
+    }
   }
 }
 

@@ -16,7 +16,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from recording import Recording
 from wire_client import PATIENCE_S, pb
-from wire_test import SERVO_TEXT, TWO_AXES, WireTest, until
+from wire_test import SERVO_TEXT, TWO_AXES, TWO_DRIVES, WireTest, until
 
 
 class Exchange(WireTest):
@@ -73,6 +73,28 @@ class Exchange(WireTest):
         sample = client.step(2, 1e6, -1e6)
         self.assertEqual((sample.u_a_v, sample.u_b_v), (80.0, -80.0))
         self.assertTrue(sample.faults & 1, "saturation is flagged")
+
+    def test_cmd_11_currents_that_are_not_finite_never_arrive(self):
+        """Catches: NaN that passes as a current, though as a voltage it does not."""
+        client = self.client(self.server(text=TWO_DRIVES))
+        client.lease(axis=0)
+
+        def exchange(tick, **currents):
+            return client.ask(exchange=pb.Exchange(commands=[pb.Command(tick=tick, gates=pb.GATES_CURRENT, **currents)]))
+
+        for tick in range(40):
+            exchange(tick, i_a_a=2.0, i_b_a=-1.0)
+        before = client.newest()
+        self.assertAlmostEqual(before.true_i_a_a, 2.0, places=1)
+        for current in ("i_a_a", "i_b_a", "i_c_a", "i_f_a"):
+            for bad in (math.nan, math.inf, -math.inf):
+                self.assertRefused(exchange(40, **{current: bad}), pb.REFUSAL_NOT_FINITE, "commands")
+            for bad in (1e308, -1e308):
+                self.assertRefused(exchange(40, **{current: bad}), pb.REFUSAL_OUT_OF_RANGE, "commands")
+        self.assertEqual(client.newest(), before)
+        after = exchange(40, i_a_a=2.0, i_b_a=-1.0).exchange_reply.samples[0].sample
+        self.assertEqual(after.refused_commands, before.refused_commands + 20)
+        self.assertAlmostEqual(after.true_i_a_a, 2.0, places=1)
 
     def test_cmd_11_legal_values_are_kept_to_the_bit(self):
         """Catches: -0.0 that becomes 0.0 on its way, or a denormal that becomes 0."""
