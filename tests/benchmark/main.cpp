@@ -33,6 +33,8 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"modbus", "lockstep over Modbus against plain libmodbus", measure_modbus},
     {"abuse", "a polite Modbus client beside three that are not", measure_abuse},
     {"crowd", "a healthy client beside 1,000 idle ones, 32 viewers and 50 that never read", measure_crowd},
+    {"attacks", "the ticks beside large frames, a crowd at the door, guesses and forbidden requests",
+     measure_attacks},
     {"memory", "memory of the server with 32 viewers", measure_memory},
 });
 

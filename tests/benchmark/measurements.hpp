@@ -46,6 +46,8 @@ std::vector<Row> measure_socketcan(const Plan& plan);
 std::vector<Row> measure_modbus(const Plan& plan);
 /// A healthy client beside 1,000 idle clients, 32 viewers, and 50 clients that never read.
 std::vector<Row> measure_crowd(const Plan& plan);
+/// The ticks of a bench beside hostile clients, against the same clients at another server.
+std::vector<Row> measure_attacks(const Plan& plan);
 /// A polite Modbus client beside abusers, and beside plain libmodbus.
 std::vector<Row> measure_abuse(const Plan& plan);
 

@@ -14,6 +14,7 @@
 
 #include "clients/link/tcp/tcp_link.hpp"
 #include "tests/benchmark/crowd/viewers.hpp"
+#include "tests/benchmark/crowd/windows.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
@@ -29,41 +30,8 @@ constexpr int kSubscribers = 32;
 constexpr std::uint32_t kEighth = 8;  // 1 kHz
 constexpr std::size_t kDeaf = 50;
 constexpr double kMaxP99Ratio = 2.0;
-constexpr double kMaxMoreLate = 5.0;  // of 10,000 ticks: windows of one kind differ by as much
 constexpr double kMaxGrowthMiB = 60.0;
 constexpr double kMaxCut_s = 3.0;
-constexpr auto kWindow = 2s;
-constexpr int kRounds = 5;  // of windows of each kind, in turn
-
-/// Answer times of one healthy client that asks for the newest sample 500 times a second, and the late ticks
-/// of the bench meanwhile.
-struct Window {
-  double p99_us = 0.0;
-  double ticks = 0.0;
-  double late_ticks = 0.0;
-};
-
-Window watch(link::Link& client) {
-  const auto newest = [&client] { return client.exchange({}).samples(0).sample(); };
-  const v1::Sample first = newest();
-  std::vector<double> us;
-  const auto end = std::chrono::steady_clock::now() + kWindow;
-  while (std::chrono::steady_clock::now() < end) {
-    const std::int64_t begin = now_ns();
-    newest();
-    us.push_back(static_cast<double>(now_ns() - begin) * 1e-3);
-    std::this_thread::sleep_for(2ms);
-  }
-  const v1::Sample last = newest();
-  return {.p99_us = percentile(us, 0.99),
-          .ticks = static_cast<double>(last.tick() - first.tick()),
-          .late_ticks = static_cast<double>(last.late_ticks() - first.late_ticks())};
-}
-
-/// In the median window: a stall of the machine makes a hundred ticks late in one.
-double late_per_10000(const std::vector<Window>& windows) {
-  return median(windows, [](const Window& each) { return 1e4 * each.late_ticks / each.ticks; });
-}
 
 /// Clients that say hello and then nothing.
 using Idlers = std::vector<std::unique_ptr<link::Link>>;
@@ -83,31 +51,6 @@ Idlers deaf(const std::string& address) {
   return all;
 }
 
-struct Windows {
-  std::vector<Window> alone;
-  std::vector<Window> beside;
-  std::vector<Window> elsewhere;  ///< the same clients at another server: their load on the machine alone
-};
-
-/// Windows of each kind in turn; `come` makes the clients at an address, `other` is a bench file.
-template <class Come>
-Windows in_turn(link::Link& client, const std::string& here, const std::string& other, Come come) {
-  constexpr auto kUntilTheyAreGone = 500ms;
-  Windows windows;
-  for (int round = 0; round < kRounds; ++round) {
-    windows.alone.push_back(watch(client));
-    {
-      const auto company = come(here);
-      windows.beside.push_back(watch(client));
-    }
-    std::this_thread::sleep_for(kUntilTheyAreGone);
-    Server there({other});
-    const auto company = come(there.address());
-    windows.elsewhere.push_back(watch(client));
-  }
-  return windows;
-}
-
 void add_rows(std::vector<Row>& rows, const std::string& beside, const Windows& windows, double gone) {
   rows.push_back({.name = "p99 of a healthy client beside " + beside,
                   .unit = "us",
@@ -116,13 +59,7 @@ void add_rows(std::vector<Row>& rows, const std::string& beside, const Windows& 
                   .limit = Limit{Limit::Kind::kRatioAtMost, kMaxP99Ratio},
                   .gone = gone,
                   .note = "floor: alone, in windows in turn"});
-  rows.push_back({.name = "late ticks per 10,000 beside " + beside,
-                  .measured = late_per_10000(windows.beside),
-                  .floor = late_per_10000(windows.elsewhere),
-                  .limit = Limit{Limit::Kind::kExcessAtMost, kMaxMoreLate},
-                  .gone = gone,
-                  .note = fmt::format("floor: the same at another server on this machine; alone: {:.2f}",
-                                      late_per_10000(windows.alone))});
+  rows.push_back(late_ticks_row(beside, windows, gone));
 }
 
 /// Both ends of all connections belong to this process or its child.
@@ -140,11 +77,6 @@ void expect_full(const std::string& address) {
     return;  // refused with a reason
   }
   throw std::runtime_error("a session beyond max_sessions was taken");
-}
-
-std::filesystem::path written(const BenchConfig& config, std::filesystem::path file) {
-  if (!(std::ofstream(file) << to_toml(config))) throw std::runtime_error("cannot write " + file.string());
-  return file;
 }
 
 /// The time until the server has cut the clients that do not read, and its memory meanwhile.
@@ -175,13 +107,13 @@ std::vector<Row> measure_crowd(const Plan&) {
   BenchConfig config = bench_config("servo-realtime");
   config.tcp.max_sessions = kIdle + kSubscribers + 1;
   config.tcp.unix_path = (folder / "bench.socket").string();
-  const std::filesystem::path bench = written(config, folder / "bench.toml");
+  const std::filesystem::path bench = written(folder / "bench.toml", to_toml(config));
   // This server's ticks shall cost nothing, only its clients.
   config.tcp.max_sessions = kIdle + kSubscribers;
   config.tcp.unix_path = (folder / "other.socket").string();
   config.realtime.pacer = PacerKind::kSleep;
   config.realtime.priority = 1;
-  const std::string other = written(config, folder / "other.toml").string();
+  const std::string other = written(folder / "other.toml", to_toml(config)).string();
 
   GapCanary canary;
   const CpuPair cpu = cpu_pair();
@@ -196,12 +128,15 @@ std::vector<Row> measure_crowd(const Plan&) {
     std::unique_ptr<Viewers> subscribers;
   };
   const Windows crowded = in_turn(*client, server.address(), other, [](const std::string& place) {
-    Crowd crowd{.idle = idlers(place, kIdle),
-                .subscribers = std::make_unique<Viewers>(place, kSubscribers, kEighth)};
+    auto crowd = std::make_shared<Crowd>();
+    crowd->idle = idlers(place, kIdle);
+    crowd->subscribers = std::make_unique<Viewers>(place, kSubscribers, kEighth);
     expect_full(place);
     return crowd;
   });
-  const Windows unheard = in_turn(*client, server.address(), other, deaf);
+  const Windows unheard = in_turn(*client, server.address(), other, [](const std::string& place) {
+    return std::make_shared<Idlers>(deaf(place));
+  });
   client.reset();
   server.stop();
   canary.look(std::array{cpu.near, cpu.far});

@@ -53,6 +53,7 @@ struct Round {
 Round one_round(const can::MessageRow& row) {
   can::Profile profile;
   profile.fd = row.variant != can::Variant::kClassic;
+  profile.wide = row.width == can::Width::kWide;
   Sample sample = a_sample();
   can::Frame frame = can::encode_sample(row, profile, 1, sample);
   const double encode_ns = batch_ns([&] {
