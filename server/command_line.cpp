@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-/// As a script gives it whose variable is not set.
+/// Refuses an empty value, which a script gives when its variable is not set.
 std::string not_empty(const std::string& value) {
   return value.empty() ? "must not be empty" : "";
 }

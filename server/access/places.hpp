@@ -44,7 +44,7 @@ class Places {
   };
   /// A new connection from this address. It gets no place if no role would make it a session.
   Entry enter(const std::string& address);
-  /// How the stranger ends, with a sentence, when another one gets its place.
+  /// Calls `end` with a sentence when another stranger gets the place of this one.
   void on_displaced(Number number, std::function<void(const std::string&)> end);
   /// The stranger has sent something.
   void heard(Number number);

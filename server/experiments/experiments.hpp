@@ -90,7 +90,7 @@ class Experiments {
   /// The most tables of all sessions, each of which is a file.
   static constexpr std::size_t kMaxTables = 1024;
 
-  /// Of the tables, whose numbers are no ids.
+  /// The ending of the files of tables, whose numbers are no ids.
   static constexpr std::string_view kTableEnding = ".table";
 
   std::filesystem::path file_of(std::uint64_t id, std::string_view ending) const;

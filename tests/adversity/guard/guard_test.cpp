@@ -50,7 +50,8 @@ class BusyRun {
         requests_.push({.tick = tick + 90, .axis = 0, .owner = kOwner, .action = fault_of("bus_sag", 0.0)});
         requests_.push({.tick = tick + 60, .axis = 1, .owner = kOwner, .action = ShaftBump{1e-7}});
         requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = ClearFaults{}});
-        requests_.push({.tick = 0, .axis = 0, .owner = 99, .action = RefusedCommand{}});
+        requests_.push({.tick = 0, .axis = 0, .owner = kOwner, .action = RefusedCommand{}});
+        requests_.push({.tick = 0, .axis = 0, .owner = 99, .action = RefusedCommand{}});  // a stranger's
         requests_.push({.tick = 0, .axis = 0, .owner = 0, .action = LateTick{}});
       }
       while (const Input* request = requests_.front()) {

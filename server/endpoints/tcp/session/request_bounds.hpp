@@ -17,7 +17,7 @@ inline constexpr std::size_t kMaxUnknownFields = 64;
 /// The deepest nesting of messages and groups.
 inline constexpr int kMaxRequestNesting = 16;
 
-/// What became of a frame.
+/// The result of reading a frame.
 struct FrameReading {
   enum class Outcome {
     kRequest,
