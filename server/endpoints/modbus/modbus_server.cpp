@@ -198,6 +198,9 @@ TransportReport ModbusServer::report() const {
                          .counts = {}};
   if (!shared_) return report;
   const modbus::Shared::Counts& counts = shared_->counts;
+  std::uint64_t unread_keys = 0;
+  for (const auto& desk : shared_->desks)
+    unread_keys += desk->unread_keys();
   report.counts = {{"connections", connections_.size()},
                    {"requests", counts.requests},
                    {"exceptions", counts.exceptions},
@@ -206,9 +209,7 @@ TransportReport ModbusServer::report() const {
                    {"throttled", counts.throttled},
                    {"cut", counts.cut},
                    {"turned_away", counts.turned_away},
-                   {"unread_keys", 0}};
-  for (const auto& desk : shared_->desks)
-    report.counts.back().second += desk->unread_keys();
+                   {"unread_keys", unread_keys}};
   return report;
 }
 
