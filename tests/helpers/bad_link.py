@@ -34,6 +34,7 @@ class BadLink:
         self.random = random.Random(seed)
         self.loss, self.damage, self.jitter_s = 0.0, 0.0, 0.0
         self.cut = False
+        self.longest_pause_s = 0.0  # of the thread that carries the packets: a busy machine may keep it waiting
         self.counts = {"passed": 0, "lost": 0, "damaged": 0, "overtaken": 0}
         self.far = concurrent.futures.ThreadPoolExecutor(1)
         self.stopped = threading.Event()
@@ -71,7 +72,11 @@ class BadLink:
 
     def carry(self):
         under_way, number, since_loss, newest = [], 0, 2, [0, 0]
+        seen = time.monotonic()
         while not self.stopped.is_set():
+            now = time.monotonic()
+            self.longest_pause_s = max(self.longest_pause_s, now - seen)
+            seen = now
             wait_s = max(0.0, under_way[0][0] - time.monotonic()) if under_way else 0.05
             for device in select.select(self.ends, [], [], min(wait_s, 0.05))[0]:
                 packet = bytearray(os.read(device, 65536))

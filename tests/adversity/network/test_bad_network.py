@@ -19,7 +19,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from bad_link import HERE, BadLink
 from own_network import in_own_network
-from wire_client import PATIENCE_S, pb
+from wire_client import PATIENCE_S, Closed, pb
 from wire_test import SERVO_TEXT, WireTest, until
 
 TIMEOUT = 1 << 9  # command_timeout, in the fault word
@@ -135,25 +135,37 @@ class BadPath(WireTest):
         for tick in range(25):
             client.step(tick, 0.1 * tick)
 
+    def run_over(self, link, **bad):
+        """The state hash of a run over this link; none if the machine kept the link from carrying packets for so long that
+        the server had to take the peer for dead (3 s)."""
+        server = self.server_here()
+        client = link.there(server.client, token="anna-secret")
+        self.addCleanup(client.close)
+        if bad:
+            link.get_bad(**bad)
+        try:
+            self.run_of(client)
+        except (Closed, OSError):
+            if link.longest_pause_s < 1.0:
+                raise
+            return None
+        finally:
+            self.assertEqual(server.stop(), 0)
+            link.close()
+        return server.verdict["state_hash"]
+
     def test_tcp_21_loss_damage_and_disorder_cost_time_and_nothing_else(self):
         """Catches: a damaged bit that is taken, a session that ends at random losses, a command that acts twice."""
-        hashes = []
-        for bad in (False, True):
+        good, bad = None, None
+        while good is None:
+            good = self.run_over(self.link(21))
+        while bad is None:
             link = self.link(21)
-            server = self.server_here()
-            client = link.there(server.client, token="anna-secret")
-            self.addCleanup(client.close)
-            if bad:
-                link.get_bad(loss=0.4, damage=0.1, jitter_s=0.03)
-            self.run_of(client)
-            self.assertEqual(server.stop(), 0)
-            hashes.append(server.verdict["state_hash"])
-            link.close()
-            if bad:
-                self.assertGreater(link.counts["lost"], 0.1 * link.counts["passed"], link.counts)
-                self.assertGreater(link.counts["damaged"], 0, link.counts)
-                self.assertGreater(link.counts["overtaken"], 0, link.counts)
-        self.assertEqual(hashes[0], hashes[1])
+            bad = self.run_over(link, loss=0.4, damage=0.1, jitter_s=0.03)
+        self.assertGreater(link.counts["lost"], 0.1 * link.counts["passed"], link.counts)
+        self.assertGreater(link.counts["damaged"], 0, link.counts)
+        self.assertGreater(link.counts["overtaken"], 0, link.counts)
+        self.assertEqual(bad, good)
 
     def test_tcp_21_the_watchdog_acts_in_an_outage_only(self):
         """Catches: an axis that is given up for a lost segment, or one that goes on without commands."""
