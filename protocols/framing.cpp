@@ -1,5 +1,6 @@
 #include "protocols/framing.hpp"
 
+#include <algorithm>
 #include <cstring>
 
 namespace drivebench {
@@ -9,10 +10,7 @@ std::array<std::byte, kFrameHeaderSize> frame_header(std::uint32_t payload_size)
           std::byte(payload_size)};
 }
 
-FrameReader::FrameReader(std::size_t capacity)
-    : buffer_(kFrameHeaderSize + capacity), capacity_(capacity), max_payload_(capacity) {}
-
-std::span<std::byte> FrameReader::free_space() noexcept {
+std::span<std::byte> FrameReader::free_space() {
   if (begin_ == end_) {
     begin_ = end_ = 0;
   } else if (begin_ > 0) {
@@ -20,6 +18,7 @@ std::span<std::byte> FrameReader::free_space() noexcept {
     end_ -= begin_;
     begin_ = 0;
   }
+  buffer_.resize(std::max(buffer_.size(), kFrameHeaderSize + max_payload_));
   return std::span(buffer_).subspan(end_);
 }
 

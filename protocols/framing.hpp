@@ -24,13 +24,14 @@ std::array<std::byte, kFrameHeaderSize> frame_header(std::uint32_t payload_size)
 /// Cuts a byte stream into frames. Holds at most one frame; never allocates after construction.
 class FrameReader {
  public:
-  /// Reads frames with up to `capacity` bytes of payload; set_max_payload() may lower that limit.
-  explicit FrameReader(std::size_t capacity);
+  /// Reads frames with up to `capacity` bytes of payload; set_max_payload() may lower that limit. The buffer
+  /// has room for one frame of the limit, and grows with it.
+  explicit FrameReader(std::size_t capacity) : capacity_(capacity), max_payload_(capacity) {}
 
   void set_max_payload(std::size_t size) noexcept { max_payload_ = size < capacity_ ? size : capacity_; }
 
   /// The buffer for the next bytes of the stream; empty only while next() has a frame to give.
-  std::span<std::byte> free_space() noexcept;
+  std::span<std::byte> free_space();
   /// Reports how many bytes were put into free_space().
   void received(std::size_t count) noexcept { end_ += count; }
 

@@ -87,6 +87,23 @@ TEST(Framing, CapMayBeLoweredAndRaisedWithinTheCapacity) {
   EXPECT_FALSE(lowered.reader.error().empty());
 }
 
+// Catches: memory for the largest frame for each client that has not said hello; bytes that are lost when the
+// buffer grows.
+TEST(Framing, LIMIT_01_TheBufferGrowsWithTheLimit) {
+  Stream stream(1000);
+  stream.reader.set_max_payload(10);
+  EXPECT_EQ(stream.reader.free_space().size(), kFrameHeaderSize + 10);
+  const Bytes small = frame(10, 1);
+  const Bytes large = frame(1000, 2);
+  Bytes bytes = small;
+  bytes.insert(bytes.end(), large.begin(), large.begin() + 3);
+  stream.feed(bytes);
+  stream.reader.set_max_payload(1000);
+  stream.feed(std::span(large).subspan(3));
+  ASSERT_EQ(stream.frames.size(), 2u);
+  EXPECT_EQ(stream.frames[1], Bytes(large.begin() + kFrameHeaderSize, large.end()));
+}
+
 // Catches: a reader that goes on with a stream behind a bad length.
 TEST(Framing, NothingFollowsABadLength) {
   Stream stream(100);
