@@ -49,6 +49,10 @@ void add_row(Outcome& seen, ClosedLoopRow row, double counts_per_rad) {
   const Sample& s = row.sample;
   seen.peak_error_rad = larger(seen.peak_error_rad, row.error_rad);
   seen.peak_error_counts = seen.peak_error_rad * counts_per_rad;
+  if (row.phase != control::RunPhase::kPreparing) {
+    seen.peak_error_while_moving_counts =
+        larger(seen.peak_error_while_moving_counts, row.error_rad * counts_per_rad);
+  }
   seen.peak_speed_rad_s = larger(seen.peak_speed_rad_s, s.speed_rad_s);
   seen.peak_speed_error_rad_s =
       larger(seen.peak_speed_error_rad_s, row.reference.speed_rad_s - s.speed_rad_s);

@@ -48,7 +48,8 @@ struct ClosedLoopRow {
 struct Outcome {
   double peak_error_rad = 0.0;  ///< of the true angle
   double peak_error_counts = 0.0;
-  double final_error_counts = 0.0;  ///< of the true angle, largest of the last 100 samples
+  double peak_error_while_moving_counts = 0.0;  ///< from the start of the trajectory on
+  double final_error_counts = 0.0;              ///< of the true angle, largest of the last 100 samples
   double final_encoder_error_counts = 0.0;
   double peak_speed_rad_s = 0.0;        ///< true
   double peak_speed_error_rad_s = 0.0;  ///< reference - true speed

@@ -113,7 +113,8 @@ std::vector<Preset> induction_input_output_presets() {
               "servo-8000rpm"},
              kDrive, kTextGains, kOptimumFlux, kMove, kWithin80V6A),
       preset({"book/8.2.5-soft-flux", "as book/8.2.5 with flux gains 100 and 1e4, which 4 kHz can sample",
-              "peak error at most 8 counts (3.7), final at most 1, currents below 6 A", "servo-8000rpm"},
+              "peak error at most 8 counts (3.7), final at most 1 (2 of the encoder), currents below 6 A",
+              "servo-8000rpm"},
              kDrive, kSoftGains, kOptimumFlux, kMove, kWithin80V6A),
       preset({"book/8.2.5-constant-flux",
               "the move of book/8.2.5 under field-oriented control with constant flux: the text's "

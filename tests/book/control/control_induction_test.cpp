@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -16,15 +15,6 @@
 
 namespace drivebench {
 namespace {
-
-/// The largest error from the start of the trajectory on, without the error of an earlier load.
-double peak_error_while_moving_counts(const Outcome& seen) {
-  double peak_rad = 0.0;
-  for (const ClosedLoopRow& row : seen.rows) {
-    if (row.phase != control::RunPhase::kPreparing) peak_rad = std::max(peak_rad, std::abs(row.error_rad));
-  }
-  return peak_rad * 2000.0 / (2.0 * std::numbers::pi);
-}
 
 /// Samples from the start of the trajectory on in which the law was not applied.
 std::int64_t singular_samples(const Outcome& seen) {
@@ -186,7 +176,7 @@ TEST(InductionControl, AnIntegratorOnTheDirectAxisFollowsAFallingFlux) {
 // and the law holds throughout; without load it must give way at rest.
 TEST(InductionControl, AnIntegratorOnTheQuadratureAxisLiftsALoad) {
   const Outcome seen = closed_loop("exercise/8.29");
-  EXPECT_LE(peak_error_while_moving_counts(seen), 3.0);
+  EXPECT_LE(seen.peak_error_while_moving_counts, 3.0);
   EXPECT_EQ(singular_samples(seen), 0);
   EXPECT_NEAR(seen.rows.back().telemetry[seen.column("load_nm")], 0.25, 0.01);
   const Outcome without = closed_loop("exercise/8.29-no-load");
