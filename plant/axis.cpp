@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "plant/drive/phases.hpp"
 #include "plant/math/rounding.hpp"
@@ -282,13 +283,44 @@ Sample Axis::sample(Tick tick) const noexcept {
   return s;
 }
 
+namespace {
+
+constexpr double kStepsInTimeConstant = 10.0;
+// The output of the filter is exact at both ends and in the middle of a step; the machine only smooths it.
+constexpr double kStepsInFilter = 2.0;
+constexpr double kRadPerStep = 0.2;
+
+/// The fastest electrical angle that the axis is known to turn through [rad/s]: of its source, of its prime
+/// mover, and of an emf that reaches the voltage limit.
+template <class Machine>
+double fastest_turning_rad_s(const AxisParameters& p, const Machine& machine) noexcept {
+  double turning_rad_s = 0.0;
+  if (p.drive.kind == DriveKind::kSource) {
+    turning_rad_s = 2.0 * std::numbers::pi * p.drive.source.frequency_hz;
+  }
+  if constexpr (requires { machine.pole_pairs; }) {
+    if (p.mechanics.motion == ShaftMotion::kImposed) {
+      turning_rad_s = std::max(turning_rad_s, machine.pole_pairs * std::abs(p.mechanics.imposed_speed_rad_s));
+    }
+  }
+  if constexpr (requires { electrical_speed_rad_s(machine, 0.0); }) {
+    turning_rad_s =
+        std::max(turning_rad_s, electrical_speed_rad_s(machine, p.drive.amplifier.voltage_limit_v));
+  }
+  return turning_rad_s;
+}
+
+}  // namespace
+
 int default_substeps(const AxisParameters& p, double period_s) noexcept {
-  constexpr double kStepsInTimeConstant = 10.0;
-  constexpr double kRadPerStep = 0.2;
   constexpr double kLongestStepS = 50e-6;
   constexpr double kCurrentLoopS = 20e-6;
   double step_s = p.drive.kind == DriveKind::kCurrent ? kCurrentLoopS : kLongestStepS;
   step_s = std::min(step_s, fastest_time_constant_s(p.mechanics) / kStepsInTimeConstant);
+  if (p.drive.amplifier.filter_hz > 0.0) {
+    const double filter_s = 1.0 / (2.0 * std::numbers::pi * p.drive.amplifier.filter_hz);
+    step_s = std::min(step_s, filter_s / kStepsInFilter);
+  }
   std::visit(
       [&](const auto& machine) {
         step_s = std::min(step_s, fastest_time_constant_s(machine) / kStepsInTimeConstant);
@@ -297,10 +329,8 @@ int default_substeps(const AxisParameters& p, double period_s) noexcept {
           const Adjustment loop{.series_resistance_ohm = p.drive.current_loop.proportional_v_per_a};
           step_s = std::min(step_s, 0.5 * fastest_time_constant_s(adjusted(machine, loop)));
         }
-        if constexpr (requires { electrical_speed_rad_s(machine, 0.0); }) {
-          const double turning_rad_s = electrical_speed_rad_s(machine, p.drive.amplifier.voltage_limit_v);
-          if (turning_rad_s > 0.0) step_s = std::min(step_s, kRadPerStep / turning_rad_s);
-        }
+        const double turning_rad_s = fastest_turning_rad_s(p, machine);
+        if (turning_rad_s > 0.0) step_s = std::min(step_s, kRadPerStep / turning_rad_s);
       },
       p.machine);
   const double substeps = std::ceil(period_s / step_s - 1e-9);
