@@ -101,6 +101,14 @@ struct ShaftBranch {
   double contact = 1.0;  ///< two masses: 1: the teeth touch, 0: they are apart
   double load_turns = 1.0;  ///< two masses: 0: the load stands against its passive torque
   double load_direction = 0.0;
+  double held_nm = 0.0;       ///< static friction that holds the rotor, which stands; 0: none does
+  double load_held_nm = 0.0;  ///< the same of the load
+};
+
+/// Masses whose static friction the torques have just overcome: it does not hold them any more.
+struct Freed {
+  bool rotor = false;
+  bool load = false;
 };
 
 /// The output of the gear, and the table of a screw.
@@ -117,8 +125,8 @@ constexpr double sign_of(double x) noexcept {
 }
 
 /// The part of the branch that concerns the rotor, under all torques on it but its own friction.
-inline ShaftBranch rotor_branch(const ShaftConstants& c, double speed_rad_s, double driving_nm,
-                                bool blocked) noexcept {
+inline ShaftBranch rotor_branch(const ShaftConstants& c, double speed_rad_s, double driving_nm, bool blocked,
+                                bool freed) noexcept {
   if (blocked || c.motion == ShaftMotion::kLocked) return {.turns = 0.0};
   if (c.motion == ShaftMotion::kImposed) {
     return {
@@ -128,7 +136,7 @@ inline ShaftBranch rotor_branch(const ShaftConstants& c, double speed_rad_s, dou
   }
   if (c.hold_nm == 0.0) return {};
   if (speed_rad_s != 0.0) return {.direction = sign_of(speed_rad_s)};
-  if (std::abs(driving_nm) <= c.hold_nm) return {.turns = 0.0};
+  if (!freed && std::abs(driving_nm) <= c.hold_nm) return {.turns = 0.0, .held_nm = c.hold_nm};
   return {.direction = sign_of(driving_nm)};
 }
 
@@ -172,9 +180,9 @@ constexpr TwoMassState output_bumped(const ShaftConstants& c, TwoMassState x, do
 
 /// The branch of a rigid shaft under the torque of the machine and the active load at the output.
 inline ShaftBranch branch_of(const ShaftConstants& c, const ShaftState& x, double driving_nm, double load_nm,
-                             bool blocked, bool output_blocked = false) noexcept {
+                             bool blocked, bool output_blocked = false, Freed freed = {}) noexcept {
   return shaft_detail::rotor_branch(c, x.speed_rad_s, driving_nm - c.per_ratio * load_nm,
-                                    blocked || output_blocked);
+                                    blocked || output_blocked, freed.rotor);
 }
 
 /// A gear train without play on a rigid shaft, with n turns of the motor for one of the output:
@@ -193,12 +201,24 @@ inline ShaftState derivative(const ShaftConstants& c, const ShaftState& x, doubl
   return {.speed_rad_s = gain * net_nm + branch.acceleration_rad_s2, .angle_rad = x.speed_rad_s};
 }
 
+/// Whether event_values() needs the torques: of a shaft that turns they end nothing.
+inline bool is_held(const ShaftBranch& branch) noexcept {
+  return branch.held_nm > 0.0 || branch.load_held_nm > 0.0;
+}
+
 /// Numbers that end the branch when they pass zero, and how many there are. A value that starts at zero ends
-/// nothing. Here: the speed, less that of the prime mover.
-inline int event_values(const ShaftConstants& c, const ShaftState& x, const ShaftBranch&,
-                        std::array<double, 4>& values) noexcept {
-  values[0] = x.speed_rad_s - shaft_detail::ending_speed_rad_s(c);
+/// nothing. Here: the speed, less that of the prime mover; of a held shaft the static friction less the
+/// torque that it takes up.
+inline int event_values(const ShaftConstants& c, const ShaftState& x, const ShaftBranch& branch,
+                        double driving_nm, double load_nm, std::array<double, 4>& values) noexcept {
+  values[0] = branch.held_nm > 0.0 ? branch.held_nm - std::abs(driving_nm - c.per_ratio * load_nm)
+                                   : x.speed_rad_s - shaft_detail::ending_speed_rad_s(c);
   return c.hold_nm > 0.0 || c.motion == ShaftMotion::kImposed ? 1 : 0;
+}
+
+/// The masses that this event frees; the first two events are those of rotor and load.
+constexpr Freed freed_by(const ShaftBranch& branch, int event) noexcept {
+  return {.rotor = event == 0 && branch.held_nm > 0.0, .load = event == 1 && branch.load_held_nm > 0.0};
 }
 
 /// The state with the quantity of this event exactly where it ends the branch.
@@ -222,10 +242,9 @@ inline double shaft_torque_nm(const ShaftConstants& c, const TwoMassState& x,
 
 /// The branch of two masses. The teeth only push: they part where spring and damper together would begin to
 /// pull, and the twist that the shaft still has then is lost in its damping. They meet again at either end of
-/// the backlash, or sooner where the shaft has not yet sprung back. A stuck mass is looked at anew each time
-/// this is called.
+/// the backlash, or sooner where the shaft has not yet sprung back.
 ShaftBranch branch_of(const ShaftConstants& c, const TwoMassState& x, double driving_nm, double load_nm,
-                      bool blocked, bool output_blocked = false) noexcept;
+                      bool blocked, bool output_blocked = false, Freed freed = {}) noexcept;
 
 /// Rotor and load on an elastic shaft behind the gear, in motor convention:
 ///   J1 w1' = tau - f1 w1 - tau_C sign(w1) - tau_s/n
@@ -247,10 +266,10 @@ inline TwoMassState derivative(const ShaftConstants& c, const TwoMassState& x, d
           .twist_rad = c.per_ratio * x.speed_rad_s - x.load_speed_rad_s};
 }
 
-/// As for a rigid shaft, of two masses: speed of the rotor, speed of the load, and two numbers that tell when
-/// the teeth meet or part.
-int event_values(const ShaftConstants& c, const TwoMassState& x, const ShaftBranch& branch,
-                 std::array<double, 4>& values) noexcept;
+/// As for a rigid shaft, of two masses: of the rotor, of the load, and two numbers that tell when the teeth
+/// meet or part.
+int event_values(const ShaftConstants& c, const TwoMassState& x, const ShaftBranch& branch, double driving_nm,
+                 double load_nm, std::array<double, 4>& values) noexcept;
 TwoMassState settled(const ShaftConstants& c, const TwoMassState& x, int event) noexcept;
 
 LoadSide load_side(const ShaftConstants& c, const TwoMassState& x, double turns_rad) noexcept;

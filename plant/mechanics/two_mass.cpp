@@ -5,7 +5,7 @@
 namespace drivebench {
 namespace {
 
-enum Event : std::size_t { kRotorStops, kLoadStops, kUpperTeeth, kLowerTeeth };
+enum Event : std::size_t { kRotor, kLoad, kUpperTeeth, kLowerTeeth };
 
 // The value of an event that cannot happen in the branch.
 constexpr double kNever = 1.0;
@@ -37,10 +37,12 @@ double pressure_nm(const ShaftConstants& c, const TwoMassState& x) noexcept {
 
 /// Rotor and load under the torque of the shaft: whether they turn, and which way friction acts.
 ShaftBranch with_friction(const ShaftConstants& c, const TwoMassState& x, double driving_nm, double load_nm,
-                          bool blocked, bool output_blocked, double contact_rad, double contact) noexcept {
+                          bool blocked, bool output_blocked, Freed freed, double contact_rad,
+                          double contact) noexcept {
   ShaftBranch branch{.contact_rad = contact_rad, .contact = contact};
   const double shaft_nm = shaft_torque_nm(c, x, branch);
-  branch = shaft_detail::rotor_branch(c, x.speed_rad_s, driving_nm - c.per_ratio * shaft_nm, blocked);
+  const double rotor_nm = driving_nm - c.per_ratio * shaft_nm;
+  branch = shaft_detail::rotor_branch(c, x.speed_rad_s, rotor_nm, blocked, freed.rotor);
   branch.contact_rad = contact_rad;
   branch.contact = contact;
   if (output_blocked) {
@@ -48,9 +50,10 @@ ShaftBranch with_friction(const ShaftConstants& c, const TwoMassState& x, double
   } else if (c.load_dry_nm > 0.0) {
     const double output_nm = shaft_nm - load_nm;
     const double towards = x.load_speed_rad_s != 0.0 ? x.load_speed_rad_s : output_nm;
-    const bool stands = x.load_speed_rad_s == 0.0 && std::abs(output_nm) <= c.load_dry_nm;
+    const bool stands = !freed.load && x.load_speed_rad_s == 0.0 && std::abs(output_nm) <= c.load_dry_nm;
     branch.load_turns = stands ? 0.0 : 1.0;
     branch.load_direction = stands ? 0.0 : shaft_detail::sign_of(towards);
+    branch.load_held_nm = stands ? c.load_dry_nm : 0.0;
   }
   return branch;
 }
@@ -58,9 +61,9 @@ ShaftBranch with_friction(const ShaftConstants& c, const TwoMassState& x, double
 }  // namespace
 
 ShaftBranch branch_of(const ShaftConstants& c, const TwoMassState& x, double driving_nm, double load_nm,
-                      bool blocked, bool output_blocked) noexcept {
+                      bool blocked, bool output_blocked, Freed freed) noexcept {
   const auto with = [&](double contact_rad, double contact) {
-    return with_friction(c, x, driving_nm, load_nm, blocked, output_blocked, contact_rad, contact);
+    return with_friction(c, x, driving_nm, load_nm, blocked, output_blocked, freed, contact_rad, contact);
   };
   if (c.half_backlash_rad == 0.0) return with(0.0, 1.0);
   const double beyond = beyond_rad(c, x);
@@ -76,13 +79,19 @@ ShaftBranch branch_of(const ShaftConstants& c, const TwoMassState& x, double dri
   return pressure > 0.0 ? with(border_rad, 1.0) : apart;
 }
 
+/// Rotor and load: the speed, or where static friction holds the mass what it could still take up.
 /// The teeth: within the backlash the ways to its two ends; while they touch the pressure; while they are
 /// apart and the shaft has not yet sprung back the pressure and the rest of its way.
-int event_values(const ShaftConstants& c, const TwoMassState& x, const ShaftBranch& branch,
-                 std::array<double, 4>& values) noexcept {
+int event_values(const ShaftConstants& c, const TwoMassState& x, const ShaftBranch& branch, double driving_nm,
+                 double load_nm, std::array<double, 4>& values) noexcept {
   values = {x.speed_rad_s - shaft_detail::ending_speed_rad_s(c), x.load_speed_rad_s, kNever, kNever};
-  if (c.hold_nm == 0.0 && c.motion != ShaftMotion::kImposed) values[kRotorStops] = kNever;
-  if (c.load_dry_nm == 0.0) values[kLoadStops] = kNever;
+  if (c.hold_nm == 0.0 && c.motion != ShaftMotion::kImposed) values[kRotor] = kNever;
+  if (c.load_dry_nm == 0.0) values[kLoad] = kNever;
+  const double shaft_nm = shaft_torque_nm(c, x, branch);
+  if (branch.held_nm > 0.0) {
+    values[kRotor] = branch.held_nm - std::abs(driving_nm - c.per_ratio * shaft_nm);
+  }
+  if (branch.load_held_nm > 0.0) values[kLoad] = branch.load_held_nm - std::abs(shaft_nm - load_nm);
   if (c.half_backlash_rad == 0.0) return 2;
   if (branch.contact_rad != 0.0) {
     values[kUpperTeeth] = pressure_nm(c, x);
@@ -97,10 +106,10 @@ int event_values(const ShaftConstants& c, const TwoMassState& x, const ShaftBran
 TwoMassState settled(const ShaftConstants& c, const TwoMassState& x, int event) noexcept {
   TwoMassState result = x;
   switch (event) {
-    case kRotorStops:
+    case kRotor:
       result.speed_rad_s = shaft_detail::ending_speed_rad_s(c);
       break;
-    case kLoadStops:
+    case kLoad:
       result.load_speed_rad_s = 0.0;
       break;
     default: {

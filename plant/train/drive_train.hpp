@@ -35,8 +35,8 @@ class DriveTrain final : public Train {
 
   void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
             const RotorMotion& motion) noexcept override;
-  double stage_torque_nm(const RotorMotion& motion) const noexcept override {
-    return torque_nm(c_, piece_.stage, turned(motion));
+  double torque_nm_at(PieceEnd end, const RotorMotion& motion) const noexcept override {
+    return torque_nm(c_, end == PieceEnd::kStart ? piece_.from : piece_.stage, turned(motion));
   }
   void stage(int number, double duration_s, const RotorMotion& motion) noexcept override;
   void shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
@@ -68,6 +68,13 @@ class DriveTrain final : public Train {
     bool plain = false;       ///< every terminal conducts at a constant voltage, nothing is shorted
     bool open = false;        ///< no terminal is driven, none carries a current
     bool stays = false;       ///< either of them, and the next piece has the same
+  };
+
+  /// The part of a piece up to its first event.
+  struct Cut {
+    double fraction = 1.0;
+    int electrical_event = -1;  ///< the one of terminals and emf that ends it; negative: none does
+    Freed freed{};              ///< by an event of the shaft
   };
 
   static State machine_of(const AxisState& state) noexcept;
@@ -111,11 +118,11 @@ class DriveTrain final : public Train {
   bool leave_open(const AxisCore& core, const State& x, const RotorMotion& motion) noexcept;
   void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
                      const RotorMotion& motion) noexcept;
-  /// The step up to the event that comes first, and which one it is (-1: none comes).
-  Crossing cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
-                        double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
+  /// The step up to the event that comes first.
+  Cut cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
+                   double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
   EventValues values_at(const AxisCore& core, TerminalSet open, TerminalSet dying, const Whole& x,
-                        const ShaftBranch& branch, double corner) const noexcept;
+                        const ShaftBranch& branch, double load_nm, double corner) const noexcept;
   void add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying, const State& x,
                       const RotorMotion& motion, double corner, EventValues& values) const noexcept;
   double corner_between(const RotorMotion& from, const RotorMotion& to) const noexcept;

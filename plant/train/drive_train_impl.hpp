@@ -105,12 +105,13 @@ double DriveTrain<Machine, Shaft>::corner_between(const RotorMotion& from,
 
 template <class Machine, class Shaft>
 EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, TerminalSet open, TerminalSet dying,
-                                                  const Whole& x, const ShaftBranch& branch,
+                                                  const Whole& x, const ShaftBranch& branch, double load_nm,
                                                   double corner) const noexcept {
   EventValues values;
   if (core.shaft_has_events) {
     std::array<double, 4> shaft{};
-    values.shaft = event_values(core.shaft, x.shaft, branch, shaft);
+    const double driving_nm = is_held(branch) ? torque_nm(c_, x.machine, motion_of(x)) : 0.0;
+    values.shaft = event_values(core.shaft, x.shaft, branch, driving_nm, load_nm, shaft);
     for (int k = 0; k < values.shaft; ++k)
       values.add(shaft[static_cast<std::size_t>(k)]);
   }
@@ -119,29 +120,32 @@ EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, Terminal
 }
 
 template <class Machine, class Shaft>
-Crossing DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, const Whole& from,
-                                                  Whole& to, double start_s, double duration_s,
-                                                  const ShaftBranch& branch, double load_nm) noexcept {
+auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to,
+                                              double start_s, double duration_s, const ShaftBranch& branch,
+                                              double load_nm) noexcept -> Cut {
   const TerminalSet dying = piece_.circuit.dying;
   const double corner = corner_between(motion_of(from), motion_of(to));
-  const EventValues before = values_at(core, state.open_terminals, dying, from, branch, corner);
-  const EventValues after = values_at(core, state.open_terminals, dying, to, branch, corner);
-  Crossing crossing = located_event(before, after, [&](double fraction) noexcept {
+  const auto values = [&](const Whole& x) noexcept {
+    return values_at(core, state.open_terminals, dying, x, branch, load_nm, corner);
+  };
+  const EventValues before = values(from);
+  const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
       connect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
     }
     to = from;
     step(core, to, shorter_s, branch, load_nm);
-    return values_at(core, state.open_terminals, dying, to, branch, corner);
+    return values(to);
   });
-  if (crossing.event < 0) return crossing;
-  if (crossing.event < before.shaft) {
+  Cut cut{.fraction = crossing.fraction};
+  if (crossing.event >= before.shaft) {
+    cut.electrical_event = crossing.event - before.shaft;
+  } else if (crossing.event >= 0) {
     to.shaft = settled(core.shaft, to.shaft, crossing.event);
+    cut.freed = freed_by(branch, crossing.event);
   }
-  crossing.event -=
-      before.shaft;  // from here on: negative for the shaft, else the number of the electrical one
-  return crossing;
+  return cut;
 }
 
 template <class Machine, class Shaft>
@@ -172,6 +176,7 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s,
                                            double end_s, double load_nm) noexcept {
   const bool blocked = state.injected.blocked_rotor != 0.0;
+  Freed freed;
   for (std::size_t events = 0; start_s < end_s; ++events) {
     const double duration_s = end_s - start_s;
     if (core.shaft_has_events || blocked) x.shaft = locked(core.shaft, x.shaft, blocked);
@@ -181,20 +186,22 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     connect_piece(core, state, start_s, duration_s, from.machine, from_motion);
     ShaftBranch branch;
     if (core.shaft_has_events || blocked) {
-      branch = branch_of(core.shaft, from.shaft, torque_nm(c_, from.machine, from_motion), load_nm, blocked);
+      branch = branch_of(core.shaft, from.shaft, torque_nm(c_, from.machine, from_motion), load_nm, blocked,
+                         false, freed);
     }
     step(core, x, duration_s, branch, load_nm);
     const bool may_cut = piece_.circuit.dying != 0 || core.shaft_has_events || Machine::kHasCorners;
-    Crossing crossing;
+    Cut cut;
     if (may_cut && events < kMaxEvents) {
-      crossing = cut_at_event(core, state, from, x, start_s, duration_s, branch, load_nm);
-      if (crossing.fraction < 1.0 && crossing.event >= 0) {
-        settle_terminals(core, state, x.machine, motion_of(x), crossing.event);
+      cut = cut_at_event(core, state, from, x, start_s, duration_s, branch, load_nm);
+      if (cut.electrical_event >= 0) {
+        settle_terminals(core, state, x.machine, motion_of(x), cut.electrical_event);
       }
     }
-    const double passed_s = crossing.fraction < 1.0 ? crossing.fraction * duration_s : duration_s;
+    freed = cut.freed;
+    const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
     finish_piece(core, state, start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x));
-    start_s = crossing.fraction < 1.0 ? start_s + passed_s : end_s;
+    start_s = cut.fraction < 1.0 ? start_s + passed_s : end_s;
   }
 }
 

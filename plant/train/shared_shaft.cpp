@@ -43,28 +43,33 @@ Shaft SharedShaft::stepped(const Shaft& from, double duration_s, const ShaftBran
   Shaft sum{};
   for (int k = 0; k < 4; ++k) {
     const auto number = static_cast<std::size_t>(k);
-    const RotorMotion first = first_motion(x);
-    const RotorMotion second = second_motion(x);
-    const double first_nm = first_.train.stage_torque_nm(first);
-    const double second_nm = second_.train.stage_torque_nm(second);
-    const Shaft slope = derivative(first_.core.shaft, x, first_nm, load_nm - second_nm, branch);
-    first_.train.stage(k, duration_s, first);
-    second_.train.stage(k, duration_s, second);
+    const Torques torques = torques_at(PieceEnd::kNow, x, load_nm);
+    const Shaft slope = derivative(first_.core.shaft, x, torques.driving_nm, torques.output_nm, branch);
+    first_.train.stage(k, duration_s, first_motion(x));
+    second_.train.stage(k, duration_s, second_motion(x));
     sum = advanced(sum, kWeight[number], slope);
     x = advanced(from, kWay[number] * duration_s, slope);
   }
   return advanced(from, duration_s / 6.0, sum);
 }
 
+/// The torques of the first machine, and of the load and the second machine, whose rotor is the output.
+template <class Shaft>
+auto SharedShaft::torques_at(PieceEnd end, const Shaft& x, double load_nm) const noexcept -> Torques {
+  return {.driving_nm = first_.train.torque_nm_at(end, first_motion(x)),
+          .output_nm = load_nm - second_.train.torque_nm_at(end, second_motion(x))};
+}
+
 /// The events that may end a piece: of the shaft, then of the first machine, then of the second.
 template <class Shaft>
-auto SharedShaft::events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch) const noexcept
-    -> Events {
+auto SharedShaft::events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch,
+                            double load_nm) const noexcept -> Events {
   Events events;
   EventValues& values = events.values;
   if (first_.core.shaft_has_events) {
     std::array<double, 4> shaft{};
-    values.shaft = event_values(first_.core.shaft, x, branch, shaft);
+    const Torques torques = is_held(branch) ? torques_at(end, x, load_nm) : Torques{};
+    values.shaft = event_values(first_.core.shaft, x, branch, torques.driving_nm, torques.output_nm, shaft);
     for (int k = 0; k < values.shaft; ++k)
       values.add(shaft[static_cast<std::size_t>(k)]);
   }
@@ -80,14 +85,14 @@ auto SharedShaft::cut_at_event(const Shaft& from, Shaft& x, double start_s, doub
                                const ShaftBranch& branch, double load_nm) noexcept -> Cut {
   first_.train.find_corner(first_motion(from), first_motion(x));
   second_.train.find_corner(second_motion(from), second_motion(x));
-  const Events before = events_at(PieceEnd::kStart, from, branch);
-  const EventValues after = events_at(PieceEnd::kNow, x, branch).values;
+  const Events before = events_at(PieceEnd::kStart, from, branch, load_nm);
+  const EventValues after = events_at(PieceEnd::kNow, x, branch, load_nm).values;
   const Crossing crossing = located_event(before.values, after, [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     first_.train.shorten(first_.core, first_.state, start_s, shorter_s, first_motion(from));
     second_.train.shorten(second_.core, second_.state, start_s, shorter_s, second_motion(from));
     x = stepped(from, shorter_s, branch, load_nm);
-    return events_at(PieceEnd::kNow, x, branch).values;
+    return events_at(PieceEnd::kNow, x, branch, load_nm).values;
   });
   Cut cut{.fraction = crossing.fraction};
   if (crossing.event >= before.second) {
@@ -96,32 +101,34 @@ auto SharedShaft::cut_at_event(const Shaft& from, Shaft& x, double start_s, doub
     cut.first_event = crossing.event - before.values.shaft;
   } else if (crossing.event >= 0) {
     x = settled(first_.core.shaft, x, crossing.event);
+    cut.freed = freed_by(branch, crossing.event);
   }
   return cut;
 }
 
-/// The branch of the shaft where both trains have opened a piece. The rotor of the second machine is the
-/// output.
+/// The branch of the shaft where both trains have opened a piece.
 template <class Shaft>
-ShaftBranch SharedShaft::branch_at(const Shaft& x, double load_nm) const noexcept {
+ShaftBranch SharedShaft::branch_at(const Shaft& x, double load_nm, Freed freed) const noexcept {
   if (!first_.core.shaft_has_events && !is_blocked(first_) && !is_blocked(second_)) return {};
-  return branch_of(first_.core.shaft, x, first_.train.stage_torque_nm(first_motion(x)),
-                   load_nm - second_.train.stage_torque_nm(second_motion(x)), is_blocked(first_),
-                   is_blocked(second_));
+  const Torques torques = torques_at(PieceEnd::kStart, x, load_nm);
+  return branch_of(first_.core.shaft, x, torques.driving_nm, torques.output_nm, is_blocked(first_),
+                   is_blocked(second_), freed);
 }
 
 template <class Shaft>
 void SharedShaft::run_piece(Shaft& x, double start_s, double end_s, double load_nm) noexcept {
+  Freed freed;
   for (std::size_t events = 0; start_s < end_s; ++events) {
     const double duration_s = end_s - start_s;
     x = locked(first_.core.shaft, x, is_blocked(first_), is_blocked(second_));
     const Shaft from = x;
     first_.train.open(first_.core, first_.state, start_s, duration_s, first_motion(from));
     second_.train.open(second_.core, second_.state, start_s, duration_s, second_motion(from));
-    const ShaftBranch branch = branch_at(from, load_nm);
+    const ShaftBranch branch = branch_at(from, load_nm, freed);
     x = stepped(from, duration_s, branch, load_nm);
     Cut cut;
     if (events < kMaxEvents) cut = cut_at_event(from, x, start_s, duration_s, branch, load_nm);
+    freed = cut.freed;
     const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
     first_.train.close(first_.core, first_.state, start_s, passed_s, first_motion(from), first_motion(x),
                        cut.first_event);

@@ -30,6 +30,11 @@ class SharedShaft {
     double fraction = 1.0;
     int first_event = -1;
     int second_event = -1;
+    Freed freed{};
+  };
+  struct Torques {
+    double driving_nm = 0.0;  ///< on the rotor of the first machine
+    double output_nm = 0.0;   ///< against the output
   };
   template <class Shaft>
   void run_substeps(double load_nm) noexcept;
@@ -38,12 +43,14 @@ class SharedShaft {
   template <class Shaft>
   Shaft stepped(const Shaft& from, double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
   template <class Shaft>
-  Events events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch) const noexcept;
+  Torques torques_at(PieceEnd end, const Shaft& x, double load_nm) const noexcept;
+  template <class Shaft>
+  Events events_at(PieceEnd end, const Shaft& x, const ShaftBranch& branch, double load_nm) const noexcept;
   template <class Shaft>
   Cut cut_at_event(const Shaft& from, Shaft& x, double start_s, double duration_s, const ShaftBranch& branch,
                    double load_nm) noexcept;
   template <class Shaft>
-  ShaftBranch branch_at(const Shaft& x, double load_nm) const noexcept;
+  ShaftBranch branch_at(const Shaft& x, double load_nm, Freed freed) const noexcept;
   template <class Shaft>
   RotorMotion second_motion(const Shaft& x) const noexcept;
   static bool is_blocked(const Side& side) noexcept { return side.state.injected.blocked_rotor != 0.0; }

@@ -69,14 +69,14 @@ class Train {
 
   virtual MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
 
-  // Stage by stage, for two machines on one shaft. Order: open(), then for each stage stage_torque_nm() of
+  // Stage by stage, for two machines on one shaft. Order: open(), then for each stage torque_nm_at() of
   // both and stage() of both, then find_corner() and add_events(); shorten() and the stages again until an
   // event is found; then close().
 
   /// Connects drive and windings for a piece of the tick.
   virtual void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
                     const RotorMotion& motion) noexcept = 0;
-  virtual double stage_torque_nm(const RotorMotion& motion) const noexcept = 0;
+  virtual double torque_nm_at(PieceEnd end, const RotorMotion& motion) const noexcept = 0;
   /// Stage 0 to 3 of a Runge-Kutta step.
   virtual void stage(int number, double duration_s, const RotorMotion& motion) noexcept = 0;
   /// Goes back to the start of the piece, of which only so much will be run.

@@ -19,9 +19,12 @@ class ShaftRun {
 
   void step(double duration_s, double torque_nm, double load_nm) {
     constexpr int kMaxEvents = 12;
+    torque_nm_ = torque_nm;
+    load_nm_ = load_nm;
+    Freed freed;
     for (int n = 0; duration_s > 0.0 && n < kMaxEvents; ++n) {
       x_.shaft = locked(c_, x_.shaft, blocked);
-      branch_ = branch_of(c_, x_.shaft, torque_nm, load_nm, blocked);
+      branch_ = branch_of(c_, x_.shaft, torque_nm, load_nm, blocked, false, freed);
       const Audited from = x_;
       const auto after = [&](double s) {
         return rk4_step(from, s, [&](const Audited& x) { return slope(x, torque_nm, load_nm); });
@@ -33,6 +36,7 @@ class ShaftRun {
           located(from.shaft, crossing, [&](double s) { return after(s * duration_s).shaft; });
       x_ = after(fraction * duration_s);
       x_.shaft = settled(c_, x_.shaft, crossing.event);
+      freed = freed_by(branch_, crossing.event);
       duration_s *= 1.0 - fraction;
       ++events_;
     }
@@ -71,13 +75,13 @@ class ShaftRun {
 
   double value(const State& x, int event) const {
     std::array<double, 4> values{};
-    event_values(c_, x, branch_, values);
+    event_values(c_, x, branch_, torque_nm_, load_nm_, values);
     return values[static_cast<std::size_t>(event)];
   }
 
   Crossing first_crossing(const State& from, const State& to) const {
     std::array<double, 4> unused{};
-    const int count = event_values(c_, from, branch_, unused);
+    const int count = event_values(c_, from, branch_, torque_nm_, load_nm_, unused);
     Crossing first;
     for (int k = 0; k < count; ++k) {
       const double before = value(from, k);
@@ -105,6 +109,8 @@ class ShaftRun {
   }
 
   ShaftConstants c_;
+  double torque_nm_ = 0.0;  // of the present step, as is the load
+  double load_nm_ = 0.0;
   Audited x_;
   ShaftBranch branch_{};
   int events_ = 0;

@@ -139,6 +139,27 @@ PhaseCommand eventful_command(Tick tick) {
   return {.gates = Gates::kOff};
 }
 
+// The torques of both machines free the shaft, of which the second one's acts through its rising current.
+// Catches: a breakaway that is looked for in the torque of the first machine alone, or at the ends of
+// substeps.
+TEST(SharedShaft, TheBreakawayIsLocatedWithinTheSubstep) {
+  AxisParameters p = dc_axis();
+  p.mechanics.static_friction_nm = p.mechanics.coulomb_friction_nm = 0.1;
+  const auto speed_rad_s = [&p](int substeps, double first_v, double second_v) {
+    const AxisTiming timing{.period_s = 1e-3, .substeps = substeps};
+    Axis first(p, timing, 1, 0);
+    Axis second(dc_axis(), timing, 1, 1);
+    for (Tick tick = 0; tick < 3; ++tick)
+      Axis::advance_pair(first, second, volts(first_v), volts(second_v), tick);
+    return first.sample(3).speed_rad_s;
+  };
+  for (const double second_v : {2.9, 3.3, 4.1}) {
+    const double exact_rad_s = speed_rad_s(64, 1.0, second_v);
+    EXPECT_GT(exact_rad_s, 0.01);
+    EXPECT_NEAR(speed_rad_s(16, 1.0, second_v), exact_rad_s, 1e-6 * exact_rad_s) << second_v;
+  }
+}
+
 /// A machine that neither drives nor brakes what it hangs on.
 AxisParameters idle_axis() {
   AxisParameters p = dc_axis();
