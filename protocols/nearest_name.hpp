@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -25,24 +26,43 @@ inline std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// The name with the smallest edit distance, for "did you mean"; a name that begins with the wrong one has
-/// distance 0. Empty if there are no candidates. `name_of` gives the name of a candidate, which must outlive
-/// the call.
-template <class Range, class NameOf>
-std::string_view nearest_name(std::string_view name, const Range& candidates, NameOf name_of) {
+/// The candidate that an unknown name most likely means: the first that contains it, or else the first with
+/// the smallest edit distance, if that is at most 2 letters or a third of the name. Empty if there is none,
+/// or if the name is longer than 64 bytes, which bounds the time that a hostile file takes. `name_of` gives
+/// the name of a candidate, which must outlive the call.
+template <class Range, class NameOf = std::identity>
+std::string_view nearest_name(std::string_view name, const Range& candidates, NameOf name_of = {}) {
+  constexpr std::size_t kLongest = 64;
+  if (name.empty() || name.size() > kLongest) return {};
   std::string_view nearest;
-  std::size_t fewest = 0;
-  bool first = true;
+  std::size_t fewest = std::max<std::size_t>(2, name.size() / 3) + 1;
   for (const auto& candidate : candidates) {
-    const std::string_view there = std::invoke(name_of, candidate);
-    const std::size_t distance = there.starts_with(name) ? 0 : edit_distance(name, there);
-    if (first || distance < fewest) {
-      nearest = there;
+    const std::string_view known = std::invoke(name_of, candidate);
+    const std::size_t distance = known.find(name) != std::string_view::npos ? 0 : edit_distance(name, known);
+    if (distance < fewest) {
+      nearest = known;
       fewest = distance;
-      first = false;
     }
   }
   return nearest;
+}
+
+/// The end of a sentence that refuses an unknown name: `; did you mean "name"?`, or nothing if no candidate
+/// is near.
+template <class Range, class NameOf = std::identity>
+std::string did_you_mean(std::string_view name, const Range& candidates, NameOf name_of = {}) {
+  const std::string_view nearest = nearest_name(name, candidates, name_of);
+  return nearest.empty() ? std::string() : "; did you mean \"" + std::string(nearest) + "\"?";
+}
+
+/// As did_you_mean(), but lists all candidates if none is near: `; known here: a, b`.
+template <class Range, class NameOf = std::identity>
+std::string advice(std::string_view name, const Range& candidates, NameOf name_of = {}) {
+  std::string text = did_you_mean(name, candidates, name_of);
+  if (!text.empty()) return text;
+  for (const auto& candidate : candidates)
+    text.append(text.empty() ? "; known here: " : ", ").append(std::invoke(name_of, candidate));
+  return text;
 }
 
 }  // namespace drivebench

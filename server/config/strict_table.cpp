@@ -25,27 +25,11 @@ std::string described(const ConfigNode& node) {
   return std::get<bool>(node.scalar) ? "true" : "false";
 }
 
-std::string joined(const auto& words, std::string_view quote) {
+std::string quoted(std::span<const std::string_view> words) {
   std::string list;
-  for (const auto& word : words) {
-    if (!list.empty()) list += ", ";
-    list.append(quote).append(word).append(quote);
-  }
+  for (const std::string_view word : words)
+    list.append(list.empty() ? "\"" : ", \"").append(word).append("\"");
   return list;
-}
-
-/// Suggests the nearest known key, or lists all of them.
-std::string advice(std::string_view key, const std::vector<std::string>& known) {
-  constexpr std::size_t kLongest = 64;  // bounds the time that a hostile file takes
-  if (known.empty()) return {};
-  const auto distance = [&](const std::string& other) { return edit_distance(key, other); };
-  if (key.size() <= kLongest) {
-    const std::string& nearest = *std::ranges::min_element(known, {}, distance);
-    if (distance(nearest) <= std::max<std::size_t>(2, key.size() / 3)) {
-      return "; did you mean \"" + nearest + "\"?";
-    }
-  }
-  return "; known here: " + joined(known, "");
 }
 
 bool belongs_to_identifier(char c) {
@@ -133,11 +117,11 @@ std::optional<std::string> StrictTable::address(std::string_view key) {
 
 std::optional<std::size_t> StrictTable::choice(std::string_view key,
                                                std::span<const std::string_view> words) {
-  const std::string* value = scalar<std::string>(key, "one of " + joined(words, "\""));
+  const std::string* value = scalar<std::string>(key, "one of " + quoted(words));
   if (value == nullptr) return std::nullopt;
   const auto found = std::find(words.begin(), words.end(), *value);
   if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-  report(key, "is \"" + printable(*value) + "\" but must be one of " + joined(words, "\""));
+  report(key, "is \"" + printable(*value) + "\" but must be one of " + quoted(words));
   return std::nullopt;
 }
 

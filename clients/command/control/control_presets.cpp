@@ -7,6 +7,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/control/control_json.hpp"
+#include "protocols/nearest_name.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -36,8 +37,8 @@ void print_preset(const control::Preset& preset) {
 const control::Preset& chosen_preset(const std::string& name) {
   const control::Preset* const preset = control::find_preset(name);
   if (preset == nullptr) {
-    throw UsageError(fmt::format("no preset '{}'; did you mean {}? --list shows all", name,
-                                 control::nearest_preset_name(name)));
+    const std::string nearest = did_you_mean(name, control::presets(), &control::Preset::name);
+    throw UsageError(fmt::format("no preset '{}'{} --list shows all", name, nearest.empty() ? ";" : nearest));
   }
   return *preset;
 }

@@ -33,11 +33,7 @@ std::string problem_with_gain(std::string_view name, double value, GainRule rule
 namespace gains_detail {
 
 void refuse_unknown(const Gain& gain, const std::vector<Gain>& known) {
-  std::string text = "no gain '" + gain.name + "'";
-  if (!known.empty()) {
-    text += "; did you mean " + std::string(nearest_name(gain.name, known, &Gain::name)) + "?";
-  }
-  throw std::invalid_argument(text);
+  throw std::invalid_argument("no gain '" + gain.name + "'" + advice(gain.name, known, &Gain::name));
 }
 
 void refuse_problems(const std::vector<std::string>& problems, const std::vector<Gain>& values) {

@@ -129,7 +129,7 @@ void refuse_problems(const std::vector<std::string>& problems, const std::vector
 }  // namespace gains_detail
 
 /// The parts with the overrides in place. Throws std::invalid_argument that names gain, value and rule, or
-/// for an unknown name the nearest one.
+/// for an unknown name the nearest one or all.
 ///   const auto [controller, move] = with_gains(std::tuple{kController, kMove}, overrides);
 template <class... Parts>
 std::tuple<Parts...> with_gains(std::tuple<Parts...> parts, std::span<const Gain> overrides) {

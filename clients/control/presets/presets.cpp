@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "clients/control/presets/presets_families.hpp"
-#include "protocols/nearest_name.hpp"
 
 namespace drivebench::control {
 
@@ -22,10 +21,6 @@ const Preset* find_preset(std::string_view name) {
   const std::vector<Preset>& all = presets();
   const auto found = std::ranges::find(all, name, &Preset::name);
   return found == all.end() ? nullptr : &*found;
-}
-
-std::string_view nearest_preset_name(std::string_view name) {
-  return nearest_name(name, presets(), &Preset::name);
 }
 
 }  // namespace drivebench::control

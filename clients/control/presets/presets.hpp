@@ -13,7 +13,4 @@ const std::vector<Preset>& presets();
 /// nullptr when there is none of that name.
 const Preset* find_preset(std::string_view name);
 
-/// The preset name with the fewest letters to change, for "did you mean".
-std::string_view nearest_preset_name(std::string_view name);
-
 }  // namespace drivebench::control

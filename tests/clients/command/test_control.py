@@ -52,7 +52,8 @@ class Gains(ControlTest):
 
     def test_a_wrong_gain_is_refused_before_anything_is_connected(self):
         """Catches: a misspelt gain that is ignored, a refusal that does not say which number breaks which rule."""
-        self.assertIn("no gain 'current.prop'; did you mean current.proportional_v_per_a?", self.refusal("--gain", "current.prop=7"))
+        self.assertIn("no gain 'current.prop'; did you mean \"current.proportional_v_per_a\"?",
+                      self.refusal("--gain", "current.prop=7"))
         self.assertIn("position.derivative_per_s = -3 must not be negative", self.refusal("--gain", "position.derivative_per_s=-3"))
         both = self.refusal("--gain", "move.ramp_up_s=0", "--gain", "machine.inertia_kgm2=-1")
         self.assertIn("move.ramp_up_s = 0 must be positive", both)
@@ -203,7 +204,7 @@ class Plot(ControlTest):
         """Catches: an empty picture with an exit code of 0."""
         file, _ = self.recording("own")
         for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),
-                                ([__file__], "is not a recording"), ([file, "--preset", "book/8"], "did you mean book/8.2.2"),
+                                ([__file__], "is not a recording"), ([file, "--preset", "book/8"], 'did you mean "book/8.2.2"'),
                                 ([file, "--preset", "book/8.2.2", "--gain", "run.hold_s=1e300"], "at most 3600 s")):
             self.assertIn(fact, self.plot(*arguments, code=USAGE).stderr)
 

@@ -38,7 +38,7 @@ class WithoutABench(CommandTest):
         """Catches: an option that is ignored, a number that is half read, NaN that passes every comparison, -1 that is 2^64 - 1."""
         for arguments, fact in (
                 ([], "subcommand"), (["nope"], "nope"), (["status", "--nope"], "--nope"), (["status", "more"], "more"),
-                (["control", "--preset", "book/8.2"], "did you mean book/8.2.2"),
+                (["control", "--preset", "book/8.2"], 'did you mean "book/8.2.2"'),
                 (["control", "--load", "0.1"], "NM@SECONDS"), (["control", "--load", "0.1x@0"], "not a number"),
                 (["control", "--load", "nan@0"], "not a number"), (["control", "--load", "0.1@-1"], "between 0 and"),
                 (["control", "--load", "0.1@1e30"], "between 0 and"), (["control", "--load", "0.1@nan"], "not a number"),

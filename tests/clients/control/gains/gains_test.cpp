@@ -48,8 +48,10 @@ TEST(Gains, WrongNamesAndValuesAreRefusedInWords) {
   const Preset& book = *find_preset("book/8.2.2");
   EXPECT_EQ(refusal(book, {"current.proportional_v_per_a", -1.0}),
             "current.proportional_v_per_a = -1 must not be negative");
-  EXPECT_EQ(refusal(book, {"curent.proportional", 7.0}),
-            "no gain 'curent.proportional'; did you mean current.proportional_v_per_a?");
+  EXPECT_EQ(refusal(book, {"curent.proportional_v_per_a", 7.0}),
+            "no gain 'curent.proportional_v_per_a'; did you mean \"current.proportional_v_per_a\"?");
+  EXPECT_TRUE(refusal(book, {"warp", 7.0}).starts_with("no gain 'warp'; known here: "))
+      << refusal(book, {"warp", 7.0});
   EXPECT_EQ(refusal(book, {"current.proportional_v_per_a", 7.0}), "");
 }
 

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "clients/control/presets/induction_servo.hpp"
+#include "protocols/nearest_name.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -46,9 +47,10 @@ TEST(Presets, BookGainsHaveTheClosedLoopPolesOfExercise14) {
 // Catches: a suggestion that is not the obvious one, and a lookup that takes it silently.
 TEST(Presets, MisspeltNameFindsNothingButSuggestsTheNearest) {
   EXPECT_EQ(find_preset("book/8.2.2-4kHz"), nullptr);
-  EXPECT_EQ(nearest_preset_name("book/8.2.2-4kHz"), "book/8.2.2-4khz");
-  EXPECT_EQ(nearest_preset_name("book/822"), "book/8.2.2");
-  EXPECT_EQ(nearest_preset_name("backward-difference"), "book/8.2.2-backward-difference");
+  const auto nearest = [](std::string_view name) { return nearest_name(name, presets(), &Preset::name); };
+  EXPECT_EQ(nearest("book/8.2.2-4kHz"), "book/8.2.2-4khz");
+  EXPECT_EQ(nearest("book/822"), "book/8.2.2");
+  EXPECT_EQ(nearest("backward-difference"), "book/8.2.2-backward-difference");
 }
 
 // Catches: a check that stops at the first problem.
