@@ -177,7 +177,7 @@ Resimulation run_from_measured(const Model& model, const Measured& m, const Meas
   return run(model, x, m, data, range, rest);
 }
 
-/// phi of an instant from the voltage equation, in the stator's frame: Chiasson 2005, (8.123).
+/// phi of an instant from the voltage equation, in the stator's frame: the book, (8.123).
 std::complex<double> flux_of(const InductionModel& model, const InductionInstant& s, double electrical_rad) {
   const std::complex<double> i(s.i_x, s.i_y);
   const std::complex<double> slope(s.slope_x, s.slope_y);

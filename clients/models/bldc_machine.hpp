@@ -9,7 +9,7 @@ namespace drivebench {
 ///   (L_S + M)·di_k/dt = u_k − v_N − R_S·i_k + e_p·ω·e(n_p·θ − (k−1)·120°)
 ///   J·dω/dt = −τ_p·Σ e_k·i_k − f·ω − τ_L        with τ_p = e_p
 /// The emf has the sense of the terminal voltage, so that a motor takes currents of the sign opposite to e.
-/// Source: Chiasson 2005, chapter 10 (BL-01).
+/// Source: the book, chapter 10 (BL-01).
 struct BldcMachineModel {
   double pole_pairs;
   double resistance_ohm;            ///< per phase
@@ -26,7 +26,7 @@ struct BldcMachineModel {
 };
 
 /// e over the electrical angle, in turns: 0 at 0, rising to 1 at 30°, falling from 150° on, −1 from 210° to
-/// 330°. Source: Chiasson 2005, (10.7)-(10.8) (BL-02).
+/// 330°. Source: the book, (10.7)-(10.8) (BL-02).
 inline double trapezoid_at_turns(double turns) noexcept {
   // A triangle of height 3 around the middle of the top, a quarter turn after the rise, cut off at 1.
   const double from_middle = turns - 0.25;

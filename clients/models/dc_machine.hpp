@@ -5,7 +5,7 @@ namespace drivebench {
 /// A client's model of a DC machine with permanent magnets; K_b = K_T in SI units:
 ///   L·di/dt = u − R·i − K_T·ω
 ///   J·dω/dt = K_T·i − f·ω − τ_L
-/// Source: Chiasson 2005, 2.7.
+/// Source: the book, 2.7.
 struct DcMachineModel {
   double resistance_ohm;
   double inductance_h;

@@ -7,7 +7,7 @@ namespace drivebench {
 ///   L_S·di_d/dt = −R_S·i_d + n_p·ω·L_S·i_q + u_d
 ///   L_S·di_q/dt = −R_S·i_q − n_p·ω·L_S·i_d − K_m·ω + u_q
 ///   J·dω/dt = K_m·i_q − f·ω − τ_L
-/// Source: Chiasson 2005, (9.1) and the equations that follow from it (PM-02).
+/// Source: the book, (9.1) and the equations that follow from it (PM-02).
 struct PmMachineModel {
   double pole_pairs;
   double resistance_ohm;

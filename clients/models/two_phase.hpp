@@ -13,7 +13,7 @@ struct PhasePair {
 
 /// Three phases of a star to their two-phase equivalent, power-invariant; the zero sequence drops out:
 ///   x_a = √(2/3)·(x_1 − x_2/2 − x_3/2)        x_b = (x_2 − x_3)/√2
-/// Source: Chiasson 2005, section 7.1 (P3-02).
+/// Source: the book, section 7.1 (P3-02).
 constexpr PhasePair two_phase_of(double x1, double x2, double x3) noexcept {
   constexpr double kRootTwoThirds = std::numbers::sqrt2 * std::numbers::inv_sqrt3;
   return {.a = kRootTwoThirds * (x1 - 0.5 * (x2 + x3)), .b = (x2 - x3) / std::numbers::sqrt2};

@@ -8,7 +8,7 @@ namespace drivebench {
 ///   u_q = R_S·i_q + L_S·di_q/dt + n_p·ω·(L_S·i_d + M·i_F)
 ///   u_F = R_F·i_F + L_F·di_F/dt + M·di_d/dt
 ///   J·dω/dt = n_p·M·i_F·i_q − f·ω − τ_L
-/// Source: Chiasson 2005, (6.38) and problem 6.14, whose print lacks n_p in the torque (SM-01, SM-03).
+/// Source: the book, (6.38) and problem 6.14, whose print lacks n_p in the torque (SM-01, SM-03).
 struct WoundRotorModel {
   double pole_pairs;
   double stator_resistance_ohm;

@@ -17,7 +17,7 @@ struct CurrentLoopParameters {
 PhaseValues limited_currents(const CurrentLoopParameters& p, const PhaseValues& command_a,
                              Connection connection) noexcept;
 
-/// The voltage that the loop of a phase asks for: v = K_P e + integral. Source: Chiasson 2005, section 2.2;
+/// The voltage that the loop of a phase asks for: v = K_P e + integral. Source: the book, section 2.2;
 /// tag CUR-01.
 constexpr double loop_voltage_v(const CurrentLoopParameters& p, double error_a, double integral_v) noexcept {
   return p.proportional_v_per_a * error_a + integral_v;

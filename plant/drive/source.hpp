@@ -47,7 +47,7 @@ SourceConstants constants_of(const SourceParameters& p, Connection connection) n
 ThreePhase source_voltages(const SourceParameters& p, const SourceConstants& c, double amplitude_v,
                            double angle_rad) noexcept;
 
-/// The trapezoid e: 0 at angle 0, rising over 60 degrees to a flat top of 120 degrees. Source: Chiasson 2005,
+/// The trapezoid e: 0 at angle 0, rising over 60 degrees to a flat top of 120 degrees. Source: the book,
 /// (10.7)-(10.8); tag BL-02.
 double trapezoid(double angle_rad) noexcept;
 

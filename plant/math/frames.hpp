@@ -10,7 +10,7 @@
 /// 169.83 V phase peak and 208.00 V two-phase peak. Limits of a phase are therefore tested on three-phase
 /// quantities, never on two-phase ones.
 ///
-/// Rotation is positive from phase a to phase b (to phase c). Source: Chiasson 2005, section 7.1; tags P3-02,
+/// Rotation is positive from phase a to phase b (to phase c). Source: the book, section 7.1; tags P3-02,
 /// P3-03.
 namespace drivebench {
 

@@ -189,7 +189,7 @@ inline ShaftBranch branch_of(const ShaftConstants& c, const ShaftState& x, doubl
 ///   tau = (J1 + J2/n^2) w' + (f1 + f2/n^2) w + tau_dry sign(w) + (k/n^3) w|w| + tau_L/n
 /// tau_dry is the Coulomb friction of the rotor plus the passive load over n. The active load tau_L keeps its
 /// sign when the motion reverses, like a hanging mass. A prime mover imposes w' = +-its acceleration.
-/// Source: Chiasson 2005, (1.34), (2.1), (9.104).
+/// Source: the book, (1.34), (2.1), (9.104).
 inline ShaftState derivative(const ShaftConstants& c, const ShaftState& x, double torque_nm, double load_nm,
                              const ShaftBranch& branch) noexcept {
   // Both are the same in all stages of a step: the compiler works them out once.

@@ -14,7 +14,7 @@ struct HallParameters {
 
 /// Lines 1, 2, 3 as bits 0, 1, 2 at an electrical angle n_p theta. Line k is high while that angle, less the
 /// offset and less (k-1) 120 degrees, lies in [-30, 150) degrees. So without an offset the lines change where
-/// a trapezoidal machine commutates (Chiasson 2005, (10.10)), and while it turns forward they say
+/// a trapezoidal machine commutates (the book, (10.10)), and while it turns forward they say
 ///   angle    -30..30   30..90   90..150   150..210   210..270   270..330 degrees
 ///   lines         5        1         3          2          6          4
 /// 0 and 7 come with a stuck line only. A sensor that is not enabled says 0.

@@ -13,7 +13,7 @@ struct TachometerParameters {
   int ripple_per_turn = 0;  ///< commutator segments: periods of the ripple in a turn
 };
 
-/// K w (1 + ripple cos(n theta)): its sign is that of the speed. Source: Chiasson 2005, section 1.5.3.
+/// K w (1 + ripple cos(n theta)): its sign is that of the speed. Source: the book, section 1.5.3.
 inline double tachometer_v(const TachometerParameters& p, double angle_rad, double speed_rad_s) noexcept {
   const double mean_v = p.gain_vs_per_rad * speed_rad_s;
   if (p.ripple == 0.0) return mean_v;

@@ -12,7 +12,7 @@
 namespace drivebench {
 namespace {
 
-/// Motor DC-A of the reference: Chiasson 2005, chapter 1, problem 8.
+/// Motor DC-A of the reference: the book, chapter 1, problem 8.
 constexpr PmDcMachineParameters kDcA{
     .armature_resistance_ohm = 2.0, .armature_inductance_h = 2e-3, .torque_constant_nm_per_a = 0.07};
 constexpr RigLoad kDcALoad{.inertia_kgm2 = 6e-5, .friction_nms = 4e-4};

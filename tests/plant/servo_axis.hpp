@@ -2,7 +2,7 @@
 
 #include "plant/axis.hpp"
 
-/// The 1/12 hp servo motor of the book's examples, in the two-phase values of Chiasson 2005, section 8.2.
+/// The 1/12 hp servo motor of the book's examples, in the two-phase values of its section 8.2.
 namespace drivebench {
 
 inline constexpr InductionMachineParameters kServoMachine{.pole_pairs = 3,

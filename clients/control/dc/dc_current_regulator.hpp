@@ -6,7 +6,7 @@ namespace drivebench::control {
 
 /// The current loop of an armature: v = K_P·e + K_I·∫e with e = i_ref − i, within the voltage limit; the
 /// command is clamped to the current limit first. While the voltage stands at its limit the integral does not
-/// move further out (the book has no such rule). Sampled it is stable for K_P·T/L < 2. Source: Chiasson 2005,
+/// move further out (the book has no such rule). Sampled it is stable for K_P·T/L < 2. Source: the book,
 /// 2.2 (CUR-01).
 class DcCurrentRegulator {
  public:

@@ -45,7 +45,7 @@ struct DcNestedLoopsParameters {
 ///   ω_want = K_thP·e + K_thI·∫e        i_r = K_wP·(ω_want − ω̂) + K_wI·∫(ω_want − ω̂)
 /// A constant acceleration a is always missed: by a·(f/J + K_wP·k)/(K_thI·K_wP·k) with K_wI = 0, else by
 /// a/K_thI. With DcDrive::kOwnRegulator the current loop is the third (CTL-05).
-/// Source: Chiasson 2005, 2.7 (CTL-04, CTL-05).
+/// Source: the book, 2.7 (CTL-04, CTL-05).
 class DcNestedLoops final : public DcController {
  public:
   /// `p` must have no problems().

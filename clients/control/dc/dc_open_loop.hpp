@@ -18,7 +18,7 @@ struct DcOpenLoopParameters {
 
 /// The current of the reference alone, i_ref = (J·α_ref + f·ω_ref)/K_T, with nothing fed back but the
 /// current: it shows the current loop, and what every offset, friction and load does without a position loop.
-/// Source: Chiasson 2005, 2.2 (CUR-01), problem 2.19 (a-d).
+/// Source: the book, 2.2 (CUR-01), problem 2.19 (a-d).
 class DcOpenLoop final : public DcController {
  public:
   /// `p` must have no problems().

@@ -32,7 +32,7 @@ struct DcSineLoopParameters {
 
 /// Follows a sine of known frequency without error because the compensator can make that sine by itself
 /// (internal model): i_r = K·(a·x1 + x2), dx1/dt = x2, dx2/dt = −ω_0²·x1 + e, solved exactly for a held
-/// error. Source: Chiasson 2005, appendix of chapter 2 (CTL-07).
+/// error. Source: the book, appendix of chapter 2 (CTL-07).
 class DcSineLoop final : public DcController {
  public:
   /// `p` must have no problems().

@@ -19,7 +19,7 @@ struct DcSpeedLoopParameters {
   std::vector<std::string> problems() const { return dc_problems(*this); }
 };
 
-/// i_r = K·(ω_ref − ω̂). A constant speed ω_0 is missed by f·ω_0/(f + K·K_T). Source: Chiasson 2005, 2.3
+/// i_r = K·(ω_ref − ω̂). A constant speed ω_0 is missed by f·ω_0/(f + K·K_T). Source: the book, 2.3
 /// (SPD-01).
 class DcSpeedLoop final : public DcController {
  public:

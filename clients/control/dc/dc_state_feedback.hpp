@@ -20,7 +20,7 @@ struct DcStateFeedbackParameters {
 
 /// Tracking of a position with the reference's own current in front:
 ///   i_r = i_ref + (J/K_T)·(K0·∫e + K1·e + K2·(ω_ref − ω̂))        with e = θ_ref − θ
-/// A constant load leaves nothing with the integral and e = τ_L/(J·K1) without. Source: Chiasson 2005, 2.6
+/// A constant load leaves nothing with the integral and e = τ_L/(J·K1) without. Source: the book, 2.6
 /// (CTL-01, CTL-02).
 class DcStateFeedback final : public DcController {
  public:

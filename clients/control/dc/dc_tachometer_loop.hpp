@@ -39,7 +39,7 @@ struct DcTachometerLoopParameters {
 /// The classical position loop: PI on the angle error, and the speed, usually of a tachometer, fed back by
 /// itself and not as the derivative of the error:
 ///   i_r = K·(e + a·∫e) − K_t·ω
-/// A step of the reference asks for K amperes per radian at once. Source: Chiasson 2005, appendix of chapter
+/// A step of the reference asks for K amperes per radian at once. Source: the book, appendix of chapter
 /// 2 (CTL-06).
 class DcTachometerLoop final : public DcController {
  public:

@@ -45,7 +45,7 @@ struct DcVoltageFeedbackParameters {
 
 /// State feedback straight to the voltage of the armature, without a current loop:
 ///   v = v_ref + L·(K0·∫e + K1·e + K2·(ω_ref − ω̂) + K3·(i_ref − i))        with e = θ_ref − θ
-/// Under a constant load e goes to 0 and the current error to −τ_L/K_T. Source: Chiasson 2005, problem 2.23
+/// Under a constant load e goes to 0 and the current error to −τ_L/K_T. Source: the book, problem 2.23
 /// (CTL-03).
 class DcVoltageFeedback final : public DcController {
  public:

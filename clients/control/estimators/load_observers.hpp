@@ -25,7 +25,7 @@ struct LoadObserverGains {
 
 /// Angle, speed and load from the encoder and the torque the machine should be making:
 ///   dθ̂/dt = ω̂ + l1·e        dω̂/dt = α_motor − (f/J)·ω̂ − t̂ + l2·e        dt̂/dt = l3·e
-/// with e = θ − θ̂ and t = τ_L/J. Forward Euler. Source: Chiasson 2005, exercise 25 and the slides of chapter
+/// with e = θ − θ̂ and t = τ_L/J. Forward Euler. Source: the book, exercise 25 and the slides of chapter
 /// 8 (IMO-09), which print r1·r2 twice in l2 and leave t̂ out of the speed.
 class LoadTorqueObserver {
  public:

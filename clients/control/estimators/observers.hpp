@@ -13,7 +13,7 @@ namespace drivebench::control {
 ///   dψ/dt = −η·ψ + η·M·i_d        dρ/dt = n_p·ω + η·M·i_q/ψ
 /// Stepped by forward Euler with the currents of the sample. ψ starts at 1e-4 Wb and the division takes at
 /// least 1e-3 Wb, since an unmagnetised machine has no flux direction; ρ starts at 0, which becomes true
-/// because i_d builds the flux there. Source: Chiasson 2005, (8.37) (IMO-02).
+/// because i_d builds the flux there. Source: the book, (8.37) (IMO-02).
 class PolarFluxObserver {
  public:
   PolarFluxObserver(const InductionMachineModel& machine, double period_s) noexcept;
@@ -72,7 +72,7 @@ struct SpeedObserverGains {
 
 /// Angle and speed from the encoder and the torque the machine should be making:
 ///   dθ̂/dt = ω̂ + l1·(θ − θ̂)        dω̂/dt = α_motor − (f/J)·ω̂ + l2·(θ − θ̂)
-/// Forward Euler: at 8 kHz the book's gains put the poles at 0.876 and 0.899. Source: Chiasson 2005, (8.40)
+/// Forward Euler: at 8 kHz the book's gains put the poles at 0.876 and 0.899. Source: the book, (8.40)
 /// (IMO-04).
 class SpeedObserver {
  public:
@@ -101,7 +101,7 @@ enum class SpeedSource {
 
 /// Speed as the last change of the count over the time it took. Its error against the mean speed stays below
 /// one count per period, 25.13 rad/s at 2000 counts and 8 kHz, which is why it is not used to control.
-/// Source: Chiasson 2005, (8.38) (IMO-03).
+/// Source: the book, (8.38) (IMO-03).
 class BackwardDifference {
  public:
   BackwardDifference(double counts_per_revolution, double period_s) noexcept;

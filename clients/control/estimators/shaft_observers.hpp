@@ -36,14 +36,14 @@ struct ShaftObserverGains {
 
 /// Angle θ̂ and speed ω̂ from the angle and the acceleration that the machine's torque gives to J:
 ///   dθ̂/dt = ω̂ + l1·(θ − θ̂)        dω̂/dt = α_motor − (f/J)·ω̂ + l2·(θ − θ̂)
-/// A load that it knows nothing of, τ_L, leaves ω̂ − ω = l1·τ_L/(J·p1·p2). Source: Chiasson 2005, 2.5
+/// A load that it knows nothing of, τ_L, leaves ω̂ − ω = l1·τ_L/(J·p1·p2). Source: the book, 2.5
 /// (EST-02).
 LinearSystem<2, 1> shaft_observer(const ShaftObserverGains& gains, double friction_rate_per_s) noexcept;
 
 /// The same with the load over the inertia as a third state, constant:
 ///   dω̂/dt = α_motor − (f/J)·ω̂ − τ̂_L/J + l2·(θ − θ̂)        d(τ̂_L/J)/dt = l3·(θ − θ̂)
 /// The error's polynomial ends in −l3: only a negative l3 is stable (the book's problem says nothing of the
-/// sign). Source: Chiasson 2005, problem 2.13 (EST-03).
+/// sign). Source: the book, problem 2.13 (EST-03).
 LinearSystem<3, 1> load_observer(const ShaftObserverGains& gains, double friction_rate_per_s) noexcept;
 
 }  // namespace drivebench::control

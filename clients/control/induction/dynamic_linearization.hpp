@@ -50,7 +50,7 @@ struct SpeedFactor {
 /// would be one of the speed. Singular at c = 0: without friction ψ' = −n_p²·ψ³/(2·J·R_R), −0.988 Wb/s for
 /// the servo motor at rated flux, −0.052 Wb/s at 0.017 Wb. While c/n_p is below least_distance, c of constant
 /// flux stands in, which is input-output linearisation, and `singular` in the telemetry is 1. Current loops
-/// that decouple follow. Source: Chiasson 2005, exercise 28 of chapter 8 (IMC-07), derived here.
+/// that decouple follow. Source: the book, exercise 28 of chapter 8 (IMC-07), derived here.
 class DirectIntegratorController final : public Controller {
  public:
   /// No parameter set may have problems(). `optimum` as in FluxReference.
@@ -108,7 +108,7 @@ QuadratureIntegratorCommand quadrature_integrator(const InductionMachineModel& m
 /// Of the flux angle the rate alone is controlled: torque does not depend on the angle. τ̂_L is that of the
 /// load observer (IMO-09), which takes the place of an integral. Singular at i_q = 0: the machine must hold a
 /// load. While |i_q| is below least_i_q_a input-output linearisation stands in and `singular` in the
-/// telemetry is 1. Current loops that decouple follow. Source: Chiasson 2005, exercises 29 and 30 of chapter
+/// telemetry is 1. Current loops that decouple follow. Source: the book, exercises 29 and 30 of chapter
 /// 8 (IMC-08).
 class QuadratureIntegratorController final : public Controller {
  public:

@@ -82,7 +82,7 @@ struct ControlOutput {
 ///   i_d,ref = K_ψP·(ψ_d0 − ψ̂) + K_ψI·∫(ψ_d0 − ψ̂) + i_d0
 /// followed by PI current loops in the frame of the estimated flux. Friction is fed forward with a plus sign
 /// (the print has a minus). A reference at its clip freezes its own integrator; a voltage at its limit
-/// freezes all of them. Source: Chiasson 2005, (8.12), (8.19)-(8.21), (8.37), (8.40) (IMC-02, IMC-03, IMO-02,
+/// freezes all of them. Source: the book, (8.12), (8.19)-(8.21), (8.37), (8.40) (IMC-02, IMC-03, IMO-02,
 /// IMO-04).
 class FieldOrientedController final : public Controller {
  public:

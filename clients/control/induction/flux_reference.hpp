@@ -18,7 +18,7 @@ enum class FluxPolicy {
   kOptimumTorque,   ///< the flux of a share of the optimum torque at this speed
 };
 
-/// Which flux a machine is to have. Source: Chiasson 2005, (8.24) (IMC-04) and 8.4 (IMX-02).
+/// Which flux a machine is to have. Source: the book, (8.24) (IMC-04) and 8.4 (IMX-02).
 struct FluxReferenceParameters {
   double rated_flux_wb;           ///< ψ_d0; with the optimum torque it has no effect
   double base_speed_rad_s;        ///< of field weakening

@@ -15,7 +15,7 @@ namespace drivebench::control {
 /// from the acceleration and friction, and the voltages of both,
 ///   u_d = R_S·i_d − σ·L_S·ω_S·i_q + (M/L_R)·dψ/dt     u_q = R_S·i_q + σ·L_S·ω_S·i_d + (M/L_R)·ω_S·ψ
 /// with ω_S = n_p·ω + η·M·i_q/ψ. Lengths of the two-phase vectors; the voltage across σ·L_S that changes the
-/// currents themselves is left out, since references may step. Source: Chiasson 2005, (8.9).
+/// currents themselves is left out, since references may step. Source: the book, (8.9).
 class InductionDemands {
  public:
   InductionDemands(const InductionMotorModel& motor, const MoveAllowance& allowance) noexcept

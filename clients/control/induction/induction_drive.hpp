@@ -100,7 +100,7 @@ double clipped(double x, double limit, bool& at_limit) noexcept;
 /// The voltages that bring these rates of both currents about, by undoing what couples them:
 ///   u_d = σ·L_S·(γ·i_d − η·β·ψ − n_p·ω·i_q − η·M·i_q²/ψ + di_d/dt)
 ///   u_q = σ·L_S·(γ·i_q + β·n_p·ω·ψ + n_p·ω·i_d + η·M·i_d·i_q/ψ + di_q/dt)
-/// Source: Chiasson 2005, (8.10), (8.11) (IMC-01), which practice does without, as the text says.
+/// Source: the book, (8.10), (8.11) (IMC-01), which practice does without, as the text says.
 DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
                                      DirectQuadrature current_rate_a_s) noexcept;
 

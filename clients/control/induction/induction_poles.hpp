@@ -7,7 +7,7 @@
 #include "clients/models/induction_machine.hpp"
 
 // Where the gains of a field-oriented or linearised induction machine put the poles, each loop alone and
-// without sampling. Source: Chiasson 2005, exercise 14 of chapter 8.
+// without sampling. Source: the book, exercise 14 of chapter 8.
 namespace drivebench::control {
 
 /// s³ + K2·s² + K1·s + K0: angle, its friction compensated.

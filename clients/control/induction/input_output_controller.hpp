@@ -36,7 +36,7 @@ struct InputOutputParameters {
 /// so that flux and speed are linear and do not see each other; with TorqueDivisor::kFluxReference it is
 /// field-oriented control, with field weakening if the flux reference has it. Followed by PI current loops. A
 /// reference at its clip freezes its own integrator, a phase at its voltage limit all of them. Source:
-/// Chiasson 2005, (8.24), (8.27)-(8.32) (IMC-04, IMC-05).
+/// the book, (8.24), (8.27)-(8.32) (IMC-04, IMC-05).
 class InputOutputController final : public Controller {
  public:
   /// No parameter set may have problems(). `optimum` as in FluxReference.

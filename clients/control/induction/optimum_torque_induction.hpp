@@ -16,7 +16,7 @@ struct VectorLimits {
 /// An induction machine that turns steadily, in the six numbers on which its torque depends. δ = i_q/i_d is
 /// also T_R times the slip. With w_S = n_p·ω + δ/T_R the electrical speed of the flux:
 ///   u_d/R_S = i_d − σ·T_S·i_q·w_S     u_q/R_S = i_q + T_S·i_d·w_S     τ = k_t·i_d·i_q
-/// Source: Chiasson 2005, (8.59), (8.60).
+/// Source: the book, (8.59), (8.60).
 struct SteadyInductionModel {
   double pole_pairs;
   double stator_resistance_ohm;

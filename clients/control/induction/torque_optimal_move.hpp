@@ -31,7 +31,7 @@ struct TorqueMoveParameters {
 /// with the k that reaches the top speed, or rest, in just the time given: one for motoring and one for
 /// generating. A share above 1 is a move that the limits behind τ_opt do not allow; it is made all the same,
 /// so that first_exceeded() can say where. The book gives times and speed and says that τ_ref is close to the
-/// optimum; share and fade are an assumption. Source: Chiasson 2005, 8.2.5 and 8.4 (IMX-02).
+/// optimum; share and fade are an assumption. Source: the book, 8.2.5 and 8.4 (IMX-02).
 class TorqueOptimalMove final : public Trajectory {
  public:
   /// `p` must have no problems(). Throws std::invalid_argument when even four times the optimum torque does

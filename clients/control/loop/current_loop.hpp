@@ -12,8 +12,8 @@ struct PhaseVoltages {
 
 /// PI control of i_d and i_q straight to voltages, without decoupling: u = K_P·e + K_I·∫e on each axis,
 /// turned into the phases and limited there, as the amplifier would. While a phase is limited both
-/// integrators stand still, so they never hold more than what the amplifier could give. Source: Chiasson
-/// 2005, (8.12) (IMC-02).
+/// integrators stand still, so they never hold more than what the amplifier could give. Source: the book,
+/// (8.12) (IMC-02).
 class CurrentLoop {
  public:
   CurrentLoop(const CurrentGains& gains, double voltage_limit_v, double period_s) noexcept

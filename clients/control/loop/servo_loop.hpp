@@ -7,7 +7,7 @@ namespace drivebench::control {
 
 /// The acceleration that brings a shaft back to its trajectory:
 ///   α = α_ref + K0·∫e + K1·e + K2·(ω_ref − ω)        with e = θ_ref − θ
-/// Source: Chiasson 2005, (10.14)-(10.15) (BL-04).
+/// Source: the book, (10.14)-(10.15) (BL-04).
 class ServoLoop {
  public:
   ServoLoop(const ServoGains& gains, double period_s) noexcept : gains_(gains), period_s_(period_s) {}

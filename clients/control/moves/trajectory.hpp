@@ -53,14 +53,14 @@ struct TrajectoryParameters {
 using Ramp = Reference (*)(double max_speed_rad_s, double ramp_s, double u_s) noexcept;
 
 /// ω = c1·u² + c2·u³ with c1 = 3ω_max/t1², c2 = −2ω_max/t1³: angle, speed and acceleration are continuous,
-/// the jerk is not. Source: Chiasson 2005, ch. 2 (TRJ-01).
+/// the jerk is not. Source: the book, ch. 2 (TRJ-01).
 Reference cubic_ramp(double max_speed_rad_s, double ramp_s, double u_s) noexcept;
 /// ω = ω_max·(10x³ − 15x⁴ + 6x⁵), x = u/t1: the jerk is continuous too, so that the voltage which the
 /// reference needs has no corners. Its peaks are α = 1.875·ω_max/t1 and j = 5.7735·ω_max/t1². Source:
-/// Chiasson 2005, problem 2.17 (TRJ-02).
+/// the book, problem 2.17 (TRJ-02).
 Reference smooth_ramp(double max_speed_rad_s, double ramp_s, double u_s) noexcept;
 /// α = ω_max/t1. The acceleration jumps, so the jerk, given as 0, has an impulse at each corner. Source:
-/// Chiasson 2005, 2.7 and problem 2.26 (TRJ-03).
+/// the book, 2.7 and problem 2.26 (TRJ-03).
 Reference linear_ramp(double max_speed_rad_s, double ramp_s, double u_s) noexcept;
 
 /// The move at time t after its start: rest at 0 before it, rest at the distance after it.

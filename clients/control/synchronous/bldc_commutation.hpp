@@ -17,7 +17,7 @@ int commutation_sector(double electrical_rad) noexcept;
 std::optional<int> commutation_sector(std::uint64_t hall_lines) noexcept;
 
 /// Phase currents for a torque of 2·τ_p: against e in the two phases where it is at its top, none in the
-/// third. Their sum is 0. Source: Chiasson 2005, (10.10) (BL-03).
+/// third. Their sum is 0. Source: the book, (10.10) (BL-03).
 Phases commutation_currents(int sector) noexcept;
 
 /// e(n_p·θ) of the three phases.

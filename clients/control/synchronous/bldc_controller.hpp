@@ -50,8 +50,8 @@ struct BldcParameters {
 /// with c_k from (10.10), sectors from the encoder or from Hall lines. Friction is not fed forward, the
 /// integral supplies it. The currents go to a current amplifier, or PI loops of the phases make voltages:
 ///   u_k = K_P·(i_k,ref − i_k) + K_I·∫(i_k,ref − i_k) + R_S·i_k,ref − e_p·ω·e_k
-/// A current or a voltage at its limit freezes the integrals. No valid sector: no current. Source: Chiasson
-/// 2005, (10.10), (10.13)-(10.15) (BL-03, BL-04).
+/// A current or a voltage at its limit freezes the integrals. No valid sector: no current. Source: the book,
+/// (10.10), (10.13)-(10.15) (BL-03, BL-04).
 class BldcController final : public Controller {
  public:
   /// `p` must have no problems().

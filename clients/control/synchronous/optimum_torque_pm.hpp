@@ -29,7 +29,7 @@ struct PmOptimum {
 ///   current alone   i_d = 0, i_q = ±I
 ///   voltage alone   i_d = −X·K_m·ω/Z², i_q = (±V·Z − K_m·ω·R_S)/Z²
 ///   both            where the circles |i| = I and |u| = V meet
-/// Source: Chiasson 2005, 9.2 (PMT-01..04).
+/// Source: the book, 9.2 (PMT-01..04).
 std::optional<PmOptimum> optimum_torque(const PmMachineModel& p, const PmLimits& limits, double speed_rad_s,
                                         double direction) noexcept;
 

@@ -43,7 +43,7 @@ struct PmCurrentParameters {
 /// optimal lead angle of a stepping motor would make a machine of few pole pairs carry more i_d than i_q. A
 /// current amplifier that lags by an electrical angle puts i_q into i_d, so n_p must be small. Where |i|
 /// would be above its limit i_q is shortened and the integral stands still. The magnet lies along phase a at
-/// count 0. Source: Chiasson 2005, (9.49)-(9.52) (PMC-04).
+/// count 0. Source: the book, (9.49)-(9.52) (PMC-04).
 class PmCurrentController final : public Controller {
  public:
   /// `p` must have no problems().

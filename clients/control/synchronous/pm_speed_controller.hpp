@@ -49,7 +49,7 @@ struct PmSpeedParameters {
 ///   i_q,ref = (J·K·(ω_ref − ω) + J·α_ref + f·ω)/K_m,  at most that of the largest torque at this speed
 ///   i_d,ref = that of the largest torque there, else the one closest to zero that the voltage allows
 /// followed by PI current loops with decoupling, u_ff = (−n_p·ω·L_S·i_q, n_p·ω·L_S·i_d + K_m·ω). The magnet
-/// lies along phase a at count 0. Source: Chiasson 2005, 9.2 and problem 9.8 (PMT-06).
+/// lies along phase a at count 0. Source: the book, 9.2 and problem 9.8 (PMT-06).
 class PmSpeedController final : public Controller {
  public:
   /// `p` must have no problems().

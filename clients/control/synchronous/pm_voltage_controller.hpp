@@ -61,7 +61,7 @@ struct PmVoltageParameters {
 ///   v_q = −k22·(i_q − i_q,ref) − k23·(ω − ω_ref) − k24·(θ − θ_ref) − k25·∫(θ − θ_ref)
 /// The term −K_m·ω of the machine stays in the loop as damping. In the print v has the wrong sign, and
 /// matches the printed poles only with L_S taken out of the input matrix, as here. A voltage at its limit
-/// freezes the integral. The magnet lies along phase a at count 0. Source: Chiasson 2005, (9.8), (9.9),
+/// freezes the integral. The magnet lies along phase a at count 0. Source: the book, (9.8), (9.9),
 /// (9.16), (9.21)-(9.42) (PMC-01, PMC-02, PMC-03, PMO-01).
 class PmVoltageController final : public Controller {
  public:

@@ -40,7 +40,7 @@ struct StepperParameters {
 };
 
 /// The phase values, for an amplitude of 1, at which the rotor of a stepping motor rests at an electrical
-/// angle; the angle is rounded to the nearest step. Source: Chiasson 2005, 9.4 and problem 9.10 (ST-01,
+/// angle; the angle is rounded to the nearest step. Source: the book, 9.4 and problem 9.10 (ST-01,
 /// ST-03).
 PhasePair step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept;
 

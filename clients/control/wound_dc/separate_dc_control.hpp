@@ -8,8 +8,8 @@
 
 namespace drivebench::control {
 
-/// λ_ref = λ_0 up to the base speed and λ_0·ω_base/|ω| above, so that the back-emf stays. Source: Chiasson
-/// 2005, 1.7 (DC-07).
+/// λ_ref = λ_0 up to the base speed and λ_0·ω_base/|ω| above, so that the back-emf stays. Source: the book,
+/// 1.7 (DC-07).
 struct FieldWeakening {
   double rated_flux_wb;  ///< λ_0
   double base_speed_rad_s;
@@ -44,7 +44,7 @@ struct SeparateDcParameters {
 ///   u = R·i + K_m·λ_f·ω + (L/λ_f)·((J/K_m)·(v1 + (f/J)·z2) − λ_f'·i)        so that dz2/dt = v1
 ///   v1 = K0·∫(ω_ref − ω) + K1·(ω_ref − ω) + K2·(α_ref − z2) + jerk
 /// λ_f' is the one that the field voltage gives within its limit. Singular without flux. With friction, which
-/// the book omits. Source: Chiasson 2005, problem 2.40 (CTL-08).
+/// the book omits. Source: the book, problem 2.40 (CTL-08).
 class SeparateDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
@@ -88,7 +88,7 @@ struct FieldControlDcParameters {
 ///   v = K0·∫e1 + K1·e1 + K2·e2 + K3·e3        with e = z_ref − z, z1_ref = J·ω_ref²/2 and its derivatives
 /// A load, and friction, enter dz1/dt as −ω·τ_L alone: the integral takes them. Singular at ω = 0 and i =
 /// V_a0/(2R), so it starts with full field and an armature voltage that rises with the reference. Source:
-/// Chiasson 2005, problem 2.41 (CTL-09); its first two equations are misprinted.
+/// the book, problem 2.41 (CTL-09); its first two equations are misprinted.
 class FieldControlDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().

@@ -35,7 +35,7 @@ struct SeriesDcParameters {
 ///   u = (R + R_f)·i + K_m·λ_f·ω + (L + dλ_f/di)·(J·v1 + f·z2)/(K_m·(λ_f + i·dλ_f/di))        so that dz2/dt
 ///   = v1 v1 = K0·∫(ω_ref − ω) + K1·(ω_ref − ω) + K2·(α_ref − z2) + jerk
 /// Singular without current, where it takes `least_current_a`; and since the torque has one sign only, no
-/// negative voltage is given to a current below that. Source: Chiasson 2005, problem 2.42 (CTL-10).
+/// negative voltage is given to a current below that. Source: the book, problem 2.42 (CTL-10).
 class SeriesDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
@@ -72,7 +72,7 @@ struct WeakenedSeriesDcParameters {
 ///   u = −R_p·i_f + K_m·λ_f·ω + v1·(R + R_p)·J/(K_m·λ_f)        makes dω/dt = v1 − τ_L/J
 ///   v1 = α_ref + K1·(ω_ref − ω) + K0·∫(ω_ref − ω)
 /// The flux follows by itself, λ_f² towards v1·J·R_p·L_f/(K_m·(R_p + R_f)): v1 is kept between the values
-/// that belong to `least_flux_wb` and `most_flux_wb`. Friction is a load to it. Source: Chiasson 2005,
+/// that belong to `least_flux_wb` and `most_flux_wb`. Friction is a load to it. Source: the book,
 /// problem 2.43 (CTL-11).
 class WeakenedSeriesDcController final : public WoundDcController {
  public:

@@ -42,8 +42,8 @@ struct SeriesDcObserverGains {
 /// τ_L/J) the equations are linear in what is not measured:
 ///   d(ln λ_f)/dt = (v − (R + R_f)·i)/λ_f − K_m·ω        dω/dt = (K_m/J)·λ_f·i − (f/J)·ω − τ_L/J
 /// The armature's own inductance, which the book neglects, makes the left side (1 + L/L_f)·d(ln λ_f)/dt.
-/// Nothing can be seen without current: below `least_current_a` the estimates stand still. Source: Chiasson
-/// 2005, problems 2.44 and 2.45 (EST-05, EST-06).
+/// Nothing can be seen without current: below `least_current_a` the estimates stand still. Source: the book,
+/// problems 2.44 and 2.45 (EST-05, EST-06).
 class SeriesDcObserver {
  public:
   SeriesDcObserver(const WoundDcModel& model, const SeriesDcObserverGains& gains, double least_current_a,

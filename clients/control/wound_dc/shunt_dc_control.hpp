@@ -24,7 +24,7 @@ struct ShuntDcParameters {
 ///   u = K_m·λ_f·ω + v1·J·R/(K_m·λ_f)        makes dω/dt = v1 − τ_L/J
 ///   v1 = α_ref + K1·(ω_ref − ω) + K0·∫(ω_ref − ω)
 /// What is left, ½·d(λ_f²)/dt = −(R_F/L_f − K_m·ω)·λ_f² + (J·R/K_m)·v1, is bounded below ω = R_F/(K_m·L_f)
-/// only (with the resistance of the field: the book prints the armature's). Source: Chiasson 2005,
+/// only (with the resistance of the field: the book prints the armature's). Source: the book,
 /// problem 2.47 (CTL-13).
 class ShuntDcController final : public WoundDcController {
  public:
@@ -76,7 +76,7 @@ struct ExactShuntDcParameters {
 /// Both states of the reduced shunt machine made linear: dz2/dt = K1·(z1_ref − z1) + K2·(z2_ref − z2), with
 /// the references that belong to ω_ref under the present load, of friction and of the load observer. Singular
 /// where β = 0: at rest, and where 2R_F/L_f − 2K_m·ω = K_m²·λ_f²/(J·R); there the input-output law stands in.
-/// Unloaded there is no flux to hold any speed but R_F/(K_m·L_f). Source: Chiasson 2005, problem 2.46
+/// Unloaded there is no flux to hold any speed but R_F/(K_m·L_f). Source: the book, problem 2.46
 /// (CTL-12).
 class ExactShuntDcController final : public WoundDcController {
  public:

@@ -5,7 +5,7 @@
 #include <vector>
 
 /// Elimination theory over any commutative ring: numbers, whole numbers, residues, polynomials of these.
-/// Source: Chiasson 2005, appendix of chapter 8; tag ELIM-01.
+/// Source: the book, appendix of chapter 8; tag ELIM-01.
 namespace drivebench::identification {
 
 /// A polynomial over a ring, ascending powers; the zero polynomial has no coefficients. Trailing zeros are

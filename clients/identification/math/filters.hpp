@@ -20,7 +20,7 @@ struct DigitalFilter {
 };
 
 /// Poles of the Butterworth low-pass of corner 1 rad/s, e^(j pi (2k + n - 1)/(2n)), k = 1 .. n.
-/// Source: Chiasson 2005, 2.8; tag FLT-01.
+/// Source: the book, 2.8; tag FLT-01.
 std::vector<std::complex<double>> butterworth_poles(int order);
 
 /// The Butterworth low-pass, |G|^2 = 1/(1 + (w/w_c)^(2n)), as a product of second-order sections (and one of

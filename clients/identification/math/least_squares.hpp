@@ -41,7 +41,7 @@ struct LeastSquares {
   std::vector<double> estimate;
   double residual = 0.0;     ///< E^2(K*), sum of the squared equation errors
   double energy = 0.0;       ///< R_y, sum of y^2
-  double error_index = 0.0;  ///< sqrt(E^2/R_y), 0 to 1. Source: Chiasson 2005, (2.40); tag IDN-02
+  double error_index = 0.0;  ///< sqrt(E^2/R_y), 0 to 1. Source: the book, (2.40); tag IDN-02
   /// The change of a parameter that doubles E^2 (2.46), or makes it 1.25 E^2 (8.116): an order of magnitude
   /// of its error, no standard deviation; it does not fall with the length of the record.
   std::vector<double> index_double;

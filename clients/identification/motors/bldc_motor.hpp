@@ -9,7 +9,7 @@ namespace drivebench::identification {
 ///   J w' + f w + tau_p (e_1 i_1 + e_2 i_2 + e_3 i_3) = 0
 /// A phase links -M of another phase's current, so a star shows L + M; with the sign of the literature it is
 /// L - M. e has the sense of the terminal voltage: motoring currents are opposite to it. Products are formed
-/// before filtering, because filtering would round the corners of e. Source: Chiasson 2005, chapter 10; tag
+/// before filtering, because filtering would round the corners of e. Source: the book, chapter 10; tag
 /// BL-01.
 Result identify_bldc_motor(const MeasuredData& data, const Settings& settings);
 

@@ -19,7 +19,7 @@ struct MeterReading {
 /// R_S from voltage and current at the terminals of two phases in series, with DC.
 double dc_resistance_ohm(double terminal_voltage_v, double current_a);
 
-/// L_S = Im Z/w of a motor that turns with the field. Source: Chiasson 2005, problem 7.19; tag P3-09.
+/// L_S = Im Z/w of a motor that turns with the field. Source: the book, problem 7.19; tag P3-09.
 double no_load_inductance_h(const MeterReading& reading, double frequency_hz);
 
 /// R_R = Re Z - R_S and sigma_S M = Im Z/(2 w) of a motor that is held: the magnetising branch counts as

@@ -15,11 +15,11 @@ struct InductionParameters {
   double rotor_resistance_ohm;   ///< R_R = L_S/T_R with these
 };
 
-/// Source: Chiasson 2005, (8.101).
+/// Source: the book, (8.101).
 InductionParameters induction_parameters(double k4, double k6, double k8, double k14) noexcept;
 
 /// sqrt(limit E^2 g' H^-1 g) for R_S, T_R, L_S, sigma, M, R_R: the change that makes E^2 1.25 E^2*, from the
-/// quadratic approximation of E^2 at the minimum. Source: Chiasson 2005, (8.116); tag IMID-03.
+/// quadratic approximation of E^2 at the minimum. Source: the book, (8.116); tag IMID-03.
 std::vector<double> induction_indices(const InductionMinimum& minimum);
 
 /// R_S, T_R, L_S, sigma by the constrained least squares of (8.97)-(8.100), found globally

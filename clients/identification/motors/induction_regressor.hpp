@@ -21,7 +21,7 @@ struct InductionInstant {
 
 inline constexpr std::size_t kInductionParameters = 15;
 
-/// K_j as they depend on K_4, K_6, K_8, K_14: factor x K_8^power. Source: Chiasson 2005, (8.100).
+/// K_j as they depend on K_4, K_6, K_8, K_14: factor x K_8^power. Source: the book, (8.100).
 enum class InductionFactor { kOne, kK4, kK6, kK14 };
 struct InductionMonomial {
   InductionFactor factor;
@@ -46,7 +46,7 @@ inline constexpr std::array<InductionMonomial, kInductionParameters> kInductionM
 }};
 
 /// The two equations y = W K of an instant. No unknown is in the frame, so all its signals are measured.
-/// Source: Chiasson 2005, (8.97)-(8.99), all columns checked against the model; tag IMID-01.
+/// Source: the book, (8.97)-(8.99), all columns checked against the model; tag IMID-01.
 struct InductionEquations {
   std::array<double, kInductionParameters> x_row;
   std::array<double, kInductionParameters> y_row;

@@ -68,7 +68,7 @@ struct DcModel {
 /// In the four numbers that the terminals show, so not those of InductionMotorModel, in the stator's frame,
 /// phi = (M/L_R) psi_R:
 ///   sigma L_S i' = u - sigma L_S gamma i + (1/T_R - j n_p w) phi,   phi' = -(1/T_R - j n_p w) phi +
-///   (1 - sigma) L_S/T_R i,   J w' = n_p Im(phi* i) - {f w or tau_L}. Source: Chiasson 2005, (8.4)-(8.6).
+///   (1 - sigma) L_S/T_R i,   J w' = n_p Im(phi* i) - {f w or tau_L}. Source: the book, (8.4)-(8.6).
 struct InductionModel {
   using State = std::array<double, 5>;  // i_alpha, i_beta, phi_alpha, phi_beta, w
   static constexpr std::size_t kSpeed = 4;
@@ -108,7 +108,7 @@ struct InductionModel {
 };
 
 /// The equations of PmMachineModel in the magnet's frame, whose angle is the measured one, with dry friction:
-///   J w' = K_m i_q - f w - f_c sgn w; at standstill f_c balances smaller torques. Source: Chiasson 2005,
+///   J w' = K_m i_q - f w - f_c sgn w; at standstill f_c balances smaller torques. Source: the book,
 ///   (9.104).
 struct PmModel {
   using State = std::array<double, 3>;  // i_d, i_q, w

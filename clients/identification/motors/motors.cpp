@@ -31,7 +31,7 @@ class Reader {
   bool all_known_ = true;
 };
 
-/// Source: Chiasson 2005, (8.97)-(8.101).
+/// Source: the book, (8.97)-(8.101).
 Truth induction_truth(Reader& read) {
   const double r_s = read("machine.stator_resistance_ohm");
   const double r_r = read("machine.rotor_resistance_ohm");

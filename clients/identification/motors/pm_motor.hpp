@@ -9,7 +9,7 @@ namespace drivebench::identification {
 ///   R i_q + L (i_q' + n_p w i_d) + K_m w     = u_q
 ///   J w' + f w + f_c sgn w - K_m i_q         = 0
 /// One stage solves all three. Two stages solve the third one after the others, as J w' + ... = K_m i_q, so
-/// that the error of the voltages does not enter its indices. Source: Chiasson 2005, (9.104); tags PMID-01,
+/// that the error of the voltages does not enter its indices. Source: the book, (9.104); tags PMID-01,
 /// PMID-02.
 Result identify_pm_motor(const MeasuredData& data, const Settings& settings);
 

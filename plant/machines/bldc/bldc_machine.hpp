@@ -62,7 +62,7 @@ BldcMachineState slope_of_conducting(const BldcMachineConstants& c, const BldcMa
 
 /// e(n_p theta), e(n_p theta - 120 deg), e(n_p theta + 120 deg): e is 0 at 0, rises to 1 at 30 degrees, falls
 /// from 150 degrees to -1 at 210. It has the sense of the terminal voltage: the back-emf of the literature,
-/// which opposes it, is -e. Source: Chiasson 2005, (10.7)-(10.8).
+/// which opposes it, is -e. Source: the book, (10.7)-(10.8).
 inline ThreePhase back_emf_shape(const BldcMachineConstants& c, double angle_rad) noexcept {
   const double turns = c.turns_per_rad * angle_rad - 0.25;
   return {.a = bldc_detail::trapezoid(turns),
@@ -73,7 +73,7 @@ inline ThreePhase back_emf_shape(const BldcMachineConstants& c, double angle_rad
 /// Phases k = 1, 2, 3, motor convention, rotation positive from phase a to phase b, no saturation:
 ///   L_S i_k' - M (sum of the other i') = u_k - v_N - R_S i_k + e_p w e(n_p theta - (k-1) 2 pi/3)
 /// A star has sum i_k = 0, which v_N sees to: see neutral_voltage_v(). Independent phases have v_N = 0. The
-/// two-phase currents see L_S + M, the zero sequence L_S - 2M. Source: Chiasson 2005, chapter 10.
+/// two-phase currents see L_S + M, the zero sequence L_S - 2M. Source: the book, chapter 10.
 // Always inline: else clang works out the emf twice per stage, once more in torque_nm().
 [[gnu::always_inline]] inline BldcMachineState derivative(const BldcMachineConstants& c,
                                                           const BldcMachineState& x,

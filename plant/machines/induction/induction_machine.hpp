@@ -29,10 +29,10 @@ struct InductionMachineTerminals {
 };
 
 /// The machine with L_R = L_S that behaves so; all others that do have (k M, k^2 L_R, k^2 R_R) and a rotor
-/// flux k times as large. Source: Chiasson 2005, (8.132).
+/// flux k times as large. Source: the book, (8.132).
 InductionMachineParameters terminal_equivalent(const InductionMachineTerminals& t) noexcept;
 
-/// The constants that the equations use, derived once from the parameters. Source: Chiasson 2005, (8.6).
+/// The constants that the equations use, derived once from the parameters. Source: the book, (8.6).
 struct InductionMachineConstants {
   double pole_pairs;
   double sigma;                       ///< leakage factor [1]
@@ -64,7 +64,7 @@ struct InductionMachineState {
 ///   i_b'   = eta beta psi_b - beta n_p w psi_a - gamma i_b + u_b/(sigma L_S)
 ///   psi_a' = -eta psi_a - n_p w psi_b + eta M i_a
 ///   psi_b' = -eta psi_b + n_p w psi_a + eta M i_b
-/// No sine of the angle occurs. Source: Chiasson 2005, (8.3)-(8.6).
+/// No sine of the angle occurs. Source: the book, (8.3)-(8.6).
 inline InductionMachineState derivative(const InductionMachineConstants& c, const InductionMachineState& x,
                                         const RotorMotion& motion, const TerminalInput& u) noexcept {
   const double omega_e = c.pole_pairs * motion.speed_rad_s;
@@ -82,7 +82,7 @@ inline InductionMachineState derivative(const InductionMachineConstants& c, cons
   };
 }
 
-/// Torque on the rotor: n_p (M/L_R) (i_b psi_a - i_a psi_b). Source: Chiasson 2005, (8.3).
+/// Torque on the rotor: n_p (M/L_R) (i_b psi_a - i_a psi_b). Source: the book, (8.3).
 inline double torque_nm(const InductionMachineConstants& c, const InductionMachineState& x,
                         const RotorMotion&) noexcept {
   return c.torque_constant * (x.i_b_a * x.psi_a_wb - x.i_a_a * x.psi_b_wb);

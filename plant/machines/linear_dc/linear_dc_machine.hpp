@@ -17,7 +17,7 @@ struct LinearDcMachineParameters {
 /// The equations are those of pm_dc, with K = B l [N/A]:
 ///   L i' = u - R i - B l v, and B l i is the force on the bar.
 /// The book has L = 0; the currents of both differ for some L/R after a change only. The inductance does not
-/// grow with the loop. Source: Chiasson 2005, section 1.2. The parameters must be free of problems().
+/// grow with the loop. Source: the book, section 1.2. The parameters must be free of problems().
 PmDcMachineConstants constants_of(const LinearDcMachineParameters& p) noexcept;
 
 Connection connection_of(const LinearDcMachineParameters& p) noexcept;

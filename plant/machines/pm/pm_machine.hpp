@@ -23,7 +23,7 @@ struct PmMachinePhase {
   double emf_constant_v_s = 0.0;   ///< K: peak of the phase voltage over the speed of the shaft [V·s/rad]
 };
 
-/// The star of three such phases: R_S = R, L_S = 3 L/2, K_m = sqrt(3/2) K. Source: Chiasson 2005, (7.80).
+/// The star of three such phases: R_S = R, L_S = 3 L/2, K_m = sqrt(3/2) K. Source: the book, (7.80).
 PmMachineParameters two_phase_equivalent(int pole_pairs, const PmMachinePhase& phase) noexcept;
 
 /// The constants that the equations use, derived once from the parameters.
@@ -79,7 +79,7 @@ inline TwoPhase salient_slope(const PmMachineConstants& c, const PmMachineState&
 /// Motor convention, rotation positive from phase a to phase b, magnet along phase a at theta = 0:
 ///   L_S i_a' = u_a - R_S i_a + K_m w sin(n_p theta)
 ///   L_S i_b' = u_b - R_S i_b - K_m w cos(n_p theta)
-/// and with L_d != L_q as in salient_slope(). Source: Chiasson 2005, (6.40), (9.1); the signs printed in
+/// and with L_d != L_q as in salient_slope(). Source: the book, (6.40), (9.1); the signs printed in
 /// (7.81) are wrong.
 inline PmMachineState derivative(const PmMachineConstants& c, const PmMachineState& x,
                                  const RotorMotion& motion, const TerminalInput& u) noexcept {
@@ -94,7 +94,7 @@ inline PmMachineState derivative(const PmMachineConstants& c, const PmMachineSta
   return {.i_a_a = slope.a, .i_b_a = slope.b};
 }
 
-/// Torque on the rotor: K_m i_q + n_p (L_d - L_q) i_d i_q - T_d sin(4 n_p theta). Source: Chiasson 2005,
+/// Torque on the rotor: K_m i_q + n_p (L_d - L_q) i_d i_q - T_d sin(4 n_p theta). Source: the book,
 /// (9.1), and problem 11 of chapter 9, whose printed torque is corrected.
 inline double torque_nm(const PmMachineConstants& c, const PmMachineState& x,
                         const RotorMotion& motion) noexcept {

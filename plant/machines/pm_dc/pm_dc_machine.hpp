@@ -27,7 +27,7 @@ struct PmDcMachineState {
 
 /// L i' = -R i - K w + u, with K_b = K_T = K: the power K w i that leaves the circuit is the torque times the
 /// speed. Motor convention. Omitted: the ripple of commutation, armature reaction, brush drop.
-/// Source: Chiasson 2005, (1.6), (1.12), (2.1).
+/// Source: the book, (1.6), (1.12), (2.1).
 inline PmDcMachineState derivative(const PmDcMachineConstants& c, const PmDcMachineState& x,
                                    const RotorMotion& motion, const TerminalInput& u) noexcept {
   if (u.conduction == Conduction::kNone) return {};

@@ -47,7 +47,7 @@ double commutator_sawtooth(const SeparateDcMachineConstants& c, double angle_rad
 /// zero. The book's model has no term of the armature current in the field equation, so power balances with
 /// the coupling off: u i + u_f i_f = R i^2 + R_f i_f^2 + (L i^2/2)' + i_f lambda_f' + torque w. With the
 /// coupling on, i (dlambda/di_f) i_f' comes from nowhere: use it to see the voltage, not for energy audits.
-/// The steps of the sawtooth are not split. Source: Chiasson 2005, (1.19)-(1.21).
+/// The steps of the sawtooth are not split. Source: the book, (1.19)-(1.21).
 inline SeparateDcMachineState derivative(const SeparateDcMachineConstants& c, const SeparateDcMachineState& x,
                                          const RotorMotion& motion, const TerminalInput& u) noexcept {
   const double flux_slope = u.field_v - c.field_resistance_ohm * field_current_a(c.field, x.field_flux_wb);

@@ -59,7 +59,7 @@ SeriesCircuit series_circuit(const SeriesDcMachineConstants& c, SeriesDcMachineS
 /// one current with this linkage burns in the arc. The second member of the state then goes to i at the rate
 /// (R + R_p)/L; a switch that closes again before finds the rest of the difference, and never more energy
 /// than the arc took. With open terminals i = 0: the field current circulates through R_p, or, if the switch
-/// opens then as well, dies at that rate. Source: Chiasson 2005, chapter 1, problem 13, and chapter 2,
+/// opens then as well, dies at that rate. Source: the book, chapter 1, problem 13, and chapter 2,
 /// problems 42 and 43. Cold, as are the next two: so derivative() keeps its values in registers, 1.1 instead
 /// of 1.3 times the time of its equation alone.
 [[gnu::cold]] SeriesDcMachineState full_derivative(const SeriesDcMachineConstants& c, SeriesDcMachineState x,

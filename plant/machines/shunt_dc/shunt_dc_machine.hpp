@@ -42,7 +42,7 @@ struct ShuntDcMachineState {
 
 ///   L i'      = -R i - K_m lambda_f w + u
 ///   lambda_f' = -R_F i_f + u,           i_f = f^-1(lambda_f),  R_F = R_f + R_adj
-/// The terminals carry i + i_f. Source: Chiasson 2005, chapter 2, problem 46.
+/// The terminals carry i + i_f. Source: the book, chapter 2, problem 46.
 inline ShuntDcMachineState derivative(const ShuntDcMachineConstants& c, const ShuntDcMachineState& x,
                                       const RotorMotion& motion, const TerminalInput& u) noexcept {
   if (u.conduction == Conduction::kNone) return open_derivative(c, x, motion.speed_rad_s);

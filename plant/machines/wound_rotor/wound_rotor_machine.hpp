@@ -10,7 +10,7 @@ namespace drivebench {
 /// The field quantities are those of one winding F whose terminals take the power u_F i_F: M, L_F and
 /// R_F are as measured at the field terminals. A three-phase rotor that carries (i_f, -i_f/2, -i_f/2) is
 /// i_F = sqrt(3/2) i_f, u_F = sqrt(3/2) u_R1 with R_F, L_F and M those of its two-phase equivalent. Source:
-/// Chiasson 2005, chapter 7, problem 27.
+/// the book, chapter 7, problem 27.
 struct WoundRotorMachineParameters {
   int pole_pairs = 1;
   double stator_resistance_ohm = 0.0;
@@ -51,7 +51,7 @@ struct WoundRotorMachineState {
 ///   u   = R_S i   + L_S i'   + M (i_F' e + i_F e')
 ///   u_F = R_F i_F + L_F i_F' + M (i' · e + i · e')
 /// solved for the slopes; of e and of the voltage only the part counts along which the stator conducts.
-/// Source: Chiasson 2005, (6.38).
+/// Source: the book, (6.38).
 inline WoundRotorMachineState derivative(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                                          const RotorMotion& motion, const TerminalInput& u) noexcept {
   const CosSin e = motion.electrical;
@@ -71,7 +71,7 @@ inline WoundRotorMachineState derivative(const WoundRotorMachineConstants& c, co
           .i_field_a = i_field_slope};
 }
 
-/// Torque on the rotor: n_p M i_F i_q, where i_q lies across the field. Source: Chiasson 2005, (6.38).
+/// Torque on the rotor: n_p M i_F i_q, where i_q lies across the field. Source: the book, (6.38).
 inline double torque_nm(const WoundRotorMachineConstants& c, const WoundRotorMachineState& x,
                         const RotorMotion& motion) noexcept {
   return c.pole_pairs * c.mutual_inductance_h * x.i_field_a *

@@ -1,4 +1,4 @@
-"""The 180 degree move of Chiasson 2005, 8.2.2, over TCP: the product's controller, server and recording.
+"""The 180 degree move of the book (8.2.2) over TCP: the product's controller, server and recording.
 
 Numbers: cases 4 to 7 of the acceptance list. The loop is chaotic in its last digits (half a count moves the peak by some
 tenths), so the tests use the bounds of the book, not equality with one run."""

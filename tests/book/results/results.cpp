@@ -16,7 +16,7 @@ constexpr std::string_view kHead =
     "`configs/benches`, in process; the test `Results.TheTableEqualsTheResultsOfTheExperiments` runs them "
     "again and "
     "compares.\n"
-    "Numbers are those of the acceptance list of Chiasson 2005. \"Derived\" and \"simulated\" mark results "
+    "Numbers are those of the acceptance list of the book. \"Derived\" and \"simulated\" mark results "
     "that "
     "the book does not\n"
     "print: closed forms of its equations, and separate programs with the same settings. A count is a "

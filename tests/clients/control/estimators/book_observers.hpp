@@ -18,7 +18,7 @@ enum class FluxStep {
   kExact,  ///< the exponential: stable at any rate
 };
 
-/// An open-loop copy of the flux equation; its error decays at η whatever the speed. Source: Chiasson 2005,
+/// An open-loop copy of the flux equation; its error decays at η whatever the speed. Source: the book,
 /// (8.35) (IMO-01), exercises 19 and 22 (IMO-07).
 class StationaryFluxObserver {
  public:

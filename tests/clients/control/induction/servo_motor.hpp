@@ -6,7 +6,7 @@
 
 namespace drivebench::control {
 
-/// The servo motor of Chiasson 2005, 8.2.2, as a controller knows it.
+/// The servo motor of the book, 8.2.2, as a controller knows it.
 inline constexpr InductionMotorModel kServoMotor = {.machine = {.pole_pairs = 3.0,
                                                                 .mutual_inductance_h = 0.0117,
                                                                 .rotor_resistance_ohm = 3.9,

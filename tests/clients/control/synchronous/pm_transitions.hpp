@@ -42,7 +42,7 @@ double positive_beyond(double low, F f) {
 /// Second speeds, x = ω², D = (n_p·L_S·I)² − K_m², A = V² − R_S²·I²:
 ///   (D·x − A)²·(x + (R_S/(n_p·L_S))²) = (2·K_m·R_S·V/(n_p·L_S))²·x
 /// of which roots with D·x < A are those of motoring. Needs V > R_S·I; throws std::invalid_argument.
-/// Source: Chiasson 2005, (9.82) with the terms that the print lacks, (9.88)-(9.94) (PMT-05).
+/// Source: the book, (9.82) with the terms that the print lacks, (9.88)-(9.94) (PMT-05).
 inline PmTransitions transition_speeds(const PmMachineModel& p, const PmLimits& limits) {
   const double v = limits.voltage_v;
   const double i = limits.current_a;
