@@ -39,7 +39,7 @@ struct WindingValues {
   double field = 0.0;
 };
 
-/// Which stator currents the circuit outside of the machine lets change.
+/// The stator currents that the circuit outside of the machine lets change.
 enum class Conduction : std::int64_t {
   kFull,  ///< all of them
   kLine,  ///< only along one direction of the plane (one open phase)

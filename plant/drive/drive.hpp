@@ -49,7 +49,7 @@ struct DriveMemory {
   double source_phase_rad = 0.0;  ///< of the source less phase_rad, within a turn, at the next begin_tick()
   double contactor_closed = 0.0;  ///< 0: open, or waiting for its angle
   StartCapacitor start_capacitor{};
-  std::int64_t pwm_segment = 0;  ///< where at() has been last
+  std::int64_t pwm_segment = 0;  ///< segment of the last at()
   double bus_v = 0.0;            ///< 0 with a source
   double chopper = 0.0;          ///< 1: the brake resistor is on
   double switched_off = 0.0;     ///< 1: tripped within this tick

@@ -90,8 +90,8 @@ struct TwoMassState {
   double twist_rad = 0.0;         ///< angle of the rotor over the gear ratio less that of the output
 };
 
-/// Which branch of the laws of friction, prime mover and backlash holds, constant between two events. As it
-/// stands here: of a free shaft without dry friction and backlash.
+/// The branch of the laws of friction, prime mover and backlash that holds, constant between two events. The
+/// default is that of a free shaft without dry friction and backlash.
 struct ShaftBranch {
   double turns = 1.0;                ///< 1: the torques act, 0: stiction, lock or prime mover hold the speed
   double direction = 0.0;            ///< sign of the motion that dry friction opposes

@@ -10,7 +10,7 @@ namespace drivebench {
 /// on it three of the terminals and a corner.
 struct EventValues {
   std::array<double, 12> value;  ///< the first `count` of them
-  int shaft = 0;                 ///< how many of them belong to the shaft; the rest follows
+  int shaft = 0;                 ///< number of them that belong to the shaft; the rest follows
   int count = 0;
 
   void add(double v) noexcept { value[static_cast<std::size_t>(count++)] = v; }

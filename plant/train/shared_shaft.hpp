@@ -23,7 +23,7 @@ class SharedShaft {
   };
   struct Events {
     EventValues values{};
-    int second = 0;  ///< where those of the second machine begin
+    int second = 0;  ///< index of the first one of the second machine
   };
   /// The part of a piece up to its first event, and which one of a machine's it is; negative: none.
   struct Cut {

@@ -249,7 +249,7 @@ class McapReader {
   std::uint64_t at_ = 0;         // the next record outside chunks
   std::uint64_t chunk_at_ = 0;   // the next record inside the current chunk
   std::uint64_t chunk_end_ = 0;  // equal to chunk_at_ outside chunks
-  std::uint64_t data_end_ = 0;   // where the data section ends, once known
+  std::uint64_t data_end_ = 0;   // end of the data section, once known
   std::uint32_t data_crc_ = 0;   // of all bytes before at_
   bool is_done_ = false;
   std::optional<McapProblem> problem_;

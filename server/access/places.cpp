@@ -8,7 +8,7 @@
 
 namespace drivebench {
 
-/// How much of the reserve a session with this role may use.
+/// The part of the reserve that a session with this role may use.
 std::size_t Places::reserve_for(const std::string& address, Role role) const {
   const bool on_unix = address == kUnixAddress;
   if (!asks_for_token_) return on_unix ? kReserve : 0;

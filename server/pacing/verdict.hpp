@@ -17,7 +17,7 @@ struct Verdict {
   std::uint64_t gaps = 0;        ///< entries that the recorder lost
   std::uint64_t state_hash = 0;
   std::string recording{};  ///< its first file that is there; empty: none
-  std::string remarks{};    ///< what disks and other programs have done to its files
+  std::string remarks{};    ///< damage that disks and other programs have done to its files
 
   /// Whether every sample follows from the recorded inputs alone, and the recording has all of them.
   bool exact() const noexcept { return gaps == 0; }

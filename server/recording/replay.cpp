@@ -127,7 +127,7 @@ class Replayer {
     report_.problem = "the recording has no end: " + why;
   }
 
-  /// Why the input cannot have come here; empty: it can.
+  /// The reason for which the input cannot have come here; empty: it can.
   std::string problem_of_place(const McapMessageHeader& header, const v1::Input& message,
                                const Input& input) const {
     const Tick now = bench_->tick();

@@ -22,7 +22,7 @@ inline CountedMemory& counted_memory() noexcept {
   return count;
 }
 
-/// What an action takes above what there was before it.
+/// The memory that an action takes on top of the memory before it.
 struct Taken {
   std::size_t peak_bytes;
   std::size_t calls;

@@ -199,7 +199,7 @@ def channel_of(parts, message):
 
 # ---- the wire ----
 
-# What RequestBounds.TCP_05_ASearchFindsNoFrameThatTakesMuch has found, as programs of request_program.hpp.
+# RequestBounds.TCP_05_ASearchFindsNoFrameThatTakesMuch has found these programs of request_program.hpp.
 WORST_REQUESTS = {
     "worst-without-bounds": "c31154a6a00fd68a9f4e30219be7e58e",
     "worst-memory": "ee57214f299e6c7284a584988b1f9a95f4e40c121720182e",

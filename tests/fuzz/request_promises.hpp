@@ -12,7 +12,7 @@
 #include "server/endpoints/tcp/session/request_bounds.hpp"
 #include "tests/fuzz/counted_memory.hpp"
 
-/// What holds for every message that read_request() makes of a frame of 64 KiB.
+/// The promises that every message of read_request() keeps, made of a frame of 64 KiB.
 namespace drivebench::fuzz {
 
 inline constexpr std::size_t kMostParsedBytes = std::size_t{256} * 1024;
@@ -64,7 +64,7 @@ inline std::string broken_promise(const v1::Envelope& request) {
   return {};
 }
 
-/// What a frame costs the server, and the promise that it breaks.
+/// The memory that a frame costs the server, and the promise that it breaks.
 struct FrameCost {
   Taken taken{};
   std::string broken{};

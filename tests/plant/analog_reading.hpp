@@ -2,7 +2,7 @@
 
 #include "plant/sensors/current_sensor.hpp"
 
-/// What one channel of the sensor bank reads.
+/// The reading of one channel of the sensor bank.
 namespace drivebench {
 
 /// gain x + offset + noise, then the converter.

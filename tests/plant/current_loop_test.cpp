@@ -72,7 +72,7 @@ TEST(CurrentLoop, TheIntegralTakesTheMeanError) {
 }
 
 // 5 A need 210 V of proportional part against the emf of 110 V: clipped at 100 V, the current goes backwards.
-// When the emf is gone the loop must come to 5 A without the integral of that time.
+// After the emf is gone the loop must come to 5 A without the integral of that time.
 // Catches: an integral that winds up, a freeze that never lets go, a flag that is not raised.
 TEST(CurrentLoop, TheIntegralStandsStillWhileTheVoltageIsClipped) {
   DriveRig rig(current_drive(kIntegral), Connection::kArmature, kLoad, 100);

@@ -62,7 +62,8 @@ void step(Rig<State>& rig, double step_s, const Constants& c, const TerminalInpu
   });
 }
 
-/// What went in less what was lost and what is in windings and shaft: constant if energy is. Without a load.
+/// The energy that went in, less the losses and the energy in windings and shaft: constant if energy is
+/// conserved. Without a load.
 template <class Constants, class State>
 double unaccounted_j(const Rig<State>& rig, const Constants& c, const RigLoad& load) {
   const double speed_rad_s = rig.shaft.speed_rad_s;

@@ -58,7 +58,7 @@ TEST(LinearDcMachine, ReachesTheSteadySpeedOfTheReference) {
   EXPECT_NEAR(unaccounted_j(rig, c, kSlide), 0.0, 1e-9 * rig.energy.drawn_j);
 }
 
-/// How far the speed after one time constant is from that of the book's bar without inductance.
+/// The difference of the speed after one time constant from that of the book's bar without inductance.
 double lag_m_s(double inductance_h) {
   LinearDcMachineParameters p = kBar;
   p.inductance_h = inductance_h;

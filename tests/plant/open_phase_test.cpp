@@ -1,4 +1,5 @@
-// What an open terminal shows, against the phase equations solved here with finite differences of the fluxes.
+// Voltages of an open terminal, against the phase equations solved here with finite differences of the
+// fluxes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

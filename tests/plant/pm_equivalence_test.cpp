@@ -8,8 +8,8 @@
 #include "plant/machines/wound_rotor/wound_rotor_machine.hpp"
 #include "plant/math/rk4.hpp"
 
-/// The same machine described in two ways must move in the same way. What it is compared with is written here
-/// from the book's equations and shares no code with the machines.
+/// The same machine described in two ways must move in the same way. The one to compare with is written
+/// here from the book's equations and shares no code with the machines.
 namespace drivebench {
 namespace {
 

@@ -11,7 +11,7 @@
 namespace drivebench {
 namespace {
 
-/// What a machine is connected to while it starts from rest, and what it turns.
+/// The source that a machine is connected to while it starts from rest, and the load that it turns.
 struct Start {
   double peak_v;
   double rate_rad_s = 0.0;  ///< of the vector of the voltages; 0: DC

@@ -71,7 +71,8 @@ TEST(SensorRows, EveryAnalogSectionHasTheSameKeys) {
     row_of(name);
 }
 
-// What configurations and clients of the first version rely on. Catches: a range or a liveness that moved.
+// Configurations and clients of the first version rely on these rows. Catches: a range or a liveness that
+// moved.
 TEST(SensorRows, TheRowsOfTheFirstVersionStay) {
   const Parameter& counts = row_of("encoder.counts_per_revolution");
   EXPECT_EQ(counts.minimum, 4);

@@ -140,7 +140,7 @@ TEST(SeriesDcMachine, TheWeakenedFieldTakesItsShareOfTheCurrent) {
 }
 
 // DC-08: the book's limit of no armature inductance, i = (v + R_p i_f - K_m lambda_f w)/(R + R_p). Catches: a
-// derivative of the linkage that forgets the armature. What is left is of the order of L: L i'/(R + R_p).
+// derivative of the linkage that forgets the armature. The rest is of the order of L: L i'/(R + R_p).
 TEST(SeriesDcMachine, TheWeakenedMachineTendsToThatOfTheBookWithoutArmatureInductance) {
   for (const double inductance_h : {1e-4, 1e-5}) {
     SeriesDcMachineParameters p = divided(saturated(kSeries), true);

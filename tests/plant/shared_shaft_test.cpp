@@ -75,8 +75,8 @@ struct Audit {
   double stored_j = 0.0;
 };
 
-// What both drives supply is lost in the windings and in friction or stored. The sums are trapezoids over
-// 5 us: 1e-4 of the supplied energy. Catches: a coupling that creates or destroys energy.
+// The energy that both drives supply is lost in the windings and in friction or stored. The sums are
+// trapezoids over 5 us: 1e-4 of the supplied energy. Catches: a coupling that creates or destroys energy.
 TEST(SharedShaft, MotorAndLoadMachineConserveEnergy) {
   AxisParameters p = dc_axis();
   p.mechanics = {.inertia_kgm2 = 6e-5,

@@ -113,7 +113,8 @@ double integral(const Points& points, double x) {
   return whole * within(1.0) + within(x - whole);
 }
 
-/// How far the voltage-time areas of a source of 100 V are from those of the waveform after 10 to 390 ticks.
+/// The largest difference of the voltage-time areas of a source of 100 V from those of the waveform, after 10
+/// to 390 ticks.
 double largest_area_error(DriveParameters p, const Points& waveform, double frequency_hz) {
   p.source.amplitude_v = 100.0;
   p.source.frequency_hz = frequency_hz;

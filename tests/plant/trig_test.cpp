@@ -97,8 +97,7 @@ TEST(Trig, Arctangent2StaysBelowTwoUlpInEveryQuadrant) {
     const double x = coordinate(engine);
     double y = coordinate(engine);
     if (i % 4 == 0) y = std::ldexp(y, exponent(engine));
-    if (i % 4 == 1)
-      y = std::ldexp(x, -(i / 4) % 8) * (1.0 + 0.02 * std::fabs(y));  // where errors are largest
+    if (i % 4 == 1) y = std::ldexp(x, -(i / 4) % 8) * (1.0 + 0.02 * std::fabs(y));  // errors are largest here
     worst = std::max(
         worst, ulps(arctangent2(y, x), std::atan2(static_cast<long double>(y), static_cast<long double>(x))));
   }

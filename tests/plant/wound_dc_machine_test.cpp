@@ -308,8 +308,8 @@ TEST(ShuntDcMachine, WithOpenTerminalsExcitesItselfAboveItsCriticalSpeedUntilItS
   EXPECT_LT(std::abs(excited(c, -160.0, 5.0).machine.field_flux_wb), 1e-6);
 }
 
-// Catches: energy from nowhere while the machine excites itself and brakes the shaft by it. What RK4 leaves
-// where the loop crosses a kink of the curve is 1e-5 J of 2560 J.
+// Catches: energy from nowhere while the machine excites itself and brakes the shaft by it. RK4 leaves 1e-5 J
+// of 2560 J where the loop crosses a kink of the curve.
 TEST(ShuntDcMachine, WithOpenTerminalsTheEnergyOfTheShaftGoesIntoFieldAndLosses) {
   const ShuntDcMachineConstants c = constants_of(saturated(kShunt));
   Rig<ShuntDcMachineState> rig;

@@ -84,7 +84,7 @@ TEST(WoundRotorMachine, SlopesAndTorqueAreThoseOfTheEquationsAlongTheField) {
 
     const WoundRotorMachineState slope = derivative(c, p.x, motion, p.u);
     const Dq stator_slope = to_dq({slope.i_a_a, slope.i_b_a}, motion.electrical);
-    // What turning axes add. Slopes reach 1e5 A/s: 1e-13 of that.
+    // Turning axes add omega_e i. Slopes reach 1e5 A/s: 1e-13 of that.
     EXPECT_NEAR(stator_slope.d + omega_e * i.q, i_d_slope, 1e-8);
     EXPECT_NEAR(stator_slope.q - omega_e * i.d, i_q_slope, 1e-8);
     EXPECT_NEAR(slope.i_field_a, i_f_slope, 1e-8);

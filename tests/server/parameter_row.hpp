@@ -10,7 +10,7 @@
 
 namespace drivebench {
 
-/// Where a parameter stands in the table of an axis.
+/// The position of a parameter in the table of an axis.
 inline std::uint32_t row_of(const AxisParameters& p, std::string_view name) {
   const Parameter* const row = find_parameter(p, name);
   if (row == nullptr) throw std::invalid_argument("no parameter " + std::string(name));

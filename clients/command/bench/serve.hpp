@@ -12,7 +12,7 @@ int run_serve(const std::vector<std::string>& arguments);
 struct PrintOptions {
   std::string config = "servo";  ///< path or name
   std::string what{};            ///< "dbc", "can-table", "modbus-map" or "modbus-csv"
-  unsigned bus = 1;              ///< which of its [[can]] sections
+  unsigned bus = 1;              ///< number of one of its [[can]] sections
 };
 int run_print(const PrintOptions& options);
 

@@ -128,7 +128,7 @@ struct End {
   }
 };
 
-/// Why the recording is not the whole run; empty: it is.
+/// The reason for which the recording is not the whole run; empty: it is.
 std::string problem_of(const McapSeries& reader, const End& end) {
   if (reader.problem()) return reader.problem()->what;
   if (!end.verdict) return "it has no end: it holds no verdict";

@@ -53,15 +53,14 @@ std::vector<std::string> dc_problems(const P& p) {
 /// A controller of a DC motor with permanent magnets: the law gives one number a sample. Over
 /// lost samples its observers are carried on; its integrals count a gap as one period.
 class DcController : public Controller {
- public:
  protected:
-  /// The law's command.
+  /// The quantity that the law commands.
   enum class Law { kCurrent, kVoltage };
   DcController(const DcAxisParameters& axis, Law law) noexcept;
 
-  /// Amperes, or volts from a law of voltage, for this sample.
+  /// Computes the command of the law for this sample: amperes or volts.
   virtual double wanted(const Reference& r, const ShaftEstimate& shaft, double armature_a) noexcept = 0;
-  /// The integrals of the law go on by one period. `excess` is what it wanted beyond a limit, 0 if nothing.
+  /// Carries the integrals of the law on by one period. `excess` is the part of the command beyond a limit.
   virtual void integrate(double excess) noexcept = 0;
 
   /// integral + T·error, unless the law stands at a limit and the error drives it further out.

@@ -18,13 +18,13 @@ enum class FluxPolicy {
   kOptimumTorque,   ///< the flux of a share of the optimum torque at this speed
 };
 
-/// Which flux a machine is to have. Source: the book, (8.24) (IMC-04) and 8.4 (IMX-02).
+/// The flux that a machine is to have. Source: the book, (8.24) (IMC-04) and 8.4 (IMX-02).
 struct FluxReferenceParameters {
   double rated_flux_wb;           ///< ψ_d0; with the optimum torque it has no effect
   double base_speed_rad_s;        ///< of field weakening
   double motoring_share = 1.0;    ///< of the optimum torque: i_d,ref = √share·i_d,opt(ω)
   double generating_share = 1.0;  ///< while α_ref brakes
-  double feed_forward = 1.0;      ///< what of i_d,ref is passed on; 0 leaves all of it to the flux loop
+  double feed_forward = 1.0;      ///< share of i_d,ref that is passed on; 0 leaves all of it to the flux loop
   FluxPolicy policy = FluxPolicy::kConstant;
 
   static constexpr std::tuple kGains{

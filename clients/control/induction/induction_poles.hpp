@@ -6,7 +6,7 @@
 #include "clients/control/induction/field_oriented_controller.hpp"
 #include "clients/models/induction_machine.hpp"
 
-// Where the gains of a field-oriented or linearised induction machine put the poles, each loop alone and
+// The poles that the gains of a field-oriented or linearised induction machine give, each loop alone and
 // without sampling. Source: the book, exercise 14 of chapter 8.
 namespace drivebench::control {
 

@@ -45,12 +45,12 @@ struct TorquePoint {
   double i_q_a() const noexcept { return delta * i_d_a; }
 };
 
-/// Where the torque of a given voltage has its extrema over δ, in rising order: the real roots of
+/// The δ at which the torque of a given voltage has its extrema, in rising order: the real roots of
 ///   p = −3σ²r²δ⁴ − 4σ²raδ³ + (2σr − σ²a² − (1+r)²)δ² + 1 + a²     with r = T_S/T_R, a = T_S·n_p·ω
 /// Exactly one is positive. Source: (8.68); (8.74) and (8.75) print another sign (IMT-02).
 std::vector<double> voltage_extrema(const SteadyInductionModel& m, double speed_rad_s);
 
-/// Where both limits are met at once, in rising order: the real roots δ of
+/// The δ at which both limits are met at once, in rising order: the real roots of
 ///   k²(1+δ²) = σ²r²δ⁴ + 2σ²raδ³ + ((1+r)² − 2σr + σ²a²)δ² + 2a(1 − σ + r)δ + 1 + a²     k = V/(R_S·I)
 /// (IMT-03).
 std::vector<double> limit_crossings(const SteadyInductionModel& m, const VectorLimits& limits,

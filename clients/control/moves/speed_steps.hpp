@@ -13,7 +13,7 @@ namespace drivebench::control {
 /// speed.
 struct SpeedStepsParameters {
   double first_rad_s;
-  double first_s;  ///< how long
+  double first_s;  ///< duration of the first speed
   double second_rad_s;
   double second_s;
 

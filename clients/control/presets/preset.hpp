@@ -35,7 +35,7 @@ struct Requirements {
 struct Preset {
   std::string_view name;  ///< "book/8.2.2"
   std::string_view source;
-  std::string_view expectation;  ///< what a run of it must show
+  std::string_view expectation;  ///< the result that a run of it must show
   std::string_view bench;        ///< configs/benches/<bench>.toml, where it runs as it stands
   Requirements needs;
   std::function<std::vector<Gain>()> gains;

@@ -27,7 +27,7 @@ struct SteadyPm {
   }
 };
 
-/// Where |i| = I and |u| = V meet, the point of the larger sign·i_q. There
+/// The point at which |i| = I and |u| = V meet, of two the one with the larger sign·i_q. There
 ///   V² = Z²·I² + E² + 2·E·(R·i_q + X·i_d)
 /// so both points lie on a line across the direction (X, R).
 std::optional<DirectQuadrature> meeting_point(const SteadyPm& m, const PmLimits& limits,

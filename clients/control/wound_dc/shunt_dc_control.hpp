@@ -23,7 +23,7 @@ struct ShuntDcParameters {
 /// Speed of a shunt machine by input and output, the armature's inductance neglected:
 ///   u = K_m·λ_f·ω + v1·J·R/(K_m·λ_f)        makes dω/dt = v1 − τ_L/J
 ///   v1 = α_ref + K1·(ω_ref − ω) + K0·∫(ω_ref − ω)
-/// What is left, ½·d(λ_f²)/dt = −(R_F/L_f − K_m·ω)·λ_f² + (J·R/K_m)·v1, is bounded below ω = R_F/(K_m·L_f)
+/// The rest, ½·d(λ_f²)/dt = −(R_F/L_f − K_m·ω)·λ_f² + (J·R/K_m)·v1, is bounded below ω = R_F/(K_m·L_f)
 /// only (with the resistance of the field: the book prints the armature's). Source: the book,
 /// problem 2.47 (CTL-13).
 class ShuntDcController final : public WoundDcController {
@@ -49,7 +49,7 @@ struct ShuntDcChain {
   double z2_rad_s2;
   double alpha_rad_s3;
   double beta_rad_s3_per_v;
-  double load_gain_per_s;  ///< what τ_L/J enters dz2/dt with
+  double load_gain_per_s;  ///< factor of τ_L/J in dz2/dt
 
   static ShuntDcChain at(const WoundDcModel& m, double flux_wb, double speed_rad_s) noexcept;
   /// λ_f that holds a speed against a load: the speed must be below R_F/(K_m·L_f).

@@ -19,7 +19,7 @@ struct WoundDcAxisParameters {
   WoundDcModel machine;
   double sample_rate_hz;
   double voltage_limit_v;        ///< of the armature or of the only pair of terminals
-  double current_limit_a;        ///< what the references of a move may ask of the armature
+  double current_limit_a;        ///< of the armature; the references of a move stay within it
   double field_voltage_limit_v;  ///< of a field supply of its own; else 0
   double least_flux_wb;          ///< divisions by the flux take at least this
   ShaftEstimatorParameters shaft;

@@ -18,7 +18,7 @@ struct Estimate {
   std::string unit;
   double value = 0.0;
   double index = 0.0;           ///< parametric error index: E^2 grows by Result::index_factor within it
-  std::optional<double> truth;  ///< where it is known
+  std::optional<double> truth;  ///< if it is known
 };
 
 /// The result of an identification.

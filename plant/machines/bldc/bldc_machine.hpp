@@ -132,8 +132,8 @@ BldcMachineState restricted(const BldcMachineConstants& c, const BldcMachineStat
 WindingValues open_circuit_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
                                     const RotorMotion& motion) noexcept;
 
-/// Voltages of the windings with the currents that `u` lets flow: R i + d(flux)/dt. What an open phase of
-/// independent ones shows while the others carry current.
+/// Voltages of the windings with the currents that `u` lets flow: R i + d(flux)/dt. An open
+/// phase of independent ones shows its voltage while the others carry current.
 WindingValues winding_voltages(const BldcMachineConstants& c, const BldcMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
@@ -165,7 +165,7 @@ double fastest_time_constant_s(const BldcMachineParameters& p) noexcept;
 /// Electrical angular speed at which the emf reaches a voltage; 0 without a magnet.
 double electrical_speed_rad_s(const BldcMachineParameters& p, double voltage_v) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct BldcMachine {
   using Parameters = BldcMachineParameters;
   using Constants = BldcMachineConstants;

@@ -18,7 +18,7 @@ struct InductionMachineParameters {
 /// Leakage factor sigma = 1 - M^2/(L_R L_S); the machine exists for 0 < sigma < 1 only.
 double leakage_factor(const InductionMachineParameters& p) noexcept;
 
-/// What the terminals of a machine can tell about it.
+/// The parameters that measurements at the terminals of a machine can determine.
 struct InductionMachineTerminals {
   int pole_pairs = 1;
   double stator_resistance_ohm = 0.0;  ///< R_S
@@ -125,7 +125,7 @@ InductionMachineParameters adjusted(const InductionMachineParameters& p, const A
 /// The fastest electrical time constant at standstill: sets the substep.
 double fastest_time_constant_s(const InductionMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct InductionMachine {
   using Parameters = InductionMachineParameters;
   using Constants = InductionMachineConstants;

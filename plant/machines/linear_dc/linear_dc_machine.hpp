@@ -27,7 +27,7 @@ LinearDcMachineParameters adjusted(const LinearDcMachineParameters& p, const Adj
 /// L/R: sets the substep.
 double fastest_time_constant_s(const LinearDcMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct LinearDcMachine {
   using Parameters = LinearDcMachineParameters;
   using Constants = PmDcMachineConstants;

@@ -54,7 +54,7 @@ namespace pm_machine_detail {
 /// The slopes of the currents of a salient machine along (d) and across (q) the magnet, seen from the stator:
 ///   L_d s_d = u_d - R_S i_d - n_p w (L_d - L_q) i_q
 ///   L_q s_q = u_q - R_S i_q - n_p w (L_d - L_q) i_d - K_m w
-/// Where current flows only along a line l, it is (L_d l_d^2 + L_q l_q^2) s = l · (the right sides): the
+/// If current flows only along a line l, it is (L_d l_d^2 + L_q l_q^2) s = l · (the right sides): the
 /// inductance is not the same in every direction.
 inline TwoPhase salient_slope(const PmMachineConstants& c, const PmMachineState& x, const RotorMotion& motion,
                               const TerminalInput& u) noexcept {
@@ -117,8 +117,8 @@ PmMachineState restricted(const PmMachineConstants& c, const PmMachineState& x, 
 WindingValues open_circuit_voltages(const PmMachineConstants& c, const PmMachineState& x,
                                     const RotorMotion& motion) noexcept;
 
-/// Voltages of the windings with the currents that `u` lets flow: R i + d(flux)/dt. What an open phase of a
-/// salient machine shows while the other two carry current.
+/// Voltages of the windings with the currents that `u` lets flow: R i + d(flux)/dt. An open
+/// phase of a salient machine shows its voltage while the other two carry current.
 WindingValues winding_voltages(const PmMachineConstants& c, const PmMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
@@ -152,7 +152,7 @@ double fastest_time_constant_s(const PmMachineParameters& p) noexcept;
 /// Electrical angular speed at which the emf reaches a voltage; 0 without a magnet.
 double electrical_speed_rad_s(const PmMachineParameters& p, double voltage_v) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct PmMachine {
   using Parameters = PmMachineParameters;
   using Constants = PmMachineConstants;

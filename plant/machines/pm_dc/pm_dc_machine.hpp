@@ -73,7 +73,7 @@ PmDcMachineParameters adjusted(const PmDcMachineParameters& p, const Adjustment&
 /// L/R: sets the substep.
 double fastest_time_constant_s(const PmDcMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct PmDcMachine {
   using Parameters = PmDcMachineParameters;
   using Constants = PmDcMachineConstants;

@@ -19,7 +19,7 @@ double square(TwoPhase x) noexcept {
 /// The magnetising flux where stator current and rotor flux are known: it follows s = i_S + lambda_R/l_r.
 struct MagneticState {
   double chord_h;       ///< flux over s
-  double anisotropy_h;  ///< what the inductance to small changes along s has more than that across it
+  double anisotropy_h;  ///< inductance to small changes along s less that across it
   TwoPhase total_a;     ///< s
   double square_a2;     ///< |s|^2
 };

@@ -67,7 +67,7 @@ inline Inductances inductances(std::span<const CurvePoint> points, double leakag
   const double dy_wb = from[1].y - from[0].y;
   const double per_wb = leakage_h / (dy_wb + leakage_h * dx_a);
   const double slope_h = per_wb * dy_wb;
-  // What the line through the segment has at zero: nothing on the first one, where total_a may be zero.
+  // The flux of the line through the segment at 0 A: zero on the first segment, where total_a may be zero.
   const double offset_wb = per_wb * (from[0].y * dx_a - from[0].x * dy_wb);
   return {.chord_h = offset_wb == 0.0 ? slope_h : slope_h + offset_wb / total_a, .slope_h = slope_h};
 }
@@ -175,7 +175,7 @@ SaturatedInductionMachineParameters adjusted(const SaturatedInductionMachinePara
 /// The fastest electrical time constant at any saturation: sets the substep.
 double fastest_time_constant_s(const SaturatedInductionMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct SaturatedInductionMachine {
   using Parameters = SaturatedInductionMachineParameters;
   using Constants = SaturatedInductionMachineConstants;

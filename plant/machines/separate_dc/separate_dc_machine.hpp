@@ -98,7 +98,7 @@ SeparateDcMachineParameters adjusted(const SeparateDcMachineParameters& p, const
 /// L/R or, saturated, L_f/R_f, whichever is less: sets the substep.
 double fastest_time_constant_s(const SeparateDcMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct SeparateDcMachine {
   using Parameters = SeparateDcMachineParameters;
   using Constants = SeparateDcMachineConstants;

@@ -126,7 +126,7 @@ SeriesDcMachineParameters adjusted(const SeriesDcMachineParameters& p, const Adj
 /// A lower bound, saturated and with the switch closed if there is one: sets the substep.
 double fastest_time_constant_s(const SeriesDcMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct SeriesDcMachine {
   using Parameters = SeriesDcMachineParameters;
   using Constants = SeriesDcMachineConstants;

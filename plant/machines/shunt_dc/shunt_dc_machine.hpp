@@ -67,8 +67,8 @@ inline WindingValues winding_currents(const ShuntDcMachineConstants& c, const Sh
   return {.stator = {x.armature_a + field_a, 0.0}, .field = field_a};
 }
 
-/// With open terminals: i = -i_f. What the opening changes, it changes by the same voltage on armature and
-/// field, so that lambda_f - L i stays; the magnetic energy of the terminal current burns in the arc.
+/// With open terminals: i = -i_f. The opening acts by the same voltage on armature and field, so that
+/// lambda_f - L i stays; the magnetic energy of the terminal current burns in the arc.
 ShuntDcMachineState restricted(const ShuntDcMachineConstants& c, const ShuntDcMachineState& x,
                                const RotorMotion& motion, const TerminalInput& u) noexcept;
 
@@ -91,12 +91,12 @@ double losses_w(const ShuntDcMachineConstants& c, const ShuntDcMachineState& x,
 Connection connection_of(const ShuntDcMachineParameters& p) noexcept;
 /// 0: the equations do not know the angle.
 double pole_pairs_of(const ShuntDcMachineParameters& p) noexcept;
-/// What is in series acts on the armature; the field sees the source before it.
+/// Resistance and inductance in series act on the armature; the field sees the source before them.
 ShuntDcMachineParameters adjusted(const ShuntDcMachineParameters& p, const Adjustment& a) noexcept;
 /// L/R or, saturated, L_f/R_F, whichever is less: sets the substep.
 double fastest_time_constant_s(const ShuntDcMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct ShuntDcMachine {
   using Parameters = ShuntDcMachineParameters;
   using Constants = ShuntDcMachineConstants;

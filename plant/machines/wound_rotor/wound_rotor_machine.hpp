@@ -126,7 +126,7 @@ WoundRotorMachineParameters adjusted(const WoundRotorMachineParameters& p, const
 /// The fastest electrical time constant at standstill. The substep must resolve n_p w as well.
 double fastest_time_constant_s(const WoundRotorMachineParameters& p) noexcept;
 
-/// What makes a drive train and a configuration of the equations: see plant/parameters/machine_kind.hpp.
+/// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct WoundRotorMachine {
   using Parameters = WoundRotorMachineParameters;
   using Constants = WoundRotorMachineConstants;

@@ -27,7 +27,7 @@ from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, frame, pb
 from wire_test import PATIENT_TEXT, SERVO_TEXT, WireTest, until
 
 # A silent controller keeps its axis for so long that only the event under test takes it away.
-FLUSH_DENORMALS = 0x9FC0  # what -Ofast sets, for the whole process
+FLUSH_DENORMALS = 0x9FC0  # -Ofast sets them, for the whole process
 TIMEOUT, OVERRUN = 1 << 9, 1 << 11  # in the fault word
 RUN, HOLD = 1, 2  # states in which an axis is driven
 MIB = 1 << 20

@@ -47,7 +47,7 @@ def kill_one(local, number):
         written = found.messages.get("/servo/sample", 0)
         done = subprocess.run([SERVER, "--replay", file, "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         report = json.loads(done.stdout) if done.stdout else {"samples": 0, "problem": done.stderr}
-        # What was written is the run up to there, bit for bit; without a sample there is no run.
+        # The written part is the run up to there, bit for bit; without a sample there is no run.
         replays = done.returncode == (3 if written else 2) and (not written or report["ticks"] == written - 1)
         readable = found.has_start and found.damaged == 0 and replays and "ends" in report["problem"]
         in_time = misfortune.taken <= len(data) <= misfortune.handed

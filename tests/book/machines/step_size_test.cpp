@@ -191,7 +191,7 @@ TEST(StepSize, EveryMotorIsExactAtItsDefaultSubstep) {
     std::printf("| %s | %g us | %.3g us | %.1e | %.1e | %s |\n", study.bench, period_s * 1e6,
                 period_s * 1e6 / n, error, fine, n > 1 ? scientific(coarse).c_str() : "-");
     EXPECT_LT(error, 1e-6) << study.bench;
-    // Where a curve or a trapezoid has kinks, those limit plant and reference to some 1e-7.
+    // The kinks of a curve or a trapezoid limit plant and reference to some 1e-7.
     EXPECT_LT(fine, std::max(0.5 * error, 5e-7)) << study.bench;
   }
 }

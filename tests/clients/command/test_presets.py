@@ -59,7 +59,7 @@ def short_ones(all_presets):
 
 class Presets(unittest.TestCase):
     def run_on(self, preset, link_of, mode="lockstep"):
-        """What the controller reports, and the last sample and the state hash of the bench."""
+        """The report of the controller, and the last sample and the state hash of the bench."""
         ways_in = WAYS_IN if mode == "lockstep" else ""  # in real time a bus must carry what it promises
         text = bench_text(preset, ways_in)
         with Server("--mode", mode, text=text if mode == "lockstep" else without_trip(text)) as server:

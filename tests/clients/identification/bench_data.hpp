@@ -26,7 +26,7 @@ inline void set_rate(BenchConfig& config, std::int64_t period_ns, int substeps) 
   config.setup.substeps = substeps;
 }
 
-/// What a client would record: signals of the catalogue, one sample of `every`. The true signals of `truths`
+/// Records as a client would: signals of the catalogue, one sample of `every`. The true signals of `truths`
 /// take the place of the measured ones: {"i_a_a", "true_i_a_a"}.
 class Recorder {
  public:
@@ -53,7 +53,7 @@ class Recorder {
   MeasuredData data_;
 };
 
-/// What a line start with sensors shows; `ideal`: true currents and angle.
+/// The recorder of a line start with sensors; `ideal`: of true currents and angle.
 inline Recorder line_recorder(double period_s, bool ideal) {
   if (ideal) {
     return Recorder({"i_a_a=true_i_a_a", "i_b_a=true_i_b_a", "i_c_a=true_i_c_a", "u_a_v", "u_b_v", "u_c_v",

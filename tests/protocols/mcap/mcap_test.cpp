@@ -115,7 +115,7 @@ TEST(Mcap, MessagesSurviveManyChunks) {
 TEST(McapWriter, EveryMessageIsIndexedOnceInChunksOfTheRequestedSize) {
   std::vector<Kept> written;
   const Bytes file = small_file(written);
-  std::size_t records = 0;  // where those of the current chunk begin
+  std::size_t records = 0;  // start of those of the current chunk
   std::size_t chunks = 0;
   std::size_t indexed = 0;
   for (const Place& place : places(file)) {

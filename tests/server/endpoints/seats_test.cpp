@@ -285,7 +285,7 @@ class Seats : public testing::TestWithParam<Transport> {
  protected:
   std::unique_ptr<SeatClient> client() { return GetParam().connect(world_); }
   Owner owner() const { return world_.engine->owner(0); }
-  /// What the next tick shows, which another session commands with the gates off.
+  /// The faults in the sample of the next tick, which another session commands with the gates off.
   std::uint64_t faults_of_next_tick() {
     const Owner number = world_.engine->new_owner({.transport = "test", .peer = {}, .subject = {}});
     world_.engine->request({.tick = 0, .axis = 0, .owner = number, .action = LeaseAction::kAcquire},

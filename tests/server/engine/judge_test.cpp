@@ -214,7 +214,7 @@ TEST(CommandMail, AnOwnerStaysOwnerUntilTheSampleShowsTheEndOfItsLease) {
   lease(LeaseAction::kAcquire, kMe);
   mail.deliver(bench, 0);
   bench.step();
-  const CommandView shown = bench.command_view(0);  // what the newest sample shows
+  const CommandView shown = bench.command_view(0);  // as the newest sample shows it
   const Command command{.answers = bench.tick(), .phases = {.gates = Gates::kOff}};
   EXPECT_EQ(mail.judge(command, kMe, shown), Refused::kNot);
 

@@ -23,8 +23,8 @@ void stall(std::int64_t duration_ns) {
   }
 }
 
-/// What one call of wait() tells of the time its tick was due: it lies between these two. True whatever else
-/// the machine does, so that no test here measures how fast it is.
+/// The two times between which the tick of one call of wait() was due. They hold whatever else the machine
+/// does, so that no test here measures its speed.
 struct Due {
   std::int64_t from_ns;
   std::int64_t to_ns;

@@ -126,7 +126,7 @@ TEST(RecordingDisk, REC_02_SyncedDataSurviveAPowerCut) {
   ASSERT_EQ(record(writer, 0, kTicks), 0u);
   writer.finish({.ticks = kTicks});
   const DiskLog& log = disk.files.at("run.mcap");
-  // How many samples are safe after each call: those in the chunks before the last sync.
+  // The number of samples that are safe after each call: those in the chunks before the last sync.
   std::vector<std::uint64_t> safe(log.entries.size() + 1);
   std::uint64_t written_bytes = 0;
   for (std::size_t n = 0; n < log.entries.size(); ++n) {

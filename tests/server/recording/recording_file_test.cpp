@@ -1,4 +1,4 @@
-// What other programs do to the files of a recording while it is written.
+// Other programs change the files of a recording while it is written.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

@@ -100,7 +100,7 @@ class Series(WireTest):
 
 
 class Watched(WireTest):
-    """What other programs do to a recording while a server writes it."""
+    """Other programs change a recording while a server writes it."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="drivebench-watched-")

@@ -154,7 +154,7 @@ class Subscriptions(WireTest):
         server = self.server(unix=True)
         owner, viewer = self.client(server), self.client(server)
         stopped = [self.client(server, receive_buffer=4096) for _ in range(25)]
-        stopped += [self.client(server, unix=True) for _ in range(25)]  # where no timeout of TCP helps
+        stopped += [self.client(server, unix=True) for _ in range(25)]  # no timeout of TCP helps there
         memory_kib = server.memory_kib()
         owner.lease()
         for client in stopped:

@@ -240,7 +240,7 @@ class FrameCount {
   bool is_envelope_;
 };
 
-/// Why the frame is refused; empty: it is not.
+/// The refusal of the frame; empty: it is not refused.
 std::optional<FrameReading> problem_with(const FrameCount& count) {
   const auto refusal = [&count](v1::RefusalCode code, std::string sentence, std::string field) {
     return FrameReading{.outcome = FrameReading::Outcome::kRefused,

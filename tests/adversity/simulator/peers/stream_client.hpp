@@ -13,7 +13,7 @@
 
 namespace drivebench::simulator {
 
-/// How a client behaves. Chances are per turn, unless they say something else.
+/// The behaviour of a client. Chances are per turn, unless they say something else.
 struct Manners {
   const char* name = "";
   const char* token = "";

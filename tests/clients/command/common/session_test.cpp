@@ -1,5 +1,4 @@
-// What needs no bench of the subcommands that talk to one. The rest is tried against the real server in the
-// wire tests.
+// The parts of subcommands that need no bench. The wire tests try the rest against the real server.
 #include "clients/command/common/session.hpp"
 
 #include <gtest/gtest.h>

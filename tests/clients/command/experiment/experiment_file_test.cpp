@@ -102,7 +102,7 @@ class Csv : public testing::Test {
   }
   ~Csv() override { std::filesystem::remove_all(folder_); }
 
-  /// How many rows came in how many uploads; or the problem.
+  /// The numbers of rows and uploads that came; or the problem.
   std::string read(const std::string& text) {
     std::ofstream(folder_ / "t.csv", std::ios::binary) << text;
     int uploads = 0;

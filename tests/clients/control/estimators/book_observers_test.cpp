@@ -24,7 +24,7 @@ PhasePair wave(int k, double amplitude, double phase_rad) {
   return {.a = amplitude * std::cos(0.3 * k + phase_rad), .b = amplitude * std::sin(0.17 * k)};
 }
 
-/// What one step makes of the squared difference of two stationary observers.
+/// The factor by which one step multiplies the squared difference of two stationary observers.
 double factor_of_one_step(FluxStep kind, double rate_hz) {
   StationaryFluxObserver a(kServoMotor.machine, 1.0 / rate_hz, kind);
   StationaryFluxObserver b(kServoMotor.machine, 1.0 / rate_hz, kind);

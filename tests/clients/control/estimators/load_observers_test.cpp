@@ -99,7 +99,7 @@ TEST(RotorFrameObserver, FluxLiesAlongACurrentThatTurnsWithTheRotor) {
 
 // Catches: a torque or slip from the wrong axis, and an observer that turns its flux with the true speed
 // only: a machine in the same Euler steps, already turning at 20 rad/s when the observer starts at rest, must
-// be found in all four states. What is left is the flux error, which has decayed by exp(-0.2·η).
+// be found in all four states. The flux error is left, which has decayed by exp(-0.2·η).
 TEST(CoupledObserver, FindsAllFourStates) {
   CoupledObserver observer(kServo, {.angle_per_s = 1.8e3, .speed_per_s2 = 8e5}, kPeriod_s);
   PolarFluxObserver machine(kServo, kPeriod_s);

@@ -45,7 +45,7 @@ inline double voltage_limited_speed_rad_s(const SteadyInductionModel& m, const V
   return high;
 }
 
-/// Where the machine's voltage comes to its limit at rated flux, as the book has it for L_S = L_R = M:
+/// The speed at which the voltage comes to its limit at rated flux, as the book has it for L_S = L_R = M:
 /// n_p·ω_base·ψ_d0 = V. The slides keep M/L_R before it, so their base speed is L_R/M times as high.
 inline double base_speed_of_book_rad_s(const InductionMachineModel& machine, double rated_flux_wb,
                                        double voltage_v) noexcept {

@@ -65,7 +65,7 @@ struct Machine {
   }
 };
 
-/// What a case changes about the run of a preset.
+/// The changes that a case makes to the run of a preset.
 struct Circumstances {
   bool delay_one_sample = false;
   double load_from_s = 1e9;  ///< 0.1 N·m from here on, in time of the trajectory

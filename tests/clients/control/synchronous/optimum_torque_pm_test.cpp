@@ -53,7 +53,7 @@ TEST(PmTransitions, AreThoseOfTheBm500) {
   ASSERT_EQ(large.second_braking_rad_s.size(), 1u);
   expect_ratio(large.second_motoring_rad_s[0], 340.8, kTwoPerMille);
   expect_ratio(large.second_braking_rad_s[0], 383.4, kTwoPerMille);
-  // What the book has.
+  // The book prints these.
   expect_ratio(small.first_motoring_rad_s, 592.0, kText);
   expect_ratio(small.first_braking_rad_s, 635.0, kText);
   expect_ratio(large.first_motoring_rad_s, 288.0, kText);

@@ -34,7 +34,7 @@ struct Slopes {
   double d, q, field;
 };
 
-/// What the machine does with voltages, SM-03 solved for the slopes.
+/// The slopes of the currents under these voltages: SM-03 solved for them.
 Slopes machine(double i_d, double i_q, double i_field, double speed_rad_s, double u_d, double u_q,
                double u_field) {
   const double omega = kMotor.pole_pairs * speed_rad_s;

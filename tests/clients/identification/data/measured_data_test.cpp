@@ -18,7 +18,8 @@ std::string refusal(std::string_view text, const CsvOptions& options = {}) {
   return "";
 }
 
-// What `drivebench export` writes. Catches: units left in names, a period from two rows instead of all.
+// The text is as `drivebench export` writes it. Catches: units left in names, a period from two rows instead
+// of all.
 TEST(MeasuredData, AnExportReadsBack) {
   const MeasuredData data = parse_csv(
       "tick,time_s,i_a_a [A],encoder_count "

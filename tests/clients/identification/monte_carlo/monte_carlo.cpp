@@ -11,7 +11,7 @@
 namespace drivebench::identification {
 namespace {
 
-/// How much of a line another run must give again.
+/// The part of a line that another run must give again.
 enum class Check { kAll, kNumbers, kTwoCells };
 
 struct Line {
@@ -60,7 +60,7 @@ std::string range_text(const Range& range) {
   return fmt::format("{:g} to {:g}{}{}", range.low, range.high, range.unit.empty() ? "" : " ", range.unit);
 }
 
-/// What all trials of a kind say of one parameter.
+/// The errors of one parameter in all trials of a kind.
 struct Summary {
   std::vector<double> errors{};
   std::vector<double> indices{};  ///< over the truth

@@ -6,7 +6,7 @@
 
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
-/// What tests/book/IDENTIFICATION.md holds.
+/// The trials whose results tests/book/IDENTIFICATION.md holds.
 namespace drivebench::identification {
 
 struct MonteCarloPlan {
@@ -32,7 +32,7 @@ std::vector<Trials> run_trials(std::span<const MotorDraw> draws, const MonteCarl
 /// The document. What it says of all motors needs kAllMotors and kAllNoises.
 std::string markdown_of(const std::vector<Trials>& trials);
 
-/// Where a text differs from what these trials, of at least kShownMotors, would make it, one sentence each.
+/// The differences between a text and that of these trials, of at least kShownMotors, one sentence each.
 /// Of the tables over all motors only names and ranges are compared; the motors that are shown one by one to
 /// 2 % of each number and 0.002 points of a percentage: other C libraries round otherwise.
 std::vector<std::string> differences(const std::string& text, const std::vector<Trials>& trials);

@@ -10,7 +10,8 @@
 /// Motors drawn at random and the experiment that each of them goes through.
 namespace drivebench::identification {
 
-/// What a parameter is drawn from: evenly in its logarithm, or in itself if it may be zero; four digits.
+/// The range that a parameter is drawn from: evenly in its logarithm, or in itself if it may be zero; four
+/// digits.
 struct Range {
   std::string_view name;
   std::string_view unit;
@@ -25,7 +26,7 @@ struct MotorDraw {
   std::string_view bench;       ///< of configs/benches, whose motor stands in the middle of the ranges
   std::string_view experiment;  ///< for people
   std::span<const Range> identified;
-  std::span<const Range> others;  ///< what the experiment does not ask for
+  std::span<const Range> others;  ///< parameters that the experiment does not identify
   double longest_s;               ///< induction: the record ends here, whether the motor has run up or not
 };
 
@@ -46,7 +47,7 @@ struct Finding {
   bool covered() const noexcept;
 };
 
-/// What an experiment gave, and how to look at it.
+/// The data of an experiment and the settings to identify the motor with.
 struct Recorded {
   MeasuredData data;
   Settings how;

@@ -111,7 +111,7 @@ TEST(PmMotor, TwoStagesShrinkTheMechanicalIndices) {
   const MeasuredData data = start_data(0.0);
   const Result one = identify(data, experiment(500.0, 100.0, false));
   const Result two = identify(data, experiment(500.0, 100.0, true));
-  EXPECT_LT(one.at("R_S"), 0.58);  // what filters that differ cost, of 0.6
+  EXPECT_LT(one.at("R_S"), 0.58);  // different filters cost this much of 0.6
   for (const char* name : {"R_S", "L_S", "K_m", "J", "f", "f_c"})
     EXPECT_NEAR(two.at(name), one.at(name), 1e-3 * std::abs(one.at(name))) << name;
   for (const char* name : {"J", "f", "f_c"})

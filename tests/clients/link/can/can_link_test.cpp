@@ -29,7 +29,7 @@ struct Kind {
   bool wide;
 };
 
-/// What a narrow axis has of a command too.
+/// The part of a command that a narrow axis has too.
 std::vector<double> narrow(std::vector<double> command) {
   command.resize(std::min<std::size_t>(command.size(), 4));
   return command;
@@ -41,7 +41,7 @@ class CanLinkOf : public testing::TestWithParam<Kind> {
     address_.node = kNode;
     address_.profile.fd = GetParam().fd;
     can::Profile profile = address_.profile;
-    profile.wide = GetParam().wide;  // which the link learns by itself
+    profile.wide = GetParam().wide;  // the link learns this by itself
     auto bus = std::make_unique<FakeCanBench>(profile, kNode);
     bench_ = bus.get();
     bus_ = std::move(bus);

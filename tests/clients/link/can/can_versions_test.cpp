@@ -28,7 +28,7 @@ CanAddress address_with(bool fd, can::IdSet set) {
   return address;
 }
 
-/// Why a link to a bus that carries these frames and nothing else cannot connect.
+/// The error of a link that connects to a bus with these frames and nothing else.
 std::string failure_with(std::deque<can::Frame> frames, const CanAddress& address) {
   auto silent = std::make_unique<FakeCanBench>(address.profile, kNode);
   silent->coming = std::move(frames);

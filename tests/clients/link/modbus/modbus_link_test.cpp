@@ -254,7 +254,7 @@ TEST(ModbusLink, AnotherDeviceOrASilentOneIsAnError) {
   server.silent = true;
   EXPECT_THROW(link.newest(), LinkError);
   server.silent = false;
-  EXPECT_THROW(link.newest(), LinkError);  // what comes late is the answer to nothing
+  EXPECT_THROW(link.newest(), LinkError);  // a late answer answers nothing
   EXPECT_THROW(ModbusLink({.host = "127.0.0.1", .port = "1", .unit = 1}, 1s), ConnectError);
 }
 

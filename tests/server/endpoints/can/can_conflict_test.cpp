@@ -151,8 +151,8 @@ TEST_F(ConflictTest, CAN_11_TwoBenchesWithTheSameNodeTellItAsLongAsItLasts) {
   EXPECT_EQ(state(bench), "up");
 }
 
-/// What a CANopen tool sends to find its devices: NMT to all, guarding, an SDO upload of object 0x1000 from
-/// every node, and what devices answer.
+/// The frames with which a CANopen tool finds its devices: NMT to all, guarding, an SDO upload of object
+/// 0x1000 from every node, and what devices answer.
 std::vector<Frame> canopen_scan() {
   std::vector<Frame> frames = {{.id = 0x000, .size = 2, .data = {0x82, 0}},
                                {.id = 0x080, .size = 0},

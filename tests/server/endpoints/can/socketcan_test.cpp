@@ -165,7 +165,7 @@ TEST_F(SocketCan, CAN_05_AnInterfaceThatCannotCarryTheFramesIsRefused) {
 // Catches: an error frame taken for a message; a bus-off that goes unnoticed or never ends.
 TEST_F(SocketCan, CAN_06_ErrorFramesChangeTheStateAndAreNoMessages) {
   open(config());
-  bus_->set_filter({0x0, 0x4, 0x40});  // what the class bits would look like as identifiers
+  bus_->set_filter({0x0, 0x4, 0x40});  // the class bits, read as identifiers
   const Peer peer(interface_);
   const auto report = [&](std::uint32_t what, std::uint8_t controller) {
     peer.send(CAN_ERR_FLAG | what, {0, controller, 0, 0, 0, 0, 0, 0});

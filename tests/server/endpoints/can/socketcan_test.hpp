@@ -58,7 +58,7 @@ class Peer {
     const auto size = fd ? CANFD_MTU : CAN_MTU;
     ASSERT_EQ(::send(fd_, &raw, size, 0), static_cast<ssize_t>(size));
   }
-  /// What has come; waits until it is at least so many frames, as the kernel may deliver them later.
+  /// Receives all frames that have come; waits for at least so many, as the kernel may deliver them later.
   std::vector<Frame> receive_all(std::size_t at_least = 0) const {
     const auto give_up = std::chrono::steady_clock::now() + kPatience;
     std::vector<Frame> frames;

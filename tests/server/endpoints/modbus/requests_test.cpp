@@ -1,4 +1,4 @@
-// What each request is answered with: MB-01 to MB-04, MB-07, MB-12 of the list of faults.
+// The answer to each request: MB-01 to MB-04, MB-07, MB-12 of the list of faults.
 #include <cmath>
 #include <limits>
 
@@ -196,7 +196,7 @@ TEST(Modbus, MB_02_EveryEdgeOfTheMapHasItsVerdict) {
   EXPECT_EQ(bench.owner(), 0u);
   EXPECT_EQ(bench.newest().tick, 0u);
   for (std::size_t i = 0; i < after.size(); ++i) {
-    if (before[i].size() == 11) after[i][10] = before[i][10];  // why the last write was refused
+    if (before[i].size() == 11) after[i][10] = before[i][10];  // the reason of the last refusal
     EXPECT_EQ(before[i], after[i]) << "block " << i;
   }
 }

@@ -29,7 +29,7 @@ TEST(Audience, AFeedEndsWithItsLastReader) {
 }
 
 // Catches: a viewer that makes the server keep 0.1 MB for every number that it thinks of; a limit that shuts
-// out those who want every sample, or a decimation that is there; places that are not given back.
+// out clients that want every sample, or a decimation that is there; places that are not given back.
 TEST(Audience, LIMIT_03_FeedsOfManyDecimationsHaveAnEnd) {
   asio::io_context io(1);
   const std::unique_ptr<Engine> engine = make_lockstep_engine(servo_bench());

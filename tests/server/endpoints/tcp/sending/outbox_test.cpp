@@ -54,7 +54,7 @@ class Pair {
     ::ioctl(peer_, SIOCINQ, &in_kernel);
     return sent_ - received_ - static_cast<std::size_t>(in_kernel);
   }
-  /// What the peer gets until nothing comes; whether it is what was sent.
+  /// Lets the peer read until nothing comes; whether it got the bytes that were sent.
   bool read_all() {
     while (read_what_is_there())
       settle();
