@@ -21,7 +21,7 @@ std::string name_of(const asio::ip::tcp::endpoint& peer) {
 
 }  // namespace
 
-Connection::Connection(asio::ip::tcp::socket socket, Visitor number, Shared& shared)
+ClientConnection::ClientConnection(asio::ip::tcp::socket socket, Visitor number, Shared& shared)
     : socket_(std::move(socket)),
       number_(number),
       shared_(shared),
@@ -34,7 +34,7 @@ Connection::Connection(asio::ip::tcp::socket socket, Visitor number, Shared& sha
   socket_.non_blocking(true, gone);
 }
 
-void Connection::close() noexcept {
+void ClientConnection::close() noexcept {
   open_ = false;
   boost::system::error_code ignored;
   socket_.shutdown(asio::ip::tcp::socket::shutdown_both, ignored);
@@ -42,7 +42,7 @@ void Connection::close() noexcept {
   waker_.cancel();
 }
 
-void Connection::cut(std::string_view why) {
+void ClientConnection::cut(std::string_view why) {
   ++shared_.counts.cut;
   if (shared_.cut_log.allow()) {
     spdlog::warn("{}: cut off: {} ({} more since the last such line)", name_, why,
@@ -52,19 +52,19 @@ void Connection::cut(std::string_view why) {
   close();
 }
 
-void Connection::audit(std::string_view event, std::string_view why_not,
-                       std::optional<std::uint32_t> axis) const {
+void ClientConnection::audit(std::string_view event, std::string_view why_not,
+                             std::optional<std::uint32_t> axis) const {
   if (shared_.audit == nullptr) return;
   const drivebench::Client client{.transport = "modbus", .peer = peer_name(), .subject = {}};
   shared_.audit->note({.name = event, .axis = axis, .client = &client, .result = why_not});
 }
 
-bool Connection::has_lease() const noexcept {
+bool ClientConnection::has_lease() const noexcept {
   return std::any_of(shared_.desks.begin(), shared_.desks.end(),
                      [this](const auto& desk) { return desk->holds(number_); });
 }
 
-void Connection::start_timer() {
+void ClientConnection::start_timer() {
   if (timing_) return;
   timing_ = true;
   timer_.set(std::chrono::milliseconds(shared_.engine.config().modbus.frame_timeout_ms),
@@ -73,8 +73,8 @@ void Connection::start_timer() {
              });
 }
 
-asio::awaitable<void> Connection::run() {
-  const std::shared_ptr<Connection> self = shared_from_this();
+asio::awaitable<void> ClientConnection::run() {
+  const std::shared_ptr<ClientConnection> self = shared_from_this();
   boost::system::error_code error;
   while (open_) {
     const std::span<std::uint8_t> space = reader_.free_space();
@@ -101,14 +101,14 @@ asio::awaitable<void> Connection::run() {
   stop_timer();
 }
 
-void Connection::end() {
+void ClientConnection::end() {
   for (const auto& desk : shared_.desks)
     desk->connection_ended(number_);
   close();
 }
 
 /// Sends the queued answers. Most often the kernel takes them at once.
-asio::awaitable<bool> Connection::flush() {
+asio::awaitable<bool> ClientConnection::flush() {
   boost::system::error_code error;
   std::size_t sent = 0;
   while (sent < out_.size() && !error && socket_.is_open()) {
@@ -124,12 +124,12 @@ asio::awaitable<bool> Connection::flush() {
   co_return !error;
 }
 
-AxisDesk* Connection::desk_of(std::uint8_t unit) {
+AxisDesk* ClientConnection::desk_of(std::uint8_t unit) {
   const std::size_t axis = unit == 0 || unit == 255 ? 0 : unit - 1u;
   return axis < shared_.desks.size() ? shared_.desks[axis].get() : nullptr;
 }
 
-void Connection::reply(Bytes adu, Bytes pdu) {
+void ClientConnection::reply(Bytes adu, Bytes pdu) {
   const std::size_t length = pdu.size() + 1;
   out_.insert(out_.end(), adu.begin(), adu.begin() + 4);
   out_.push_back(static_cast<std::uint8_t>(length >> 8));
@@ -138,7 +138,7 @@ void Connection::reply(Bytes adu, Bytes pdu) {
   out_.insert(out_.end(), pdu.begin(), pdu.end());
 }
 
-void Connection::refuse(Bytes adu, Exception exception) {
+void ClientConnection::refuse(Bytes adu, Exception exception) {
   ++shared_.counts.exceptions;
   const std::array<std::uint8_t, 2> pdu{static_cast<std::uint8_t>(adu[kMbapSize] | 0x80),
                                         static_cast<std::uint8_t>(exception)};
@@ -146,7 +146,7 @@ void Connection::refuse(Bytes adu, Exception exception) {
 }
 
 /// False: the connection ends once the queued answers are sent.
-asio::awaitable<bool> Connection::answer(Bytes adu) {
+asio::awaitable<bool> ClientConnection::answer(Bytes adu) {
   ++shared_.counts.requests;
   last_request_ = Clock::now();
   const RateLimit::Answer rate = shared_.rate.charge(peer_, last_request_);
@@ -187,7 +187,7 @@ asio::awaitable<bool> Connection::answer(Bytes adu) {
   co_return true;
 }
 
-asio::awaitable<void> Connection::execute(AxisDesk& desk, Bytes adu, Request request) {
+asio::awaitable<void> ClientConnection::execute(AxisDesk& desk, Bytes adu, Request request) {
   const Bytes pdu = adu.subspan(kMbapSize);
   if (request.function == Function::kDiagnostics) {
     reply(adu, pdu);
@@ -212,7 +212,7 @@ asio::awaitable<void> Connection::execute(AxisDesk& desk, Bytes adu, Request req
 }
 
 /// Writes the registers and bits that libmodbus is going to read.
-void Connection::fill_reply(AxisDesk& desk, const Request& request) {
+void ClientConnection::fill_reply(AxisDesk& desk, const Request& request) {
   const std::size_t from = request.read_address;
   for (std::size_t i = from; i < from + request.read_count; ++i) {
     if (request.function == Function::kReadCoils) shared_.replies.coils()[i] = desk.coil(i, number_) ? 1 : 0;
@@ -225,7 +225,7 @@ void Connection::fill_reply(AxisDesk& desk, const Request& request) {
   }
 }
 
-asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Request& request) {
+asio::awaitable<Exception> ClientConnection::carry_out_write(AxisDesk& desk, const Request& request) {
   const bool is_process = request.write.count > 0 && request.write.first < kCommandStart;
   const bool runs_by_itself = shared_.engine.config().mode != RunMode::kLockstep;
   if (is_process && runs_by_itself && desk.has_answered_tick(number_))
@@ -259,7 +259,7 @@ asio::awaitable<Exception> Connection::carry_out_write(AxisDesk& desk, const Req
   co_return Exception::kNone;
 }
 
-void Connection::note_refused_write(AxisDesk& desk, Refused why) {
+void ClientConnection::note_refused_write(AxisDesk& desk, Refused why) {
   ++shared_.counts.refused_writes;
   desk.note_refusal(number_, why);
   if (lacks_lease(why)) {  // other mistakes concern the owner alone
@@ -271,14 +271,14 @@ void Connection::note_refused_write(AxisDesk& desk, Refused why) {
                desk.axis(), sentence_of(why), shared_.refused_writes_log.held_back());
 }
 
-bool Connection::is_peer_gone() {
+bool ClientConnection::is_peer_gone() {
   pollfd socket{.fd = socket_.native_handle(), .events = POLLRDHUP, .revents = 0};
   return ::poll(&socket, 1, 0) > 0;
 }
 
 /// Waits for the tick after `before`; kBusy: it never comes. So an exchange gets the first sample after its
 /// command, and in real time two process data within a tick count as two.
-asio::awaitable<Exception> Connection::wait_for_tick(AxisDesk& desk, Tick before) {
+asio::awaitable<Exception> ClientConnection::wait_for_tick(AxisDesk& desk, Tick before) {
   if (shared_.engine.tick() != before) co_return Exception::kNone;
   const bool sent = co_await flush();  // earlier answers must not wait with this request
   if (!sent) open_ = false;

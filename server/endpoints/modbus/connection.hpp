@@ -47,11 +47,11 @@ struct Shared {
 
 /// The connection of one client. It answers requests in their order; an error ends this connection and
 /// nothing else.
-class Connection : public std::enable_shared_from_this<Connection> {
+class ClientConnection : public std::enable_shared_from_this<ClientConnection> {
  public:
   using Clock = ServerClock;
 
-  Connection(asio::ip::tcp::socket socket, Visitor number, Shared& shared);
+  ClientConnection(asio::ip::tcp::socket socket, Visitor number, Shared& shared);
 
   /// Reads and answers until the peer or an error ends the connection.
   asio::awaitable<void> run();

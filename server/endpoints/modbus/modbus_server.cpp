@@ -129,7 +129,7 @@ asio::awaitable<void> ModbusServer::accept() {
 
 void ModbusServer::start(tcp::socket socket) {
   tune(socket);
-  auto connection = std::make_shared<modbus::Connection>(std::move(socket), ++last_number_, *shared_);
+  auto connection = std::make_shared<modbus::ClientConnection>(std::move(socket), ++last_number_, *shared_);
   if (connections_.size() >= config_.max_connections && !make_room(connection->peer())) {
     ++shared_->counts.turned_away;
     if (shared_->turned_away_log.allow()) {
@@ -152,7 +152,8 @@ bool ModbusServer::make_room(const asio::ip::address& newcomer) {
   const auto longest =
       std::min_element(connections_.begin(), connections_.end(),
                        [](const auto& a, const auto& b) { return a->idle_since() < b->idle_since(); });
-  const auto limit = modbus::Connection::Clock::now() - std::chrono::milliseconds(config_.idle_timeout_ms);
+  const auto limit =
+      modbus::ClientConnection::Clock::now() - std::chrono::milliseconds(config_.idle_timeout_ms);
   if (longest != connections_.end() && (*longest)->idle_since() <= limit) {
     (*longest)->cut("all connections are taken, and this one has been idle for long");
     connections_.erase(longest);
@@ -175,7 +176,7 @@ bool ModbusServer::make_room(const asio::ip::address& newcomer) {
   return true;
 }
 
-asio::awaitable<void> ModbusServer::run(std::shared_ptr<modbus::Connection> connection) {
+asio::awaitable<void> ModbusServer::run(std::shared_ptr<modbus::ClientConnection> connection) {
   try {
     co_await connection->run();
   } catch (const std::exception& error) {

@@ -39,7 +39,7 @@ class ModbusServer {
   std::string name_of(modbus::Visitor visitor) const;
   void note_takeover(std::uint32_t axis, const Client& by, const std::string& from);
   bool make_room(const asio::ip::address& newcomer);
-  asio::awaitable<void> run(std::shared_ptr<modbus::Connection> connection);
+  asio::awaitable<void> run(std::shared_ptr<modbus::ClientConnection> connection);
 
   asio::io_context& io_;
   ModbusConfig config_;
@@ -50,7 +50,7 @@ class ModbusServer {
   std::optional<modbus::Identification> identification_;
   std::optional<modbus::Shared> shared_;
   modbus::Visitor last_number_ = 0;
-  std::vector<std::shared_ptr<modbus::Connection>> connections_;
+  std::vector<std::shared_ptr<modbus::ClientConnection>> connections_;
 };
 
 }  // namespace drivebench
