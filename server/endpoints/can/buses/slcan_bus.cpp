@@ -31,9 +31,9 @@ std::uint16_t stamp_ms() {
                                     60'000);
 }
 
-/// A client with its emulated adapter.
-struct Client {
-  Client(asio::io_context& io, int fd, BusStatus& status)
+/// The serial CAN adapter that a client sees, and the stream to the client.
+struct EmulatedAdapter {
+  EmulatedAdapter(asio::io_context& io, int fd, BusStatus& status)
       : peer(io, fd, status, [this](std::string& out, const Frame& frame) {
           append_slcan(out, frame, stamped ? std::optional(stamp_ms()) : std::nullopt);
         }) {}
@@ -59,17 +59,17 @@ class SlcanBus final : public VirtualBus {
  private:
   std::string open() override;
   void welcome(int fd);
-  void part(const Client* client);
-  void broadcast(const Frame& frame, const Client* except);
-  void take(Client& client, const SlcanReader::Line& line);
-  std::string answer(Client& client, std::string_view line);
+  void part(const EmulatedAdapter* adapter);
+  void broadcast(const Frame& frame, const EmulatedAdapter* except);
+  void take(EmulatedAdapter& adapter, const SlcanReader::Line& line);
+  std::string answer(EmulatedAdapter& adapter, std::string_view line);
 
   bool is_tcp() const { return config_.channel.starts_with(kTcp); }
 
   std::string name_ = config_.channel;
   TextListener listener_;
   Terminal terminal_;
-  std::vector<std::unique_ptr<Client>> clients_;
+  std::vector<std::unique_ptr<EmulatedAdapter>> adapters_;
 };
 
 std::string SlcanBus::open() {
@@ -84,53 +84,53 @@ std::string SlcanBus::open() {
 }
 
 void SlcanBus::welcome(int fd) {
-  if (clients_.size() == kMaxClients) {
+  if (adapters_.size() == kMaxClients) {
     refused(peer_of(fd), "there are as many clients as this bus serves");
     ::close(fd);
     return;
   }
-  clients_.push_back(std::make_unique<Client>(io_, fd, status_));
-  Client* client = clients_.back().get();
-  client->peer.on_bytes = [this, client](std::string_view bytes) {
+  adapters_.push_back(std::make_unique<EmulatedAdapter>(io_, fd, status_));
+  EmulatedAdapter* adapter = adapters_.back().get();
+  adapter->peer.on_bytes = [this, adapter](std::string_view bytes) {
     for (const char byte : bytes) {
-      if (const auto line = client->reader.push(byte)) take(*client, *line);
+      if (const auto line = adapter->reader.push(byte)) take(*adapter, *line);
     }
   };
-  client->peer.on_end = [this, client] { part(client); };
-  client->peer.start();
+  adapter->peer.on_end = [this, adapter] { part(adapter); };
+  adapter->peer.start();
 }
 
-void SlcanBus::part(const Client* client) {
-  std::erase_if(clients_, [client](const auto& each) { return each.get() == client; });
+void SlcanBus::part(const EmulatedAdapter* adapter) {
+  std::erase_if(adapters_, [adapter](const auto& each) { return each.get() == adapter; });
   if (!is_tcp()) terminal_.release();
 }
 
-void SlcanBus::broadcast(const Frame& frame, const Client* except) {
-  for (const auto& client : clients_) {
-    if (client->open && client.get() != except) client->peer.send(frame);
+void SlcanBus::broadcast(const Frame& frame, const EmulatedAdapter* except) {
+  for (const auto& adapter : adapters_) {
+    if (adapter->open && adapter.get() != except) adapter->peer.send(frame);
   }
 }
 
-void SlcanBus::take(Client& client, const SlcanReader::Line& line) {
+void SlcanBus::take(EmulatedAdapter& adapter, const SlcanReader::Line& line) {
   if (line.refusal) return;  // a BELL from a client has no meaning
   const auto frame = line.too_long ? std::nullopt : parse_slcan(line.text);
-  const bool may_send = client.open && !client.listen_only;
+  const bool may_send = adapter.open && !adapter.listen_only;
   // A client that never reads loses its answers.
   if (line.too_long) {
     ++status_.malformed;
-    client.peer.answer({&kSlcanRefused, 1});
+    adapter.peer.answer({&kSlcanRefused, 1});
   } else if (!frame) {
-    client.peer.answer(answer(client, line.text));
+    adapter.peer.answer(answer(adapter, line.text));
   } else {
-    client.peer.answer({may_send ? &kSlcanOk : &kSlcanRefused, 1});
+    adapter.peer.answer({may_send ? &kSlcanOk : &kSlcanRefused, 1});
   }
   if (!frame || !may_send) return;
-  broadcast(*frame, &client);
+  broadcast(*frame, &adapter);
   deliver(*frame, 0);
 }
 
 /// The answer to a command. Bit rates are accepted without effect.
-std::string SlcanBus::answer(Client& client, std::string_view line) {
+std::string SlcanBus::answer(EmulatedAdapter& adapter, std::string_view line) {
   static const std::string kYes(1, kSlcanOk);
   static const std::string kNo(1, kSlcanRefused);
   if (line.empty()) return kYes;
@@ -142,26 +142,26 @@ std::string SlcanBus::answer(Client& client, std::string_view line) {
   switch (line.front()) {
     case 'O':
     case 'L':
-      if (client.open || !argument.empty()) return kNo;
-      client.open = true;
-      client.listen_only = line.front() == 'L';
+      if (adapter.open || !argument.empty()) return kNo;
+      adapter.open = true;
+      adapter.listen_only = line.front() == 'L';
       return kYes;
     case 'C':
-      if (!client.open || !argument.empty()) return kNo;
-      client.open = false;
-      client.peer.forget_frames();
+      if (!adapter.open || !argument.empty()) return kNo;
+      adapter.open = false;
+      adapter.peer.forget_frames();
       return kYes;
     case 'S':
     case 'Y':
-      return !client.open && is_digits(1, 1) ? kYes : kNo;
+      return !adapter.open && is_digits(1, 1) ? kYes : kNo;
     case 's':
-      return !client.open && is_digits(4, 8) ? kYes : kNo;
+      return !adapter.open && is_digits(4, 8) ? kYes : kNo;
     case 'Z':
-      if (client.open || (argument != "0" && argument != "1")) return kNo;
-      client.stamped = argument == "1";
+      if (adapter.open || (argument != "0" && argument != "1")) return kNo;
+      adapter.stamped = argument == "1";
       return kYes;
     case 'F':
-      return client.open && argument.empty() ? "F00" + kYes : kNo;
+      return adapter.open && argument.empty() ? "F00" + kYes : kNo;
     case 'V':
       return argument.empty() ? "V0101" + kYes : kNo;
     case 'N':
