@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kTerminalNames = {"a", "b", "c", "field"};
 
-Terminals asked_for(const v1::Command& c) {
+TerminalValues asked_for(const v1::Command& c) {
   if (c.gates() == v1::GATES_CURRENT) return {c.i_a_a(), c.i_b_a(), c.i_c_a(), c.i_f_a()};
   if (c.gates() == v1::GATES_VOLTAGE) return {c.u_a_v(), c.u_b_v(), c.u_c_v(), c.u_f_v()};
   return {};
@@ -43,10 +43,11 @@ void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison
     const std::uint64_t tick = row.sample.tick;
     const auto periods = std::max<std::int64_t>(1, static_cast<std::int64_t>(tick - last_tick));
     last_tick = tick;
-    const Terminals reference = terminals_of(run.step(measurement_of(row.sample, kAllSignals), periods));
+    const TerminalValues reference =
+        terminal_values_of(run.step(measurement_of(row.sample, kAllSignals), periods));
     if (run.done()) break;
     ++out.samples;
-    const Terminals there = asked_for(row.command);
+    const TerminalValues there = asked_for(row.command);
     for (std::size_t i = 0; i < reference.size(); ++i) {
       const double difference = there[i] - reference[i];
       out.commands.add(tick, difference, out.threshold);
@@ -72,8 +73,8 @@ void compare_runs(const RecordedRun& recorded, const RecordedRun& other, std::in
       ++there;
     if (there == other.rows.end()) return;
     if (there->sample.tick - first_there.tick != tick - first.tick) continue;
-    const Terminals asked = asked_for(row.command);
-    const Terminals asked_there = asked_for(there->command);
+    const TerminalValues asked = asked_for(row.command);
+    const TerminalValues asked_there = asked_for(there->command);
     for (std::size_t i = 0; i < asked.size(); ++i)
       out.other_commands.add(tick, asked[i] - asked_there[i], out.threshold);
     const double turned_rad = row.sample.angle_rad - first.angle_rad;

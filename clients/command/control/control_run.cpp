@@ -15,13 +15,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kField = 3;  // of Terminals
+constexpr std::size_t kField = 3;  // of TerminalValues
 
 double larger(double peak, double value) noexcept {
   return std::max(peak, std::abs(value));
 }
 
-double larger_phase(double peak, const Terminals& x) noexcept {
+double larger_phase(double peak, const TerminalValues& x) noexcept {
   return larger(larger(larger(peak, x[0]), x[1]), x[2]);
 }
 
@@ -60,7 +60,7 @@ ControlRow row_of(const Sample& sample, const ControlRun& into, std::int64_t per
   row.speed_observer_rad_s = controller.speed_rad_s();
   row.speed_rad_s = into.knows_speed ? sample.speed_rad_s : row.speed_observer_rad_s;
   row.current_a = {sample.i_a_a, sample.i_b_a, sample.i_c_a, sample.i_f_a};
-  row.setpoint = terminals_of(setpoint);
+  row.setpoint = terminal_values_of(setpoint);
   row.voltage_v = {sample.u_a_v, sample.u_b_v, sample.u_c_v, sample.u_f_v};
   row.saturated = controller.saturated();
   return row;
@@ -168,7 +168,7 @@ control::Measurement measurement_of(const Sample& s, SignalMask known) {
           .i_f_a = real(bit_of("i_f_a"), s.i_f_a)};
 }
 
-Terminals terminals_of(const control::Setpoint& x) {
+TerminalValues terminal_values_of(const control::Setpoint& x) {
   return {x.a, x.b, x.c, x.field};
 }
 
@@ -262,7 +262,7 @@ std::string to_csv(const ControlRun& run) {
     fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{}", r.tick, r.time_s, r.reference.angle_rad, r.angle_rad,
                    r.error_rad * run.counts_per_rad, r.measured_error_rad * run.counts_per_rad, r.error_rad,
                    r.reference.speed_rad_s, r.speed_rad_s, r.speed_observer_rad_s);
-    for (const Terminals& each : {r.current_a, r.setpoint, r.voltage_v})
+    for (const TerminalValues& each : {r.current_a, r.setpoint, r.voltage_v})
       fmt::format_to(out, ",{}", fmt::join(each, ","));
     fmt::format_to(out, ",{}", r.saturated ? 1 : 0);
     const std::size_t columns = run.telemetry_names.size();

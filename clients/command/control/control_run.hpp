@@ -15,7 +15,7 @@
 namespace drivebench::command {
 
 /// One value for each terminal: phases a, b, c (an armature is a) and the field winding.
-using Terminals = std::array<double, 4>;
+using TerminalValues = std::array<double, 4>;
 
 /// A load torque at a time after the start of the trajectory.
 struct LoadAt {
@@ -26,7 +26,7 @@ struct LoadAt {
 /// The measurement in a sample of a link with these signals; other values are zero.
 control::Measurement measurement_of(const Sample& sample, SignalMask known);
 
-Terminals terminals_of(const control::Setpoint& setpoint);
+TerminalValues terminal_values_of(const control::Setpoint& setpoint);
 
 /// A sample of a run and the controller's answer.
 struct ControlRow {
@@ -39,9 +39,9 @@ struct ControlRow {
   double measured_error_rad = 0.0;  ///< reference - encoder
   double speed_rad_s = 0.0;         ///< the true speed, or else the observer's
   double speed_observer_rad_s = 0.0;
-  Terminals current_a{};
-  Terminals setpoint{};   ///< commanded, [V] or [A]
-  Terminals voltage_v{};  ///< at the machine during the previous tick, if the link carries it
+  TerminalValues current_a{};
+  TerminalValues setpoint{};   ///< commanded, [V] or [A]
+  TerminalValues voltage_v{};  ///< at the machine during the previous tick, if the link carries it
   bool saturated = false;
   double exchange_us = 0.0;  ///< from sending the command to receiving the next sample
 };

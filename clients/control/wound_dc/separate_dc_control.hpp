@@ -49,7 +49,7 @@ class SeparateDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
   explicit SeparateDcController(const SeparateDcParameters& p) noexcept
-      : WoundDcController(p.axis, Terminals::kSeparate), p_(p) {}
+      : WoundDcController(p.axis, FieldConnection::kSeparate), p_(p) {}
 
  private:
   Setpoint voltages(const Reference& r, const WoundDcState& x) noexcept override;
@@ -93,7 +93,7 @@ class FieldControlDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
   explicit FieldControlDcController(const FieldControlDcParameters& p) noexcept
-      : WoundDcController(p.axis, Terminals::kSeparate), p_(p) {}
+      : WoundDcController(p.axis, FieldConnection::kSeparate), p_(p) {}
 
  private:
   Setpoint voltages(const Reference& r, const WoundDcState& x) noexcept override;

@@ -18,7 +18,7 @@ std::vector<std::string> SeriesDcParameters::problems() const {
 }
 
 SeriesDcController::SeriesDcController(const SeriesDcParameters& p) noexcept
-    : WoundDcController(p.axis, Terminals::kSeries), p_(p) {
+    : WoundDcController(p.axis, FieldConnection::kSeries), p_(p) {
   if (p.source == SeriesDcSpeed::kCurrent) {
     observer_.emplace(p.axis.machine, p.observer, p.least_current_a, p.axis.period_s(),
                       Discretisation::kTrapezoidal);

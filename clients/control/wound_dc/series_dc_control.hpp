@@ -78,7 +78,7 @@ class WeakenedSeriesDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
   explicit WeakenedSeriesDcController(const WeakenedSeriesDcParameters& p) noexcept
-      : WoundDcController(p.axis, Terminals::kSeries), p_(p) {}
+      : WoundDcController(p.axis, FieldConnection::kSeries), p_(p) {}
 
  private:
   Setpoint voltages(const Reference& r, const WoundDcState& x) noexcept override;

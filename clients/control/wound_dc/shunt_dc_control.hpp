@@ -30,7 +30,7 @@ class ShuntDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
   explicit ShuntDcController(const ShuntDcParameters& p) noexcept
-      : WoundDcController(p.axis, Terminals::kShunt), p_(p) {}
+      : WoundDcController(p.axis, FieldConnection::kShunt), p_(p) {}
 
  private:
   Setpoint voltages(const Reference& r, const WoundDcState& x) noexcept override;
@@ -82,7 +82,7 @@ class ExactShuntDcController final : public WoundDcController {
  public:
   /// `p` must have no problems().
   explicit ExactShuntDcController(const ExactShuntDcParameters& p) noexcept
-      : WoundDcController(p.axis, Terminals::kShunt), p_(p) {}
+      : WoundDcController(p.axis, FieldConnection::kShunt), p_(p) {}
 
  private:
   Setpoint voltages(const Reference& r, const WoundDcState& x) noexcept override;

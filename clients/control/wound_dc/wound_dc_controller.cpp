@@ -4,10 +4,11 @@
 
 namespace drivebench::control {
 
-WoundDcController::WoundDcController(const WoundDcAxisParameters& axis, Terminals terminals) noexcept
+WoundDcController::WoundDcController(const WoundDcAxisParameters& axis,
+                                     FieldConnection field_connection) noexcept
     : Controller(Quantity::kVoltage, {"speed_error_rad_s", "flux_wb", "speed_rad_s", "load_rad_s2"}),
       axis_(axis),
-      terminals_(terminals),
+      field_connection_(field_connection),
       shaft_(axis.shaft, axis.machine.friction_rate_per_s(), axis.period_s()) {}
 
 double WoundDcController::clamped_armature_v(double wanted_v) const noexcept {
@@ -29,8 +30,9 @@ ShaftEstimate WoundDcController::seen_from_terminals(double, const ShaftEstimate
 
 Setpoint WoundDcController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   const WoundDcModel& machine = axis_.machine;
-  const bool whole_field = terminals_ == Terminals::kSeries && machine.field_shunt_resistance_ohm == 0.0;
-  const double armature_a = terminals_ == Terminals::kShunt ? m.i_a_a - m.i_f_a : m.i_a_a;
+  const bool whole_field =
+      field_connection_ == FieldConnection::kSeries && machine.field_shunt_resistance_ohm == 0.0;
+  const double armature_a = field_connection_ == FieldConnection::kShunt ? m.i_a_a - m.i_f_a : m.i_a_a;
   const double field_a = whole_field ? m.i_a_a : m.i_f_a;
   const double flux_wb = machine.flux_wb(field_a);
   const double motor_rad_s2 = machine.torque_nm(flux_wb, armature_a) / machine.inertia_kgm2;

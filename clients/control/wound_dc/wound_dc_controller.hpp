@@ -59,15 +59,14 @@ struct WoundDcState {
 
 /// Speed control of a DC machine with a wound field: the law gives the voltages.
 class WoundDcController : public Controller {
- public:
  protected:
-  /// The current that the terminals carry.
-  enum class Terminals {
+  /// The connection of field and armature, and with it the current that the terminals carry.
+  enum class FieldConnection {
     kSeparate,  ///< the armature's
     kSeries,    ///< that of armature and field, of the armature with R_p
     kShunt,     ///< that of armature and field together
   };
-  WoundDcController(const WoundDcAxisParameters& axis, Terminals terminals) noexcept;
+  WoundDcController(const WoundDcAxisParameters& axis, FieldConnection field_connection) noexcept;
 
   /// The voltages for this sample, before any limit.
   virtual Setpoint voltages(const Reference& r, const WoundDcState& x) noexcept = 0;
@@ -94,7 +93,7 @@ class WoundDcController : public Controller {
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept final;
 
   WoundDcAxisParameters axis_;
-  Terminals terminals_;
+  FieldConnection field_connection_;
   ShaftEstimator shaft_;
   Setpoint last_;
 };
