@@ -38,7 +38,7 @@ v1::ExperimentInfo fetch_into(ExperimentClient& client, const ExperimentOptions&
       [&] { return data.next_tick(); });
   data.flush();
   if (!recording || info.recording_bytes() == 0 || client.gave_up()) return info;
-  RecordingWriter out(options.out_file);
+  RecordingDownload out(options.out_file);
   info = client.fetch(
       id, true,
       [&](const v1::ExperimentInfo&, const v1::ExperimentData* piece) {

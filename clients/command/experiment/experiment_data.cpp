@@ -88,7 +88,7 @@ void DataWriter::flush() {
   out_->flush();
 }
 
-void RecordingWriter::take(const v1::ExperimentData& data) {
+void RecordingDownload::take(const v1::ExperimentData& data) {
   if (data.first() > bytes_) throw std::runtime_error("the server left out a piece of the recording");
   const std::uint64_t known = bytes_ - data.first();
   if (known >= data.data().size()) return;

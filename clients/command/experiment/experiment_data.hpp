@@ -67,9 +67,9 @@ class DataWriter {
 };
 
 /// Writes the bytes of a recording to a file.
-class RecordingWriter {
+class RecordingDownload {
  public:
-  explicit RecordingWriter(std::string file) : file_(std::move(file)) {}
+  explicit RecordingDownload(std::string file) : file_(std::move(file)) {}
   /// Creates the file; to be called before the first bytes.
   void describe() {
     if (!out_) out_.emplace(file_);
