@@ -112,11 +112,11 @@ void apply_options(const IdentifyOptions& o, Settings& e) {
   if (o.one_stage) e.two_stage = false;
 }
 
-Measurement measurement(const IdentifyOptions& options, const MotorName& motor,
-                        const NamedExperiment* named) {
+MeasuredMotor measured_motor(const IdentifyOptions& options, const MotorName& motor,
+                             const NamedExperiment* named) {
   if (options.from_file.empty()) return measure(options, wanted_experiment(motor, named, options.experiment));
-  Measurement m = options.from_file.ends_with(".mcap") ? read_recording(options.from_file, options.axis)
-                                                       : read_foreign(options);
+  MeasuredMotor m = options.from_file.ends_with(".mcap") ? read_recording(options.from_file, options.axis)
+                                                         : read_foreign(options);
   if (!m.machine.empty() && m.machine != motor.machine)
     throw UsageError(fmt::format("{} is of kind {}, --motor {} is for {}", m.source, m.machine, motor.name,
                                  motor.machine));
@@ -124,7 +124,7 @@ Measurement measurement(const IdentifyOptions& options, const MotorName& motor,
 }
 
 Settings settings(const IdentifyOptions& options, const MotorName& motor, const NamedExperiment* named,
-                  const Measurement& m) {
+                  const MeasuredMotor& m) {
   Settings e = settings_of(motor.kind, m.facts, m.data.period_s);
   if (m.drive.empty())
     e.processing.voltage_shift = usual_processing(motor.kind, m.data.period_s).voltage_shift;
@@ -134,7 +134,7 @@ Settings settings(const IdentifyOptions& options, const MotorName& motor, const 
   return e;
 }
 
-void check_foreign(const IdentifyOptions& options, const MotorName& motor, const Measurement& m) {
+void check_foreign(const IdentifyOptions& options, const MotorName& motor, const MeasuredMotor& m) {
   if (!m.bench.empty()) return;
   const bool counts = m.data.find("encoder_count") != nullptr;
   if (counts && !options.counts_per_revolution && m.data.find("angle_rad") == nullptr)
@@ -143,14 +143,14 @@ void check_foreign(const IdentifyOptions& options, const MotorName& motor, const
     throw UsageError("--pole-pairs is missing: the file does not say how many the motor has");
 }
 
-void compare(const Measurement& m, const Settings& e, identification::Result& result) {
+void compare(const MeasuredMotor& m, const Settings& e, identification::Result& result) {
   auto truth = truth_of(e.kind, m.bench);
   if (truth.empty()) return;
   add_load_truth(m.data, e, truth);
   result.compare(truth);
 }
 
-IdentifyReport identified(const MotorName& motor, Measurement m, const Settings& e) {
+IdentifyReport identified(const MotorName& motor, MeasuredMotor m, const Settings& e) {
   IdentifyReport report{.motor = std::string(motor.name),
                         .source = m.source,
                         .period_s = m.data.period_s,
@@ -183,7 +183,7 @@ std::string relative_plot(const IdentifyOptions& options) {
 }
 
 /// Writes the requested files. Reports a file that it cannot write after it has written the others.
-int write_files(const IdentifyOptions& options, const IdentifyReport& report, const Measurement& m) {
+int write_files(const IdentifyOptions& options, const IdentifyReport& report, const MeasuredMotor& m) {
   std::string problems;
   const auto attempt = [&](const std::string& path, const auto& text) {
     if (path.empty()) return;
@@ -232,7 +232,7 @@ int run_identify(const IdentifyOptions& options) {
   const NamedExperiment* const named =
       options.from_file.empty() ? chosen_experiment(motor, options.experiment) : nullptr;
   catch_interrupts();
-  Measurement m = measurement(options, motor, named);
+  MeasuredMotor m = measured_motor(options, motor, named);
   check_foreign(options, motor, m);
   if (!options.data_file.empty()) write(options.data_file, csv_of(m.data));
   const Settings e = settings(options, motor, named, m);

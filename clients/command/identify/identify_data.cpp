@@ -109,7 +109,7 @@ bool has_three_phases(const std::string& machine, const BenchParameters& paramet
   return machine == "bldc" || (star != parameters.end() && star->second != 0.0);
 }
 
-void read_configuration(const McapReader& file, const std::string& axis, Measurement& m) {
+void read_configuration(const McapReader& file, const std::string& axis, MeasuredMotor& m) {
   for (const McapAttachment& attachment : file.attachments()) {
     if (attachment.name != kConfiguration) continue;
     const std::string_view text(reinterpret_cast<const char*>(attachment.data.data()),
@@ -134,7 +134,7 @@ std::string word_of(const v1::AxisDescription& axis, const v1::NamedValue& setti
 }  // namespace
 
 void take_description(const v1::BenchDescription& bench, std::uint32_t number,
-                      const v1::RunExperiment& request, Measurement& m) {
+                      const v1::RunExperiment& request, MeasuredMotor& m) {
   const v1::AxisDescription& axis = bench.axes(static_cast<int>(number));
   m.machine = axis.machine_kind();
   m.motor = axis.machine();
@@ -155,7 +155,7 @@ void take_description(const v1::BenchDescription& bench, std::uint32_t number,
   m.facts.decimation = std::max(1, static_cast<int>(request.decimation()));
 }
 
-void take_configuration(std::string_view toml, const std::string& axis, Measurement& m) {
+void take_configuration(std::string_view toml, const std::string& axis, MeasuredMotor& m) {
   ProblemList problems;
   const auto document = parse_document(toml, "bench.toml", problems, kMaxRecordedConfigBytes);
   const ConfigNode* const axes = document ? child_of(*document, "axis") : nullptr;
@@ -183,8 +183,8 @@ void take_configuration(std::string_view toml, const std::string& axis, Measurem
   }
 }
 
-Measurement read_recording(const std::string& path, const std::string& axis) {
-  Measurement m;
+MeasuredMotor read_recording(const std::string& path, const std::string& axis) {
+  MeasuredMotor m;
   const MappedSeries files = open_recording(path);
   McapSeries reader(files.segments());
   refuse_other_files(reader, path);
@@ -206,8 +206,8 @@ Measurement read_recording(const std::string& path, const std::string& axis) {
   return m;
 }
 
-Measurement read_foreign(const IdentifyOptions& options) {
-  Measurement m;
+MeasuredMotor read_foreign(const IdentifyOptions& options) {
+  MeasuredMotor m;
   try {
     m.data = identification::read_csv(options.from_file, csv_options(options));
   } catch (const identification::IdentificationError& error) {

@@ -14,8 +14,8 @@ namespace drivebench::command {
 
 struct IdentifyOptions;
 
-/// Signals of a motor, and the known facts about them.
-struct Measurement {
+/// A motor as its measurement shows it: its signals, and the known facts about them.
+struct MeasuredMotor {
   identification::MeasuredData data{};
   identification::MeasurementFacts facts{};
   identification::BenchParameters bench{};  ///< empty: the truth is unknown
@@ -30,18 +30,18 @@ struct Measurement {
 /// Takes the facts about an axis from the description of its bench and from the request: settings of the
 /// request override the description, and a value that its events change is unknown.
 void take_description(const v1::BenchDescription& bench, std::uint32_t axis, const v1::RunExperiment& request,
-                      Measurement& measurement);
+                      MeasuredMotor& motor);
 
 /// Samples of one axis of a recording, with the facts in its configuration. Throws UsageError if the axis has
 /// no samples, or if ticks are missing between the first and the last one.
-Measurement read_recording(const std::string& file, const std::string& axis);
+MeasuredMotor read_recording(const std::string& file, const std::string& axis);
 
 /// A CSV file; all facts keep their defaults. Throws UsageError "file:line: column: rule".
-Measurement read_foreign(const IdentifyOptions& options);
+MeasuredMotor read_foreign(const IdentifyOptions& options);
 
 /// Takes `bench`, `machine`, `motor`, `drive` and `substeps` of one axis (empty: the first) from the
 /// configuration in a recording. Takes nothing if the text is not a configuration.
-void take_configuration(std::string_view toml, const std::string& axis, Measurement& measurement);
+void take_configuration(std::string_view toml, const std::string& axis, MeasuredMotor& motor);
 
 /// The data as CSV, as `drivebench export` writes them.
 std::string csv_of(const identification::MeasuredData& data);

@@ -139,8 +139,9 @@ class Columns {
   ExperimentRows rows_;
 };
 
-Measurement run_on(const IdentifyOptions& options, const ExperimentServer& server, WantedExperiment wanted) {
-  Measurement m;
+MeasuredMotor run_on(const IdentifyOptions& options, const ExperimentServer& server,
+                     WantedExperiment wanted) {
+  MeasuredMotor m;
   ExperimentClient client(server, "identify");
   v1::RunExperiment& request = wanted.file.request;
   std::string bench;
@@ -170,7 +171,7 @@ Measurement run_on(const IdentifyOptions& options, const ExperimentServer& serve
   return m;
 }
 
-Measurement run_on_own_server(const IdentifyOptions& options, const WantedExperiment& wanted) {
+MeasuredMotor run_on_own_server(const IdentifyOptions& options, const WantedExperiment& wanted) {
   const OwnServer server(wanted.bench);
   ExperimentServer there = options.server;
   there.link = {.address = server.address(), .token = {}};
@@ -180,7 +181,7 @@ Measurement run_on_own_server(const IdentifyOptions& options, const WantedExperi
 
 }  // namespace
 
-Measurement measure(const IdentifyOptions& options, const WantedExperiment& wanted) {
+MeasuredMotor measure(const IdentifyOptions& options, const WantedExperiment& wanted) {
   if (!options.bench.empty()) {
     if (options.link_was_named)
       throw UsageError("--bench starts a server of our own, --link names another one");

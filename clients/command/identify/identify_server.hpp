@@ -16,6 +16,6 @@ struct WantedExperiment {
 /// Runs the experiment on a server and fetches its data: on the server of the link if its bench has the axis,
 /// else on a server that this call starts and ends. Throws UsageError if the bench does not fit,
 /// std::runtime_error if the experiment does not complete.
-Measurement measure(const IdentifyOptions& options, const WantedExperiment& wanted);
+MeasuredMotor measure(const IdentifyOptions& options, const WantedExperiment& wanted);
 
 }  // namespace drivebench::command

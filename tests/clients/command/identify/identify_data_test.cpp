@@ -105,7 +105,7 @@ class IdentifyFiles : public testing::Test {
 // Catches: the wrong axis, a period in ticks, a truth or settings that do not come from the file.
 TEST_F(IdentifyFiles, ARecordingBringsItsSamplesAndItsConfiguration) {
   const std::string file = recording("r.mcap", 10);
-  const Measurement first = read_recording(file, "");
+  const MeasuredMotor first = read_recording(file, "");
   EXPECT_EQ(first.data.samples(), 10U);
   EXPECT_NEAR(first.data.period_s, 250e-6, 1e-15);
   EXPECT_EQ(first.data.at("i_a_a")[1], 50.5);
@@ -118,7 +118,7 @@ TEST_F(IdentifyFiles, ARecordingBringsItsSamplesAndItsConfiguration) {
   EXPECT_FALSE(first.facts.half_count);
   EXPECT_EQ(first.facts.voltage_held_ticks, 0.0);  // a source
   EXPECT_EQ(first.bench.at("machine.stator_resistance_ohm"), 9.7);
-  const Measurement second = read_recording(file, "second");
+  const MeasuredMotor second = read_recording(file, "second");
   EXPECT_EQ(second.data.at("i_a_a")[1], 101.0);
   EXPECT_EQ(second.machine, "pm_dc");
   EXPECT_FALSE(second.facts.three_phase);
@@ -151,7 +151,7 @@ TEST_F(IdentifyFiles, AnUnusableRecordingIsRefused) {
 TEST_F(IdentifyFiles, ACutRecordingGivesItsSamples) {
   const std::string file = recording("r.mcap", 3000);
   fs::resize_file(file, fs::file_size(file) / 2);
-  const Measurement m = read_recording(file, "");
+  const MeasuredMotor m = read_recording(file, "");
   EXPECT_GT(m.data.samples(), 100U);
   EXPECT_LT(m.data.samples(), 3000U);
 }
@@ -159,7 +159,7 @@ TEST_F(IdentifyFiles, ACutRecordingGivesItsSamples) {
 // Catches: a configuration of garbage in a recording that ends the command.
 TEST(IdentifyData, AnInvalidConfigurationGivesNoFacts) {
   for (const char* text : {"", "[[axis", "axis = 3", "[[axis]]\nname = 5\n", "[axis]\nname = \"a\"\n"}) {
-    Measurement m;
+    MeasuredMotor m;
     take_configuration(text, "a", m);
     EXPECT_TRUE(m.bench.empty()) << text;
     EXPECT_TRUE(m.machine.empty()) << text;
@@ -187,7 +187,7 @@ TEST(IdentifyData, TheDescriptionAndTheRequestGiveTheFacts) {
   kind->add_words("current_amplifier");
   v1::RunExperiment request;
   request.set_decimation(4);
-  Measurement m;
+  MeasuredMotor m;
   take_description(bench, 0, request, m);
   EXPECT_DOUBLE_EQ(m.facts.voltage_held_ticks, 0.2);
   EXPECT_EQ(m.facts.decimation, 4);
