@@ -42,19 +42,19 @@ std::vector<double> column(const Plan& plan, double control::Reference::*member)
   return values;
 }
 
-/// The series that are not zero throughout.
-Panel panel_of(std::string label, std::vector<Series> series) {
-  std::erase_if(series, [](const Series& each) {
+/// The lines that are not zero throughout.
+Panel panel_of(std::string label, std::vector<PlotLine> lines) {
+  std::erase_if(lines, [](const PlotLine& each) {
     return std::ranges::all_of(each.values, [](double value) { return value == 0.0; });
   });
-  return {.label = std::move(label), .series = std::move(series)};
+  return {.label = std::move(label), .lines = std::move(lines)};
 }
 
 Panel with_reference(std::string label, const std::string& name, std::vector<double> values, const Plan& plan,
                      double control::Reference::*member) {
-  Panel panel = {.label = std::move(label), .series = {}};
-  if (!plan.references.empty()) panel.series.push_back({"reference", column(plan, member)});
-  panel.series.push_back({name, std::move(values)});
+  Panel panel = {.label = std::move(label), .lines = {}};
+  if (!plan.references.empty()) panel.lines.push_back({"reference", column(plan, member)});
+  panel.lines.push_back({name, std::move(values)});
   return panel;
 }
 
@@ -66,18 +66,18 @@ Panel error_panel(const RecordedRun& run, const Plan& plan) {
     const double angle_rad = run.rows[i].sample.angle_rad - run.rows[0].sample.angle_rad;
     errors.push_back(factor * (plan.references[i].angle_rad - angle_rad));
   }
-  return {.label = in_counts ? "error [counts]" : "error [rad]", .series = {{"error", std::move(errors)}}};
+  return {.label = in_counts ? "error [counts]" : "error [rad]", .lines = {{"error", std::move(errors)}}};
 }
 
 /// Phases a, b and c and the field winding.
 Panel terminals(const RecordedRun& run, std::string label, char quantity,
                 const std::array<double Sample::*, 4>& members) {
-  std::vector<Series> series;
+  std::vector<PlotLine> lines;
   for (std::size_t k = 0; k < members.size(); ++k) {
-    series.push_back({fmt::format("{}_{}", quantity, "abcf"[k]),
-                      column(run, [&](const Answered& row) { return row.sample.*members[k]; })});
+    lines.push_back({fmt::format("{}_{}", quantity, "abcf"[k]),
+                     column(run, [&](const Answered& row) { return row.sample.*members[k]; })});
   }
-  return panel_of(std::move(label), std::move(series));
+  return panel_of(std::move(label), std::move(lines));
 }
 
 Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& plan) {

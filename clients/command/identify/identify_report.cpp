@@ -110,7 +110,7 @@ std::string identify_plot(const IdentifyReport& r) {
   std::vector<Panel> panels;
   for (const Resimulated& signal : v.signals) {
     panels.push_back({.label = fmt::format("{} [{}]", signal.name, signal.unit),
-                      .series = {{"measured", signal.measured}, {"re-simulated", signal.simulated}}});
+                      .lines = {{"measured", signal.measured}, {"re-simulated", signal.simulated}}});
   }
   std::vector<double> times_ms;
   for (std::size_t k = 0; k < v.signals.front().measured.size(); ++k)

@@ -73,8 +73,8 @@ Scale scale_over(double low, double high, int most_steps) {
 Scale vertical_scale(const Panel& panel, double top_px) {
   double low = 0.0;
   double high = 0.0;
-  for (const Series& series : panel.series) {
-    for (const double value : series.values) {
+  for (const PlotLine& line : panel.lines) {
+    for (const double value : line.values) {
       if (!std::isfinite(value)) continue;
       low = std::min(low, value);
       high = std::max(high, value);
@@ -112,7 +112,7 @@ void append_grid(std::string& svg, const Scale& x, const Scale& y, double top_px
 
 /// Draws the smallest and the largest of the values in a pixel, in their order. Tenths of pixels and steps
 /// from point to point keep the text short.
-void append_line(std::string& svg, const std::vector<double>& x, const Series& series, const Scale& x_scale,
+void append_line(std::string& svg, const std::vector<double>& x, const PlotLine& line, const Scale& x_scale,
                  const Scale& y_scale, std::string_view colour) {
   const auto out = std::back_inserter(svg);
   fmt::format_to(out, "<path stroke='{}' d='", colour);
@@ -120,21 +120,21 @@ void append_line(std::string& svg, const std::vector<double>& x, const Series& s
   long last_y = 0;
   const auto point = [&](std::size_t i) {
     const long px = std::lround(10.0 * x_scale.place(x[i]));
-    const long py = std::lround(10.0 * y_scale.place(series.values[i]));
+    const long py = std::lround(10.0 * y_scale.place(line.values[i]));
     const bool is_first = svg.ends_with('\'');
     fmt::format_to(out, "{}{} {}", is_first ? 'M' : 'l', px - last_x, py - last_y);
     last_x = px;
     last_y = py;
   };
-  const std::size_t count = std::min(x.size(), series.values.size());
+  const std::size_t count = std::min(x.size(), line.values.size());
   for (std::size_t begin = 0; begin < count;) {
     const double pixel = std::floor(x_scale.place(x[begin]) / kPixelsPerPoint);
     std::size_t end = begin;
     std::size_t least = begin;
     std::size_t largest = begin;
     for (; end < count && std::floor(x_scale.place(x[end]) / kPixelsPerPoint) == pixel; ++end) {
-      if (series.values[end] < series.values[least]) least = end;
-      if (series.values[end] > series.values[largest]) largest = end;
+      if (line.values[end] < line.values[least]) least = end;
+      if (line.values[end] > line.values[largest]) largest = end;
     }
     point(std::min(least, largest));
     if (least != largest) point(std::max(least, largest));
@@ -152,13 +152,13 @@ void append_panel(std::string& svg, const Panel& panel, const std::vector<double
       out, "<text x='12' y='{0:.1f}' text-anchor='middle' transform='rotate(-90 12 {0:.1f})'>{1}</text>\n",
       top_px + kPanelHeight / 2.0, escaped(panel.label));
   double legend_px = kLeft + 8.0;
-  for (std::size_t i = 0; i < panel.series.size(); ++i) {
+  for (std::size_t i = 0; i < panel.lines.size(); ++i) {
     const std::string_view colour = kColours[i % kColours.size()];
-    append_line(svg, x, panel.series[i], x_scale, y_scale, colour);
-    if (panel.series.size() == 1) continue;
+    append_line(svg, x, panel.lines[i], x_scale, y_scale, colour);
+    if (panel.lines.size() == 1) continue;
     fmt::format_to(out, "<text x='{:.1f}' y='{:.1f}' class='l' style='fill:{}'>{}</text>\n", legend_px,
-                   top_px + 12.0, colour, escaped(panel.series[i].name));
-    legend_px += 14.0 + 6.5 * static_cast<double>(panel.series[i].name.size());
+                   top_px + 12.0, colour, escaped(panel.lines[i].name));
+    legend_px += 14.0 + 6.5 * static_cast<double>(panel.lines[i].name.size());
   }
 }
 

@@ -7,14 +7,14 @@
 namespace drivebench::command {
 
 /// A line of a panel, with a value for each place on the common axis.
-struct Series {
+struct PlotLine {
   std::string name;
   std::vector<double> values;
 };
 
 struct Panel {
   std::string label;  ///< of its vertical axis, with unit
-  std::vector<Series> series;
+  std::vector<PlotLine> lines;
 };
 
 /// Panels below each other over a common horizontal axis, as an SVG picture of 720 pixels width. Where many
