@@ -42,8 +42,9 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
           .connection = connection,
           .pole_pairs = pole_pairs_of(p.machine),
           .drive = Drive(p.drive, connection, timing.period_s, seed, noise + kCommandNoise),
-          .sensors = SensorBank(p.sensors, connection, timing.period_s, seed, noise,
-                                timing.period_s / timing.substeps, kind_of(p.machine).field != Field::kNone),
+          .sensors =
+              SensorBank(p.sensors, connection, timing.period_s, seed, noise,
+                         timing.period_s / timing.substeps, kind_of(p.machine).field != FieldSupply::kNone),
           .encoder = Encoder(p.encoder, timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};

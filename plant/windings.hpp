@@ -23,8 +23,8 @@ constexpr int terminal_count(Connection connection) noexcept {
   return connection == Connection::kTwoPhase ? 2 : 3;
 }
 
-/// The field winding of a machine.
-enum class Field : std::int64_t {
+/// The supply of the field winding of a machine.
+enum class FieldSupply : std::int64_t {
   kNone,          ///< there is none: magnets or a cage
   kOnArmature,    ///< fed from the terminals of the armature; its current can be measured
   kOwnTerminals,  ///< the same with terminals of its own, which a command drives

@@ -18,7 +18,7 @@ class Train;
 /// <kind>_kind.cpp.
 struct MachineKind {
   std::string_view name;  ///< machine.kind of configurations
-  Field field = Field::kNone;
+  FieldSupply field = FieldSupply::kNone;
   std::span<const Parameter> rows;  ///< section [axis.machine]
   std::span<const CurveParameter> curves{};
   /// Appends the rules between the values that are broken; null: there are no such rules.

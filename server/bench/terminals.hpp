@@ -36,10 +36,10 @@ struct Terminals {
 
 inline Terminals terminals_of(const AxisParameters& p) {
   const SensorParameters& sensors = p.sensors;
-  const Field field = kind_of(p.machine).field;
+  const FieldSupply field = kind_of(p.machine).field;
   return {.connection = std::visit([](const auto& machine) { return connection_of(machine); }, p.machine),
-          .field = field == Field::kOwnTerminals,
-          .field_current = field != Field::kNone,
+          .field = field == FieldSupply::kOwnTerminals,
+          .field_current = field != FieldSupply::kNone,
           .speed_sensors = sensors.tachometer.analog.enabled || sensors.resolver.analog.enabled,
           .hall = sensors.hall.enabled};
 }

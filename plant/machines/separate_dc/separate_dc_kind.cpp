@@ -36,7 +36,7 @@ void add_broken_rules(const Machine& p, Problems& found) {
 
 MachineKind SeparateDcMachine::kind() noexcept {
   return {.name = "separately_excited_dc",
-          .field = Field::kOwnTerminals,
+          .field = FieldSupply::kOwnTerminals,
           .rows = kTable,
           .curves = kCurves,
           .add_broken_rules = rules_of<add_broken_rules>,

@@ -39,7 +39,7 @@ void add_broken_rules(const Machine& p, Problems& found) {
 
 MachineKind SeriesDcMachine::kind() noexcept {
   return {.name = "series_dc",
-          .field = Field::kOnArmature,
+          .field = FieldSupply::kOnArmature,
           .rows = kTable,
           .curves = kCurves,
           .add_broken_rules = rules_of<add_broken_rules>,

@@ -32,7 +32,7 @@ void add_broken_rules(const Machine& p, Problems& found) {
 
 MachineKind ShuntDcMachine::kind() noexcept {
   return {.name = "shunt_dc",
-          .field = Field::kOnArmature,
+          .field = FieldSupply::kOnArmature,
           .rows = kTable,
           .curves = kCurves,
           .add_broken_rules = rules_of<add_broken_rules>,

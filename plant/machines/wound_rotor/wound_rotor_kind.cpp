@@ -46,7 +46,7 @@ void add_broken_rules(const Machine& p, Problems& found) {
 
 MachineKind WoundRotorMachine::kind() noexcept {
   return {.name = "wound_rotor_synchronous",
-          .field = Field::kOwnTerminals,
+          .field = FieldSupply::kOwnTerminals,
           .rows = kTable,
           .add_broken_rules = rules_of<add_broken_rules>,
           .make_train = make_drive_train<WoundRotorMachine>};
