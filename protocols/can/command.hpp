@@ -30,23 +30,23 @@ inline constexpr auto kNames =
 using Numbers = std::array<double, kNames.size()>;
 
 /// The index of each of these fields in a message; kMaxFields: the message lacks it.
-using Places = std::array<std::size_t, kNames.size()>;
-inline constexpr auto kPlaces = [] {
-  std::array<Places, kMessages.size()> all{};
+using FieldIndices = std::array<std::size_t, kNames.size()>;
+inline constexpr auto kFieldIndices = [] {
+  std::array<FieldIndices, kMessages.size()> all{};
   for (std::size_t row = 0; row < kMessages.size(); ++row) {
     for (std::size_t i = 0; i < kNames.size(); ++i) {
-      std::size_t place = 0;
+      std::size_t index = 0;
       const auto& fields = kMessages[row].fields;
-      while (place < fields.size() && fields[place].name != kNames[i])
-        ++place;
-      all[row][i] = place < fields.size() ? place : kMaxFields;
+      while (index < fields.size() && fields[index].name != kNames[i])
+        ++index;
+      all[row][i] = index < fields.size() ? index : kMaxFields;
     }
   }
   return all;
 }();
 
-inline const Places& places_in(const MessageRow& row) noexcept {
-  return kPlaces[static_cast<std::size_t>(&row - kMessages.data())];
+inline const FieldIndices& indices_in(const MessageRow& row) noexcept {
+  return kFieldIndices[static_cast<std::size_t>(&row - kMessages.data())];
 }
 
 }  // namespace command_detail
@@ -54,9 +54,9 @@ inline const Places& places_in(const MessageRow& row) noexcept {
 /// The set-points in the values of a command or a phase_command; `tick` holds only low bits.
 inline CommandFields setpoints_in(const MessageRow& row, const Values& values) noexcept {
   command_detail::Numbers n{};
-  const command_detail::Places& places = command_detail::places_in(row);
+  const command_detail::FieldIndices& indices = command_detail::indices_in(row);
   for (std::size_t i = 0; i < n.size(); ++i)
-    n[i] = places[i] < kMaxFields ? values[places[i]] : 0.0;
+    n[i] = indices[i] < kMaxFields ? values[indices[i]] : 0.0;
   return {.tick = static_cast<std::uint64_t>(n[0]),
           .mode = static_cast<unsigned>(n[1]),
           .lease = static_cast<unsigned>(n[2]),
@@ -89,9 +89,9 @@ inline CommandFrames encode_command(const Profile& profile, std::uint32_t node, 
     const MessageRow* const row = find_message(message, profile.fd, wide);
     if (row == nullptr) continue;
     Values values{};
-    const command_detail::Places& places = command_detail::places_in(*row);
+    const command_detail::FieldIndices& indices = command_detail::indices_in(*row);
     for (std::size_t i = 0; i < n.size(); ++i) {
-      if (places[i] < kMaxFields) values[places[i]] = n[i];
+      if (indices[i] < kMaxFields) values[indices[i]] = n[i];
     }
     frames.frame[frames.count++] = encode(*row, profile, node, values);
   }
