@@ -5,60 +5,15 @@
 #include <cmath>
 #include <limits>
 
+#include "protocols/can/layout.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::can {
 namespace {
 
-// ---- rules of the table ----
-
-/// Whether the encoding fits the signal: integers need an integer encoding, and a code has no sign.
-constexpr bool can_carry(const Field& field, const Signal& signal) {
-  const bool wraps = field.encoding == Encoding::kCounter || field.encoding == Encoding::kSigned;
-  if (signal.type == SignalType::kReal) return !wraps && field.encoding != Encoding::kCode;
-  return wraps || (field.encoding == Encoding::kCode && signal.type == SignalType::kUnsigned);
-}
-
-/// Fields are in the order of their pages; within a page they are sorted, disjoint, whole bytes and inside
-/// the frame.
-constexpr bool is_sound(const MessageRow& row) {
-  if (row.fields.size() > kMaxFields || !is_fd_size(row.size)) return false;
-  if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() relies on the size
-  if (is_paged(row) && (row.fields.front().name != "page" || row.fields.front().start_bit != 0)) return false;
-  unsigned common_end = 0;
-  unsigned end = 0;
-  std::uint8_t page = kEveryPage;
-  for (const Field& field : row.fields) {
-    if (field.page != page) {
-      if (field.page >= kPages || field.page < (page == kEveryPage ? 0 : page)) return false;
-      page = field.page;
-      end = common_end;
-    }
-    if (field.start_bit < end || field.start_bit % 8 != 0) return false;
-    if (field.bits != 8 && field.bits != 16 && field.bits != 32) return false;
-    if (field.encoding == Encoding::kFloat && field.bits != 32) return false;
-    const Signal* const signal = find_signal(field.signal);
-    if (field.signal.empty() != (signal == nullptr)) return false;
-    if (signal != nullptr && !can_carry(field, *signal)) return false;
-    end = field.start_bit + field.bits;
-    if (end > 8U * row.size) return false;
-    if (page == kEveryPage) common_end = end;
-  }
-  return true;
-}
-
-static_assert(std::ranges::all_of(kMessages, is_sound));
-static_assert(kFirstEdgeByte + 2 * kEdgesPerFrame == 64);
 static_assert(32767 * kDutyUnit == 1.0, "the full duty is exactly 1");
 
-// ---- derived from the table ----
-
-struct Layout {
-  std::array<const Signal*, kMaxFields> signals{};
-  bool paged = false;
-  /// By page. Bit n: byte n belongs to no field of the page. The last element is for pages that do not exist.
-  std::array<std::uint64_t, kPages + 1> reserved{};
-};
+// ---- keys of match() ----
 
 /// The part of a row that match() needs, small because match() looks at every row.
 struct Key {
@@ -70,30 +25,6 @@ struct Key {
   std::uint8_t row;
   bool per_node;
 };
-
-constexpr std::uint64_t bytes_mask(unsigned first, unsigned count) {
-  return count == 0 ? 0 : (~std::uint64_t{0} >> (64 - count)) << first;
-}
-
-constexpr auto kLayouts = [] {
-  std::array<Layout, kMessages.size()> layouts{};
-  for (std::size_t i = 0; i < kMessages.size(); ++i) {
-    const MessageRow& row = kMessages[i];
-    Layout& layout = layouts[i];
-    layout.paged = is_paged(row);
-    for (std::size_t page = 0; page < layout.reserved.size(); ++page) {
-      std::uint64_t& reserved = layout.reserved[page];
-      reserved = bytes_mask(0, row.size);
-      if (row.message == Message::kEdges) reserved &= ~bytes_mask(kFirstEdgeByte, 2 * kEdgesPerFrame);
-      for (std::size_t f = 0; f < row.fields.size(); ++f) {
-        const Field& field = row.fields[f];
-        layout.signals[f] = find_signal(field.signal);
-        if (is_on_page(field, page)) reserved &= ~bytes_mask(field.start_bit / 8U, field.bits / 8U);
-      }
-    }
-  }
-  return layouts;
-}();
 
 /// Narrow axes come first: in a profile without wide axes their identifiers may belong to other messages.
 constexpr auto kKeys = [] {
@@ -114,10 +45,6 @@ constexpr auto kKeys = [] {
   }
   return keys;
 }();
-
-const Layout& layout_of(const MessageRow& row) noexcept {
-  return kLayouts[static_cast<std::size_t>(&row - kMessages.data())];
-}
 
 constexpr std::size_t kCommandMode = index_of(Message::kCommand, false, "mode");
 static_assert(kCommandMode == index_of(Message::kPhaseCommand, false, "mode", true));
@@ -326,10 +253,10 @@ Frame encode_sample(const MessageRow& row, const Profile& profile, std::uint32_t
   const Layout& layout = layout_of(row);
   const auto number = static_cast<std::uint8_t>(page);
   if (layout.paged) frame.data[0] = number;
-  for (std::size_t i = 0; i < row.fields.size(); ++i) {
-    const Field& field = row.fields[i];
-    if (layout.signals[i] != nullptr && is_on_page(field, number))
-      put(frame, field, raw_of(field, *layout.signals[i], sample, profile));
+  for (const SingleField& each : std::span(layout.singles).first(layout.single_count))
+    put_bytes<4>(&frame.data[each.byte], std::bit_cast<std::uint32_t>(single(sample.*each.signal)));
+  for (const auto& [field, signal] : std::span(layout.others).first(layout.other_count)) {
+    if (is_on_page(*field, number)) put(frame, *field, raw_of(*field, *signal, sample, profile));
   }
   return frame;
 }
