@@ -119,8 +119,8 @@ void AxisAccount::check_state(const Sample& s) {
   require(!hold || (silent_ < setup_.watchdog_ticks), "the watchdog comes in time");
   const bool timed_out = (latched & ~latched_before & kCommandTimeout) != 0;
   require(!timed_out || skipped_ || silent_ >= setup_.watchdog_ticks, "the watchdog does not come too early");
-  const auto lease = leases_.find(s.owner);  // a lease given back and taken again within a tick begins anew
-  const bool stays = same_owner && (lease == leases_.end() || !lease->second.gave_back);
+  // A lease given back and taken again within a tick begins anew.
+  const bool stays = same_owner && !gave_back(s.owner);
   require(!is(s, ControlState::kIdle) || !stays || cleared || is(before_, ControlState::kIdle) ||
               is(before_, ControlState::kReady) || s.owner == 0,
           "an owned axis does not become idle by itself");
@@ -191,15 +191,23 @@ void AxisAccount::check_quiet(const std::string& transport, Time awake) {
 }
 
 void AxisAccount::gone(Owner owner, bool asks) {
+  leaving_.push_back({.owner = owner, .asks = asks, .gave_back = gave_back(owner)});
   leases_.erase(owner);
-  leaving_.push_back({.owner = owner, .asks = asks});
+}
+
+/// Whether this owner has asked for the end of its lease at some time. That of a session that is gone counts
+/// until its departure shows: the samples of earlier ticks come later if the I/O stood still.
+bool AxisAccount::gave_back(Owner owner) const {
+  const auto lease = leases_.find(owner);
+  return (lease != leases_.end() && lease->second.gave_back) ||
+         std::ranges::any_of(leaving_,
+                             [owner](const Leaving& each) { return each.owner == owner && each.gave_back; });
 }
 
 /// In real time the bench counts only what it takes under the lease, which may have ended on the way.
 void AxisAccount::command_refused(Owner owner, std::uint64_t sent) {
-  const auto lease = leases_.find(owner);
   const bool was_held =
-      before_.owner == owner && held_since_ <= sent && lease != leases_.end() && !lease->second.gave_back;
+      before_.owner == owner && held_since_ <= sent && leases_.contains(owner) && !gave_back(owner);
   if (lockstep_ || was_held) ++refusals_told_;
 }
 

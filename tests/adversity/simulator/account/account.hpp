@@ -86,6 +86,7 @@ class AxisAccount {
   void check_counters(const Sample& s);
   void check_state(const Sample& s);
   void check_owner(const Sample& s);
+  bool gave_back(Owner owner) const;
 
   BenchSetup setup_;
   std::size_t axis_;
@@ -103,6 +104,7 @@ class AxisAccount {
   struct Leaving {
     Owner owner;
     bool asks;           ///< the bench may be about to give it the lease
+    bool gave_back;      ///< in samples that the I/O may have yet to see
     Tick seen = -1;      ///< by the I/O, before this tick
     Tick deadline = -1;  ///< -1: the I/O does not know yet that there is a lease to give back
   };

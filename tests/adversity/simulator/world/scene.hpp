@@ -7,6 +7,7 @@
 
 #include "server/engine/engine.hpp"
 #include "tests/adversity/simulator/account/account.hpp"
+#include "tests/adversity/simulator/account/io_pauses.hpp"
 #include "tests/adversity/simulator/account/trace.hpp"
 #include "tests/adversity/simulator/world/random.hpp"
 #include "tests/adversity/simulator/world/schedule.hpp"
@@ -47,6 +48,7 @@ struct Scene {
 
   Time stalled_until = 0;                  ///< the last time that the host stood still, or the I/O did
   Time stalled = 0;                        ///< sum of all stalls
+  IoPauses io;                             ///< until now
   std::function<std::size_t()> connected;  ///< stream clients that the server has not left
   /// A disk has stood still; meanwhile refused commands in lockstep are not counted.
   bool time_waited = false;

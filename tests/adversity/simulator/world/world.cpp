@@ -190,6 +190,7 @@ void World::turn_clock() {
 
 void World::poll() {
   if (scene_.schedule.now() < std::max(io_free_at_, io_next_)) return;
+  scene_.io.ran(scene_.schedule.now());
   io_next_ = scene_.schedule.now() + io_every_;
   if (scene_.schedule.now() >= clock_next_) turn_clock();
   io_.restart();
