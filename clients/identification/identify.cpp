@@ -8,10 +8,11 @@
 #include "clients/identification/motors/dc_motor.hpp"
 #include "clients/identification/motors/induction_motor.hpp"
 #include "clients/identification/motors/pm_motor.hpp"
+#include "clients/identification/refinement/refine.hpp"
 
 namespace drivebench::identification {
 
-Result identify(const MeasuredData& data, const Settings& settings) {
+Result identify_by_equations(const MeasuredData& data, const Settings& settings) {
   if (!(data.period_s > 0.0 && std::isfinite(data.period_s)))
     throw IdentificationError("the period of the data must be positive");
   if (settings.pole_pairs < 1) throw IdentificationError("pole_pairs must be 1 or more");
@@ -31,6 +32,12 @@ Result identify(const MeasuredData& data, const Settings& settings) {
       break;
   }
   return identify_bldc_motor(data, settings);
+}
+
+Result identify(const MeasuredData& data, const Settings& settings) {
+  Result result = identify_by_equations(data, settings);
+  refine(data, settings, result);
+  return result;
 }
 
 }  // namespace drivebench::identification

@@ -9,9 +9,11 @@
 #include <numbers>
 #include <string>
 
+#include "clients/identification/math/runge_kutta.hpp"
 #include "clients/identification/motors/induction_regressor.hpp"
 #include "clients/identification/motors/motor_models.hpp"
 #include "clients/identification/motors/motors.hpp"
+#include "clients/identification/motors/terminal_voltages.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -22,31 +24,20 @@ constexpr double kBeyondAllBounds = 1e9;  // [A] or [rad/s]
 
 /// The measured inputs of a model, and the measured signals to compare with.
 struct Measured {
-  std::vector<Series> u;
+  TerminalVoltages voltages;
   std::vector<SeriesView> i;
   ShaftSignals shaft;
-  double voltage_shift;
   double pole_pairs;
 
   Measured(const MeasuredData& data, const Settings& e)
-      : shaft(shaft_signals(data, e)), voltage_shift(e.processing.voltage_shift), pole_pairs(e.pole_pairs) {
-    const std::size_t phases = e.kind == MotorKind::kDc                      ? 1
-                               : e.kind == MotorKind::kBldc || e.three_phase ? 3
-                                                                             : 2;
-    for (std::size_t k = 0; k < phases; ++k) {
-      const char phase = static_cast<char>('a' + k);
-      const SeriesView voltage = data.at(fmt::format("u_{}_v", phase));
-      u.emplace_back(voltage.begin(), voltage.end());
-      i.push_back(data.at(fmt::format("i_{}_a", phase)));
-    }
-    continue_to_begin();
+      : voltages(data, e), shaft(shaft_signals(data, e, e.processing.current)), pole_pairs(e.pole_pairs) {
+    for (std::size_t k = 0; k < voltages.phases(); ++k)
+      i.push_back(data.at(fmt::format("i_{}_a", static_cast<char>('a' + k))));
   }
 
-  MotorInput input(double position) const noexcept {
-    MotorInput in{.u = {}, .electrical_rad = pole_pairs * value_at(shaft.angle, position)};
-    for (std::size_t k = 0; k < u.size(); ++k)
-      in.u[k] = value_at(u[k], position + voltage_shift);
-    return in;
+  MotorInput input(std::size_t sample, double part) const noexcept {
+    return {.u = voltages.at(sample, part),
+            .electrical_rad = pole_pairs * value_at(shaft.angle, static_cast<double>(sample) + part)};
   }
   std::array<double, 3> currents(std::size_t sample) const noexcept {
     std::array<double, 3> values{};
@@ -54,54 +45,24 @@ struct Measured {
       values[k] = i[k][sample];
     return values;
   }
-
- private:
-  /// Sample 0 of a bench shows no voltage, because no tick has run: extrapolates it from the next two
-  /// samples.
-  void continue_to_begin() {
-    if (std::ranges::any_of(u, [](const Series& x) { return x[0] != 0.0; })) return;
-    for (Series& x : u)
-      x[0] = 2.0 * x[1] - x[2];
-  }
 };
-
-double largest(SeriesView x) {
-  double most = 0.0;
-  for (const double value : x)
-    most = std::max(most, std::abs(value));
-  return most;
-}
 
 /// Whether the first samples have negligible speed and currents.
 bool begins_at_rest(const Measured& m) {
   constexpr double kNoCurrent = 0.01;
   constexpr double kNoSpeed = 0.05;  // the filter sees a start some samples early
   if (std::abs(m.shaft.speed[0]) > kNoSpeed * largest(m.shaft.speed)) return false;
-  return std::ranges::all_of(m.i, [&](SeriesView i) { return std::abs(i[0]) <= kNoCurrent * largest(i); });
+  return std::ranges::all_of(m.i, [](SeriesView i) { return std::abs(i[0]) <= kNoCurrent * largest(i); });
 }
 
-template <class State>
-State sum(const State& x, double factor, const State& slope) {
-  State y = x;
-  for (std::size_t k = 0; k < y.size(); ++k)
-    y[k] += factor * slope[k];
-  return y;
-}
-
-/// One classical Runge-Kutta step; `begin` and `length` in samples.
+/// One step from `begin` on, in periods after the sample, as `length`.
 template <class Model>
 typename Model::State stepped(const Model& model, const Measured& m, const typename Model::State& x,
-                              double begin, double length, double period_s) {
-  const double h = length * period_s;
-  const MotorInput middle = m.input(begin + 0.5 * length);
-  const auto k1 = model.slope(x, m.input(begin));
-  const auto k2 = model.slope(sum(x, 0.5 * h, k1), middle);
-  const auto k3 = model.slope(sum(x, 0.5 * h, k2), middle);
-  const auto k4 = model.slope(sum(x, h, k3), m.input(begin + length));
-  auto y = x;
-  for (std::size_t k = 0; k < y.size(); ++k)
-    y[k] += h / 6.0 * (k1[k] + 2.0 * k2[k] + 2.0 * k3[k] + k4[k]);
-  model.settle(y, x);
+                              std::size_t sample, double begin, double length, double period_s) {
+  auto y = runge_kutta(x, length * period_s, [&](const typename Model::State& at, double part) {
+    return model.slope(at, m.input(sample, begin + part * length));
+  });
+  model.settle(y, x, length * period_s);
   return y;
 }
 
@@ -148,15 +109,14 @@ Resimulation run(const Model& model, typename Model::State x, const Measured& m,
   const int substeps = std::max(1, static_cast<int>(steps));
   const double length = 1.0 / substeps;
   for (std::size_t k = from_rest ? 0 : range.first; k < range.end; ++k) {
-    const auto at = static_cast<double>(k);
     if (k >= range.first) {
-      const std::array<double, 3> i = model.currents(x, m.input(at));
+      const std::array<double, 3> i = model.currents(x, m.input(k, 0.0));
       for (std::size_t phase = 0; phase < m.i.size(); ++phase)
         out.signals[phase].simulated.push_back(i[phase]);
       out.signals.back().simulated.push_back(x[Model::kSpeed]);
     }
     for (int n = 0; n < substeps; ++n)
-      x = stepped(model, m, x, at + n * length, length, data.period_s);
+      x = stepped(model, m, x, k, n * length, length, data.period_s);
     for (const double value : x) {
       if (!(std::abs(value) < kBeyondAllBounds))
         throw IdentificationError("no re-simulation: the motor found leaves all bounds on these voltages");
@@ -172,7 +132,7 @@ Resimulation run_from_measured(const Model& model, const Measured& m, const Meas
                                const SampleRange& range) {
   const bool rest = begins_at_rest(m);
   const std::size_t start = rest ? 0 : range.first;
-  auto x = model.state_of(m.currents(start), m.shaft.speed[start], m.input(static_cast<double>(start)));
+  auto x = model.state_of(m.currents(start), m.shaft.speed[start], m.input(start, 0.0));
   if (rest) x = {};
   return run(model, x, m, data, range, rest);
 }
@@ -193,7 +153,7 @@ Resimulation run_induction(const InductionModel& model, const Measured& m, const
                            const Settings& e, const SampleRange& range) {
   if (begins_at_rest(m)) return run(model, {}, m, data, range, true);
   const std::size_t start = range.first;
-  const MotorInput in = m.input(static_cast<double>(start));
+  const MotorInput in = m.input(start, 0.0);
   auto x = model.state_of(m.currents(start), m.shaft.speed[start], in);
   const std::complex<double> phi = flux_of(model, induction_instants(data, e)[start], in.electrical_rad);
   x[2] = phi.real();
@@ -221,7 +181,7 @@ Resimulation resimulate(const MeasuredData& data, const Settings& e, const Resul
   const Measured m(data, e);
   switch (e.kind) {
     case MotorKind::kDc:
-      return run_from_measured(DcModel(result), m, data, range);
+      return run_from_measured(DcModel(result, e), m, data, range);
     case MotorKind::kInduction:
       return run_induction(InductionModel(result, e), m, data, e, range);
     case MotorKind::kPmSynchronous:
@@ -229,7 +189,7 @@ Resimulation resimulate(const MeasuredData& data, const Settings& e, const Resul
     case MotorKind::kBldc:
       break;
   }
-  return run_from_measured(BldcModel(result), m, data, range);
+  return run_from_measured(BldcModel(result, e), m, data, range);
 }
 
 }  // namespace drivebench::identification

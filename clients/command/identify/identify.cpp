@@ -131,6 +131,9 @@ Settings settings(const IdentifyOptions& options, const MotorName& motor, const 
   if (named != nullptr) apply(*named, e);
   if (m.bench.empty() && m.data.find("encoder_count") == nullptr) e.counts_per_revolution = 0.0;
   apply_options(options, e);
+  const bool given = options.shaft_hz || options.current_hz || options.voltage_hz ||
+                     (named != nullptr && named->shaft_hz > 0.0);
+  if (!given) choose_shaft_filter(m.data, e);
   return e;
 }
 

@@ -24,6 +24,7 @@ std::string identify_json(const IdentifyReport& report) {
                          {"current_hz", p.current.cutoff_hz},
                          {"voltage_hz", p.voltage.cutoff_hz},
                          {"shaft_hz", p.shaft.cutoff_hz},
+                         {"shaft_chosen", p.shaft_chosen},
                          {"order", p.current.order}};
   Json signals = Json::object();
   if (report.validation) {

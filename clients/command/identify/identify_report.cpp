@@ -18,12 +18,6 @@ using identification::Processing;
 using identification::Resimulated;
 using identification::Result;
 
-std::string percent(double part, double of) {
-  const double value = of == 0.0 ? HUGE_VAL : 100.0 * part / std::abs(of);
-  if (!std::isfinite(value)) return "-";
-  return std::abs(value) >= 1e4 ? fmt::format("{:.1e} %", value) : fmt::format("{:.3g} %", value);
-}
-
 std::string filter_text(const LowPass& filter) {
   return filter.cutoff_hz > 0.0 ? fmt::format("{:g} Hz", filter.cutoff_hz) : std::string("none");
 }
@@ -39,6 +33,9 @@ std::string settings_text(const IdentifyReport& r) {
       p.voltage_shift);
   text += fmt::format("; filters of order {}: currents {}, voltages {}, shaft {}", p.current.order,
                       filter_text(p.current), filter_text(p.voltage), filter_text(p.shaft));
+  if (p.shaft_chosen)
+    text += r.settings.kind == MotorKind::kDc ? " (chosen from counts, rate and motion)"
+                                              : " (that of the shaft chosen from counts, rate and motion)";
   if (r.settings.kind == MotorKind::kInduction)
     text += r.settings.load == LoadModel::kConstant ? "; constant load torque" : "; viscous friction";
   return text;
@@ -62,7 +59,10 @@ std::string validation_text(const IdentifyReport& r) {
 
 const char* inside_text(const Result& result, const Estimate& e) {
   const std::optional<bool> inside = is_inside(result, e);
-  return !inside ? "" : *inside ? "inside the index" : "outside the index";
+  const bool refined = e.interval.has_value();
+  if (!inside) return "";
+  if (*inside) return refined ? "inside" : "inside the index";
+  return refined ? "outside" : "outside the index";
 }
 
 }  // namespace
@@ -71,17 +71,16 @@ std::string identify_text(const IdentifyReport& r) {
   const Result& result = r.result;
   std::string text = fmt::format("{}\n{}\n{}\n\n", result.method, r.source, settings_text(r));
   auto out = std::back_inserter(text);
-  fmt::format_to(out, "  {:<6} {:<12} {:>12} {:>10} {:>12} {:>10}\n", "", "unit", "estimate", "index",
-                 "truth", "error");
-  for (const Estimate& e : result.parameters) {
-    const bool hidden = result.is_unseen(e.name);
-    std::string line =
-        fmt::format("  {:<6} {:<12} {:>12} {:>10} {:>12} {:>10}  {}", e.name, e.unit,
-                    hidden ? "not seen" : fmt::format("{:.6g}", e.value),
-                    hidden ? "-" : percent(e.index, e.value), e.truth ? fmt::format("{:.6g}", *e.truth) : "-",
-                    e.truth && !hidden ? percent(e.value - *e.truth, *e.truth) : "-", inside_text(result, e));
+  constexpr const char* kRow = "  {:<6} {:<12} {:>12} {:>10} {:>12} {:>10} {:>14} {:>10}  {}";
+  const auto add = [&text](std::string line) {
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + '\n';
+  };
+  add(fmt::format(kRow, "", "unit", "estimate", "95 %", "truth", "error", "by equations", "index", ""));
+  for (const Estimate& e : result.parameters) {
+    const identification::EstimateText cell = text_of(result, e);
+    add(fmt::format(kRow, e.name, e.unit, cell.value, cell.interval, cell.truth, cell.error,
+                    cell.by_equations, cell.index, inside_text(result, e)));
   }
   fmt::format_to(out, "\nverdict: {}\n", result.excitation.verdict);
   fmt::format_to(out, "error index {:.4g}", result.error_index);
@@ -90,6 +89,7 @@ std::string identify_text(const IdentifyReport& r) {
   fmt::format_to(
       out, ", condition {:.3g}; an index is how far a parameter goes until the error is {} times as large\n",
       result.condition, result.index_factor);
+  if (result.explanation) fmt::format_to(out, "{}\n", explanation_text(*result.explanation));
   fmt::format_to(out, "validation: {}\n", validation_text(r));
   for (const std::string& note : result.notes)
     text += note + '\n';

@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace drivebench::identification {
 namespace {
 
 std::string percent(double part, double of) {
-  const double value = 100.0 * part / std::abs(of);
+  const double value = of == 0.0 ? HUGE_VAL : 100.0 * part / std::abs(of);
   if (!std::isfinite(value)) return "-";
   return std::abs(value) >= 1e4 ? fmt::format("{:.1e} %", value) : fmt::format("{:.3g} %", value);
 }
@@ -88,6 +89,10 @@ const Estimate* Result::find(std::string_view name) const noexcept {
   return found == parameters.end() ? nullptr : &*found;
 }
 
+Estimate* Result::find(std::string_view name) noexcept {
+  return const_cast<Estimate*>(std::as_const(*this).find(name));
+}
+
 double Result::at(std::string_view name) const {
   if (const Estimate* estimate = find(name)) return estimate->value;
   throw IdentificationError(fmt::format("the result has no parameter {}", name));
@@ -99,7 +104,7 @@ bool Result::is_unseen(std::string_view name) const noexcept {
 
 std::optional<bool> is_inside(const Result& result, const Estimate& e) noexcept {
   if (!e.truth || result.is_unseen(e.name)) return std::nullopt;
-  return std::abs(e.value - *e.truth) <= e.index;
+  return std::abs(e.value - *e.truth) <= e.interval.value_or(e.index);
 }
 
 void Result::compare(const std::map<std::string, double, std::less<>>& truth) {
@@ -109,23 +114,47 @@ void Result::compare(const std::map<std::string, double, std::less<>>& truth) {
   }
 }
 
+EstimateText text_of(const Result& r, const Estimate& e) {
+  EstimateText text;
+  if (e.truth) text.truth = fmt::format("{:.6g}", *e.truth);
+  if (r.is_unseen(e.name)) {
+    text.value = "not seen";
+    return text;
+  }
+  text.value = fmt::format("{:.6g}", e.value);
+  if (e.interval) text.interval = percent(*e.interval, e.value);
+  if (e.truth) text.error = percent(e.value - *e.truth, *e.truth);
+  const double by_equations = e.by_equations.value_or(e.value);
+  text.by_equations = fmt::format("{:.6g}", by_equations);
+  text.index = percent(e.index, by_equations);
+  return text;
+}
+
+std::string explanation_text(const Explanation& x) {
+  return fmt::format(
+      "noise that explains the record: voltages {:.3g} V rms beside {:.4g} V, currents {:.3g} A rms "
+      "(measured {:.3g} A); "
+      "innovations of the currents {:.2f}, of the angle {:.2f} of what these and the encoder make",
+      x.voltage_noise_v, x.voltage_rms_v, x.current_noise_a, x.current_white_a, x.current_error,
+      x.angle_error);
+}
+
 std::string to_markdown(const Result& r) {
   std::string text = fmt::format("{}, {} samples\n\n", r.method, r.samples);
   text += fmt::format(
-      "| parameter | unit | estimate | index (x{}) | truth | error | inside index "
-      "|\n|---|---|---|---|---|---|---|\n",
+      "| parameter | unit | estimate | 95 % | truth | error | inside | by the equations | index (x{}) |\n"
+      "|---|---|---|---|---|---|---|---|---|\n",
       r.index_factor);
   for (const Estimate& e : r.parameters) {
-    const bool hidden = r.is_unseen(e.name);
+    const EstimateText cell = text_of(r, e);
     text +=
-        fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", e.name, e.unit,
-                    hidden ? "not seen" : fmt::format("{:.6g}", e.value),
-                    hidden ? "-" : percent(e.index, e.value), e.truth ? fmt::format("{:.6g}", *e.truth) : "-",
-                    e.truth && !hidden ? percent(e.value - *e.truth, *e.truth) : "-", inside_text(r, e));
+        fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", e.name, e.unit, cell.value,
+                    cell.interval, cell.truth, cell.error, inside_text(r, e), cell.by_equations, cell.index);
   }
   text += fmt::format("\nError index {:.4g}", r.error_index);
   if (r.mechanical_error_index) text += fmt::format(", mechanical {:.4g}", *r.mechanical_error_index);
   text += fmt::format(", condition {:.3g}. Verdict: {}.\n", r.condition, r.excitation.verdict);
+  if (r.explanation) text += "\n" + explanation_text(*r.explanation) + ".\n";
   for (const std::string& note : r.notes)
     text += "\n" + note + "\n";
   return text;
@@ -134,8 +163,12 @@ std::string to_markdown(const Result& r) {
 std::string to_json(const Result& r) {
   nlohmann::json parameters = nlohmann::json::object();
   for (const Estimate& e : r.parameters) {
-    nlohmann::json row = {{"estimate", r.is_unseen(e.name) ? nlohmann::json(nullptr) : number(e.value)},
+    const bool hidden = r.is_unseen(e.name);
+    const auto seen = [hidden](double x) { return hidden ? nlohmann::json(nullptr) : number(x); };
+    nlohmann::json row = {{"estimate", seen(e.value)},
                           {"unit", e.unit},
+                          {"interval", e.interval ? seen(*e.interval) : nlohmann::json(nullptr)},
+                          {"by_equations", seen(e.by_equations.value_or(e.value))},
                           {"index", number(e.index)}};
     row["truth"] = e.truth ? number(*e.truth) : nlohmann::json(nullptr);
     const std::optional<bool> inside = is_inside(r, e);
@@ -154,6 +187,13 @@ std::string to_json(const Result& r) {
                         {"verdict", r.excitation.verdict},
                         {"notes", r.notes}};
   if (r.mechanical_error_index) all["mechanical_error_index"] = number(*r.mechanical_error_index);
+  if (r.explanation) {
+    const Explanation& x = *r.explanation;
+    all["explanation"] = {
+        {"voltage_noise_v", number(x.voltage_noise_v)}, {"voltage_rms_v", number(x.voltage_rms_v)},
+        {"current_noise_a", number(x.current_noise_a)}, {"current_white_a", number(x.current_white_a)},
+        {"current_error", number(x.current_error)},     {"angle_error", number(x.angle_error)}};
+  }
   return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

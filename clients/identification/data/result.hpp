@@ -16,9 +16,22 @@ namespace drivebench::identification {
 struct Estimate {
   std::string name;  ///< the book's: R_S, T_R, L_S, sigma, ...
   std::string unit;
-  double value = 0.0;
-  double index = 0.0;           ///< parametric error index: E^2 grows by Result::index_factor within it
-  std::optional<double> truth;  ///< if it is known
+  double value = 0.0;  ///< refined, or that of the equations where there is no refinement
+  double index =
+      0.0;  ///< parametric error index of the equations: E^2 grows by Result::index_factor within it
+  std::optional<double> truth;           ///< if it is known
+  std::optional<double> interval{};      ///< half of the 95 % interval about the value
+  std::optional<double> by_equations{};  ///< the book's least squares, where the value is refined
+};
+
+/// The noises that explain the record, of which the intervals come, and what they are measured against.
+struct Explanation {
+  double voltage_noise_v = 0.0;  ///< rms, white, that the terminals need beside the measured voltages
+  double voltage_rms_v = 0.0;    ///< of the measured voltages
+  double current_noise_a = 0.0;  ///< rms, white
+  double current_error = 0.0;    ///< rms of the currents' innovations over what both noises make them
+  double current_white_a = 0.0;  ///< what the measured currents show without a model
+  double angle_error = 0.0;      ///< rms of the angle's innovations over what the encoder's counts make them
 };
 
 /// The result of an identification.
@@ -34,10 +47,12 @@ struct Result {
   double normal_condition = 0.0;  ///< DC motor: of R_W as in the book, unscaled
   std::size_t samples = 0;
   Excitation excitation{};
+  std::optional<Explanation> explanation{};  ///< of the refinement
   std::vector<std::string> notes{};
 
   /// The estimate of this name, or null.
   const Estimate* find(std::string_view name) const noexcept;
+  Estimate* find(std::string_view name) noexcept;
   /// Its value; throws IdentificationError if there is none.
   double at(std::string_view name) const;
   /// Whether the data do not determine this parameter.
@@ -46,17 +61,31 @@ struct Result {
   void compare(const std::map<std::string, double, std::less<>>& truth);
 };
 
-/// Whether the truth lies within the index of the estimate. Nothing if the truth is unknown or the parameter
-/// is unseen.
+/// Whether the truth lies within the interval of the estimate, or within its index where it has none. Nothing
+/// if the truth is unknown or the parameter is unseen.
 std::optional<bool> is_inside(const Result& result, const Estimate& estimate) noexcept;
 
-/// A table: parameter, unit, estimate, index in percent, truth, error in percent, whether the index held the
-/// truth; verdict and notes below it.
-/// If the excitation was not sufficient, unseen parameters show no number.
+/// The cells of an estimate in a table; "-" for what is unknown, and an unseen parameter shows no number.
+struct EstimateText {
+  std::string value{};
+  std::string interval = "-";  ///< half of it, in percent of the value
+  std::string truth = "-";
+  std::string error = "-";  ///< in percent of the truth
+  std::string by_equations = "-";
+  std::string index = "-";  ///< in percent of the value by the equations
+};
+EstimateText text_of(const Result& result, const Estimate& estimate);
+
+/// The noises as a line.
+std::string explanation_text(const Explanation& explanation);
+
+/// A table of the estimates with interval, truth, error, and the values of the equations with their index;
+/// verdict, explanation and notes below it.
 std::string to_markdown(const Result& result);
 
-/// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, index, truth, inside}},
-/// ...}; a number that is not finite and the estimate of an unseen parameter are null.
+/// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, interval, by_equations,
+/// index, truth, inside}}, explanation, ...}; a number that is not finite and the estimate of an unseen
+/// parameter are null.
 std::string to_json(const Result& result);
 
 /// The contents of a motor file beside the estimates.

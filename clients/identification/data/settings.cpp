@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -32,16 +34,70 @@ Processing usual_processing(MotorKind kind, double period_s) {
   return p;
 }
 
-ShaftSignals shaft_signals(const MeasuredData& data, const Settings& e) {
-  const Processing& p = e.processing;
+Series measured_angle(const MeasuredData& data, const Settings& e) {
   const SeriesView measured = data.at(e.counts_per_revolution > 0.0 ? "encoder_count" : "angle_rad");
-  Series angle = e.counts_per_revolution > 0.0 ? angle_of(measured, e.counts_per_revolution, e.half_count)
-                                               : Series(measured.begin(), measured.end());
-  angle = zero_phase(angle, p.shaft, data.period_s);
+  return e.counts_per_revolution > 0.0 ? angle_of(measured, e.counts_per_revolution, e.half_count)
+                                       : Series(measured.begin(), measured.end());
+}
+
+ShaftSignals shaft_signals(const MeasuredData& data, const Settings& e, const LowPass& filter) {
+  const Processing& p = e.processing;
+  const Series angle = zero_phase(measured_angle(data, e), filter, data.period_s);
   Series speed = slope_of(angle, data, p);
   Series acceleration =
       p.backward_differences ? slope_of(speed, data, p) : second_difference(angle, data.period_s);
-  return {.angle = std::move(angle), .speed = std::move(speed), .acceleration = std::move(acceleration)};
+  return {.angle = angle, .speed = std::move(speed), .acceleration = std::move(acceleration)};
+}
+
+namespace {
+
+/// The variance of the acceleration that white noise of variance 1 in the angle makes behind a filter.
+double noise_gain(const LowPass& filter, double period_s) {
+  const auto half = static_cast<std::size_t>(4.0 / (filter.cutoff_hz * period_s)) + 8;
+  Series impulse(2 * half + 1, 0.0);
+  impulse[half] = 1.0;
+  double gain = 0.0;
+  for (const double value : second_difference(zero_phase(impulse, filter, period_s), period_s))
+    gain += value * value;
+  return gain;
+}
+
+double variance(SeriesView x) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const double value : x) {
+    sum += value;
+    squares += value * value;
+  }
+  const auto count = static_cast<double>(x.size());
+  return squares / count - sum * sum / (count * count);
+}
+
+}  // namespace
+
+void choose_shaft_filter(const MeasuredData& data, Settings& e) {
+  Processing& p = e.processing;
+  if (e.counts_per_revolution <= 0.0 || e.kind == MotorKind::kInduction || p.shaft.cutoff_hz == 0.0) return;
+  constexpr double kMostNoise = 1e-3;
+  constexpr double kStep = std::numbers::sqrt2;
+  constexpr int kMostSteps = 12;
+  const SampleRange range = window_of(data, p);
+  const Series angle = measured_angle(data, e);
+  const double count_rad = 2.0 * std::numbers::pi / e.counts_per_revolution;
+  LowPass best = p.shaft;
+  double least = std::numeric_limits<double>::infinity();
+  LowPass tried = p.shaft;
+  for (int step = 0; step < kMostSteps && least > kMostNoise; ++step, tried.cutoff_hz /= kStep) {
+    const Series acceleration = second_difference(zero_phase(angle, tried, data.period_s), data.period_s);
+    const double noise = count_rad * count_rad / 12.0 * noise_gain(tried, data.period_s);
+    const double share = noise / variance(SeriesView(acceleration).subspan(range.first, range.count()));
+    if (!(share < least)) continue;
+    least = share;
+    best = tried;
+  }
+  p.shaft = best;
+  p.shaft_chosen = true;
+  if (e.kind == MotorKind::kDc) p.current = p.voltage = best;
 }
 
 TwoPhaseSeries windings(const MeasuredData& data, const Settings& e, char quantity, char unit) {

@@ -17,7 +17,8 @@ enum class MotorKind : std::uint8_t { kDc, kInduction, kPmSynchronous, kBldc };
 struct Processing {
   LowPass current{};  ///< of currents and what is derived from them
   LowPass voltage{};
-  LowPass shaft{};  ///< of the angle, before its differences
+  LowPass shaft{};            ///< of the angle, before its differences
+  bool shaft_chosen = false;  ///< by choose_shaft_filter()
   /// Backward differences are late by half a period; they are here to show what that does.
   bool backward_differences = false;
   /// The advance of the voltages in periods. An amplifier of the bench, and many drives, report the mean of
@@ -49,13 +50,24 @@ struct Settings {
 /// of an induction motor are taken as those of a line source, all others as those of an amplifier.
 Processing usual_processing(MotorKind kind, double period_s);
 
+/// The angle of the shaft as measured [rad].
+Series measured_angle(const MeasuredData& data, const Settings& settings);
+
 /// The angle of the shaft with its derivatives [rad, rad/s, rad/s^2].
 struct ShaftSignals {
   Series angle;
   Series speed;
   Series acceleration;
 };
-ShaftSignals shaft_signals(const MeasuredData& data, const Settings& settings);
+ShaftSignals shaft_signals(const MeasuredData& data, const Settings& settings, const LowPass& filter);
+
+/// Sets the corner of the shaft's filter from the counts of the encoder, the rate and the motion: the highest
+/// one, up to the corner that is set, at which the counts leave a thousandth of the acceleration's variance
+/// at most, so that they take no more than 0.1 % of the inertia; if there is none, the one with the smallest
+/// share. A DC motor has its current and its speed in the same equations, so all of its filters get that
+/// corner. An induction motor keeps what it has: its acceleration stands beside the second derivative of the
+/// currents.
+void choose_shaft_filter(const MeasuredData& data, Settings& settings);
 
 /// Currents or voltages of the two-phase equivalent, as measured: "i", "_a" reads i_a_a, i_b_a, i_c_a.
 TwoPhaseSeries windings(const MeasuredData& data, const Settings& settings, char quantity, char unit);

@@ -87,6 +87,13 @@ double value_at(SeriesView x, double position) noexcept {
   return Cubic(place).at(x, 0);
 }
 
+double largest(SeriesView x) noexcept {
+  double most = 0.0;
+  for (const double value : x)
+    most = std::max(most, std::abs(value));
+  return most;
+}
+
 TwoPhaseSeries two_phase(SeriesView a, SeriesView b, SeriesView c) {
   TwoPhaseSeries y = {.a = Series(a.size()), .b = Series(a.size())};
   for (std::size_t k = 0; k < a.size(); ++k) {

@@ -22,6 +22,9 @@ Series advanced(SeriesView x, double samples);
 /// value. The series must not be empty.
 double value_at(SeriesView x, double position) noexcept;
 
+/// The largest absolute value.
+double largest(SeriesView x) noexcept;
+
 /// Two-phase quantities in some frame.
 struct TwoPhaseSeries {
   Series a;

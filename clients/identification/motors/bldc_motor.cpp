@@ -15,15 +15,16 @@ struct BldcSignals {
   std::array<Series, 3> i;
   std::array<Series, 3> emf;  ///< -w (e_k - e_mean)
   std::array<Series, 3> u;
-  Series torque;  ///< e_1 i_1 + e_2 i_2 + e_3 i_3
-  ShaftSignals shaft;
+  Series torque;       ///< e_1 i_1 + e_2 i_2 + e_3 i_3
+  ShaftSignals shaft;  ///< in the equation of motion
 };
 
 BldcSignals phase_signals(const MeasuredData& data, const Settings& settings) {
   const Processing& p = settings.processing;
   const std::size_t n = data.samples();
   BldcSignals s;
-  s.shaft = shaft_signals(data, settings);
+  s.shaft = shaft_signals(data, settings, p.shaft);
+  const ShaftSignals frame = shaft_signals(data, settings, p.current);
   s.torque.assign(n, 0.0);
   std::array<Series, 3> u;
   std::array<SeriesView, 3> i;
@@ -36,13 +37,13 @@ BldcSignals phase_signals(const MeasuredData& data, const Settings& settings) {
   for (std::size_t k = 0; k < n; ++k) {
     std::array<double, 3> e{};
     for (std::size_t phase = 0; phase < 3; ++phase)
-      e[phase] = trapezoid_at_turns((settings.pole_pairs * s.shaft.angle[k] -
-                                     static_cast<double>(phase) * 2.0 * std::numbers::pi / 3.0) /
-                                    (2.0 * std::numbers::pi));
+      e[phase] = trapezoid_at_turns(
+          (settings.pole_pairs * frame.angle[k] - static_cast<double>(phase) * 2.0 * std::numbers::pi / 3.0) /
+          (2.0 * std::numbers::pi));
     const double mean_e = (e[0] + e[1] + e[2]) / 3.0;
     const double mean_u = (u[0][k] + u[1][k] + u[2][k]) / 3.0;
     for (std::size_t phase = 0; phase < 3; ++phase) {
-      s.emf[phase][k] = -s.shaft.speed[k] * (e[phase] - mean_e);
+      s.emf[phase][k] = -frame.speed[k] * (e[phase] - mean_e);
       u[phase][k] -= mean_u;
       s.torque[k] += e[phase] * i[phase][k];
     }

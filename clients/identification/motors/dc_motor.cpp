@@ -7,7 +7,7 @@ namespace drivebench::identification {
 Result identify_dc_motor(const MeasuredData& data, const Settings& settings) {
   const Processing& p = settings.processing;
   const SampleRange range = window_of(data, p);
-  const ShaftSignals shaft = shaft_signals(data, settings);
+  const ShaftSignals shaft = shaft_signals(data, settings, p.shaft);
   const Series i = zero_phase(data.at("i_a_a"), p.current, data.period_s);
   const Series v = zero_phase(advanced(data.at("u_a_v"), p.voltage_shift), p.voltage, data.period_s);
   const Series slope = slope_of(i, data, p);

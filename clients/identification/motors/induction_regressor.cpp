@@ -49,7 +49,7 @@ InductionEquations induction_equations(const InductionInstant& q, double n) noex
 std::vector<InductionInstant> induction_instants(const MeasuredData& data, const Settings& e) {
   const Processing& p = e.processing;
   const double period = data.period_s;
-  const ShaftSignals shaft = shaft_signals(data, e);
+  const ShaftSignals shaft = shaft_signals(data, e, p.shaft);
   Series electrical = shaft.angle;
   for (double& angle : electrical)
     angle *= e.pole_pairs;

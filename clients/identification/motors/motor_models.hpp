@@ -25,6 +25,9 @@ struct MotorInput {
   double electrical_rad = 0.0;  ///< the measured angle times the pole pairs
 };
 
+/// A state that the signals show is known to this part of the largest current and speed of the record.
+inline constexpr double kKnownPart = 0.05;
+
 /// The two-phase equivalent of a star, or the phases of a two-phase machine, as a complex number; and back.
 inline std::complex<double> two_phase_of(const std::array<double, 3>& x, bool three_phase) noexcept {
   if (!three_phase) return {x[0], x[1]};
@@ -42,7 +45,7 @@ struct DcModel {
   static constexpr std::size_t kSpeed = 1;
   DcMachineModel m;
 
-  explicit DcModel(const Result& r)
+  DcModel(const Result& r, const Settings&)
       : m{.resistance_ohm = r.at("R"),
           .inductance_h = r.at("L"),
           .torque_constant_nm_per_a = r.at("K_T"),
@@ -56,13 +59,14 @@ struct DcModel {
     return {(in.u[0] - m.resistance_ohm * x[0] - m.torque_constant_nm_per_a * x[1]) / m.inductance_h,
             (m.torque_constant_nm_per_a * x[0] - m.friction_nms * x[1]) / m.inertia_kgm2};
   }
-  void settle(State&, const State&) const noexcept {}
+  void settle(State&, const State&, double) const noexcept {}
   std::array<double, 3> currents(const State& x, const MotorInput&) const noexcept {
     return {x[0], 0.0, 0.0};
   }
   State state_of(const std::array<double, 3>& i, double speed, const MotorInput&) const noexcept {
     return {i[0], speed};
   }
+  State spread(double current_a, double speed_rad_s) const noexcept { return {current_a, speed_rad_s}; }
 };
 
 /// In the four numbers that the terminals show, so not those of InductionMotorModel, in the stator's frame,
@@ -96,7 +100,7 @@ struct InductionModel {
     const double torque = pole_pairs * (x[2] * x[1] - x[3] * x[0]);
     return {di.real(), di.imag(), dphi.real(), dphi.imag(), (torque - friction * x[4] - load) / inertia};
   }
-  void settle(State&, const State&) const noexcept {}
+  void settle(State&, const State&, double) const noexcept {}
   std::array<double, 3> currents(const State& x, const MotorInput&) const noexcept {
     return phases_of({x[0], x[1]}, three_phase);
   }
@@ -104,6 +108,11 @@ struct InductionModel {
   State state_of(const std::array<double, 3>& i, double speed, const MotorInput&) const noexcept {
     const std::complex<double> current = two_phase_of(i, three_phase);
     return {current.real(), current.imag(), 0.0, 0.0, speed};
+  }
+  /// A flux that the currents could have built up is as likely as none.
+  State spread(double current_a, double speed_rad_s) const noexcept {
+    const double flux = magnetising_h * current_a / kKnownPart;
+    return {current_a, current_a, flux, flux, speed_rad_s};
   }
 };
 
@@ -124,7 +133,7 @@ struct PmModel {
           .friction_nms = r.at("f"),
           .inertia_kgm2 = r.at("J"),
           .star = settings.three_phase},
-        coulomb_nm(std::max(0.0, r.at("f_c"))) {}
+        coulomb_nm(r.at("f_c")) {}
   double fastest_rate(double speed) const noexcept {
     return m.resistance_ohm / m.inductance_h + m.pole_pairs * std::abs(speed) +
            m.torque_constant_nm_per_a / std::sqrt(m.inductance_h * m.inertia_kgm2);
@@ -138,9 +147,16 @@ struct PmModel {
             omega_e * x[0],
         (m.torque_constant_nm_per_a * x[1] - m.friction_nms * x[2] - friction_torque_nm(x)) / m.inertia_kgm2};
   }
-  /// A shaft that comes to rest within a step stays there if friction can hold it.
-  void settle(State& x, const State& before) const noexcept {
-    if (x[2] * before[2] < 0.0 && std::abs(m.torque_constant_nm_per_a * x[1]) <= coulomb_nm) x[2] = 0.0;
+  /// A shaft that comes to rest within a step of h stays there if friction can hold it, and goes on from rest
+  /// for what is left of the step if it cannot: the slopes across the change of sign mix both frictions.
+  void settle(State& x, const State& before, double h) const noexcept {
+    if (coulomb_nm <= 0.0 || x[2] * before[2] >= 0.0) return;
+    const double torque_nm = 0.5 * m.torque_constant_nm_per_a * (x[1] + before[1]);
+    x[2] = 0.0;
+    if (std::abs(torque_nm) <= coulomb_nm) return;
+    const double braking = (torque_nm - std::copysign(coulomb_nm, before[2])) / m.inertia_kgm2;
+    const double left = std::clamp(h + before[2] / braking, 0.0, h);
+    x[2] = left * (torque_nm - std::copysign(coulomb_nm, torque_nm)) / m.inertia_kgm2;
   }
   std::array<double, 3> currents(const State& x, const MotorInput& in) const noexcept {
     return phases_of(std::complex<double>(x[0], x[1]) * std::polar(1.0, in.electrical_rad), m.star);
@@ -149,11 +165,15 @@ struct PmModel {
     const std::complex<double> dq = two_phase_of(i, m.star) * std::polar(1.0, -in.electrical_rad);
     return {dq.real(), dq.imag(), speed};
   }
+  State spread(double current_a, double speed_rad_s) const noexcept {
+    return {current_a, current_a, speed_rad_s};
+  }
 
  private:
   double friction_torque_nm(const State& x) const noexcept {
     if (x[2] != 0.0) return std::copysign(coulomb_nm, x[2]);
-    return std::clamp(m.torque_constant_nm_per_a * x[1], -coulomb_nm, coulomb_nm);
+    const double most = std::max(0.0, coulomb_nm);
+    return std::clamp(m.torque_constant_nm_per_a * x[1], -most, most);
   }
 };
 
@@ -163,7 +183,7 @@ struct BldcModel {
   static constexpr std::size_t kSpeed = 3;
   BldcMachineModel m;
 
-  explicit BldcModel(const Result& r)
+  BldcModel(const Result& r, const Settings&)
       : m{.pole_pairs = 1.0,
           .resistance_ohm = r.at("R_S"),
           .torque_constant_nm_per_a = r.at("tau_p"),
@@ -192,12 +212,15 @@ struct BldcModel {
     dx[3] = (torque_nm - m.friction_nms * x[3]) / m.inertia_kgm2;
     return dx;
   }
-  void settle(State&, const State&) const noexcept {}
+  void settle(State&, const State&, double) const noexcept {}
   std::array<double, 3> currents(const State& x, const MotorInput&) const noexcept {
     return {x[0], x[1], x[2]};
   }
   State state_of(const std::array<double, 3>& i, double speed, const MotorInput&) const noexcept {
     return {i[0], i[1], i[2], speed};
+  }
+  State spread(double current_a, double speed_rad_s) const noexcept {
+    return {current_a, current_a, current_a, speed_rad_s};
   }
 };
 

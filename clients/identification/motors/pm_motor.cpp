@@ -1,6 +1,7 @@
 #include "clients/identification/motors/pm_motor.hpp"
 
 #include <array>
+#include <utility>
 
 namespace drivebench::identification {
 namespace {
@@ -10,14 +11,18 @@ struct PmSignals {
   TwoPhaseSeries i;
   TwoPhaseSeries slope;
   TwoPhaseSeries u;
-  ShaftSignals shaft;
+  Series speed;        ///< in the equations of the voltages, through the filter of the currents
+  Series torque_a;     ///< i_q in the equation of motion, through the filter of the shaft
+  ShaftSignals shaft;  ///< in the equation of motion
 };
 
 PmSignals dq_signals(const MeasuredData& data, const Settings& e) {
   const Processing& p = e.processing;
   PmSignals s;
-  s.shaft = shaft_signals(data, e);
-  Series electrical = s.shaft.angle;
+  s.shaft = shaft_signals(data, e, p.shaft);
+  ShaftSignals frame = shaft_signals(data, e, p.current);
+  s.speed = std::move(frame.speed);
+  Series electrical = std::move(frame.angle);
   for (double& angle : electrical)
     angle *= e.pole_pairs;
   const auto filtered = [&](const TwoPhaseSeries& x, const LowPass& filter) {
@@ -26,7 +31,9 @@ PmSignals dq_signals(const MeasuredData& data, const Settings& e) {
   };
   TwoPhaseSeries u = windings(data, e, 'u', 'v');
   u = {.a = advanced(u.a, p.voltage_shift), .b = advanced(u.b, p.voltage_shift)};
-  s.i = filtered(windings(data, e, 'i', 'a'), p.current);
+  const TwoPhaseSeries i = windings(data, e, 'i', 'a');
+  s.i = filtered(i, p.current);
+  s.torque_a = zero_phase(rotated(i, electrical).b, p.shaft, data.period_s);
   s.u = filtered(u, p.voltage);
   s.slope = {.a = slope_of(s.i.a, data, p), .b = slope_of(s.i.b, data, p)};
   return s;
@@ -62,9 +69,9 @@ Result identify_pm_motor(const MeasuredData& data, const Settings& e) {
     std::array<double, 6> d{};
     std::array<double, 6> q{};
     for (std::size_t k = range.first; k < range.end; ++k) {
-      const double omega_e = e.pole_pairs * s.shaft.speed[k];
+      const double omega_e = e.pole_pairs * s.speed[k];
       d = {s.i.a[k], s.slope.a[k] - omega_e * s.i.b[k], 0.0};
-      q = {s.i.b[k], s.slope.b[k] + omega_e * s.i.a[k], s.shaft.speed[k]};
+      q = {s.i.b[k], s.slope.b[k] + omega_e * s.i.a[k], s.speed[k]};
       fit.add(SeriesView(d).first(columns), s.u.a[k]);
       fit.add(SeriesView(q).first(columns), s.u.b[k]);
     }
@@ -74,7 +81,7 @@ Result identify_pm_motor(const MeasuredData& data, const Settings& e) {
     electrical_rows(fit, 6);
     for (std::size_t k = range.first; k < range.end; ++k) {
       const double w = s.shaft.speed[k];
-      fit.add(std::array{0.0, 0.0, -s.i.b[k], s.shaft.acceleration[k], w, sign_of(w)}, 0.0);
+      fit.add(std::array{0.0, 0.0, -s.torque_a[k], s.shaft.acceleration[k], w, sign_of(w)}, 0.0);
     }
     const LeastSquares found = fit.solve();
     take(result, found, 0);
@@ -91,7 +98,7 @@ Result identify_pm_motor(const MeasuredData& data, const Settings& e) {
   Regression mechanical({kNames.begin() + 3, kNames.end()});
   for (std::size_t k = range.first; k < range.end; ++k) {
     const double w = s.shaft.speed[k];
-    mechanical.add(std::array{s.shaft.acceleration[k], w, sign_of(w)}, first.estimate[2] * s.i.b[k]);
+    mechanical.add(std::array{s.shaft.acceleration[k], w, sign_of(w)}, first.estimate[2] * s.torque_a[k]);
   }
   const LeastSquares second = mechanical.solve();
   take(result, first, 0);

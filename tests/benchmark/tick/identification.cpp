@@ -32,7 +32,7 @@ Row start_row() {
     double slowest_ms = 0.0;
     for (const Recorded& start : starts) {
       const std::int64_t begin = now_ns();
-      const Result found = identify(start.data, start.how);
+      const Result found = identify_by_equations(start.data, start.how);
       slowest_ms = std::max(slowest_ms, static_cast<double>(now_ns() - begin) * 1e-6);
       if (found.parameters.empty()) throw std::runtime_error("a start is not identified");
     }
@@ -44,6 +44,37 @@ Row start_row() {
           .limit = Limit{Limit::Kind::kAtMost, kMostMs},
           .gone = rounds.gone,
           .note = "slowest of 20 induction motors, 0.2 s at 20 kHz: filters, regressor, global search"};
+}
+
+/// Random motors of each kind from recorded signals to parameters with intervals. The slowest counts.
+Row refinement_row() {
+  constexpr int kMotors = 3;
+  constexpr double kMostRefinedMs = 1000.0;
+  std::vector<Recorded> records;
+  for (const MotorDraw& draw : motor_draws().first(4)) {
+    for (int number = 1; number <= kMotors; ++number)
+      records.push_back(record_motor(draw, number, 1));
+  }
+  const std::array cpu{cpu_pair().far};
+  const Pinned pinned(cpu[0]);
+  const auto rounds = undisturbed_rounds(cpu, kRounds, [&] {
+    double slowest_ms = 0.0;
+    for (const Recorded& record : records) {
+      const std::int64_t begin = now_ns();
+      const Result found = identify(record.data, record.how);
+      slowest_ms = std::max(slowest_ms, static_cast<double>(now_ns() - begin) * 1e-6);
+      if (!found.excitation.sufficient)
+        throw std::runtime_error("a motor is refused: " + found.excitation.verdict);
+    }
+    return slowest_ms;
+  });
+  return {
+      .name = "identification with intervals",
+      .unit = "ms",
+      .measured = percentile(rounds.results, 0.5),
+      .limit = Limit{Limit::Kind::kAtMost, kMostRefinedMs},
+      .gone = rounds.gone,
+      .note = "slowest of 12 motors of four kinds, up to 20,000 samples: least squares, refinement, verdict"};
 }
 
 /// 200 motors of three kinds, experiments and identification, on two threads.
@@ -72,7 +103,7 @@ Row monte_carlo_row() {
 }  // namespace
 
 std::vector<Row> measure_identification(const Plan&) {
-  return {start_row(), monte_carlo_row()};
+  return {start_row(), refinement_row(), monte_carlo_row()};
 }
 
 }  // namespace drivebench::speed

@@ -43,7 +43,7 @@ std::vector<Measured> start(std::initializer_list<const char*> names) {
   e.processing = usual_processing(e.kind, run.period_s());
   e.processing.from_s = 0.005;
   e.processing.to_s = 0.2;
-  return estimates(identify(record.data(), e), names);
+  return estimates(identify_by_equations(record.data(), e), names);
 }
 
 std::vector<Measured> conversion() {

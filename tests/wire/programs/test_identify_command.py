@@ -192,6 +192,24 @@ class Identify(WireTest):
         self.assertIn("no motor file", ran.stderr)
         self.assertFalse(motor.exists() and motor.stat().st_size > 0)
 
+    def test_a_motor_at_constant_speed_is_refused_with_the_experiment_that_helps(self):
+        """Catches: a PM motor whose R_S is five times too large, stated because the encoder's noise passes for excitation."""
+        toml = self.path / "constant.toml"
+        toml.write_text('axis = "pm-9-3"\nduration_s = 0.3\nsignals = ["i_a_a"]\n'
+                        'settings = [{ name = "amplifier.delay_ticks", value = 0 }, { name = "amplifier.filter_hz", value = 0 }]\n'
+                        '[input]\nkind = "dq_voltages"\nangle = "true"\n[[input.shapes]]\nchannel = "q"\n'
+                        'constant = { value = 10.0 }\n', encoding="utf-8")
+        motor = self.path / "motor.toml"
+        words = ("--motor", "pm", "--experiment", toml, "--bench", "pm-9-3", "--window", "0.15:0.3", "--shaft-hz", "30")
+        ran = self.identify(*words, "--motor-file", motor, code=1)
+        self.assertIn("swings several times a second", ran.stdout)
+        self.assertFalse(motor.exists() and motor.stat().st_size > 0)
+        found = self.parameters(*words, code=1)
+        self.assertFalse(found["identifiable"])
+        for name in ("R_S", "K_m", "J"):
+            self.assertIsNone(found["parameters"][name]["estimate"], name)
+            self.assertIsNone(found["parameters"][name]["by_equations"], name)
+
     def test_a_foreign_file_is_read_by_its_column_map(self):
         """Catches: a column map that takes the wrong column or scale."""
         own = self.path / "own.csv"

@@ -44,11 +44,32 @@ TEST(IdentificationResult, ReportsWhetherTheIndexHeldTheTruth) {
   EXPECT_EQ(json["parameters"]["R_S"]["inside"], true);
   EXPECT_EQ(json["parameters"]["L_S"]["inside"], false);
   EXPECT_TRUE(json["parameters"]["M"]["inside"].is_null());
-  EXPECT_NE(to_markdown(r).find("| L_S | H | 0.67 | 1.49 % | 0.69 | -2.9 % | no |"), std::string::npos);
+  EXPECT_NE(to_markdown(r).find("| L_S | H | 0.67 | - | 0.69 | -2.9 % | no | 0.67 | 1.49 % |"),
+            std::string::npos);
   r.compare({{"R_S", 10.0}});  // 3 % away, with an index of 0.1 ohm
   EXPECT_EQ(is_inside(r, *r.find("R_S")), false);
   r.excitation.unseen = {"R_S"};
   EXPECT_EQ(is_inside(r, *r.find("R_S")), std::nullopt);
+}
+
+// A refined estimate is judged by its interval, not by the index of the equations, whose value stays beside
+// it. Catches: an index that flatters a refined estimate, a JSON without the interval.
+TEST(IdentificationResult, ARefinedEstimateIsJudgedByItsInterval) {
+  Result r = some_result();
+  r.compare({{"R_S", 9.75}});
+  Estimate& e = *r.find("R_S");
+  e.by_equations = 9.6;
+  e.interval = 0.03;
+  EXPECT_EQ(is_inside(r, e), false);
+  EXPECT_NE(to_markdown(r).find("| R_S | ohm | 9.7 | 0.309 % | 9.75 | -0.513 % | no | 9.6 | 1.04 % |"),
+            std::string::npos)
+      << to_markdown(r);
+  const nlohmann::json json = nlohmann::json::parse(to_json(r));
+  EXPECT_EQ(json["parameters"]["R_S"]["interval"], 0.03);
+  EXPECT_EQ(json["parameters"]["R_S"]["by_equations"], 9.6);
+  r.excitation = {.sufficient = false, .unseen = {"R_S"}, .verdict = "no"};
+  EXPECT_EQ(to_json(r).find("9.6"), std::string::npos);
+  EXPECT_EQ(to_markdown(r).find("9.6"), std::string::npos);
 }
 
 // Catches: a number in the table that the data do not hold.
@@ -56,7 +77,8 @@ TEST(IdentificationResult, UnseenParametersShowNoNumber) {
   Result r = some_result();
   r.excitation = {.sufficient = false, .unseen = {"L_S"}, .verdict = "not identifiable: L_S"};
   EXPECT_NE(to_markdown(r).find("| L_S | H | not seen | - | - | - |"), std::string::npos) << to_markdown(r);
-  EXPECT_NE(to_markdown(r).find("| R_S | ohm | 9.7 | 1.03 % | - | - |"), std::string::npos) << to_markdown(r);
+  EXPECT_NE(to_markdown(r).find("| R_S | ohm | 9.7 | - | - | - | - | 9.7 | 1.03 % |"), std::string::npos)
+      << to_markdown(r);
   EXPECT_TRUE(nlohmann::json::parse(to_json(r))["parameters"]["L_S"]["estimate"].is_null());
   EXPECT_THROW(to_motor_toml(r, {.name = "x"}), IdentificationError);
 }

@@ -11,7 +11,8 @@ int main() {
   try {
     const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
     const auto trials = run_trials(motor_draws(), {kAllMotors, kAllNoises, threads});
-    std::fputs(markdown_of(trials).c_str(), stdout);
+    const auto verdicts = run_verdicts(motor_draws(), kVerdictMotors, threads);
+    std::fputs(markdown_of(trials, verdicts).c_str(), stdout);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -39,12 +39,16 @@ std::vector<double> draw_motor(const MotorDraw& draw, int number);
 /// One parameter of one motor.
 struct Finding {
   double truth;
-  double estimate;
-  double index;
-  bool stated;  ///< the verdict does not name it
+  double by_equations = 0.0;  ///< the book's least squares
+  double index = 0.0;
+  double estimate = 0.0;  ///< refined
+  double interval = 0.0;  ///< half of the 95 % interval
+  bool stated = false;    ///< the verdict does not name it
 
   double error() const noexcept { return (estimate - truth) / truth; }
+  double error_by_equations() const noexcept { return (by_equations - truth) / truth; }
   bool covered() const noexcept;
+  bool covered_by_index() const noexcept;
 };
 
 /// The data of an experiment and the settings to identify the motor with.

@@ -34,7 +34,7 @@ TEST(BldcMotor, IsIdentifiedFromItsTrapezoids) {
   Settings e{.kind = MotorKind::kBldc, .pole_pairs = 1};
   e.processing = usual_processing(MotorKind::kBldc, run.period_s());
   e.processing.from_s = 0.02;
-  Result r = identify(record.data(), e);
+  Result r = identify_by_equations(record.data(), e);
   r.compare({{"R_S", 0.7}, {"L+M", 2.87e-3}, {"tau_p", 0.5128}, {"J", 2e-4}, {"f", 2e-3}});
   const auto expect = [&](const char* name, double percent) {
     const Estimate& x = *r.find(name);

@@ -54,7 +54,7 @@ Settings dc_experiment() {
 TEST(DcMotor, SinesOfCurrentIdentifyAllFiveParameters) {
   Recorder record({"i_a_a", "u_a_v", "encoder_count"}, 1e-5, 100);
   run_dc(sines, 0.0, record);
-  const Result r = identify(record.data(), dc_experiment());
+  const Result r = identify_by_equations(record.data(), dc_experiment());
   expect_percent(r.at("L"), 2e-3, 1.0);
   expect_percent(r.at("R"), 2.0, 0.5);
   expect_percent(r.at("K_T"), 0.07, 0.5);
@@ -72,7 +72,7 @@ TEST(DcMotor, BackwardDifferencesLoseTheFriction) {
   run_dc(sines, 0.0, record);
   Settings e = dc_experiment();
   e.processing.backward_differences = true;
-  const double error = identify(record.data(), e).at("f") / 4e-4 - 1.0;
+  const double error = identify_by_equations(record.data(), e).at("f") / 4e-4 - 1.0;
   EXPECT_LT(error, -0.5);
   EXPECT_GT(error, -0.95);
 }
@@ -110,7 +110,7 @@ TEST(DcMotor, AConstantCurrentIdentifiesNothing) {
   const BookBench run = run_dc([](double) { return 2.5; }, 3.0, record);
   EXPECT_NEAR(run.sample().speed_rad_s, 437.5, 0.44);
   EXPECT_NEAR(run.sample().u_a_v, 35.625, 0.036);
-  const Result r = identify(record.data(), dc_experiment());
+  const Result r = identify_by_equations(record.data(), dc_experiment());
   EXPECT_FALSE(r.excitation.sufficient) << to_markdown(r);
   for (const char* name : {"R", "K_T"})
     EXPECT_EQ(std::count(r.excitation.unseen.begin(), r.excitation.unseen.end(), name), 1)
@@ -124,17 +124,17 @@ TEST(DcMotor, AConstantCurrentIdentifiesNothing) {
 TEST(DcMotor, UnusableDataAreRefused) {
   MeasuredData data{.period_s = 1e-3,
                     .columns = {{"i_a_a", "A", Series(80, 0.0)}, {"u_a_v", "V", Series(80, 0.0)}}};
-  EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // 40 samples are left
+  EXPECT_THROW(identify_by_equations(data, dc_experiment()), IdentificationError);  // 40 samples are left
   data.columns[0].values.resize(200);
   data.columns[1].values.resize(200);
-  EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // no encoder
+  EXPECT_THROW(identify_by_equations(data, dc_experiment()), IdentificationError);  // no encoder
   data.columns.push_back({"encoder_count", "counts", Series(199, 0.0)});
-  EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);  // one count is missing
+  EXPECT_THROW(identify_by_equations(data, dc_experiment()), IdentificationError);  // one count is missing
   data.columns[2].values.resize(200);
-  const Result r = identify(data, dc_experiment());
+  const Result r = identify_by_equations(data, dc_experiment());
   EXPECT_EQ(r.excitation.unseen.size(), 5U);
   data.period_s = 0.0;
-  EXPECT_THROW(identify(data, dc_experiment()), IdentificationError);
+  EXPECT_THROW(identify_by_equations(data, dc_experiment()), IdentificationError);
 }
 
 }  // namespace

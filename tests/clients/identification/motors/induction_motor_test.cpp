@@ -114,7 +114,7 @@ TEST(InductionMotor, TheTextsTableConvertsToItsParameters) {
 TEST(InductionMotor, IdealDataGiveTheTruthAndOneMinimum) {
   MeasuredData data = start_data(250'000, true);
   put_line_voltages(data, 381.059, 50.0, 1);
-  Result r = identify(data, ideal_experiment());
+  Result r = identify_by_equations(data, ideal_experiment());
   expect_percent(r.at("K4"), 1717.2, 0.1);
   expect_percent(r.at("K6"), 3839.8, 0.1);
   expect_percent(r.at("K8"), 0.0779, 0.1);
@@ -132,7 +132,7 @@ TEST(InductionMotor, IdealDataGiveTheTruthAndOneMinimum) {
 // holds both. The index holds the true error. Catches: a filter with phase, different filters in one
 // equation.
 TEST(InductionMotor, SensorsAndFiltersKeepTheParameters) {
-  const Result r = identify(start_data(250'000, false), sensor_experiment(2.5e-4));
+  const Result r = identify_by_equations(start_data(250'000, false), sensor_experiment(2.5e-4));
   expect_percent(r.at("R_S"), 9.7, 1.5);
   expect_percent(r.at("T_R"), 0.67 / 8.6, 1.5);
   expect_percent(r.at("L_S"), 0.67, 1.5);
@@ -157,12 +157,12 @@ TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
   e.processing.backward_differences = true;
   MeasuredData data = start_data(250'000, true);
   put_line_voltages(data, 381.059, 50.0, 1);
-  const Result slow = identify(data, e);
+  const Result slow = identify_by_equations(data, e);
   expect_percent(slow.at("R_S"), 9.41, 1.0);
   expect_percent(slow.at("K4"), 1759.0, 1.0);
   MeasuredData often = start_data(50'000, true);
   put_line_voltages(often, 381.059, 50.0, 1);
-  expect_percent(identify(often, e).at("R_S"), 9.64, 0.5);
+  expect_percent(identify_by_equations(often, e).at("R_S"), 9.64, 0.5);
 }
 
 // Half a sample between voltages and currents is enough to lose 5 % and more of R_S at 4 kHz. Catches: a
@@ -170,9 +170,9 @@ TEST(InductionMotor, BackwardDifferencesBiasTheResistance) {
 TEST(InductionMotor, VoltagesHalfASampleOffBiasTheResistance) {
   const MeasuredData data = start_data(250'000, true);
   Settings e = ideal_experiment();
-  expect_percent(identify(data, e).at("R_S"), 9.7, 0.1);
+  expect_percent(identify_by_equations(data, e).at("R_S"), 9.7, 0.1);
   e.processing.voltage_shift = 0.5;
-  EXPECT_LT(identify(data, e).at("R_S"), 0.95 * 9.7);
+  EXPECT_LT(identify_by_equations(data, e).at("R_S"), 0.95 * 9.7);
 }
 
 // The start of 8.5.6 without load: 4096 counts, viscous friction. The reference's own run: R_S 5.10, T_R
@@ -185,7 +185,7 @@ TEST(InductionMotor, TheLineStartOfTheExperiment) {
   Settings e = sensor_experiment(run.period_s());
   e.counts_per_revolution = 4096;
   e.load = LoadModel::kViscous;
-  const Result r = identify(record.data(), e);
+  const Result r = identify_by_equations(record.data(), e);
   expect_percent(r.at("R_S"), 5.12, 2.0);
   expect_percent(r.at("T_R"), 0.1311, 2.0);
   expect_percent(r.at("L_S"), 0.2919, 2.0);
@@ -202,7 +202,7 @@ TEST(InductionMotor, WithoutLoadNothingIsIdentified) {
   run.run_until(2.0);
   Recorder record = line_recorder(run.period_s(), false);
   run.run_until(2.25, std::ref(record));
-  const Result r = identify(record.data(), sensor_experiment(run.period_s()));
+  const Result r = identify_by_equations(record.data(), sensor_experiment(run.period_s()));
   EXPECT_FALSE(r.excitation.sufficient) << to_markdown(r);
   EXPECT_TRUE(std::count(r.excitation.unseen.begin(), r.excitation.unseen.end(), "T_R") == 1)
       << r.excitation.verdict;
@@ -219,7 +219,7 @@ TEST(InductionMotor, TheVerdictNamesAParameterHiddenByNoise) {
     for (double& x : data.columns[column].values)
       x += noise(engine);
   }
-  const Result r = identify(data, sensor_experiment(2.5e-4));
+  const Result r = identify_by_equations(data, sensor_experiment(2.5e-4));
   ASSERT_NE(r.find("K8"), nullptr);
   EXPECT_LT(std::abs(r.at("R_S") - 9.7), r.find("R_S")->index);
   EXPECT_LT(std::abs(r.at("T_R") - 0.67 / 8.6), 1.5 * r.find("T_R")->index);

@@ -68,7 +68,7 @@ TEST(PmMotor, EqualFiltersAndAShiftedVoltageGiveTheTruth) {
   const MeasuredData data = start_data(0.0);
   EXPECT_NEAR(data.at("speed_rad_s")[500], 15.9, 0.2);
   EXPECT_NEAR(data.at("speed_rad_s")[1500], 24.4, 0.2);
-  const Result r = identify(data, experiment(500.0, 500.0, false));
+  const Result r = identify_by_equations(data, experiment(500.0, 500.0, false));
   expect_part(r.at("R_S"), 0.5996, 3e-3);
   expect_part(r.at("L_S"), 2.399e-3, 3e-3);
   expect_part(r.at("K_m"), 0.5151, 3e-3);
@@ -84,12 +84,12 @@ TEST(PmMotor, AnUnshiftedVoltageBiasesTheResistance) {
   const MeasuredData commanded = with_commands(reported);
   Settings e = experiment(500.0, 500.0, false);
   e.processing.voltage_shift = -0.5;
-  expect_part(identify(commanded, e).at("R_S"), 0.5996, 3e-3);
+  expect_part(identify_by_equations(commanded, e).at("R_S"), 0.5996, 3e-3);
   e.processing.voltage_shift = 0.0;
-  const Result r = identify(commanded, e);
+  const Result r = identify_by_equations(commanded, e);
   EXPECT_NEAR(r.at("R_S"), 0.48, 0.024);
   EXPECT_GT(r.at("K_m"), 0.525);
-  EXPECT_NEAR(identify(reported, e).at("R_S"), 0.72, 0.036);
+  EXPECT_NEAR(identify_by_equations(reported, e).at("R_S"), 0.72, 0.036);
 }
 
 // Commands that reach the terminals 1.6 periods late: shifted by 1.6 + 0.5 they give R_S to 1 %, unshifted
@@ -99,9 +99,9 @@ TEST(PmMotor, CommandedVoltagesAreShiftedByTheirDelay) {
   const MeasuredData data = with_commands(start_data(1.6));
   Settings e = experiment(500.0, 500.0, true);
   e.processing.voltage_shift = -2.1;
-  expect_part(identify(data, e).at("R_S"), 0.6, 1e-2);
+  expect_part(identify_by_equations(data, e).at("R_S"), 0.6, 1e-2);
   e.processing.voltage_shift = 0.0;
-  EXPECT_GT(std::abs(identify(data, e).at("R_S") - 0.6), 0.2);
+  EXPECT_GT(std::abs(identify_by_equations(data, e).at("R_S") - 0.6), 0.2);
 }
 
 // Case 32: the text's filters, 500 and 100 Hz. Both ways give the same parameters (1e-3), and in two stages
@@ -109,8 +109,8 @@ TEST(PmMotor, CommandedVoltagesAreShiftedByTheirDelay) {
 // a second stage with the first one's error.
 TEST(PmMotor, TwoStagesShrinkTheMechanicalIndices) {
   const MeasuredData data = start_data(0.0);
-  const Result one = identify(data, experiment(500.0, 100.0, false));
-  const Result two = identify(data, experiment(500.0, 100.0, true));
+  const Result one = identify_by_equations(data, experiment(500.0, 100.0, false));
+  const Result two = identify_by_equations(data, experiment(500.0, 100.0, true));
   EXPECT_LT(one.at("R_S"), 0.58);  // different filters cost this much of 0.6
   for (const char* name : {"R_S", "L_S", "K_m", "J", "f", "f_c"})
     EXPECT_NEAR(two.at(name), one.at(name), 1e-3 * std::abs(one.at(name))) << name;
@@ -138,7 +138,7 @@ TEST(PmMotor, AConstantSpeedShowsNoMechanics) {
     data.columns[2].values[k] = -1.2 * c - 10.6 * s;
     data.columns[3].values[k] = -1.2 * s + 10.6 * c;
   }
-  const Result r = identify(data, experiment(500.0, 500.0, true));
+  const Result r = identify_by_equations(data, experiment(500.0, 500.0, true));
   EXPECT_FALSE(r.excitation.sufficient);
   for (const char* name : {"R_S", "K_m", "J", "f", "f_c"})
     EXPECT_EQ(std::count(r.excitation.unseen.begin(), r.excitation.unseen.end(), name), 1)

@@ -1,0 +1,37 @@
+#include "clients/identification/data/noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace drivebench::identification {
+namespace {
+
+/// The smallest step between two neighbours, 0 for a signal that takes more values than a converter has.
+double quantisation_step(SeriesView x) {
+  constexpr double kLevels = 1 << 20;  // what a converter of 20 bits tells apart
+  const auto [least, most] = std::ranges::minmax_element(x);
+  const double finest = (*most - *least) / kLevels;
+  double step = *most - *least;
+  for (std::size_t k = 1; k < x.size(); ++k) {
+    const double change = std::abs(x[k] - x[k - 1]);
+    if (change > 0.0) step = std::min(step, change);
+  }
+  return step > finest ? step : 0.0;
+}
+
+}  // namespace
+
+double white_noise(SeriesView x) {
+  if (x.size() < 5) return 0.0;
+  constexpr double kMedianOfGauss = 0.6744897501960817;
+  constexpr double kGain2 = 70.0;  // 1 + 16 + 36 + 16 + 1
+  Series size;
+  size.reserve(x.size());
+  for (std::size_t k = 2; k + 2 < x.size(); ++k)
+    size.push_back(std::abs(x[k - 2] - 4.0 * x[k - 1] + 6.0 * x[k] - 4.0 * x[k + 1] + x[k + 2]));
+  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+  std::nth_element(size.begin(), middle, size.end());
+  return std::max(*middle / (kMedianOfGauss * std::sqrt(kGain2)), quantisation_step(x) / std::sqrt(12.0));
+}
+
+}  // namespace drivebench::identification

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "clients/identification/math/series.hpp"
+
+namespace drivebench::identification {
+
+/// The rms of the white part of a signal, without a model: from the median of its fourth differences, which a
+/// smooth signal hardly has and a few edges do not move, and not below the step of its quantisation/sqrt(12).
+/// A signal with edges at every sample shows more than its noise: an upper bound.
+double white_noise(SeriesView x);
+
+}  // namespace drivebench::identification

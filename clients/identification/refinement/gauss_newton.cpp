@@ -1,0 +1,117 @@
+#include "clients/identification/refinement/gauss_newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace drivebench::identification {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+constexpr double kDifference = 1e-5;
+constexpr double kUnknownDeviation = 100.0;
+constexpr int kMostSteps = 15;
+constexpr double kSmallStep2 = 1e-4;  // of a step in its own standard deviations, squared
+constexpr Eigen::Index kParts = 64;
+
+double square_sum(const std::vector<double>& x) {
+  return Eigen::Map<const Vector>(x.data(), static_cast<Eigen::Index>(x.size())).squaredNorm();
+}
+
+/// The residuals at a point and their derivatives.
+struct Linear {
+  std::vector<double> residual;
+  Matrix jacobian;
+  Matrix information;
+  Vector gradient;
+};
+
+bool linearise(const Residuals& residuals, const Vector& at, Linear& out) {
+  const auto rows = static_cast<Eigen::Index>(out.residual.size());
+  out.jacobian.resize(rows, at.size());
+  std::vector<double> moved;
+  for (Eigen::Index k = 0; k < at.size(); ++k) {
+    Vector there = at;
+    there(k) += kDifference;
+    if (!residuals(there, moved)) return false;
+    for (Eigen::Index row = 0; row < rows; ++row) {
+      const auto n = static_cast<std::size_t>(row);
+      out.jacobian(row, k) = (moved[n] - out.residual[n]) / kDifference;
+    }
+  }
+  if (!out.jacobian.allFinite()) return false;
+  const Eigen::Map<const Vector> r(out.residual.data(), rows);
+  out.information = out.jacobian.transpose() * out.jacobian;
+  out.information.diagonal().array() += 1.0 / (kUnknownDeviation * kUnknownDeviation);
+  out.gradient = out.jacobian.transpose() * r;
+  return true;
+}
+
+/// The covariance about the scatter of the scores of parts of the record.
+Matrix scattered(const Linear& l, const Matrix& inverse) {
+  const Eigen::Index rows = l.jacobian.rows();
+  const Eigen::Index columns = l.jacobian.cols();
+  const Eigen::Map<const Vector> r(l.residual.data(), rows);
+  Matrix scatter = Matrix::Zero(columns, columns);
+  for (Eigen::Index part = 0; part < kParts; ++part) {
+    const Eigen::Index first = part * rows / kParts;
+    const Eigen::Index count = (part + 1) * rows / kParts - first;
+    const Vector score = l.jacobian.middleRows(first, count).transpose() * r.segment(first, count);
+    scatter += score * score.transpose();
+  }
+  const double freedom = static_cast<double>(kParts) / static_cast<double>(kParts - columns);
+  return freedom * inverse * scatter * inverse;
+}
+
+Matrix covariance_of(const Linear& l) {
+  const Matrix inverse =
+      l.information.llt().solve(Matrix::Identity(l.information.rows(), l.information.cols()));
+  const Matrix robust = scattered(l, inverse);
+  const Vector growth = (robust.diagonal().array() / inverse.diagonal().array()).max(1.0).sqrt();
+  return growth.asDiagonal() * inverse * growth.asDiagonal();
+}
+
+}  // namespace
+
+Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) {
+  Fit fit{.at = start, .sum = std::numeric_limits<double>::infinity(), .covariance = {}, .found = false};
+  Linear l;
+  if (!residuals(start, l.residual)) return fit;
+  fit.sum = square_sum(l.residual);
+  double damping = 0.0;
+  std::vector<double> tried;
+  for (int step = 0; step < kMostSteps; ++step) {
+    if (!linearise(residuals, fit.at, l)) return fit;
+    bool better = false;
+    double size2 = 0.0;
+    for (int attempt = 0; attempt < 8 && !better; ++attempt) {
+      Matrix damped = l.information;
+      damped.diagonal() *= 1.0 + damping;
+      Vector change = -damped.llt().solve(l.gradient);
+      const double most = change.cwiseAbs().maxCoeff();
+      if (!(most < std::numeric_limits<double>::infinity())) return fit;
+      if (most > limit) change *= limit / most;
+      size2 = change.dot(l.information * change);
+      if (residuals(fit.at + change, tried)) {
+        const double sum = square_sum(tried);
+        if (sum <= fit.sum) {
+          fit.at += change;
+          fit.sum = sum;
+          l.residual.swap(tried);
+          better = true;
+        }
+      }
+      if (size2 < kSmallStep2) break;
+      damping = better ? 0.1 * damping : std::max(10.0 * damping, 1e-3);
+      if (damping < 1e-4) damping = 0.0;
+    }
+    if (!better || size2 < kSmallStep2) break;
+  }
+  fit.covariance = covariance_of(l);
+  fit.found = fit.covariance.allFinite();
+  return fit;
+}
+
+}  // namespace drivebench::identification

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <functional>
+#include <vector>
+
+namespace drivebench::identification {
+
+/// Residuals as a function of coordinates; false where there are none.
+using Residuals = std::function<bool(const Eigen::VectorXd&, std::vector<double>&)>;
+
+/// A least squares of residuals of unit variance at its minimum.
+struct Fit {
+  Eigen::VectorXd at;
+  double sum = 0.0;            ///< of squares
+  Eigen::MatrixXd covariance;  ///< of the coordinates
+  bool found = false;
+};
+
+/// Gauss-Newton with damping after Levenberg and Marquardt, derivatives by forward differences. A direction
+/// that the residuals do not show stays where it is and has a standard deviation of 100. The covariance is
+/// component by component the larger one of two, by variance: the inverse of the information, and the same
+/// about the scatter of the scores of 64 parts of the record, which holds for residuals that are not white.
+/// `limit` bounds the change of a coordinate in a step.
+Fit gauss_newton(const Residuals& residuals, const Eigen::VectorXd& start, double limit);
+
+}  // namespace drivebench::identification

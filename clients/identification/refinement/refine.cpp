@@ -1,0 +1,283 @@
+#include "clients/identification/refinement/refine.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/identification/data/noise.hpp"
+#include "clients/identification/refinement/gauss_newton.hpp"
+#include "clients/identification/refinement/predictor.hpp"
+#include "clients/identification/refinement/unknowns.hpp"
+#include "clients/identification/refinement/verdict.hpp"
+
+namespace drivebench::identification {
+namespace {
+
+constexpr double k95 = 1.96;
+constexpr int kRounds = 2;              ///< of linearisation, Gauss-Newton and noise
+constexpr double kFirstVoltage = 0.02;  ///< of the rms voltage: the noise that the first round allows
+constexpr double kFirstCurrent = 0.01;  ///< of the largest current: the same
+constexpr double kLeastCurrent = 1e-4;  ///< of the largest: no model is better
+constexpr double kHopeless = 25.0;      ///< mean square of the first round's innovations, where 1 is expected
+constexpr double kLargestChange = 0.7;  ///< of a logarithm in a step
+/// Half of an interval, of the value. Beyond a tenth a valley of the error may bend, and the interval, which
+/// is straight, does not tell how far it goes; friction and load enter linearly.
+constexpr double kWidest = 0.1;
+constexpr double kWidestFriction = 0.5;
+constexpr double kImmaterial = 0.02;  ///< half of a friction's interval, of the torque that accelerates
+
+PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
+  PredictorRecord r{.voltages = {data, e},
+                    .currents = {},
+                    .angle = {},
+                    .range = window_of(data, e.processing),
+                    .period_s = data.period_s,
+                    .pole_pairs = static_cast<double>(e.pole_pairs),
+                    .first_speed = 0.0,
+                    .largest_current_a = 0.0,
+                    .largest_speed = 0.0};
+  const ShaftSignals shaft = shaft_signals(data, e, e.processing.shaft);
+  for (std::size_t k = 0; k < r.voltages.phases(); ++k) {
+    r.currents.push_back(data.at("i_" + std::string(1, static_cast<char>('a' + k)) + "_a"));
+    r.largest_current_a = std::max(r.largest_current_a, largest(r.currents.back()));
+  }
+  r.angle = measured_angle(data, e);
+  r.largest_speed = largest(shaft.speed);
+  r.first_speed = shaft.speed[r.range.first];
+  return r;
+}
+
+SensorNoise first_noise(const PredictorRecord& r, const Settings& e) {
+  SensorNoise noise{.voltage_v = kFirstVoltage * r.voltages.rms(r.range), .current_a = 0.0, .angle_rad = 0.0};
+  for (const SeriesView i : r.currents)
+    noise.current_a = std::max(noise.current_a, white_noise(i.subspan(r.range.first, r.range.count())));
+  noise.current_a = std::max(noise.current_a, kLeastCurrent * r.largest_current_a);
+  noise.angle_rad =
+      e.counts_per_revolution > 0.0
+          ? 2.0 * std::numbers::pi / e.counts_per_revolution / std::sqrt(12.0)
+          : std::max(1e-6, white_noise(SeriesView(r.angle).subspan(r.range.first, r.range.count())));
+  return noise;
+}
+
+/// The noises of voltages and currents that make the likelihood greatest, each to a fifth.
+template <class Model>
+SensorNoise likeliest(Predictor<Model>& predictor, const Model& model, SensorNoise noise,
+                      const SensorNoise& least, const SensorNoise& most) {
+  double best = predictor.unlikelihood(model, noise);
+  const auto improve = [&](double SensorNoise::*which, double factor) {
+    bool any = false;
+    for (const double by : {factor, 1.0 / factor}) {
+      while (true) {
+        SensorNoise there = noise;
+        there.*which = std::clamp(there.*which * by, least.*which, most.*which);
+        if (there.*which == noise.*which) break;
+        const double value = predictor.unlikelihood(model, there);
+        if (!(value < best)) break;
+        best = value;
+        noise = there;
+        any = true;
+      }
+      if (any) break;
+    }
+    return any;
+  };
+  for (const double factor : {4.0, 2.0, 1.2}) {
+    for (int pass = 0; pass < 3; ++pass) {
+      const bool first = improve(&SensorNoise::voltage_v, factor);
+      if (!improve(&SensorNoise::current_a, factor) && !first) break;
+    }
+  }
+  predictor.filter(model, noise);
+  return noise;
+}
+
+/// The torque that accelerates, rms, over spans of a hundredth of the window [N m].
+double accelerating_torque(const Series& speeds, double period_s, double inertia) {
+  const std::size_t span = std::max<std::size_t>(1, speeds.size() / 100);
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t k = span; k < speeds.size(); k += span, ++count)
+    sum += (speeds[k] - speeds[k - span]) * (speeds[k] - speeds[k - span]);
+  return inertia * std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, count))) /
+         (static_cast<double>(span) * period_s);
+}
+
+double rms(const Series& x) {
+  double sum = 0.0;
+  for (const double value : x)
+    sum += value * value;
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, x.size())));
+}
+
+/// Puts values and intervals at a fit into the result; the values of before become those of the equations.
+void put_fit(const Settings& e, const std::vector<Unknown>& unknowns, const Fit& fit, Result& result) {
+  for (Estimate& estimate : result.parameters)
+    estimate.by_equations = estimate.value;
+  const auto at = [&](const Eigen::VectorXd& z) {
+    put(unknowns, z, result);
+    put_dependent(e, result);
+    std::vector<double> values;
+    for (const Estimate& estimate : result.parameters)
+      values.push_back(estimate.value);
+    return values;
+  };
+  constexpr double kStep = 1e-6;
+  std::vector<Eigen::VectorXd> gradients(result.parameters.size(), Eigen::VectorXd::Zero(fit.at.size()));
+  const std::vector<double> values = at(fit.at);
+  for (Eigen::Index k = 0; k < fit.at.size(); ++k) {
+    Eigen::VectorXd there = fit.at;
+    there(k) += kStep;
+    const std::vector<double> moved = at(there);
+    for (std::size_t n = 0; n < values.size(); ++n)
+      gradients[n](k) = (moved[n] - values[n]) / kStep;
+  }
+  at(fit.at);
+  for (std::size_t n = 0; n < values.size(); ++n)
+    result.parameters[n].interval = k95 * std::sqrt(gradients[n].dot(fit.covariance * gradients[n]));
+}
+
+/// The parameters that these data do not determine. The electrical ones share the voltages: where one is
+/// open, the valley of the error bends, and none of them is stated. `torque_nm` accelerates, `speed_rad_s` is
+/// an rms.
+std::vector<std::string> unseen_parameters(const Result& result, double torque_nm, double speed_rad_s) {
+  std::vector<std::string> unseen;
+  const auto immaterial = [&](const Estimate& e) {
+    const double factor = e.name == "f" ? speed_rad_s : e.name == "f_c" || e.name == "tau_L" ? 1.0 : HUGE_VAL;
+    return *e.interval * factor < kImmaterial * torque_nm;
+  };
+  for (const Estimate& e : result.parameters) {
+    if (e.name == "K17") continue;
+    const bool linear = e.name == "f" || e.name == "f_c" || e.name == "tau_L";
+    const double widest = linear ? kWidestFriction : kWidest;
+    if (!(*e.interval < widest * std::abs(e.value)) && !immaterial(e)) unseen.push_back(e.name);
+  }
+  const auto electrical = [](const Estimate& e) {
+    constexpr std::array kMechanical = {"J", "f", "f_c", "tau_L", "K16", "K17"};
+    return std::ranges::find(kMechanical, e.name) == kMechanical.end();
+  };
+  if (std::ranges::any_of(result.parameters, [&](const Estimate& e) {
+        return electrical(e) && std::ranges::find(unseen, e.name) != unseen.end();
+      })) {
+    std::erase_if(unseen, [&](const std::string& name) { return electrical(*result.find(name)); });
+    std::vector<std::string> all;
+    for (const Estimate& e : result.parameters) {
+      if (electrical(e)) all.push_back(e.name);
+    }
+    unseen.insert(unseen.begin(), all.begin(), all.end());
+  }
+  const auto is_unseen = [&](const char* name) { return std::ranges::find(unseen, name) != unseen.end(); };
+  if (result.find("K17") != nullptr && (is_unseen("f") || is_unseen("tau_L") || is_unseen("J")))
+    unseen.emplace_back("K17");
+  return unseen;
+}
+
+template <class Model>
+void refine_with(const PredictorRecord& record, const Settings& e, Result& result) {
+  const double duration_s = record.period_s * static_cast<double>(record.range.count());
+  const std::vector<Unknown> unknowns = unknowns_of(e, result, record.largest_speed, duration_s);
+  Result trial = result;
+  const auto model_at = [&](const Eigen::VectorXd& z) {
+    put(unknowns, z, trial);
+    return Model(trial, e);
+  };
+  Predictor<Model> predictor(record, Model(result, e));
+  const SensorNoise first = first_noise(record, e);
+  const double voltage_rms_v = record.voltages.rms(record.range);
+  const SensorNoise least{.voltage_v = 1e-4 * voltage_rms_v,
+                          .current_a = kLeastCurrent * record.largest_current_a,
+                          .angle_rad = first.angle_rad};
+  const SensorNoise most{
+      .voltage_v = voltage_rms_v, .current_a = record.largest_current_a, .angle_rad = first.angle_rad};
+  const auto residuals = [&](const Eigen::VectorXd& z, std::vector<double>& out) {
+    const Model model = model_at(z);
+    const Estimate* const sigma = trial.find("sigma");
+    return (sigma == nullptr || sigma->value < 1.0) && predictor.innovations(model, out);
+  };
+  SensorNoise noise = first;
+  noise.current_a = std::max(noise.current_a, kFirstCurrent * record.largest_current_a);
+  Fit fit{.at = coordinates_of(unknowns, result), .sum = 0.0, .covariance = {}, .found = true};
+  for (int round = 0; round < kRounds && fit.found; ++round) {
+    predictor.linearise(model_at(fit.at), noise);
+    if (round > 0) {
+      noise.current_a = first.current_a;
+      noise = likeliest(predictor, model_at(fit.at), noise, least, most);
+    }
+    fit = gauss_newton(residuals, fit.at, kLargestChange);
+    if (round == 0 && fit.sum > kHopeless * static_cast<double>(predictor.rows())) fit.found = false;
+  }
+  if (!fit.found) {
+    result.excitation = verdict_against(result, "no motor near that of the equations follows it");
+    return;
+  }
+  std::vector<double> innovations;
+  residuals(fit.at, innovations);
+  const auto outputs = static_cast<std::size_t>(predictor.outputs());
+  Series angle_errors;
+  Series current_errors;
+  for (std::size_t row = 0; row < innovations.size(); ++row)
+    (row % outputs + 1 == outputs ? angle_errors : current_errors).push_back(innovations[row]);
+  put_fit(e, unknowns, fit, result);
+  result.explanation = {.voltage_noise_v = noise.voltage_v,
+                        .voltage_rms_v = voltage_rms_v,
+                        .current_noise_a = noise.current_a,
+                        .current_error = rms(current_errors),
+                        .current_white_a = first.current_a,
+                        .angle_error = rms(angle_errors)};
+  std::string reason = unexplained(*result.explanation, record.largest_current_a);
+  for (const char* name : {"f", "f_c"}) {
+    const Estimate* const friction = result.find(name);
+    if (reason.empty() && friction != nullptr && friction->value + *friction->interval < 0.0)
+      reason = std::string(name) + " comes out below zero, a friction that drives";
+  }
+  if (!reason.empty()) {
+    result.excitation = verdict_against(result, reason);
+    return;
+  }
+  const double torque_nm = accelerating_torque(predictor.speeds(), record.period_s, result.at("J"));
+  result.excitation = verdict_on(e.kind, unseen_parameters(result, torque_nm, rms(predictor.speeds())));
+}
+
+/// Whether the estimates of the equations can begin a refinement: finite, and not zero where a motor is not.
+bool can_begin(const Settings& e, const Result& result) {
+  if (result.find("J") == nullptr) return false;
+  for (const Unknown& unknown : unknowns_of(e, result, 1.0, 1.0)) {
+    const double value = result.at(unknown.name);
+    if (!std::isfinite(value) || (unknown.scale == 0.0 && value == 0.0)) return false;
+  }
+  return true;
+}
+
+/// Signs that a motor cannot have are turned, so that the search begins with a motor.
+void make_positive(const Settings& e, Result& result) {
+  for (const Unknown& unknown : unknowns_of(e, result, 1.0, 1.0)) {
+    double& value = result.find(unknown.name)->value;
+    if (unknown.scale == 0.0) value = std::abs(value);
+  }
+}
+
+}  // namespace
+
+void refine(const MeasuredData& data, const Settings& e, Result& result) {
+  if (!can_begin(e, result)) {
+    result.excitation = verdict_without_start(e.kind, result);
+    return;
+  }
+  make_positive(e, result);
+  const PredictorRecord record = record_of(data, e);
+  switch (e.kind) {
+    case MotorKind::kDc:
+      return refine_with<DcModel>(record, e, result);
+    case MotorKind::kInduction:
+      return refine_with<InductionModel>(record, e, result);
+    case MotorKind::kPmSynchronous:
+      return refine_with<PmModel>(record, e, result);
+    case MotorKind::kBldc:
+      return refine_with<BldcModel>(record, e, result);
+  }
+}
+
+}  // namespace drivebench::identification

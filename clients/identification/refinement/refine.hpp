@@ -1,0 +1,19 @@
+#pragma once
+
+#include "clients/identification/data/settings.hpp"
+
+namespace drivebench::identification {
+
+/// Refines the estimates of the equations by the predicted trajectory (predictor.hpp): Gauss-Newton on the
+/// innovations over all parameters, friction and load, with the noises of voltages and currents by maximum
+/// likelihood; the encoder's is that of its counts. Each estimate gets its 95 % interval: 1.96 standard
+/// deviations from the information of the innovations or, if that is more, from the scatter of their scores,
+/// which does not take the innovations for white. The book's value and its index stay beside it.
+///
+/// The verdict of the equations is replaced: a parameter whose interval is wider than half of its value is
+/// unseen (a friction also stands where it hardly matters beside the torque that accelerates), and a motor
+/// that does not explain the record within what noise and quantisation allow has no parameter that is seen.
+/// The verdict then says which experiment would help.
+void refine(const MeasuredData& data, const Settings& settings, Result& result);
+
+}  // namespace drivebench::identification

@@ -1,0 +1,117 @@
+#include "clients/identification/refinement/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+namespace drivebench::identification {
+namespace {
+
+/// What shows a parameter.
+struct Advice {
+  MotorKind kind;
+  std::string_view names;  ///< each between blanks
+  std::string_view experiment;
+};
+
+constexpr auto kAdvice = std::to_array<Advice>({
+    {MotorKind::kInduction, " R_S T_R L_S sigma M L_R R_R K4 K6 K8 K14 ",
+     "record a start from the line until 50 ms after the motor has run up, or a motor that changes its load"},
+    {MotorKind::kDc, " R K_T ",
+     "let current and speed change independently, by a voltage that changes its sign several times a second"},
+    {MotorKind::kPmSynchronous, " R_S K_m ",
+     "let current and speed change independently, by a u_q that swings several times a second"},
+    {MotorKind::kBldc, " R_S tau_p ",
+     "let current and speed change independently, by a voltage that swings several times a second"},
+    {MotorKind::kDc, " L ", "let the current change within L/R, by steps of the voltage"},
+    {MotorKind::kPmSynchronous, " L_S ",
+     "let the current change within L/R, by a u_d that swings at some 60 Hz"},
+    {MotorKind::kBldc, " L+M ",
+     "let the current change within L/R, by a higher speed or steps of the voltage"},
+});
+
+constexpr std::string_view kInertia = "let the speed rise and fall by much of itself";
+constexpr std::string_view kFriction = "record longer, at low and high speed, and in both directions";
+constexpr std::string_view kLoad = "record longer after the motor has run up";
+
+std::string_view experiment_for(MotorKind kind, const std::string& name) {
+  if (name == "J" || name == "K16") return kInertia;
+  if (name == "f" || name == "f_c") return kFriction;
+  if (name == "tau_L" || name == "K17") return kLoad;
+  for (const Advice& each : kAdvice) {
+    if (each.kind == kind && each.names.find(" " + name + " ") != std::string_view::npos)
+      return each.experiment;
+  }
+  return kFriction;
+}
+
+/// The experiments that would show these parameters, each once.
+std::string experiments_for(MotorKind kind, const std::vector<std::string>& names) {
+  std::vector<std::string_view> experiments;
+  for (const std::string& name : names) {
+    const std::string_view experiment = experiment_for(kind, name);
+    if (std::ranges::find(experiments, experiment) == experiments.end()) experiments.push_back(experiment);
+  }
+  return fmt::format("{}", fmt::join(experiments, "; "));
+}
+
+std::vector<std::string> names_of(const Result& result) {
+  std::vector<std::string> names;
+  for (const Estimate& estimate : result.parameters)
+    names.push_back(estimate.name);
+  return names;
+}
+
+}  // namespace
+
+std::string unexplained(const Explanation& found, double largest_current_a) {
+  constexpr double kMostCurrent = 3.0;
+  constexpr double kMostOfLargest = 0.01;
+  constexpr double kMostVoltage = 0.03;
+  constexpr double kMostError = 1.5;
+  std::string reason;
+  const auto add = [&reason](const std::string& text) { reason += (reason.empty() ? "" : ", ") + text; };
+  if (found.current_noise_a > kMostCurrent * found.current_white_a + kMostOfLargest * largest_current_a)
+    add(fmt::format("its currents are off by {:.3g} A rms where the measured ones have {:.3g} A of noise",
+                    found.current_noise_a, found.current_white_a));
+  if (found.current_error > kMostError)
+    add(fmt::format("its currents stray {:.3g} times as far as these noises allow", found.current_error));
+  if (found.voltage_noise_v > kMostVoltage * found.voltage_rms_v)
+    add(fmt::format("it needs {:.3g} V rms beside the measured {:.3g} V", found.voltage_noise_v,
+                    found.voltage_rms_v));
+  if (found.angle_error > kMostError)
+    add(fmt::format("its shaft strays {:.3g} times as far as the counts of the encoder allow",
+                    found.angle_error));
+  return reason;
+}
+
+Excitation verdict_on(MotorKind kind, std::vector<std::string> unseen) {
+  Excitation e{
+      .sufficient = unseen.empty(), .unseen = std::move(unseen), .verdict = "the data see every parameter"};
+  if (e.sufficient) return e;
+  e.verdict = fmt::format("not identifiable: under the noise of these data {} may lie far off; {}",
+                          fmt::join(e.unseen, ", "), experiments_for(kind, e.unseen));
+  return e;
+}
+
+Excitation verdict_without_start(MotorKind kind, const Result& result) {
+  Excitation e{.sufficient = false, .unseen = names_of(result), .verdict = {}};
+  const std::string& by_equations = result.excitation.verdict;
+  e.verdict = fmt::format("{}; {}", result.excitation.sufficient ? "not identifiable" : by_equations,
+                          experiments_for(kind, e.unseen));
+  return e;
+}
+
+Excitation verdict_against(const Result& result, const std::string& reason) {
+  Excitation e{.sufficient = false, .unseen = names_of(result), .verdict = {}};
+  e.verdict = "no motor of this kind explains the record: " + reason +
+              "; check pole pairs, counts and direction of the encoder, order of the phases and voltage "
+              "shift, or record "
+              "a run that shows more of the motor";
+  return e;
+}
+
+}  // namespace drivebench::identification

@@ -1,0 +1,44 @@
+#include "clients/identification/motors/terminal_voltages.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace drivebench::identification {
+namespace {
+
+MeasuredData record(double (*value)(int)) {
+  MeasuredData data{.period_s = 1e-3, .columns = {{"u_a_v", "V", {}}}};
+  for (int k = 0; k < 100; ++k)
+    data.columns[0].values.push_back(value(k));
+  return data;
+}
+
+TerminalVoltages voltages(const MeasuredData& data, double shift) {
+  Settings e{.kind = MotorKind::kDc};
+  e.processing.voltage_shift = shift;
+  return {data, e};
+}
+
+// The mean of the period before its sample holds throughout that period; a command that arrives 1.6 periods
+// late shares a period with the one before it, 0.6 to 0.4. Catches: a voltage a period early or late, edges
+// that are rounded.
+TEST(TerminalVoltages, AHeldValueFillsItsPeriod) {
+  const MeasuredData data = record([](int k) { return static_cast<double>(k); });
+  for (const double part : {0.0, 0.5, 1.0}) {
+    EXPECT_DOUBLE_EQ(voltages(data, 0.5).at(10, part)[0], 11.0);
+    EXPECT_DOUBLE_EQ(voltages(data, -0.5).at(10, part)[0], 10.0);
+    EXPECT_NEAR(voltages(data, -2.1).at(10, part)[0], 10.0 - 1.6, 1e-12);
+  }
+}
+
+// The voltage of a line lies on its cubic: a sine of 20 samples to 1e-4. Catches: a line in steps, a cubic
+// that is off by a sample.
+TEST(TerminalVoltages, AnInstantaneousValueRunsThroughACubic) {
+  const MeasuredData data = record([](int k) { return std::cos(0.314 * k); });
+  EXPECT_NEAR(voltages(data, 0.0).at(50, 0.5)[0], std::cos(0.314 * 50.5), 5e-4);
+  EXPECT_NEAR(voltages(data, 0.2).at(50, 0.5)[0], std::cos(0.314 * 50.7), 5e-4);
+}
+
+}  // namespace
+}  // namespace drivebench::identification
