@@ -89,12 +89,11 @@ std::string unexplained(const Explanation& found, double largest_current_a) {
 }
 
 Excitation verdict_on(MotorKind kind, std::vector<std::string> unseen) {
-  Excitation e{
-      .sufficient = unseen.empty(), .unseen = std::move(unseen), .verdict = "the data see every parameter"};
-  if (e.sufficient) return e;
-  e.verdict = fmt::format("not identifiable: under the noise of these data {} may lie far off; {}",
-                          fmt::join(e.unseen, ", "), experiments_for(kind, e.unseen));
-  return e;
+  if (unseen.empty()) return {.sufficient = true, .unseen = {}, .verdict = "the data see every parameter"};
+  const std::string sentence =
+      fmt::format("not identifiable: under the noise of these data {} may lie far off; {}",
+                  fmt::join(unseen, ", "), experiments_for(kind, unseen));
+  return {.sufficient = false, .unseen = std::move(unseen), .verdict = sentence};
 }
 
 Excitation verdict_without_start(MotorKind kind, const Result& result) {
