@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "protocols/can/layout.hpp"
 #include "protocols/signals/catalogue.hpp"
@@ -15,34 +16,47 @@ static_assert(32767 * kDutyUnit == 1.0, "the full duty is exactly 1");
 
 // ---- keys of match() ----
 
-/// The part of a row that match() needs, small because match() looks at every row.
+/// The part of a message that match() needs, small because match() may look at every message.
 struct Key {
-  Message message;
-  bool in_classic;
-  bool in_fd;
-  bool wide;
-  std::uint8_t size;
-  std::uint8_t row;
-  bool per_node;
+  /// The rows of a message in one variant of the profile.
+  struct Rows {
+    std::uint8_t count = 0;
+    std::array<std::uint8_t, 2> index{};  ///< in kMessages; the second one is for wide axes
+    bool only_wide = false;
+
+    constexpr void add(std::size_t i) {
+      if (count == 0) only_wide = kMessages[i].width == Width::kWide;
+      index.at(count++) = static_cast<std::uint8_t>(i);
+    }
+  };
+
+  Message message{};
+  bool per_node = false;
+  std::array<Rows, 2> rows{};  ///< of the classic profile, of the FD profile
+
+  constexpr bool only_wide() const { return rows[0].only_wide || rows[1].only_wide; }
 };
 
-/// Narrow axes come first: in a profile without wide axes their identifiers may belong to other messages.
+/// The messages that a bus carries in every tick; match() looks at these first.
+constexpr std::array kInEveryTick = {Message::kSensors, Message::kCommand, Message::kCurrents,
+                                     Message::kEncoder, Message::kEdges,   Message::kSync};
+
+/// Messages that only wide axes have come last: on a bus without such axes their identifiers may belong to
+/// others.
 constexpr auto kKeys = [] {
-  std::array<Key, kMessages.size()> keys{};
-  std::size_t n = 0;
-  for (const bool wide : {false, true}) {
-    for (std::size_t i = 0; i < kMessages.size(); ++i) {
-      const MessageRow& row = kMessages[i];
-      if ((row.width == Width::kWide) != wide) continue;
-      keys[n++] = {.message = row.message,
-                   .in_classic = is_in(row, false),
-                   .in_fd = is_in(row, true),
-                   .wide = wide,
-                   .size = row.size,
-                   .row = static_cast<std::uint8_t>(i),
-                   .per_node = row.per_node};
-    }
+  std::array<Key, kMessageCount> keys{};
+  for (std::size_t m = 0; m < kMessageCount; ++m)
+    keys[m].message = static_cast<Message>(m);
+  for (std::size_t i = 0; i < kMessages.size(); ++i) {
+    Key& key = keys[static_cast<std::size_t>(kMessages[i].message)];
+    key.per_node = kMessages[i].per_node;
+    if (is_in(kMessages[i], false)) key.rows[0].add(i);
+    if (is_in(kMessages[i], true)) key.rows[1].add(i);
   }
+  std::ranges::sort(keys, {}, [](const Key& key) {
+    const auto often = std::ranges::find(kInEveryTick, key.message) - kInEveryTick.begin();
+    return (key.only_wide() ? 2 * kMessageCount : 0) + static_cast<std::size_t>(often);
+  });
   return keys;
 }();
 
@@ -109,6 +123,10 @@ std::uint64_t raw_of(const Field& field, double value, double unit) noexcept {
   return std::bit_cast<std::uint32_t>(single(value));
 }
 
+double value_of_single(std::uint64_t raw) noexcept {
+  return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
+}
+
 double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
   constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
   const std::int64_t number = unwrap(raw, field.bits, 0);
@@ -127,7 +145,7 @@ double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
     case Encoding::kFloat:
       break;
   }
-  return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)));
+  return value_of_single(raw);
 }
 
 /// The value of one count of a set-point in a classic command whose mode gives duties or currents; 0 in the
@@ -145,7 +163,7 @@ double unit_of(const Field& field, const Profile& profile, double setpoint) noex
 
 // ---- bytes ----
 
-// Loops of constant length, which compilers turn into one move.
+// Both become one move: the loop at any level, the shifts where a loop would not.
 template <unsigned kBytes>
 void put_bytes(std::uint8_t* at, std::uint64_t raw) noexcept {
   for (unsigned i = 0; i < kBytes; ++i)
@@ -153,10 +171,9 @@ void put_bytes(std::uint8_t* at, std::uint64_t raw) noexcept {
 }
 template <unsigned kBytes>
 std::uint64_t get_bytes(const std::uint8_t* at) noexcept {
-  std::uint32_t raw = 0;
-  for (unsigned i = 0; i < kBytes; ++i)
-    raw |= std::uint32_t{at[i]} << 8 * i;
-  return raw;
+  return [at]<unsigned... i>(std::integer_sequence<unsigned, i...>) noexcept {
+    return ((std::uint32_t{at[i]} << 8 * i) | ...);
+  }(std::make_integer_sequence<unsigned, kBytes>{});
 }
 
 void put(Frame& frame, const Field& field, std::uint64_t raw) noexcept {
@@ -224,12 +241,15 @@ Frame encode(const MessageRow& row, const Profile& profile, std::uint32_t node,
 
 Values decode(const MessageRow& row, const Profile& profile, const Frame& frame) noexcept {
   Values values;
+  const Layout& layout = layout_of(row);
   const double setpoint =
       is_classic_command(row, profile)
           ? setpoint_unit(profile, static_cast<double>(frame.data[row.fields[kCommandMode].start_bit / 8U]))
           : 0.0;
   const std::uint8_t page = frame.data[0];
-  for (std::size_t i = 0; i < row.fields.size(); ++i) {
+  for (const auto [i, byte] : std::span(layout.float_fields).first(layout.float_count))
+    values[i] = value_of_single(get_bytes<4>(&frame.data[byte]));
+  for (const std::uint8_t i : std::span(layout.coded_fields).first(layout.coded_count)) {
     const Field& field = row.fields[i];
     values[i] =
         is_on_page(field, page) ? value_of(field, get(frame, field), unit_of(field, profile, setpoint)) : 0.0;
@@ -290,20 +310,18 @@ std::string_view name_of(FrameProblem problem) noexcept {
 
 Match match(const Profile& profile, const Frame& frame) noexcept {
   if (frame.error) return {nullptr, 0, FrameProblem::kError};
-  const Key* found = nullptr;
   const std::uint32_t max_node = profile.max_node();
   for (const Key& key : kKeys) {
     const std::uint32_t node = frame.id - profile.base_ids[static_cast<std::size_t>(key.message)];
     if (key.per_node ? node < 1 || node > max_node : node != 0) continue;
-    if (!(profile.fd ? key.in_fd : key.in_classic) || (key.wide && !profile.wide)) continue;
-    if (found != nullptr && (key.message != found->message || key.size != frame.size)) continue;
-    found = &key;
-    if (!profile.wide || key.size == frame.size) break;
+    const Key::Rows& rows = key.rows[profile.fd ? 1 : 0];
+    if (rows.count == 0 || (rows.only_wide && !profile.wide)) continue;
+    const MessageRow* row = &kMessages[rows.index[0]];
+    if (profile.wide && rows.count == 2 && frame.size == kMessages[rows.index[1]].size)
+      row = &kMessages[rows.index[1]];
+    return {row, node, problem_of(*row, profile, frame)};
   }
-  if (found == nullptr) return {};
-  const MessageRow& row = kMessages[found->row];
-  return {&row, frame.id - profile.base_ids[static_cast<std::size_t>(row.message)],
-          problem_of(row, profile, frame)};
+  return {};
 }
 
 void put_edge(Frame& frame, std::size_t index, Edge edge) noexcept {

@@ -22,7 +22,7 @@ constexpr bool can_carry(const Field& field, const Signal& signal) {
 }
 
 /// Fields are in the order of their pages; within a page they are sorted, disjoint, whole bytes and inside
-/// the frame. Singles stand on every page: encode_sample() relies on it.
+/// the frame. Singles stand on every page: encode_sample() and decode() rely on it.
 constexpr bool is_sound(const MessageRow& row) {
   if (row.fields.size() > kMaxFields || !is_fd_size(row.size)) return false;
   if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() relies on the size
@@ -60,6 +60,12 @@ struct SingleField {
   std::size_t byte;
 };
 
+/// A field that is a single.
+struct FloatField {
+  std::uint8_t index;
+  std::uint8_t byte;
+};
+
 /// A signal that frames carry in another encoding.
 struct OtherField {
   const Field* field;
@@ -75,6 +81,11 @@ struct Layout {
   std::size_t single_count = 0;
   std::array<OtherField, kMaxFields> others{};
   std::size_t other_count = 0;
+  /// For decode(), apart for the same reason: the fields that are singles, and the indices of the others.
+  std::array<FloatField, kMaxFields> float_fields{};
+  std::size_t float_count = 0;
+  std::array<std::uint8_t, kMaxFields> coded_fields{};
+  std::size_t coded_count = 0;
   bool paged = false;
   /// By page. Bit n: byte n belongs to no field of the page. The last element is for pages that do not exist.
   std::array<std::uint64_t, kPages + 1> reserved{};
@@ -95,6 +106,12 @@ inline constexpr auto kLayouts = [] {
     for (std::size_t f = 0; f < row.fields.size(); ++f) {
       const Field& field = row.fields[f];
       const Signal* const signal = layout.signals[f] = find_signal(field.signal);
+      if (field.encoding == Encoding::kFloat) {
+        layout.float_fields[layout.float_count++] = {static_cast<std::uint8_t>(f),
+                                                     static_cast<std::uint8_t>(field.start_bit / 8U)};
+      } else {
+        layout.coded_fields[layout.coded_count++] = static_cast<std::uint8_t>(f);
+      }
       if (signal == nullptr) continue;
       if (field.encoding == Encoding::kFloat) {
         layout.singles[layout.single_count++] = {signal->as_real, field.start_bit / 8U};
