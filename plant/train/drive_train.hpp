@@ -121,10 +121,13 @@ class DriveTrain final : public Train {
   /// The step up to the event that comes first.
   Cut cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
                    double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
-  EventValues values_at(const AxisCore& core, TerminalSet open, TerminalSet dying, const Whole& x,
+  /// The distances to events. `current_a` are the terminals' currents, at the start of a piece those that
+  /// connect_piece() knew: a diode that begins to conduct has exactly none there, where the state of the
+  /// windings may leave a residue of rounding whose sign would end the piece at once.
+  EventValues values_at(const AxisCore& core, TerminalSet dying, const PhaseValues& current_a, const Whole& x,
                         const ShaftBranch& branch, double load_nm, double corner) const noexcept;
-  void add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying, const State& x,
-                      const RotorMotion& motion, double corner, EventValues& values) const noexcept;
+  void add_electrical(TerminalSet dying, const PhaseValues& current_a, const RotorMotion& motion,
+                      double corner, EventValues& values) const noexcept;
   double corner_between(const RotorMotion& from, const RotorMotion& to) const noexcept;
   void settle_terminals(const AxisCore& core, AxisState& state, State& x, const RotorMotion& motion,
                         int electrical_event) const noexcept;

@@ -79,15 +79,12 @@ void DriveTrain<Machine, Shaft>::step_varying(const AxisCore& core, Whole& x, do
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::add_electrical(const AxisCore& core, TerminalSet open, TerminalSet dying,
-                                                const State& x, const RotorMotion& motion, double corner,
+void DriveTrain<Machine, Shaft>::add_electrical(TerminalSet dying, const PhaseValues& current_a,
+                                                const RotorMotion& motion, double corner,
                                                 EventValues& values) const noexcept {
-  if (dying != 0) {
-    const PhaseValues i = terminal_currents(core.connection, winding_currents(c_, x, motion), open);
-    if ((dying & 1u) != 0) values.add(i.a);
-    if ((dying & 2u) != 0) values.add(i.b);
-    if ((dying & 4u) != 0) values.add(i.c);
-  }
+  if ((dying & 1u) != 0) values.add(current_a.a);
+  if ((dying & 2u) != 0) values.add(current_a.b);
+  if ((dying & 4u) != 0) values.add(current_a.c);
   if constexpr (Machine::kHasCorners) {
     if (corner != kNoCorner) values.add(corner_position(c_, motion.angle_rad) - corner);
   }
@@ -104,8 +101,9 @@ double DriveTrain<Machine, Shaft>::corner_between(const RotorMotion& from,
 }
 
 template <class Machine, class Shaft>
-EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, TerminalSet open, TerminalSet dying,
-                                                  const Whole& x, const ShaftBranch& branch, double load_nm,
+EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, TerminalSet dying,
+                                                  const PhaseValues& current_a, const Whole& x,
+                                                  const ShaftBranch& branch, double load_nm,
                                                   double corner) const noexcept {
   EventValues values;
   if (core.shaft_has_events) {
@@ -115,7 +113,7 @@ EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, Terminal
     for (int k = 0; k < values.shaft; ++k)
       values.add(shaft[static_cast<std::size_t>(k)]);
   }
-  add_electrical(core, open, dying, x.machine, motion_of(x), corner, values);
+  add_electrical(dying, current_a, motion_of(x), corner, values);
   return values;
 }
 
@@ -126,9 +124,10 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
   const TerminalSet dying = piece_.circuit.dying;
   const double corner = corner_between(motion_of(from), motion_of(to));
   const auto values = [&](const Whole& x) noexcept {
-    return values_at(core, state.open_terminals, dying, x, branch, load_nm, corner);
+    const PhaseValues current_a = dying != 0 ? currents(core, state, x.machine, motion_of(x)) : PhaseValues{};
+    return values_at(core, dying, current_a, x, branch, load_nm, corner);
   };
-  const EventValues before = values(from);
+  const EventValues before = values_at(core, dying, piece_.current_a, from, branch, load_nm, corner);
   const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
@@ -338,8 +337,12 @@ void DriveTrain<Machine, Shaft>::shorten(AxisCore& core, AxisState& state, doubl
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::add_events(const AxisCore& core, const AxisState& state, PieceEnd end,
                                             const RotorMotion& motion, EventValues& values) const noexcept {
-  add_electrical(core, state.open_terminals, piece_.circuit.dying,
-                 end == PieceEnd::kStart ? piece_.from : piece_.stage, turned(motion), piece_.corner, values);
+  const RotorMotion at = turned(motion);
+  const TerminalSet dying = piece_.circuit.dying;
+  PhaseValues current_a{};
+  if (dying != 0)
+    current_a = end == PieceEnd::kStart ? piece_.current_a : currents(core, state, piece_.stage, at);
+  add_electrical(dying, current_a, at, piece_.corner, values);
 }
 
 template <class Machine, class Shaft>

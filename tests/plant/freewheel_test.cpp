@@ -189,5 +189,38 @@ TEST(Freewheel, ABackEmfAboveTheLinkVoltageChargesTheLinkAndBrakes) {
   EXPECT_LT(s.torque_nm, 0.0);
 }
 
+/// The pieces of the ticks beyond the substeps: each ends at a located event.
+int events_of_rectifier(double link_v, int ticks) {
+  AxisParameters p = servo_axis();
+  p.machine = PmMachineParameters{.pole_pairs = 3,
+                                  .stator_resistance_ohm = 0.4,
+                                  .inductance_d_h = 1.1e-3,
+                                  .inductance_q_h = 1.1e-3,
+                                  .torque_constant_nm_per_a = 0.1,
+                                  .star = true};
+  p.mechanics.inertia_kgm2 = 1e3;
+  p.drive.amplifier.voltage_limit_v = link_v;
+  Axis axis(p, kServoTiming, 1, 0);
+  spin(axis, 300.0);
+  int events = 0;
+  for (Tick tick = 0; tick < ticks; ++tick) {
+    axis.advance(kOff, tick);
+    events += static_cast<int>(axis.last_tick().size()) - kServoTiming.substeps;
+  }
+  return events;
+}
+
+// The magnet induces 42 V between two terminals at most, the link takes what is above 30 V: in each
+// electrical turn the current of every diode of six ends once. Ten electrical turns, within one at their
+// ends. Catches: a diode that begins to conduct with a residue of rounding instead of no current, and dies of
+// its sign at once.
+TEST(Freewheel, ARectifierOfSixPulsesHasSixEventsInATurn) {
+  const double turn_s = 2.0 * 3.14159265358979 / (3.0 * 300.0);
+  const int ticks = static_cast<int>(10.0 * turn_s / kServoTick_s);
+  for (const double link_v : {5.0, 10.0, 15.0, 20.0}) {
+    EXPECT_NEAR(events_of_rectifier(link_v, ticks), 60, 3) << link_v;
+  }
+}
+
 }  // namespace
 }  // namespace drivebench
