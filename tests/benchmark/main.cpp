@@ -54,7 +54,7 @@ int run(int argc, char** argv) {
   bool markdown = false;
   bool strict = false;
   Plan plan;
-  CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about three minutes.");
+  CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about ten minutes.");
   app.add_option("--only", only, "these measurements only, separated by commas")
       ->delimiter(',')
       ->check(CLI::IsMember(names));
