@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
@@ -17,18 +19,21 @@
 #include "clients/identification/identify.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/named_experiments.hpp"
+#include "clients/identification/wiring/wiring.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
 
+using identification::GivenWiring;
 using identification::IdentificationError;
 using identification::LoadModel;
 using identification::MotorKind;
 using identification::MotorName;
 using identification::NamedExperiment;
 using identification::Settings;
+using identification::WiringFact;
 
 int print_list(bool json) {
   if (json) {
@@ -101,6 +106,7 @@ void apply_options(const IdentifyOptions& o, Settings& e) {
   if (o.pole_pairs) e.pole_pairs = *o.pole_pairs;
   if (o.counts_per_revolution) e.counts_per_revolution = *o.counts_per_revolution;
   if (o.phases) e.three_phase = *o.phases == 3;
+  e.reversed = o.direction == "reversed";
   if (!o.voltages.empty()) p.voltage_shift = o.voltages == "mean" ? 0.5 : 0.0;
   if (o.voltage_shift) p.voltage_shift = *o.voltage_shift;
   if (!o.window.empty()) set_window(o.window, p);
@@ -137,13 +143,28 @@ Settings settings(const IdentifyOptions& options, const MotorName& motor, const 
   return e;
 }
 
-void check_foreign(const IdentifyOptions& options, const MotorName& motor, const MeasuredMotor& m) {
+void check_foreign(const IdentifyOptions& options, const MeasuredMotor& m) {
   if (!m.bench.empty()) return;
   const bool counts = m.data.find("encoder_count") != nullptr;
   if (counts && !options.counts_per_revolution && m.data.find("angle_rad") == nullptr)
     throw UsageError("--counts is missing: how many counts of encoder_count are a revolution");
-  if (motor.kind != MotorKind::kDc && !options.pole_pairs)
-    throw UsageError("--pole-pairs is missing: the file does not say how many the motor has");
+}
+
+/// Finds the wiring of a record. A bench knows its own, except where its voltages belong to no instant.
+std::vector<WiringFact> wiring_of(const IdentifyOptions& options, const MeasuredMotor& m, Settings& e) {
+  const bool bench = !m.bench.empty();
+  const GivenWiring given = {
+      .pole_pairs = bench || options.pole_pairs,
+      .direction = bench || !options.direction.empty(),
+      .voltage_shift = !m.drive.empty() || !options.voltages.empty() || options.voltage_shift,
+      .zero = bench,
+      .by_bench = bench};
+  std::vector<WiringFact> wiring = find_wiring(m.data, e, given);
+  for (const WiringFact& fact : wiring) {
+    if (fact.name == "pole_pairs" && !fact.found && !given.pole_pairs)
+      throw UsageError("--pole-pairs is missing, and the data do not tell: " + fact.remark);
+  }
+  return wiring;
 }
 
 void compare(const MeasuredMotor& m, const Settings& e, identification::Result& result) {
@@ -153,7 +174,9 @@ void compare(const MeasuredMotor& m, const Settings& e, identification::Result& 
   result.compare(truth);
 }
 
-IdentifyReport identified(const MotorName& motor, MeasuredMotor m, const Settings& e) {
+IdentifyReport identified(const IdentifyOptions& options, const MotorName& motor, MeasuredMotor m,
+                          Settings e) {
+  std::vector<WiringFact> wiring = wiring_of(options, m, e);
   IdentifyReport report{.motor = std::string(motor.name),
                         .source = m.source,
                         .period_s = m.data.period_s,
@@ -162,6 +185,7 @@ IdentifyReport identified(const MotorName& motor, MeasuredMotor m, const Setting
                         .validation = {},
                         .validation_problem = {},
                         .experiment = std::move(m.experiment)};
+  report.result.wiring = std::move(wiring);
   compare(m, e, report.result);
   if (!m.facts.note.empty()) report.result.notes.push_back(m.facts.note);
   try {
@@ -236,12 +260,12 @@ int run_identify(const IdentifyOptions& options) {
       options.from_file.empty() ? chosen_experiment(motor, options.experiment) : nullptr;
   catch_interrupts();
   MeasuredMotor m = measured_motor(options, motor, named);
-  check_foreign(options, motor, m);
+  check_foreign(options, m);
   if (!options.data_file.empty()) write(options.data_file, csv_of(m.data));
   const Settings e = settings(options, motor, named, m);
   IdentifyReport report;
   try {
-    report = identified(motor, m, e);
+    report = identified(options, motor, m, e);
   } catch (const IdentificationError& error) {
     throw UsageError(fmt::format("{}: {}", m.source, error.what()));
   }

@@ -27,7 +27,8 @@ struct IdentifyOptions {
   std::optional<int> pole_pairs{};
   std::optional<double> counts_per_revolution{};
   std::optional<int> phases{};
-  std::string voltages{};  ///< mean or instant; empty: that of the data's source
+  std::string direction{};  ///< of the encoder: forward or reversed; empty: as found
+  std::string voltages{};   ///< mean or instant; empty: that of the data's source
   std::optional<double> voltage_shift{};
   std::string window{};  ///< FROM:TO [s]
   std::optional<double> current_hz{};

@@ -33,9 +33,15 @@ void add_measurement(CLI::App& sub, IdentifyOptions& o) {
 void add_settings(CLI::App& sub, IdentifyOptions& o) {
   constexpr const char* kGroup =
       "How data become equations (default: what bench, recording and experiment say)";
-  sub.add_option("--pole-pairs", o.pole_pairs, "of the motor")->check(CLI::Range(1, 1000))->group(kGroup);
+  sub.add_option("--pole-pairs", o.pole_pairs, "of the motor; --from CSV finds them in the data")
+      ->check(CLI::Range(1, 1000))
+      ->group(kGroup);
   sub.add_option("--counts", o.counts_per_revolution, "of encoder_count in a revolution; 0: angle_rad counts")
       ->check(finite_between(0.0, 1e9))
+      ->group(kGroup);
+  sub.add_option("--direction", o.direction,
+                 "of the encoder against the order of the phases; --from CSV finds it in the data")
+      ->check(CLI::IsMember({"forward", "reversed"}))
       ->group(kGroup);
   sub.add_option("--phases", o.phases, "3 in a star, or the 2 of a two-phase machine")
       ->check(CLI::IsMember({2, 3}))
@@ -44,8 +50,9 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
                  "mean: of the period before the sample (an amplifier); instant: at the sample (a line)")
       ->check(CLI::IsMember({"mean", "instant"}))
       ->group(kGroup);
-  sub.add_option("--voltage-shift", o.voltage_shift,
-                 "advance voltages by so many periods; mean is 0.5, instant 0")
+  sub.add_option(
+         "--voltage-shift", o.voltage_shift,
+         "advance voltages by so many periods; mean is 0.5, instant 0; --from CSV finds it in the data")
       ->check(finite_between(-100.0, 100.0))
       ->group(kGroup);
   sub.add_option("--window", o.window, "FROM:TO [s], the part of the record that counts")->group(kGroup);

@@ -82,6 +82,9 @@ std::string identify_text(const IdentifyReport& r) {
     add(fmt::format(kRow, e.name, e.unit, cell.value, cell.interval, cell.truth, cell.error,
                     cell.by_equations, cell.index, inside_text(result, e)));
   }
+  text += result.wiring.empty() ? "" : "\n";
+  for (const identification::WiringFact& fact : result.wiring)
+    fmt::format_to(out, "wiring: {}\n", wiring_text(fact));
   fmt::format_to(out, "\nverdict: {}\n", result.excitation.verdict);
   fmt::format_to(out, "error index {:.4g}", result.error_index);
   if (result.mechanical_error_index)

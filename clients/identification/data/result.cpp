@@ -130,6 +130,41 @@ EstimateText text_of(const Result& r, const Estimate& e) {
   return text;
 }
 
+namespace {
+
+/// A value of a fact, as people say it.
+std::string said(const WiringFact& fact, double value) {
+  if (fact.name == "pole_pairs") return fmt::format("{:.0f}", value);
+  if (fact.name == "direction") return value < 0.0 ? "against the phases" : "with the phases";
+  return fmt::format("{:.3g} {}", value + 0.0, fact.unit);
+}
+
+}  // namespace
+
+std::string wiring_text(const WiringFact& fact) {
+  constexpr std::pair<std::string_view, std::string_view> kNames[] = {{"pole_pairs", "pole pairs"},
+                                                                      {"direction", "encoder"},
+                                                                      {"voltage_shift", "voltages"},
+                                                                      {"zero", "zero of the encoder"}};
+  std::string text;
+  for (const auto& [key, name] : kNames) {
+    if (key == fact.name) text = name;
+  }
+  if (fact.name == "voltage_shift") text += " advanced by";
+  text += " " + said(fact, fact.used);
+  if (!fact.found) {
+    text += fact.given ? ", as set; " : ", assumed; ";
+  } else if (fact.contradicts) {
+    text += ", as set, BUT THE DATA SAY " + said(fact, *fact.found);
+  } else {
+    text += fact.given ? ", as set and found" : ", found";
+  }
+  if (fact.found && fact.interval > 0.0)
+    text += fmt::format(" ({:.4g} +- {:.2g} {})", *fact.found + 0.0, fact.interval, fact.unit);
+  if (!fact.remark.empty()) text += (fact.found ? "; " : "") + fact.remark;
+  return text;
+}
+
 std::string explanation_text(const Explanation& x) {
   return fmt::format(
       "noise that explains the record: voltages {:.3g} V rms beside {:.4g} V, currents {:.3g} A rms "
@@ -155,6 +190,9 @@ std::string to_markdown(const Result& r) {
   if (r.mechanical_error_index) text += fmt::format(", mechanical {:.4g}", *r.mechanical_error_index);
   text += fmt::format(", condition {:.3g}. Verdict: {}.\n", r.condition, r.excitation.verdict);
   if (r.explanation) text += "\n" + explanation_text(*r.explanation) + ".\n";
+  if (!r.wiring.empty()) text += "\nWiring:\n\n";
+  for (const WiringFact& fact : r.wiring)
+    text += "* " + wiring_text(fact) + "\n";
   for (const std::string& note : r.notes)
     text += "\n" + note + "\n";
   return text;
@@ -193,6 +231,17 @@ std::string to_json(const Result& r) {
         {"voltage_noise_v", number(x.voltage_noise_v)}, {"voltage_rms_v", number(x.voltage_rms_v)},
         {"current_noise_a", number(x.current_noise_a)}, {"current_white_a", number(x.current_white_a)},
         {"current_error", number(x.current_error)},     {"angle_error", number(x.angle_error)}};
+  }
+  if (!r.wiring.empty()) {
+    nlohmann::json& wiring = all["wiring"] = nlohmann::json::object();
+    for (const WiringFact& fact : r.wiring)
+      wiring[fact.name] = {{"found", fact.found ? number(*fact.found) : nlohmann::json(nullptr)},
+                           {"unit", fact.unit},
+                           {"interval", number(fact.interval)},
+                           {"used", number(fact.used)},
+                           {"given", fact.given},
+                           {"contradicts", fact.contradicts},
+                           {"remark", fact.remark}};
   }
   return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }

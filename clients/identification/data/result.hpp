@@ -32,6 +32,19 @@ struct Explanation {
   double current_error = 0.0;    ///< rms of the currents' innovations over what both noises make them
   double current_white_a = 0.0;  ///< what the measured currents show without a model
   double angle_error = 0.0;      ///< rms of the angle's innovations over what the encoder's counts make them
+  double unlikelihood = 0.0;     ///< minus twice the logarithm of the likelihood, less a constant
+};
+
+/// A fact about the wiring of a record: found in the data (wiring/wiring.hpp), or set.
+struct WiringFact {
+  std::string name;  ///< pole_pairs, direction (1: with the phases, -1: against them), voltage_shift, zero
+  std::string unit;
+  std::optional<double> found{};  ///< nothing: the data do not tell
+  double interval = 0.0;          ///< half of the 95 % interval of what was found; 0: a whole number
+  double used = 0.0;              ///< what the identification works with
+  bool given = false;             ///< set by the user or known of the bench: used, whatever was found
+  bool contradicts = false;       ///< the data say something else than what is given
+  std::string remark{};           ///< why the data do not tell, or what they leave open
 };
 
 /// The result of an identification.
@@ -48,6 +61,7 @@ struct Result {
   std::size_t samples = 0;
   Excitation excitation{};
   std::optional<Explanation> explanation{};  ///< of the refinement
+  std::vector<WiringFact> wiring{};          ///< empty: not looked for
   std::vector<std::string> notes{};
 
   /// The estimate of this name, or null.
@@ -76,6 +90,9 @@ struct EstimateText {
 };
 EstimateText text_of(const Result& result, const Estimate& estimate);
 
+/// A fact as text: "pole pairs 6, found, as set".
+std::string wiring_text(const WiringFact& fact);
+
 /// The noises as a line.
 std::string explanation_text(const Explanation& explanation);
 
@@ -84,7 +101,8 @@ std::string explanation_text(const Explanation& explanation);
 std::string to_markdown(const Result& result);
 
 /// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, interval, by_equations,
-/// index, truth, inside}}, explanation, ...}; a number that is not finite and the estimate of an unseen
+/// index, truth, inside}}, wiring: {pole_pairs: {found, unit, interval, used, given, contradicts, remark}},
+/// explanation, ...}; a number that is not finite and the estimate of an unseen
 /// parameter are null.
 std::string to_json(const Result& result);
 

@@ -36,8 +36,13 @@ Processing usual_processing(MotorKind kind, double period_s) {
 
 Series measured_angle(const MeasuredData& data, const Settings& e) {
   const SeriesView measured = data.at(e.counts_per_revolution > 0.0 ? "encoder_count" : "angle_rad");
-  return e.counts_per_revolution > 0.0 ? angle_of(measured, e.counts_per_revolution, e.half_count)
-                                       : Series(measured.begin(), measured.end());
+  Series angle = e.counts_per_revolution > 0.0 ? angle_of(measured, e.counts_per_revolution, e.half_count)
+                                               : Series(measured.begin(), measured.end());
+  if (e.reversed || e.zero_rad != 0.0) {
+    for (double& x : angle)
+      x = (e.reversed ? -x : x) + e.zero_rad;
+  }
+  return angle;
 }
 
 ShaftSignals shaft_signals(const MeasuredData& data, const Settings& e, const LowPass& filter) {

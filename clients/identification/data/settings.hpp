@@ -41,6 +41,8 @@ struct Settings {
   bool three_phase = true;  ///< star with phases a, b, c; else the two phases of a two-phase machine
   double counts_per_revolution = 0.0;  ///< > 0: the shaft is column encoder_count, else angle_rad
   bool half_count = true;              ///< takes the half count out by which a floor encoder is behind
+  bool reversed = false;  ///< the shaft's angle falls while the motor turns from phase a to phase b
+  double zero_rad = 0.0;  ///< added to the shaft's angle: the magnet points to phase a at zero
   LoadModel load = LoadModel::kViscous;
   bool two_stage = true;  ///< PM synchronous: first the electrical parameters, then the mechanical ones
   Processing processing{};
@@ -50,7 +52,7 @@ struct Settings {
 /// of an induction motor are taken as those of a line source, all others as those of an amplifier.
 Processing usual_processing(MotorKind kind, double period_s);
 
-/// The angle of the shaft as measured [rad].
+/// The angle of the shaft as measured, in the direction of the phases and from their zero [rad].
 Series measured_angle(const MeasuredData& data, const Settings& settings);
 
 /// The angle of the shaft with its derivatives [rad, rad/s, rad/s^2].

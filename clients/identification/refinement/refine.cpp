@@ -227,6 +227,8 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
                         .current_error = rms(current_errors),
                         .current_white_a = first.current_a,
                         .angle_error = rms(angle_errors)};
+  const Series speeds = predictor.speeds();
+  result.explanation->unlikelihood = predictor.unlikelihood(model_at(fit.at), noise);
   std::string reason = unexplained(*result.explanation, record.largest_current_a);
   for (const char* name : {"f", "f_c"}) {
     const Estimate* const friction = result.find(name);
@@ -237,8 +239,8 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     result.excitation = verdict_against(result, reason);
     return;
   }
-  const double torque_nm = accelerating_torque(predictor.speeds(), record.period_s, result.at("J"));
-  result.excitation = verdict_on(e.kind, unseen_parameters(result, torque_nm, rms(predictor.speeds())));
+  const double torque_nm = accelerating_torque(speeds, record.period_s, result.at("J"));
+  result.excitation = verdict_on(e.kind, unseen_parameters(result, torque_nm, rms(speeds)));
 }
 
 /// Whether the estimates of the equations can begin a refinement: finite, and not zero where a motor is not.

@@ -90,6 +90,16 @@ class Identify(WireTest):
                                 "instant", "--window", "0.005:0", "--load", "constant")
         self.assertEqual(again["parameters"]["R_S"]["estimate"], found["parameters"]["R_S"]["estimate"])
         self.assertIsNone(again["parameters"]["R_S"]["truth"])
+        words = ("--motor", "im", "--from", files["csv"], "--counts", 2048, "--window", "0.005:0", "--load", "constant")
+        found_alone = self.parameters(*words)
+        self.assertEqual(found_alone["parameters"]["R_S"]["estimate"], found["parameters"]["R_S"]["estimate"])
+        self.assertEqual(found_alone["settings"]["pole_pairs"], 2)
+        self.assertEqual(found_alone["settings"]["voltage_shift"], 0.0)
+        self.assertEqual(found_alone["wiring"]["direction"]["found"], 1)
+        told = self.parameters(*words, "--pole-pairs", 3, code=1)
+        self.assertTrue(told["wiring"]["pole_pairs"]["contradicts"])
+        self.assertEqual(told["wiring"]["pole_pairs"]["found"], 2)
+        self.assertIn("BUT THE DATA SAY 2", self.identify(*words, "--pole-pairs", 3, code=1).stdout)
         self.assertIn("voltages advanced by 0.5 samples",
                       self.identify("--motor", "im", "--from", files["csv"], "--pole-pairs", 2, "--counts", 2048,
                                     "--voltages", "mean", "--load", "constant").stdout)
