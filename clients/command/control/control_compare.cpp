@@ -10,6 +10,7 @@
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"
+#include "clients/command/control/control_replay.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/command/recording/recorded_run.hpp"
 
@@ -24,29 +25,16 @@ TerminalValues asked_for(const v1::Command& c) {
   return {};
 }
 
-void check_rate(const RecordedRun& recorded, const control::Run& run) {
-  const double rate_hz = run.timing().sample_rate_hz;
-  if (std::abs(recorded.period_s * rate_hz - 1.0) > 1e-6) {
-    throw UsageError(fmt::format("the recording is sampled at {:g} Hz, the preset at {:g} Hz",
-                                 1.0 / recorded.period_s, rate_hz));
-  }
-}
-
 /// The reference controller answers the same samples.
 void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison& out) {
   out.terminals.clear();
   for (const std::string_view name : kTerminalNames)
     out.terminals.emplace_back(name, Difference());
-  std::uint64_t last_tick = recorded.rows.front().sample.tick;
   const double start_rad = recorded.rows.front().sample.angle_rad;
-  for (const Answered& row : recorded.rows) {
+  answer_recorded(recorded, run, [&](const Answered& row, const control::Setpoint& setpoint) {
     const std::uint64_t tick = row.sample.tick;
-    const auto periods = std::max<std::int64_t>(1, static_cast<std::int64_t>(tick - last_tick));
-    last_tick = tick;
-    const TerminalValues reference =
-        terminal_values_of(run.step(measurement_of(row.sample, kAllSignals), periods));
-    if (run.done()) break;
     ++out.samples;
+    const TerminalValues reference = terminal_values_of(setpoint);
     const TerminalValues there = asked_for(row.command);
     for (std::size_t i = 0; i < reference.size(); ++i) {
       const double difference = there[i] - reference[i];
@@ -55,7 +43,7 @@ void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison
     }
     out.final_error_rad = run.reference().angle_rad - (row.sample.angle_rad - start_rad);
     out.tracking_rad.add(tick, out.final_error_rad, HUGE_VAL);
-  }
+  });
   // A controller may have missed samples on the way to the end; a damaged file may hide them.
   out.whole = (run.done() && recorded.is_whole) || out.samples == run.planned_samples();
 }
@@ -127,7 +115,6 @@ int run_compare(const CompareOptions& options) {
   const control::Preset& preset = chosen_preset(options.preset);
   control::Run run = made(preset, options.overrides);
   const RecordedRun recorded = read_run(options.recording, options.axis, options.from_tick);
-  check_rate(recorded, run);
   Comparison out;
   out.recording = options.recording;
   out.axis = recorded.axis;

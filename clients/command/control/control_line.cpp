@@ -123,8 +123,10 @@ void add_plot(CommandLine& line) {
   add_gains(sub, o.overrides);
   sub.add_option("--axis", o.axis, "name; default: the first in the file");
   sub.add_option("--from", o.from_tick, "tick at which the run starts")->check(not_negative());
-  sub.add_option("--panels", o.panels,
-                 "of angle, speed, error, currents, voltages, torque, separated by commas")
+  sub.add_option(
+         "--panels", o.panels,
+         "of angle, speed, error, currents, voltages, torque; with --preset also the estimates of its "
+         "controller beside the truth: speed-estimate, flux, load; separated by commas")
       ->delimiter(',');
   sub.add_option("--title", o.title, "default: the preset, or else the file");
 }

@@ -8,11 +8,13 @@
 #include <functional>
 #include <numbers>
 #include <optional>
+#include <span>
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"
+#include "clients/command/control/control_replay.hpp"
 #include "clients/command/recording/recorded_run.hpp"
 #include "clients/command/recording/svg_plot.hpp"
 #include "clients/control/loop/run.hpp"
@@ -24,6 +26,13 @@ namespace {
 struct Plan {
   std::vector<control::Reference> references;
   double counts_per_rad = 0.0;  ///< 0: unknown
+};
+
+/// What the preset's controller makes of the recorded samples.
+struct Estimates {
+  std::vector<double> speed_rad_s;
+  std::vector<double> flux_wb;  ///< empty: the controller has no such estimate
+  std::vector<double> load_nm;  ///< likewise
 };
 
 std::vector<double> column(const RecordedRun& run, const std::function<double(const Answered&)>& value) {
@@ -80,7 +89,35 @@ Panel terminals(const RecordedRun& run, std::string label, char quantity,
   return panel_of(std::move(label), std::move(lines));
 }
 
-Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& plan) {
+Panel with_estimate(std::string label, const std::string& name, std::vector<double> values,
+                    const std::vector<double>& estimate) {
+  Panel panel = {.label = std::move(label), .lines = {{name, std::move(values)}}};
+  if (!estimate.empty()) panel.lines.push_back({"estimate", estimate});
+  return panel;
+}
+
+/// The panels that show estimates beside the truth.
+constexpr std::array<std::string_view, 3> kEstimatePanels = {"speed-estimate", "flux", "load"};
+
+Panel estimate_panel(std::string_view name, const RecordedRun& run, const Estimates& estimates) {
+  if (name == "speed-estimate") {
+    return with_estimate("speed [rad/s]", "speed",
+                         column(run, [](const Answered& row) { return row.sample.speed_rad_s; }),
+                         estimates.speed_rad_s);
+  }
+  if (name == "flux") {
+    return with_estimate(
+        "rotor flux [Wb]", "flux",
+        column(run, [](const Answered& row) { return std::hypot(row.sample.psi_a_wb, row.sample.psi_b_wb); }),
+        estimates.flux_wb);
+  }
+  return with_estimate("load [N m]", "load",
+                       column(run, [](const Answered& row) { return row.sample.load_nm; }),
+                       estimates.load_nm);
+}
+
+Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& plan,
+                  const Estimates& estimates) {
   if (name == "angle") {
     const double start_rad = run.rows.front().sample.angle_rad;
     return with_reference(
@@ -107,8 +144,9 @@ Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& pla
                     {{"machine", column(run, [](const Answered& row) { return row.sample.torque_nm; })},
                      {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}});
   }
-  throw UsageError(
-      fmt::format("no panel '{}'; there are angle, speed, error, currents, voltages and torque", name));
+  if (std::ranges::count(kEstimatePanels, name) != 0) return estimate_panel(name, run, estimates);
+  throw UsageError(fmt::format("no panel '{}'; there are angle, speed, error, currents, voltages, torque, {}",
+                               name, fmt::join(kEstimatePanels, ", ")));
 }
 
 /// The trajectory over the recorded samples; the recording is cut where the run has ended.
@@ -130,6 +168,36 @@ Plan planned(const PlotOptions& options, RecordedRun& recorded, double& start_s)
   return plan;
 }
 
+Estimates estimated(const PlotOptions& options, const RecordedRun& recorded) {
+  control::Run run = made(chosen_preset(options.preset), options.overrides);
+  const auto names = run.controller().telemetry_names();
+  const auto column_of = [&](std::string_view name) {
+    return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+  };
+  const std::size_t flux = column_of("flux_wb");
+  const std::size_t load = column_of("load_nm");
+  Estimates out;
+  answer_recorded(recorded, run, [&](const Answered&, const control::Setpoint&) {
+    const std::span<const double> values = run.controller().telemetry();
+    out.speed_rad_s.push_back(run.controller().speed_rad_s());
+    if (flux < values.size()) out.flux_wb.push_back(values[flux]);
+    if (load < values.size()) out.load_nm.push_back(values[load]);
+  });
+  return out;
+}
+
+/// Whether a panel needs the estimates; refuses panels that need a preset where there is none.
+bool needs_estimates(const std::vector<std::string>& names, bool has_preset) {
+  bool found = false;
+  for (const std::string& name : names) {
+    const bool is_estimate = std::ranges::count(kEstimatePanels, name) != 0;
+    if (!has_preset && (is_estimate || name == "error"))
+      throw UsageError(fmt::format("the panel {} needs --preset", name));
+    found |= is_estimate;
+  }
+  return found;
+}
+
 }  // namespace
 
 int run_plot(const PlotOptions& options) {
@@ -139,11 +207,11 @@ int run_plot(const PlotOptions& options) {
   std::vector<std::string> names = options.panels;
   if (names.empty()) names = {"speed", "currents", "voltages"};
   if (options.panels.empty() && !plan.references.empty()) names.insert(names.begin() + 1, "error");
+  Estimates estimates;
+  if (needs_estimates(names, !plan.references.empty())) estimates = estimated(options, recorded);
   std::vector<Panel> panels;
-  for (const std::string& name : names) {
-    if (name == "error" && plan.references.empty()) throw UsageError("the panel error needs --preset");
-    panels.push_back(panel_named(name, recorded, plan));
-  }
+  for (const std::string& name : names)
+    panels.push_back(panel_named(name, recorded, plan, estimates));
   const std::uint64_t first = recorded.rows.front().sample.tick;
   const std::vector<double> times_ms = column(recorded, [&](const Answered& row) {
     return 1e3 * (static_cast<double>(row.sample.tick - first) * recorded.period_s - start_s);

@@ -21,6 +21,7 @@ class PolarFluxObserver {
   double magnitude_wb() const noexcept { return magnitude_wb_; }
   double angle_rad() const noexcept { return angle_rad_; }  ///< in (−π, π]
 
+  void start_at(double magnitude_wb) noexcept { magnitude_wb_ = magnitude_wb; }
   /// From this sample to the next one.
   void step(DirectQuadrature current_a, double speed_rad_s) noexcept;
 

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "clients/control/estimators/flux_estimator.hpp"
 #include "clients/control/estimators/observers.hpp"
 #include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
@@ -18,6 +19,31 @@ namespace drivebench::control {
 enum class QuadratureClip {
   kFixed,  ///< |i_q,ref| ≤ quadrature_reference_limit_a
   kCircular,  ///< |i_q,ref| ≤ √(I² − i_d,ref²): the mistake of treating a reference as if it were the current
+};
+
+/// The law of the position.
+enum class PositionLaw {
+  kServo,   ///< ServoGains around the reference
+  kNested,  ///< NestedServoGains, which know the angle of the reference alone
+};
+
+/// A proportional position loop around a PI speed loop:
+///   ω_want = K_θ·e + share·ω_ref, within ± the limit        α = K_P·(ω_want − ω̂) + K_I·∫(ω_want − ω̂)
+/// The polynomial is s³ + (K_P + f/J)·s² + (K_I + K_P·K_θ)·s + K_I·K_θ. In a cruise it lags by (1 −
+/// share)·ω/K_θ. Source: the book, figure 8.34 (exercise 17 of chapter 8, IMC-09); the share is ours.
+struct NestedServoGains {
+  double angle_proportional_per_s = 0.0;  ///< K_θ
+  double speed_proportional_per_s = 0.0;  ///< K_P
+  double speed_integral_per_s2 = 0.0;     ///< K_I
+  double speed_share = 0.0;               ///< of ω_ref that is fed forward
+  double speed_limit_rad_s = 0.0;
+
+  static constexpr std::tuple kGains{
+      gain("angle_proportional_per_s", &NestedServoGains::angle_proportional_per_s, GainRule::kNotNegative),
+      gain("speed_proportional_per_s", &NestedServoGains::speed_proportional_per_s, GainRule::kNotNegative),
+      gain("speed_integral_per_s2", &NestedServoGains::speed_integral_per_s2, GainRule::kNotNegative),
+      gain("speed_share", &NestedServoGains::speed_share, GainRule::kNotNegative),
+      gain("speed_limit_rad_s", &NestedServoGains::speed_limit_rad_s, GainRule::kNotNegative)};
 };
 
 struct ControllerParameters {
@@ -34,6 +60,9 @@ struct ControllerParameters {
   SpeedObserverGains speed_observer;
   SpeedSource speed_source = SpeedSource::kObserver;
   QuadratureClip quadrature_clip = QuadratureClip::kFixed;
+  FluxEstimatorParameters flux_observer{};
+  PositionLaw law = PositionLaw::kServo;
+  NestedServoGains nested{};  ///< of kNested
 
   static constexpr std::tuple kGains{
       gains_in("machine.", &ControllerParameters::machine),
@@ -47,9 +76,11 @@ struct ControllerParameters {
       gains_in("current.", &ControllerParameters::current),
       gains_in("position.", &ControllerParameters::position),
       gains_in("flux.", &ControllerParameters::flux),
-      gains_in("speed_observer.", &ControllerParameters::speed_observer)};
+      gains_in("speed_observer.", &ControllerParameters::speed_observer),
+      gains_in("flux_observer.", &ControllerParameters::flux_observer),
+      gains_in("nested.", &ControllerParameters::nested)};
   /// Everything that is wrong, one sentence each; empty when a controller can be built.
-  std::vector<std::string> problems() const { return range_problems(*this); }
+  std::vector<std::string> problems() const;
 
   constexpr double period_s() const noexcept { return 1.0 / sample_rate_hz; }
   /// ψ_d0 = M·i_d0, the flux that the rated direct current keeps up.
@@ -71,8 +102,9 @@ struct ControlOutput {
   double flux_estimate_wb = 0.0;
   double flux_angle_estimate_rad = 0.0;
   double speed_estimate_rad_s = 0.0;    ///< by the speed source in use
-  double speed_observer_rad_s = 0.0;    ///< IMO-04, whichever is in use
+  double speed_observer_rad_s = 0.0;    ///< IMO-04, or IMO-10 with the flux; whichever is in use
   double speed_difference_rad_s = 0.0;  ///< IMO-03, whichever is in use
+  double load_nm = 0.0;                 ///< IMO-10 alone
   double measured_angle_rad = 0.0;      ///< since the first sample
   double position_error_counts = 0.0;   ///< reference − measured angle
 };
@@ -80,9 +112,11 @@ struct ControlOutput {
 /// Field-oriented position control of an induction machine from encoder counts and two phase currents:
 ///   i_q,ref = (K0·∫e + K1·e + K2·(ω_ref − ω̂) + (f/J)·ω̂ + α_ref)/(μ·ψ_d0)         with e = θ_ref − θ
 ///   i_d,ref = K_ψP·(ψ_d0 − ψ̂) + K_ψI·∫(ψ_d0 − ψ̂) + i_d0
+/// or the acceleration of NestedServoGains in place of that in the bracket,
 /// followed by PI current loops in the frame of the estimated flux. Friction is fed forward with a plus sign
 /// (the print has a minus). A reference at its clip freezes its own integrator; a voltage at its limit
-/// freezes all of them. Source: the book, (8.12), (8.19)-(8.21), (8.37), (8.40) (IMC-02, IMC-03, IMO-02,
+/// freezes all of them. ψ̂ is the estimate of flux_observer; where that gives a speed too, it is the
+/// observer's speed. Source: the book, (8.12), (8.19)-(8.21), (8.37), (8.40) (IMC-02, IMC-03, IMO-02,
 /// IMO-04).
 class FieldOrientedController final : public Controller {
  public:
@@ -98,6 +132,7 @@ class FieldOrientedController final : public Controller {
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
   void carry_observers(std::int64_t periods) noexcept;
   double direct_reference(double flux_error_wb, bool& clipped) noexcept;
+  double wanted_acceleration_rad_s2(const Reference& r, double angle_error_rad, double speed_rad_s) noexcept;
   double quadrature_reference(const Reference& r, double angle_error_rad, double speed_rad_s,
                               double i_d_reference_a, bool& clipped) noexcept;
 
@@ -105,7 +140,7 @@ class FieldOrientedController final : public Controller {
   double rad_per_count_;
   double amperes_per_acceleration_;  // 1/(μ·ψ_d0)
   CurrentLoop current_loop_;
-  PolarFluxObserver flux_;
+  FluxEstimator flux_;
   SpeedObserver speed_;
   BackwardDifference difference_;
 
@@ -113,9 +148,12 @@ class FieldOrientedController final : public Controller {
   bool started_ = false;
   std::int64_t start_count_ = 0;
   double angle_integral_rad_s_ = 0.0;
+  double nested_speed_error_rad_s_ = 0.0;
+  double speed_integral_rad_ = 0.0;
   double flux_integral_wb_s_ = 0.0;
   // Of the last sample: what the observers are stepped with when the next one comes.
   DirectQuadrature last_current_a_{.d = 0.0, .q = 0.0};
+  PhasePair last_voltage_v_{.a = 0.0, .b = 0.0};
   double last_angle_rad_ = 0.0;
   double last_speed_rad_s_ = 0.0;
 };

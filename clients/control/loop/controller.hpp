@@ -63,10 +63,12 @@ class Controller {
   std::span<const double> telemetry() const noexcept { return std::span(telemetry_).first(telemetry_count_); }
 
  protected:
-  static constexpr std::size_t kMostTelemetry = 8;
+  static constexpr std::size_t kMostTelemetry = 9;
 
   /// The names must be literals, at most kMostTelemetry of them.
-  Controller(Quantity quantity, std::initializer_list<std::string_view> telemetry_names) noexcept;
+  Controller(Quantity quantity, std::span<const std::string_view> telemetry_names) noexcept;
+  Controller(Quantity quantity, std::initializer_list<std::string_view> telemetry_names) noexcept
+      : Controller(quantity, std::span(telemetry_names.begin(), telemetry_names.size())) {}
   Controller(const Controller&) = default;
   Controller& operator=(const Controller&) = default;
 
@@ -76,7 +78,10 @@ class Controller {
     bool saturated = false;
   };
   /// Stores the results of a sample at the end of every step(), with one value for each name.
-  void tell(const Seen& seen, std::initializer_list<double> telemetry) noexcept;
+  void tell(const Seen& seen, std::span<const double> telemetry) noexcept;
+  void tell(const Seen& seen, std::initializer_list<double> telemetry) noexcept {
+    tell(seen, std::span(telemetry.begin(), telemetry.size()));
+  }
 
  private:
   virtual Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept = 0;

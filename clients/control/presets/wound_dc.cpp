@@ -78,6 +78,10 @@ constexpr SeriesDcParameters kSeriesSpeed = {
 constexpr SeriesDcParameters kSeriesSensorless =
     with(kSeriesSpeed, &SeriesDcParameters::source, SeriesDcSpeed::kCurrent, &SeriesDcParameters::observer,
          SeriesDcObserverGains::placed(std::array{80.0, 80.0, 80.0}, kSeries));
+/// Without the load in the observer: the fan leaves ω̂ − ω = l1·τ_L/(J·p1·p2).
+constexpr SeriesDcParameters kSeriesSpeedAlone =
+    with(kSeriesSensorless, &SeriesDcParameters::observer,
+         SeriesDcObserverGains::placed(std::array{80.0, 80.0}, kSeries));
 constexpr WeakenedSeriesDcParameters kWeakened = {
     .axis = axis_of(with(kSeries, &WoundDcModel::field_shunt_resistance_ohm, 4.0), 0.0, 0.1, 100.0),
     .most_flux_wb = 0.9,
@@ -128,8 +132,14 @@ std::vector<Preset> wound_dc_presets() {
            "Chiasson 2005, problem 2.43: series motor with 4 ohm across its field, a fan, to 150 rad/s",
            "150 rad/s within 1 rad/s", "dc-series-weakened"},
           "series_dc", kWeakened, kTo150, kAtOnce),
+      preset<SeriesDcController>({"book/2.44",
+                                  "Chiasson 2005, problems 2.42 and 2.44: as book/2.42 without a sensor on "
+                                  "the shaft, by an observer "
+                                  "that knows of no load",
+                                  "2.7 rad/s too slow: the fan is a load to the observer", "dc-series-servo"},
+                                 "series_dc", kSeriesSpeedAlone, kTo150, kAtOnce),
       preset<SeriesDcController>(
-          {"book/2.45", "Chiasson 2005, problems 2.42 and 2.45: the same without a sensor on the shaft",
+          {"book/2.45", "Chiasson 2005, problems 2.42 and 2.45: as book/2.44 with the load in the observer",
            "speed within 3 rad/s of the reference", "dc-series-servo"},
           "series_dc", kSeriesSensorless, kTo150, kAtOnce),
       preset<ExactShuntDcController>(

@@ -3,6 +3,10 @@
 // tolerances.
 #include <gtest/gtest.h>
 
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
 #include "tests/book/closed_loop.hpp"
 
 namespace drivebench {
@@ -76,6 +80,52 @@ TEST(ServoControl, ASecondRunIsAsGoodAsTheFirst) {
   EXPECT_LE(back.peak_error_counts, 2.2);
   EXPECT_NEAR(back.rows.back().angle_rad, -3.0, 0.01);
   EXPECT_NEAR(loop.sample().angle_rad, 0.1416, 0.01);
+}
+
+// IMC-09. Catches: a nested loop that knows more of the reference than its angle, or an outer gain that is
+// not in 1/s: after twenty time constants of the slowest pole it lags by ω/K_θ, with the share fed forward by
+// the rest of it, to half a percent and a count.
+TEST(ServoControl, NestedLoopsLagByTheSpeedOverTheOuterGain) {
+  constexpr double kCount_rad = 2.0 * std::numbers::pi / 2000.0;
+  const auto lag_in_cruise = [](const char* preset, double share) {
+    const Outcome seen = closed_loop(
+        preset, {}, {{"move.distance_rad", 20.0}, {"move.cruise_s", 0.25}, {"nested.speed_share", share}});
+    EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9) << preset;
+    double lag_rad = 0.0;
+    for (const ClosedLoopRow& row : seen.rows) {
+      if (row.time_s < 0.279) lag_rad = row.error_rad;
+    }
+    return lag_rad;
+  };
+  const double speed_rad_s = 20.0 / 0.28;
+  EXPECT_NEAR(lag_in_cruise("exercise/8.17", 0.0), speed_rad_s / 100.0, 0.005 * 0.71 + kCount_rad);
+  EXPECT_NEAR(lag_in_cruise("exercise/8.17", 0.5), 0.5 * speed_rad_s / 100.0, 0.005 * 0.71 + kCount_rad);
+  EXPECT_NEAR(lag_in_cruise("exercise/8.17-feed-forward", 1.0), 0.0, 0.005 * 0.71 + kCount_rad);
+}
+
+// IMC-09. Catches: a limit of the speed that does not hold, an integral that winds up behind it, and gains
+// that are taken although they are unstable or bound nothing.
+TEST(ServoControl, NestedLoopsKeepTheirSpeedLimit) {
+  const Outcome seen = closed_loop("exercise/8.17", {}, {{"nested.speed_limit_rad_s", 30.0}});
+  // The zero of the PI loop lets the speed overshoot by an eighth; then it stays.
+  EXPECT_LE(seen.peak_speed_rad_s, 30.0 * 1.15);
+  for (const ClosedLoopRow& row : seen.rows) {
+    if (row.time_s > 0.06 && row.time_s < 0.09) {
+      EXPECT_NEAR(row.sample.speed_rad_s, 30.0, 1.5) << row.time_s;
+    }
+  }
+  EXPECT_GT(seen.peak_error_rad, 1.0);
+  EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9);
+  const auto refusal = [](const char* gain, double value) -> std::string {
+    try {
+      closed_loop("exercise/8.17", {}, {{gain, value}});
+    } catch (const std::invalid_argument& refused) {
+      return refused.what();
+    }
+    return {};
+  };
+  EXPECT_NE(refusal("nested.speed_limit_rad_s", 0.0).find("must be positive"), std::string::npos);
+  EXPECT_NE(refusal("nested.speed_proportional_per_s", 0.0).find("unstable"), std::string::npos);
 }
 
 }  // namespace

@@ -80,6 +80,19 @@ TEST(WoundDcControl, TheSeriesMotorRunsWithoutASensorOnItsShaft) {
   EXPECT_NEAR(0.02 * seen.rows.back().telemetry[seen.column("load_rad_s2")], 2.25, 0.05);
 }
 
+// EST-05. Catches: a load that the observer of two states knows after all, or gains that are not those of its
+// poles: a load leaves ω̂ − ω = l1·τ_L/(J·p1·p2), with the fan at the speed that results 2.7 rad/s.
+TEST(WoundDcControl, TheSeriesMotorIsTooSlowByTheLoadThatItsObserverIgnores) {
+  const Outcome seen = closed_loop("book/2.44", {}, {{"counts_per_revolution", 500.0}});
+  const double true_rad_s = final_speed(seen);
+  const double fan_nm = 1e-4 * true_rad_s * true_rad_s;
+  const double l1_per_s = 160.0 - 1e-3 / 0.02;
+  const double expected_rad_s = l1_per_s * fan_nm / (0.02 * 80.0 * 80.0);
+  EXPECT_NEAR(expected_rad_s, 2.7, 0.05);
+  EXPECT_NEAR(seen.rows.back().speed_estimate_rad_s - true_rad_s, expected_rad_s, 0.02 * expected_rad_s);
+  EXPECT_NEAR(150.0 - true_rad_s, expected_rad_s, 0.05 * expected_rad_s);
+}
+
 // CTL-11. Catches: a flux that leaves its two bounds, or loses them under a fan.
 TEST(WoundDcControl, TheWeakenedSeriesMotorKeepsItsFlux) {
   const Outcome seen = closed_loop("book/2.43");

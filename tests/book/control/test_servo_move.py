@@ -98,6 +98,21 @@ class TheMove(unittest.TestCase):
             both = move(server, "--preset", "book/8.2.2-clipped-backward-difference")
         self.assertGreater(both["peak_error_counts"], 50.0)
 
+    def test_the_move_stays_within_two_counts_on_every_observer_of_the_flux(self):
+        """Catches: an observer that only runs in process: one that needs a value that the wire does not carry. The load
+        of the rotor frame is found over the wire too, with the true one in the sample beside it."""
+        for preset in ("book/8.2.2-flux-copy", "book/8.2.2-verghese-sanders", "exercise/8.27"):
+            with Server() as server:
+                report = move(server, "--preset", preset)
+            self.assertLessEqual(report["peak_error_counts"], 2.0, preset)
+            self.assertLessEqual(report["final_error_counts"], 1, preset)
+        file = self.folder / "loaded.csv"
+        with Server() as server:
+            move(server, "--preset", "exercise/8.26", "--load", "0.1@0", "--csv", str(file))
+        with open(file, newline="", encoding="utf-8") as lines:
+            last = list(csv.DictReader(lines))[-1]
+        self.assertAlmostEqual(float(last["load_nm"]), 0.1, delta=0.005)
+
     def test_the_same_run_gives_the_same_bits_for_any_link_and_viewers(self):
         """Catches: a hash or a sample that depends on the transport, on viewers or on wall time, and inputs missing
         from the recording."""

@@ -2,13 +2,13 @@
 #include <cmath>
 #include <complex>
 
+#include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/observers.hpp"
 #include "clients/control/induction/induction_poles.hpp"
 #include "clients/control/induction/optimum_torque_induction.hpp"
 #include "clients/control/presets/induction_servo.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/book/results/results.hpp"
-#include "tests/clients/control/estimators/book_observers.hpp"
 #include "tests/clients/control/induction/limit_speeds.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 #include "tests/plant/servo_axis.hpp"

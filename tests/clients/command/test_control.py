@@ -200,10 +200,19 @@ class Plot(ControlTest):
         self.assertEqual(sum(each.tag.endswith("path") for each in picture.iter()), 2 + 1 + 2 + 2)
         self.assertEqual(self.plot(file, "--panels", "angle").stdout.count("<path"), 1)
 
+    def test_estimates_are_drawn_beside_the_truth(self):
+        """Catches: an estimate that is not the controller's, a panel without one that looks as if it had one."""
+        file, _ = self.recording("own")
+        drawn = self.plot(file, "--preset", "book/8.2.2", "--panels", "flux,speed-estimate").stdout
+        self.assertEqual((drawn.count("<path"), drawn.count(">estimate<")), (4, 2))
+        drawn = self.plot(file, "--preset", "book/8.2.2", "--panels", "load").stdout
+        self.assertEqual((drawn.count("<path"), drawn.count(">estimate<")), (1, 0))
+        self.assertIn("the preset at 4000 Hz", self.plot(file, "--preset", "book/8.2.2-4khz", "--panels", "flux", code=USAGE).stderr)
+
     def test_an_impossible_picture_is_refused(self):
         """Catches: an empty picture with an exit code of 0."""
         file, _ = self.recording("own")
-        for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),
+        for arguments, fact in (([file, "--panels", "error"], "needs --preset"), ([file, "--panels", "flux"], "flux needs --preset"), ([file, "--panels", "heat"], "no panel 'heat'"),
                                 ([__file__], "is not a recording"), ([file, "--preset", "book/8"], 'did you mean "book/8.2.2"'),
                                 ([file, "--preset", "book/8.2.2", "--gain", "run.hold_s=1e300"], "at most 3600 s")):
             self.assertIn(fact, self.plot(*arguments, code=USAGE).stderr)

@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/math/polynomial.hpp"
-#include "tests/clients/control/estimators/book_observers.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <complex>
 
+#include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/observers.hpp"
-#include "tests/clients/control/estimators/book_observers.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {
