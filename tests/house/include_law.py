@@ -39,7 +39,7 @@ SYSTEM = {
 ORDERED = {
     "server": ("host", "bench", "config", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
     "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
-                        "presets"),
+                        "salient", "presets"),
     "clients/identification": ("math", "data", "motors", "refinement"),
 }
 

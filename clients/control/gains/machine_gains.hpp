@@ -7,6 +7,7 @@
 #include "clients/models/dc_machine.hpp"
 #include "clients/models/induction_machine.hpp"
 #include "clients/models/pm_machine.hpp"
+#include "clients/models/salient_pm_machine.hpp"
 #include "clients/models/wound_dc_machine.hpp"
 #include "clients/models/wound_rotor_machine.hpp"
 
@@ -29,6 +30,16 @@ inline constexpr auto kGainsOf<PmMachineModel> = std::tuple{
     gain("torque_constant_nm_per_a", &PmMachineModel::torque_constant_nm_per_a, GainRule::kPositive),
     gain("friction_nms", &PmMachineModel::friction_nms, GainRule::kNotNegative),
     gain("inertia_kgm2", &PmMachineModel::inertia_kgm2, GainRule::kPositive)};
+
+template <>
+inline constexpr auto kGainsOf<SalientPmModel> = std::tuple{
+    gain("pole_pairs", &SalientPmModel::pole_pairs, GainRule::kPositive),
+    gain("resistance_ohm", &SalientPmModel::resistance_ohm, GainRule::kPositive),
+    gain("inductance_d_h", &SalientPmModel::inductance_d_h, GainRule::kPositive),
+    gain("inductance_q_h", &SalientPmModel::inductance_q_h, GainRule::kPositive),
+    gain("torque_constant_nm_per_a", &SalientPmModel::torque_constant_nm_per_a, GainRule::kPositive),
+    gain("friction_nms", &SalientPmModel::friction_nms, GainRule::kNotNegative),
+    gain("inertia_kgm2", &SalientPmModel::inertia_kgm2, GainRule::kPositive)};
 
 template <>
 inline constexpr auto kGainsOf<BldcMachineModel> = std::tuple{

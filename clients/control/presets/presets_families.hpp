@@ -11,6 +11,7 @@ std::vector<Preset> induction_servo_presets();
 std::vector<Preset> induction_input_output_presets();
 std::vector<Preset> induction_linearization_presets();
 std::vector<Preset> pm_presets();
+std::vector<Preset> salient_pm_presets();
 std::vector<Preset> stepper_presets();
 std::vector<Preset> bldc_presets();
 std::vector<Preset> wound_rotor_presets();
@@ -23,6 +24,7 @@ inline constexpr auto kPresetFamilies = {
     induction_input_output_presets,
     induction_linearization_presets,
     pm_presets,
+    salient_pm_presets,
     stepper_presets,
     bldc_presets,
     wound_rotor_presets,
