@@ -142,4 +142,55 @@ Setpoint QuadratureIntegratorController::step(const Measurement& m, const Refere
   return {.a = command.voltage_v.a, .b = command.voltage_v.b};
 }
 
+FlatInductionState flat_induction(const InductionMachineModel& m, double slip_rad_s, double torque_nm,
+                                  double torque_rate_nm_s) noexcept {
+  const double eta = m.flux_decay_per_s();
+  const double eta_m = eta * m.mutual_inductance_h;
+  const double flux_wb = std::sqrt(m.rotor_resistance_ohm * torque_nm / (m.pole_pairs * slip_rad_s));
+  const double rate_wb_s = flux_wb * torque_rate_nm_s / (2.0 * torque_nm);
+  return {.flux_wb = flux_wb,
+          .flux_rate_wb_s = rate_wb_s,
+          .current_a = {.d = (eta * flux_wb + rate_wb_s) / eta_m, .q = flux_wb * slip_rad_s / eta_m},
+          .i_q_rate_a_s = rate_wb_s * slip_rad_s / eta_m};
+}
+
+FlatInductionController::FlatInductionController(const InductionDriveParameters& drive,
+                                                 const FlatInductionParameters& p) noexcept
+    : Controller(Quantity::kVoltage, {"i_d_a", "i_q_a", "i_d_ref_a", "i_q_ref_a", "flux_wb", "flux_ref_wb",
+                                      "load_nm", "singular"}),
+      drive_(drive),
+      p_(p),
+      feedback_(drive, p.load_pole_per_s),
+      current_loop_(drive, p.current_pole_per_s) {}
+
+Setpoint FlatInductionController::step(const Measurement& m, const Reference& r,
+                                       std::int64_t periods) noexcept {
+  const InductionMachineModel& machine = drive_.motor.machine;
+  const InductionState& x = feedback_.sample(m, periods);
+  const double wanted_nm = machine.inertia_kgm2 * r.acceleration_rad_s2 +
+                           machine.friction_nms * r.speed_rad_s + feedback_.load_nm();
+  const bool singular = !(wanted_nm >= p_.least_torque_nm);
+  const FlatInductionState flat = singular ? flat_induction(machine, p_.slip_rad_s, p_.least_torque_nm, 0.0)
+                                           : flat_induction(machine, p_.slip_rad_s, wanted_nm,
+                                                            machine.inertia_kgm2 * r.jerk_rad_s3 +
+                                                                machine.friction_nms * r.acceleration_rad_s2);
+
+  const double angle_error_rad = r.angle_rad - x.angle_rad;
+  const double motor_rad_s2 = wanted_nm / machine.inertia_kgm2 +
+                              p_.position.integral_per_s3 * angle_integral_rad_s_ +
+                              p_.position.proportional_per_s2 * angle_error_rad +
+                              p_.position.derivative_per_s * (r.speed_rad_s - x.speed_rad_s);
+  bool at_limit = false;
+  const DirectQuadrature reference_a = {
+      .d = clipped(flat.current_a.d, drive_.direct_reference_limit_a(), at_limit),
+      .q = clipped(motor_rad_s2 / (machine.acceleration_per_wb_a() * x.flux_divisor_wb()),
+                   drive_.quadrature_reference_limit_a, at_limit)};
+  const PhaseVoltages command = current_loop_.step(x, reference_a, {.d = 0.0, .q = flat.i_q_rate_a_s});
+  tell({.angle_rad = x.angle_rad, .speed_rad_s = x.speed_rad_s, .saturated = command.saturated},
+       {x.current_a.d, x.current_a.q, reference_a.d, reference_a.q, x.flux_wb, flat.flux_wb,
+        feedback_.load_nm(), singular ? 1.0 : 0.0});
+  if (!command.saturated && !at_limit) angle_integral_rad_s_ += drive_.period_s() * angle_error_rad;
+  return {.a = command.voltage_v.a, .b = command.voltage_v.b};
+}
+
 }  // namespace drivebench::control

@@ -128,4 +128,56 @@ class QuadratureIntegratorController final : public Controller {
   DirectQuadrature reference_a_{.d = 0.0, .q = 0.0};
 };
 
+struct FlatInductionParameters {
+  double current_pole_per_s;
+  double slip_rad_s;       ///< S, the rate of the flat output beside the angle
+  ServoGains position;     ///< around the flat trajectory
+  double load_pole_per_s;  ///< three of the load observer
+  double least_torque_nm;  ///< of the motor; below it the law is too close to its singularity
+
+  static constexpr std::tuple kGains{
+      gain("current.pole_per_s", &FlatInductionParameters::current_pole_per_s, GainRule::kPositive),
+      gain("slip_rad_s", &FlatInductionParameters::slip_rad_s, GainRule::kPositive),
+      gains_in("position.", &FlatInductionParameters::position),
+      gain("load_observer.pole_per_s", &FlatInductionParameters::load_pole_per_s, GainRule::kPositive),
+      gain("least_torque_nm", &FlatInductionParameters::least_torque_nm, GainRule::kPositive)};
+  std::vector<std::string> problems() const { return range_problems(*this); }
+};
+
+/// State and currents of a machine from its flat outputs: the angle of the shaft and ρ_R = ρ − n_p·θ, the
+/// angle of the flux from the rotor. With τ the motor's torque, τ = (n_p/R_R)·ψ²·ρ_R', and a constant rate S
+/// of ρ_R:
+///   ψ = √(R_R·τ/(n_p·S))        ψ' = ψ·τ'/(2τ)        i_d = (ψ + ψ'/η)/M        i_q = ψ·S/(η·M)
+/// Singular at zero torque. With S = η the steady currents are alike, the shortest for the torque.
+struct FlatInductionState {
+  double flux_wb;
+  double flux_rate_wb_s;
+  DirectQuadrature current_a;
+  double i_q_rate_a_s;
+};
+FlatInductionState flat_induction(const InductionMachineModel& m, double slip_rad_s, double torque_nm,
+                                  double torque_rate_nm_s) noexcept;
+
+/// Position control of an induction machine along its flat outputs: currents and their rates follow from
+/// θ_ref and from a constant slip, feedback of the angle is added to i_q,
+///   i_q,ref = (τ*/J + K0·∫e + K1·e + K2·(ω_ref − ω̂))/(μ·ψ̂)        τ* = J·α_ref + f·ω_ref + τ̂_L
+/// and the flux finds to its trajectory by itself, at η. τ̂_L is that of the load observer (IMO-09): the
+/// machine must hold a load. While τ* is below least_torque_nm the flux of that torque stands in, and
+/// `singular` in the telemetry is 1. Current loops that decouple follow. Source: the book, exercise 30 of
+/// chapter 8.
+class FlatInductionController final : public Controller {
+ public:
+  /// No parameter set may have problems().
+  FlatInductionController(const InductionDriveParameters& drive, const FlatInductionParameters& p) noexcept;
+
+ private:
+  Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
+
+  InductionDriveParameters drive_;
+  FlatInductionParameters p_;
+  LoadedInductionFeedback feedback_;
+  DecoupledCurrentLoop current_loop_;
+  double angle_integral_rad_s_ = 0.0;
+};
+
 }  // namespace drivebench::control

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tests/book/closed_loop.hpp"
@@ -182,6 +184,47 @@ TEST(InductionControl, AnIntegratorOnTheQuadratureAxisLiftsALoad) {
   const Outcome without = closed_loop("exercise/8.29-no-load");
   EXPECT_GT(singular_samples(without), 100);
   EXPECT_LE(without.peak_error_counts, 3.0);
+}
+
+/// Rates of the flux from the rotor, ρ_R', while the run moves: smallest and largest, over 5 ms each [rad/s].
+std::pair<double, double> slips(const Outcome& seen) {
+  constexpr std::size_t kApart = 40;
+  constexpr double kPolePairs = 3.0;
+  const auto from_rotor_rad = [](const Sample& s) {
+    return std::atan2(s.psi_b_wb, s.psi_a_wb) - kPolePairs * s.angle_rad;
+  };
+  std::pair<double, double> found{HUGE_VAL, -HUGE_VAL};
+  for (std::size_t k = kApart; k < seen.rows.size(); ++k) {
+    if (seen.rows[k].phase != control::RunPhase::kMoving) continue;
+    const double turned_rad =
+        std::remainder(from_rotor_rad(seen.rows[k].sample) - from_rotor_rad(seen.rows[k - kApart].sample),
+                       2.0 * std::numbers::pi);
+    const double slip_rad_s = turned_rad / (125e-6 * kApart);
+    found = {std::min(found.first, slip_rad_s), std::max(found.second, slip_rad_s)};
+  }
+  return found;
+}
+
+// Exercise 30. Catches: a flux that does not belong to the torque, i_d without ψ', a torque without n_p:
+// along the flat outputs the flux turns from the rotor at the constant rate η = 278.6 1/s while the torque
+// changes threefold, to 15 % (a count moves the torque by 0.04 N·m, hence the 5 ms), and in the hold both
+// currents are √(R_R·τ/(n_p·η))/M = 2.92 A.
+TEST(InductionControl, AlongTheFlatOutputsTheSlipIsConstant) {
+  const Outcome seen = closed_loop("exercise/8.30");
+  EXPECT_LE(seen.peak_error_while_moving_counts, 3.0);
+  EXPECT_LE(seen.final_encoder_error_counts, 1.0 + 1e-9);
+  const std::size_t singular = seen.column("singular");
+  for (const ClosedLoopRow& row : seen.rows) {
+    if (row.phase != control::RunPhase::kPreparing) {
+      ASSERT_EQ(row.telemetry[singular], 0.0) << row.time_s;
+    }
+  }
+  const auto [least, most] = slips(seen);
+  EXPECT_NEAR(least, 278.6, 42.0);
+  EXPECT_NEAR(most, 278.6, 42.0);
+  const double expected_a = std::sqrt(3.9 * 0.25 / (3.0 * 278.57)) / 0.0117;
+  EXPECT_NEAR(seen.rows.back().telemetry[seen.column("i_d_a")], expected_a, 0.02 * expected_a);
+  EXPECT_NEAR(seen.rows.back().telemetry[seen.column("i_q_a")], expected_a, 0.02 * expected_a);
 }
 
 }  // namespace

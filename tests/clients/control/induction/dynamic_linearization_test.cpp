@@ -145,5 +145,23 @@ TEST(QuadratureIntegrator, ReportsASingularityWithoutTorque) {
   EXPECT_NEAR(telemetry_of(controller, "i_q_ref_a"), 0.0, 1e-9);
 }
 
+// Exercise 30. Catches: a factor in the flat map: its currents and flux, put into the machine's equations,
+// give back the torque, the slip and the rate of the flux, and the rate is that of the flux over time.
+TEST(FlatInduction, CurrentsAndFluxAreThoseOfTheFlatOutputs) {
+  constexpr double kStep_s = 1e-7;
+  for (const double slip_rad_s : {100.0, kEta, 700.0}) {
+    for (const double rate_nm_s : {-20.0, 0.0, 20.0}) {
+      const FlatInductionState x = flat_induction(kServo, slip_rad_s, 0.25, rate_nm_s);
+      EXPECT_NEAR(kServo.inertia_kgm2 * kMu * x.flux_wb * x.current_a.q, 0.25, 1e-12);
+      EXPECT_NEAR(kEtaM * x.current_a.q / x.flux_wb, slip_rad_s, 1e-9);
+      EXPECT_NEAR(kEtaM * x.current_a.d - kEta * x.flux_wb, x.flux_rate_wb_s, 1e-12);
+      const FlatInductionState later =
+          flat_induction(kServo, slip_rad_s, 0.25 + kStep_s * rate_nm_s, rate_nm_s);
+      EXPECT_NEAR((later.flux_wb - x.flux_wb) / kStep_s, x.flux_rate_wb_s, 1e-5);
+      EXPECT_NEAR((later.current_a.q - x.current_a.q) / kStep_s, x.i_q_rate_a_s, 1e-2);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace drivebench::control
