@@ -133,7 +133,14 @@ void print_comparison(const DemoReport& r) {
   numbers("exchange p50 [us]", "{:.1f}", a.exchange_p50_us, b.exchange_p50_us);
   numbers("exchange p99 [us]", "{:.1f}", a.exchange_p99_us, b.exchange_p99_us);
   row("state hash", r.lockstep.verdict.state_hash, r.realtime.verdict.state_hash);
-  fmt::print("\n  (a real-time exchange waits for the next tick)\n\n");
+  fmt::print("\n  In real time the bench does not wait: an exchange lasts until the next tick.\n");
+  if (b.missed_ticks > 0) {
+    fmt::print(
+        "  The controller, an ordinary process, was woken too late for {} samples and went on with the next\n"
+        "  one: nothing is wrong, and the errors above show what it cost.\n",
+        b.missed_ticks);
+  }
+  fmt::print("\n");
   for (const DemoRun* run : {&r.lockstep, &r.realtime}) {
     fmt::print("{}\n  recorded in {}\n", run->verdict.sentence, run->recording);
     if (!run->failure.empty()) fmt::print("  FAILED: {}\n", run->failure);
