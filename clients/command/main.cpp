@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   add_bench_commands(line);
   add_control_commands(line);
   add_experiment_commands(line);
-  add_identify_command(line);
+  add_identify_commands(line);
   add_recording_commands(line);
   add_can_commands(line);
   return line.run(argc, argv);

@@ -1,6 +1,7 @@
 #include "clients/command/identify/identify_line.hpp"
 
 #include "clients/command/common/command_line.hpp"
+#include "clients/command/identify/filter.hpp"
 #include "clients/command/identify/identify.hpp"
 
 namespace drivebench::command {
@@ -75,9 +76,7 @@ void add_files(CLI::App& sub, IdentifyOptions& o) {
   sub.add_option("--data", o.data_file, "write what was measured as CSV");
 }
 
-}  // namespace
-
-void add_identify_command(CommandLine& line) {
+void add_identify(CommandLine& line) {
   const auto [sub, o] = line.add<IdentifyOptions>(
       "identify", "the parameters of a motor, from an experiment or a file", run_identify);
   add_measurement(sub, o);
@@ -86,6 +85,30 @@ void add_identify_command(CommandLine& line) {
   sub.footer(
       "Exit codes: 0 ok, 1 the experiment failed or its data do not tell every parameter, 2 usage, file or "
       "configuration, 3 cannot connect.");
+}
+
+void add_filter(CommandLine& line) {
+  const auto [sub, o] = line.add<FilterOptions>(
+      "filter", "the numbers of a Butterworth low-pass, or a column of a CSV file through it", run_filter);
+  sub.add_option("FILE", o.file, "a CSV file; without it the numbers are printed");
+  sub.add_option("--order", o.order)->check(CLI::Range(1, 10))->capture_default_str();
+  sub.add_option("--cutoff-hz", o.cutoff_hz, "corner")
+      ->check(finite_between(1e-6, 1e9))
+      ->capture_default_str();
+  sub.add_option("--rate-hz", o.rate_hz, "sample rate; of a file it is that of the rows")
+      ->check(finite_between(1e-6, 1e9));
+  sub.add_option("--column", o.column, "header of the column to be filtered");
+  sub.add_option("--time", o.time, "header of the time [s]")->capture_default_str();
+  sub.add_option("--out", o.out_file,
+                 "instead of standard output: the column as it was, filtered once, filtered there and back, "
+                 "and the slope of that");
+}
+
+}  // namespace
+
+void add_identify_commands(CommandLine& line) {
+  add_identify(line);
+  add_filter(line);
 }
 
 }  // namespace drivebench::command

@@ -4,6 +4,6 @@ namespace drivebench::command {
 
 class CommandLine;
 
-void add_identify_command(CommandLine& line);
+void add_identify_commands(CommandLine& line);
 
 }  // namespace drivebench::command
