@@ -290,6 +290,8 @@ constexpr double kStepsInTimeConstant = 10.0;
 // The output of the filter is exact at both ends and in the middle of a step; the machine only smooths it.
 constexpr double kStepsInFilter = 2.0;
 constexpr double kRadPerStep = 0.2;
+// A rotor that swings carries the error of every step on: 3000 random machines on strong sources keep 1e-5.
+constexpr double kSwingRadPerStep = 0.01;
 
 /// The fastest electrical angle that the axis is known to turn through [rad/s]: of its source, of its prime
 /// mover, and of an emf that reaches the voltage limit.
@@ -309,6 +311,20 @@ double fastest_turning_rad_s(const AxisParameters& p, const Machine& machine) no
         std::max(turning_rad_s, electrical_speed_rad_s(machine, p.drive.amplifier.voltage_limit_v));
   }
   return turning_rad_s;
+}
+
+/// The fastest swing of a rotor against the field of its source [rad/s]; 0: none is known.
+template <class Machine>
+double fastest_swing_rad_s(const AxisParameters& p, const Machine& machine) noexcept {
+  if constexpr (requires { swing_rad_s(machine, 1.0, 1.0, 1.0, 1.0); }) {
+    if (p.drive.kind == DriveKind::kSource && p.mechanics.motion != ShaftMotion::kImposed) {
+      const SourceParameters& source = p.drive.source;
+      const double two_phase = connection_of(machine) == Connection::kStar ? std::sqrt(1.5) : 1.0;
+      return swing_rad_s(machine, p.mechanics.inertia_kgm2, two_phase * source.amplitude_v,
+                         2.0 * std::numbers::pi * source.frequency_hz, source.field_v);
+    }
+  }
+  return 0.0;
 }
 
 }  // namespace
@@ -332,6 +348,8 @@ int default_substeps(const AxisParameters& p, double period_s) noexcept {
         }
         const double turning_rad_s = fastest_turning_rad_s(p, machine);
         if (turning_rad_s > 0.0) step_s = std::min(step_s, kRadPerStep / turning_rad_s);
+        const double swing_rad_s = fastest_swing_rad_s(p, machine);
+        if (swing_rad_s > 0.0) step_s = std::min(step_s, kSwingRadPerStep / swing_rad_s);
       },
       p.machine);
   const double substeps = std::ceil(period_s / step_s - 1e-9);

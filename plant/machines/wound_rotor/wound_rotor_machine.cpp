@@ -104,4 +104,13 @@ double fastest_time_constant_s(const WoundRotorMachineParameters& p) noexcept {
   return 1.0 / (half + std::sqrt(half * half - r_s * r_f / sigma));
 }
 
+double swing_rad_s(const WoundRotorMachineParameters& p, double inertia_kgm2, double amplitude_v,
+                   double electrical_rad_s, double field_v) noexcept {
+  const double field_a = std::abs(field_v) / p.field_resistance_ohm;
+  const double stator_a =
+      std::abs(amplitude_v) /
+      std::hypot(p.stator_resistance_ohm, electrical_rad_s * leakage_factor(p) * p.stator_inductance_h);
+  return p.pole_pairs * std::sqrt(p.mutual_inductance_h * field_a * stator_a / inertia_kgm2);
+}
+
 }  // namespace drivebench

@@ -126,6 +126,12 @@ WoundRotorMachineParameters adjusted(const WoundRotorMachineParameters& p, const
 /// The fastest electrical time constant at standstill. The substep must resolve n_p w as well.
 double fastest_time_constant_s(const WoundRotorMachineParameters& p) noexcept;
 
+/// Fastest swing of the rotor about the direction of a stator that a source feeds, n_p sqrt(M i_F i_S / J):
+/// with the field current u_F/R_F, and with the stator current that the source drives through R_S and the
+/// leakage before the rotor turns. The amplitude is that of the two-phase equivalent.
+double swing_rad_s(const WoundRotorMachineParameters& p, double inertia_kgm2, double amplitude_v,
+                   double electrical_rad_s, double field_v) noexcept;
+
 /// Names the parts of the machine for the templates of plant/train/drive_train.hpp.
 struct WoundRotorMachine {
   using Parameters = WoundRotorMachineParameters;
