@@ -5,6 +5,7 @@
 #include "clients/command/demo/demo_line.hpp"
 #include "clients/command/experiment/experiment_line.hpp"
 #include "clients/command/identify/identify_line.hpp"
+#include "clients/command/motor/motor_line.hpp"
 #include "clients/command/recording/recording_line.hpp"
 
 int main(int argc, char** argv) {
@@ -16,6 +17,7 @@ int main(int argc, char** argv) {
   add_experiment_commands(line);
   add_identify_commands(line);
   add_recording_commands(line);
+  add_motor_commands(line);
   add_can_commands(line);
   return line.run(argc, argv);
 }

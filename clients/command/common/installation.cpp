@@ -55,4 +55,8 @@ fs::path find_experiment_file(std::string_view choice) {
   return find_in("experiments", "experiment file", choice);
 }
 
+fs::path find_motor_file(std::string_view choice) {
+  return find_in("motors", "motor file", choice);
+}
+
 }  // namespace drivebench::command

@@ -18,5 +18,7 @@ std::filesystem::path server_executable();
 std::filesystem::path find_config(std::string_view choice);
 /// An experiment file, searched for like a bench file, in `experiments/` of these folders.
 std::filesystem::path find_experiment_file(std::string_view choice);
+/// A motor file, searched for like a bench file, in `motors/` of these folders.
+std::filesystem::path find_motor_file(std::string_view choice);
 
 }  // namespace drivebench::command
