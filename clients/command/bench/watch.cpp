@@ -115,7 +115,7 @@ class View {
     };
     for (const Signal* signal : signals_) {
       add(heading(*signal), value_text(*signal, sample, bench_));
-      if (has_time_ && signal->name == "tick") add("time [s]", time_text(sample));
+      if (has_time_ && signal->name == "tick") add("time_s", time_text(sample));
     }
     if (!is_started_) fmt::print("{}\n", heads);
     fmt::print("{}\n", values);

@@ -54,6 +54,8 @@ ControlRow row_of(const Sample& sample, const ControlRun& into, std::int64_t per
   const control::Controller& controller = run.controller();
   ControlRow row = {.tick = sample.tick, .periods = periods, .time_s = run.time_s()};
   row.reference = run.reference();
+  row.encoder_count = sample.encoder_count;
+  row.shaft_rad = into.knows_angle ? sample.angle_rad : 0.0;
   row.angle_rad = into.knows_angle ? sample.angle_rad - start_rad : controller.angle_rad();
   row.error_rad = row.reference.angle_rad - row.angle_rad;
   row.measured_error_rad = row.reference.angle_rad - controller.angle_rad();
@@ -246,24 +248,33 @@ ControlReport summary_of(const ControlRun& run, double period_s) {
 }
 
 std::string to_csv(const ControlRun& run) {
-  const std::string_view unit = run.quantity == control::Quantity::kVoltage ? "V" : "A";
+  const bool voltage = run.quantity == control::Quantity::kVoltage;
   std::string csv =
-      "tick,time [s],reference [rad],angle [rad],error [counts],measured_error [counts],error [rad],"
-      "reference_speed [rad/s],speed [rad/s],speed_observer [rad/s],i_a [A],i_b [A],i_c [A],i_f [A]";
-  for (const std::string_view terminal : {"a", "b", "c", "f"})
-    csv += fmt::format(",command_{} [{}]", terminal, unit);
-  csv += ",u_a [V],u_b [V],u_c [V],u_f [V],saturated";
+      "tick,time_s,reference_rad [rad],moved_rad [rad],error_counts [counts],measured_error_counts [counts],"
+      "error_rad [rad],reference_speed_rad_s [rad/s],speed_rad_s [rad/s],speed_observer_rad_s [rad/s],"
+      "encoder_count [counts]";
+  if (run.knows_angle) csv += ",angle_rad [rad]";
+  const auto add = [&csv](std::string_view format) {
+    for (const std::string_view terminal : {"a", "b", "c", "f"})
+      csv += fmt::format(fmt::runtime(format), terminal);
+  };
+  add(",i_{}_a [A]");
+  add(voltage ? ",command_{}_v [V]" : ",command_{}_a [A]");
+  if (run.knows_voltage) add(",u_{}_v [V]");
+  csv += ",saturated";
   for (const std::string& name : run.telemetry_names)
-    csv += "," + name;
-  csv += ",exchange [us]\n";
+    csv += ",controller_" + name;
+  csv += ",exchange_us [us]\n";
   for (std::size_t i = 0; i < run.rows.size(); ++i) {
     const ControlRow& r = run.rows[i];
     const auto out = std::back_inserter(csv);
-    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{}", r.tick, r.time_s, r.reference.angle_rad, r.angle_rad,
-                   r.error_rad * run.counts_per_rad, r.measured_error_rad * run.counts_per_rad, r.error_rad,
-                   r.reference.speed_rad_s, r.speed_rad_s, r.speed_observer_rad_s);
-    for (const TerminalValues& each : {r.current_a, r.setpoint, r.voltage_v})
-      fmt::format_to(out, ",{}", fmt::join(each, ","));
+    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},{}", r.tick, r.time_s, r.reference.angle_rad,
+                   r.angle_rad, r.error_rad * run.counts_per_rad, r.measured_error_rad * run.counts_per_rad,
+                   r.error_rad, r.reference.speed_rad_s, r.speed_rad_s, r.speed_observer_rad_s,
+                   r.encoder_count);
+    if (run.knows_angle) fmt::format_to(out, ",{}", r.shaft_rad);
+    fmt::format_to(out, ",{},{}", fmt::join(r.current_a, ","), fmt::join(r.setpoint, ","));
+    if (run.knows_voltage) fmt::format_to(out, ",{}", fmt::join(r.voltage_v, ","));
     fmt::format_to(out, ",{}", r.saturated ? 1 : 0);
     const std::size_t columns = run.telemetry_names.size();
     for (std::size_t column = 0; column < columns; ++column)

@@ -34,6 +34,8 @@ struct ControlRow {
   std::int64_t periods = 1;  ///< since the previous row
   double time_s = 0.0;       ///< after the start of the trajectory
   control::Reference reference{};
+  std::int64_t encoder_count = 0;
+  double shaft_rad = 0.0;           ///< the true angle as the sample has it, if the link carries it
   double angle_rad = 0.0;           ///< since the first sample: the true angle, or else that of the encoder
   double error_rad = 0.0;           ///< reference - this angle
   double measured_error_rad = 0.0;  ///< reference - encoder
@@ -104,7 +106,9 @@ ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<L
 /// The numbers of the report that follow from the rows.
 ControlReport summary_of(const ControlRun& run, double period_s);
 
-/// Everything as CSV, units in the header.
+/// Everything as CSV in the header dialect of export: `tick,time_s,NAME [UNIT]`; the bench's signals have
+/// their names in the catalogue, so that `identify --from` reads them, and the controller's telemetry begins
+/// with `controller_`. Columns that the link does not carry are left out.
 std::string to_csv(const ControlRun& run);
 
 }  // namespace drivebench::command

@@ -213,7 +213,12 @@ MeasuredMotor read_foreign(const IdentifyOptions& options) {
   } catch (const identification::IdentificationError& error) {
     throw UsageError(error.what());
   }
-  m.facts.three_phase = m.data.find("i_c_a") != nullptr || m.data.find("u_c_v") != nullptr;
+  // A column of zeros is a terminal that the machine does not have.
+  const auto lives = [&m](const char* name) {
+    const identification::Column* const column = m.data.find(name);
+    return column != nullptr && std::ranges::any_of(column->values, [](double x) { return x != 0.0; });
+  };
+  m.facts.three_phase = lives("i_c_a") || lives("u_c_v");
   m.source = "file " + options.from_file;
   return m;
 }

@@ -83,8 +83,8 @@ class TheMove(unittest.TestCase):
             move(server, "--csv", str(file))
         with open(file, newline="", encoding="utf-8") as lines:
             rows = [{name.split(" ")[0]: float(value) for name, value in row.items()} for row in csv.DictReader(lines)]
-        observer = max(abs(row["speed_observer"] - row["speed"]) for row in rows)
-        difference = max(abs(row["speed_difference_rad_s"] - row["speed"]) for row in rows)
+        observer = max(abs(row["speed_observer_rad_s"] - row["speed_rad_s"]) for row in rows)
+        difference = max(abs(row["controller_speed_difference_rad_s"] - row["speed_rad_s"]) for row in rows)
         self.assertLess(observer, 1.2)
         self.assertGreater(difference, 24.0)
         self.assertLess(difference, 25.2)  # one count in one tick is 25.13 rad/s

@@ -301,7 +301,7 @@ class Controlling(CommandTest):
         """Catches: a file without its end or its units; a missing folder that is reported after the move."""
         self.control("--csv", "move.csv")
         head, *rows = (self.folder / "move.csv").read_text(encoding="utf-8").splitlines()
-        self.assertSays(head, "tick,time [s],reference [rad],angle [rad],error [counts]")
+        self.assertSays(head, "tick,time_s,reference_rad [rad],moved_rad [rad],error_counts [counts]")
         self.assertEqual([int(row.split(",")[0]) for row in rows], list(range(1024)))
         before = self.json_of("status", link=self.link)["tick"]
         self.assertSays(self.control("--csv", "none/move.csv", code=USAGE)["error"]["message"], "cannot write")

@@ -220,6 +220,20 @@ class Identify(WireTest):
             self.assertIsNone(found["parameters"][name]["estimate"], name)
             self.assertIsNone(found["parameters"][name]["by_equations"], name)
 
+    def test_the_csv_of_a_controller_is_read_as_it_is(self):
+        """Catches: headers of a dialect that only their own command reads, an angle that begins anew with the run."""
+        server = self.server(text=(BENCHES / "dc-a-voltage.toml").read_text(encoding="utf-8").replace(
+            "../motors/", f"{REPOSITORY}/configs/motors/"))
+        moved = self.path / "move.csv"
+        ran = self.drivebench("control", "--preset", "book/2.23", "--csv", moved, "--link", f"tcp:{server.ready['tcp']}")
+        self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+        ran = self.drivebench("identify", "--motor", "dc", "--from", moved, "--counts", 2000, "--json")
+        found = json.loads(ran.stdout)
+        self.assertEqual(found["settings"]["voltage_shift"], 0.5)
+        self.assertEqual(found["wiring"]["direction"]["found"], 1)
+        for name, truth in (("R", 2.0), ("K_T", 0.07)):
+            self.assertAlmostEqual(found["parameters"][name]["estimate"] / truth, 1.0, delta=0.01)
+
     def test_a_foreign_file_is_read_by_its_column_map(self):
         """Catches: a column map that takes the wrong column or scale."""
         own = self.path / "own.csv"

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "clients/command/control/control_json.hpp"
+#include "clients/identification/data/measured_data.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -94,6 +95,43 @@ TEST(ControlRunSummary, NamesTheSourceOfItsNumbers) {
   EXPECT_FALSE(parse_control(json)->peak_voltage_v.has_value());
   run.counts_per_rad = 0.0;
   EXPECT_FALSE(summary_of(run, 0.001).peak_error_counts.has_value());
+}
+
+std::string header_of(const ControlRun& run) {
+  const std::string csv = to_csv(run);
+  return csv.substr(0, csv.find('\n'));
+}
+
+// Catches: a dialect of its own, a catalogue's name over something else, a column of zeros for what the link
+// does not carry, a row with another number of cells than the header.
+TEST(ControlRunCsv, SpeaksTheDialectOfExport) {
+  ControlRun run;
+  run.counts_per_rad = 2.0;
+  run.telemetry_names = {"speed_rad_s"};
+  run.telemetry = {0.25};
+  run.rows = {{.tick = 7,
+               .time_s = 0.5,
+               .encoder_count = -3,
+               .shaft_rad = 9.0,
+               .angle_rad = 1.5,
+               .current_a = {1.0, 2.0, 3.0, 4.0},
+               .voltage_v = {5.0, 6.0, 7.0, 8.0}}};
+  const identification::MeasuredData data = identification::parse_csv(to_csv(run), "run", {.period_s = 1e-3});
+  EXPECT_EQ(data.at("encoder_count")[0], -3.0);
+  EXPECT_EQ(data.at("angle_rad")[0], 9.0);
+  EXPECT_EQ(data.at("moved_rad")[0], 1.5);
+  EXPECT_EQ(data.at("controller_speed_rad_s")[0], 0.25);
+  EXPECT_EQ(data.at("i_b_a")[0], 2.0);
+  EXPECT_EQ(data.at("u_f_v")[0], 8.0);
+  EXPECT_EQ(data.at("time_s")[0], 0.5);
+  EXPECT_EQ(data.find("i_b_a")->unit, "A");
+  EXPECT_NE(header_of(run).find(",command_a_v [V],"), std::string::npos);
+  run.quantity = control::Quantity::kCurrent;
+  run.knows_angle = run.knows_voltage = false;
+  EXPECT_NE(header_of(run).find(",command_a_a [A],"), std::string::npos);
+  const identification::MeasuredData less = identification::parse_csv(to_csv(run), "run", {.period_s = 1e-3});
+  EXPECT_EQ(less.find("u_a_v"), nullptr);
+  EXPECT_EQ(less.find("angle_rad"), nullptr);
 }
 
 }  // namespace
