@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
+#include <vector>
 
 #include "clients/command/recording/svg_plot.hpp"
 
@@ -57,6 +60,17 @@ std::string validation_text(const IdentifyReport& r) {
                      r.validation->from_rest ? "standstill" : "the measured state", text);
 }
 
+/// Adds measured less re-simulated to the panel of its unit.
+void add_residual(std::vector<Panel>& panels, const Resimulated& signal) {
+  const std::string label = fmt::format("residual [{}]", signal.unit);
+  PlotLine line{.name = signal.name, .values = {}};
+  for (std::size_t k = 0; k < signal.measured.size(); ++k)
+    line.values.push_back(signal.measured[k] - signal.simulated[k]);
+  auto panel = std::ranges::find(panels, label, &Panel::label);
+  if (panel == panels.end()) panel = panels.insert(panel, {.label = label, .lines = {}});
+  panel->lines.push_back(std::move(line));
+}
+
 const char* inside_text(const Result& result, const Estimate& e) {
   const std::optional<bool> inside = is_inside(result, e);
   const bool refined = e.interval.has_value();
@@ -82,6 +96,8 @@ std::string identify_text(const IdentifyReport& r) {
     add(fmt::format(kRow, e.name, e.unit, cell.value, cell.interval, cell.truth, cell.error,
                     cell.by_equations, cell.index, inside_text(result, e)));
   }
+  for (const Estimate& error : result.sensors)
+    fmt::format_to(out, "sensor: {}\n", sensor_text(error));
   text += result.wiring.empty() ? "" : "\n";
   for (const identification::WiringFact& fact : result.wiring)
     fmt::format_to(out, "wiring: {}\n", wiring_text(fact));
@@ -115,6 +131,8 @@ std::string identify_plot(const IdentifyReport& r) {
     panels.push_back({.label = fmt::format("{} [{}]", signal.name, signal.unit),
                       .lines = {{"measured", signal.measured}, {"re-simulated", signal.simulated}}});
   }
+  for (const Resimulated& signal : v.signals)
+    add_residual(panels, signal);
   std::vector<double> times_ms;
   for (std::size_t k = 0; k < v.signals.front().measured.size(); ++k)
     times_ms.push_back(1e3 * v.time_s(k));

@@ -28,7 +28,8 @@ std::string identify_text(const IdentifyReport& report);
 /// The same text with a Markdown table; `plot` is the picture's path relative to the file, or empty.
 std::string identify_markdown(const IdentifyReport& report, const std::string& plot);
 
-/// Measured and re-simulated currents and speed as an SVG picture.
+/// Measured and re-simulated currents and speed as an SVG picture, below them their differences: a panel for
+/// each unit.
 std::string identify_plot(const IdentifyReport& report);
 
 }  // namespace drivebench::command

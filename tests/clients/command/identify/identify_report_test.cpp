@@ -39,13 +39,16 @@ TEST(IdentifyReport, TheTextHasEstimateIndexTruthErrorAndVerdict) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
 }
 
-// Catches: a picture without the measured or without the re-simulated signals, and a report that links to
-// none.
+// Catches: residuals of the wrong sign or of two units in one panel, a picture without the measured or
+// without the re-simulated signals, and a report that links to none.
 TEST(IdentifyReport, PictureAndMarkdownShowTheValidation) {
   IdentifyReport report = some_report();
   const std::string svg = identify_plot(report);
-  for (const char* part : {"measured", "re-simulated", "i_a_a [A]", "speed_rad_s [rad/s]", "file &lt;x>"})
+  for (const char* part : {"measured", "re-simulated", "i_a_a [A]", "speed_rad_s [rad/s]", "residual [A]",
+                           "residual [rad/s]", "file &lt;x>"})
     EXPECT_NE(svg.find(part), std::string::npos) << part;
+  // The residual of the current goes down to -0.5 A in the middle: the axis of its panel is below zero.
+  EXPECT_NE(svg.find(">-0.5</text>"), std::string::npos) << svg;
   const std::string markdown = identify_markdown(report, "x.svg");
   EXPECT_NE(markdown.find("| R | ohm | 2.02 | - | 2 | 1 % | yes | 2.02 | 1.49 % |"), std::string::npos)
       << markdown;
