@@ -175,8 +175,33 @@ void check(const Result& result) {
 
 }  // namespace
 
-Resimulation resimulate(const MeasuredData& data, const Settings& e, const Result& result) {
+namespace {
+
+/// The signals without the errors of the sensors that were found.
+MeasuredData without_errors(MeasuredData data, const Result& result) {
+  for (const bool gains : {false, true}) {  // a sensor shows gain times the truth, plus offset
+    for (const Estimate& error : result.sensors) {
+      const std::size_t blank = error.name.find(' ');
+      if ((error.name.substr(blank + 1) == "gain") != gains) continue;
+      for (Column& column : data.columns) {
+        if (column.name != error.name.substr(0, blank)) continue;
+        for (double& x : column.values)
+          x = gains ? x / error.value : x - error.value;
+      }
+    }
+  }
+  return data;
+}
+
+}  // namespace
+
+Resimulation resimulate(const MeasuredData& measured, const Settings& settings, const Result& result) {
   check(result);
+  const MeasuredData data = without_errors(measured, result);
+  Settings e = settings;
+  for (const Estimate& error : result.sensors) {
+    if (error.name == "angle offset") e.zero_rad += error.value / e.pole_pairs;
+  }
   const SampleRange range = window_of(data, e.processing);
   const Measured m(data, e);
   switch (e.kind) {

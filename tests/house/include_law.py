@@ -40,7 +40,7 @@ ORDERED = {
     "server": ("host", "bench", "config", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
     "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
                         "salient", "presets"),
-    "clients/identification": ("math", "data", "motors", "refinement"),
+    "clients/identification": ("math", "data", "motors", "refinement", "wiring"),
 }
 
 # Files beside rooms that the rooms may include. They count as rooms of their own in the search for circles.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -16,10 +17,10 @@
 #include "clients/command/identify/identify_json.hpp"
 #include "clients/command/identify/identify_report.hpp"
 #include "clients/command/identify/identify_server.hpp"
+#include "clients/identification/find_wiring.hpp"
 #include "clients/identification/identify.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/named_experiments.hpp"
-#include "clients/identification/wiring/wiring.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
 
@@ -116,6 +117,10 @@ void apply_options(const IdentifyOptions& o, Settings& e) {
   if (o.order) p.current.order = p.voltage.order = p.shaft.order = *o.order;
   if (!o.load.empty()) e.load = o.load == "constant" ? LoadModel::kConstant : LoadModel::kViscous;
   if (o.one_stage) e.two_stage = false;
+  const auto finds = [&](const char* what) { return std::ranges::find(o.find, what) != o.find.end(); };
+  e.sensors = {.current_offsets = finds("current-offsets"),
+               .voltage_offsets = finds("voltage-offsets"),
+               .gains = finds("gains")};
 }
 
 MeasuredMotor measured_motor(const IdentifyOptions& options, const MotorName& motor,

@@ -22,7 +22,8 @@ struct IdentifyOptions {
   std::vector<std::string> maps{};  ///< of CSV: HEADER=SIGNAL or a column-map file
   std::string time{};               ///< of CSV: header of the time; empty: time_s
   std::optional<double> period_s{};
-  std::string axis{};  ///< of a recording: name; empty: the first in the file
+  std::vector<std::string> find{};  ///< current-offsets, voltage-offsets, gains
+  std::string axis{};               ///< of a recording: name; empty: the first in the file
 
   std::optional<int> pole_pairs{};
   std::optional<double> counts_per_revolution{};

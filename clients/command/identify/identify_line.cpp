@@ -25,6 +25,12 @@ void add_measurement(CLI::App& sub, IdentifyOptions& o) {
   sub.add_option("--axis", o.axis, "--from a recording: name; default: the first in the file");
   sub.add_option("--map", o.maps,
                  "--from CSV: HEADER=SIGNAL, HEADER=SIGNAL*FACTOR+OFFSET, or a column-map file (.toml)");
+  sub.add_option("--find", o.find,
+                 "errors of the sensors to look for beside the motor: current-offsets, voltage-offsets, "
+                 "gains (of the "
+                 "phases b and c against a); separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"current-offsets", "voltage-offsets", "gains"}));
   sub.add_option("--time", o.time, "--from CSV: header of the time [s]; default: time_s");
   sub.add_option("--period", o.period_s,
                  "--from CSV: seconds between two rows, if there is no column of time")
@@ -71,7 +77,8 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
 
 void add_files(CLI::App& sub, IdentifyOptions& o) {
   sub.add_option("--markdown", o.markdown_file, "write the report");
-  sub.add_option("--plot", o.plot_file, "write an SVG picture: measured against re-simulated");
+  sub.add_option("--plot", o.plot_file,
+                 "write an SVG picture: measured against re-simulated, and what is left between them");
   sub.add_option("--motor-file", o.motor_file, "write a TOML file for configs/motors");
   sub.add_option("--data", o.data_file, "write what was measured as CSV");
 }

@@ -165,6 +165,11 @@ std::string wiring_text(const WiringFact& fact) {
   return text;
 }
 
+std::string sensor_text(const Estimate& e) {
+  return fmt::format("{} {:.4g} +- {:.2g}{}{}", e.name, e.value, e.interval.value_or(0.0),
+                     e.unit == "1" ? "" : " ", e.unit == "1" ? "" : e.unit);
+}
+
 std::string explanation_text(const Explanation& x) {
   return fmt::format(
       "noise that explains the record: voltages {:.3g} V rms beside {:.4g} V, currents {:.3g} A rms "
@@ -190,6 +195,9 @@ std::string to_markdown(const Result& r) {
   if (r.mechanical_error_index) text += fmt::format(", mechanical {:.4g}", *r.mechanical_error_index);
   text += fmt::format(", condition {:.3g}. Verdict: {}.\n", r.condition, r.excitation.verdict);
   if (r.explanation) text += "\n" + explanation_text(*r.explanation) + ".\n";
+  if (!r.sensors.empty()) text += "\nErrors of the sensors:\n\n";
+  for (const Estimate& error : r.sensors)
+    text += "* " + sensor_text(error) + "\n";
   if (!r.wiring.empty()) text += "\nWiring:\n\n";
   for (const WiringFact& fact : r.wiring)
     text += "* " + wiring_text(fact) + "\n";
@@ -232,6 +240,10 @@ std::string to_json(const Result& r) {
         {"current_noise_a", number(x.current_noise_a)}, {"current_white_a", number(x.current_white_a)},
         {"current_error", number(x.current_error)},     {"angle_error", number(x.angle_error)}};
   }
+  for (const Estimate& error : r.sensors)
+    all["sensors"][error.name] = {{"estimate", number(error.value)},
+                                  {"unit", error.unit},
+                                  {"interval", number(error.interval.value_or(0.0))}};
   if (!r.wiring.empty()) {
     nlohmann::json& wiring = all["wiring"] = nlohmann::json::object();
     for (const WiringFact& fact : r.wiring)

@@ -35,7 +35,7 @@ struct Explanation {
   double unlikelihood = 0.0;     ///< minus twice the logarithm of the likelihood, less a constant
 };
 
-/// A fact about the wiring of a record: found in the data (wiring/wiring.hpp), or set.
+/// A fact about the wiring of a record: found in the data (find_wiring.hpp), or set.
 struct WiringFact {
   std::string name;  ///< pole_pairs, direction (1: with the phases, -1: against them), voltage_shift, zero
   std::string unit;
@@ -61,6 +61,7 @@ struct Result {
   std::size_t samples = 0;
   Excitation excitation{};
   std::optional<Explanation> explanation{};  ///< of the refinement
+  std::vector<Estimate> sensors{};           ///< errors that were looked for: "i_a_a offset", "u_b_v gain"
   std::vector<WiringFact> wiring{};          ///< empty: not looked for
   std::vector<std::string> notes{};
 
@@ -90,6 +91,9 @@ struct EstimateText {
 };
 EstimateText text_of(const Result& result, const Estimate& estimate);
 
+/// The error of a sensor as text: "i_a_a offset 0.2 A +- 0.01 A".
+std::string sensor_text(const Estimate& error);
+
 /// A fact as text: "pole pairs 6, found, as set".
 std::string wiring_text(const WiringFact& fact);
 
@@ -102,8 +106,8 @@ std::string to_markdown(const Result& result);
 
 /// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, interval, by_equations,
 /// index, truth, inside}}, wiring: {pole_pairs: {found, unit, interval, used, given, contradicts, remark}},
-/// explanation, ...}; a number that is not finite and the estimate of an unseen
-/// parameter are null.
+/// sensors: {"i_a_a offset": {estimate, unit, interval}}, explanation, ...}; a number that is not finite and
+/// the estimate of an unseen parameter are null.
 std::string to_json(const Result& result);
 
 /// The contents of a motor file beside the estimates.

@@ -34,6 +34,14 @@ struct Processing {
 /// The load that opposes the torque of an induction motor in the equation of motion.
 enum class LoadModel : std::uint8_t { kViscous, kConstant };
 
+/// Errors of the sensors that the refinement looks for beside the motor.
+struct SensorSearch {
+  bool current_offsets = false;
+  bool voltage_offsets = false;  ///< in a star against phase a, as its terminals show no more
+  bool zero = false;             ///< of the encoder, beside Settings::zero_rad
+  bool gains = false;  ///< of the currents and of the voltages of the phases b and c against phase a
+};
+
 /// The input of identify() beside the data.
 struct Settings {
   MotorKind kind = MotorKind::kInduction;
@@ -45,6 +53,8 @@ struct Settings {
   double zero_rad = 0.0;  ///< added to the shaft's angle: the magnet points to phase a at zero
   LoadModel load = LoadModel::kViscous;
   bool two_stage = true;  ///< PM synchronous: first the electrical parameters, then the mechanical ones
+  SensorSearch sensors{};
+  std::size_t most_samples = 100'000;  ///< that the refinement reads: keeps a long record below some seconds
   Processing processing{};
 };
 

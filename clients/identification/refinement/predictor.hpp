@@ -22,6 +22,15 @@ struct SensorNoise {
   double angle_rad = 0.0;
 };
 
+/// What the sensors make of the truth: gain times it, plus offset, by phase.
+struct SensorErrors {
+  std::array<double, 3> current_gain = {1.0, 1.0, 1.0};
+  std::array<double, 3> current_offset_a{};
+  std::array<double, 3> voltage_gain = {1.0, 1.0, 1.0};
+  std::array<double, 3> voltage_offset_v{};
+  double angle_offset_rad = 0.0;  ///< electrical, added to that of the measured shaft
+};
+
 /// What the predictor needs of a record.
 struct PredictorRecord {
   TerminalVoltages voltages;
@@ -68,6 +77,9 @@ class Predictor {
 
   int outputs() const noexcept { return outputs_; }
   std::size_t rows() const noexcept { return samples_.size() * static_cast<std::size_t>(outputs_); }
+
+  /// The errors that the measured signals are freed of from now on.
+  void correct(const SensorErrors& errors) noexcept { errors_ = errors; }
 
   /// Linearises the model along its filtered run with these noises.
   void linearise(const Model& model, const SensorNoise& noise) { run<true>(model, noise); }
@@ -121,7 +133,15 @@ class Predictor {
   static constexpr std::size_t at(int index) noexcept { return static_cast<std::size_t>(index); }
 
   double measured(int output, std::size_t sample) const noexcept {
-    return output + 1 == outputs_ ? r_.angle[sample] : r_.currents[at(output)][sample];
+    return output + 1 == outputs_ ? r_.angle[sample] : current(at(output), sample);
+  }
+
+  double electrical(double shaft_rad) const noexcept {
+    return r_.pole_pairs * shaft_rad + errors_.angle_offset_rad;
+  }
+
+  double current(std::size_t phase, std::size_t sample) const noexcept {
+    return (r_.currents[phase][sample] - errors_.current_offset_a[phase]) / errors_.current_gain[phase];
   }
 
   static typename Model::State part_of(const State& x) noexcept {
@@ -132,8 +152,7 @@ class Predictor {
 
   double output(const Model& model, const State& x, int which) const noexcept {
     if (which + 1 == outputs_) return x.back();
-    return model.currents(part_of(x),
-                          MotorInput{.u = {}, .electrical_rad = r_.pole_pairs * x.back()})[at(which)];
+    return model.currents(part_of(x), MotorInput{.u = {}, .electrical_rad = electrical(x.back())})[at(which)];
   }
 
   State advanced(const Model& model, State x, std::size_t sample,
@@ -142,10 +161,9 @@ class Predictor {
     for (int n = 0; n < substeps_; ++n) {
       const State before = x;
       x = runge_kutta(before, r_.period_s / substeps_, [&](const State& y, double part) {
-        MotorInput in{.u = u[2 * n + static_cast<int>(2.0 * part)],
-                      .electrical_rad = r_.pole_pairs * y.back()};
+        MotorInput in{.u = u[2 * n + static_cast<int>(2.0 * part)], .electrical_rad = electrical(y.back())};
         for (std::size_t k = 0; k < in.u.size(); ++k)
-          in.u[k] += added_v[k];
+          in.u[k] = (in.u[k] - errors_.voltage_offset_v[k]) / errors_.voltage_gain[k] + added_v[k];
         const typename Model::State slope = model.slope(part_of(y), in);
         State all;
         std::copy(slope.begin(), slope.end(), all.begin());
@@ -165,9 +183,9 @@ class Predictor {
     x.back() = r_.angle[k];
     std::array<double, 3> currents{};
     for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
-      currents[phase] = r_.currents[phase][k];
+      currents[phase] = current(phase, k);
     const auto part =
-        model.state_of(currents, r_.first_speed, {.u = {}, .electrical_rad = r_.pole_pairs * r_.angle[k]});
+        model.state_of(currents, r_.first_speed, {.u = {}, .electrical_rad = electrical(r_.angle[k])});
     std::copy(part.begin(), part.end(), x.begin());
     return x;
   }
@@ -243,6 +261,7 @@ class Predictor {
   }
 
   const PredictorRecord& r_;
+  SensorErrors errors_;
   int substeps_ = 1;
   int outputs_ = 0;
   std::vector<Sample> samples_;

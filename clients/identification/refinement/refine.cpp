@@ -1,5 +1,7 @@
 #include "clients/identification/refinement/refine.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +13,7 @@
 #include "clients/identification/data/noise.hpp"
 #include "clients/identification/refinement/gauss_newton.hpp"
 #include "clients/identification/refinement/predictor.hpp"
+#include "clients/identification/refinement/sensor_unknowns.hpp"
 #include "clients/identification/refinement/unknowns.hpp"
 #include "clients/identification/refinement/verdict.hpp"
 
@@ -40,6 +43,7 @@ PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
                     .first_speed = 0.0,
                     .largest_current_a = 0.0,
                     .largest_speed = 0.0};
+  r.range.end = std::min(r.range.end, r.range.first + e.most_samples);
   const ShaftSignals shaft = shaft_signals(data, e, e.processing.shaft);
   for (std::size_t k = 0; k < r.voltages.phases(); ++k) {
     r.currents.push_back(data.at("i_" + std::string(1, static_cast<char>('a' + k)) + "_a"));
@@ -178,13 +182,15 @@ std::vector<std::string> unseen_parameters(const Result& result, double torque_n
 template <class Model>
 void refine_with(const PredictorRecord& record, const Settings& e, Result& result) {
   const double duration_s = record.period_s * static_cast<double>(record.range.count());
-  const std::vector<Unknown> unknowns = unknowns_of(e, result, record.largest_speed, duration_s);
+  std::vector<Unknown> unknowns = unknowns_of(e, result, record.largest_speed, duration_s);
+  add_sensors(e, record, result, unknowns);
   Result trial = result;
+  Predictor<Model> predictor(record, Model(result, e));
   const auto model_at = [&](const Eigen::VectorXd& z) {
     put(unknowns, z, trial);
+    predictor.correct(errors_of(trial));
     return Model(trial, e);
   };
-  Predictor<Model> predictor(record, Model(result, e));
   const SensorNoise first = first_noise(record, e);
   const double voltage_rms_v = record.voltages.rms(record.range);
   const SensorNoise least{.voltage_v = 1e-4 * voltage_rms_v,
@@ -210,6 +216,7 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     if (round == 0 && fit.sum > kHopeless * static_cast<double>(predictor.rows())) fit.found = false;
   }
   if (!fit.found) {
+    set_apart(e, result);
     result.excitation = verdict_against(result, "no motor near that of the equations follows it");
     return;
   }
@@ -221,6 +228,7 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
   for (std::size_t row = 0; row < innovations.size(); ++row)
     (row % outputs + 1 == outputs ? angle_errors : current_errors).push_back(innovations[row]);
   put_fit(e, unknowns, fit, result);
+  set_apart(e, result);
   result.explanation = {.voltage_noise_v = noise.voltage_v,
                         .voltage_rms_v = voltage_rms_v,
                         .current_noise_a = noise.current_a,
@@ -270,6 +278,9 @@ void refine(const MeasuredData& data, const Settings& e, Result& result) {
   }
   make_positive(e, result);
   const PredictorRecord record = record_of(data, e);
+  if (const std::size_t all = window_of(data, e.processing).count(); all > e.most_samples)
+    result.notes.push_back(
+        fmt::format("refined from the first {} of {} samples of the window", e.most_samples, all));
   switch (e.kind) {
     case MotorKind::kDc:
       return refine_with<DcModel>(record, e, result);

@@ -10,6 +10,8 @@ namespace drivebench::identification {
 /// deviations from the information of the innovations or, if that is more, from the scatter of their scores,
 /// which does not take the innovations for white. The book's value and its index stay beside it.
 ///
+/// A window of more than Settings::most_samples samples is cut after these, and a note says so.
+///
 /// The verdict of the equations is replaced: a parameter whose interval is wider than half of its value is
 /// unseen (a friction also stands where it hardly matters beside the torque that accelerates), and a motor
 /// that does not explain the record within what noise and quantisation allow has no parameter that is seen.

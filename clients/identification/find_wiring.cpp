@@ -1,4 +1,4 @@
-#include "clients/identification/wiring/wiring.hpp"
+#include "clients/identification/find_wiring.hpp"
 
 #include <fmt/format.h>
 
@@ -210,6 +210,7 @@ WiringFact zero_fact(const FluxFit& fit, Settings& e, bool given) {
   const double off = std::remainder(fit.zero_rad - e.zero_rad * e.pole_pairs, 2.0 * std::numbers::pi);
   fact.contradicts = given && std::abs(off) > fact.interval + kSlackZero_rad;
   if (!given) e.zero_rad = std::abs(off) > fact.interval + kSlackZero_rad ? fit.zero_rad / e.pole_pairs : 0.0;
+  e.sensors.zero = !given;
   fact.used = e.zero_rad * e.pole_pairs;
   return fact;
 }
