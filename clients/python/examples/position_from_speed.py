@@ -22,7 +22,8 @@ def final_offset(rows, period_s, l1, l2, from_angle):
 
 def main():
     with open(sys.argv[1], newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+        short = {"time_s": "time [s]", "angle_rad": "angle [rad]", "speed_rad_s": "speed [rad/s]"}
+        rows = [{short.get(name, name): value for name, value in row.items()} for row in csv.DictReader(file)]
     period_s = float(rows[1]["time [s]"]) - float(rows[0]["time [s]"])
     for l1, l2, source in ((1000.0, 250e3, "angle"), (1000.0, 2000.0, "speed"), (-500.0, 2000.0, "speed"), (0.0, 50.0, "speed")):
         left_rad = final_offset(rows, period_s, l1, l2, source == "angle")
