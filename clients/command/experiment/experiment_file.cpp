@@ -35,7 +35,7 @@ bool is_hidden(const FieldDescriptor& field) {
 }
 
 /// The word of an enumerator: CHANNEL_A of Channel is "a".
-std::string word_of(const google::protobuf::EnumValueDescriptor& value) {
+std::string enum_word(const google::protobuf::EnumValueDescriptor& value) {
   std::size_t prefix = value.type()->name().size() + 1;
   for (std::size_t i = 1; i < value.type()->name().size(); ++i)
     prefix +=
@@ -49,7 +49,7 @@ std::string word_of(const google::protobuf::EnumValueDescriptor& value) {
 std::string words_of(const EnumDescriptor& type) {
   std::string words;
   for (int i = 1; i < type.value_count(); ++i)
-    words += (words.empty() ? "" : ", ") + word_of(*type.value(i));
+    words += (words.empty() ? "" : ", ") + enum_word(*type.value(i));
   return words;
 }
 
@@ -171,7 +171,7 @@ class MessageReader {
     const auto* const word = std::get_if<std::string>(&node.scalar);
     const EnumDescriptor& type = *field.enum_type();
     for (int i = 1; word != nullptr && i < type.value_count(); ++i) {
-      if (word_of(*type.value(i)) != *word) continue;
+      if (enum_word(*type.value(i)) != *word) continue;
       return message.GetReflection()->SetEnumValue(&message, &field, type.value(i)->number());
     }
     report(node, key, "must be one of " + words_of(type));
@@ -196,7 +196,7 @@ bool parse_number(std::string_view& text, double& value) {
 std::string word_of(v1::ExperimentState state) {
   const auto* const value =
       google::protobuf::GetEnumDescriptor<v1::ExperimentState>()->FindValueByNumber(state);
-  return value == nullptr ? "unknown" : word_of(*value);
+  return value == nullptr ? "unknown" : enum_word(*value);
 }
 
 ExperimentFile parse_experiment(std::string_view text, const std::string& name) {

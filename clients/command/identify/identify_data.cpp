@@ -122,7 +122,7 @@ void read_configuration(const McapReader& file, const std::string& axis, Measure
 }
 
 /// The word that a setting chooses.
-std::string word_of(const v1::AxisDescription& axis, const v1::NamedValue& setting) {
+std::string setting_word(const v1::AxisDescription& axis, const v1::NamedValue& setting) {
   for (const v1::ParameterDescription& parameter : axis.parameters()) {
     if (parameter.name() != setting.name()) continue;
     const double place = setting.value();
@@ -145,7 +145,7 @@ void take_description(const v1::BenchDescription& bench, std::uint32_t number,
     m.bench[parameter.name()] = parameter.value();
   for (const v1::NamedValue& setting : request.settings()) {
     m.bench[setting.name()] = setting.value();
-    if (setting.name() == "drive.kind") m.drive = word_of(axis, setting);
+    if (setting.name() == "drive.kind") m.drive = setting_word(axis, setting);
   }
   for (const v1::ExperimentEvent& event : request.events()) {
     if (event.has_parameter()) m.bench.erase(event.parameter().name());
