@@ -111,7 +111,7 @@ class TheMove(unittest.TestCase):
             move(server, "--preset", "exercise/8.26", "--load", "0.1@0", "--csv", str(file))
         with open(file, newline="", encoding="utf-8") as lines:
             last = list(csv.DictReader(lines))[-1]
-        self.assertAlmostEqual(float(last["load_nm"]), 0.1, delta=0.005)
+        self.assertAlmostEqual(float(last["controller_load_nm"]), 0.1, delta=0.005)
 
     def test_the_same_run_gives_the_same_bits_for_any_link_and_viewers(self):
         """Catches: a hash or a sample that depends on the transport, on viewers or on wall time, and inputs missing
