@@ -143,6 +143,7 @@ Decision decide(const MeasuredData& data, const Settings& e, const GivenWiring& 
   if (contenders.size() == 1) return {contenders.front(), {}};
   const Settings part = busiest_part(data, e, kContestSamples);
   std::vector<std::pair<double, Hypothesis>> judged;
+  judged.reserve(contenders.size());
   for (const Hypothesis& h : contenders)
     judged.emplace_back(unlikelihood(data, with(part, h, given)), h);
   std::ranges::stable_sort(judged, {}, &std::pair<double, Hypothesis>::first);

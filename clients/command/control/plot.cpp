@@ -210,6 +210,7 @@ int run_plot(const PlotOptions& options) {
   Estimates estimates;
   if (needs_estimates(names, !plan.references.empty())) estimates = estimated(options, recorded);
   std::vector<Panel> panels;
+  panels.reserve(names.size());
   for (const std::string& name : names)
     panels.push_back(panel_named(name, recorded, plan, estimates));
   const std::uint64_t first = recorded.rows.front().sample.tick;

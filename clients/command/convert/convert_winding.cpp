@@ -56,6 +56,7 @@ struct Factors {
 
 std::vector<Factors> factors_of(const Winding& winding) {
   std::vector<Factors> all;
+  all.reserve(kHarmonics.size());
   for (const int harmonic : kHarmonics)
     all.push_back({.harmonic = harmonic,
                    .distribution = distribution_factor(winding.angles_rad, harmonic),

@@ -187,7 +187,7 @@ class Observing(CommandTest):
         present = json.loads(present)
         self.assertEqual((present["bench"], present["tick"], present["time_s"], present["state"]), ("servo", 0, 0.0, 0))
         watching = self.start(DRIVEBENCH, "watch", link=self.link)
-        self.assertEqual(watching.stdout.readline().split()[:3], ["tick", "time", "[s]"])
+        self.assertEqual(watching.stdout.readline().split()[:3], ["tick", "time_s", "state"])
         self.assertEqual(watching.stdout.readline().split()[:3], ["0", "0.000000", "idle"])
         watching.stderr.readline()
         self.assertSays(watching.stderr.readline(), self.STILL, "drivebench control", "the values go on then")

@@ -197,7 +197,8 @@ class Readmes(unittest.TestCase):
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "take", "control", "plot", "replay",
                           "export", "identify", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
-                          "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state")
+                          "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
+                          "convert winding", "convert frame")
         names = re.findall(r"^  ([a-z-]+) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
                                                           check=True).stdout, re.M)
         self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))
