@@ -248,6 +248,10 @@ std::span<const MotorDraw> motor_draws() noexcept {
 std::vector<double> draw_motor(const MotorDraw& draw, int number) {
   std::mt19937_64 engine(100'000 * (static_cast<std::uint64_t>(draw.kind) + 1) +
                          static_cast<std::uint64_t>(number));
+  return draw_motor(draw, engine);
+}
+
+std::vector<double> draw_motor(const MotorDraw& draw, std::mt19937_64& engine) {
   std::vector<double> values;
   for (const std::span<const Range> ranges : {draw.identified, draw.others}) {
     for (const Range& range : ranges)
@@ -257,9 +261,13 @@ std::vector<double> draw_motor(const MotorDraw& draw, int number) {
 }
 
 Recorded record_motor(const MotorDraw& draw, int number, int noise) {
+  return record_motor(draw, draw_motor(draw, number),
+                      1000 * static_cast<std::uint64_t>(number) + static_cast<std::uint64_t>(noise));
+}
+
+Recorded record_motor(const MotorDraw& draw, const std::vector<double>& motor, std::uint64_t seed) {
   BenchConfig config = base_of(draw);
-  config.setup.seed = 1000 * static_cast<std::uint64_t>(number) + static_cast<std::uint64_t>(noise);
-  const std::vector<double> motor = draw_motor(draw, number);
+  config.setup.seed = seed;
   switch (draw.kind) {
     case MotorKind::kDc:
       return run_dc(std::move(config), motor);
@@ -281,30 +289,32 @@ bool Finding::covered_by_index() const noexcept {
   return std::abs(by_equations - truth) <= index;
 }
 
-std::vector<Finding> identify_motor(const MotorDraw& draw, int number, int noise) {
-  const std::vector<double> motor = draw_motor(draw, number);
+std::vector<Finding> findings_of(const MotorDraw& draw, const std::vector<double>& motor,
+                                 const Result& found) {
   std::vector<Finding> findings;
-  for (std::size_t k = 0; k < draw.identified.size(); ++k)
+  for (std::size_t k = 0; k < draw.identified.size(); ++k) {
+    const std::string name(draw.identified[k].name);
+    const Estimate* const estimate = found.find(name);
     findings.push_back({.truth = motor[k]});
-  try {
-    const Recorded run = record_motor(draw, number, noise);
-    const Result found = identify(run.data, run.how);
-    for (std::size_t k = 0; k < findings.size(); ++k) {
-      const std::string name(draw.identified[k].name);
-      const Estimate* estimate = found.find(name);
-      const auto& unseen = found.excitation.unseen;
-      if (estimate == nullptr || std::find(unseen.begin(), unseen.end(), name) != unseen.end()) continue;
-      findings[k] = {.truth = motor[k],
-                     .by_equations = estimate->by_equations.value_or(estimate->value),
-                     .index = estimate->index,
-                     .estimate = estimate->value,
-                     .interval = estimate->interval.value_or(0.0),
-                     .stated = true};
-    }
-  } catch (const IdentificationError&) {
-    // Nothing is stated.
+    if (estimate == nullptr || found.is_unseen(name)) continue;
+    findings[k] = {.truth = motor[k],
+                   .by_equations = estimate->by_equations.value_or(estimate->value),
+                   .index = estimate->index,
+                   .estimate = estimate->value,
+                   .interval = estimate->interval.value_or(0.0),
+                   .stated = true};
   }
   return findings;
+}
+
+std::vector<Finding> identify_motor(const MotorDraw& draw, int number, int noise) {
+  const std::vector<double> motor = draw_motor(draw, number);
+  try {
+    const Recorded run = record_motor(draw, number, noise);
+    return findings_of(draw, motor, identify(run.data, run.how));
+  } catch (const IdentificationError&) {
+    return findings_of(draw, motor, Result{});  // nothing is stated
+  }
 }
 
 }  // namespace drivebench::identification

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <random>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -36,6 +38,9 @@ std::span<const MotorDraw> motor_draws() noexcept;
 /// Motor `number` of a kind, from 1 on, always the same: first the identified parameters, then the others.
 std::vector<double> draw_motor(const MotorDraw& draw, int number);
 
+/// A motor of a kind from an engine, in the same order.
+std::vector<double> draw_motor(const MotorDraw& draw, std::mt19937_64& engine);
+
 /// One parameter of one motor.
 struct Finding {
   double truth;
@@ -59,6 +64,13 @@ struct Recorded {
 
 /// The experiment on such a motor, on the product's bench with a noise of this number.
 Recorded record_motor(const MotorDraw& draw, int number, int noise);
+
+/// The experiment on a motor with these parameters, on a bench with this seed.
+Recorded record_motor(const MotorDraw& draw, const std::vector<double>& motor, std::uint64_t seed);
+
+/// The findings of a result, one for each of draw.identified.
+std::vector<Finding> findings_of(const MotorDraw& draw, const std::vector<double>& motor,
+                                 const Result& result);
 
 /// The same with its identification: a finding for each of draw.identified. Data that identify() refuses
 /// state nothing. May run on many threads at once.
