@@ -159,10 +159,11 @@ FluxFit settled_fit(const MeasuredData& data, const Settings& e, const Hypothesi
   return fit;
 }
 
-/// The half sample whose refined motor is likelier than those of both neighbours by kDecisive; found by steps
-/// of half a sample from the nearest to `from`.
-std::optional<double> likeliest_shift(const MeasuredData& data, const Settings& e, double from) {
-  const Settings part = busiest_part(data, e, kShiftSamples);
+/// The half sample whose motor, refined on so many samples, is likelier than those of both neighbours by
+/// kDecisive; found by steps of half a sample from the nearest to `from`.
+std::optional<double> likeliest_shift(const MeasuredData& data, const Settings& e, double from,
+                                      std::size_t samples) {
+  const Settings part = busiest_part(data, e, samples);
   std::map<int, double> known;
   const auto at = [&](int half) {
     const auto place = known.find(half);
@@ -192,7 +193,10 @@ WiringFact shift_fact(const MeasuredData& data, const FluxFit& fit, Settings& e,
     usual = usual_shift(fit);
   } else if (!g.by_bench) {
     const bool near = fit.shift_deviation < 1.0;
-    fact.found = likeliest_shift(data, e, near ? fit.voltage_shift : shift);
+    const double from = near ? fit.voltage_shift : shift;
+    fact.found = likeliest_shift(data, e, from, kShiftSamples);
+    // What the part does not tell the whole record may: no motor is certified on a shift that it contradicts.
+    if (!fact.found && !g.voltage_shift) fact.found = likeliest_shift(data, e, from, data.samples());
     fact.interval = kHalfStep;
     usual = fact.found.value_or(shift);
   }

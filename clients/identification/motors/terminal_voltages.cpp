@@ -37,8 +37,12 @@ std::size_t phases_of(const Settings& e) noexcept {
   return e.kind == MotorKind::kBldc || e.three_phase ? 3 : 2;
 }
 
+bool is_held(double voltage_shift) noexcept {
+  return std::abs(voltage_shift) >= 0.5 && voltage_shift != std::round(voltage_shift);
+}
+
 TerminalVoltages::TerminalVoltages(const MeasuredData& data, const Settings& e)
-    : shift_(e.processing.voltage_shift), held_(std::abs(e.processing.voltage_shift) >= 0.5) {
+    : shift_(e.processing.voltage_shift), held_(is_held(shift_)) {
   for (std::size_t k = 0; k < phases_of(e); ++k) {
     const SeriesView measured = data.at("u_" + std::string(1, static_cast<char>('a' + k)) + "_v");
     u_.emplace_back(measured.begin(), measured.end());

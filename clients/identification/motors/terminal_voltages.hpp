@@ -8,12 +8,16 @@
 
 namespace drivebench::identification {
 
+/// Whether voltages with this Processing::voltage_shift are means of a period, as TerminalVoltages takes
+/// them.
+bool is_held(double voltage_shift) noexcept;
+
 /// The measured voltages of a record at every instant [V].
 ///
 /// A value that is the mean of a period, Processing::voltage_shift s with |s| >= 1/2, is constant within that
 /// period: between the samples k and k + 1 the terminals have u(k + s + 1/2), which needs no interpolation
 /// with whole s + 1/2 and else is the mean of the two values that share the period. A value at an instant,
-/// |s| < 1/2, runs through the cubic of value_at().
+/// |s| < 1/2, runs through the cubic of value_at(), and so does one that comes whole samples late or early.
 class TerminalVoltages {
  public:
   TerminalVoltages(const MeasuredData& data, const Settings& settings);
