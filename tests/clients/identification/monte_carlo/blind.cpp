@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "clients/identification/identify.hpp"
 #include "clients/identification/find_wiring.hpp"
+#include "clients/identification/identify.hpp"
 
 namespace drivebench::identification {
 namespace {
