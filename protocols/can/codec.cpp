@@ -171,9 +171,10 @@ void put_bytes(std::uint8_t* at, std::uint64_t raw) noexcept {
 }
 template <unsigned kBytes>
 std::uint64_t get_bytes(const std::uint8_t* at) noexcept {
-  return [at]<unsigned... i>(std::integer_sequence<unsigned, i...>) noexcept {
+  const auto joined = [at]<unsigned... i>(std::integer_sequence<unsigned, i...>) noexcept {
     return ((std::uint32_t{at[i]} << 8 * i) | ...);
-  }(std::make_integer_sequence<unsigned, kBytes>{});
+  };
+  return joined(std::make_integer_sequence<unsigned, kBytes>{});
 }
 
 void put(Frame& frame, const Field& field, std::uint64_t raw) noexcept {

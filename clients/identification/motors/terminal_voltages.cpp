@@ -30,15 +30,16 @@ Series held_values(const Series& measured, double place) {
   return held;
 }
 
+/// Whether voltages with this shift are means of a period.
+bool is_held(double voltage_shift) noexcept {
+  return std::abs(voltage_shift) >= 0.5 && voltage_shift != std::round(voltage_shift);
+}
+
 }  // namespace
 
 std::size_t phases_of(const Settings& e) noexcept {
   if (e.kind == MotorKind::kDc) return 1;
   return e.kind == MotorKind::kBldc || e.three_phase ? 3 : 2;
-}
-
-bool is_held(double voltage_shift) noexcept {
-  return std::abs(voltage_shift) >= 0.5 && voltage_shift != std::round(voltage_shift);
 }
 
 TerminalVoltages::TerminalVoltages(const MeasuredData& data, const Settings& e)

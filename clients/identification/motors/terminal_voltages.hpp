@@ -8,10 +8,6 @@
 
 namespace drivebench::identification {
 
-/// Whether voltages with this Processing::voltage_shift are means of a period, as TerminalVoltages takes
-/// them.
-bool is_held(double voltage_shift) noexcept;
-
 /// The measured voltages of a record at every instant [V].
 ///
 /// A value that is the mean of a period, Processing::voltage_shift s with |s| >= 1/2, is constant within that
@@ -26,7 +22,6 @@ class TerminalVoltages {
   /// Root of the mean square over samples and phases in the window.
   double rms(const SampleRange& range) const noexcept;
   std::size_t phases() const noexcept { return u_.size(); }
-  bool held() const noexcept { return held_; }
 
  private:
   std::vector<Series> u_;  ///< held: of the period after each sample; else as measured
