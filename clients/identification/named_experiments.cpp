@@ -1,5 +1,6 @@
 #include "clients/identification/named_experiments.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace drivebench::identification {
@@ -66,6 +67,11 @@ const NamedExperiment* find_experiment(std::string_view motor, std::string_view 
     if (each.motor == motor && each.name == name) return &each;
   }
   return nullptr;
+}
+
+const NamedExperiment* first_experiment(std::string_view motor) noexcept {
+  const auto found = std::ranges::find(kExperiments, motor, &NamedExperiment::motor);
+  return found == kExperiments.end() ? nullptr : &*found;
 }
 
 std::string experiment_names(std::string_view motor) {

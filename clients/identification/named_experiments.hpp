@@ -28,6 +28,9 @@ std::span<const NamedExperiment> named_experiments() noexcept;
 /// The experiment of this motor with this name, or null.
 const NamedExperiment* find_experiment(std::string_view motor, std::string_view name) noexcept;
 
+/// The first experiment of a motor, or null.
+const NamedExperiment* first_experiment(std::string_view motor) noexcept;
+
 /// The names of a motor's experiments, separated by commas.
 std::string experiment_names(std::string_view motor);
 

@@ -11,6 +11,7 @@
 #include <limits>
 #include <optional>
 
+#include "clients/command/experiment/experiment_fields.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
 
@@ -26,25 +27,6 @@ using google::protobuf::Message;
 constexpr int kRowsPerUpload = 4000;
 constexpr std::size_t kMaxCsvLine = 200;
 constexpr int kMaxElements = 1000;
-
-/// Fields that no file has: the client sets them.
-bool is_hidden(const FieldDescriptor& field) {
-  const std::string& name = field.full_name();
-  return name == "drivebench.v1.RunExperiment.owner" || name == "drivebench.v1.RunExperiment.request_key" ||
-         name == "drivebench.v1.RunExperiment.axis" || name == "drivebench.v1.Shape.Table.id";
-}
-
-/// The word of an enumerator: CHANNEL_A of Channel is "a".
-std::string enum_word(const google::protobuf::EnumValueDescriptor& value) {
-  std::size_t prefix = value.type()->name().size() + 1;
-  for (std::size_t i = 1; i < value.type()->name().size(); ++i)
-    prefix +=
-        static_cast<std::size_t>(std::isupper(static_cast<unsigned char>(value.type()->name()[i])) != 0);
-  std::string word = value.name().substr(prefix);
-  for (char& c : word)
-    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return word;
-}
 
 std::string words_of(const EnumDescriptor& type) {
   std::string words;

@@ -20,6 +20,9 @@ struct ExperimentFile {
 ExperimentFile parse_experiment(std::string_view text, const std::string& name);
 ExperimentFile load_experiment(const std::filesystem::path& file);
 
+/// The file that parse_experiment() reads as this experiment, with `comment` above it as lines of comment.
+std::string to_toml(const ExperimentFile& file, std::string_view comment);
+
 /// Calls `take` with the rows of a CSV file, time and value, in pieces that fit into a request. Throws
 /// ConfigError with the line of the first wrong row.
 void read_table(const std::filesystem::path& file, const std::function<void(v1::UploadTable&)>& take);

@@ -17,6 +17,8 @@
 #include "clients/command/identify/identify_json.hpp"
 #include "clients/command/identify/identify_report.hpp"
 #include "clients/command/identify/identify_server.hpp"
+#include "clients/command/identify/identify_steps.hpp"
+#include "clients/command/identify/suggest.hpp"
 #include "clients/identification/find_wiring.hpp"
 #include "clients/identification/identify.hpp"
 #include "clients/identification/motors/motors.hpp"
@@ -51,15 +53,6 @@ int print_list(bool json) {
   return kExitOk;
 }
 
-const MotorName& chosen_motor(const std::string& name) {
-  const std::string names = listed(identification::kMotorNames, &MotorName::name);
-  if (name.empty()) throw UsageError("--motor is missing; there are " + names);
-  const MotorName* const motor = identification::find_motor(name);
-  if (motor == nullptr)
-    throw UsageError(fmt::format("--motor '{}' is not known; there are {}", printable(name), names));
-  return *motor;
-}
-
 /// The chosen experiment; null for a file of the user.
 const NamedExperiment* chosen_experiment(const MotorName& motor, const std::string& choice) {
   for (const NamedExperiment& each : identification::named_experiments()) {
@@ -71,58 +64,6 @@ const NamedExperiment* chosen_experiment(const MotorName& motor, const std::stri
       printable(choice), motor.name, identification::experiment_names(motor.name)));
 }
 
-WantedExperiment wanted_experiment(const MotorName& motor, const NamedExperiment* named,
-                                   const std::string& choice) {
-  try {
-    const std::filesystem::path file =
-        find_experiment_file(named != nullptr ? std::string(named->file) : choice);
-    return {.file = load_experiment(file),
-            .bench = named != nullptr ? std::string(named->bench) : std::string(),
-            .machine = motor.machine};
-  } catch (const ConfigError& error) {
-    throw UsageError(error.what());
-  }
-}
-
-double seconds(std::string_view text, const std::string& whole) {
-  const auto value = finite_number(text);
-  if (!value || *value < 0.0)
-    throw UsageError(
-        fmt::format("--window '{}' should be FROM:TO in seconds, 0.005:0.2 for example", printable(whole)));
-  return *value;
-}
-
-void set_window(const std::string& text, identification::Processing& p) {
-  const std::size_t colon = text.find(':');
-  const std::string_view view = text;
-  p.from_s = seconds(view.substr(0, colon), text);
-  if (colon != std::string::npos && colon + 1 < text.size()) p.to_s = seconds(view.substr(colon + 1), text);
-  if (p.to_s > 0.0 && p.to_s <= p.from_s)
-    throw UsageError(fmt::format("--window '{}' ends before it begins", printable(text)));
-}
-
-/// Applies the options of the command line, which override the settings of the experiment.
-void apply_options(const IdentifyOptions& o, Settings& e) {
-  identification::Processing& p = e.processing;
-  if (o.pole_pairs) e.pole_pairs = *o.pole_pairs;
-  if (o.counts_per_revolution) e.counts_per_revolution = *o.counts_per_revolution;
-  if (o.phases) e.three_phase = *o.phases == 3;
-  e.reversed = o.direction == "reversed";
-  if (!o.voltages.empty()) p.voltage_shift = o.voltages == "mean" ? 0.5 : 0.0;
-  if (o.voltage_shift) p.voltage_shift = *o.voltage_shift;
-  if (!o.window.empty()) set_window(o.window, p);
-  if (o.current_hz) p.current.cutoff_hz = *o.current_hz;
-  if (o.voltage_hz) p.voltage.cutoff_hz = *o.voltage_hz;
-  if (o.shaft_hz) p.shaft.cutoff_hz = *o.shaft_hz;
-  if (o.order) p.current.order = p.voltage.order = p.shaft.order = *o.order;
-  if (!o.load.empty()) e.load = o.load == "constant" ? LoadModel::kConstant : LoadModel::kViscous;
-  if (o.one_stage) e.two_stage = false;
-  const auto finds = [&](const char* what) { return std::ranges::find(o.find, what) != o.find.end(); };
-  e.sensors = {.current_offsets = finds("current-offsets"),
-               .voltage_offsets = finds("voltage-offsets"),
-               .gains = finds("gains")};
-}
-
 MeasuredMotor measured_motor(const IdentifyOptions& options, const MotorName& motor,
                              const NamedExperiment* named) {
   if (options.from_file.empty()) return measure(options, wanted_experiment(motor, named, options.experiment));
@@ -132,20 +73,6 @@ MeasuredMotor measured_motor(const IdentifyOptions& options, const MotorName& mo
     throw UsageError(fmt::format("{} is of kind {}, --motor {} is for {}", m.source, m.machine, motor.name,
                                  motor.machine));
   return m;
-}
-
-Settings settings(const IdentifyOptions& options, const MotorName& motor, const NamedExperiment* named,
-                  const MeasuredMotor& m) {
-  Settings e = settings_of(motor.kind, m.facts, m.data.period_s);
-  if (m.drive.empty())
-    e.processing.voltage_shift = usual_processing(motor.kind, m.data.period_s).voltage_shift;
-  if (named != nullptr) apply(*named, e);
-  if (m.bench.empty() && m.data.find("encoder_count") == nullptr) e.counts_per_revolution = 0.0;
-  apply_options(options, e);
-  const bool given = options.shaft_hz || options.current_hz || options.voltage_hz ||
-                     (named != nullptr && named->shaft_hz > 0.0);
-  if (!given) choose_shaft_filter(m.data, e);
-  return e;
 }
 
 void check_foreign(const IdentifyOptions& options, const MeasuredMotor& m) {
@@ -170,13 +97,6 @@ std::vector<WiringFact> wiring_of(const IdentifyOptions& options, const Measured
       throw UsageError("--pole-pairs is missing, and the data do not tell: " + fact.remark);
   }
   return wiring;
-}
-
-void compare(const MeasuredMotor& m, const Settings& e, identification::Result& result) {
-  auto truth = truth_of(e.kind, m.bench);
-  if (truth.empty()) return;
-  add_load_truth(m.data, e, truth);
-  result.compare(truth);
 }
 
 IdentifyReport identified(const IdentifyOptions& options, const MotorName& motor, MeasuredMotor m,
@@ -259,6 +179,7 @@ void check_choice(const IdentifyOptions& options) {
 
 int run_identify(const IdentifyOptions& options) {
   if (options.list) return print_list(options.json);
+  if (options.suggest) return run_suggest(options);
   const MotorName& motor = chosen_motor(options.motor);
   check_choice(options);
   const NamedExperiment* const named =
@@ -267,7 +188,7 @@ int run_identify(const IdentifyOptions& options) {
   MeasuredMotor m = measured_motor(options, motor, named);
   check_foreign(options, m);
   if (!options.data_file.empty()) write(options.data_file, csv_of(m.data));
-  const Settings e = settings(options, motor, named, m);
+  const Settings e = settings_for(options, motor, named, m);
   IdentifyReport report;
   try {
     report = identified(options, motor, m, e);

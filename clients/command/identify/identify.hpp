@@ -8,11 +8,23 @@
 
 namespace drivebench::command {
 
+/// The limits of a suggested experiment.
+struct SuggestOptions {
+  std::optional<double> current_a{};  ///< nothing: that of the bench's amplifier
+  std::optional<double> voltage_v{};  ///< the same; of a phase, or of the armature
+  std::optional<double> speed_rad_s{};
+  std::optional<double> duration_s{};  ///< nothing: that of the motor's first experiment
+  int trials = 40;
+  std::string file{};  ///< TOML; empty: standard output
+};
+
 /// A motor identified from an experiment on a bench, or from a file.
 struct IdentifyOptions {
   ExperimentServer server{};
   bool link_was_named = false;  ///< the command line names the link: uses no other bench
   bool json = false;
+  bool suggest = false;
+  SuggestOptions suggestion{};
   bool list = false;  ///< print motors and experiments and end
   std::string motor{};
   std::string experiment{};  ///< name, or file; empty: the first of the motor

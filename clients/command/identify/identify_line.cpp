@@ -75,6 +75,29 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
   sub.add_flag("--one-stage", o.one_stage, "pm: all parameters in one least squares")->group(kGroup);
 }
 
+void add_suggestion(CLI::App& sub, IdentifyOptions& o) {
+  constexpr const char* kGroup = "An experiment for the bench's motor, by trials on the bench";
+  const auto limit = [&](const char* name, std::optional<double>& value, const char* text) {
+    sub.add_option(name, value, text)->check(finite_between(1e-9, 1e9))->group(kGroup)->needs("--suggest");
+  };
+  sub.add_flag("--suggest", o.suggest,
+               "make an experiment whose worst interval is small, beside what the named ones would give")
+      ->group(kGroup);
+  limit("--max-current", o.suggestion.current_a, "[A] of a phase; default: that of the bench's amplifier");
+  limit("--max-voltage", o.suggestion.voltage_v,
+        "[V] of a phase; default: that of the bench's amplifier or source");
+  limit("--max-speed", o.suggestion.speed_rad_s, "[rad/s]; default: none");
+  limit("--seconds", o.suggestion.duration_s, "of the record; default: that of the motor's first experiment");
+  sub.add_option("--trials", o.suggestion.trials, "experiments that are tried at most")
+      ->check(CLI::Range(1, 250))
+      ->capture_default_str()
+      ->group(kGroup)
+      ->needs("--suggest");
+  sub.add_option("--suggest-file", o.suggestion.file, "write the experiment (.toml), for --experiment")
+      ->group(kGroup)
+      ->needs("--suggest");
+}
+
 void add_files(CLI::App& sub, IdentifyOptions& o) {
   sub.add_option("--markdown", o.markdown_file, "write the report");
   sub.add_option("--plot", o.plot_file,
@@ -87,6 +110,7 @@ void add_identify(CommandLine& line) {
   const auto [sub, o] = line.add<IdentifyOptions>(
       "identify", "the parameters of a motor, from an experiment or a file", run_identify);
   add_measurement(sub, o);
+  add_suggestion(sub, o);
   add_files(sub, o);
   add_settings(sub, o);
   sub.footer(

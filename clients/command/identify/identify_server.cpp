@@ -44,6 +44,8 @@ class OwnFolder {
   std::filesystem::path path_;
 };
 
+}  // namespace
+
 /// drivebench-server on a bench, on a port of its own.
 class OwnServer {
  public:
@@ -76,6 +78,8 @@ class OwnServer {
   Process process_;
   std::string address_;
 };
+
+namespace {
 
 /// The reason why the bench behind the link does not fit; empty: it fits. Throws the error of a link that the
 /// command line names.
@@ -139,20 +143,26 @@ class Columns {
   ExperimentRows rows_;
 };
 
+/// Takes the description of the axis and adds the signals that identification needs; the name of the bench.
+std::string describe_axis(ExperimentClient& client, WantedExperiment& wanted, MeasuredMotor& m) {
+  std::string name;
+  client.with_link([&](link::Link& link) {
+    const v1::BenchDescription& bench = link.welcome().bench();
+    const std::uint32_t axis = axis_number(bench, wanted.file.axis);
+    name = bench.name();
+    take_description(bench, axis, wanted.file.request, m);
+    add_signals(wanted.file.request, bench.axes(static_cast<int>(axis)));
+    m.data.period_s = bench.period_s() * m.facts.decimation;
+  });
+  return name;
+}
+
 MeasuredMotor run_on(const IdentifyOptions& options, const ExperimentServer& server,
                      WantedExperiment wanted) {
   MeasuredMotor m;
   ExperimentClient client(server, "identify");
-  v1::RunExperiment& request = wanted.file.request;
-  std::string bench;
   // The description is read first: the request needs signals that fit the machine.
-  client.with_link([&](link::Link& link) {
-    const v1::BenchDescription& description = link.welcome().bench();
-    const std::uint32_t axis = axis_number(description, wanted.file.axis);
-    bench = description.name();
-    take_description(description, axis, request, m);
-    add_signals(request, description.axes(static_cast<int>(axis)));
-  });
+  const std::string bench = describe_axis(client, wanted, m);
   v1::ExperimentInfo info = client.run(wanted.file);
   if (!options.json)
     fmt::print(stderr, "identify: experiment {} on the bench {}, {}\n", info.id(), bench,
@@ -171,30 +181,38 @@ MeasuredMotor run_on(const IdentifyOptions& options, const ExperimentServer& ser
   return m;
 }
 
-MeasuredMotor run_on_own_server(const IdentifyOptions& options, const WantedExperiment& wanted) {
-  const OwnServer server(wanted.bench);
-  ExperimentServer there = options.server;
-  there.link = {.address = server.address(), .token = {}};
-  there.owner = random_word();
-  return run_on(options, there, wanted);
+}  // namespace
+
+OwnBench::OwnBench(const std::string& bench) : server_(std::make_unique<OwnServer>(bench)) {}
+OwnBench::~OwnBench() = default;
+
+ExperimentServer OwnBench::experiments() const {
+  return {.link = {.address = server_->address(), .token = {}}, .owner = random_word()};
 }
 
-}  // namespace
+MeasuredMotor OwnBench::describe(WantedExperiment& wanted) const {
+  MeasuredMotor m;
+  ExperimentClient client(experiments(), "identify");
+  describe_axis(client, wanted, m);
+  return m;
+}
+
+MeasuredMotor OwnBench::measure(const IdentifyOptions& options, const WantedExperiment& wanted) const {
+  return run_on(options, experiments(), wanted);
+}
 
 MeasuredMotor measure(const IdentifyOptions& options, const WantedExperiment& wanted) {
   if (!options.bench.empty()) {
     if (options.link_was_named)
       throw UsageError("--bench starts a server of our own, --link names another one");
-    WantedExperiment there = wanted;
-    there.bench = options.bench;
-    return run_on_own_server(options, there);
+    return OwnBench(options.bench).measure(options, wanted);
   }
   const std::string problem = why_not(options, wanted);
   if (problem.empty()) return run_on(options, options.server, wanted);
   if (options.link_was_named) throw UsageError(problem);
   if (wanted.bench.empty()) throw UsageError(problem + "; --bench names one to start, --link one that runs");
   if (!options.json) fmt::print(stderr, "identify: {}; starting a server on {}\n", problem, wanted.bench);
-  return run_on_own_server(options, wanted);
+  return OwnBench(wanted.bench).measure(options, wanted);
 }
 
 }  // namespace drivebench::command

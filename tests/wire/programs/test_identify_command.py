@@ -267,6 +267,65 @@ class Identify(WireTest):
         foreign.unlink()
         refused("cannot be read", "--counts", "2000")
 
+    def noisy_bench(self, seed):
+        """dc-a-voltage with currents of 12 bits and their noise."""
+        text = (BENCHES / "dc-a-voltage.toml").read_text(encoding="utf-8")
+        text = text.replace("[bench]", f"[bench]\nseed = {seed}").replace('"../motors/', f'"{BENCHES.parent}/motors/')
+        bench = self.path / f"noisy-{seed}.toml"
+        bench.write_text(text + "\n[axis.current_sensor]\nbits = 12\nfull_scale_a = 10.0\nnoise_rms_a = 0.01\n",
+                         encoding="utf-8")
+        return bench
+
+    def test_a_suggested_experiment_keeps_its_limits_and_its_promise(self):
+        """Catches: a suggestion beyond a limit, one worse than what there is, a forecast that the experiment from the
+        file does not keep, an experiment that suits one seed of the noise only."""
+        suggested = self.path / "suggested.toml"
+        limits = ("--max-current", 4, "--max-voltage", 10, "--max-speed", 60)
+        told = json.loads(self.identify("--motor", "dc", "--bench", self.noisy_bench(1), "--suggest", *limits, "--trials",
+                                        30, "--suggest-file", suggested, "--json").stdout)
+        best = told["suggested"]
+        existing = {row["name"]: row for row in told["existing"]}
+        self.assertGreater(existing["voltage-steps"]["limit_used"], 1.0)  # 6.3 A
+        self.assertIn("no current loop", existing["two-sines"]["problem"])
+        self.assertLessEqual(best["limit_used"], 1.0)
+        self.assertGreater(best["limit_used"], 0.8)  # an experiment that hardly moves the motor is none
+        # Beside noise an interval is inverse to the amplitude: the steps within the limits would tell so much.
+        self.assertLess(best["worst"], existing["voltage-steps"]["worst"] * existing["voltage-steps"]["limit_used"])
+        self.assertLessEqual(told["trials"], 30)
+        self.assertEqual(told["experiment"], suggested.read_text(encoding="utf-8"))
+
+        for seed, likeness in ((1, 1e-9), (2, 0.5)):
+            data = self.path / f"{seed}.csv"
+            found = self.parameters("--motor", "dc", "--bench", self.noisy_bench(seed), "--experiment", suggested,
+                                    "--data", data)
+            self.assertTrue(found["identifiable"])
+            self.assertEqual(found["experiment"]["state"], "completed")  # not stopped by a limit
+            for name, width in best["relative_intervals"].items():
+                row = found["parameters"][name]
+                self.assertAlmostEqual(row["interval"] / row["estimate"] / width, 1.0, delta=likeness, msg=name)
+                self.assertLess(abs(row["estimate"] - row["truth"]), 2.0 * row["interval"], name)
+            header, *rows = data.read_text(encoding="utf-8").splitlines()
+            columns = dict(zip((name.split()[0] for name in header.split(",")), zip(*(map(float, row.split(",")) for row in rows))))
+            self.assertLess(max(map(abs, columns["i_a_a"])), 4.05)
+            self.assertLessEqual(max(map(abs, columns["u_a_v"])), 10.0)
+
+    def test_a_suggestion_is_refused_where_it_cannot_be_made(self):
+        """Catches: trials on somebody's server, limits without a search, a motor of another kind, endless frequencies."""
+        for words, reason in ((("--suggest", "--from", "a.csv"), "--from reads what was measured"),
+                              (("--suggest", "--link", "unix:/nothing"), "server of its own"),
+                              (("--suggest", "--experiment", "two-sines"), "--experiment runs one that there is"),
+                              (("--suggest", "--data", "a.csv"), "--suggest-file"),
+                              (("--suggest", "--seconds", "0.001"), "100 samples"),
+                              (("--suggest", "--trials", "0"), "--trials"),
+                              (("--suggest", "--max-current", "-1"), "--max-current"),
+                              (("--suggest", "--bench", "im-a"), "of kind induction"),
+                              (("--suggest", "--bench", "no-such-bench"), "no-such-bench"),
+                              (("--max-current", "3"), "--suggest")):
+            with self.subTest(words=words):
+                refused = self.identify("--motor", "dc", *words, code=2)
+                self.assertIn(reason, refused.stderr)
+                self.assertEqual(refused.stdout, "")
+
     def test_wrong_words_are_refused_with_the_choices(self):
         """Catches: a refusal without the possible words."""
         for words, text in (

@@ -61,6 +61,26 @@ TEST(ExperimentFile, GivesTheRequestWithItsValues) {
   EXPECT_EQ(r.events(0).fault().name(), "open_phase");
 }
 
+// Catches: a value that a suggested experiment loses on its way through its file: a zero, a table in an
+// array, text with quotes.
+TEST(ExperimentFile, OfEveryShippedExperimentIsWrittenAsItIsRead) {
+  int files = 0;
+  const auto expect_same = [&](const ExperimentFile& file) {
+    const ExperimentFile again = parse_experiment(to_toml(file, "one line\nanother"), "again.toml");
+    EXPECT_EQ(again.axis, file.axis);
+    EXPECT_EQ(again.request.SerializeAsString(), file.request.SerializeAsString()) << to_toml(file, "");
+    ++files;
+  };
+  for (const auto& entry : std::filesystem::directory_iterator(DRIVEBENCH_CONFIGS "/experiments"))
+    expect_same(load_experiment(entry.path()));
+  expect_same(parse_experiment(kGood, "e.toml"));
+  expect_same(
+      parse_experiment("axis = 'a \"b\" \\ c'\nlabel = 'd \"e\" \\ f'\n"
+                       "settings = [{ name = \"amplifier.delay_ticks\", value = 0 }]\n",
+                       "e.toml"));
+  EXPECT_GT(files, 8);
+}
+
 // Catches: a mistake that is passed over, told with another line, or the only one that is told.
 TEST(ExperimentFile, ReportsEveryProblemWithItsLine) {
   const auto with = [](const std::string& from, const std::string& to) {
