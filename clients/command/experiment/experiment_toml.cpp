@@ -2,6 +2,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <cstddef>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -70,15 +71,19 @@ std::vector<const FieldDescriptor*> fields_of(const Message& message) {
 /// "name = value", an array for a repeated field.
 std::string pair_text(const Message& message, const FieldDescriptor& field) {
   if (!field.is_repeated()) return fmt::format("{} = {}", field.name(), value_text(message, field, -1));
+  const int count = message.GetReflection()->FieldSize(message, &field);
   std::vector<std::string> values;
-  for (int k = 0; k < message.GetReflection()->FieldSize(message, &field); ++k)
+  values.reserve(static_cast<std::size_t>(count));
+  for (int k = 0; k < count; ++k)
     values.push_back(value_text(message, field, k));
   return fmt::format("{} = [{}]", field.name(), fmt::join(values, ", "));
 }
 
 std::string inline_table(const Message& message) {
+  const std::vector<const FieldDescriptor*> fields = fields_of(message);
   std::vector<std::string> pairs;
-  for (const FieldDescriptor* field : fields_of(message))
+  pairs.reserve(fields.size());
+  for (const FieldDescriptor* field : fields)
     pairs.push_back(pair_text(message, *field));
   return fmt::format("{{ {} }}", fmt::join(pairs, ", "));
 }

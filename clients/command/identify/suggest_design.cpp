@@ -22,6 +22,13 @@ SearchVariable frequency(double turns, const ExperimentLimits& limits, double pe
           .most = 1.0 / (kSamplesOfSine * period_s)};
 }
 
+/// An instant, by parts of the duration.
+SearchVariable instant(double least, double start, double most, const ExperimentLimits& limits) {
+  return {.start = start * limits.duration_s,
+          .least = least * limits.duration_s,
+          .most = most * limits.duration_s};
+}
+
 void add_sine(v1::RunExperiment& request, v1::Channel channel, double amplitude_v, double frequency_hz) {
   v1::Shape& shape = *request.mutable_input()->add_shapes();
   shape.set_channel(channel);
@@ -93,13 +100,9 @@ ExperimentDesign line_start(bool source, const BenchParameters& bench, const Exp
   const auto rated = bench.find("source.frequency_hz");
   const double rated_hz = source && rated != bench.end() && rated->second > 0.0 ? rated->second : 50.0;
   const SearchVariable hertz = {.start = rated_hz, .least = 0.1 * rated_hz, .most = 2.0 * rated_hz};
-  const double T = limits.duration_s;
   return {.sentence = "A start, and after it another amplitude and frequency.",
-          .variables = {amplitude(1.0, limits),
-                        hertz,
-                        amplitude(0.7, limits),
-                        hertz,
-                        {.start = 0.7 * T, .least = 0.1 * T, .most = 0.95 * T}},
+          .variables = {amplitude(1.0, limits), hertz, amplitude(0.7, limits), hertz,
+                        instant(0.1, 0.7, 0.95, limits)},
           .excite = [=](const std::vector<double>& x, v1::RunExperiment& request) {
             if (!source) {
               request.mutable_input()->set_kind(v1::INPUT_KIND_PHASE_VOLTAGES);

@@ -53,6 +53,7 @@ ResultSection stepper_results();
 ResultSection other_synchronous_results();
 ResultSection dc_results();
 ResultSection wound_dc_results();
+ResultSection steady_state_results();
 ResultSection identification_results();
 
 /// All of them; runs every experiment.
