@@ -88,7 +88,7 @@ Result no_load_and_locked() {
            number("", locked.meter_i_rms_a, "A"),
            number("", locked.meter_p_w / std::hypot(locked.meter_p_w, locked.meter_q_var), ""),
            number("", locked.torque_nm, "N m")},
-          "agrees; `drivebench steady-state im-b --voltage 120.1 --hz 60` prints the circuit's"};
+          "agrees; `drivebench steady-state im-b --voltage 120.1 --frequency 60` prints the circuit's"};
 }
 
 Result pull_out() {
