@@ -149,10 +149,9 @@ void Axis::adjust() noexcept {
   a.stator_resistance_factor *= 1.0 + state_.injected.stator_resistance_drift;
   a.rotor_resistance_factor *= 1.0 + state_.injected.rotor_resistance_drift;
   a.magnet_factor *= 1.0 - state_.injected.demagnetisation;
-  if (core_.p.drive.kind == DriveKind::kSource) {
-    a.series_resistance_ohm = core_.p.drive.source.resistance_ohm;
-    a.series_inductance_h = core_.p.drive.source.inductance_h;
-  }
+  const SeriesImpedance series = series_impedance(core_.p.drive);
+  a.series_resistance_ohm = series.resistance_ohm;
+  a.series_inductance_h = series.inductance_h;
   train_->set_machine(core_.p.machine, a);
   look_inside();
 }
@@ -320,11 +319,23 @@ double fastest_swing_rad_s(const AxisParameters& p, const Machine& machine) noex
     if (p.drive.kind == DriveKind::kSource && p.mechanics.motion != ShaftMotion::kImposed) {
       const SourceParameters& source = p.drive.source;
       const double two_phase = connection_of(machine) == Connection::kStar ? std::sqrt(1.5) : 1.0;
-      return swing_rad_s(machine, p.mechanics.inertia_kgm2, two_phase * source.amplitude_v,
+      const double turns_ratio = has_transformer(p.drive.transformer) ? p.drive.transformer.turns_ratio : 1.0;
+      return swing_rad_s(machine, p.mechanics.inertia_kgm2, two_phase * turns_ratio * source.amplitude_v,
                          2.0 * std::numbers::pi * source.frequency_hz, source.field_v);
     }
   }
   return 0.0;
+}
+
+/// Of the machine behind the impedance of its source. The flux of a transformer is a state more: both rates
+/// of a winding behind one are real and below their sum.
+template <class Machine>
+double fastest_electrical_s(const DriveParameters& p, const Machine& machine) noexcept {
+  const SeriesImpedance z = series_impedance(p);
+  const Adjustment series{.series_resistance_ohm = z.resistance_ohm, .series_inductance_h = z.inductance_h};
+  const double machine_s = fastest_time_constant_s(adjusted(machine, series));
+  if (p.kind != DriveKind::kSource || !has_transformer(p.transformer)) return machine_s;
+  return 1.0 / (1.0 / machine_s + constants_of(p.transformer).decay_per_s);
 }
 
 }  // namespace
@@ -340,7 +351,7 @@ int default_substeps(const AxisParameters& p, double period_s) noexcept {
   }
   std::visit(
       [&](const auto& machine) {
-        step_s = std::min(step_s, fastest_time_constant_s(machine) / kStepsInTimeConstant);
+        step_s = std::min(step_s, fastest_electrical_s(p.drive, machine) / kStepsInTimeConstant);
         if (p.drive.kind == DriveKind::kCurrent) {
           // The loop makes of the machine one with K_P in series: it is stable below 2 L/K_P.
           const Adjustment loop{.series_resistance_ohm = p.drive.current_loop.proportional_v_per_a};

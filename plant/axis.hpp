@@ -89,9 +89,9 @@ class Axis {
 };
 
 /// The number of integration steps for a tick of this length, at most kMaxSubsteps. A step is at most a tenth
-/// of the fastest time constant of machine and mechanics, 0.2 rad of the electrical angle at the speed at
-/// which the emf of a magnet reaches the voltage limit, 50 us, and under a current loop 20 us and L/(2 (K_P +
-/// R)).
+/// of the fastest time constant of mechanics and of the machine behind its source's impedance, 0.2 rad of the
+/// electrical angle at the speed at which the emf of a magnet reaches the voltage limit, 50 us, and under a
+/// current loop 20 us and L/(2 (K_P + R)).
 int default_substeps(const AxisParameters& p, double period_s) noexcept;
 
 }  // namespace drivebench

@@ -16,6 +16,15 @@ constexpr double kNoEdge = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
+SeriesImpedance series_impedance(const DriveParameters& p) noexcept {
+  if (p.kind != DriveKind::kSource) return {};
+  const SeriesImpedance own{.resistance_ohm = p.source.resistance_ohm, .inductance_h = p.source.inductance_h};
+  if (!has_transformer(p.transformer)) return own;
+  const TransformerConstants transformer = constants_of(p.transformer);
+  return {.resistance_ohm = own.resistance_ohm + transformer.resistance_ohm,
+          .inductance_h = own.inductance_h + transformer.inductance_h};
+}
+
 Drive::Drive(const DriveParameters& p, Connection connection, double period_s, std::uint64_t seed,
              std::uint64_t noise_channel) noexcept
     : connection_(connection),
@@ -36,6 +45,8 @@ void Drive::set_parameters(const DriveParameters& p) noexcept {
   dead_part_ = p.inverter.dead_time_s / pwm_period_s_;
   filter_rate_per_s_ = kTurnRad * p.amplifier.filter_hz;
   source_ = constants_of(p.source, connection_);
+  has_transformer_ = kind_ == DriveKind::kSource && has_transformer(p.transformer);
+  transformer_ = constants_of(p.transformer);
 }
 
 DriveMemory Drive::initial() const noexcept {
@@ -151,31 +162,6 @@ void Drive::take_order(Order& order, const PhaseCommand& command, DriveMemory& m
     }
   } else if (command.gates == Gates::kZeroVoltage) {
     order.gates = Gates::kZeroVoltage;
-  }
-}
-
-void Drive::begin_source(DriveMemory& m) noexcept {
-  const SourceParameters& source = p_.source;
-  const double omega_rad_s = kTurnRad * source.frequency_hz;
-  source_angle_rad_ = m.source_phase_rad + source.phase_rad;
-  m.source_phase_rad = within_turn(m.source_phase_rad + omega_rad_s * period_s_);
-  follows_ = source.start_capacitance_f > 0.0;
-  closing_s_ = 0.0;
-  if (!source.contactor) {
-    m.contactor_closed = 0.0;
-  } else if (m.contactor_closed == 0.0) {
-    const double wait_s =
-        source.choose_angle ? time_until_s(source.closing_angle_rad, source_angle_rad_, omega_rad_s) : 0.0;
-    if (wait_s < period_s_ - tolerance_s_) {
-      m.contactor_closed = 1.0;
-      closing_s_ = wait_s;
-    }
-  }
-  has_corners_ = has_corners(source, period_s_);
-  has_edges_ = closing_s_ > tolerance_s_ || has_corners_;
-  if (m.contactor_closed != 0.0 && !has_edges_ && !follows_) {
-    steady_output_ = source_output(m, 0.0, period_s_, {});
-    steady_ = steady_output_.constant;
   }
 }
 
@@ -305,39 +291,6 @@ void Drive::hold_terminals(TerminalDrive& out) const noexcept {
     const double held_v = hold == Hold::kHigh ? out.rail_v : -out.rail_v;
     phase(out.start_v, k) = phase(out.middle_v, k) = phase(out.end_v, k) = held_v;
   }
-}
-
-TerminalDrive Drive::source_output(const DriveMemory& m, double start_s, double duration_s,
-                                   const PhaseValues& current_a) const noexcept {
-  const SourceParameters& source = p_.source;
-  TerminalDrive out;
-  out.rail_v = std::max(p_.amplifier.voltage_limit_v, 2.0 * p_.source.amplitude_v);
-  out.field_v = field_lost_ ? 0.0 : source.field_v;
-  if (m.contactor_closed == 0.0 || start_s + tolerance_s_ < closing_s_) {
-    out.mode.fill(TerminalMode::kOpen);
-    return out;
-  }
-  // A table may jump at either end of the interval: its values there are those within.
-  const double inside_s =
-      source.waveform == Waveform::kTable ? std::min(tolerance_s_, 0.5 * duration_s) : 0.0;
-  const auto voltages = [&](double time_s) noexcept {
-    const double within_s = std::clamp(time_s, inside_s, duration_s - inside_s);
-    ThreePhase v = source_voltages(source, source_, source_amplitude_v_, source_angle_at(start_s + within_s));
-    if (source.start_switch) {
-      v.b = 0.0;
-    } else if (source.start_capacitance_f > 0.0) {
-      v.b = v.a - capacitor_drop_v(source, m.start_capacitor, current_a.b, time_s);
-    }
-    return v;
-  };
-  out.start_v = voltages(0.0);
-  out.constant = source.frequency_hz == 0.0 && (source.start_capacitance_f == 0.0 || source.start_switch);
-  if (!out.constant) {
-    out.middle_v = voltages(0.5 * duration_s);
-    out.end_v = voltages(duration_s);
-  }
-  if (holds_) hold_terminals(out);
-  return out;
 }
 
 }  // namespace drivebench

@@ -13,6 +13,7 @@
 #include "plant/drive/inverter.hpp"
 #include "plant/drive/source.hpp"
 #include "plant/drive/terminal_drive.hpp"
+#include "plant/drive/transformer.hpp"
 #include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
 #include "protocols/signals/command.hpp"
@@ -35,7 +36,15 @@ struct DriveParameters {
   InverterParameters inverter;
   BusParameters bus;
   SourceParameters source;
+  TransformerParameters transformer;
 };
+
+/// In series with each winding of the machine: of the source itself and of its transformer.
+struct SeriesImpedance {
+  double resistance_ohm = 0.0;
+  double inductance_h = 0.0;
+};
+SeriesImpedance series_impedance(const DriveParameters& p) noexcept;
 
 inline constexpr int kMaxDelayTicks = 8;           ///< of amplifier.delay_ticks
 inline constexpr int kMaxInjectedDelayTicks = 16;  ///< of the fault command_delay
@@ -49,6 +58,7 @@ struct DriveMemory {
   double source_phase_rad = 0.0;  ///< of the source less phase_rad, within a turn, at the next begin_tick()
   double contactor_closed = 0.0;  ///< 0: open, or waiting for its angle
   StartCapacitor start_capacitor{};
+  std::array<TransformerPhase, 3> transformer{};
   std::int64_t pwm_segment = 0;  ///< segment of the last at()
   double bus_v = 0.0;            ///< 0 with a source
   double chopper = 0.0;          ///< 1: the brake resistor is on
@@ -143,6 +153,17 @@ class Drive {
                               const PhaseValues& current_a) const noexcept;
   TerminalDrive source_output(const DriveMemory& m, double start_s, double duration_s,
                               const PhaseValues& current_a) const noexcept;
+  /// The source's own voltages at a time after the start of an interval.
+  ThreePhase source_v(double start_s, double time_s) const noexcept {
+    return source_voltages(p_.source, source_, source_amplitude_v_, source_angle_at(start_s + time_s));
+  }
+  /// A table may jump at either end of an interval: its values there are those so far within.
+  double inside_s_of(double duration_s) const noexcept {
+    return p_.source.waveform == Waveform::kTable ? std::min(tolerance_s_, 0.5 * duration_s) : 0.0;
+  }
+  /// From the voltages of the primaries to those of the secondaries.
+  void transform(const DriveMemory& m, double duration_s, const PhaseValues& current_a,
+                 TerminalDrive& out) const noexcept;
   void follow(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
               const PhaseValues& voltage_v, const PhaseValues& from_a,
               const PhaseValues& to_a) const noexcept;
@@ -172,6 +193,10 @@ class Drive {
                             const PhaseValues& current_a) const noexcept;
   void filter(DriveMemory& m, double duration_s, TerminalDrive& out) const noexcept;
   void hold_terminals(TerminalDrive& out) const noexcept;
+  void follow_start_capacitor(DriveMemory& m, double duration_s, const TerminalDrive& applied,
+                              const PhaseValues& from_a, const PhaseValues& to_a) const noexcept;
+  void follow_transformer(DriveMemory& m, double start_s, double duration_s, const TerminalDrive& applied,
+                          const PhaseValues& from_a, const PhaseValues& to_a) const noexcept;
   void follow_filter(DriveMemory& m, double duration_s, const TerminalDrive& applied,
                      const PhaseValues& voltage_v) const noexcept;
   void follow_loop(DriveMemory& m, double start_s, double duration_s, const PhaseValues& from_a,
@@ -190,6 +215,8 @@ class Drive {
   double dead_part_;  ///< dead time over PWM period
   double filter_rate_per_s_;
   SourceConstants source_;
+  TransformerConstants transformer_;
+  bool has_transformer_;
   std::uint64_t seed_;
   std::uint64_t noise_channel_;
 

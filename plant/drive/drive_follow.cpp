@@ -1,4 +1,4 @@
-// The state of the drive after an interval: filter, current loop, link and starting capacitor.
+// The state of the drive after an interval: filter, current loop and link.
 #include "plant/drive/drive.hpp"
 #include "plant/drive/phases.hpp"
 #include "plant/math/exponential.hpp"
@@ -16,9 +16,11 @@ void Drive::follow(DriveMemory& m, double start_s, double duration_s, const Term
                    const PhaseValues& voltage_v, const PhaseValues& from_a,
                    const PhaseValues& to_a) const noexcept {
   if (kind_ == DriveKind::kSource) {
-    m.start_capacitor = applied.mode[1] == TerminalMode::kDriven && !p_.source.start_switch
-                            ? charged(p_.source, m.start_capacitor, from_a.b, to_a.b, duration_s)
-                            : StartCapacitor{.voltage_v = m.start_capacitor.voltage_v};
+    if (has_transformer_) {
+      follow_transformer(m, start_s, duration_s, applied, from_a, to_a);
+    } else {
+      follow_start_capacitor(m, duration_s, applied, from_a, to_a);
+    }
     return;
   }
   if (filter_rate_per_s_ > 0.0) follow_filter(m, duration_s, applied, voltage_v);

@@ -109,28 +109,21 @@ double time_until_s(double target_rad, double angle_rad, double omega_rad_s) noe
 double capacitor_drop_v(const SourceParameters& p, const StartCapacitor& x, double current_a,
                         double time_s) noexcept {
   // i = i0 + slope t + bend t (t + h), with h the last interval.
-  const double current = current_a + time_s * (x.slope_a_s + x.bend_a_s2 * (time_s + x.interval_s));
+  const CurrentTrend& trend = x.current;
   const double charge_as =
-      time_s * (current_a + time_s * (0.5 * x.slope_a_s + x.bend_a_s2 * (time_s / 3.0 + 0.5 * x.interval_s)));
-  return x.voltage_v + charge_as / p.start_capacitance_f + p.start_resistance_ohm * current;
+      time_s * (current_a +
+                time_s * (0.5 * trend.slope_a_s + trend.bend_a_s2 * (time_s / 3.0 + 0.5 * trend.interval_s)));
+  return x.voltage_v + charge_as / p.start_capacitance_f +
+         p.start_resistance_ohm * foreseen_a(trend, current_a, time_s);
 }
 
 StartCapacitor charged(const SourceParameters& p, const StartCapacitor& x, double from_a, double to_a,
                        double duration_s) noexcept {
-  constexpr double kTooShort = 1e-3;  // of the last interval, to give a slope
-  if (duration_s < kTooShort * x.interval_s) {
-    StartCapacitor result = x;
-    result.voltage_v += 0.5 * duration_s * (from_a + to_a) / p.start_capacitance_f;
-    return result;
-  }
-  const double slope_a_s = (to_a - from_a) / duration_s;
-  const double bend_a_s2 = x.interval_s > 0.0 ? (slope_a_s - x.slope_a_s) / (duration_s + x.interval_s) : 0.0;
+  const CurrentTrend trend = followed(x.current, from_a, to_a, duration_s);
   // The parabola through both ends and the start of the last interval.
-  const double charge_as = duration_s * (0.5 * (from_a + to_a) - bend_a_s2 * duration_s * duration_s / 6.0);
-  return {.voltage_v = x.voltage_v + charge_as / p.start_capacitance_f,
-          .slope_a_s = slope_a_s,
-          .bend_a_s2 = bend_a_s2,
-          .interval_s = duration_s};
+  const double charge_as =
+      duration_s * (0.5 * (from_a + to_a) - trend.bend_a_s2 * duration_s * duration_s / 6.0);
+  return {.voltage_v = x.voltage_v + charge_as / p.start_capacitance_f, .current = trend};
 }
 
 }  // namespace drivebench

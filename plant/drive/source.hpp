@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "plant/drive/current_trend.hpp"
 #include "plant/math/curve.hpp"
 #include "plant/windings.hpp"
 
@@ -22,7 +23,7 @@ struct SourceParameters {
   double amplitude_factor_c = 1.0;
   double phase_offset_b_rad = 0.0;
   double phase_offset_c_rad = 0.0;
-  double resistance_ohm = 0.0;  ///< in series with each phase
+  double resistance_ohm = 0.0;  ///< in series with each phase, behind a transformer
   double inductance_h = 0.0;
   bool contactor = true;      ///< closed
   bool choose_angle = false;  ///< the contactor waits until phase a is at closing_angle_rad
@@ -64,14 +65,11 @@ double within_turn(double angle_rad) noexcept;
 /// Time until the angle of a source that is at angle_rad comes to target_rad; infinity if it stands still.
 double time_until_s(double target_rad, double angle_rad, double omega_rad_s) noexcept;
 
-/// The capacitor through which phase b is fed, u_b = u_a - v_C - R i_b with C v_C' = i_b. The current of the
-/// next interval is the parabola through the ends of the last two, which makes voltage and charge third-order
-/// accurate; after a jump (contactor) it starts as a constant. 8-byte members only.
+/// The capacitor through which phase b is fed, u_b = u_a - v_C - R i_b with C v_C' = i_b. 8-byte members
+/// only.
 struct StartCapacitor {
   double voltage_v = 0.0;
-  double slope_a_s = 0.0;   ///< of the current over the last interval
-  double bend_a_s2 = 0.0;   ///< second divided difference
-  double interval_s = 0.0;  ///< the last one; 0: none yet
+  CurrentTrend current{};
 };
 
 /// v_C + R i_b at a time after the start of an interval, at which the current is current_a.

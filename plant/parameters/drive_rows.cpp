@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "plant/parameters/rows.hpp"
+#include "plant/parameters/transformer_rows.hpp"
 
 namespace drivebench {
 namespace {
@@ -99,8 +100,9 @@ constexpr auto kTable = std::to_array<Parameter>({
     source<&Source::phase_offset_c_rad>("source.phase_offset_c_rad", "rad", -7, 7, kLive,
                                         "added to the phase of phase c"),
     source<&Source::resistance_ohm>("source.resistance_ohm", "ohm", 0, 1e6, kLive,
-                                    "in series with each phase"),
-    source<&Source::inductance_h>("source.inductance_h", "H", 0, 1e3, kReal, "in series with each phase"),
+                                    "in series with each phase, behind a transformer"),
+    source<&Source::inductance_h>("source.inductance_h", "H", 0, 1e3, kReal,
+                                  "in series with each phase, behind a transformer"),
     source<&Source::contactor>("source.contactor", "1", 0, 1, kInteger | kLive, "1: closed"),
     source<&Source::choose_angle>("source.choose_angle", "1", 0, 1, kInteger | kLive,
                                   "1: the contactor closes when phase a is at closing_angle_rad"),
@@ -202,6 +204,7 @@ void add_problems(const DriveParameters& p, Problems& found) {
   }
   add_bus_problems(p, found);
   add_source_problems(p, found);
+  add_transformer_problems(p, found);
 }
 
 void add_period_problems(const DriveParameters& p, double period_s, Problems& found) {

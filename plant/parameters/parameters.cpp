@@ -11,6 +11,7 @@
 #include "plant/parameters/mechanics_rows.hpp"
 #include "plant/parameters/rows.hpp"
 #include "plant/parameters/sensor_rows.hpp"
+#include "plant/parameters/transformer_rows.hpp"
 
 namespace drivebench {
 namespace {
@@ -29,7 +30,7 @@ Tables make_tables() {
   for (std::size_t k = 0; k < kKinds; ++k) {
     const MachineKind& kind = all_machine_kinds()[k];
     tables.names[k] = kind.name;
-    for (const auto part : {kind.rows, mechanics_rows(), drive_rows(), sensor_rows()}) {
+    for (const auto part : {kind.rows, mechanics_rows(), drive_rows(), sensor_rows(), transformer_rows()}) {
       tables.rows[k].insert(tables.rows[k].end(), part.begin(), part.end());
     }
     for (const auto part : {kind.curves, mechanics_curves(), drive_curves()}) {

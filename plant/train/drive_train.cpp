@@ -6,22 +6,23 @@ namespace drivebench {
 namespace {
 
 /// The mean voltage across the source's own impedance over an interval.
-double series_drop_v(const SourceParameters& source, double duration_s, double from_a, double to_a) noexcept {
-  return 0.5 * source.resistance_ohm * (from_a + to_a) + source.inductance_h * (to_a - from_a) / duration_s;
+double series_drop_v(const SeriesImpedance& z, double duration_s, double from_a, double to_a) noexcept {
+  return 0.5 * z.resistance_ohm * (from_a + to_a) + z.inductance_h * (to_a - from_a) / duration_s;
 }
 
-PhaseValues behind_source(const SourceParameters& source, double duration_s, const PhaseValues& v,
+PhaseValues behind_source(const SeriesImpedance& z, double duration_s, const PhaseValues& v,
                           const PhaseValues& from_a, const PhaseValues& to_a) noexcept {
-  return {.a = v.a - series_drop_v(source, duration_s, from_a.a, to_a.a),
-          .b = v.b - series_drop_v(source, duration_s, from_a.b, to_a.b),
-          .c = v.c - series_drop_v(source, duration_s, from_a.c, to_a.c),
+  return {.a = v.a - series_drop_v(z, duration_s, from_a.a, to_a.a),
+          .b = v.b - series_drop_v(z, duration_s, from_a.b, to_a.b),
+          .c = v.c - series_drop_v(z, duration_s, from_a.c, to_a.c),
           .field = v.field};
 }
 
 }  // namespace
 
 bool has_impedance(const DriveParameters& p) noexcept {
-  return p.kind == DriveKind::kSource && (p.source.resistance_ohm != 0.0 || p.source.inductance_h != 0.0);
+  return p.kind == DriveKind::kSource &&
+         (p.source.resistance_ohm != 0.0 || p.source.inductance_h != 0.0 || has_transformer(p.transformer));
 }
 
 double corner_on_the_way(double from, double to) noexcept {
@@ -64,11 +65,10 @@ void follow_piece(AxisCore& core, AxisState& state, double start_s, double durat
     if (core.sensors.follows()) core.sensors.follow(state.sensors, start_s, duration_s, from, to);
     return;
   }
+  const SeriesImpedance z = series_impedance(core.p.drive);
   Measurable behind = from;
-  behind.voltage_v =
-      behind_source(core.p.drive.source, duration_s, from.voltage_v, from.current_a, to.current_a);
-  state.voltage_v =
-      behind_source(core.p.drive.source, duration_s, to.voltage_v, from.current_a, to.current_a);
+  behind.voltage_v = behind_source(z, duration_s, from.voltage_v, from.current_a, to.current_a);
+  state.voltage_v = behind_source(z, duration_s, to.voltage_v, from.current_a, to.current_a);
   if (!core.sensors.follows()) return;
   Measurable behind_to = to;
   behind_to.voltage_v = state.voltage_v;

@@ -94,7 +94,12 @@ inline BenchSetup zoo() {
                          {"source.frequency_hz", 50},
                          {"source.resistance_ohm", 0.1},
                          {"source.inductance_h", 1e-4},
-                         {"source.amplitude_factor_b", 0.95}};
+                         {"source.amplitude_factor_b", 0.95},
+                         {"transformer.turns_ratio", 0.8},
+                         {"transformer.primary_resistance_ohm", 0.2},
+                         {"transformer.primary_leakage_h", 1e-3},
+                         {"transformer.magnetising_inductance_h", 0.3},
+                         {"transformer.secondary_resistance_ohm", 0.1}};
   const Values kLoop = {{"current_loop.proportional_v_per_a", 10},
                         {"current_loop.integral_v_per_as", 4000},
                         {"current_loop.limit_a", 10}};

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <set>
 #include <string>
+#include <vector>
+
+#include "plant/parameters/transformer_rows.hpp"
 
 namespace drivebench {
 namespace {
@@ -24,15 +27,17 @@ using Fields = std::vector<std::string>;
 // Catches: two rows of one member or one name, a row that writes elsewhere than it reads, a default out of
 // range.
 TEST(DriveRows, EveryRowHasAMemberOfItsOwn) {
+  std::vector<Parameter> rows(drive_rows().begin(), drive_rows().end());
+  rows.insert(rows.end(), transformer_rows().begin(), transformer_rows().end());
   std::set<std::string_view> names;
   const AxisParameters defaults;
-  for (const Parameter& row : drive_rows()) {
+  for (const Parameter& row : rows) {
     EXPECT_TRUE(names.insert(row.name).second) << row.name;
     AxisParameters p;
     const double value = row.get(p) == row.maximum ? row.minimum : row.maximum;
     row.set(p, value);
     EXPECT_EQ(row.get(p), value) << row.name;
-    for (const Parameter& other : drive_rows()) {
+    for (const Parameter& other : rows) {
       if (&other == &row) continue;
       EXPECT_EQ(other.get(p), other.get(defaults)) << row.name << " moves " << other.name;
     }
@@ -93,6 +98,22 @@ TEST(DriveRows, BrokenRulesOfTheSourceAreNamed) {
   EXPECT_EQ(fields(p), Fields{"source.table"});
   p.source.table = Curve({{0.0, 0.0}, {1.0, 1.0}});
   EXPECT_EQ(fields(p), Fields{});
+}
+
+// Catches: a transformer without a source or without a core, one that is forgotten because its ratio is, a
+// capacitor or a switch that would connect two of them.
+TEST(DriveRows, BrokenRulesOfTheTransformerAreNamed) {
+  DriveParameters p;
+  p.transformer.secondary_leakage_h = 1e-3;
+  EXPECT_EQ(fields(p), Fields{"transformer.turns_ratio"});
+  p.transformer.turns_ratio = 0.5;
+  EXPECT_EQ(fields(p), (Fields{"transformer.turns_ratio", "transformer.magnetising_inductance_h"}));
+  p.kind = DriveKind::kSource;
+  p.transformer.magnetising_inductance_h = 1.0;
+  EXPECT_EQ(fields(p), Fields{});
+  p.source.start_capacitance_f = 1e-6;
+  p.source.start_switch = true;
+  EXPECT_EQ(fields(p), (Fields{"source.start_capacitance_f", "source.start_switch"}));
 }
 
 // Catches: a dead time that leaves nothing of the carrier period, a rule that forgets the periods in a tick.

@@ -368,10 +368,11 @@ TEST(Source, TheStartCapacitorIsInSeriesWithPhaseA) {
 TEST(Source, AnIntervalOfNoLengthLeavesTheSlopeOfTheCurrent) {
   SourceParameters p;
   p.start_capacitance_f = kStartCapacitance_f;
-  const StartCapacitor before{.voltage_v = 3.0, .slope_a_s = 100.0, .bend_a_s2 = 5.0, .interval_s = 10e-6};
+  const StartCapacitor before{.voltage_v = 3.0,
+                              .current = {.slope_a_s = 100.0, .bend_a_s2 = 5.0, .interval_s = 10e-6}};
   const StartCapacitor after = charged(p, before, 1.0, 1.0 + 1e-15, 1e-17);
-  EXPECT_EQ(after.slope_a_s, 100.0);
-  EXPECT_EQ(after.bend_a_s2, 5.0);
+  EXPECT_EQ(after.current.slope_a_s, 100.0);
+  EXPECT_EQ(after.current.bend_a_s2, 5.0);
   EXPECT_NEAR(after.voltage_v, 3.0, 1e-12);
 }
 
