@@ -48,6 +48,7 @@ ResultSection field_oriented_results();
 ResultSection high_speed_results();
 ResultSection optimum_torque_results();
 ResultSection flux_observer_results();
+ResultSection transformer_results();
 ResultSection pm_results();
 ResultSection stepper_results();
 ResultSection other_synchronous_results();
