@@ -19,10 +19,8 @@ double quantisation_step(SeriesView x) {
   return step > finest ? step : 0.0;
 }
 
-}  // namespace
-
-double white_noise(SeriesView x) {
-  if (x.size() < 5) return 0.0;
+/// The rms of the white part from the median of the fourth differences.
+double difference_noise(SeriesView x) {
   constexpr double kMedianOfGauss = 0.6744897501960817;
   constexpr double kGain2 = 70.0;  // 1 + 16 + 36 + 16 + 1
   Series size;
@@ -31,7 +29,24 @@ double white_noise(SeriesView x) {
     size.push_back(std::abs(x[k - 2] - 4.0 * x[k - 1] + 6.0 * x[k] - 4.0 * x[k + 1] + x[k + 2]));
   const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
   std::nth_element(size.begin(), middle, size.end());
-  return std::max(*middle / (kMedianOfGauss * std::sqrt(kGain2)), quantisation_step(x) / std::sqrt(12.0));
+  return *middle / (kMedianOfGauss * std::sqrt(kGain2));
+}
+
+}  // namespace
+
+double white_noise(SeriesView x) {
+  if (x.size() < 5) return 0.0;
+  return std::max(difference_noise(x), quantisation_step(x) / std::sqrt(12.0));
+}
+
+double rounding_without_noise(SeriesView x) {
+  if (x.size() < 5) return 0.0;
+  const double step = quantisation_step(x);
+  constexpr double kLeastLevels = 8.0;  // fewer are the jumps of a switched voltage, not a converter's steps
+  const auto [least, most] = std::ranges::minmax_element(x);
+  if (*most - *least < kLeastLevels * step) return 0.0;
+  // Rounding alone shows as white noise of step/sqrt(12) = 0.29 steps where the signal moves.
+  return difference_noise(x) < 0.5 * step ? step / std::sqrt(12.0) : 0.0;
 }
 
 }  // namespace drivebench::identification

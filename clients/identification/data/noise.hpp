@@ -9,4 +9,8 @@ namespace drivebench::identification {
 /// A signal with edges at every sample shows more than its noise: an upper bound.
 double white_noise(SeriesView x);
 
+/// The rms of a converter's rounding, step/sqrt(12), where the noise of the signal is too small to round it
+/// off: below half a step, so that a steady signal errs by the same each time. 0 elsewhere.
+double rounding_without_noise(SeriesView x);
+
 }  // namespace drivebench::identification
