@@ -6,7 +6,7 @@
 namespace drivebench::identification {
 namespace {
 
-constexpr std::array<NamedExperiment, 7> kExperiments = {{
+constexpr std::array<NamedExperiment, 11> kExperiments = {{
     {.motor = "im",
      .name = "dol-start",
      .file = "im-8-5-5-start",
@@ -20,6 +20,33 @@ constexpr std::array<NamedExperiment, 7> kExperiments = {{
      .bench = "im-8-5-6",
      .summary = "direct-on-line start of 8.5.6 without load, 0.6 s at 4 kHz",
      .from_s = 0.005},
+    {.motor = "im",
+     .name = "dc-resistance",
+     .file = "im-b-dc-resistance",
+     .bench = "im-b",
+     .summary = "8 V of DC through two phases in series, 2.5 s: R_S",
+     .from_s = 2.0,
+     .test = TerminalTest::kDcResistance},
+    {.motor = "im",
+     .name = "no-load",
+     .file = "im-b-no-load",
+     .bench = "im-b",
+     .summary = "problem 7.19: 208 V, 60 Hz, the shaft free, 3 s: L_S",
+     .from_s = 2.4,
+     .test = TerminalTest::kNoLoad},
+    {.motor = "im",
+     .name = "blocked-rotor",
+     .file = "im-b-blocked-rotor",
+     .bench = "im-b",
+     .summary = "problem 7.19: a third of 208 V, 60 Hz, the shaft held, 1 s: R_R, L_S - M",
+     .from_s = 0.7,
+     .test = TerminalTest::kBlockedRotor},
+    {.motor = "im",
+     .name = "classical",
+     .file = "im-b-dc-resistance",
+     .bench = "im-b",
+     .summary = "these three in turn: all parameters, with what the way of the book makes wrong in them",
+     .test = TerminalTest::kAll},
     {.motor = "dc",
      .name = "voltage-steps",
      .file = "dc-a-steps",
@@ -72,6 +99,10 @@ const NamedExperiment* find_experiment(std::string_view motor, std::string_view 
 const NamedExperiment* first_experiment(std::string_view motor) noexcept {
   const auto found = std::ranges::find(kExperiments, motor, &NamedExperiment::motor);
   return found == kExperiments.end() ? nullptr : &*found;
+}
+
+const NamedExperiment& experiment_of(TerminalTest test) noexcept {
+  return *std::ranges::find(kExperiments, test, &NamedExperiment::test);
 }
 
 std::string experiment_names(std::string_view motor) {

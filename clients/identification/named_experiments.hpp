@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -7,6 +8,10 @@
 #include "clients/identification/data/settings.hpp"
 
 namespace drivebench::identification {
+
+/// A test at the terminals whose steady state is read as meters would (motors/classical_tests.hpp), in the
+/// place of an identification from samples.
+enum class TerminalTest : std::uint8_t { kNone, kDcResistance, kNoLoad, kBlockedRotor, kAll };
 
 /// An experiment that identifies a motor of the book, with the settings of its identification.
 struct NamedExperiment {
@@ -21,6 +26,7 @@ struct NamedExperiment {
   double current_hz = 0.0;  ///< corners of the filters; 0: the usual ones
   double voltage_hz = 0.0;
   double shaft_hz = 0.0;
+  TerminalTest test = TerminalTest::kNone;  ///< kAll: the three others in turn, `file` is that of the first
 };
 
 std::span<const NamedExperiment> named_experiments() noexcept;
@@ -30,6 +36,9 @@ const NamedExperiment* find_experiment(std::string_view motor, std::string_view 
 
 /// The first experiment of a motor, or null.
 const NamedExperiment* first_experiment(std::string_view motor) noexcept;
+
+/// The experiment of this test.
+const NamedExperiment& experiment_of(TerminalTest test) noexcept;
 
 /// The names of a motor's experiments, separated by commas.
 std::string experiment_names(std::string_view motor);

@@ -13,6 +13,7 @@
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/common/text.hpp"
+#include "clients/command/identify/classical.hpp"
 #include "clients/command/identify/identify_data.hpp"
 #include "clients/command/identify/identify_json.hpp"
 #include "clients/command/identify/identify_report.hpp"
@@ -67,12 +68,7 @@ const NamedExperiment* chosen_experiment(const MotorName& motor, const std::stri
 MeasuredMotor measured_motor(const IdentifyOptions& options, const MotorName& motor,
                              const NamedExperiment* named) {
   if (options.from_file.empty()) return measure(options, wanted_experiment(motor, named, options.experiment));
-  MeasuredMotor m = options.from_file.ends_with(".mcap") ? read_recording(options.from_file, options.axis)
-                                                         : read_foreign(options);
-  if (!m.machine.empty() && m.machine != motor.machine)
-    throw UsageError(fmt::format("{} is of kind {}, --motor {} is for {}", m.source, m.machine, motor.name,
-                                 motor.machine));
-  return m;
+  return read_measurement(options, motor);
 }
 
 void check_foreign(const IdentifyOptions& options, const MeasuredMotor& m) {
@@ -181,6 +177,11 @@ int run_identify(const IdentifyOptions& options) {
   if (options.list) return print_list(options.json);
   if (options.suggest) return run_suggest(options);
   const MotorName& motor = chosen_motor(options.motor);
+  const NamedExperiment* const test = identification::find_experiment(motor.name, options.experiment);
+  if (test != nullptr && test->test != identification::TerminalTest::kNone)
+    return run_terminal_tests(options, motor, *test);
+  if (options.stator_resistance_ohm)
+    throw UsageError("--stator-resistance belongs to the experiments no-load and blocked-rotor");
   check_choice(options);
   const NamedExperiment* const named =
       options.from_file.empty() ? chosen_experiment(motor, options.experiment) : nullptr;

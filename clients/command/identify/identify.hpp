@@ -50,6 +50,7 @@ struct IdentifyOptions {
   std::optional<int> order{};
   std::string load{};  ///< viscous or constant; empty: that of the experiment
   bool one_stage = false;
+  std::optional<double> stator_resistance_ohm{};  ///< known, for a no-load or blocked-rotor test alone
 
   std::string markdown_file{};
   std::string plot_file{};

@@ -39,6 +39,10 @@ MeasuredMotor read_recording(const std::string& file, const std::string& axis);
 /// A CSV file; all facts keep their defaults. Throws UsageError "file:line: column: rule".
 MeasuredMotor read_foreign(const IdentifyOptions& options);
 
+/// The file of --from, a recording or CSV. Throws UsageError, also for a recording of another kind of
+/// machine.
+MeasuredMotor read_measurement(const IdentifyOptions& options, const identification::MotorName& motor);
+
 /// Takes `bench`, `machine`, `motor`, `drive` and `substeps` of one axis (empty: the first) from the
 /// configuration in a recording. Takes nothing if the text is not a configuration.
 void take_configuration(std::string_view toml, const std::string& axis, MeasuredMotor& motor);

@@ -48,7 +48,8 @@ std::string named_experiments_json() {
                        {"name", each.name},
                        {"file", each.file},
                        {"bench", each.bench},
-                       {"summary", each.summary}});
+                       {"summary", each.summary},
+                       {"test", each.test != identification::TerminalTest::kNone}});
   return Json{{"experiments", out}}.dump(2);
 }
 

@@ -73,6 +73,10 @@ void add_settings(CLI::App& sub, IdentifyOptions& o) {
       ->check(CLI::IsMember({"viscous", "constant"}))
       ->group(kGroup);
   sub.add_flag("--one-stage", o.one_stage, "pm: all parameters in one least squares")->group(kGroup);
+  sub.add_option("--stator-resistance", o.stator_resistance_ohm,
+                 "no-load, blocked-rotor: R_S [ohm] as measured with DC")
+      ->check(finite_between(1e-9, 1e9))
+      ->group(kGroup);
 }
 
 void add_suggestion(CLI::App& sub, IdentifyOptions& o) {

@@ -39,7 +39,8 @@ void set_window(const std::string& text, identification::Processing& p) {
     throw UsageError(fmt::format("--window '{}' ends before it begins", printable(text)));
 }
 
-/// Applies the options of the command line, which override the settings of the experiment.
+}  // namespace
+
 void apply_options(const IdentifyOptions& o, Settings& e) {
   identification::Processing& p = e.processing;
   if (o.pole_pairs) e.pole_pairs = *o.pole_pairs;
@@ -60,6 +61,8 @@ void apply_options(const IdentifyOptions& o, Settings& e) {
                .voltage_offsets = finds("voltage-offsets"),
                .gains = finds("gains")};
 }
+
+namespace {
 
 /// Whether the bench loads the shaft from tick 0 to the end; sample 0 is taken before.
 bool has_load(const identification::MeasuredData& data) {

@@ -19,6 +19,9 @@ const identification::MotorName& chosen_motor(const std::string& name);
 WantedExperiment wanted_experiment(const identification::MotorName& motor,
                                    const identification::NamedExperiment* named, const std::string& choice);
 
+/// Applies the options of the command line, which override the settings of the experiment.
+void apply_options(const IdentifyOptions& options, identification::Settings& settings);
+
 /// What bench or recording and experiment say, overridden by the command line; the shaft's filter from the
 /// data unless somebody has set it.
 identification::Settings settings_for(const IdentifyOptions& options, const identification::MotorName& motor,

@@ -123,7 +123,7 @@ class Suggestion {
   /// What the named experiments of the motor tell on this bench, with their own settings.
   void try_existing() {
     for (const NamedExperiment& each : identification::named_experiments()) {
-      if (each.motor != motor_.name) continue;
+      if (each.motor != motor_.name || each.test != identification::TerminalTest::kNone) continue;
       WantedExperiment wanted = wanted_experiment(motor_, &each, {});
       if (each.bench != bench_) wanted.file.axis = options_.axis.empty() ? "0" : options_.axis;
       report_.existing.push_back(forecasts_.run(std::string(each.name), wanted, &each));

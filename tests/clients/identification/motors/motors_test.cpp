@@ -144,7 +144,9 @@ TEST(Motors, EveryNamedExperimentHasItsFiles) {
   EXPECT_EQ(motors.size(), kMotorNames.size());
   EXPECT_EQ(find_motor("ac"), nullptr);
   EXPECT_EQ(find_experiment("dc", "dol-start"), nullptr);
-  EXPECT_EQ(experiment_names("im"), "dol-start, no-load-start");
+  EXPECT_EQ(experiment_names("im"),
+            "dol-start, no-load-start, dc-resistance, no-load, blocked-rotor, classical");
+  EXPECT_EQ(experiment_of(TerminalTest::kBlockedRotor).name, "blocked-rotor");
   EXPECT_EQ(motor_name(MotorKind::kBldc).name, "bldc");
 }
 
