@@ -91,7 +91,8 @@ std::vector<ResultSection> all_results() {
   return {field_oriented_results(), high_speed_results(),        optimum_torque_results(),
           flux_observer_results(),  transformer_results(),       pm_results(),
           stepper_results(),        other_synchronous_results(), dc_results(),
-          wound_dc_results(),       steady_state_results(),      identification_results()};
+          wound_dc_results(),       steady_state_results(),      identification_results(),
+          classical_results()};
 }
 
 std::string markdown_of(const std::vector<ResultSection>& sections) {

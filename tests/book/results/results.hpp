@@ -56,6 +56,7 @@ ResultSection dc_results();
 ResultSection wound_dc_results();
 ResultSection steady_state_results();
 ResultSection identification_results();
+ResultSection classical_results();
 
 /// All of them; runs every experiment.
 std::vector<ResultSection> all_results();
