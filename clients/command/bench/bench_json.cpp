@@ -123,6 +123,7 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
     const Sample sample = plain(each.sample());
     Json axis = {{"axis", each.axis()},
                  {"faults_set", names_in(bench.faults(), sample.faults)},
+                 {"latched_set", names_in(bench.faults(), latched_faults(bench, sample.faults))},
                  {"injected_set", names_in(bench.injectable_faults(), sample.injected)}};
     for (const Signal& signal : kSignals)
       axis[std::string(signal.name)] = value_as_json(signal, sample);
@@ -144,6 +145,13 @@ std::string sample_json(const Sample& sample, const v1::BenchDescription& bench,
 
 std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick) {
   return Json{{"axis", axis}, {"name", name}, {"value", value}, {"tick", tick}}.dump();
+}
+
+std::string clear_json(const v1::BenchDescription& bench, std::uint32_t axis, std::uint64_t cleared,
+                       std::uint64_t tick) {
+  return Json{
+      {"axis", axis}, {"name", "clear"}, {"cleared", names_in(bench.faults(), cleared)}, {"tick", tick}}
+      .dump();
 }
 
 }  // namespace drivebench::command

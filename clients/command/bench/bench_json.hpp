@@ -17,6 +17,10 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
 std::string sample_json(const Sample& sample, const v1::BenchDescription& bench, std::uint32_t axis,
                         std::uint64_t dropped, const std::vector<const Signal*>& signals);
 /// An accepted fault, parameter or bump, with its tick.
+/// {axis, name: "clear", cleared: [...], tick}
+std::string clear_json(const v1::BenchDescription& bench, std::uint32_t axis, std::uint64_t cleared,
+                       std::uint64_t tick);
+
 std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick);
 
 }  // namespace drivebench::command

@@ -71,6 +71,13 @@ void add_bump(CommandLine& line) {
       ->check(finite_between(-kMost, kMost));
 }
 
+void add_clear(CommandLine& line) {
+  const auto [sub, o] = line.add<ClearOptions>(
+      "clear", "clear the latched faults of an axis that no session controls", run_clear);
+  add_link(sub, o.link);
+  sub.add_option("AXIS", o.axis, "number or name")->required();
+}
+
 void add_take(CommandLine& line) {
   const auto [sub, o] = line.add<TakeOptions>(
       "take", "take an axis from the session that holds it and leave it free; for administrators", run_take);
@@ -111,6 +118,7 @@ void add_bench_commands(CommandLine& line) {
   add_inject(line);
   add_set(line);
   add_bump(line);
+  add_clear(line);
   add_take(line);
   add_prints(line);
 }

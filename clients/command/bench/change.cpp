@@ -10,6 +10,8 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/common/text.hpp"
+#include "protocols/nearest_name.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -60,8 +62,9 @@ double value_of(const v1::ParameterDescription& row, const std::string& text) {
   if (const auto value = finite_number(text)) return *value;
   const auto word = std::find(row.words().begin(), row.words().end(), text);
   if (word != row.words().end()) return static_cast<double>(word - row.words().begin());
-  throw UsageError(fmt::format("'{}' is not {} {}", text, row.words().empty() ? "a number for" : "a value of",
-                               row.name()));
+  throw UsageError(fmt::format("'{}' is not {} {}{}", printable(text),
+                               row.words().empty() ? "a number for" : "a value of", row.name(),
+                               row.words().empty() ? "" : advice(text, row.words())));
 }
 
 }  // namespace
@@ -72,7 +75,9 @@ int run_inject(const InjectOptions& options) {
   const auto fault = std::find_if(faults.begin(), faults.end(),
                                   [&](const auto& each) { return each.name() == options.fault; });
   if (fault == faults.end()) {
-    throw UsageError(fmt::format("no fault '{}'; `drivebench describe` lists them", options.fault));
+    throw UsageError(fmt::format("no fault '{}'{}; `drivebench describe` lists them",
+                                 printable(options.fault),
+                                 did_you_mean(options.fault, faults, &v1::InjectableFaultDescription::name)));
   }
   const std::uint64_t tick =
       axis.link().inject_fault(axis.number(), {.name = options.fault, .value = options.value});
@@ -86,7 +91,9 @@ int run_set(const SetOptions& options) {
   const auto row =
       std::find_if(rows.begin(), rows.end(), [&](const auto& each) { return each.name() == options.name; });
   if (row == rows.end()) {
-    throw UsageError(fmt::format("no parameter '{}'; `drivebench describe` lists them", options.name));
+    throw UsageError(fmt::format("no parameter '{}'{}; `drivebench describe` lists them",
+                                 printable(options.name),
+                                 did_you_mean(options.name, rows, &v1::ParameterDescription::name)));
   }
   const double value = value_of(*row, options.value);
   const double ticks = std::round(options.ramp_s / axis.bench().period_s());
@@ -94,6 +101,20 @@ int run_set(const SetOptions& options) {
   const std::uint64_t tick = axis.link().write_parameter(
       axis.number(), {.name = options.name, .value = value, .ramp_ticks = static_cast<std::uint64_t>(ticks)});
   tell(options.json, axis, options.name, value, row->unit(), tick + static_cast<std::uint64_t>(ticks));
+  return kExitOk;
+}
+
+int run_clear(const ClearOptions& options) {
+  HeldAxis axis(options.link, options.axis, "clear");
+  const v1::Sample newest = axis.link().status().axes(static_cast<int>(axis.number())).sample();
+  const std::uint64_t latched = latched_faults(axis.bench(), newest.faults());
+  const std::uint64_t tick = axis.link().clear_faults(axis.number());
+  if (options.json) {
+    fmt::print("{}\n", clear_json(axis.bench(), axis.number(), latched, tick));
+  } else {
+    fmt::print("axis {} ({}): cleared{} at tick {}\n", axis.number(), axis.description().name(),
+               latched == 0 ? ", no latched fault showed," : " " + fault_names(axis.bench(), latched), tick);
+  }
   return kExitOk;
 }
 

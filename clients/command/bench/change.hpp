@@ -37,6 +37,14 @@ struct BumpOptions {
 };
 int run_bump(const BumpOptions& options);
 
+/// Clears the latched faults of an axis.
+struct ClearOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string axis{};  ///< number or name
+};
+int run_clear(const ClearOptions& options);
+
 /// Takes an axis from the session that holds it and leaves it free.
 struct TakeOptions {
   LinkChoice link{};

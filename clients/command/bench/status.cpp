@@ -60,6 +60,12 @@ int run_status(const StatusOptions& options) {
                s.owner() == 0 ? "none" : fmt::format("{}", s.owner()), fault_names(bench, s.faults()),
                s.injected() == 0 ? "" : ", injected ",
                s.injected() == 0 ? "" : injected_names(bench, s.injected()));
+    if (const std::uint64_t latched = latched_faults(bench, s.faults()); latched != 0) {
+      fmt::print(
+          "  latched: {}; no command is executed before `drivebench clear {}`, or `--clear` of a "
+          "controller\n",
+          fault_names(bench, latched), i);
+    }
     fmt::print("  count {}, {}speed {:.3f} rad/s, load {:g} N*m\n", s.encoder_count(),
                terminals_text(s, axis), s.speed_rad_s(), s.load_nm());
     fmt::print("  missed commands {}, refused commands {}\n", s.missed_commands(), s.refused_commands());

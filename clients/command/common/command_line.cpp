@@ -8,6 +8,8 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
+#include "protocols/nearest_name.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 
@@ -42,7 +44,11 @@ int CommandLine::parse_and_run(int argc, char** argv) {
   if (argc > 1 && argv[1][0] != '-') {
     const auto is_named = [&](const CLI::App* sub) { return sub->get_name() == argv[1]; };
     if (app_.get_subcommands(is_named).empty()) {
-      throw UsageError(fmt::format("no subcommand '{}'; --help lists them", argv[1]));
+      std::vector<std::string> verbs;
+      for (const CLI::App* sub : app_.get_subcommands(nullptr))
+        verbs.push_back(sub->get_name());
+      throw UsageError(fmt::format("no subcommand '{}'{}; --help lists them", printable(argv[1]),
+                                   did_you_mean(argv[1], verbs)));
     }
   }
   app_.parse(argc, argv);

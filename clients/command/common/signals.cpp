@@ -5,6 +5,8 @@
 #include <iterator>
 
 #include "clients/command/common/errors.hpp"
+#include "protocols/nearest_name.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 
@@ -13,7 +15,8 @@ std::vector<const Signal*> signals_named(const std::vector<std::string>& names) 
   for (const std::string& name : names) {
     const Signal* const signal = find_signal(name);
     if (signal == nullptr) {
-      throw UsageError(fmt::format("no signal '{}'; `drivebench describe` lists them", name));
+      throw UsageError(fmt::format("no signal '{}'{}; `drivebench describe` lists them", printable(name),
+                                   did_you_mean(name, kSignals, &Signal::name)));
     }
     signals.push_back(signal);
   }

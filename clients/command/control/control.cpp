@@ -53,7 +53,8 @@ void apply_settings(link::AxisLink& bench, const std::vector<ParameterSetting>& 
 void refuse_latched_faults(link::AxisLink& bench) {
   const std::string latched = latched_text(bench.bench(), bench.newest());
   if (!latched.empty()) {
-    throw UsageError(fmt::format("the axis has latched {}; --clear clears it", latched));
+    throw UsageError(
+        fmt::format("the axis has latched {}; --clear clears it, or `drivebench clear`", latched));
   }
 }
 

@@ -14,8 +14,8 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from command_test import FAILED, USAGE, CommandTest, link_of
-from wire_client import pb
-from wire_test import TWO_DRIVES
+from wire_client import BENCHES, pb
+from wire_test import TWO_DRIVES, until
 
 NAME = "machine.rotor_resistance_ohm"
 
@@ -73,17 +73,71 @@ class Commands(CommandTest):
             self.assertEqual((found["axis"], found["name"], found["tick"]), (0, "take", 3))
             self.assertEqual(self.status()["owner"], 0)
 
+    def test_clear_ends_what_a_lost_controller_left(self):
+        """Catches: an axis that nobody can use after its controller died, a status without the latch, a clear that keeps
+        the axis, one that says it cleared what is not gone."""
+        bench = self.server("--mode", "realtime")
+        link = link_of(bench)
+
+        def status():
+            return self.json_of("status", link=link)["axes"][0]
+
+        self.assertSays(self.drivebench("clear", "servo", link=link).stdout, "axis 0 (servo): cleared, no latched fault showed")
+        with bench.client() as client:
+            client.lease()
+            for _ in range(50):
+                client.exchange(client.newest().tick, gates=pb.GATES_OFF)
+        until(lambda: status()["latched_set"] == ["lease_lost"], "the session's end is noticed")
+        self.assertSays(self.drivebench("status", link=link).stdout, "latched: lease_lost; no command is executed",
+                        "`drivebench clear 0`")
+        self.assertSays(self.drivebench("control", link=link, code=USAGE).stderr, "has latched lease_lost", "`drivebench clear`")
+        found = self.json_of("clear", "0", link=link)
+        self.assertEqual((found["axis"], found["name"], found["cleared"]), (0, "clear", ["lease_lost"]))
+        self.assertEqual(status()["latched_set"], [])
+
+    def test_a_fault_whose_cause_is_still_there_is_not_cleared(self):
+        """Catches: a clear that exits with 0 and left the latch: a short of a turning magnet."""
+        text = (BENCHES / "pm-9-3.toml").read_text(encoding="utf-8").replace("../motors/", f"{BENCHES.parent}/motors/")
+        for old, new in (('"lockstep"', '"realtime"'), ("period_us = 20", "period_us = 500"),
+                         ("command_delay_ticks = 0", "command_delay_ticks = 1"),
+                         ("over_current_a = 8.0", "over_current_a = 0.5"), ("over_current_trip = false", "over_current_trip = true")):
+            self.assertIn(old, text)
+            text = text.replace(old, new)
+        text += ('\n[axis.mechanics]\nmotion = "imposed"\nimposed_speed_rad_s = 10.0\n'
+                 '[[axis.fault]]\nat_s = 0\nname = "phase_short"\nvalue = 1\n')
+        link = link_of(self.server(text=text))
+        until(lambda: self.json_of("status", link=link)["axes"][0]["latched_set"] == ["over_current_trip"], "the short trips")
+        self.assertSays(self.drivebench("clear", "0", link=link, code=FAILED).stderr,
+                        "what caused the latched fault is still there: over-current")
+        self.drivebench("inject", "0", "phase_short", "0", link=link)
+        until(lambda: abs(self.json_of("status", link=link)["axes"][0]["i_a_a"]) < 0.1, "the current decays")
+        self.assertSays(self.drivebench("clear", "0", link=link).stdout, "cleared over_current_trip")
+
+    def test_clear_works_where_time_stands_still(self):
+        """Catches: a clear that waits for a tick of a lockstep bench, one that the next controller does not feel."""
+        with self.bench.client() as client:
+            client.lease()
+            for tick in range(3):
+                client.step(tick, 10.0)
+        said = self.drivebench("clear", "servo", link=self.link).stdout
+        self.assertEqual(said, "axis 0 (servo): cleared, no latched fault showed, at tick 3\n")
+        with self.bench.client() as client:
+            client.lease()
+            self.assertEqual(client.step(3, 10.0).faults, 0)
+
     def test_a_refused_change_is_reported(self):
         """Catches: a command that exits with 0 and changed nothing."""
         for arguments, code, fact in (
-                (["inject", "servo", "bus_sagg", "1"], USAGE, "no fault 'bus_sagg'"),
+                (["inject", "servo", "bus_sagg", "1"], USAGE, "no fault 'bus_sagg'; did you mean \"bus_sag\"?"),
+                (["clear", "brake"], USAGE, "no axis 'brake'"),
                 (["inject", "brake", "bus_sag", "1"], USAGE, "no axis 'brake'"),
                 (["inject", "servo", "bus_sag", "2"], FAILED, "must lie between 0 and 1"),
                 (["inject", "servo", "bus_sag", "much"], USAGE, "VALUE"),
                 (["inject", "servo", "bus_sag"], USAGE, "VALUE"),
+                (["set", "servo", "machine.rotor_resistance", "2"], USAGE, f"did you mean \"{NAME}\""),
                 (["set", "servo", "machine.rr", "2"], USAGE, "no parameter 'machine.rr'"),
                 (["set", "servo", NAME, "hot"], USAGE, "'hot' is not a number for"),
-                (["set", "servo", "mechanics.motion", "loked"], USAGE, "'loked' is not a value of"),
+                (["set", "servo", "mechanics.motion", "loked"], USAGE, "'loked' is not a value of mechanics.motion; did you mean \"locked\"?"),
                 (["set", "servo", NAME, "-2"], FAILED, "must lie between"),
                 (["set", "servo", "machine.pole_pairs", "2"], FAILED, "cannot be changed"),
                 (["set", "servo", NAME, "5", "--ramp-s", "-1"], USAGE, "--ramp-s"),
