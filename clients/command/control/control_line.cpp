@@ -115,19 +115,24 @@ void add_control(CommandLine& line) {
 }
 
 void add_plot(CommandLine& line) {
-  const auto [sub, o] =
-      line.add<PlotOptions>("plot", "a controlled run of a recording as an SVG picture", run_plot);
+  const auto [sub, o] = line.add<PlotOptions>("plot", "a run of a recording as an SVG picture", run_plot);
   sub.add_option("FILE", o.recording, "an MCAP recording")->required();
   sub.add_option("--out", o.out_file, "instead of standard output");
   sub.add_option("--preset", o.preset, "draws its trajectory and the error too");
   add_gains(sub, o.overrides);
   sub.add_option("--axis", o.axis, "name; default: the first in the file");
-  sub.add_option("--from", o.from_tick, "tick at which the run starts")->check(not_negative());
+  sub.add_option("--from", o.from_tick,
+                 "tick at which the picture starts; default: the first command with a set-point, or else the "
+                 "first sample")
+      ->check(not_negative());
   sub.add_option(
          "--panels", o.panels,
          "of angle, speed, error, currents, voltages, torque; with --preset also the estimates of its "
          "controller beside the truth: speed-estimate, flux, load; separated by commas")
       ->delimiter(',');
+  sub.add_option("--signals", o.signals, "by name, a panel for each unit; separated by commas")
+      ->delimiter(',')
+      ->excludes("--panels");
   sub.add_option("--title", o.title, "default: the preset, or else the file");
 }
 

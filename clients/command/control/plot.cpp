@@ -12,6 +12,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/output.hpp"
+#include "clients/command/common/signals.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_replay.hpp"
@@ -198,12 +199,21 @@ bool needs_estimates(const std::vector<std::string>& names, bool has_preset) {
   return found;
 }
 
-}  // namespace
+/// A panel for each unit, in the order of the names.
+std::vector<Panel> panels_of_signals(const std::vector<std::string>& names, const RecordedRun& run) {
+  std::vector<Panel> panels;
+  for (const Signal* signal : signals_named(names)) {
+    const std::string label = fmt::format("[{}]", signal->unit);
+    auto panel = std::ranges::find(panels, label, &Panel::label);
+    if (panel == panels.end()) panel = panels.insert(panel, {.label = label, .lines = {}});
+    panel->lines.push_back({std::string(signal->name),
+                            column(run, [&](const Answered& row) { return value_of(*signal, row.sample); })});
+  }
+  return panels;
+}
 
-int run_plot(const PlotOptions& options) {
-  RecordedRun recorded = read_run(options.recording, options.axis, options.from_tick);
-  double start_s = 0.0;
-  const Plan plan = planned(options, recorded, start_s);
+std::vector<Panel> panels_of(const PlotOptions& options, const RecordedRun& recorded, const Plan& plan) {
+  if (!options.signals.empty()) return panels_of_signals(options.signals, recorded);
   std::vector<std::string> names = options.panels;
   if (names.empty()) names = {"speed", "currents", "voltages"};
   if (options.panels.empty() && !plan.references.empty()) names.insert(names.begin() + 1, "error");
@@ -213,6 +223,19 @@ int run_plot(const PlotOptions& options) {
   panels.reserve(names.size());
   for (const std::string& name : names)
     panels.push_back(panel_named(name, recorded, plan, estimates));
+  return panels;
+}
+
+}  // namespace
+
+int run_plot(const PlotOptions& options) {
+  signals_named(options.signals);  // reports a wrong name before it reads a file
+  RecordedRun recorded = options.preset.empty()
+                             ? read_samples(options.recording, options.axis, options.from_tick)
+                             : read_run(options.recording, options.axis, options.from_tick);
+  double start_s = 0.0;
+  const Plan plan = planned(options, recorded, start_s);
+  const std::vector<Panel> panels = panels_of(options, recorded, plan);
   const std::uint64_t first = recorded.rows.front().sample.tick;
   const std::vector<double> times_ms = column(recorded, [&](const Answered& row) {
     return 1e3 * (static_cast<double>(row.sample.tick - first) * recorded.period_s - start_s);

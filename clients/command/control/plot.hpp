@@ -9,7 +9,7 @@
 
 namespace drivebench::command {
 
-/// A controlled run of a recording as an SVG picture.
+/// A run of a recording as an SVG picture.
 struct PlotOptions {
   std::string recording{};
   std::string out_file{};  ///< empty: standard output
@@ -17,9 +17,10 @@ struct PlotOptions {
   std::vector<control::Gain> overrides{};
   std::string axis{};  ///< name; empty: the first in the file
   std::optional<std::uint64_t>
-      from_tick{};                    ///< start of the run; default: the first command with a set-point
-  std::vector<std::string> panels{};  ///< empty: speed, currents and voltages
-  std::string title{};                ///< empty: the preset, or else the file
+      from_tick{};                     ///< start of the run; default: the first command with a set-point
+  std::vector<std::string> panels{};   ///< empty: speed, currents and voltages
+  std::vector<std::string> signals{};  ///< in the place of panels: a panel for each unit
+  std::string title{};                 ///< empty: the preset, or else the file
 };
 int run_plot(const PlotOptions& options);
 

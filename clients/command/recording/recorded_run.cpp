@@ -39,6 +39,18 @@ class Reader {
     }
     return out;
   }
+  RecordedRun all() const {
+    RecordedRun out = {.axis = wanted_, .period_s = period_s_, .rows = {}};
+    out.rows.reserve(samples_.size());
+    auto command = commands_.begin();
+    for (const Sample& sample : samples_) {
+      while (command != commands_.end() && command->tick() < sample.tick)
+        ++command;
+      const bool answered = command != commands_.end() && command->tick() == sample.tick;
+      out.rows.push_back({.sample = sample, .command = answered ? *command : v1::Command()});
+    }
+    return out;
+  }
   bool has_axis() const noexcept { return number_.has_value(); }
   const std::string& axes() const noexcept { return axes_; }
 
@@ -86,8 +98,9 @@ bool asks_for_something(const v1::Command& command) noexcept {
   return command.gates() == v1::GATES_VOLTAGE || command.gates() == v1::GATES_CURRENT;
 }
 
-RecordedRun read_run(const std::string& path, const std::string& axis,
-                     std::optional<std::uint64_t> from_tick) {
+namespace {
+
+RecordedRun read(const std::string& path, const std::string& axis, bool all) {
   Reader reader(axis);
   const MappedSeries files = open_recording(path);
   McapSeries mcap(files.segments());
@@ -99,13 +112,34 @@ RecordedRun read_run(const std::string& path, const std::string& axis,
     throw UsageError(fmt::format("no samples of axis '{}'; the recording has {}", axis,
                                  reader.axes().empty() ? "none" : reader.axes()));
   }
-  RecordedRun run = reader.joined();
+  RecordedRun run = all ? reader.all() : reader.joined();
   run.is_whole = !mcap.problem();
+  return run;
+}
+
+}  // namespace
+
+RecordedRun read_run(const std::string& path, const std::string& axis,
+                     std::optional<std::uint64_t> from_tick) {
+  RecordedRun run = read(path, axis, false);
   const auto start = std::ranges::find_if(run.rows, [&](const Answered& row) {
     return from_tick ? row.sample.tick >= *from_tick : asks_for_something(row.command);
   });
   run.rows.erase(run.rows.begin(), start);
   if (run.rows.empty()) throw UsageError(fmt::format("{} has no commands for axis {}", path, run.axis));
+  return run;
+}
+
+RecordedRun read_samples(const std::string& path, const std::string& axis,
+                         std::optional<std::uint64_t> from_tick) {
+  RecordedRun run = read(path, axis, true);
+  const auto start = std::ranges::find_if(run.rows, [&](const Answered& row) {
+    return from_tick ? row.sample.tick >= *from_tick : asks_for_something(row.command);
+  });
+  if (from_tick || start != run.rows.end()) run.rows.erase(run.rows.begin(), start);
+  if (run.rows.empty())
+    throw UsageError(
+        fmt::format("{} has no samples of axis {} from tick {} on", path, run.axis, from_tick.value_or(0)));
   return run;
 }
 

@@ -34,4 +34,9 @@ bool asks_for_something(const v1::Command& command) noexcept;
 RecordedRun read_run(const std::string& path, const std::string& axis,
                      std::optional<std::uint64_t> from_tick);
 
+/// All samples of one axis, those without an answer with an empty command, from the given tick on, or from
+/// the first command with set-points, or from the beginning if there is none. Otherwise as read_run().
+RecordedRun read_samples(const std::string& path, const std::string& axis,
+                         std::optional<std::uint64_t> from_tick);
+
 }  // namespace drivebench::command

@@ -1,6 +1,7 @@
 """`drivebench control`: gains by name, refusals before anything moves, and recordings against the reference."""
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -208,6 +209,24 @@ class Plot(ControlTest):
         drawn = self.plot(file, "--preset", "book/8.2.2", "--panels", "load").stdout
         self.assertEqual((drawn.count("<path"), drawn.count(">estimate<")), (1, 0))
         self.assertIn("the preset at 4000 Hz", self.plot(file, "--preset", "book/8.2.2-4khz", "--panels", "flux", code=USAGE).stderr)
+
+    def test_a_run_without_commands_becomes_a_picture(self):
+        """Catches: the line start of the README without a picture, signals that are left out or share a panel with another
+        unit, a picture that begins before --from."""
+        file = self.folder / "start.mcap"
+        subprocess.run([SERVER, BENCHES / "im-b.toml", "--port", "0", "--duration", "0.1", "--record", file],
+                       capture_output=True, timeout=PATIENCE_S, check=True)
+        drawn = self.plot(file).stdout
+        for text in ("speed [rad/s]", "i_a", "i_b", "i_c", "u_c", str(file)):
+            self.assertIn(f">{text}<", drawn)
+        drawn = self.plot(file, "--signals", "torque_nm,speed_rad_s,load_nm").stdout
+        texts = re.findall(r"<text[^>]*>([^<]*)</text>", drawn)
+        self.assertEqual([text for text in texts if text in ("[N*m]", "[rad/s]")], ["[N*m]", "[rad/s]"])
+        self.assertEqual(drawn.count("<path"), 3)
+        self.assertIn("no samples of axis im-b from tick 5000 on", self.plot(file, "--from", 5000, code=USAGE).stderr)
+        self.assertIn('did you mean "torque_nm"', self.plot(file, "--signals", "torqe_nm", code=USAGE).stderr)
+        self.assertIn("--panels", self.plot(file, "--signals", "torque_nm", "--panels", "speed", code=USAGE).stderr)
+        self.assertIn("has no commands", self.plot(file, "--preset", "book/8.2.2", code=USAGE).stderr)
 
     def test_an_impossible_picture_is_refused(self):
         """Catches: an empty picture with an exit code of 0."""

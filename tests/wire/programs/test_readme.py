@@ -70,12 +70,14 @@ class Bench:
         self.environment = guarded({name: value for name, value in os.environ.items() if not name.startswith("DRIVEBENCH_")})
         self.server = None
         self.moved = False
+        self.ends_by_itself = False
 
     def program(self, *words):
         return [str(SERVER.parent / words[0]), *words[1:]]
 
     def start(self, words):
         self.stop()
+        self.ends_by_itself = "--duration" in words
         self.server = subprocess.Popen(self.program(*words, "--port", "0"), stdout=subprocess.PIPE, text=True,
                                        cwd=self.folder, env=self.environment)
         ready = self.server.stdout.readline()
@@ -87,7 +89,8 @@ class Bench:
     def stop(self):
         if self.server is None:
             return
-        self.server.send_signal(signal.SIGTERM)
+        if not self.ends_by_itself:
+            self.server.send_signal(signal.SIGTERM)
         self.server.communicate(timeout=PATIENCE_S)
         code, self.server = self.server.returncode, None
         if code != 0:
@@ -131,7 +134,7 @@ class Bench:
         if words[:2] == ["drivebench", "serve"] or words[0] == "drivebench-server":
             self.start(words)
         elif words[1] in ("replay", "export", "plot") or "--compare" in words:
-            if self.server is not None and not self.moved:
+            if self.server is not None and not self.moved and not self.ends_by_itself:
                 self.move()  # something to read
             self.stop()  # a recording is whole when its server has ended
             self.run(words)
