@@ -8,7 +8,10 @@ if not os.path.exists(os.path.join(generated, "bench_pb2.py")):
     protocols = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../protocols")
     subprocess.run(["protoc", "-I", protocols, "--python_out", generated, "bench.proto"], check=True)
 sys.path.insert(0, generated)
-import bench_pb2 as v1
+try:
+    import bench_pb2 as v1
+except ImportError as error:
+    sys.exit(f"{error}: {sys.executable} lacks protobuf; Debian's /usr/bin/python3 has it with the package python3-protobuf")
 
 host, port = address.removeprefix("tcp:").rsplit(":", 1)
 stream = socket.create_connection((host, int(port)), timeout=5)
@@ -18,7 +21,9 @@ reader = stream.makefile("rb")
 def ask(**request):  # a frame: 4-byte big-endian length, then one Envelope
     payload = v1.Envelope(id=1, **request).SerializeToString()
     stream.sendall(struct.pack(">I", len(payload)) + payload)
-    answer = v1.Envelope.FromString(reader.read(struct.unpack(">I", reader.read(4))[0]))
+    answer = v1.Envelope()
+    while answer.id != 1:  # 0 is no answer but a notice
+        answer = v1.Envelope.FromString(reader.read(struct.unpack(">I", reader.read(4))[0]))
     if answer.HasField("refusal"):
         sys.exit(f"refused: {answer.refusal.message}")
     return answer
