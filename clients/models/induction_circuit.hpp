@@ -11,10 +11,11 @@ namespace drivebench {
 
 /// An induction machine on a symmetric line of fixed frequency at a constant speed: phasors of one phase,
 /// rms, motor convention, the phase voltage real:
-///   U = (R_S + jω·L_S)·I_S + jω·M·I_R
+///   U = (R_line + jω·L_line)·I_S + (R_S + jω·L_S)·I_S + jω·M·I_R
 ///   0 = (R_R/S + jω·L_R)·I_R + jω·M·I_S        with S = 1 − n_p·ω_shaft/ω
 ///   τ = m·n_p·M·Im{I_S·I_R*}                   with m phases
-/// L_S, L_R and M are those of the two-phase equivalent. No saturation, no iron loss.
+/// L_S, L_R and M are those of the two-phase equivalent; R_line and L_line stand between the line and the
+/// terminals of each phase. No saturation, no iron loss.
 /// Source: the book, section 7.3 (P3-04 to P3-07, P3-14).
 struct InductionCircuit {
   using Complex = std::complex<double>;
@@ -25,9 +26,11 @@ struct InductionCircuit {
     double speed_rad_s;  ///< of the shaft
     Complex stator_a;
     Complex rotor_a;
-    double torque_nm;  ///< of the field on the rotor
-    double active_w;   ///< from the line
+    Complex terminal_v;  ///< behind R_line and L_line
+    double torque_nm;    ///< of the field on the rotor
+    double active_w;     ///< from the line
     double reactive_var;
+    double line_loss_w;  ///< in R_line
     double stator_loss_w;
     double rotor_loss_w;
     double mechanical_w;  ///< torque times speed, friction of the shaft included
@@ -50,6 +53,8 @@ struct InductionCircuit {
   bool star;         ///< three phases; else two
   double voltage_v;  ///< rms, of a phase
   double frequency_hz;
+  double line_resistance_ohm = 0.0;
+  double line_inductance_h = 0.0;
 
   double phases() const noexcept { return star ? 3.0 : 2.0; }
   double pulsation_rad_s() const noexcept { return 2.0 * std::numbers::pi * frequency_hz; }
@@ -67,9 +72,11 @@ struct InductionCircuit {
             .speed_rad_s = speed_rad_s,
             .stator_a = i_s,
             .rotor_a = i_r,
+            .terminal_v = voltage_v - line_ohm() * i_s,
             .torque_nm = torque_nm,
             .active_w = power.real(),
             .reactive_var = power.imag(),
+            .line_loss_w = phases() * line_resistance_ohm * std::norm(i_s),
             .stator_loss_w = phases() * motor.stator_resistance_ohm * std::norm(i_s),
             .rotor_loss_w = phases() * rotor_ohm() * std::norm(i_r),
             .mechanical_w = torque_nm * speed_rad_s};
@@ -86,7 +93,8 @@ struct InductionCircuit {
     const double rest_ohm = std::abs(rotor_ohm() + seen_from_rotor_ohm());
     return rotor_ohm() / (rotor_ohm() + (mode == Mode::kMotor ? rest_ohm : -rest_ohm));
   }
-  /// Of the best power factor without R_S: √σ times the pull-out slip R_R/(σ·ω·L_R), the book's rated slip.
+  /// Of the best power factor at the terminals without R_S: √σ times the pull-out slip R_R/(σ·ω·L_R), the
+  /// book's rated slip.
   double rated_slip() const noexcept {
     return rotor_ohm() / (std::sqrt(motor.leakage()) * rotor_reactance_ohm().imag());
   }
@@ -121,8 +129,10 @@ struct InductionCircuit {
     return {0.0, pulsation_rad_s() * motor.machine.rotor_inductance_h};
   }
   Complex mutual_ohm() const noexcept { return {0.0, pulsation_rad_s() * motor.machine.mutual_inductance_h}; }
+  Complex line_ohm() const noexcept { return {line_resistance_ohm, pulsation_rad_s() * line_inductance_h}; }
+  /// Of line and stator.
   Complex stator_ohm() const noexcept {
-    return {motor.stator_resistance_ohm, pulsation_rad_s() * motor.stator_inductance_h};
+    return line_ohm() + Complex(motor.stator_resistance_ohm, pulsation_rad_s() * motor.stator_inductance_h);
   }
   Complex stator_current_a(Complex slip) const noexcept {
     const Complex rotor = rotor_ohm() + slip * rotor_reactance_ohm();

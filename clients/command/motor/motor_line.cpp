@@ -18,6 +18,13 @@ void add_motor_commands(CommandLine& line) {
   sub.add_option("--load", o.load_nm, "torque on the shaft [N*m]; negative drives it as a generator")
       ->check(finite_between(-kMost, kMost))
       ->capture_default_str();
+  sub.add_option("--line-ohm", o.line_resistance_ohm,
+                 "in series with each phase [ohm]: of a cable, a transformer")
+      ->check(finite_between(0.0, 1e6))
+      ->capture_default_str();
+  sub.add_option("--line-h", o.line_inductance_h, "in series with each phase [H]")
+      ->check(finite_between(0.0, 1e3))
+      ->capture_default_str();
   sub.add_option("--plot", o.plot_file, "write torque, current and power over speed as an SVG picture");
   sub.add_option("--circle", o.circle_file, "write the circle diagram as an SVG picture");
   sub.footer("Exit codes: 0 ok, 2 usage or motor file, also a load that the motor cannot carry.");

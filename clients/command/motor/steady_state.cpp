@@ -35,13 +35,19 @@ void print_table(const InductionMotorFile& file, const InductionCircuit& circuit
   fmt::print("{}: {} phases, {:g} V rms each, {:g} Hz; synchronous {:.6g} rad/s, sigma {:.6g}\n", file.name,
              circuit.phases(), circuit.voltage_v, circuit.frequency_hz, circuit.synchronous_rad_s(),
              circuit.motor.leakage());
-  fmt::print("{:<26}{:>10}{:>10}{:>10}{:>8}{:>10}{:>11}{:>10}{:>10}{:>11}{:>7}\n", "", "slip", "rad/s",
-             "A rms", "cos phi", "N*m", "line W", "R_S W", "R_R W", "shaft W", "eta");
+  if (circuit.line_resistance_ohm > 0.0 || circuit.line_inductance_h > 0.0) {
+    fmt::print(
+        "behind {:g} ohm and {:g} H in each phase: the power and cos phi of the line are before these\n",
+        circuit.line_resistance_ohm, circuit.line_inductance_h);
+  }
+  fmt::print("{:<26}{:>10}{:>10}{:>10}{:>9}{:>8}{:>10}{:>11}{:>10}{:>10}{:>11}{:>7}\n", "", "slip", "rad/s",
+             "A rms", "V rms", "cos phi", "N*m", "line W", "R_S W", "R_R W", "shaft W", "eta");
   for (const auto& [name, p] : points) {
     fmt::print(
-        "{:<26}{:>10.5f}{:>10.3f}{:>10.4f}{:>8.4f}{:>10.4f}{:>11.2f}{:>10.2f}{:>10.2f}{:>11.2f}{:>7.3f}\n",
-        name, p.slip, p.speed_rad_s, std::abs(p.stator_a), p.power_factor(), p.torque_nm, p.active_w,
-        p.stator_loss_w, p.rotor_loss_w, p.mechanical_w, p.efficiency());
+        "{:<26}{:>10.5f}{:>10.3f}{:>10.4f}{:>9.3f}{:>8.4f}{:>10.4f}{:>11.2f}{:>10.2f}{:>10.2f}{:>11.2f}{:>7."
+        "3f}\n",
+        name, p.slip, p.speed_rad_s, std::abs(p.stator_a), std::abs(p.terminal_v), p.power_factor(),
+        p.torque_nm, p.active_w, p.stator_loss_w, p.rotor_loss_w, p.mechanical_w, p.efficiency());
   }
   const InductionCircuit::Circle circle = circuit.circle();
   fmt::print("circle of the current: centre {:.5g} A active, {:.5g} A reactive, radius {:.5g} A\n",
@@ -72,7 +78,9 @@ int run_steady_state(const SteadyStateOptions& options) {
   const InductionCircuit circuit{.motor = file.motor,
                                  .star = file.star,
                                  .voltage_v = options.voltage_v,
-                                 .frequency_hz = options.frequency_hz};
+                                 .frequency_hz = options.frequency_hz,
+                                 .line_resistance_ohm = options.line_resistance_ohm,
+                                 .line_inductance_h = options.line_inductance_h};
   if (!circuit.slip_under(options.load_nm)) {
     const double most_nm = circuit.at(circuit.pull_out_slip(Mode::kMotor)).torque_nm;
     throw UsageError(fmt::format(

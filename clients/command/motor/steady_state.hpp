@@ -14,6 +14,8 @@ struct SteadyStateOptions {
   double voltage_v = 0.0;
   double frequency_hz = 0.0;
   double load_nm = 0.0;
+  double line_resistance_ohm = 0.0;
+  double line_inductance_h = 0.0;
   std::string plot_file{};    ///< SVG: torque, current and power over speed
   std::string circle_file{};  ///< SVG: the circle diagram
   bool json = false;

@@ -12,13 +12,8 @@ namespace drivebench {
 /// The induction motor of an axis behind its transformer, as phasors of one phase: Thévenin's voltage and
 /// impedance of the circuit of 7.4.3, worked out from its elements and not from the plant's equations.
 struct TransformerCircuit {
-  std::complex<double> open_v;    ///< rms, against the source's phase
-  std::complex<double> line_ohm;  ///< of the secondary side
-  InductionCircuit motor;         ///< with the transformer's impedance in its stator, on |open_v|
-
-  std::complex<double> terminal_v(double slip) const {
-    return open_v - line_ohm * motor.at(slip).stator_a * std::polar(1.0, std::arg(open_v));
-  }
+  std::complex<double> open_v;  ///< rms, against the source's phase
+  InductionCircuit motor;       ///< on |open_v|, with the impedance in its line
 };
 
 inline TransformerCircuit transformer_circuit(const AxisParameters& p, const InductionMotorModel& motor) {
@@ -31,13 +26,13 @@ inline TransformerCircuit transformer_circuit(const AxisParameters& p, const Ind
   const double n = t.turns_ratio;
   TransformerCircuit result;
   result.open_v = n * p.drive.source.amplitude_v / std::sqrt(2.0) * magnetising / (primary + magnetising);
-  result.line_ohm = secondary + n * n * primary * magnetising / (primary + magnetising);
+  const Complex line_ohm = secondary + n * n * primary * magnetising / (primary + magnetising);
   result.motor = {.motor = motor,
                   .star = true,
                   .voltage_v = std::abs(result.open_v),
-                  .frequency_hz = p.drive.source.frequency_hz};
-  result.motor.motor.stator_resistance_ohm += result.line_ohm.real();
-  result.motor.motor.stator_inductance_h += result.line_ohm.imag() / omega;
+                  .frequency_hz = p.drive.source.frequency_hz,
+                  .line_resistance_ohm = line_ohm.real(),
+                  .line_inductance_h = line_ohm.imag() / omega};
   return result;
 }
 

@@ -99,6 +99,23 @@ class WithoutABench(CommandTest):
         for command in (["describe"], ["control"], ["experiment", "run"], ["identify"]):
             self.assertSays(self.drivebench(*command, "--help").stdout, "tcp:HOST:PORT", "tls:HOST:PORT", "unix:PATH")
 
+    def test_a_line_in_front_of_a_motor_takes_its_drop(self):
+        """Catches: options that are exchanged, left out, or in other units."""
+        words = ["steady-state", "im-b", "--voltage", "120", "--frequency", "60"]
+        stiff = self.json_of(*words)["points"]["locked"]
+        self.assertEqual(stiff["terminal_rms_v"], 120.0)
+        for name, value, resistance_ohm in (("--line-ohm", "0.5", 0.5), ("--line-h", "5e-3", 0.0)):
+            locked = self.json_of(*words, name, value)["points"]["locked"]
+            self.assertLess(locked["terminal_rms_v"], 119.0)
+            # The motor at a lower voltage, and nothing else.
+            part = locked["terminal_rms_v"] / 120.0
+            self.assertAlmostEqual(locked["current_rms_a"], part * stiff["current_rms_a"], places=9)
+            self.assertAlmostEqual(locked["torque_nm"], part**2 * stiff["torque_nm"], places=9)
+            self.assertAlmostEqual(locked["line_loss_w"], 3 * resistance_ohm * locked["current_rms_a"]**2, places=9)
+        shown = self.drivebench(*words, "--line-ohm", "0.5").stdout
+        self.assertIn("behind 0.5 ohm and 0 H in each phase", shown)
+        self.assertIn("--line-h", self.drivebench(*words, "--line-h", "-1", code=USAGE).stderr)
+
     def test_presets_are_listed(self):
         """Catches: a preset that is not listed, or that does not name its source."""
         presets = self.json_of("control", "--list")
