@@ -1,29 +1,25 @@
 #!/usr/bin/python3
 """Starts the motor open loop over the wire: a rotating voltage, u/f, up to 20 Hz. [host:port] [folder of bench_pb2]"""
-import math, os, socket, struct, subprocess, sys, tempfile
+import importlib.util, math, os, socket, struct, subprocess, sys, tempfile
 
 address = sys.argv[1] if len(sys.argv) > 1 else "127.0.0.1:7300"
 generated = sys.argv[2] if len(sys.argv) > 2 else tempfile.mkdtemp()
 if not os.path.exists(os.path.join(generated, "bench_pb2.py")):
     protocols = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../protocols")
     subprocess.run(["protoc", "-I", protocols, "--python_out", generated, "bench.proto"], check=True)
+if importlib.util.find_spec("google") is None:
+    sys.exit(f"{sys.executable} lacks protobuf; Debian's /usr/bin/python3 has it with the package python3-protobuf")
 sys.path.insert(0, generated)
-try:
-    import bench_pb2 as v1
-except ImportError as error:
-    sys.exit(f"{error}: {sys.executable} lacks protobuf; Debian's /usr/bin/python3 has it with the package python3-protobuf")
-
-host, port = address.removeprefix("tcp:").rsplit(":", 1)
-stream = socket.create_connection((host, int(port)), timeout=5)
+import bench_pb2 as v1
+stream = socket.create_connection(address.removeprefix("tcp:").rsplit(":", 1), timeout=5)
 stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 reader = stream.makefile("rb")
 
 def ask(**request):  # a frame: 4-byte big-endian length, then one Envelope
     payload = v1.Envelope(id=1, **request).SerializeToString()
     stream.sendall(struct.pack(">I", len(payload)) + payload)
-    answer = v1.Envelope()
-    while answer.id != 1:  # 0 is no answer but a notice
-        answer = v1.Envelope.FromString(reader.read(struct.unpack(">I", reader.read(4))[0]))
+    while (answer := v1.Envelope.FromString(reader.read(struct.unpack(">I", reader.read(4))[0]))).id != 1:
+        pass  # 0 is no answer but a notice
     if answer.HasField("refusal"):
         sys.exit(f"refused: {answer.refusal.message}")
     return answer
