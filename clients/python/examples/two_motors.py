@@ -109,10 +109,16 @@ class Link:
             protocols = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../protocols")
             subprocess.run(["protoc", "-I", protocols, "--python_out", folder, "bench.proto"], check=True)
         sys.path.insert(0, folder)
-        import bench_pb2
+        try:
+            import bench_pb2
+        except ImportError as error:
+            sys.exit(f"{error}: {sys.executable} lacks protobuf; Debian's /usr/bin/python3 has it with the package python3-protobuf")
         self.v1 = bench_pb2
         host, port = address.removeprefix("tcp:").rsplit(":", 1)
-        self.stream = socket.create_connection((host, int(port)), timeout=10)
+        try:
+            self.stream = socket.create_connection((host, int(port)), timeout=10)
+        except OSError as error:
+            sys.exit(f"no bench at {address}: {error}")
         self.stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.reader = self.stream.makefile("rb")
         hello = self.v1.Hello(protocol_min=1, protocol_max=1, client="two_motors.py")
@@ -121,7 +127,12 @@ class Link:
     def ask(self, **request):
         payload = self.v1.Envelope(id=1, **request).SerializeToString()
         self.stream.sendall(struct.pack(">I", len(payload)) + payload)
-        answer = self.v1.Envelope.FromString(self.reader.read(struct.unpack(">I", self.reader.read(4))[0]))
+        answer = self.v1.Envelope()
+        while answer.id != 1:  # 0 is no answer but a notice
+            head = self.reader.read(4)
+            if len(head) < 4:
+                sys.exit("the bench has closed the connection")
+            answer = self.v1.Envelope.FromString(self.reader.read(struct.unpack(">I", head)[0]))
         if answer.HasField("refusal"):
             sys.exit(f"refused: {answer.refusal.message}")
         return answer

@@ -88,6 +88,12 @@ class TwoMotors(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("the bench is servo", done.stderr)
 
+    def test_without_a_bench_it_says_so(self):
+        """Catches: a traceback in the place of a sentence."""
+        done = subprocess.run([sys.executable, EXAMPLE, "127.0.0.1:1"], capture_output=True, text=True, timeout=PATIENCE_S)
+        self.assertEqual(done.returncode, 1)
+        self.assertTrue(done.stderr.startswith("no bench at 127.0.0.1:1: "), done.stderr)
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
