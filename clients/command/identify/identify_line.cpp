@@ -3,6 +3,7 @@
 #include "clients/command/common/command_line.hpp"
 #include "clients/command/identify/filter.hpp"
 #include "clients/command/identify/identify.hpp"
+#include "clients/command/identify/track.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -122,6 +123,44 @@ void add_identify(CommandLine& line) {
       "configuration, 3 cannot connect.");
 }
 
+void add_track(CommandLine& line) {
+  const auto [sub, o] = line.add<TrackOptions>(
+      "track", "stator resistance and rotor time constant of an induction motor while it runs", run_track);
+  add_link(sub, o.data.server.link);
+  sub.add_option("--axis", o.data.axis, "number or name; default: the first");
+  sub.add_option("--from", o.data.from_file, "a recording (.mcap) or a CSV file in the place of a bench");
+  sub.add_option("--map", o.data.maps, "--from CSV: as of identify");
+  sub.add_option("--time", o.data.time, "--from CSV: header of the time [s]; default: time_s");
+  sub.add_option("--period", o.data.period_s,
+                 "--from CSV: seconds between two rows, without a column of time")
+      ->check(finite_between(1e-12, kMost_s));
+  sub.add_option("--motor-file", o.motor_file, "the inductances: a file or name of configs/motors");
+  sub.add_option("--stator-inductance", o.stator_inductance_h, "L_S [H]; default: the bench's")
+      ->check(finite_between(1e-9, 1e6));
+  sub.add_option("--leakage", o.leakage, "sigma = 1 - M^2/(L_S L_R); default: the bench's")
+      ->check(finite_between(1e-6, 0.999999));
+  sub.add_option("--window", o.window_s, "[s] that an estimate goes by")
+      ->check(finite_between(1e-3, 1e3))
+      ->capture_default_str();
+  sub.add_option("--stride", o.stride_s, "[s] between two estimates")
+      ->check(finite_between(1e-4, 1e3))
+      ->capture_default_str();
+  sub.add_option("--duration", o.duration_s, "[s] of the bench's time; 0: until ctrl-C")
+      ->check(finite_between(0.0, kMost_s))
+      ->capture_default_str();
+  sub.add_option("--cutoff-hz", o.cutoff_hz, "corner of all filters")
+      ->check(finite_between(1e-3, 1e9))
+      ->capture_default_str();
+  sub.add_option("--pole-pairs", o.data.pole_pairs)->check(CLI::Range(1, 1000));
+  sub.add_option("--counts", o.data.counts_per_revolution, "of encoder_count in a revolution")
+      ->check(finite_between(0.0, 1e9));
+  sub.add_option("--phases", o.data.phases)->check(CLI::IsMember({2, 3}));
+  sub.add_option("--voltage-shift", o.data.voltage_shift, "as of identify; default: that of the drive")
+      ->check(finite_between(-100.0, 100.0));
+  sub.add_option("--plot", o.plot_file, "write an SVG picture of both over time, with the truth of a bench");
+  sub.footer("Exit codes: 0 ok, 1 nothing could be told, 2 usage, file or configuration, 3 cannot connect.");
+}
+
 void add_filter(CommandLine& line) {
   const auto [sub, o] = line.add<FilterOptions>(
       "filter", "the numbers of a Butterworth low-pass, or a column of a CSV file through it", run_filter);
@@ -143,6 +182,7 @@ void add_filter(CommandLine& line) {
 
 void add_identify_commands(CommandLine& line) {
   add_identify(line);
+  add_track(line);
   add_filter(line);
 }
 

@@ -118,27 +118,35 @@ void append_line(std::string& svg, const std::vector<double>& x, const PlotLine&
   fmt::format_to(out, "<path stroke='{}' d='", colour);
   long last_x = 0;
   long last_y = 0;
+  bool is_broken = false;  // by values that are not finite
   const auto point = [&](std::size_t i) {
     const long px = std::lround(10.0 * x_scale.place(x[i]));
     const long py = std::lround(10.0 * y_scale.place(line.values[i]));
     const bool is_first = svg.ends_with('\'');
-    fmt::format_to(out, "{}{} {}", is_first ? 'M' : 'l', px - last_x, py - last_y);
+    fmt::format_to(out, "{}{} {}", is_first ? 'M' : is_broken ? 'm' : 'l', px - last_x, py - last_y);
     last_x = px;
     last_y = py;
+    is_broken = false;
   };
   const std::size_t count = std::min(x.size(), line.values.size());
   for (std::size_t begin = 0; begin < count;) {
     const double pixel = std::floor(x_scale.place(x[begin]) / kPixelsPerPoint);
     std::size_t end = begin;
-    std::size_t least = begin;
-    std::size_t largest = begin;
+    std::size_t least = count;
+    std::size_t largest = count;
     for (; end < count && std::floor(x_scale.place(x[end]) / kPixelsPerPoint) == pixel; ++end) {
+      if (!std::isfinite(line.values[end])) continue;
+      if (least == count) least = largest = end;
       if (line.values[end] < line.values[least]) least = end;
       if (line.values[end] > line.values[largest]) largest = end;
     }
+    begin = end;
+    if (least == count) {
+      is_broken = true;
+      continue;
+    }
     point(std::min(least, largest));
     if (least != largest) point(std::max(least, largest));
-    begin = end;
   }
   svg += "'/>\n";
 }

@@ -6,7 +6,8 @@
 
 namespace drivebench::command {
 
-/// A line of a panel, with a value for each place on the common axis.
+/// A line of a panel, with a value for each place on the common axis; it has a gap where a value is not
+/// finite.
 struct PlotLine {
   std::string name;
   std::vector<double> values;

@@ -45,8 +45,9 @@ double rounding_without_noise(SeriesView x) {
   constexpr double kLeastLevels = 8.0;  // fewer are the jumps of a switched voltage, not a converter's steps
   const auto [least, most] = std::ranges::minmax_element(x);
   if (*most - *least < kLeastLevels * step) return 0.0;
-  // Rounding alone shows as white noise of step/sqrt(12) = 0.29 steps where the signal moves.
-  return difference_noise(x) < 0.5 * step ? step / std::sqrt(12.0) : 0.0;
+  // Rounding alone shows as white noise of step/sqrt(12) = 0.29 steps, but of up to 0.9 where its errors
+  // alternate from sample to sample.
+  return difference_noise(x) < step ? step / std::sqrt(12.0) : 0.0;
 }
 
 }  // namespace drivebench::identification

@@ -10,7 +10,7 @@ namespace drivebench::identification {
 double white_noise(SeriesView x);
 
 /// The rms of a converter's rounding, step/sqrt(12), where the noise of the signal is too small to round it
-/// off: below half a step, so that a steady signal errs by the same each time. 0 elsewhere.
+/// off: below a step, so that a steady signal errs by the same each time. 0 elsewhere.
 double rounding_without_noise(SeriesView x);
 
 }  // namespace drivebench::identification

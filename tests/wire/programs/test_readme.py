@@ -199,7 +199,7 @@ class Readmes(unittest.TestCase):
         """Catches: an option that only its --help names."""
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "control", "plot", "replay",
-                          "export", "identify", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
+                          "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
                           "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
                           "convert winding", "convert frame")
         names = re.findall(r"^  ([a-z-]+) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,

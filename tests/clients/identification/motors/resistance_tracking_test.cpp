@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "tests/clients/identification/bench_data.hpp"
 
@@ -110,6 +114,110 @@ TEST(Resistances, AreTrackedWhileTheyDrift) {
   });
   EXPECT_EQ(estimates, 72);  // (8000 - 840) samples, one estimate every 100
   EXPECT_LT(last, 0.88 * 0.67 / 8.6);
+}
+
+/// Estimates of a motor in steady state with these sensors, windows of 0.2 s one after the other.
+struct Sensors {
+  double load_nm = 3.7;
+  double noise_a = 0.02;
+  int counts = 4096;
+  int period_us = 250;
+};
+
+std::vector<ResistanceEstimate> tracked(const Sensors& sensors, int windows, double from_s = 1.5) {
+  BenchConfig config = loaded(sensors.load_nm, 1.0, 1.0);
+  set_rate(config, 1000LL * sensors.period_us, 1);
+  AxisParameters& p = config.setup.axes[0].parameters;
+  p.encoder.counts_per_revolution = sensors.counts;
+  p.sensors.current.noise_rms_a = sensors.noise_a;
+  BookBench run(config);
+  run.run_until(from_s);
+  Settings e = steady_experiment(false);
+  e.counts_per_revolution = sensors.counts;
+  e.processing = tracking_processing(100.0, run.period_s(), 0.0);
+  const auto window = static_cast<std::size_t>(200'000 / sensors.period_us);
+  ResistanceTracker tracker(
+      {.settings = e, .known = kKnown, .period_s = run.period_s(), .window = window, .stride = window});
+  std::vector<ResistanceEstimate> estimates;
+  run.run_until(from_s + 0.2 * windows + 0.03, [&](const Sample& s) {
+    if (const auto found = tracker.push(
+            {s.i_a_a, s.i_b_a, s.i_c_a, s.u_a_v, s.u_b_v, s.u_c_v, static_cast<double>(s.encoder_count)}))
+      estimates.push_back(*found);
+  });
+  return estimates;
+}
+
+bool is_stated(const ResistanceEstimate& e, const char* name) {
+  return std::ranges::find(e.excitation.unseen, name) == e.excitation.unseen.end();
+}
+
+// A search over load, noise behind 12 bits (none in every third draw), encoder and rate, with a literal seed:
+// what is stated lies in its interval in 95 of 100, none is off by a tenth, and without slip nothing is said
+// of T_R. A larger search, 6000 windows, found 7263 of 7267 inside and at most 7.1 % of R_S (at 0.09 A). Its
+// worst case is the first one here: little load and converter steps that no noise rounds off, 14 % of R_S and
+// 17 % of T_R if their scatter alone made the interval. Catches: the pull of noise in the columns; steps that
+// err alike in every window.
+TEST(Resistances, AreStatedOnlyWhereTheNoiseLetsThem) {
+  std::mt19937_64 engine(20261124);
+  const auto drawn = [&engine](double low, double high) {
+    return low + (high - low) * static_cast<double>(engine() >> 11U) * 0x1p-53;
+  };
+  int stated = 0;
+  int inside = 0;
+  for (int draw = 0; draw < 80; ++draw) {
+    Sensors sensors = {.load_nm = draw % 5 == 0 ? 0.0 : drawn(0.2, 5.0),
+                       .noise_a = draw % 3 == 0 ? 0.0 : drawn(0.003, 0.1),
+                       .counts = draw % 2 == 0 ? 1024 : 4096,
+                       .period_us = draw % 4 == 0 ? 100 : 250};
+    if (draw == 0) sensors = {.load_nm = 0.2477, .noise_a = 0.0, .counts = 1024, .period_us = 100};
+    for (const ResistanceEstimate& e : tracked(sensors, 4)) {
+      const auto judge_one = [&](const char* name, double value, double truth, double interval) {
+        if (!is_stated(e, name)) return;
+        ++stated;
+        inside += std::abs(value - truth) <= interval ? 1 : 0;
+        EXPECT_NEAR(value, truth, 0.1 * truth)
+            << name << " at " << sensors.load_nm << " N m, " << sensors.noise_a << " A";
+      };
+      judge_one("R_S", e.stator_resistance_ohm, 9.7, e.stator_interval_ohm);
+      judge_one("T_R", e.rotor_time_constant_s, 0.67 / 8.6, e.rotor_interval_s);
+      EXPECT_FALSE(sensors.load_nm == 0.0 && is_stated(e, "T_R"));
+    }
+  }
+  EXPECT_GT(stated, 200);
+  EXPECT_GE(inside, 0.95 * stated);
+}
+
+// A start: the equations count the speed as constant, which it is not for the first 0.2 s. Under load and a
+// little noise all windows after the run-up state both. Catches: R_S 7 % off while the motor runs up; a
+// refusal of good data.
+TEST(Resistances, NothingIsStatedWhileTheSpeedChanges) {
+  const auto start = tracked({}, 1, 0.0);
+  ASSERT_EQ(start.size(), 1U);
+  EXPECT_FALSE(is_stated(start[0], "R_S"));
+  EXPECT_FALSE(is_stated(start[0], "T_R"));
+  EXPECT_NE(start[0].excitation.verdict.find("speed"), std::string::npos);
+  for (const ResistanceEstimate& e : tracked({}, 5))
+    EXPECT_TRUE(e.excitation.sufficient) << e.excitation.verdict;
+}
+
+// After a gap the window fills anew: 840 samples, not the stride of 100. Catches: an estimate over samples
+// that do not follow each other.
+TEST(Resistances, ATrackerBeginsAnewAfterAGap) {
+  ResistanceTracker tracker({.settings = steady_experiment(false), .known = kKnown, .period_s = 2.5e-4});
+  const auto pushed_until_estimate = [&tracker] {
+    for (int count = 1; count < 2000; ++count) {
+      const double angle = 0.08 * count;
+      if (tracker.push({std::cos(angle), std::cos(angle - 2.1), std::cos(angle + 2.1),
+                        300.0 * std::cos(angle + 1.0), 300.0 * std::cos(angle - 1.1),
+                        300.0 * std::cos(angle + 3.1), 0.9 * count}))
+        return count;
+    }
+    return 0;
+  };
+  EXPECT_EQ(pushed_until_estimate(), 840);
+  EXPECT_EQ(pushed_until_estimate(), 100);
+  tracker.restart();
+  EXPECT_EQ(pushed_until_estimate(), 840);
 }
 
 // Catches: a tracker that divides by an inductance of zero.
