@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -47,6 +48,20 @@ TEST(SvgPlot, APeakOfOneSampleAmongManyIsDrawn) {
   EXPECT_LT(bottom->x, top->x);
   EXPECT_EQ(line.front().x, 640);
   EXPECT_NEAR(static_cast<double>(line.back().x), 7080.0, 20.0);
+}
+
+// Catches: a line drawn through values that are not known, or their text in the picture.
+TEST(SvgPlot, ALineHasAGapWhereAValueIsNotFinite) {
+  const double nothing = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> x = {0.0, 1.0, 2.0, 3.0, 4.0, 5.0};
+  const std::string svg =
+      svg_of("gap", "x", x, {{.label = "y", .lines = {{"y", {nothing, 1.0, 2.0, nothing, 2.0, 1.0}}}}});
+  const std::size_t start = svg.find(" d='M");
+  ASSERT_NE(start, std::string::npos);
+  const std::string line = svg.substr(start + 5, svg.find('\'', start + 5) - start - 5);
+  EXPECT_EQ(std::ranges::count(line, 'm'), 1) << line;  // one gap inside
+  EXPECT_EQ(std::ranges::count(line, 'l'), 2) << line;  // two pieces of two points
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
 }
 
 // Catches: a title that breaks the picture, and a value range of nothing that divides by zero.
