@@ -70,7 +70,7 @@ Settings with(const Settings& e, const Hypothesis& h, const GivenWiring& given) 
 }
 
 /// All hypotheses, the best first. An electrical turn has six samples at least.
-std::vector<Hypothesis> ranked(const FluxEquations& equations, MotorKind kind) {
+std::vector<Hypothesis> ranked(const FluxEquations& equations, MotorKind kind, bool salient) {
   int most = kind == MotorKind::kDc          ? 1
              : kind == MotorKind::kInduction ? kMostInductionPairs
                                              : kMostPolePairs;
@@ -78,10 +78,17 @@ std::vector<Hypothesis> ranked(const FluxEquations& equations, MotorKind kind) {
     most = std::clamp(static_cast<int>(1.0 / equations.fastest_rad()), 1, most);
   std::vector<Hypothesis> all;
   for (int turn = -most; turn <= most; ++turn) {
-    if (turn != 0) all.push_back({turn, equations.fit(turn)});
+    if (turn != 0) all.push_back({turn, equations.fit(turn, salient)});
   }
   std::ranges::stable_sort(all, {}, [](const Hypothesis& h) { return h.fit.square_sum; });
   return all;
+}
+
+/// Whether a rotor of a PM synchronous motor is salient: the best hypothesis then leaves clearly less than
+/// the best one of a round rotor, whose equations determine more where they hold.
+bool has_saliency(const std::vector<Hypothesis>& salient, const std::vector<Hypothesis>& round) {
+  constexpr double kClearly = 0.9;
+  return salient.front().fit.square_sum < kClearly * round.front().fit.square_sum;
 }
 
 /// The settings with the part of the window, of so many samples, in which the voltages change most.
@@ -152,10 +159,10 @@ Decision decide(const MeasuredData& data, const Settings& e, const GivenWiring& 
 }
 
 /// The fit again with the whole samples of the shift taken off, until what is left is less than one.
-FluxFit settled_fit(const MeasuredData& data, const Settings& e, const Hypothesis& h) {
+FluxFit settled_fit(const MeasuredData& data, const Settings& e, const Hypothesis& h, bool salient) {
   FluxFit fit = h.fit;
   for (int round = 0; round < 3 && tells_shift(fit); ++round)
-    fit = FluxEquations(data, e, static_cast<int>(std::floor(fit.voltage_shift))).fit(h.turn);
+    fit = FluxEquations(data, e, static_cast<int>(std::floor(fit.voltage_shift))).fit(h.turn, salient);
   return fit;
 }
 
@@ -224,7 +231,13 @@ WiringFact zero_fact(const FluxFit& fit, Settings& e, bool given) {
 
 std::vector<WiringFact> find_wiring(const MeasuredData& data, Settings& e, const GivenWiring& given) {
   const FluxEquations equations(data, e, static_cast<int>(std::floor(e.processing.voltage_shift)));
-  const std::vector<Hypothesis> all = ranked(equations, e.kind);
+  std::vector<Hypothesis> all = ranked(equations, e.kind, false);
+  bool salient = false;
+  if (e.kind == MotorKind::kPmSynchronous) {
+    std::vector<Hypothesis> others = ranked(equations, e.kind, true);
+    salient = has_saliency(others, all);
+    if (salient) all.swap(others);
+  }
   Decision decision = decide(data, e, given, all);
   const bool dc = e.kind == MotorKind::kDc;
   WiringFact pairs{.name = "pole_pairs", .unit = "1", .given = given.pole_pairs};
@@ -259,7 +272,7 @@ std::vector<WiringFact> find_wiring(const MeasuredData& data, Settings& e, const
                      .remark = "the data do not tell"});
     return facts;
   }
-  const FluxFit fit = settled_fit(data, e, *decision.chosen);
+  const FluxFit fit = settled_fit(data, e, *decision.chosen, salient);
   std::optional<WiringFact> zero;
   if (has_magnet(e.kind)) zero = zero_fact(fit, e, given.zero);
   facts.push_back(shift_fact(data, fit, e, given));

@@ -6,7 +6,7 @@
 namespace drivebench::identification {
 namespace {
 
-constexpr std::array<NamedExperiment, 11> kExperiments = {{
+constexpr std::array<NamedExperiment, 12> kExperiments = {{
     {.motor = "im",
      .name = "dol-start",
      .file = "im-8-5-5-start",
@@ -74,6 +74,11 @@ constexpr std::array<NamedExperiment, 11> kExperiments = {{
      .current_hz = 200.0,
      .voltage_hz = 200.0,
      .shaft_hz = 200.0},
+    {.motor = "pm",
+     .name = "salient-swing",
+     .file = "ipm-swing",
+     .bench = "ipm-servo",
+     .summary = "buried magnets: sines of u_q and u_d, both ways, 1 s at 10 kHz"},
     {.motor = "bldc",
      .name = "swing",
      .file = "bldc-swing",

@@ -165,7 +165,8 @@ Resimulation run_induction(const InductionModel& model, const Measured& m, const
 void check(const Result& result) {
   if (!result.excitation.sufficient)
     throw IdentificationError("no re-simulation: " + result.excitation.verdict);
-  for (const char* name : {"R", "L", "K_T", "R_S", "L_S", "T_R", "sigma", "K_m", "L+M", "tau_p", "J"}) {
+  for (const char* name :
+       {"R", "L", "K_T", "R_S", "L_S", "L_d", "L_q", "T_R", "sigma", "K_m", "L+M", "tau_p", "J"}) {
     const Estimate* const e = result.find(name);
     if (e != nullptr && !(e->value > 0.0 && std::isfinite(e->value)))
       throw IdentificationError(

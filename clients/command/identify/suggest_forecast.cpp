@@ -103,7 +103,9 @@ ExperimentForecast Forecasts::run(std::string name, WantedExperiment wanted,
     forecast.current_a = largest_phase(m.data, 'i', 'a');
     forecast.voltage_v = largest_phase(m.data, 'u', 'v');
     forecast.speed_rad_s = largest_of(m.data.at("speed_rad_s"));
-    const identification::Settings settings = settings_for(options_, motor_, named, m);
+    identification::Settings settings = settings_for(options_, motor_, named, m);
+    const bool round = truth_of(motor_.kind, m.bench).contains("L_S");
+    settings.rotor = round ? identification::Rotor::kRound : identification::Rotor::kSalient;
     forecast.result = identify(m.data, settings);
     compare(m, settings, forecast.result);
     if (forecast.result.explanation) find_worst(forecast);

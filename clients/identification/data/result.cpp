@@ -43,8 +43,8 @@ std::vector<Row> machine_rows(const Result& r) {
   }
   if (r.kind == "pm_synchronous") {
     return {{"stator_resistance_ohm", r.at("R_S"), false},
-            {"inductance_d_h", r.at("L_S"), false},
-            {"inductance_q_h", r.at("L_S"), false},
+            {"inductance_d_h", r.at(is_salient(r) ? "L_d" : "L_S"), false},
+            {"inductance_q_h", r.at(is_salient(r) ? "L_q" : "L_S"), false},
             {"torque_constant_nm_per_a", r.at("K_m"), false}};
   }
   if (r.kind == "bldc") {
@@ -100,6 +100,10 @@ double Result::at(std::string_view name) const {
 
 bool Result::is_unseen(std::string_view name) const noexcept {
   return std::find(excitation.unseen.begin(), excitation.unseen.end(), name) != excitation.unseen.end();
+}
+
+bool is_salient(const Result& result) noexcept {
+  return result.find("L_d") != nullptr;
 }
 
 std::optional<bool> is_inside(const Result& result, const Estimate& e) noexcept {
@@ -262,8 +266,7 @@ std::string to_motor_toml(const Result& r, const MotorFile& file) {
   if (!r.excitation.sufficient) throw IdentificationError("no motor file: " + r.excitation.verdict);
   std::string text = fmt::format("name = {}\nsource = {}\n\n[machine]\nkind = {}\n", toml_string(file.name),
                                  toml_string(file.source), toml_string(r.kind));
-  if (r.kind == "induction" || r.kind == "bldc") text += fmt::format("star = {}\n", file.star);
-  if (r.kind != "pm_dc") text += fmt::format("pole_pairs = {}\n", file.pole_pairs);
+  if (r.kind != "pm_dc") text += fmt::format("star = {}\npole_pairs = {}\n", file.star, file.pole_pairs);
   for (const Row& row : machine_rows(r))
     text += line_of(row);
   if (r.find("J") == nullptr) return text;

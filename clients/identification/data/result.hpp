@@ -33,6 +33,7 @@ struct Explanation {
   double current_white_a = 0.0;  ///< what the measured currents show without a model
   double angle_error = 0.0;      ///< rms of the angle's innovations over what the encoder's counts make them
   double unlikelihood = 0.0;     ///< minus twice the logarithm of the likelihood, less a constant
+  bool holds = false;            ///< these noises are ones that a record may have
 };
 
 /// A fact about the wiring of a record: found in the data (find_wiring.hpp), or set.
@@ -75,6 +76,9 @@ struct Result {
   /// Puts the truth beside the estimates of these names.
   void compare(const std::map<std::string, double, std::less<>>& truth);
 };
+
+/// Whether this is a PM synchronous motor with L_d and L_q in place of L_S.
+bool is_salient(const Result& result) noexcept;
 
 /// Whether the truth lies within the interval of the estimate, or within its index where it has none. Nothing
 /// if the truth is unknown or the parameter is unseen.

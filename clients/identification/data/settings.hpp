@@ -34,6 +34,9 @@ struct Processing {
 /// The load that opposes the torque of an induction motor in the equation of motion.
 enum class LoadModel : std::uint8_t { kViscous, kConstant };
 
+/// The rotor of a PM synchronous motor.
+enum class Rotor : std::uint8_t { kAsTheDataSay, kRound, kSalient };
+
 /// Errors of the sensors that the refinement looks for beside the motor.
 struct SensorSearch {
   bool current_offsets = false;
@@ -53,6 +56,7 @@ struct Settings {
   double zero_rad = 0.0;  ///< added to the shaft's angle: the magnet points to phase a at zero
   LoadModel load = LoadModel::kViscous;
   bool two_stage = true;  ///< PM synchronous: first the electrical parameters, then the mechanical ones
+  Rotor rotor = Rotor::kAsTheDataSay;  ///< one that is known saves the question: a third of the time
   SensorSearch sensors{};
   std::size_t most_samples = 100'000;  ///< that the refinement reads: keeps a long record below some seconds
   Processing processing{};

@@ -11,7 +11,7 @@
 #include "clients/identification/data/settings.hpp"
 #include "clients/models/bldc_machine.hpp"
 #include "clients/models/dc_machine.hpp"
-#include "clients/models/pm_machine.hpp"
+#include "clients/models/salient_pm_machine.hpp"
 #include "clients/models/two_phase.hpp"
 
 /// The motors of the identification methods as differential equations, for re-simulation: parameters as
@@ -116,42 +116,46 @@ struct InductionModel {
   }
 };
 
-/// The equations of PmMachineModel in the magnet's frame, whose angle is the measured one, with dry friction:
-///   J w' = K_m i_q - f w - f_c sgn w; at standstill f_c balances smaller torques. Source: the book,
-///   (9.104).
+/// The equations of SalientPmModel in the magnet's frame, whose angle is the measured one, with dry friction:
+///   J w' = tau(i_d, i_q) - f w - f_c sgn w; at standstill f_c balances smaller torques. A round rotor has
+///   L_d = L_q = L_S. Source: the book, (9.104) and problem 9.11.
 struct PmModel {
   using State = std::array<double, 3>;  // i_d, i_q, w
   static constexpr std::size_t kSpeed = 2;
-  PmMachineModel m;
+  SalientPmModel m;
   double coulomb_nm;
 
   PmModel(const Result& r, const Settings& settings)
       : m{.pole_pairs = static_cast<double>(settings.pole_pairs),
           .resistance_ohm = r.at("R_S"),
-          .inductance_h = r.at("L_S"),
+          .inductance_d_h = r.at(is_salient(r) ? "L_d" : "L_S"),
+          .inductance_q_h = r.at(is_salient(r) ? "L_q" : "L_S"),
           .torque_constant_nm_per_a = r.at("K_m"),
           .friction_nms = r.at("f"),
           .inertia_kgm2 = r.at("J"),
           .star = settings.three_phase},
         coulomb_nm(r.at("f_c")) {}
   double fastest_rate(double speed) const noexcept {
-    return m.resistance_ohm / m.inductance_h + m.pole_pairs * std::abs(speed) +
-           m.torque_constant_nm_per_a / std::sqrt(m.inductance_h * m.inertia_kgm2);
+    const double least_h = std::min(m.inductance_d_h, m.inductance_q_h);
+    return m.resistance_ohm / least_h +
+           m.pole_pairs * std::abs(speed) *
+               std::sqrt(std::max(m.inductance_d_h, m.inductance_q_h) / least_h) +
+           m.torque_constant_nm_per_a / std::sqrt(least_h * m.inertia_kgm2);
   }
   State slope(const State& x, const MotorInput& in) const noexcept {
     const std::complex<double> u = two_phase_of(in.u, m.star) * std::polar(1.0, -in.electrical_rad);
     const double omega_e = m.pole_pairs * x[2];
-    return {
-        (u.real() - m.resistance_ohm * x[0]) / m.inductance_h + omega_e * x[1],
-        (u.imag() - m.resistance_ohm * x[1] - m.torque_constant_nm_per_a * x[2]) / m.inductance_h -
-            omega_e * x[0],
-        (m.torque_constant_nm_per_a * x[1] - m.friction_nms * x[2] - friction_torque_nm(x)) / m.inertia_kgm2};
+    return {(u.real() - m.resistance_ohm * x[0] + omega_e * m.inductance_q_h * x[1]) / m.inductance_d_h,
+            (u.imag() - m.resistance_ohm * x[1] - m.torque_constant_nm_per_a * x[2] -
+             omega_e * m.inductance_d_h * x[0]) /
+                m.inductance_q_h,
+            (m.torque_nm(x[0], x[1]) - m.friction_nms * x[2] - friction_torque_nm(x)) / m.inertia_kgm2};
   }
   /// A shaft that comes to rest within a step of h stays there if friction can hold it, and goes on from rest
   /// for what is left of the step if it cannot: the slopes across the change of sign mix both frictions.
   void settle(State& x, const State& before, double h) const noexcept {
     if (coulomb_nm <= 0.0 || x[2] * before[2] >= 0.0) return;
-    const double torque_nm = 0.5 * m.torque_constant_nm_per_a * (x[1] + before[1]);
+    const double torque_nm = 0.5 * (m.torque_nm(x[0], x[1]) + m.torque_nm(before[0], before[1]));
     x[2] = 0.0;
     if (std::abs(torque_nm) <= coulomb_nm) return;
     const double braking = (torque_nm - std::copysign(coulomb_nm, before[2])) / m.inertia_kgm2;
@@ -173,7 +177,7 @@ struct PmModel {
   double friction_torque_nm(const State& x) const noexcept {
     if (x[2] != 0.0) return std::copysign(coulomb_nm, x[2]);
     const double most = std::max(0.0, coulomb_nm);
-    return std::clamp(m.torque_constant_nm_per_a * x[1], -most, most);
+    return std::clamp(m.torque_nm(x[0], x[1]), -most, most);
   }
 };
 

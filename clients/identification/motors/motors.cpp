@@ -61,7 +61,11 @@ Truth pm_truth(Reader& read) {
   Truth truth = {{"R_S", read("machine.stator_resistance_ohm")},
                  {"K_m", read("machine.torque_constant_nm_per_a")}};
   if (!read.all_known()) return {};
-  if (std::abs(l_d - l_q) < 1e-9 * l_d) truth.emplace("L_S", l_d);
+  if (std::abs(l_d - l_q) < 1e-9 * l_d) {
+    truth.emplace("L_S", l_d);
+  } else {
+    truth.insert({{"L_d", l_d}, {"L_q", l_q}, {"L_g", 0.5 * (l_d - l_q)}});
+  }
   truth.emplace("f_c", read.or_else("mechanics.coulomb_friction_nm", 0.0));
   return truth;
 }

@@ -20,7 +20,7 @@ struct MotorName {
 inline constexpr std::array<MotorName, 4> kMotorNames = {
     {{"im", "induction", "induction motor, squirrel cage", MotorKind::kInduction},
      {"dc", "pm_dc", "DC motor with permanent magnets", MotorKind::kDc},
-     {"pm", "pm_synchronous", "PM synchronous motor without saliency", MotorKind::kPmSynchronous},
+     {"pm", "pm_synchronous", "PM synchronous motor, round or salient", MotorKind::kPmSynchronous},
      {"bldc", "bldc", "brushless DC motor in an isolated star", MotorKind::kBldc}}};
 
 /// The row of this name, or null.
@@ -55,8 +55,8 @@ Settings settings_of(MotorKind kind, const MeasurementFacts& facts, double perio
 
 /// The true values of the estimates on a bench with these parameters, by the names of the estimates. It
 /// leaves out values that the method does not define: M, L_R, R_R of an induction motor are those of equal
-/// leakages; a motor with different L_d and L_q has no L_S; a shaft with its own load has no J; with a
-/// thermal model the resistances change.
+/// leakages; a motor with different L_d and L_q has no L_S, one with equal ones no L_d, L_q, L_g; a shaft
+/// with its own load has no J; with a thermal model the resistances change.
 std::map<std::string, double, std::less<>> truth_of(MotorKind kind, const BenchParameters& bench);
 
 /// Adds the truth from column `load_nm`: tau_L and K17 if the load is constant in the window and the method

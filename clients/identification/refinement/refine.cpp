@@ -154,7 +154,7 @@ std::vector<std::string> unseen_parameters(const Result& result, double torque_n
     return *e.interval * factor < kImmaterial * torque_nm;
   };
   for (const Estimate& e : result.parameters) {
-    if (e.name == "K17") continue;
+    if (e.name == "K17" || e.name == "L_g") continue;
     const bool linear = e.name == "f" || e.name == "f_c" || e.name == "tau_L";
     const double widest = linear ? kWidestFriction : kWidest;
     if (!(*e.interval < widest * std::abs(e.value)) && !immaterial(e)) unseen.push_back(e.name);
@@ -179,13 +179,23 @@ std::vector<std::string> unseen_parameters(const Result& result, double torque_n
   return unseen;
 }
 
+/// A result with the refined values of `near`, where it has them.
+Result begun(Result result, const Result& near) {
+  const auto take = [&result](const Estimate& refined) {
+    if (Estimate* const there = result.find(refined.name)) there->value = refined.value;
+  };
+  std::ranges::for_each(near.parameters, take);
+  std::ranges::for_each(near.sensors, take);
+  return result;
+}
+
 template <class Model>
-void refine_with(const PredictorRecord& record, const Settings& e, Result& result) {
+void refine_with(const PredictorRecord& record, const Settings& e, Result& result, const Result* near) {
   const double duration_s = record.period_s * static_cast<double>(record.range.count());
   std::vector<Unknown> unknowns = unknowns_of(e, result, record.largest_speed, duration_s);
   add_sensors(e, record, result, unknowns);
-  Result trial = result;
-  Predictor<Model> predictor(record, Model(result, e));
+  Result trial = near == nullptr ? result : begun(result, *near);
+  Predictor<Model> predictor(record, Model(trial, e));
   const auto model_at = [&](const Eigen::VectorXd& z) {
     put(unknowns, z, trial);
     predictor.correct(errors_of(trial));
@@ -205,10 +215,14 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
   };
   SensorNoise noise = first;
   noise.current_a = std::max(noise.current_a, kFirstCurrent * record.largest_current_a);
-  Fit fit{.at = coordinates_of(unknowns, result), .sum = 0.0, .covariance = {}, .found = true};
-  for (int round = 0; round < kRounds && fit.found; ++round) {
+  if (near != nullptr) {
+    noise.voltage_v = near->explanation->voltage_noise_v;
+    noise.current_a = near->explanation->current_noise_a;
+  }
+  Fit fit{.at = coordinates_of(unknowns, trial), .sum = 0.0, .covariance = {}, .found = true};
+  for (int round = near == nullptr ? 0 : kRounds - 1; round < kRounds && fit.found; ++round) {
     predictor.linearise(model_at(fit.at), noise);
-    if (round > 0) {
+    if (round > 0 && near == nullptr) {
       noise.current_a = first.current_a;
       noise = likeliest(predictor, model_at(fit.at), noise, least, most);
     }
@@ -243,6 +257,7 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     if (reason.empty() && friction != nullptr && friction->value + *friction->interval < 0.0)
       reason = std::string(name) + " comes out below zero, a friction that drives";
   }
+  result.explanation->holds = reason.empty();
   if (!reason.empty()) {
     result.excitation = verdict_against(result, reason);
     return;
@@ -271,7 +286,7 @@ void make_positive(const Settings& e, Result& result) {
 
 }  // namespace
 
-void refine(const MeasuredData& data, const Settings& e, Result& result) {
+void refine(const MeasuredData& data, const Settings& e, Result& result, const Result* near) {
   if (!can_begin(e, result)) {
     result.excitation = verdict_without_start(e.kind, result);
     return;
@@ -283,13 +298,13 @@ void refine(const MeasuredData& data, const Settings& e, Result& result) {
         fmt::format("refined from the first {} of {} samples of the window", e.most_samples, all));
   switch (e.kind) {
     case MotorKind::kDc:
-      return refine_with<DcModel>(record, e, result);
+      return refine_with<DcModel>(record, e, result, near);
     case MotorKind::kInduction:
-      return refine_with<InductionModel>(record, e, result);
+      return refine_with<InductionModel>(record, e, result, near);
     case MotorKind::kPmSynchronous:
-      return refine_with<PmModel>(record, e, result);
+      return refine_with<PmModel>(record, e, result, near);
     case MotorKind::kBldc:
-      return refine_with<BldcModel>(record, e, result);
+      return refine_with<BldcModel>(record, e, result, near);
   }
 }
 

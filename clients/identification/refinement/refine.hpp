@@ -16,6 +16,9 @@ namespace drivebench::identification {
 /// unseen (a friction also stands where it hardly matters beside the torque that accelerates), and a motor
 /// that does not explain the record within what noise and quantisation allow has no parameter that is seen.
 /// The verdict then says which experiment would help.
-void refine(const MeasuredData& data, const Settings& settings, Result& result);
+///
+/// `near`, if there is one, is a refined motor that explains the record and hardly differs: its values and
+/// noises begin the last round of the search, and the others fall away.
+void refine(const MeasuredData& data, const Settings& settings, Result& result, const Result* near = nullptr);
 
 }  // namespace drivebench::identification

@@ -6,13 +6,14 @@
 namespace drivebench::identification {
 namespace {
 
-std::vector<std::string> positive_names(MotorKind kind) {
+std::vector<std::string> positive_names(MotorKind kind, bool salient) {
   switch (kind) {
     case MotorKind::kDc:
       return {"R", "L", "K_T", "J"};
     case MotorKind::kInduction:
       return {"R_S", "T_R", "L_S", "sigma", "J"};
     case MotorKind::kPmSynchronous:
+      if (salient) return {"R_S", "L_d", "L_q", "K_m", "J"};
       return {"R_S", "L_S", "K_m", "J"};
     case MotorKind::kBldc:
       break;
@@ -25,7 +26,7 @@ std::vector<std::string> positive_names(MotorKind kind) {
 std::vector<Unknown> unknowns_of(const Settings& e, const Result& start, double speed_rad_s,
                                  double duration_s) {
   std::vector<Unknown> unknowns;
-  for (std::string& name : positive_names(e.kind))
+  for (std::string& name : positive_names(e.kind, is_salient(start)))
     unknowns.push_back({.name = std::move(name)});
   const double friction = start.at("J") / duration_s;
   for (const char* name : {"f", "f_c", "tau_L"}) {
@@ -53,6 +54,8 @@ void put(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& at, Result
 }
 
 void put_dependent(const Settings& e, Result& result) {
+  if (Estimate* const saliency = result.find("L_g"))
+    saliency->value = 0.5 * (result.at("L_d") - result.at("L_q"));
   if (e.kind != MotorKind::kInduction) return;
   const double l_s = result.at("L_S");
   const double t_r = result.at("T_R");

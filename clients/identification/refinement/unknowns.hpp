@@ -25,7 +25,8 @@ std::vector<Unknown> unknowns_of(const Settings& settings, const Result& start, 
 Eigen::VectorXd coordinates_of(const std::vector<Unknown>& unknowns, const Result& result);
 void put(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& at, Result& result);
 
-/// Sets all estimates that follow from the unknowns of an induction motor: M, L_R, R_R, K4 to K17.
+/// Sets all estimates that follow from the unknowns: M, L_R, R_R, K4 to K17 of an induction motor, L_g of a
+/// salient PM motor.
 void put_dependent(const Settings& settings, Result& result);
 
 }  // namespace drivebench::identification

@@ -27,7 +27,7 @@ constexpr auto kAdvice = std::to_array<Advice>({
     {MotorKind::kBldc, " R_S tau_p ",
      "let current and speed change independently, by a voltage that swings several times a second"},
     {MotorKind::kDc, " L ", "let the current change within L/R, by steps of the voltage"},
-    {MotorKind::kPmSynchronous, " L_S ",
+    {MotorKind::kPmSynchronous, " L_S L_d L_q L_g ",
      "let the current change within L/R, by a u_d that swings at some 60 Hz"},
     {MotorKind::kBldc, " L+M ",
      "let the current change within L/R, by a higher speed or steps of the voltage"},

@@ -171,7 +171,9 @@ void FluxEquations::add_windows(const std::vector<Complex>& u, const std::vector
     }
     const std::size_t end = begin + length;
     w.u_step = u[end] - u[begin];
-    w.i_step = i[end] - i[begin];
+    w.first_i = i[begin];
+    w.last_i = i[end];
+    w.i_step = w.last_i - w.first_i;
     w.first_angle = angle[begin];
     w.last_angle = angle[end];
     w.angle_step = w.last_angle - w.first_angle;
@@ -180,17 +182,18 @@ void FluxEquations::add_windows(const std::vector<Complex>& u, const std::vector
   }
 }
 
-std::size_t FluxEquations::columns() const noexcept {
-  return kind_ == MotorKind::kInduction ? 10 : kind_ == MotorKind::kDc ? 5 : 5 + 2 * harmonics();
+std::size_t FluxEquations::columns(bool salient) const noexcept {
+  if (kind_ == MotorKind::kInduction) return 10;
+  return kind_ == MotorKind::kDc ? 5 : 5 + 2 * harmonics() + (salient ? 2 : 0);
 }
 
 std::size_t FluxEquations::harmonics() const noexcept {
   return kind_ == MotorKind::kBldc ? kHarmonics.size() : 1;
 }
 
-/// Columns: the shift, R, L; then the magnet, or what an induction motor has; last what offsets of voltages
-/// and currents add up to, which an induction motor has among its own.
-Complex FluxEquations::put_row(const Window& w, double n, std::span<Complex> c) const {
+/// Columns: the shift, R, L; then the magnet and its saliency, or what an induction motor has; last what
+/// offsets of voltages and currents add up to, which an induction motor has among its own.
+Complex FluxEquations::put_row(const Window& w, double n, bool salient, std::span<Complex> c) const {
   constexpr Complex kJ(0.0, 1.0);
   c[0] = -period_s_ * w.u_step;
   c[1] = w.i_integral;
@@ -214,6 +217,12 @@ Complex FluxEquations::put_row(const Window& w, double n, std::span<Complex> c) 
       c[3 + 2 * h] = std::polar(1.0, order * w.last_angle) - std::polar(1.0, order * w.first_angle);
       c[4 + 2 * h] = kJ * c[3 + 2 * h];
     }
+    if (salient) {
+      const std::size_t first = 3 + 2 * harmonics();
+      c[first] = std::polar(1.0, 2.0 * n * w.last_angle) * std::conj(w.last_i) -
+                 std::polar(1.0, 2.0 * n * w.first_angle) * std::conj(w.first_i);
+      c[first + 1] = kJ * c[first];
+    }
   }
   c[c.size() - 2] = w.duration_s;
   c[c.size() - 1] = kJ * w.duration_s;
@@ -221,10 +230,10 @@ Complex FluxEquations::put_row(const Window& w, double n, std::span<Complex> c) 
 }
 
 /// What noise adds to the square sums of the columns.
-std::vector<double> FluxEquations::noise_of_columns(double n) const {
+std::vector<double> FluxEquations::noise_of_columns(double n, bool salient) const {
   const bool dc = kind_ == MotorKind::kDc;
   const double each = (dc ? 1.0 : 2.0) * static_cast<double>(windows_.size());
-  std::vector<double> noise2(columns(), 0.0);
+  std::vector<double> noise2(columns(salient), 0.0);
   noise2[0] = 2.0 * each * std::pow(period_s_ * u_noise_v_, 2);
   noise2[1] = each * period_s_ * mean_s_ * std::pow(i_noise_a_, 2);
   noise2[2] = 2.0 * each * std::pow(i_noise_a_, 2);
@@ -232,20 +241,21 @@ std::vector<double> FluxEquations::noise_of_columns(double n) const {
   if (dc || kind_ == MotorKind::kInduction) return noise2;
   for (std::size_t h = 0; h < harmonics(); ++h)
     noise2[3 + 2 * h] = noise2[4 + 2 * h] = each * std::pow(n * kHarmonics[h] * angle_noise_rad_, 2);
+  if (salient) noise2[3 + 2 * harmonics()] = noise2[4 + 2 * harmonics()] = noise2[2];
   return noise2;
 }
 
-FluxFit FluxEquations::fit(int turn) const {
+FluxFit FluxEquations::fit(int turn, bool salient) const {
   const double n = turn;
   const bool dc = kind_ == MotorKind::kDc;
   const auto solved = [&](double pairs) {
-    ComplexRows rows(windows_.size(), static_cast<Eigen::Index>(columns()), dc ? 1 : 2);
-    std::vector<Complex> c(columns());
+    ComplexRows rows(windows_.size(), static_cast<Eigen::Index>(columns(salient)), dc ? 1 : 2);
+    std::vector<Complex> c(columns(salient));
     for (std::size_t k = 0; k < windows_.size(); ++k) {
-      const Complex right = put_row(windows_[k], pairs, c);
+      const Complex right = put_row(windows_[k], pairs, salient, c);
       rows.put(k, c, right);
     }
-    rows.solve(noise_of_columns(pairs));
+    rows.solve(noise_of_columns(pairs, salient));
     return rows;
   };
   ComplexRows rows = solved(n);

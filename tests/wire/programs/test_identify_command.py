@@ -112,6 +112,7 @@ class Identify(WireTest):
                     "dc/voltage-steps": {"R": 0.5, "L": 1, "K_T": 0.5, "J": 2, "f": 10},
                     "dc/two-sines": {"R": 0.5, "L": 1, "K_T": 0.5, "J": 2, "f": 10},
                     "pm/swing": {"R_S": 1, "L_S": 1, "K_m": 0.5, "J": 1},
+                    "pm/salient-swing": {"R_S": 0.1, "L_d": 0.1, "L_q": 0.1, "L_g": 0.1, "K_m": 0.1, "J": 0.1, "f": 1},
                     "pm/ramp": {"R_S": 5, "L_S": 5, "K_m": 2, "J": 10},
                     "bldc/swing": {"R_S": 2, "L+M": 3, "tau_p": 0.5, "J": 5, "f": 5}}
         for experiment in listed:

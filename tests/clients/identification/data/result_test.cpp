@@ -97,7 +97,8 @@ BenchConfig bench_of(const Result& r, const MotorFile& file) {
 }
 
 // The bench reads the motor file that identification writes, for every kind, with names that need quoting.
-// Catches: a key that the bench does not know, negative friction, a reserved character in a name.
+// Catches: a key that the bench does not know, negative friction, a reserved character in a name,
+// L_d for both axes, a star that comes back as two phases.
 TEST(IdentificationResult, TheBenchReadsTheMotorFile) {
   const BenchConfig im =
       bench_of(some_result(), {.name = "a \"motor\"\n", .source = "C:\\x", .pole_pairs = 2});
@@ -118,6 +119,13 @@ TEST(IdentificationResult, TheBenchReadsTheMotorFile) {
   pm.parameters = {{"R_S", "ohm", 0.6, 0, {}}, {"L_S", "H", 2.4e-3, 0, {}}, {"K_m", "", 0.515, 0, {}},
                    {"J", "", 1.9e-4, 0, {}},   {"f", "", 3e-3, 0, {}},      {"f_c", "", 0.07, 0, {}}};
   EXPECT_EQ(bench_of(pm, {.pole_pairs = 50}).setup.axes[0].parameters.mechanics.coulomb_friction_nm, 0.07);
+  pm.parameters[1] = {"L_d", "H", 1.8e-3, 0, {}};
+  pm.parameters.push_back({"L_q", "H", 4.2e-3, 0, {}});
+  const BenchConfig salient = bench_of(pm, {.pole_pairs = 4, .star = true});
+  const auto& buried = std::get<PmMachineParameters>(salient.setup.axes[0].parameters.machine);
+  EXPECT_EQ(buried.inductance_d_h, 1.8e-3);
+  EXPECT_EQ(buried.inductance_q_h, 4.2e-3);
+  EXPECT_TRUE(buried.star);
   Result bldc = {.kind = "bldc", .method = "m"};
   bldc.parameters = {{"R_S", "ohm", 0.7, 0, {}},
                      {"L+M", "H", 2.87e-3, 0, {}},

@@ -99,7 +99,7 @@ BlindMotor blind_motor(const MotorDraw& draw, std::uint64_t seed, int number) {
 }
 
 std::vector<BlindMotor> run_blind(std::uint64_t seed, int motors, int threads) {
-  constexpr std::size_t kKinds = 4;
+  constexpr std::size_t kKinds = 5;
   const auto draws = motor_draws().first(kKinds);
   const auto per_kind = static_cast<std::size_t>(motors);
   std::vector<BlindMotor> all(per_kind * kKinds);

@@ -31,7 +31,7 @@ struct BlindMotor {
 /// and from when on the equations hold.
 BlindMotor blind_motor(const MotorDraw& draw, std::uint64_t seed, int number);
 
-/// DC, induction, PM, brushless; `threads` has no influence on the numbers.
+/// DC, induction, PM, brushless, salient PM; `threads` has no influence on the numbers.
 std::vector<BlindMotor> run_blind(std::uint64_t seed, int motors, int threads);
 
 /// The score as Markdown.

@@ -12,6 +12,7 @@
 #include <random>
 #include <string>
 
+#include "clients/models/two_phase.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
 namespace drivebench::identification {
@@ -45,6 +46,13 @@ constexpr std::array kBldc = std::to_array<Range>({{"R_S", "ohm", 0.35, 1.4},
                                                    {"tau_p", "N m/A", 0.26, 1.03},
                                                    {"J", "kg m^2", 1e-4, 4e-4},
                                                    {"f", "N m s/rad", 1e-3, 4e-3}});
+constexpr std::array kSalient = std::to_array<Range>({{"R_S", "ohm", 0.175, 0.7},
+                                                      {"L_d", "H", 0.9e-3, 2.5e-3},
+                                                      {"L_q", "H", 2.8e-3, 8.4e-3},
+                                                      {"K_m", "N m/A", 0.15, 0.6},
+                                                      {"J", "kg m^2", 1.5e-4, 6e-4},
+                                                      {"f", "N m s/rad", 1e-3, 4e-3},
+                                                      {"f_c", "N m", 0.02, 0.08}});
 
 constexpr std::array kDraws = std::to_array<MotorDraw>({
     {MotorKind::kDc, "DC motors", "dc-a-servo",
@@ -69,6 +77,11 @@ constexpr std::array kDraws = std::to_array<MotorDraw>({
      "within 1 s, at 20 kHz, turned by the encoder of 4096 counts; currents to 70 A, voltages to 50 V; "
      "filters 500 Hz, of the shaft chosen from the data. L_S is 95 % of L+M.",
      kBldc, kNothing, 0.0},
+    {MotorKind::kPmSynchronous, "Salient PM synchronous motors", "ipm-servo",
+     "Voltage amplifier, 4 pole pairs; u_q a chirp of 12 V from 2 to 20 Hz and u_d 1 V and a sine of 5 V at "
+     "60 Hz for 0.6 s, at 10 kHz, turned by the encoder of 4096 counts; no detent torque; currents to 40 A, "
+     "voltages to 50 V; filters 500 Hz, of the shaft chosen from the data. L_q is 1.1 to 9 times L_d.",
+     kSalient, kNothing, 0.0, true},
     {MotorKind::kInduction, "Induction motors in 0.2 s", "im-8-5-5",
      "The same motors and starts, but every record ends after 0.2 s, when those of one pole pair and those "
      "with much inertia are still far from their speed. At a slip close to 1 noise takes the place of T_R in "
@@ -207,6 +220,39 @@ Recorded run_pm(BenchConfig config, const std::vector<double>& motor) {
   return {std::move(record.data()), e};
 }
 
+Recorded run_salient(BenchConfig config, const std::vector<double>& motor) {
+  constexpr int kCounts = 4096;
+  constexpr int kPolePairs = 4;
+  AxisParameters& p = config.setup.axes[0].parameters;
+  p.machine = PmMachineParameters{.pole_pairs = kPolePairs,
+                                  .stator_resistance_ohm = motor[0],
+                                  .inductance_d_h = motor[1],
+                                  .inductance_q_h = motor[2],
+                                  .torque_constant_nm_per_a = motor[3],
+                                  .star = true};
+  p.mechanics.inertia_kgm2 = motor[4];
+  p.mechanics.viscous_friction_nms = motor[5];
+  p.mechanics.coulomb_friction_nm = p.mechanics.static_friction_nm = motor[6];
+  p.encoder.counts_per_revolution = kCounts;
+  put_sensors(p, 40.0, 50.0);
+  BookBench run(config);
+  Recorder record({"i_a_a", "i_b_a", "i_c_a", "u_a_v", "u_b_v", "u_c_v", "encoder_count"}, run.period_s());
+  run.control_until(0.6, [&](const Sample& s) {
+    record(s);
+    const double angle = kPolePairs * kTurn * (static_cast<double>(s.encoder_count) + 0.5) / kCounts;
+    const double t = run.now_s();
+    const double u_d = 1.0 + 5.0 * std::sin(kTurn * 60.0 * t);
+    const double u_q = 12.0 * std::sin(kTurn * (2.0 + 15.0 * t) * t);
+    const auto u = three_phases_of({.a = u_d * std::cos(angle) - u_q * std::sin(angle),
+                                    .b = u_d * std::sin(angle) + u_q * std::cos(angle)});
+    return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = u[0], .b = u[1], .c = u[2]}};
+  });
+  Settings e{.kind = MotorKind::kPmSynchronous, .pole_pairs = kPolePairs, .counts_per_revolution = kCounts};
+  e.processing = usual_processing(e.kind, run.period_s());
+  choose_shaft_filter(record.data(), e);
+  return {std::move(record.data()), e};
+}
+
 Recorded run_bldc(BenchConfig config, const std::vector<double>& motor) {
   constexpr int kCounts = 4096;
   set_rate(config, 50'000, 5);
@@ -274,7 +320,7 @@ Recorded record_motor(const MotorDraw& draw, const std::vector<double>& motor, s
     case MotorKind::kInduction:
       return run_induction(std::move(config), motor, draw.longest_s);
     case MotorKind::kPmSynchronous:
-      return run_pm(std::move(config), motor);
+      return draw.salient ? run_salient(std::move(config), motor) : run_pm(std::move(config), motor);
     case MotorKind::kBldc:
       break;
   }

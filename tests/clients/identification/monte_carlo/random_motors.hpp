@@ -30,9 +30,11 @@ struct MotorDraw {
   std::span<const Range> identified;
   std::span<const Range> others;  ///< parameters that the experiment does not identify
   double longest_s;               ///< induction: the record ends here, whether the motor has run up or not
+  bool salient = false;           ///< PM synchronous: L_d and L_q
 };
 
-/// DC, induction, PM synchronous, brushless DC; then the same induction motors with records of 0.2 s.
+/// DC, induction, PM synchronous round and, after brushless DC, salient; last the same induction motors with
+/// records of 0.2 s.
 std::span<const MotorDraw> motor_draws() noexcept;
 
 /// Motor `number` of a kind, from 1 on, always the same: first the identified parameters, then the others.

@@ -42,6 +42,25 @@ TEST(Motors, TheTruthOfAnInductionMotorIsThatOfTheBook) {
   expect("K16", 181.82);
 }
 
+// Catches: a saliency of the wrong sign or twice as large, an L_S of a motor that has none, an L_g of a round
+// one.
+TEST(Motors, TheTruthOfAPmMotorIsThatOfItsRotor) {
+  BenchParameters bench = {{"machine.pole_pairs", 4},
+                           {"machine.stator_resistance_ohm", 0.35},
+                           {"machine.inductance_d_h", 1.8e-3},
+                           {"machine.inductance_q_h", 4.2e-3},
+                           {"machine.torque_constant_nm_per_a", 0.3}};
+  auto truth = truth_of(MotorKind::kPmSynchronous, bench);
+  EXPECT_EQ(truth.find("L_d")->second, 1.8e-3);
+  EXPECT_EQ(truth.find("L_q")->second, 4.2e-3);
+  EXPECT_DOUBLE_EQ(truth.find("L_g")->second, -1.2e-3);
+  EXPECT_FALSE(truth.contains("L_S"));
+  bench["machine.inductance_q_h"] = 1.8e-3;
+  truth = truth_of(MotorKind::kPmSynchronous, bench);
+  EXPECT_EQ(truth.find("L_S")->second, 1.8e-3);
+  EXPECT_FALSE(truth.contains("L_d") || truth.contains("L_g"));
+}
+
 // A motor whose leakages differ: its terminals are those of one with equal leakages. Catches: the bench's own
 // M and R_R as the truth about a split that no data show.
 TEST(Motors, UnequalLeakagesAreComparedAsEqualOnes) {
