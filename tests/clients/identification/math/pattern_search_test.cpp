@@ -56,7 +56,7 @@ TEST(PatternSearch, ComesBackFromBeyondALimit) {
   const std::array<SearchVariable, 2> variables = {
       {{.start = 8.0, .least = 0.1, .most = 10.0}, {.start = 8.0, .least = 0.1, .most = 10.0}}};
   const auto score = [](const std::vector<double>& x) {
-    if (x[0] + x[1] > 5.0) return 1e6 * (x[0] + x[1]);  // beyond a limit
+    if (x[0] + x[1] > 5.0) return 1e6 * (x[0] + x[1]);     // beyond a limit
     return x[0] * x[1] > 4.0 ? 1.0 / (x[0] * x[1]) : 1e3;  // unused
   };
   const std::vector<double> best = pattern_search(variables, {.most_trials = 200}, score);
