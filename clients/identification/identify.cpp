@@ -67,11 +67,14 @@ Result identify_either_rotor(const MeasuredData& data, const Settings& settings)
   refine(data, settings, salient);
   if (tells_saliency(salient)) return salient;
   Result round = identify_pm_motor(data, settings);
-  if (salient.explanation && salient.explanation->holds) {
+  if (salient.excitation.sufficient) {
     const Result near = with_one_inductance(salient);
-    refine(data, settings, round, &near);
-    round.notes.push_back(round_note(salient));
-    return round;
+    Result begun_near = round;
+    refine(data, settings, begun_near, &near);
+    if (begun_near.explanation && begun_near.explanation->holds) {
+      begun_near.notes.push_back(round_note(salient));
+      return begun_near;
+    }
   }
   refine(data, settings, round);
   const bool better = salient.explanation && round.explanation && !round.explanation->holds &&

@@ -217,14 +217,15 @@ TerminalReading read_terminals(const MeasuredData& data, const Settings& setting
   if (feed == Feed::kAc) {
     turning = turning_hz(u, data.period_s);
     reading.meter.frequency_hz = std::abs(turning);
-    length = 1.0 / (std::abs(turning) * data.period_s);
-    count = static_cast<std::size_t>(static_cast<double>(range.count()) / length + 1e-6);
-    if (!(std::abs(turning) > 0.0) || count < kLeastPeriods)
+    const double periods = static_cast<double>(range.count()) * std::abs(turning) * data.period_s;
+    count = static_cast<std::size_t>(periods + 1e-6);
+    if (count < kLeastPeriods)
       throw IdentificationError(fmt::format(
           "the window from {:.4g} to {:.4g} s holds {} periods of the voltage ({:.4g} Hz); a test "
           "with AC needs {} at least",
           static_cast<double>(range.first) * data.period_s, static_cast<double>(range.end) * data.period_s,
-          turning == 0.0 ? 0 : count, reading.meter.frequency_hz, kLeastPeriods));
+          count, reading.meter.frequency_hz, kLeastPeriods));
+    length = static_cast<double>(range.count()) / periods;
     u = vectors(u_windings, range, turning < 0.0);
   }
   const double angle_step = 2.0 * std::numbers::pi * reading.meter.frequency_hz * data.period_s;
