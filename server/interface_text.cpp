@@ -120,9 +120,10 @@ std::vector<std::string> bus_overloads(const BenchConfig& config) {
 }
 
 std::string interface_text(const BenchConfig& config, std::string_view what, std::size_t bus) {
-  if (what == "dbc") return can::dbc_text(config.name, chosen_bus(config, bus).profile, bus_axes(config));
   if (what.starts_with("modbus")) return modbus::map_of(config, what == "modbus-csv");
   const CanConfig chosen = chosen_bus(config, bus);
+  if (what == "dbc")
+    return can::dbc_text(config.name, chosen.profile, bus_axes(config), bus_load_of(config, chosen).messages);
   return can::table_text(config.name, chosen.profile, bus_axes(config)) + "\n## Load in real time\n\n" +
          can::load_text(bus_load_of(config, chosen));
 }

@@ -146,6 +146,22 @@ std::string value_lists(const Entry& entry) {
   return text;
 }
 
+/// The cycle times of the periodic messages; frames of all axes share a rate.
+std::string cycle_times(std::span<const Entry> entries, std::span<const MessageLoad> periodic) {
+  if (periodic.empty()) return {};
+  std::string text =
+      "BA_DEF_ BO_ \"GenMsgCycleTime\" FLOAT 0 1000000000;\nBA_DEF_DEF_ \"GenMsgCycleTime\" 0;\n";
+  constexpr double kMilliseconds = 1e3;
+  for (const Entry& entry : entries) {
+    const auto load = std::ranges::find(periodic, entry.row, &MessageLoad::row);
+    if (load == periodic.end() || !(load->frames_per_s > 0.0)) continue;
+    const auto sharing = static_cast<double>(std::ranges::count(entries, entry.row, &Entry::row));
+    text += "BA_ \"GenMsgCycleTime\" BO_ " + entry.id + " " +
+            number_text(kMilliseconds * sharing / load->frames_per_s, 6) + ";\n";
+  }
+  return text;
+}
+
 std::string attributes(std::string_view bench, const Profile& profile, std::span<const Entry> entries) {
   std::string text =
       "BA_DEF_ \"BusType\" STRING ;\nBA_DEF_ \"DBName\" STRING ;\nBA_DEF_ BO_ \"VFrameFormat\" ENUM ";
@@ -163,7 +179,8 @@ std::string attributes(std::string_view bench, const Profile& profile, std::span
 
 }  // namespace
 
-std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes) {
+std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes,
+                     std::span<const MessageLoad> periodic) {
   const std::vector<Entry> entries = entries_of(profile, axes);
   std::string text = "VERSION \"" + std::to_string(version_of(profile, axes)) + "\"\n\nNS_ :\n\nBS_:\n\n";
   text += "BU_: Bench Controller\n\n";
@@ -184,7 +201,8 @@ std::string dbc_text(std::string_view bench, const Profile& profile, std::span<c
     values += value_lists(entry);
   }
   text += "CM_ " + quoted("CAN messages of " + std::string(bench) + ", written by drivebench.") + ";\n";
-  return text + about + attributes(bench, profile, entries) + values + singles;
+  return text + about + attributes(bench, profile, entries) + cycle_times(entries, periodic) + values +
+         singles;
 }
 
 }  // namespace drivebench::can

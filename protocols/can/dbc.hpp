@@ -4,12 +4,15 @@
 #include <string>
 #include <string_view>
 
+#include "protocols/can/budget.hpp"
 #include "protocols/can/profile.hpp"
 
 namespace drivebench::can {
 
 /// The messages of these axes as a DBC file: message AXIS_MESSAGE with a signal for each field. Names are
-/// identifiers of at most 32 characters.
-std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes);
+/// identifiers of at most 32 characters. The periodic messages have their cycle time in real time, in
+/// milliseconds and parts of them (attribute GenMsgCycleTime).
+std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes,
+                     std::span<const MessageLoad> periodic = {});
 
 }  // namespace drivebench::can

@@ -63,7 +63,12 @@ int main(int argc, char** argv) {
                                      {"2nd \"load\" drive with a long name", 2, false},
                                      {"2nd \"load\" drive too", kMaxFreeNode, profile.wide}};
   if (std::strcmp(argv[1], "dbc") == 0)
-    std::fputs(dbc_text("Zwei \"Achsen\" \xC3\xA4", profile, axes).c_str(), stdout);
+    std::fputs(dbc_text("Zwei \"Achsen\" \xC3\xA4", profile, axes,
+                        bus_load(profile,
+                                 {.axes = axes.size(), .wide_axes = profile.wide ? 2U : 0U, .period_s = 2e-3})
+                            .messages)
+                   .c_str(),
+               stdout);
   else if (std::strcmp(argv[1], "table") == 0)
     std::fputs(table_text("two axes", profile, axes).c_str(), stdout);
   else

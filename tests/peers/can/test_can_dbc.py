@@ -54,6 +54,14 @@ class Dbc(unittest.TestCase):
     def each(self):
         return ((variant, load(texts("dbc", *variant))) for variant in VARIANTS)
 
+    def test_canmatrix_finds_the_cycle_times(self):
+        """Catches: an attribute that another program does not find, times in seconds."""
+        for (kind, ids, width), (matrix, _) in self.each():
+            with self.subTest(kind=kind, ids=ids, width=width):
+                times = {frame.name: frame.cycle_time for frame in matrix.frames}
+                self.assertEqual((times["sync"], times["servo_command"], times["servo_state"], times["servo_heartbeat"],
+                                  times["servo_reply"]), (2, 2, 160, 100, 0))
+
     def test_canmatrix_reads_it_without_complaint(self):
         """Catches: a line that the reader does not understand; names that are no identifiers, too long or not unique; FD
         or extended frames that are not marked."""

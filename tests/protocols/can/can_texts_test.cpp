@@ -146,6 +146,30 @@ TEST(CanTexts, TheDbcFileHasTheseLines) {
                        "value\";\n"));
 }
 
+// Catches: a cycle time of all axes together, one in seconds, one for a message that is sent on demand, the
+// heartbeat of a bench that sends none.
+TEST(CanTexts, TheDbcFileHasTheCycleTimesOfRealTime) {
+  const Profile profile{};
+  const std::vector<BusAxis> axes = {{"a", 1}, {"b", 2}};
+  const BusUse use{.axes = 2,
+                   .period_s = 125e-6,
+                   .sample_every_ticks = 2.0,
+                   .state_every_ticks = 80.0,
+                   .heartbeat_ms = 100.0};
+  std::string text = dbc_text("bench", profile, axes, bus_load(profile, use).messages);
+  for (const char* line : {"BA_DEF_ BO_ \"GenMsgCycleTime\" FLOAT", "BA_DEF_DEF_ \"GenMsgCycleTime\" 0;\n",
+                           "BA_ \"GenMsgCycleTime\" BO_ 8 0.25;\n",       // sync
+                           "BA_ \"GenMsgCycleTime\" BO_ 49 0.25;\n",      // command of a
+                           "BA_ \"GenMsgCycleTime\" BO_ 98 0.25;\n",      // sensors of b
+                           "BA_ \"GenMsgCycleTime\" BO_ 1681 10;\n",      // state of a
+                           "BA_ \"GenMsgCycleTime\" BO_ 1938 100;\n"}) {  // heartbeat of b
+    EXPECT_TRUE(contains(text, line)) << line << text;
+  }
+  for (const char* sent_on_demand : {"BO_ 17 ", "BO_ 113 ", "BO_ 1665 ", "BO_ 1713 "})
+    EXPECT_FALSE(contains(text, "\"GenMsgCycleTime\" " + std::string(sent_on_demand))) << sent_on_demand;
+  EXPECT_FALSE(contains(dbc_text("bench", profile, axes), "GenMsgCycleTime"));
+}
+
 // Catches: lines of the Markdown table that changed unseen.
 TEST(CanTexts, TheTableHasTheseLines) {
   Profile profile;
