@@ -34,6 +34,7 @@ enum class TcpRefusal : int {
   kUnspecified = 0,
   kMalformed = 1,
   kUnknownAxis = 4,
+  kUnknownParameter = 6,
   kOutOfRange = 7,
   kNotFinite = 8,
   kNotOwner = 9,
@@ -41,8 +42,10 @@ enum class TcpRefusal : int {
   kLatched = 11,
   kStale = 12,
   kBusy = 13,
+  kReadOnly = 14,
   kWrongMode = 15,
   kWrongDrive = 16,
+  kUnknownFault = 17,
   kCauseLasts = 21,
 };
 

@@ -39,6 +39,14 @@ void change_mode(BenchConfig& config, RunMode mode) noexcept {
   config.mode = mode;
 }
 
+void schedule_events(const BenchConfig& config, Bench& bench) {
+  for (std::uint32_t axis = 0; axis < config.axes.size(); ++axis) {
+    for (const AxisEvent& event : config.axes[axis].events) {
+      bench.submit({.tick = event.tick, .axis = axis, .owner = 0, .action = event.action});
+    }
+  }
+}
+
 std::string_view name_of(SafeAction action) noexcept {
   return kSafeActionWords[static_cast<std::size_t>(action)];
 }

@@ -162,6 +162,9 @@ std::string to_toml(const BenchConfig& config);
 /// action, parameters, curves and events; without names, mode, pacer and addresses.
 std::string physics_toml(const BenchConfig& config);
 
+/// Gives the bench the events of the configuration, as inputs for later ticks.
+void schedule_events(const BenchConfig& config, Bench& bench);
+
 /// The hash of physics_toml(): benches with the same hash give the same samples for the same inputs.
 std::uint64_t configuration_hash(const BenchConfig& config);
 

@@ -51,32 +51,21 @@ void Engine::refuse_to_take(std::uint32_t axis, Owner by, Refused why, const Ans
   answer(why, tick());
 }
 
-std::string Engine::problem_with_value(std::size_t axis, std::uint32_t row, double value) const {
-  const Parameter& parameter = axis_parameters(parameters_[axis])[row];
+ChangeView Engine::change_view(std::size_t axis) const {
   const std::optional<std::size_t> partner = config_.setup.axes[axis].shares_shaft_with;
-  if (partner && parameter.name.starts_with("mechanics.")) {
-    return "belongs to axis " + config_.axes[*partner].name + ", whose shaft this axis shares";
-  }
-  return problem_with(parameter, value);
+  return {.parameters = parameters_[axis],
+          .shaft_of = partner ? std::string_view(config_.axes[*partner].name) : std::string_view(),
+          .tick = tick()};
 }
 
 std::string Engine::try_parameter(std::size_t axis, std::uint32_t row, double value) {
-  if (std::string problem = problem_with_value(axis, row, value); !problem.empty()) return problem;
-  AxisParameters wanted = parameters_[axis];
-  axis_parameters(wanted)[row].set(wanted, value);
-  if (const std::vector<Problem> found = problems(wanted); !found.empty()) {
-    return "would break a rule: " + found.front().field + " " + found.front().rule;
-  }
-  parameters_[axis] = wanted;
-  return {};
+  std::string problem = problem_with_write(change_view(axis), row, value);
+  if (problem.empty()) count_as_written(axis, row, value);
+  return problem;
 }
 
-void schedule_events(const BenchConfig& config, Bench& bench) {
-  for (std::uint32_t axis = 0; axis < config.axes.size(); ++axis) {
-    for (const AxisEvent& event : config.axes[axis].events) {
-      bench.submit({.tick = event.tick, .axis = axis, .owner = 0, .action = event.action});
-    }
-  }
+void Engine::count_as_written(std::size_t axis, std::uint32_t row, double value) {
+  axis_parameters(parameters_[axis])[row].set(parameters_[axis], value);
 }
 
 }  // namespace drivebench

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/bench/bench.hpp"
+#include "server/bench/change_requests.hpp"
 #include "server/config/config.hpp"
 #include "server/engine/owners.hpp"
 #include "server/engine/tick_edges.hpp"
@@ -96,8 +97,10 @@ class Engine {
   /// The reason why a parameter cannot be written at once. Empty: it can, and counts as written; the caller
   /// sends the input.
   std::string try_parameter(std::size_t axis, std::uint32_t row, double value);
-  /// The reason why the parameter cannot have this value, whatever the values of the others.
-  std::string problem_with_value(std::size_t axis, std::uint32_t row, double value) const;
+  /// Makes a checked value one of parameters(); the caller sends the input.
+  void count_as_written(std::size_t axis, std::uint32_t row, double value);
+  /// The axis as a request for a change sees it, with parameters().
+  ChangeView change_view(std::size_t axis) const;
   /// The configuration_hash() of the configuration.
   std::uint64_t configuration_hash() const { return configuration_hash_; }
 
@@ -138,8 +141,5 @@ std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config);
 /// max_ticks, if given.
 std::unique_ptr<Engine> make_threaded_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
                                              boost::asio::io_context& io, std::optional<Tick> max_ticks);
-
-/// Gives the bench the events of the configuration, as inputs for later ticks.
-void schedule_events(const BenchConfig& config, Bench& bench);
 
 }  // namespace drivebench
