@@ -12,9 +12,8 @@ std::filesystem::path own_executable();
 /// drivebench-server, which stands next to this program. Throws UsageError when it does not.
 std::filesystem::path server_executable();
 
-/// A bench file: `choice` as a path, or else the name of a bench ("servo" or "servo.toml") in `benches/` of
-/// the folder DRIVEBENCH_CONFIGS, of `configs` here or of `configs` in a folder above the program. Throws
-/// UsageError with all places of the search.
+/// A bench file by its path or name, see installation::find_file(). Throws UsageError with all places of the
+/// search.
 std::filesystem::path find_config(std::string_view choice);
 /// An experiment file, searched for like a bench file, in `experiments/` of these folders.
 std::filesystem::path find_experiment_file(std::string_view choice);

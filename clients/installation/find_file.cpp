@@ -1,0 +1,73 @@
+#include "clients/installation/find_file.hpp"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <system_error>
+#include <vector>
+
+#include "protocols/nearest_name.hpp"
+#include "protocols/text.hpp"
+
+namespace drivebench::installation {
+namespace fs = std::filesystem;
+namespace {
+
+/// Adds the names of the TOML files in a folder, if it is there.
+void add_names(const fs::path& folder, std::vector<std::string>& names) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::ranges::sort(names);
+}
+
+}  // namespace
+
+fs::path own_file() {
+  Dl_info place{};
+  std::error_code ignored;
+  // The loader knows a library by its path, but a program only by the name that it was started with.
+  if (::dladdr(reinterpret_cast<const void*>(&own_file), &place) != 0) {
+    const std::string name = fs::path(place.dli_fname).filename().string();
+    if (name.starts_with("lib") && name.find(".so") != std::string::npos) {
+      return fs::weakly_canonical(place.dli_fname, ignored);
+    }
+  }
+  return fs::read_symlink("/proc/self/exe", ignored);
+}
+
+fs::path find_file(std::string_view kind, std::string_view what, std::string_view choice) {
+  std::error_code ignored;
+  if (fs::is_regular_file(choice, ignored)) return choice;
+
+  std::vector<fs::path> folders;
+  if (const char* chosen = std::getenv("DRIVEBENCH_CONFIGS"); chosen != nullptr) folders.emplace_back(chosen);
+  folders.emplace_back("configs");
+  // build/release/bin stands three folders below the one with configs; an installation has bin/ or
+  // lib/ARCHITECTURE/ beside share/.
+  fs::path above = own_file().parent_path();
+  for (int i = 0; i < 4; ++i, above = above.parent_path()) {
+    folders.push_back(above / "configs");
+    folders.push_back(above / "share" / "drivebench");
+  }
+
+  std::vector<std::string> looked_at = {printable(choice)};
+  std::vector<std::string> there;
+  fs::path file(choice);
+  if (file.extension() != ".toml") file += ".toml";
+  for (const fs::path& folder : folders) {
+    fs::path found = folder / kind / file;
+    if (fs::is_regular_file(found, ignored)) return found;
+    if (std::ranges::find(looked_at, found.string()) == looked_at.end()) looked_at.push_back(found.string());
+    add_names(folder / kind, there);
+  }
+  std::string places;
+  for (const std::string& place : looked_at)
+    places += "\n  " + place;
+  throw NotFound("no " + std::string(what) + " '" + printable(choice) + "'" +
+                 did_you_mean(fs::path(choice).stem().string(), there) + "; looked for" + places);
+}
+
+}  // namespace drivebench::installation
