@@ -1,10 +1,14 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <variant>
 
 #include "plant/axis_parameters.hpp"
 #include "plant/parameters/machine_kind.hpp"
+#include "plant/parameters/parameters.hpp"
 
 namespace drivebench {
 
@@ -33,6 +37,16 @@ struct Terminals {
     return connection == Connection::kStar ? 0.5 * bus_voltage_v : bus_voltage_v;
   }
 };
+
+/// The words of descriptions for the connection of the phases, and for the kind of drive.
+constexpr std::string_view word_of(Connection connection) noexcept {
+  constexpr std::array<std::string_view, 4> kWords = {"two_phase", "star", "independent", "armature"};
+  return kWords[static_cast<std::size_t>(connection)];
+}
+inline std::string_view drive_word_of(const AxisParameters& p) noexcept {
+  const Parameter* const row = find_parameter(p, "drive.kind");
+  return row->words[static_cast<std::size_t>(row->get(p))];
+}
 
 inline Terminals terminals_of(const AxisParameters& p) {
   const SensorParameters& sensors = p.sensors;

@@ -26,17 +26,6 @@ v1::SignalDescription::Kind wire_kind(SignalKind kind) noexcept {
   return v1::SignalDescription::KIND_TRUTH;
 }
 
-std::string_view word_of(Connection connection) noexcept {
-  constexpr auto kWords = std::to_array<std::string_view>({"two_phase", "star", "independent", "armature"});
-  return kWords[static_cast<std::size_t>(connection)];
-}
-
-/// The word of a parameter with choices; empty if the parameter does not exist.
-std::string_view word_of(const AxisParameters& p, std::string_view name) {
-  const Parameter* const row = find_parameter(p, name);
-  return row == nullptr ? std::string_view{} : row->words[static_cast<std::size_t>(row->get(p))];
-}
-
 v1::ParameterDescription describe_parameter(const Engine& engine, std::size_t axis, std::size_t row) {
   const AxisParameters& p = engine.parameters(axis);
   const Parameter& parameter = axis_parameters(p)[row];
@@ -65,7 +54,7 @@ v1::AxisDescription describe_axis(const Engine& engine, std::size_t axis) {
   d.set_phases(static_cast<std::uint32_t>(terminal_count(terminals.connection)));
   d.set_connection(std::string(word_of(terminals.connection)));
   d.set_field_winding(terminals.field);
-  d.set_drive_kind(std::string(word_of(p, "drive.kind")));
+  d.set_drive_kind(std::string(drive_word_of(p)));
   if (const auto partner = config.setup.axes[axis].shares_shaft_with) {
     d.set_shares_shaft_with(config.axes[*partner].name);
   }

@@ -1,0 +1,76 @@
+#include "clients/sdk/open_backend.hpp"
+
+#include <dlfcn.h>
+
+#include <string>
+
+#include "clients/installation/find_file.hpp"
+#include "clients/link/can/can_link.hpp"
+#include "clients/link/modbus/modbus_link.hpp"
+#include "clients/sdk/bus_backend.hpp"
+#include "clients/sdk/link_backend.hpp"
+
+namespace drivebench::sdk {
+namespace {
+
+constexpr std::string_view kInproc = "inproc:";
+
+/// The library stays loaded: its code must outlive every bench.
+const abi::InprocLibrary& load_inproc_library() {
+  void* const library = ::dlopen(abi::kInprocLibrary, RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) {
+    throw OpenError(DRIVEBENCH_NO_BENCH, std::string("inproc: needs the library ") + abi::kInprocLibrary +
+                                             ", which comes with drivebench: " + ::dlerror());
+  }
+  const void* const symbol = ::dlsym(library, abi::kInprocSymbol);
+  if (symbol == nullptr) {
+    throw OpenError(DRIVEBENCH_OTHER_ABI, std::string(abi::kInprocLibrary) + " is no library of drivebench");
+  }
+  const auto& inproc = *static_cast<const abi::InprocLibrary*>(symbol);
+  if (std::string_view(inproc.version) != DRIVEBENCH_PROJECT_VERSION ||
+      inproc.sample_size != sizeof(drivebench_sample)) {
+    throw OpenError(DRIVEBENCH_OTHER_ABI,
+                    std::string(abi::kInprocLibrary) + " is of version " + inproc.version +
+                        ", libdrivebench of another build: " + DRIVEBENCH_PROJECT_VERSION);
+  }
+  return inproc;
+}
+
+std::unique_ptr<abi::Backend> open_inproc(std::string_view bench) {
+  std::string error;
+  const std::string file = installation::find_file("benches", "bench file", bench).string();
+  std::unique_ptr<abi::Backend> backend(load_inproc_library().open(file.c_str(), error));
+  if (backend == nullptr) throw OpenError(DRIVEBENCH_NO_BENCH, error);
+  return backend;
+}
+
+std::unique_ptr<abi::Backend> open_any(std::string_view address, const link::LinkOptions& options) {
+  if (address.starts_with(kInproc)) return open_inproc(address.substr(kInproc.size()));
+  if (link::is_can_address(address)) {
+    return std::make_unique<BusBackend>(std::make_unique<link::CanLink>(
+        link::parse_can_address(address), link::CanLinkOptions{.deadline = options.deadline}));
+  }
+  if (link::is_modbus_address(address)) {
+    return std::make_unique<BusBackend>(
+        std::make_unique<link::ModbusLink>(link::parse_modbus_address(address)));
+  }
+  return std::make_unique<LinkBackend>(address, options);
+}
+
+}  // namespace
+
+std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link::LinkOptions& options) {
+  try {
+    return open_any(address, options);
+  } catch (const link::AddressError& wrong) {
+    throw OpenError(DRIVEBENCH_BAD_ARGUMENT, wrong.what());
+  } catch (const link::RefusalError& refusal) {
+    throw OpenError(static_cast<int>(refusal.code()), refusal.what());
+  } catch (const link::LinkError& none) {
+    throw OpenError(DRIVEBENCH_NO_BENCH, none.what());
+  } catch (const installation::NotFound& not_found) {
+    throw OpenError(DRIVEBENCH_NO_BENCH, not_found.what());
+  }
+}
+
+}  // namespace drivebench::sdk

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <exception>
+
+#include "clients/link/common/requests.hpp"
+#include "clients/link/tcp/tcp_link.hpp"
+#include "protocols/abi/backend.hpp"
+
+namespace drivebench::sdk {
+
+/// Does a request over a link, and turns what it throws into a code and a sentence.
+template <class Request>
+int carry_out(abi::Backend& backend, Request request) noexcept {
+  try {
+    request();
+    return DRIVEBENCH_OK;
+  } catch (const link::RefusalError& refusal) {
+    return backend.fail(static_cast<int>(refusal.code()), refusal.what(), refusal.field());
+  } catch (const link::LinkError& lost) {
+    return backend.fail(DRIVEBENCH_LINK_LOST, lost.what());
+  } catch (const std::exception& failure) {
+    return backend.fail(DRIVEBENCH_FAILED, failure.what());
+  }
+}
+
+/// The command for a link.
+inline link::AxisCommand command_for(const drivebench_command& c) noexcept {
+  link::AxisCommand to{.axis = c.axis, .tick = c.tick, .gates = static_cast<v1::Gates>(c.gates)};
+  if (c.gates == DRIVEBENCH_GATES_CURRENT) {
+    to.i_a_a = c.setpoint_a;
+    to.i_b_a = c.setpoint_b;
+    to.i_c_a = c.setpoint_c;
+    to.i_f_a = c.setpoint_f;
+  } else {
+    to.u_a_v = c.setpoint_a;
+    to.u_b_v = c.setpoint_b;
+    to.u_c_v = c.setpoint_c;
+    to.u_f_v = c.setpoint_f;
+  }
+  return to;
+}
+
+}  // namespace drivebench::sdk

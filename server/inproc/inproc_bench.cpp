@@ -1,0 +1,178 @@
+#include "server/inproc/inproc_bench.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "plant/parameters/parameters.hpp"
+#include "protocols/text.hpp"
+
+namespace drivebench {
+namespace {
+
+Command command_of(const drivebench_command& c) noexcept {
+  return {.answers = static_cast<Tick>(c.tick),
+          .phases = {
+              .gates = static_cast<Gates>(c.gates),
+              .setpoint = {.a = c.setpoint_a, .b = c.setpoint_b, .c = c.setpoint_c, .field = c.setpoint_f}}};
+}
+
+std::string on_axis(std::uint32_t axis) {
+  return " (axis " + std::to_string(axis) + ")";
+}
+
+BenchConfig in_lockstep(BenchConfig config) {
+  change_mode(config, RunMode::kLockstep);
+  return config;
+}
+
+}  // namespace
+
+InprocBench::InprocBench(const BenchConfig& config) : config_(in_lockstep(config)), bench_(config_.setup) {
+  schedule_events(config_, bench_);
+  start_ = bench_.save();
+  describe_bench();
+}
+
+int InprocBench::fail_with(Refused why, std::string field, std::string more) noexcept {
+  return fail(static_cast<int>(refusal_row(why).tcp), std::string(sentence_of(why)) + more, std::move(field));
+}
+
+int InprocBench::check_axis(std::uint32_t axis) noexcept {
+  if (axis < bench_.axis_count()) return DRIVEBENCH_OK;
+  return fail(DRIVEBENCH_UNKNOWN_AXIS,
+              "axis " + std::to_string(axis) + " does not exist; the bench has " +
+                  std::to_string(bench_.axis_count()),
+              "axis");
+}
+
+int InprocBench::submit(std::uint32_t axis, std::uint64_t at_tick, const JudgedRequest& judged,
+                        const char* field) noexcept {
+  if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
+    return fail(static_cast<int>(refused->code), refused->sentence, std::string(refused->field));
+  }
+  const Refused why = bench_.submit({.tick = static_cast<Tick>(at_tick),
+                                     .axis = axis,
+                                     .owner = kOwner,
+                                     .action = std::get<Action>(judged)});
+  return why == Refused::kNot ? DRIVEBENCH_OK : fail_with(why, field);
+}
+
+int InprocBench::lease(std::uint32_t axis, LeaseAction action) noexcept {
+  const int code = check_axis(axis);
+  return code == DRIVEBENCH_OK ? submit(axis, 0, Action(action), "axis") : code;
+}
+
+int InprocBench::clear(std::uint32_t axis) noexcept {
+  const int code = check_axis(axis);
+  return code == DRIVEBENCH_OK ? submit(axis, 0, Action(ClearFaults{}), "axis") : code;
+}
+
+int InprocBench::check_commands(std::span<const drivebench_command> commands) noexcept {
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const drivebench_command& c = commands[i];
+    if (const int code = check_axis(c.axis); code != DRIVEBENCH_OK) return code;
+    const auto same = [&c](const drivebench_command& other) { return other.axis == c.axis; };
+    if (std::ranges::any_of(commands.first(i), same)) {
+      return fail(DRIVEBENCH_OUT_OF_RANGE, "two commands for one axis", "commands.axis");
+    }
+    if (c.gates > DRIVEBENCH_GATES_CURRENT) {
+      return fail(DRIVEBENCH_OUT_OF_RANGE, "gates is " + std::to_string(c.gates) + " but must be 0 to 3",
+                  "commands.gates");
+    }
+  }
+  // A server would wait for the other controllers; here there is none.
+  for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis) {
+    const bool waits = bench_.owner(axis) != 0 && !bench_.is_latched(axis) &&
+                       std::ranges::none_of(commands, [axis](const auto& c) { return c.axis == axis; });
+    if (waits) {
+      return fail(DRIVEBENCH_BUSY,
+                  "the tick also waits for a command of axis " + std::to_string(axis) +
+                      ", whose lease this program holds: give all commands in one step",
+                  "commands");
+    }
+  }
+  return DRIVEBENCH_OK;
+}
+
+int InprocBench::step(std::span<const drivebench_command> commands) noexcept {
+  if (const int code = check_commands(commands); code != DRIVEBENCH_OK) return code;
+  if (commands.size() > 1) {  // all or none
+    for (const drivebench_command& c : commands) {
+      const Refused why = judge(command_of(c), kOwner, bench_.command_view(c.axis));
+      if (why == Refused::kNot) continue;
+      bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
+      return fail_with(why, why == Refused::kWrongDrive ? "commands.gates" : "commands", on_axis(c.axis));
+    }
+  }
+  for (const drivebench_command& c : commands) {
+    const Refused why =
+        bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
+    if (why == Refused::kNot) continue;
+    return fail_with(why, why == Refused::kWrongDrive ? "commands.gates" : "commands", on_axis(c.axis));
+  }
+  bench_.step();
+  return DRIVEBENCH_OK;
+}
+
+int InprocBench::check_owner(std::uint32_t axis) noexcept {
+  if (const int code = check_axis(axis); code != DRIVEBENCH_OK) return code;
+  return bench_.owner(axis) == kOwner ? DRIVEBENCH_OK : fail_with(Refused::kNotOwner, "axis");
+}
+
+ChangeView InprocBench::change_view(std::uint32_t axis) const noexcept {
+  const std::optional<std::size_t> partner = config_.setup.axes[axis].shares_shaft_with;
+  return {.parameters = bench_.axis(axis).parameters(),
+          .shaft_of = partner ? std::string_view(config_.axes[*partner].name) : std::string_view(),
+          .tick = bench_.tick()};
+}
+
+int InprocBench::get(std::uint32_t axis, const char* name, double& value) noexcept {
+  if (const int code = check_axis(axis); code != DRIVEBENCH_OK) return code;
+  const AxisParameters& p = bench_.axis(axis).parameters();
+  const Parameter* const row = find_parameter(p, name);
+  if (row == nullptr) {
+    return fail(DRIVEBENCH_UNKNOWN_PARAMETER, "there is no parameter '" + printable(name) + "'", "names");
+  }
+  value = row->get(p);
+  return DRIVEBENCH_OK;
+}
+
+int InprocBench::set(std::uint32_t axis, const char* name, double value, std::uint64_t ramp_ticks,
+                     std::uint64_t at_tick) noexcept {
+  if (const int code = check_owner(axis); code != DRIVEBENCH_OK) return code;
+  return submit(axis, at_tick, judge_parameter(change_view(axis), name, value, ramp_ticks, at_tick), "name");
+}
+
+int InprocBench::set_load(std::uint32_t axis, double load_nm, std::uint64_t ramp_ticks,
+                          std::uint64_t at_tick) noexcept {
+  if (const int code = check_owner(axis); code != DRIVEBENCH_OK) return code;
+  return submit(axis, at_tick, judge_load(load_nm, ramp_ticks, at_tick), "at_tick");
+}
+
+int InprocBench::inject(std::uint32_t axis, const char* name, double value, std::uint64_t at_tick) noexcept {
+  if (const int code = check_owner(axis); code != DRIVEBENCH_OK) return code;
+  return submit(axis, at_tick, judge_fault(name, value, at_tick), "at_tick");
+}
+
+int InprocBench::bump(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick) noexcept {
+  if (const int code = check_owner(axis); code != DRIVEBENCH_OK) return code;
+  return submit(axis, at_tick, judge_bump(impulse_nms, at_tick), "at_tick");
+}
+
+int InprocBench::state_hash(std::uint64_t& hash) noexcept {
+  hash = bench_.state_hash();
+  return DRIVEBENCH_OK;
+}
+
+int InprocBench::save(std::vector<std::byte>& state) noexcept {
+  state = bench_.save();
+  return DRIVEBENCH_OK;
+}
+
+int InprocBench::restore(std::span<const std::byte> state) noexcept {
+  if (bench_.restore(state)) return DRIVEBENCH_OK;
+  return fail(DRIVEBENCH_MALFORMED,
+              "these " + std::to_string(state.size()) + " bytes are no state of this bench", "state");
+}
+
+}  // namespace drivebench
