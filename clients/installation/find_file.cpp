@@ -52,6 +52,7 @@ fs::path find_file(std::string_view kind, std::string_view what, std::string_vie
     folders.push_back(above / "configs");
     folders.push_back(above / "share" / "drivebench");
   }
+  folders.emplace_back(DRIVEBENCH_DATA_FOLDER);  // for a program elsewhere that holds the static library
 
   std::vector<std::string> looked_at = {printable(choice)};
   std::vector<std::string> there;

@@ -7,7 +7,7 @@ namespace drivebench::command {
 namespace fs = std::filesystem;
 namespace {
 
-fs::path find(std::string_view kind, std::string_view what, std::string_view choice) {
+fs::path find_or_refuse(std::string_view kind, std::string_view what, std::string_view choice) {
   try {
     return installation::find_file(kind, what, choice);
   } catch (const installation::NotFound& not_found) {
@@ -28,15 +28,15 @@ fs::path server_executable() {
 }
 
 fs::path find_config(std::string_view choice) {
-  return find("benches", "bench file", choice);
+  return find_or_refuse("benches", "bench file", choice);
 }
 
 fs::path find_experiment_file(std::string_view choice) {
-  return find("experiments", "experiment file", choice);
+  return find_or_refuse("experiments", "experiment file", choice);
 }
 
 fs::path find_motor_file(std::string_view choice) {
-  return find("motors", "motor file", choice);
+  return find_or_refuse("motors", "motor file", choice);
 }
 
 }  // namespace drivebench::command

@@ -1,0 +1,96 @@
+"""One C program over every way to a bench: the same lines, whichever it takes."""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+from free_port import free_udp_port  # noqa: E402
+from wire_client import BENCHES, PATIENCE_S, SERVER, Server  # noqa: E402
+from wire_test import PATIENT_TEXT  # noqa: E402
+
+EXERCISE = SERVER.with_name("sdk_exercise")
+MOTORS = str(BENCHES.parent / "motors")
+
+
+def exercise(*arguments, code=0):
+    done = subprocess.run([EXERCISE, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    if done.returncode != code:
+        raise AssertionError(f"exercise {arguments} ended with {done.returncode}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+
+class Sdk(unittest.TestCase):
+    def bench_file(self, folder):
+        file = pathlib.Path(folder) / "bench.toml"
+        file.write_text(PATIENT_TEXT, encoding="utf-8")
+        return file
+
+    # Catches: a request, a refusal, a sentence or a bit that differs between the bench in process and the server.
+    def test_in_process_tcp_and_unix_say_the_same(self):
+        with tempfile.TemporaryDirectory() as folder:
+            said = [exercise(f"inproc:{self.bench_file(folder)}")]
+            for way in ("tcp", "unix"):
+                path = f"{folder}/{way}.sock"
+                with Server("--unix", path, text=PATIENT_TEXT) as server:
+                    said.append(exercise(f"unix:{path}" if way == "unix" else "tcp:%s:%d" % server.address))
+        self.assertIn("hash ", said[0])
+        self.assertIn("tick 900: encoder", said[0])
+        for other in said[1:]:
+            self.assertEqual(said[0].splitlines(), other.splitlines())
+
+    # Catches: a set-point that a bus rounds although it need not, a tick that it costs, an axis with another number.
+    def test_field_buses_move_the_motor_as_the_bench_in_process_does(self):
+        port = free_udp_port()
+        can = (BENCHES / "servo-can.toml").read_text(encoding="utf-8").replace("../motors", MOTORS)
+        can = can.replace("port = 43113", f"port = {port}").replace("fd = false", "fd = true")
+        modbus = (BENCHES / "servo-modbus.toml").read_text(encoding="utf-8").replace("../motors", MOTORS)
+        modbus = modbus.replace("port = 1502", "port = 0")
+        here = exercise("inproc:servo-can", "bus").splitlines()
+        with Server(text=can):
+            over_can = exercise(f"can:udp_multicast:239.74.163.2:{port}?fd={int('fd = true' in can)}", "bus").splitlines()
+        with Server(text=modbus) as server:
+            over_modbus = exercise(f"modbus:{server.ready['modbus']}", "bus").splitlines()
+        moved = [line for line in here if line.startswith("tick 900")]
+        self.assertEqual(len(moved), 1, here)
+        self.assertNotIn("encoder 0,", moved[0])
+        for other in (over_can, over_modbus):
+            self.assertEqual([line for line in other if line.startswith("tick 900")], moved, other)
+            self.assertIn("acquire another axis: 4 'axis 3 does not exist; this address leads to one axis, number 0' "
+                          "field 'axis'", other)
+
+    # Catches: a library that hangs on, crashes with, or keeps silent about a bench that is not there.
+    def test_what_cannot_be_opened_says_why(self):
+        for address, why in (("inproc:servoo", 'did you mean "servo"'), ("inproc:", "no bench file ''"),
+                             ("tcp:127.0.0.1:1", "Connection refused"), ("unix:/nowhere/socket", "No such file"),
+                             ("tcp:127.0.0.1:99999", "99999"), ("can:nothing:vcan0", "nothing"),
+                             ("modbus:127.0.0.1:1", "Connection refused"), ("", "")):
+            self.assertIn(why, exercise(address, code=1), address)
+
+    # Catches: a bench file with a wrong value that is opened all the same, or refused without naming file and key.
+    def test_a_wrong_bench_file_is_refused_as_the_server_does(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = self.bench_file(folder)
+            file.write_text(PATIENT_TEXT.replace("watchdog_ticks = 400000", "watchdog_ticks = -1"), encoding="utf-8")
+            said = exercise(f"inproc:{file}", code=1)
+            self.assertIn("bench.toml", said)
+            self.assertIn("watchdog_ticks", said)
+
+    # Catches: a call that waits for ever when the server dies, or that goes on as if nothing were.
+    def test_a_server_that_dies_is_a_lost_link(self):
+        with Server(text=PATIENT_TEXT) as server:
+            holder = subprocess.Popen([EXERCISE, "tcp:%s:%d" % server.address, "die"], stdin=subprocess.PIPE,
+                                      stdout=subprocess.PIPE, text=True)
+            self.assertEqual(holder.stdout.readline(), "ready\n")
+            server.process.kill()
+            server.process.wait()
+            said, _ = holder.communicate("\n", timeout=PATIENCE_S)
+        self.assertRegex(said, r"step: -3 'tcp:127\.0\.0\.1:\d+ closed the connection.*'")
+        self.assertRegex(said, r"again: -3 'the link to .* is closed'")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
