@@ -52,7 +52,7 @@ std::unique_ptr<abi::Backend> open_any(std::string_view address, const link::Lin
   }
   if (link::is_modbus_address(address)) {
     return std::make_unique<BusBackend>(
-        std::make_unique<link::ModbusLink>(link::parse_modbus_address(address)));
+        std::make_unique<link::ModbusLink>(link::parse_modbus_address(address), options.deadline));
   }
   return std::make_unique<LinkBackend>(address, options);
 }

@@ -20,6 +20,8 @@ std::vector<Row> measure_machines(const Plan& plan);
 std::vector<Row> measure_free_mode(const Plan& plan);
 /// A lockstep exchange against a blocking ping-pong of the same sizes.
 std::vector<Row> measure_exchange(const Plan& plan);
+/// A step of the bench in process behind the C ABI against the same step without it.
+std::vector<Row> measure_sdk(const Plan& plan);
 /// The pacers against a bare clock_nanosleep loop; the server in real time.
 std::vector<Row> measure_realtime(const Plan& plan);
 /// Ten axes at 20 kHz into the recorder.
