@@ -6,4 +6,8 @@ std::string_view build_id() noexcept {
   return DRIVEBENCH_BUILD_ID;
 }
 
+std::string_view project_version() noexcept {
+  return DRIVEBENCH_PROJECT_VERSION;
+}
+
 }  // namespace drivebench

@@ -307,9 +307,10 @@ class Serving(CommandTest):
             self.assertFalse(bench.verdict["realtime_valid"])
 
     def test_version_is_the_build_of_hello(self):
-        """Catches: a bug report about another build."""
-        version = self.drivebench_server("--version").stdout.strip()
-        self.assertEqual(self.json_of("describe", link=link_of(self.server()))["build_id"], version)
+        """Catches: a bug report about another build, and a program without a version."""
+        build = self.json_of("describe", link=link_of(self.server()))["build_id"]
+        for program, ask in (("drivebench-server", self.drivebench_server), ("drivebench", self.drivebench)):
+            self.assertRegex(ask("--version").stdout, rf"^{program} \d+\.\d+\.\d+, build {build}\n$")
 
 
 class Simulating(CommandTest):

@@ -1,0 +1,9 @@
+#include "clients/command/common/version.hpp"
+
+namespace drivebench::command {
+
+const char* version_line() noexcept {
+  return "drivebench " DRIVEBENCH_PROJECT_VERSION ", build " DRIVEBENCH_BUILD_ID;
+}
+
+}  // namespace drivebench::command
