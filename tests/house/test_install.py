@@ -39,7 +39,7 @@ class Install(unittest.TestCase):
 
     def flags(self, *options):
         pc = self.libraries / "pkgconfig"
-        return run("env", f"PKG_CONFIG_PATH={pc}", "pkg-config", f"--define-variable=prefix={self.prefix}", *options, "drivebench",
+        return run("env", f"PKG_CONFIG_PATH={pc}", "pkg-config", *options, "drivebench",
                    cwd=self.folder).split()
 
     # Catches: a header that only C++ or only the checkout can read, flags that find no library, a bench that is found

@@ -1,0 +1,125 @@
+"""The Debian packages in a bare Debian 12: installed, used, upgraded with their data, removed without leftovers."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "helpers"))
+from wire_client import PATIENCE_S, REPOSITORY, SERVER  # noqa: E402
+
+BUILD = SERVER.parent.parent
+SKIPPED = 77
+SPINS = "147.368 rad/s at 0.842 A"
+# What a package manager and a root without services change by themselves.
+OWN_BUSINESS = re.compile(r"\./(var/(lib/(apt|dpkg|systemd|pam)|log|cache|mail|spool)|proc|sys|dev|run|tmp|root|packages|etc/(ld\.so|passwd|"
+                          r"group|shadow|gshadow|subuid|subgid|\.pwd))")
+
+
+def run(*command, code=0, seconds=10 * PATIENCE_S, **options):
+    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          timeout=seconds, check=False, **options)
+    if done.returncode != code:
+        raise AssertionError(f"{' '.join(map(str, command))} ended with {done.returncode}:\n{done.stdout[-3000:]}")
+    return done.stdout
+
+
+def mirror():
+    """Where this machine gets Debian 12 from, or None."""
+    try:
+        listed = run("apt-get", "indextargets", "--format", "$(RELEASE) $(REPO_URI)").splitlines()
+    except (AssertionError, FileNotFoundError):
+        return None
+    return next((line.split()[1] for line in listed if line.startswith("bookworm ")), None)
+
+
+class Packages(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-packages-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        cls.root = cls.folder / "debian"
+        for release in ("0", "1"):  # the build before, and this one
+            run("cpack", "-G", "DEB", "-B", cls.folder / release, "-D", f"CPACK_DEBIAN_PACKAGE_RELEASE={release}", "-D",
+                f"CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS=libdrivebench1 (= 0.1.0-{release})", cwd=BUILD)
+        run("debootstrap", "--variant=minbase", "bookworm", cls.root, mirror(), seconds=600)
+        shutil.copy("/etc/resolv.conf", cls.root / "etc/resolv.conf")
+        for release in ("0", "1"):
+            shutil.copytree(cls.folder / release, cls.root / "packages" / release, ignore=shutil.ignore_patterns("_CPack*"))
+        cls.inside("apt-get", "update")
+
+    @classmethod
+    def inside(cls, *command, code=0):
+        """Runs a command in the bare Debian, with a /proc of its own that goes with the command."""
+        script = 'mount -t proc proc "$0/proc" && exec chroot "$0" sh -c "cd /root && exec \\"\\$@\\"" sh "$@"'
+        environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive", "HOME": "/root",
+                       **{name: value for name, value in os.environ.items() if name.endswith("_proxy")}}
+        return run("unshare", "--mount", "--pid", "--fork", "sh", "-c", script, cls.root, *command, code=code, env=environment)
+
+    def files(self):
+        found = run("find", ".", "-xdev", cwd=self.root).splitlines()
+        return {file for file in found if not OWN_BUSINESS.match(file)}
+
+    def install(self, release):
+        packages = [f"/packages/{release}/{file.name}" for file in (self.root / "packages" / release).glob("*.deb")]
+        self.assertEqual(len(packages), 3)
+        return self.inside("apt-get", "install", "-y", "--no-install-recommends", "-o", "Dpkg::Options::=--force-confold", *packages)
+
+    # Catches: a library, a file or a rule that a package forgets, a configuration or a recording lost by an upgrade, what
+    # stays behind after a purge, a program that works only on the machine that built it.
+    def test_a_bare_debian_installs_runs_upgrades_and_removes_them(self):
+        self.inside("apt-get", "install", "-y", "--no-install-recommends", "adduser")
+        before = self.files()
+        self.install("0")
+        needed = self.inside("apt-mark", "showauto").split()
+
+        said = self.inside("drivebench", "demo", "--json")
+        self.assertIn('"exact":true', said.replace(" ", ""))
+        self.assertIn("/etc/drivebench/bench.toml: ", self.inside("drivebench-server", "--check-config", "/etc/drivebench/bench.toml"))
+        self.assertRegex(self.inside("drivebench", "--version"), r"drivebench 0\.1\.0, build ")
+        run("cc", REPOSITORY / "clients/examples/blink.c", "-o", self.root / "root/blink", f"-I{self.root}/usr/include",
+            f"-L{self.root}/usr/lib", "-ldrivebench", f"-Wl,-rpath-link,{self.root}/usr/lib")
+        self.assertIn(SPINS, self.inside("/root/blink"))
+        self.assertIn("drivebench:", (self.root / "etc/passwd").read_text(encoding="utf-8"))
+        unit = (self.root / "usr/lib/systemd/system/drivebench-server.service").read_text(encoding="utf-8")
+        self.assertIn("ExecStart=/usr/bin/drivebench-server /etc/drivebench/bench.toml", unit)
+
+        bench = self.root / "etc/drivebench/bench.toml"
+        bench.write_text(bench.read_text(encoding="utf-8") + "\n# ours\n", encoding="utf-8")
+        work = self.root / "var/lib/drivebench"
+        work.mkdir(parents=True, exist_ok=True)
+        (work / "run.mcap").write_bytes(b"a day of work")
+        self.install("1")
+        self.assertEqual(self.inside("dpkg-query", "-W", "-f", "${Version}", "drivebench"), "0.1.0-1")
+        self.assertIn("# ours", bench.read_text(encoding="utf-8"))
+        self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
+        self.assertIn(SPINS, self.inside("/root/blink"))
+
+        self.inside("dpkg", "--purge", "drivebench", "libdrivebench-dev", "libdrivebench1")
+        self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
+        shutil.rmtree(work)
+        self.inside("apt-get", "purge", "-y", *needed)
+        self.assertEqual(sorted(self.files() - before), [])
+        self.assertNotIn("drivebench", (self.root / "etc/passwd").read_text(encoding="utf-8"))
+
+
+def reason_to_skip():
+    if os.geteuid() != 0:
+        return "a bare Debian needs root"
+    if mirror() is None:
+        return "apt names no mirror of Debian 12"
+    if shutil.which("debootstrap") is None or shutil.which("dpkg-shlibdeps") is None:
+        return "debootstrap or dpkg-dev is missing"
+    if subprocess.run(["unshare", "--mount", "--pid", "--fork", "true"], check=False).returncode != 0:
+        return "this machine gives no namespaces"
+    return None
+
+
+if __name__ == "__main__":
+    if reason := reason_to_skip():
+        print("skipped:", reason)
+        sys.exit(SKIPPED)
+    unittest.main(verbosity=2)
