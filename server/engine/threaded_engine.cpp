@@ -155,12 +155,13 @@ class ThreadedEngine final : public Engine {
 
   /// Runs one tick with its requests, commands and answers.
   void run_tick() noexcept {
-    clock_.wait_for_tick(bench_);
+    clock_.wait_for_tick();
     {
       const TickMark mark;
       watch_.beat();
       take_requests();
       if (watch_.take_abandoned()) abandon();
+      clock_.report_lateness(bench_);
       send_parameters();
     }
     if (recorder_ && config_.mode == RunMode::kFree) recorder_->wait_for_room();

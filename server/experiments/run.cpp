@@ -46,9 +46,10 @@ class ExperimentRun {
       bench_.submit({.tick = 0, .axis = plan_.axis, .owner = kExperimenter, .action = LeaseAction::kAcquire});
     }
     while (keep_row() && may_go_on()) {
-      clock_.wait_for_tick(bench_);
+      clock_.wait_for_tick();
       submit_events();
       if (plan_.has_commands()) submit_command();
+      clock_.report_lateness(bench_);
       recorder_.wait_for_room();
       bench_.step();
     }

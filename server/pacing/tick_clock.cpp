@@ -2,15 +2,19 @@
 
 namespace drivebench {
 
-void TickClock::wait_for_tick(Bench& bench) noexcept {
-  const std::int64_t lateness_ns = pacer_->wait();
+void TickClock::wait_for_tick() noexcept {
+  lateness_ns_ = pacer_->wait();
   if (!is_realtime_) return;
-  lateness_.add(lateness_ns);
+  lateness_.add(lateness_ns_);
   worst_ns_.store(lateness_.worst_ns(), std::memory_order_relaxed);
-  if (lateness_ns > max_lateness_ns_) {
+}
+
+void TickClock::report_lateness(Bench& bench) noexcept {
+  if (!is_realtime_) return;
+  if (lateness_ns_ > max_lateness_ns_) {
     bench.submit({.tick = bench.tick(), .axis = 0, .owner = 0, .action = Overrun{}});
     pacer_->resynchronise();
-  } else if (lateness_ns >= period_ns_) {
+  } else if (lateness_ns_ >= period_ns_) {
     bench.submit({.tick = bench.tick(), .axis = 0, .owner = 0, .action = LateTick{}});
   }
 }

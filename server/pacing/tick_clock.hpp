@@ -23,7 +23,10 @@ class TickClock {
         pacer_(std::move(pacer)) {}
 
   /// Returns when the next tick of the bench is due.
-  void wait_for_tick(Bench& bench) noexcept;
+  void wait_for_tick() noexcept;
+  /// Tells the bench how late that tick is, after the requests that had come before: one of them that clears
+  /// faults knew nothing of this one, which would otherwise be gone before a sample shows it.
+  void report_lateness(Bench& bench) noexcept;
 
   /// The latenesses of all ticks so far; empty outside real time. For the tick thread only.
   const LatenessHistogram& lateness() const noexcept { return lateness_; }
@@ -35,6 +38,7 @@ class TickClock {
   std::int64_t period_ns_;
   std::int64_t max_lateness_ns_;
   std::unique_ptr<Pacer> pacer_;
+  std::int64_t lateness_ns_ = 0;  ///< of the tick that is due
   LatenessHistogram lateness_;
   std::atomic<std::int64_t> worst_ns_{0};
 };

@@ -312,6 +312,44 @@ TEST(ThreadedEngine, OS_03_LatenessBeyondTheLimitIsALatchedFault) {
   EXPECT_FALSE(verdict.realtime_valid());
 }
 
+/// The third tick is too late.
+class LatePacer final : public Pacer {
+ public:
+  std::int64_t wait() noexcept override { return ++ticks_ == 3 ? 1'000'000'000 : 0; }
+  void resynchronise() noexcept override {}
+
+ private:
+  int ticks_ = 0;
+};
+
+// Catches: a clear that waits for the late tick and takes its fault away before a sample has shown it, so
+// that the axis becomes idle without a reason.
+TEST(ThreadedEngine, OS_03_AClearBeforeALateTickDoesNotHideItsFault) {
+  BenchConfig config = servo_bench();
+  config.mode = RunMode::kRealtime;
+  asio::io_context io(1);
+  SteppedEngine stepped = make_stepped_engine(config, nullptr, io, std::make_unique<LatePacer>());
+  Engine& engine = *stepped.engine;
+  const auto tick = [&] {
+    stepped.tick();
+    io.restart();
+    io.poll();
+  };
+  const auto ask = [&](const Action& action) {
+    engine.request({.tick = 0, .axis = 0, .owner = 1, .action = action}, [](Refused, Tick) {});
+  };
+  ask(LeaseAction::kAcquire);
+  tick();
+  tick();
+  ask(ClearFaults{});
+  tick();
+  EXPECT_EQ(engine.newest(0).faults, kBenchOverrun);
+  ask(ClearFaults{});
+  tick();
+  EXPECT_EQ(engine.newest(0).faults, 0u) << "a fault that was shown can be cleared";
+  engine.stop();
+}
+
 // Catches: a thread that outlives an engine which was never stopped.
 TEST(ThreadedEngine, MayBeDestroyedWhileItRuns) {
   asio::io_context io(1);
