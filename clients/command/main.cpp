@@ -3,6 +3,7 @@
 #include "clients/command/common/command_line.hpp"
 #include "clients/command/control/control_line.hpp"
 #include "clients/command/convert/convert_line.hpp"
+#include "clients/command/datasheet/datasheet_line.hpp"
 #include "clients/command/demo/demo_line.hpp"
 #include "clients/command/experiment/experiment_line.hpp"
 #include "clients/command/identify/identify_line.hpp"
@@ -20,6 +21,7 @@ int main(int argc, char** argv) {
   add_recording_commands(line);
   add_motor_commands(line);
   add_convert_commands(line);
+  add_datasheet_commands(line);
   add_can_commands(line);
   return line.run(argc, argv);
 }

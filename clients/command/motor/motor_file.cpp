@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
@@ -58,35 +59,60 @@ struct Table {
   }
 };
 
-bool star_of(const ConfigNode* machine) {
+bool star_of(const ConfigNode* machine, bool otherwise) {
   const ConfigNode* const star = child_of(machine, "star");
-  if (star == nullptr) return false;
+  if (star == nullptr) return otherwise;
   if (const auto* const yes = std::get_if<bool>(&star->scalar)) return *yes;
   return number_of(*star).value_or(0.0) != 0.0;
 }
 
-}  // namespace
+/// A motor file that has a machine.
+struct MotorDocument {
+  std::string file;
+  ConfigNode root;
+  const ConfigNode& machine() const { return *child_of(&root, "machine"); }
+  std::string name(const std::string& choice) const {
+    return printable(text_or(child_of(&root, "name"), choice));
+  }
+  std::string kind() const { return text_or(child_of(&machine(), "kind"), "induction"); }
+};
 
-InductionMotorFile read_induction_motor(const std::string& choice) {
+MotorDocument read_document(const std::string& choice) {
   const std::string file = find_motor_file(choice).string();
   const FileText text = read_file(file, kMaxConfigBytes);
   if (!text.why_not.empty()) throw UsageError(fmt::format("{}: the file {}", file, text.why_not));
   ProblemList problems;
-  const std::optional<ConfigNode> document = parse_document(text.text, file, problems);
+  std::optional<ConfigNode> document = parse_document(text.text, file, problems);
   problems.throw_if_any();
-
-  const ConfigNode* const machine = child_of(&*document, "machine");
-  if (machine == nullptr)
+  if (child_of(&*document, "machine") == nullptr)
     throw UsageError(fmt::format("{}: has no [machine]; a file of configs/motors has one", file));
-  const std::string kind = text_or(child_of(machine, "kind"), "induction");
-  if (kind != "induction")
+  return {.file = file, .root = *std::move(document)};
+}
+
+}  // namespace
+
+MotorFile read_motor_file(const std::string& choice) {
+  const MotorDocument document = read_document(choice);
+  const std::string kind = document.kind();
+  return {.path = document.file,
+          .name = document.name(choice),
+          .kind = kind,
+          .star = star_of(&document.machine(), kind == "bldc")};
+}
+
+InductionMotorFile read_induction_motor(const std::string& choice) {
+  const MotorDocument document = read_document(choice);
+  const std::string& file = document.file;
+  const ConfigNode* const machine = &document.machine();
+  if (const std::string kind = document.kind(); kind != "induction")
     throw UsageError(fmt::format("{}: machine.kind is {}; only induction machines have this circuit", file,
                                  printable(kind)));
+  ProblemList problems;
   const Table values{machine, "machine", file, problems};
-  const ConfigNode* const mechanics = child_of(&*document, "mechanics");
+  const ConfigNode* const mechanics = child_of(&document.root, "mechanics");
   const Table shaft{mechanics, "mechanics", file, problems};
   InductionMotorFile found = {
-      .name = printable(text_or(child_of(&*document, "name"), choice)),
+      .name = document.name(choice),
       .motor = {.machine = {.pole_pairs = values.positive("pole_pairs"),
                             .mutual_inductance_h = values.positive("mutual_inductance_h"),
                             .rotor_resistance_ohm = values.positive("rotor_resistance_ohm"),
@@ -95,7 +121,7 @@ InductionMotorFile read_induction_motor(const std::string& choice) {
                             .inertia_kgm2 = shaft.not_negative("inertia_kgm2", 0.0)},
                 .stator_resistance_ohm = values.positive("stator_resistance_ohm"),
                 .stator_inductance_h = values.positive("stator_inductance_h")},
-      .star = star_of(machine)};
+      .star = star_of(machine, false)};
   problems.throw_if_any();
   if (!(found.motor.leakage() > 0.0))
     throw UsageError(
