@@ -5,6 +5,7 @@
 #include "clients/command/convert/convert_line.hpp"
 #include "clients/command/datasheet/datasheet_line.hpp"
 #include "clients/command/demo/demo_line.hpp"
+#include "clients/command/doctor/doctor_line.hpp"
 #include "clients/command/experiment/experiment_line.hpp"
 #include "clients/command/identify/identify_line.hpp"
 #include "clients/command/motor/motor_line.hpp"
@@ -23,5 +24,6 @@ int main(int argc, char** argv) {
   add_convert_commands(line);
   add_datasheet_commands(line);
   add_can_commands(line);
+  add_doctor_command(line);
   return line.run(argc, argv);
 }

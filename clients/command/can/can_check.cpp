@@ -28,11 +28,6 @@ std::string while_down(const CanInterface& interface, std::string_view change) {
                      change);
 }
 
-std::string make_virtual(std::string_view name) {
-  return fmt::format(
-      "modprobe vcan; ip link add dev {0} type vcan; ip link set {0} mtu 72; ip link set {0} up", name);
-}
-
 /// Half of the bit after the sample point, the default of newer kernels.
 std::uint32_t good_sjw(const CanBitTiming& timing) {
   const double after = timing.quanta * (1.0 - timing.sample_point);
@@ -125,6 +120,22 @@ void print(const std::string& interface, const std::vector<CanFinding>& findings
 
 }  // namespace
 
+std::string make_virtual_can(std::string_view name) {
+  return fmt::format(
+      "modprobe vcan; ip link add dev {0} type vcan; ip link set {0} mtu 72; ip link set {0} up", name);
+}
+
+std::string can_summary(const CanInterface& interface) {
+  std::string text =
+      fmt::format("{}, queue of {} frames, {}", interface.up ? "up" : "down", interface.queue_length,
+                  interface.mtu >= kMtuFd ? "CAN FD" : "classic frames");
+  if (!interface.controller) return text;
+  for (const auto& timing : {interface.controller->timing, interface.controller->data_timing}) {
+    if (timing) text += fmt::format(", {} bit/s", timing->bit_rate);
+  }
+  return text;
+}
+
 std::vector<CanFinding> can_findings(const CanInterface& interface, bool classic) {
   std::vector<CanFinding> found;
   const bool unset = interface.controller && !interface.controller->timing;
@@ -152,7 +163,7 @@ int run_can_check(const CanCheckOptions& options) {
   if (!interface) {
     print(name,
           {{true, fmt::format("there is no interface {}", name),
-            "connect the adapter and load its driver; a virtual one: " + make_virtual(name)}},
+            "connect the adapter and load its driver; a virtual one: " + make_virtual_can(name)}},
           options.json);
     return kExitNoInterface;
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/command/can/can_netlink.hpp"
@@ -24,6 +25,11 @@ struct CanFinding {
   std::string what;
   std::string cure;  ///< shell lines or another action; may be empty for a note
 };
+
+/// The lines that make a virtual interface.
+std::string make_virtual_can(std::string_view name);
+/// State, bit rates and queue in some words.
+std::string can_summary(const CanInterface& interface);
 
 std::vector<CanFinding> can_findings(const CanInterface& interface, bool classic);
 

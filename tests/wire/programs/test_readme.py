@@ -33,6 +33,8 @@ NOT_RUN = {
     "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
     "drivebench can check can0       # the problems of bit timing, state and queue, each with the line that cures it":
         "needs an adapter; can_check_test and test_socketcan.py try it",
+    "drivebench doctor                                   # whether this machine is fit for real time and CAN, and what mends it":
+        "its exit code is this machine's; test_doctor_command.py tries it",
 }
 
 
@@ -201,7 +203,7 @@ class Readmes(unittest.TestCase):
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "control", "plot", "replay",
                           "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
                           "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
-                          "convert winding", "convert frame", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench")
+                          "convert winding", "convert frame", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor")
         names = re.findall(r"^  ([a-z-]+) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
                                                           check=True).stdout, re.M)
         self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))
