@@ -36,8 +36,10 @@ struct Measured {
   }
 
   MotorInput input(std::size_t sample, double part) const noexcept {
+    const double electrical_rad = pole_pairs * value_at(shaft.angle, static_cast<double>(sample) + part);
     return {.u = voltages.at(sample, part),
-            .electrical_rad = pole_pairs * value_at(shaft.angle, static_cast<double>(sample) + part)};
+            .electrical_rad = electrical_rad,
+            .direction = std::polar(1.0, electrical_rad)};
   }
   std::array<double, 3> currents(std::size_t sample) const noexcept {
     std::array<double, 3> values{};

@@ -23,6 +23,7 @@ struct MotorInput {
   std::array<double, 3> u{};    ///< [V] a star: against any common point; a two-phase machine or an armature
                                 ///< uses the first two or one
   double electrical_rad = 0.0;  ///< the measured angle times the pole pairs
+  std::complex<double> direction = 1.0;  ///< e^(j electrical_rad), where Model::kTurns
 };
 
 /// A state that the signals show is known to this part of the largest current and speed of the record.
@@ -39,10 +40,17 @@ inline std::array<double, 3> phases_of(std::complex<double> x, bool three_phase)
   return three_phases_of({.a = x.real(), .b = x.imag()});
 }
 
+/// x as seen from a direction of length 1: x conj(direction).
+inline std::complex<double> towards(std::complex<double> direction, std::complex<double> x) noexcept {
+  return {x.real() * direction.real() + x.imag() * direction.imag(),
+          x.imag() * direction.real() - x.real() * direction.imag()};
+}
+
 /// The equations of DcMachineModel.
 struct DcModel {
   using State = std::array<double, 2>;  // i, w
   static constexpr std::size_t kSpeed = 1;
+  static constexpr bool kTurns = false;  ///< the model needs the direction of its rotor
   DcMachineModel m;
 
   DcModel(const Result& r, const Settings&)
@@ -76,7 +84,9 @@ struct DcModel {
 struct InductionModel {
   using State = std::array<double, 5>;  // i_alpha, i_beta, phi_alpha, phi_beta, w
   static constexpr std::size_t kSpeed = 4;
+  static constexpr bool kTurns = false;
   double transient_h, gamma, rotor_rate, magnetising_h, inertia, friction = 0.0, load = 0.0, pole_pairs;
+  double per_transient_h, per_inertia;
   bool three_phase;
 
   InductionModel(const Result& r, const Settings& e)
@@ -86,19 +96,23 @@ struct InductionModel {
         magnetising_h((1.0 - r.at("sigma")) * r.at("L_S")),
         inertia(r.at("J")),
         pole_pairs(e.pole_pairs),
+        per_transient_h(1.0 / transient_h),
+        per_inertia(1.0 / inertia),
         three_phase(e.three_phase) {
     if (const Estimate* f = r.find("f")) friction = f->value;
     if (const Estimate* tau = r.find("tau_L")) load = tau->value;
   }
   double fastest_rate(double speed) const noexcept { return gamma + pole_pairs * std::abs(speed); }
   State slope(const State& x, const MotorInput& in) const noexcept {
-    const std::complex<double> i(x[0], x[1]);
-    const std::complex<double> phi(x[2], x[3]);
-    const std::complex<double> decay = std::complex<double>(rotor_rate, -pole_pairs * x[4]) * phi;
-    const std::complex<double> di = (two_phase_of(in.u, three_phase) + decay) / transient_h - gamma * i;
-    const std::complex<double> dphi = magnetising_h * rotor_rate * i - decay;
+    const std::complex<double> u = two_phase_of(in.u, three_phase);
+    const double omega_e = pole_pairs * x[4];
+    const double decay_a = rotor_rate * x[2] + omega_e * x[3];
+    const double decay_b = rotor_rate * x[3] - omega_e * x[2];
     const double torque = pole_pairs * (x[2] * x[1] - x[3] * x[0]);
-    return {di.real(), di.imag(), dphi.real(), dphi.imag(), (torque - friction * x[4] - load) / inertia};
+    return {(u.real() + decay_a) * per_transient_h - gamma * x[0],
+            (u.imag() + decay_b) * per_transient_h - gamma * x[1],
+            magnetising_h * rotor_rate * x[0] - decay_a, magnetising_h * rotor_rate * x[1] - decay_b,
+            (torque - friction * x[4] - load) * per_inertia};
   }
   void settle(State&, const State&, double) const noexcept {}
   std::array<double, 3> currents(const State& x, const MotorInput&) const noexcept {
@@ -122,8 +136,10 @@ struct InductionModel {
 struct PmModel {
   using State = std::array<double, 3>;  // i_d, i_q, w
   static constexpr std::size_t kSpeed = 2;
+  static constexpr bool kTurns = true;
   SalientPmModel m;
   double coulomb_nm;
+  double per_d_h, per_q_h, per_inertia;  ///< a division takes as long as five products
 
   PmModel(const Result& r, const Settings& settings)
       : m{.pole_pairs = static_cast<double>(settings.pole_pairs),
@@ -134,7 +150,10 @@ struct PmModel {
           .friction_nms = r.at("f"),
           .inertia_kgm2 = r.at("J"),
           .star = settings.three_phase},
-        coulomb_nm(r.at("f_c")) {}
+        coulomb_nm(r.at("f_c")),
+        per_d_h(1.0 / m.inductance_d_h),
+        per_q_h(1.0 / m.inductance_q_h),
+        per_inertia(1.0 / m.inertia_kgm2) {}
   double fastest_rate(double speed) const noexcept {
     const double least_h = std::min(m.inductance_d_h, m.inductance_q_h);
     return m.resistance_ohm / least_h +
@@ -143,13 +162,13 @@ struct PmModel {
            m.torque_constant_nm_per_a / std::sqrt(least_h * m.inertia_kgm2);
   }
   State slope(const State& x, const MotorInput& in) const noexcept {
-    const std::complex<double> u = two_phase_of(in.u, m.star) * std::polar(1.0, -in.electrical_rad);
+    const std::complex<double> u = towards(in.direction, two_phase_of(in.u, m.star));
     const double omega_e = m.pole_pairs * x[2];
-    return {(u.real() - m.resistance_ohm * x[0] + omega_e * m.inductance_q_h * x[1]) / m.inductance_d_h,
+    return {(u.real() - m.resistance_ohm * x[0] + omega_e * m.inductance_q_h * x[1]) * per_d_h,
             (u.imag() - m.resistance_ohm * x[1] - m.torque_constant_nm_per_a * x[2] -
-             omega_e * m.inductance_d_h * x[0]) /
-                m.inductance_q_h,
-            (m.torque_nm(x[0], x[1]) - m.friction_nms * x[2] - friction_torque_nm(x)) / m.inertia_kgm2};
+             omega_e * m.inductance_d_h * x[0]) *
+                per_q_h,
+            (torque_nm(x) - m.friction_nms * x[2] - friction_torque_nm(x)) * per_inertia};
   }
   /// A shaft that comes to rest within a step of h stays there if friction can hold it, and goes on from rest
   /// for what is left of the step if it cannot: the slopes across the change of sign mix both frictions.
@@ -163,10 +182,10 @@ struct PmModel {
     x[2] = left * (torque_nm - std::copysign(coulomb_nm, torque_nm)) / m.inertia_kgm2;
   }
   std::array<double, 3> currents(const State& x, const MotorInput& in) const noexcept {
-    return phases_of(std::complex<double>(x[0], x[1]) * std::polar(1.0, in.electrical_rad), m.star);
+    return phases_of(towards(std::conj(in.direction), {x[0], x[1]}), m.star);
   }
   State state_of(const std::array<double, 3>& i, double speed, const MotorInput& in) const noexcept {
-    const std::complex<double> dq = two_phase_of(i, m.star) * std::polar(1.0, -in.electrical_rad);
+    const std::complex<double> dq = towards(in.direction, two_phase_of(i, m.star));
     return {dq.real(), dq.imag(), speed};
   }
   State spread(double current_a, double speed_rad_s) const noexcept {
@@ -174,10 +193,13 @@ struct PmModel {
   }
 
  private:
+  double torque_nm(const State& x) const noexcept {
+    return (m.torque_constant_nm_per_a + m.pole_pairs * m.saliency_h() * x[0]) * x[1];
+  }
   double friction_torque_nm(const State& x) const noexcept {
     if (x[2] != 0.0) return std::copysign(coulomb_nm, x[2]);
     const double most = std::max(0.0, coulomb_nm);
-    return std::clamp(m.torque_nm(x[0], x[1]), -most, most);
+    return std::clamp(torque_nm(x), -most, most);
   }
 };
 
@@ -185,7 +207,9 @@ struct PmModel {
 struct BldcModel {
   using State = std::array<double, 4>;  // i_a, i_b, i_c, w
   static constexpr std::size_t kSpeed = 3;
+  static constexpr bool kTurns = false;
   BldcMachineModel m;
+  double per_h, per_inertia;
 
   BldcModel(const Result& r, const Settings&)
       : m{.pole_pairs = 1.0,
@@ -193,27 +217,28 @@ struct BldcModel {
           .torque_constant_nm_per_a = r.at("tau_p"),
           .friction_nms = r.at("f"),
           .inertia_kgm2 = r.at("J"),
-          .inductance_h = r.at("L+M")} {}
+          .inductance_h = r.at("L+M")},
+        per_h(1.0 / m.inductance_h),
+        per_inertia(1.0 / m.inertia_kgm2) {}
   double fastest_rate(double) const noexcept {
     return m.resistance_ohm / m.inductance_h +
            2.0 * m.torque_constant_nm_per_a / std::sqrt(m.inductance_h * m.inertia_kgm2);
   }
   State slope(const State& x, const MotorInput& in) const noexcept {
-    constexpr double kThird = 2.0943951023931953;
-    std::array<double, 3> e{};
-    for (std::size_t k = 0; k < 3; ++k)
-      e[k] = trapezoid_at_turns((in.electrical_rad - static_cast<double>(k) * kThird) /
-                                (2.0 * std::numbers::pi));
-    const double e_mean = (e[0] + e[1] + e[2]) / 3.0;
-    const double u_mean = (in.u[0] + in.u[1] + in.u[2]) / 3.0;
+    constexpr double kThird = 1.0 / 3.0;
+    const double turns = in.electrical_rad * (0.5 * std::numbers::inv_pi);
+    const std::array<double, 3> e = {trapezoid_at_turns(turns), trapezoid_at_turns(turns - kThird),
+                                     trapezoid_at_turns(turns - 2.0 * kThird)};
+    const double e_mean = (e[0] + e[1] + e[2]) * kThird;
+    const double u_mean = (in.u[0] + in.u[1] + in.u[2]) * kThird;
     State dx{};
     double torque_nm = 0.0;
     for (std::size_t k = 0; k < 3; ++k) {
       const double emf_v = m.torque_constant_nm_per_a * x[3] * (e[k] - e_mean);
-      dx[k] = (in.u[k] - u_mean - m.resistance_ohm * x[k] + emf_v) / m.inductance_h;
+      dx[k] = (in.u[k] - u_mean - m.resistance_ohm * x[k] + emf_v) * per_h;
       torque_nm -= m.torque_constant_nm_per_a * e[k] * x[k];
     }
-    dx[3] = (torque_nm - m.friction_nms * x[3]) / m.inertia_kgm2;
+    dx[3] = (torque_nm - m.friction_nms * x[3]) * per_inertia;
     return dx;
   }
   void settle(State&, const State&, double) const noexcept {}

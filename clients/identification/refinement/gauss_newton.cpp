@@ -16,49 +16,34 @@ constexpr int kMostSteps = 15;
 constexpr double kSmallStep2 = 1e-4;  // of a step in its own standard deviations, squared
 constexpr Eigen::Index kParts = 64;
 
-double square_sum(const std::vector<double>& x) {
-  return Eigen::Map<const Vector>(x.data(), static_cast<Eigen::Index>(x.size())).squaredNorm();
-}
-
 /// The residuals at a point and their derivatives.
 struct Linear {
-  std::vector<double> residual;
+  Matrix residual;  ///< one column
   Matrix jacobian;
   Matrix information;
-  Vector gradient;
 };
 
 bool linearise(const Residuals& residuals, const Vector& at, Linear& out) {
-  const auto rows = static_cast<Eigen::Index>(out.residual.size());
-  out.jacobian.resize(rows, at.size());
-  std::vector<double> moved;
-  for (Eigen::Index k = 0; k < at.size(); ++k) {
-    Vector there = at;
-    there(k) += kDifference;
-    if (!residuals(there, moved)) return false;
-    for (Eigen::Index row = 0; row < rows; ++row) {
-      const auto n = static_cast<std::size_t>(row);
-      out.jacobian(row, k) = (moved[n] - out.residual[n]) / kDifference;
-    }
-  }
-  if (!out.jacobian.allFinite()) return false;
-  const Eigen::Map<const Vector> r(out.residual.data(), rows);
+  Matrix points = at.replicate(1, at.size());
+  points.diagonal().array() += kDifference;
+  if (!residuals(points, out.jacobian)) return false;
+  out.jacobian.colwise() -= out.residual.col(0);
+  out.jacobian *= 1.0 / kDifference;
   out.information = out.jacobian.transpose() * out.jacobian;
   out.information.diagonal().array() += 1.0 / (kUnknownDeviation * kUnknownDeviation);
-  out.gradient = out.jacobian.transpose() * r;
-  return true;
+  return out.information.allFinite();
 }
 
 /// The covariance about the scatter of the scores of parts of the record.
 Matrix scattered(const Linear& l, const Matrix& inverse) {
   const Eigen::Index rows = l.jacobian.rows();
   const Eigen::Index columns = l.jacobian.cols();
-  const Eigen::Map<const Vector> r(l.residual.data(), rows);
   Matrix scatter = Matrix::Zero(columns, columns);
   for (Eigen::Index part = 0; part < kParts; ++part) {
     const Eigen::Index first = part * rows / kParts;
     const Eigen::Index count = (part + 1) * rows / kParts - first;
-    const Vector score = l.jacobian.middleRows(first, count).transpose() * r.segment(first, count);
+    const Vector score =
+        l.jacobian.middleRows(first, count).transpose() * l.residual.col(0).segment(first, count);
     scatter += score * score.transpose();
   }
   const double freedom = static_cast<double>(kParts) / static_cast<double>(kParts - columns);
@@ -79,23 +64,24 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) 
   Fit fit{.at = start, .sum = std::numeric_limits<double>::infinity(), .covariance = {}, .found = false};
   Linear l;
   if (!residuals(start, l.residual)) return fit;
-  fit.sum = square_sum(l.residual);
+  fit.sum = l.residual.squaredNorm();
   double damping = 0.0;
-  std::vector<double> tried;
+  Matrix tried;
   for (int step = 0; step < kMostSteps; ++step) {
     if (!linearise(residuals, fit.at, l)) return fit;
+    const Vector gradient = l.jacobian.transpose() * l.residual.col(0);
     bool better = false;
     double size2 = 0.0;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
       Matrix damped = l.information;
       damped.diagonal() *= 1.0 + damping;
-      Vector change = -damped.llt().solve(l.gradient);
+      Vector change = -damped.llt().solve(gradient);
       const double most = change.cwiseAbs().maxCoeff();
       if (!(most < std::numeric_limits<double>::infinity())) return fit;
       if (most > limit) change *= limit / most;
       size2 = change.dot(l.information * change);
       if (residuals(fit.at + change, tried)) {
-        const double sum = square_sum(tried);
+        const double sum = tried.squaredNorm();
         if (sum <= fit.sum) {
           fit.at += change;
           fit.sum = sum;

@@ -2,12 +2,12 @@
 
 #include <Eigen/Dense>
 #include <functional>
-#include <vector>
 
 namespace drivebench::identification {
 
-/// Residuals as a function of coordinates; false where there are none.
-using Residuals = std::function<bool(const Eigen::VectorXd&, std::vector<double>&)>;
+/// Residuals as a function of coordinates, a column for each point; false where a point has none. Points come
+/// together so that their motors may run side by side.
+using Residuals = std::function<bool(const Eigen::MatrixXd& points, Eigen::MatrixXd& residuals)>;
 
 /// A least squares of residuals of unit variance at its minimum.
 struct Fit {

@@ -208,10 +208,29 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
                           .angle_rad = first.angle_rad};
   const SensorNoise most{
       .voltage_v = voltage_rms_v, .current_a = record.largest_current_a, .angle_rad = first.angle_rad};
-  const auto residuals = [&](const Eigen::VectorXd& z, std::vector<double>& out) {
-    const Model model = model_at(z);
-    const Estimate* const sigma = trial.find("sigma");
-    return (sigma == nullptr || sigma->value < 1.0) && predictor.innovations(model, out);
+  const auto residuals = [&](const Eigen::MatrixXd& points, Eigen::MatrixXd& out) {
+    out.resize(static_cast<Eigen::Index>(predictor.rows()), points.cols());
+    std::vector<Model> models;  // those of the same sensors run side by side
+    SensorErrors errors;
+    Eigen::Index first_column = 0;
+    const auto run = [&] {
+      const auto count = static_cast<Eigen::Index>(models.size());
+      predictor.correct(errors);
+      const bool whole = predictor.innovations(models, out.middleCols(first_column, count));
+      models.clear();
+      first_column += count;
+      return whole;
+    };
+    for (Eigen::Index k = 0; k < points.cols(); ++k) {
+      put(unknowns, points.col(k), trial);
+      const Estimate* const sigma = trial.find("sigma");
+      if (sigma != nullptr && sigma->value >= 1.0) return false;
+      const SensorErrors here = errors_of(trial);
+      if (!models.empty() && !(here == errors) && !run()) return false;
+      errors = here;
+      models.emplace_back(trial, e);
+    }
+    return run();
   };
   SensorNoise noise = first;
   noise.current_a = std::max(noise.current_a, kFirstCurrent * record.largest_current_a);
@@ -234,13 +253,12 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     result.excitation = verdict_against(result, "no motor near that of the equations follows it");
     return;
   }
-  std::vector<double> innovations;
+  Eigen::MatrixXd innovations;
   residuals(fit.at, innovations);
-  const auto outputs = static_cast<std::size_t>(predictor.outputs());
   Series angle_errors;
   Series current_errors;
-  for (std::size_t row = 0; row < innovations.size(); ++row)
-    (row % outputs + 1 == outputs ? angle_errors : current_errors).push_back(innovations[row]);
+  for (Eigen::Index row = 0; row < innovations.rows(); ++row)
+    ((row + 1) % predictor.outputs() == 0 ? angle_errors : current_errors).push_back(innovations(row, 0));
   put_fit(e, unknowns, fit, result);
   set_apart(e, result);
   result.explanation = {.voltage_noise_v = noise.voltage_v,

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace drivebench::identification {
 namespace {
@@ -24,12 +25,13 @@ std::vector<double> noisy(double memory, std::uint64_t seed) {
 }
 
 Fit fitted(const std::vector<double>& noise, bool with_blind = false) {
-  const auto residuals = [&](const Eigen::VectorXd& z, std::vector<double>& out) {
-    out.resize(kRows);
+  const auto residuals = [&](const Eigen::MatrixXd& points, Eigen::MatrixXd& out) {
+    out.resize(kRows, points.cols());
     for (int k = 0; k < kRows; ++k) {
       const double t = static_cast<double>(k) / kRows;
-      out[static_cast<std::size_t>(k)] =
-          std::exp(z(0) * t) + z(1) * t - std::exp(t) - 2.0 * t + noise[static_cast<std::size_t>(k)];
+      for (Eigen::Index n = 0; n < points.cols(); ++n)
+        out(k, n) = std::exp(points(0, n) * t) + points(1, n) * t - std::exp(t) - 2.0 * t +
+                    noise[static_cast<std::size_t>(k)];
     }
     return true;
   };
