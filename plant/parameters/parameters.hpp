@@ -28,6 +28,7 @@ struct Parameter {
   bool integer;   ///< whole numbers only; a minimum of 0 and a maximum of 1 make it a switch
   bool live;      ///< may be written while the bench runs
   bool required;  ///< has no default: a configuration must name it
+  bool later;     ///< added to the table when runs had been recorded: hashes pass over it while it is 0
   std::string_view meaning;
   double (*get)(const AxisParameters&) noexcept;
   void (*set)(AxisParameters&, double) noexcept;

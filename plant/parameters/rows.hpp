@@ -11,7 +11,7 @@
 /// The form of the tables of the sections: one row for each member, found by its path from AxisParameters.
 namespace drivebench {
 
-enum Trait : unsigned { kReal = 0, kInteger = 1, kLive = 2, kRequired = 4 };
+enum Trait : unsigned { kReal = 0, kInteger = 1, kLive = 2, kRequired = 4, kLater = 8 };
 
 namespace rows_detail {
 
@@ -42,6 +42,7 @@ constexpr Parameter described(std::string_view name, std::string_view unit, doub
           (traits & kInteger) != 0,
           (traits & kLive) != 0,
           (traits & kRequired) != 0,
+          (traits & kLater) != 0,
           meaning,
           nullptr,
           nullptr,

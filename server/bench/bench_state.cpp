@@ -13,6 +13,27 @@ namespace {
 
 constexpr std::uint64_t kMagic = 0x3374'6174'7362'7264u;  // "drbstat3"
 
+/// The value of a parameter that hashes pass over while it is 0.
+struct LaterValue {
+  double value;
+};
+
+/// Calls visit(block) for the value of a row, which it may change.
+template <class Visitor>
+void visit_value(const Parameter& row, double& value, Visitor& visit) {
+  if (!row.later) return visit(value);
+  LaterValue later{value};
+  visit(later);
+  value = later.value;
+}
+
+}  // namespace
+
+template <>
+inline constexpr std::size_t kLaterWords<LaterValue> = 1;
+
+namespace {
+
 std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
   Digest digest;
   digest.add(static_cast<std::uint64_t>(setup.period_ns));
@@ -29,14 +50,28 @@ std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
     digest.add(std::bit_cast<std::uint64_t>(axis.rules.slew_per_s));
     digest.add(axis.shares_shaft_with ? *axis.shares_shaft_with + 1 : 0);
     digest.add(axis.parameters.machine.index());
-    for (const Parameter& row : axis_parameters(axis.parameters))
-      digest.add(std::bit_cast<std::uint64_t>(row.get(axis.parameters)));
+    const auto add = [&digest](const auto& block) { digest.add_block(block); };
+    for (const Parameter& row : axis_parameters(axis.parameters)) {
+      double value = row.get(axis.parameters);
+      visit_value(row, value, add);
+    }
     for (const CurveParameter& row : axis_curves(axis.parameters)) {
       const std::vector<CurvePoint>& points = row.get(axis.parameters).points();
       digest.add(points.size());
       for (const CurvePoint& point : points)
         digest.add_block(point);
     }
+  }
+  return digest.value();
+}
+
+/// Of every word, those that hashes pass over included.
+std::uint64_t digest_of(std::span<const std::byte> words) noexcept {
+  Digest digest;
+  for (std::size_t at = 0; at < words.size(); at += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, words.data() + at, sizeof(word));
+    digest.add(word);
   }
   return digest.value();
 }
@@ -60,7 +95,7 @@ void Bench::for_each_block(Self& self, Visitor visit) {
     AxisParameters parameters = a.axis.parameters();
     for (const Parameter& row : axis_parameters(parameters)) {
       double value = row.get(parameters);
-      visit(value);
+      visit_value(row, value, visit);
       if constexpr (!std::is_const_v<Self>) row.set(parameters, value);
     }
     if constexpr (!std::is_const_v<Self>) {
@@ -78,9 +113,7 @@ std::uint64_t Bench::state_hash() const noexcept {
 
 std::vector<std::byte> Bench::save() const {
   std::vector<std::byte> saved;
-  Digest digest;
-  const auto append = [&saved, &digest](const auto& block) {
-    digest.add_block(block);
+  const auto append = [&saved](const auto& block) {
     const std::size_t end = saved.size();
     saved.resize(end + sizeof(block));
     std::memcpy(saved.data() + end, &block, sizeof(block));
@@ -88,25 +121,20 @@ std::vector<std::byte> Bench::save() const {
   append(kMagic);
   append(setup_hash(setup_));
   for_each_block(*this, append);
-  append(std::uint64_t{digest.value()});
+  append(digest_of(saved));
   return saved;
 }
 
 bool Bench::restore(std::span<const std::byte> saved) {
   if (saved.size() != save().size()) return false;
-  Digest digest;
-  std::size_t position = 0;
+  std::size_t position = saved.size() - sizeof(std::uint64_t);
   const auto take = [&](auto& block) {
     std::memcpy(&block, saved.data() + position, sizeof(block));
     position += sizeof(block);
   };
   std::uint64_t word = 0;
-  while (position + sizeof(word) < saved.size()) {
-    take(word);
-    digest.add(word);
-  }
   take(word);
-  if (word != digest.value()) return false;
+  if (word != digest_of(saved.first(saved.size() - sizeof(word)))) return false;
 
   position = 0;
   take(word);

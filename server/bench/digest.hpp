@@ -9,6 +9,11 @@
 
 namespace drivebench {
 
+/// The number of words at the end of a block that later builds have added. A digest passes over them while
+/// all of them are zero: a bench that does not use them keeps its hashes, and with them its recordings.
+template <class Block>
+inline constexpr std::size_t kLaterWords = 0;
+
 /// Mixes words into a 64-bit digest. Four lanes, so that the multiplications overlap; not cryptographic.
 class Digest {
  public:
@@ -23,11 +28,41 @@ class Digest {
     static_assert(std::is_trivially_copyable_v<Block> && sizeof(Block) % 8 == 0);
     constexpr std::size_t kWords = sizeof(Block) / 8;
     const auto* const bytes = reinterpret_cast<const unsigned char*>(&block);
-    const auto word = [bytes](std::size_t n) noexcept {
-      std::uint64_t result;
-      std::memcpy(&result, bytes + 8 * n, 8);
-      return result;
-    };
+    if constexpr (kLaterWords<Block> == 0) {
+      add_words<kWords>(bytes);
+    } else {
+      constexpr std::size_t kFirst = kWords - kLaterWords<Block>;
+      add_words<kFirst>(bytes);
+      if (any_set<kLaterWords<Block>>(bytes + 8 * kFirst)) add_words<kLaterWords<Block>>(bytes + 8 * kFirst);
+    }
+  }
+
+  /// The digest of the words so far, their order and their number.
+  constexpr std::uint64_t value() const noexcept {
+    std::uint64_t result = position_;
+    for (const std::uint64_t lane : lanes_)
+      result = (std::rotl(result, 23) ^ lane) * 0xc2b2'ae3d'27d4'eb4fu;
+    return result ^ (result >> 32);
+  }
+
+ private:
+  static std::uint64_t word_at(const unsigned char* bytes, std::size_t n) noexcept {
+    std::uint64_t result;
+    std::memcpy(&result, bytes + 8 * n, 8);
+    return result;
+  }
+
+  template <std::size_t kWords>
+  static bool any_set(const unsigned char* bytes) noexcept {
+    std::uint64_t any = 0;
+    for (std::size_t n = 0; n < kWords; ++n)
+      any |= word_at(bytes, n);
+    return any != 0;
+  }
+
+  template <std::size_t kWords>
+  void add_words(const unsigned char* bytes) noexcept {
+    const auto word = [bytes](std::size_t n) noexcept { return word_at(bytes, n); };
     constexpr std::size_t kInFours = kWords - kWords % 4;
     std::uint64_t first = lane_at(0);  // keeps all four lanes in registers
     std::uint64_t second = lane_at(1);
@@ -49,15 +84,6 @@ class Digest {
     position_ += kWords;
   }
 
-  /// The digest of the words so far, their order and their number.
-  constexpr std::uint64_t value() const noexcept {
-    std::uint64_t result = position_;
-    for (const std::uint64_t lane : lanes_)
-      result = (std::rotl(result, 23) ^ lane) * 0xc2b2'ae3d'27d4'eb4fu;
-    return result ^ (result >> 32);
-  }
-
- private:
   /// The lane for the n-th next word.
   constexpr std::uint64_t& lane_at(std::size_t n) noexcept { return lanes_[(position_ + n) & 3u]; }
 

@@ -34,7 +34,10 @@ void append_timing(std::string& text, const BenchSetup& setup) {
   append(text, "lease_ticks", std::to_string(setup.lease_ticks));
 }
 
-void append_parameters(std::string& text, const AxisParameters& p, bool shares_shaft) {
+/// Whether a text names every key, or those that the hash of the configuration knows: see Parameter::later.
+enum class Keys { kAll, kHashed };
+
+void append_parameters(std::string& text, const AxisParameters& p, bool shares_shaft, Keys keys) {
   std::vector<std::string_view> sections;
   for (const Parameter& row : axis_parameters(p)) {
     if (std::find(sections.begin(), sections.end(), section_of(row.name)) == sections.end())
@@ -45,7 +48,9 @@ void append_parameters(std::string& text, const AxisParameters& p, bool shares_s
     text.append("\n[axis.").append(section).append("]\n");
     if (section == "machine") append(text, "kind", in_quotes(machine_kind(p)));
     for (const Parameter& row : axis_parameters(p)) {
-      if (section_of(row.name) == section) append(text, key_of(row.name), value_text(row, row.get(p)));
+      if (section_of(row.name) != section || (keys == Keys::kHashed && row.later && row.get(p) == 0.0))
+        continue;
+      append(text, key_of(row.name), value_text(row, row.get(p)));
     }
     for (const CurveParameter& row : axis_curves(p)) {
       if (section_of(row.name) != section || row.get(p).empty()) continue;
@@ -54,12 +59,12 @@ void append_parameters(std::string& text, const AxisParameters& p, bool shares_s
   }
 }
 
-void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config) {
+void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config, Keys keys) {
   append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
   append(text, "quick_stop_ticks", std::to_string(setup.quick_stop_ticks));
   append(text, "on_excess", in_quotes(kOnExcessWords[static_cast<std::size_t>(setup.rules.on_excess)]));
   append(text, "slew_per_s", real_text(setup.rules.slew_per_s));
-  append_parameters(text, setup.parameters, setup.shares_shaft_with.has_value());
+  append_parameters(text, setup.parameters, setup.shares_shaft_with.has_value(), keys);
   text += events_text(config.events, setup.parameters);
 }
 
@@ -136,7 +141,7 @@ std::string to_toml(const BenchConfig& config) {
     if (const auto partner = config.setup.axes[i].shares_shaft_with) {
       append(text, "shares_shaft_with", in_quotes(config.axes[*partner].name));
     }
-    append_axis(text, config.setup.axes[i], config.axes[i]);
+    append_axis(text, config.setup.axes[i], config.axes[i], Keys::kAll);
   }
   return text;
 }
@@ -149,7 +154,7 @@ std::string physics_toml(const BenchConfig& config) {
     if (const auto partner = config.setup.axes[i].shares_shaft_with) {
       append(text, "shares_shaft_with", std::to_string(*partner));  // the hash ignores names
     }
-    append_axis(text, config.setup.axes[i], config.axes[i]);
+    append_axis(text, config.setup.axes[i], config.axes[i], Keys::kHashed);
   }
   return text;
 }

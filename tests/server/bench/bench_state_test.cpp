@@ -124,6 +124,45 @@ TEST(BenchState, DET_05_SilenceAndFaultsAreRestoredToo) {
   }
 }
 
+struct Grown {
+  std::uint64_t first[5] = {1, 2, 3, 4, 5};
+  double later[2] = {};
+};
+
+}  // namespace
+template <>
+inline constexpr std::size_t kLaterWords<Grown> = 2;
+namespace {
+
+// Recordings hold hashes of earlier builds. Catches: words that a later build has added and that change the
+// hash of a bench that does not use them; used ones that it does not see; the same for values of parameters.
+TEST(BenchState, WordsOfLaterBuildsAreHashedWhereTheyAreUsed) {
+  const auto digest_of = [](const auto& block) {
+    Digest digest;
+    digest.add(7);
+    digest.add_block(block);
+    return digest.value();
+  };
+  struct {
+    std::uint64_t first[5] = {1, 2, 3, 4, 5};
+  } before;
+  Grown grown;
+  EXPECT_EQ(digest_of(grown), digest_of(before));
+  grown.later[1] = 5e-324;
+  EXPECT_NE(digest_of(grown), digest_of(before));
+  EXPECT_EQ(sizeof(Sample) / 8 - kLaterWords<Sample>, 49u);
+
+  BenchSetup setup = servo_setup();
+  const std::uint64_t as_before = Bench(setup).state_hash();
+  for (const Parameter& row : axis_parameters(servo_axis())) {
+    if (!row.later) continue;
+    EXPECT_EQ(row.get(servo_axis()), 0.0) << row.name;
+    BenchSetup used = setup;
+    row.set(used.axes[0].parameters, 1.0);
+    EXPECT_NE(Bench(used).state_hash(), as_before) << row.name;
+  }
+}
+
 // One bit of every byte, and every kind of wrong length. Catches: a part of the state that the digest does
 // not cover, a restore that has already begun when it notices.
 TEST(BenchState, DamagedBytesAreRefusedAndChangeNothing) {
