@@ -349,6 +349,9 @@ int default_substeps(const AxisParameters& p, double period_s) noexcept {
     const double filter_s = 1.0 / (2.0 * std::numbers::pi * p.drive.amplifier.filter_hz);
     step_s = std::min(step_s, filter_s / kStepsInFilter);
   }
+  if (p.drive.bus.battery && p.drive.bus.resistance_ohm > 0.0) {
+    step_s = std::min(step_s, p.drive.bus.resistance_ohm * p.drive.bus.capacitance_f / kStepsInFilter);
+  }
   std::visit(
       [&](const auto& machine) {
         step_s = std::min(step_s, fastest_electrical_s(p.drive, machine) / kStepsInTimeConstant);

@@ -29,10 +29,10 @@ BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, boo
   const double storage_s = 2.0 * p.capacitance_f * per_s;
   const double brake_s = chopper ? 1.0 / p.chopper_ohm : 0.0;
   const double power_w = taken_j * per_s;
-  // The supply conducts if its voltage is above the larger root of the balance without it.
+  // A rectifier conducts if its voltage is above the larger root of the balance without it.
   const double leak_s = storage_s + brake_s;
-  const bool fed = supply_v * (leak_s * supply_v - storage_s * bus_v) + power_w > 0.0 &&
-                   2.0 * leak_s * supply_v > storage_s * bus_v;
+  const bool fed = p.battery || (supply_v * (leak_s * supply_v - storage_s * bus_v) + power_w > 0.0 &&
+                                 2.0 * leak_s * supply_v > storage_s * bus_v);
   double middle_v;
   double supplied_j = 0.0;
   if (fed && p.resistance_ohm > 0.0) {
@@ -40,11 +40,12 @@ BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, boo
     middle_v = middle_voltage_v(storage_s, bus_v, brake_s + supply_s, supply_s * supply_v, power_w);
     supplied_j = duration_s * middle_v * (supply_v - middle_v) * supply_s;
   } else {
-    middle_v = middle_voltage_v(storage_s, bus_v, brake_s, 0.0, power_w);
+    middle_v = p.battery ? 0.5 * (bus_v + supply_v)  // whatever it takes
+                         : middle_voltage_v(storage_s, bus_v, brake_s, 0.0, power_w);
   }
   const double braked_j = duration_s * middle_v * middle_v * brake_s;
   double after_v = 2.0 * middle_v - bus_v;
-  if (p.resistance_ohm == 0.0 && after_v < supply_v) {
+  if (p.resistance_ohm == 0.0 && (p.battery || after_v < supply_v)) {
     after_v = supply_v;
     supplied_j = 0.5 * p.capacitance_f * (after_v - bus_v) * (after_v + bus_v) + braked_j + taken_j;
   }

@@ -7,11 +7,12 @@ namespace drivebench {
 /// Section [axis.bus]: the DC link.
 struct BusParameters {
   double voltage_v = 0.0;       ///< of its supply; 0: amplifier.voltage_limit_v (twice that in a star)
-  double resistance_ohm = 0.0;  ///< of the supply, which cannot take current back
+  double resistance_ohm = 0.0;  ///< of the supply
   double capacitance_f = 0.0;   ///< 0: a stiff link
   double chopper_on_v = 0.0;    ///< the brake resistor is switched on above this; 0: no chopper
   double chopper_off_v = 0.0;   ///< and off below this
   double chopper_ohm = 1.0;
+  bool battery = false;  ///< the supply takes current back; a rectifier does not
 };
 
 /// Voltage of the supply of the link.
@@ -27,14 +28,15 @@ constexpr double rail_voltage_v(double bus_v, Connection connection) noexcept {
 /// C (voltage_v^2 - before^2)/2 = supplied_j - braked_j - taken.
 struct BusInterval {
   double voltage_v;
-  double supplied_j;  ///< into the link
+  double supplied_j;  ///< into the link; negative: into a battery
   double braked_j;    ///< into the brake resistor
 };
 
 /// The interval of a link whose terminals take `taken_j` (negative: give back):
-///   C v' = max(U - v, 0)/R - [chopper] v/R_B - p/v
+///   C v' = i_S - [chopper] v/R_B - p/v     with i_S = max(U - v, 0)/R of a rectifier, (U - v)/R of a battery
 /// by the implicit midpoint rule, which keeps the energy exactly and is stable for every interval. With R = 0
-/// the supply holds the link at U or above. An interval that takes more than the link holds empties it.
+/// a rectifier holds the link at U or above, a battery at U. An interval that takes more than the link holds
+/// empties it.
 BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, bool chopper, double taken_j,
                       double duration_s) noexcept;
 

@@ -73,7 +73,7 @@ constexpr auto kTable = std::to_array<Parameter>({
     bus<&Bus::voltage_v>("bus.voltage_v", "V", 0, 1e6, kLive,
                          "supply of the DC link; 0: amplifier.voltage_limit_v, twice that in a star"),
     bus<&Bus::resistance_ohm>("bus.resistance_ohm", "ohm", 0, 1e6, kLive,
-                              "of the supply, which cannot take current back"),
+                              "of the supply of the DC link, with bus.capacitance_f"),
     bus<&Bus::capacitance_f>("bus.capacitance_f", "F", 0, 1e3, kReal, "of the DC link; 0: a stiff link"),
     bus<&Bus::chopper_on_v>("bus.chopper_on_v", "V", 0, 1e6, kLive,
                             "link voltage above which the brake resistor is on; 0: no chopper"),

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "plant/parameters/drive_rows.hpp"
+#include "plant/parameters/later_rows.hpp"
 #include "plant/parameters/machine_kind.hpp"
 #include "plant/parameters/mechanics_rows.hpp"
 #include "plant/parameters/rows.hpp"
@@ -30,7 +31,8 @@ Tables make_tables() {
   for (std::size_t k = 0; k < kKinds; ++k) {
     const MachineKind& kind = all_machine_kinds()[k];
     tables.names[k] = kind.name;
-    for (const auto part : {kind.rows, mechanics_rows(), drive_rows(), sensor_rows(), transformer_rows()}) {
+    for (const auto part :
+         {kind.rows, mechanics_rows(), drive_rows(), sensor_rows(), transformer_rows(), later_rows()}) {
       tables.rows[k].insert(tables.rows[k].end(), part.begin(), part.end());
     }
     for (const auto part : {kind.curves, mechanics_curves(), drive_curves()}) {
@@ -83,6 +85,7 @@ void add_rule_problems(const AxisParameters& p, Problems& found) {
   add_problems(p.encoder, found);
   add_problems(p.sensors, found);
   add_problems(p.thermal, found);
+  add_later_problems(p, found);
 }
 
 }  // namespace

@@ -5,8 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string_view>
+#include <vector>
 
+#include "plant/axis.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "tests/plant/drive_rig.hpp"
+#include "tests/plant/servo_axis.hpp"
 
 namespace drivebench {
 namespace {
@@ -192,6 +197,113 @@ TEST(DcBus, AStiffLinkIsItsSupply) {
   EXPECT_EQ(rig.drive.at(rig.memory, 0.0, 1e-6, {}).rail_v, 112.5);
   rig.tick(volts(10.0));
   EXPECT_EQ(rig.memory.bus_v, 300.0);
+}
+
+BusParameters battery() {
+  return {.voltage_v = 300.0, .resistance_ohm = 0.05, .capacitance_f = 1e-3, .battery = true};
+}
+
+// A link above its battery falls to it with the time constant R C, where a rectifier would leave it. The
+// midpoint rule errs by (h/RC)^2/12 of the exponent. Catches: a battery that is a rectifier, a resistance in
+// one direction only.
+TEST(DcBus, ALinkAboveItsBatteryFallsToIt) {
+  double bus_v = 350.0;
+  for (int n = 1; n <= 200; ++n) {
+    const BusInterval after = bus_after(battery(), 300.0, bus_v, false, 0.0, 1e-6);
+    EXPECT_LT(after.supplied_j, 0.0);
+    bus_v = after.voltage_v;
+    ASSERT_NEAR(bus_v, 300.0 + 50.0 * std::exp(-n * 1e-6 / 50e-6), 1e-3);
+  }
+}
+
+// With a constant power p the link settles where (U - v) v/R = p, the larger root. Catches: the smaller root,
+// a drop of the wrong sign while the machine brakes.
+TEST(DcBus, ABatteryCarriesAConstantPowerInBothDirections) {
+  for (const double power_w : {6e3, -6e3, 40.0}) {
+    double bus_v = 300.0;
+    for (int n = 0; n < 2000; ++n)
+      bus_v = bus_after(battery(), 300.0, bus_v, false, power_w * 5e-6, 5e-6).voltage_v;
+    EXPECT_NEAR(bus_v, 150.0 + std::sqrt(150.0 * 150.0 - 0.05 * power_w), 1e-9) << power_w;
+  }
+}
+
+// Catches: energy of a battery that is not that of link, brake resistor and terminals; a battery without
+// resistance that lets the link go.
+TEST(DcBus, ABatteryLosesNoEnergy) {
+  std::mt19937_64 engine(12);
+  std::uniform_real_distribution<double> power(-20e3, 20e3);
+  for (const double resistance_ohm : {0.05, 0.0}) {
+    BusParameters p = battery();
+    p.resistance_ohm = resistance_ohm;
+    p.chopper_ohm = 50.0;
+    double bus_v = 300.0;
+    double gained_j = 0.0;
+    double given_back_j = 0.0;
+    for (int n = 0; n < 10'000; ++n) {
+      const double taken_j = power(engine) * 5e-6;
+      const BusInterval after = bus_after(p, 300.0, bus_v, n > 5000, taken_j, 5e-6);
+      gained_j += after.supplied_j - after.braked_j - taken_j;
+      given_back_j += std::min(after.supplied_j, 0.0);
+      bus_v = after.voltage_v;
+      if (resistance_ohm == 0.0) {
+        EXPECT_NEAR(bus_v, 300.0, 1e-12);
+        EXPECT_EQ(after.braked_j, n > 5000 ? 5e-6 * 300.0 * 300.0 / 50.0 : 0.0);
+      }
+    }
+    EXPECT_NEAR(gained_j, stored_j(bus_v) - stored_j(300.0), 1e-9);
+    EXPECT_LT(given_back_j, -10.0);
+  }
+}
+
+bool is_refused(const AxisParameters& p, std::string_view field) {
+  const std::vector<Problem> found = problems(p);
+  return std::any_of(found.begin(), found.end(), [&](const Problem& each) { return each.field == field; });
+}
+
+// Catches: a battery whose resistance does nothing because the link is stiff; a step that jumps over R C.
+TEST(DcBus, ABatteryNeedsACapacitorAndStepsThatFollowIt) {
+  AxisParameters p = servo_axis();
+  p.drive = plain_drive(DriveKind::kAveraged);
+  p.drive.bus = battery();
+  p.drive.bus.resistance_ohm = 0.02;
+  EXPECT_FALSE(is_refused(p, "bus.battery"));
+  EXPECT_EQ(default_substeps(p, kRigTick_s), 10);  // R C = 20 us
+  p.drive.bus.capacitance_f = 0.0;
+  EXPECT_TRUE(is_refused(p, "bus.battery"));
+}
+
+// A machine that brakes gives its energy to the battery: what the terminals give is what the battery takes,
+// the losses of its resistance and what the capacitor keeps. Catches: a drive that holds the link where a
+// rectifier would.
+TEST(DcBus, ABrakingMachineChargesTheBattery) {
+  for (const DriveKind kind : {DriveKind::kVoltage, DriveKind::kAveraged, DriveKind::kSwitched}) {
+    DriveParameters p = plain_drive(kind);
+    p.amplifier.voltage_limit_v = 250.0;
+    p.bus = battery();
+    p.bus.resistance_ohm = 2.0;
+    DriveRig rig(p, Connection::kIndependent, {.resistance_ohm = 20.0, .inductance_h = 50e-3}, 100);
+    rig.load.emf_v = {200.0, -200.0, 150.0};
+    for (int tick = 0; tick < 500; ++tick)
+      rig.tick(volts(150.0, -150.0, 120.0));
+    double into_battery_j = 0.0;
+    double lost_j = 0.0;
+    const double before_j = rig.energy_j;
+    const double start_v = rig.memory.bus_v;
+    for (int tick = 0; tick < 200; ++tick) {
+      const double first_v = rig.memory.bus_v;
+      rig.tick(volts(150.0, -150.0, 120.0));
+      const double current_a = (0.5 * (first_v + rig.memory.bus_v) - 300.0) / 2.0;
+      into_battery_j += kRigTick_s * 300.0 * current_a;
+      lost_j += kRigTick_s * 2.0 * current_a * current_a;
+    }
+    EXPECT_GT(rig.memory.bus_v, 301.0);
+    EXPECT_LT(rig.memory.bus_v, 320.0);
+    EXPECT_GT(into_battery_j, 1.0);
+    // The link is followed from tick to tick here, and ripples within one under a switched inverter.
+    EXPECT_NEAR(before_j - rig.energy_j,
+                into_battery_j + lost_j + stored_j(rig.memory.bus_v) - stored_j(start_v),
+                (kind == DriveKind::kSwitched ? 2e-2 : 1e-4) * into_battery_j);
+  }
 }
 
 }  // namespace

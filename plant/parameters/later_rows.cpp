@@ -1,0 +1,31 @@
+#include "plant/parameters/later_rows.hpp"
+
+#include <array>
+
+#include "plant/parameters/rows.hpp"
+
+namespace drivebench {
+namespace {
+
+constexpr auto kTable = std::to_array<Parameter>({
+    row<&AxisParameters::drive, &DriveParameters::bus, &BusParameters::battery>(
+        "bus.battery", "1", 0, 1, kInteger | kLater,
+        "1: the supply of the link takes current back, through its resistance; 0: a rectifier"),
+});
+
+}  // namespace
+
+std::span<const Parameter> later_rows() noexcept {
+  return kTable;
+}
+
+void add_later_problems(const AxisParameters& p, Problems& found) {
+  if (p.drive.bus.battery && !(p.drive.bus.capacitance_f > 0.0)) {
+    found.add("bus.battery", [&] {
+      return "is 1 but needs bus.capacitance_f above 0, which is " + text(p.drive.bus.capacitance_f) +
+             ": a link without a capacitor is stiff and takes back all";
+    });
+  }
+}
+
+}  // namespace drivebench
