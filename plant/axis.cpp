@@ -20,10 +20,6 @@ constexpr double kEnvelope = 1e9;
 constexpr std::uint64_t kNoiseChannels = 32;
 constexpr std::uint64_t kCommandNoise = 16;
 
-Connection connection_of(const MachineParameters& machine) noexcept {
-  return std::visit([](const auto& p) { return drivebench::connection_of(p); }, machine);
-}
-
 double pole_pairs_of(const MachineParameters& machine) noexcept {
   return std::visit([](const auto& p) { return drivebench::pole_pairs_of(p); }, machine);
 }
@@ -167,8 +163,9 @@ void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
   core_.last_tick_encoder = state_.encoder;
   core_.drive.begin_tick(state_.drive, command, state_.injected, tick);
   if ((state_.faults & kOverCurrentTrip) != 0) core_.drive.switch_off(state_.drive);
+  if (core_.p.sensors.terminals) state_.terminal_mean_v = {};
   core_.follows = core_.drive.follows() || core_.sensors.follows() || core_.p.thermal.enabled ||
-                  has_impedance(core_.p.drive);
+                  core_.p.sensors.terminals || has_impedance(core_.p.drive);
 }
 
 double Axis::load_at(Tick tick) const noexcept {
@@ -280,6 +277,12 @@ Sample Axis::sample(Tick tick) const noexcept {
   s.load_angle_rad = load.angle_rad;
   s.load_speed_rad_s = load.speed_rad_s;
   s.load_position_m = load.position_m;
+  s.terminal_a_v = state_.terminal_v.a;
+  s.terminal_b_v = state_.terminal_v.b;
+  s.terminal_c_v = state_.terminal_v.c;
+  s.terminal_a_mean_v = state_.terminal_mean_v.a;
+  s.terminal_b_mean_v = state_.terminal_mean_v.b;
+  s.terminal_c_mean_v = state_.terminal_mean_v.c;
   return s;
 }
 

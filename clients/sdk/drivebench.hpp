@@ -23,6 +23,7 @@ struct Command {
   double setpoint_b = 0.0;
   double setpoint_c = 0.0;
   double setpoint_f = 0.0;
+  std::uint64_t legs_off = 0;
 
   drivebench_command to_c() const noexcept { return std::bit_cast<drivebench_command>(*this); }
 };

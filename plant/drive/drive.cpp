@@ -14,6 +14,11 @@ namespace {
 
 constexpr double kNoEdge = std::numeric_limits<double>::infinity();
 
+/// Whether the command gives the voltages of the terminals.
+constexpr bool has_voltages(Gates gates) noexcept {
+  return gates == Gates::kVoltage || gates == Gates::kDuty;
+}
+
 }  // namespace
 
 SeriesImpedance series_impedance(const DriveParameters& p) noexcept {
@@ -78,7 +83,7 @@ void Drive::begin_tick(DriveMemory& m, const PhaseCommand& command, const Inject
   take_orders(m, faults, tick);
   follows_ = !stiff || filter_rate_per_s_ > 0.0 || kind_ == DriveKind::kCurrent;
   const bool one_order = later_s_ <= tolerance_s_;
-  switches_ = kind_ == DriveKind::kSwitched && orders_[1].gates == Gates::kVoltage && !holds_;
+  switches_ = kind_ == DriveKind::kSwitched && has_voltages(orders_[1].gates) && !holds_;
   if (one_order && !follows_ && (kind_ == DriveKind::kVoltage || switches_)) {
     steady_output_ = bridge_output(m, 0.0, period_s_, {});
     steady_ = true;
@@ -112,11 +117,17 @@ PhaseCommand Drive::corrupted(const PhaseCommand& command, double probability, T
     return uniform_noise(seed_, noise_channel_ + n, static_cast<std::uint64_t>(tick));
   };
   if (!(noise(0) < probability)) return command;
-  const double full_scale =
-      command.gates == Gates::kCurrent ? p_.current_loop.limit_a : p_.amplifier.voltage_limit_v;
+  const bool duties = command.gates == Gates::kDuty;
+  const double full_scale = duties                             ? 1.0
+                            : command.gates == Gates::kCurrent ? p_.current_loop.limit_a
+                                                               : p_.amplifier.voltage_limit_v;
   const auto value = [&](std::uint64_t n) { return full_scale * (2.0 * noise(n) - 1.0); };
+  const auto phase = [&](std::uint64_t n) {
+    return duties && connection_ == Connection::kStar ? noise(n) : value(n);
+  };
   return {.gates = command.gates,
-          .setpoint = {.a = value(1), .b = value(2), .c = value(3), .field = value(4)}};
+          .legs_off = command.legs_off,
+          .setpoint = {.a = phase(1), .b = phase(2), .c = phase(3), .field = value(4)}};
 }
 
 /// With a delay of n + f ticks the command of n ticks ago takes over from the one before it f T into the
@@ -146,19 +157,21 @@ void Drive::take_orders(DriveMemory& m, const InjectedFaults& faults, Tick tick)
 
 void Drive::take_order(Order& order, const PhaseCommand& command, DriveMemory& m) const noexcept {
   order.gates = Gates::kOff;
+  order.legs_off = command.legs_off;
   const ThreePhase phases = existing(phases_of(command.setpoint), terminals_);
   const PhaseValues setpoint{.a = phases.a, .b = phases.b, .c = phases.c, .field = command.setpoint.field};
   if (command.gates == Gates::kCurrent && kind_ == DriveKind::kCurrent) {
     order.gates = Gates::kCurrent;
     order.setpoint = limited_currents(p_.current_loop, setpoint, connection_);
-  } else if (command.gates == Gates::kVoltage) {
-    order.gates = Gates::kVoltage;
-    order.setpoint = amplified(p_.amplifier, setpoint);
+  } else if (has_voltages(command.gates)) {
+    order.gates = command.gates;
+    order.setpoint = command.gates == Gates::kDuty ? parts_of_rail(connection_, setpoint)
+                                                   : amplified(p_.amplifier, setpoint);
     if (kind_ == DriveKind::kSwitched) {
-      const LimitedVoltages v = bridge_voltages(connection_, m.bus_v, phases_of(order.setpoint));
+      const LimitedVoltages v = limited(m, order.gates, phases_of(wanted_voltages(m, order, {})));
       if (v.saturated) m.saturated = 1.0;
-      order.pattern =
-          SwitchingPattern(v.voltage_v, terminals_, rail_v(m), p_.inverter.dead_time_s, pwm_period_s_);
+      order.pattern = SwitchingPattern(v.voltage_v, terminals_, rail_v(m), p_.inverter.dead_time_s,
+                                       pwm_period_s_, order.legs_off);
     }
   } else if (command.gates == Gates::kZeroVoltage) {
     order.gates = Gates::kZeroVoltage;
@@ -196,13 +209,14 @@ TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double durati
   const Gates gates = m.switched_off != 0.0 ? Gates::kOff : order.gates;
   TerminalDrive out;
   out.rail_v = rail_v(m);
-  if (gates == Gates::kVoltage || gates == Gates::kCurrent) {
+  if (has_voltages(gates) || gates == Gates::kCurrent) {
     drive_terminals(m, order, start_s, current_a, out);
   } else if (gates == Gates::kOff) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k)
       out.mode[k] = TerminalMode::kDiodes;
   }
   if (filter_rate_per_s_ > 0.0 && gates != Gates::kOff) filter(m, duration_s, out);
+  if (order.legs_off != 0) open_legs(order.legs_off, out);
   if (holds_) hold_terminals(out);
   if (field_lost_) {
     out.field_v = 0.0;
@@ -220,22 +234,36 @@ PhaseValues Drive::loop_voltages(const DriveMemory& m, const PhaseValues& setpoi
   return amplified(p_.amplifier, by_terminal(voltage_v, setpoint_a, current_a, m.integral_v));
 }
 
+PhaseValues Drive::wanted_voltages(const DriveMemory& m, const Order& order,
+                                   const PhaseValues& current_a) const noexcept {
+  if (order.gates == Gates::kCurrent) return loop_voltages(m, order.setpoint, current_a);
+  if (order.gates != Gates::kDuty) return order.setpoint;
+  const double rail = rail_v(m);
+  return amplified(p_.amplifier, {.a = order.setpoint.a * rail,
+                                  .b = order.setpoint.b * rail,
+                                  .c = order.setpoint.c * rail,
+                                  .field = order.setpoint.field * m.bus_v});
+}
+
+LimitedVoltages Drive::limited(const DriveMemory& m, Gates gates, const ThreePhase& wanted_v) const noexcept {
+  if (!is_inverter()) return clipped(wanted_v, limit_v(m));
+  return gates == Gates::kDuty ? clipped(wanted_v, rail_v(m))
+                               : bridge_voltages(connection_, m.bus_v, wanted_v);
+}
+
 void Drive::drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
                             TerminalDrive& out) const noexcept {
-  const PhaseValues wanted_v =
-      order.gates == Gates::kCurrent ? loop_voltages(m, order.setpoint, current_a) : order.setpoint;
-  const bool inverter = kind_ == DriveKind::kAveraged || kind_ == DriveKind::kSwitched;
-  const double field_limit_v = inverter ? m.bus_v : limit_v(m);
+  const PhaseValues wanted_v = wanted_voltages(m, order, current_a);
+  const double field_limit_v = is_inverter() ? m.bus_v : limit_v(m);
   out.field_v = std::clamp(wanted_v.field, -field_limit_v, field_limit_v);
   bool saturated = out.field_v != wanted_v.field && p_.source.field_v == 0.0;
   if (kind_ == DriveKind::kSwitched) {
     put_switches(m, order, start_s, out);
   } else {
-    const LimitedVoltages v = inverter ? bridge_voltages(connection_, m.bus_v, phases_of(wanted_v))
-                                       : clipped(phases_of(wanted_v), limit_v(m));
+    const LimitedVoltages v = limited(m, order.gates, phases_of(wanted_v));
     saturated = saturated || v.saturated;
     out.start_v = v.voltage_v;
-    if (inverter) out.start_v = with_dead_time(v.voltage_v, out.rail_v, current_a);
+    if (is_inverter()) out.start_v = with_dead_time(v.voltage_v, out.rail_v, current_a);
   }
   if (saturated) m.saturated = 1.0;
 }
@@ -277,6 +305,12 @@ void Drive::filter(DriveMemory& m, double duration_s, TerminalDrive& out) const 
   out.start_v = m.filtered_v;
   out.middle_v = by_phase(after(half), m.filtered_v, m.filter_input_v);
   out.end_v = by_phase(after(half * half), m.filtered_v, m.filter_input_v);
+}
+
+void Drive::open_legs(std::uint32_t legs_off, TerminalDrive& out) const noexcept {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k) {
+    if ((legs_off >> k & 1U) != 0) out.mode[k] = TerminalMode::kDiodes;
+  }
 }
 
 void Drive::hold_terminals(TerminalDrive& out) const noexcept {

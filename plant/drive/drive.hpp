@@ -71,9 +71,11 @@ struct DriveMemory {
 /// may be asked again for a shorter interval from the same start.
 ///
 /// Gates::kOff lets the currents flow through the diodes into the rails; Gates::kZeroVoltage drives every
-/// terminal at 0; Gates::kCurrent without a current loop is Gates::kOff. Commands before tick 0 are
-/// Gates::kOff. The field winding has the voltage source.field_v, if that is not 0, whatever the gates do;
-/// else the command's, which is 0 with the gates off.
+/// terminal at 0; Gates::kCurrent without a current loop is Gates::kOff. Gates::kDuty gives every leg its
+/// voltage alone: an inverter then neither shortens the vector of a star nor moves its common part. A leg
+/// that the command switches off is on its diodes, whatever the gates of the others do. Commands before tick
+/// 0 are Gates::kOff. The field winding has the voltage source.field_v, if that is not 0, whatever the gates
+/// do; else the command's, which is 0 with the gates off.
 class Drive {
  public:
   /// The parameters must be free of problems(). Noise channels from noise_channel to noise_channel + 4 are
@@ -133,8 +135,10 @@ class Drive {
  private:
   /// The effect of a command in this tick.
   struct Order {
-    Gates gates = Gates::kOff;   ///< kCurrent only with a current loop
-    PhaseValues setpoint{};      ///< [V] behind gain and offset, or [A] within the limit
+    Gates gates = Gates::kOff;  ///< kCurrent only with a current loop
+    std::uint32_t legs_off = 0;
+    /// [V] behind gain and offset, or [A] within the limit; duties as parts of the rail, -1 to 1.
+    PhaseValues setpoint{};
     SwitchingPattern pattern{};  ///< switched inverter
   };
   /// A fault that holds a terminal whatever the command says.
@@ -179,12 +183,16 @@ class Drive {
   static std::size_t segment_hint(const DriveMemory& m) noexcept {
     return static_cast<std::size_t>(m.pwm_segment);
   }
+  bool is_inverter() const noexcept { return kind_ == DriveKind::kAveraged || kind_ == DriveKind::kSwitched; }
   double rail_v(const DriveMemory& m) const noexcept { return rail_voltage_v(m.bus_v, connection_); }
   double limit_v(const DriveMemory& m) const noexcept {
     return std::min(p_.amplifier.voltage_limit_v, rail_v(m));
   }
   PhaseValues loop_voltages(const DriveMemory& m, const PhaseValues& setpoint_a,
                             const PhaseValues& current_a) const noexcept;
+  PhaseValues wanted_voltages(const DriveMemory& m, const Order& order,
+                              const PhaseValues& current_a) const noexcept;
+  LimitedVoltages limited(const DriveMemory& m, Gates gates, const ThreePhase& wanted_v) const noexcept;
   void drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
                        TerminalDrive& out) const noexcept;
   void find_segment(DriveMemory& m, const Order& order, double start_s) const noexcept;
@@ -192,6 +200,7 @@ class Drive {
   ThreePhase with_dead_time(const ThreePhase& voltage_v, double rail_v,
                             const PhaseValues& current_a) const noexcept;
   void filter(DriveMemory& m, double duration_s, TerminalDrive& out) const noexcept;
+  void open_legs(std::uint32_t legs_off, TerminalDrive& out) const noexcept;
   void hold_terminals(TerminalDrive& out) const noexcept;
   void follow_start_capacitor(DriveMemory& m, double duration_s, const TerminalDrive& applied,
                               const PhaseValues& from_a, const PhaseValues& to_a) const noexcept;

@@ -56,6 +56,9 @@ void Drive::follow_loop(DriveMemory& m, double start_s, double duration_s, const
     return integral_after(p_.current_loop, integral_v, asked_v, clip_v, error_a, duration_s);
   };
   m.integral_v = by_terminal(after, m.integral_v, wanted_v, order.setpoint, from_a, to_a);
+  if ((order.legs_off & 1U) != 0) m.integral_v.a = 0.0;
+  if ((order.legs_off & 2U) != 0) m.integral_v.b = 0.0;
+  if ((order.legs_off & 4U) != 0) m.integral_v.c = 0.0;
   if (connection_ == Connection::kStar) {
     const ThreePhase star = without_neutral(phases_of(m.integral_v));
     m.integral_v = {.a = star.a, .b = star.b, .c = star.c, .field = m.integral_v.field};

@@ -57,13 +57,17 @@ double averaged_voltage_v(double voltage_v, double rail_v, double dead_part, dou
 }
 
 SwitchingPattern::SwitchingPattern(const ThreePhase& voltage_v, int terminals, double rail_v,
-                                   double dead_time_s, double period_s) noexcept {
+                                   double dead_time_s, double period_s, std::uint32_t legs_off) noexcept {
   const std::array<double, 3> wanted_v{voltage_v.a, voltage_v.b, voltage_v.c};
   std::array<double, 6> first_half;
   first_half.fill(kNever);
   std::size_t count = 0;
   std::uint64_t passed = 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(terminals); ++k) {
+    if ((legs_off >> k & 1U) != 0) {
+      passed += kOff << (kBits * k);
+      continue;
+    }
     const double on = duty(wanted_v[k], rail_v, dead_time_s / period_s);
     if (on == 1.0) passed += kHigh << (kBits * k);
     if (on == 0.0 || on == 1.0) continue;

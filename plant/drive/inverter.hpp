@@ -25,6 +25,14 @@ struct InverterParameters {
 /// Other connections: each winding within plus and minus the link.
 LimitedVoltages bridge_voltages(Connection connection, double bus_v, const ThreePhase& wanted_v) noexcept;
 
+/// The voltages of duties as parts of the rail, -1 to 1: a star's leg with duty 0 is at the lower rail, and
+/// the middle of the link is half way between the rails.
+constexpr PhaseValues parts_of_rail(Connection connection, const PhaseValues& duties) noexcept {
+  if (connection != Connection::kStar) return duties;
+  return {
+      .a = 2.0 * duties.a - 1.0, .b = 2.0 * duties.b - 1.0, .c = 2.0 * duties.c - 1.0, .field = duties.field};
+}
+
 /// Part of the period during which a terminal is at the upper rail, for a mean voltage within the rails.
 /// Pulses and gaps that would vanish in the dead time, a part of the period, are left out: 0 or 1.
 constexpr double duty(double voltage_v, double rail_v, double dead_part) noexcept {
@@ -47,9 +55,9 @@ double averaged_voltage_v(double voltage_v, double rail_v, double dead_part, dou
 class SwitchingPattern {
  public:
   SwitchingPattern() = default;
-  /// The voltages are within the rails.
+  /// The voltages are within the rails. Both switches of the legs in `legs_off`, bit 0 for a, stay open.
   SwitchingPattern(const ThreePhase& voltage_v, int terminals, double rail_v, double dead_time_s,
-                   double period_s) noexcept;
+                   double period_s, std::uint32_t legs_off = 0) noexcept;
 
   /// The segment between two commutations in which this instant of the period lies. The search starts at
   /// `hint`, which speeds it up and changes nothing.
@@ -80,13 +88,14 @@ class SwitchingPattern {
   static constexpr double kNever = 1e300;
   static constexpr std::uint64_t kBits = 3;  ///< for the commutations that a terminal has passed: 0 to 4
   static constexpr std::uint64_t kHigh = 2;  ///< of them make the upper switch closed
+  static constexpr std::uint64_t kOff = 5;   ///< in place of their number: the leg is off
 
   // The connection of a terminal after so many commutations: lower switch, dead time, upper switch, dead
-  // time, lower switch.
+  // time, lower switch; then that of a leg that is off.
   static constexpr std::array<TerminalMode, 8> kMode{TerminalMode::kDriven, TerminalMode::kDiodes,
                                                      TerminalMode::kDriven, TerminalMode::kDiodes,
-                                                     TerminalMode::kDriven};
-  static constexpr std::array<double, 8> kLevel{-1.0, 0.0, 1.0, 0.0, -1.0};
+                                                     TerminalMode::kDriven, TerminalMode::kDiodes};
+  static constexpr std::array<double, 8> kLevel{-1.0, 0.0, 1.0, 0.0, -1.0, 0.0};
 
   struct Segment {
     double until_s = kNever;

@@ -240,6 +240,24 @@ PhaseValues open_terminal_voltages(Connection connection, const WindingValues& o
   return {.a = v[0], .b = v[1], .c = v[2], .field = field_v};
 }
 
+PhaseValues with_floating(Connection connection, TerminalSet floating, const PhaseValues& conducting_v,
+                          const WindingValues& winding_v) noexcept {
+  const Phases winding = winding_phases(connection, winding_v);
+  Phases v{conducting_v.a, conducting_v.b, conducting_v.c};
+  double neutral_v = 0.0;
+  int conducting = 0;
+  for (int k = 0; k < 3 && connection == Connection::kStar; ++k) {
+    if ((floating & bit(k)) != 0) continue;
+    neutral_v += v[at(k)] - winding[at(k)];
+    ++conducting;
+  }
+  if (conducting > 1) neutral_v /= conducting;
+  for (int k = 0; k < terminal_count(connection); ++k) {
+    if ((floating & bit(k)) != 0) v[at(k)] = neutral_v + winding[at(k)];
+  }
+  return {.a = v[0], .b = v[1], .c = v[2], .field = conducting_v.field};
+}
+
 bool diodes_block(Connection connection, const TerminalDrive& drive,
                   const WindingValues& open_circuit_v) noexcept {
   const Phases emf_v = winding_phases(connection, open_circuit_v);

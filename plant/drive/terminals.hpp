@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -75,6 +76,34 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
 /// The voltages of terminals without current.
 PhaseValues open_terminal_voltages(Connection connection, const WindingValues& open_circuit_v,
                                    double field_v) noexcept;
+
+/// The voltages of all terminals where those of `floating` carry no current: they are where the winding
+/// voltages put them, in a star above the neutral that the others give.
+PhaseValues with_floating(Connection connection, TerminalSet floating, const PhaseValues& conducting_v,
+                          const WindingValues& winding_v) noexcept;
+
+/// The voltage of a terminal against the negative rail. A winding between two legs hangs in the middle
+/// between the rails, because its legs switch together: this is the terminal of its first leg.
+constexpr double above_negative_rail(Connection connection, double terminal_v, double rail_v) noexcept {
+  return connection == Connection::kStar ? terminal_v + rail_v : 0.5 * (terminal_v + rail_v);
+}
+
+/// The terminals of an open star against the negative rail of a link: its neutral is nobody's, and the diodes
+/// hold no terminal beyond a rail.
+constexpr ThreePhase within_rails(const ThreePhase& v, double link_v) noexcept {
+  const double high_v = std::max({v.a, v.b, v.c});
+  const double low_v = std::min({v.a, v.b, v.c});
+  const double shift_v = high_v > link_v ? link_v - high_v : low_v < 0.0 ? -low_v : 0.0;
+  return {.a = v.a + shift_v, .b = v.b + shift_v, .c = v.c + shift_v};
+}
+
+constexpr TerminalSet driven_terminals(Connection connection, const TerminalDrive& drive) noexcept {
+  TerminalSet driven = 0;
+  for (int k = 0; k < terminal_count(connection); ++k) {
+    if (drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven) driven |= TerminalSet{1} << k;
+  }
+  return driven;
+}
 
 constexpr int driven_count(Connection connection, const TerminalDrive& drive) noexcept {
   int driven = 0;

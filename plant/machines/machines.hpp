@@ -35,4 +35,8 @@ using AllMachines = MachineList<InductionMachine,           //
 /// The parameters of one machine; the alternative is the kind.
 using MachineParameters = AllMachines::Parameters;
 
+inline Connection connection_of(const MachineParameters& machine) noexcept {
+  return std::visit([](const auto& p) { return connection_of(p); }, machine);
+}
+
 }  // namespace drivebench

@@ -20,6 +20,7 @@ struct SensorParameters {
   ResolverParameters resolver{};
   HallParameters hall{};
   MeterParameters meter{};
+  bool terminals = false;  ///< the terminals are shown against the negative rail
 };
 
 }  // namespace drivebench

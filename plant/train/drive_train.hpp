@@ -68,6 +68,7 @@ class DriveTrain final : public Train {
     bool plain = false;       ///< every terminal conducts at a constant voltage, nothing is shorted
     bool open = false;        ///< no terminal is driven, none carries a current
     bool stays = false;       ///< either of them, and the next piece has the same
+    TerminalSet off = 0;      ///< terminals without a current
   };
 
   /// The part of a piece up to its first event.
@@ -141,6 +142,10 @@ class DriveTrain final : public Train {
                  double load_nm) noexcept;
   void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
                     const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
+  /// Adds the piece to the mean voltages against the negative rail. `end_v` are those after its event.
+  [[gnu::noinline]] void follow_terminals(const AxisCore& core, AxisState& state, double duration_s,
+                                          const State& to, const RotorMotion& motion,
+                                          const PhaseValues& end_v) const noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
   /// Sets blocked currents to zero again, from which rounding lets them drift.
   void keep_open(const AxisCore& core, const AxisState& state, State& x,

@@ -161,6 +161,9 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state, 
     if (core.p.thermal.enabled) {
       state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
     }
+    if (core.p.sensors.terminals) {
+      follow_terminals(core, state, duration_s, to, to_motion, after.voltage_v);
+    }
     follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
   }
   core.record({.start_s = start_s,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "plant/drive/phases.hpp"
 #include "plant/train/drive_train.hpp"
 
 // The terminals of a drive train.
@@ -106,17 +107,51 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
       (piece_.open || (piece_.plain && piece_.circuit.dying == 0)) && core.drive.steady(state.drive);
   if (piece_.plain) {
     state.open_terminals = 0;
+    piece_.off = 0;
   } else if (piece_.open) {
     TerminalInput none = open_input(core.connection, all);
     none.field_v = piece_.drive.field_v;
     hold_constant(none);
     state.open_terminals = all;
+    piece_.off = all;
   } else {
     const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
     piece_.circuit = connect(core.connection, piece_.drive, state.injected, piece_.current_a,
                              WindingVoltagesOf(ask), state.open_terminals);
     if (piece_.circuit.short_circuit) trip(core, state);
+    piece_.off = state.open_terminals;
   }
+}
+
+/// A floating terminal goes linearly between the ends of a piece, at most a substep apart.
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisState& state, double duration_s,
+                                                  const State& to, const RotorMotion& motion,
+                                                  const PhaseValues& end_v) const noexcept {
+  // One driven terminal of a star alone carries no current and does not float.
+  const TerminalSet driven = driven_terminals(core.connection, piece_.drive);
+  const TerminalSet floating = piece_.off & ~driven;
+  const double rail_v = piece_.drive.rail_v;
+  const auto above = [&](double v) noexcept { return above_negative_rail(core.connection, v, rail_v); };
+  ThreePhase mean_v = phases_of(piece_.circuit.mean_v);
+  if (floating != 0) {
+    const TerminalInput& u = piece_.circuit.constant ? piece_.circuit.start : piece_.circuit.end;
+    const WindingValues winding_v = piece_.open ? open_v(to, motion) : floating_v(to, motion, u);
+    const PhaseValues last_v = with_floating(core.connection, floating, piece_.circuit.end_v, winding_v);
+    const PhaseValues& first_v = piece_.circuit.start_v;
+    if ((floating & 1u) != 0) mean_v.a = 0.5 * (first_v.a + last_v.a);
+    if ((floating & 2u) != 0) mean_v.b = 0.5 * (first_v.b + last_v.b);
+    if ((floating & 4u) != 0) mean_v.c = 0.5 * (first_v.c + last_v.c);
+  }
+  const auto against_rail = [&](const ThreePhase& v, TerminalSet afloat) noexcept {
+    const ThreePhase result = existing(by_phase(above, v), terminal_count(core.connection));
+    const bool open_star = core.connection == Connection::kStar && afloat == all_terminals(core.connection);
+    return open_star ? within_rails(result, 2.0 * rail_v) : result;
+  };
+  const double part = duration_s / core.timing.period_s;
+  const auto add = [part](double sum, double v) noexcept { return sum + part * v; };
+  state.terminal_mean_v = by_phase(add, state.terminal_mean_v, against_rail(mean_v, floating));
+  state.terminal_v = against_rail(phases_of(end_v), state.open_terminals & ~driven);
 }
 
 template <class Machine, class Shaft>

@@ -41,7 +41,7 @@ extern "C" {
 
 /** Grows when a call or a struct other than drivebench_sample changes; the library refuses a header of
  * another. */
-#define DRIVEBENCH_ABI 1
+#define DRIVEBENCH_ABI 2
 
 /** The result of a call. The positive codes are refusals of the bench: the numbers of RefusalCode in
  * bench.proto. */
@@ -82,7 +82,10 @@ enum drivebench_gates {
   DRIVEBENCH_GATES_VOLTAGE =
       1,                     /**< set-points are voltages [V]; in a star against the middle of the DC link */
   DRIVEBENCH_GATES_ZERO = 2, /**< active short circuit */
-  DRIVEBENCH_GATES_CURRENT = 3 /**< set-points are currents [A]; only a drive of kind "current_amplifier" */
+  DRIVEBENCH_GATES_CURRENT = 3, /**< set-points are currents [A]; only a drive of kind "current_amplifier" */
+  /** Set-points are duties: of a leg of a star its mean voltage against the negative rail over the link's, 0
+   * to 1; of a winding between two legs, and of the field, its voltage over the link's, -1 to 1. */
+  DRIVEBENCH_GATES_DUTY = 4
 };
 
 enum drivebench_mode { DRIVEBENCH_MODE_REALTIME = 1, DRIVEBENCH_MODE_LOCKSTEP = 2, DRIVEBENCH_MODE_FREE = 3 };
@@ -96,10 +99,12 @@ typedef struct drivebench_command {
   uint32_t axis;
   uint32_t gates;    /**< a drivebench_gates */
   uint64_t tick;     /**< of the sample that this command answers; above that of the command before */
-  double setpoint_a; /**< phase a, or an armature: [V], or [A] with DRIVEBENCH_GATES_CURRENT */
+  double setpoint_a; /**< phase a, or an armature: [V], [A] or a duty, as the gates say */
   double setpoint_b;
   double setpoint_c;
   double setpoint_f; /**< field winding */
+  uint64_t
+      legs_off; /**< legs that are off, on their diodes, whatever the gates of the others do: 1 a, 2 b, 4 c */
 } drivebench_command;
 
 /**
@@ -145,20 +150,26 @@ typedef struct drivebench_sample {
   double u_n_v;         /**< [V] neutral of the motor against the middle of the DC link */
   uint64_t hall_lines;  /**< Hall lines: 1 line 1, 2 line 2, 4 line 3 */
   double tachometer_v;  /**< [V] voltage of the tachometer */
-  double resolver_sin_v;   /**< [V] sine winding of the resolver, demodulated */
-  double resolver_cos_v;   /**< [V] cosine winding of the resolver, demodulated */
-  double temperature_k;    /**< [K] temperature of the windings */
-  double meter_u_rms_v;    /**< [V] power analyser, last whole window: rms voltage */
-  double meter_i_rms_a;    /**< [A] power analyser: rms current */
-  double meter_p_w;        /**< [W] power analyser: active power */
-  double meter_q_var;      /**< [var] power analyser: reactive power */
-  double meter_pf;         /**< power analyser: power factor */
-  double true_i_c_a;       /**< [A] true current of phase c */
-  double true_i_f_a;       /**< [A] true current of the field winding */
-  double load_angle_rad;   /**< [rad] true angle of the output: behind gear and elastic shaft */
-  double load_speed_rad_s; /**< [rad/s] true speed of the output */
-  double load_position_m;  /**< [m] true position of the table on the screw */
-  uint64_t injected;       /**< injected faults in force; the description lists the bits */
+  double resolver_sin_v;    /**< [V] sine winding of the resolver, demodulated */
+  double resolver_cos_v;    /**< [V] cosine winding of the resolver, demodulated */
+  double temperature_k;     /**< [K] temperature of the windings */
+  double meter_u_rms_v;     /**< [V] power analyser, last whole window: rms voltage */
+  double meter_i_rms_a;     /**< [A] power analyser: rms current */
+  double meter_p_w;         /**< [W] power analyser: active power */
+  double meter_q_var;       /**< [var] power analyser: reactive power */
+  double meter_pf;          /**< power analyser: power factor */
+  double true_i_c_a;        /**< [A] true current of phase c */
+  double true_i_f_a;        /**< [A] true current of the field winding */
+  double load_angle_rad;    /**< [rad] true angle of the output: behind gear and elastic shaft */
+  double load_speed_rad_s;  /**< [rad/s] true speed of the output */
+  double load_position_m;   /**< [m] true position of the table on the screw */
+  uint64_t injected;        /**< injected faults in force; the description lists the bits */
+  double terminal_a_v;      /**< [V] terminal a against the negative rail at the end of the tick before */
+  double terminal_b_v;      /**< [V] terminal b against the negative rail at the end of the tick before */
+  double terminal_c_v;      /**< [V] terminal c against the negative rail at the end of the tick before */
+  double terminal_a_mean_v; /**< [V] terminal a against the negative rail, mean over the tick before */
+  double terminal_b_mean_v; /**< [V] terminal b against the negative rail, mean over the tick before */
+  double terminal_c_mean_v; /**< [V] terminal c against the negative rail, mean over the tick before */
 } drivebench_sample;
 
 enum drivebench_kind { DRIVEBENCH_KIND_STATUS = 1, DRIVEBENCH_KIND_SENSOR = 2, DRIVEBENCH_KIND_TRUTH = 3 };

@@ -151,7 +151,7 @@ double value_of(const Field& field, std::uint64_t raw, double unit) noexcept {
 /// The value of one count of a set-point in a classic command whose mode gives duties or currents; 0 in the
 /// other modes.
 double setpoint_unit(const Profile& profile, double mode) noexcept {
-  if (mode == double{kDutyMode}) return kDutyUnit;
+  if (mode == double{kDutyMode} || mode == double{kLegDutyMode}) return kDutyUnit;
   return mode == double{kCurrentMode} ? profile.current_unit_a : 0.0;
 }
 
@@ -181,6 +181,10 @@ void put(Frame& frame, const Field& field, std::uint64_t raw) noexcept {
   std::uint8_t* const at = &frame.data[field.start_bit / 8U];
   if (field.bits == 8) return put_bytes<1>(at, raw);
   if (field.bits == 16) return put_bytes<2>(at, raw);
+  if (field.bits == 4) {
+    *at = static_cast<std::uint8_t>(*at | raw << field.start_bit % 8U);
+    return;
+  }
   put_bytes<4>(at, raw);
 }
 
@@ -188,6 +192,7 @@ std::uint64_t get(const Frame& frame, const Field& field) noexcept {
   const std::uint8_t* const at = &frame.data[field.start_bit / 8U];
   if (field.bits == 8) return get_bytes<1>(at);
   if (field.bits == 16) return get_bytes<2>(at);
+  if (field.bits == 4) return get_bytes<1>(at) >> field.start_bit % 8U & 0xFU;
   return get_bytes<4>(at);
 }
 
@@ -245,7 +250,7 @@ Values decode(const MessageRow& row, const Profile& profile, const Frame& frame)
   const Layout& layout = layout_of(row);
   const double setpoint =
       is_classic_command(row, profile)
-          ? setpoint_unit(profile, static_cast<double>(frame.data[row.fields[kCommandMode].start_bit / 8U]))
+          ? setpoint_unit(profile, static_cast<double>(get(frame, row.fields[kCommandMode])))
           : 0.0;
   const std::uint8_t page = frame.data[0];
   for (const auto [i, byte] : std::span(layout.float_fields).first(layout.float_count))

@@ -15,6 +15,7 @@ struct CommandFields {
   std::uint64_t tick = 0;  ///< of the sample that the command answers
   unsigned mode = 0;
   unsigned lease = 0;
+  unsigned legs_off = 0;
   double a = 0.0;
   double b = 0.0;
   double c = 0.0;      ///< wide axes only
@@ -25,7 +26,7 @@ namespace command_detail {
 
 /// The fields of commands in the order of the members of CommandFields.
 inline constexpr auto kNames =
-    std::to_array<std::string_view>({"tick", "mode", "lease", "u_a", "u_b", "u_c", "u_f"});
+    std::to_array<std::string_view>({"tick", "mode", "lease", "legs_off", "u_a", "u_b", "u_c", "u_f"});
 
 using Numbers = std::array<double, kNames.size()>;
 
@@ -60,10 +61,11 @@ inline CommandFields setpoints_in(const MessageRow& row, const Values& values) n
   return {.tick = static_cast<std::uint64_t>(n[0]),
           .mode = static_cast<unsigned>(n[1]),
           .lease = static_cast<unsigned>(n[2]),
-          .a = n[3],
-          .b = n[4],
-          .c = n[5],
-          .field = n[6]};
+          .legs_off = static_cast<unsigned>(n[3]),
+          .a = n[4],
+          .b = n[5],
+          .c = n[6],
+          .field = n[7]};
 }
 
 /// The frames of one command, in the order of sending: a wide axis takes two classic frames.
@@ -80,6 +82,7 @@ inline CommandFrames encode_command(const Profile& profile, std::uint32_t node, 
   const command_detail::Numbers n = {static_cast<double>(s.tick),
                                      static_cast<double>(s.mode),
                                      static_cast<double>(s.lease),
+                                     static_cast<double>(s.legs_off),
                                      s.a,
                                      s.b,
                                      s.c,

@@ -84,6 +84,11 @@ constexpr Field real(std::string_view name, std::string_view unit, std::uint16_t
                      std::string_view signal, std::string_view meaning) {
   return {name, unit, start, 32, Encoding::kFloat, Unit::kNone, signal, meaning};
 }
+/// A code in half a byte.
+constexpr Field half_byte(Field field) {
+  field.bits = 4;
+  return field;
+}
 constexpr Field on_page(std::uint8_t page, Field field) {
   field.page = page;
   return field;

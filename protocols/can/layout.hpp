@@ -21,8 +21,8 @@ constexpr bool can_carry(const Field& field, const Signal& signal) {
   return wraps || (field.encoding == Encoding::kCode && signal.type == SignalType::kUnsigned);
 }
 
-/// Fields are in the order of their pages; within a page they are sorted, disjoint, whole bytes and inside
-/// the frame. Singles stand on every page: encode_sample() and decode() rely on it.
+/// Fields are in the order of their pages; within a page they are sorted, disjoint, whole bytes or halves of
+/// one, and inside the frame. Singles stand on every page: encode_sample() and decode() rely on it.
 constexpr bool is_sound(const MessageRow& row) {
   if (row.fields.size() > kMaxFields || !is_fd_size(row.size)) return false;
   if ((row.variant == Variant::kFd) != (row.size > 8)) return false;  // match() relies on the size
@@ -36,8 +36,9 @@ constexpr bool is_sound(const MessageRow& row) {
       page = field.page;
       end = common_end;
     }
-    if (field.start_bit < end || field.start_bit % 8 != 0) return false;
-    if (field.bits != 8 && field.bits != 16 && field.bits != 32) return false;
+    if (field.start_bit < end || field.start_bit % (field.bits == 4 ? 4 : 8) != 0) return false;
+    if (field.bits != 4 && field.bits != 8 && field.bits != 16 && field.bits != 32) return false;
+    if (field.bits == 4 && field.encoding != Encoding::kCode) return false;
     if (field.encoding == Encoding::kFloat && (field.bits != 32 || field.page != kEveryPage)) return false;
     const Signal* const signal = find_signal(field.signal);
     if (field.signal.empty() != (signal == nullptr)) return false;
@@ -124,7 +125,7 @@ inline constexpr auto kLayouts = [] {
       reserved = bytes_mask(0, row.size);
       if (row.message == Message::kEdges) reserved &= ~bytes_mask(kFirstEdgeByte, 2 * kEdgesPerFrame);
       for (const Field& field : row.fields) {
-        if (is_on_page(field, page)) reserved &= ~bytes_mask(field.start_bit / 8U, field.bits / 8U);
+        if (is_on_page(field, page)) reserved &= ~bytes_mask(field.start_bit / 8U, (field.bits + 7U) / 8U);
       }
     }
   }

@@ -80,8 +80,9 @@ std::string title_of(const MessageRow& row, std::span<const MessageRow* const> r
 std::string field_line(const Field& field, const Profile& profile) {
   const std::optional<Range> range = range_of(field, profile);
   const unsigned first = field.start_bit / 8U;
-  const unsigned last = first + field.bits / 8U - 1;
+  const unsigned last = first + (field.bits + 7U) / 8U - 1;
   std::string line = "| " + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
+  if (field.bits < 8) line += field.start_bit % 8U == 0 ? " low half" : " high half";
   line += " | " + std::string(field.name) + " | ";
   if (field.page != kEveryPage) line += "page " + std::to_string(field.page) + ": ";
   line += encoding_text(field, profile) + " | ";

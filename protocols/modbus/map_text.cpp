@@ -165,7 +165,8 @@ constexpr std::string_view kRules = R"(
 Functions 1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43/14 (device identification) and 8/0 (echo). Functions 3 and 4 read the same registers.
 Addresses count from 0; the columns 3xxxx and 4xxxx are the traditional notation, which counts from 1. A value of more than one register has
 its most significant word first (ABCD); at the address in column CDAB it has the words in reverse order. One request sees one tick.
-The sample has two blocks without a gap: one request may read the 125 registers from 200 on, which hold every sensor.
+The sample has two blocks without a gap: one request may read the 125 registers from 200 on, which hold every sensor but the terminals against the
+negative rail. These have a block of their own, with the tick before them.
 
 A value is a register, or registers, times its scaling. Scaled 16-bit values saturate at +-32767 (unsigned: 65534); -32768 (65535) stands for
 "no number". float32 rounds the double precision of the bench, in both directions.
@@ -178,8 +179,10 @@ the request 2 gives the lease back.
 **Commands.** A command is one write of `command_mode` to `command_b`. The write of `command_counter` triggers it, so write the other registers
 together with it or before. With function 23 the answer waits for the tick and reads the sample after it: one transaction for each tick in
 lockstep. The registers from `more_lease_key` on repeat the block and add phase c and field, so that one write commands a machine with these;
-`terminals` lists the terminals of the machine, and set-points of other terminals are ignored. A duty of 1 is the bus voltage, for a leg of a
-star half of it. Function 16 is answered as soon as the bench has accepted the command. A write of the process data is a command as well, for the
+`terminals` lists the terminals of the machine, and set-points of other terminals are ignored. A duty is a part of the bus voltage, -1 to 1, across a
+winding between two legs and across the field. A leg of a star has in mode 5 its part of the bus voltage against the negative rail, 0 to 1; mode 3 counts
+it from the middle of the link, so that -1 is the negative rail and 1 the positive one. The common part of duties reaches the terminals. `legs_off`
+holds until the next write or the end of the lease. Function 16 is answered as soon as the bench has accepted the command. A write of the process data is a command as well, for the
 newest tick at its arrival; in real time it waits for the next tick if this one is answered already, so that no command is lost.
 
 | exception | meaning |

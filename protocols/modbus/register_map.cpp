@@ -69,6 +69,8 @@ RegisterMap::RegisterMap(std::span<const ParameterInfo> parameters, bool writabl
       block(5, kMoreProcess, "process data of all terminals"),
       block(6, kMoreSample, "sample, continued"),
       block(7, kMoreCommand, "lease and command for all terminals"),
+      block(8, kLegs, "legs of a command"),
+      block(9, kRailSample, "terminals against the negative rail"),
   };
 }
 

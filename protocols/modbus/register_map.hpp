@@ -17,7 +17,7 @@ namespace drivebench::modbus {
 inline constexpr std::uint16_t kSampleLength = map_detail::length_of(map_detail::kSample);
 
 /// The most registers from kSampleStart on that one request can read in whole values; they include every
-/// sensor.
+/// sensor but the terminals against the negative rail.
 inline constexpr std::uint16_t kSensorsLength = [] {
   std::size_t end = kMoreSampleStart;
   for (const Row& row : map_detail::kMoreSample) {
@@ -114,8 +114,9 @@ class RegisterMap {
 
   std::span<const Row> rows() const noexcept { return rows_; }
   std::span<const Block> blocks() const noexcept { return blocks_; }
-  /// The number of blocks in the first list of the header; the second list has the others.
+  /// The number of blocks in the first and in the second list of the header; the third has the others.
   static constexpr std::size_t kFirstBlocks = 4;
+  static constexpr std::size_t kMoreBlocks = 3;
   bool writable() const noexcept { return writable_; }
 
   /// The registers of a request, without a gap.

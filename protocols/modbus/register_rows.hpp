@@ -24,6 +24,7 @@ inline constexpr std::uint16_t kMirrorOffset = 10'000;
 inline constexpr std::uint16_t kProcessStart = 100;
 inline constexpr std::uint16_t kSampleStart = 200;
 inline constexpr std::uint16_t kMoreSampleStart = 286;
+inline constexpr std::uint16_t kRailSampleStart = 340;
 inline constexpr std::uint16_t kCommandStart = 400;
 inline constexpr std::uint16_t kParameterStart = 1000;
 
@@ -38,6 +39,7 @@ enum class Content : std::uint8_t {
   kMirror,
   kBlocks,
   kMoreBlocks,
+  kFurtherBlocks,
   kBlockId,  ///< of block number `index`
   kBlockStart,
   kBlockLength,
@@ -64,6 +66,7 @@ enum class Content : std::uint8_t {
   kSetpointB,
   kSetpointC,
   kSetpointField,
+  kLegsOff,
   kLeaseStatus,
   kLastRefusal,
   kParameter,  ///< row `index` of the parameters
@@ -91,7 +94,14 @@ struct Row {
 enum class AxisRequest : std::uint16_t { kNone = 0, kClearFaults = 1, kRelease = 2, kRenew = 3 };
 
 /// The codes of the mode register in the command block.
-enum class CommandMode : std::uint16_t { kOff = 0, kVoltage = 1, kZeroVoltage = 2, kDuty = 3, kCurrent = 4 };
+enum class CommandMode : std::uint16_t {
+  kOff = 0,
+  kVoltage = 1,
+  kZeroVoltage = 2,
+  kDuty = 3,  ///< counts the legs of a star from the middle of the link
+  kCurrent = 4,
+  kLegDuty = 5,
+};
 
 /// The quantity of the references in the process data.
 enum class ReferenceMode : std::uint16_t { kVoltage = 0, kCurrent = 1 };
@@ -184,6 +194,13 @@ inline constexpr auto kHeader = std::to_array<Row>({
     fixed(41, kUnsigned16, kConnection, "connection", "enum",
           "of the stator: 0 two-phase, 1 star, 2 independent phases, 3 armature"),
     fixed(42, kUnsigned16, kTerminals, "terminals", "bits", "what can be commanded: 1 a, 2 b, 4 c, 8 field"),
+    fixed(43, kUnsigned16, kFurtherBlocks, "further_blocks", "1", "number of blocks that follow, as above"),
+    fixed(44, kUnsigned16, kBlockId, "legs_id", "1", "8: legs of a command, right after block 7", 7),
+    fixed(45, kUnsigned16, kBlockStart, "legs_start", "1", "its first register", 7),
+    fixed(46, kUnsigned16, kBlockLength, "legs_length", "1", "its number of registers", 7),
+    fixed(47, kUnsigned16, kBlockId, "rail_sample_id", "1", "9: terminals against the negative rail", 8),
+    fixed(48, kUnsigned16, kBlockStart, "rail_sample_start", "1", "its first register", 8),
+    fixed(49, kUnsigned16, kBlockLength, "rail_sample_length", "1", "its number of registers", 8),
 });
 
 inline constexpr auto kProcess = std::to_array<Row>({
@@ -240,11 +257,12 @@ inline constexpr auto kMoreProcess = std::to_array<Row>({
     low_bits(141, kUnsigned16, "tick", "more_snapshot", "as at the start of the block"),
 });
 
-// The numbers of signals, in the order of the catalogue, in the two blocks of the sample. A block never
+// The numbers of signals, in the order of the catalogue, in the three blocks of the sample. A block never
 // grows.
 inline constexpr std::size_t kFirstSignals = 28;
 inline constexpr std::size_t kMoreSignals = 21;
-static_assert(kFirstSignals + kMoreSignals == kSignals.size(), "further signals need a block of their own");
+inline constexpr std::size_t kRailSignals = 6;
+static_assert(kFirstSignals + kMoreSignals + kRailSignals == kSignals.size(), "others need a new block");
 
 constexpr Row sample_row(std::size_t index, std::uint16_t address) {
   const Signal& s = kSignals[index];
@@ -268,13 +286,13 @@ inline constexpr auto kSample = [] {
   return rows;
 }();
 
-/// The other signals: sensors before truth, so that one request can read all sensors; then the tick again.
+/// The next signals: sensors before truth, so that one request can read these sensors; then the tick again.
 inline constexpr auto kMoreSample = [] {
   std::array<Row, kMoreSignals + 1> rows{};
   std::uint16_t address = kMoreSampleStart;
   std::size_t n = 0;
   for (const bool truth : {false, true}) {
-    for (std::size_t i = kFirstSignals; i < kSignals.size(); ++i) {
+    for (std::size_t i = kFirstSignals; i < kFirstSignals + kMoreSignals; ++i) {
       if ((kSignals[i].kind == SignalKind::kTruth) != truth) continue;
       rows[n] = sample_row(i, address);
       address = static_cast<std::uint16_t>(rows[n++].end());
@@ -285,8 +303,17 @@ inline constexpr auto kMoreSample = [] {
   return rows;
 }();
 
+/// The tick and the terminals against the negative rail.
+inline constexpr auto kRailSample = [] {
+  std::array<Row, kRailSignals + 1> rows{};
+  rows[0] = low_bits(kRailSampleStart, kUnsigned64, "tick", "rail_snapshot", "the tick of these voltages");
+  for (std::size_t i = 0; i < kRailSignals; ++i)
+    rows[i + 1] = sample_row(kFirstSignals + kMoreSignals + i, static_cast<std::uint16_t>(rows[i].end()));
+  return rows;
+}();
+
 inline constexpr std::string_view kModeMeaning =
-    "0 gates off, 1 voltages, 2 zero voltage, 3 duties: shares of the bus voltage, 4 currents";
+    "0 gates off, 1 voltages, 2 zero voltage, 3 duties from the middle, 4 currents, 5 duties of legs";
 
 inline constexpr auto kCommand = std::to_array<Row>({
     written(400, kUnsigned16, kLeaseKey, "lease_key", "1", 1.0, 0.0, kAny16,
@@ -295,13 +322,13 @@ inline constexpr auto kCommand = std::to_array<Row>({
             "used the same number; 0 gives it back. Reads as 0 for others"),
     written(401, kUnsigned16, kRequest, "request", "enum", 1.0, 0.0, 3.0,
             "1 clear faults, 2 release the lease, 3 renew it; reads as 0"),
-    written(402, kUnsigned16, kCommandMode, "command_mode", "enum", 1.0, 0.0, 4.0, kModeMeaning),
+    written(402, kUnsigned16, kCommandMode, "command_mode", "enum", 1.0, 0.0, 5.0, kModeMeaning),
     written(403, kUnsigned32, kCounter, "command_counter", "1", 1.0, 0.0, 4294967295.0,
             "low bits of the tick of the sample that the command answers; writing it gives the command"),
     written(405, kFloat32, kSetpointA, "command_a", "V, 1 or A", 1.0, -kMaxSetpoint, kMaxSetpoint,
-            "voltage of phase a, or its duty in -1 .. 1, or its current"),
+            "voltage of phase a, or its duty, or its current"),
     written(407, kFloat32, kSetpointB, "command_b", "V, 1 or A", 1.0, -kMaxSetpoint, kMaxSetpoint,
-            "voltage of phase b, or its duty in -1 .. 1, or its current"),
+            "voltage of phase b, or its duty, or its current"),
     fixed(409, kUnsigned16, kLeaseStatus, "lease_status", "enum",
           "holder of the lease: 0 none, 1 this connection, 2 another Modbus connection, 3 another transport"),
     fixed(410, kUnsigned16, kLastRefusal, "last_refusal", "enum", kLastRefusalMeaning),
@@ -311,7 +338,7 @@ inline constexpr auto kCommand = std::to_array<Row>({
 inline constexpr auto kMoreCommand = std::to_array<Row>({
     written(420, kUnsigned16, kLeaseKey, "more_lease_key", "1", 1.0, 0.0, kAny16, "as lease_key"),
     written(421, kUnsigned16, kRequest, "more_request", "enum", 1.0, 0.0, 3.0, "as request"),
-    written(422, kUnsigned16, kCommandMode, "more_command_mode", "enum", 1.0, 0.0, 4.0, kModeMeaning),
+    written(422, kUnsigned16, kCommandMode, "more_command_mode", "enum", 1.0, 0.0, 5.0, kModeMeaning),
     written(423, kUnsigned32, kCounter, "more_command_counter", "1", 1.0, 0.0, 4294967295.0,
             "as command_counter; writing it gives the command"),
     written(425, kFloat32, kSetpointA, "more_command_a", "V, 1 or A", 1.0, -kMaxSetpoint, kMaxSetpoint,
@@ -324,10 +351,17 @@ inline constexpr auto kMoreCommand = std::to_array<Row>({
             "voltage of the field winding, or its duty, or its current"),
 });
 
+/// What a command says of the legs; one request writes it together with the registers above.
+inline constexpr auto kLegs = std::to_array<Row>({
+    written(433, kUnsigned16, kLegsOff, "legs_off", "bits", 1.0, 0.0, 7.0,
+            "legs that are off, whatever the mode gives the others: 1 a, 2 b, 4 c"),
+});
+
 /// All parts in one array, sorted by address.
 inline constexpr auto kFixedRows = [] {
   std::array<Row, kHeader.size() + kProcess.size() + kMoreProcess.size() + kSample.size() +
-                      kMoreSample.size() + kCommand.size() + kMoreCommand.size()>
+                      kMoreSample.size() + kRailSample.size() + kCommand.size() + kMoreCommand.size() +
+                      kLegs.size()>
       rows{};
   std::size_t n = 0;
   const auto append = [&](const auto& part) {
@@ -339,8 +373,10 @@ inline constexpr auto kFixedRows = [] {
   append(kMoreProcess);
   append(kSample);
   append(kMoreSample);
+  append(kRailSample);
   append(kCommand);
   append(kMoreCommand);
+  append(kLegs);
   return rows;
 }();
 

@@ -15,5 +15,8 @@ struct Sample {
 };
 
 inline constexpr std::size_t kSampleWords = sizeof(Sample) / 8;
+/// The last of them, from terminal_a_v on, came when runs had been recorded: hashes pass over them while they
+/// are zero.
+inline constexpr std::size_t kLaterSampleWords = kSampleWords - offsetof(Sample, terminal_a_v) / 8;
 
 }  // namespace drivebench

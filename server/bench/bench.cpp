@@ -168,6 +168,7 @@ CommandView Bench::command_view(std::size_t axis) const noexcept {
           .newest = a.control.newest,
           .is_latched = is_latched(axis),
           .step = a.command_step,
+          .connection = a.axis.connection(),
           .rules = a.rules,
           .drive = a.axis.parameters().drive};
 }
@@ -241,8 +242,10 @@ PhaseCommand Bench::drive_with(AxisRuntime& a, const PhaseCommand& command) noex
   PhaseCommand limited = command;
   if (slows) {
     const PhaseCommand before = in_force(c.last, a.on_link_loss, a.axis.connection(), a.quick_stop_ticks);
-    if (is_steeper(before, command, a.command_step)) {
-      limited = slewed(before, command, a.command_step);
+    const LargestChange change =
+        largest_change(a.command_step, command.gates, a.axis.connection(), a.axis.parameters().drive);
+    if (is_steeper(before, command, change)) {
+      limited = slewed(before, command, change);
       c.flags = kCommandSlewLimited;
     }
   }

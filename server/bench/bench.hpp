@@ -18,6 +18,11 @@
 
 namespace drivebench {
 
+template <>
+inline constexpr std::size_t kLaterWords<Sample> = kLaterSampleWords;
+template <>
+inline constexpr std::size_t kLaterWords<AxisState> = kLaterAxisWords;
+
 /// The control state of an axis, as in Sample.state. Only a clear by the controller ends timeout and fault;
 /// it leads to idle.
 enum class ControlState : std::uint64_t {

@@ -13,20 +13,25 @@ double largest(const PhaseValues& x) noexcept {
 }
 
 /// The set-points in force before a command with these gates.
-PhaseValues start_of(const PhaseCommand& before, Gates gates) noexcept {
-  return before.gates == gates ? before.setpoint : PhaseValues{};
+PhaseValues start_of(const PhaseCommand& before, Gates gates, Connection connection) noexcept {
+  if (before.gates == gates) return before.setpoint;
+  if (gates != Gates::kDuty || connection != Connection::kStar) return {};
+  return {.a = 0.5, .b = 0.5, .c = 0.5, .field = 0.0};
 }
 
-Refused check_values(const PhaseCommand& command, const CommandRules& rules,
-                     const DriveParameters& drive) noexcept {
+bool is_beyond(const PhaseCommand& command, const CommandView& axis) noexcept {
+  if (command.gates == Gates::kDuty) return largest(parts_of_rail(axis.connection, command.setpoint)) > 1.0;
+  const double limit = command.gates == Gates::kCurrent ? axis.drive.current_loop.limit_a
+                                                        : axis.drive.amplifier.voltage_limit_v;
+  return largest(command.setpoint) > limit;
+}
+
+Refused check_values(const PhaseCommand& command, const CommandView& axis) noexcept {
   if (!is_finite(command)) return Refused::kNotFinite;
-  if (!suits(drive.kind, command.gates)) return Refused::kWrongDrive;
-  const double magnitude = largest(command.setpoint);
-  if (magnitude > kMaxSetpoint) return Refused::kBeyondDrive;
-  if (rules.on_excess == OnExcess::kSaturate) return Refused::kNot;
-  const double limit =
-      command.gates == Gates::kCurrent ? drive.current_loop.limit_a : drive.amplifier.voltage_limit_v;
-  return magnitude > limit ? Refused::kBeyondDrive : Refused::kNot;
+  if (!suits(axis.drive.kind, command.gates)) return Refused::kWrongDrive;
+  if (largest(command.setpoint) > kMaxSetpoint) return Refused::kBeyondDrive;
+  if (axis.rules.on_excess == OnExcess::kSaturate) return Refused::kNot;
+  return is_beyond(command, axis) ? Refused::kBeyondDrive : Refused::kNot;
 }
 
 /// Whether a set-point changes faster than the rules allow, from the command before to this one.
@@ -34,30 +39,45 @@ bool is_too_steep(const Command& command, const CommandView& axis) noexcept {
   if (axis.rules.on_excess != OnExcess::kRefuse || axis.step <= 0.0) return false;
   const Command& before = axis.newest;
   const Tick ticks = before.answers < 0 ? 1 : command.answers - before.answers;
-  return is_steeper(before.phases, command.phases, static_cast<double>(ticks) * axis.step);
+  return is_steeper(before.phases, command.phases,
+                    largest_change(static_cast<double>(ticks) * axis.step, command.phases.gates,
+                                   axis.connection, axis.drive));
 }
 
 }  // namespace
 
 Refused judge(const Command& command, Owner sender, const CommandView& axis) noexcept {
   if (sender == 0 || sender != axis.owner) return Refused::kNotOwner;
-  const Refused values = check_values(command.phases, axis.rules, axis.drive);
+  const Refused values = check_values(command.phases, axis);
   if (values != Refused::kNot) return values;
   if (command.answers > axis.tick || command.answers <= axis.newest.answers) return Refused::kStale;
   if (is_too_steep(command, axis)) return Refused::kBeyondDrive;
   return axis.is_latched && command.phases.gates != Gates::kOff ? Refused::kLatched : Refused::kNot;
 }
 
-bool is_steeper(const PhaseCommand& before, const PhaseCommand& command, double step) noexcept {
-  const PhaseValues from = start_of(before, command.gates);
-  const auto difference = [](double a, double b) { return b - a; };
-  return largest(by_terminal(difference, from, command.setpoint)) > step;
+LargestChange largest_change(double step, Gates gates, Connection connection,
+                             const DriveParameters& drive) noexcept {
+  if (gates != Gates::kDuty) return {.step = step, .connection = connection};
+  // Not the voltage of the link: a command must be judged alike before the tick and in it.
+  const double supply_v = supply_voltage_v(drive.bus, drive.amplifier.voltage_limit_v, connection);
+  return {.step = step / supply_v, .connection = connection};
 }
 
-PhaseCommand slewed(const PhaseCommand& before, const PhaseCommand& command, double step) noexcept {
-  const PhaseValues from = start_of(before, command.gates);
+bool is_steeper(const PhaseCommand& before, const PhaseCommand& command,
+                const LargestChange& largest_change) noexcept {
+  const PhaseValues from = start_of(before, command.gates, largest_change.connection);
+  const auto difference = [](double a, double b) { return b - a; };
+  return largest(by_terminal(difference, from, command.setpoint)) > largest_change.step;
+}
+
+PhaseCommand slewed(const PhaseCommand& before, const PhaseCommand& command,
+                    const LargestChange& largest_change) noexcept {
+  const PhaseValues from = start_of(before, command.gates, largest_change.connection);
+  const double step = largest_change.step;
   const auto towards = [step](double a, double b) { return std::clamp(b, a - step, a + step); };
-  return {.gates = command.gates, .setpoint = by_terminal(towards, from, command.setpoint)};
+  return {.gates = command.gates,
+          .legs_off = command.legs_off,
+          .setpoint = by_terminal(towards, from, command.setpoint)};
 }
 
 }  // namespace drivebench

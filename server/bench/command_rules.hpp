@@ -29,6 +29,7 @@ struct CommandView {
   Command newest{};  ///< the last command that the axis took under this lease; it answers -1 if there is none
   bool is_latched = false;
   double step = 0.0;  ///< largest change of a set-point in a tick [V or A]; 0: any
+  Connection connection = Connection::kTwoPhase;
   const CommandRules& rules;
   const DriveParameters& drive;
 };
@@ -45,11 +46,23 @@ constexpr double largest_step(const CommandRules& rules, std::int64_t period_ns)
 /// off.
 Refused judge(const Command& command, Owner sender, const CommandView& axis) noexcept;
 
-/// Whether a set-point of `command` differs from `before` by more than `step`; a command with other gates
-/// starts from 0.
-bool is_steeper(const PhaseCommand& before, const PhaseCommand& command, double step) noexcept;
+/// A change of set-points that the rules allow.
+struct LargestChange {
+  double step;  ///< [V or A]; of duties the part of the supply's voltage
+  Connection connection;
+};
 
-/// The command with each set-point limited to a change of at most `step` from `before`.
-PhaseCommand slewed(const PhaseCommand& before, const PhaseCommand& command, double step) noexcept;
+/// `step` for set-points of this kind.
+LargestChange largest_change(double step, Gates gates, Connection connection,
+                             const DriveParameters& drive) noexcept;
+
+/// Whether a set-point of `command` differs from `before` by more than the change; a command with other gates
+/// starts from 0, the duties of a star from half.
+bool is_steeper(const PhaseCommand& before, const PhaseCommand& command,
+                const LargestChange& largest) noexcept;
+
+/// The command with each set-point limited to this change from `before`.
+PhaseCommand slewed(const PhaseCommand& before, const PhaseCommand& command,
+                    const LargestChange& largest) noexcept;
 
 }  // namespace drivebench

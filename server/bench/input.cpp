@@ -14,7 +14,7 @@ using Words = std::uint64_t[6];
 // One pair of functions for each action with contents.
 void put(Words& w, const Command& c) noexcept {
   w[0] = static_cast<std::uint64_t>(c.answers);
-  w[1] = static_cast<std::uint64_t>(c.phases.gates);
+  w[1] = std::uint64_t{static_cast<std::uint32_t>(c.phases.gates)} | std::uint64_t{c.phases.legs_off} << 32;
   w[2] = std::bit_cast<std::uint64_t>(c.phases.setpoint.a);
   w[3] = std::bit_cast<std::uint64_t>(c.phases.setpoint.b);
   w[4] = std::bit_cast<std::uint64_t>(c.phases.setpoint.c);
@@ -22,7 +22,8 @@ void put(Words& w, const Command& c) noexcept {
 }
 void get(const Words& w, Command& c) noexcept {
   c.answers = static_cast<Tick>(w[0]);
-  c.phases.gates = static_cast<Gates>(w[1]);
+  c.phases.gates = static_cast<Gates>(static_cast<std::uint32_t>(w[1]));
+  c.phases.legs_off = static_cast<std::uint32_t>(w[1] >> 32);
   c.phases.setpoint = {.a = std::bit_cast<double>(w[2]),
                        .b = std::bit_cast<double>(w[3]),
                        .c = std::bit_cast<double>(w[4]),

@@ -25,29 +25,38 @@ double turned_between(double from_rad, double to_rad) noexcept {
   return turn_rad < -std::numbers::pi ? turn_rad + 2.0 * std::numbers::pi : turn_rad;
 }
 
-PhaseValues turned(const PhaseValues& x, double angle_rad, Connection connection) noexcept {
+/// The set-points turned by an angle; those of three phases have `common` as their common part.
+PhaseValues turned(const PhaseValues& x, double angle_rad, Connection connection, double common) noexcept {
   if (connection == Connection::kArmature) return x;
   const CosSin by = cos_sin(angle_rad);
   const TwoPhase v = vector_of(x, connection);
   const TwoPhase w = to_ab({.d = v.a, .q = v.b}, by);
   if (connection == Connection::kTwoPhase) return {.a = w.a, .b = w.b, .c = 0.0, .field = x.field};
-  const double common = neutral(phases_of(x));
   const ThreePhase phases = two_to_three(w);
   return {.a = phases.a + common, .b = phases.b + common, .c = phases.c + common, .field = x.field};
 }
 
 /// Constant deceleration: after m of n ticks the frequency is 1 - m/n of its start. The field winding keeps
-/// its set-point, so that an armature brakes.
+/// its set-point, so that an armature brakes. All legs are on: a leg that was off belongs to one position of
+/// the rotor. The duties of a star get half for their common part, so that no leg comes to a rail on its way.
 PhaseCommand ramp_down(const LastCommands& last, Connection connection, Tick ramp_ticks) noexcept {
   if (last.gone >= ramp_ticks) return {};
   const auto m = static_cast<double>(last.gone);
   const double part = m / static_cast<double>(ramp_ticks);
   PhaseCommand command = last.command;
+  command.legs_off = 0;
+  const bool star_duties = command.gates == Gates::kDuty && connection == Connection::kStar;
+  const double common = star_duties ? 0.0 : neutral(phases_of(last.command.setpoint));
   command.setpoint =
-      turned(last.command.setpoint, last.turn_rad_per_tick * m * (1.0 - 0.5 * part), connection);
+      turned(last.command.setpoint, last.turn_rad_per_tick * m * (1.0 - 0.5 * part), connection, common);
   command.setpoint.a *= 1.0 - part;
   command.setpoint.b *= 1.0 - part;
   command.setpoint.c *= 1.0 - part;
+  if (star_duties) {
+    command.setpoint.a += 0.5;
+    command.setpoint.b += 0.5;
+    command.setpoint.c += 0.5;
+  }
   return command;
 }
 

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
-#include <variant>
 
 #include "plant/axis_parameters.hpp"
 #include "plant/parameters/machine_kind.hpp"
@@ -31,10 +30,10 @@ struct Terminals {
     return 1u | (has_b() ? 2u : 0u) | (has_c() ? 4u : 0u) | (field ? 8u : 0u);
   }
 
-  /// The voltage of a duty of 1: the whole DC link across a winding with its own bridge; half of it for a leg
-  /// of a star, whose voltages are against the middle of the link.
-  double volts_per_duty(double bus_voltage_v) const noexcept {
-    return connection == Connection::kStar ? 0.5 * bus_voltage_v : bus_voltage_v;
+  /// The duties of a command from those that count the legs of a star from the middle of the link, -1 to 1.
+  PhaseValues duties_from_middle(const PhaseValues& d) const noexcept {
+    if (connection != Connection::kStar) return d;
+    return {.a = 0.5 + 0.5 * d.a, .b = 0.5 + 0.5 * d.b, .c = 0.5 + 0.5 * d.c, .field = d.field};
   }
 };
 
@@ -51,7 +50,7 @@ inline std::string_view drive_word_of(const AxisParameters& p) noexcept {
 inline Terminals terminals_of(const AxisParameters& p) {
   const SensorParameters& sensors = p.sensors;
   const FieldSupply field = kind_of(p.machine).field;
-  return {.connection = std::visit([](const auto& machine) { return connection_of(machine); }, p.machine),
+  return {.connection = connection_of(p.machine),
           .field = field == FieldSupply::kOwnTerminals,
           .field_current = field != FieldSupply::kNone,
           .speed_sensors = sensors.tachometer.analog.enabled || sensors.resolver.analog.enabled,

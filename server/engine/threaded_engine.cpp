@@ -76,6 +76,7 @@ class ThreadedEngine final : public Engine {
                                       .tick = static_cast<Tick>(newest.tick),
                                       .is_latched = (newest.faults & kLatchedFaults) != 0,
                                       .step = largest_step(rules, config_.setup.period_ns),
+                                      .connection = connection_of(parameters(axis).machine),
                                       .rules = rules,
                                       .drive = parameters(axis).drive});
   }

@@ -13,6 +13,7 @@ Command command_of(const drivebench_command& c) noexcept {
   return {.answers = static_cast<Tick>(c.tick),
           .phases = {
               .gates = static_cast<Gates>(c.gates),
+              .legs_off = static_cast<std::uint32_t>(c.legs_off),
               .setpoint = {.a = c.setpoint_a, .b = c.setpoint_b, .c = c.setpoint_c, .field = c.setpoint_f}}};
 }
 
@@ -75,9 +76,13 @@ int InprocBench::check_commands(std::span<const drivebench_command> commands) no
     if (std::ranges::any_of(commands.first(i), same)) {
       return fail(DRIVEBENCH_OUT_OF_RANGE, "two commands for one axis", "commands.axis");
     }
-    if (c.gates > DRIVEBENCH_GATES_CURRENT) {
-      return fail(DRIVEBENCH_OUT_OF_RANGE, "gates is " + std::to_string(c.gates) + " but must be 0 to 3",
+    if (c.gates > DRIVEBENCH_GATES_DUTY) {
+      return fail(DRIVEBENCH_OUT_OF_RANGE, "gates is " + std::to_string(c.gates) + " but must be 0 to 4",
                   "commands.gates");
+    }
+    if (c.legs_off > kAllLegs) {
+      return fail(DRIVEBENCH_OUT_OF_RANGE,
+                  "legs_off is " + std::to_string(c.legs_off) + " but must be 0 to 7", "commands.legs_off");
     }
   }
   // A server would wait for the other controllers; here there is none.

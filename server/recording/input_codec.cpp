@@ -11,6 +11,7 @@ static_assert(static_cast<int>(Gates::kOff) == v1::GATES_OFF);
 static_assert(static_cast<int>(Gates::kVoltage) == v1::GATES_VOLTAGE);
 static_assert(static_cast<int>(Gates::kZeroVoltage) == v1::GATES_ZERO);
 static_assert(static_cast<int>(Gates::kCurrent) == v1::GATES_CURRENT);
+static_assert(static_cast<int>(Gates::kDuty) == v1::GATES_DUTY);
 static_assert(static_cast<int>(LeaseAction::kAcquire) == v1::LeaseRequest::ACTION_ACQUIRE);
 static_assert(static_cast<int>(LeaseAction::kLost) == v1::LeaseRequest::ACTION_LOST);
 
@@ -23,11 +24,17 @@ struct ActionWriter {
     out.set_tick(static_cast<std::uint64_t>(c.answers));
     out.set_gates(static_cast<v1::Gates>(c.phases.gates));
     const PhaseValues& x = c.phases.setpoint;
+    out.set_legs_off(c.phases.legs_off);
     if (c.phases.gates == Gates::kCurrent) {
       out.set_i_a_a(x.a);
       out.set_i_b_a(x.b);
       out.set_i_c_a(x.c);
       out.set_i_f_a(x.field);
+    } else if (c.phases.gates == Gates::kDuty) {
+      out.set_d_a(x.a);
+      out.set_d_b(x.b);
+      out.set_d_c(x.c);
+      out.set_d_f(x.field);
     } else {
       out.set_u_a_v(x.a);
       out.set_u_b_v(x.b);
@@ -96,19 +103,23 @@ void encode_input(Tick received, const Input& input, const ParameterTables& tabl
   std::visit(ActionWriter{message, tables}, input.action);
 }
 
+namespace {
+
+PhaseValues setpoint_of(const v1::Command& m) {
+  if (m.gates() == v1::GATES_CURRENT)
+    return {.a = m.i_a_a(), .b = m.i_b_a(), .c = m.i_c_a(), .field = m.i_f_a()};
+  if (m.gates() == v1::GATES_DUTY) return {.a = m.d_a(), .b = m.d_b(), .c = m.d_c(), .field = m.d_f()};
+  return {.a = m.u_a_v(), .b = m.u_b_v(), .c = m.u_c_v(), .field = m.u_f_v()};
+}
+
+}  // namespace
+
 std::optional<Command> decode_command(const v1::Command& message) {
-  if (!v1::Gates_IsValid(message.gates())) return std::nullopt;
-  const auto gates = static_cast<Gates>(message.gates());
-  const PhaseValues setpoint =
-      gates == Gates::kCurrent
-          ? PhaseValues{.a = message.i_a_a(),
-                        .b = message.i_b_a(),
-                        .c = message.i_c_a(),
-                        .field = message.i_f_a()}
-          : PhaseValues{
-                .a = message.u_a_v(), .b = message.u_b_v(), .c = message.u_c_v(), .field = message.u_f_v()};
+  if (!v1::Gates_IsValid(message.gates()) || message.legs_off() > kAllLegs) return std::nullopt;
   return Command{.answers = static_cast<Tick>(message.tick()),
-                 .phases = {.gates = gates, .setpoint = setpoint}};
+                 .phases = {.gates = static_cast<Gates>(message.gates()),
+                            .legs_off = message.legs_off(),
+                            .setpoint = setpoint_of(message)}};
 }
 
 std::optional<Input> decode_input(const v1::Input& message, const ParameterTables& tables) {

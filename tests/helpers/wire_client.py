@@ -221,8 +221,8 @@ class Client:
     def newest(self, axis=0):
         return self.ask(exchange=pb.Exchange()).exchange_reply.samples[axis].sample
 
-    def exchange(self, tick, u_a_v=0.0, u_b_v=0.0, gates=pb.GATES_VOLTAGE, axis=0):
-        command = pb.Command(axis=axis, tick=tick, gates=gates, u_a_v=u_a_v, u_b_v=u_b_v)
+    def exchange(self, tick, u_a_v=0.0, u_b_v=0.0, gates=pb.GATES_VOLTAGE, axis=0, **fields):
+        command = pb.Command(axis=axis, tick=tick, gates=gates, u_a_v=u_a_v, u_b_v=u_b_v, **fields)
         return self.ask(exchange=pb.Exchange(commands=[command]))
 
     def step(self, tick, *voltages, **options):

@@ -13,6 +13,7 @@
 #include "clients/command/control/control_replay.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/command/recording/recorded_run.hpp"
+#include "clients/link/common/requests.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -20,9 +21,9 @@ namespace {
 constexpr std::array<std::string_view, 4> kTerminalNames = {"a", "b", "c", "field"};
 
 TerminalValues asked_for(const v1::Command& c) {
-  if (c.gates() == v1::GATES_CURRENT) return {c.i_a_a(), c.i_b_a(), c.i_c_a(), c.i_f_a()};
-  if (c.gates() == v1::GATES_VOLTAGE) return {c.u_a_v(), c.u_b_v(), c.u_c_v(), c.u_f_v()};
-  return {};
+  if (!asks_for_something(c)) return {};
+  const link::Setpoints x = link::setpoints_of(c);
+  return {x.a, x.b, x.c, x.f};
 }
 
 /// The reference controller answers the same samples.
@@ -33,6 +34,12 @@ void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison
   const double start_rad = recorded.rows.front().sample.angle_rad;
   answer_recorded(recorded, run, [&](const Answered& row, const control::Setpoint& setpoint) {
     const std::uint64_t tick = row.sample.tick;
+    if (row.command.gates() == v1::GATES_DUTY) {
+      throw UsageError(
+          fmt::format("the recording commands duties at tick {}, but the reference controller commands "
+                      "voltages or currents",
+                      tick));
+    }
     ++out.samples;
     const TerminalValues reference = terminal_values_of(setpoint);
     const TerminalValues there = asked_for(row.command);

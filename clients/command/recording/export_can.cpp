@@ -5,6 +5,7 @@
 #include <array>
 
 #include "clients/command/common/errors.hpp"
+#include "clients/link/common/requests.hpp"
 #include "protocols/can/codec.hpp"
 #include "protocols/can/command.hpp"
 #include "protocols/can/formats/candump.hpp"
@@ -43,15 +44,15 @@ void CandumpText::add(const v1::Input& input, double time_s) {
   if (!input.has_command()) return;
   end_tick();
   const v1::Command& command = input.command();
-  const bool currents = command.gates() == v1::GATES_CURRENT;
-  const can::CommandFields setpoints{
-      .tick = command.tick(),
-      .mode = currents ? can::kCurrentMode : static_cast<unsigned>(command.gates()),
-      .lease = static_cast<unsigned>(input.owner() & 0xFF),
-      .a = currents ? command.i_a_a() : command.u_a_v(),
-      .b = currents ? command.i_b_a() : command.u_b_v(),
-      .c = currents ? command.i_c_a() : command.u_c_v(),
-      .field = currents ? command.i_f_a() : command.u_f_v()};
+  const link::Setpoints x = link::setpoints_of(command);
+  const can::CommandFields setpoints{.tick = command.tick(),
+                                     .mode = link::can_mode_of(command.gates()),
+                                     .lease = static_cast<unsigned>(input.owner() & 0xFF),
+                                     .legs_off = command.legs_off(),
+                                     .a = x.a,
+                                     .b = x.b,
+                                     .c = x.c,
+                                     .field = x.f};
   bool& wide = before_[input.axis()].wide;
   wide = wide || setpoints.c != 0.0 || setpoints.field != 0.0;
   for (const can::Frame& frame : can::encode_command(address_.profile, node(input.axis()), wide, setpoints)) {

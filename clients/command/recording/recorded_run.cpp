@@ -95,7 +95,8 @@ class Reader {
 }  // namespace
 
 bool asks_for_something(const v1::Command& command) noexcept {
-  return command.gates() == v1::GATES_VOLTAGE || command.gates() == v1::GATES_CURRENT;
+  return command.gates() == v1::GATES_VOLTAGE || command.gates() == v1::GATES_CURRENT ||
+         command.gates() == v1::GATES_DUTY;
 }
 
 namespace {

@@ -160,6 +160,11 @@ CanAddress parse_can_address(std::string_view text) {
   return address;
 }
 
+unsigned can_mode_of(v1::Gates gates) noexcept {
+  if (gates == v1::GATES_CURRENT) return can::kCurrentMode;
+  return gates == v1::GATES_DUTY ? can::kLegDutyMode : static_cast<unsigned>(gates);
+}
+
 std::string to_string(const CanAddress& address) {
   std::string text =
       std::string(kScheme) + std::string(can::name_of(address.backend)) + ":" + address.channel;

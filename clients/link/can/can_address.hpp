@@ -1,5 +1,7 @@
 #pragma once
 
+#include <bench.pb.h>
+
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -30,6 +32,9 @@ bool is_can_address(std::string_view text) noexcept;
 /// node, fd, extended, identifiers (free, canopen), bus, bit_rate, data_bit_rate, the names of the messages
 /// (their base identifiers) and of the units of can::Profile. Throws AddressError.
 CanAddress parse_can_address(std::string_view text);
+
+/// The mode of a command with these gates, in the numbers of the profile.
+unsigned can_mode_of(v1::Gates gates) noexcept;
 
 /// Without keys: "can:socketcan:vcan0".
 std::string to_string(const CanAddress& address);

@@ -23,11 +23,6 @@ constexpr unsigned kStopped = 4;  // of a heartbeat
   refuse(static_cast<v1::RefusalCode>(meaning.tcp), meaning.sentence);
 }
 
-/// The mode in the numbers of the profile.
-unsigned mode_of(v1::Gates gates) {
-  return gates == v1::GATES_CURRENT ? can::kCurrentMode : static_cast<unsigned>(gates);
-}
-
 constexpr SignalMask signals_of(const can::MessageRow& row) {
   SignalMask mask = 0;
   for (const can::Field& field : row.fields) {
@@ -135,20 +130,19 @@ const Sample& CanLink::newest() {
 }
 
 can::CommandFrames CanLink::frames_of(const AxisCommand& command) const {
-  const bool wants_more =
-      command.u_c_v != 0.0 || command.u_f_v != 0.0 || command.i_c_a != 0.0 || command.i_f_a != 0.0;
-  if (wants_more && !profile_.wide) {
+  const Setpoints x = setpoints_of(command);
+  if ((x.c != 0.0 || x.f != 0.0) && !profile_.wide) {
     refuse(v1::REFUSAL_OUT_OF_RANGE, "over CAN this axis has neither a phase c nor a field", "command");
   }
-  const bool currents = command.gates == v1::GATES_CURRENT;
   return can::encode_command(profile_, node_, profile_.wide,
                              {.tick = command.tick,
-                              .mode = mode_of(command.gates),
+                              .mode = can_mode_of(command.gates),
                               .lease = lease_,
-                              .a = currents ? command.i_a_a : command.u_a_v,
-                              .b = currents ? command.i_b_a : command.u_b_v,
-                              .c = currents ? command.i_c_a : command.u_c_v,
-                              .field = currents ? command.i_f_a : command.u_f_v});
+                              .legs_off = command.legs_off,
+                              .a = x.a,
+                              .b = x.b,
+                              .c = x.c,
+                              .field = x.f});
 }
 
 const Sample& CanLink::exchange(const AxisCommand& command) {

@@ -23,8 +23,9 @@ class RefusalError : public std::runtime_error {
   std::string field_;
 };
 
-/// A command for an axis, in answer to the sample of `tick`: voltages, or currents with GATES_CURRENT. A
-/// machine ignores terminals that it lacks; `f` is the field winding.
+/// A command for an axis, in answer to the sample of `tick`: voltages, currents with GATES_CURRENT, or duties
+/// with GATES_DUTY, as bench.proto defines them. A machine ignores terminals that it lacks; `f` is the field
+/// winding.
 struct AxisCommand {
   std::uint32_t axis = 0;
   std::uint64_t tick = 0;
@@ -37,7 +38,32 @@ struct AxisCommand {
   double i_b_a = 0.0;
   double i_c_a = 0.0;
   double i_f_a = 0.0;
+  double d_a = 0.0;
+  double d_b = 0.0;
+  double d_c = 0.0;
+  double d_f = 0.0;
+  std::uint32_t legs_off = 0;  ///< legs that are off: 1 a, 2 b, 4 c
 };
+
+/// The set-points of a command by its gates.
+struct Setpoints {
+  double a = 0.0;
+  double b = 0.0;
+  double c = 0.0;
+  double f = 0.0;
+};
+
+constexpr Setpoints setpoints_of(const AxisCommand& x) noexcept {
+  if (x.gates == v1::GATES_CURRENT) return {x.i_a_a, x.i_b_a, x.i_c_a, x.i_f_a};
+  if (x.gates == v1::GATES_DUTY) return {x.d_a, x.d_b, x.d_c, x.d_f};
+  return {x.u_a_v, x.u_b_v, x.u_c_v, x.u_f_v};
+}
+
+inline Setpoints setpoints_of(const v1::Command& x) {
+  if (x.gates() == v1::GATES_CURRENT) return {x.i_a_a(), x.i_b_a(), x.i_c_a(), x.i_f_a()};
+  if (x.gates() == v1::GATES_DUTY) return {x.d_a(), x.d_b(), x.d_c(), x.d_f()};
+  return {x.u_a_v(), x.u_b_v(), x.u_c_v(), x.u_f_v()};
+}
 
 struct LoadChange {
   double load_nm = 0.0;

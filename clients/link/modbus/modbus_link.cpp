@@ -52,7 +52,8 @@ constexpr SignalMask kKnown = [] {
 
 /// The mode in the numbers of the register.
 modbus::CommandMode mode_of(v1::Gates gates) {
-  return gates == v1::GATES_CURRENT ? modbus::CommandMode::kCurrent : static_cast<modbus::CommandMode>(gates);
+  if (gates == v1::GATES_CURRENT) return modbus::CommandMode::kCurrent;
+  return gates == v1::GATES_DUTY ? modbus::CommandMode::kLegDuty : static_cast<modbus::CommandMode>(gates);
 }
 
 }  // namespace
@@ -169,28 +170,28 @@ const Sample& ModbusLink::newest() {
 
 const Sample& ModbusLink::exchange(const AxisCommand& command) {
   constexpr std::span<const Row> kRows(modbus::map_detail::kMoreCommand);
+  constexpr const Row& kLegs = modbus::map_detail::kLegs.front();
   constexpr std::uint16_t kFirst = kRows[2].address;  // after lease and request
-  static_assert(kRows[2].content == Content::kCommandMode);
-  const bool currents = command.gates == v1::GATES_CURRENT;
-  std::array<std::uint16_t, kRows.back().end() - kFirst> registers{};
+  static_assert(kRows[2].content == Content::kCommandMode && kLegs.address == kRows.back().end());
+  const Setpoints x = setpoints_of(command);
+  std::array<std::uint16_t, kLegs.end() - kFirst> registers{};
   for (const Row& row : kRows.subspan(2)) {
     std::uint64_t bits = command.tick;
     if (row.content == Content::kCommandMode) bits = static_cast<std::uint64_t>(mode_of(command.gates));
-    if (row.content == Content::kSetpointA)
-      bits = modbus::float_bits(currents ? command.i_a_a : command.u_a_v);
-    if (row.content == Content::kSetpointB)
-      bits = modbus::float_bits(currents ? command.i_b_a : command.u_b_v);
-    if (row.content == Content::kSetpointC)
-      bits = modbus::float_bits(currents ? command.i_c_a : command.u_c_v);
-    if (row.content == Content::kSetpointField)
-      bits = modbus::float_bits(currents ? command.i_f_a : command.u_f_v);
+    if (row.content == Content::kSetpointA) bits = modbus::float_bits(x.a);
+    if (row.content == Content::kSetpointB) bits = modbus::float_bits(x.b);
+    if (row.content == Content::kSetpointC) bits = modbus::float_bits(x.c);
+    if (row.content == Content::kSetpointField) bits = modbus::float_bits(x.f);
     modbus::put(bits, row.type, modbus::WordOrder::kAbcd, &registers[row.address - kFirst]);
   }
+  // A bench of an earlier build has no register for the legs, and it keeps its value from write to write.
+  commands_legs_ = commands_legs_ || command.legs_off != 0;
+  registers.back() = static_cast<std::uint16_t>(std::min(command.legs_off, 0xFFFFu));
+  const std::size_t count = registers.size() - (commands_legs_ ? 0 : kLegs.size());
   const std::uint64_t tick = command.tick;
   std::array<std::uint16_t, modbus::kSensorsLength> words{};
-  check(::modbus_write_and_read_registers(modbus_.get(), kFirst, static_cast<int>(registers.size()),
-                                          registers.data(), modbus::kSampleStart,
-                                          static_cast<int>(words.size()), words.data()),
+  check(::modbus_write_and_read_registers(modbus_.get(), kFirst, static_cast<int>(count), registers.data(),
+                                          modbus::kSampleStart, static_cast<int>(words.size()), words.data()),
         "the sample after tick " + std::to_string(tick));
   sample_ = modbus::read_sample(words);
   // In real time the answer may come within the same tick.

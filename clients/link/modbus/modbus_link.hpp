@@ -67,6 +67,7 @@ class ModbusLink final : public AxisLink {
   bool writes_allowed_ = false;
   std::uint16_t key_;
   bool holds_axis_ = false;
+  bool commands_legs_ = false;  ///< a command has switched a leg off
   Sample sample_;
 };
 

@@ -89,6 +89,11 @@ const v1::ExchangeReply& Link::exchange(std::span<const AxisCommand> commands) {
     to.set_i_b_a(from.i_b_a);
     to.set_i_c_a(from.i_c_a);
     to.set_i_f_a(from.i_f_a);
+    to.set_d_a(from.d_a);
+    to.set_d_b(from.d_b);
+    to.set_d_c(from.d_c);
+    to.set_d_f(from.d_f);
+    to.set_legs_off(from.legs_off);
   }
   return ask(request, Kind::kExchangeReply).exchange_reply();
 }

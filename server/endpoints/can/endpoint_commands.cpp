@@ -4,16 +4,20 @@
 namespace drivebench::can {
 namespace {
 
-constexpr unsigned kLastMode = kCurrentMode;
+constexpr unsigned kLastMode = kLegDutyMode;
+
+constexpr bool has_duties(unsigned mode) noexcept {
+  return mode == kDutyMode || mode == kLegDutyMode;
+}
 
 /// Whether a command in this mode has set-points.
 constexpr bool has_setpoints(unsigned mode) noexcept {
-  return mode == static_cast<unsigned>(Gates::kVoltage) || mode == kDutyMode || mode == kCurrentMode;
+  return mode == static_cast<unsigned>(Gates::kVoltage) || mode == kCurrentMode || has_duties(mode);
 }
 
 Gates gates_of(unsigned mode) noexcept {
   if (mode == kCurrentMode) return Gates::kCurrent;
-  return mode == kDutyMode ? Gates::kVoltage : static_cast<Gates>(mode);
+  return has_duties(mode) ? Gates::kDuty : static_cast<Gates>(mode);
 }
 
 }  // namespace
@@ -49,7 +53,10 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   const Owner owner = given.lease == node.lease ? node.seat.owner() : 0;
   if (owner != 0) node.spoke = true;
   if (given.mode > kLastMode) {
-    return refuse(node, owner, Refused::kMalformed, given, "its mode must be 0 to 4");
+    return refuse(node, owner, Refused::kMalformed, given, "its mode must be 0 to 5");
+  }
+  if (given.legs_off > kAllLegs) {
+    return refuse(node, owner, Refused::kMalformed, given, "its legs_off must be 0 to 7");
   }
   const bool is_whole = row.width == Width::kWide || !node.terminals.has_more() || !has_setpoints(given.mode);
   if (!is_whole && node.phases.answers == answers && node.phases.mode == given.mode) {
@@ -59,16 +66,13 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
     return refuse(node, owner, Refused::kIncomplete, given);
   }
 
-  const double bus_voltage_v = engine_->newest(node.axis).bus_voltage_v;
-  const bool duties = given.mode == kDutyMode;
-  const double unit = duties ? node.terminals.volts_per_duty(bus_voltage_v) : 1.0;
-  const double field_unit = duties ? bus_voltage_v : 1.0;
-  const Command command{.answers = answers,
-                        .phases = {.gates = gates_of(given.mode),
-                                   .setpoint = {.a = given.a * unit,
-                                                .b = given.b * unit,
-                                                .c = given.c * unit,
-                                                .field = given.field * field_unit}}};
+  const PhaseValues setpoint{.a = given.a, .b = given.b, .c = given.c, .field = given.field};
+  const Command command{
+      .answers = answers,
+      .phases = {
+          .gates = gates_of(given.mode),
+          .legs_off = given.legs_off,
+          .setpoint = given.mode == kDutyMode ? node.terminals.duties_from_middle(setpoint) : setpoint}};
   const Refused why = engine_->command(node.axis, owner, command);
   if (why != Refused::kNot) {
     ++refused_;

@@ -83,7 +83,9 @@ std::uint64_t AxisDesk::header_bits(const Row& row) const {
     case Content::kBlocks:
       return RegisterMap::kFirstBlocks;
     case Content::kMoreBlocks:
-      return map_.blocks().size() - RegisterMap::kFirstBlocks;
+      return RegisterMap::kMoreBlocks;
+    case Content::kFurtherBlocks:
+      return map_.blocks().size() - RegisterMap::kFirstBlocks - RegisterMap::kMoreBlocks;
     case Content::kBlockId:
       return map_.blocks()[row.index].id;
     case Content::kBlockStart:
@@ -139,6 +141,8 @@ std::uint64_t AxisDesk::input_bits(Content content) const {
       return real(command_.c);
     case Content::kSetpointField:
       return real(command_.field);
+    case Content::kLegsOff:
+      return command_.legs_off;
     default:
       return 0;  // a request register reads as no request
   }

@@ -101,6 +101,7 @@ class AxisDesk {
     float b = 0.0f;
     float c = 0.0f;
     float field = 0.0f;
+    std::uint16_t legs_off = 0;
   };
   /// The content of the writable registers of the process data.
   struct ProcessInput {

@@ -14,6 +14,23 @@ Tick tick_of(std::uint32_t counter, Tick newest) noexcept {
   return newest + static_cast<std::int32_t>(counter - static_cast<std::uint32_t>(newest));
 }
 
+Gates gates_of(CommandMode mode) noexcept {
+  switch (mode) {
+    case CommandMode::kVoltage:
+      return Gates::kVoltage;
+    case CommandMode::kZeroVoltage:
+      return Gates::kZeroVoltage;
+    case CommandMode::kDuty:
+    case CommandMode::kLegDuty:
+      return Gates::kDuty;
+    case CommandMode::kCurrent:
+      return Gates::kCurrent;
+    case CommandMode::kOff:
+      break;
+  }
+  return Gates::kOff;
+}
+
 float as_float(std::uint64_t bits) noexcept {
   return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
 }
@@ -115,17 +132,13 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_process(Written written, Visi
 
 Command AxisDesk::command_of(const CommandInput& input) const {
   Command command{.answers = tick_of(input.counter, engine_.tick()), .phases = {}};
-  if (input.mode == CommandMode::kZeroVoltage) command.phases.gates = Gates::kZeroVoltage;
+  command.phases.gates = gates_of(input.mode);
+  command.phases.legs_off = input.legs_off;
   if (input.mode == CommandMode::kOff || input.mode == CommandMode::kZeroVoltage) return command;
-  const bool duties = input.mode == CommandMode::kDuty;
-  const double bus_voltage_v = engine_.newest(axis_).bus_voltage_v;
-  const double unit = duties ? terminals_.volts_per_duty(bus_voltage_v) : 1.0;
-  const double field_unit = duties ? bus_voltage_v : 1.0;
-  command.phases = {.gates = input.mode == CommandMode::kCurrent ? Gates::kCurrent : Gates::kVoltage,
-                    .setpoint = {.a = unit * static_cast<double>(input.a),
-                                 .b = unit * static_cast<double>(input.b),
-                                 .c = unit * static_cast<double>(input.c),
-                                 .field = field_unit * static_cast<double>(input.field)}};
+  const PhaseValues setpoint{
+      .a = double{input.a}, .b = double{input.b}, .c = double{input.c}, .field = double{input.field}};
+  command.phases.setpoint =
+      input.mode == CommandMode::kDuty ? terminals_.duties_from_middle(setpoint) : setpoint;
   return command;
 }
 
@@ -141,6 +154,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
   if (const auto bits = written[Content::kSetpointB]) input.b = as_float(*bits);
   if (const auto bits = written[Content::kSetpointC]) input.c = as_float(*bits);
   if (const auto bits = written[Content::kSetpointField]) input.field = as_float(*bits);
+  if (const auto bits = written[Content::kLegsOff]) input.legs_off = static_cast<std::uint16_t>(*bits);
   const auto is_beyond = [](float duty) { return std::abs(duty) > 1.0f; };
   const bool beyond =
       is_beyond(input.a) || is_beyond(input.b) || is_beyond(input.c) || is_beyond(input.field);

@@ -53,7 +53,8 @@ void check_input(const v1::Input& message) {
 void check_commands(const v1::Exchange& exchange) {
   for (const v1::Command& each : exchange.commands()) {
     const std::optional<Command> command = decode_command(each);
-    require(command.has_value() == v1::Gates_IsValid(each.gates()), "only known gates make a command");
+    require(command.has_value() == (v1::Gates_IsValid(each.gates()) && each.legs_off() <= kAllLegs),
+            "only known gates and legs make a command");
     v1::Input recorded;
     *recorded.mutable_command() = each;
     check_input(recorded);

@@ -58,7 +58,7 @@ TEST(CanCodec, ClassicFramesHaveTheseBytes) {
   EXPECT_EQ(data_of(sent(Message::kState, false)), "18FCE00110000080");
   EXPECT_EQ(data_of(sent(Message::kCounters, false)), "8867020003000402");
   EXPECT_EQ(data_of(sent(Message::kIndex, false)), "00FFFFFFFFFFFFFF");
-  const Values command = {12.34, -0.01, 0x12345, 1, 200};
+  const Values command = {12.34, -0.01, 0x12345, 1, 0, 200};
   EXPECT_EQ(data_of(encode(*find_message(Message::kCommand, false), profile_of(false), 1, command)),
             "D204FFFF452301C8");
   const Values reply = {1, 2, 0xDEADBEEF, 7, 0x145};
@@ -83,7 +83,7 @@ TEST(CanCodec, FdFramesHaveTheseBytes) {
             "00004042"
             "10000080"
             "03000401");
-  const Values command = {0x12345, 1.5, -0.25, 3, 9};
+  const Values command = {0x12345, 1.5, -0.25, 3, 0, 9};
   EXPECT_EQ(data_of(encode(*find_message(Message::kCommand, true), profile_of(true), 1, command)),
             "45230100"
             "0000C03F"
@@ -229,12 +229,31 @@ TEST(CanCodec, EachQuantityHasItsUnit) {
 TEST(CanCodec, InModeThreeACommandCarriesDuties) {
   const MessageRow& row = *find_message(Message::kCommand, false);
   const Profile profile = profile_of(false);
-  const Frame frame = encode(row, profile, 1, Values{1.0, -0.5, 7, kDutyMode, 1});
+  const Frame frame = encode(row, profile, 1, Values{1.0, -0.5, 7, kDutyMode, 0, 1});
   EXPECT_EQ(data_of(frame), "FF7F00C007000301");
   const Values values = decode(row, profile, frame);
   EXPECT_EQ(values[0], 1.0);
   EXPECT_NEAR(values[1], -0.5, kDutyUnit);
-  EXPECT_EQ(data_of(encode(row, profile, 1, Values{-2.0, kNan, 7, kDutyMode, 1})), "0180008007000301");
+  EXPECT_EQ(data_of(encode(row, profile, 1, Values{-2.0, kNan, 7, kDutyMode, 0, 1})), "0180008007000301");
+}
+
+// Mode and legs share a byte. Catches: half a byte that overwrites the other one, a leg that is taken for a
+// mode, duties of legs that are scaled as volts.
+TEST(CanCodec, ACommandCarriesDutiesOfLegsAndTheLegsThatAreOff) {
+  const MessageRow& row = *find_message(Message::kCommand, false);
+  const Profile profile = profile_of(false);
+  const Frame frame = encode(row, profile, 1, Values{1.0, 0.0, 7, kLegDutyMode, 5, 1});
+  EXPECT_EQ(data_of(frame), "FF7F000007005501");
+  const Values values = decode(row, profile, frame);
+  EXPECT_EQ(values[0], 1.0);
+  EXPECT_EQ(values[index_of(row, "mode")], kLegDutyMode);
+  EXPECT_EQ(values[index_of(row, "legs_off")], 5.0);
+  const Values fd = {0x12345, 1.0, 0.0, kLegDutyMode, 2, 9};
+  EXPECT_EQ(data_of(encode(*find_message(Message::kCommand, true), profile_of(true), 1, fd)),
+            "45230100"
+            "0000803F"
+            "00000000"
+            "25090000");
 }
 
 // Catches: any field that does not come back as it was sent: all patterns of all fields, but for a NaN's

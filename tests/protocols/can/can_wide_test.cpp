@@ -67,7 +67,7 @@ TEST(CanCodec, FdFramesOfWideAxesBeginAsThoseOfNarrowOnes) {
             "0000FAC2"
             "0000403F"
             "01000008");
-  const Values command = {0x12345, 1.5, -0.25, 4, 9, 0.5, -2.0};
+  const Values command = {0x12345, 1.5, -0.25, 4, 0, 9, 0.5, -2.0};
   const Frame narrow = encode(*find_message(Message::kCommand, true), profile_of(true), 1, command);
   const Frame wide = encode(*find_message(Message::kCommand, true, true), profile_of(true), 1, command);
   EXPECT_EQ(data_of(wide), data_of(narrow) + "0000003F" + "000000C0");
@@ -80,7 +80,9 @@ TEST(CanCodec, InModeFourACommandCarriesCurrents) {
   profile.current_unit_a = 0.25;
   for (const Message message : {Message::kCommand, Message::kPhaseCommand}) {
     const MessageRow& row = *find_message(message, false, true);
-    const Frame frame = encode(row, profile, 1, Values{1.5, -2.0, 7, kCurrentMode, 1});
+    Values given{1.5, -2.0, 7, kCurrentMode};
+    given[index_of(row, "lease")] = 1;
+    const Frame frame = encode(row, profile, 1, given);
     EXPECT_EQ(data_of(frame), "0600F8FF07000401") << row.name;
     const Values values = decode(row, profile, frame);
     EXPECT_EQ(values[0], 1.5);

@@ -115,5 +115,66 @@ TEST(CommandRules, CMD_13_TheSlewLimitCountsFromTheSafeAction) {
   }
 }
 
+BenchSetup star_setup(OnExcess on_excess, double slew_per_s = 0.0) {
+  BenchSetup setup = limited_setup(on_excess, slew_per_s);
+  AxisParameters& p = setup.axes[0].parameters;
+  induction(p).star = true;
+  p.drive.kind = DriveKind::kAveraged;
+  return setup;
+}
+
+Refused submit_duties(Bench& bench, const PhaseValues& duties) {
+  const PhaseCommand phases{.gates = Gates::kDuty, .setpoint = duties};
+  return bench.submit(
+      {.axis = 0, .owner = kOwner, .action = Command{.answers = bench.tick(), .phases = phases}});
+}
+
+// A leg of a star takes 0 to 1, a winding between two legs and the field -1 to 1. Catches: a duty that is
+// judged by the volts of the drive, a negative duty of a star's leg that passes, a flag that is missing.
+TEST(CommandRules, CMD_13_ADutyBeyondTheRailsIsLimitedOrRefusedAsConfigured) {
+  struct Case {
+    bool star;
+    PhaseValues duties;
+    bool beyond;
+  };
+  for (const Case& c :
+       {Case{true, {.a = 0.0, .b = 1.0, .c = 0.5}, false}, Case{true, {.a = -1e-9, .b = 1.0, .c = 0.5}, true},
+        Case{true, {.a = 0.0, .b = 0.5, .c = std::nextafter(1.0, 2.0)}, true},
+        Case{false, {.a = -1.0, .b = 1.0}, false},
+        Case{false, {.a = -1.0, .b = std::nextafter(1.0, 2.0)}, true},
+        Case{false, {.a = 0.0, .field = -1.5}, true}}) {
+    for (const OnExcess on_excess : {OnExcess::kRefuse, OnExcess::kSaturate}) {
+      BenchSetup setup = star_setup(on_excess);
+      induction(setup.axes[0].parameters).star = c.star;
+      Bench bench = owned_bench(setup, kOwner);
+      const bool refused = c.beyond && on_excess == OnExcess::kRefuse;
+      EXPECT_EQ(submit_duties(bench, c.duties), refused ? Refused::kBeyondDrive : Refused::kNot);
+      bench.step();
+      EXPECT_EQ(bench.sample(0).faults, c.beyond && !refused ? kVoltageSaturated : 0u);
+    }
+  }
+}
+
+// 8000 V/s are 1 V in a tick, 1/80 of the link of 80 V. Catches: a step in volts that passes whole for a
+// duty, a star whose first duty is compared with 0, a leg's mask that is lost on the way.
+TEST(CommandRules, CMD_13_TheSlewLimitOfADutyIsAPartOfTheSupply) {
+  Bench bench = owned_bench(star_setup(OnExcess::kSaturate, 8000.0), kOwner);
+  EXPECT_EQ(submit_duties(bench, {.a = 0.5 + 0.02, .b = 0.5, .c = 0.5}), Refused::kNot);
+  bench.step();
+  EXPECT_EQ(bench.sample(0).faults, kCommandSlewLimited);
+  EXPECT_NEAR(bench.sample(0).u_a_v, 1.0, 1e-12);
+  EXPECT_EQ(bench.sample(0).u_b_v, 0.0);
+  Bench refusing = owned_bench(star_setup(OnExcess::kRefuse, 8000.0), kOwner);
+  EXPECT_EQ(submit_duties(refusing, {.a = 0.5 + 0.02, .b = 0.5, .c = 0.5}), Refused::kBeyondDrive);
+  EXPECT_EQ(submit_duties(refusing, {.a = 0.5 + 0.012, .b = 0.5, .c = 0.5}), Refused::kNot);
+  const PhaseCommand before{.gates = Gates::kDuty, .legs_off = 2, .setpoint = {.a = 0.5}};
+  PhaseCommand wanted = before;
+  wanted.legs_off = 4;
+  wanted.setpoint.a = 1.0;
+  const PhaseCommand slow = slewed(before, wanted, {.step = 0.125, .connection = Connection::kStar});
+  EXPECT_EQ(slow.legs_off, 4u);
+  EXPECT_EQ(slow.setpoint.a, 0.625);
+}
+
 }  // namespace
 }  // namespace drivebench

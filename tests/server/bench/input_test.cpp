@@ -20,6 +20,7 @@ std::vector<Input> one_of_each() {
   return {input_with(ClearFaults{}),
           input_with(Command{.answers = 1'234'567'890'123,
                              .phases = {.gates = Gates::kZeroVoltage,
+                                        .legs_off = 6,
                                         .setpoint = {.a = -0.1, .b = 1e300, .c = -0.0, .field = 5e-324}}}),
           input_with(LeaseAction::kLost),
           input_with(LoadChange{.load_nm = -0.3, .ramp_ticks = 1'000'000'007}),
@@ -49,6 +50,7 @@ TEST(Input, EveryKindSurvivesPackingWordForWord) {
   const auto command = std::get<Command>(unpack(pack(inputs[1])).action);
   EXPECT_EQ(command.answers, 1'234'567'890'123);
   EXPECT_EQ(command.phases.gates, Gates::kZeroVoltage);
+  EXPECT_EQ(command.phases.legs_off, 6u);
   EXPECT_EQ(command.phases.setpoint.a, -0.1);
   EXPECT_EQ(command.phases.setpoint.b, 1e300);
   EXPECT_TRUE(std::signbit(command.phases.setpoint.c));

@@ -43,6 +43,11 @@ double current_a(const Bench& bench) {
   return std::hypot(bench.sample(0).true_i_a_a, bench.sample(0).true_i_b_a);
 }
 
+double vector_length(const PhaseValues& x) {
+  const TwoPhase v = three_to_two({x.a, x.b, x.c});
+  return std::hypot(v.a, v.b);
+}
+
 // With all terminals at one potential: L i' = -R i - emf turns with the electrical speed, whose steady
 // magnitude is K w/|R + j n_p w L|, 24 A here and K/(n_p L) = 25 A at high speed; the heat R i^2 comes from
 // the shaft. Tolerance: the speed falls by 0.2 % in the 0.2 s. Catches: a short circuit that frees the shaft,
@@ -143,6 +148,28 @@ TEST(SafeAction, AQuickStopOfAnArmatureBrakesAgainstItsField) {
     EXPECT_EQ(command.setpoint.field, 5.0);
   }
   EXPECT_EQ(act_safely(last, SafeAction::kQuickStop, false, Connection::kArmature, 4).gates, Gates::kOff);
+}
+
+// Catches: duties of a star whose vector shrinks towards the lower rail, so that turned legs come beyond it;
+// a leg that stays off while the vector turns; a hold that switches it on.
+TEST(SafeAction, AQuickStopOfDutiesShrinksAboutTheMiddleWithAllLegs) {
+  const PhaseCommand clamped{
+      .gates = Gates::kDuty, .legs_off = 1, .setpoint = {.a = 1.0, .b = 0.0, .c = 0.3}};
+  LastCommands last;
+  follow(last, clamped, Connection::kStar, true);
+  last.turn_rad_per_tick = 0.5;
+  const double size = vector_length(clamped.setpoint);
+  for (Tick m = 1; m < 8; ++m) {
+    const PhaseCommand command = act_safely(last, SafeAction::kQuickStop, false, Connection::kStar, 8);
+    EXPECT_EQ(command.gates, Gates::kDuty);
+    EXPECT_EQ(command.legs_off, 0u);
+    const PhaseValues& d = command.setpoint;
+    EXPECT_NEAR(d.a + d.b + d.c, 1.5, 1e-12);
+    EXPECT_NEAR(vector_length(d), size * (1.0 - static_cast<double>(m) / 8.0), 1e-12);
+  }
+  LastCommands held;
+  follow(held, clamped, Connection::kStar, false);
+  EXPECT_EQ(act_safely(held, SafeAction::kHold, false, Connection::kStar, 8).legs_off, 1u);
 }
 
 // Six steps of 60 degrees, 20 ticks each, are 0.0524 rad per tick. Catches: a mean over so few commands that

@@ -3,6 +3,7 @@
 import math
 import pathlib
 import struct
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -15,7 +16,7 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from recording import Recording
-from wire_client import PATIENCE_S, pb
+from wire_client import PATIENCE_S, SERVER, pb
 from wire_test import SERVO_TEXT, TWO_AXES, TWO_DRIVES, WireTest, until
 
 
@@ -111,6 +112,33 @@ class Exchange(WireTest):
         taken = [each.command for each in inputs if each.WhichOneof("action") == "command"]
         self.assertEqual([struct.pack("<2d", each.u_a_v, each.u_b_v) for each in taken], [struct.pack("<2d", *each) for each in given])
 
+    def test_duties_reach_the_terminals_and_legs_are_off(self):
+        """Catches: duties without their common part, a leg that stays on, a recording that loses either or replays as
+        another run."""
+        star = "\n".join((SERVO_TEXT, "[axis.machine]", "star = true", "[axis.drive]", 'kind = "switched_inverter"',
+                          "[axis.voltage_sensor]", "against_rail = true", ""))
+        with tempfile.TemporaryDirectory(prefix="drivebench-duties-") as folder:
+            file = pathlib.Path(folder) / "run.mcap"
+            server = self.server("--record", str(file), text=star)
+            client = self.client(server)
+            client.lease()
+            for tick, duty in enumerate((0.0, 0.5, 1.0)):
+                sample = client.step(tick, gates=pb.GATES_DUTY, d_a=duty, d_b=duty, d_c=duty)
+                for mean in (sample.terminal_a_mean_v, sample.terminal_b_mean_v, sample.terminal_c_mean_v):
+                    self.assertAlmostEqual(mean, duty * sample.bus_voltage_v, places=6)
+            for tick in range(3, 60):
+                sample = client.step(tick, gates=pb.GATES_DUTY, d_a=0.6, d_b=0.5, d_c=0.4, legs_off=1)
+            self.assertEqual((sample.true_i_a_a, sample.faults), (0.0, 0))
+            self.assertNotEqual(sample.true_i_b_a, 0.0)
+            self.assertEqual(server.stop(), 0)
+            inputs = [pb.Input.FromString(content) for content in Recording(file.read_bytes()).contents["/inputs"]]
+            last = [each.command for each in inputs if each.WhichOneof("action") == "command"][-1]
+            self.assertEqual((last.gates, last.d_a, last.d_b, last.d_c, last.legs_off, last.u_a_v),
+                             (pb.GATES_DUTY, 0.6, 0.5, 0.4, 1, 0.0))
+            replayed = subprocess.run([SERVER, "--replay", file], capture_output=True, text=True, timeout=PATIENCE_S)
+            self.assertEqual(replayed.returncode, 0, replayed.stderr)
+            self.assertIn("equal, bit for bit", replayed.stdout)
+
     def test_unknown_axes_and_gates_are_refused(self):
         """Catches: an index that is used before it is checked."""
         client = self.client(self.server())
@@ -123,7 +151,8 @@ class Exchange(WireTest):
                          {"write_parameter": pb.WriteParameter(axis=axis)}, {"clear_faults": pb.ClearFaults(axis=axis)},
                          {"inject_fault": pb.InjectFault(axis=axis)}, {"shaft_bump": pb.ShaftBump(axis=axis)}):
                 self.assertRefused(client.ask(**kind), pb.REFUSAL_UNKNOWN_AXIS, "axis")
-        self.assertRefused(client.exchange(0, gates=4), pb.REFUSAL_OUT_OF_RANGE, "commands.gates")
+        self.assertRefused(client.exchange(0, gates=5), pb.REFUSAL_OUT_OF_RANGE, "commands.gates")
+        self.assertRefused(client.exchange(0, legs_off=8), pb.REFUSAL_OUT_OF_RANGE, "commands.legs_off")
         self.assertRefused(client.exchange(0, gates=3), pb.REFUSAL_WRONG_DRIVE, "commands.gates")
         both = pb.Exchange(commands=[pb.Command(tick=0), pb.Command(tick=0)])
         self.assertRefused(client.ask(exchange=both), pb.REFUSAL_OUT_OF_RANGE, "commands.axis")

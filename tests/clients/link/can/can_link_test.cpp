@@ -122,6 +122,9 @@ TEST_P(CanLinkOf, SendsEveryFieldOfACommand) {
   EXPECT_EQ(narrow(bench_->command), (std::vector<double>{1.0, 0.0, 0.0, 0.0}));
   link().exchange({.tick = 2, .gates = v1::GATES_CURRENT, .u_a_v = 9.0, .i_a_a = 1.25, .i_b_a = -2.5});
   EXPECT_EQ(narrow(bench_->command), (std::vector<double>{2.0, 1.25, -2.5, 4.0}));
+  link().exchange({.tick = 3, .gates = v1::GATES_DUTY, .u_a_v = 9.0, .d_a = 1.0, .d_b = -1.0, .legs_off = 2});
+  EXPECT_EQ(narrow(bench_->command), (std::vector<double>{3.0, 1.0, -1.0, 5.0}));
+  EXPECT_EQ(bench_->legs_off, 2.0);
 }
 
 // Catches: set-points of phase c or of the field that are left out, are those of another kind, or go to an

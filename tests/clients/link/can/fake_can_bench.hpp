@@ -85,6 +85,7 @@ class FakeCanBench final : public CanBus {
   double request_result = 0.0;  ///< other than 0: every request is refused
   double command_result = 0.0;  ///< other than 0: every command is refused
   std::vector<double> command;  ///< tick, u_a, u_b, mode of the last one taken; of a wide axis also u_c, u_f
+  double legs_off = 0.0;        ///< of the same
   can::CommandFields phases{};  ///< of the last phase command
 
  private:
@@ -107,6 +108,7 @@ class FakeCanBench final : public CanBus {
 
   void on_command(const can::MessageRow& row, const can::Values& values) {
     can::CommandFields given = can::setpoints_in(row, values);
+    legs_off = given.legs_off;
     const unsigned bits = row.fields[can::index_of(row, "tick")].bits;
     const auto tick =
         static_cast<std::uint64_t>(can::unwrap(given.tick, bits, static_cast<std::int64_t>(sample.tick)));

@@ -193,6 +193,25 @@ TEST(ModbusLink, CommandsEveryTerminalAndReadsEverySensor) {
     EXPECT_FALSE(link.knows(name)) << name;
 }
 
+// Catches: duties sent as voltages or in mode 3, which counts a star's legs from the middle; a register that
+// an earlier bench lacks, written to it; a leg that stays off because the register is not written again.
+TEST(ModbusLink, CommandsDutiesAndLegs) {
+  FakeServer server;
+  ModbusLink link(server.address);
+  link.acquire();
+  const auto legs_off = [&server] { return server.get(433, modbus::Type::kUnsigned16); };
+  server.put(433, modbus::Type::kUnsigned16, 99);
+  link.exchange({.tick = 0, .gates = v1::GATES_DUTY, .u_a_v = 9.0, .d_a = 0.25, .d_c = 1.0});
+  EXPECT_EQ(server.get(422, modbus::Type::kUnsigned16), 5U);
+  EXPECT_EQ(server.get(425, modbus::Type::kFloat32), std::bit_cast<std::uint32_t>(0.25F));
+  EXPECT_EQ(server.get(429, modbus::Type::kFloat32), std::bit_cast<std::uint32_t>(1.0F));
+  EXPECT_EQ(legs_off(), 99U);
+  link.exchange({.tick = 1, .gates = v1::GATES_DUTY, .legs_off = 6});
+  EXPECT_EQ(legs_off(), 6U);
+  link.exchange({.tick = 2, .gates = v1::GATES_DUTY});
+  EXPECT_EQ(legs_off(), 0U);
+}
+
 // Catches: an axis that stays taken by a controller that is gone.
 TEST(ModbusLink, GivesTheAxisBackAtItsEnd) {
   FakeServer server;

@@ -77,6 +77,11 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
       sample.mutable_sample()->set_i_b_a(command.i_b_a());
       sample.mutable_sample()->set_i_c_a(command.i_c_a());
       sample.mutable_sample()->set_i_f_a(command.i_f_a());
+      sample.mutable_sample()->set_terminal_a_v(command.d_a());
+      sample.mutable_sample()->set_terminal_b_v(command.d_b());
+      sample.mutable_sample()->set_terminal_c_v(command.d_c());
+      sample.mutable_sample()->set_terminal_a_mean_v(command.d_f());
+      sample.mutable_sample()->set_faults(command.legs_off());
       sample.mutable_sample()->set_state(static_cast<std::uint64_t>(command.gates()));
     }
     return FakePeer::framed(answer);
@@ -97,9 +102,17 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
                                      .i_a_a = 5.0,
                                      .i_b_a = -6.0,
                                      .i_c_a = 7.0,
-                                     .i_f_a = -8.0}};
+                                     .i_f_a = -8.0},
+                                    {.axis = 5,
+                                     .tick = tick,
+                                     .gates = v1::GATES_DUTY,
+                                     .d_a = 0.25,
+                                     .d_b = 0.5,
+                                     .d_c = 1.0,
+                                     .d_f = -0.75,
+                                     .legs_off = 6}};
     const v1::ExchangeReply& reply = link.exchange(commands);
-    ASSERT_EQ(reply.samples_size(), 2);
+    ASSERT_EQ(reply.samples_size(), 3);
     EXPECT_EQ(reply.samples(0).axis(), 3U);
     EXPECT_EQ(reply.samples(0).sample().tick(), tick + 1);
     EXPECT_EQ(reply.samples(0).sample().u_a_v(), 1.5);
@@ -112,6 +125,12 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
     EXPECT_EQ((std::array{second.i_a_a(), second.i_b_a(), second.i_c_a(), second.i_f_a()}),
               (std::array{5.0, -6.0, 7.0, -8.0}));
     EXPECT_EQ(second.state(), 3U);
+    const v1::Sample& third = reply.samples(2).sample();
+    EXPECT_EQ(third.state(), 4U);
+    EXPECT_EQ((std::array{third.terminal_a_v(), third.terminal_b_v(), third.terminal_c_v(),
+                          third.terminal_a_mean_v()}),
+              (std::array{0.25, 0.5, 1.0, -0.75}));
+    EXPECT_EQ(third.faults(), 6U);
   }
 }
 

@@ -82,7 +82,7 @@ TEST(CanEndpoint, EveryRefusedCommandGetsAReasonAndIsCounted) {
   expect(Result::kNotFinite, 1, std::numeric_limits<double>::infinity(), lease, 1.0);
   expect(Result::kStale, 0, 1.0, lease, 1.0);  // a duplicate
   expect(Result::kStale, 2, 1.0, lease, 1.0);  // of the future
-  expect(Result::kMalformed, 1, 1.0, lease, 5.0);
+  expect(Result::kMalformed, 1, 1.0, lease, 6.0);
   expect(Result::kWrongDrive, 1, 1.0, lease, 4.0);  // currents for a voltage amplifier
   bench.command(1, 2.0, 0.0, lease);
   EXPECT_EQ(bench.engine().tick(), 2);
@@ -115,7 +115,7 @@ TEST(CanEndpoint, CAN_09_FramesOfTheWrongFormAreCountedByKind) {
   const std::uint8_t lease = bench.acquire();
   const MessageRow& row = *find_message(Message::kCommand, true);
   const Frame good =
-      encode(row, bench.profile(), 1, std::array{0.0, 1.0, 1.0, 1.0, static_cast<double>(lease)});
+      encode(row, bench.profile(), 1, std::array{0.0, 1.0, 1.0, 1.0, 0.0, static_cast<double>(lease)});
   Frame frame = good;
   frame.size = 12;
   bench.send(frame);
@@ -147,7 +147,7 @@ TEST(CanEndpoint, CAN_09_AClassicBenchObeysNoFdFrame) {
   CanBench bench(classic());
   const std::uint8_t lease = bench.acquire();
   Frame frame = encode(*find_message(Message::kCommand, false), bench.profile(), 1,
-                       std::array{1.0, 1.0, 0.0, 1.0, static_cast<double>(lease)});
+                       std::array{1.0, 1.0, 0.0, 1.0, 0.0, static_cast<double>(lease)});
   frame.fd = true;
   bench.send(frame);
   EXPECT_EQ(bench.count("wrong_kind"), 1u);

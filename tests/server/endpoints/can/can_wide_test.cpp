@@ -111,7 +111,7 @@ TEST(ClassicWideAxis, SetpointsAreKeptForTheirCommandAlone) {
   };
   const auto main = [&](double tick, double mode, double with) {
     bench.received.clear();
-    bench.send(Message::kCommand, std::array{1.0, 2.0, tick, mode, with});
+    bench.send(Message::kCommand, std::array{1.0, 2.0, tick, mode, 0.0, with});
   };
   constexpr auto kIncomplete = static_cast<double>(Result::kIncomplete);
   phases(1, 1, lease, 7.0);
@@ -147,6 +147,26 @@ TEST_P(WideAxis, ADutyIsOfTheHalfLinkInAStar) {
   EXPECT_NEAR(s.u_a_v, 0.25 * bus_v, kDutyUnit * bus_v);
   EXPECT_NEAR(s.u_b_v, -0.125 * bus_v, kDutyUnit * bus_v);
   EXPECT_NEAR(s.u_c_v, 0.0625 * bus_v, kDutyUnit * bus_v);
+}
+
+// Catches: duties of legs that count from the middle of the link; legs that are off in another order, or only
+// in the frames of phase c; a mask of legs that do not exist.
+TEST_P(WideAxis, InModeFiveLegsHaveDutiesAndCanBeOff) {
+  CanBench bench(on_bus(star_bench(DriveKind::kAveraged), profile_of(GetParam())));
+  const std::uint8_t lease = bench.acquire();
+  const double bus_v = bench.engine().newest(0).bus_voltage_v;
+  bench.command({.tick = 0, .mode = kLegDutyMode, .lease = lease, .a = 1.0, .b = 0.25, .c = 0.0});
+  const Sample& s = bench.engine().newest(0);
+  EXPECT_NEAR(s.u_a_v, 0.5 * bus_v, 1e-9);
+  EXPECT_NEAR(s.u_b_v, -0.25 * bus_v, kDutyUnit * bus_v);
+  EXPECT_NEAR(s.u_c_v, -0.5 * bus_v, 1e-9);
+  for (std::uint64_t tick = 1; tick < 100; ++tick) {
+    bench.command({.tick = tick, .mode = kLegDutyMode, .lease = lease, .legs_off = 2, .a = 0.6, .c = 0.5});
+  }
+  EXPECT_EQ(bench.engine().newest(0).true_i_b_a, 0.0);
+  EXPECT_NE(bench.engine().newest(0).true_i_a_a, 0.0);
+  bench.command({.tick = 100, .mode = kLegDutyMode, .lease = lease, .legs_off = 8});
+  EXPECT_EQ(bench.result(), static_cast<double>(Result::kMalformed));
 }
 
 // CMD-11. Catches: currents that are taken for voltages, or a phase that the current loop does not get; a

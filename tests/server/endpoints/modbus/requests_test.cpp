@@ -21,9 +21,9 @@ const std::vector<ParameterInfo>& parameters() {
 
 const std::vector<Area>& areas() {
   static const std::vector<Area> whole = [] {
-    std::vector<Area> all{
-        {0, 43}, {100, 13}, {120, 22}, {200, 136}, {400, 11}, {420, 13}, {1000, 2 * parameters().size()}};
-    for (std::size_t i = 0; i < 7; ++i)
+    std::vector<Area> all{{0, 50},   {100, 13}, {120, 22}, {200, 136},
+                          {340, 16}, {400, 11}, {420, 14}, {1000, 2 * parameters().size()}};
+    for (std::size_t i = 0; i < 8; ++i)
       all.push_back({all[i].start + 10'000, all[i].length});
     return all;
   }();
@@ -289,7 +289,7 @@ TEST(Modbus, MB_12_AnInvalidValueIsRefused) {
   EXPECT_TRUE(client.exchange(3, 0, 1.01f, 0.0f).empty()) << "a duty above 1";
   EXPECT_EQ(client.last_exception(), 3);
   ++refused;
-  EXPECT_TRUE(client.exchange(5, 0, 0.0f, 0.0f).empty()) << "a mode that does not exist";
+  EXPECT_TRUE(client.exchange(6, 0, 0.0f, 0.0f).empty()) << "a mode that does not exist";
   ++refused;
   EXPECT_EQ(client.write(401, {4}), 3) << "a request that does not exist";
   EXPECT_EQ(client.write(1002, {0x7fc0, 0}), 3) << "NaN as a resistance";

@@ -78,6 +78,35 @@ TEST(ModbusTerminals, ADutyIsOfTheHalfLinkInAStar) {
   EXPECT_EQ(client.read_one(410), 8);
 }
 
+// Catches: duties of legs that count from the middle of the link, legs that are off in the wrong order or for
+// one command only, a mask of legs that do not exist, voltages of the terminals at another address.
+TEST(ModbusTerminals, LegsHaveDutiesAndCanBeOff) {
+  BenchConfig config = star_config(DriveKind::kAveraged);
+  config.setup.axes[0].parameters.sensors.terminals = true;
+  ModbusBench bench(config);
+  Client client(bench.port());
+  ASSERT_EQ(client.write(400, {7}), 0);
+  const double bus_v = bench.newest().bus_voltage_v;
+  Words legs = command_words(5, 0, {1.0f, 0.25f, 0.0f, 0.0f});
+  EXPECT_EQ(client.write(422, legs), 0);
+  const Words terminals = client.read(340, 16);
+  EXPECT_EQ(terminals[3], bench.newest().tick);
+  EXPECT_EQ(real_at(terminals, 4), static_cast<float>(bus_v));
+  EXPECT_EQ(real_at(terminals, 10), static_cast<float>(bus_v));
+  EXPECT_EQ(real_at(terminals, 12), static_cast<float>(0.25 * bus_v));
+  legs = command_words(5, 1, {0.5f, 0.5f, 0.5f, 0.0f});
+  legs.push_back(5);
+  EXPECT_EQ(client.write(422, legs), 0);
+  EXPECT_EQ(client.read_one(433), 5);
+  for (std::uint32_t tick = 2; tick < 100; ++tick)
+    ASSERT_EQ(client.write(422, command_words(5, tick, {0.5f, 0.5f, 0.5f, 0.0f})), 0);
+  EXPECT_EQ(bench.newest().true_i_a_a, 0.0) << "a and c are off: no current is left";
+  EXPECT_EQ(bench.newest().true_i_b_a, 0.0);
+  EXPECT_EQ(client.write(433, {8}), 3);
+  EXPECT_EQ(client.write(400, {0}), 0);
+  EXPECT_EQ(client.read_one(433), 0) << "the next controller finds all legs on";
+}
+
 // CMD-11. Catches: currents taken for voltages or duties, by command and by process data; a current that is
 // no number and not refused; a refusal without its reason.
 TEST(ModbusTerminals, CurrentsAreForCurrentAmplifiers) {
@@ -183,11 +212,12 @@ TEST(ModbusTerminals, TheParametersOfTheFirstMapStayWhereTheyWere) {
 TEST(ModbusTerminals, TheHeaderTellsOfTheOtherBlocks) {
   ModbusBench bench;
   Client client(bench.port());
-  const Words header = client.read(0, 43);
+  const Words header = client.read(0, 50);
   EXPECT_EQ(Words(header.begin() + 5, header.begin() + 17),
             (Words{4, 1, 100, 13, 2, 200, 86, 3, 400, 11, 4, 1000}));
   EXPECT_EQ(Words(header.begin() + 30, header.begin() + 40), (Words{3, 5, 120, 22, 6, 286, 50, 7, 420, 13}));
-  for (std::size_t at = 31; at < 40; at += 3)
+  EXPECT_EQ(Words(header.begin() + 43, header.begin() + 50), (Words{2, 8, 433, 1, 9, 340, 16}));
+  for (const std::size_t at : {31u, 34u, 37u, 44u, 47u})
     EXPECT_FALSE(client.read(header[at + 1], header[at + 2]).empty()) << at;
 }
 

@@ -44,9 +44,11 @@ std::optional<std::vector<std::uint32_t>> Exchanges::axes_of(const v1::Exchange&
       return std::nullopt;
     }
     if (!decode_command(command)) {
+      const bool gates = !v1::Gates_IsValid(command.gates());
       dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
-                       "gates is " + std::to_string(command.gates()) + " but must be 0 to 3",
-                       "commands.gates");
+                       gates ? "gates is " + std::to_string(command.gates()) + " but must be 0 to 4"
+                             : "legs_off is " + std::to_string(command.legs_off()) + " but must be 0 to 7",
+                       gates ? "commands.gates" : "commands.legs_off");
       return std::nullopt;
     }
     axes.push_back(command.axis());
