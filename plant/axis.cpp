@@ -8,6 +8,7 @@
 #include "plant/math/rounding.hpp"
 #include "plant/math/trig.hpp"
 #include "plant/parameters/machine_kind.hpp"
+#include "plant/train/shared_amplifier.hpp"
 #include "plant/train/shared_shaft.hpp"
 
 namespace drivebench {
@@ -212,25 +213,21 @@ void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
 
 void Axis::advance(const PhaseCommand& command, Tick tick) noexcept {
   if ((state_.faults & kDiverged) != 0) return;
-  const MotionState before{state_.machine, state_.shaft};
+  const MotionState before = motion();
   begin_tick(command, tick);
   train_->run(core_, state_, load_at(tick));
   end_tick(before, tick);
 }
 
-void Axis::advance_pair(Axis& first, Axis& second, const PhaseCommand& first_command,
-                        const PhaseCommand& second_command, Tick tick) noexcept {
-  if (((first.state_.faults | second.state_.faults) & kDiverged) != 0) {
-    first.latch(kDiverged);
-    second.latch(kDiverged);
-    return;
-  }
-  const MotionState first_before{first.state_.machine, first.state_.shaft};
-  const MotionState second_before{second.state_.machine, second.state_.shaft};
-  first.begin_tick(first_command, tick);
-  second.begin_tick(second_command, tick);
-  SharedShaft(first.core_, first.state_, *first.train_, second.core_, second.state_, *second.train_)
-      .run(first.load_at(tick) + second.load_at(tick));
+bool Axis::has_diverged(Axis& first, Axis& second) noexcept {
+  if (((first.state_.faults | second.state_.faults) & kDiverged) == 0) return false;
+  first.latch(kDiverged);
+  second.latch(kDiverged);
+  return true;
+}
+
+void Axis::end_both(Axis& first, const MotionState& first_before, Axis& second,
+                    const MotionState& second_before, Tick tick) noexcept {
   if (first.finite() && second.finite()) {
     first.end_tick(first_before, tick);
     second.end_tick(second_before, tick);
@@ -238,6 +235,34 @@ void Axis::advance_pair(Axis& first, Axis& second, const PhaseCommand& first_com
     first.hold(first_before);
     second.hold(second_before);
   }
+}
+
+void Axis::advance_pair(Axis& first, Axis& second, const PhaseCommand& first_command,
+                        const PhaseCommand& second_command, Tick tick) noexcept {
+  if (has_diverged(first, second)) return;
+  const MotionState first_before = first.motion();
+  const MotionState second_before = second.motion();
+  first.begin_tick(first_command, tick);
+  second.begin_tick(second_command, tick);
+  SharedShaft(first.core_, first.state_, *first.train_, second.core_, second.state_, *second.train_)
+      .run(first.load_at(tick) + second.load_at(tick));
+  end_both(first, first_before, second, second_before, tick);
+}
+
+void Axis::advance_on_one_amplifier(Axis& first, Axis& second, const PhaseCommand& command,
+                                    Tick tick) noexcept {
+  if (has_diverged(first, second)) return;
+  const MotionState first_before = first.motion();
+  const MotionState second_before = second.motion();
+  first.begin_tick(command, tick);
+  second.begin_tick(command, tick);
+  SharedAmplifier({first.core_, first.state_, *first.train_, first.load_at(tick)},
+                  {second.core_, second.state_, *second.train_, second.load_at(tick)}, command, tick)
+      .run();
+  end_both(first, first_before, second, second_before, tick);
+  const std::uint64_t latched = (first.state_.faults | second.state_.faults) & kLatchedFaults;
+  first.latch(latched);
+  second.latch(latched);
 }
 
 bool Axis::finite() const noexcept {

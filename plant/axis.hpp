@@ -32,6 +32,11 @@ class Axis {
   static void advance_pair(Axis& first, Axis& second, const PhaseCommand& first_command,
                            const PhaseCommand& second_command, Tick tick) noexcept;
 
+  /// The same for two axes whose machines are in parallel on the amplifier of `first`: both have its
+  /// voltages, and a latched fault of one is that of both. The drive parameters of both must be equal.
+  static void advance_on_one_amplifier(Axis& first, Axis& second, const PhaseCommand& command,
+                                       Tick tick) noexcept;
+
   /// Sensors and truth at the start of `tick`, after the advance that led there: a pure function of state and
   /// tick. The bench's state of commands, leases and late ticks is not in it.
   Sample sample(Tick tick) const noexcept;
@@ -73,6 +78,11 @@ class Axis {
     TwoMassState shaft;
   };
 
+  /// Whether one of two axes that run together has diverged: then both have.
+  static bool has_diverged(Axis& first, Axis& second) noexcept;
+  static void end_both(Axis& first, const MotionState& first_before, Axis& second,
+                       const MotionState& second_before, Tick tick) noexcept;
+  MotionState motion() const noexcept { return {.machine = state_.machine, .shaft = state_.shaft}; }
   void begin_tick(const PhaseCommand& command, Tick tick) noexcept;
   void end_tick(const MotionState& before, Tick tick) noexcept;
   void hold(const MotionState& before) noexcept;

@@ -134,6 +134,19 @@ constexpr std::size_t find_injectable_fault(std::string_view name) noexcept {
   return row;
 }
 
+/// Whether the fault is one of the drive and its commands: two axes on one amplifier have it together.
+constexpr bool is_of_drive(const InjectableFault& fault) noexcept {
+  constexpr auto kMembers = std::to_array<double InjectedFaults::*>(
+      {&InjectedFaults::leg_stuck_high, &InjectedFaults::leg_stuck_low, &InjectedFaults::leg_stuck_off,
+       &InjectedFaults::bus_sag, &InjectedFaults::field_loss, &InjectedFaults::command_loss,
+       &InjectedFaults::command_delay, &InjectedFaults::command_corruption,
+       &InjectedFaults::command_duplication});
+  for (const auto member : kMembers) {
+    if (fault.member == member) return true;
+  }
+  return false;
+}
+
 /// The faults that are in force, as bits: bit n is row n.
 constexpr std::uint64_t injected_bits(const InjectedFaults& faults) noexcept {
   std::uint64_t bits = 0;

@@ -121,6 +121,10 @@ class Drive {
     if (follows_) follow(m, start_s, duration_s, applied, voltage_v, from_a, to_a);
   }
 
+  /// Instead of at() and finish(): from here on in this tick the terminals are those of a drive that this
+  /// machine shares with another one, with constant voltages. A wire that breaks is this machine's own.
+  void share_output(const TerminalDrive& out) noexcept;
+
   /// Whether at() gives the same during what is left of the tick, whatever the machine does.
   bool steady(const DriveMemory& m) const noexcept { return steady_ && !switches_ && m.switched_off == 0.0; }
   /// Whether at() changes during what is left of the tick by the switches alone: see switch_terminals().

@@ -1,4 +1,4 @@
-// The state of the drive after an interval: filter, current loop and link.
+// The state of the drive after an interval: filter, current loop and link; and the output of a shared drive.
 #include "plant/drive/drive.hpp"
 #include "plant/drive/phases.hpp"
 #include "plant/math/exponential.hpp"
@@ -78,6 +78,15 @@ void Drive::follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& a
   m.bus_v =
       bus_after(p_.bus, supply_v_, m.bus_v, m.chopper != 0.0, taken_w * duration_s, duration_s).voltage_v;
   m.chopper = chopper_after(p_.bus, m.bus_v, m.chopper != 0.0) ? 1.0 : 0.0;
+}
+
+void Drive::share_output(const TerminalDrive& out) noexcept {
+  steady_output_ = out;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k) {
+    if (hold_[k] == Hold::kOpen) steady_output_.mode[k] = TerminalMode::kOpen;
+  }
+  steady_ = true;
+  switches_ = has_edges_ = follows_ = false;
 }
 
 }  // namespace drivebench

@@ -194,6 +194,13 @@ std::span<const CurveParameter> drive_curves() noexcept {
   return kCurves;
 }
 
+bool is_of_drive(std::string_view parameter) noexcept {
+  const auto has = [parameter](std::span<const Parameter> rows) noexcept {
+    return std::ranges::find(rows, parameter, &Parameter::name) != rows.end();
+  };
+  return has(drive_rows()) || has(transformer_rows());
+}
+
 void add_problems(const DriveParameters& p, Problems& found) {
   add_loop_problems(p, found);
   if (p.kind == DriveKind::kSwitched && p.amplifier.filter_hz > 0.0) {
@@ -205,6 +212,20 @@ void add_problems(const DriveParameters& p, Problems& found) {
   add_bus_problems(p, found);
   add_source_problems(p, found);
   add_transformer_problems(p, found);
+}
+
+void add_shared_problems(const DriveParameters& p, Problems& found) {
+  if (p.kind == DriveKind::kCurrent || p.kind == DriveKind::kSource) {
+    found.add("drive.kind", [&] {
+      return "is \"" + std::string(kKinds[static_cast<std::size_t>(p.kind)]) +
+             "\" but two machines share voltage amplifiers and inverters only";
+    });
+  }
+  if (p.amplifier.filter_hz != 0.0) {
+    found.add("amplifier.filter_hz", [&] {
+      return "is " + text(p.amplifier.filter_hz) + " but must be 0 where two machines share the amplifier";
+    });
+  }
 }
 
 void add_period_problems(const DriveParameters& p, double period_s, Problems& found) {

@@ -31,6 +31,8 @@ class DriveTrain final : public Train {
   }
 
   void run(AxisCore& core, AxisState& state, double load_nm) noexcept override;
+  void run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
+                double load_nm) noexcept override;
   MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept override;
 
   void open(AxisCore& core, AxisState& state, double start_s, double duration_s,

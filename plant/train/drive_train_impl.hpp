@@ -286,6 +286,23 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
 }
 
 template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
+                                          double load_nm) noexcept {
+  Whole x;
+  x.machine = machine_of(state);
+  x.shaft = shaft_of(state);
+  look_up_angle(x.shaft);
+  piece_.plain = piece_.open = piece_.stays = false;
+  run_piece(core, state, x, start_s, end_s, load_nm);
+  const RotorMotion motion = motion_of(x);
+  keep_open(core, state, x.machine, motion);
+  piece_.current_a = currents(core, state, x.machine, motion);
+  end_run(core, state, x.machine, motion);
+  keep_machine(state, x.machine);
+  keep_shaft(state, x.shaft);
+}
+
+template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::end_run(const AxisCore& core, AxisState& state, const State& x,
                                          const RotorMotion& motion) noexcept {
   if (!has_impedance(core.p.drive)) state.voltage_v = end_voltages(core, state, x, motion);
