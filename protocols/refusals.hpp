@@ -27,6 +27,7 @@ enum class Refused : std::uint32_t {
   kWrongMode,
   kRuleBroken,
   kTooManyRamps,
+  kSharedAmplifier,
 };
 
 /// The codes of bench.proto's RefusalCode that the table needs. A test compares them with the schema.
@@ -47,6 +48,7 @@ enum class TcpRefusal : int {
   kWrongDrive = 16,
   kUnknownFault = 17,
   kCauseLasts = 21,
+  kSharedAmplifier = 23,
 };
 
 namespace can {
@@ -65,6 +67,7 @@ enum class Result : std::uint8_t {
   kWrongDrive = 9,
   kBeyondDrive = 10,
   kCauseLasts = 11,
+  kSharedAmplifier = 12,
 };
 
 }  // namespace can
@@ -85,6 +88,7 @@ enum class Refusal : std::uint16_t {
   kWrongMode = 9,
   kWrongDrive = 10,
   kCauseLasts = 11,
+  kSharedAmplifier = 12,
 };
 
 /// The exception codes of Modbus that the bench answers with.
@@ -162,6 +166,8 @@ inline constexpr auto kRefusals = [] {
        "the parameter would break a rule with the values that hold now"},
       {R::kTooManyRamps,  "too many ramps",    T::kBusy,        C::kBusy,        M::kBusy,        E::kBusy,
        "16 parameters of the axis are on their way already"},
+      {R::kSharedAmplifier, "shares amplifier", T::kSharedAmplifier, C::kSharedAmplifier, M::kSharedAmplifier,
+       E::kFailure, "the axis takes the voltages of another axis, whose amplifier it shares"},
   });
 }();
 // clang-format on
@@ -173,12 +179,12 @@ static_assert([] {
   for (std::size_t i = 0; i < kRefusals.size(); ++i) {
     if (kRefusals[i].refused != static_cast<Refused>(i)) return false;
   }
-  return refusal_row(Refused::kTooManyRamps).refused == Refused::kTooManyRamps;
+  return refusal_row(Refused::kSharedAmplifier).refused == Refused::kSharedAmplifier;
 }());
 
-/// Whether the sender did not hold the lease: such a request is no part of the run.
+/// Whether the sender did not hold the lease, or the axis has none: such a request is no part of the run.
 constexpr bool lacks_lease(Refused why) noexcept {
-  return why == Refused::kNotOwner || why == Refused::kOwned;
+  return why == Refused::kNotOwner || why == Refused::kOwned || why == Refused::kSharedAmplifier;
 }
 
 /// The reason for people; empty for kNot.

@@ -25,8 +25,12 @@ AxisTiming timing_of(const BenchSetup& setup) {
   return {.period_s = static_cast<double>(setup.period_ns) * 1e-9, .substeps = setup.substeps};
 }
 
-double largest_phase_current_a(const Sample& s) noexcept {
-  return std::max({std::abs(s.true_i_a_a), std::abs(s.true_i_b_a), std::abs(s.true_i_c_a)});
+/// The drive of an axis is that of the axis whose amplifier it shares.
+AxisParameters parameters_of(const BenchSetup& setup, std::size_t axis) {
+  AxisParameters p = setup.axes[axis].parameters;
+  if (const auto other = setup.axes[axis].shares_amplifier_with)
+    p.drive = setup.axes[*other].parameters.drive;
+  return p;
 }
 
 constexpr bool expects_commands(ControlState state) noexcept {
@@ -40,13 +44,15 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
   axes_.reserve(setup.axes.size());
   for (std::size_t i = 0; i < setup.axes.size(); ++i) {
     const AxisSetup& axis = setup.axes[i];
-    axes_.push_back({.axis = Axis(axis.parameters, timing_of(setup), setup.seed, i),
+    axes_.push_back({.axis = Axis(parameters_of(setup, i), timing_of(setup), setup.seed, i),
                      .on_link_loss = axis.on_link_loss,
                      .quick_stop_ticks = axis.quick_stop_ticks,
                      .rules = axis.rules,
                      .command_step = largest_step(axis.rules, setup.period_ns),
-                     .shaft = axis.shares_shaft_with.value_or(i)});
+                     .shaft = axis.shares_shaft_with.value_or(i),
+                     .amplifier = axis.shares_amplifier_with.value_or(i)});
     if (axis.shares_shaft_with) axes_[*axis.shares_shaft_with].shares_with = i;
+    if (axis.shares_amplifier_with) axes_[*axis.shares_amplifier_with].feeds = i;
     axis_parameters(axis.parameters);  // the first use builds the table, which must not happen in a tick
     take_sample(i);
   }
@@ -54,8 +60,10 @@ Bench::Bench(const BenchSetup& setup, BenchObserver* observer)
 
 Refused Bench::submit(const Input& input) noexcept {
   if (input.axis >= axes_.size()) return Refused::kUnknownAxis;
-  const Refused why = check_sender(input, owner(input.axis));
-  return why == Refused::kNot ? repeat(input) : why;
+  const Refused why = check_sender(input, owner(input.axis), takes_voltages(input.axis));
+  if (why != Refused::kNot) return why;
+  const Refused shared = check_shared(input);
+  return shared == Refused::kNot ? repeat(input) : shared;
 }
 
 Refused Bench::repeat(const Input& input) noexcept {
@@ -150,9 +158,10 @@ Refused Bench::clear_faults(AxisRuntime& a, Owner owner) noexcept {
   const std::uint64_t faults = a.axis.state().faults & kLatchedFaults;
   if (faults == 0) return Refused::kNot;
   const double limit_a = a.axis.parameters().drive.amplifier.over_current_a;
-  const bool over_current = (faults & kOverCurrentTrip) != 0 && largest_phase_current_a(a.sample) > limit_a;
+  const bool over_current = (faults & kOverCurrentTrip) != 0 && largest_current_a(a) > limit_a;
   if (over_current || c.bad_values != 0 || a.axis.injected().command_loss != 0.0) return Refused::kCauseLasts;
   a.axis.clear_faults();
+  if (a.feeds != 0) axes_[a.feeds].axis.clear_faults();
   c.state = ControlState::kIdle;
   c.in_force = {};
   c.silent_ticks = 0;
@@ -170,7 +179,22 @@ CommandView Bench::command_view(std::size_t axis) const noexcept {
           .step = a.command_step,
           .connection = a.axis.connection(),
           .rules = a.rules,
-          .drive = a.axis.parameters().drive};
+          .drive = a.axis.parameters().drive,
+          .takes_voltages = takes_voltages(axis)};
+}
+
+void Bench::latch(AxisRuntime& a, std::uint64_t faults) noexcept {
+  a.axis.latch(faults);
+  if (a.feeds != 0) axes_[a.feeds].axis.latch(faults);
+}
+
+/// Of a terminal of the amplifier.
+double Bench::largest_current_a(const AxisRuntime& a) const noexcept {
+  const Sample none{};
+  const Sample& one = a.sample;
+  const Sample& other = a.feeds != 0 ? axes_[a.feeds].sample : none;
+  return std::max({std::abs(one.true_i_a_a + other.true_i_a_a), std::abs(one.true_i_b_a + other.true_i_b_a),
+                   std::abs(one.true_i_c_a + other.true_i_c_a)});
 }
 
 Refused Bench::accept(std::size_t axis, const Command& command, Owner owner) noexcept {
@@ -207,15 +231,15 @@ Refused Bench::change_lease(std::size_t axis, LeaseAction action, Owner owner) n
 void Bench::lose_controller(std::size_t axis, std::uint64_t fault) noexcept {
   AxisRuntime& a = axes_[axis];
   forget_scheduled(axis, a.control.owner);
-  if (is_driven(a.control.state)) a.axis.latch(fault);
+  if (is_driven(a.control.state)) latch(a, fault);
   a.control = {.last = a.control.last, .missed = a.control.missed, .refused = a.control.refused};
 }
 
 void Bench::forget_scheduled(std::size_t axis, Owner owner) noexcept {
   const auto end = schedule_.begin() + static_cast<std::ptrdiff_t>(scheduled_);
   const auto still_to_come = schedule_.begin() + static_cast<std::ptrdiff_t>(due_);
-  const auto kept = std::remove_if(still_to_come, end, [axis, owner](const PackedInput& input) {
-    return input.axis == axis && input.owner == owner;
+  const auto kept = std::remove_if(still_to_come, end, [this, axis, owner](const PackedInput& input) {
+    return axes_[input.axis].amplifier == axis && input.owner == owner;
   });
   std::fill(kept, end, PackedInput{});
   scheduled_ = static_cast<std::uint64_t>(kept - schedule_.begin());
@@ -280,7 +304,7 @@ void Bench::miss_command(AxisRuntime& a) noexcept {
   }
   ++c.missed;
   c.state = ControlState::kHold;
-  if (c.silent_ticks >= setup_.watchdog_ticks) a.axis.latch(kCommandTimeout);
+  if (c.silent_ticks >= setup_.watchdog_ticks) latch(a, kCommandTimeout);
 }
 
 PhaseCommand Bench::supervise(std::size_t axis) noexcept {
@@ -312,12 +336,14 @@ void Bench::step() noexcept {
   apply_due();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i].ramps.count != 0) follow_ramps(axes_[i]);
-    axes_[i].command = supervise(i);
+    if (!takes_voltages(i)) axes_[i].command = supervise(i);
   }
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     AxisRuntime& a = axes_[i];
-    if (a.shaft != i) continue;  // advanced with its partner
-    if (a.shares_with == 0) {
+    if (a.shaft != i || a.amplifier != i) continue;  // advanced with its partner
+    if (a.feeds != 0) {
+      Axis::advance_on_one_amplifier(a.axis, axes_[a.feeds].axis, a.command, tick_);
+    } else if (a.shares_with == 0) {
       a.axis.advance(a.command, tick_);
     } else {
       AxisRuntime& partner = axes_[a.shares_with];
@@ -337,13 +363,13 @@ void Bench::step() noexcept {
 
 void Bench::take_sample(std::size_t index) noexcept {
   AxisRuntime& a = axes_[index];
-  const Control& c = a.control;
+  const Control& c = control_of(a);
   const Tick answered = c.in_force.answers;
   a.sample = a.axis.sample(tick_);
   a.sample.command_tick = answered;
   a.sample.command_age_ticks = answered < 0 ? 0 : static_cast<std::uint64_t>(tick_ - 1 - answered);
   a.sample.missed_commands = c.missed;
-  a.sample.refused_commands = c.refused;
+  a.sample.refused_commands = a.control.refused;  // of its own requests, too, where it shares an amplifier
   a.sample.late_ticks = late_ticks_;
   a.sample.state = static_cast<std::uint64_t>(c.state);
   a.sample.faults |= c.flags;

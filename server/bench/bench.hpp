@@ -48,6 +48,9 @@ struct AxisSetup {
   /// The number of an earlier axis with the same shaft: a dynamometer. The mechanics of that axis are those
   /// of both.
   std::optional<std::size_t> shares_shaft_with{};
+  /// The number of an earlier axis whose amplifier drives this machine, too. Drive, commands, safe action and
+  /// lease of that axis are those of both.
+  std::optional<std::size_t> shares_amplifier_with{};
 };
 
 /// The settings of a bench.
@@ -119,9 +122,10 @@ class Bench {
   std::size_t axis_count() const noexcept { return axes_.size(); }
   const Sample& sample(std::size_t axis) const noexcept { return axes_[axis].sample; }
   const Axis& axis(std::size_t index) const noexcept { return axes_[index].axis; }
-  Owner owner(std::size_t axis) const noexcept { return axes_[axis].control.owner; }
+  /// Of the lease of the axis, or of the axis whose amplifier it shares.
+  Owner owner(std::size_t axis) const noexcept { return control_of(axes_[axis]).owner; }
   /// Whether a command for the current tick has arrived.
-  bool has_command(std::size_t axis) const noexcept { return axes_[axis].control.fresh != 0; }
+  bool has_command(std::size_t axis) const noexcept { return control_of(axes_[axis]).fresh != 0; }
 
   /// A hash of the whole state and of every sample so far.
   std::uint64_t state_hash() const noexcept;
@@ -158,6 +162,8 @@ class Bench {
     double command_step;          ///< largest change of a set-point in a tick [V or A]; 0: no limit
     std::size_t shaft;            ///< the axis that owns the shaft: this one, or its partner before it
     std::size_t shares_with = 0;  ///< the other axis on this shaft; 0: none
+    std::size_t amplifier;        ///< the axis that owns the amplifier: this one, or the one it shares
+    std::size_t feeds = 0;        ///< the other axis on this amplifier; 0: none
     Control control{};
     ParameterRamps ramps{};
     Sample sample{};
@@ -165,6 +171,12 @@ class Bench {
     std::uint64_t parameter_changes = 0;
   };
 
+  const Control& control_of(const AxisRuntime& a) const noexcept { return axes_[a.amplifier].control; }
+  bool takes_voltages(std::size_t axis) const noexcept { return axes_[axis].amplifier != axis; }
+  /// The faults of both axes on an amplifier.
+  void latch(AxisRuntime& a, std::uint64_t faults) noexcept;
+  Refused check_shared(const Input& input) const noexcept;
+  double largest_current_a(const AxisRuntime& a) const noexcept;
   Refused apply(const Input& input) noexcept;
   Refused apply_action(AxisRuntime& a, const Input& input) noexcept;
   Refused accept(std::size_t axis, const Command& command, Owner owner) noexcept;

@@ -1,11 +1,35 @@
-// Changes of a running axis: parameters, at once or on a ramp, and injected faults.
+// Changes of a running axis: parameters, at once or on a ramp, and injected faults. Those of a drive are for
+// the axis that owns it.
 #include <cmath>
 #include <span>
 
+#include "plant/parameters/drive_rows.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "server/bench/bench.hpp"
 
 namespace drivebench {
+namespace {
+
+bool breaks_a_shared_rule(const DriveParameters& p) noexcept {
+  Problems found;
+  add_shared_problems(p, found);
+  return found.any();
+}
+
+}  // namespace
+
+Refused Bench::check_shared(const Input& input) const noexcept {
+  if (!takes_voltages(input.axis)) return Refused::kNot;
+  if (const auto* write = std::get_if<ParameterWrite>(&input.action)) {
+    const std::span<const Parameter> rows = axis_parameters(axes_[input.axis].axis.parameters());
+    if (write->row < rows.size() && is_of_drive(rows[write->row].name)) return Refused::kSharedAmplifier;
+  } else if (const auto* fault = std::get_if<InjectFault>(&input.action)) {
+    if (fault->row < kInjectableFaultCount && is_of_drive(kInjectableFaults[fault->row])) {
+      return Refused::kSharedAmplifier;
+    }
+  }
+  return Refused::kNot;
+}
 
 Refused Bench::write_parameter(AxisRuntime& a, const ParameterWrite& write) noexcept {
   const AxisParameters& p = a.axis.parameters();
@@ -30,7 +54,7 @@ Refused Bench::write_parameter(AxisRuntime& a, const ParameterWrite& write) noex
 bool Bench::set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept {
   AxisParameters p = a.axis.parameters();
   axis_parameters(p)[row].set(p, value);
-  if (breaks_a_rule(p)) return false;
+  if (breaks_a_rule(p) || (a.feeds != 0 && breaks_a_shared_rule(p.drive))) return false;
   change_parameters(a, p);
   return true;
 }
@@ -40,7 +64,7 @@ void Bench::follow_ramps(AxisRuntime& a) noexcept {
   const std::span<const Parameter> rows = axis_parameters(p);
   for (std::size_t i = 0; i < a.ramps.count; ++i)
     rows[a.ramps.ramp[i].row].set(p, a.ramps.ramp[i].at(tick_));
-  const bool possible = !breaks_a_rule(p);
+  const bool possible = !breaks_a_rule(p) && (a.feeds == 0 || !breaks_a_shared_rule(p.drive));
   if (possible) change_parameters(a, p);
   for (std::size_t i = a.ramps.count; i-- > 0;) {
     const ParameterRamp ramp = a.ramps.ramp[i];
@@ -54,6 +78,12 @@ void Bench::follow_ramps(AxisRuntime& a) noexcept {
 void Bench::change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept {
   a.axis.set_parameters(p);
   ++a.parameter_changes;
+  if (a.feeds == 0) return;
+  AxisRuntime& other = axes_[a.feeds];
+  AxisParameters both = other.axis.parameters();
+  both.drive = p.drive;
+  other.axis.set_parameters(both);
+  ++other.parameter_changes;
 }
 
 Refused Bench::inject(AxisRuntime& a, const InjectFault& fault) noexcept {

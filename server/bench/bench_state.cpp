@@ -12,6 +12,8 @@ namespace drivebench {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x3374'6174'7362'7264u;  // "drbstat3"
+// Far from every number of an axis, because a setup without a shared amplifier has no word for it.
+constexpr std::uint64_t kSharedAmplifier = 0x1'0000'0000u;
 
 /// The value of a parameter that hashes pass over while it is 0.
 struct LaterValue {
@@ -49,6 +51,7 @@ std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
     digest.add(static_cast<std::uint64_t>(axis.rules.on_excess));
     digest.add(std::bit_cast<std::uint64_t>(axis.rules.slew_per_s));
     digest.add(axis.shares_shaft_with ? *axis.shares_shaft_with + 1 : 0);
+    if (axis.shares_amplifier_with) digest.add(kSharedAmplifier + *axis.shares_amplifier_with);
     digest.add(axis.parameters.machine.index());
     const auto add = [&digest](const auto& block) { digest.add_block(block); };
     for (const Parameter& row : axis_parameters(axis.parameters)) {

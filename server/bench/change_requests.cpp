@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "plant/injected_faults.hpp"
+#include "plant/parameters/drive_rows.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "protocols/text.hpp"
 
@@ -39,6 +40,9 @@ std::string problem_with_value(const ChangeView& axis, std::uint32_t row, double
   if (!axis.shaft_of.empty() && parameter.name.starts_with("mechanics.")) {
     return "belongs to axis " + std::string(axis.shaft_of) + ", whose shaft this axis shares";
   }
+  if (!axis.amplifier_of.empty() && is_of_drive(parameter.name)) {
+    return "belongs to axis " + std::string(axis.amplifier_of) + ", whose amplifier this axis shares";
+  }
   return problem_with(parameter, value);
 }
 
@@ -46,7 +50,10 @@ std::string problem_with_write(const ChangeView& axis, std::uint32_t row, double
   if (std::string problem = problem_with_value(axis, row, value); !problem.empty()) return problem;
   AxisParameters wanted = axis.parameters;
   axis_parameters(wanted)[row].set(wanted, value);
-  if (const std::vector<Problem> found = problems(wanted); !found.empty()) {
+  std::vector<Problem> found = problems(wanted);
+  Problems of_both(found);
+  if (axis.drives_another) add_shared_problems(wanted.drive, of_both);
+  if (!found.empty()) {
     return "would break a rule: " + found.front().field + " " + found.front().rule;
   }
   return {};

@@ -27,6 +27,8 @@ using JudgedRequest = std::variant<Action, RefusedRequest>;
 struct ChangeView {
   const AxisParameters& parameters;  ///< in force
   std::string_view shaft_of;         ///< the name of the axis whose shaft this one shares; empty: its own
+  std::string_view amplifier_of;     ///< the name of the axis whose amplifier this one shares; empty: its own
+  bool drives_another;               ///< another axis shares the amplifier of this one
   Tick tick;                         ///< the current one
 };
 

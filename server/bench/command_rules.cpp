@@ -47,6 +47,7 @@ bool is_too_steep(const Command& command, const CommandView& axis) noexcept {
 }  // namespace
 
 Refused judge(const Command& command, Owner sender, const CommandView& axis) noexcept {
+  if (axis.takes_voltages) return Refused::kSharedAmplifier;
   if (sender == 0 || sender != axis.owner) return Refused::kNotOwner;
   const Refused values = check_values(command.phases, axis);
   if (values != Refused::kNot) return values;

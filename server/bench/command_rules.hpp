@@ -32,6 +32,7 @@ struct CommandView {
   Connection connection = Connection::kTwoPhase;
   const CommandRules& rules;
   const DriveParameters& drive;
+  bool takes_voltages = false;  ///< those of another axis, whose amplifier it shares
 };
 
 /// The change of a set-point in a tick that the rules allow [V or A]; 0: any.
@@ -39,11 +40,11 @@ constexpr double largest_step(const CommandRules& rules, std::int64_t period_ns)
   return rules.slew_per_s * (static_cast<double>(period_ns) * 1e-9);
 }
 
-/// The reason why an axis refuses a command of `sender`. In this order: the sender must hold the lease; the
-/// values must be finite, no accident, of a kind that the drive takes and, with OnExcess::kRefuse, within its
-/// limits; the command must answer a sample that has been taken and not been answered; with OnExcess::kRefuse
-/// its set-points must be near enough to those of the command before; under a latched fault the gates must be
-/// off.
+/// The reason why an axis refuses a command of `sender`. In this order: the axis must have an amplifier of
+/// its own; the sender must hold the lease; the values must be finite, no accident, of a kind that the drive
+/// takes and, with OnExcess::kRefuse, within its limits; the command must answer a sample that has been taken
+/// and not been answered; with OnExcess::kRefuse its set-points must be near enough to those of the command
+/// before; under a latched fault the gates must be off.
 Refused judge(const Command& command, Owner sender, const CommandView& axis) noexcept;
 
 /// A change of set-points that the rules allow.

@@ -111,8 +111,9 @@ Input unpack(const PackedInput& packed) noexcept {
   return input;
 }
 
-Refused check_sender(const Input& input, Owner holder) noexcept {
+Refused check_sender(const Input& input, Owner holder, bool takes_voltages) noexcept {
   if (concerns_all_axes(input)) return Refused::kNot;
+  if (takes_voltages && !may_be_scheduled(input.action)) return Refused::kSharedAmplifier;
   const auto* const lease = std::get_if<LeaseAction>(&input.action);
   if (lease != nullptr && *lease == LeaseAction::kAcquire) {
     if (holder != 0 && holder != input.owner) return Refused::kOwned;

@@ -96,8 +96,9 @@ inline bool concerns_all_axes(const Input& input) noexcept {
 
 /// The reason why the sender has no right to the input while `holder` holds the lease of its axis; 0: no
 /// session does. Loads, parameters, faults and bumps may also come without an owner: from the configuration,
-/// from an experiment, or from a client of a free run.
-Refused check_sender(const Input& input, Owner holder) noexcept;
+/// from an experiment, or from a client of a free run. An axis that takes the voltages of another one has no
+/// lease of its own and no commands: the holder is that of the other axis.
+Refused check_sender(const Input& input, Owner holder, bool takes_voltages) noexcept;
 
 /// Whether the input gives a lease up.
 inline bool ends_lease(const Input& input) noexcept {

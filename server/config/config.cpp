@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "protocols/text.hpp"
@@ -37,6 +39,29 @@ void change_mode(BenchConfig& config, RunMode mode) noexcept {
   }
   if (mode == RunMode::kRealtime) setup.command_delay_ticks = 1;
   config.mode = mode;
+}
+
+ChangeView change_view(const BenchConfig& config, std::size_t axis, const AxisParameters& in_force,
+                       Tick tick) noexcept {
+  const auto name = [&config](std::optional<std::size_t> other) {
+    return other ? std::string_view(config.axes[*other].name) : std::string_view();
+  };
+  const std::vector<AxisSetup>& axes = config.setup.axes;
+  return {.parameters = in_force,
+          .shaft_of = name(axes[axis].shares_shaft_with),
+          .amplifier_of = name(axes[axis].shares_amplifier_with),
+          .drives_another = std::ranges::any_of(
+              axes, [axis](const AxisSetup& other) { return other.shares_amplifier_with == axis; }),
+          .tick = tick};
+}
+
+std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis) {
+  const std::optional<std::size_t> owner =
+      axis < config.axes.size() ? config.setup.axes[axis].shares_amplifier_with : std::nullopt;
+  if (why != Refused::kSharedAmplifier || !owner) return std::string(sentence_of(why));
+  const std::string& other = config.axes[*owner].name;
+  return "axis " + config.axes[axis].name + " takes the voltages of axis " + other +
+         ", whose amplifier it shares: lease, commands and drive are those of " + other;
 }
 
 void schedule_events(const BenchConfig& config, Bench& bench) {

@@ -12,6 +12,7 @@
 #include "protocols/can/profile.hpp"
 #include "protocols/document.hpp"
 #include "server/bench/bench.hpp"
+#include "server/bench/change_requests.hpp"
 #include "server/config/grants.hpp"
 
 namespace drivebench {
@@ -164,6 +165,13 @@ std::string physics_toml(const BenchConfig& config);
 
 /// Gives the bench the events of the configuration, as inputs for later ticks.
 void schedule_events(const BenchConfig& config, Bench& bench);
+
+/// An axis for requests that change it.
+ChangeView change_view(const BenchConfig& config, std::size_t axis, const AxisParameters& in_force,
+                       Tick tick) noexcept;
+
+/// The reason for people why a request for this axis was refused.
+std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis);
 
 /// The hash of physics_toml(): benches with the same hash give the same samples for the same inputs.
 std::uint64_t configuration_hash(const BenchConfig& config);

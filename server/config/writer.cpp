@@ -37,14 +37,16 @@ void append_timing(std::string& text, const BenchSetup& setup) {
 /// Whether a text names every key, or those that the hash of the configuration knows: see Parameter::later.
 enum class Keys { kAll, kHashed };
 
-void append_parameters(std::string& text, const AxisParameters& p, bool shares_shaft, Keys keys) {
+void append_parameters(std::string& text, const AxisSetup& setup, Keys keys) {
+  const AxisParameters& p = setup.parameters;
   std::vector<std::string_view> sections;
   for (const Parameter& row : axis_parameters(p)) {
     if (std::find(sections.begin(), sections.end(), section_of(row.name)) == sections.end())
       sections.push_back(section_of(row.name));
   }
   for (const std::string_view section : sections) {
-    if (shares_shaft && section == "mechanics") continue;
+    if (setup.shares_shaft_with && section == "mechanics") continue;
+    if (setup.shares_amplifier_with && is_section_of_drive(section)) continue;
     text.append("\n[axis.").append(section).append("]\n");
     if (section == "machine") append(text, "kind", in_quotes(machine_kind(p)));
     for (const Parameter& row : axis_parameters(p)) {
@@ -60,11 +62,13 @@ void append_parameters(std::string& text, const AxisParameters& p, bool shares_s
 }
 
 void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config, Keys keys) {
-  append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
-  append(text, "quick_stop_ticks", std::to_string(setup.quick_stop_ticks));
-  append(text, "on_excess", in_quotes(kOnExcessWords[static_cast<std::size_t>(setup.rules.on_excess)]));
-  append(text, "slew_per_s", real_text(setup.rules.slew_per_s));
-  append_parameters(text, setup.parameters, setup.shares_shaft_with.has_value(), keys);
+  if (!setup.shares_amplifier_with) {
+    append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
+    append(text, "quick_stop_ticks", std::to_string(setup.quick_stop_ticks));
+    append(text, "on_excess", in_quotes(kOnExcessWords[static_cast<std::size_t>(setup.rules.on_excess)]));
+    append(text, "slew_per_s", real_text(setup.rules.slew_per_s));
+  }
+  append_parameters(text, setup, keys);
   text += events_text(config.events, setup.parameters);
 }
 
@@ -141,6 +145,9 @@ std::string to_toml(const BenchConfig& config) {
     if (const auto partner = config.setup.axes[i].shares_shaft_with) {
       append(text, "shares_shaft_with", in_quotes(config.axes[*partner].name));
     }
+    if (const auto other = config.setup.axes[i].shares_amplifier_with) {
+      append(text, "shares_amplifier_with", in_quotes(config.axes[*other].name));
+    }
     append_axis(text, config.setup.axes[i], config.axes[i], Keys::kAll);
   }
   return text;
@@ -153,6 +160,9 @@ std::string physics_toml(const BenchConfig& config) {
     text += "\n[[axis]]\n";
     if (const auto partner = config.setup.axes[i].shares_shaft_with) {
       append(text, "shares_shaft_with", std::to_string(*partner));  // the hash ignores names
+    }
+    if (const auto other = config.setup.axes[i].shares_amplifier_with) {
+      append(text, "shares_amplifier_with", std::to_string(*other));
     }
     append_axis(text, config.setup.axes[i], config.axes[i], Keys::kHashed);
   }

@@ -52,10 +52,11 @@ void Engine::refuse_to_take(std::uint32_t axis, Owner by, Refused why, const Ans
 }
 
 ChangeView Engine::change_view(std::size_t axis) const {
-  const std::optional<std::size_t> partner = config_.setup.axes[axis].shares_shaft_with;
-  return {.parameters = parameters_[axis],
-          .shaft_of = partner ? std::string_view(config_.axes[*partner].name) : std::string_view(),
-          .tick = tick()};
+  return drivebench::change_view(config_, axis, parameters_[axis], tick());
+}
+
+std::string Engine::sentence_of(Refused why, std::size_t axis) const {
+  return drivebench::sentence_of(why, config_, axis);
 }
 
 std::string Engine::try_parameter(std::size_t axis, std::uint32_t row, double value) {

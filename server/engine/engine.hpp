@@ -78,7 +78,14 @@ class Engine {
   /// The owner of the axis, as far as the I/O thread knows; 0: none.
   virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
   /// Whether a new controller that asks for the lease now would get it.
-  virtual bool may_be_acquired(std::uint32_t axis) { return owner(axis) == 0; }
+  virtual bool may_be_acquired(std::uint32_t axis) { return owner(axis) == 0 && !takes_voltages(axis); }
+  /// Whether the axis takes the voltages of another one, whose amplifier it shares: it has no commands and no
+  /// lease of its own.
+  bool takes_voltages(std::size_t axis) const {
+    return config_.setup.axes[axis].shares_amplifier_with.has_value();
+  }
+  /// The reason for people why a request for this axis was refused.
+  std::string sentence_of(Refused why, std::size_t axis) const;
 
   const Sample& newest(std::size_t axis) const { return newest_[axis]; }
   /// The encoder edges of the tick before newest(), if a bus of the configuration sends edges.

@@ -81,7 +81,7 @@ class LockstepEngine final : public Engine {
   }
 
   Owner owner(std::size_t axis) const override { return bench_.owner(axis); }
-  bool may_be_acquired(std::uint32_t axis) override { return bench_.owner(axis) == 0 && has_room(); }
+  bool may_be_acquired(std::uint32_t axis) override { return Engine::may_be_acquired(axis) && has_room(); }
   std::uint64_t state_hash() const override { return bench_.state_hash(); }
   std::int64_t worst_lateness_ns() const override { return 0; }
 

@@ -78,7 +78,8 @@ class ThreadedEngine final : public Engine {
                                       .step = largest_step(rules, config_.setup.period_ns),
                                       .connection = connection_of(parameters(axis).machine),
                                       .rules = rules,
-                                      .drive = parameters(axis).drive});
+                                      .drive = parameters(axis).drive,
+                                      .takes_voltages = takes_voltages(axis)});
   }
 
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
@@ -100,12 +101,14 @@ class ThreadedEngine final : public Engine {
     refuse_to_take(axis, by, Refused::kBusy, answer);
   }
 
-  bool may_be_acquired(std::uint32_t axis) override { return holder_of(axis) == 0 && has_room(); }
+  bool may_be_acquired(std::uint32_t axis) override {
+    return holder_of(axis) == 0 && !takes_voltages(axis) && has_room();
+  }
 
   void submit(const Input& input, Answer answer) override {
     // Here, so that clients without the lease do not fill the ring; changes are checked by their sessions.
     if (input.axis < lease_mail_.size() && !may_be_scheduled(input.action)) {
-      const Refused why = check_sender(input, holder_of(input.axis));
+      const Refused why = check_sender(input, holder_of(input.axis), takes_voltages(input.axis));
       if (why != Refused::kNot) return answer(has_room() ? why : Refused::kBusy, tick());
     }
     const bool ends = ends_lease(input);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/parameters/drive_rows.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
@@ -86,6 +87,10 @@ std::uint32_t row_of(const v1::NamedValue& wanted, const BenchConfig& config, st
     throw BadRequest(v1::REFUSAL_READ_ONLY, field + ".name",
                      wanted.name() + " belongs to the axis whose shaft this one shares");
   }
+  if (config.setup.axes[axis].shares_amplifier_with && is_of_drive(row->name)) {
+    throw BadRequest(v1::REFUSAL_SHARED_AMPLIFIER, field + ".name",
+                     wanted.name() + " belongs to the axis whose amplifier this one shares");
+  }
   if (const std::string problem = problem_with(*row, wanted.value()); !problem.empty()) {
     throw BadRequest(std::isfinite(wanted.value()) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
                      field + ".value", wanted.name() + " " + problem);
@@ -164,6 +169,10 @@ Action action_of(const v1::ExperimentEvent& e, const ExperimentPlan& plan, std::
           !problem.empty()) {
         throw BadRequest(std::isfinite(e.fault().value()) ? v1::REFUSAL_OUT_OF_RANGE : v1::REFUSAL_NOT_FINITE,
                          field + ".fault.value", e.fault().name() + " " + problem);
+      }
+      if (plan.config.setup.axes[axis].shares_amplifier_with && is_of_drive(kInjectableFaults[row])) {
+        throw BadRequest(v1::REFUSAL_SHARED_AMPLIFIER, field + ".fault.name",
+                         e.fault().name() + " is a fault of the axis whose amplifier this one shares");
       }
       return InjectFault{.row = static_cast<std::uint32_t>(row), .value = e.fault().value()};
     }

@@ -230,6 +230,9 @@ void check_kind(const v1::ExperimentInput& input, const ExperimentPlan& plan) {
     refuse_input("kind", "input.kind is phase_currents but the drive of this axis has no current loop",
                  v1::REFUSAL_WRONG_DRIVE);
   }
+  if (plan.has_commands() && plan.config.setup.axes[plan.axis].shares_amplifier_with) {
+    refuse_input("kind", std::string(sentence_of(Refused::kSharedAmplifier)), v1::REFUSAL_SHARED_AMPLIFIER);
+  }
   if (plan.has_commands() && drive == DriveKind::kSource) {
     refuse_input("kind", "the drive of this axis is a source, which takes no commands",
                  v1::REFUSAL_WRONG_DRIVE);

@@ -34,8 +34,9 @@ InprocBench::InprocBench(const BenchConfig& config) : config_(in_lockstep(config
   describe_bench();
 }
 
-int InprocBench::fail_with(Refused why, std::string field, std::string more) noexcept {
-  return fail(static_cast<int>(refusal_row(why).tcp), std::string(sentence_of(why)) + more, std::move(field));
+int InprocBench::fail_with(Refused why, std::uint32_t axis, std::string field, std::string more) noexcept {
+  return fail(static_cast<int>(refusal_row(why).tcp), sentence_of(why, config_, axis) + more,
+              std::move(field));
 }
 
 int InprocBench::check_axis(std::uint32_t axis) noexcept {
@@ -55,7 +56,7 @@ int InprocBench::submit(std::uint32_t axis, std::uint64_t at_tick, const JudgedR
                                      .axis = axis,
                                      .owner = kOwner,
                                      .action = std::get<Action>(judged)});
-  return why == Refused::kNot ? DRIVEBENCH_OK : fail_with(why, field);
+  return why == Refused::kNot ? DRIVEBENCH_OK : fail_with(why, axis, field);
 }
 
 int InprocBench::lease(std::uint32_t axis, LeaseAction action) noexcept {
@@ -88,6 +89,7 @@ int InprocBench::check_commands(std::span<const drivebench_command> commands) no
   // A server would wait for the other controllers; here there is none.
   for (std::uint32_t axis = 0; axis < bench_.axis_count(); ++axis) {
     const bool waits = bench_.owner(axis) != 0 && !bench_.is_latched(axis) &&
+                       !config_.setup.axes[axis].shares_amplifier_with &&
                        std::ranges::none_of(commands, [axis](const auto& c) { return c.axis == axis; });
     if (waits) {
       return fail(DRIVEBENCH_BUSY,
@@ -106,14 +108,16 @@ int InprocBench::step(std::span<const drivebench_command> commands) noexcept {
       const Refused why = judge(command_of(c), kOwner, bench_.command_view(c.axis));
       if (why == Refused::kNot) continue;
       bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
-      return fail_with(why, why == Refused::kWrongDrive ? "commands.gates" : "commands", on_axis(c.axis));
+      return fail_with(why, c.axis, why == Refused::kWrongDrive ? "commands.gates" : "commands",
+                       on_axis(c.axis));
     }
   }
   for (const drivebench_command& c : commands) {
     const Refused why =
         bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
     if (why == Refused::kNot) continue;
-    return fail_with(why, why == Refused::kWrongDrive ? "commands.gates" : "commands", on_axis(c.axis));
+    return fail_with(why, c.axis, why == Refused::kWrongDrive ? "commands.gates" : "commands",
+                     on_axis(c.axis));
   }
   bench_.step();
   return DRIVEBENCH_OK;
@@ -121,14 +125,11 @@ int InprocBench::step(std::span<const drivebench_command> commands) noexcept {
 
 int InprocBench::check_owner(std::uint32_t axis) noexcept {
   if (const int code = check_axis(axis); code != DRIVEBENCH_OK) return code;
-  return bench_.owner(axis) == kOwner ? DRIVEBENCH_OK : fail_with(Refused::kNotOwner, "axis");
+  return bench_.owner(axis) == kOwner ? DRIVEBENCH_OK : fail_with(Refused::kNotOwner, axis, "axis");
 }
 
 ChangeView InprocBench::change_view(std::uint32_t axis) const noexcept {
-  const std::optional<std::size_t> partner = config_.setup.axes[axis].shares_shaft_with;
-  return {.parameters = bench_.axis(axis).parameters(),
-          .shaft_of = partner ? std::string_view(config_.axes[*partner].name) : std::string_view(),
-          .tick = bench_.tick()};
+  return drivebench::change_view(config_, axis, bench_.axis(axis).parameters(), bench_.tick());
 }
 
 int InprocBench::get(std::uint32_t axis, const char* name, double& value) noexcept {

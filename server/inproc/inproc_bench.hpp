@@ -56,7 +56,7 @@ class InprocBench final : public abi::Backend {
              const char* field) noexcept;
   /// Whether the controller may change the axis.
   int check_owner(std::uint32_t axis) noexcept;
-  int fail_with(Refused why, std::string field, std::string more = {}) noexcept;
+  int fail_with(Refused why, std::uint32_t axis, std::string field, std::string more = {}) noexcept;
   ChangeView change_view(std::uint32_t axis) const noexcept;
   void describe_bench();
 

@@ -38,6 +38,7 @@ TEST(Refusals, EveryVerdictHasItsCodesOnEachWire) {
       {Refused::kWrongMode, 15, 6, 9, 4},
       {Refused::kRuleBroken, 7, 7, 8, 3},
       {Refused::kTooManyRamps, 13, 6, 7, 6},
+      {Refused::kSharedAmplifier, 23, 12, 12, 4},
   });
   ASSERT_EQ(kCodes.size(), kRefusals.size());
   std::set<Refused> seen;
@@ -82,6 +83,7 @@ TEST(Refusals, TheSchemaHasTheCodesOfTheTable) {
   expect(TcpRefusal::kWrongMode, v1::REFUSAL_WRONG_MODE);
   expect(TcpRefusal::kWrongDrive, v1::REFUSAL_WRONG_DRIVE);
   expect(TcpRefusal::kCauseLasts, v1::REFUSAL_CAUSE_LASTS);
+  expect(TcpRefusal::kSharedAmplifier, v1::REFUSAL_SHARED_AMPLIFIER);
 }
 
 // Catches: a code of two verdicts that a client takes for the rarer one, and a code of a newer bench that
@@ -105,11 +107,11 @@ TEST(Refusals, TheListsOfCodesComeFromTheTable) {
   EXPECT_EQ(
       kCanResultMeaning,
       "0 done, 1 not the owner, 2 owned by another, 3 not finite, 4 latched, 5 stale, 6 busy, 7 malformed, "
-      "8 incomplete, 9 wrong drive, 10 beyond drive, 11 cause lasts");
+      "8 incomplete, 9 wrong drive, 10 beyond drive, 11 cause lasts, 12 shares amplifier");
   EXPECT_EQ(kLastRefusalMeaning,
             "why the last write here was refused: 0 none yet, 1 no such axis, 2 not the owner, "
             "3 owned by another, 4 not finite, 5 latched, 6 stale, 7 busy, 8 out of range, 9 wrong mode, "
-            "10 wrong drive, 11 cause lasts");
+            "10 wrong drive, 11 cause lasts, 12 shares amplifier");
 }
 
 }  // namespace

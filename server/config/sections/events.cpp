@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "plant/parameters/drive_rows.hpp"
 #include "protocols/text.hpp"
 #include "server/bench/ramps.hpp"
 #include "server/config/sections/axis.hpp"
@@ -51,7 +52,8 @@ void read_bumps(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent
   }
 }
 
-void read_faults(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent>& events) {
+void read_faults(StrictTable& axis, SharedParts shared, std::int64_t period_ns,
+                 std::vector<AxisEvent>& events) {
   for (StrictTable& table : axis.tables("fault", kMaxAxisEvents)) {
     const auto name = table.choice("name", kFaultNames);
     const Tick tick = read_at(table, period_ns);
@@ -62,6 +64,10 @@ void read_faults(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEven
     if (name && value) {
       const std::string rule = problem_with(kInjectableFaults[*name], *value);
       if (!rule.empty()) table.report("value", rule);
+    }
+    if (name && shared.drive && is_of_drive(kInjectableFaults[*name])) {
+      table.report("name", "is \"" + std::string(kFaultNames[*name]) +
+                               "\", a fault of the axis whose amplifier this one shares");
     }
     if (until && *until <= tick) {
       table.report(table.has("until_s") ? "until_s" : "until_tick",
@@ -83,7 +89,7 @@ struct Setting {
 };
 
 /// The row of the parameter that a setting names; null if the parameter is not live.
-const Parameter* read_row(StrictTable& table, const AxisParameters* p, bool shares_shaft) {
+const Parameter* read_row(StrictTable& table, const AxisParameters* p, SharedParts shared) {
   const auto name = table.text("parameter", 200);
   table.require("parameter");
   if (!name || p == nullptr) return nullptr;
@@ -94,15 +100,18 @@ const Parameter* read_row(StrictTable& table, const AxisParameters* p, bool shar
   };
   if (row == nullptr) return report("but there is no such parameter");
   if (!row->live) return report("which cannot be changed while the bench runs");
-  if (shares_shaft && section_of(row->name) == "mechanics") {
+  if (shared.shaft && section_of(row->name) == "mechanics") {
     return report("which belongs to the axis whose shaft this one shares");
+  }
+  if (shared.drive && is_of_drive(row->name)) {
+    return report("which belongs to the axis whose amplifier this one shares");
   }
   return row;
 }
 
-std::optional<Setting> read_setting(StrictTable& table, const AxisParameters* p, bool shares_shaft,
+std::optional<Setting> read_setting(StrictTable& table, const AxisParameters* p, SharedParts shared,
                                     std::int64_t period_ns) {
-  const Parameter* const row = read_row(table, p, shares_shaft);
+  const Parameter* const row = read_row(table, p, shared);
   const Tick tick = read_at(table, period_ns);
   const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", period_ns);
   const auto value = row != nullptr ? read_value(table, "value", *row) : std::nullopt;
@@ -160,12 +169,12 @@ void check_settings(std::vector<Setting>& settings, AxisParameters p) {
   }
 }
 
-void read_settings(StrictTable& axis, const AxisParameters* p, bool shares_shaft, std::int64_t period_ns,
+void read_settings(StrictTable& axis, const AxisParameters* p, SharedParts shared, std::int64_t period_ns,
                    std::vector<AxisEvent>& events) {
   std::vector<Setting> settings;
   bool all_right = p != nullptr;
   for (StrictTable& table : axis.tables("set", kMaxAxisEvents)) {
-    if (const auto setting = read_setting(table, p, shares_shaft, period_ns)) {
+    if (const auto setting = read_setting(table, p, shared, period_ns)) {
       settings.push_back(*setting);
     } else {
       all_right = false;
@@ -234,12 +243,12 @@ std::vector<AxisEvent> in_order(std::vector<AxisEvent> events) {
   return events;
 }
 
-std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, bool shares_shaft,
+std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, SharedParts shared,
                                    std::int64_t period_ns) {
   std::vector<AxisEvent> events;
   read_loads(axis, period_ns, events);
-  read_settings(axis, p, shares_shaft, period_ns, events);
-  read_faults(axis, period_ns, events);
+  read_settings(axis, p, shared, period_ns, events);
+  read_faults(axis, shared, period_ns, events);
   read_bumps(axis, period_ns, events);
   return in_order(std::move(events));
 }

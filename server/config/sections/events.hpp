@@ -9,9 +9,15 @@
 
 namespace drivebench {
 
+/// The parts of an axis that are those of another one.
+struct SharedParts {
+  bool shaft = false;
+  bool drive = false;
+};
+
 /// Reads [[axis.load]], [[axis.set]], [[axis.fault]] and [[axis.bump]]. `p` are the initial parameters, or
 /// null if they are wrong: then only the keys of [[axis.set]] are checked.
-std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, bool shares_shaft,
+std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, SharedParts shared,
                                    std::int64_t period_ns);
 
 /// The events as TOML, in ticks.

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "plant/parameters/drive_rows.hpp"
 #include "server/config/sections/curves.hpp"
 #include "server/config/sections/plausible.hpp"
 #include "server/config/words.hpp"
@@ -112,6 +113,19 @@ void report_oddities(std::vector<Section>& sections, const AxisParameters& p,
   }
 }
 
+/// Takes the drive of the axis whose amplifier this one shares, without using the values of its sections.
+void share_drive(Sections& sections, const ParameterSource& source, AxisParameters& p) {
+  for (Section& section : sections.all()) {
+    if (!is_section_of_drive(section.name)) continue;
+    if (section.bench.exists()) {
+      source.axis.report(section.name,
+                         "cannot stand beside shares_amplifier_with: the drive is that of the other axis");
+    }
+    section.incomplete = true;  // the other axis reports broken rules
+  }
+  p.drive = *source.shared_drive;
+}
+
 /// Checks the mechanics of an axis that shares the shaft of another one, without using the values.
 void share_mechanics(Section& section, const ParameterSource& source, AxisParameters& p) {
   if (section.bench.exists()) {
@@ -134,6 +148,11 @@ bool read_parameters(const ParameterSource& source, ProblemList& problems, AxisP
   const auto is_unknown = [&](std::string_view section) { return !kind && section == "machine"; };
 
   if (source.shared_mechanics != nullptr) sections.find("mechanics").optional = true;
+  if (source.shared_drive != nullptr) {
+    for (const Parameter& row : axis_parameters(p)) {
+      if (is_of_drive(row.name)) sections.find(section_of(row.name)).optional = true;
+    }
+  }
   for (const Parameter& row : axis_parameters(p)) {
     if (is_unknown(section_of(row.name))) continue;
     read_entry(sections.find(section_of(row.name)), key_of(row.name), row.required, source.motor_missing,
@@ -153,6 +172,7 @@ bool read_parameters(const ParameterSource& source, ProblemList& problems, AxisP
                  return curve.has_value();
                });
   }
+  if (source.shared_drive != nullptr) share_drive(sections, source, p);
   if (source.shared_mechanics != nullptr) share_mechanics(sections.find("mechanics"), source, p);
   for (Section& section : sections.all()) {
     right = right && (!section.incomplete || section.optional);
@@ -184,6 +204,12 @@ std::optional<double> read_value(StrictTable& table, std::string_view key, const
     return std::nullopt;
   }
   return value;
+}
+
+bool is_section_of_drive(std::string_view section) noexcept {
+  return std::ranges::any_of(axis_parameters(AxisParameters{}), [section](const Parameter& row) {
+    return section_of(row.name) == section && is_of_drive(row.name);
+  });
 }
 
 std::string value_text(const Parameter& row, double value) {

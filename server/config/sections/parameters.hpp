@@ -28,6 +28,7 @@ struct ParameterSource {
   std::filesystem::path folder;     ///< of the bench file; empty: the text must not name other files
   std::vector<ConfigProblem>& odd;  ///< collects valid but implausible values
   const MechanicsParameters* shared_mechanics = nullptr;  ///< of the axis whose shaft this one shares
+  const DriveParameters* shared_drive = nullptr;          ///< of the axis whose amplifier this one shares
 };
 
 /// Reads the kind of machine and every row and curve of its tables. False if a value was missing or wrong;
@@ -36,6 +37,9 @@ bool read_parameters(const ParameterSource& source, ProblemList& problems, AxisP
 
 /// The value of a parameter; nothing if it is absent or out of its limits.
 std::optional<double> read_value(StrictTable& table, std::string_view key, const Parameter& row);
+
+/// Whether all parameters of a section are those of the drive.
+bool is_section_of_drive(std::string_view section) noexcept;
 
 /// The value in TOML.
 std::string value_text(const Parameter& row, double value);

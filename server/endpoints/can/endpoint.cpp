@@ -142,6 +142,10 @@ void Endpoint::on_request(Node& node, const Values& values) {
   if (code == 0 || code > static_cast<std::uint64_t>(Request::kClearFaults)) {
     return turn_away(node, request, controller, Refused::kMalformed, "its code must be 1 to 4");
   }
+  if (engine_->takes_voltages(node.axis)) {
+    return turn_away(node, request, controller, Refused::kSharedAmplifier,
+                     engine_->sentence_of(Refused::kSharedAmplifier, node.axis));
+  }
   if (request == Request::kAcquire) return acquire(node, controller);
   if (node.seat.owner() == 0 || lease != node.lease) {
     return turn_away(node, request, controller, Refused::kNotOwner);

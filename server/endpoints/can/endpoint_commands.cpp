@@ -76,7 +76,7 @@ void Endpoint::on_command(Node& node, const MessageRow& row, const Values& value
   const Refused why = engine_->command(node.axis, owner, command);
   if (why != Refused::kNot) {
     ++refused_;
-    log_refusal(node, "a command", sentence_of(why));
+    log_refusal(node, "a command", engine_->sentence_of(why, node.axis));
     return reply(node, Request::kCommand, why, 0, static_cast<std::uint8_t>(given.lease), answers);
   }
   node.commanded_at = engine_->tick();

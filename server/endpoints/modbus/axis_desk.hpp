@@ -119,6 +119,8 @@ class AxisDesk {
     std::optional<std::uint64_t> operator[](Content content) const noexcept;
   };
 
+  /// The reason why a write without the lease is refused.
+  Refused no_lease() const;
   asio::awaitable<Outcome> write_process(Written written, Visitor visitor);
   asio::awaitable<Outcome> write_command(Written written, Visitor visitor);
   asio::awaitable<Outcome> write_parameters(Written written, Visitor visitor);

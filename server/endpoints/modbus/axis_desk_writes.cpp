@@ -49,6 +49,10 @@ AxisDesk::Outcome AxisDesk::refuse(Refused why) noexcept {
   return {.exception = refusal_row(why).exception, .refused = why};
 }
 
+Refused AxisDesk::no_lease() const {
+  return engine_.takes_voltages(axis_) ? Refused::kSharedAmplifier : Refused::kNotOwner;
+}
+
 void AxisDesk::note_refusal(Visitor visitor, Refused why) noexcept {
   last_refusal_ = why;
   if (holds(visitor)) holders_refusal_ = why;
@@ -181,7 +185,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
     if (why != Refused::kNot) co_return refuse(why);
   }
   if (!commands) {
-    if (!holds(visitor)) co_return refuse(Refused::kNotOwner);
+    if (!holds(visitor)) co_return refuse(no_lease());
     command_ = input;
     const AxisRequest wanted = gives_back ? AxisRequest::kRelease : request;
     co_return co_await carry_out(wanted, visitor);
@@ -200,7 +204,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_command(Written written, Visi
 }
 
 asio::awaitable<AxisDesk::Outcome> AxisDesk::carry_out(AxisRequest request, Visitor visitor) {
-  if (!holds(visitor)) co_return refuse(Refused::kNotOwner);
+  if (!holds(visitor)) co_return refuse(no_lease());
   if (request == AxisRequest::kNone) co_return Outcome{};
   const Owner owner = seat_.owner();
   Refused why = Refused::kNot;
@@ -232,7 +236,7 @@ asio::awaitable<AxisDesk::Outcome> AxisDesk::write_coils(std::size_t address, st
 }
 
 asio::awaitable<AxisDesk::Outcome> AxisDesk::write_parameters(Written written, Visitor visitor) {
-  if (!holds(visitor) && engine_.config().mode != RunMode::kFree) co_return refuse(Refused::kNotOwner);
+  if (!holds(visitor) && engine_.config().mode != RunMode::kFree) co_return refuse(no_lease());
   struct Change {
     std::uint32_t row;
     double before;

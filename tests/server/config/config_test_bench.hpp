@@ -75,6 +75,13 @@ inline const std::string kBench =
     "[axis.encoder]\n"                 // 19
     "counts_per_revolution = 2000\n";  // 20
 
+/// A second axis on the shaft of the first, from line 21 on.
+inline const std::string kBrake = [] {
+  std::string text = "[[axis]]\nname = \"brake\"\nshares_shaft_with = \"x\"\n" +
+                     kBench.substr(kBench.find("[axis.machine]"));
+  return text.replace(text.find("[axis.mechanics]\ninertia_kgm2 = 1.1e-4\n"), 39, "");
+}();
+
 /// kBench with one piece of text exchanged.
 inline std::string with(const std::string& piece, const std::string& other) {
   std::string text = kBench;
@@ -185,6 +192,7 @@ inline void expect_equal(const BenchConfig& x, const BenchConfig& y) {
     const AxisParameters& p = x.setup.axes[i].parameters;
     const AxisParameters& q = y.setup.axes[i].parameters;
     EXPECT_EQ(x.setup.axes[i].shares_shaft_with, y.setup.axes[i].shares_shaft_with);
+    EXPECT_EQ(x.setup.axes[i].shares_amplifier_with, y.setup.axes[i].shares_amplifier_with);
     ASSERT_EQ(p.machine.index(), q.machine.index());
     for (const CurveParameter& row : axis_curves(p))
       expect_equal(row.get(p).points(), row.get(q).points());

@@ -111,12 +111,6 @@ TEST(ConfigMachine, TheMotorFileNamesTheKind) {
 
 // ---- one shaft ----
 
-const std::string kBrake = [] {
-  std::string text = "[[axis]]\nname = \"brake\"\nshares_shaft_with = \"x\"\n" +
-                     kBench.substr(kBench.find("[axis.machine]"));
-  return text.replace(text.find("[axis.mechanics]\ninertia_kgm2 = 1.1e-4\n"), 39, "");
-}();
-
 /// kBrake with another name, on the shaft of another axis.
 std::string named(std::string text, const std::string& own, const std::string& other) {
   text.replace(text.find("\"brake\""), 7, '"' + own + '"');

@@ -59,8 +59,12 @@ void Dialogue::refuse(std::uint64_t id, v1::RefusalCode code, const std::string&
 }
 
 void Dialogue::refuse(std::uint64_t id, Refused why, const char* field) {
+  refuse(id, why, std::string(sentence_of(why)), field);
+}
+
+void Dialogue::refuse(std::uint64_t id, Refused why, const std::string& sentence, const char* field) {
   if (lacks_lease(why)) note_not_owner(why);
-  refuse(id, code_of(why), std::string(sentence_of(why)), field);
+  refuse(id, code_of(why), sentence, field);
 }
 
 void Dialogue::note_not_owner(Refused why) {

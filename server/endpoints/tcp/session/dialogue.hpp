@@ -48,6 +48,8 @@ class Dialogue {
   void done(std::uint64_t id, Tick tick);
   void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& message, const char* field);
   void refuse(std::uint64_t id, Refused why, const char* field);
+  /// The same with a sentence that says more than that of the table.
+  void refuse(std::uint64_t id, Refused why, const std::string& sentence, const char* field);
   /// Counts and logs a request without the lease of its axis.
   void note_not_owner(Refused why);
   void notify(v1::Notice::Kind kind, const std::string& sentence, std::uint32_t axis);

@@ -45,6 +45,33 @@ TEST(CanLease, OWN_01_OneControllerAtATimeHoldsAnAxis) {
   EXPECT_EQ(bench.result(), static_cast<double>(Result::kOwned));
 }
 
+// Catches: a second axis on an amplifier that can be leased or commanded, a reply that gives another reason,
+// a tick that waits for it.
+TEST(CanLease, OWN_01_AnAxisOnAnotherOnesAmplifierRefusesByACodeOfItsOwn) {
+  BenchConfig config = on_bus(servo_bench(2), {});
+  config.setup.axes[1].shares_amplifier_with = 0;
+  CanBench bench(config);
+  constexpr std::uint32_t kSecond = 2;
+  constexpr auto kShared = static_cast<double>(Result::kSharedAmplifier);
+  const auto result = [&bench] {
+    const auto reply = bench.newest(Message::kReply, kSecond);
+    return reply ? (*reply)["result"] : -1.0;
+  };
+  for (const std::uint8_t lease : {std::uint8_t{0}, bench.acquire()}) {
+    for (const Request request :
+         {Request::kAcquire, Request::kRenew, Request::kRelease, Request::kClearFaults}) {
+      bench.request(request, lease, 77, kSecond);
+      EXPECT_EQ(result(), kShared);
+    }
+    bench.command(0.0, 1.0, 0.0, lease, 1.0, kSecond);
+    EXPECT_EQ(result(), kShared);
+    if (lease == 0) continue;
+    bench.command(0.0, 1.0, 0.0, lease);
+    EXPECT_EQ(bench.engine().tick(), 1);
+    EXPECT_TRUE(bench.newest(Message::kSensors, kSecond)) << "its samples go out as ever";
+  }
+}
+
 // Catches: a controller that is refused, or one that asks without a lease, of which only a counter knows.
 TEST(CanLease, SEC_07_ARefusedControllerStandsInTheAuditLog) {
   const std::filesystem::path file =

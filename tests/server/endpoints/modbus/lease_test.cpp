@@ -27,6 +27,27 @@ std::uint16_t lease_status(Client& client) {
   return client.read_one(409);
 }
 
+// Catches: a second axis on an amplifier that can be leased, commanded or cleared, an answer that gives
+// another reason, a tick that waits for it.
+TEST(Modbus, MB_13_AnAxisOnAnotherOnesAmplifierRefusesByACodeOfItsOwn) {
+  BenchConfig config = modbus_bench_config(2);
+  config.setup.axes[1].shares_amplifier_with = 0;
+  ModbusBench bench(config);
+  Client client(bench.port());
+  constexpr std::uint8_t kSecond = 2;
+  constexpr int kFailure = 4;
+  ASSERT_EQ(client.write(400, {7}), 0);
+  for (const Words& words : {Words{7}, Words{0}}) {
+    EXPECT_EQ(client.write(400, words, kSecond), kFailure);
+    EXPECT_EQ(client.read_one(410, kSecond), 12) << "shares amplifier";
+  }
+  EXPECT_EQ(client.write(401, {1}, kSecond), kFailure) << "a clear";
+  EXPECT_EQ(client.write(402, command_words(1, 0, 1.0f, 0.0f), kSecond), kFailure);
+  EXPECT_EQ(client.read_one(410, kSecond), 12);
+  EXPECT_FALSE(client.exchange(1, 0, 1.0f, 0.0f).empty());
+  EXPECT_EQ(bench.newest().tick, 1u);
+}
+
 // Catches: a block put together from two ticks, a float whose halves belong to different values.
 TEST(Modbus, MB_11_ABlockIsOfOneTick) {
   BenchConfig config = modbus_bench_config();

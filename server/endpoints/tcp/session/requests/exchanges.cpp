@@ -29,6 +29,7 @@ void Exchanges::exchange(const v1::Exchange& r) {
   }
   std::optional<std::vector<std::uint32_t>> axes = axes_of(r);
   if (!axes || !are_taken(r)) return;
+  add_shared(*axes);
   waiting_ = Waiting{.id = id, .axes = std::move(*axes)};
   dialogue_.context().audience.add_waiting(*this);
   engine_.advance();
@@ -64,8 +65,8 @@ bool Exchanges::are_taken(const v1::Exchange& r) {
     const Refused why = engine_.command(command.axis(), owner, *decode_command(command));
     excess_.charge();
     if (lacks_lease(why)) dialogue_.note_not_owner(why);
-    const std::string sentence =
-        why == Refused::kNotOwner ? leases_.not_owner_of(command.axis()) : std::string(sentence_of(why));
+    const std::string sentence = why == Refused::kNotOwner ? leases_.not_owner_of(command.axis())
+                                                           : engine_.sentence_of(why, command.axis());
     dialogue_.refuse(dialogue_.id(), code_of(why),
                      sentence + " (axis " + std::to_string(command.axis()) + ")",
                      why == Refused::kWrongDrive ? "commands.gates" : "commands");
@@ -74,6 +75,15 @@ bool Exchanges::are_taken(const v1::Exchange& r) {
   for (const v1::Command& command : r.commands())
     engine_.command(command.axis(), owner, *decode_command(command));
   return true;
+}
+
+/// The answer has the samples of all axes that the commands drive.
+void Exchanges::add_shared(std::vector<std::uint32_t>& axes) const {
+  const std::vector<AxisSetup>& all = engine_.config().setup.axes;
+  for (std::uint32_t axis = 0; axis < all.size(); ++axis) {
+    const auto other = all[axis].shares_amplifier_with;
+    if (other && std::find(axes.begin(), axes.end(), *other) != axes.end()) axes.push_back(axis);
+  }
 }
 
 void Exchanges::on_newest() {

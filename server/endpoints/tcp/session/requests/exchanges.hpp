@@ -38,6 +38,7 @@ class Exchanges final : public Audience::Waiter {
   /// The axes of the commands; nothing after it has refused the request.
   std::optional<std::vector<std::uint32_t>> axes_of(const v1::Exchange& request);
   bool are_taken(const v1::Exchange& request);
+  void add_shared(std::vector<std::uint32_t>& axes) const;
   void reply(std::uint64_t id, std::span<const std::uint32_t> axes);
 
   Dialogue& dialogue_;

@@ -95,7 +95,9 @@ Engine::Answer Leases::answer_for(std::uint32_t axis, const char* field, std::fu
   return [this, session = dialogue_.keep_alive(), id = dialogue_.id(), axis, field,
           on_done = std::move(on_done)](Refused refused, Tick tick) {
     if (refused == Refused::kOwned) return refuse_owned(id, axis);
-    if (refused != Refused::kNot) return dialogue_.refuse(id, refused, field);
+    if (refused != Refused::kNot) {
+      return dialogue_.refuse(id, refused, engine_.sentence_of(refused, axis), field);
+    }
     if (on_done) on_done();
     dialogue_.done(id, tick);
   };

@@ -58,6 +58,9 @@ v1::AxisDescription describe_axis(const Engine& engine, std::size_t axis) {
   if (const auto partner = config.setup.axes[axis].shares_shaft_with) {
     d.set_shares_shaft_with(config.axes[*partner].name);
   }
+  if (const auto other = config.setup.axes[axis].shares_amplifier_with) {
+    d.set_shares_amplifier_with(config.axes[*other].name);
+  }
   for (std::size_t row = 0; row < axis_parameters(p).size(); ++row)
     *d.add_parameters() = describe_parameter(engine, axis, row);
   return d;
