@@ -68,7 +68,8 @@ enum drivebench_code {
   DRIVEBENCH_NOT_AVAILABLE = 20, /**< this way to the bench does not carry the request */
   DRIVEBENCH_CAUSE_LASTS = 21,   /**< what caused the latched fault is still there */
   DRIVEBENCH_FORBIDDEN = 22,     /**< the role of the token does not allow the request */
-  DRIVEBENCH_SHARED_AMPLIFIER = 23, /**< commands and lease are those of the axis whose amplifier this one shares */
+  DRIVEBENCH_SHARED_AMPLIFIER =
+      23, /**< commands and lease are those of the axis whose amplifier this one shares */
 
   DRIVEBENCH_BAD_ARGUMENT = -1, /**< an argument is wrong; the bench was not asked */
   DRIVEBENCH_NO_BENCH = -2,     /**< nothing answers at the address, or the bench file is unusable */

@@ -124,7 +124,8 @@ Outcome ClosedLoop::run(control::Run run, std::span<const LoadStep> loads) {
   const double start_rad = sample().angle_rad;
   while (seen.samples < run.planned_samples()) {
     const Sample now = sample();
-    const control::Setpoint setpoint = run.step(measurement_of(now));
+    const control::Setpoint setpoint =
+        run.step(preset_.needs.drives_second ? measurement_of(now, bench_.sample(1)) : measurement_of(now));
     const std::span<const double> telemetry = run.controller().telemetry();
     const double angle_rad = now.angle_rad - start_rad;
     const double error_rad = run.reference().angle_rad - angle_rad;

@@ -6,8 +6,9 @@
 
 namespace drivebench {
 
-/// A sample as the controller's measurement, with nothing between them.
-inline control::Measurement measurement_of(const Sample& s) {
+/// A sample as the controller's measurement, with nothing between them; `second` is that of the axis on the
+/// same amplifier.
+inline control::Measurement measurement_of(const Sample& s, const Sample& second = {}) {
   return {.encoder_count = s.encoder_count,
           .edge_age_s = s.edge_age_s,
           .edge_period_s = s.edge_period_s,
@@ -16,7 +17,8 @@ inline control::Measurement measurement_of(const Sample& s) {
           .i_a_a = s.i_a_a,
           .i_b_a = s.i_b_a,
           .i_c_a = s.i_c_a,
-          .i_f_a = s.i_f_a};
+          .i_f_a = s.i_f_a,
+          .second = {.encoder_count = second.encoder_count, .i_a_a = second.i_a_a, .i_b_a = second.i_b_a}};
 }
 
 inline PhaseCommand command_of(const control::Setpoint& x, control::Quantity quantity) {

@@ -70,10 +70,13 @@ TEST(SharedAmplifier, TripsByTheSumOfTheCurrents) {
   Axis first = dc_motor(p, 0);
   Axis second = dc_motor(p, 1);
   Axis alone = dc_motor(p, 0);
+  std::uint64_t seen = 0;
   for (Tick tick = 0; tick < 100; ++tick) {
     Axis::advance_on_one_amplifier(first, second, volts(8.0), tick);
     alone.advance(volts(8.0), tick);
+    seen |= second.sample(tick + 1).faults;
   }
+  EXPECT_NE(seen & kOverCurrent, 0u) << "the bit of the tick, too";
   EXPECT_EQ(alone.sample(100).faults & kOverCurrentTrip, 0u);
   EXPECT_NE(first.sample(100).faults & kOverCurrentTrip, 0u);
   EXPECT_NE(second.sample(100).faults & kOverCurrentTrip, 0u);
@@ -200,8 +203,8 @@ AxisParameters star_axis() {
   return p;
 }
 
-// Fluxed and turning, with currents that a link of 20 V takes; a leg that stays off on a driven amplifier
-// floats as well. Catches: a star whose sums do not vanish, equations that are singular in a star.
+// Fluxed and turning. Catches: a star whose sums do not vanish, terminals that drift away from the middle of
+// the link.
 TEST(SharedAmplifier, StarsFloatWithoutASumOfCurrents) {
   AxisParameters p = star_axis();
   p.drive.amplifier.voltage_limit_v = 200.0;
@@ -219,6 +222,7 @@ TEST(SharedAmplifier, StarsFloatWithoutASumOfCurrents) {
   EXPECT_NEAR(a.true_i_b_a + b.true_i_b_a, 0.0, 1e-9);
   EXPECT_NEAR(a.true_i_c_a + b.true_i_c_a, 0.0, 1e-9);
   EXPECT_GT(std::abs(a.true_i_a_a) + std::abs(a.true_i_b_a), 0.01) << "the flux of one drives both";
+  EXPECT_NEAR(a.u_a_v + a.u_b_v + a.u_c_v, 0.0, 1e-9);
   EXPECT_EQ(a.faults, 0u);
 }
 

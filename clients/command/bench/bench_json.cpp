@@ -71,6 +71,7 @@ std::string describe_json(const v1::Welcome& welcome) {
                            {"field_winding", axis.field_winding()},
                            {"drive_kind", axis.drive_kind()},
                            {"shares_shaft_with", axis.shares_shaft_with()},
+                           {"shares_amplifier_with", axis.shares_amplifier_with()},
                            {"parameters", parameters_of(axis)}});
   }
   for (const v1::SignalDescription& s : bench.signals()) {

@@ -16,6 +16,12 @@
 namespace drivebench::command {
 namespace {
 
+/// The axis whose lease is that of this one: itself, or the one whose amplifier it shares.
+std::uint32_t leased_axis(const v1::BenchDescription& bench, std::uint32_t number) {
+  const std::string& shared = bench.axes(static_cast<int>(number)).shares_amplifier_with();
+  return shared.empty() ? number : axis_number(bench, shared);
+}
+
 /// An open link and the lease of the chosen axis: only the owner may change an axis. A free run has no
 /// owners.
 class HeldAxis {
@@ -23,12 +29,13 @@ class HeldAxis {
   HeldAxis(const LinkChoice& choice, std::string_view axis, std::string_view subcommand)
       : link_(open_link(choice, subcommand)),
         number_(axis_number(link_.welcome().bench(), axis)),
+        leased_(leased_axis(link_.welcome().bench(), number_)),
         holds_(link_.welcome().bench().mode() != v1::MODE_FREE) {
-    if (holds_) link_.acquire(number_);
+    if (holds_) link_.acquire(leased_);
   }
   ~HeldAxis() {
     try {
-      if (holds_) link_.release(number_);
+      if (holds_) link_.release(leased_);
     } catch (const std::exception&) {
       return;  // the end of the session gives it back
     }
@@ -44,6 +51,7 @@ class HeldAxis {
  private:
   link::Link link_;
   std::uint32_t number_;
+  std::uint32_t leased_;
   bool holds_;
 };
 

@@ -27,10 +27,12 @@ std::string words_text(const v1::ParameterDescription& p) {
 
 void print_axis(int number, const v1::AxisDescription& axis) {
   fmt::print("\naxis {} ({}): {}\n", number, axis.name(), axis.machine());
-  fmt::print("  machine {}, {} phase{} ({}){}, drive {}{}{}\n", axis.machine_kind(), axis.phases(),
+  fmt::print("  machine {}, {} phase{} ({}){}, drive {}{}{}{}{}\n", axis.machine_kind(), axis.phases(),
              axis.phases() == 1 ? "" : "s", axis.connection(),
              axis.field_winding() ? " and a field winding" : "", axis.drive_kind(),
-             axis.shares_shaft_with().empty() ? "" : ", on the shaft of ", axis.shares_shaft_with());
+             axis.shares_shaft_with().empty() ? "" : ", on the shaft of ", axis.shares_shaft_with(),
+             axis.shares_amplifier_with().empty() ? "" : ", on the amplifier of ",
+             axis.shares_amplifier_with());
 }
 
 void print_parameters(const v1::AxisDescription& axis) {

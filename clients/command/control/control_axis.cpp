@@ -8,6 +8,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/link/tcp/tcp_axis.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -50,6 +51,30 @@ double speed_after_rest(link::AxisLink& bench, double duration_s, double counts_
   const double turned_rad = static_cast<double>(sample.encoder_count - half_way.encoder_count) *
                             (2.0 * std::numbers::pi / counts_per_revolution);
   return turned_rad / (static_cast<double>(sample.tick - half_way.tick) * bench.bench().period_s());
+}
+
+/// The second motor that the preset drives is that of the axis on the same amplifier.
+void add_mismatches_of_second(const v1::BenchDescription& bench, std::uint32_t axis,
+                              const control::Requirements& needs, std::vector<std::string>& found) {
+  const std::optional<std::uint32_t> number = link::sharer_of_amplifier(bench, axis);
+  if (!number) {
+    found.emplace_back(
+        "the preset drives two motors, but this link shows no axis that shares the amplifier of this one");
+    return;
+  }
+  const v1::AxisDescription& second = bench.axes(static_cast<int>(*number));
+  const auto must_equal = [&](std::string_view name, double expected) {
+    const std::optional<double> value = parameter(second, name);
+    if (!value || !differ(*value, expected)) return;
+    found.push_back(fmt::format("{} of axis {} is {:g} on the bench, {:g} in the preset", name, second.name(),
+                                *value, expected));
+  };
+  if (second.machine_kind() != needs.machine_kind) {
+    found.push_back(fmt::format("machine.kind of axis {} is {} on the bench, {} in the preset", second.name(),
+                                second.machine_kind(), needs.machine_kind));
+  }
+  must_equal("encoder.counts_per_revolution", needs.counts_per_revolution);
+  must_equal("machine.pole_pairs", needs.pole_pairs);
 }
 
 }  // namespace
@@ -103,6 +128,7 @@ std::vector<std::string> mismatches(const v1::BenchDescription& bench, std::uint
     found.push_back(fmt::format("amplifier.voltage_limit_v is {:g} on the bench, the preset uses up to {:g}",
                                 *limit_v, needs.voltage_limit_v));
   }
+  if (needs.drives_second) add_mismatches_of_second(bench, axis, needs, found);
   return found;
 }
 
@@ -119,6 +145,9 @@ void let_rest(link::AxisLink& bench, double counts_per_revolution) {
   double speed_rad_s = 0.0;
   for (int rest = 0; rest < kMostRests && !interrupted(); ++rest) {
     speed_rad_s = speed_after_rest(bench, kRest_s, counts_per_revolution);
+    if (bench.second() != nullptr && std::abs(bench.second()->speed_rad_s) > std::abs(speed_rad_s)) {
+      speed_rad_s = bench.second()->speed_rad_s;
+    }
     if (std::abs(speed_rad_s) <= kStill_rad_s) return;
   }
   throw UsageError(fmt::format("the shaft turns at {:.3g} rad/s; the run starts from rest", speed_rad_s));

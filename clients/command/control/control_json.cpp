@@ -49,6 +49,7 @@ std::string presets_json() {
                    {"voltage_limit_v", needs.voltage_limit_v},
                    {"commands", needs.quantity == control::Quantity::kVoltage ? "voltages" : "currents"},
                    {"signal", needs.signal},
+                   {"drives_second", needs.drives_second},
                    {"gains", as_json(preset.gains())}});
   }
   return out.dump(2);

@@ -23,7 +23,8 @@ void answer_recorded(const RecordedRun& recorded, control::Run& run,
     const std::uint64_t tick = row.sample.tick;
     const auto periods = std::max<std::int64_t>(1, static_cast<std::int64_t>(tick - last_tick));
     last_tick = tick;
-    const control::Setpoint setpoint = run.step(measurement_of(row.sample, kAllSignals), periods);
+    const control::Setpoint setpoint =
+        run.step(measurement_of(row.sample, kAllSignals, recorded.second_at(tick)), periods);
     if (run.done()) return;
     see(row, setpoint);
   }

@@ -104,7 +104,7 @@ void exchange_all(link::AxisLink& bench, control::Run& run, const std::vector<Lo
   std::int64_t periods = 1;
   std::int64_t covered = 0;  // samples of the plan up to the newest row
   for (;;) {
-    const control::Measurement measured = measurement_of(*sample, bench.known());
+    const control::Measurement measured = measurement_of(*sample, bench.known(), bench.second());
     const control::Setpoint setpoint = run.step(measured, periods);
     into.late_ticks = sample->late_ticks - first_late;
     if (run.done()) {
@@ -157,7 +157,7 @@ std::map<std::string, double> telemetry_peaks(const ControlRun& run) {
 
 }  // namespace
 
-control::Measurement measurement_of(const Sample& s, SignalMask known) {
+control::Measurement measurement_of(const Sample& s, SignalMask known, const Sample* second) {
   const auto real = [known](SignalMask bit, double value) { return (known & bit) != 0 ? value : 0.0; };
   return {.encoder_count = s.encoder_count,
           .edge_age_s = real(bit_of("edge_age_s"), s.edge_age_s),
@@ -167,7 +167,11 @@ control::Measurement measurement_of(const Sample& s, SignalMask known) {
           .i_a_a = s.i_a_a,
           .i_b_a = s.i_b_a,
           .i_c_a = real(bit_of("i_c_a"), s.i_c_a),
-          .i_f_a = real(bit_of("i_f_a"), s.i_f_a)};
+          .i_f_a = real(bit_of("i_f_a"), s.i_f_a),
+          .second = second == nullptr ? control::Measurement::Second{}
+                                      : control::Measurement::Second{.encoder_count = second->encoder_count,
+                                                                     .i_a_a = second->i_a_a,
+                                                                     .i_b_a = second->i_b_a}};
 }
 
 TerminalValues terminal_values_of(const control::Setpoint& x) {

@@ -24,7 +24,7 @@ struct LoadAt {
 };
 
 /// The measurement in a sample of a link with these signals; other values are zero.
-control::Measurement measurement_of(const Sample& sample, SignalMask known);
+control::Measurement measurement_of(const Sample& sample, SignalMask known, const Sample* second = nullptr);
 
 TerminalValues terminal_values_of(const control::Setpoint& setpoint);
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -34,6 +35,7 @@ struct Estimates {
   std::vector<double> speed_rad_s;
   std::vector<double> flux_wb;  ///< empty: the controller has no such estimate
   std::vector<double> load_nm;  ///< likewise
+  std::map<std::string, std::vector<double>, std::less<>> telemetry;  ///< by its names
 };
 
 std::vector<double> column(const RecordedRun& run, const std::function<double(const Answered&)>& value) {
@@ -97,7 +99,11 @@ Panel with_estimate(std::string label, const std::string& name, std::vector<doub
   return panel;
 }
 
-/// The panels that show estimates beside the truth.
+/// The panels of recorded values.
+constexpr std::array<std::string_view, 6> kPlainPanels = {"angle",    "speed",    "error",
+                                                          "currents", "voltages", "torque"};
+/// The panels that show estimates beside the truth. Every value of the controller's telemetry is a panel,
+/// too.
 constexpr std::array<std::string_view, 3> kEstimatePanels = {"speed-estimate", "flux", "load"};
 
 Panel estimate_panel(std::string_view name, const RecordedRun& run, const Estimates& estimates) {
@@ -146,8 +152,14 @@ Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& pla
                      {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}});
   }
   if (std::ranges::count(kEstimatePanels, name) != 0) return estimate_panel(name, run, estimates);
-  throw UsageError(fmt::format("no panel '{}'; there are angle, speed, error, currents, voltages, torque, {}",
-                               name, fmt::join(kEstimatePanels, ", ")));
+  if (const auto found = estimates.telemetry.find(name); found != estimates.telemetry.end()) {
+    return {.label = std::string(name), .lines = {{"controller", found->second}}};
+  }
+  std::string more;
+  for (const auto& [telemetry, values] : estimates.telemetry)
+    more += ", " + telemetry;
+  throw UsageError(fmt::format("no panel '{}'; there are {}, {}{}", name, fmt::join(kPlainPanels, ", "),
+                               fmt::join(kEstimatePanels, ", "), more));
 }
 
 /// The trajectory over the recorded samples; the recording is cut where the run has ended.
@@ -183,6 +195,8 @@ Estimates estimated(const PlotOptions& options, const RecordedRun& recorded) {
     out.speed_rad_s.push_back(run.controller().speed_rad_s());
     if (flux < values.size()) out.flux_wb.push_back(values[flux]);
     if (load < values.size()) out.load_nm.push_back(values[load]);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      out.telemetry[std::string(names[i])].push_back(values[i]);
   });
   return out;
 }
@@ -194,7 +208,7 @@ bool needs_estimates(const std::vector<std::string>& names, bool has_preset) {
     const bool is_estimate = std::ranges::count(kEstimatePanels, name) != 0;
     if (!has_preset && (is_estimate || name == "error"))
       throw UsageError(fmt::format("the panel {} needs --preset", name));
-    found |= is_estimate;
+    found |= has_preset && std::ranges::count(kPlainPanels, name) == 0;
   }
   return found;
 }

@@ -12,6 +12,7 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/identify/identify.hpp"
 #include "clients/command/identify/identify_map.hpp"
+#include "clients/command/recording/recorded_configuration.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "protocols/document.hpp"
 #include "protocols/sample_codec.hpp"
@@ -80,17 +81,6 @@ class AxisColumns {
   std::uint64_t first_ns_ = 0;
   std::uint64_t last_ns_ = 0;
 };
-
-const ConfigNode* child_of(const ConfigNode& table, std::string_view key) {
-  const auto found = std::ranges::find(table.children, key, &ConfigNode::key);
-  return found == table.children.end() ? nullptr : &*found;
-}
-
-std::string text_of(const ConfigNode& table, std::string_view key) {
-  const ConfigNode* const node = child_of(table, key);
-  const auto* const text = node == nullptr ? nullptr : std::get_if<std::string>(&node->scalar);
-  return text == nullptr ? "" : *text;
-}
 
 void take_scalars(const ConfigNode& section, BenchParameters& parameters) {
   for (const ConfigNode& node : section.children) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "clients/command/common/errors.hpp"
+#include "clients/command/recording/recorded_configuration.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "protocols/sample_codec.hpp"
 
@@ -51,6 +52,7 @@ class Reader {
     }
     return out;
   }
+  std::vector<Sample> take_samples() noexcept { return std::move(samples_); }
   bool has_axis() const noexcept { return number_.has_value(); }
   const std::string& axes() const noexcept { return axes_; }
 
@@ -101,12 +103,27 @@ bool asks_for_something(const v1::Command& command) noexcept {
 
 namespace {
 
+void take_all(McapSeries& mcap, Reader& reader) {
+  for (McapMessage message; mcap.next(message);)
+    reader.take(mcap.reader(), message);
+}
+
+/// The name of the axis that shares the amplifier of this one; empty: none does.
+std::string second_of(const McapReader& file, const std::string& axis) {
+  const std::optional<ConfigNode> configuration = recorded_configuration(file);
+  const ConfigNode* const axes = configuration ? child_of(*configuration, "axis") : nullptr;
+  if (axes == nullptr) return {};
+  for (const ConfigNode& node : axes->children) {
+    if (text_of(node, "shares_amplifier_with") == axis) return text_of(node, "name");
+  }
+  return {};
+}
+
 RecordedRun read(const std::string& path, const std::string& axis, bool all) {
   Reader reader(axis);
   const MappedSeries files = open_recording(path);
   McapSeries mcap(files.segments());
-  for (McapMessage message; mcap.next(message);)
-    reader.take(mcap.reader(), message);
+  take_all(mcap, reader);
   refuse_other_files(mcap, path);
   if (mcap.problem()) fmt::print(stderr, "drivebench: {} is not whole: {}\n", path, mcap.problem()->what);
   if (!reader.has_axis()) {
@@ -115,10 +132,21 @@ RecordedRun read(const std::string& path, const std::string& axis, bool all) {
   }
   RecordedRun run = all ? reader.all() : reader.joined();
   run.is_whole = !mcap.problem();
+  if (const std::string second = second_of(mcap.reader(), run.axis); !second.empty()) {
+    Reader other(second);
+    McapSeries again(files.segments());
+    take_all(again, other);
+    run.second = other.take_samples();
+  }
   return run;
 }
 
 }  // namespace
+
+const Sample* RecordedRun::second_at(std::uint64_t tick) const noexcept {
+  const auto found = std::ranges::lower_bound(second, tick, {}, &Sample::tick);
+  return found != second.end() && found->tick == tick ? &*found : nullptr;
+}
 
 RecordedRun read_run(const std::string& path, const std::string& axis,
                      std::optional<std::uint64_t> from_tick) {

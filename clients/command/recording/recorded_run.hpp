@@ -22,7 +22,12 @@ struct RecordedRun {
   std::string axis;
   double period_s = 0.0;
   std::vector<Answered> rows;  ///< in the order of their ticks, at least one
-  bool is_whole = true;        ///< false: a damaged or missing part of the file may belong to the run
+  /// All samples of the axis that shares the amplifier of this one, in the order of their ticks.
+  std::vector<Sample> second{};
+  bool is_whole = true;  ///< false: a damaged or missing part of the file may belong to the run
+
+  /// Null: there is none.
+  const Sample* second_at(std::uint64_t tick) const noexcept;
 };
 
 /// Whether a command has voltages or currents as set-points, in contrast to gates off or a short circuit.

@@ -23,6 +23,14 @@ struct Measurement {
   double i_b_a = 0.0;
   double i_c_a = 0.0;
   double i_f_a = 0.0;  ///< field winding
+
+  /// Of the axis that shares the amplifier of this one.
+  struct Second {
+    std::int64_t encoder_count = 0;
+    double i_a_a = 0.0;
+    double i_b_a = 0.0;
+  };
+  Second second{};
 };
 
 /// The quantity that the controller commands: voltages or currents.

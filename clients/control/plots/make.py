@@ -32,6 +32,7 @@ PLOTS = (  # preset, panels, title, options of the run
     ("book/9.8-22a", "speed,torque,currents,voltages", "run-up at the limits of voltage and current"),
     ("book/9.4-current", "angle,currents", "a step of 1 A"),
     ("stepper/train-400", "angle,currents", "400 steps a second are too many for 1.1 V"),
+    ("exercise/9.9", "speed,error,second_error_rad,determinant,currents,voltages", "two motors on one amplifier, through the determinant 0"),
     ("book/9.11", SERVO, "salient PM machine, the least current for its torque"),
     ("book/10.6", SERVO, "brushless DC, six-step, 250 V"),
     ("book/10.6-200v", SERVO, "the same with 200 V"),

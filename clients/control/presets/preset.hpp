@@ -29,6 +29,7 @@ struct Requirements {
   /// The signal that the controller measures beside counts and phase currents, which not every link carries:
   /// "i_f_a", "hall_lines", "tachometer_v", "edge_age_s"; empty: nothing.
   std::string_view signal{};
+  bool drives_second = false;  ///< a second axis must share the amplifier
 };
 
 /// A controller and a run that belong together, with the source of their numbers.

@@ -13,6 +13,7 @@ std::vector<Preset> induction_linearization_presets();
 std::vector<Preset> pm_presets();
 std::vector<Preset> salient_pm_presets();
 std::vector<Preset> stepper_presets();
+std::vector<Preset> two_motor_presets();
 std::vector<Preset> bldc_presets();
 std::vector<Preset> wound_rotor_presets();
 std::vector<Preset> dc_presets();
@@ -26,6 +27,7 @@ inline constexpr auto kPresetFamilies = {
     pm_presets,
     salient_pm_presets,
     stepper_presets,
+    two_motor_presets,
     bldc_presets,
     wound_rotor_presets,
     dc_presets,

@@ -39,6 +39,9 @@ class AxisLink {
 
   /// The newest sample, without waiting for a tick.
   virtual const Sample& newest() = 0;
+  /// The sample of the axis that shares the amplifier of this one, of the tick of the last sample. Null:
+  /// there is no such axis, or the transport does not carry both.
+  virtual const Sample* second() const noexcept { return nullptr; }
   /// Sends the answer to the sample of command.tick; ignores command.axis. Returns in lockstep the sample of
   /// tick + 1, in real time the first sample that arrives afterwards. A transport that cannot carry a
   /// set-point refuses the command.

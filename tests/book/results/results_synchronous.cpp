@@ -54,6 +54,28 @@ std::vector<Measured> run_up(const char* preset) {
   return {number("up after", 1e3 * up_s, "ms"), number("down after", 1e3 * down_s, "ms")};
 }
 
+/// The largest errors of both motors on one amplifier, away from the determinant 0 and on the way through it.
+std::vector<Measured> two_motors() {
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  const Outcome seen = closed_loop("exercise/9.9");
+  const std::size_t second = seen.column("second_error_rad");
+  const std::size_t determinant = seen.column("determinant");
+  double apart_deg = 0.0;
+  double through_deg = 0.0;
+  double least = 1.0;
+  for (const ClosedLoopRow& row : seen.rows) {
+    if (row.time_s < 0.0) continue;
+    const double error_deg = kDegrees * std::max(std::abs(row.error_rad), std::abs(row.telemetry[second]));
+    double& most_deg = row.time_s >= 0.6 && row.time_s < 0.75 ? through_deg : apart_deg;
+    most_deg = std::max(most_deg, error_deg);
+    least = std::min(least, std::abs(row.telemetry[determinant]));
+  }
+  return {{"error", apart_deg, "degrees", 0.01},
+          {"error on the way", through_deg, "degrees", 0.2},
+          {"least determinant", least, "", 0.02},
+          {"amplifier", seen.peak_of("amplifier_current_a"), "A", 0.6}};
+}
+
 std::vector<Measured> transitions(double current_a) {
   const control::PmTransitions t =
       control::transition_speeds(kBm500, {.voltage_v = kBm500_v, .current_a = current_a});
@@ -142,7 +164,10 @@ ResultSection pm_results() {
             "about 40 ms; simulated 44.0, 84.3 ms", run_up("book/9.8-22a"),
             "the current needs time; without that 41.4 ms"},
            {"9.8", "the same with 67.4 A, `book/9.8-67a`", "nothing; simulated 23.5, 44.7 ms",
-            run_up("book/9.8-67a"), "agrees"}}};
+            run_up("book/9.8-67a"), "agrees"},
+           {"ST-05", "two steppers on one amplifier, through the determinant 0, `exercise/9.9`",
+            "no numbers; derived: the determinant is sin(n_p(θ₂ − θ₁))", two_motors(),
+            "machines, gains and move are ours"}}};
 }
 
 ResultSection stepper_results() {
