@@ -22,8 +22,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from own_network import in_own_network
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
 
-READMES = ("README.md", "server/README.md", "clients/README.md", "clients/control/README.md", "protocols/can/README.md",
-           "protocols/modbus/README.md")
+READMES = ("README.md", "server/README.md", "clients/README.md", "clients/control/README.md", "clients/python/README.md",
+           "protocols/can/README.md", "protocols/modbus/README.md")
 PROGRAMS = ("drivebench", "drivebench-server")
 
 # Lines that are not run, and why.

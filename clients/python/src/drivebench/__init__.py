@@ -1,0 +1,25 @@
+"""A test bench for electric drives: the calls of libdrivebench.
+
+    import drivebench
+
+    with drivebench.Bench("inproc:dc-a-voltage") as bench:
+        bench.acquire()
+        sample = bench.step(voltages=12.0)
+
+SI units. Motor convention: power into the machine is positive. Rotation is positive from phase a to phase b. Two-phase
+quantities are power-invariant (a three-phase amplitude times sqrt(3/2)). Time counts in ticks: step() runs the tick whose
+command it brings, except in real time, where it returns with the next one.
+"""
+from drivebench.aio import AsyncBench
+from drivebench.bench import OFF, SHORT, Bench, Command
+from drivebench.description import Axis, Description, Fault, Injectable, Kind, Mode, Parameter, Signal, State, Type
+from drivebench.errors import (BadArgument, BenchClosed, Code, DrivebenchError, Failed, LibraryNotFound, LinkLost, NoBench,
+                               OtherAbi, Refused, ServerFailed)
+from drivebench.library import Sample, version
+from drivebench.recorder import Recorder
+from drivebench.server import Server, serve
+
+__all__ = ["OFF", "SHORT", "AsyncBench", "Axis", "BadArgument", "Bench", "BenchClosed", "Code", "Command", "Description",
+           "DrivebenchError", "Failed", "Fault", "Injectable", "Kind", "LibraryNotFound", "LinkLost", "Mode", "NoBench",
+           "OtherAbi", "Parameter", "Recorder", "Refused", "Sample", "Server", "ServerFailed", "Signal", "State", "Type",
+           "serve", "version"]

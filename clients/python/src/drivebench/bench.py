@@ -1,0 +1,281 @@
+"""The bench: leases, steps, samples, changes and state."""
+import ctypes
+import dataclasses
+import enum
+import types
+import weakref
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from typing import Any, Self
+
+from drivebench import arguments
+from drivebench.description import Description, description_of
+from drivebench.errors import BadArgument, Code
+from drivebench.handle import Handle
+from drivebench.library import ABI, CommandStruct, OptionsStruct, Sample, load
+from drivebench.recorder import Recorder
+
+Setpoints = float | Sequence[float]
+
+
+class _Gates(enum.IntEnum):
+    OFF = 0
+    VOLTAGE = 1
+    ZERO = 2
+    CURRENT = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """What a controller asks of an axis for a tick: one of the four.
+
+    voltages: at the terminals a, b, c [V], one number for each that the machine has; in a star against the middle of
+        the DC link.
+    currents: the same in [A], for a drive of kind "current_amplifier".
+    short: all terminals connected, an active short circuit.
+    off: gates off; currents flow through the diodes until they are zero.
+    field: of the field winding, [V] or [A] like the others.
+    """
+
+    voltages: Setpoints | None = None
+    currents: Setpoints | None = None
+    short: bool = False
+    off: bool = False
+    field: float = 0.0
+
+
+OFF = Command(off=True)
+SHORT = Command(short=True)
+
+
+class Bench:
+    """An open bench; a context manager, which closes it.
+
+    address: "inproc:BENCH" (in this process: a bench file, or the name of one that came with drivebench),
+        "tcp:HOST:PORT", "tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE", "unix:PATH", "can:BACKEND:CHANNEL?node=N",
+        "modbus:HOST:PORT?unit=N". The samples are the same, bit for bit, but over can and modbus, which round.
+    token: of the bench; None: the environment variable DRIVEBENCH_TOKEN, if it is set.
+    deadline_s: [s] for connecting and for each answer.
+    clear: acquire() clears what a controller before has left latched.
+
+    Every method raises DrivebenchError. `axis` is a number or a name. Several threads may call: they take turns.
+    """
+
+    def __init__(self, address: str, token: str | None = None, deadline_s: float = 5.0, clear: bool = False) -> None:
+        library = load()
+        options = OptionsStruct(token=None if token is None else arguments.string("token", token), client=b"drivebench-python",
+                                deadline_ms=arguments.milliseconds("deadline_s", deadline_s), clear_on_acquire=bool(clear))
+        pointer = ctypes.c_void_p()
+        code = library.open_abi(arguments.string("address", address), options, ABI, library.sample_size, ctypes.byref(pointer))
+        if code != Code.OK:
+            raise library.error_for(code, None)
+        self.address = address
+        self._handle = Handle(library, pointer)
+        self._finalizer = weakref.finalize(self, self._handle.close)  # also at exit
+        self._library = library
+        self._description_struct = library.describe(pointer).contents
+        self._sample_type = library.sample_type(self._description_struct)
+        self._description = description_of(self._description_struct)
+        axes = self._description.axes
+        self._numbers: dict[int | str, int] = {axis.name: number for number, axis in enumerate(axes)}
+        self._numbers.update((number, number) for number in range(len(axes)))
+        self._ticks: dict[int, int] = {}  # by axis: of the newest sample that a call has returned
+        self._recorders: list[Recorder] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: types.TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Releases the axes and closes the bench; again does nothing."""
+        self._handle.close()
+
+    def __repr__(self) -> str:
+        return f"Bench({self.address!r}{', closed' if self._handle.pointer is None else ''})"
+
+    def describe(self) -> Description:
+        """The bench with its axes, parameters, signals and faults."""
+        return self._description
+
+    def acquire(self, axis: int | str = 0) -> None:
+        """Acquires the lease of an axis: only its holder may command, change and clear."""
+        with self._handle.lock:
+            number = self._number(axis)
+            self._call("acquire", number)
+            self._ticks.pop(number, None)  # another controller may have gone on from there
+            self._description = description_of(self._description_struct)  # a CAN bus tells its mode with the lease
+
+    def renew(self, axis: int | str = 0) -> None:
+        """Keeps a lease without a command."""
+        self._call("renew", self._number(axis))
+
+    def release(self, axis: int | str = 0) -> None:
+        """Gives the lease back; the axis goes into its safe action."""
+        self._call("release", self._number(axis))
+
+    def clear(self, axis: int | str = 0) -> None:
+        """Clears the latched faults of an axis."""
+        self._call("clear", self._number(axis))
+
+    def step(self, axis: int | str = 0, *, voltages: Setpoints | None = None, currents: Setpoints | None = None,
+             short: bool = False, off: bool = False, field: float = 0.0, tick: int | None = None) -> Sample:
+        """Gives the bench a command for one axis and returns the next sample.
+
+        The keywords are those of Command; exactly one of the first four is given. The command answers the sample that
+        step(), newest() or run() returned last, or that of `tick`. In lockstep the tick runs when every axis that a
+        controller holds has its command: several axes take step_all().
+        """
+        number = self._number(axis)
+        sample = self._sample_type()
+        handle = self._handle
+        with handle.lock:
+            command = self._command(number, voltages, currents, short, off, field, tick)
+            code = self._library.step(handle.pointer, command, 1, ctypes.byref(sample))
+            if code:
+                handle.fail(code)
+            self._keep(number, sample)
+        return sample
+
+    def step_all(self, commands: Mapping[int | str, Command]) -> dict[int | str, Sample]:
+        """Gives the bench a command for each of several axes and returns the next samples under the same keys. If one
+        command is refused, none is taken."""
+        with self._handle.lock:
+            numbers = [self._number(axis) for axis in commands]
+            rows = [self._command(number, c.voltages, c.currents, c.short, c.off, c.field, None)
+                    for number, c in zip(numbers, map(_checked, commands.values()))]
+            samples = (self._sample_type * len(rows))()
+            code = self._library.step(self._handle.pointer, (CommandStruct * len(rows))(*rows), len(rows), samples)
+            if code:
+                self._handle.fail(code)
+            for number, sample in zip(numbers, samples):
+                self._keep(number, sample)
+        return dict(zip(commands, samples))
+
+    def run(self, controller: Callable[[Sample], Command], ticks: int, axis: int | str = 0) -> Sample:
+        """Runs a controller for so many ticks: it gets each sample, at first the newest, and returns the command that
+        answers it. Returns the last sample."""
+        sample = self.newest(axis)
+        for _ in range(arguments.whole("ticks", ticks)):
+            c = _checked(controller(sample))
+            sample = self.step(axis, voltages=c.voltages, currents=c.currents, short=c.short, off=c.off, field=c.field,
+                               tick=sample.tick)
+        return sample
+
+    def newest(self, axis: int | str = 0) -> Sample:
+        """The newest sample of an axis, without waiting."""
+        number = self._number(axis)
+        sample = self._sample_type()
+        with self._handle.lock:
+            self._call("newest", number, ctypes.byref(sample))
+            self._keep(number, sample)
+        return sample
+
+    def record(self, signals: Iterable[str], axis: int | str = 0) -> Recorder:
+        """Keeps these signals of every sample of an axis that a call returns from now on; see Recorder."""
+        recorder = Recorder(self._description, list(signals), self._number(axis), self._recorders.remove)
+        self._recorders.append(recorder)
+        return recorder
+
+    def get(self, name: str, axis: int | str = 0) -> float:
+        """Reads a parameter, in the unit of its description."""
+        value = ctypes.c_double()
+        self._call("get", self._number(axis), arguments.string("name", name), ctypes.byref(value))
+        return value.value
+
+    def set(self, name: str, value: float, axis: int | str = 0, *, ramp_ticks: int = 0, at_tick: int = 0) -> None:
+        """Writes a parameter: at once (at_tick 0) or at a tick, as a step (ramp_ticks 0) or in a ramp."""
+        self._call("set", self._number(axis), arguments.string("name", name), arguments.number("value", value),
+                   arguments.whole("ramp_ticks", ramp_ticks), arguments.whole("at_tick", at_tick))
+
+    def set_load(self, load_nm: float, axis: int | str = 0, *, ramp_ticks: int = 0, at_tick: int = 0) -> None:
+        """Changes the load torque [N*m]; positive opposes a positive torque of the machine."""
+        self._call("set_load", self._number(axis), arguments.number("load_nm", load_nm),
+                   arguments.whole("ramp_ticks", ramp_ticks), arguments.whole("at_tick", at_tick))
+
+    def inject(self, name: str, value: float, axis: int | str = 0, *, at_tick: int = 0) -> None:
+        """Puts one of describe().injectables into an axis; a value of 0 takes it away."""
+        self._call("inject", self._number(axis), arguments.string("name", name), arguments.number("value", value),
+                   arguments.whole("at_tick", at_tick))
+
+    def bump(self, impulse_nms: float, axis: int | str = 0, *, at_tick: int = 0) -> None:
+        """Bumps the shaft with an angular impulse [N*m*s], positive like a torque of the machine."""
+        self._call("bump", self._number(axis), arguments.number("impulse_nms", impulse_nms),
+                   arguments.whole("at_tick", at_tick))
+
+    def state_hash(self) -> int:
+        """The hash of the state and of all samples so far: equal hashes mean equal runs. Lockstep only."""
+        value = ctypes.c_uint64()
+        self._call("state_hash", ctypes.byref(value))
+        return value.value
+
+    def reset(self) -> None:
+        """Back to tick 0, as after opening: no lease, no changes. In process only."""
+        with self._handle.lock:
+            self._call("reset")
+            self._ticks.clear()
+
+    def save(self) -> bytes:
+        """The whole state: machines, sensors, noise, leases, scheduled changes. In process only."""
+        with self._handle.lock:
+            size = ctypes.c_size_t()
+            self._call("save", None, ctypes.byref(size))
+            state = ctypes.create_string_buffer(size.value)
+            self._call("save", state, ctypes.byref(size))
+        return state.raw
+
+    def restore(self, state: bytes) -> None:
+        """Goes on from a saved state of the same bench, of this process or another. In process only."""
+        if not isinstance(state, bytes):
+            raise BadArgument(f"state is of type {type(state).__name__} but must be bytes from save()", "state")
+        with self._handle.lock:
+            self._call("restore", state, len(state))
+            self._ticks.clear()
+
+    def _call(self, name: str, *values: Any) -> None:
+        with self._handle.lock:
+            code = getattr(self._library, name)(self._handle.pointer, *values)
+            if code:
+                self._handle.fail(code)
+
+    def _number(self, axis: int | str) -> int:
+        try:
+            return self._numbers[axis]
+        except (KeyError, TypeError):
+            there = ", ".join(f"{number} {each.name}".rstrip() for number, each in enumerate(self._description.axes))
+            raise BadArgument(f"axis {axis!r:.80} does not exist; the bench has {there}", "axis") from None
+
+    def _keep(self, number: int, sample: Sample) -> None:
+        self._ticks[number] = sample.tick
+        for recorder in self._recorders:
+            recorder.add(number, sample)
+
+    def _command(self, number: int, voltages: Setpoints | None, currents: Setpoints | None, short: bool, off: bool,
+                 field: float, tick: int | None) -> CommandStruct:
+        if (voltages is not None) + (currents is not None) + bool(short) + bool(off) != 1:
+            raise BadArgument("a command has exactly one of voltages, currents, short and off")
+        if tick is None:
+            tick = self._ticks[number] if number in self._ticks else self.newest(number).tick
+        else:
+            tick = arguments.whole("tick", tick)
+        if voltages is not None:
+            return CommandStruct(number, _Gates.VOLTAGE, tick, *self._setpoints("voltages", number, voltages, field))
+        if currents is not None:
+            return CommandStruct(number, _Gates.CURRENT, tick, *self._setpoints("currents", number, currents, field))
+        return CommandStruct(number, _Gates.ZERO if short else _Gates.OFF, tick)
+
+    def _setpoints(self, name: str, number: int, values: Setpoints, field: float) -> tuple[float, float, float, float]:
+        each = tuple(values) if isinstance(values, Sized) and not isinstance(values, (str, bytes)) else (values,)
+        terminals = self._description.axes[number].phases
+        if len(each) not in ((terminals,) if terminals else (1, 2, 3)):
+            rule = f"needs {terminals}" if terminals else "needs 1 to 3"
+            raise BadArgument(f"{name} is {values!r:.80} but axis {number} {rule}, one for each terminal", name)
+        a, b, c = (tuple(arguments.number(name, value) for value in each) + (0.0, 0.0))[:3]
+        return a, b, c, arguments.number("field", field)
+
+
+def _checked(command: Command) -> Command:
+    if not isinstance(command, Command):
+        raise BadArgument(f"the command is {command!r:.80} but must be a drivebench.Command", "command")
+    return command
