@@ -1,4 +1,5 @@
 """The structs, codes and calls of the package `drivebench` are those of drivebench.h."""
+import copy
 import ctypes
 import ctypes.util
 import pathlib
@@ -61,6 +62,18 @@ class Declarations(unittest.TestCase):
         self.assertEqual(type(sample)._fields_, members("sample"))
         self.assertEqual(ctypes.sizeof(sample), library.load().sample_size)
         self.assertEqual(list(sample.as_dict()), list(opened.describe().signals))
+
+    # Catches: a name that is written wrong and yet kept, and a copy that changes with the sample it was made from.
+    def test_a_sample_has_its_signals_only_and_can_be_copied(self):
+        with drivebench.Bench("inproc:servo") as opened:
+            sample = opened.newest()
+        for change in (lambda: sample.sped_rad_s, lambda: setattr(sample, "sped_rad_s", 1.0)):
+            with self.assertRaisesRegex(AttributeError, "sped_rad_s"):
+                change()
+        for copied in (copy.copy(sample), copy.deepcopy(sample)):
+            self.assertEqual(copied, sample)
+            copied.speed_rad_s = 5.0
+            self.assertNotEqual(copied, sample)
 
     # Catches: a code, a mode or a state of the gates with the number of another.
     def test_numbers_are_those_of_the_header(self):

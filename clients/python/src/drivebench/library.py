@@ -124,6 +124,12 @@ class Sample(ctypes.Structure):
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __copy__(self) -> "Sample":
+        return type(self).from_buffer_copy(self)
+
+    def __deepcopy__(self, memo: object) -> "Sample":
+        return self.__copy__()
+
     def __repr__(self) -> str:
         return "Sample(" + ", ".join(f"{name}={value!r}" for name, value in self.as_dict().items()) + ")"
 
