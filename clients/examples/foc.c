@@ -18,11 +18,10 @@ static drivebench_command command;
 
 /* Compare counts of the three legs: 0 low, PWM_PERIOD high. */
 static void pwm_set(int a, int b, int c) {
-  const double volt_per_count = sensors.bus_voltage_v / PWM_PERIOD;
-  command.gates = DRIVEBENCH_GATES_VOLTAGE; /* against the middle of the DC link */
-  command.setpoint_a = (a - PWM_PERIOD / 2) * volt_per_count;
-  command.setpoint_b = (b - PWM_PERIOD / 2) * volt_per_count;
-  command.setpoint_c = (c - PWM_PERIOD / 2) * volt_per_count;
+  command.gates = DRIVEBENCH_GATES_DUTY;
+  command.setpoint_a = (double)a / PWM_PERIOD;
+  command.setpoint_b = (double)b / PWM_PERIOD;
+  command.setpoint_c = (double)c / PWM_PERIOD;
 }
 
 static int adc_read(double current_a) {

@@ -41,7 +41,7 @@ extern "C" {
 
 /** Grows when a call or a struct other than drivebench_sample changes; the library refuses a header of
  * another. */
-#define DRIVEBENCH_ABI 2
+#define DRIVEBENCH_ABI 1
 
 /** The result of a call. The positive codes are refusals of the bench: the numbers of RefusalCode in
  * bench.proto. */

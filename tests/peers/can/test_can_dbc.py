@@ -98,8 +98,8 @@ class Dbc(unittest.TestCase):
         self.assertEqual(len(data), frame.size)
         theirs = frame.decode(data)
         self.assertEqual(set(theirs), set(values))
-        # A classic command in mode 3 or 4 holds duties or currents, which a DBC file cannot express.
-        unit = {"3": 1 / 32767, "4": 1e-3}.get(values.get("mode"))
+        # A classic command in modes 3 to 5 holds duties or currents, which a DBC file cannot express.
+        unit = {"3": 1 / 32767, "4": 1e-3, "5": 1 / 32767}.get(values.get("mode"))
         other_unit = unit is not None and frame.name.endswith("_command") and not frame.is_fd
         for name, text in values.items():
             signal, ours = frame.signal_by_name(name), float(text)
@@ -135,8 +135,10 @@ class Dbc(unittest.TestCase):
 
     def check_field(self, field, signal):
         where, _, encoding, unit, limits, no_value, meaning = field
-        first, _, last = where.partition("-")
-        self.assertEqual((signal.start_bit, signal.size), (8 * int(first), 8 * (int(last or first) - int(first) + 1)))
+        place, _, half = where.partition(" ")
+        first, _, last = place.partition("-")
+        size = 4 if half else 8 * (int(last or first) - int(first) + 1)
+        self.assertEqual((signal.start_bit, signal.size), (8 * int(first) + (4 if half == "high half" else 0), size))
         self.assertTrue(signal.is_little_endian)
         page, kind, bits, factor = re.fullmatch(r"(?:page (\d): )?(uint|int|float)(\d+)(?:, wraps| x (.+))?",
                                                 encoding).groups()
