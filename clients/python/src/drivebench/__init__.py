@@ -14,12 +14,13 @@ from drivebench.aio import AsyncBench
 from drivebench.bench import OFF, SHORT, Bench, Command
 from drivebench.description import Axis, Description, Fault, Injectable, Kind, Mode, Parameter, Signal, State, Type
 from drivebench.errors import (BadArgument, BenchClosed, Code, DrivebenchError, Failed, LibraryNotFound, LinkLost, NoBench,
-                               OtherAbi, Refused, ServerFailed)
+                               OtherAbi, ProgramNotFound, Refused, ServerFailed)
 from drivebench.library import Sample, version
 from drivebench.recorder import Recorder
+from drivebench.recording import Recording, read_recording
 from drivebench.server import Server, serve
 
 __all__ = ["OFF", "SHORT", "AsyncBench", "Axis", "BadArgument", "Bench", "BenchClosed", "Code", "Command", "Description",
            "DrivebenchError", "Failed", "Fault", "Injectable", "Kind", "LibraryNotFound", "LinkLost", "Mode", "NoBench",
-           "OtherAbi", "Parameter", "Recorder", "Refused", "Sample", "Server", "ServerFailed", "Signal", "State", "Type",
-           "serve", "version"]
+           "OtherAbi", "Parameter", "ProgramNotFound", "Recorder", "Recording", "Refused", "Sample", "Server",
+           "ServerFailed", "Signal", "State", "Type", "read_recording", "serve", "version"]

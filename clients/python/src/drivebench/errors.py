@@ -95,6 +95,10 @@ class LibraryNotFound(DrivebenchError):
     """There is no libdrivebench, or it cannot be loaded."""
 
 
+class ProgramNotFound(DrivebenchError):
+    """The program `drivebench` is neither beside the library nor on PATH."""
+
+
 class ServerFailed(DrivebenchError):
     """drivebench-server did not start; the sentence has its own words."""
 

@@ -1,11 +1,10 @@
 """Chosen signals of a run, as arrays."""
-import array
-import importlib.util
 import operator
 import types
 from collections.abc import Callable
 from typing import Any, Self
 
+from drivebench.columns import Columns
 from drivebench.description import Description
 from drivebench.errors import BadArgument
 from drivebench.library import Sample
@@ -13,7 +12,7 @@ from drivebench.library import Sample
 _ARRAY_CODES = "Qqd"  # by Type
 
 
-class Recorder:
+class Recorder(Columns):
     """The signals that Bench.record() was asked for, sample by sample, and `tick`.
 
     A context manager: at the end of its block it stops, and keeps what it has.
@@ -23,10 +22,8 @@ class Recorder:
         for name in signals:
             if not isinstance(name, str) or name not in description.signals:
                 raise BadArgument(f"there is no signal {name!r:.80}", "signals")
-        names = list(dict.fromkeys(["tick", *signals]))
-        self._columns = [array.array(_ARRAY_CODES[description.signals[name].type]) for name in names]
-        self._names = names
-        self._get = [operator.attrgetter(name) for name in names]
+        super().__init__({name: _ARRAY_CODES[description.signals[name].type] for name in ["tick", *signals]})
+        self._get = [operator.attrgetter(name) for name in self.names]
         self._period_s = description.period_s
         self._axis = axis
         self._forget: Callable[["Recorder"], None] | None = forget
@@ -37,9 +34,6 @@ class Recorder:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: types.TracebackType | None) -> None:
         self.stop()
-
-    def __len__(self) -> int:
-        return len(self._columns[0])
 
     def stop(self) -> None:
         """Records no more; again does nothing."""
@@ -54,21 +48,5 @@ class Recorder:
         for column, get in zip(self._columns, self._get):
             column.append(get(sample))
 
-    def __getitem__(self, name: str) -> Any:
-        """One signal, as in arrays()."""
-        if name not in self._names:
-            raise BadArgument(f"{name!r:.80} was not recorded", "signals")
-        return self.arrays()[name]
-
-    def arrays(self) -> dict[str, Any]:
-        """The signals by name: NumPy arrays if NumPy is installed, else lists."""
-        if importlib.util.find_spec("numpy") is None:
-            return {name: column.tolist() for name, column in zip(self._names, self._columns)}
-        import numpy
-        return {name: numpy.array(column) for name, column in zip(self._names, self._columns)}
-
-    def dataframe(self) -> Any:
-        """A pandas DataFrame over the time [s]."""
-        import pandas  # type: ignore[import]
-        columns = self.arrays()
-        return pandas.DataFrame(columns, index=pandas.Index(columns["tick"] * self._period_s, name="time_s"))
+    def _times(self) -> Any:
+        return self.arrays()["tick"] * self._period_s

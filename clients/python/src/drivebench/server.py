@@ -1,9 +1,7 @@
 """A drivebench-server of one's own, for tests and CI."""
 import json
 import os
-import pathlib
 import selectors
-import shutil
 import subprocess
 import tempfile
 import types
@@ -12,23 +10,9 @@ from typing import IO, Any, Self
 
 from drivebench import arguments
 from drivebench.errors import ServerFailed
-from drivebench.library import load
+from drivebench.programs import program
 
 _END_S = 10.0  # from SIGTERM to SIGKILL
-
-
-def _program() -> str:
-    """`drivebench`, which starts the drivebench-server beside it: beside the library, as in a build tree or an
-    installation, or on PATH."""
-    library = pathlib.Path(load().path)  # a mere name if the system's loader has found it
-    for folder in library.resolve().parents[:4] if library.is_absolute() else ():
-        program = folder / "bin" / "drivebench"
-        if program.is_file():
-            return str(program)
-    found = shutil.which("drivebench")
-    if found is None:
-        raise ServerFailed("there is no program drivebench: neither beside libdrivebench nor on PATH")
-    return found
 
 
 def _end(process: "subprocess.Popen[str]", owner: int) -> None:
@@ -121,5 +105,5 @@ def serve(bench: str = "servo", *options: str, timeout_s: float = 30.0) -> Serve
     timeout_s: [s] for the start.
     """
     words = [arguments.string("bench", bench), *(arguments.string("options", each) for each in options)]
-    command = [_program(), "serve", *(word.decode() for word in words), "--port", "0", "--json"]
+    command = [program(), "serve", *(word.decode() for word in words), "--port", "0", "--json"]
     return Server(command, arguments.milliseconds("timeout_s", timeout_s) / 1000)
