@@ -60,8 +60,10 @@ class Arguments(unittest.TestCase):
     # Catches: a command that is taken as another one because two were given, or none.
     def test_a_command_has_exactly_one_kind(self):
         for words in ({}, {"voltages": 1.0, "off": True}, {"short": True, "off": True}, {"voltages": 1.0, "currents": 1.0}):
-            with self.assertRaisesRegex(BadArgument, "exactly one of voltages, currents, short and off"):
+            with self.assertRaisesRegex(BadArgument, "exactly one of voltages, currents, duties, short and off"):
                 self.bench.step(**words)
+        with self.assertRaisesRegex(BadArgument, "legs_off is 'd' but must name legs"):
+            self.bench.step(duties=0.1, legs_off="d")
 
     # Catches: a refusal without its code, or one that was carried out in part.
     def test_what_the_bench_refuses_has_its_code(self):

@@ -20,7 +20,8 @@ static void count(const drivebench_sample* sample) {
     digest = (digest ^ bytes[i]) * 1099511628211u;
 }
 
-/* Rotating voltages whose numbers float32 holds exactly, so that a field bus carries them whole. */
+/* Rotating voltages, from tick 500 on duties, from 700 on without the legs of phase b, in numbers that
+ * float32 holds exactly, so that a field bus carries them whole. */
 static drivebench_command command_at(uint64_t tick) {
   const float phase = 0.05f * (float)tick;
   drivebench_command command;
@@ -29,6 +30,12 @@ static drivebench_command command_at(uint64_t tick) {
   command.gates = DRIVEBENCH_GATES_VOLTAGE;
   command.setpoint_a = (double)(20.0f * cosf(phase));
   command.setpoint_b = (double)(20.0f * sinf(phase));
+  if (tick >= 500) {
+    command.gates = DRIVEBENCH_GATES_DUTY;
+    command.setpoint_a = (double)(0.25f * cosf(phase));
+    command.setpoint_b = (double)(0.25f * sinf(phase));
+  }
+  if (tick >= 700) command.legs_off = 2;
   return command;
 }
 
@@ -143,6 +150,10 @@ int main(int argc, char** argv) {
     wrong.tick = 400;
     wrong.gates = 9;
     tell("gates that are none", drivebench_step(bench, &wrong, 1, NULL));
+    wrong.gates = DRIVEBENCH_GATES_DUTY;
+    wrong.legs_off = 9;
+    tell("a leg that is none", drivebench_step(bench, &wrong, 1, NULL));
+    wrong.legs_off = 0;
     wrong.gates = DRIVEBENCH_GATES_CURRENT;
     tell("currents for a voltage drive", drivebench_step(bench, &wrong, 1, NULL));
     wrong.gates = DRIVEBENCH_GATES_VOLTAGE;

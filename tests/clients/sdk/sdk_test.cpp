@@ -1,11 +1,14 @@
 #include <drivebench.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <drivebench.hpp>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <new>
 #include <string>
@@ -35,6 +38,17 @@ namespace {
 
 const std::string kServo = "inproc:" DRIVEBENCH_CONFIGS "/benches/servo.toml";
 const std::string kDynamometer = "inproc:" DRIVEBENCH_CONFIGS "/benches/dynamometer.toml";
+
+/// The BM500 behind its switched inverter, with voltage sensors against the negative rail.
+const std::string kStar = [] {
+  std::ifstream shipped(DRIVEBENCH_CONFIGS "/benches/bm500.toml");
+  std::string text((std::istreambuf_iterator<char>(shipped)), {});
+  text.replace(text.find("../motors/"), 10, DRIVEBENCH_CONFIGS "/motors/");
+  const auto file =
+      std::filesystem::temp_directory_path() / ("drivebench-sdk-" + std::to_string(::getpid()) + ".toml");
+  std::ofstream(file) << text << "\n[axis.voltage_sensor]\nagainst_rail = true\n";
+  return "inproc:" + file.string();
+}();
 
 /// Runs `ticks` with rotating voltages on axis 0 and returns the last sample.
 Sample turn(Bench& bench, std::uint64_t ticks) {
@@ -235,6 +249,42 @@ TEST(Sdk, WhatIsLatchedIsClearedOnlyIfAsked) {
     EXPECT_EQ(refusal_of([&] { bench.step({.gates = DRIVEBENCH_GATES_VOLTAGE, .tick = tick}); }).code(),
               clears ? DRIVEBENCH_OK : DRIVEBENCH_LATCHED);
   }
+}
+
+// Catches: duties without their common part, which the currents of a star do not show.
+TEST(Sdk, ACommonDutyReachesTheTerminals) {
+  Bench bench(kStar);
+  bench.acquire();
+  for (const double duty : {0.0, 0.25, 1.0}) {
+    Sample sample = bench.newest();
+    for (int k = 0; k < 3; ++k) {
+      sample = bench.step({.gates = DRIVEBENCH_GATES_DUTY,
+                           .tick = sample.tick,
+                           .setpoint_a = duty,
+                           .setpoint_b = duty,
+                           .setpoint_c = duty});
+    }
+    EXPECT_NEAR(sample.terminal_a_mean_v, duty * sample.bus_voltage_v, 1e-9);
+    EXPECT_NEAR(sample.true_i_a_a, 0.0, 1e-12);
+  }
+}
+
+// Catches: a leg that is off and yet drives its phase.
+TEST(Sdk, ALegThatIsOffCarriesNoCurrentAtRest) {
+  Bench bench(kStar);
+  bench.acquire();
+  Sample sample = bench.newest();
+  for (int k = 0; k < 20; ++k) {
+    sample = bench.step({.gates = DRIVEBENCH_GATES_DUTY,
+                         .tick = sample.tick,
+                         .setpoint_a = 0.52,
+                         .setpoint_b = 0.48,
+                         .setpoint_c = 0.9,
+                         .legs_off = 4});
+  }
+  EXPECT_GT(sample.true_i_a_a, 0.1);
+  EXPECT_NEAR(sample.true_i_a_a + sample.true_i_b_a, 0.0, 1e-9);
+  EXPECT_NEAR(sample.true_i_c_a, 0.0, 1e-9);
 }
 
 // Catches: memory taken in a step, which has no bound on time.

@@ -22,25 +22,31 @@ class _Gates(enum.IntEnum):
     VOLTAGE = 1
     ZERO = 2
     CURRENT = 3
+    DUTY = 4
 
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """What a controller asks of an axis for a tick: one of the four.
+    """What a controller asks of an axis for a tick: one of the five.
 
     voltages: at the terminals a, b, c [V], one number for each that the machine has; in a star against the middle of
         the DC link.
     currents: the same in [A], for a drive of kind "current_amplifier".
+    duties: of a leg of a star its mean voltage against the negative rail over the link's, 0 to 1; of a winding between
+        two legs its voltage over the link's, -1 to 1.
     short: all terminals connected, an active short circuit.
     off: gates off; currents flow through the diodes until they are zero.
-    field: of the field winding, [V] or [A] like the others.
+    field: of the field winding, [V], [A] or a duty like the others.
+    legs_off: letters of the legs that are on their diodes, whatever the others do: "c" floats phase c.
     """
 
     voltages: Setpoints | None = None
     currents: Setpoints | None = None
+    duties: Setpoints | None = None
     short: bool = False
     off: bool = False
     field: float = 0.0
+    legs_off: str = ""
 
 
 OFF = Command(off=True)
@@ -120,10 +126,11 @@ class Bench:
         self._call("clear", self._number(axis))
 
     def step(self, axis: int | str = 0, *, voltages: Setpoints | None = None, currents: Setpoints | None = None,
-             short: bool = False, off: bool = False, field: float = 0.0, tick: int | None = None) -> Sample:
+             duties: Setpoints | None = None, short: bool = False, off: bool = False, field: float = 0.0,
+             legs_off: str = "", tick: int | None = None) -> Sample:
         """Gives the bench a command for one axis and returns the next sample.
 
-        The keywords are those of Command; exactly one of the first four is given. The command answers the sample that
+        The keywords are those of Command; exactly one of the first five is given. The command answers the sample that
         step(), newest() or run() returned last, or that of `tick`. In lockstep the tick runs when every axis that a
         controller holds has its command: several axes take step_all().
         """
@@ -131,7 +138,7 @@ class Bench:
         sample = self._sample_type()
         handle = self._handle
         with handle.lock:
-            command = self._command(number, voltages, currents, short, off, field, tick)
+            command = self._command(number, tick, Command(voltages, currents, duties, short, off, field, legs_off))
             code = self._library.step(handle.pointer, command, 1, ctypes.byref(sample))
             if code:
                 handle.fail(code)
@@ -143,8 +150,7 @@ class Bench:
         command is refused, none is taken."""
         with self._handle.lock:
             numbers = [self._number(axis) for axis in commands]
-            rows = [self._command(number, c.voltages, c.currents, c.short, c.off, c.field, None)
-                    for number, c in zip(numbers, map(_checked, commands.values()))]
+            rows = [self._command(number, None, c) for number, c in zip(numbers, map(_checked, commands.values()))]
             samples = (self._sample_type * len(rows))()
             code = self._library.step(self._handle.pointer, (CommandStruct * len(rows))(*rows), len(rows), samples)
             if code:
@@ -159,8 +165,8 @@ class Bench:
         sample = self.newest(axis)
         for _ in range(arguments.whole("ticks", ticks)):
             c = _checked(controller(sample))
-            sample = self.step(axis, voltages=c.voltages, currents=c.currents, short=c.short, off=c.off, field=c.field,
-                               tick=sample.tick)
+            sample = self.step(axis, voltages=c.voltages, currents=c.currents, duties=c.duties, short=c.short, off=c.off,
+                               field=c.field, legs_off=c.legs_off, tick=sample.tick)
         return sample
 
     def newest(self, axis: int | str = 0) -> Sample:
@@ -251,19 +257,20 @@ class Bench:
         for recorder in self._recorders:
             recorder.add(number, sample)
 
-    def _command(self, number: int, voltages: Setpoints | None, currents: Setpoints | None, short: bool, off: bool,
-                 field: float, tick: int | None) -> CommandStruct:
-        if (voltages is not None) + (currents is not None) + bool(short) + bool(off) != 1:
-            raise BadArgument("a command has exactly one of voltages, currents, short and off")
+    def _command(self, number: int, tick: int | None, c: Command) -> CommandStruct:
+        given = {"voltages": (_Gates.VOLTAGE, c.voltages), "currents": (_Gates.CURRENT, c.currents),
+                 "duties": (_Gates.DUTY, c.duties)}
+        setpoints = [(name, gates, values) for name, (gates, values) in given.items() if values is not None]
+        if len(setpoints) + bool(c.short) + bool(c.off) != 1:
+            raise BadArgument("a command has exactly one of voltages, currents, duties, short and off")
         if tick is None:
             tick = self._ticks[number] if number in self._ticks else self.newest(number).tick
         else:
             tick = arguments.whole("tick", tick)
-        if voltages is not None:
-            return CommandStruct(number, _Gates.VOLTAGE, tick, *self._setpoints("voltages", number, voltages, field))
-        if currents is not None:
-            return CommandStruct(number, _Gates.CURRENT, tick, *self._setpoints("currents", number, currents, field))
-        return CommandStruct(number, _Gates.ZERO if short else _Gates.OFF, tick)
+        legs_off = _legs(c.legs_off) if c.legs_off else 0
+        for name, gates, values in setpoints:
+            return CommandStruct(number, gates, tick, *self._setpoints(name, number, values, c.field), legs_off)
+        return CommandStruct(number, _Gates.ZERO if c.short else _Gates.OFF, tick, legs_off=legs_off)
 
     def _setpoints(self, name: str, number: int, values: Setpoints, field: float) -> tuple[float, float, float, float]:
         each = tuple(values) if isinstance(values, Sized) and not isinstance(values, (str, bytes)) else (values,)
@@ -273,6 +280,12 @@ class Bench:
             raise BadArgument(f"{name} is {values!r:.80} but axis {number} {rule}, one for each terminal", name)
         a, b, c = (tuple(arguments.number(name, value) for value in each) + (0.0, 0.0))[:3]
         return a, b, c, arguments.number("field", field)
+
+
+def _legs(letters: str) -> int:
+    if not isinstance(letters, str) or not set(letters) <= set("abc"):
+        raise BadArgument(f"legs_off is {letters!r:.80} but must name legs by their letters, such as \"c\" or \"ab\"", "legs_off")
+    return sum(1 << "abc".index(letter) for letter in set(letters))
 
 
 def _checked(command: Command) -> Command:

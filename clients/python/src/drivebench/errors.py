@@ -26,6 +26,7 @@ class Code(enum.IntEnum):
     NOT_AVAILABLE = 20
     CAUSE_LASTS = 21
     FORBIDDEN = 22
+    SHARED_AMPLIFIER = 23
     BAD_ARGUMENT = -1
     NO_BENCH = -2
     LINK_LOST = -3

@@ -18,7 +18,7 @@ SIGNAL_BYTES = 8
 class CommandStruct(ctypes.Structure):
     _fields_ = [("axis", ctypes.c_uint32), ("gates", ctypes.c_uint32), ("tick", ctypes.c_uint64),
                 ("setpoint_a", ctypes.c_double), ("setpoint_b", ctypes.c_double), ("setpoint_c", ctypes.c_double),
-                ("setpoint_f", ctypes.c_double)]
+                ("setpoint_f", ctypes.c_double), ("legs_off", ctypes.c_uint64)]
 
 
 class SignalStruct(ctypes.Structure):
