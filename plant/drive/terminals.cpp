@@ -8,10 +8,6 @@ namespace {
 
 using Phases = std::array<double, 3>;
 
-constexpr TerminalSet bit(int k) noexcept {
-  return TerminalSet{1} << k;
-}
-
 constexpr std::size_t at(int k) noexcept {
   return static_cast<std::size_t>(k);
 }
@@ -46,7 +42,7 @@ struct Work {
 
   bool driven(int k) const noexcept { return drive.mode[at(k)] == TerminalMode::kDriven; }
   bool has_diodes(int k) const noexcept { return drive.mode[at(k)] == TerminalMode::kDiodes; }
-  bool conducts(int k) const noexcept { return (open & bit(k)) == 0; }
+  bool conducts(int k) const noexcept { return (open & terminal_bit(k)) == 0; }
 };
 
 /// Sorts the terminals into driven, dying and open ones by mode and current.
@@ -54,21 +50,21 @@ void sort_terminals(Work& w) noexcept {
   const Phases start = phases(w.drive.start_v);
   for (int k = 0; k < w.count; ++k) {
     if (w.driven(k)) {
-      w.open &= ~bit(k);
+      w.open &= ~terminal_bit(k);
       w.voltage_v[at(k)] = start[at(k)];
     } else if (w.conducts(k) && w.current_a[at(k)] != 0.0) {
-      w.dying |= bit(k);
+      w.dying |= terminal_bit(k);
       w.voltage_v[at(k)] = terminals_detail::against(w.current_a[at(k)], w.drive.rail_v);
     } else {
-      w.open |= bit(k);
+      w.open |= terminal_bit(k);
     }
   }
 }
 
 /// A diode begins to conduct: the terminal goes to the rail on this side.
 void clamp_terminal(Work& w, int k, double side) noexcept {
-  w.open &= ~bit(k);
-  w.dying |= bit(k);
+  w.open &= ~terminal_bit(k);
+  w.dying |= terminal_bit(k);
   w.voltage_v[at(k)] = side * w.drive.rail_v;
 }
 
@@ -184,9 +180,9 @@ Shorts shorts_of(const InjectedFaults& faults, int count) noexcept {
 void close_shorted(Work& w, const Shorts& shorts) noexcept {
   if (shorts.pair >= 0) {
     const int next = w.count == 2 ? 1 : (shorts.pair + 1) % 3;
-    w.open &= ~(bit(shorts.pair) | bit(next));
+    w.open &= ~(terminal_bit(shorts.pair) | terminal_bit(next));
   }
-  if (shorts.winding >= 0) w.open &= ~bit(shorts.winding);
+  if (shorts.winding >= 0) w.open &= ~terminal_bit(shorts.winding);
 }
 
 bool apply_shorts(const Work& w, const Shorts& shorts, Phases& v) noexcept {
@@ -247,13 +243,13 @@ PhaseValues with_floating(Connection connection, TerminalSet floating, const Pha
   double neutral_v = 0.0;
   int conducting = 0;
   for (int k = 0; k < 3 && connection == Connection::kStar; ++k) {
-    if ((floating & bit(k)) != 0) continue;
+    if ((floating & terminal_bit(k)) != 0) continue;
     neutral_v += v[at(k)] - winding[at(k)];
     ++conducting;
   }
   if (conducting > 1) neutral_v /= conducting;
   for (int k = 0; k < terminal_count(connection); ++k) {
-    if ((floating & bit(k)) != 0) v[at(k)] = neutral_v + winding[at(k)];
+    if ((floating & terminal_bit(k)) != 0) v[at(k)] = neutral_v + winding[at(k)];
   }
   return {.a = v[0], .b = v[1], .c = v[2], .field = conducting_v.field};
 }

@@ -14,6 +14,11 @@ namespace drivebench {
 /// A set of terminals: bit 0 is a, bit 1 b, bit 2 c.
 using TerminalSet = std::uint64_t;
 
+/// The set of terminal k alone.
+constexpr TerminalSet terminal_bit(int k) noexcept {
+  return TerminalSet{1} << k;
+}
+
 constexpr TerminalSet all_terminals(Connection connection) noexcept {
   return (TerminalSet{1} << terminal_count(connection)) - 1;
 }

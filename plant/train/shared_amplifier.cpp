@@ -14,10 +14,6 @@ namespace {
 // A sum of currents below this is none: where it dies, rounding leaves about 1e-13 of it.
 constexpr double kNoCurrentA = 1e-9;
 
-constexpr TerminalSet bit(int k) noexcept {
-  return TerminalSet{1} << k;
-}
-
 double of_phase(const PhaseValues& x, int k) noexcept {
   return k == 0 ? x.a : (k == 1 ? x.b : x.c);
 }
@@ -133,7 +129,7 @@ auto SharedAmplifier::sorted(TerminalDrive& out, double start_s) const noexcept 
     TerminalMode& mode = out.mode[static_cast<std::size_t>(k)];
     if (std::exchange(mode, TerminalMode::kDriven) == TerminalMode::kDriven) continue;
     const double i = of_phase(current_a, k);
-    (std::abs(i) > kNoCurrentA ? piece.dying : piece.floating) |= bit(k);
+    (std::abs(i) > kNoCurrentA ? piece.dying : piece.floating) |= terminal_bit(k);
     phase(out.start_v, k) = std::abs(i) > kNoCurrentA ? terminals_detail::against(i, out.rail_v) : 0.0;
   }
   return piece;
@@ -146,7 +142,7 @@ double SharedAmplifier::run_undriven(TerminalDrive& out, double start_s, double 
   const auto dying_a = [&piece](const PhaseValues& current_a) noexcept {
     EventValues values;
     for (int k = 0; k < 3; ++k) {
-      if ((piece.dying & bit(k)) != 0) values.add(of_phase(current_a, k));
+      if ((piece.dying & terminal_bit(k)) != 0) values.add(of_phase(current_a, k));
     }
     return values;
   };
@@ -193,7 +189,7 @@ PhaseValues SharedAmplifier::float_terminals(TerminalDrive& out, const Undriven&
   std::array<int, 3> unknown{};
   int count = 0;
   for (int k = 0; k < 3; ++k) {
-    if ((floating & bit(k)) != 0) unknown[static_cast<std::size_t>(count++)] = k;
+    if ((floating & terminal_bit(k)) != 0) unknown[static_cast<std::size_t>(count++)] = k;
   }
   // A star without any terminal that conducts: only the differences count.
   const bool star = first_.core.connection == Connection::kStar;
@@ -232,7 +228,7 @@ PhaseValues SharedAmplifier::float_terminals(TerminalDrive& out, const Undriven&
 bool SharedAmplifier::clamp_one(TerminalDrive& out, TerminalSet& floating) const noexcept {
   const auto clamp = [&](int k, double side) noexcept {
     phase(out.start_v, k) = side * out.rail_v;
-    floating &= ~bit(k);
+    floating &= ~terminal_bit(k);
   };
   if (first_.core.connection == Connection::kStar && floating == terminals()) {
     ThreePhase& v = out.start_v;
@@ -251,7 +247,7 @@ bool SharedAmplifier::clamp_one(TerminalDrive& out, TerminalSet& floating) const
   }
   for (int k = 0; k < terminal_count(first_.core.connection); ++k) {
     const double v = phase(out.start_v, k);
-    if ((floating & bit(k)) == 0 || std::abs(v) <= out.rail_v) continue;
+    if ((floating & terminal_bit(k)) == 0 || std::abs(v) <= out.rail_v) continue;
     clamp(k, v > 0.0 ? 1.0 : -1.0);
     return true;
   }
