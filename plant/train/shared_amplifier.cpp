@@ -26,6 +26,11 @@ PhaseValues side_current_a(const SharedAmplifier::Side& side) noexcept {
                            side.state.open_terminals);
 }
 
+ThreePhase centred(const ThreePhase& v) noexcept {
+  const double mean_v = (v.a + v.b + v.c) / 3.0;
+  return {.a = v.a - mean_v, .b = v.b - mean_v, .c = v.c - mean_v};
+}
+
 /// A small system of linear equations, by elimination. An unknown without effect becomes 0.
 struct Equations {
   int count = 0;
@@ -191,9 +196,9 @@ PhaseValues SharedAmplifier::float_terminals(TerminalDrive& out, const Undriven&
   for (int k = 0; k < 3; ++k) {
     if ((floating & terminal_bit(k)) != 0) unknown[static_cast<std::size_t>(count++)] = k;
   }
-  // A star without any terminal that conducts: only the differences count.
-  const bool star = first_.core.connection == Connection::kStar;
-  if (star && count == 3) count = 2;
+  // A star without any terminal that conducts: only the differences count, and the common part is 0.
+  const bool all_float = first_.core.connection == Connection::kStar && count == 3;
+  if (all_float) count = 2;
   Equations slopes{.count = count};
   PhaseValues end_a = try_piece(out, piece, end_s);
   for (int n = 0; n < kRefinements; ++n) {
@@ -218,6 +223,7 @@ PhaseValues SharedAmplifier::float_terminals(TerminalDrive& out, const Undriven&
     const std::array<double, 3> step_v = equations.solved();
     for (std::size_t j = 0; j < static_cast<std::size_t>(count); ++j)
       phase(out.start_v, unknown[j]) += step_v[j];
+    if (all_float) out.start_v = centred(out.start_v);
     end_a = try_piece(out, piece, end_s);
   }
   return end_a;
@@ -232,8 +238,6 @@ bool SharedAmplifier::clamp_one(TerminalDrive& out, TerminalSet& floating) const
   };
   if (first_.core.connection == Connection::kStar && floating == terminals()) {
     ThreePhase& v = out.start_v;
-    const double mean_v = (v.a + v.b + v.c) / 3.0;
-    v = {.a = v.a - mean_v, .b = v.b - mean_v, .c = v.c - mean_v};
     int high = 0;
     int low = 0;
     for (int k = 1; k < 3; ++k) {

@@ -44,7 +44,7 @@ def two_axes(bench):
     for axis in (0, 1):
         bench.acquire(axis)
     names = [axis.name for axis in bench.describe().axes]
-    commands = {names[0]: drivebench.Command(voltages=(1.0, 0.5)), 1: drivebench.Command(voltages=(-1.0, 2.0))}
+    commands = {names[0]: drivebench.Command(voltages=(1.0, 0.5)), 1: drivebench.Command(voltages=-1.0)}
     for _ in range(50):
         samples = bench.step_all(commands)
     assert list(samples) == list(commands)
@@ -65,10 +65,10 @@ class SameBits(unittest.TestCase):
 
     # Catches: commands of several axes in another order than their samples, or a second tick for the second axis.
     def test_two_axes_have_the_same_samples_in_process_and_over_tcp(self):
-        with drivebench.Bench("inproc:two-steppers") as bench:
+        with drivebench.Bench("inproc:dynamometer") as bench:
             expected = two_axes(bench)
         self.assertNotEqual(*expected[0])
-        with drivebench.serve("two-steppers") as server, drivebench.Bench(server.address) as bench:
+        with drivebench.serve("dynamometer") as server, drivebench.Bench(server.address) as bench:
             self.assertEqual(two_axes(bench), expected)
 
     # Catches: an example that no longer works, or that needs to know its link.

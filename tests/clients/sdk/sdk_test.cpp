@@ -313,6 +313,7 @@ TEST(Sdk, AnyCommandIsTakenOrRefusedInWords) {
     Command command = std::bit_cast<Command>(words);
     if (next() >> 62 == 0) command.axis = 0;
     if (next() >> 62 != 0) command.gates &= 3;
+    if (next() >> 62 != 0) command.legs_off &= 7;
     if (next() >> 62 != 0) command.tick = bench.newest().tick;
     const Error error = refusal_of([&] { bench.step(command); });
     if (error.code() != DRIVEBENCH_OK) {
