@@ -49,7 +49,8 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   CLI::App app(
       "drivebench-server: emulates electric drives in deterministic real time and serves them to "
       "controllers.");
-  app.set_version_flag("--version", fmt::format("drivebench-server {}, build {}", project_version(), build_id()));
+  app.set_version_flag("--version",
+                       fmt::format("drivebench-server {}, build {}", project_version(), build_id()));
   auto* config = app.add_option("config", o.config, "bench file (TOML)");
   auto* replay =
       app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server")

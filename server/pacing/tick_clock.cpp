@@ -7,7 +7,8 @@ void TickClock::wait_for_tick() noexcept {
   if (!is_realtime_) return;
   lateness_.add(lateness_ns_);
   worst_ns_.store(lateness_.worst_ns(), std::memory_order_relaxed);
-  if (lateness_ns_ > max_lateness_ns_) pacer_->resynchronise();  // it asks for the time, which a tick must not
+  if (lateness_ns_ > max_lateness_ns_)
+    pacer_->resynchronise();  // it asks for the time, which a tick must not
 }
 
 void TickClock::report_lateness(Bench& bench) noexcept {
