@@ -101,24 +101,22 @@ int InprocBench::check_commands(std::span<const drivebench_command> commands) no
   return DRIVEBENCH_OK;
 }
 
+int InprocBench::give(const drivebench_command& c) noexcept {
+  const Refused why =
+      bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
+  if (why == Refused::kNot) return DRIVEBENCH_OK;
+  return fail_with(why, c.axis, why == Refused::kWrongDrive ? "commands.gates" : "commands", on_axis(c.axis));
+}
+
 int InprocBench::step(std::span<const drivebench_command> commands) noexcept {
   if (const int code = check_commands(commands); code != DRIVEBENCH_OK) return code;
-  if (commands.size() > 1) {  // all or none
-    for (const drivebench_command& c : commands) {
-      const Refused why = judge(command_of(c), kOwner, bench_.command_view(c.axis));
-      if (why == Refused::kNot) continue;
-      bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
-      return fail_with(why, c.axis, why == Refused::kWrongDrive ? "commands.gates" : "commands",
-                       on_axis(c.axis));
-    }
-  }
-  for (const drivebench_command& c : commands) {
-    const Refused why =
-        bench_.submit({.tick = bench_.tick(), .axis = c.axis, .owner = kOwner, .action = command_of(c)});
-    if (why == Refused::kNot) continue;
-    return fail_with(why, c.axis, why == Refused::kWrongDrive ? "commands.gates" : "commands",
-                     on_axis(c.axis));
-  }
+  // All or none: the first command that is refused is given alone, so that the bench counts it.
+  const auto refused = std::ranges::find_if(commands, [this](const drivebench_command& c) {
+    return judge(command_of(c), kOwner, bench_.command_view(c.axis)) != Refused::kNot;
+  });
+  if (refused != commands.end()) return give(*refused);
+  for (const drivebench_command& c : commands)
+    give(c);
   bench_.step();
   return DRIVEBENCH_OK;
 }

@@ -51,6 +51,8 @@ class InprocBench final : public abi::Backend {
   int check_axis(std::uint32_t axis) noexcept;
   int check_commands(std::span<const drivebench_command> commands) noexcept;
   int lease(std::uint32_t axis, LeaseAction action) noexcept;
+  /// Gives the bench a command of the controller.
+  int give(const drivebench_command& c) noexcept;
   /// Gives the bench an input of the controller; `field` is that of the bench's refusal.
   int submit(std::uint32_t axis, std::uint64_t at_tick, const JudgedRequest& judged,
              const char* field) noexcept;

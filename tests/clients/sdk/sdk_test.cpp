@@ -202,7 +202,8 @@ TEST(Sdk, ASavedBenchGoesOnElsewhere) {
   drivebench_close(raw);
 }
 
-// Catches: a step that waits for a command that nobody else can send, one of two commands taken alone.
+// Catches: a step that waits for a command that no other controller can send, one of two commands taken
+// alone.
 TEST(Sdk, TwoAxesStepTogetherOrNotAtAll) {
   Bench bench(kDynamometer);
   ASSERT_EQ(bench.describe().axis_count, 2u);
