@@ -16,12 +16,12 @@ EXAMPLES = REPOSITORY / "clients/examples"
 SPINS = "147.368 rad/s at 0.842 A"  # 12 V on the motor of dc-a-voltage: K_T i = f w, 12 V = R i + K_T w
 
 
-def run(*command, cwd, code=0):
+def run(*command, cwd, code=(0,)):
     """Where no variable, no current folder and no file of the checkout helps; its output."""
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                           cwd=cwd, timeout=4 * PATIENCE_S, check=False,
                           env={name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ})
-    if done.returncode != code:
+    if done.returncode not in code:
         raise AssertionError(f"{shlex.join(map(str, command))} ended with {done.returncode}:\n{done.stdout}")
     return done.stdout
 
@@ -87,8 +87,9 @@ target_link_libraries(half_turn PRIVATE drivebench::drivebench)
 
     # Catches: programs that find neither each other nor their benches once they are installed.
     def test_installed_programs_know_the_benches_by_name(self):
-        said = run(self.prefix / "bin/drivebench", "demo", "--json", cwd=self.folder)
-        self.assertIn('"exact":true', said.replace(" ", ""))
+        # A busy machine is not real-time valid, which is no fault of the installation: code 1.
+        said = run(self.prefix / "bin/drivebench", "demo", "--json", cwd=self.folder, code=(0, 1))
+        self.assertRegex(said, r'"replay": \{\s*"equal": true')
 
     # Catches: an installation without the library in process that crashes or says nothing.
     def test_without_the_library_in_process_the_sentence_names_it(self):
@@ -97,7 +98,7 @@ target_link_libraries(half_turn PRIVATE drivebench::drivebench)
         for file in self.libraries.glob("libdrivebench.so*"):
             shutil.copy(file, alone, follow_symlinks=False)
         run("cc", "blink.c", "-o", "lonely", *self.flags("--cflags"), f"-L{alone}", "-ldrivebench", f"-Wl,-rpath,{alone}", cwd=self.folder)
-        said = run("./lonely", f"inproc:{self.prefix}/share/drivebench/benches/dc-a-voltage.toml", cwd=self.folder, code=1)
+        said = run("./lonely", f"inproc:{self.prefix}/share/drivebench/benches/dc-a-voltage.toml", cwd=self.folder, code=(1,))
         self.assertIn("inproc: needs the library libdrivebench-inproc.so.1", said)
 
 

@@ -19,10 +19,10 @@ OWN_BUSINESS = re.compile(r"\./(var/(lib/(apt|dpkg|systemd|pam)|log|cache|mail|s
                           r"group|shadow|gshadow|subuid|subgid|\.pwd))")
 
 
-def run(*command, code=0, seconds=10 * PATIENCE_S, **options):
+def run(*command, code=(0,), seconds=10 * PATIENCE_S, **options):
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                           timeout=seconds, check=False, **options)
-    if done.returncode != code:
+    if done.returncode not in code:
         raise AssertionError(f"{' '.join(map(str, command))} ended with {done.returncode}:\n{done.stdout[-3000:]}")
     return done.stdout
 
@@ -52,7 +52,7 @@ class Packages(unittest.TestCase):
         cls.inside("apt-get", "update")
 
     @classmethod
-    def inside(cls, *command, code=0):
+    def inside(cls, *command, code=(0,)):
         """Runs a command in the bare Debian, with a /proc of its own that goes with the command."""
         script = 'mount -t proc proc "$0/proc" && exec chroot "$0" sh -c "cd /root && exec \\"\\$@\\"" sh "$@"'
         environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive", "HOME": "/root",
@@ -76,8 +76,9 @@ class Packages(unittest.TestCase):
         self.install("0")
         needed = self.inside("apt-mark", "showauto").split()
 
-        said = self.inside("drivebench", "demo", "--json")
-        self.assertIn('"exact":true', said.replace(" ", ""))
+        # A busy machine is not real-time valid, which is no fault of the packages: code 1.
+        said = self.inside("drivebench", "demo", "--json", code=(0, 1))
+        self.assertRegex(said, r'"replay": \{\s*"equal": true')
         self.assertIn("/etc/drivebench/bench.toml: ", self.inside("drivebench-server", "--check-config", "/etc/drivebench/bench.toml"))
         self.assertRegex(self.inside("drivebench", "--version"), r"drivebench 0\.1\.0, build ")
         run("cc", REPOSITORY / "clients/examples/blink.c", "-o", self.root / "root/blink", f"-I{self.root}/usr/include",
