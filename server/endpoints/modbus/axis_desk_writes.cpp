@@ -139,8 +139,10 @@ Command AxisDesk::command_of(const CommandInput& input) const {
   command.phases.gates = gates_of(input.mode);
   command.phases.legs_off = input.legs_off;
   if (input.mode == CommandMode::kOff || input.mode == CommandMode::kZeroVoltage) return command;
-  const PhaseValues setpoint{
-      .a = double{input.a}, .b = double{input.b}, .c = double{input.c}, .field = double{input.field}};
+  const PhaseValues setpoint{.a = static_cast<double>(input.a),
+                             .b = static_cast<double>(input.b),
+                             .c = static_cast<double>(input.c),
+                             .field = static_cast<double>(input.field)};
   command.phases.setpoint =
       input.mode == CommandMode::kDuty ? terminals_.duties_from_middle(setpoint) : setpoint;
   return command;

@@ -41,10 +41,12 @@ void run_in_real_time(Bench& bench) {
     const Tick now = bench.tick();
     const TwoPhase& u = line_voltages()[static_cast<std::size_t>(now) % line_voltages().size()];
     for (std::uint32_t axis = 0; axis < kAxes; ++axis) {
-      bench.submit({.tick = now,
-                    .axis = axis,
-                    .owner = kController,
-                    .action = Command{.answers = now, .phases = {Gates::kVoltage, {.a = u.a, .b = u.b}}}});
+      bench.submit(
+          {.tick = now,
+           .axis = axis,
+           .owner = kController,
+           .action = Command{.answers = now,
+                             .phases = {.gates = Gates::kVoltage, .setpoint = {.a = u.a, .b = u.b}}}});
     }
     bench.step();
   }

@@ -47,10 +47,12 @@ class Pair {
     const std::int64_t begin = now_ns();
     for (int k = 0; k < kTicksPerBatch; ++k) {
       const Tick now = bench_.tick();
-      bench_.submit({.tick = now,
-                     .axis = 0,
-                     .owner = kController,
-                     .action = Command{.answers = now, .phases = {Gates::kVoltage, {.a = 20.0, .b = 5.0}}}});
+      bench_.submit(
+          {.tick = now,
+           .axis = 0,
+           .owner = kController,
+           .action = Command{.answers = now,
+                             .phases = {.gates = Gates::kVoltage, .setpoint = {.a = 20.0, .b = 5.0}}}});
       bench_.step();
       direct_ = bench_.sample(0);
       ::benchmark::DoNotOptimize(direct_);

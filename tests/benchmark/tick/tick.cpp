@@ -111,7 +111,8 @@ class Race {
            .axis = 0,
            .owner = kController,
            .action = Command{.answers = now,
-                             .phases = {Gates::kVoltage, {.a = voltage_at(now).a, .b = voltage_at(now).b}}}});
+                             .phases = {.gates = Gates::kVoltage,
+                                        .setpoint = {.a = voltage_at(now).a, .b = voltage_at(now).b}}}});
       bench_.step();
       ::benchmark::DoNotOptimize(bench_.sample(0));
     }
