@@ -22,11 +22,11 @@ const abi::InprocLibrary& load_inproc_library() {
     throw OpenError(DRIVEBENCH_NO_BENCH, std::string("inproc: needs the library ") + abi::kInprocLibrary +
                                              ", which comes with drivebench: " + ::dlerror());
   }
-  const void* const symbol = ::dlsym(library, abi::kInprocSymbol);
-  if (symbol == nullptr) {
+  const auto function = reinterpret_cast<abi::InprocFunction>(::dlsym(library, abi::kInprocSymbol));
+  if (function == nullptr) {
     throw OpenError(DRIVEBENCH_OTHER_ABI, std::string(abi::kInprocLibrary) + " is no library of drivebench");
   }
-  const auto& inproc = *static_cast<const abi::InprocLibrary*>(symbol);
+  const abi::InprocLibrary& inproc = *function();
   if (std::string_view(inproc.version) != DRIVEBENCH_PROJECT_VERSION ||
       inproc.sample_size != sizeof(drivebench_sample)) {
     throw OpenError(DRIVEBENCH_OTHER_ABI,

@@ -71,7 +71,7 @@ class Backend {
   std::string field_;
 };
 
-/// The symbol `drivebench_inproc` of the in-process library: a bench behind the ABI. libdrivebench loads it
+/// What drivebench_inproc() of the in-process library returns: a bench behind the ABI. libdrivebench loads it
 /// while the program runs, because clients do not link the plant.
 struct InprocLibrary {
   const char* version;  ///< of drivebench; both libraries come from the same build
@@ -81,5 +81,6 @@ struct InprocLibrary {
 };
 inline constexpr const char* kInprocLibrary = "libdrivebench-inproc.so.1";
 inline constexpr const char* kInprocSymbol = "drivebench_inproc";
+using InprocFunction = const InprocLibrary* (*)() noexcept;
 
 }  // namespace drivebench::abi

@@ -26,7 +26,10 @@ abi::Backend* open_bench(const char* bench_file, std::string& error) noexcept {
 }  // namespace
 }  // namespace drivebench
 
-extern "C" __attribute__((visibility("default"))) const drivebench::abi::InprocLibrary drivebench_inproc;
-const drivebench::abi::InprocLibrary drivebench_inproc = {.version = DRIVEBENCH_PROJECT_VERSION,
-                                                          .sample_size = sizeof(drivebench_sample),
-                                                          .open = drivebench::open_bench};
+extern "C" __attribute__((visibility("default"))) const drivebench::abi::InprocLibrary*
+drivebench_inproc() noexcept {
+  static constexpr drivebench::abi::InprocLibrary kLibrary = {.version = DRIVEBENCH_PROJECT_VERSION,
+                                                              .sample_size = sizeof(drivebench_sample),
+                                                              .open = drivebench::open_bench};
+  return &kLibrary;
+}
