@@ -93,8 +93,8 @@ constexpr double above_negative_rail(Connection connection, double terminal_v, d
   return connection == Connection::kStar ? terminal_v + rail_v : 0.5 * (terminal_v + rail_v);
 }
 
-/// The terminals of an open star against the negative rail of a link: its neutral is nobody's, and the diodes
-/// hold no terminal beyond a rail.
+/// The terminals of an open star against the negative rail of a link: no switch holds its neutral, and the
+/// diodes hold no terminal beyond a rail.
 constexpr ThreePhase within_rails(const ThreePhase& v, double link_v) noexcept {
   const double high_v = std::max({v.a, v.b, v.c});
   const double low_v = std::min({v.a, v.b, v.c});
