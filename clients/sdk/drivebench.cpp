@@ -193,6 +193,18 @@ int drivebench_bump(drivebench_bench* bench, uint32_t axis, double impulse_nms, 
   return backend == nullptr ? DRIVEBENCH_BAD_ARGUMENT : backend->bump(axis, impulse_nms, at_tick);
 }
 
+int drivebench_event_tick(drivebench_bench* bench, size_t event, int64_t* tick) {
+  Backend* const backend = begin(bench);
+  if (backend == nullptr) return DRIVEBENCH_BAD_ARGUMENT;
+  if (tick == nullptr) return refuse_null(*backend, "tick");
+  const std::size_t count = backend->describe().event_count;
+  if (event < count) return backend->event_tick(event, *tick);
+  return backend->fail(DRIVEBENCH_BAD_ARGUMENT,
+                       "event is " + std::to_string(event) + " but the description has " +
+                           std::to_string(count) + (count == 1 ? " event" : " events"),
+                       "event");
+}
+
 int drivebench_state_hash(drivebench_bench* bench, uint64_t* hash) {
   Backend* const backend = begin(bench);
   if (backend == nullptr) return DRIVEBENCH_BAD_ARGUMENT;

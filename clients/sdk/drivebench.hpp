@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -110,6 +111,12 @@ class Bench {
     check(drivebench_bump(bench_.get(), axis, impulse_nms, at_tick));
   }
 
+  /// The tick in which an event of describe() acted; nothing: not yet.
+  std::optional<std::int64_t> event_tick(std::size_t event) const {
+    std::int64_t tick = 0;
+    check(drivebench_event_tick(bench_.get(), event, &tick));
+    return tick < 0 ? std::nullopt : std::optional(tick);
+  }
   std::uint64_t state_hash() const {
     std::uint64_t hash = 0;
     check(drivebench_state_hash(bench_.get(), &hash));

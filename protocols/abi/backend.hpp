@@ -44,6 +44,8 @@ class Backend {
   virtual int inject(std::uint32_t axis, const char* name, double value, std::uint64_t at_tick) noexcept = 0;
   virtual int bump(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick) noexcept = 0;
 
+  /// An event of describe(), whose number is right.
+  virtual int event_tick(std::size_t, std::int64_t&) noexcept { return only_in_process("event_tick"); }
   virtual int state_hash(std::uint64_t& hash) noexcept = 0;
   virtual int reset() noexcept { return only_in_process("reset"); }
   virtual int save(std::vector<std::byte>&) noexcept { return only_in_process("save"); }

@@ -34,6 +34,7 @@ class Description {
   }
   void add_fault(const drivebench_fault& fault) { faults_.push_back(fault); }
   void add_injectable(const drivebench_injectable& fault) { injectables_.push_back(fault); }
+  void add_event(const drivebench_event& event) { events_.push_back(event); }
 
   /// Adds the signals of the catalogue, of which this link knows some, and closes the description.
   void finish(SignalMask known) {
@@ -56,6 +57,7 @@ class Description {
     show(signals_, bench.signal_count, bench.signals);
     show(faults_, bench.fault_count, bench.faults);
     show(injectables_, bench.injectable_count, bench.injectables);
+    show(events_, bench.event_count, bench.events);
   }
 
  private:
@@ -66,6 +68,7 @@ class Description {
   std::vector<drivebench_signal> signals_;
   std::vector<drivebench_fault> faults_;
   std::vector<drivebench_injectable> injectables_;
+  std::vector<drivebench_event> events_;
 };
 
 static_assert(static_cast<int>(SignalKind::kStatus) + DRIVEBENCH_KIND_STATUS == DRIVEBENCH_KIND_STATUS);

@@ -231,6 +231,12 @@ typedef struct drivebench_injectable {
   int32_t integer;
 } drivebench_injectable;
 
+/** A change that the bench file makes at a tick or on a condition: a load, a parameter, a fault, a bump. */
+typedef struct drivebench_event {
+  uint32_t axis;
+  const char* text; /**< for example "fault open_phase = 2 when speed_rad_s > 100 for 40 ticks" */
+} drivebench_event;
+
 typedef struct drivebench_description {
   const char* name;
   int32_t mode; /**< a drivebench_mode */
@@ -250,6 +256,8 @@ typedef struct drivebench_description {
   const drivebench_fault* faults;
   size_t injectable_count;
   const drivebench_injectable* injectables;
+  size_t event_count; /**< 0 over a link: only a bench in process tells its events */
+  const drivebench_event* events;
 } drivebench_description;
 
 /** Settings of drivebench_open(); all zero is the default. */
@@ -315,6 +323,9 @@ DRIVEBENCH_API int drivebench_inject(drivebench_bench* bench, uint32_t axis, con
 /** Bumps the shaft with an angular impulse [N*m*s], positive like a torque of the machine. */
 DRIVEBENCH_API int drivebench_bump(drivebench_bench* bench, uint32_t axis, double impulse_nms,
                                    uint64_t at_tick);
+
+/** The tick in which an event of the description acted; -1: not yet. In process only. */
+DRIVEBENCH_API int drivebench_event_tick(drivebench_bench* bench, size_t event, int64_t* tick);
 
 /** The hash of the state and of all samples so far: equal hashes mean equal runs. Lockstep only. */
 DRIVEBENCH_API int drivebench_state_hash(drivebench_bench* bench, uint64_t* hash);

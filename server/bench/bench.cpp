@@ -85,6 +85,23 @@ Refused Bench::repeat(const Input& input) noexcept {
   return Refused::kNot;
 }
 
+void Bench::await(const Trigger& trigger, const Input& input) {
+  awaited_.push_back({.trigger = trigger, .input = input});
+}
+
+void Bench::submit_triggered() noexcept {
+  for (AwaitedInput& awaited : awaited_) {
+    TriggerState& state = awaited.state;
+    if (state.triggered >= 0) continue;
+    state.held = awaited.trigger.condition.holds(axes_[awaited.trigger.axis].sample) ? state.held + 1 : 0;
+    if (state.held <= awaited.trigger.for_ticks) continue;
+    state.triggered = tick_;
+    Input input = awaited.input;
+    input.tick += tick_;
+    if (repeat(input) != Refused::kNot) ++axes_[input.axis].control.refused;
+  }
+}
+
 void Bench::apply_due() noexcept {
   while (due_ < scheduled_ && schedule_[due_].tick <= tick_) {
     const Input input = unpack(schedule_[due_++]);
@@ -333,6 +350,7 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
 }
 
 void Bench::step() noexcept {
+  submit_triggered();
   apply_due();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i].ramps.count != 0) follow_ramps(axes_[i]);

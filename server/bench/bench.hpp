@@ -101,6 +101,13 @@ class Bench {
   /// lease, and counted them in the state.
   Refused repeat(const Input& input) noexcept;
 
+  /// Takes an input that happens once, `input.tick` ticks after its trigger: 0 in the tick whose sample it
+  /// sees. The bench submits it then like an input of the configuration, so that the observer sees it and a
+  /// recording repeats it. Before the first tick; allocates.
+  void await(const Trigger& trigger, const Input& input);
+  /// The tick in which the input of the n-th await() was submitted; -1: not yet.
+  Tick triggered_at(std::size_t n) const noexcept { return awaited_[n].state.triggered; }
+
   /// Runs one tick: due inputs, commands, plant, sensors.
   void step() noexcept;
 
@@ -127,7 +134,8 @@ class Bench {
   /// Whether a command for the current tick has arrived.
   bool has_command(std::size_t axis) const noexcept { return control_of(axes_[axis]).fresh != 0; }
 
-  /// A hash of the whole state and of every sample so far.
+  /// A hash of the state and of every sample so far, without the inputs that wait for a trigger: a replay,
+  /// which finds them among the recorded inputs, has the same hash.
   std::uint64_t state_hash() const noexcept;
 
   /// The whole state as bytes, for restore() on a bench with the same setup, in any process.
@@ -153,6 +161,16 @@ class Bench {
     LastCommands last{};
     std::uint64_t missed = 0;
     std::uint64_t refused = 0;
+  };
+  /// Whether and since when the condition of a trigger holds. 8-byte members only.
+  struct TriggerState {
+    Tick held = 0;  ///< samples in a row
+    Tick triggered = -1;
+  };
+  struct AwaitedInput {
+    Trigger trigger;
+    Input input;
+    TriggerState state{};
   };
   struct AxisRuntime {
     Axis axis;
@@ -192,6 +210,8 @@ class Bench {
   Refused change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept;
   void lose_controller(std::size_t axis, std::uint64_t fault) noexcept;
   void apply_due() noexcept;
+  void submit_triggered() noexcept;
+  std::uint64_t setup_hash() const noexcept;
   void forget_scheduled(std::size_t axis, Owner owner) noexcept;
   PhaseCommand supervise(std::size_t axis) noexcept;
   void take_command(Control& c) noexcept;
@@ -215,6 +235,7 @@ class Bench {
   std::uint64_t scheduled_ = 0;
   std::array<PackedInput, kMaxScheduled> schedule_{};  ///< sorted by tick, first come first served within one
   std::vector<AxisRuntime> axes_;
+  std::vector<AwaitedInput> awaited_;
 };
 
 }  // namespace drivebench

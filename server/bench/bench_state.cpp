@@ -36,8 +36,7 @@ inline constexpr std::size_t kLaterWords<LaterValue> = 1;
 
 namespace {
 
-std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
-  Digest digest;
+void add_setup(const BenchSetup& setup, Digest& digest) noexcept {
   digest.add(static_cast<std::uint64_t>(setup.period_ns));
   digest.add(static_cast<std::uint64_t>(setup.substeps));
   digest.add(setup.seed);
@@ -65,7 +64,6 @@ std::uint64_t setup_hash(const BenchSetup& setup) noexcept {
         digest.add_block(point);
     }
   }
-  return digest.value();
 }
 
 /// Of every word, those that hashes pass over included.
@@ -80,6 +78,18 @@ std::uint64_t digest_of(std::span<const std::byte> words) noexcept {
 }
 
 }  // namespace
+
+std::uint64_t Bench::setup_hash() const noexcept {
+  Digest digest;
+  add_setup(setup_, digest);
+  for (const AwaitedInput& awaited : awaited_) {
+    digest.add_block(pack(awaited.input));
+    digest.add_block(awaited.trigger.condition);
+    digest.add(awaited.trigger.axis);
+    digest.add(static_cast<std::uint64_t>(awaited.trigger.for_ticks));
+  }
+  return digest.value();
+}
 
 template <class Self, class Visitor>
 void Bench::for_each_block(Self& self, Visitor visit) {
@@ -122,8 +132,10 @@ std::vector<std::byte> Bench::save() const {
     std::memcpy(saved.data() + end, &block, sizeof(block));
   };
   append(kMagic);
-  append(setup_hash(setup_));
+  append(setup_hash());
   for_each_block(*this, append);
+  for (const AwaitedInput& awaited : awaited_)
+    append(awaited.state);
   append(digest_of(saved));
   return saved;
 }
@@ -143,9 +155,11 @@ bool Bench::restore(std::span<const std::byte> saved) {
   take(word);
   if (word != kMagic) return false;
   take(word);
-  if (word != setup_hash(setup_)) return false;
+  if (word != setup_hash()) return false;
   Bench restored(*this);
   for_each_block(restored, take);
+  for (AwaitedInput& awaited : restored.awaited_)
+    take(awaited.state);
   if (restored.scheduled_ > kMaxScheduled) return false;
   for (const PackedInput& input : restored.schedule_) {
     if (input.axis >= axes_.size()) return false;

@@ -8,6 +8,7 @@
 #include "plant/drive/drive.hpp"
 #include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
+#include "protocols/condition.hpp"
 #include "protocols/refusals.hpp"
 #include "protocols/signals/command.hpp"
 
@@ -68,6 +69,13 @@ struct Input {
   Action action;
 };
 static_assert(std::is_trivially_copyable_v<Input>);
+
+/// What lets an event happen: a condition that has held for some time.
+struct Trigger {
+  std::uint32_t axis = 0;  ///< whose samples the condition sees
+  Condition condition;
+  Tick for_ticks = 0;  ///< the condition holds in the samples of so many ticks before, too
+};
 
 /// An input as words, for saved states and hashes.
 struct PackedInput {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "protocols/text.hpp"
+#include "server/config/sections/events.hpp"
 #include "server/config/words.hpp"
 
 namespace drivebench {
@@ -64,12 +65,41 @@ std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis
          ", whose amplifier it shares: lease, commands and drive are those of " + other;
 }
 
+std::vector<std::string> axis_names(const BenchConfig& config) {
+  std::vector<std::string> names;
+  for (const AxisConfig& axis : config.axes)
+    names.push_back(axis.name);
+  return names;
+}
+
 void schedule_events(const BenchConfig& config, Bench& bench) {
   for (std::uint32_t axis = 0; axis < config.axes.size(); ++axis) {
     for (const AxisEvent& event : config.axes[axis].events) {
-      bench.submit({.tick = event.tick, .axis = axis, .owner = 0, .action = event.action});
+      const Input input{.tick = event.tick, .axis = axis, .owner = 0, .action = event.action};
+      if (event.trigger) {
+        bench.await(*event.trigger, input);
+      } else {
+        bench.submit(input);
+      }
     }
   }
+}
+
+std::vector<EventState> event_states(const BenchConfig& config, const Bench& bench) {
+  const std::vector<std::string> names = axis_names(config);
+  std::vector<EventState> states;
+  std::size_t awaited = 0;
+  for (std::size_t axis = 0; axis < config.axes.size(); ++axis) {
+    for (const AxisEvent& event : config.axes[axis].events) {
+      const Tick triggered = event.trigger ? bench.triggered_at(awaited++) : 0;
+      const Tick acts = triggered + event.tick;
+      states.push_back(
+          {.axis = axis,
+           .text = event_text(event, config.setup.axes[axis].parameters, {.axis = axis, .names = names}),
+           .acted = triggered >= 0 && acts < bench.tick() ? std::optional(acts) : std::nullopt});
+    }
+  }
+  return states;
 }
 
 std::string_view name_of(SafeAction action) noexcept {

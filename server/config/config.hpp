@@ -108,10 +108,11 @@ struct AuditConfig {
 /// Section [log]: the least severe level that goes to standard error.
 enum class LogLevel { kDebug, kInfo, kWarn, kError, kOff };
 
-/// A change of an axis at a tick that the bench file sets: a load, a parameter value, a fault, a bump.
+/// A change of an axis that the bench file sets: a load, a parameter value, a fault, a bump.
 struct AxisEvent {
-  Tick tick = 0;
+  Tick tick = 0;  ///< of the change, or the ticks between its trigger and it
   Action action;
+  std::optional<Trigger> trigger{};
 };
 
 /// The settings of an axis beside its physics.
@@ -163,8 +164,19 @@ std::string to_toml(const BenchConfig& config);
 /// action, parameters, curves and events; without names, mode, pacer and addresses.
 std::string physics_toml(const BenchConfig& config);
 
-/// Gives the bench the events of the configuration, as inputs for later ticks.
+std::vector<std::string> axis_names(const BenchConfig& config);
+
+/// Gives the bench the events of the configuration, as inputs for later ticks or behind a trigger.
 void schedule_events(const BenchConfig& config, Bench& bench);
+
+/// An event of the configuration as people read it, and what has come of it.
+struct EventState {
+  std::size_t axis;
+  std::string text;           ///< for example "fault open_phase = 2 when speed_rad_s > 100 for 40 ticks"
+  std::optional<Tick> acted;  ///< the tick in which it acted; none: not yet
+};
+/// The events in the order of the axes, on a bench to which schedule_events() gave them.
+std::vector<EventState> event_states(const BenchConfig& config, const Bench& bench);
 
 /// An axis for requests that change it.
 ChangeView change_view(const BenchConfig& config, std::size_t axis, const AxisParameters& in_force,
@@ -180,7 +192,8 @@ std::string_view name_of(RunMode mode) noexcept;
 std::string_view name_of(PacerKind pacer) noexcept;
 std::string_view name_of(SafeAction action) noexcept;
 
-/// Sorts events by tick; within a tick loads, parameters, faults that end, faults that begin, bumps.
+/// Sorts events by tick; within a tick loads, parameters, faults that end, faults that begin, bumps. Those
+/// with a trigger come last.
 std::vector<AxisEvent> in_order(std::vector<AxisEvent> events);
 
 /// Whether the text is an IPv4 or IPv6 address or "localhost". Short forms such as "127.1", "0x7f000001" and

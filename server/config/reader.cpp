@@ -149,6 +149,13 @@ void read_experiments(StrictTable table, const std::filesystem::path& folder,
   table.finish();
 }
 
+/// The name of an axis that is yet to be read; empty without one.
+std::string name_in(StrictTable& axis) {
+  const ConfigNode* const node = axis.node("name");
+  const auto* const name = node != nullptr ? std::get_if<std::string>(&node->scalar) : nullptr;
+  return name != nullptr ? *name : std::string();
+}
+
 std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::path& folder,
                                    ProblemList& problems, std::vector<ConfigProblem>& odd,
                                    const BenchConfig& config) {
@@ -156,8 +163,12 @@ std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::pat
   std::vector<AxisReading> axes;
   std::size_t events = 0;
   std::size_t points = 0;
-  for (StrictTable& table : root.tables("axis", kMaxAxes)) {
-    AxisReading axis = read_axis(table, folder, config.setup.period_ns, axes, problems, odd);
+  std::vector<StrictTable> tables = root.tables("axis", kMaxAxes);
+  std::vector<std::string> names;
+  for (StrictTable& table : tables)
+    names.push_back(name_in(table));
+  for (StrictTable& table : tables) {
+    AxisReading axis = read_axis(table, folder, config.setup.period_ns, names, axes, problems, odd);
     const std::string& name = axis.config.name;
     const std::uint32_t node = axis.config.can_node;
     const auto another = [&](auto same) { return std::any_of(axes.begin(), axes.end(), same); };

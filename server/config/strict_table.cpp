@@ -190,7 +190,7 @@ const ConfigNode* StrictTable::find(std::string_view key) const {
 }
 
 const ConfigNode* StrictTable::take(std::string_view key) {
-  known_.emplace_back(key);
+  if (std::ranges::find(known_, key) == known_.end()) known_.emplace_back(key);
   return find(key);
 }
 

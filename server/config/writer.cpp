@@ -61,7 +61,8 @@ void append_parameters(std::string& text, const AxisSetup& setup, Keys keys) {
   }
 }
 
-void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& config, Keys keys) {
+void append_axis(std::string& text, const BenchConfig& bench, const EventPlace& place, Keys keys) {
+  const AxisSetup& setup = bench.setup.axes[place.axis];
   if (!setup.shares_amplifier_with) {
     append(text, "on_link_loss", in_quotes(name_of(setup.on_link_loss)));
     append(text, "quick_stop_ticks", std::to_string(setup.quick_stop_ticks));
@@ -69,7 +70,7 @@ void append_axis(std::string& text, const AxisSetup& setup, const AxisConfig& co
     append(text, "slew_per_s", real_text(setup.rules.slew_per_s));
   }
   append_parameters(text, setup, keys);
-  text += events_text(config.events, setup.parameters);
+  text += events_text(bench.axes[place.axis].events, setup.parameters, place);
 }
 
 void append_service(std::string& text, const RealtimeConfig& realtime, const TcpConfig& tcp) {
@@ -137,6 +138,7 @@ std::string to_toml(const BenchConfig& config) {
   for (const CanConfig& bus : config.can)
     append_can(text, bus);
   if (config.modbus.enabled) append_modbus(text, config.modbus);
+  const std::vector<std::string> names = axis_names(config);
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     text += "\n[[axis]]\n";
     append(text, "name", in_quotes(config.axes[i].name));
@@ -148,7 +150,7 @@ std::string to_toml(const BenchConfig& config) {
     if (const auto other = config.setup.axes[i].shares_amplifier_with) {
       append(text, "shares_amplifier_with", in_quotes(config.axes[*other].name));
     }
-    append_axis(text, config.setup.axes[i], config.axes[i], Keys::kAll);
+    append_axis(text, config, {.axis = i, .names = names}, Keys::kAll);
   }
   return text;
 }
@@ -156,15 +158,18 @@ std::string to_toml(const BenchConfig& config) {
 std::string physics_toml(const BenchConfig& config) {
   std::string text = "[bench]\n";
   append_timing(text, config.setup);
+  std::vector<std::string> numbers;  // the hash ignores names
+  for (std::size_t i = 0; i < config.axes.size(); ++i)
+    numbers.push_back(std::to_string(i));
   for (std::size_t i = 0; i < config.axes.size(); ++i) {
     text += "\n[[axis]]\n";
     if (const auto partner = config.setup.axes[i].shares_shaft_with) {
-      append(text, "shares_shaft_with", std::to_string(*partner));  // the hash ignores names
+      append(text, "shares_shaft_with", numbers[*partner]);
     }
     if (const auto other = config.setup.axes[i].shares_amplifier_with) {
-      append(text, "shares_amplifier_with", std::to_string(*other));
+      append(text, "shares_amplifier_with", numbers[*other]);
     }
-    append_axis(text, config.setup.axes[i], config.axes[i], Keys::kHashed);
+    append_axis(text, config, {.axis = i, .names = numbers}, Keys::kHashed);
   }
   return text;
 }

@@ -163,6 +163,11 @@ int InprocBench::bump(std::uint32_t axis, double impulse_nms, std::uint64_t at_t
   return submit(axis, at_tick, judge_bump(impulse_nms, at_tick), "at_tick");
 }
 
+int InprocBench::event_tick(std::size_t event, std::int64_t& tick) noexcept {
+  tick = event_states(config_, bench_)[event].acted.value_or(-1);
+  return DRIVEBENCH_OK;
+}
+
 int InprocBench::state_hash(std::uint64_t& hash) noexcept {
   hash = bench_.state_hash();
   return DRIVEBENCH_OK;

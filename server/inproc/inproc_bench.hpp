@@ -39,6 +39,7 @@ class InprocBench final : public abi::Backend {
   int inject(std::uint32_t axis, const char* name, double value, std::uint64_t at_tick) noexcept override;
   int bump(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick) noexcept override;
 
+  int event_tick(std::size_t event, std::int64_t& tick) noexcept override;
   int state_hash(std::uint64_t& hash) noexcept override;
   int reset() noexcept override { return restore(start_); }
   int save(std::vector<std::byte>& state) noexcept override;

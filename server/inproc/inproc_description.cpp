@@ -67,6 +67,10 @@ void InprocBench::describe_bench() {
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
     add_axis(description_, config_.axes[axis], bench_.axis(axis).parameters());
   add_faults(description_);
+  for (const EventState& event : event_states(config_, bench_)) {
+    description_.add_event(
+        {.axis = static_cast<std::uint32_t>(event.axis), .text = description_.keep(event.text)});
+  }
   description_.finish(kAllSignals);
 }
 

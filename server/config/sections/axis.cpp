@@ -151,8 +151,8 @@ void read_commands(StrictTable& axis, std::int64_t period_ns, bool shares_amplif
 }  // namespace
 
 AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, std::int64_t period_ns,
-                      std::span<const AxisReading> before, ProblemList& problems,
-                      std::vector<ConfigProblem>& odd) {
+                      std::span<const std::string> names, std::span<const AxisReading> before,
+                      ProblemList& problems, std::vector<ConfigProblem>& odd) {
   AxisReading result;
   axis.require("name");
   result.config.name = axis.identifier("name").value_or("");
@@ -205,7 +205,8 @@ AxisReading read_axis(StrictTable& axis, const std::filesystem::path& folder, st
   result.config.can_node =
       static_cast<std::uint32_t>(node.value_or(static_cast<std::int64_t>(before.size()) + 1));
   result.config.events = read_events(axis, result.parameters_valid ? &p : nullptr,
-                                     {.shaft = shares_shaft, .drive = shares_amplifier}, period_ns);
+                                     {.shaft = shares_shaft, .drive = shares_amplifier},
+                                     {.axis = before.size(), .names = names, .period_ns = period_ns});
   axis.finish();
   return result;
 }

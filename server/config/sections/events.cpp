@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "plant/parameters/drive_rows.hpp"
@@ -12,7 +13,6 @@
 #include "server/bench/ramps.hpp"
 #include "server/config/sections/axis.hpp"
 #include "server/config/sections/parameters.hpp"
-#include "server/config/words.hpp"
 
 namespace drivebench {
 namespace {
@@ -24,40 +24,36 @@ constexpr auto kFaultNames = [] {
   return names;
 }();
 
-/// Reads the tick of an event; 0 if it is missing or wrong.
-Tick read_at(StrictTable& table, std::int64_t period_ns) {
-  const auto tick = read_ticks(table, "at_s", "at_tick", period_ns);
-  if (!table.has("at_tick")) table.require("at_s");
-  return tick.value_or(0);
-}
-
-void read_loads(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent>& events) {
+void read_loads(StrictTable& axis, const EventPlace& place, std::vector<AxisEvent>& events) {
   for (StrictTable& table : axis.tables("load", kMaxAxisEvents)) {
-    const Tick tick = read_at(table, period_ns);
+    const EventTime time = read_event_time(table, place);
     const auto load_nm = table.real("load_nm", -kMaxLoadNm, kMaxLoadNm);
-    const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", period_ns);
+    const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", place.period_ns);
     table.require("load_nm");
     table.finish();
-    events.push_back({tick, LoadChange{.load_nm = load_nm.value_or(0.0), .ramp_ticks = ramp.value_or(0)}});
+    events.push_back({.tick = time.tick,
+                      .action = LoadChange{.load_nm = load_nm.value_or(0.0), .ramp_ticks = ramp.value_or(0)},
+                      .trigger = time.trigger});
   }
 }
 
-void read_bumps(StrictTable& axis, std::int64_t period_ns, std::vector<AxisEvent>& events) {
+void read_bumps(StrictTable& axis, const EventPlace& place, std::vector<AxisEvent>& events) {
   for (StrictTable& table : axis.tables("bump", kMaxAxisEvents)) {
-    const Tick tick = read_at(table, period_ns);
+    const EventTime time = read_event_time(table, place);
     const auto impulse_nms = table.real("impulse_nms", -kMaxImpulseNms, kMaxImpulseNms);
     table.require("impulse_nms");
     table.finish();
-    events.push_back({tick, ShaftBump{impulse_nms.value_or(0.0)}});
+    events.push_back(
+        {.tick = time.tick, .action = ShaftBump{impulse_nms.value_or(0.0)}, .trigger = time.trigger});
   }
 }
 
-void read_faults(StrictTable& axis, SharedParts shared, std::int64_t period_ns,
+void read_faults(StrictTable& axis, SharedParts shared, const EventPlace& place,
                  std::vector<AxisEvent>& events) {
   for (StrictTable& table : axis.tables("fault", kMaxAxisEvents)) {
     const auto name = table.choice("name", kFaultNames);
-    const Tick tick = read_at(table, period_ns);
-    const auto until = read_ticks(table, "until_s", "until_tick", period_ns);
+    const EventTime begin = read_event_time(table, place);
+    const auto end = read_event_end(table, begin, place.period_ns);
     const auto value = table.real("value");
     table.require("name");
     table.require("value");
@@ -69,21 +65,20 @@ void read_faults(StrictTable& axis, SharedParts shared, std::int64_t period_ns,
       table.report("name", "is \"" + std::string(kFaultNames[*name]) +
                                "\", a fault of the axis whose amplifier this one shares");
     }
-    if (until && *until <= tick) {
-      table.report(table.has("until_s") ? "until_s" : "until_tick",
-                   "comes to tick " + std::to_string(*until) + " but must lie after tick " +
-                       std::to_string(tick) + ", where the fault begins");
-    }
     table.finish();
     const auto row = static_cast<std::uint32_t>(name.value_or(0));
-    events.push_back({tick, InjectFault{.row = row, .value = value.value_or(0.0)}});
-    if (until) events.push_back({*until, InjectFault{.row = row, .value = 0.0}});
+    const auto add = [&](const EventTime& time, double to) {
+      events.push_back(
+          {.tick = time.tick, .action = InjectFault{.row = row, .value = to}, .trigger = time.trigger});
+    };
+    add(begin, value.value_or(0.0));
+    if (end) add(*end, 0.0);
   }
 }
 
 /// A parameter change and its table.
 struct Setting {
-  Tick tick;
+  EventTime time;
   ParameterWrite write;
   StrictTable table;
 };
@@ -110,10 +105,10 @@ const Parameter* read_row(StrictTable& table, const AxisParameters* p, SharedPar
 }
 
 std::optional<Setting> read_setting(StrictTable& table, const AxisParameters* p, SharedParts shared,
-                                    std::int64_t period_ns) {
+                                    const EventPlace& place) {
   const Parameter* const row = read_row(table, p, shared);
-  const Tick tick = read_at(table, period_ns);
-  const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", period_ns);
+  const EventTime time = read_event_time(table, place);
+  const auto ramp = read_ticks(table, "ramp_s", "ramp_ticks", place.period_ns);
   const auto value = row != nullptr ? read_value(table, "value", *row) : std::nullopt;
   if (row == nullptr) table.node("value");
   table.require("value");
@@ -123,7 +118,7 @@ std::optional<Setting> read_setting(StrictTable& table, const AxisParameters* p,
   }
   table.finish();
   if (!value) return std::nullopt;
-  return Setting{.tick = tick,
+  return Setting{.time = time,
                  .write = {.row = static_cast<std::uint32_t>(row - axis_parameters(*p).data()),
                            .value = *value,
                            .ramp_ticks = ramp.value_or(0)},
@@ -138,12 +133,12 @@ bool report_broken(Setting& setting, Tick tick, const AxisParameters& p) {
   return true;
 }
 
-/// Applies the settings as the bench will, and reports the first that breaks a rule between values. Checks at
-/// the begin and end of each setting.
+/// Applies the settings, none of which has a trigger, as the bench will, and reports the first that breaks a
+/// rule between values. Checks at the begin and end of each setting.
 void check_settings(std::vector<Setting>& settings, AxisParameters p) {
   std::set<Tick> ticks;
   for (const Setting& setting : settings)
-    ticks.insert({setting.tick, setting.tick + setting.write.ramp_ticks});
+    ticks.insert({setting.time.tick, setting.time.tick + setting.write.ramp_ticks});
   const std::span<const Parameter> rows = axis_parameters(p);
   ParameterRamps ramps;
   auto next = settings.begin();
@@ -153,7 +148,7 @@ void check_settings(std::vector<Setting>& settings, AxisParameters p) {
       rows[ramp.row].set(p, ramp.at(tick));
       if (ramp.is_over(tick)) ramps.remove(i);
     }
-    for (; next != settings.end() && next->tick == tick; ++next) {
+    for (; next != settings.end() && next->time.tick == tick; ++next) {
       const auto& [row, value, ramp_ticks] = next->write;
       ramps.forget(row);
       if (ramp_ticks == 0) {
@@ -169,22 +164,21 @@ void check_settings(std::vector<Setting>& settings, AxisParameters p) {
   }
 }
 
-void read_settings(StrictTable& axis, const AxisParameters* p, SharedParts shared, std::int64_t period_ns,
+void read_settings(StrictTable& axis, const AxisParameters* p, SharedParts shared, const EventPlace& place,
                    std::vector<AxisEvent>& events) {
-  std::vector<Setting> settings;
+  std::vector<Setting> timed;
   bool all_right = p != nullptr;
   for (StrictTable& table : axis.tables("set", kMaxAxisEvents)) {
-    if (const auto setting = read_setting(table, p, shared, period_ns)) {
-      settings.push_back(*setting);
-    } else {
-      all_right = false;
-    }
+    const auto setting = read_setting(table, p, shared, place);
+    all_right = all_right && setting;
+    if (!setting) continue;
+    events.push_back(
+        {.tick = setting->time.tick, .action = setting->write, .trigger = setting->time.trigger});
+    if (!setting->time.trigger) timed.push_back(*setting);
   }
-  std::stable_sort(settings.begin(), settings.end(),
-                   [](const Setting& x, const Setting& y) { return x.tick < y.tick; });
-  if (all_right) check_settings(settings, *p);
-  for (const Setting& setting : settings)
-    events.push_back({setting.tick, setting.write});
+  std::stable_sort(timed.begin(), timed.end(),
+                   [](const Setting& x, const Setting& y) { return x.time.tick < y.time.tick; });
+  if (all_right) check_settings(timed, *p);
 }
 
 /// The rank of an event within its tick.
@@ -195,69 +189,24 @@ int rank_of(const Action& action) {
   return 4;
 }
 
-void append(std::string& text, std::string_view key, const std::string& value) {
-  text.append(key).append(" = ").append(value).append("\n");
-}
-
-/// Writes an event as a table.
-struct EventWriter {
-  std::string& text;
-  const AxisParameters& p;
-  Tick tick;
-
-  void begin(std::string_view kind) const {
-    text.append("\n[[axis.").append(kind).append("]]\n");
-    append(text, "at_tick", std::to_string(tick));
-  }
-  void operator()(const LoadChange& load) const {
-    begin("load");
-    append(text, "load_nm", real_text(load.load_nm));
-    append(text, "ramp_ticks", std::to_string(load.ramp_ticks));
-  }
-  void operator()(const ParameterWrite& write) const {
-    const Parameter& row = axis_parameters(p)[write.row];
-    begin("set");
-    append(text, "parameter", in_quotes(row.name));
-    append(text, "value", value_text(row, write.value));
-    append(text, "ramp_ticks", std::to_string(write.ramp_ticks));
-  }
-  void operator()(const InjectFault& fault) const {
-    begin("fault");
-    append(text, "name", in_quotes(kInjectableFaults[fault.row].name));
-    append(text, "value", real_text(fault.value));
-  }
-  void operator()(const ShaftBump& bump) const {
-    begin("bump");
-    append(text, "impulse_nms", real_text(bump.impulse_nms));
-  }
-  template <class Other>
-  void operator()(const Other&) const {}  // a configuration has no other actions
-};
-
 }  // namespace
 
 std::vector<AxisEvent> in_order(std::vector<AxisEvent> events) {
   std::stable_sort(events.begin(), events.end(), [](const AxisEvent& x, const AxisEvent& y) {
-    return std::pair(x.tick, rank_of(x.action)) < std::pair(y.tick, rank_of(y.action));
+    return std::tuple(x.trigger.has_value(), x.tick, rank_of(x.action)) <
+           std::tuple(y.trigger.has_value(), y.tick, rank_of(y.action));
   });
   return events;
 }
 
 std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, SharedParts shared,
-                                   std::int64_t period_ns) {
+                                   const EventPlace& place) {
   std::vector<AxisEvent> events;
-  read_loads(axis, period_ns, events);
-  read_settings(axis, p, shared, period_ns, events);
-  read_faults(axis, shared, period_ns, events);
-  read_bumps(axis, period_ns, events);
+  read_loads(axis, place, events);
+  read_settings(axis, p, shared, place, events);
+  read_faults(axis, shared, place, events);
+  read_bumps(axis, place, events);
   return in_order(std::move(events));
-}
-
-std::string events_text(const std::vector<AxisEvent>& events, const AxisParameters& p) {
-  std::string text;
-  for (const AxisEvent& event : events)
-    std::visit(EventWriter{text, p, event.tick}, event.action);
-  return text;
 }
 
 }  // namespace drivebench

@@ -39,16 +39,19 @@ namespace {
 const std::string kServo = "inproc:" DRIVEBENCH_CONFIGS "/benches/servo.toml";
 const std::string kDynamometer = "inproc:" DRIVEBENCH_CONFIGS "/benches/dynamometer.toml";
 
-/// The BM500 behind its switched inverter, with voltage sensors against the negative rail.
-const std::string kStar = [] {
-  std::ifstream shipped(DRIVEBENCH_CONFIGS "/benches/bm500.toml");
+/// A shipped bench and some more lines, as the address of a bench file of its own.
+std::string variant_of(const std::string& bench, const std::string& more) {
+  std::ifstream shipped(DRIVEBENCH_CONFIGS "/benches/" + bench + ".toml");
   std::string text((std::istreambuf_iterator<char>(shipped)), {});
   text.replace(text.find("../motors/"), 10, DRIVEBENCH_CONFIGS "/motors/");
-  const auto file =
-      std::filesystem::temp_directory_path() / ("drivebench-sdk-" + std::to_string(::getpid()) + ".toml");
-  std::ofstream(file) << text << "\n[axis.voltage_sensor]\nagainst_rail = true\n";
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("drivebench-sdk-" + bench + "-" + std::to_string(::getpid()) + ".toml");
+  std::ofstream(file) << text << more;
   return "inproc:" + file.string();
-}();
+}
+
+/// The BM500 behind its switched inverter, with voltage sensors against the negative rail.
+const std::string kStar = variant_of("bm500", "\n[axis.voltage_sensor]\nagainst_rail = true\n");
 
 /// Runs `ticks` with rotating voltages on axis 0 and returns the last sample.
 Sample turn(Bench& bench, std::uint64_t ticks) {
@@ -146,6 +149,26 @@ TEST(Sdk, AProgramWithAnOlderHeaderGetsTheSignalsThatItKnows) {
   EXPECT_NE(room[kKnown - 1], 0x5a5a5a5a5a5a5a5a) << "the last one that it knows";
   EXPECT_EQ(room[kKnown], 0x5a5a5a5a5a5a5a5a);
   drivebench_close(bench);
+}
+
+// Catches: an event that is not told, that acts elsewhere than in its tick or not at all, and a reset that
+// leaves it done.
+TEST(Sdk, EventsOfTheBenchFileAreTold) {
+  Bench bench(variant_of("servo",
+                         "\n[[axis.fault]]\nname = \"bus_sag\"\nvalue = 0.25\nwhen = \"command_tick >= 20\"\n"
+                         "for_ticks = 4\ndelay_ticks = 10\n"));
+  ASSERT_EQ(bench.describe().event_count, 1u);
+  EXPECT_EQ(std::string(bench.describe().events[0].text),
+            "fault bus_sag = 0.25 10 ticks after command_tick >= 20 for 4 ticks");
+  for (int run = 0; run < 2; ++run) {
+    bench.acquire();
+    EXPECT_EQ(bench.event_tick(0), std::nullopt);
+    turn(bench, 100);
+    EXPECT_EQ(bench.event_tick(0), 35)
+        << "command 20 shows in sample 21, the condition still holds in sample 25";
+    bench.reset();
+  }
+  EXPECT_EQ(refusal_of([&] { bench.event_tick(1); }).code(), DRIVEBENCH_BAD_ARGUMENT);
 }
 
 // Catches: a reset that forgets a parameter, a lease, a scheduled change or the noise.

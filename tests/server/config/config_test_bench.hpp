@@ -152,6 +152,11 @@ inline void expect_equal(const std::vector<AxisEvent>& x, const std::vector<Axis
     const PackedInput a = pack({.tick = x[i].tick, .action = x[i].action});
     const PackedInput b = pack({.tick = y[i].tick, .action = y[i].action});
     EXPECT_EQ(std::memcmp(&a, &b, sizeof(a)), 0) << "event " << i << " at tick " << x[i].tick;
+    ASSERT_EQ(x[i].trigger.has_value(), y[i].trigger.has_value()) << "event " << i;
+    if (!x[i].trigger) continue;
+    EXPECT_EQ(x[i].trigger->axis, y[i].trigger->axis) << "event " << i;
+    EXPECT_EQ(x[i].trigger->for_ticks, y[i].trigger->for_ticks) << "event " << i;
+    EXPECT_EQ(text_of(x[i].trigger->condition), text_of(y[i].trigger->condition)) << "event " << i;
   }
 }
 

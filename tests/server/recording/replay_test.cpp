@@ -14,6 +14,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "protocols/mcap/mcap.hpp"
 #include "protocols/sample_codec.hpp"
+#include "protocols/signals/catalogue.hpp"
 #include "server/engine/engine.hpp"
 #include "server/host/asio.hpp"
 #include "server/host/build_id.hpp"
@@ -27,11 +28,16 @@ using Result = ReplayReport::Result;
 using Bytes = std::vector<std::byte>;
 
 /// A lockstep run with every event that a recording can hold: two axes, a lease, commands, loads from the
-/// file and from clients, a parameter write and a ramp, a fault, a bump, refused commands, a clear.
+/// file, one of them behind a trigger, and from clients, a parameter write and a ramp, a fault, a bump, refused
+/// commands, a clear.
 Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
   const TestFolder folder;
   BenchConfig config = servo_bench(axes);
-  config.axes[1].events = {{.tick = 5, .action = LoadChange{.load_nm = 0.02, .ramp_ticks = 3}}};
+  const auto load = static_cast<std::uint64_t>(find_signal("load_nm") - kSignals.data());
+  const Trigger loaded{.axis = 1, .condition = {.signal = load, .number = 0.01}};
+  config.axes[1].events = {
+      {.tick = 5, .action = LoadChange{.load_nm = 0.02, .ramp_ticks = 3}},
+      {.tick = 2, .action = LoadChange{.load_nm = 0.01, .ramp_ticks = 0}, .trigger = loaded}};
   asio::io_context io(1);
   const auto engine =
       make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config), io);
@@ -104,7 +110,7 @@ TEST(Replay, REC_12_ARunReplaysBitForBit) {
   EXPECT_EQ(report.result, Result::kEqual) << report.problem;
   EXPECT_EQ(report.ticks, 501u);
   EXPECT_EQ(report.samples, 2 * 502u) << "of two axes, with those of tick 0";
-  EXPECT_EQ(report.inputs, 7 + 2 + 500u + 1) << "the last one takes the lease back";
+  EXPECT_EQ(report.inputs, 8 + 2 + 500u + 1) << "the last one takes the lease back";
   EXPECT_EQ(report.state_hash, state_hash);
   EXPECT_NE(report.recorded_by.find("drivebench"), std::string::npos);
   EXPECT_FALSE(report.difference);

@@ -12,7 +12,7 @@ command it brings, except in real time, where it returns with the next one.
 """
 from drivebench.aio import AsyncBench
 from drivebench.bench import OFF, SHORT, Bench, Command
-from drivebench.description import Axis, Description, Fault, Injectable, Kind, Mode, Parameter, Signal, State, Type
+from drivebench.description import Axis, Description, Event, Fault, Injectable, Kind, Mode, Parameter, Signal, State, Type
 from drivebench.errors import (BadArgument, BenchClosed, Code, DrivebenchError, Failed, LibraryNotFound, LinkLost, NoBench,
                                OtherAbi, ProgramNotFound, Refused, ServerFailed)
 from drivebench.library import Sample, version
@@ -21,6 +21,6 @@ from drivebench.recording import Recording, read_recording
 from drivebench.server import Server, serve
 
 __all__ = ["OFF", "SHORT", "AsyncBench", "Axis", "BadArgument", "Bench", "BenchClosed", "Code", "Command", "Description",
-           "DrivebenchError", "Failed", "Fault", "Injectable", "Kind", "LibraryNotFound", "LinkLost", "Mode", "NoBench",
+           "DrivebenchError", "Event", "Failed", "Fault", "Injectable", "Kind", "LibraryNotFound", "LinkLost", "Mode", "NoBench",
            "OtherAbi", "Parameter", "ProgramNotFound", "Recorder", "Recording", "Refused", "Sample", "Server",
            "ServerFailed", "Signal", "State", "Type", "read_recording", "serve", "version"]

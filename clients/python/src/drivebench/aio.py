@@ -69,6 +69,7 @@ class AsyncBench:
     set_load = _awaited(Bench.set_load)
     inject = _awaited(Bench.inject)
     bump = _awaited(Bench.bump)
+    event_tick = _awaited(Bench.event_tick)
     state_hash = _awaited(Bench.state_hash)
     reset = _awaited(Bench.reset)
     save = _awaited(Bench.save)

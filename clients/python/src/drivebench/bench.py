@@ -210,6 +210,12 @@ class Bench:
         self._call("bump", self._number(axis), arguments.number("impulse_nms", impulse_nms),
                    arguments.whole("at_tick", at_tick))
 
+    def event_tick(self, event: int) -> int | None:
+        """The tick in which one of describe().events acted; None: not yet. In process only."""
+        tick = ctypes.c_int64()
+        self._call("event_tick", arguments.whole("event", event), ctypes.byref(tick))
+        return tick.value if tick.value >= 0 else None
+
     def state_hash(self) -> int:
         """The hash of the state and of all samples so far: equal hashes mean equal runs. Lockstep only."""
         value = ctypes.c_uint64()

@@ -95,6 +95,14 @@ class Fault:
 
 
 @dataclasses.dataclass(frozen=True)
+class Event:
+    """A change that the bench file makes at a tick or on a condition."""
+
+    axis: int
+    text: str  # for example "fault open_phase = 2 when speed_rad_s > 100 for 40 ticks"
+
+
+@dataclasses.dataclass(frozen=True)
 class Injectable:
     """A fault for Bench.inject(); its bit stands in Sample.injected."""
 
@@ -130,6 +138,7 @@ class Description:
     signals: dict[str, Signal]
     faults: dict[str, Fault]
     injectables: dict[str, Injectable]
+    events: tuple[Event, ...]  # empty over a link: only a bench in process tells its events
 
     def fault_names(self, word: int) -> list[str]:
         """The names of the bits in a fault word, as in Sample.faults."""
@@ -153,4 +162,5 @@ def description_of(d: DescriptionStruct) -> Description:
     return Description(text(d.name), Mode(d.mode) if d.mode else None, d.period_s, d.substeps, d.command_delay_ticks,
                        d.arming_commands, d.watchdog_ticks, d.lease_s, d.seed, d.configuration_hash,
                        tuple(_axis(row) for row in d.axes[:d.axis_count]), {each.name: each for each in signals},
-                       {each.name: each for each in faults}, {each.name: each for each in injectables})
+                       {each.name: each for each in faults}, {each.name: each for each in injectables},
+                       tuple(Event(e.axis, text(e.text)) for e in d.events[:d.event_count]))

@@ -49,6 +49,10 @@ class InjectableStruct(ctypes.Structure):
                 ("minimum", ctypes.c_double), ("maximum", ctypes.c_double), ("integer", ctypes.c_int32)]
 
 
+class EventStruct(ctypes.Structure):
+    _fields_ = [("axis", ctypes.c_uint32), ("text", ctypes.c_char_p)]
+
+
 class DescriptionStruct(ctypes.Structure):
     _fields_ = [("name", ctypes.c_char_p), ("mode", ctypes.c_int32), ("period_s", ctypes.c_double),
                 ("substeps", ctypes.c_uint32), ("command_delay_ticks", ctypes.c_uint32), ("arming_commands", ctypes.c_uint32),
@@ -57,7 +61,8 @@ class DescriptionStruct(ctypes.Structure):
                 ("axes", ctypes.POINTER(AxisStruct)), ("signal_count", ctypes.c_size_t),
                 ("signals", ctypes.POINTER(SignalStruct)), ("fault_count", ctypes.c_size_t),
                 ("faults", ctypes.POINTER(FaultStruct)), ("injectable_count", ctypes.c_size_t),
-                ("injectables", ctypes.POINTER(InjectableStruct))]
+                ("injectables", ctypes.POINTER(InjectableStruct)), ("event_count", ctypes.c_size_t),
+                ("events", ctypes.POINTER(EventStruct))]
 
 
 class OptionsStruct(ctypes.Structure):
@@ -83,6 +88,7 @@ _CALLS: dict[str, tuple[Any, ...]] = {
     "set_load": (_BENCH, _AXIS, ctypes.c_double, _TICKS, _TICKS),
     "inject": (_BENCH, _AXIS, ctypes.c_char_p, ctypes.c_double, _TICKS),
     "bump": (_BENCH, _AXIS, ctypes.c_double, _TICKS),
+    "event_tick": (_BENCH, ctypes.c_size_t, ctypes.POINTER(ctypes.c_int64)),
     "state_hash": (_BENCH, ctypes.POINTER(ctypes.c_uint64)),
     "reset": (_BENCH,),
     "save": (_BENCH, ctypes.c_void_p, ctypes.POINTER(ctypes.c_size_t)),
