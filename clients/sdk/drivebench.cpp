@@ -34,6 +34,7 @@ drivebench::link::LinkOptions link_options(const drivebench_options& o) {
   drivebench::link::LinkOptions options{.client = o.client != nullptr ? o.client : "libdrivebench"};
   const char* const token = o.token != nullptr ? o.token : std::getenv("DRIVEBENCH_TOKEN");
   if (token != nullptr) options.token = token;
+  options.conducts = o.conducts != 0;
   if (o.deadline_ms != 0) options.deadline = std::chrono::milliseconds(o.deadline_ms);
   return options;
 }

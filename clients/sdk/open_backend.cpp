@@ -45,6 +45,12 @@ std::unique_ptr<abi::Backend> open_inproc(std::string_view bench) {
 }
 
 std::unique_ptr<abi::Backend> open_any(std::string_view address, const link::LinkOptions& options) {
+  const bool is_bus = link::is_can_address(address) || link::is_modbus_address(address);
+  if (options.conducts && (is_bus || address.starts_with(kInproc))) {
+    throw OpenError(DRIVEBENCH_NOT_AVAILABLE,
+                    "conducts works over tcp:, tls: and unix: only: elsewhere there is no "
+                    "other session whose axis could be changed, or no way to ask for it");
+  }
   if (address.starts_with(kInproc)) return open_inproc(address.substr(kInproc.size()));
   if (link::is_can_address(address)) {
     return std::make_unique<BusBackend>(std::make_unique<link::CanLink>(

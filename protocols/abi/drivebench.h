@@ -266,6 +266,9 @@ typedef struct drivebench_options {
   const char* client;   /**< a name for the server's log; null: "libdrivebench" */
   uint32_t deadline_ms; /**< for connecting and for each answer; 0: 5000 */
   int32_t clear_on_acquire; /**< 1: drivebench_acquire() clears what a controller before has left latched */
+  /** 1: drivebench_set(), _set_load(), _inject() and _bump() also change axes that other sessions hold; over
+   * tcp, tls and unix, with the role conductor */
+  int32_t conducts;
 } drivebench_options;
 
 DRIVEBENCH_API int drivebench_open_abi(const char* address, const drivebench_options* options, uint32_t abi,

@@ -13,7 +13,7 @@ std::size_t Places::reserve_for(const std::string& address, Role role) const {
   const bool on_unix = address == kUnixAddress;
   if (!asks_for_token_) return on_unix ? kReserve : 0;
   if (role == Role::kAdmin) return kReserve;
-  return on_unix || role == Role::kOperator ? kReserve / 2 : 0;
+  return on_unix || role >= Role::kOperator ? kReserve / 2 : 0;
 }
 
 /// Empty: there is a place for one more session.

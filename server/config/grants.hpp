@@ -13,7 +13,7 @@
 namespace drivebench {
 
 /// The rights of a session; each role includes those before it.
-enum class Role : std::uint32_t { kViewer = 1, kOperator = 2, kAdmin = 3 };
+enum class Role : std::uint32_t { kViewer = 1, kOperator = 2, kConductor = 3, kAdmin = 4 };
 std::string_view name_of(Role role) noexcept;
 
 /// The SHA-256 of a token. The server keeps only the hashes.

@@ -12,7 +12,7 @@ inline constexpr std::array<std::string_view, 2> kPacerWords{"sleep", "sleep+spi
 inline constexpr std::array<std::string_view, 4> kSafeActionWords{"freewheel", "zero_voltage", "hold",
                                                                   "quick_stop"};
 inline constexpr std::array<std::string_view, 2> kOnExcessWords{"saturate", "refuse"};
-inline constexpr std::array<std::string_view, 3> kRoleWords{"viewer", "operator", "admin"};
+inline constexpr std::array<std::string_view, 4> kRoleWords{"viewer", "operator", "conductor", "admin"};
 inline constexpr std::array<std::string_view, 2> kAuditFailureWords{"continue", "safe"};
 inline constexpr std::array<std::string_view, 5> kLogLevelWords{"debug", "info", "warn", "error", "off"};
 

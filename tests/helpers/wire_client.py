@@ -129,14 +129,14 @@ class Server:
             s.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return s
 
-    def client(self, hello=True, token="", **options):
-        return Client(self.raw(**options), hello, token)
+    def client(self, hello=True, token="", conducts=False, **options):
+        return Client(self.raw(**options), hello, token, conducts)
 
 
 class Client:
     """One connection. Messages without a request are kept in `samples` and `notices`."""
 
-    def __init__(self, sock, hello=True, token=""):
+    def __init__(self, sock, hello=True, token="", conducts=False):
         self.socket = sock
         self.samples = []
         self.notices = []
@@ -145,7 +145,7 @@ class Client:
         self.welcome = None
         self.buffer = b""
         if hello:
-            self.welcome = self.hello(token).welcome
+            self.welcome = self.hello(token, conducts=conducts).welcome
 
     def __enter__(self):
         return self
@@ -156,8 +156,8 @@ class Client:
     def close(self):
         self.socket.close()
 
-    def hello(self, token="", name="wire test"):
-        return self.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client=name, token=token))
+    def hello(self, token="", name="wire test", conducts=False):
+        return self.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client=name, token=token, conducts=conducts))
 
     def send_bytes(self, data):
         self.socket.sendall(data)

@@ -41,19 +41,24 @@ void add_watch(CommandLine& line) {
       ->capture_default_str();
 }
 
+void add_conduct(CLI::App& sub, LinkChoice& link) {
+  sub.add_flag("--conduct", link.conducts,
+               "also while another session controls the axis; needs the role conductor");
+}
+
 void add_inject(CommandLine& line) {
-  const auto [sub, o] =
-      line.add<InjectOptions>("inject", "put a fault into an axis that no session controls", run_inject);
+  const auto [sub, o] = line.add<InjectOptions>("inject", "put a fault into an axis", run_inject);
   add_link(sub, o.link);
+  add_conduct(sub, o.link);
   sub.add_option("AXIS", o.axis, "number or name")->required();
   sub.add_option("FAULT", o.fault, "name, as describe lists them")->required();
   sub.add_option("VALUE", o.value, "0 takes it away")->required()->check(finite_between(-kMost, kMost));
 }
 
 void add_set(CommandLine& line) {
-  const auto [sub, o] =
-      line.add<SetOptions>("set", "write a parameter of an axis that no session controls", run_set);
+  const auto [sub, o] = line.add<SetOptions>("set", "write a parameter of an axis", run_set);
   add_link(sub, o.link);
+  add_conduct(sub, o.link);
   sub.add_option("AXIS", o.axis, "number or name")->required();
   sub.add_option("NAME", o.name, "as describe lists them")->required();
   sub.add_option("VALUE", o.value, "a number, or the word of a choice")->required();
@@ -62,9 +67,9 @@ void add_set(CommandLine& line) {
 }
 
 void add_bump(CommandLine& line) {
-  const auto [sub, o] =
-      line.add<BumpOptions>("bump", "hit the shaft of an axis that no session controls", run_bump);
+  const auto [sub, o] = line.add<BumpOptions>("bump", "hit the shaft of an axis", run_bump);
   add_link(sub, o.link);
+  add_conduct(sub, o.link);
   sub.add_option("AXIS", o.axis, "number or name")->required();
   sub.add_option("IMPULSE", o.impulse_nms, "[N*m*s], positive like a machine torque")
       ->required()

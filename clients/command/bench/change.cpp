@@ -22,15 +22,15 @@ std::uint32_t leased_axis(const v1::BenchDescription& bench, std::uint32_t numbe
   return shared.empty() ? number : axis_number(bench, shared);
 }
 
-/// An open link and the lease of the chosen axis: only the owner may change an axis. A free run has no
-/// owners.
+/// An open link and the lease of the chosen axis: only its owner and a conductor may change an axis. A free
+/// run has no owners.
 class HeldAxis {
  public:
   HeldAxis(const LinkChoice& choice, std::string_view axis, std::string_view subcommand)
       : link_(open_link(choice, subcommand)),
         number_(axis_number(link_.welcome().bench(), axis)),
         leased_(leased_axis(link_.welcome().bench(), number_)),
-        holds_(link_.welcome().bench().mode() != v1::MODE_FREE) {
+        holds_(!choice.conducts && link_.welcome().bench().mode() != v1::MODE_FREE) {
     if (holds_) link_.acquire(leased_);
   }
   ~HeldAxis() {

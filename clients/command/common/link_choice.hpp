@@ -10,6 +10,7 @@ namespace drivebench::command {
 struct LinkChoice {
   std::string address{link::kDefaultAddress};
   std::string token{};
+  bool conducts = false;  ///< changes axes that other sessions hold
 };
 
 }  // namespace drivebench::command

@@ -37,8 +37,9 @@ link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
         "{} needs a tcp:, tls: or unix: link; over CAN and Modbus there is only control", subcommand));
   }
   try {
-    return link::Link(choice.address,
-                      {.client = fmt::format("drivebench {}", subcommand), .token = choice.token});
+    return link::Link(choice.address, {.client = fmt::format("drivebench {}", subcommand),
+                                       .token = choice.token,
+                                       .conducts = choice.conducts});
   } catch (const link::RefusalError& refused) {
     throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
   }

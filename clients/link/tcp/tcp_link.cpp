@@ -59,6 +59,7 @@ void Link::hello(const LinkOptions& options) {
   mine.set_protocol_max(kProtocol);
   mine.set_client(options.client);
   mine.set_token(options.token);
+  mine.set_conducts(options.conducts);
   welcome_ = ask(request, Kind::kWelcome).welcome();
   if (welcome_.protocol() != kProtocol) {
     fail("speaks protocol " + std::to_string(welcome_.protocol()) + ", this program speaks " +

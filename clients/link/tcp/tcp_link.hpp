@@ -23,6 +23,7 @@ namespace drivebench::link {
 struct LinkOptions {
   std::string client = "drivebench";  ///< a name for the server's log
   std::string token{};
+  bool conducts = false;  ///< changes axes that other sessions hold; needs the role conductor
   std::chrono::milliseconds deadline{5000};  ///< for connecting and for every answer
 };
 

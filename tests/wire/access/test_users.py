@@ -102,6 +102,37 @@ class Roles(UsersTest):
         self.assertIn("admin", answer.refusal.message)
         operator.step(0)
 
+    def test_own_10_a_conductor_changes_what_another_session_drives(self):
+        """Catches: a conductor that is refused, that needs no role, that may command, or whose changes end with a lease."""
+        server = self.server_for(USERS + entry("cora", "conductor"))
+        for name in ("vera", "otto"):
+            with server.client(hello=False) as client:
+                answer = client.hello(f"{name}-secret", conducts=True)
+                self.assertRefused(answer, pb.REFUSAL_FORBIDDEN, "conducts")
+                self.assertIn("needs the role conductor", answer.refusal.message)
+        owner = self.user(server, "otto")
+        self.assertDone(owner.lease())
+        owner.step(0, 1.0)
+        modest = self.user(server, "cora")
+        self.assertEqual(modest.welcome.role, pb.ROLE_CONDUCTOR)
+        changes = [{"write_parameter": pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.0)},
+                   {"set_load": pb.SetLoad(load_nm=0.25)}, {"inject_fault": pb.InjectFault(name="bus_sag", value=0.5)},
+                   {"shaft_bump": pb.ShaftBump(impulse_nms=1e-4)}]
+        for change in changes:  # who does not say that he conducts disturbs nobody by mistake
+            self.assertRefused(modest.ask(**change), pb.REFUSAL_NOT_OWNER, "axis")
+        conductor = self.user(server, "cora", conducts=True)
+        for change in changes:
+            self.assertDone(conductor.ask(**change))
+        self.assertRefused(conductor.ask(exchange=pb.Exchange(commands=[pb.Command(tick=1)])), pb.REFUSAL_NOT_OWNER)
+        self.assertRefused(conductor.ask(clear_faults=pb.ClearFaults()), pb.REFUSAL_NOT_OWNER)
+        conductor.close()
+        owner.step(1, 1.0)
+        sample = owner.newest()
+        self.assertEqual((sample.load_nm, sample.owner), (0.25, owner.owner))
+        self.assertEqual(sample.injected, 1 << [f.name for f in owner.welcome.bench.injectable_faults].index("bus_sag"))
+        self.assertDone(owner.lease(pb.LeaseRequest.ACTION_RELEASE))
+        self.assertEqual(owner.newest().load_nm, 0.25)
+
     def test_without_tokens_every_client_is_an_administrator(self):
         """Catches: a bench for one user that asks for a token."""
         client = self.client(self.server())

@@ -15,8 +15,9 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from command_test import FAILED, USAGE, CommandTest, link_of
 from wire_client import BENCHES, pb
-from wire_test import TWO_DRIVES, until
+from wire_test import PATIENT_TEXT, TWO_DRIVES, until
 
+RUN = 1  # a state of an axis
 NAME = "machine.rotor_resistance_ohm"
 
 
@@ -42,6 +43,20 @@ class Commands(CommandTest):
         self.assertSays(self.drivebench("status", link=self.link).stdout, "injected bus_sag hall_offset")
         self.assertSays(self.drivebench("describe", link=self.link).stdout, "machine induction, 2 phases (two_phase)",
                         "drive voltage_amplifier", "injectable fault", "open_phase")
+
+    def test_a_conductor_disturbs_an_axis_that_a_controller_drives(self):
+        """Catches: --conduct that asks for the lease, and a change that a running controller cannot see."""
+        changes = [("inject", "servo", "bus_sag", "0.25"), ("set", "servo", NAME, "5.9"), ("bump", "servo", "0.0001")]
+        with self.bench.client() as client:
+            client.lease()
+            client.step(0, 1.0)
+            for change in changes:
+                self.assertSays(self.drivebench(*change, link=self.link, code=1).stderr, "another session holds the lease")
+            for change in changes:
+                self.assertSays(self.drivebench(*change, "--conduct", link=self.link).stdout, "from tick 1 on")
+            client.step(1, 1.0)
+            self.assertEqual(self.status()["injected_set"], ["bus_sag"])
+            self.assertEqual(client.newest().owner, client.owner)
 
     def test_set_writes_numbers_and_words_and_ramps(self):
         """Catches: a ramp in ticks of another bench, a word that is taken for 0."""
@@ -76,7 +91,7 @@ class Commands(CommandTest):
     def test_clear_ends_what_a_lost_controller_left(self):
         """Catches: an axis that nobody can use after its controller died, a status without the latch, a clear that keeps
         the axis, one that says it cleared what is not gone."""
-        bench = self.server("--mode", "realtime")
+        bench = self.server("--mode", "realtime", text=PATIENT_TEXT)
         link = link_of(bench)
 
         def status():
@@ -85,8 +100,11 @@ class Commands(CommandTest):
         self.assertSays(self.drivebench("clear", "servo", link=link).stdout, "axis 0 (servo): cleared, no latched fault showed")
         with bench.client() as client:
             client.lease()
-            for _ in range(50):
-                client.exchange(client.newest().tick, gates=pb.GATES_OFF)
+
+            def is_driven():
+                client.exchange(client.newest().tick)
+                return client.newest().state == RUN
+            until(is_driven, "the axis is driven")
         until(lambda: status()["latched_set"] == ["lease_lost"], "the session's end is noticed")
         self.assertSays(self.drivebench("status", link=link).stdout, "latched: lease_lost; no command is executed",
                         "`drivebench clear 0`")

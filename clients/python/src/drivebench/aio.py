@@ -30,8 +30,9 @@ class AsyncBench:
     dropped, and the next call comes after it.
     """
 
-    def __init__(self, address: str, token: str | None = None, deadline_s: float = 5.0, clear: bool = False) -> None:
-        self._open = functools.partial(Bench, address, token, deadline_s, clear)
+    def __init__(self, address: str, token: str | None = None, deadline_s: float = 5.0, clear: bool = False,
+                 conducts: bool = False) -> None:
+        self._open = functools.partial(Bench, address, token, deadline_s, clear, conducts)
         self._bench: Bench | None = None
         self._process = os.getpid()  # a forked child has no worker
         self._worker = concurrent.futures.ThreadPoolExecutor(1, "drivebench")

@@ -62,14 +62,18 @@ class Bench:
     token: of the bench; None: the environment variable DRIVEBENCH_TOKEN, if it is set.
     deadline_s: [s] for connecting and for each answer.
     clear: acquire() clears what a controller before has left latched.
+    conducts: set(), set_load(), inject() and bump() also change axes that other sessions hold: over tcp, tls and unix,
+        with the role conductor.
 
     Every method raises DrivebenchError. `axis` is a number or a name. Several threads may call: they take turns.
     """
 
-    def __init__(self, address: str, token: str | None = None, deadline_s: float = 5.0, clear: bool = False) -> None:
+    def __init__(self, address: str, token: str | None = None, deadline_s: float = 5.0, clear: bool = False,
+                 conducts: bool = False) -> None:
         library = load()
         options = OptionsStruct(token=None if token is None else arguments.string("token", token), client=b"drivebench-python",
-                                deadline_ms=arguments.milliseconds("deadline_s", deadline_s), clear_on_acquire=bool(clear))
+                                deadline_ms=arguments.milliseconds("deadline_s", deadline_s), clear_on_acquire=bool(clear),
+                                conducts=bool(conducts))
         pointer = ctypes.c_void_p()
         code = library.open_abi(arguments.string("address", address), options, ABI, library.sample_size, ctypes.byref(pointer))
         if code != Code.OK:

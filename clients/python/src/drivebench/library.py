@@ -67,7 +67,7 @@ class DescriptionStruct(ctypes.Structure):
 
 class OptionsStruct(ctypes.Structure):
     _fields_ = [("token", ctypes.c_char_p), ("client", ctypes.c_char_p), ("deadline_ms", ctypes.c_uint32),
-                ("clear_on_acquire", ctypes.c_int32)]
+                ("clear_on_acquire", ctypes.c_int32), ("conducts", ctypes.c_int32)]
 
 
 _BENCH = ctypes.c_void_p

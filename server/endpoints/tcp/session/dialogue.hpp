@@ -32,6 +32,9 @@ class Dialogue {
   /// lease.
   Owner owner() const noexcept { return owner_; }
   void set_owner(Owner owner) noexcept { owner_ = owner; }
+  /// Whether the session may change axes that other sessions hold.
+  bool conducts() const noexcept { return conducts_; }
+  void set_conducts(bool conducts) noexcept { conducts_ = conducts; }
   std::shared_ptr<void> keep_alive() const { return keep_alive_(); }
 
   /// The id of the present request.
@@ -74,6 +77,7 @@ class Dialogue {
   std::function<std::shared_ptr<void>()> keep_alive_;
   std::uint64_t id_ = 0;
   Owner owner_ = 0;
+  bool conducts_ = false;
   std::size_t bytes_in_turn_ = 0;
 };
 

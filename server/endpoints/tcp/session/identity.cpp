@@ -35,24 +35,28 @@ bool Identity::admit(const v1::Hello& hello) {
   Client& client = dialogue_.client();
   const Admission::Decision decision = context.admission.admit(
       hello.token(), address_of(client), ServerClock::now(), std::chrono::system_clock::now());
-  if (decision.admitted) {
-    grant_ = decision.grant;
-    if (!grant_.name.empty()) client.subject = grant_.name;  // otherwise the name of the certificate stays
-    return true;
+  if (!decision.admitted) {
+    ++context.counts.wrong_tokens;
+    dialogue_.report("authentication", "not admitted", decision.why_not, {{"client", hello.client()}});
+    dialogue_.refuse(dialogue_.id(), v1::REFUSAL_UNAUTHENTICATED, decision.why_not, "token");
+    return false;
   }
-  ++context.counts.wrong_tokens;
-  dialogue_.report("authentication", "not admitted", decision.why_not, {{"client", hello.client()}});
-  dialogue_.refuse(dialogue_.id(), v1::REFUSAL_UNAUTHENTICATED, decision.why_not, "token");
-  return false;
+  grant_ = decision.grant;
+  if (!grant_.name.empty()) client.subject = grant_.name;  // otherwise the name of the certificate stays
+  if (hello.conducts() && !is_at_least(Role::kConductor, "conducts")) return false;
+  dialogue_.set_conducts(hello.conducts());
+  return true;
 }
 
 bool Identity::may_ask(const v1::Envelope& request) {
-  const Role needed = role_needed_for(request);
+  const auto* kind = v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(request.kind_case()));
+  return is_at_least(role_needed_for(request), kind == nullptr ? "kind" : kind->name());
+}
+
+bool Identity::is_at_least(Role needed, const std::string& field) {
   if (grant_.role >= needed) return true;
   forbidden().use();
   asked_forbidden_ = true;
-  const auto* kind = v1::Envelope::descriptor()->FindFieldByNumber(static_cast<int>(request.kind_case()));
-  const std::string field = kind == nullptr ? "kind" : kind->name();
   dialogue_.report("forbidden", "forbidden", "the role does not allow it", {{"request", field}});
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_FORBIDDEN,
                    "this session is that of " + (grant_.name.empty() ? "an unnamed user" : grant_.name) +

@@ -23,7 +23,8 @@ class Identity {
   /// Called with a sentence when the grant is no longer valid.
   std::function<void(const std::string&)> on_end;
 
-  /// Checks the token of a hello; refuses the hello if no grant has this token.
+  /// Checks the token of a hello and what it asks for; refuses the hello if no grant has this token or if its
+  /// role does not allow that.
   bool admit(const v1::Hello& hello);
   /// Whether the role allows the request; if not, refuses it.
   bool may_ask(const v1::Envelope& request);
@@ -40,6 +41,8 @@ class Identity {
   const Grant& grant() const noexcept { return grant_; }
 
  private:
+  /// Whether the role is this one or a higher one; if not, refuses the request.
+  bool is_at_least(Role needed, const std::string& field);
   Allowance& forbidden();
 
   Dialogue& dialogue_;

@@ -12,6 +12,20 @@ namespace {
 
 constexpr std::uint32_t kProtocolVersion = 1;
 
+v1::Role wire_role(Role role) noexcept {
+  switch (role) {
+    case Role::kViewer:
+      return v1::ROLE_VIEWER;
+    case Role::kOperator:
+      return v1::ROLE_OPERATOR;
+    case Role::kConductor:
+      return v1::ROLE_CONDUCTOR;
+    case Role::kAdmin:
+      break;
+  }
+  return v1::ROLE_ADMIN;
+}
+
 }  // namespace
 
 Session::Session(Outbox::Socket socket, Client client, SessionContext& context, Places::Number place)
@@ -229,7 +243,7 @@ void Session::welcome() {
   welcome.set_build_id(std::string(build_id()));
   *welcome.mutable_bench() = describe(dialogue_.engine());
   welcome.set_descriptor_set(bench_descriptor_set());
-  welcome.set_role(static_cast<v1::Role>(identity_.grant().role));
+  welcome.set_role(wire_role(identity_.grant().role));
   welcome.set_subject(identity_.grant().name);
   dialogue_.send_reply();
 }

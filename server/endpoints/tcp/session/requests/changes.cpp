@@ -12,7 +12,7 @@ void pass_on(Dialogue& dialogue, Leases& leases, std::uint32_t axis, std::uint64
   }
   leases.ask({.tick = static_cast<Tick>(at_tick),
               .axis = axis,
-              .owner = dialogue.owner(),
+              .owner = dialogue.conducts() ? leases.sender(axis) : dialogue.owner(),
               .action = std::get<Action>(judged)},
              field);
 }

@@ -76,10 +76,14 @@ void Leases::lose_all() {
 
 bool Leases::may_change(std::uint32_t axis) {
   if (!dialogue_.axis_exists(axis)) return false;
-  const Owner owner = engine_.owner(axis);
-  if (engine_.config().mode == RunMode::kFree || (owner != 0 && owner == dialogue_.owner())) return true;
+  if (engine_.config().mode == RunMode::kFree || dialogue_.conducts() || sender(axis) != 0) return true;
   dialogue_.refuse(dialogue_.id(), Refused::kNotOwner, "axis");
   return false;
+}
+
+Owner Leases::sender(std::uint32_t axis) const {
+  const Owner owner = dialogue_.owner();
+  return owner == engine_.owner(axis) ? owner : 0;
 }
 
 std::string Leases::not_owner_of(std::uint32_t axis) const {

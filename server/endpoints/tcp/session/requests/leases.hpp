@@ -25,8 +25,11 @@ class Leases {
   /// Called at the end of the session: its leases end as lost, and so does any lease granted afterwards.
   void lose_all();
 
-  /// Whether the session may change this axis; if not, refuses the request.
+  /// Whether the session may change this axis, as its holder, as a conductor or in a free run; if not,
+  /// refuses the request.
   bool may_change(std::uint32_t axis);
+  /// The owner number of the session on an axis that it holds; 0, no owner, on any other.
+  Owner sender(std::uint32_t axis) const;
   /// The reason why the session does not hold the axis, for a refusal.
   std::string not_owner_of(std::uint32_t axis) const;
   /// Sends the input to the bench under the owner number of the session, and the answer to the client.
