@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace drivebench::identification {
 namespace {
@@ -61,7 +62,9 @@ Matrix covariance_of(const Linear& l) {
 }  // namespace
 
 Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) {
-  Fit fit{.at = start, .sum = std::numeric_limits<double>::infinity(), .covariance = {}, .found = false};
+  Fit fit;
+  fit.at = start;
+  fit.sum = std::numeric_limits<double>::infinity();
   Linear l;
   if (!residuals(start, l.residual)) return fit;
   fit.sum = l.residual.squaredNorm();
@@ -96,6 +99,8 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) 
     if (!better || size2 < kSmallStep2) break;
   }
   fit.covariance = covariance_of(l);
+  fit.residual = l.residual.col(0);
+  fit.jacobian = std::move(l.jacobian);
   fit.found = fit.covariance.allFinite();
   return fit;
 }

@@ -14,6 +14,8 @@ struct Fit {
   Eigen::VectorXd at;
   double sum = 0.0;            ///< of squares
   Eigen::MatrixXd covariance;  ///< of the coordinates
+  Eigen::VectorXd residual;    ///< at the minimum
+  Eigen::MatrixXd jacobian;    ///< of the residuals, at most a hundredth of a standard deviation from there
   bool found = false;
 };
 

@@ -112,10 +112,11 @@ class Predictor {
 
   /// The innovations of each model with the gains of the last filter(), over their expected rms, sample by
   /// sample, a column for each model; false if a run leaves all bounds. The models run side by side, so that
-  /// none waits for the end of its own step.
-  bool innovations(std::span<const Model> models, Eigen::Ref<Eigen::MatrixXd> out) const {
+  /// none waits for the end of its own step. They may be of another type with the same state.
+  template <class Other>
+  bool innovations(std::span<const Other> models, Eigen::Ref<Eigen::MatrixXd> out) const {
     std::vector<State> states;
-    for (const Model& model : models)
+    for (const Other& model : models)
       states.push_back(first_state(model));
     for (std::size_t n = 0; n < samples_.size(); ++n) {
       for (std::size_t m = 0; m < models.size(); ++m) {
@@ -127,8 +128,8 @@ class Predictor {
     return true;
   }
 
-  /// The speed of the last filter() or linearise() at each sample [rad/s].
-  const Series& speeds() const noexcept { return speeds_; }
+  /// The state of the last filter() or linearise() at each sample, with the angle at its end.
+  const std::vector<State>& filtered() const noexcept { return filtered_; }
 
  private:
   static constexpr double kStepOfRate = 0.2;
@@ -174,7 +175,7 @@ class Predictor {
     return 1.0;
   }
 
-  Values outputs(const Model& model, const State& x, const Direction& near) const noexcept {
+  Values outputs(const auto& model, const State& x, const Direction& near) const noexcept {
     const double electrical_rad = electrical(x.back());
     const auto i = model.currents(
         part_of(x), {.u = {}, .electrical_rad = electrical_rad, .direction = turned(near, electrical_rad)});
@@ -193,7 +194,7 @@ class Predictor {
   }
 
   /// The state after the n-th sample, from x at it on, with voltages added to the measured ones.
-  State advanced(const Model& model, State x, std::size_t n, const std::array<double, 3>& added_v,
+  State advanced(const auto& model, State x, std::size_t n, const std::array<double, 3>& added_v,
                  Direction near) const {
     const std::array<double, 3>* u = &voltages_[n * at(2 * substeps_ + 1)];
     const double step_s = r_.period_s / substeps_;
@@ -223,7 +224,7 @@ class Predictor {
   }
 
   /// The state at the next sample; the innovations of the n-th one go to `out`.
-  State followed(const Model& model, State x, std::size_t n, double* out) const {
+  State followed(const auto& model, State x, std::size_t n, double* out) const {
     const Direction direction = direction_at(x);
     const Correction& c = corrections_[n];
     Values found = errors_at(n, outputs(model, x, direction));
@@ -237,7 +238,7 @@ class Predictor {
     return advanced(model, x, n, {}, direction);
   }
 
-  State first_state(const Model& model) const {
+  State first_state(const auto& model) const {
     const std::size_t k = r_.range.first;
     State x{};
     x.back() = r_.angle[k];
@@ -324,14 +325,14 @@ class Predictor {
     Square p = first_spread(model, noise);
     const double voltage2 = noise.voltage_v * noise.voltage_v;
     double sum = 0.0;
-    speeds_.clear();
+    filtered_.clear();
     for (std::size_t n = 0; n < std::min(most, samples_.size()); ++n) {
       const Direction direction = direction_at(x);
       Sample& s = samples_[n];
       if constexpr (linearising) differentiate(model, x, n, direction, s);
       const Values errors = errors_at(n, outputs(model, x, direction));
       sum += corrected(s, noise, errors, x, p, corrections_[n]);
-      speeds_.push_back(x[Model::kSpeed]);
+      filtered_.push_back(x);
       x = advanced(model, x, n, {}, direction);
       if (!bounded(x)) return std::numeric_limits<double>::infinity();
       const Square carried = s.transition * p;
@@ -350,7 +351,7 @@ class Predictor {
   std::vector<Correction> corrections_;
   std::vector<double> measured_;                 ///< outputs of all samples, freed of the errors
   std::vector<std::array<double, 3>> voltages_;  ///< the same, at both ends and in the middle of each step
-  Series speeds_;
+  std::vector<State> filtered_;
 };
 
 }  // namespace drivebench::identification

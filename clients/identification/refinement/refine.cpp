@@ -5,12 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <optional>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "clients/identification/data/noise.hpp"
+#include "clients/identification/motors/bending_induction.hpp"
+#include "clients/identification/refinement/bend.hpp"
 #include "clients/identification/refinement/gauss_newton.hpp"
 #include "clients/identification/refinement/predictor.hpp"
 #include "clients/identification/refinement/sensor_unknowns.hpp"
@@ -189,6 +195,37 @@ Result begun(Result result, const Result& near) {
   return result;
 }
 
+/// A motor at the fit with a bend of each power, straight up to the flux that 95 % of the samples do not
+/// reach: the first samples of a run know the flux to within that of the largest current.
+std::vector<BendingInductionModel> bending_motors(const Predictor<InductionModel>& predictor,
+                                                  const BendingInductionModel& straight, double bend) {
+  constexpr double kUsual = 0.95;
+  Series flux_wb;
+  for (const auto& x : predictor.filtered())
+    flux_wb.push_back(std::abs(straight.magnetising_flux_wb({x[0], x[1], x[2], x[3], x[4]})));
+  const auto usual =
+      flux_wb.begin() + static_cast<std::ptrdiff_t>(kUsual * static_cast<double>(flux_wb.size()));
+  std::nth_element(flux_wb.begin(), usual, flux_wb.end());
+  std::vector<BendingInductionModel> motors(std::size(kBendPowers), straight);
+  for (std::size_t k = 0; k < motors.size(); ++k) {
+    motors[k].bend = bend;
+    motors[k].power = kBendPowers[k];
+    motors[k].reference_wb = *usual;
+  }
+  return motors;
+}
+
+/// What the fit says of iron that bends; `motor` is the motor at the fit.
+BendTest bend_of(const Predictor<InductionModel>& predictor, const Fit& fit,
+                 const std::vector<Unknown>& unknowns, const BendingInductionModel& motor) {
+  constexpr double kBend = 1e-4;
+  const auto motors = bending_motors(predictor, motor, kBend);
+  Eigen::MatrixXd directions(fit.residual.size(), static_cast<Eigen::Index>(motors.size()));
+  predictor.innovations(std::span<const BendingInductionModel>(motors), directions);
+  directions.colwise() -= fit.residual;
+  return test_bend(fit, unknowns, directions / kBend);
+}
+
 template <class Model>
 void refine_with(const PredictorRecord& record, const Settings& e, Result& result, const Result* near) {
   const double duration_s = record.period_s * static_cast<double>(record.range.count());
@@ -216,7 +253,8 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     const auto run = [&] {
       const auto count = static_cast<Eigen::Index>(models.size());
       predictor.correct(errors);
-      const bool whole = predictor.innovations(models, out.middleCols(first_column, count));
+      const bool whole =
+          predictor.innovations(std::span<const Model>(models), out.middleCols(first_column, count));
       models.clear();
       first_column += count;
       return whole;
@@ -238,7 +276,9 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     noise.voltage_v = near->explanation->voltage_noise_v;
     noise.current_a = near->explanation->current_noise_a;
   }
-  Fit fit{.at = coordinates_of(unknowns, trial), .sum = 0.0, .covariance = {}, .found = true};
+  Fit fit;
+  fit.at = coordinates_of(unknowns, trial);
+  fit.found = true;
   for (int round = near == nullptr ? 0 : kRounds - 1; round < kRounds && fit.found; ++round) {
     predictor.linearise(model_at(fit.at), noise);
     if (round > 0 && near == nullptr) {
@@ -253,12 +293,10 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     result.excitation = verdict_against(result, "no motor near that of the equations follows it");
     return;
   }
-  Eigen::MatrixXd innovations;
-  residuals(fit.at, innovations);
   Series angle_errors;
   Series current_errors;
-  for (Eigen::Index row = 0; row < innovations.rows(); ++row)
-    ((row + 1) % predictor.outputs() == 0 ? angle_errors : current_errors).push_back(innovations(row, 0));
+  for (Eigen::Index row = 0; row < fit.residual.size(); ++row)
+    ((row + 1) % predictor.outputs() == 0 ? angle_errors : current_errors).push_back(fit.residual(row));
   put_fit(e, unknowns, fit, result);
   set_apart(e, result);
   result.explanation = {.voltage_noise_v = noise.voltage_v,
@@ -267,8 +305,14 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
                         .current_error = rms(current_errors),
                         .current_white_a = first.current_a,
                         .angle_error = rms(angle_errors)};
-  const Series speeds = predictor.speeds();
-  result.explanation->unlikelihood = predictor.unlikelihood(model_at(fit.at), noise);
+  Series speeds;
+  for (const auto& x : predictor.filtered())
+    speeds.push_back(x[Model::kSpeed]);
+  const Model motor = model_at(fit.at);
+  std::optional<BendTest> bend;
+  if constexpr (std::is_same_v<Model, InductionModel>)
+    bend = bend_of(predictor, fit, unknowns, BendingInductionModel(trial, e));
+  result.explanation->unlikelihood = predictor.unlikelihood(motor, noise);
   std::string reason = unexplained(*result.explanation, record.largest_current_a);
   for (const char* name : {"f", "f_c"}) {
     const Estimate* const friction = result.find(name);
@@ -280,8 +324,14 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     result.excitation = verdict_against(result, reason);
     return;
   }
+  if (bend && bend->evidence > kTellsBend) {
+    result.explanation->holds = false;
+    result.excitation = verdict_on_saturation(result, *bend);
+    return;
+  }
   const double torque_nm = accelerating_torque(speeds, record.period_s, result.at("J"));
   result.excitation = verdict_on(e.kind, unseen_parameters(result, torque_nm, rms(speeds)));
+  if (bend && result.excitation.sufficient) result.notes.push_back(straight_note(*bend));
 }
 
 /// Whether the estimates of the equations can begin a refinement: finite, and not zero where a motor is not.

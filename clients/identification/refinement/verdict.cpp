@@ -36,6 +36,8 @@ constexpr auto kAdvice = std::to_array<Advice>({
 constexpr std::string_view kInertia = "let the speed rise and fall by much of itself";
 constexpr std::string_view kFriction = "record longer, at low and high speed, and in both directions";
 constexpr std::string_view kLoad = "record longer after the motor has run up";
+constexpr std::string_view kLessFlux =
+    "record a start at lower flux: at the same frequency with half the voltage or less";
 
 std::string_view experiment_for(MotorKind kind, const std::string& name) {
   if (name == "J" || name == "K16") return kInertia;
@@ -110,6 +112,17 @@ Excitation verdict_against(const Result& result, const std::string& reason) {
               "; check pole pairs, counts and direction of the encoder, order of the phases and voltage "
               "shift, or record "
               "a run that shows more of the motor";
+  if (result.kind == "induction") e.verdict += fmt::format("; if its iron may saturate, {}", kLessFlux);
+  return e;
+}
+
+Excitation verdict_on_saturation(const Result& result, const BendTest& bend) {
+  Excitation e{.sufficient = false, .unseen = names_of(result), .verdict = {}};
+  e.verdict = fmt::format(
+      "the motor saturates at the flux of this record, so that no single L_S and T_R describes it: that its "
+      "magnetising curve bends is {:.3g} in chi-squared, where noise alone passes {:.3g} once in 1,000 "
+      "records; {}",
+      bend.evidence, kTellsBend, kLessFlux);
   return e;
 }
 

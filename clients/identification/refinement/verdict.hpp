@@ -5,6 +5,7 @@
 
 #include "clients/identification/data/result.hpp"
 #include "clients/identification/data/settings.hpp"
+#include "clients/identification/refinement/bend.hpp"
 
 namespace drivebench::identification {
 
@@ -23,5 +24,8 @@ Excitation verdict_without_start(MotorKind kind, const Result& result);
 
 /// The verdict on a motor that does not explain its record: no parameter is stated.
 Excitation verdict_against(const Result& result, const std::string& reason);
+
+/// The verdict on an induction motor whose iron bends at the flux of the record: no parameter is stated.
+Excitation verdict_on_saturation(const Result& result, const BendTest& bend);
 
 }  // namespace drivebench::identification

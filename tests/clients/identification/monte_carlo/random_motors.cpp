@@ -35,6 +35,12 @@ constexpr std::array kInduction = std::to_array<Range>({{"R_S", "ohm", 4.85, 19.
 constexpr std::array kInductionOthers = std::to_array<Range>({{"L_R/L_S", "", 0.9, 1.1},
                                                               {"pole pairs (rounded)", "", 1.0, 3.0},
                                                               {"phase of the line", "rad", 0.0, kTurn}});
+constexpr std::array kSaturatedOthers =
+    std::to_array<Range>({{"log L_R/L_S over log(1-sigma)", "", -0.7, 0.7},
+                          {"pole pairs (rounded)", "", 1.0, 3.0},
+                          {"phase of the line", "rad", 0.0, kTurn},
+                          {"flux of twice the current", "Wb", 1.2, 6.0},
+                          {"power of the curve", "", 2.0, 8.0}});
 constexpr std::array kPm = std::to_array<Range>({{"R_S", "ohm", 0.3, 1.2},
                                                  {"L_S", "H", 1.2e-3, 4.8e-3},
                                                  {"K_m", "N m/A", 0.26, 1.03},
@@ -81,13 +87,24 @@ constexpr std::array kDraws = std::to_array<MotorDraw>({
      "Voltage amplifier, 4 pole pairs; u_q a chirp of 12 V from 2 to 20 Hz and u_d 1 V and a sine of 5 V at "
      "60 Hz for 0.6 s, at 10 kHz, turned by the encoder of 4096 counts; no detent torque; currents to 40 A, "
      "voltages to 50 V; filters 500 Hz, of the shaft chosen from the data. L_q is 1.1 to 9 times L_d.",
-     kSalient, kNothing, 0.0, true},
+     kSalient, kNothing, 0.0, Iron::kSalient},
     {MotorKind::kInduction, "Induction motors in 0.2 s", "im-8-5-5",
      "The same motors and starts, but every record ends after 0.2 s, when those of one pole pair and those "
      "with much inertia are still far from their speed. At a slip close to 1 noise takes the place of T_R in "
      "the equations.",
      kInduction, kInductionOthers, 0.2},
 });
+
+constexpr MotorDraw kSaturatedDraw = {
+    MotorKind::kInduction,
+    "Saturated induction motors",
+    "im-8-5-5",
+    "The same starts of motors whose magnetising current is lambda/M (1 + (lambda/lambda_h)^n); the flux of "
+    "the line is 1.5 Wb.",
+    kInduction,
+    kSaturatedOthers,
+    1.0,
+    Iron::kSaturated};
 
 double four_digits(double x) {
   std::array<char, 32> text{};
@@ -146,21 +163,50 @@ Recorded run_dc(BenchConfig config, const std::vector<double>& motor) {
   return {std::move(record.data()), e};
 }
 
-Recorded run_induction(BenchConfig config, const std::vector<double>& motor, double longest_s) {
+InductionMachineParameters straight_machine(const std::vector<double>& motor, double rotor_h) {
+  return {.pole_pairs = static_cast<int>(std::lround(motor[7])),
+          .stator_resistance_ohm = motor[0],
+          .rotor_resistance_ohm = rotor_h / motor[1],
+          .stator_inductance_h = motor[2],
+          .rotor_inductance_h = rotor_h,
+          .mutual_inductance_h = std::sqrt((1.0 - motor[3]) * motor[2] * rotor_h),
+          .star = true};
+}
+
+/// The same with a magnetising current that is twice as large as that of a straight line at the flux
+/// `twice_wb`.
+SaturatedInductionMachineParameters saturated_machine(const InductionMachineParameters& straight,
+                                                      double twice_wb, double power) {
+  constexpr int kPoints = 400;
+  constexpr double kFarWb = 6.0;  // beyond the flux of every start
+  const double mutual_h = straight.mutual_inductance_h;
+  std::vector<CurvePoint> points;
+  for (int k = 0; k <= kPoints; ++k) {
+    const double flux_wb = kFarWb * k / kPoints;
+    points.push_back({.x = flux_wb / mutual_h * (1.0 + std::pow(flux_wb / twice_wb, power)), .y = flux_wb});
+  }
+  return {.pole_pairs = straight.pole_pairs,
+          .stator_resistance_ohm = straight.stator_resistance_ohm,
+          .rotor_resistance_ohm = straight.rotor_resistance_ohm,
+          .stator_leakage_h = straight.stator_inductance_h - mutual_h,
+          .rotor_leakage_h = straight.rotor_inductance_h - mutual_h,
+          .magnetising_curve = Curve(std::move(points)),
+          .star = true};
+}
+
+Recorded run_induction(BenchConfig config, const MotorDraw& draw, const std::vector<double>& motor) {
   constexpr double kAmplitude = 381.059;
   constexpr double kLine = kTurn * 50.0;
-  const auto pole_pairs = static_cast<int>(std::lround(motor[7]));
   set_rate(config, 50'000, 4);
   AxisParameters& p = config.setup.axes[0].parameters;
-  const double rotor_h = motor[6] * motor[2];
-  p.machine =
-      InductionMachineParameters{.pole_pairs = pole_pairs,
-                                 .stator_resistance_ohm = motor[0],
-                                 .rotor_resistance_ohm = rotor_h / motor[1],
-                                 .stator_inductance_h = motor[2],
-                                 .rotor_inductance_h = rotor_h,
-                                 .mutual_inductance_h = std::sqrt((1.0 - motor[3]) * motor[2] * rotor_h),
-                                 .star = true};
+  const bool saturated = draw.iron == Iron::kSaturated;
+  const double ratio = saturated ? std::pow(1.0 - motor[3], motor[6]) : motor[6];
+  const InductionMachineParameters straight = straight_machine(motor, ratio * motor[2]);
+  const int pole_pairs = straight.pole_pairs;
+  if (saturated)
+    p.machine = saturated_machine(straight, motor[9], motor[10]);
+  else
+    p.machine = straight;
   p.mechanics.inertia_kgm2 = motor[4];
   p.drive.source.phase_rad = motor[8];
   put_sensors(p, 2.0 * kAmplitude / (kLine * motor[3] * motor[2]), 500.0);
@@ -168,7 +214,7 @@ Recorded run_induction(BenchConfig config, const std::vector<double>& motor, dou
   BookBench run(config);
   Recorder record = line_recorder(run.period_s(), false);
   constexpr double kMarginS = 0.01;  // the equations keep away from the edge of the filters
-  double end_s = longest_s + kMarginS;
+  double end_s = draw.longest_s + kMarginS;
   while (run.now_s() < end_s) {
     run.bench().step();
     record(run.sample());
@@ -291,6 +337,10 @@ std::span<const MotorDraw> motor_draws() noexcept {
   return kDraws;
 }
 
+const MotorDraw& saturated_draw() noexcept {
+  return kSaturatedDraw;
+}
+
 std::vector<double> draw_motor(const MotorDraw& draw, int number) {
   std::mt19937_64 engine(100'000 * (static_cast<std::uint64_t>(draw.kind) + 1) +
                          static_cast<std::uint64_t>(number));
@@ -318,9 +368,10 @@ Recorded record_motor(const MotorDraw& draw, const std::vector<double>& motor, s
     case MotorKind::kDc:
       return run_dc(std::move(config), motor);
     case MotorKind::kInduction:
-      return run_induction(std::move(config), motor, draw.longest_s);
+      return run_induction(std::move(config), draw, motor);
     case MotorKind::kPmSynchronous:
-      return draw.salient ? run_salient(std::move(config), motor) : run_pm(std::move(config), motor);
+      return draw.iron == Iron::kSalient ? run_salient(std::move(config), motor)
+                                         : run_pm(std::move(config), motor);
     case MotorKind::kBldc:
       break;
   }

@@ -21,6 +21,9 @@ struct Range {
   double high;
 };
 
+/// What the iron of a motor has beyond the plain model of its kind.
+enum class Iron : std::uint8_t { kPlain, kSalient, kSaturated };
+
 /// A kind of motor and the experiment with it.
 struct MotorDraw {
   MotorKind kind;
@@ -30,12 +33,16 @@ struct MotorDraw {
   std::span<const Range> identified;
   std::span<const Range> others;  ///< parameters that the experiment does not identify
   double longest_s;               ///< induction: the record ends here, whether the motor has run up or not
-  bool salient = false;           ///< PM synchronous: L_d and L_q
+  Iron iron = Iron::kPlain;       ///< salient: L_d and L_q of a PM rotor; saturated: a magnetising curve
 };
 
 /// DC, induction, PM synchronous round and, after brushless DC, salient; last the same induction motors with
 /// records of 0.2 s.
 std::span<const MotorDraw> motor_draws() noexcept;
+
+/// The induction motors of the table with iron that saturates, from a curve that bends below the flux of the
+/// start to one that hardly bends at it. L_S, T_R and sigma are those without flux.
+const MotorDraw& saturated_draw() noexcept;
 
 /// Motor `number` of a kind, from 1 on, always the same: first the identified parameters, then the others.
 std::vector<double> draw_motor(const MotorDraw& draw, int number);

@@ -18,7 +18,7 @@ namespace {
 
 const MotorDraw& draw_of(bool salient) {
   return *std::ranges::find_if(motor_draws(), [&](const MotorDraw& draw) {
-    return draw.kind == MotorKind::kPmSynchronous && draw.salient == salient;
+    return draw.kind == MotorKind::kPmSynchronous && (draw.iron == Iron::kSalient) == salient;
   });
 }
 
