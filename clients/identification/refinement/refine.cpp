@@ -195,8 +195,8 @@ Result begun(Result result, const Result& near) {
   return result;
 }
 
-/// A motor at the fit with a bend of each power, straight up to the flux that 95 % of the samples do not
-/// reach: the first samples of a run know the flux to within that of the largest current.
+/// A motor at the fit with a bend of each power, which grows up to the flux that 95 % of the samples do not
+/// exceed: the first samples of a run know the flux to within that of the largest current.
 std::vector<BendingInductionModel> bending_motors(const Predictor<InductionModel>& predictor,
                                                   const BendingInductionModel& straight, double bend) {
   constexpr double kUsual = 0.95;
@@ -215,13 +215,14 @@ std::vector<BendingInductionModel> bending_motors(const Predictor<InductionModel
   return motors;
 }
 
-/// What the fit says of iron that bends; `motor` is the motor at the fit.
-BendTest bend_of(const Predictor<InductionModel>& predictor, const Fit& fit,
-                 const std::vector<Unknown>& unknowns, const BendingInductionModel& motor) {
+/// What the fit says of iron that bends, or nothing if a motor with a bend leaves all bounds; `motor` is the
+/// motor at the fit.
+std::optional<BendTest> bend_of(const Predictor<InductionModel>& predictor, const Fit& fit,
+                                const std::vector<Unknown>& unknowns, const BendingInductionModel& motor) {
   constexpr double kBend = 1e-4;
   const auto motors = bending_motors(predictor, motor, kBend);
   Eigen::MatrixXd directions(fit.residual.size(), static_cast<Eigen::Index>(motors.size()));
-  predictor.innovations(std::span<const BendingInductionModel>(motors), directions);
+  if (!predictor.innovations(std::span<const BendingInductionModel>(motors), directions)) return {};
   directions.colwise() -= fit.residual;
   return test_bend(fit, unknowns, directions / kBend);
 }
