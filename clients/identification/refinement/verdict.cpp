@@ -121,7 +121,8 @@ Excitation verdict_on_saturation(const Result& result, const BendTest& bend) {
   e.verdict = fmt::format(
       "the motor saturates at the flux of this record, so that no single L_S and T_R describes it: that its "
       "magnetising curve bends is {:.3g} in chi-squared, where noise alone passes {:.3g} once in 1,000 "
-      "records; {}",
+      "records; {}, "
+      "and check the voltage shift, as voltages of another instant look alike",
       bend.evidence, kTellsBend, kLessFlux);
   return e;
 }

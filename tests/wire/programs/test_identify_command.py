@@ -102,7 +102,7 @@ class Identify(WireTest):
         self.assertIn("BUT THE DATA SAY 2", self.identify(*words, "--pole-pairs", 3, code=1).stdout)
         self.assertIn("voltages advanced by 0.5 samples",
                       self.identify("--motor", "im", "--from", files["csv"], "--pole-pairs", 2, "--counts", 2048,
-                                    "--voltages", "mean", "--load", "constant").stdout)
+                                    "--voltages", "mean", "--load", "constant", code=1).stdout)  # which they are not
 
     def test_every_named_experiment_identifies_its_motor(self):
         """Catches: an experiment that its bench refuses, or that does not identify its parameters."""
