@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "clients/command/common/errors.hpp"
-#include "clients/command/control/control_run.hpp"
+#include "clients/command/control/control_loop.hpp"
 
 namespace drivebench::command {
 

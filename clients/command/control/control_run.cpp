@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "clients/command/common/session.hpp"
+#include "clients/command/control/control_loop.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -33,10 +34,6 @@ double microseconds(Clock::duration duration) noexcept {
 double quantile(const std::vector<double>& sorted, double part) noexcept {
   if (sorted.empty()) return 0.0;
   return sorted[static_cast<std::size_t>(part * static_cast<double>(sorted.size() - 1))];
-}
-
-consteval SignalMask bit_of(std::string_view name) {
-  return SignalMask{1} << (find_signal(name) - kSignals.data());
 }
 
 /// The tick k of the run is the bench's `first_tick` + k.
@@ -68,15 +65,6 @@ ControlRow row_of(const Sample& sample, const ControlRun& into, std::int64_t per
   return row;
 }
 
-link::AxisCommand command_of(std::uint64_t tick, const control::Setpoint& x, control::Quantity quantity) {
-  if (quantity == control::Quantity::kVoltage) {
-    return {
-        .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = x.a, .u_b_v = x.b, .u_c_v = x.c, .u_f_v = x.field};
-  }
-  return {
-      .tick = tick, .gates = v1::GATES_CURRENT, .i_a_a = x.a, .i_b_a = x.b, .i_c_a = x.c, .i_f_a = x.field};
-}
-
 /// The reason why the run cannot continue with this sample; empty: it can.
 std::string obstacle(const link::AxisLink& bench, const Sample& sample, const control::Measurement& m,
                      bool is_first) {
@@ -94,45 +82,57 @@ void append_telemetry(ControlRun& into, const control::Controller& controller) {
   into.telemetry.insert(into.telemetry.end(), values.begin(), values.end());
 }
 
-/// The loop itself; a link that breaks throws out of it, and the rows so far stay.
-void exchange_all(link::AxisLink& bench, control::Run& run, const std::vector<LoadAt>& loads,
-                  ControlRun& into) {
-  Progress progress("control");
-  const Sample* sample = &bench.newest();
-  const double start_rad = sample->angle_rad;
-  const std::uint64_t first_late = sample->late_ticks;
-  std::int64_t periods = 1;
-  std::int64_t covered = 0;  // samples of the plan up to the newest row
-  for (;;) {
-    const control::Measurement measured = measurement_of(*sample, bench.known(), bench.second());
-    const control::Setpoint setpoint = run.step(measured, periods);
-    into.late_ticks = sample->late_ticks - first_late;
-    if (run.done()) {
-      into.missed_at_end = run.planned_samples() - covered;
-      return;
-    }
-    covered += periods;
-    into.rows.push_back(row_of(*sample, into, periods, start_rad, run, setpoint));
-    append_telemetry(into, run.controller());
-    ControlRow& row = into.rows.back();
-    into.failure = obstacle(bench, *sample, measured, into.rows.size() == 1);
-    if (!into.failure.empty()) return;
+/// Keeps every sample of the loop; a link that breaks throws out of the loop, and the rows so far stay.
+class RowKeeper final : public LoopWatcher {
+ public:
+  RowKeeper(link::AxisLink& bench, const control::Run& run, const std::vector<LoadAt>& loads,
+            ControlRun& into)
+      : bench_(bench), run_(run), loads_(loads), into_(into) {}
 
-    const Clock::time_point asked = Clock::now();
-    sample = &bench.exchange(command_of(row.tick, setpoint, into.quantity));
-    row.exchange_us = microseconds(Clock::now() - asked);
-    if (into.rows.size() == 1 && !loads.empty()) {
-      // Only now it is certain which tick was the first.
-      schedule_loads(bench, run, loads, row.tick);
-      sample = &bench.newest();
+  Answer answering(const LoopStep& step) override {
+    const Sample& sample = step.sample;
+    if (into_.rows.empty()) {
+      start_rad_ = sample.angle_rad;
+      first_late_ = sample.late_ticks;
     }
-    periods = static_cast<std::int64_t>(sample->tick - row.tick);
-    if (into.rows.size() % 64 == 0) {
-      progress.update(static_cast<double>(into.rows.size()) / static_cast<double>(run.planned_samples()),
-                      name_of(run.phase()));
+    into_.late_ticks = sample.late_ticks - first_late_;
+    if (run_.done()) {
+      into_.missed_at_end = run_.planned_samples() - covered_;
+      return Answer::kEnd;
     }
+    covered_ += step.periods;
+    into_.rows.push_back(row_of(sample, into_, step.periods, start_rad_, run_, step.setpoint));
+    append_telemetry(into_, run_.controller());
+    into_.failure = obstacle(bench_, sample, step.measured, into_.rows.size() == 1);
+    if (!into_.failure.empty()) return Answer::kEnd;
+    asked_ = Clock::now();
+    return Answer::kSend;
   }
-}
+
+  const Sample& answered(const Sample& next) override {
+    ControlRow& row = into_.rows.back();
+    row.exchange_us = microseconds(Clock::now() - asked_);
+    if (into_.rows.size() % 64 == 0) {
+      progress_.update(static_cast<double>(into_.rows.size()) / static_cast<double>(run_.planned_samples()),
+                       name_of(run_.phase()));
+    }
+    if (into_.rows.size() != 1 || loads_.empty()) return next;
+    // Only now it is certain which tick was the first.
+    schedule_loads(bench_, run_, loads_, row.tick);
+    return bench_.newest();
+  }
+
+ private:
+  link::AxisLink& bench_;
+  const control::Run& run_;
+  const std::vector<LoadAt>& loads_;
+  ControlRun& into_;
+  Progress progress_{"control"};
+  double start_rad_ = 0.0;
+  std::uint64_t first_late_ = 0;
+  std::int64_t covered_ = 0;  // samples of the plan up to the newest row
+  Clock::time_point asked_;
+};
 
 void add_to(ControlReport& report, const ControlRow& row) {
   report.missed_ticks += row.periods - 1;
@@ -157,23 +157,6 @@ std::map<std::string, double> telemetry_peaks(const ControlRun& run) {
 
 }  // namespace
 
-control::Measurement measurement_of(const Sample& s, SignalMask known, const Sample* second) {
-  const auto real = [known](SignalMask bit, double value) { return (known & bit) != 0 ? value : 0.0; };
-  return {.encoder_count = s.encoder_count,
-          .edge_age_s = real(bit_of("edge_age_s"), s.edge_age_s),
-          .edge_period_s = real(bit_of("edge_period_s"), s.edge_period_s),
-          .hall_lines = (known & bit_of("hall_lines")) != 0 ? s.hall_lines : 0,
-          .tachometer_v = real(bit_of("tachometer_v"), s.tachometer_v),
-          .i_a_a = s.i_a_a,
-          .i_b_a = s.i_b_a,
-          .i_c_a = real(bit_of("i_c_a"), s.i_c_a),
-          .i_f_a = real(bit_of("i_f_a"), s.i_f_a),
-          .second = second == nullptr ? control::Measurement::Second{}
-                                      : control::Measurement::Second{.encoder_count = second->encoder_count,
-                                                                     .i_a_a = second->i_a_a,
-                                                                     .i_b_a = second->i_b_a}};
-}
-
 TerminalValues terminal_values_of(const control::Setpoint& x) {
   return {x.a, x.b, x.c, x.field};
 }
@@ -192,7 +175,8 @@ ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<L
   into.telemetry.reserve(into.rows.capacity() * names.size());
   const Clock::time_point started = Clock::now();
   try {
-    exchange_all(bench, run, loads, into);
+    RowKeeper keeper(bench, run, loads, into);
+    control_loop(bench, run, keeper);
   } catch (const link::RefusalError& refused) {
     into.failure = fmt::format("the bench refused: {}", refused.what());
     if (refused.code() == v1::REFUSAL_LATCHED) {

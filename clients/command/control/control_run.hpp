@@ -23,9 +23,6 @@ struct LoadAt {
   double after_s = 0.0;
 };
 
-/// The measurement in a sample of a link with these signals; other values are zero.
-control::Measurement measurement_of(const Sample& sample, SignalMask known, const Sample* second = nullptr);
-
 TerminalValues terminal_values_of(const control::Setpoint& setpoint);
 
 /// A sample of a run and the controller's answer.

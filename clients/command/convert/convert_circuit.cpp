@@ -57,22 +57,22 @@ InductionWindings windings_of(const ConvertCircuitOptions& o) {
   return windings;
 }
 
-struct Form {
+struct CircuitForm {
   const char* name;
   const char* key;
   InductionWindings windings;
 };
 
-std::array<Form, 4> forms_of(const InductionWindings& given) {
+std::array<CircuitForm, 4> forms_of(const InductionWindings& given) {
   return {{{"as given", "given", given},
            {"equal leakages", "equal_leakages", given.with_turns(given.turns_of_equal_leakages())},
            {"gamma", "gamma", given.with_turns(given.turns_of_gamma())},
            {"inverse gamma", "inverse_gamma", given.with_turns(given.turns_of_inverse_gamma())}}};
 }
 
-void print_json(const InductionWindings& given, const std::array<Form, 4>& forms) {
+void print_json(const InductionWindings& given, const std::array<CircuitForm, 4>& forms) {
   Json out = {{"leakage", given.leakage()}, {"rotor_time_s", given.rotor_time_s()}};
-  for (const Form& form : forms) {
+  for (const CircuitForm& form : forms) {
     const InductionWindings& w = form.windings;
     const InductionTCircuit t = t_circuit_of(w);
     out[form.key] = {{"stator_resistance_ohm", w.stator_resistance_ohm},
@@ -86,12 +86,12 @@ void print_json(const InductionWindings& given, const std::array<Form, 4>& forms
   fmt::print("{}\n", out.dump());
 }
 
-void print_table(const InductionWindings& given, const std::array<Form, 4>& forms) {
+void print_table(const InductionWindings& given, const std::array<CircuitForm, 4>& forms) {
   fmt::print("one machine at its terminals; a phase of the star, or of the two-phase equivalent\n\n");
   constexpr const char* kRow = "{:<16}{:>12}{:>12}{:>12}{:>12}{:>12}{:>14}{:>13}\n";
   fmt::print(fmt::runtime(kRow), "", "R_S [ohm]", "R_R [ohm]", "L_S [mH]", "L_R [mH]", "M [mH]",
              "L_S - M [mH]", "L_R - M [mH]");
-  for (const Form& form : forms) {
+  for (const CircuitForm& form : forms) {
     const InductionWindings& w = form.windings;
     const InductionTCircuit t = t_circuit_of(w);
     const auto number = [](double value) { return fmt::format("{:.5g}", value); };
@@ -117,7 +117,7 @@ void print_table(const InductionWindings& given, const std::array<Form, 4>& form
 
 int run_convert_circuit(const ConvertCircuitOptions& options) {
   const InductionWindings given = windings_of(options);
-  const std::array<Form, 4> forms = forms_of(given);
+  const std::array<CircuitForm, 4> forms = forms_of(given);
   options.json ? print_json(given, forms) : print_table(given, forms);
   return kExitOk;
 }

@@ -16,7 +16,7 @@
 namespace drivebench::command {
 namespace {
 
-const ConfigNode* child_of(const ConfigNode* parent, std::string_view key) {
+const ConfigNode* child_under(const ConfigNode* parent, std::string_view key) {
   if (parent == nullptr) return nullptr;
   const auto child = std::ranges::find(parent->children, key, &ConfigNode::key);
   return child == parent->children.end() ? nullptr : &*child;
@@ -47,7 +47,7 @@ struct Table {
 
  private:
   double number(std::string_view key, std::optional<double> otherwise, double least, bool may_equal) const {
-    const ConfigNode* const value = child_of(node, key);
+    const ConfigNode* const value = child_under(node, key);
     if (value == nullptr && otherwise) return *otherwise;
     const std::optional<double> found = value == nullptr ? std::nullopt : number_of(*value);
     if (found && std::isfinite(*found) && (*found > least || (may_equal && *found == least))) return *found;
@@ -60,7 +60,7 @@ struct Table {
 };
 
 bool star_of(const ConfigNode* machine, bool otherwise) {
-  const ConfigNode* const star = child_of(machine, "star");
+  const ConfigNode* const star = child_under(machine, "star");
   if (star == nullptr) return otherwise;
   if (const auto* const yes = std::get_if<bool>(&star->scalar)) return *yes;
   return number_of(*star).value_or(0.0) != 0.0;
@@ -70,11 +70,11 @@ bool star_of(const ConfigNode* machine, bool otherwise) {
 struct MotorDocument {
   std::string file;
   ConfigNode root;
-  const ConfigNode& machine() const { return *child_of(&root, "machine"); }
+  const ConfigNode& machine() const { return *child_under(&root, "machine"); }
   std::string name(const std::string& choice) const {
-    return printable(text_or(child_of(&root, "name"), choice));
+    return printable(text_or(child_under(&root, "name"), choice));
   }
-  std::string kind() const { return text_or(child_of(&machine(), "kind"), "induction"); }
+  std::string kind() const { return text_or(child_under(&machine(), "kind"), "induction"); }
 };
 
 MotorDocument read_document(const std::string& choice) {
@@ -84,7 +84,7 @@ MotorDocument read_document(const std::string& choice) {
   ProblemList problems;
   std::optional<ConfigNode> document = parse_document(text.text, file, problems);
   problems.throw_if_any();
-  if (child_of(&*document, "machine") == nullptr)
+  if (child_under(&*document, "machine") == nullptr)
     throw UsageError(fmt::format("{}: has no [machine]; a file of configs/motors has one", file));
   return {.file = file, .root = *std::move(document)};
 }
@@ -109,7 +109,7 @@ InductionMotorFile read_induction_motor(const std::string& choice) {
                                  printable(kind)));
   ProblemList problems;
   const Table values{machine, "machine", file, problems};
-  const ConfigNode* const mechanics = child_of(&document.root, "mechanics");
+  const ConfigNode* const mechanics = child_under(&document.root, "mechanics");
   const Table shaft{mechanics, "mechanics", file, problems};
   InductionMotorFile found = {
       .name = document.name(choice),
