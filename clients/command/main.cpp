@@ -10,6 +10,7 @@
 #include "clients/command/identify/identify_line.hpp"
 #include "clients/command/motor/motor_line.hpp"
 #include "clients/command/recording/recording_line.hpp"
+#include "clients/command/regression/test_line.hpp"
 
 int main(int argc, char** argv) {
   using namespace drivebench::command;
@@ -25,5 +26,6 @@ int main(int argc, char** argv) {
   add_datasheet_commands(line);
   add_can_commands(line);
   add_doctor_command(line);
+  add_test_command(line);
   return line.run(argc, argv);
 }

@@ -23,6 +23,15 @@ void add_names(const fs::path& folder, std::vector<std::string>& names) {
   std::ranges::sort(names);
 }
 
+/// Adds the names of the folders in a folder, if it is there.
+void add_folders(const fs::path& folder, std::vector<std::string>& names) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+    if (entry.is_directory(ignored)) names.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(names);
+}
+
 }  // namespace
 
 fs::path own_file() {
@@ -38,10 +47,10 @@ fs::path own_file() {
   return fs::read_symlink("/proc/self/exe", ignored);
 }
 
-fs::path find_file(std::string_view kind, std::string_view what, std::string_view choice) {
-  std::error_code ignored;
-  if (fs::is_regular_file(choice, ignored)) return choice;
+namespace {
 
+/// Where files that come with drivebench may stand.
+std::vector<fs::path> folders_to_search() {
   std::vector<fs::path> folders;
   if (const char* chosen = std::getenv("DRIVEBENCH_CONFIGS"); chosen != nullptr) folders.emplace_back(chosen);
   folders.emplace_back("configs");
@@ -53,22 +62,50 @@ fs::path find_file(std::string_view kind, std::string_view what, std::string_vie
     folders.push_back(above / "share" / "drivebench");
   }
   folders.emplace_back(DRIVEBENCH_DATA_FOLDER);  // for a program elsewhere that holds the static library
+  return folders;
+}
 
+/// The first `folder / kind / name` that `is_right`; `add` collects the names that there are.
+template <class IsRight, class Add>
+fs::path search(std::string_view kind, std::string_view what, std::string_view choice, const fs::path& name,
+                IsRight is_right, Add add) {
   std::vector<std::string> looked_at = {printable(choice)};
   std::vector<std::string> there;
-  fs::path file(choice);
-  if (file.extension() != ".toml") file += ".toml";
-  for (const fs::path& folder : folders) {
-    fs::path found = folder / kind / file;
-    if (fs::is_regular_file(found, ignored)) return found;
+  for (const fs::path& folder : folders_to_search()) {
+    fs::path found = folder / kind / name;
+    if (is_right(found)) return found;
     if (std::ranges::find(looked_at, found.string()) == looked_at.end()) looked_at.push_back(found.string());
-    add_names(folder / kind, there);
+    add(folder / kind, there);
   }
   std::string places;
   for (const std::string& place : looked_at)
     places += "\n  " + place;
   throw NotFound("no " + std::string(what) + " '" + printable(choice) + "'" +
                  did_you_mean(fs::path(choice).stem().string(), there) + "; looked for" + places);
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+}  // namespace
+
+fs::path find_file(std::string_view kind, std::string_view what, std::string_view choice) {
+  if (is_file(choice)) return choice;
+  fs::path file(choice);
+  if (file.extension() != ".toml") file += ".toml";
+  return search(kind, what, choice, file, is_file, add_names);
+}
+
+fs::path find_folder(std::string_view kind, std::string_view what, std::string_view choice) {
+  if (is_folder(choice) || is_file(choice)) return choice;
+  return search(kind, what, choice, choice, is_folder, add_folders);
 }
 
 }  // namespace drivebench::installation

@@ -22,4 +22,8 @@ std::filesystem::path own_file();
 /// `share/drivebench` in a folder above own_file(). `what` names such a file in the sentence of NotFound.
 std::filesystem::path find_file(std::string_view kind, std::string_view what, std::string_view choice);
 
+/// A folder, or a single TOML file: `choice` as a path, or else a folder by its name in `kind` ("suites") of
+/// the same folders.
+std::filesystem::path find_folder(std::string_view kind, std::string_view what, std::string_view choice);
+
 }  // namespace drivebench::installation

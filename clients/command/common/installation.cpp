@@ -35,6 +35,14 @@ fs::path find_experiment_file(std::string_view choice) {
   return find_or_refuse("experiments", "experiment file", choice);
 }
 
+fs::path find_suite(std::string_view choice) {
+  try {
+    return installation::find_folder("suites", "suite", choice);
+  } catch (const installation::NotFound& not_found) {
+    throw UsageError(not_found.what());
+  }
+}
+
 fs::path find_motor_file(std::string_view choice) {
   return find_or_refuse("motors", "motor file", choice);
 }

@@ -17,6 +17,9 @@ std::filesystem::path server_executable();
 std::filesystem::path find_config(std::string_view choice);
 /// An experiment file, searched for like a bench file, in `experiments/` of these folders.
 std::filesystem::path find_experiment_file(std::string_view choice);
+/// A folder of regression cases or a single case file, by its path, or the name of a folder in `suites/` of
+/// these folders.
+std::filesystem::path find_suite(std::string_view choice);
 /// A motor file, searched for like a bench file, in `motors/` of these folders.
 std::filesystem::path find_motor_file(std::string_view choice);
 

@@ -32,15 +32,43 @@ int milliseconds_until(Process::Deadline deadline) {
   return static_cast<int>(std::clamp<std::int64_t>(left.count(), 0, 1'000'000));
 }
 
+/// The environment of this process with some variables in the place of its own.
+std::vector<std::string> environment_with(const std::vector<std::string>& variables) {
+  std::vector<std::string> all = variables;
+  for (char** each = environ; *each != nullptr; ++each) {
+    const std::string_view variable = *each;
+    const std::string_view name = variable.substr(0, variable.find('=') + 1);
+    const auto is_same = [name](const std::string& other) { return other.starts_with(name); };
+    if (std::ranges::none_of(variables, is_same)) all.emplace_back(variable);
+  }
+  return all;
+}
+
+/// In the child, before it becomes the other program.
+bool prepare_child(const ProcessSettings& settings, int output) noexcept {
+  if (settings.own_group) ::setpgid(0, 0);
+  if (!settings.folder.empty() && ::chdir(settings.folder.c_str()) != 0) return false;
+  int error = STDERR_FILENO;
+  if (!settings.error_file.empty()) {
+    error = ::open(settings.error_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    if (error < 0 || ::dup2(error, STDERR_FILENO) < 0) return false;
+  }
+  return ::dup2(settings.joins_output ? error : output, STDOUT_FILENO) >= 0;
+}
+
 [[noreturn]] void system_failure(const std::string& what) {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
 }  // namespace
 
-Process::Process(const std::vector<std::string>& arguments) {
+Process::Process(const std::vector<std::string>& arguments, const ProcessSettings& settings)
+    : own_group_(settings.own_group) {
+  // Between fork and exec there must be no allocation: another thread may have held the lock.
   std::vector<std::string> copy = arguments;
   const std::vector<char*> pointers = c_arguments(copy);
+  std::vector<std::string> variables = environment_with(settings.environment);
+  const std::vector<char*> environment = c_arguments(variables);
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) system_failure("pipe");
   output_ = link::FileDescriptor(ends[0]);
@@ -50,8 +78,8 @@ Process::Process(const std::vector<std::string>& arguments) {
   if (pid_ < 0) system_failure("fork");
   if (pid_ == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (::getppid() == parent && ::dup2(child_end.get(), STDOUT_FILENO) >= 0) {
-      ::execv(pointers[0], pointers.data());
+    if (::getppid() == parent && prepare_child(settings, child_end.get())) {
+      ::execvpe(pointers[0], pointers.data(), environment.data());
     }
     ::_exit(127);
   }
@@ -59,9 +87,14 @@ Process::Process(const std::vector<std::string>& arguments) {
 
 Process::~Process() {
   if (exit_code_) return;
-  ::kill(pid_, SIGKILL);
+  signal(SIGKILL);
   while (::waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
   }
+}
+
+void Process::signal(int number) noexcept {
+  // Its group exists only once the child has made it.
+  if (!own_group_ || ::kill(-pid_, number) != 0) ::kill(pid_, number);
 }
 
 std::optional<std::string> Process::read_line(Deadline deadline) {
@@ -84,7 +117,7 @@ std::optional<std::string> Process::read_line(Deadline deadline) {
 }
 
 void Process::terminate() noexcept {
-  if (!exit_code_) ::kill(pid_, SIGTERM);
+  if (!exit_code_) signal(SIGTERM);
 }
 
 std::optional<int> Process::wait(Deadline deadline) {
@@ -94,6 +127,7 @@ std::optional<int> Process::wait(Deadline deadline) {
     if (ended < 0 && errno != EINTR) system_failure("waitpid");
     if (ended == pid_) {
       exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+      if (own_group_) ::kill(-pid_, SIGKILL);  // what it has left behind
     } else if (std::chrono::steady_clock::now() >= deadline) {
       break;
     } else {

@@ -12,14 +12,24 @@
 
 namespace drivebench::command {
 
+/// How a child process differs from its parent.
+struct ProcessSettings {
+  std::vector<std::string> environment{};  ///< NAME=VALUE, in the place of the parent's
+  std::string folder{};                    ///< where it starts; empty: here
+  std::string error_file{};                ///< takes its standard error; empty: that of the parent
+  bool joins_output = false;               ///< its standard output goes to that file, too
+  bool own_group = false;                  ///< it gets its signals together with its own children
+};
+
 /// A child process with its standard output in a pipe and the standard error of this process. It gets SIGTERM
 /// at the end of this process, for whatever reason, and SIGKILL from the destructor if it still runs.
 class Process {
  public:
   using Deadline = std::chrono::steady_clock::time_point;
 
-  /// Throws std::system_error if it cannot be started.
-  explicit Process(const std::vector<std::string>& arguments);
+  /// The program is looked for in PATH unless its name has a slash. Throws std::system_error if it cannot be
+  /// started; one that cannot be executed ends with 127.
+  explicit Process(const std::vector<std::string>& arguments, const ProcessSettings& settings = {});
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
   ~Process();
@@ -48,7 +58,10 @@ class Process {
   }
 
  private:
+  void signal(int number) noexcept;
+
   pid_t pid_ = -1;
+  bool own_group_;
   link::FileDescriptor output_;
   std::string buffer_;
   std::optional<int> exit_code_;

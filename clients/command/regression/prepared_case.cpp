@@ -1,0 +1,130 @@
+#include "clients/command/regression/prepared_case.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/installation.hpp"
+#include "clients/command/control/control_axis.hpp"
+#include "clients/command/control/control_presets.hpp"
+#include "clients/regression/suite/compose.hpp"
+
+namespace drivebench::command {
+namespace fs = std::filesystem;
+using regression::Case;
+using regression::DeviceUnderTest;
+using regression::RunFacts;
+
+namespace {
+
+/// A bench by its path from the case file, or else by its path from here or its name.
+fs::path bench_file_of(const Case& c) {
+  std::error_code ignored;
+  const fs::path beside = fs::path(c.file).parent_path() / c.bench;
+  return fs::is_regular_file(beside, ignored) ? beside : find_config(c.bench);
+}
+
+RunFacts facts_of(const v1::BenchDescription& bench) {
+  RunFacts facts{.period_s = bench.period_s()};
+  for (const v1::AxisDescription& axis : bench.axes())
+    facts.axes.push_back(axis.name());
+  for (const v1::FaultDescription& fault : bench.faults())
+    facts.faults.push_back({.name = fault.name(), .bit = fault.bit()});
+  return facts;
+}
+
+/// The reason why the preset cannot run on this bench; empty: it can.
+std::string misfit(const Case& c, const InprocAxis& axis, const control::Preset& preset,
+                   const control::Run& run) {
+  const std::vector<control::Gain> gains = gains_of(c.device);
+  std::string text;
+  for (const std::string& each : mismatches(axis.bench(), axis.axis(), needs_of(preset, gains),
+                                            run.timing().sample_rate_hz, axis.known()))
+    text += (text.empty() ? "" : "; ") + each;
+  return text;
+}
+
+/// The last tick of a case whose bench arms after so many commands.
+std::uint64_t end_tick_of(const Case& c, double period_s, std::uint32_t arming_commands,
+                          const control::Run* run) {
+  if (c.duration_s) return static_cast<std::uint64_t>(std::llround(*c.duration_s / period_s));
+  if (run == nullptr) return RunFacts{}.end_tick;
+  return static_cast<std::uint64_t>(run->planned_samples()) + (arming_commands > 1 ? arming_commands : 0);
+}
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw std::runtime_error("cannot write " + file.string());
+}
+
+PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& problems) {
+  const fs::path bench = bench_file_of(c);
+  write(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
+                          fs::path(c.file).filename().string(), regression::composed_bench(c, bench)));
+  const InprocAxis axis(file.string(), c.device.axis);
+  PreparedCase prepared{.what = &c, .bench_file = file, .facts = facts_of(axis.bench())};
+  std::optional<control::Run> run;
+  if (c.device.kind == DeviceUnderTest::Kind::kPreset) {
+    const control::Preset& preset = chosen_preset(c.device.preset);
+    run.emplace(made(preset, gains_of(c.device)));
+    if (const std::string why = misfit(c, axis, preset, *run); !why.empty()) {
+      problems.add(c.file, c.device.line, "dut.preset",
+                   fmt::format("is \"{}\", which does not fit the bench: {}", c.device.preset, why));
+    }
+  }
+  prepared.facts.end_tick =
+      end_tick_of(c, axis.bench().period_s(), axis.bench().arming_commands(), run ? &*run : nullptr);
+  regression::check_on_bench(c, prepared.facts, problems);
+  return prepared;
+}
+
+}  // namespace
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (fs::temp_directory_path() / "drivebench-test-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::system_error(errno, std::generic_category(), name);
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+std::vector<control::Gain> gains_of(const DeviceUnderTest& device) {
+  std::vector<control::Gain> gains;
+  for (const auto& [name, value] : device.gains)
+    gains.push_back({name, value});
+  return gains;
+}
+
+std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path& folder) {
+  ProblemList problems;
+  std::vector<PreparedCase> prepared;
+  for (const Case& c : cases) {
+    const fs::path file = folder / fmt::format("{}.toml", prepared.size());
+    prepared.push_back({.what = &c, .bench_file = file});
+    if (!c.skip.empty()) continue;
+    try {
+      prepared.back() = prepare_one(c, file, problems);
+    } catch (const ConfigError& error) {
+      for (const ConfigProblem& each : error.problems())
+        problems.add(each.file, each.line, each.key, each.rule);
+    } catch (const UsageError& error) {
+      problems.add(c.file, c.line, c.name + ":", error.what());
+    }
+    if (problems.full()) break;
+  }
+  problems.throw_if_any();
+  return prepared;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/command/common/inproc_axis.hpp"
+#include "clients/control/presets/preset.hpp"
+#include "clients/regression/verdicts/judge.hpp"
+
+/// Cases that are ready to run: their benches are composed, opened once and checked.
+namespace drivebench::command {
+
+/// A private temporary folder, removed at the end.
+class TemporaryFolder {
+ public:
+  /// Throws std::system_error.
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct PreparedCase {
+  const regression::Case* what;
+  std::filesystem::path bench_file;  ///< composed
+  regression::RunFacts facts{};
+};
+
+/// The gains of a preset, as control takes them.
+std::vector<control::Gain> gains_of(const regression::DeviceUnderTest& device);
+
+/// Composes the bench of every case into the folder, and opens it once. Throws ConfigError with everything
+/// that does not fit: nothing has run then. Skipped cases are left as they are.
+std::vector<PreparedCase> prepare(const std::vector<regression::Case>& cases,
+                                  const std::filesystem::path& folder);
+
+}  // namespace drivebench::command

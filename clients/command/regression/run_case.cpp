@@ -1,0 +1,105 @@
+#include "clients/command/regression/run_case.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <exception>
+#include <optional>
+
+#include "clients/command/common/session.hpp"
+#include "clients/command/control/control_loop.hpp"
+#include "clients/command/control/control_presets.hpp"
+
+namespace drivebench::command {
+namespace {
+
+using regression::Case;
+using regression::CaseResult;
+using regression::DeviceUnderTest;
+using regression::Judge;
+using regression::Verdict;
+
+constexpr std::uint64_t kTimeout = 3;
+constexpr std::uint64_t kFault = 4;
+constexpr std::uint64_t kRun = 1;
+
+/// The run went on after an interrupt only to here.
+class Interrupted : public std::exception {};
+
+/// Shows the judge every sample, and ends the loop with the case. A bench that has latched a fault refuses
+/// commands: its gates stay off until the end.
+class JudgingWatcher final : public LoopWatcher {
+ public:
+  JudgingWatcher(InprocAxis& axis, Judge& judge) : axis_(axis), judge_(judge) {}
+
+  Answer answering(const LoopStep& step) override {
+    judge_.see(axis_.all());
+    if (interrupted()) throw Interrupted();
+    if (step.sample.tick >= judge_.end_tick()) return Answer::kEnd;
+    const std::uint64_t state = step.sample.state;
+    return state == kTimeout || state == kFault ? Answer::kGatesOff : Answer::kSend;
+  }
+
+ private:
+  InprocAxis& axis_;
+  Judge& judge_;
+};
+
+/// Gates off to the end of the case, or `until_armed`.
+void keep_off(InprocAxis& axis, Judge& judge, bool until_armed) {
+  const Sample* sample = &axis.newest();
+  while (sample->tick < judge.end_tick() && !(until_armed && sample->state == kRun)) {
+    judge.see(axis.all());
+    if (interrupted()) throw Interrupted();
+    sample = &axis.exchange({.tick = sample->tick, .gates = v1::GATES_OFF});
+  }
+  if (!until_armed) judge.see(axis.all());
+}
+
+void run_in_process(const PreparedCase& prepared, Judge& judge) {
+  const Case& c = *prepared.what;
+  InprocAxis axis(prepared.bench_file.string(), c.device.axis);
+  axis.acquire();
+  if (c.device.kind == DeviceUnderTest::Kind::kNone) {
+    keep_off(axis, judge, false);
+    return;
+  }
+  control::Run run = made(chosen_preset(c.device.preset), gains_of(c.device));
+  if (axis.bench().arming_commands() > 1) keep_off(axis, judge, true);
+  JudgingWatcher watcher(axis, judge);
+  control_loop(axis, run, watcher);
+}
+
+CaseResult skipped(const Case& c) {
+  CaseResult result{.name = c.name, .file = c.file, .line = c.line, .values = c.values};
+  result.tags = c.tags;
+  result.verdict = Verdict::kSkipped;
+  result.reason = c.skip;
+  return result;
+}
+
+CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& folder, bool keeps_trace) {
+  const Case& c = *prepared.what;
+  if (!c.skip.empty()) return skipped(c);
+  Judge judge(c, prepared.facts, keeps_trace);
+  try {
+    if (c.device.kind == DeviceUnderTest::Kind::kProgram) return run_program_case(prepared, folder, judge);
+    run_in_process(prepared, judge);
+  } catch (const Interrupted&) {
+    return judge.failure(Verdict::kError, "interrupted");
+  } catch (const std::exception& error) {
+    return judge.failure(Verdict::kError, error.what());
+  }
+  return judge.result();
+}
+
+}  // namespace
+
+CaseResult run_case(const PreparedCase& prepared, const std::filesystem::path& folder, bool keeps_trace) {
+  const auto started = std::chrono::steady_clock::now();
+  CaseResult result = judged(prepared, folder, keeps_trace);
+  result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  return result;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,156 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <thread>
+
+#include "clients/command/common/installation.hpp"
+#include "clients/command/common/process.hpp"
+#include "clients/command/common/server_ready.hpp"
+#include "clients/command/common/session.hpp"
+#include "clients/command/recording/recording_file.hpp"
+#include "clients/command/regression/run_case.hpp"
+#include "protocols/sample_codec.hpp"
+
+namespace drivebench::command {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using regression::Case;
+using regression::CaseResult;
+using regression::Judge;
+using regression::RunFacts;
+using regression::Verdict;
+
+constexpr auto kServerStart = 20s;
+constexpr auto kServerEnd = 20s;
+constexpr auto kPoll = 2ms;
+/// The device under test may end by itself for so long, once its bench is gone.
+constexpr auto kFarewell = 2s;
+constexpr std::size_t kMostOutput = 65'536;
+
+/// The end of what a program wrote.
+std::string tail_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  std::string all = text.str();
+  if (all.size() > kMostOutput) all.erase(0, all.size() - kMostOutput);
+  return all;
+}
+
+/// The output without the address of this run, so that equal runs give equal reports.
+std::string without_place(std::string text, const std::string& link) {
+  for (std::size_t at = text.find(link); at != std::string::npos; at = text.find(link, at))
+    text.replace(at, link.size(), "DRIVEBENCH_LINK");
+  return text;
+}
+
+/// A server on the bench of the case.
+class RecordedServer {
+ public:
+  RecordedServer(const PreparedCase& prepared, const fs::path& folder)
+      : socket_(folder / "bench.sock"),
+        recording_(folder / "run.mcap"),
+        log_(folder / "server.log"),
+        process_({server_executable().string(), prepared.bench_file.string(), "--json", "--port", "0",
+                  "--unix", socket_.string(), "--record", recording_.string()},
+                 {.error_file = log_.string()}) {
+    if (!process_.await(Process::in(kServerStart), parse_ready)) {
+      throw std::runtime_error("the server did not start: " + tail_of(log_));
+    }
+  }
+
+  std::string link() const { return "unix:" + socket_.string(); }
+  const fs::path& recording() const noexcept { return recording_; }
+  void end() {
+    process_.terminate();
+    if (!process_.wait(Process::in(kServerEnd))) throw std::runtime_error("the server did not end");
+  }
+
+ private:
+  fs::path socket_;
+  fs::path recording_;
+  fs::path log_;
+  Process process_;
+};
+
+/// The newest tick of a bench that somebody else drives.
+class TickView {
+ public:
+  explicit TickView(const std::string& address)
+      : link_(address, {.client = "drivebench test", .token = {}}) {}
+  std::uint64_t tick() { return link_.exchange({}).samples(0).sample().tick(); }
+
+ private:
+  link::Link link_;
+};
+
+/// Waits until the bench has come to the end of the case, or the program has ended. Returns the reason why
+/// the run is none; empty: it is one.
+std::string await_end(Process& program, TickView& bench, const Case& c, const RunFacts& facts) {
+  const auto deadline = Process::in(std::chrono::milliseconds(std::llround(c.device.time_limit_s * 1e3)));
+  const auto at = [&](std::uint64_t tick) { return static_cast<double>(tick) * facts.period_s; };
+  for (;;) {
+    const std::optional<int> code =
+        program.wait(Process::in(0ms));  // before the tick: it may end with the last one
+    const std::uint64_t tick = bench.tick();
+    if (tick >= facts.end_tick) return {};
+    if (code) {
+      if (*code == 127) return fmt::format("the device under test {} cannot be started", c.device.command[0]);
+      if (*code == 0 && !c.duration_s) return {};
+      const std::string when = c.duration_s ? fmt::format("at {:.6g} s of {:.6g} s", at(tick), *c.duration_s)
+                                            : fmt::format("at {:.6g} s", at(tick));
+      return fmt::format("the device under test ended with code {} {}", *code, when);
+    }
+    if (interrupted()) return "interrupted";
+    if (std::chrono::steady_clock::now() >= deadline) {
+      return fmt::format("the time limit of {:.6g} s passed at {:.6g} s of the bench", c.device.time_limit_s,
+                         at(tick));
+    }
+    std::this_thread::sleep_for(kPoll);
+  }
+}
+
+/// Shows the judge the samples of a recording, a tick at a time.
+void judge_recording(const fs::path& file, const RunFacts& facts, Judge& judge) {
+  const MappedSeries files = open_recording(file.string());
+  McapSeries mcap(files.segments());
+  std::vector<Sample> samples(facts.axes.size());
+  for (McapMessage message; mcap.next(message);) {
+    const std::string_view axis = axis_of(mcap.reader().channels().at(message.header.channel).topic);
+    const auto place = static_cast<std::size_t>(std::ranges::find(facts.axes, axis) - facts.axes.begin());
+    if (axis.empty() || place == samples.size()) continue;
+    if (const std::optional<Sample> sample = decode_sample(message.payload)) samples[place] = *sample;
+    if (place + 1 == samples.size()) judge.see(samples);  // a tick brings the axes in their order
+  }
+  if (mcap.problem()) throw std::runtime_error("the recording is not whole: " + mcap.problem()->what);
+}
+
+}  // namespace
+
+CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder, Judge& judge) {
+  const Case& c = *prepared.what;
+  const fs::path output = folder / "output.txt";
+  RecordedServer server(prepared, folder);
+  TickView bench(server.link());
+  Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + server.link()},
+                                     .folder = fs::absolute(fs::path(c.file).parent_path()).string(),
+                                     .error_file = output.string(),
+                                     .joins_output = true,
+                                     .own_group = true});
+  const std::string failure = await_end(program, bench, c, prepared.facts);
+  server.end();
+  if (!program.wait(Process::in(failure.empty() ? kFarewell : 0s))) program.terminate();
+  program.wait(Process::in(kFarewell));
+  judge_recording(server.recording(), prepared.facts, judge);
+  CaseResult result = failure.empty() ? judge.result() : judge.failure(Verdict::kError, failure);
+  result.output = without_place(tail_of(output), server.link());
+  return result;
+}
+
+}  // namespace drivebench::command

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "clients/command/regression/prepared_case.hpp"
+#include "clients/regression/verdicts/result.hpp"
+
+namespace drivebench::command {
+
+/// Runs cases on so many threads. `finished` hears of every result on the calling thread, in the order of the
+/// cases, with the number of cases that have ended. After an interrupt the cases that have not begun are
+/// errors.
+std::vector<regression::CaseResult> run_suite(
+    const std::vector<PreparedCase>& cases, const std::filesystem::path& folder, unsigned jobs,
+    bool keeps_traces, const std::function<void(const regression::CaseResult&, std::size_t ended)>& finished);
+
+}  // namespace drivebench::command

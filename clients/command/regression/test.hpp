@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace drivebench::command {
+
+inline constexpr int kExitInvalid = 4;  ///< real time was not kept, and nothing failed
+
+struct TestOptions {
+  std::string suite;
+  unsigned jobs = 1;
+  bool list = false;
+  std::string filter{};  ///< part of the names of cases
+  std::vector<std::string> wanted_tags{};
+  std::string junit_file{};
+  std::string json_file{};
+  bool tap = false;
+  bool github = false;
+};
+
+/// Runs the cases of a suite. 0: all passed or were skipped, 1: one failed or had an error, 2: usage, 4: none
+/// failed, but real time was not kept in one.
+int run_test(const TestOptions& options);
+
+}  // namespace drivebench::command

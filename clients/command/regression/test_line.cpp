@@ -1,0 +1,25 @@
+#include "clients/command/regression/test_line.hpp"
+
+#include "clients/command/common/command_line.hpp"
+#include "clients/command/regression/test.hpp"
+
+namespace drivebench::command {
+
+void add_test_command(CommandLine& line) {
+  const auto [sub, o] = line.add<TestOptions>("test", "run a suite of regression cases", run_test);
+  sub.add_option("SUITE", o.suite,
+                 "a folder of cases, a case file, or the name of a suite that came with drivebench")
+      ->required();
+  sub.add_option("--jobs", o.jobs, "cases at the same time")
+      ->capture_default_str()
+      ->check(CLI::Range(1U, 1024U));
+  sub.add_flag("--list", o.list, "print the cases and end");
+  sub.add_option("--filter", o.filter, "only cases whose name contains this text");
+  sub.add_option("--tag", o.wanted_tags, "only cases with this tag; several: with all of them");
+  sub.add_option("--junit", o.junit_file, "write a JUnit XML report");
+  sub.add_option("--json", o.json_file, "write a JSON report");
+  sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
+  sub.add_flag("--github", o.github, "print annotations for GitHub");
+}
+
+}  // namespace drivebench::command

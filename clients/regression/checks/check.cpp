@@ -1,0 +1,100 @@
+#include "clients/regression/checks/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/regression/checks/check_kinds.hpp"
+
+namespace drivebench::regression {
+namespace {
+
+std::uint64_t ticks_in(double seconds, double period_s) noexcept {
+  return static_cast<std::uint64_t>(std::llround(seconds / period_s));
+}
+
+}  // namespace
+
+std::optional<double> CheckSpec::number(std::string_view key) const noexcept {
+  for (const auto& [each, value] : numbers) {
+    if (each == key) return value;
+  }
+  return std::nullopt;
+}
+
+Check::Check(const CheckSpec& spec, const RunFacts& facts)
+    : spec_(spec),
+      facts_period_s_(facts.period_s),
+      from_ticks_(ticks_in(spec.from_s, facts.period_s)),
+      to_ticks_(spec.to_s ? ticks_in(*spec.to_s, facts.period_s) : facts.end_tick),
+      is_open_(!spec.after),
+      first_tick_(from_ticks_),
+      last_tick_(to_ticks_) {}
+
+void Check::see(const Sample& sample) noexcept {
+  if (!is_open_) {
+    if (!spec_.after->holds(sample)) return;
+    is_open_ = true;
+    first_tick_ = sample.tick + from_ticks_;
+    last_tick_ = spec_.to_s ? sample.tick + to_ticks_ : to_ticks_;
+  }
+  if (sample.tick < first_tick_ || sample.tick > last_tick_) return;
+  const double value = spec_.signal != nullptr ? value_of(*spec_.signal, sample) : 0.0;
+  last_seen_ = sample.tick;
+  ++samples_;
+  if (std::isfinite(value)) {
+    take(sample, value);
+  } else if (!not_finite_at_) {
+    not_finite_at_ = sample.tick;
+  }
+}
+
+bool Check::within(std::uint64_t ticks, double limit_s) const noexcept {
+  return ticks <= ticks_in(limit_s, facts_period_s_);
+}
+
+Finding Check::blank() const {
+  Finding finding;
+  finding.name = spec_.name;
+  finding.kind = spec_.kind->name;
+  finding.signal = spec_.signal != nullptr ? spec_.signal->name : "";
+  finding.axis = spec_.axis;
+  finding.line = spec_.line;
+  finding.from_s = seconds(first_tick_);
+  finding.to_s = seconds(last_seen_);
+  return finding;
+}
+
+Finding Check::finish() const {
+  Finding finding = blank();
+  if (!is_open_) {
+    finding.sentence = fmt::format("never applied: \"{}\" never held", spec_.after->text());
+    return finding;
+  }
+  if (samples_ == 0) {
+    finding.sentence = fmt::format("never applied: no sample from {:.6g} s on", seconds(first_tick_));
+    return finding;
+  }
+  finding.applied = true;
+  if (not_finite_at_) {
+    finding.at_s = seconds(*not_finite_at_);
+    finding.sentence = fmt::format("{} is no finite number at {:.6g} s", spec_.signal->name, finding.at_s);
+    return finding;
+  }
+  Outcome found = outcome();
+  finding.passed = found.passed;
+  finding.measured = found.measured;
+  finding.limit = found.limit;
+  finding.at_s = seconds(found.worst_tick);
+  finding.unit = found.unit;
+  finding.sentence = std::move(found.sentence);
+  finding.lines = std::move(found.lines);
+  return finding;
+}
+
+std::string with_unit(double value, std::string_view unit) {
+  return unit.empty() || unit == "1" ? fmt::format("{:.6g}", value) : fmt::format("{:.6g} {}", value, unit);
+}
+
+}  // namespace drivebench::regression

@@ -1,0 +1,125 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "clients/regression/checks/condition.hpp"
+
+namespace drivebench::regression {
+
+struct CheckKind;
+
+/// A check as its case file asks for it.
+struct CheckSpec {
+  const CheckKind* kind = nullptr;
+  std::string name;
+  int line = 0;
+  std::string axis{};  ///< name or number; empty: that of the device under test
+  const Signal* signal = nullptr;
+  double from_s = 0.0;           ///< of the window; with `after`, since the trigger
+  std::optional<double> to_s{};  ///< empty: to the end
+  std::optional<Condition> after{};
+  std::optional<Condition> condition{};
+  std::string fault{};
+  std::string golden_file{};
+  std::vector<std::pair<std::string_view, double>> numbers{};  ///< the other keys
+
+  std::optional<double> number(std::string_view key) const noexcept;
+  double number_or(std::string_view key, double otherwise) const noexcept {
+    return number(key).value_or(otherwise);
+  }
+};
+
+/// What a check must know of the bench before the run.
+struct RunFacts {
+  struct Fault {
+    std::string name;
+    std::uint64_t bit;
+  };
+  double period_s = 0.0;
+  std::uint64_t end_tick = std::numeric_limits<std::uint64_t>::max();  ///< the last sample, if it is known
+  std::vector<std::string> axes{};
+  std::vector<Fault> faults{};
+};
+
+/// The outcome of a check.
+struct Finding {
+  std::string name;
+  std::string kind;
+  std::string signal;  ///< empty: it is about a condition
+  std::string axis;
+  std::string unit;  ///< of the numbers
+  bool passed = false;
+  bool applied = false;  ///< false: its window was empty, or its trigger never came
+  double measured = std::numeric_limits<double>::quiet_NaN();
+  double limit = std::numeric_limits<double>::quiet_NaN();
+  double at_s = std::numeric_limits<double>::quiet_NaN();  ///< where it was worst
+  double from_s = 0.0;                                     ///< the window, in the time of the bench
+  double to_s = 0.0;
+  std::vector<double> lines{};  ///< limits of the signal, for a plot
+  std::string sentence{};       ///< for people
+  int line = 0;                 ///< in the case file
+};
+
+/// Sees every sample of its axis in their order and judges them at the end.
+class Check {
+ public:
+  Check(const CheckSpec& spec, const RunFacts& facts);
+  Check(const Check&) = delete;
+  Check& operator=(const Check&) = delete;
+  virtual ~Check() = default;
+
+  /// Does not allocate.
+  void see(const Sample& sample) noexcept;
+  Finding finish() const;
+
+  const CheckSpec& spec() const noexcept { return spec_; }
+
+ protected:
+  /// What a kind of check found in its window.
+  struct Outcome {
+    bool passed;
+    double measured;
+    double limit;
+    std::uint64_t worst_tick;
+    std::string_view unit;
+    std::string sentence;
+    std::vector<double> lines{};
+  };
+
+  double seconds(std::uint64_t ticks) const noexcept { return static_cast<double>(ticks) * facts_period_s_; }
+  /// Whether so many ticks are at most so many seconds; times are rounded to ticks, as everywhere.
+  bool within(std::uint64_t ticks, double limit_s) const noexcept;
+  std::uint64_t first_tick() const noexcept { return first_tick_; }
+  std::uint64_t last_seen() const noexcept { return last_seen_; }
+  std::uint64_t samples() const noexcept { return samples_; }
+  std::string_view unit() const noexcept { return spec_.signal != nullptr ? spec_.signal->unit : ""; }
+
+ private:
+  /// A sample of the window; `value` is that of the signal, or 0.
+  virtual void take(const Sample& sample, double value) noexcept = 0;
+  virtual Outcome outcome() const = 0;
+
+  Finding blank() const;
+
+  CheckSpec spec_;
+  double facts_period_s_;
+  std::uint64_t from_ticks_;
+  std::uint64_t to_ticks_;
+  bool is_open_;  ///< the trigger has come, or there is none
+  std::uint64_t first_tick_ = 0;
+  std::uint64_t last_tick_ = 0;
+  std::uint64_t last_seen_ = 0;
+  std::uint64_t samples_ = 0;
+  std::optional<std::uint64_t> not_finite_at_{};
+};
+
+/// A value and the unit, for sentences.
+std::string with_unit(double value, std::string_view unit);
+
+}  // namespace drivebench::regression

@@ -1,0 +1,236 @@
+#include "clients/regression/suite/case_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <system_error>
+
+#include "clients/regression/checks/check_reader.hpp"
+#include "clients/regression/suite/matrix.hpp"
+
+namespace drivebench::regression {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kLongestCase_s = 1e6;
+constexpr std::int64_t kMostSeed = std::int64_t{1} << 53;
+
+/// `{a = {b = 1.0}}` as `a.b = 1.0`, as gains are named.
+void flatten(const ConfigNode& table, const std::string& prefix, KeyTable& gains, DeviceUnderTest& device) {
+  for (const ConfigNode& child : table.children) {
+    const std::string name = prefix + child.key;
+    const std::optional<double> value = number_in(child);
+    if (child.kind == ConfigNode::Kind::kTable) {
+      flatten(child, name + ".", gains, device);
+    } else if (value) {
+      device.gains.emplace_back(name, *value);
+    } else {
+      gains.report(name, "is " + described(child) + " but must be a finite number");
+    }
+  }
+}
+
+DeviceUnderTest read_device(KeyTable& table) {
+  DeviceUnderTest device;
+  device.line = table.line();
+  const auto preset = table.text("preset");
+  const ConfigNode* const gains = table.node("gains");
+  device.command = table.texts("command");
+  device.axis = table.text("axis").value_or("0");
+  device.time_limit_s = table.number("time_limit_s", 0.1, 86'400.0).value_or(device.time_limit_s);
+  if (preset) {
+    device.kind = DeviceUnderTest::Kind::kPreset;
+    device.preset = *preset;
+  } else if (table.has("command")) {
+    device.kind = DeviceUnderTest::Kind::kProgram;
+  } else {
+    table.require("preset");
+  }
+  if (preset && table.has("command")) table.report("command", "cannot stand beside preset");
+  if (gains != nullptr && !preset) table.report("gains", "belongs to a preset");
+  if (gains != nullptr) {
+    if (auto inner = table.table("gains")) flatten(*gains, "", *inner, device);
+  }
+  table.finish();
+  return device;
+}
+
+/// Exactly one of the actions. The value of a parameter or a fault is for the bench to judge.
+void read_action(KeyTable& table, Step& step) {
+  struct Row {
+    std::string_view key;
+    Step::Action action;
+  };
+  static constexpr auto kActions = std::to_array<Row>({{"load_nm", Step::Action::kLoad},
+                                                       {"parameter", Step::Action::kParameter},
+                                                       {"fault", Step::Action::kFault},
+                                                       {"impulse_nms", Step::Action::kImpulse}});
+  const bool has_name = table.has("parameter") || table.has("fault");
+  std::size_t count = 0;
+  for (const Row& row : kActions) {
+    if (!table.has(row.key)) {
+      table.node(row.key);  // a key that may stand here
+      continue;
+    }
+    ++count;
+    step.action = row.action;
+    if (row.action == Step::Action::kParameter || row.action == Step::Action::kFault) {
+      step.name = table.text(row.key).value_or("");
+    } else if (table.number(row.key)) {
+      step.value = *table.node(row.key);
+    }
+  }
+  if (count != 1) {
+    table.report("load_nm",
+                 fmt::format("is one of load_nm, parameter, fault and impulse_nms, of which a step has "
+                             "exactly one; here are {}",
+                             count));
+  }
+  const ConfigNode* const value = table.node("value");
+  if (has_name) table.require("value");
+  if (value == nullptr) return;
+  if (!has_name) table.report("value", "belongs to parameter and fault");
+  if (value->kind != ConfigNode::Kind::kScalar) table.report("value", "must be a single value");
+  step.value = *value;
+}
+
+Step read_step(KeyTable& table) {
+  Step step;
+  step.line = table.line();
+  step.axis = table.text("axis").value_or("0");
+  step.at_s = table.number("at_s", 0.0, kLongestCase_s);
+  step.when = read_condition(table, "when");
+  if (table.has("at_s") == table.has("when")) {
+    table.report("at_s", "or else when must stand in a step: a time, or a condition");
+  }
+  step.for_s = table.number("for_s", 0.0, kLongestCase_s).value_or(0.0);
+  step.delay_s = table.number("delay_s", 0.0, kLongestCase_s).value_or(0.0);
+  for (const std::string_view key : {"for_s", "delay_s"}) {
+    if (table.has(key) && !table.has("when")) table.report(key, "belongs to when");
+  }
+  read_action(table, step);
+  step.ramp_s = table.number("ramp_s", 0.0, kLongestCase_s).value_or(0.0);
+  if (table.has("ramp_s") && !table.has("load_nm") && !table.has("parameter")) {
+    table.report("ramp_s", "belongs to load_nm and parameter");
+  }
+  table.finish();
+  return step;
+}
+
+void refuse_equal_names(KeyTable& root, const std::vector<CheckSpec>& checks) {
+  std::set<std::string_view> names;
+  for (const CheckSpec& check : checks) {
+    if (names.insert(check.name).second) continue;
+    root.report("check", fmt::format("has two of the name \"{}\" (line {}): give each a name", check.name,
+                                     check.line));
+  }
+}
+
+/// The rules between the parts of a case.
+void check_whole(KeyTable& root, const Case& c) {
+  using enum DeviceUnderTest::Kind;
+  if (c.device.kind == kNone && !c.duration_s) root.require("duration_s");
+  if (c.is_realtime && c.device.kind == kPreset) {
+    root.report("mode", "is \"realtime\", but a preset runs in lockstep");
+  }
+  if (c.checks.empty() && c.skip.empty())
+    root.report("check", "is missing: a case without checks proves nothing");
+  refuse_equal_names(root, c.checks);
+}
+
+Case read_case(const ConfigNode& node, const fs::path& file, const std::string& name, ProblemList& problems) {
+  const std::string path = file.string();
+  KeyTable root(node, "", 1, path, problems);
+  Case c{.name = name, .file = path, .bench = {}};
+  root.require("bench");
+  c.bench = root.text("bench").value_or("");
+  root.text("about");
+  c.seed = root.node("seed") != nullptr ? root.integer("seed", 0, kMostSeed) : std::nullopt;
+  c.duration_s = root.number("duration_s", 1e-6, kLongestCase_s);
+  if (const auto mode = root.text("mode")) {
+    c.is_realtime = *mode == "realtime";
+    if (!c.is_realtime && *mode != "lockstep") {
+      root.report("mode", "is \"" + *mode + "\" but must be \"lockstep\" or \"realtime\"");
+    }
+  }
+  c.skip = root.text("skip").value_or("");
+  c.tags = root.texts("tags");
+  if (auto device = root.table("dut")) c.device = read_device(*device);
+  if (root.table("override")) c.overrides = *root.node("override");
+  for (KeyTable& step : root.tables("step"))
+    c.steps.push_back(read_step(step));
+  for (KeyTable& table : root.tables("check")) {
+    auto check = read_check(table, file.parent_path());
+    if (!check) continue;
+    if (check->axis.empty()) check->axis = c.device.axis;
+    c.checks.push_back(std::move(*check));
+  }
+  check_whole(root, c);
+  root.finish();
+  return c;
+}
+
+std::string with_values(const std::string& name,
+                        const std::vector<std::pair<std::string, std::string>>& values) {
+  std::string text;
+  for (const auto& [label, value] : values)
+    text += fmt::format("{}{}={}", text.empty() ? "" : ", ", label, value);
+  return text.empty() ? name : fmt::format("{}[{}]", name, text);
+}
+
+}  // namespace
+
+std::vector<Case> read_case_file(const fs::path& file, const std::string& name, ProblemList& problems) {
+  const std::string path = file.string();
+  const FileText content = read_file(file, kMaxConfigBytes);
+  if (!content.why_not.empty()) {
+    problems.add(path, 0, "", content.why_not);
+    return {};
+  }
+  const std::optional<ConfigNode> root = parse_document(content.text, path, problems);
+  if (!root) return {};
+  const Matrix matrix(*root, path, problems);
+  std::vector<Case> cases;
+  for (std::size_t i = 0; i < matrix.size(); ++i) {
+    ProblemList found;  // the other combinations would tell most of it again
+    auto values = matrix.values_at(i);
+    const ConfigNode whole = matrix.at(i, *root, path, found);
+    Case& c = cases.emplace_back(read_case(whole, file, with_values(name, values), found));
+    c.values = std::move(values);
+    try {
+      found.throw_if_any();
+    } catch (const ConfigError& error) {
+      for (const ConfigProblem& each : error.problems())
+        problems.add(each.file, each.line, each.key, each.rule);
+      break;
+    }
+  }
+  return cases;
+}
+
+std::vector<Case> read_suite(const fs::path& suite) {
+  ProblemList problems;
+  std::vector<std::pair<std::string, fs::path>> files;
+  std::error_code error;
+  if (fs::is_directory(suite, error)) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(suite, error)) {
+      const fs::path& file = entry.path();
+      if (file.extension() != ".toml") continue;
+      files.emplace_back(fs::relative(file, suite).replace_extension().generic_string(), file);
+    }
+    if (error) problems.add(suite.string(), 0, "", "cannot be read: " + error.message());
+    if (files.empty()) problems.add(suite.string(), 0, "", "has no cases: no file ends with .toml");
+  } else {
+    files.emplace_back(suite.stem().string(), suite);
+  }
+  std::ranges::sort(files);
+  std::vector<Case> cases;
+  for (const auto& [name, file] : files)
+    std::ranges::move(read_case_file(file, name, problems), std::back_inserter(cases));
+  problems.throw_if_any();
+  return cases;
+}
+
+}  // namespace drivebench::regression

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "clients/regression/suite/case.hpp"
+
+namespace drivebench::regression {
+
+/// The bench of a case as one text that anybody can serve: the bench file with its motor files, the overrides
+/// of the case, its seed, mode and steps, and without what belongs to a place (buses, TLS, folders). CSV
+/// files of curves are named by their absolute paths. Throws ConfigError with all problems.
+std::string composed_bench(const Case& c, const std::filesystem::path& bench_file);
+
+}  // namespace drivebench::regression

@@ -1,0 +1,150 @@
+#include "clients/regression/verdicts/judge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <utility>
+
+#include "protocols/nearest_name.hpp"
+#include "protocols/text.hpp"
+
+namespace drivebench::regression {
+namespace {
+
+constexpr std::array<std::uint64_t, 4> kSeeds = {0x9e3779b97f4a7c15, 0xbf58476d1ce4e5b9, 0x94d049bb133111eb,
+                                                 0xd6e8feb86659fd93};
+constexpr std::uint64_t kMultiplier = 0x2545f4914f6cdd1d;
+
+constexpr std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) noexcept {
+  return (std::rotl(hash, 29) ^ word) * kMultiplier;
+}
+
+}  // namespace
+
+std::string_view word_of(Verdict verdict) noexcept {
+  switch (verdict) {
+    case Verdict::kPass:
+      return "pass";
+    case Verdict::kFail:
+      return "fail";
+    case Verdict::kError:
+      return "error";
+    case Verdict::kInvalid:
+      return "invalid";
+    case Verdict::kSkipped:
+      break;
+  }
+  return "skipped";
+}
+
+std::size_t find_axis(const RunFacts& facts, const std::string& choice) {
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(choice.data(), choice.data() + choice.size(), number);
+  if (error == std::errc{} && end == choice.data() + choice.size()) {
+    return std::min(number, facts.axes.size());
+  }
+  return static_cast<std::size_t>(std::ranges::find(facts.axes, choice) - facts.axes.begin());
+}
+
+void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems) {
+  const auto need_axis = [&](const std::string& choice, int line, const std::string& key) {
+    if (find_axis(facts, choice) < facts.axes.size()) return;
+    problems.add(
+        c.file, line, key,
+        fmt::format("is \"{}\", no axis of the bench{}", printable(choice), advice(choice, facts.axes)));
+  };
+  need_axis(c.device.axis, c.device.line, "dut.axis");
+  for (const CheckSpec& check : c.checks) {
+    need_axis(check.axis, check.line, "check.axis");
+    const std::string rule = problem_on_bench(check, facts);
+    if (!rule.empty()) problems.add(c.file, check.line, "check", rule);
+  }
+}
+
+Judge::Judge(const Case& c, const RunFacts& facts, bool keeps_trace)
+    : case_(c),
+      period_s_(facts.period_s),
+      end_tick_(facts.end_tick),
+      device_axis_(find_axis(facts, c.device.axis)),
+      keeps_trace_(keeps_trace),
+      lanes_(kSeeds) {
+  for (const CheckSpec& spec : c.checks) {
+    const std::size_t axis = find_axis(facts, spec.axis);
+    watches_.push_back({.check = spec.kind->make(spec, facts), .axis = axis});
+    const Signal* const signal = spec.signal != nullptr ? spec.signal
+                                 : spec.condition       ? &spec.condition->signal()
+                                                        : nullptr;
+    const auto is_kept = [&](const Trace::Column& column) {
+      return column.signal == signal && column.axis == facts.axes[axis];
+    };
+    if (signal == nullptr || std::ranges::any_of(trace_.columns, is_kept)) continue;
+    trace_.columns.push_back({.axis = facts.axes[axis], .signal = signal, .values = {}});
+    trace_axes_.push_back(axis);
+  }
+}
+
+void Judge::see(std::span<const Sample> axes) {
+  const Sample& device = axes[device_axis_];
+  if (device.tick > end_tick_) return;
+  constexpr std::uint64_t kRun = 1;
+  was_armed_ = was_armed_ || device.state == kRun;
+  last_tick_ = device.tick;
+  late_ticks_ = device.late_ticks;
+  samples_ += axes.size();
+  for (const Sample& sample : axes)
+    add_hash(sample);
+  for (Watch& watch : watches_)
+    watch.check->see(axes[watch.axis]);
+  if (keeps_trace_) keep(axes);
+}
+
+/// Owner and late ticks differ between equal runs.
+void Judge::add_hash(const Sample& sample) noexcept {
+  Sample counted = sample;
+  counted.owner = 0;
+  counted.late_ticks = 0;
+  const auto words = std::bit_cast<std::array<std::uint64_t, sizeof(Sample) / 8>>(counted);
+  std::array<std::uint64_t, 4> lanes = lanes_;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    lanes[i % lanes.size()] = mixed(lanes[i % lanes.size()], words[i]);
+  lanes_ = lanes;
+}
+
+void Judge::keep(std::span<const Sample> axes) {
+  trace_.time_s.push_back(static_cast<double>(axes[device_axis_].tick) * period_s_);
+  for (std::size_t i = 0; i < trace_.columns.size(); ++i)
+    trace_.columns[i].values.push_back(value_of(*trace_.columns[i].signal, axes[trace_axes_[i]]));
+}
+
+CaseResult Judge::failure(Verdict verdict, std::string reason) const {
+  CaseResult result{.name = case_.name, .file = case_.file, .line = case_.line, .values = case_.values};
+  result.tags = case_.tags;
+  result.verdict = verdict;
+  result.reason = std::move(reason);
+  for (const Watch& watch : watches_)
+    result.findings.push_back(watch.check->finish());
+  result.bench_s = static_cast<double>(last_tick_) * period_s_;
+  result.samples = samples_;
+  for (const std::uint64_t lane : lanes_)
+    result.hash = mixed(result.hash, lane);
+  result.trace = trace_;
+  return result;
+}
+
+CaseResult Judge::result() const {
+  using enum DeviceUnderTest::Kind;
+  if (samples_ == 0) return failure(Verdict::kError, "the run has no samples");
+  if (case_.device.kind != kNone && !was_armed_) {
+    return failure(Verdict::kError, "never armed: the bench accepted no command of the device under test");
+  }
+  if (case_.is_realtime && late_ticks_ != 0) {
+    return failure(Verdict::kInvalid, fmt::format("{} ticks of the bench were late", late_ticks_));
+  }
+  CaseResult result = failure(Verdict::kPass, "");
+  if (!std::ranges::all_of(result.findings, &Finding::passed)) result.verdict = Verdict::kFail;
+  return result;
+}
+
+}  // namespace drivebench::regression

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clients/regression/checks/check_kinds.hpp"
+#include "clients/regression/suite/case.hpp"
+#include "clients/regression/verdicts/result.hpp"
+
+namespace drivebench::regression {
+
+/// The axis of the bench with this name or number, or the number of axes if there is none.
+std::size_t find_axis(const RunFacts& facts, const std::string& choice);
+
+/// Every rule that the case breaks on its bench goes to the list.
+void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems);
+
+/// Sees all samples of a run and judges the case.
+class Judge {
+ public:
+  /// The case must have no problems on this bench. `keeps_trace`: the signals of its checks are kept.
+  Judge(const Case& c, const RunFacts& facts, bool keeps_trace);
+
+  /// The samples of a tick, one for each axis, in the order of their ticks. Those after the end of the case
+  /// are left out. Allocates only for a trace.
+  void see(std::span<const Sample> axes);
+
+  std::uint64_t end_tick() const noexcept { return end_tick_; }
+  /// The verdict of a run that went to its end.
+  CaseResult result() const;
+  /// The verdict of one that did not; what the checks found stands beside it.
+  CaseResult failure(Verdict verdict, std::string reason) const;
+
+ private:
+  struct Watch {
+    std::unique_ptr<Check> check;
+    std::size_t axis;
+  };
+
+  void add_hash(const Sample& sample) noexcept;
+  void keep(std::span<const Sample> axes);
+
+  const Case& case_;
+  double period_s_;
+  std::uint64_t end_tick_;
+  std::size_t device_axis_;
+  std::vector<Watch> watches_;
+  bool keeps_trace_;
+  Trace trace_;
+  std::vector<std::size_t> trace_axes_;
+  std::array<std::uint64_t, 4> lanes_;
+  std::uint64_t samples_ = 0;
+  std::uint64_t last_tick_ = 0;
+  std::uint64_t late_ticks_ = 0;
+  bool was_armed_ = false;
+};
+
+}  // namespace drivebench::regression
