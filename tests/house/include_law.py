@@ -24,6 +24,7 @@ NARROWER = {
     "clients/control": ("clients/control", "clients/models", "protocols/signals", "protocols/nearest_name.hpp"),
     "clients/identification": ("clients/identification", "clients/models", "protocols/signals"),
     "clients/link": ("clients/link", "protocols"),
+    "clients/regression": ("clients/regression", "protocols"),
 }
 
 # The headers allowed between < and >, where not all are.
@@ -41,6 +42,7 @@ ORDERED = {
     "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
                         "salient", "presets"),
     "clients/identification": ("math", "data", "motors", "refinement", "wiring"),
+    "clients/regression": ("tables", "checks", "suite", "verdicts", "reports"),
 }
 
 # Files beside rooms that the rooms may include. They count as rooms of their own in the search for circles.

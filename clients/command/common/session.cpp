@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "clients/command/common/errors.hpp"
+#include "clients/command/common/inproc_axis.hpp"
 #include "clients/command/common/text.hpp"
 #include "clients/link/can/can_link.hpp"
 #include "clients/link/modbus/modbus_link.hpp"
@@ -47,6 +48,10 @@ link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
 
 std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
                                           std::string_view subcommand) {
+  constexpr std::string_view kInproc = "inproc:";
+  if (choice.address.starts_with(kInproc)) {
+    return std::make_unique<InprocAxis>(choice.address.substr(kInproc.size()), axis);
+  }
   const bool is_can = link::is_can_address(choice.address);
   if (!is_can && !link::is_modbus_address(choice.address)) {
     std::unique_ptr<link::Link> bench(new link::Link(open_link(choice, subcommand)));  // it does not move

@@ -98,7 +98,8 @@ void add_compare(CLI::App& sub, CompareOptions& o) {
 void add_control(CommandLine& line) {
   const auto [sub, o] =
       line.add<ControlLine>("control", "run the reference controller on a move", run_control_or_compare);
-  add_link(sub, o.link, std::string(kStreamLinks) + ", can:BACKEND:CHANNEL?node=N, modbus:HOST:PORT?unit=N");
+  add_link(sub, o.link,
+           std::string(kStreamLinks) + ", inproc:BENCH, can:BACKEND:CHANNEL?node=N, modbus:HOST:PORT?unit=N");
   sub.add_option("--preset", o.preset, "gains and move by name")->capture_default_str();
   sub.add_flag("--list", o.list, "print the presets and end; with --gains all their gains");
   sub.add_flag("--gains", o.gains, "print the gains of the preset and end");

@@ -23,51 +23,37 @@ constexpr std::uint64_t kTimeout = 3;
 constexpr std::uint64_t kFault = 4;
 constexpr std::uint64_t kRun = 1;
 
-/// The run went on after an interrupt only to here.
+/// The user has ended the run.
 class Interrupted : public std::exception {};
 
-/// Shows the judge every sample, and ends the loop with the case. A bench that has latched a fault refuses
-/// commands: its gates stay off until the end.
-class JudgingWatcher final : public LoopWatcher {
+/// Shows every sample, and ends the loop with the case. A bench that has latched a fault refuses commands:
+/// its gates stay off until the end.
+class CaseWatcher final : public LoopWatcher {
  public:
-  JudgingWatcher(InprocAxis& axis, Judge& judge) : axis_(axis), judge_(judge) {}
+  CaseWatcher(std::uint64_t end_tick, const SeeTick& see) : end_tick_(end_tick), see_(see) {}
 
   Answer answering(const LoopStep& step) override {
-    judge_.see(axis_.all());
+    see_();
     if (interrupted()) throw Interrupted();
-    if (step.sample.tick >= judge_.end_tick()) return Answer::kEnd;
+    if (step.sample.tick >= end_tick_) return Answer::kEnd;
     const std::uint64_t state = step.sample.state;
     return state == kTimeout || state == kFault ? Answer::kGatesOff : Answer::kSend;
   }
 
  private:
-  InprocAxis& axis_;
-  Judge& judge_;
+  std::uint64_t end_tick_;
+  const SeeTick& see_;
 };
 
 /// Gates off to the end of the case, or `until_armed`.
-void keep_off(InprocAxis& axis, Judge& judge, bool until_armed) {
+void keep_off(link::AxisLink& axis, std::uint64_t end_tick, const SeeTick& see, bool until_armed) {
   const Sample* sample = &axis.newest();
-  while (sample->tick < judge.end_tick() && !(until_armed && sample->state == kRun)) {
-    judge.see(axis.all());
+  while (sample->tick < end_tick && !(until_armed && sample->state == kRun)) {
+    see();
     if (interrupted()) throw Interrupted();
     sample = &axis.exchange({.tick = sample->tick, .gates = v1::GATES_OFF});
   }
-  if (!until_armed) judge.see(axis.all());
-}
-
-void run_in_process(const PreparedCase& prepared, Judge& judge) {
-  const Case& c = *prepared.what;
-  InprocAxis axis(prepared.bench_file.string(), c.device.axis);
-  axis.acquire();
-  if (c.device.kind == DeviceUnderTest::Kind::kNone) {
-    keep_off(axis, judge, false);
-    return;
-  }
-  control::Run run = made(chosen_preset(c.device.preset), gains_of(c.device));
-  if (axis.bench().arming_commands() > 1) keep_off(axis, judge, true);
-  JudgingWatcher watcher(axis, judge);
-  control_loop(axis, run, watcher);
+  if (!until_armed) see();
 }
 
 CaseResult skipped(const Case& c) {
@@ -82,9 +68,11 @@ CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& fol
   const Case& c = *prepared.what;
   if (!c.skip.empty()) return skipped(c);
   Judge judge(c, prepared.facts, keeps_trace);
+  if (interrupted()) return judge.failure(Verdict::kError, "interrupted");
   try {
     if (c.device.kind == DeviceUnderTest::Kind::kProgram) return run_program_case(prepared, folder, judge);
-    run_in_process(prepared, judge);
+    InprocAxis axis(prepared.bench_file.string(), c.device.axis);
+    drive(axis, c, judge.end_tick(), [&] { judge.see(axis.all()); });
   } catch (const Interrupted&) {
     return judge.failure(Verdict::kError, "interrupted");
   } catch (const std::exception& error) {
@@ -94,6 +82,18 @@ CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& fol
 }
 
 }  // namespace
+
+void drive(link::AxisLink& axis, const Case& c, std::uint64_t end_tick, const SeeTick& see) {
+  axis.acquire();
+  if (c.device.kind == DeviceUnderTest::Kind::kNone) {
+    keep_off(axis, end_tick, see, false);
+    return;
+  }
+  control::Run run = made(chosen_preset(c.device.preset), gains_of(c.device));
+  if (axis.bench().arming_commands() > 1) keep_off(axis, end_tick, see, true);
+  CaseWatcher watcher(end_tick, see);
+  control_loop(axis, run, watcher);
+}
 
 CaseResult run_case(const PreparedCase& prepared, const std::filesystem::path& folder, bool keeps_trace) {
   const auto started = std::chrono::steady_clock::now();

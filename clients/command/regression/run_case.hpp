@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "clients/command/regression/prepared_case.hpp"
 #include "clients/regression/verdicts/result.hpp"
 
@@ -10,9 +12,23 @@ namespace drivebench::command {
 regression::CaseResult run_case(const PreparedCase& prepared, const std::filesystem::path& folder,
                                 bool keeps_trace);
 
+/// Hears of every tick of a run, when its samples are there.
+using SeeTick = std::function<void()>;
+
+/// Drives the axis with the preset of a case, or with its gates off, until its last tick.
+void drive(link::AxisLink& axis, const regression::Case& c, std::uint64_t end_tick, const SeeTick& see);
+
 /// The case of a program: a drivebench-server in lockstep (or in real time) on a unix socket, recorded, the
 /// program beside it, and the samples from the recording.
 regression::CaseResult run_program_case(const PreparedCase& prepared, const std::filesystem::path& folder,
                                         regression::Judge& judge);
+
+/// Runs the case of a preset, or of an open bench, once more over a server that records it.
+void record_case(const PreparedCase& prepared, const std::filesystem::path& folder);
+
+/// Puts what a case left behind into a folder of its name: its composed bench, its recording, and what its
+/// device under test printed. Throws std::filesystem::filesystem_error.
+void keep_case(const PreparedCase& prepared, const std::filesystem::path& folder,
+               const std::filesystem::path& into);
 
 }  // namespace drivebench::command

@@ -50,12 +50,15 @@ std::string without_place(std::string text, const std::string& link) {
   return text;
 }
 
+constexpr const char* kRecording = "run.mcap";
+constexpr const char* kOutput = "output.txt";
+
 /// A server on the bench of the case.
 class RecordedServer {
  public:
   RecordedServer(const PreparedCase& prepared, const fs::path& folder)
       : socket_(folder / "bench.sock"),
-        recording_(folder / "run.mcap"),
+        recording_(folder / kRecording),
         log_(folder / "server.log"),
         process_({server_executable().string(), prepared.bench_file.string(), "--json", "--port", "0",
                   "--unix", socket_.string(), "--record", recording_.string()},
@@ -135,7 +138,7 @@ void judge_recording(const fs::path& file, const RunFacts& facts, Judge& judge) 
 
 CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder, Judge& judge) {
   const Case& c = *prepared.what;
-  const fs::path output = folder / "output.txt";
+  const fs::path output = folder / kOutput;
   RecordedServer server(prepared, folder);
   TickView bench(server.link());
   Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + server.link()},
@@ -151,6 +154,31 @@ CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder
   CaseResult result = failure.empty() ? judge.result() : judge.failure(Verdict::kError, failure);
   result.output = without_place(tail_of(output), server.link());
   return result;
+}
+
+void record_case(const PreparedCase& prepared, const fs::path& folder) {
+  RecordedServer server(prepared, folder);
+  {
+    const auto axis = open_axis({.address = server.link(), .token = {}}, prepared.what->device.axis, "test");
+    drive(*axis, *prepared.what, prepared.facts.end_tick, [] {});
+  }
+  server.end();
+}
+
+void keep_case(const PreparedCase& prepared, const fs::path& folder, const fs::path& into) {
+  std::string name = prepared.what->name;
+  std::ranges::replace(name, '/', '_');
+  const fs::path kept = into / name;
+  fs::create_directories(kept);
+  const auto keep = [&kept](const fs::path& file, const fs::path& as) {
+    std::error_code none;
+    if (fs::exists(file, none)) fs::copy_file(file, kept / as, fs::copy_options::overwrite_existing);
+  };
+  const bool is_recorded = prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram;
+  if (!is_recorded) record_case(prepared, folder);
+  keep(prepared.bench_file, "bench.toml");
+  keep(folder / kRecording, kRecording);
+  keep(folder / kOutput, kOutput);
 }
 
 }  // namespace drivebench::command

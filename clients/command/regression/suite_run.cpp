@@ -1,5 +1,7 @@
 #include "clients/command/regression/suite_run.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
@@ -19,9 +21,9 @@ using regression::CaseResult;
 /// Workers take the next case from a counter, and put its result in its place.
 class Crew {
  public:
-  Crew(const std::vector<PreparedCase>& cases, const fs::path& folder, unsigned jobs, bool keeps_traces)
-      : cases_(cases), folder_(folder), keeps_traces_(keeps_traces), results_(cases.size()) {
-    const std::size_t workers = std::min<std::size_t>(std::max(1U, jobs), cases.size());
+  Crew(const std::vector<PreparedCase>& cases, const fs::path& folder, const SuiteSettings& settings)
+      : cases_(cases), folder_(folder), settings_(settings), results_(cases.size()) {
+    const std::size_t workers = std::min<std::size_t>(std::max(1U, settings.jobs), cases.size());
     for (std::size_t i = 0; i < workers; ++i)
       workers_.emplace_back([this] { work(); });
   }
@@ -39,7 +41,8 @@ class Crew {
     for (std::size_t index = next_++; index < cases_.size(); index = next_++) {
       const fs::path folder = folder_ / std::to_string(index);
       fs::create_directory(folder);
-      CaseResult result = run_case(cases_[index], folder, keeps_traces_);
+      CaseResult result = run_case(cases_[index], folder, settings_.keeps_traces);
+      keep(cases_[index], folder, result);
       std::error_code ignored;
       fs::remove_all(folder, ignored);
       const std::lock_guard lock(mutex_);
@@ -49,9 +52,19 @@ class Crew {
     }
   }
 
+  void keep(const PreparedCase& prepared, const fs::path& folder, CaseResult& result) const {
+    using enum regression::Verdict;
+    if (settings_.keep_folder.empty() || result.verdict == kPass || result.verdict == kSkipped) return;
+    try {
+      keep_case(prepared, folder, settings_.keep_folder);
+    } catch (const std::exception& error) {
+      result.reason += fmt::format("{}not kept: {}", result.reason.empty() ? "" : "; ", error.what());
+    }
+  }
+
   const std::vector<PreparedCase>& cases_;
   fs::path folder_;
-  bool keeps_traces_;
+  SuiteSettings settings_;
   std::mutex mutex_;
   std::condition_variable ready_;
   std::vector<std::optional<CaseResult>> results_;
@@ -63,9 +76,9 @@ class Crew {
 }  // namespace
 
 std::vector<CaseResult> run_suite(const std::vector<PreparedCase>& cases, const fs::path& folder,
-                                  unsigned jobs, bool keeps_traces,
+                                  const SuiteSettings& settings,
                                   const std::function<void(const CaseResult&, std::size_t ended)>& finished) {
-  Crew crew(cases, folder, jobs, keeps_traces);
+  Crew crew(cases, folder, settings);
   std::vector<CaseResult> results;
   results.reserve(cases.size());
   for (std::size_t i = 0; i < cases.size(); ++i) {

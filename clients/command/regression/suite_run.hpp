@@ -8,11 +8,18 @@
 
 namespace drivebench::command {
 
+struct SuiteSettings {
+  unsigned jobs = 1;
+  bool keeps_traces = false;
+  std::filesystem::path keep_folder{};  ///< for cases that have not passed; empty: nothing is kept
+};
+
 /// Runs cases on so many threads. `finished` hears of every result on the calling thread, in the order of the
 /// cases, with the number of cases that have ended. After an interrupt the cases that have not begun are
 /// errors.
 std::vector<regression::CaseResult> run_suite(
-    const std::vector<PreparedCase>& cases, const std::filesystem::path& folder, unsigned jobs,
-    bool keeps_traces, const std::function<void(const regression::CaseResult&, std::size_t ended)>& finished);
+    const std::vector<PreparedCase>& cases, const std::filesystem::path& folder,
+    const SuiteSettings& settings,
+    const std::function<void(const regression::CaseResult&, std::size_t ended)>& finished);
 
 }  // namespace drivebench::command

@@ -10,6 +10,7 @@
 #include "clients/command/common/installation.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/command/regression/html_report.hpp"
 #include "clients/command/regression/suite_run.hpp"
 #include "clients/regression/reports/reports.hpp"
 #include "clients/regression/suite/case_file.hpp"
@@ -66,10 +67,12 @@ std::vector<PreparedCase> prepared_or_refused(const std::vector<Case>& cases,
 struct ReportFiles {
   std::optional<Output> junit{};
   std::optional<Output> json{};
+  std::optional<Output> html{};
 
   explicit ReportFiles(const TestOptions& options) {
     if (!options.junit_file.empty()) junit.emplace(options.junit_file);
     if (!options.json_file.empty()) json.emplace(options.json_file);
+    if (!options.html_file.empty()) html.emplace(options.html_file);
   }
 };
 
@@ -95,7 +98,9 @@ void print_summary(const std::vector<CaseResult>& results, double wall_s) {
 std::vector<CaseResult> run_all(const std::vector<PreparedCase>& cases, const std::filesystem::path& folder,
                                 const TestOptions& options) {
   Progress progress("test");
-  return run_suite(cases, folder, options.jobs, false, [&](const CaseResult& result, std::size_t ended) {
+  const SuiteSettings settings{
+      .jobs = options.jobs, .keeps_traces = !options.html_file.empty(), .keep_folder = options.keep_folder};
+  return run_suite(cases, folder, settings, [&](const CaseResult& result, std::size_t ended) {
     progress.update(static_cast<double>(ended) / static_cast<double>(cases.size()),
                     fmt::format("{} of {} cases", ended, cases.size()));
     if (!options.tap) fmt::print("{}", regression::table_row(result));
@@ -122,6 +127,7 @@ int run_test(const TestOptions& options) {
   const std::string name = suite.stem().string();
   write(files.junit, regression::to_junit(name, results));
   write(files.json, regression::to_json(name, results));
+  if (files.html) write(files.html, html_report(name, results));
   if (options.tap) {
     fmt::print("{}", regression::to_tap(results));
   } else {

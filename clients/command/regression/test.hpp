@@ -15,6 +15,8 @@ struct TestOptions {
   std::vector<std::string> wanted_tags{};
   std::string junit_file{};
   std::string json_file{};
+  std::string html_file{};
+  std::string keep_folder{};
   bool tap = false;
   bool github = false;
 };

@@ -18,6 +18,9 @@ void add_test_command(CommandLine& line) {
   sub.add_option("--tag", o.wanted_tags, "only cases with this tag; several: with all of them");
   sub.add_option("--junit", o.junit_file, "write a JUnit XML report");
   sub.add_option("--json", o.json_file, "write a JSON report");
+  sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network");
+  sub.add_option("--keep", o.keep_folder,
+                 "keep recording, composed bench and output of cases that have not passed in this folder");
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
   sub.add_flag("--github", o.github, "print annotations for GitHub");
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include "clients/regression/checks/check_kinds.hpp"
@@ -23,26 +24,48 @@ std::optional<double> CheckSpec::number(std::string_view key) const noexcept {
   return std::nullopt;
 }
 
+std::size_t find_axis(const RunFacts& facts, const std::string& choice) {
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(choice.data(), choice.data() + choice.size(), number);
+  if (error == std::errc{} && end == choice.data() + choice.size()) {
+    return std::min(number, facts.axes.size());
+  }
+  return static_cast<std::size_t>(std::ranges::find(facts.axes, choice) - facts.axes.begin());
+}
+
+AxisCondition::AxisCondition(const CaseCondition& condition, const RunFacts& facts, std::size_t axis)
+    : condition_(condition.named.condition),
+      axis_(condition.named.axis.empty() ? axis : find_axis(facts, condition.named.axis)) {}
+
 Check::Check(const CheckSpec& spec, const RunFacts& facts)
     : spec_(spec),
+      axis_(find_axis(facts, spec.axis)),
       facts_period_s_(facts.period_s),
       from_ticks_(ticks_in(spec.from_s, facts.period_s)),
       to_ticks_(spec.to_s ? ticks_in(*spec.to_s, facts.period_s) : facts.end_tick),
       is_open_(!spec.after),
       first_tick_(from_ticks_),
-      last_tick_(to_ticks_) {}
+      last_tick_(to_ticks_) {
+  if (spec.after) after_.emplace(*spec.after, facts, axis_);
+  if (spec.condition) condition_.emplace(*spec.condition, facts, axis_);
+}
 
-void Check::see(const Sample& sample) noexcept {
+void Check::see(std::span<const Sample> axes) noexcept {
+  const Sample& sample = axes[axis_];
   if (!is_open_) {
-    if (!spec_.after->holds(sample)) return;
+    if (!after_->holds(axes)) return;
     is_open_ = true;
     first_tick_ = sample.tick + from_ticks_;
     last_tick_ = spec_.to_s ? sample.tick + to_ticks_ : to_ticks_;
   }
   if (sample.tick < first_tick_ || sample.tick > last_tick_) return;
-  const double value = spec_.signal != nullptr ? value_of(*spec_.signal, sample) : 0.0;
   last_seen_ = sample.tick;
   ++samples_;
+  if (condition_) {
+    take(sample, condition_->holds(axes) ? 1.0 : 0.0);
+    return;
+  }
+  const double value = spec_.signal != nullptr ? value_of(*spec_.signal, sample) : 0.0;
   if (std::isfinite(value)) {
     take(sample, value);
   } else if (!not_finite_at_) {
@@ -58,7 +81,8 @@ Finding Check::blank() const {
   Finding finding;
   finding.name = spec_.name;
   finding.kind = spec_.kind->name;
-  finding.signal = spec_.signal != nullptr ? spec_.signal->name : "";
+  if (spec_.signal != nullptr) finding.signal = spec_.signal->name;
+  if (spec_.condition) finding.signal = kSignals[spec_.condition->named.condition.signal].name;
   finding.axis = spec_.axis;
   finding.line = spec_.line;
   finding.from_s = seconds(first_tick_);
@@ -69,7 +93,7 @@ Finding Check::blank() const {
 Finding Check::finish() const {
   Finding finding = blank();
   if (!is_open_) {
-    finding.sentence = fmt::format("never applied: \"{}\" never held", spec_.after->text());
+    finding.sentence = fmt::format("never applied: \"{}\" never held", spec_.after->text);
     return finding;
   }
   if (samples_ == 0) {

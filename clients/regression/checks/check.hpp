@@ -3,16 +3,24 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "clients/regression/checks/condition.hpp"
+#include "protocols/condition.hpp"
+#include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::regression {
 
 struct CheckKind;
+
+/// A condition as a case file has it.
+struct CaseCondition {
+  std::string text;
+  NamedCondition named;
+};
 
 /// A check as its case file asks for it.
 struct CheckSpec {
@@ -23,8 +31,8 @@ struct CheckSpec {
   const Signal* signal = nullptr;
   double from_s = 0.0;           ///< of the window; with `after`, since the trigger
   std::optional<double> to_s{};  ///< empty: to the end
-  std::optional<Condition> after{};
-  std::optional<Condition> condition{};
+  std::optional<CaseCondition> after{};
+  std::optional<CaseCondition> condition{};
   std::string fault{};
   std::string golden_file{};
   std::vector<std::pair<std::string_view, double>> numbers{};  ///< the other keys
@@ -47,11 +55,26 @@ struct RunFacts {
   std::vector<Fault> faults{};
 };
 
+/// The axis of the bench with this name or number, or the number of axes if there is none.
+std::size_t find_axis(const RunFacts& facts, const std::string& choice);
+
+/// A condition on the samples of a tick.
+class AxisCondition {
+ public:
+  /// Without a name in front of its signal it is about `axis`.
+  AxisCondition(const CaseCondition& condition, const RunFacts& facts, std::size_t axis);
+  bool holds(std::span<const Sample> axes) const noexcept { return condition_.holds(axes[axis_]); }
+
+ private:
+  Condition condition_;
+  std::size_t axis_;
+};
+
 /// The outcome of a check.
 struct Finding {
   std::string name;
   std::string kind;
-  std::string signal;  ///< empty: it is about a condition
+  std::string signal;  ///< that it is about; empty: a fault
   std::string axis;
   std::string unit;  ///< of the numbers
   bool passed = false;
@@ -66,7 +89,7 @@ struct Finding {
   int line = 0;                 ///< in the case file
 };
 
-/// Sees every sample of its axis in their order and judges them at the end.
+/// Sees the samples of every tick in their order and judges them at the end.
 class Check {
  public:
   Check(const CheckSpec& spec, const RunFacts& facts);
@@ -74,8 +97,8 @@ class Check {
   Check& operator=(const Check&) = delete;
   virtual ~Check() = default;
 
-  /// Does not allocate.
-  void see(const Sample& sample) noexcept;
+  /// One sample for each axis. Does not allocate.
+  void see(std::span<const Sample> axes) noexcept;
   Finding finish() const;
 
   const CheckSpec& spec() const noexcept { return spec_; }
@@ -101,13 +124,16 @@ class Check {
   std::string_view unit() const noexcept { return spec_.signal != nullptr ? spec_.signal->unit : ""; }
 
  private:
-  /// A sample of the window; `value` is that of the signal, or 0.
+  /// A sample of the window; `value` is that of the signal, or whether the condition holds, 1 or 0.
   virtual void take(const Sample& sample, double value) noexcept = 0;
   virtual Outcome outcome() const = 0;
 
   Finding blank() const;
 
   CheckSpec spec_;
+  std::size_t axis_;
+  std::optional<AxisCondition> after_{};
+  std::optional<AxisCondition> condition_{};
   double facts_period_s_;
   std::uint64_t from_ticks_;
   std::uint64_t to_ticks_;

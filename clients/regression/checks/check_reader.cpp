@@ -78,19 +78,20 @@ void read_window(KeyTable& table, CheckSpec& spec) {
 
 /// The name of a check that has none of its own.
 std::string default_name(const CheckSpec& spec) {
-  if (spec.condition) return fmt::format("{} {}", spec.kind->name, spec.condition->text());
+  if (spec.condition) return fmt::format("{} {}", spec.kind->name, spec.condition->text);
   if (spec.signal != nullptr) return fmt::format("{} {}", spec.kind->name, spec.signal->name);
   return fmt::format("{} {}", spec.kind->name, spec.fault);
 }
 
 }  // namespace
 
-std::optional<Condition> read_condition(KeyTable& table, std::string_view key) {
+std::optional<CaseCondition> read_condition(KeyTable& table, std::string_view key) {
   const std::optional<std::string> text = table.text(key);
   if (!text) return std::nullopt;
-  Condition::Parsed parsed = Condition::parse(*text);
-  if (!parsed.condition) table.report(key, parsed.problem);
-  return parsed.condition;
+  const auto parsed = parse_condition(*text);
+  if (const auto* const named = std::get_if<NamedCondition>(&parsed)) return CaseCondition{*text, *named};
+  table.report(key, fmt::format("is \"{}\" but {}", printable(*text), std::get<std::string>(parsed)));
+  return std::nullopt;
 }
 
 std::optional<CheckSpec> read_check(KeyTable& table, const std::filesystem::path& folder) {

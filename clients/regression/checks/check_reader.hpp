@@ -13,6 +13,6 @@ namespace drivebench::regression {
 std::optional<CheckSpec> read_check(KeyTable& table, const std::filesystem::path& folder);
 
 /// Reads a condition; a wrong one is a problem of the key.
-std::optional<Condition> read_condition(KeyTable& table, std::string_view key);
+std::optional<CaseCondition> read_condition(KeyTable& table, std::string_view key);
 
 }  // namespace drivebench::regression

@@ -18,15 +18,15 @@ class OnEverySample : public Check {
       : Check(spec, facts), wanted_(wanted) {}
 
  private:
-  void take(const Sample& sample, double) noexcept override {
-    if (spec().condition->holds(sample) == wanted_) return;
+  void take(const Sample& sample, double value) noexcept override {
+    if ((value != 0.0) == wanted_) return;
     if (count_++ == 0) first_wrong_ = sample.tick;
   }
   Outcome outcome() const override {
     std::string text =
-        fmt::format("\"{}\" {} throughout", spec().condition->text(), wanted_ ? "holds" : "does not hold");
+        fmt::format("\"{}\" {} throughout", spec().condition->text, wanted_ ? "holds" : "does not hold");
     if (count_ != 0) {
-      text = fmt::format("\"{}\" {} at {:.6g} s, in {} of {} samples", spec().condition->text(),
+      text = fmt::format("\"{}\" {} at {:.6g} s, in {} of {} samples", spec().condition->text,
                          wanted_ ? "does not hold" : "holds", seconds(first_wrong_), count_, samples());
     }
     return {.passed = count_ == 0,
@@ -59,8 +59,8 @@ class FirstHold : public Check {
   std::optional<std::uint64_t> held() const noexcept { return held_; }
 
  private:
-  void take(const Sample& sample, double) noexcept override {
-    if (!held_ && spec().condition->holds(sample)) held_ = sample.tick;
+  void take(const Sample& sample, double value) noexcept override {
+    if (!held_ && value != 0.0) held_ = sample.tick;
   }
 
   std::optional<std::uint64_t> held_{};
@@ -79,9 +79,9 @@ class Eventually final : public FirstHold {
             .limit = window_s,
             .worst_tick = held().value_or(last_seen()),
             .unit = "s",
-            .sentence = held() ? fmt::format("\"{}\" holds after {:.6g} s", spec().condition->text(), after_s)
+            .sentence = held() ? fmt::format("\"{}\" holds after {:.6g} s", spec().condition->text, after_s)
                                : fmt::format("\"{}\" never holds in the window of {:.6g} s",
-                                             spec().condition->text(), window_s)};
+                                             spec().condition->text, window_s)};
   }
 };
 
@@ -94,7 +94,7 @@ class Reaction final : public FirstHold {
   Outcome outcome() const override {
     const double limit = spec().number_or("within_ticks", 0.0);
     const double ticks = held() ? static_cast<double>(*held() - first_tick()) : kInfinite;
-    const std::string& reaction = spec().condition->text();
+    const std::string& reaction = spec().condition->text;
     return {.passed = ticks <= limit,
             .measured = ticks,
             .limit = limit,
@@ -102,8 +102,8 @@ class Reaction final : public FirstHold {
             .unit = "ticks",
             .sentence = held()
                             ? fmt::format("\"{}\" {} ticks after \"{}\", max {}", reaction, ticks,
-                                          spec().after->text(), limit)
-                            : fmt::format("\"{}\" never holds after \"{}\"", reaction, spec().after->text())};
+                                          spec().after->text, limit)
+                            : fmt::format("\"{}\" never holds after \"{}\"", reaction, spec().after->text)};
   }
 };
 

@@ -33,7 +33,7 @@ struct Step {
   int line = 0;
   std::string axis = "0";
   std::optional<double> at_s{};
-  std::optional<Condition> when{};
+  std::optional<CaseCondition> when{};
   double for_s = 0.0;
   double delay_s = 0.0;
   Action action = Action::kLoad;

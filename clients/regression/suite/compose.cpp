@@ -207,14 +207,17 @@ class Composer {
     remove(bench_, "realtime");
   }
 
+  /// A step is an event of its axis in the bench file.
   void add(const Step& step) {
     ConfigNode* const on = axis(step.axis, step.line, "step.axis");
     if (on == nullptr) return;
-    if (step.at_s) {
-      add_event(*on, step);
-    } else {
-      add_conditional(step, *on);
-    }
+    ConfigNode event = table_node("");
+    if (step.at_s) set(event, "at_s", *step.at_s);
+    if (step.when) set(event, "when", step.when->text);
+    if (step.for_s > 0.0) set(event, "for_s", step.for_s);
+    if (step.delay_s > 0.0) set(event, "delay_s", step.delay_s);
+    add_action(event, step);
+    child_or_new(*on, std::string(table_of(step.action)), Kind::kArray).children.push_back(std::move(event));
   }
 
   static std::string_view table_of(Step::Action action) {
@@ -231,33 +234,14 @@ class Composer {
     return "load";
   }
 
-  /// The action of a step; `name_key` is the key of the parameter's or the fault's name.
-  static void add_action(ConfigNode& table, const Step& step, const std::string& name_key) {
+  static void add_action(ConfigNode& event, const Step& step) {
     const std::string key = step.action == Step::Action::kLoad      ? "load_nm"
                             : step.action == Step::Action::kImpulse ? "impulse_nms"
                                                                     : "value";
-    if (!step.name.empty()) set(table, name_key, step.name);
-    set(table, key, step.value.scalar);
-    if (step.ramp_s > 0.0) set(table, "ramp_s", step.ramp_s);
-  }
-
-  /// A step at a time is a scheduled event of its axis.
-  static void add_event(ConfigNode& axis, const Step& step) {
-    ConfigNode event = table_node("");
-    set(event, "at_s", *step.at_s);
-    add_action(event, step, step.action == Step::Action::kFault ? "name" : "parameter");
-    child_or_new(axis, std::string(table_of(step.action)), Kind::kArray).children.push_back(std::move(event));
-  }
-
-  /// A step on a condition stands in the bench file as it stands in the case.
-  void add_conditional(const Step& step, const ConfigNode& axis) {
-    ConfigNode table = table_node("");
-    set(table, "when", step.when->text());
-    set(table, "axis", text_of(axis, "name"));
-    if (step.for_s > 0.0) set(table, "for_s", step.for_s);
-    if (step.delay_s > 0.0) set(table, "delay_s", step.delay_s);
-    add_action(table, step, step.action == Step::Action::kFault ? "fault" : "parameter");
-    child_or_new(bench_, "step", Kind::kArray).children.push_back(std::move(table));
+    if (step.action == Step::Action::kFault) set(event, "name", step.name);
+    if (step.action == Step::Action::kParameter) set(event, "parameter", step.name);
+    set(event, key, step.value.scalar);
+    if (step.ramp_s > 0.0) set(event, "ramp_s", step.ramp_s);
   }
 
   const Case& case_;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "protocols/nearest_name.hpp"
@@ -39,15 +39,6 @@ std::string_view word_of(Verdict verdict) noexcept {
   return "skipped";
 }
 
-std::size_t find_axis(const RunFacts& facts, const std::string& choice) {
-  std::size_t number = 0;
-  const auto [end, error] = std::from_chars(choice.data(), choice.data() + choice.size(), number);
-  if (error == std::errc{} && end == choice.data() + choice.size()) {
-    return std::min(number, facts.axes.size());
-  }
-  return static_cast<std::size_t>(std::ranges::find(facts.axes, choice) - facts.axes.begin());
-}
-
 void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems) {
   const auto need_axis = [&](const std::string& choice, int line, const std::string& key) {
     if (find_axis(facts, choice) < facts.axes.size()) return;
@@ -56,8 +47,16 @@ void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems)
         fmt::format("is \"{}\", no axis of the bench{}", printable(choice), advice(choice, facts.axes)));
   };
   need_axis(c.device.axis, c.device.line, "dut.axis");
+  const auto need_axis_of = [&](const std::optional<CaseCondition>& condition, int line,
+                                const std::string& key) {
+    if (condition && !condition->named.axis.empty()) need_axis(condition->named.axis, line, key);
+  };
+  for (const Step& step : c.steps)
+    need_axis_of(step.when, step.line, "step.when");
   for (const CheckSpec& check : c.checks) {
     need_axis(check.axis, check.line, "check.axis");
+    need_axis_of(check.after, check.line, "check.after");
+    need_axis_of(check.condition, check.line, "check.condition");
     const std::string rule = problem_on_bench(check, facts);
     if (!rule.empty()) problems.add(c.file, check.line, "check", rule);
   }
@@ -72,9 +71,11 @@ Judge::Judge(const Case& c, const RunFacts& facts, bool keeps_trace)
       lanes_(kSeeds) {
   for (const CheckSpec& spec : c.checks) {
     const std::size_t axis = find_axis(facts, spec.axis);
-    watches_.push_back({.check = spec.kind->make(spec, facts), .axis = axis});
+    CheckSpec named = spec;
+    named.axis = facts.axes[axis];
+    checks_.push_back(named.kind->make(named, facts));
     const Signal* const signal = spec.signal != nullptr ? spec.signal
-                                 : spec.condition       ? &spec.condition->signal()
+                                 : spec.condition       ? &kSignals[spec.condition->named.condition.signal]
                                                         : nullptr;
     const auto is_kept = [&](const Trace::Column& column) {
       return column.signal == signal && column.axis == facts.axes[axis];
@@ -82,6 +83,13 @@ Judge::Judge(const Case& c, const RunFacts& facts, bool keeps_trace)
     if (signal == nullptr || std::ranges::any_of(trace_.columns, is_kept)) continue;
     trace_.columns.push_back({.axis = facts.axes[axis], .signal = signal, .values = {}});
     trace_axes_.push_back(axis);
+  }
+  for (const Step& step : c.steps) {
+    if (!step.when) continue;
+    steps_.push_back({.condition = AxisCondition(*step.when, facts, find_axis(facts, step.axis)),
+                      .line = step.line,
+                      .text = step.when->text,
+                      .for_ticks = static_cast<std::uint64_t>(std::llround(step.for_s / facts.period_s))});
   }
 }
 
@@ -95,9 +103,22 @@ void Judge::see(std::span<const Sample> axes) {
   samples_ += axes.size();
   for (const Sample& sample : axes)
     add_hash(sample);
-  for (Watch& watch : watches_)
-    watch.check->see(axes[watch.axis]);
+  for (const std::unique_ptr<Check>& check : checks_)
+    check->see(axes);
+  watch_steps(axes);
   if (keeps_trace_) keep(axes);
+}
+
+void Judge::watch_steps(std::span<const Sample> axes) noexcept {
+  for (StepWatch& step : steps_) {
+    if (step.has_fired) continue;
+    if (!step.condition.holds(axes)) {
+      step.held_since.reset();
+      continue;
+    }
+    if (!step.held_since) step.held_since = axes.front().tick;
+    step.has_fired = axes.front().tick - *step.held_since >= step.for_ticks;
+  }
 }
 
 /// Owner and late ticks differ between equal runs.
@@ -123,8 +144,8 @@ CaseResult Judge::failure(Verdict verdict, std::string reason) const {
   result.tags = case_.tags;
   result.verdict = verdict;
   result.reason = std::move(reason);
-  for (const Watch& watch : watches_)
-    result.findings.push_back(watch.check->finish());
+  for (const std::unique_ptr<Check>& check : checks_)
+    result.findings.push_back(check->finish());
   result.bench_s = static_cast<double>(last_tick_) * period_s_;
   result.samples = samples_;
   for (const std::uint64_t lane : lanes_)
@@ -143,7 +164,14 @@ CaseResult Judge::result() const {
     return failure(Verdict::kInvalid, fmt::format("{} ticks of the bench were late", late_ticks_));
   }
   CaseResult result = failure(Verdict::kPass, "");
-  if (!std::ranges::all_of(result.findings, &Finding::passed)) result.verdict = Verdict::kFail;
+  for (const StepWatch& step : steps_) {
+    if (step.has_fired) continue;
+    result.reason += fmt::format("{}the step of line {} never acted: \"{}\" never held",
+                                 result.reason.empty() ? "" : "; ", step.line, step.text);
+  }
+  const bool has_passed = result.reason.empty() && std::ranges::all_of(result.findings, &Finding::passed);
+  if (!has_passed) result.verdict = Verdict::kFail;
+  if (has_passed) result.trace = {};
   return result;
 }
 

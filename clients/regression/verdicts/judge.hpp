@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,9 +13,6 @@
 #include "clients/regression/verdicts/result.hpp"
 
 namespace drivebench::regression {
-
-/// The axis of the bench with this name or number, or the number of axes if there is none.
-std::size_t find_axis(const RunFacts& facts, const std::string& choice);
 
 /// Every rule that the case breaks on its bench goes to the list.
 void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems);
@@ -36,19 +34,26 @@ class Judge {
   CaseResult failure(Verdict verdict, std::string reason) const;
 
  private:
-  struct Watch {
-    std::unique_ptr<Check> check;
-    std::size_t axis;
+  /// Whether the condition of a step has held for long enough.
+  struct StepWatch {
+    AxisCondition condition;
+    int line;
+    std::string text;
+    std::uint64_t for_ticks;
+    std::optional<std::uint64_t> held_since{};
+    bool has_fired = false;
   };
 
   void add_hash(const Sample& sample) noexcept;
   void keep(std::span<const Sample> axes);
+  void watch_steps(std::span<const Sample> axes) noexcept;
 
   const Case& case_;
   double period_s_;
   std::uint64_t end_tick_;
   std::size_t device_axis_;
-  std::vector<Watch> watches_;
+  std::vector<std::unique_ptr<Check>> checks_;
+  std::vector<StepWatch> steps_;
   bool keeps_trace_;
   Trace trace_;
   std::vector<std::size_t> trace_axes_;

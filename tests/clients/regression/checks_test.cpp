@@ -52,8 +52,9 @@ std::string problem_of(const std::string& keys) {
 
 Finding found(const std::string& keys, const Course& course, std::uint64_t end_tick = 100) {
   std::string problem;
-  const std::optional<CheckSpec> spec = spec_of(keys, problem);
+  std::optional<CheckSpec> spec = spec_of(keys, problem);
   if (!spec) throw std::runtime_error(problem);
+  spec->axis = "one";
   const RunFacts facts = facts_to(end_tick);
   const std::unique_ptr<Check> check = spec->kind->make(*spec, facts);
   for (std::uint64_t tick = 0; tick <= end_tick; ++tick) {
@@ -61,7 +62,7 @@ Finding found(const std::string& keys, const Course& course, std::uint64_t end_t
     sample.tick = tick;
     sample.speed_rad_s = course.speed(tick);
     sample.faults = course.faults(tick);
-    check->see(sample);
+    check->see(std::span(&sample, 1));
   }
   return check->finish();
 }
@@ -262,7 +263,7 @@ TEST(Checks, MistakesAreRefusedWithKeyAndRule) {
   has(speed_check("bounds", "min = 2\nmax = 1"), "has a min above its max");
   has(speed_check("bounds", "max = 1\nfrom_s = 2\nto_s = 1"), "to_s is 1 but must not lie before from_s, 2");
   has(speed_check("settles", "value = 1\nband = -1\nwithin_s = 1"), "band is -1 but must be at least 0");
-  has("kind = \"never\"\ncondition = \"speed > 1\"", "did you mean \"speed_rad_s\"?");
+  has("kind = \"never\"\ncondition = \"speed > 1\"", "did you mean 'speed_rad_s'?");
   has("kind = \"bounds\"\nsignal = \"speed\"\nmax = 1",
       "no signal of a bench; did you mean \"speed_rad_s\"?");
   std::string problem;

@@ -105,7 +105,7 @@ TEST_F(Suite, MistakesAreToldWithFileLineAndAdvice) {
   has(whole + "[[step]]\nload_nm = 1", "or else when must stand in a step");
   has(whole + "[[step]]\nat_s = 1\nfault = \"open_phase\"", "value is missing");
   has(whole + "[[step]]\nat_s = 1\nfor_s = 1\nload_nm = 1", "for_s belongs to when");
-  has(whole + "[[step]]\nwhen = \"speed > 1\"\nload_nm = 1", "did you mean \"speed_rad_s\"?");
+  has(whole + "[[step]]\nwhen = \"speed > 1\"\nload_nm = 1", "did you mean 'speed_rad_s'?");
   has(whole + "[matrix]\nstep.4.load_nm = [1]", "matrix.step.4.load_nm names no place in this case");
   has(whole + "[matrix]\nseed = 4", "must be a list, [1, 2], or a range");
   has(whole + "[matrix]\nseed = {from = 1, to = 1e9, step = 1e-3}", "makes more than 1000000 values");
@@ -258,17 +258,16 @@ TEST_F(Compose, StepsAtATimeAreScheduledEvents) {
 }
 
 // Catches: a condition that is lost, or that acts on another axis than it should.
-TEST_F(Compose, StepsOnAConditionStandInTheBench) {
+TEST_F(Compose, StepsOnAConditionWaitInTheBench) {
   const ConfigNode bench = composed(
       "[[step]]\nwhen = \"speed_rad_s > 100\"\naxis = \"1\"\nfor_s = 0.005\ndelay_s = 0.01\nfault = "
       "\"open_phase\"\n"
       "value = 2");
-  const ConfigNode& step = at(bench, {"step", "0"});
-  EXPECT_EQ(std::get<std::string>(at(step, {"when"}).scalar), "speed_rad_s > 100");
-  EXPECT_EQ(std::get<std::string>(at(step, {"axis"}).scalar), "second");
-  EXPECT_EQ(std::get<std::string>(at(step, {"fault"}).scalar), "open_phase");
-  EXPECT_EQ(number_in(at(step, {"for_s"})), 0.005);
-  EXPECT_EQ(number_in(at(step, {"delay_s"})), 0.01);
+  const ConfigNode& event = at(bench, {"axis", "1", "fault", "0"});
+  EXPECT_EQ(std::get<std::string>(at(event, {"when"}).scalar), "speed_rad_s > 100");
+  EXPECT_EQ(std::get<std::string>(at(event, {"name"}).scalar), "open_phase");
+  EXPECT_EQ(number_in(at(event, {"for_s"})), 0.005);
+  EXPECT_EQ(number_in(at(event, {"delay_s"})), 0.01);
 }
 
 }  // namespace

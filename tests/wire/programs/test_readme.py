@@ -23,7 +23,7 @@ from own_network import in_own_network
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
 
 READMES = ("README.md", "server/README.md", "clients/README.md", "clients/control/README.md", "clients/python/README.md",
-           "protocols/can/README.md", "protocols/modbus/README.md")
+           "clients/regression/README.md", "protocols/can/README.md", "protocols/modbus/README.md")
 PROGRAMS = ("drivebench", "drivebench-server")
 
 # Lines that are not run, and why.
@@ -203,7 +203,7 @@ class Readmes(unittest.TestCase):
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "control", "plot", "replay",
                           "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
                           "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
-                          "convert winding", "convert frame", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor")
+                          "convert winding", "convert frame", "test", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor")
         names = re.findall(r"^  ([a-z][a-z-]*) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
                                                           check=True).stdout, re.M)
         self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))

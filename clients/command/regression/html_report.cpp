@@ -1,0 +1,140 @@
+#include "clients/command/regression/html_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "clients/command/recording/svg_plot.hpp"
+#include "clients/regression/reports/reports.hpp"
+#include "protocols/text.hpp"
+
+namespace drivebench::command {
+namespace {
+
+using regression::CaseResult;
+using regression::Finding;
+using regression::Trace;
+using regression::Verdict;
+
+constexpr std::string_view kStyle =
+    "body{font:14px/1.4 sans-serif;margin:2em auto;max-width:60em;color:#222}"
+    "table{border-collapse:collapse;width:100%}td,th{padding:.25em .6em;border-bottom:1px solid #ddd;"
+    "text-align:left;vertical-align:top}td.n{text-align:right;font-variant-numeric:tabular-nums}"
+    ".pass{color:#00704f}.fail,.error{color:#b3261e;font-weight:bold}.invalid,.skipped{color:#8a5a00}"
+    "pre{background:#f5f5f5;padding:.6em;overflow:auto;max-height:24em}svg{max-width:100%;height:auto}"
+    "details{margin:.2em 0}h2{margin-top:2em;border-top:2px solid #ddd;padding-top:.6em}";
+
+std::string escaped_for_html(std::string_view raw) {
+  std::string out;
+  for (const char c : utf8(raw)) {
+    if (c == '&') {
+      out += "&amp;";
+    } else if (c == '<') {
+      out += "&lt;";
+    } else if (c == '>') {
+      out += "&gt;";
+    } else if (c == '"') {
+      out += "&quot;";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string number_cell(double value, std::string_view unit) {
+  if (!std::isfinite(value)) return "<td class=n>-</td>";
+  return fmt::format("<td class=n>{:.6g} {}</td>", value, escaped_for_html(unit == "1" ? "" : unit));
+}
+
+std::string checks_table(const CaseResult& result) {
+  std::string html = "<table><tr><th>check<th>verdict<th>measured<th>limit<th>worst at [s]</tr>\n";
+  for (const Finding& finding : result.findings) {
+    html +=
+        fmt::format("<tr><td>{}<td class={}>{}{}{}<td class=n>{}</td></tr>\n", escaped_for_html(finding.name),
+                    finding.passed ? "pass" : "fail", finding.passed ? "pass" : "fail",
+                    number_cell(finding.measured, finding.unit), number_cell(finding.limit, finding.unit),
+                    std::isfinite(finding.at_s) ? fmt::format("{:.6g}", finding.at_s) : "-");
+  }
+  return html + "</table>\n";
+}
+
+/// The part of a column within the window of a check, with a tenth of it before and after.
+std::string plot_of(const Finding& finding, const Trace& trace, const Trace::Column& column) {
+  const double margin_s = 0.1 * (finding.to_s - finding.from_s);
+  const auto begin = std::ranges::lower_bound(trace.time_s, finding.from_s - margin_s);
+  const auto end = std::ranges::upper_bound(trace.time_s, finding.to_s + margin_s);
+  const auto first = begin - trace.time_s.begin();
+  const auto last = end - trace.time_s.begin();
+  const std::vector<double> x(begin, end);
+  if (x.size() < 2) return {};
+  Panel panel{.label = fmt::format("{} [{}]", column.signal->name, column.signal->unit), .lines = {}};
+  panel.lines.push_back({.name = std::string(column.signal->name),
+                         .values = {column.values.begin() + first, column.values.begin() + last}});
+  for (const double limit : finding.lines) {
+    PlotLine line{.name = "limit", .values = {}};
+    for (const double time_s : x) {
+      const bool is_inside = time_s >= finding.from_s && time_s <= finding.to_s;
+      line.values.push_back(is_inside ? limit : std::nan(""));
+    }
+    panel.lines.push_back(std::move(line));
+  }
+  return svg_of(finding.name, "time of the bench [s]", x, {panel});
+}
+
+std::string plots_of(const CaseResult& result) {
+  std::string html;
+  for (const Finding& finding : result.findings) {
+    if (finding.passed || !finding.applied) continue;
+    const auto column = std::ranges::find_if(result.trace.columns, [&finding](const Trace::Column& each) {
+      return each.axis == finding.axis && each.signal->name == finding.signal;
+    });
+    if (column != result.trace.columns.end()) html += plot_of(finding, result.trace, *column);
+  }
+  return html;
+}
+
+std::string section_of(const CaseResult& result) {
+  const std::string_view word = word_of(result.verdict);
+  std::string html = fmt::format("<h2>{} <span class={}>{}</span></h2>\n<p>{}</p>\n<ul>\n",
+                                 escaped_for_html(result.name), word, word, escaped_for_html(result.file));
+  for (const std::string& reason : reasons_of(result))
+    html += fmt::format("<li>{}</li>\n", escaped_for_html(reason));
+  html += "</ul>\n" + plots_of(result) + checks_table(result);
+  if (!result.output.empty()) {
+    html += fmt::format("<p>What the device under test printed, its end:</p>\n<pre>{}</pre>\n",
+                        escaped_for_html(result.output));
+  }
+  return html;
+}
+
+std::string row_of(const CaseResult& result) {
+  const std::string_view word = word_of(result.verdict);
+  const std::string detail = result.verdict == Verdict::kPass ? checks_table(result) : std::string();
+  const std::string name = escaped_for_html(result.name);
+  return fmt::format(
+      "<tr><td>{}<td class={}>{}<td class=n>{:.6g}<td class=n>{}</tr>\n",
+      detail.empty() ? name : fmt::format("<details><summary>{}</summary>{}</details>", name, detail), word,
+      word, result.bench_s, result.findings.size());
+}
+
+}  // namespace
+
+std::string html_report(const std::string& suite, std::span<const CaseResult> results) {
+  const std::string name = escaped_for_html(suite);
+  std::string html = fmt::format(
+      "<!doctype html>\n<html lang=en><meta charset=utf-8><title>{0}</title><style>{1}</style>\n"
+      "<h1>{0}</h1>\n<p>{2}</p>\n<table><tr><th>case<th>verdict<th>bench time [s]<th>checks</tr>\n",
+      name, kStyle, regression::totals_text(regression::totals_of(results)));
+  for (const CaseResult& result : results)
+    html += row_of(result);
+  html += "</table>\n";
+  for (const CaseResult& result : results) {
+    if (result.verdict != Verdict::kPass && result.verdict != Verdict::kSkipped) html += section_of(result);
+  }
+  return html + "</html>\n";
+}
+
+}  // namespace drivebench::command

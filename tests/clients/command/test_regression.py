@@ -1,0 +1,269 @@
+#!/usr/bin/python3
+"""`drivebench test`: suites over presets and programs, verdicts, exit codes and reports."""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xml.etree.ElementTree
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+try:
+    from wire_client import PATIENCE_S, REPOSITORY, SERVER
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(77)
+
+COMMAND = SERVER.with_name("drivebench")
+SUITES = REPOSITORY / "configs/suites"
+OK, FAILED, USAGE, INVALID = 0, 1, 2, 4
+
+SERVO = """bench = "servo"
+[dut]
+preset = "book/8.2.2"
+[[check]]
+name = "current"
+kind = "bounds"
+signal = "i_a_a"
+abs = 6.0
+"""
+
+# Programs that stand in for a device under test. The bench is the one of the loops in configs/suites/ten-minutes.
+PROGRAM = """bench = "dc-a-voltage"
+duration_s = 0.02
+[dut]
+command = ["/usr/bin/python3", "device.py"]
+time_limit_s = {limit_s}
+[[check]]
+kind = "always"
+condition = "i_a_a < 30"
+"""
+DRIVES = """import os
+import drivebench
+with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
+    bench.acquire()
+    sample = bench.newest()
+    while sample.tick < {until}:
+        sample = bench.step(voltages=5.0)
+"""
+
+
+class RegressionTest(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory(prefix="drivebench-regression-")
+        self.folder = pathlib.Path(temporary.name)
+        self.addCleanup(temporary.cleanup)
+        self.environment = {**os.environ, "PYTHONPATH": str(REPOSITORY / "clients/python/src"),
+                            "DRIVEBENCH_LIBRARY": str(SERVER.parents[1] / "lib/libdrivebench.so.1"), "TMPDIR": str(self.folder)}
+
+    def write(self, name, text):
+        path = self.folder / "suite" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def run_test(self, *arguments, code=OK):
+        done = subprocess.run([COMMAND, "test", *map(str, arguments)], capture_output=True, text=True, env=self.environment,
+                              timeout=4 * PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done
+
+    def report(self, *arguments, code=OK):
+        file = self.folder / "report.json"
+        self.run_test(*arguments, "--json", file, code=code)
+        return json.loads(file.read_text(encoding="utf-8"))
+
+    def suite(self, *arguments, code=OK):
+        return self.report(self.folder / "suite", *arguments, code=code)
+
+
+class Presets(RegressionTest):
+    def test_a_failed_check_names_its_value_its_limit_and_its_time(self):
+        """Catches: exit code 0 after a failure, a report that does not say where it was worst."""
+        self.write("servo.toml", SERVO.replace("6.0", "5.0"))
+        done = self.run_test(self.folder / "suite", "--github", code=FAILED)
+        self.assertRegex(done.stdout, r"(?m)^fail +servo +0\.128 s +1 check$")
+        self.assertRegex(done.stdout, r"current: at least -5\.46\d* A, min -5 A, at 0\.\d+ s \(line 4\)")
+        self.assertIn("1 failed;", done.stdout)
+        self.assertRegex(done.stdout, r"(?m)^::error file=.*servo\.toml,line=4,title=fail servo::current: ")
+
+    def test_a_matrix_runs_every_combination_and_its_values_matter(self):
+        """Catches: a matrix whose values do not reach the bench."""
+        self.write("servo.toml", SERVO + """[[step]]
+at_s = 0.06
+load_nm = 0.1
+[matrix]
+step.0.load_nm = [0.0, 0.1]
+override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
+""")
+        cases = self.suite()["cases"]
+        self.assertEqual([case["name"] for case in cases],
+                         [f"servo[load_nm={load}, rotor_resistance_ohm={ohm}]" for load in ("0.0", "0.1") for ohm in (3.9, 5.85)])
+        self.assertEqual(len({case["hash"] for case in cases}), 4)
+
+    def test_reports_are_the_same_bytes_for_any_number_of_jobs(self):
+        """Catches: an order or a number in a report that depends on threads or on the clock."""
+        self.write("servo.toml", SERVO + "[matrix]\nseed = {from = 1, to = 6}\n")
+        reports = []
+        for jobs in (1, 3):
+            names = [self.folder / f"{jobs}.{kind}" for kind in ("json", "xml")]
+            out = self.run_test(self.folder / "suite", "--jobs", jobs, "--tap", "--json", names[0], "--junit", names[1]).stdout
+            reports.append((out, *(name.read_bytes() for name in names)))
+        self.assertEqual(reports[0], reports[1])
+        self.assertEqual(len(xml.etree.ElementTree.fromstring(reports[0][2]).findall("./testsuite/testcase")), 6)
+
+    def test_nothing_runs_when_a_case_has_a_mistake(self):
+        """Catches: a mistake that is told only after an hour of other cases, or without its line."""
+        self.write("a.toml", SERVO)
+        for wrong, sentence in (
+                (SERVO.replace("book/8.2.2", "book/8.2.9"), "no preset 'book/8.2.9'; did you mean"),
+                (SERVO.replace('"servo"', '"sevro"'), "no bench file 'sevro'; did you mean \"servo\"?"),
+                (SERVO.replace('"servo"', '"dc-a"'), "does not fit the bench: machine.kind is pm_dc on the bench"),
+                (SERVO + "from_s = 1.0\n", "b.toml:4: check from_s is 1 but the case ends at 0.128 s"),
+                (SERVO + "axis = \"motor\"\n", "check.axis is \"motor\", no axis of the bench; known here: servo"),
+                (SERVO + "[override.axis.0.machine]\nrotor_resistance_ohm = -1\n", "rotor_resistance_ohm"),
+                (SERVO + "[dut.gains]\n", "b.toml"),
+                (SERVO.replace("[[check]]", "[dut.gains]\ncurrent.prop = 1\n[[check]]"), "no gain 'current.prop'"),
+                (SERVO + "[[step]]\nat_s = 0.1\nfault = \"open_phas\"\nvalue = 1\n", "open_phas")):
+            with self.subTest(sentence):
+                self.write("b.toml", wrong)
+                if sentence == "b.toml":
+                    self.run_test(self.folder / "suite")  # an empty table of gains is none
+                    continue
+                done = self.run_test(self.folder / "suite", code=USAGE)
+                self.assertIn(sentence, done.stderr)
+                self.assertEqual(done.stdout, "")
+
+    def test_filters_tags_and_lists_choose_cases(self):
+        """Catches: a filter that runs everything, a suite without cases that passes."""
+        self.write("a/one.toml", 'tags = ["quick", "dc"]\n' + SERVO)
+        self.write("b/two.toml", 'tags = ["quick"]\nskip = "no board"\n' + SERVO)
+        listed = self.run_test(self.folder / "suite", "--list").stdout
+        self.assertEqual(listed, "a/one  #quick #dc\nb/two  #quick  skipped: no board\n")
+        self.assertEqual([case["name"] for case in self.suite("--tag", "quick", "--tag", "dc")["cases"]], ["a/one"])
+        only = self.suite("--filter", "two")["cases"]
+        self.assertEqual([(case["name"], case["verdict"], case["reason"]) for case in only], [("b/two", "skipped", "no board")])
+        self.assertIn("none of the 2 cases", self.run_test(self.folder / "suite", "--tag", "slow", code=USAGE).stderr)
+        self.assertIn("no suite 'referense'; did you mean \"reference\"?", self.run_test("referense", code=USAGE).stderr)
+
+    def test_a_step_on_a_condition_acts_in_the_bench_and_must_act(self):
+        """Catches: a stimulus that never came and a case that passes all the same."""
+        step = '[[step]]\nwhen = "speed_rad_s > {}"\nfor_s = 0.002\nfault = "open_phase"\nvalue = 2\n'
+        injected = '[[check]]\nkind = "{}"\ncondition = "injected != 0"\n'
+        wide = SERVO.replace("6.0", "99.0")
+        self.write("servo.toml", wide + step.format(50) + injected.format("eventually"))
+        self.assertEqual(self.suite()["passed"], 1)
+        self.write("servo.toml", wide + step.format(500) + injected.format("never"))
+        case = self.suite(code=FAILED)["cases"][0]
+        self.assertEqual(case["reason"], 'the step of line 9 never acted: "speed_rad_s > 500" never held')
+
+    def test_a_bench_that_latches_a_fault_goes_on_to_the_end(self):
+        """Catches: a run that ends with the first fault, so that no check sees what comes after."""
+        self.write("servo.toml", SERVO.replace("6.0", "99.0") + """[[step]]
+at_s = 0.05
+fault = "command_loss"
+value = 1
+[[check]]
+name = "safe in time"
+kind = "reaction"
+after = "injected != 0"
+condition = "state == 3"
+within_ticks = 21
+""")
+        case = self.suite()["cases"][0]
+        self.assertEqual((case["verdict"], case["bench_s"]), ("pass", 0.128))
+
+    def test_the_composed_case_is_the_same_over_a_server(self):
+        """Catches: a case in process that differs from the same case of a program by a bit."""
+        self.write("preset.toml", 'bench = "dc-a-voltage"\nduration_s = 0.02\n[[check]]\nkind = "always"\ncondition = "i_a_a < 30"\n')
+        self.write("program.toml", PROGRAM.format(limit_s=30))
+        self.write("device.py", DRIVES.format(until=10 ** 9).replace("voltages=5.0", "gates=drivebench.Gates.OFF"))
+        cases = self.suite("--jobs", "2")["cases"]
+        self.assertEqual([case["verdict"] for case in cases], ["pass", "pass"], cases)
+        self.assertEqual(cases[0]["hash"], cases[1]["hash"])
+
+
+class Programs(RegressionTest):
+    def verdict_of(self, device, limit_s=30.0, code=FAILED):
+        self.write("device.py", device)
+        self.write("case.toml", PROGRAM.format(limit_s=limit_s))
+        return self.suite(code=code)["cases"][0]
+
+    def test_a_program_that_drives_passes(self):
+        """Catches: a link that does not reach the program, samples that are lost on their way through the recording."""
+        case = self.verdict_of(DRIVES.format(until=10 ** 9), code=OK)
+        self.assertEqual((case["verdict"], case["samples"], case["bench_s"]), ("pass", 201, 0.02))
+
+    def test_a_program_that_dies_or_never_drives_is_an_error(self):
+        """Catches: a device under test that died, and a case that passes or blames its checks."""
+        for device, limit_s, sentence in (
+                (DRIVES.format(until=50) + "raise SystemExit(3)\n", 30, r"ended with code 3 at 0\.005 s of 0\.02 s"),
+                (DRIVES.format(until=50), 30, r"ended with code 0 at 0\.005 s of 0\.02 s"),
+                ("import time\ntime.sleep(600)\n", 0.5, r"the time limit of 0\.5 s passed at 0 s of the bench"),
+                ("import os\nos.kill(os.getpid(), 9)\n", 30, r"ended with code 137 at 0 s")):
+            with self.subTest(sentence):
+                case = self.verdict_of(device, limit_s)
+                self.assertEqual(case["verdict"], "error")
+                self.assertRegex(case["reason"], sentence)
+
+    def test_what_a_program_prints_is_in_the_report(self):
+        """Catches: output that is lost, or that fills a pipe until the program stands still."""
+        case = self.verdict_of("print('x' * 200000)\nprint('the end', flush=True)\nraise ValueError('why')\n")
+        self.assertIn("the end\n", case["output"])
+        self.assertIn("ValueError: why\n", case["output"])
+        self.assertLess(len(case["output"]), 70000)
+
+    def test_no_process_and_no_file_stays_behind(self):
+        """Catches: a program's own children, a server or a folder that outlives the case, also after an interrupt."""
+        self.write("device.py", "import subprocess, sys\nprint(subprocess.Popen(['sleep', '600']).pid, flush=True)\n"
+                                "import time\ntime.sleep(600)\n")
+        self.write("case.toml", PROGRAM.format(limit_s=600))
+        running = subprocess.Popen([COMMAND, "test", str(self.folder / "suite")], stdout=subprocess.PIPE, text=True,
+                                   env=self.environment)
+        output, until = None, time.monotonic() + PATIENCE_S
+        while output is None and time.monotonic() < until:
+            printed = [file.read_text() for file in self.folder.glob("drivebench-test-*/0/output.txt")]
+            output = next((text for text in printed if text.strip()), None)
+        self.assertIsNotNone(output)
+        running.send_signal(signal.SIGINT)
+        out, _ = running.communicate(timeout=PATIENCE_S)
+        self.assertEqual(running.returncode, FAILED)
+        self.assertIn("interrupted", out)
+        self.assertEqual(list(self.folder.glob("drivebench-test-*")), [])
+        child = pathlib.Path(f"/proc/{output.strip()}/stat")
+        until = time.monotonic() + PATIENCE_S
+        while child.exists() and child.read_text().split()[2] != "Z" and time.monotonic() < until:
+            time.sleep(0.01)
+        self.assertTrue(not child.exists() or child.read_text().split()[2] == "Z")
+
+
+class ShippedSuites(RegressionTest):
+    def test_the_reference_controllers_pass_their_suite(self):
+        """Catches: a controller, a machine or a bench that does not do what the suite says it does."""
+        report = self.report("reference", "--jobs", "2")
+        self.assertGreaterEqual(report["passed"], 50)
+        self.assertEqual(report["skipped"], 0)
+
+    def test_the_first_suite_passes_in_python_and_in_c(self):
+        """Catches: a README that shows a device under test which does not work."""
+        suite = self.folder / "ten-minutes"
+        shutil.copytree(SUITES / "ten-minutes", suite)
+        self.assertEqual(self.report(suite, "--jobs", "2")["passed"], 4)
+        program = suite / "speed_loop"
+        subprocess.run(["cc", "-std=c99", "-Wall", "-Werror", suite / "speed_loop.c", f"-I{REPOSITORY}/protocols/abi",
+                        f"-L{SERVER.parents[1]}/lib", "-ldrivebench", "-lm", f"-Wl,-rpath,{SERVER.parents[1]}/lib", "-o", program],
+                       check=True)
+        case = suite / "speed.toml"
+        case.write_text(case.read_text().replace('["python3", "speed_loop.py"]', '["./speed_loop"]'))
+        in_c = self.report(suite)
+        self.assertEqual(in_c["passed"], 4)
+        self.assertTrue(all(case["output"].startswith("the bench ended at 0.4") for case in in_c["cases"]))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
