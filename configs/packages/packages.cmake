@@ -15,11 +15,12 @@ set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "The programs drivebench and drivebench
  over TCP, CAN and Modbus, with reference controllers and identification.")
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME drivebench)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS adduser)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_CONTROL_EXTRA
   ${CMAKE_CURRENT_LIST_DIR}/postinst ${CMAKE_CURRENT_LIST_DIR}/postrm ${CMAKE_CURRENT_LIST_DIR}/conffiles)
 
 set(library libdrivebench${DRIVEBENCH_ABI})
+# `drivebench test` and inproc: links load the bench as a library.
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "adduser, ${library} (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION "The bench behind one C ABI: in process, or over TCP, CAN and Modbus.")
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME ${library})
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libs)

@@ -65,6 +65,14 @@ void write(const fs::path& file, const std::string& text) {
   if (!out) throw std::runtime_error("cannot write " + file.string());
 }
 
+/// What the bench says about the composed file, which its reader never sees.
+std::string about_the_case(std::string sentence, const fs::path& composed) {
+  const std::string path = composed.string();
+  for (std::size_t at = sentence.find(path); at != std::string::npos; at = sentence.find(path, at))
+    sentence.replace(at, path.size(), "the composed bench");
+  return sentence;
+}
+
 PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& problems) {
   const fs::path bench = bench_file_of(c);
   write(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
@@ -119,7 +127,7 @@ std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path
       for (const ConfigProblem& each : error.problems())
         problems.add(each.file, each.line, each.key, each.rule);
     } catch (const UsageError& error) {
-      problems.add(c.file, c.line, c.name + ":", error.what());
+      problems.add(c.file, c.line, c.name + ":", about_the_case(error.what(), file));
     }
     if (problems.full()) break;
   }

@@ -19,8 +19,6 @@ using regression::DeviceUnderTest;
 using regression::Judge;
 using regression::Verdict;
 
-constexpr std::uint64_t kTimeout = 3;
-constexpr std::uint64_t kFault = 4;
 constexpr std::uint64_t kRun = 1;
 
 /// The user has ended the run.
@@ -30,17 +28,18 @@ class Interrupted : public std::exception {};
 /// its gates stay off until the end.
 class CaseWatcher final : public LoopWatcher {
  public:
-  CaseWatcher(std::uint64_t end_tick, const SeeTick& see) : end_tick_(end_tick), see_(see) {}
+  CaseWatcher(const v1::BenchDescription& bench, std::uint64_t end_tick, const SeeTick& see)
+      : latched_faults_(latched_faults(bench, ~std::uint64_t{0})), end_tick_(end_tick), see_(see) {}
 
   Answer answering(const LoopStep& step) override {
     see_();
     if (interrupted()) throw Interrupted();
     if (step.sample.tick >= end_tick_) return Answer::kEnd;
-    const std::uint64_t state = step.sample.state;
-    return state == kTimeout || state == kFault ? Answer::kGatesOff : Answer::kSend;
+    return (step.sample.faults & latched_faults_) != 0 ? Answer::kGatesOff : Answer::kSend;
   }
 
  private:
+  std::uint64_t latched_faults_;
   std::uint64_t end_tick_;
   const SeeTick& see_;
 };
@@ -91,7 +90,7 @@ void drive(link::AxisLink& axis, const Case& c, std::uint64_t end_tick, const Se
   }
   control::Run run = made(chosen_preset(c.device.preset), gains_of(c.device));
   if (axis.bench().arming_commands() > 1) keep_off(axis, end_tick, see, true);
-  CaseWatcher watcher(end_tick, see);
+  CaseWatcher watcher(axis.bench(), end_tick, see);
   control_loop(axis, run, watcher);
 }
 

@@ -51,8 +51,14 @@ void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems)
                                 const std::string& key) {
     if (condition && !condition->named.axis.empty()) need_axis(condition->named.axis, line, key);
   };
-  for (const Step& step : c.steps)
+  const double end_s = static_cast<double>(facts.end_tick) * facts.period_s;
+  for (const Step& step : c.steps) {
     need_axis_of(step.when, step.line, "step.when");
+    if (step.at_s && *step.at_s >= end_s) {
+      problems.add(c.file, step.line, "step.at_s",
+                   fmt::format("is {:.6g} but the case ends at {:.6g} s", *step.at_s, end_s));
+    }
+  }
   for (const CheckSpec& check : c.checks) {
     need_axis(check.axis, check.line, "check.axis");
     need_axis_of(check.after, check.line, "check.after");

@@ -117,6 +117,23 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertEqual(reports[0], reports[1])
         self.assertEqual(len(xml.etree.ElementTree.fromstring(reports[0][2]).findall("./testsuite/testcase")), 6)
 
+    def test_a_failed_case_is_kept_and_can_be_replayed(self):
+        """Catches: a recording of another run than the one that failed, a bench that nobody can serve."""
+        self.write("servo.toml", SERVO.replace("6.0", "5.0") + "[matrix]\ncheck.0.abs = [5.0, 6.0]\n")
+        kept, page = self.folder / "kept", self.folder / "page.html"
+        self.run_test(self.folder / "suite", "--keep", kept, "--html", page, code=FAILED)
+        self.assertEqual([path.name for path in kept.iterdir()], ["servo[abs=5.0]"])
+        case = kept / "servo[abs=5.0]"
+        subprocess.run([SERVER, "--check-config", case / "bench.toml"], check=True, capture_output=True)
+        subprocess.run([SERVER, "--replay", case / "run.mcap"], check=True, capture_output=True)
+        exported = subprocess.run([COMMAND, "export", case / "run.mcap", "--signals", "i_a_a"], check=True, capture_output=True,
+                                  text=True).stdout.splitlines()[1:]
+        self.assertAlmostEqual(min(float(line.split(",")[2]) for line in exported[:1025]), -5.4648, places=4)
+        html = page.read_text(encoding="utf-8")
+        self.assertEqual(html.count("<svg"), 1)
+        self.assertIn("current: at least -5.4648 A, min -5 A", html)
+        self.assertNotIn("http://", html.replace("http://www.w3.org/2000/svg", ""))
+
     def test_nothing_runs_when_a_case_has_a_mistake(self):
         """Catches: a mistake that is told only after an hour of other cases, or without its line."""
         self.write("a.toml", SERVO)

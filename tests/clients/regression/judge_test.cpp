@@ -71,6 +71,28 @@ TEST(Judge, LateTicksInRealTimeMakeTheRunInvalid) {
   EXPECT_EQ(run(c, 1, 3, 0).verdict, Verdict::kPass);
 }
 
+// Catches: a stimulus that never came, one that needs its condition for one tick less or more, one after the
+// end.
+TEST(Judge, AStepThatNeverActedFailsTheCase) {
+  Case c = case_with(5.0);
+  Step step{.line = 7};
+  step.when =
+      CaseCondition{"speed_rad_s < 2", std::get<NamedCondition>(parse_condition("two.speed_rad_s < 2"))};
+  step.for_s = 0.009;  // the ticks 0 to 9
+  c.steps = {step};
+  EXPECT_EQ(run(c).verdict, Verdict::kPass);
+  c.steps[0].for_s = 0.010;
+  const CaseResult result = run(c);
+  EXPECT_EQ(result.verdict, Verdict::kFail);
+  EXPECT_EQ(result.reason, "the step of line 7 never acted: \"speed_rad_s < 2\" never held");
+  ProblemList problems;
+  step.when.reset();
+  step.at_s = 0.010;
+  c.steps = {step};
+  check_on_bench(c, kTwoAxes, problems);
+  EXPECT_THROW(problems.throw_if_any(), ConfigError);
+}
+
 // Catches: a hash that depends on the number of a session, or that does not see the samples.
 TEST(Judge, EqualRunsHaveEqualHashes) {
   const std::uint64_t hash = run(case_with(5.0)).hash;
