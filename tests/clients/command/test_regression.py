@@ -53,6 +53,40 @@ with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
 """
 
 
+def with_fault(name, value):
+    """A fault between the controller and its motor from the first tick on."""
+    step = f'\n[[step]]\nat_s = 0.0\nfault = "{name}"\nvalue = {value}\n\n[[check]]\n'
+    return lambda case: case.replace("\n[[check]]\n", step, 1)
+
+
+def with_gain(name, value):
+    return lambda case: case.replace("\n\n[[", f'\n\n[dut.gains]\n"{name}" = {value}\n\n[[', 1)
+
+
+def with_text(old, new):
+    return lambda case: case.replace(old, new)
+
+
+# Defects of a controller: the case of the suite `reference`, what is wrong, and the check that tells it.
+DEFECTS = (
+    ("induction/move", "counts backwards", with_fault("encoder_swapped", 1), "arrives"),
+    ("induction/move", "half of each current is missing", with_fault("current_sensor_gain", 0.5), "moves as planned"),
+    ("induction/move", "a weak position loop", with_gain("position.proportional_per_s2", 20000.0), "arrives"),
+    ("induction/move", "differences in the place of an observer", with_text("book/8.2.2", "book/8.2.2-clipped-backward-difference"),
+     "does not run past it"),
+    ("induction/move", "a rotor resistance of a quarter", with_gain("machine.rotor_resistance_ohm", 1.0), "keeps to its current"),
+    ("induction/high_speed", "no field weakening", with_text("8.2.5-soft-flux", "8.2.5-constant-flux"), "gets up to speed"),
+    ("dc/load", "no integral", with_text('"book/2.21"', '"book/2.21-no-integral"'), "comes back"),
+    ("dc/position", "hardly any damping", with_gain("position.derivative_per_s", 10.0), "moves as planned"),
+    ("synchronous/two_phase_move", "one sample late", with_fault("command_delay", 1), "arrives"),
+    ("synchronous/high_speed", "no lead against the delay of a tick", with_text("9.7-3000rpm", "9.7-3000rpm-no-lead"), "arrives"),
+    ("synchronous/brushless", "a Hall line without a signal", with_fault("hall_stuck_low", 1), "arrives"),
+    ("synchronous/wound_rotor_weakened", "the field of rest at full speed", with_text("wound-rotor/field-weakening",
+                                                                                      "wound-rotor/constant-field"), "moves as planned"),
+    ("stepper/train", "steps faster than the rotor", with_text("train-200", "train-400"), "makes its steps"),
+)
+
+
 class RegressionTest(unittest.TestCase):
     def setUp(self):
         temporary = tempfile.TemporaryDirectory(prefix="drivebench-regression-")
@@ -199,7 +233,7 @@ within_ticks = 21
         """Catches: a case in process that differs from the same case of a program by a bit."""
         self.write("preset.toml", 'bench = "dc-a-voltage"\nduration_s = 0.02\n[[check]]\nkind = "always"\ncondition = "i_a_a < 30"\n')
         self.write("program.toml", PROGRAM.format(limit_s=30))
-        self.write("device.py", DRIVES.format(until=10 ** 9).replace("voltages=5.0", "gates=drivebench.Gates.OFF"))
+        self.write("device.py", DRIVES.format(until=10 ** 9).replace("voltages=5.0", "off=True"))
         cases = self.suite("--jobs", "2")["cases"]
         self.assertEqual([case["verdict"] for case in cases], ["pass", "pass"], cases)
         self.assertEqual(cases[0]["hash"], cases[1]["hash"])
@@ -265,6 +299,36 @@ class ShippedSuites(RegressionTest):
         report = self.report("reference", "--jobs", "2")
         self.assertGreaterEqual(report["passed"], 50)
         self.assertEqual(report["skipped"], 0)
+
+    def test_each_seeded_defect_is_caught_by_a_named_check(self):
+        """Catches: a suite that passes whatever its controllers do."""
+        for number, (name, _, change, _) in enumerate(DEFECTS):
+            case = (SUITES / "reference" / f"{name}.toml").read_text(encoding="utf-8")
+            self.assertNotEqual(change(case), case)
+            self.write(f"{number}.toml", change(case))
+        failed = {}
+        for case in self.suite("--jobs", "2", code=FAILED)["cases"]:
+            number = int(case["name"].split("[")[0])
+            failed.setdefault(number, set()).update(check["name"] for check in case["checks"] if not check["passed"])
+        for number, (name, defect, _, check) in enumerate(DEFECTS):
+            with self.subTest(f"{name}: {defect}"):
+                self.assertIn(check, failed[number])
+
+    def test_defects_of_a_program_are_caught_too(self):
+        """Catches: a program whose mistakes do not reach the checks."""
+        suite = self.folder / "suite"
+        shutil.copytree(SUITES / "ten-minutes", suite)
+        loop = (suite / "speed_loop.py").read_text(encoding="utf-8")
+        case = (suite / "speed.toml").read_text(encoding="utf-8")
+        self.write("speed.toml", case[:case.index("[matrix]")])
+        for old, new, check in (("WANTED_RAD_S - sample", "sample", "reaches its speed"),
+                                ("5.0, 40.0", "0.0, 40.0", "reaches its speed"),
+                                ("= 50.0,", "= 51.2,", "forgets the load")):
+            with self.subTest(f"{new}: {check}"):
+                self.assertIn(old, loop)
+                self.write("speed_loop.py", loop.replace(old, new))
+                failed = self.suite(code=FAILED)["cases"][0]
+                self.assertIn(check, [each["name"] for each in failed["checks"] if not each["passed"]])
 
     def test_the_first_suite_passes_in_python_and_in_c(self):
         """Catches: a README that shows a device under test which does not work."""
