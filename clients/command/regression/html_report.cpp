@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "clients/command/recording/svg_plot.hpp"
 #include "clients/regression/reports/reports.hpp"

@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <span>
 #include <system_error>
-#include <utility>
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"

@@ -15,7 +15,8 @@ void add_test_command(CommandLine& line) {
       ->check(CLI::Range(1U, 1024U));
   sub.add_flag("--list", o.list, "print the cases and end");
   sub.add_option("--filter", o.filter, "only cases whose name contains this text");
-  sub.add_option("--tag", o.wanted_tags, "only cases with this tag; several: with all of them");
+  sub.add_option("--tag", o.wanted_tags, "only cases with this tag; several: with all of them")
+      ->allow_extra_args(false);
   sub.add_option("--junit", o.junit_file, "write a JUnit XML report");
   sub.add_option("--json", o.json_file, "write a JSON report");
   sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network");

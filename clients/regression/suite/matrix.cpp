@@ -175,7 +175,7 @@ ConfigNode* place_at(ConfigNode& root, std::span<const std::string> path, int li
 
 std::string text_of(const ConfigNode& value) {
   const auto* const text = std::get_if<std::string>(&value.scalar);
-  return value.kind == Kind::kScalar && text != nullptr ? *text : toml_value(value);
+  return value.kind == Kind::kScalar && text != nullptr ? printable(*text) : toml_value(value);
 }
 
 }  // namespace
