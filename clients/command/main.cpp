@@ -11,6 +11,7 @@
 #include "clients/command/motor/motor_line.hpp"
 #include "clients/command/recording/recording_line.hpp"
 #include "clients/command/regression/test_line.hpp"
+#include "clients/command/web/web_line.hpp"
 
 int main(int argc, char** argv) {
   using namespace drivebench::command;
@@ -27,5 +28,6 @@ int main(int argc, char** argv) {
   add_can_commands(line);
   add_doctor_command(line);
   add_test_command(line);
+  add_web_command(line);
   return line.run(argc, argv);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <system_error>
 #include <vector>
 
@@ -49,19 +50,25 @@ fs::path own_file() {
 
 namespace {
 
-/// Where files that come with drivebench may stand.
-std::vector<fs::path> folders_to_search() {
+/// `configs` and `share/drivebench` in the folders above own_file(): build/release/bin stands three folders
+/// below the one with configs; an installation has bin/ or lib/ARCHITECTURE/ beside share/.
+std::vector<fs::path> folders_above() {
   std::vector<fs::path> folders;
-  if (const char* chosen = std::getenv("DRIVEBENCH_CONFIGS"); chosen != nullptr) folders.emplace_back(chosen);
-  folders.emplace_back("configs");
-  // build/release/bin stands three folders below the one with configs; an installation has bin/ or
-  // lib/ARCHITECTURE/ beside share/.
   fs::path above = own_file().parent_path();
   for (int i = 0; i < 4; ++i, above = above.parent_path()) {
     folders.push_back(above / "configs");
     folders.push_back(above / "share" / "drivebench");
   }
   folders.emplace_back(DRIVEBENCH_DATA_FOLDER);  // for a program elsewhere that holds the static library
+  return folders;
+}
+
+/// Where files that come with drivebench may stand.
+std::vector<fs::path> folders_to_search() {
+  std::vector<fs::path> folders;
+  if (const char* chosen = std::getenv("DRIVEBENCH_CONFIGS"); chosen != nullptr) folders.emplace_back(chosen);
+  folders.emplace_back("configs");
+  std::ranges::copy(folders_above(), std::back_inserter(folders));
   return folders;
 }
 
@@ -106,6 +113,16 @@ fs::path find_file(std::string_view kind, std::string_view what, std::string_vie
 fs::path find_folder(std::string_view kind, std::string_view what, std::string_view choice) {
   if (is_folder(choice) || is_file(choice)) return choice;
   return search(kind, what, choice, choice, is_folder, add_folders);
+}
+
+fs::path find_page() {
+  std::error_code ignored;
+  for (const fs::path& folder : folders_above()) {
+    if (fs::is_regular_file(folder / "web" / "index.html", ignored)) return folder / "web";
+  }
+  throw NotFound(
+      "the page was not built: it needs node and npm when drivebench is built (Debian: apt install nodejs "
+      "npm)");
 }
 
 }  // namespace drivebench::installation

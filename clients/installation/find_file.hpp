@@ -26,4 +26,7 @@ std::filesystem::path find_file(std::string_view kind, std::string_view what, st
 /// the same folders.
 std::filesystem::path find_folder(std::string_view kind, std::string_view what, std::string_view choice);
 
+/// The folder with the page of `drivebench web`: `web` in `share/drivebench` in a folder above own_file().
+std::filesystem::path find_page();
+
 }  // namespace drivebench::installation

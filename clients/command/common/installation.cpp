@@ -47,4 +47,12 @@ fs::path find_motor_file(std::string_view choice) {
   return find_or_refuse("motors", "motor file", choice);
 }
 
+fs::path find_page() {
+  try {
+    return installation::find_page();
+  } catch (const installation::NotFound& not_found) {
+    throw UsageError(not_found.what());
+  }
+}
+
 }  // namespace drivebench::command

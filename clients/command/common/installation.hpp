@@ -23,4 +23,7 @@ std::filesystem::path find_suite(std::string_view choice);
 /// A motor file, searched for like a bench file, in `motors/` of these folders.
 std::filesystem::path find_motor_file(std::string_view choice);
 
+/// The folder with the page of `drivebench web`. Throws UsageError when it was not built.
+std::filesystem::path find_page();
+
 }  // namespace drivebench::command

@@ -1,0 +1,47 @@
+#include "clients/command/web/web.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <fstream>
+
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/installation.hpp"
+#include "clients/command/common/json.hpp"
+#include "clients/web/gateway/gateway.hpp"
+
+namespace drivebench::command {
+namespace {
+
+/// The first line of a file.
+std::string token_in(const std::string& path) {
+  std::ifstream file(path);
+  std::string token;
+  if (!std::getline(file, token)) throw UsageError("--browser-token " + path + ": no token to read");
+  return token;
+}
+
+}  // namespace
+
+int run_web(const WebOptions& options) {
+  web::GatewayOptions gateway;
+  gateway.bench = options.link.address;
+  gateway.bench_token = options.link.token;
+  gateway.certificate = options.certificate;
+  gateway.key = options.key;
+  if (!options.browser_token.empty()) gateway.browser_token = token_in(options.browser_token);
+  gateway.page = find_page();
+  try {
+    gateway.listen = web::parse_listen_address(options.listen);
+    web::run_gateway(gateway, [&options](const std::string& url) {
+      fmt::print("{}\n", options.json ? Json{{"event", "ready"}, {"url", url}}.dump()
+                                      : "the bench in a browser: " + url);
+      std::fflush(stdout);
+    });
+  } catch (const web::StartError& error) {
+    throw UsageError(error.what());
+  }
+  return kExitOk;
+}
+
+}  // namespace drivebench::command

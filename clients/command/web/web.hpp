@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "clients/command/common/link_choice.hpp"
+
+namespace drivebench::command {
+
+struct WebOptions {
+  LinkChoice link{};
+  bool json = false;
+  std::string listen = "127.0.0.1:7380";
+  std::string certificate{};    ///< a file, PEM
+  std::string key{};            ///< a file, PEM
+  std::string browser_token{};  ///< a file with the token that browsers must show
+};
+int run_web(const WebOptions& options);
+
+}  // namespace drivebench::command

@@ -1,0 +1,10 @@
+#pragma once
+
+namespace drivebench::command {
+
+class CommandLine;
+
+/// web.
+void add_web_command(CommandLine& line);
+
+}  // namespace drivebench::command

@@ -1,0 +1,54 @@
+/** What the page knows of the bench. */
+import { History } from "./history";
+import { hasBit } from "./trigger";
+import { pb, Wire } from "./wire";
+
+export class Bench {
+  readonly description: pb.BenchDescription;
+  readonly histories: History[];
+  status: pb.Status | null = null;
+  /** Samples that the server dropped because the page read too slowly. */
+  dropped = 0;
+
+  constructor(readonly wire: Wire, readonly welcome: pb.Welcome) {
+    this.description = welcome.bench as pb.BenchDescription;
+    this.histories = this.description.axes.map(() => new History());
+  }
+
+  get mayChange(): boolean {
+    return this.welcome.role !== pb.Role.ROLE_VIEWER;
+  }
+
+  get isLockstep(): boolean {
+    return this.description.mode === pb.Mode.MODE_LOCKSTEP;
+  }
+
+  axisName(axis: number): string {
+    return this.description.axes[axis].name as string;
+  }
+
+  signal(name: string): pb.SignalDescription {
+    return this.description.signals.find((each) => each.name === name) as pb.SignalDescription;
+  }
+
+  sampleOf(axis: number): pb.Sample | null {
+    return (this.status?.axes.find((each) => each.axis === axis)?.sample ?? null) as pb.Sample | null;
+  }
+}
+
+/** The names of the bits that are set. */
+export function namesOfBits(descriptions: { bit?: number | null; name?: string | null }[], word: number): string[] {
+  return descriptions.filter((each) => hasBit(word, each.bit as number)).map((each) => each.name as string);
+}
+
+/** The signals that an axis usually shows, in panes. */
+export function usualPanes(axis: pb.IAxisDescription): string[][] {
+  const terminals = ["a", "b", "c"].slice(0, axis.phases ?? 3);
+  const currents = terminals.map((each) => `i_${each}_a`);
+  const voltages = terminals.map((each) => `u_${each}_v`);
+  if (axis.field_winding) {
+    currents.push("i_f_a");
+    voltages.push("u_f_v");
+  }
+  return [["speed_rad_s"], currents, voltages];
+}

@@ -1,0 +1,235 @@
+/** The scope: panes, time base, trigger, cursors and measurements. */
+import { Bench, usualPanes } from "./bench";
+import { button, choice, element, save, setText } from "./dom";
+import { csvOf, svgOf } from "./exports";
+import { MeasurementTable } from "./measurement_table";
+import { Pane } from "./pane";
+import { Trigger } from "./trigger";
+import { TriggerBar } from "./trigger_bar";
+import { frozen, part, rollingView, View, viewOf } from "./view";
+
+const kWindows_s = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30];
+const kTableMs = 200;
+const kAutoMs = 500;
+
+export class Scope {
+  private readonly panes: Pane[] = [];
+  private readonly place = element("div", { class: "panes", tabindex: 0, role: "group",
+    "aria-label": "Plots. Space pauses; a and b choose a cursor, the arrows move it, Escape removes cursors and zoom." });
+  private readonly trigger = new Trigger();
+  private readonly bar: TriggerBar;
+  private readonly table: MeasurementTable;
+  private readonly pauseButton = button("Pause", () => this.togglePause());
+  private readonly time: HTMLSelectElement;
+  private readonly note = element("span", { class: "note" });
+  private windowS = 2;
+  private held: View | null = null; // by pause or trigger
+  private zoom: [number, number] | null = null;
+  private isPaused = false;
+  private cursors: (number | null)[] = [null, null]; // ticks
+  private active = 0;
+  private isDirty = true;
+  private tableDrawn = 0;
+  private autoShown = 0;
+  private isOver = false;
+
+  /** `subscribe` is called when other signals are needed. */
+  constructor(root: HTMLElement, private readonly bench: Bench, private readonly subscribe: () => void) {
+    this.bar = new TriggerBar(bench, this.trigger, () => this.arm());
+    this.table = new MeasurementTable(bench);
+    this.time = choice("window", kWindows_s.map((each) => [String(each), each < 1 ? `${each * 1000} ms` : `${each} s`]),
+      (value) => this.setWindow(Number(value)));
+    this.time.value = String(this.windowS);
+    root.replaceChildren(element("div", { class: "bar" }, "Window", this.time, this.pauseButton,
+      button("Add pane", () => this.addPane([])), button("CSV", () => this.exportCsv()), button("SVG", () => this.exportSvg()),
+      this.note), this.bar.root, this.place, this.table.root);
+    for (const signals of usualPanes(bench.description.axes[0])) this.addPane(signals);
+    this.place.addEventListener("keydown", (event) => this.key(event));
+    this.frame();
+  }
+
+  /** Ends the drawing, for a page that gets another bench. */
+  end(): void {
+    this.isOver = true;
+  }
+
+  signalsOf(axis: number): Set<string> {
+    const signals = new Set(["tick", "state", "faults", "injected"]);
+    for (const pane of this.panes) {
+      for (const channel of pane.channels) if (channel.axis === axis) signals.add(channel.signal);
+    }
+    const trigger = this.bar.signalOf(axis);
+    if (trigger !== null) signals.add(trigger);
+    return signals;
+  }
+
+  see(axis: number, sample: Record<string, number>): void {
+    this.trigger.see(axis, sample);
+    this.isDirty = true;
+  }
+
+  /** Draws in the colours of another theme. */
+  recolour(): void {
+    for (const pane of this.panes) pane.rebuild();
+    this.isDirty = true;
+  }
+
+  private get periodS(): number {
+    return this.bench.description.period_s as number;
+  }
+
+  private get windowTicks(): number {
+    return Math.max(this.windowS / this.periodS, 2);
+  }
+
+  private addPane(signals: string[]): void {
+    const pane = new Pane(this.bench, signals.map((signal) => ({ axis: 0, signal })), {
+      changed: () => this.channelsChanged(),
+      removed: (gone) => {
+        this.panes.splice(this.panes.indexOf(gone), 1);
+        gone.root.remove();
+        this.channelsChanged();
+      },
+      clicked: (time) => this.putCursor(time),
+      selected: (from, to) => this.zoomTo(from, to),
+    });
+    this.panes.push(pane);
+    this.place.append(pane.root);
+    this.channelsChanged();
+  }
+
+  private channelsChanged(): void {
+    this.isDirty = true;
+    this.tableDrawn = 0;
+    this.subscribe();
+  }
+
+  private setWindow(windowS: number): void {
+    this.windowS = windowS;
+    this.zoom = null;
+    if (!this.isPaused) this.held = null;
+    this.isDirty = true;
+  }
+
+  private arm(): void {
+    this.trigger.arm();
+    this.held = null;
+    this.zoom = null;
+    this.isPaused = false;
+    this.autoShown = performance.now();
+    setText(this.pauseButton, "Pause");
+    this.subscribe();
+    this.isDirty = true;
+  }
+
+  private togglePause(): void {
+    this.isPaused = !this.isPaused;
+    setText(this.pauseButton, this.isPaused ? "Run" : "Pause");
+    if (this.isPaused) {
+      this.held ??= frozen(rollingView(this.bench, this.windowTicks));
+    } else {
+      this.held = null;
+      this.zoom = null;
+      this.trigger.arm();
+    }
+    this.isDirty = true;
+  }
+
+  private frame(): void {
+    if (this.isOver) return;
+    requestAnimationFrame(() => this.frame());
+    if (!this.isDirty) return;
+    this.isDirty = false;
+    this.sweep();
+    const view = this.view();
+    const marks = this.cursors.filter((each) => each !== null).map((each) => (each! - view.origin) * this.periodS);
+    if (view.origin !== 0) marks.push(0); // the trigger
+    for (const pane of this.panes) pane.draw(view, this.periodS, marks);
+    if (performance.now() - this.tableDrawn > kTableMs) {
+      this.tableDrawn = performance.now();
+      this.table.draw(this.panes, view, this.cursors);
+      setText(this.note, this.bench.dropped === 0 ? "" : `${this.bench.dropped} samples lost: the browser reads too slowly`);
+    } else {
+      this.isDirty = true;
+    }
+  }
+
+  private view(): View {
+    const view = this.held ?? rollingView(this.bench, this.windowTicks);
+    return this.zoom === null ? view : part(view, ...this.zoom);
+  }
+
+  /** Holds the window of a trigger once its last sample has come. */
+  private sweep(): void {
+    const { settings, firedTick } = this.trigger;
+    if (settings.condition === "off" || this.isPaused) {
+      this.bar.show(settings.condition === "off" ? "off" : "paused");
+      return;
+    }
+    if (!this.trigger.isArmed) return;
+    if (firedTick === null) {
+      this.bar.show("armed");
+      if (settings.sweep === "auto" && performance.now() - this.autoShown > kAutoMs) this.held = null;
+      else if (this.held === null && settings.sweep !== "auto") this.held = frozen(viewOf(this.bench, 0, -1, 0));
+      return;
+    }
+    const from = firedTick - settings.before * this.windowTicks;
+    const to = from + this.windowTicks;
+    this.held = frozen(viewOf(this.bench, from, to, firedTick));
+    this.autoShown = performance.now();
+    this.bar.show(`triggered at tick ${firedTick}`);
+    if (this.bench.histories[settings.axis].lastTick < to) return;
+    if (settings.sweep === "single") this.trigger.isArmed = false;
+    else this.trigger.arm();
+  }
+
+  private ticksAt(time: number): number {
+    return Math.round(time / this.periodS) + this.view().origin;
+  }
+
+  private putCursor(time: number): void {
+    this.cursors[this.active] = this.ticksAt(time);
+    this.active = 1 - this.active;
+    this.tableDrawn = 0;
+    this.isDirty = true;
+  }
+
+  private zoomTo(fromTime: number, toTime: number): void {
+    if (this.held === null) this.togglePause();
+    const [from, to] = [this.ticksAt(fromTime), this.ticksAt(toTime)];
+    if (to - from >= 2) this.zoom = [from, to];
+    this.isDirty = true;
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (event.target !== this.place) return;
+    const view = this.view();
+    const step = event.shiftKey ? 1 : (view.to - view.from) / 100;
+    const moved = (sign: number) => {
+      this.cursors[this.active] = Math.round((this.cursors[this.active] ?? (view.from + view.to) / 2) + sign * step);
+    };
+    if (event.key === " ") this.togglePause();
+    else if (event.key === "a" || event.key === "b") this.active = event.key === "a" ? 0 : 1;
+    else if (event.key === "ArrowLeft") moved(-1);
+    else if (event.key === "ArrowRight") moved(1);
+    else if (event.key === "Escape") [this.cursors, this.zoom] = [[null, null], null];
+    else return;
+    event.preventDefault();
+    this.tableDrawn = 0;
+    this.isDirty = true;
+  }
+
+  private exportCsv(): void {
+    const channels = this.panes.flatMap((pane) => pane.channels.map((each) => ({
+      ...each, title: `${pane.nameOf(each)} [${this.bench.signal(each.signal).unit}]` })));
+    save(`${this.bench.description.name}.csv`, "text/csv", csvOf(channels, this.view(), this.periodS));
+  }
+
+  private exportSvg(): void {
+    const panes = this.panes.map((pane) => ({
+      units: pane.units.map((each) => `[${each}]`).join(" "),
+      lines: pane.channels.map((each) => ({ ...each, title: pane.nameOf(each), colour: pane.colourOf(each) })),
+    }));
+    save(`${this.bench.description.name}.svg`, "image/svg+xml", svgOf(panes, this.view(), this.periodS));
+  }
+}

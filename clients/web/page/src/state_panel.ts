@@ -1,0 +1,92 @@
+/** The state of the bench and of each axis. */
+import { Bench, namesOfBits } from "./bench";
+import { element, setText } from "./dom";
+import { plain, withUnit } from "./numbers";
+import { pb } from "./wire";
+
+const kStates = ["idle", "run", "hold", "timeout", "fault", "ready"];
+
+/** A list of names and values, whose values change in place. */
+class Facts {
+  readonly root = element("dl");
+  private readonly values = new Map<string, HTMLElement>();
+
+  set(name: string, text: string, kind = ""): void {
+    let value = this.values.get(name);
+    if (value === undefined) {
+      value = element("dd");
+      this.values.set(name, value);
+      this.root.append(element("dt", {}, name), value);
+    }
+    setText(value, text);
+    value.className = kind;
+  }
+}
+
+export class StatePanel {
+  private readonly bench = new Facts();
+  private readonly axes: Facts[];
+  private readonly notes = element("ul", { class: "notes" });
+
+  constructor(root: HTMLElement, private readonly of: Bench, private readonly ownerOf: (axis: number) => number) {
+    this.axes = of.description.axes.map(() => new Facts());
+    root.replaceChildren(element("h2", {}, "Bench"), this.bench.root, this.notes, ...this.axes.flatMap((facts, axis) => {
+      const { name, machine, machine_kind: kind } = of.description.axes[axis];
+      return [element("h2", {}, `Axis ${axis}: ${name}`), element("p", { class: "soft" }, `${machine}, ${kind}`), facts.root];
+    }));
+  }
+
+  draw(status: pb.Status): void {
+    const tick = status.tick as number;
+    this.bench.set("tick", String(tick));
+    this.bench.set("time", `${(tick * (this.of.description.period_s as number)).toFixed(3)} s`);
+    if (status.mode === pb.Mode.MODE_REALTIME) {
+      const late = status.late_ticks as number;
+      this.bench.set("late ticks", late === 0 ? "none" : `${late}, worst ${withUnit(status.worst_lateness_s as number, "s")}`, late > 0 ? "warn" : "");
+    }
+    const hash = status.state_hash as number | bigint;
+    if (this.of.isLockstep) this.bench.set("state hash", hash.toString(16).padStart(16, "0"), "mono");
+    this.bench.set("sessions", String(status.sessions));
+    this.bench.set("recording", recordingText(status), (status.recording_gaps as number) > 0 ? "warn" : "");
+    this.showNotes(status);
+    for (const each of status.axes) this.drawAxis(each.axis as number, each.sample as pb.Sample);
+  }
+
+  private drawAxis(axis: number, sample: pb.Sample): void {
+    const { faults, injectable_faults: injectable } = this.of.description;
+    const facts = this.axes[axis];
+    const state = kStates[sample.state as number] ?? "unknown";
+    facts.set("state", state, state === "fault" || state === "timeout" ? "bad" : state === "run" ? "good" : "");
+    facts.set("controller", ownerText(sample.owner as number, this.ownerOf(axis)));
+    const present = namesOfBits(faults, sample.faults as number);
+    const latched = namesOfBits(faults.filter((each) => each.latched), sample.faults as number);
+    facts.set("faults", present.map((each) => (latched.includes(each) ? `${each} (latched)` : each)).join(", ") || "none",
+      present.length > 0 ? "bad" : "");
+    facts.set("injected", namesOfBits(injectable, sample.injected as number).join(", ") || "none",
+      sample.injected !== 0 ? "warn" : "");
+    facts.set("speed", withUnit(sample.speed_rad_s as number, "rad/s"));
+    facts.set("load", withUnit(sample.load_nm as number, "N*m"));
+    facts.set("encoder", `${plain(sample.encoder_count as number)} counts`);
+    facts.set("commands", `${sample.missed_commands} missed, ${sample.refused_commands} refused`);
+  }
+
+  private showNotes(status: pb.Status): void {
+    const notes = [...status.notes];
+    if (this.of.isLockstep && status.axes.every((each) => each.sample?.owner === 0)) {
+      notes.push("lockstep: time stands still until a controller drives the bench, `drivebench control` for example");
+    }
+    if (this.notes.childElementCount !== notes.length) this.notes.replaceChildren(...notes.map((each) => element("li", {}, each)));
+  }
+}
+
+function ownerText(owner: number, own: number): string {
+  if (owner === 0) return "none";
+  return owner === own ? "this page" : `session ${owner}`;
+}
+
+function recordingText(status: pb.Status): string {
+  if (!status.recording) return "none";
+  const file = (status.recording as string).split("/").pop() as string;
+  const gaps = status.recording_gaps as number;
+  return `${file}${gaps > 0 ? `, ${gaps} gaps` : ""}${status.recording_over ? ", ended" : ""}`;
+}

@@ -1,0 +1,42 @@
+/** What the scope shows: a window that rolls with time, or one that stands still. */
+import { Bench } from "./bench";
+import { between, copyOf, Rows } from "./history";
+
+/** A window in ticks, with the samples of every axis. Times are shown from the origin on. */
+export interface View {
+  from: number;
+  to: number;
+  origin: number;
+  rows: Rows[];
+}
+
+export interface Channel {
+  axis: number;
+  signal: string;
+}
+
+export function rollingView(bench: Bench, windowTicks: number): View {
+  const newest = Math.max(...bench.histories.map((each) => each.lastTick), windowTicks);
+  return viewOf(bench, newest - windowTicks, newest, 0);
+}
+
+export function viewOf(bench: Bench, from: number, to: number, origin: number): View {
+  return { from, to, origin, rows: bench.histories.map((each) => each.rows(from, to)) };
+}
+
+/** A copy that stays as it is. */
+export function frozen(view: View): View {
+  return { ...view, rows: view.rows.map(copyOf) };
+}
+
+/** A part of a view that stands still. */
+export function part(view: View, from: number, to: number): View {
+  return { ...view, from, to, rows: view.rows.map((each) => between(each, from, to)) };
+}
+
+/** The value of the sample at or before a tick; NaN before the first. */
+export function valueAt(view: View, channel: Channel, tick: number): number {
+  const rows = between(view.rows[channel.axis], -Infinity, tick);
+  const values = rows.columns.get(channel.signal);
+  return values === undefined || values.length === 0 ? NaN : values[values.length - 1];
+}

@@ -1,0 +1,115 @@
+/** The wire to the bench: frames of bench.proto in a WebSocket, which the gateway passes on. */
+import { Reader } from "protobufjs/minimal.js";
+import { drivebench } from "./bench_messages.js";
+
+export import pb = drivebench.v1;
+
+// Hashes have 64 bits; a number holds 53 of them.
+Reader.prototype.fixed64 = function (this: Reader) {
+  const low = this.fixed32();
+  return ((BigInt(this.fixed32()) << 32n) | BigInt(low)) as unknown as ReturnType<Reader["fixed64"]>;
+};
+
+/** The bench refused a request, in its own words. */
+export class Refused extends Error {
+  constructor(readonly refusal: pb.Refusal) {
+    super(refusal.field ? `${refusal.message} (${refusal.field})` : refusal.message);
+  }
+}
+
+export interface Listener {
+  welcome(welcome: pb.Welcome): void;
+  samples(samples: pb.Samples): void;
+  notice(notice: pb.Notice): void;
+  /** The bench turned the page away: it wants another token. */
+  tokenWanted(sentence: string): void;
+  lost(sentence: string): void;
+}
+
+interface Waiting {
+  resolve(answer: pb.Envelope): void;
+  reject(problem: Error): void;
+}
+
+const kRetryMs = 1000;
+
+/** One session after the other: a lost one is replaced until one answers. */
+export class Wire {
+  private socket: WebSocket | null = null;
+  private waiting = new Map<number, Waiting>();
+  private lastId = 0;
+  private rest = new Uint8Array(0);
+
+  constructor(private readonly listener: Listener) {}
+
+  connect(): void {
+    const socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/bench`);
+    socket.binaryType = "arraybuffer";
+    this.rest = new Uint8Array(0);
+    let refused = false;
+    socket.onopen = async () => {
+      try {
+        const hello = { protocol_min: 1, protocol_max: 1, client: "browser", token: sessionStorage.getItem("token") ?? "" };
+        this.listener.welcome((await this.ask({ hello })).welcome as pb.Welcome);
+      } catch (problem) {
+        if (!(problem instanceof Refused)) return;
+        refused = true;
+        this.listener.tokenWanted(problem.message);
+      }
+    };
+    socket.onmessage = (event) => this.take(new Uint8Array(event.data as ArrayBuffer));
+    socket.onclose = (event) => {
+      for (const each of this.waiting.values()) each.reject(new Error("the connection to the bench is lost"));
+      this.waiting.clear();
+      if (this.socket === socket) this.socket = null;
+      if (refused) return;
+      this.listener.lost(event.reason || `the gateway does not answer (${event.code})`);
+      setTimeout(() => this.connect(), kRetryMs);
+    };
+    this.socket = socket;
+  }
+
+  /** The answer; throws Refused, or Error when the connection ends first. */
+  ask(kind: pb.IEnvelope): Promise<pb.Envelope> {
+    const id = ++this.lastId;
+    const payload = pb.Envelope.encode({ ...kind, id } as pb.Envelope).finish();
+    const frame = new Uint8Array(4 + payload.length);
+    new DataView(frame.buffer).setUint32(0, payload.length);
+    frame.set(payload, 4);
+    return new Promise((resolve, reject) => {
+      if (this.socket?.readyState !== WebSocket.OPEN) {
+        reject(new Error("there is no connection to the bench"));
+        return;
+      }
+      this.waiting.set(id, { resolve, reject });
+      this.socket.send(frame);
+    });
+  }
+
+  private take(message: Uint8Array): void {
+    let bytes = message;
+    if (this.rest.length > 0) {
+      bytes = new Uint8Array(this.rest.length + message.length);
+      bytes.set(this.rest);
+      bytes.set(message, this.rest.length);
+    }
+    let at = 0;
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    while (bytes.length - at >= 4) {
+      const size = view.getUint32(at);
+      if (bytes.length - at - 4 < size) break;
+      this.dispatch(pb.Envelope.decode(bytes.subarray(at + 4, at + 4 + size)) as pb.Envelope);
+      at += 4 + size;
+    }
+    this.rest = bytes.slice(at);
+  }
+
+  private dispatch(envelope: pb.Envelope): void {
+    if (envelope.samples) return this.listener.samples(envelope.samples as pb.Samples);
+    if (envelope.notice) return this.listener.notice(envelope.notice as pb.Notice);
+    const waiting = this.waiting.get(envelope.id as number);
+    this.waiting.delete(envelope.id as number);
+    if (envelope.refusal) waiting?.reject(new Refused(envelope.refusal as pb.Refusal));
+    else waiting?.resolve(envelope);
+  }
+}

@@ -1,0 +1,227 @@
+// node scenarios.mjs NAME URL [ARGUMENTS]
+//
+// Opens the page of `drivebench web` in chromium, does what a user would and prints one JSON object with what the page then
+// shows. A line "ask WHAT" asks the test to do something outside, and waits for a line on standard input.
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { createInterface } from "node:readline";
+import puppeteer from "puppeteer-core";
+
+const kPatienceMs = 60_000;
+const lines = createInterface({ input: process.stdin })[Symbol.asyncIterator]();
+
+async function outside(what) {
+  console.log(`ask ${what}`);
+  await lines.next();
+}
+
+/** Asks again and again until the text matches; the page's own policy forbids to evaluate texts in it. */
+async function until(find, pattern) {
+  for (const end = Date.now() + kPatienceMs; ;) {
+    const shown = await find();
+    if (shown !== undefined && pattern.test(shown)) return shown;
+    if (Date.now() > end) throw new Error(`still '${shown}', not ${pattern}`);
+    await new Promise((done) => setTimeout(done, 50));
+  }
+}
+
+const text = (page, selector, pattern = /./) =>
+  until(() => page.evaluate((where) => document.querySelector(where)?.textContent, selector), pattern);
+
+/** The value beside a name in the state of the bench or of its axis. */
+const stateOf = (page, name, pattern = /./) => until(() => page.evaluate((wanted) =>
+  [...document.querySelectorAll("#state dt")].find((each) => each.textContent === wanted)?.nextElementSibling.textContent,
+name), pattern);
+
+async function set(page, label, value) {
+  await page.$eval(`[aria-label="${label}"]`, (field, wanted) => {
+    field.value = wanted;
+    field.dispatchEvent(new Event(field.type === "range" ? "input" : "change", { bubbles: true }));
+  }, value);
+}
+
+const press = (page, words) => page.evaluate((wanted) =>
+  [...document.querySelectorAll("button")].find((each) => (each.ariaLabel ?? each.textContent) === wanted).click(), words);
+
+/** The cells of a row of measurements by its signal. */
+const measured = (page, signal) => page.evaluate((wanted) => {
+  const row = [...document.querySelectorAll(".measurements tbody tr")].find((each) => each.querySelector("th").textContent === wanted);
+  const heads = [...document.querySelectorAll(".measurements thead th")].map((each) => each.textContent);
+  return row && Object.fromEntries([...row.children].map((cell, i) => [heads[i], cell.textContent]));
+}, signal);
+
+const isShown = (page, selector) => page.evaluate((where) => !document.querySelector(where).hidden, selector);
+
+/** The files that the page offers from now on, by their names. */
+async function catchFiles(page) {
+  await page.evaluate(() => {
+    window.offered = {};
+    const blobs = {};
+    const make = URL.createObjectURL.bind(URL);
+    URL.createObjectURL = (blob) => {
+      const url = make(blob);
+      blobs[url] = blob;
+      return url;
+    };
+    HTMLAnchorElement.prototype.click = async function click() {
+      window.offered[this.download] = await blobs[this.href].text();
+    };
+  });
+  return (pattern) => until(async () => {
+    const offered = await page.evaluate(() => window.offered);
+    return Object.entries(offered).map(([name, content]) => `${name}\n${content}`).find((each) => pattern.test(each));
+  }, /./);
+}
+
+const scenarios = {
+  /** A user opens the page and looks. */
+  async look(page) {
+    const first = parseFloat(await stateOf(page, "speed", /^[1-9]/));
+    const later = await until(async () => ((parseFloat(await stateOf(page, "speed")) !== first ? "changed" : "")), /changed/);
+    const row = await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"[1-9]/);
+    const file = await catchFiles(page);
+    await press(page, "Pause");
+    await press(page, "CSV");
+    await press(page, "SVG");
+    return {
+      name: await text(page, "#bench-name"), facts: await text(page, "#bench-facts"), link: await text(page, "#link-state"), later,
+      speed: JSON.parse(row), plots: (await page.$$(".pane canvas")).length, knobs: await isShown(page, "#knobs"),
+      csv: (await file(/\.csv/)).split("\n").slice(0, 4), svg: (await file(/\.svg/)).slice(0, 200),
+    };
+  },
+
+  /** A fault of one tick, and a trigger on it. */
+  async trigger(page) {
+    await stateOf(page, "tick", /[1-9]/);
+    await set(page, "window", "0.05");
+    await set(page, "trigger condition", "bit");
+    await page.evaluate(() => {
+      const bits = document.querySelector('[aria-label="trigger bit"]');
+      bits.value = [...bits.options].find((each) => each.textContent.endsWith("injected encoder_count_jump")
+        || each.textContent.endsWith("injected open_phase")).value;
+      bits.dispatchEvent(new Event("change"));
+    });
+    await set(page, "trigger sweep", "single");
+    const armed = await text(page, '[aria-label="trigger state"]', /armed/);
+    await set(page, "fault", "open_phase");
+    await set(page, "value of the fault", "1");
+    await set(page, "ticks that the fault lasts; 0: until it is ended", "1");
+    await press(page, "Inject");
+    const state = await text(page, '[aria-label="trigger state"]', /triggered/);
+    const answer = await text(page, "#knobs .answer", /done|refused|:/);
+    await page.evaluate(() => {
+      const add = document.querySelector('[aria-label="add a signal to this pane"]');
+      add.value = "0:injected";
+      add.dispatchEvent(new Event("change"));
+    });
+    const row = await until(async () => JSON.stringify(await measured(page, "injected") ?? {}), /"maximum":"[1-9]/);
+    const file = await catchFiles(page);
+    await press(page, "CSV");
+    return { armed, state, answer, row: JSON.parse(row), csv: await file(/\.csv/) };
+  },
+
+  /** Values out of range, words instead of numbers, and a value that is taken. */
+  async knobs(page, name, tooMuch, good) {
+    await stateOf(page, "tick", /[1-9]/);
+    const tried = async (value) => {
+      await page.$eval("#knobs .answer", (each) => { each.textContent = ""; });
+      await set(page, name, value);
+      await press(page, `set ${name}`);
+      return text(page, "#knobs .answer");
+    };
+    const refused = await tried(tooMuch);
+    const word = await tried("much");
+    const done = await tried(good);
+    const inForce = await until(() => page.evaluate((wanted) =>
+      document.querySelector(`[aria-label="${wanted}"]`).closest("tr").children[1].textContent, name), new RegExp(`^${good}$`));
+    await press(page, "Take the lease");
+    const owner = await stateOf(page, "controller", /this page/);
+    await press(page, "Release the lease");
+    return { refused, word, done, inForce, owner, released: await stateOf(page, "controller", /none/) };
+  },
+
+  /** A user without rights, who first shows no token. */
+  async viewer(page, token) {
+    const asked = await text(page, "#alert", /token/);
+    await page.type("#token", token);
+    await page.keyboard.press("Enter");
+    const facts = await text(page, "#bench-facts", /role/);
+    return { asked, facts, knobs: await isShown(page, "#knobs"), buttons: await page.$$eval("#knobs button", (all) => all.length) };
+  },
+
+  /** The server ends and comes back. */
+  async lost(page) {
+    await text(page, "#link-state", /connected/);
+    await outside("stop");
+    const link = await text(page, "#link-state", /lost/);
+    const alert = await text(page, "#alert");
+    await outside("start");
+    const again = await text(page, "#link-state", /connected/);
+    return { link, alert, again, tick: await stateOf(page, "tick", /[1-9]/), alertShown: await isShown(page, "#alert") };
+  },
+
+  /** Keys alone: everything can be reached, and the plots obey. */
+  async keyboard(page) {
+    await stateOf(page, "tick", /[1-9]/);
+    const reached = new Set();
+    for (let i = 0; i < 400; ++i) {
+      await page.keyboard.press("Tab");
+      const name = await page.evaluate(() => document.activeElement === document.body ? "" : document.activeElement.ariaLabel
+        ?? document.activeElement.textContent);
+      if (name === "") break;
+      reached.add(name);
+    }
+    await page.focus(".panes");
+    await page.keyboard.press("Space");
+    const paused = await page.evaluate(() => [...document.querySelectorAll("button")].some((each) => each.textContent === "Run"));
+    for (const key of ["a", "ArrowLeft", "ArrowLeft", "b", "ArrowRight"]) await page.keyboard.press(key);
+    const caption = await text(page, ".measurements caption", /Between/);
+    const missing = await page.evaluate(() => [...document.querySelectorAll("button, input, select")]
+      .filter((each) => !each.disabled && each.checkVisibility() && each.tabIndex < 0).map((each) => each.outerHTML));
+    return { reached: [...reached], paused, caption, missing };
+  },
+
+  /** What axe-core says against the page, in both themes. */
+  async axe(page) {
+    await stateOf(page, "tick", /[1-9]/);
+    const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+    const found = [];
+    for (const theme of ["light", "dark"]) {
+      await page.evaluate((chosen) => { document.documentElement.dataset.theme = chosen; }, theme);
+      await page.evaluate(source);
+      const { violations } = await page.evaluate(() => window.axe.run());
+      found.push(...violations.map(({ id, impact, nodes }) => ({ theme, id, impact, nodes: nodes.slice(0, 3).map((each) => each.html) })));
+    }
+    return { found };
+  },
+
+  /** A picture of the page in a theme. */
+  async picture(page, theme, path) {
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
+    await stateOf(page, "speed", /^[1-9]/);
+    await set(page, "window", "0.1");
+    await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"[1-9]/);
+    await new Promise((done) => setTimeout(done, 1000));
+    await page.screenshot({ path });
+    return {};
+  },
+};
+
+const [name, url, ...rest] = process.argv.slice(2);
+const browser = await puppeteer.launch({
+  executablePath: "/usr/bin/chromium", headless: true,
+  args: ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--ignore-certificate-errors"],
+});
+try {
+  const page = await browser.newPage();
+  await page.setViewport({ width: 1440, height: 1080 });
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(error.message));
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  await page.goto(url, { waitUntil: "domcontentloaded", timeout: kPatienceMs });
+  const shown = await scenarios[name](page, ...rest);
+  console.log(JSON.stringify({ ...shown, complaints }));
+} finally {
+  await browser.close();
+}
+process.exit(0);
