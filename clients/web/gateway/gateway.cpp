@@ -21,6 +21,7 @@
 #include "clients/web/gateway/frames.hpp"
 #include "clients/web/gateway/page_files.hpp"
 #include "clients/web/gateway/reports.hpp"
+#include "clients/web/gateway/send_queue.hpp"
 #include "clients/web/gateway/tls_door.hpp"
 #include "protocols/framing.hpp"
 
@@ -78,8 +79,8 @@ struct Shared {
   asio::thread_pool probing{1};
 };
 
-/// A browser's WebSocket and its session with the bench. Two coroutines share it, one for each direction; the
-/// one towards the browser ends both.
+/// A browser's WebSocket and its session with the bench. Three coroutines share it; the one that sends to the
+/// browser also closes.
 class Relay : public std::enable_shared_from_this<Relay> {
  public:
   Relay(Shared& shared, Stream stream)
@@ -97,10 +98,15 @@ class Relay : public std::enable_shared_from_this<Relay> {
     browser_.set_option(websocket::stream_base::timeout{kRequestTime, kSilence, true});
     browser_.read_message_max(kFrameHeaderSize + kMaxRequestFrame);
     browser_.binary(true);
+    browser_.auto_fragment(false);
     co_await browser_.async_accept(request, use_awaitable);
-    if (co_await connect()) {
+    const bool is_connected = co_await connect();
+    if (is_connected) {
+      const auto self = shared_from_this();
       asio::co_spawn(
-          browser_.get_executor(), [self = shared_from_this()] { return self->to_bench(); }, asio::detached);
+          browser_.get_executor(), [self] { return self->to_bench(); }, asio::detached);
+      asio::co_spawn(
+          browser_.get_executor(), [self] { return self->from_bench(); }, asio::detached);
       co_await to_browser();
     }
     error_code ignored;
@@ -133,6 +139,7 @@ class Relay : public std::enable_shared_from_this<Relay> {
     }
     error_code ignored;
     bench_.close(ignored);
+    pause_.cancel();
   }
 
   asio::awaitable<void> to_bench() {
@@ -155,35 +162,47 @@ class Relay : public std::enable_shared_from_this<Relay> {
     end(websocket::close_code::normal, "");
   }
 
-  /// Waits for each message to be on its way before it reads on: what a slow browser does not take stays with
-  /// the server, which drops the oldest samples and counts them.
-  asio::awaitable<void> to_browser() {
+  /// Reads on however slow the browser is: the server would end a session that takes nothing.
+  asio::awaitable<void> from_bench() {
     FrameReader reader(kMaxReplyFrame);
-    std::vector<std::byte> message;
-    for (error_code error; !error;) {
+    bool is_taken = true;
+    for (error_code error; !error && is_taken && reader.error().empty();) {
       const std::span<std::byte> space = reader.free_space();
       reader.received(co_await bench_.async_read_some(asio::buffer(space.data(), space.size()),
                                                       asio::redirect_error(use_awaitable, error)));
-      message.clear();
-      while (const auto frame = reader.next()) {
-        const auto header = frame_header(static_cast<std::uint32_t>(frame->size()));
-        message.insert(message.end(), header.begin(), header.end());
-        message.insert(message.end(), frame->begin(), frame->end());
+      while (const auto frame = reader.next())
+        is_taken = queue_.add(*frame) && is_taken;
+      pause_.cancel();
+      if (error) break;
+      asio::steady_timer between(browser_.get_executor(), kBetweenMessages);
+      co_await between.async_wait(use_awaitable);
+    }
+    end(websocket::close_code::going_away,
+        is_taken ? "the bench has ended the session" : "the browser reads too slowly");
+  }
+
+  asio::awaitable<void> to_browser() {
+    std::vector<std::byte> message;
+    for (error_code error; !error;) {
+      queue_.take(message);
+      if (message.empty()) {
+        if (reason_.code != websocket::close_code::none) co_return;
+        pause_.expires_at(asio::steady_timer::time_point::max());
+        co_await pause_.async_wait(asio::redirect_error(use_awaitable, error));
+        error = {};
+        continue;
       }
-      if (!reader.error().empty()) break;
-      if (message.empty()) continue;
-      pause_.expires_after(kBetweenMessages);
       co_await browser_.async_write(asio::buffer(message), asio::redirect_error(use_awaitable, error));
       shared_.counts.bytes_to_browsers += message.size();
-      if (!error) co_await pause_.async_wait(use_awaitable);
     }
-    end(websocket::close_code::going_away, "the bench has ended the session");
+    end(websocket::close_code::normal, "");
   }
 
   Shared& shared_;
   websocket::stream<Stream> browser_;
   asio::generic::stream_protocol::socket bench_;
-  asio::steady_timer pause_;
+  asio::steady_timer pause_;  // of to_browser(), until there is something to send
+  SendQueue queue_{};
   websocket::close_reason reason_{websocket::close_code::none};
 };
 

@@ -28,6 +28,8 @@ PROGRAMS = ("drivebench", "drivebench-server")
 
 # Lines that are not run, and why.
 NOT_RUN = {
+    "drivebench web                                      # the same in a browser, with a scope, triggers and knobs: http://127.0.0.1:7380/":
+        "needs the page, which npm builds; test_gateway.py and test_page.py try it",
     "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH]":
         "a synopsis; test_commands.py tries each option",
     "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
@@ -203,7 +205,7 @@ class Readmes(unittest.TestCase):
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "control", "plot", "replay",
                           "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
                           "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
-                          "convert winding", "convert frame", "test", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor")
+                          "convert winding", "convert frame", "test", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor", "web")
         names = re.findall(r"^  ([a-z][a-z-]*) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
                                                           check=True).stdout, re.M)
         self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))

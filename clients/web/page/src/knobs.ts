@@ -152,32 +152,32 @@ export class Knobs {
 
   private parameterRows(axis: number): HTMLElement {
     const live = this.bench.description.axes[axis].parameters?.filter((each) => each.live) ?? [];
-    return element("div", { class: "table", tabindex: 0, role: "group", "aria-label": "Parameters" }, element("table", {},
-      element("thead", {}, element("tr", {}, ...["parameter", "in force", "range", "new value, ramp"].map((each) =>
-        element("th", { scope: "col" }, each)))),
-      element("tbody", {}, ...live.map((each) => this.parameterRow(axis, each as pb.ParameterDescription)))));
+    return element("ul", { class: "parameters", "aria-label": "Parameters" },
+      ...live.map((each) => this.parameterRow(axis, each as pb.ParameterDescription)));
   }
 
   private parameterRow(axis: number, parameter: pb.ParameterDescription): HTMLElement {
     const name = parameter.name as string;
     const words = parameter.words;
-    const shown = element("td", {}, valueText(parameter));
+    const unit = parameter.unit === "1" ? "" : ` ${parameter.unit}`;
+    const shown = element("b", { class: "value" }, valueText(parameter));
     this.values.set(`${axis}:${name}`, shown);
     const field = words.length > 0
       ? element("select", { "aria-label": name }, ...words.map((word, i) => element("option", { value: String(i) }, word)))
-      : element("input", { "aria-label": name, value: plain(parameter.value as number), size: 8 });
-    const ramp = element("input", { "aria-label": `ramp of ${name}, s`, value: "0", size: 3, title: "ramp in seconds" });
-    const range = words.length > 0 ? "" : `${plain(parameter.minimum as number)} to ${plain(parameter.maximum as number)}`;
-    const unit = parameter.unit === "1" ? "" : ` [${parameter.unit}]`;
-    return element("tr", {}, element("th", { scope: "row", title: parameter.meaning as string }, `${name}${unit}`), shown,
-      element("td", {}, range), element("td", {}, element("form", { class: "set", submit: (event) => {
+      : element("input", { "aria-label": name, value: plain(parameter.value as number), size: 9 });
+    const ramp = element("input", { "aria-label": `ramp of ${name}, s`, value: "0", size: 4 });
+    const range = words.length > 0 ? "" : `${plain(parameter.minimum as number)} to ${plain(parameter.maximum as number)}${unit}`;
+    return element("li", { title: parameter.meaning as string },
+      element("div", { class: "parameter" }, element("span", {}, name), element("span", {}, shown, unit)),
+      element("form", { class: "bar", submit: (event) => {
         event.preventDefault();
         const value = field instanceof HTMLSelectElement ? Number(field.value) : this.number(field);
         const rampS = this.number(ramp);
         if (value === null || rampS === null) return;
         void this.change(axis, name, { write_parameter: { axis, name, value, ramp_ticks: this.ticks(rampS) } })
           .then(() => this.readParameters());
-      } }, field, ramp, element("button", { type: "submit", "aria-label": `set ${name}` }, "Set"))));
+      } }, field, "in", ramp, "s", element("button", { type: "submit", "aria-label": `set ${name}` }, "Set"),
+      element("span", { class: "soft range" }, range)));
   }
 
   private async readParameters(): Promise<void> {

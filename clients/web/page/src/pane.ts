@@ -60,7 +60,7 @@ export class Pane {
       legend: { show: false },
       cursor: { sync: { key: "scope" }, drag: { x: true, y: false, setScale: false }, points: { show: false } },
       scales: { x: { time: false, range: () => [this.times[0], this.times[1]] } },
-      axes: [{ ...line, label: "time [s]", labelSize: 16, size: 28 },
+      axes: [{ ...line, label: "time [s]", labelSize: 16, size: 28, values: (_plot, ticks) => ticks.map((each) => String(Number(each.toPrecision(9)))) },
         { ...line, label: this.units.map((each) => `[${each}]`).join(" "), labelSize: 18, size: 62 }],
       series: [{}, ...this.channels.map((each) => ({
         label: each.signal, stroke: this.colourOf(each), width: 1.3, points: { show: false },

@@ -1,0 +1,114 @@
+// node --test parts.test.mjs, with PAGE_SOURCES and PAGE_PACKAGES in the environment.
+//
+// The parts of the page that calculate, without a browser. A test's comment names the mistake that it catches.
+import assert from "node:assert/strict";
+import { createRequire } from "node:module";
+import test from "node:test";
+
+const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
+const { outputFiles } = buildSync({
+  stdin: {
+    contents: ["history", "measurements", "trigger", "numbers", "view", "exports"].map((each) => `export * from "./${each}";`).join("\n"),
+    resolveDir: process.env.PAGE_SOURCES, loader: "ts",
+  },
+  bundle: true, write: false, format: "esm",
+});
+const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf } =
+  await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
+
+function historyOf(ticks, valueOf) {
+  const history = new History();
+  history.choose(["x"]);
+  for (const tick of ticks) history.push({ tick, x: valueOf(tick) }, false);
+  return history;
+}
+
+const range = (from, to) => Array.from({ length: to - from }, (_, i) => from + i);
+
+// Catches: a spike that decimation loses, one that is drawn at the wrong place or in the wrong order.
+test("the envelope keeps a spike of one tick", () => {
+  const rows = historyOf(range(0, 100_000), (tick) => (tick === 77_777 ? 5 : tick === 77_778 ? -3 : 0)).rows(0, 100_000);
+  const points = envelope(rows, "x", 0, 100_000, 100);
+  assert.deepEqual(points.slice(154, 156), [5, -3]);
+  assert.ok(points.every((each, i) => each === 0 || i === 154 || i === 155));
+});
+
+// Catches: a line that is drawn across samples that were lost, and one that breaks where the pixels are finer than the ticks.
+test("a gap breaks the line, and columns without samples do not", () => {
+  const history = historyOf(range(0, 10), () => 1);
+  history.push({ tick: 20, x: 2 }, true);
+  const points = envelope(history.rows(0, 20), "x", 0, 21, 42);
+  assert.equal(points[2], undefined);
+  assert.equal(points.filter((each) => each === null).length, 2);
+  assert.equal(points.indexOf(null) >> 1, 39);
+});
+
+// Catches: a ring that mixes old and new samples where it begins again, and a run that goes on in the window of the last.
+test("the history is one window across its end, and begins anew with the bench", () => {
+  const history = historyOf(range(0, 300_000), (tick) => tick);
+  const rows = history.rows(250_000, 299_999);
+  assert.equal(rows.ticks.length, 50_000);
+  assert.ok(rows.ticks.every((tick, i) => tick === 250_000 + i && rows.columns.get("x")[i] === tick));
+  assert.equal(history.rows(0, 1000).ticks.length, 0);
+  history.push({ tick: 5, x: 1 }, false);
+  assert.deepEqual([...history.rows(0, 1e9).ticks], [5]);
+});
+
+// Catches: a picture on hold that the samples after it change.
+test("a copy stays as it is", () => {
+  const history = historyOf(range(0, 10), () => 1);
+  const copy = copyOf(history.rows(0, 9));
+  for (const tick of range(10, 600_000)) history.push({ tick, x: 2 }, false);
+  assert.deepEqual([...copy.columns.get("x")], Array(10).fill(1));
+  assert.deepEqual([...between(copy, 3, 5).ticks], [3, 4, 5]);
+});
+
+// Catches: a factor of sqrt(2), a mean over the gaps, a frequency that noise doubles or the window's ends shift.
+test("measurements of a noisy sine with a gap", () => {
+  const ticks = Float64Array.from(range(0, 8000).filter((tick) => tick < 3000 || tick > 3100));
+  const values = ticks.map((tick) => 1 + 2 * Math.sin(2 * Math.PI * 50 * tick / 8000) + 0.1 * Math.sin(tick * 12.9898));
+  values[2500] = NaN;
+  const m = measure(values, ticks, 1 / 8000);
+  assert.ok(Math.abs(m.mean - 1) < 0.03);
+  assert.ok(Math.abs(m.rms - Math.sqrt(3)) < 0.03);
+  assert.ok(Math.abs(m.peakToPeak - 4.2) < 0.05);
+  assert.ok(Math.abs(m.frequency - 50) < 0.2);
+  assert.ok(Number.isNaN(measure(new Float64Array(0), ticks, 1).mean));
+  assert.ok(Number.isNaN(measure(Float64Array.from([1, 1, 1]), ticks, 1).frequency));
+});
+
+// Catches: an edge that fires on the first sample, on a touch from the wrong side, or twice; a bit beyond 32.
+test("the conditions of the trigger", () => {
+  assert.ok(fires("rising", 0.9, 1, 1));
+  assert.ok(!fires("rising", 1, 1.1, 1));
+  assert.ok(!fires("rising", NaN, 2, 1));
+  assert.ok(fires("falling", 1.1, 1, 1));
+  assert.ok(!fires("falling", 1, 0.9, 1));
+  assert.ok(fires("above", NaN, 2, 1) && !fires("above", NaN, 1, 1));
+  assert.ok(fires("below", NaN, 0, 1));
+  assert.ok(fires("bit", 1, 5, 4) && !fires("bit", 4, 4, 4) && !fires("bit", NaN, 4, 4));
+  assert.ok(!fires("off", 0, 1, 1));
+  assert.ok(hasBit(2 ** 40 + 1, 2 ** 40) && !hasBit(2 ** 41, 2 ** 40));
+});
+
+// Catches: 8.5e-170 for nothing, a prefix for a count, a word that is read as a number.
+test("numbers for people", () => {
+  assert.equal(withUnit(0.0123, "A"), "12.30 mA");
+  assert.equal(withUnit(-1234.5, "V"), "-1.234 kV".replace("1.234", (1.2345).toPrecision(4)));
+  assert.equal(withUnit(8.5e-170, "A"), "0 A");
+  assert.equal(withUnit(1234567, "counts"), "1234567 counts");
+  assert.equal(withUnit(NaN, "A"), "–");
+  for (const word of ["", "much", "1,5", "0x10", "1e", "Infinity", "NaN", "--1"]) assert.ok(Number.isNaN(numberIn(word)), word);
+  assert.equal(numberIn(" -2.5e-3 "), -0.0025);
+});
+
+// Catches: columns under the wrong title, rows of gaps, and an SVG that a title can break.
+test("exports of two axes", () => {
+  const rows = [historyOf(range(0, 4), (tick) => tick), historyOf([1, 3], () => 7)].map((each) => each.rows(0, 10));
+  const view = { from: 0, to: 4, origin: 0, rows };
+  const channels = [{ axis: 0, signal: "x", title: "a.x [A]" }, { axis: 1, signal: "x", title: "b.x [A]" }];
+  assert.equal(csvOf(channels, view, 0.5), "tick,time_s,a.x [A],b.x [A]\n0,0,0,\n1,0.5,1,7\n2,1,2,\n3,1.5,3,7\n");
+  const svg = svgOf([{ units: "[A]", lines: [{ ...channels[0], title: "<b>&", colour: "red" }] }], view, 0.5);
+  assert.match(svg, /&lt;b>&amp;/);
+  assert.match(svg, /<path d="M[0-9.]+ [0-9.]+L/);
+});

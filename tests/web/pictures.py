@@ -1,0 +1,28 @@
+#!/usr/bin/python3
+"""Makes the pictures of clients/web/README.md: the page on a motor that starts from the line, in a light and a dark theme.
+
+Usage: /usr/bin/python3 tests/web/pictures.py. Needs the release build, npm, chromium."""
+import pathlib
+import sys
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from test_page import PageTest, missing
+from wire_client import BENCHES, REPOSITORY
+
+PICTURES = REPOSITORY / "clients/web/pictures"
+
+
+class Pictures(PageTest):
+    def test_pictures(self):
+        server = self.serve("--mode", "realtime", config=BENCHES / "im-b.toml")
+        gateway = self.gateway(server)
+        PICTURES.mkdir(exist_ok=True)
+        for theme in ("light", "dark"):
+            self.play("picture", gateway.url, theme, PICTURES / f"{theme}.png")
+
+
+if __name__ == "__main__":
+    if reason := missing():
+        sys.exit(f"pictures: {reason}")
+    unittest.main()

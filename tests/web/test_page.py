@@ -1,0 +1,175 @@
+#!/usr/bin/python3
+"""The page of `drivebench web` in Debian's chromium, driven by puppeteer-core: browser/scenarios.mjs does what a user would."""
+import csv
+import io
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import google.protobuf  # noqa: F401
+except ImportError:
+    print("SKIPPED: python3-protobuf is not installed")
+    sys.exit(77)
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "helpers"))
+from web_client import PAGE, Gateway
+from wire_client import BENCHES, REPOSITORY, Server
+
+PATIENCE_S = 180
+VERA = '[[token]]\nname = "vera"\nrole = "viewer"\ntoken = "vera-secret"\n'
+
+
+def missing():
+    """What this machine lacks for the page or the browser; empty: nothing."""
+    if not PAGE.exists():
+        return f"the page was not built (node and npm): no {PAGE}"
+    for program, package in (("node", "nodejs"), ("npm", "npm"), ("chromium", "chromium")):
+        if shutil.which(program) is None:
+            return f"no {program} (Debian: apt install {package})"
+    return ""
+
+
+class PageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="drivebench-page-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.package = cls.folder / "browser"
+        shutil.copytree(HERE / "browser", cls.package, ignore=shutil.ignore_patterns("node_modules"))
+        installed = subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=cls.package, capture_output=True,
+                                   text=True, timeout=300, check=False)
+        if installed.returncode != 0:
+            raise unittest.SkipTest(f"npm cannot install puppeteer-core: {installed.stderr.strip().splitlines()[-1:]}")
+
+    def serve(self, *options, **more):
+        server = Server(*options, **more)
+        self.addCleanup(server.__exit__)
+        return server
+
+    def gateway(self, server, **more):
+        gateway = Gateway(server, **more)
+        self.addCleanup(gateway.__exit__)
+        return gateway
+
+    def play(self, scenario, url, *arguments, outside=None):
+        """What the page showed. `outside` is called with each request of the scenario."""
+        command = ["node", "scenarios.mjs", scenario, url, *map(str, arguments)]
+        process = subprocess.Popen(command, cwd=self.package, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True)
+        self.addCleanup(lambda: process.poll() is None and process.kill())
+        last = ""
+        for line in process.stdout:
+            last = line
+            if line.startswith("ask "):
+                outside(line.split()[1])
+                process.stdin.write("done\n")
+                process.stdin.flush()
+        _, problems = process.communicate(timeout=PATIENCE_S)
+        self.assertEqual(process.returncode, 0, problems)
+        shown = json.loads(last)
+        self.assertEqual(shown.pop("complaints"), [], "the browser complains: scripts, or what the policy forbids")
+        return shown
+
+
+class Page(PageTest):
+    def rising(self):
+        """A motor on the line: its speed rises by itself, and slowly."""
+        text = (BENCHES / "im-b.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        return self.serve("--mode", "realtime", text=text)
+
+    def test_the_page_finds_the_bench_and_shows_a_rising_speed(self):
+        """Catches: a page that stays empty, decodes wrongly, or exports another thing than it shows."""
+        shown = self.play("look", self.gateway(self.rising()).url)
+        self.assertEqual((shown["name"], shown["link"]), ("im-b", "connected"))
+        self.assertRegex(shown["facts"], r"^real time, 10000 Hz, role admin")
+        self.assertEqual((shown["plots"], shown["knobs"]), (3, True))
+        self.assertGreater(float(shown["speed"]["maximum"].split()[0]), 1.0)
+        self.assertEqual(shown["csv"][0], "im-b.csv")
+        self.assertTrue(shown["csv"][1].startswith("tick,time_s,speed_rad_s [rad/s],i_a_a [A]"))
+        row = shown["csv"][2].split(",")
+        self.assertAlmostEqual(int(row[0]) * 1e-4, float(row[1]))
+        self.assertIn("<svg", shown["svg"])
+
+    def test_a_trigger_catches_a_fault_of_one_tick(self):
+        """Catches: a trigger on what is drawn instead of every sample, a window at the wrong tick, a spike that decimation
+        loses."""
+        shown = self.play("trigger", self.gateway(self.rising()).url)
+        tick = int(re.search(r"triggered at tick (\d+)", shown["state"])[1])
+        self.assertIn("done at tick", shown["answer"])
+        self.assertEqual(shown["row"]["maximum"], "1")
+        rows = list(csv.DictReader(io.StringIO(shown["csv"].partition("\n")[2])))
+        injected = {int(row["tick"]): row["injected [bits]"] for row in rows}
+        self.assertEqual([each for each, word in injected.items() if word not in ("0", "")], [tick])
+        self.assertLess(min(injected), tick - 50)
+        self.assertGreater(max(injected), tick + 300)
+
+    def test_a_knob_out_of_range_is_refused_in_words(self):
+        """Catches: a refusal that the page swallows or rewords, and a value that it sends although it is no number."""
+        shown = self.play("knobs", self.gateway(self.rising()).url, "machine.rotor_resistance_ohm", "-1", "2.5")
+        self.assertRegex(shown["refused"], r"machine\.rotor_resistance_ohm: .*-1.*")
+        self.assertIn("'much' is not a number", shown["word"])
+        self.assertIn("done at tick", shown["done"])
+        self.assertEqual((shown["inForce"], shown["owner"], shown["released"]), ("2.5", "this page", "none"))
+
+    def test_a_viewer_sees_no_knobs(self):
+        """Catches: knobs that only the server's refusal stops, a token that the page does not ask for or keeps after a
+        refusal."""
+        tokens = self.folder / "tokens"
+        tokens.write_text(VERA, encoding="utf-8")
+        tokens.chmod(0o600)
+        text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        server = self.serve("--mode", "lockstep", text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{tokens}"'))
+        shown = self.play("viewer", self.gateway(server).url, "vera-secret")
+        self.assertIn("token", shown["asked"])
+        self.assertIn("role viewer, user vera", shown["facts"])
+        self.assertEqual((shown["knobs"], shown["buttons"]), (False, 0))
+
+    def test_a_lost_server_is_shown_and_found_again(self):
+        """Catches: a page that shows old values as if they were new, or must be loaded again."""
+        path = self.folder / "lost.sock"
+        servers = [self.serve("--mode", "free", "--unix", str(path))]
+
+        def outside(what):
+            if what == "stop":
+                servers[-1].stop()
+            else:
+                servers.append(self.serve("--mode", "free", "--unix", str(path)))
+
+        shown = self.play("lost", self.gateway(None, link=f"unix:{path}").url, outside=outside)
+        self.assertIn("lost", shown["link"])
+        self.assertRegex(shown["alert"], "ended|nothing answers")
+        self.assertEqual((shown["again"], shown["alertShown"]), ("connected", False))
+
+    def test_keys_alone_suffice(self):
+        """Catches: a control that only a mouse reaches, and plots without keys."""
+        shown = self.play("keyboard", self.gateway(self.rising()).url)
+        for control in ("Pause", "window", "trigger condition", "Take the lease", "Clear faults", "Set load", "Bump", "Inject",
+                        "set machine.rotor_resistance_ohm", "add a signal to this pane", "theme: system"):
+            self.assertIn(control, shown["reached"])
+        self.assertTrue(shown["paused"])
+        self.assertIn("Between the cursors", shown["caption"])
+        self.assertEqual(shown["missing"], [])
+
+    def test_axe_finds_no_serious_fault(self):
+        """Catches: a control without a name, too little contrast in one of the themes."""
+        shown = self.play("axe", self.gateway(self.rising()).url)
+        self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
+
+    def test_the_first_page_is_small(self):
+        """Catches: a dependency that makes the page slow to load."""
+        self.assertLess(sum(each.stat().st_size for each in PAGE.parent.iterdir()), 400_000)
+
+
+if __name__ == "__main__":
+    if reason := missing():
+        print(f"SKIPPED: {reason}")
+        sys.exit(77)
+    unittest.main(verbosity=2)
