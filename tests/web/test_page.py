@@ -83,7 +83,7 @@ class Page(PageTest):
     def rising(self):
         """A motor on the line: its speed rises by itself, and slowly."""
         text = (BENCHES / "im-b.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
-        return self.serve("--mode", "realtime", text=text)
+        return self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
 
     def test_the_page_finds_the_bench_and_shows_a_rising_speed(self):
         """Catches: a page that stays empty, decodes wrongly, or exports another thing than it shows."""
