@@ -5,6 +5,8 @@ import { numberIn, plain } from "./numbers";
 import { pb } from "./wire";
 
 const kReadMs = 2000;
+/** How far ahead a fault for some ticks begins. */
+const kAhead_s = 0.5;
 
 export class Knobs {
   /** The numbers under which samples show this page as owner, by axis; 0: it holds no lease. */
@@ -55,17 +57,21 @@ export class Knobs {
     setText(this.leases[axis], owner === 0 ? "Take the lease" : "Release the lease");
   }
 
-  /** Asks, under a lease of a moment if the page holds none, and shows the answer. */
-  private async change(axis: number, what: string, ...requests: pb.IEnvelope[]): Promise<void> {
+  /**
+   * Asks, under a lease of a moment if the page holds none, and shows the answer. The requests may depend on the present tick,
+   * and go out together.
+   */
+  private async change(axis: number, what: string, requests: (tick: number) => pb.IEnvelope[]): Promise<void> {
+    const { ACTION_ACQUIRE, ACTION_RELEASE } = pb.LeaseRequest.Action;
     const isOwner = this.owners[axis] !== 0;
     try {
-      if (!isOwner) await this.lease(axis, pb.LeaseRequest.Action.ACTION_ACQUIRE);
+      if (!isOwner) await this.lease(axis, ACTION_ACQUIRE);
       try {
-        let tick = 0;
-        for (const request of requests) tick = (await this.bench.wire.ask(request)).done?.tick as number;
-        this.tell(`${what}: done at tick ${tick}`);
+        const { status } = await this.bench.wire.ask({ status_request: {} });
+        const answers = await Promise.all(requests(status?.tick as number).map((each) => this.bench.wire.ask(each)));
+        this.tell(`${what}: done at tick ${answers.map((each) => each.done?.tick).join(" and ")}`);
       } finally {
-        if (!isOwner) await this.lease(axis, pb.LeaseRequest.Action.ACTION_RELEASE);
+        if (!isOwner) await this.lease(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
       }
     } catch (problem) {
       this.tell(`${what}: ${(problem as Error).message}`, true);
@@ -98,7 +104,7 @@ export class Knobs {
       }
     });
     this.leases[axis] = toggle;
-    const clear = button("Clear faults", () => this.change(axis, "clear", { clear_faults: { axis } }));
+    const clear = button("Clear faults", () => this.change(axis, "clear", () => [{ clear_faults: { axis } }]));
     return element("div", { class: "bar" }, toggle, clear);
   }
 
@@ -110,12 +116,12 @@ export class Knobs {
         event.preventDefault();
         const [loadNm, rampS] = [this.number(load), this.number(ramp)];
         if (loadNm === null || rampS === null) return;
-        void this.change(axis, "load", { set_load: { axis, load_nm: loadNm, ramp_ticks: this.ticks(rampS) } });
+        void this.change(axis, "load", () => [{ set_load: { axis, load_nm: loadNm, ramp_ticks: this.ticks(rampS) } }]);
       } }, "Load", load, "N·m in", ramp, "s", element("button", { type: "submit" }, "Set load")),
       element("form", { class: "bar", submit: (event) => {
         event.preventDefault();
         const impulseNms = this.number(impulse);
-        if (impulseNms !== null) void this.change(axis, "bump", { shaft_bump: { axis, impulse_nms: impulseNms } });
+        if (impulseNms !== null) void this.change(axis, "bump", () => [{ shaft_bump: { axis, impulse_nms: impulseNms } }]);
       } }, "Bump", impulse, "N·m·s", element("button", { type: "submit" }, "Bump")));
   }
 
@@ -134,14 +140,13 @@ export class Knobs {
     const inject = (size: number | null, ticks: number | null) => {
       if (size === null || ticks === null) return;
       const name = select.value;
-      if (ticks === 0) {
-        void this.change(axis, `fault ${name}`, { inject_fault: { axis, name, value: size } });
-        return;
-      }
+      const put = (value: number, atTick: number) => ({ inject_fault: { axis, name, value, at_tick: atTick } });
+      if (ticks === 0) void this.change(axis, `fault ${name}`, () => [put(size, 0)]);
       // Both instants in the same future, so that the fault lasts exactly so long.
-      const at = Math.max(this.bench.histories[axis].lastTick, 0) + this.ticks(0.2) + 1;
-      void this.change(axis, `fault ${name} for ${ticks} ticks`, { inject_fault: { axis, name, value: size, at_tick: at } },
-        { inject_fault: { axis, name, value: 0, at_tick: at + ticks } });
+      else void this.change(axis, `fault ${name} for ${ticks} ticks`, (now) => {
+        const at = now + this.ticks(kAhead_s) + 1;
+        return [put(size, at), put(0, at + ticks)];
+      });
     };
     return element("div", {}, element("form", { class: "bar", submit: (event) => {
       event.preventDefault();
@@ -174,7 +179,7 @@ export class Knobs {
         const value = field instanceof HTMLSelectElement ? Number(field.value) : this.number(field);
         const rampS = this.number(ramp);
         if (value === null || rampS === null) return;
-        void this.change(axis, name, { write_parameter: { axis, name, value, ramp_ticks: this.ticks(rampS) } })
+        void this.change(axis, name, () => [{ write_parameter: { axis, name, value, ramp_ticks: this.ticks(rampS) } }])
           .then(() => this.readParameters());
       } }, field, "in", ramp, "s", element("button", { type: "submit", "aria-label": `set ${name}` }, "Set"),
       element("span", { class: "soft range" }, range)));

@@ -9,6 +9,7 @@ import { TriggerBar } from "./trigger_bar";
 import { frozen, part, rollingView, View, viewOf } from "./view";
 
 const kWindows_s = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30];
+const kFrameMs = 25;
 const kTableMs = 200;
 const kAutoMs = 500;
 
@@ -29,6 +30,8 @@ export class Scope {
   private cursors: (number | null)[] = [null, null]; // ticks
   private active = 0;
   private isDirty = true;
+  private drawn = 0;
+  private isTableDirty = true;
   private tableDrawn = 0;
   private autoShown = 0;
   private isOver = false;
@@ -65,7 +68,7 @@ export class Scope {
 
   see(axis: number, sample: Record<string, number>): void {
     this.trigger.see(axis, sample);
-    this.isDirty = true;
+    this.isDirty ||= this.held === null || this.trigger.isArmed;
   }
 
   /** Draws in the colours of another theme. */
@@ -138,19 +141,22 @@ export class Scope {
   private frame(): void {
     if (this.isOver) return;
     requestAnimationFrame(() => this.frame());
-    if (!this.isDirty) return;
-    this.isDirty = false;
-    this.sweep();
-    const view = this.view();
-    const marks = this.cursors.filter((each) => each !== null).map((each) => (each! - view.origin) * this.periodS);
-    if (view.origin !== 0) marks.push(0); // the trigger
-    for (const pane of this.panes) pane.draw(view, this.periodS, marks);
-    if (performance.now() - this.tableDrawn > kTableMs) {
-      this.tableDrawn = performance.now();
-      this.table.draw(this.panes, view, this.cursors);
+    const now = performance.now();
+    if (this.isDirty && now - this.drawn > kFrameMs) {
+      this.drawn = now;
+      this.isDirty = false;
+      this.sweep();
+      const view = this.view();
+      const marks = this.cursors.filter((each) => each !== null).map((each) => (each! - view.origin) * this.periodS);
+      if (view.origin !== 0) marks.push(0); // the trigger
+      for (const pane of this.panes) pane.draw(view, this.periodS, marks);
+      this.isTableDirty = true;
+    }
+    if (this.isTableDirty && now - this.tableDrawn > kTableMs) {
+      this.tableDrawn = now;
+      this.isTableDirty = false;
+      this.table.draw(this.panes, this.view(), this.cursors);
       setText(this.note, this.bench.dropped === 0 ? "" : `${this.bench.dropped} samples lost: the browser reads too slowly`);
-    } else {
-      this.isDirty = true;
     }
   }
 
