@@ -44,6 +44,7 @@ constexpr std::size_t kMaxConnections = 256;
 constexpr std::size_t kMaxBrowsers = 64;
 constexpr std::size_t kMaxHeader = 8192;
 constexpr std::size_t kMinToken = 16;
+constexpr int kSendBuffer = 64 * 1024;
 constexpr auto kRequestTime = 10s;      // for a handshake, a request or an answer
 constexpr auto kSilence = 30s;          // of a browser that answers no ping
 constexpr auto kBetweenMessages = 4ms;  // to a browser: many small frames become one message
@@ -337,6 +338,8 @@ asio::awaitable<void> admit(Shared& shared, tcp::acceptor& acceptor) {
       if (!make_room(shared)) continue;
     }
     socket.set_option(tcp::no_delay(true), error);
+    // What the kernel holds for a slow browser comes late: the queue drops samples, the kernel does not.
+    socket.set_option(tcp::socket::send_buffer_size(kSendBuffer), error);
     const auto place = shared.places.emplace(shared.places.end());
     asio::co_spawn(acceptor.get_executor(), welcome(shared, std::move(socket), place), asio::detached);
   }

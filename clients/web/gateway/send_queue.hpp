@@ -13,7 +13,7 @@ namespace drivebench::web {
 /// go through.
 class SendQueue {
  public:
-  static constexpr std::size_t kSamplesLimit = std::size_t{512} * 1024;
+  static constexpr std::size_t kSamplesLimit = std::size_t{256} * 1024;
   static constexpr std::size_t kLimit = std::size_t{4} * 1024 * 1024;
 
   /// Adds the payload of a frame of the bench. False: the queue is full of answers, and the browser takes
