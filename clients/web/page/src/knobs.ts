@@ -5,6 +5,7 @@ import { numberIn, plain } from "./numbers";
 import { pb } from "./wire";
 
 const kReadMs = 2000;
+const kPatienceMs = 1500;
 /** How far ahead a fault for some ticks begins. */
 const kAhead_s = 0.5;
 
@@ -68,13 +69,22 @@ export class Knobs {
       if (!isOwner) await this.lease(axis, ACTION_ACQUIRE);
       try {
         const { status } = await this.bench.wire.ask({ status_request: {} });
-        const answers = await Promise.all(requests(status?.tick as number).map((each) => this.bench.wire.ask(each)));
+        const made = requests(status?.tick as number);
+        const answers = await Promise.all(made.map((each) => this.bench.wire.ask(each)));
+        if (!isOwner) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
         this.tell(`${what}: done at tick ${answers.map((each) => each.done?.tick).join(" and ")}`);
       } finally {
         if (!isOwner) await this.lease(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
       }
     } catch (problem) {
       this.tell(`${what}: ${(problem as Error).message}`, true);
+    }
+  }
+
+  /** Waits for a tick: what is scheduled ends with the lease. */
+  private async reached(axis: number, tick: number): Promise<void> {
+    for (const end = performance.now() + kPatienceMs; this.bench.histories[axis].lastTick < tick && performance.now() < end;) {
+      await new Promise((done) => setTimeout(done, 20));
     }
   }
 

@@ -10,6 +10,8 @@ import { frozen, part, rollingView, View, viewOf } from "./view";
 
 const kWindows_s = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30];
 const kFrameMs = 25;
+/** Drawing takes at most one part in five of the time, so that a slow computer still reads its samples and obeys its user. */
+const kDrawShare = 5;
 const kTableMs = 200;
 const kAutoMs = 500;
 
@@ -30,7 +32,7 @@ export class Scope {
   private cursors: (number | null)[] = [null, null]; // ticks
   private active = 0;
   private isDirty = true;
-  private drawn = 0;
+  private nextDraw = 0;
   private isTableDirty = true;
   private tableDrawn = 0;
   private autoShown = 0;
@@ -142,8 +144,7 @@ export class Scope {
     if (this.isOver) return;
     requestAnimationFrame(() => this.frame());
     const now = performance.now();
-    if (this.isDirty && now - this.drawn > kFrameMs) {
-      this.drawn = now;
+    if (this.isDirty && now > this.nextDraw) {
       this.isDirty = false;
       this.sweep();
       const view = this.view();
@@ -151,6 +152,7 @@ export class Scope {
       if (view.origin !== 0) marks.push(0); // the trigger
       for (const pane of this.panes) pane.draw(view, this.periodS, marks);
       this.isTableDirty = true;
+      this.nextDraw = now + Math.max(kFrameMs, kDrawShare * (performance.now() - now));
     }
     if (this.isTableDirty && now - this.tableDrawn > kTableMs) {
       this.tableDrawn = now;
