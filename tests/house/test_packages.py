@@ -44,6 +44,7 @@ class Packages(unittest.TestCase):
         cls.root = cls.folder / "debian"
         for release in ("0", "1"):  # the build before, and this one
             run("cpack", "-G", "DEB", "-B", cls.folder / release, "-D", f"CPACK_DEBIAN_PACKAGE_RELEASE={release}", "-D",
+                f"CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS=adduser, libdrivebench1 (= 0.1.0-{release})", "-D",
                 f"CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS=libdrivebench1 (= 0.1.0-{release})", cwd=BUILD)
         run("debootstrap", "--variant=minbase", "bookworm", cls.root, mirror(), seconds=600)
         shutil.copy("/etc/resolv.conf", cls.root / "etc/resolv.conf")

@@ -22,6 +22,8 @@ TYPES = {"uint32_t": ctypes.c_uint32, "int32_t": ctypes.c_int32, "uint64_t": cty
          "const drivebench_signal*": ctypes.POINTER(library.SignalStruct),
          "const drivebench_fault*": ctypes.POINTER(library.FaultStruct),
          "const drivebench_injectable*": ctypes.POINTER(library.InjectableStruct),
+         "int64_t*": ctypes.POINTER(ctypes.c_int64),
+         "const drivebench_event*": ctypes.POINTER(library.EventStruct),
          "int": ctypes.c_int, "void": None, "const drivebench_description*": ctypes.POINTER(library.DescriptionStruct),
          "drivebench_bench*": ctypes.c_void_p, "const drivebench_bench*": ctypes.c_void_p,
          "drivebench_bench**": ctypes.POINTER(ctypes.c_void_p), "const drivebench_options*": ctypes.POINTER(library.OptionsStruct),
@@ -51,7 +53,8 @@ class Declarations(unittest.TestCase):
     def test_structs_are_those_of_the_header(self):
         for name, struct in (("command", library.CommandStruct), ("signal", library.SignalStruct), ("axis", library.AxisStruct),
                              ("parameter", library.ParameterStruct), ("fault", library.FaultStruct),
-                             ("injectable", library.InjectableStruct), ("description", library.DescriptionStruct),
+                             ("injectable", library.InjectableStruct), ("event", library.EventStruct),
+                             ("description", library.DescriptionStruct),
                              ("options", library.OptionsStruct)):
             self.assertEqual(struct._fields_, members(name), name)
 
