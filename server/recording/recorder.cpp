@@ -18,7 +18,8 @@ constexpr std::size_t kMaxRingBytes = std::size_t{256} << 20;
 constexpr std::size_t kEntriesPerLook = 4096;
 
 /// The most inputs between two checks for room: in a free run the 256 requests and commands of a tick, in
-/// lockstep an exchange, a command and an end of the lease for each axis; and the events that a trigger lets go.
+/// lockstep an exchange, a command and an end of the lease for each axis; and the events that a trigger lets
+/// go.
 constexpr std::size_t kInputsPerLook = 576;
 static_assert(kInputsPerLook >= 256 + 3 * kMaxAxes + kMaxAxisEvents);
 

@@ -259,12 +259,11 @@ TEST(Sdk, TwoAxesStepTogetherOrNotAtAll) {
 // unasked.
 TEST(Sdk, WhatIsLatchedIsClearedOnlyIfAsked) {
   for (const bool clears : {false, true}) {
-    Bench bench(kServo,
-                {.token = nullptr,
-                 .client = nullptr,
-                 .deadline_ms = 0,
-                 .clear_on_acquire = clears ? 1 : 0,
-                 .conducts = 0});
+    Bench bench(kServo, {.token = nullptr,
+                         .client = nullptr,
+                         .deadline_ms = 0,
+                         .clear_on_acquire = clears ? 1 : 0,
+                         .conducts = 0});
     bench.acquire();
     turn(bench, 20);
     bench.inject("command_loss", 1.0);

@@ -28,8 +28,8 @@ using Result = ReplayReport::Result;
 using Bytes = std::vector<std::byte>;
 
 /// A lockstep run with every event that a recording can hold: two axes, a lease, commands, loads from the
-/// file, one of them behind a trigger, and from clients, a parameter write and a ramp, a fault, a bump, refused
-/// commands, a clear.
+/// file, one of them behind a trigger, and from clients, a parameter write and a ramp, a fault, a bump,
+/// refused commands, a clear.
 Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
   const TestFolder folder;
   BenchConfig config = servo_bench(axes);
