@@ -165,6 +165,7 @@ std::vector<AxisReading> read_axes(StrictTable& root, const std::filesystem::pat
   std::size_t points = 0;
   std::vector<StrictTable> tables = root.tables("axis", kMaxAxes);
   std::vector<std::string> names;
+  names.reserve(tables.size());
   for (StrictTable& table : tables)
     names.push_back(name_in(table));
   for (StrictTable& table : tables) {
