@@ -17,8 +17,6 @@ namespace drivebench::regression {
 namespace fs = std::filesystem;
 namespace {
 
-using Kind = ConfigNode::Kind;
-
 ConfigNode table_node(std::string key) {
   return {.key = std::move(key), .line = 0, .kind = Kind::kTable, .scalar = {}, .children = {}};
 }

@@ -14,8 +14,6 @@
 namespace drivebench::regression {
 namespace {
 
-using Kind = ConfigNode::Kind;
-
 constexpr std::size_t kMostCombinations = 1'000'000;
 
 ConfigNode number_node(double value, bool is_whole, int line) {

@@ -9,8 +9,6 @@
 
 namespace drivebench::regression {
 
-using Kind = ConfigNode::Kind;
-
 const ConfigNode* find_child(const ConfigNode& table, std::string_view key) noexcept {
   const auto found = std::ranges::find(table.children, key, &ConfigNode::key);
   return found == table.children.end() ? nullptr : &*found;

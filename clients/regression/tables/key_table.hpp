@@ -12,6 +12,8 @@
 
 namespace drivebench::regression {
 
+using Kind = ConfigNode::Kind;
+
 /// The child with this key; null: there is none.
 const ConfigNode* find_child(const ConfigNode& table, std::string_view key) noexcept;
 

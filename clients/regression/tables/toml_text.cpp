@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clients/regression/tables/key_table.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::regression {
 namespace {
-
-using Kind = ConfigNode::Kind;
 
 std::string basic_string_text(std::string_view text) {
   std::string result = "\"";
