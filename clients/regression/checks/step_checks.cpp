@@ -53,7 +53,7 @@ class Progress {
 
   double of(double value) noexcept {
     if (!start_) start_ = value;
-    return (value - *start_) / (value_ - *start_);
+    return is_step() ? (value - *start_) / span() : 0.0;
   }
   bool is_step() const noexcept { return start_ && *start_ != value_; }
   double value() const noexcept { return value_; }
