@@ -9,6 +9,7 @@ namespace drivebench {
 Admission::Decision Admission::admit(std::string_view token, const std::string& address, Time now,
                                      WallTime wall) {
   if (!asks_) return {.admitted = true, .grant = {.name = {}, .role = Role::kAdmin}};
+  if (token.empty()) return {.looked_at = false, .why_not = "no token, and this bench asks for one"};
   if (const auto wait = guesses_.wait_of(address, now); wait > GuessLimit::Duration{}) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(wait);
     return {.looked_at = false,
@@ -21,7 +22,7 @@ Admission::Decision Admission::admit(std::string_view token, const std::string& 
     return {.admitted = true, .grant = *grant};
   }
   guesses_.note_wrong(address, now);
-  if (grant == nullptr) return {.why_not = "wrong or no token"};
+  if (grant == nullptr) return {.why_not = "wrong token"};
   return {.why_not = grant->revoked ? "the token has been revoked" : "the time of the token is over"};
 }
 

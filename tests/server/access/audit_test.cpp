@@ -217,7 +217,7 @@ TEST_F(AuditTest, SEC_07_AFloodOfGuessesCostsNoOtherEventItsLine) {
     for (const char* const peer : {"192.0.2.7:1", "192.0.2.8:1", "192.0.2.9:1"}) {
       const Client guesser{.transport = "tcp", .peer = peer, .subject = {}};
       for (int n = 0; n < 1000; ++n)
-        audit->note({.name = "authentication", .client = &guesser, .result = "wrong or no token"});
+        audit->note({.name = "authentication", .client = &guesser, .result = "wrong token"});
     }
   };
   const Client other{.transport = "tcp", .peer = "192.0.2.10:1", .subject = {}};
@@ -226,7 +226,7 @@ TEST_F(AuditTest, SEC_07_AFloodOfGuessesCostsNoOtherEventItsLine) {
   for (int n = 0; n < kForbidden; ++n)
     audit->note({.name = "forbidden", .client = &kAnna, .result = "the role does not allow it"});
   audit->note({.name = "reload", .result = "no bench"});
-  audit->note({.name = "authentication", .client = &other, .result = "wrong or no token"});
+  audit->note({.name = "authentication", .client = &other, .result = "wrong token"});
   flood();
   std::map<std::string, int> count;
   for (const json& line : lines())

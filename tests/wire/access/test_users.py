@@ -274,7 +274,7 @@ class Tokens(UsersTest):
         self.assertEqual(server.stop(), 0)
         # Each place with what shows that this test can read it. A wrong token may be nearly the right one.
         hashes = [hashlib.sha256(f"{name}-secret".encode()).hexdigest() for name in ("otto", "adam")]
-        for place, known in ((server.errors(), "not admitted: wrong or no token"), (" ".join(server.process.args), "--audit"),
+        for place, known in ((server.errors(), "not admitted: wrong token"), (" ".join(server.process.args), "--audit"),
                              ((folder / "audit").read_text(encoding="utf-8"), '"authentication"'), (seen, "otto"),
                              ((folder / "run.mcap").read_bytes().decode("latin-1"), "stator_resistance_ohm")):
             self.assertIn(known, place)
