@@ -28,8 +28,8 @@ class Admission {
     Grant grant{};          ///< of the user; without a name if the server needs no token
     std::string why_not{};  ///< one sentence
   };
-  /// `address` is where the peer comes from, without its port. No token is no guess: a client that asks whether it
-  /// needs one does not wait when it comes back with it.
+  /// `address` is where the peer comes from, without its port. No token is no guess: a client that asks
+  /// whether it needs one does not wait when it comes back with it.
   Decision admit(std::string_view token, const std::string& address, Time now, WallTime wall);
 
   /// Puts these grants in place of those before.

@@ -4,6 +4,7 @@
 
 #include "clients/command/common/json.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -52,7 +53,7 @@ const char* kind_name(v1::SignalDescription::Kind kind) {
 std::string describe_json(const v1::Welcome& welcome) {
   const v1::BenchDescription& bench = welcome.bench();
   Json out = {{"bench", bench.name()},
-              {"mode", command::name_of(bench.mode())},
+              {"mode", link::name_of(bench.mode())},
               {"build_id", welcome.build_id()},
               {"protocol", welcome.protocol()},
               {"period_s", bench.period_s()},
@@ -99,7 +100,7 @@ std::string describe_json(const v1::Welcome& welcome) {
 }
 
 std::string status_json(const v1::Status& status, const v1::BenchDescription& bench) {
-  Json out = {{"mode", command::name_of(status.mode())},
+  Json out = {{"mode", link::name_of(status.mode())},
               {"tick", status.tick()},
               {"late_ticks", status.late_ticks()},
               {"worst_lateness_s", status.worst_lateness_s()},

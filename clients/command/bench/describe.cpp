@@ -8,6 +8,7 @@
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -72,7 +73,7 @@ int run_describe(const DescribeOptions& options) {
     return kExitOk;
   }
   const v1::BenchDescription& bench = welcome.bench();
-  fmt::print("bench {} at {}, {}, build {}\n", bench.name(), bench_link.peer(), name_of(bench.mode()),
+  fmt::print("bench {} at {}, {}, build {}\n", bench.name(), bench_link.peer(), link::name_of(bench.mode()),
              welcome.build_id());
   fmt::print(
       "period {:g} us ({:g} kHz), {} substeps, command delay {} tick{}, watchdog {} ticks, lease {:g} s\n",

@@ -7,6 +7,7 @@
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -39,8 +40,9 @@ int run_status(const StatusOptions& options) {
   unknown.set_name("?");
   unknown.set_phases(3);
   fmt::print("bench {} at {}: {}, tick {} ({:.3f} s), {} session{}\n", bench.name(), bench_link.peer(),
-             name_of(status.mode()), status.tick(), static_cast<double>(status.tick()) * bench.period_s(),
-             status.sessions(), status.sessions() == 1 ? "" : "s");
+             link::name_of(status.mode()), status.tick(),
+             static_cast<double>(status.tick()) * bench.period_s(), status.sessions(),
+             status.sessions() == 1 ? "" : "s");
   if (status.mode() == v1::MODE_REALTIME) {
     fmt::print("late ticks {}, worst lateness {:.1f} us\n", status.late_ticks(),
                status.worst_lateness_s() * 1e6);

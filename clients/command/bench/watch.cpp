@@ -11,6 +11,7 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/common/signals.hpp"
+#include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -91,7 +92,7 @@ class View {
   const v1::AxisDescription& description() const { return bench_.axes(static_cast<int>(axis_)); }
   std::string title() const {
     return fmt::format("axis {} ({}) of bench {}, {}", axis_, description().name(), bench_.name(),
-                       name_of(bench_.mode()));
+                       link::name_of(bench_.mode()));
   }
   std::string time_text(const Sample& sample) const {
     return fmt::format("{:.6f}", static_cast<double>(sample.tick) * bench_.period_s());

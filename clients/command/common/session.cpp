@@ -85,19 +85,6 @@ std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view ch
   throw UsageError(fmt::format("no axis '{}'; this bench has {}", choice, known));
 }
 
-const char* name_of(v1::Mode mode) noexcept {
-  switch (mode) {
-    case v1::MODE_REALTIME:
-      return "realtime";
-    case v1::MODE_LOCKSTEP:
-      return "lockstep";
-    case v1::MODE_FREE:
-      return "free";
-    default:
-      return "unknown";
-  }
-}
-
 const char* name_of_state(std::uint64_t state) noexcept {
   constexpr std::array kNames = {"idle", "run", "hold", "timeout", "fault", "ready"};
   return state < kNames.size() ? kNames[state] : "unknown";

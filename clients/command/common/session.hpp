@@ -33,7 +33,6 @@ std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_
 
 using link::plain;
 
-const char* name_of(v1::Mode mode) noexcept;
 const char* name_of_state(std::uint64_t state) noexcept;
 
 /// The names of the bits that are set, separated by blanks; "none".

@@ -14,6 +14,7 @@
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_run.hpp"
+#include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -154,7 +155,7 @@ int run_control(const ControlOptions& options) {
 
   ControlReport report = summary_of(done, description.period_s());
   report.bench = description.name();
-  report.mode = name_of(description.mode());
+  report.mode = link::name_of(description.mode());
   report.axis = description.axes(static_cast<int>(axis->axis())).name();
   report.preset = preset.name;
   if (options.json) {

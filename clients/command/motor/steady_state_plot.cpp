@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "clients/command/recording/svg_plot.hpp"
+#include "protocols/markup.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -15,13 +16,6 @@ constexpr int kPoints = 1000;
 constexpr double kBackward = 1.5;  // slip at the left end
 constexpr double kSize_px = 600.0;
 constexpr double kMargin_px = 70.0;
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return out;
-}
 
 }  // namespace
 
@@ -68,7 +62,7 @@ std::string circle_diagram(const InductionCircuit& circuit, const std::vector<Na
       "<text x='{1}' y='40'> active current</text>\n"
       "<text x='{0}' y='{4:.1f}' text-anchor='end'>reactive current</text>\n"
       "<circle cx='{5:.1f}' cy='{6:.1f}' r='{7:.1f}' fill='none' stroke='#0072b2'/>\n",
-      kSize_px, kMargin_px, escaped(title), middle_px, middle_px - 4.0, x_px(circle.centre_a),
+      kSize_px, kMargin_px, markup(title), middle_px, middle_px - 4.0, x_px(circle.centre_a),
       y_px(circle.centre_a), circle.radius_a * pixels_per_a);
   const auto out = std::back_inserter(svg);
   for (const auto& [name, point] : points) {

@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <iterator>
 
+#include "protocols/markup.hpp"
+
 namespace drivebench::command {
 namespace {
 
@@ -22,20 +24,6 @@ constexpr double kPixelsPerPoint = 2.0;  // keeps a file small
 // Colours that colour-blind readers distinguish too (Okabe and Ito).
 constexpr std::array<std::string_view, 6> kColours = {"#0072b2", "#d55e00", "#009e73",
                                                       "#cc79a7", "#e69f00", "#000000"};
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<') {
-      out += "&lt;";
-    } else if (c == '&') {
-      out += "&amp;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
 
 /// The range of an axis of the plot: from a multiple of the step to another.
 struct Scale {
@@ -158,14 +146,14 @@ void append_panel(std::string& svg, const Panel& panel, const std::vector<double
   append_grid(svg, x_scale, y_scale, top_px, is_last);
   fmt::format_to(
       out, "<text x='12' y='{0:.1f}' text-anchor='middle' transform='rotate(-90 12 {0:.1f})'>{1}</text>\n",
-      top_px + kPanelHeight / 2.0, escaped(panel.label));
+      top_px + kPanelHeight / 2.0, markup(panel.label));
   double legend_px = kLeft + 8.0;
   for (std::size_t i = 0; i < panel.lines.size(); ++i) {
     const std::string_view colour = kColours[i % kColours.size()];
     append_line(svg, x, panel.lines[i], x_scale, y_scale, colour);
     if (panel.lines.size() == 1) continue;
     fmt::format_to(out, "<text x='{:.1f}' y='{:.1f}' class='l' style='fill:{}'>{}</text>\n", legend_px,
-                   top_px + 12.0, colour, escaped(panel.lines[i].name));
+                   top_px + 12.0, colour, markup(panel.lines[i].name));
     legend_px += 14.0 + 6.5 * static_cast<double>(panel.lines[i].name.size());
   }
 }
@@ -182,7 +170,7 @@ std::string svg_of(std::string_view title, std::string_view x_label, const std::
       "path{{fill:none;stroke-width:12;transform:scale(.1)}}</style>\n"
       "<rect width='100%' height='100%' fill='#fff'/>\n"
       "<text x='{2}' y='18' font-size='13'>{3}</text>\n",
-      kWidth, height, kLeft, escaped(title));
+      kWidth, height, kLeft, markup(title));
   Scale x_scale = scale_over(x.empty() ? 0.0 : x.front(), x.empty() ? 1.0 : x.back(), 10);
   const double shown = x.size() > 1 ? x.back() - x.front() : x_scale.high - x_scale.low;
   x_scale.pixels_per_unit = (kWidth - kLeft - kRight) / shown;
@@ -193,7 +181,7 @@ std::string svg_of(std::string_view title, std::string_view x_label, const std::
     top_px += kPanelHeight + kGap;
   }
   svg += fmt::format("<text x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>\n</svg>\n",
-                     (kLeft + kWidth - kRight) / 2.0, height - 8.0, escaped(x_label));
+                     (kLeft + kWidth - kRight) / 2.0, height - 8.0, markup(x_label));
   return svg;
 }
 

@@ -7,7 +7,7 @@
 
 #include "clients/command/recording/svg_plot.hpp"
 #include "clients/regression/reports/reports.hpp"
-#include "protocols/text.hpp"
+#include "protocols/markup.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -25,37 +25,18 @@ constexpr std::string_view kStyle =
     "pre{background:#f5f5f5;padding:.6em;overflow:auto;max-height:24em}svg{max-width:100%;height:auto}"
     "details{margin:.2em 0}h2{margin-top:2em;border-top:2px solid #ddd;padding-top:.6em}";
 
-std::string escaped_for_html(std::string_view raw) {
-  std::string out;
-  for (const char c : utf8(raw)) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '"') {
-      out += "&quot;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
 std::string number_cell(double value, std::string_view unit) {
   if (!std::isfinite(value)) return "<td class=n>-</td>";
-  return fmt::format("<td class=n>{:.6g} {}</td>", value, escaped_for_html(unit == "1" ? "" : unit));
+  return fmt::format("<td class=n>{:.6g} {}</td>", value, markup(unit == "1" ? "" : unit));
 }
 
 std::string checks_table(const CaseResult& result) {
   std::string html = "<table><tr><th>check<th>verdict<th>measured<th>limit<th>worst at [s]</tr>\n";
   for (const Finding& finding : result.findings) {
-    html +=
-        fmt::format("<tr><td>{}<td class={}>{}{}{}<td class=n>{}</td></tr>\n", escaped_for_html(finding.name),
-                    finding.passed ? "pass" : "fail", finding.passed ? "pass" : "fail",
-                    number_cell(finding.measured, finding.unit), number_cell(finding.limit, finding.unit),
-                    std::isfinite(finding.at_s) ? fmt::format("{:.6g}", finding.at_s) : "-");
+    html += fmt::format("<tr><td>{}<td class={}>{}{}{}<td class=n>{}</td></tr>\n", markup(finding.name),
+                        finding.passed ? "pass" : "fail", finding.passed ? "pass" : "fail",
+                        number_cell(finding.measured, finding.unit), number_cell(finding.limit, finding.unit),
+                        std::isfinite(finding.at_s) ? fmt::format("{:.6g}", finding.at_s) : "-");
   }
   return html + "</table>\n";
 }
@@ -98,13 +79,13 @@ std::string plots_of(const CaseResult& result) {
 std::string section_of(const CaseResult& result) {
   const std::string_view word = word_of(result.verdict);
   std::string html = fmt::format("<h2>{} <span class={}>{}</span></h2>\n<p>{}</p>\n<ul>\n",
-                                 escaped_for_html(result.name), word, word, escaped_for_html(result.file));
+                                 markup(result.name), word, word, markup(result.file));
   for (const std::string& reason : reasons_of(result))
-    html += fmt::format("<li>{}</li>\n", escaped_for_html(reason));
+    html += fmt::format("<li>{}</li>\n", markup(reason));
   html += "</ul>\n" + plots_of(result) + checks_table(result);
   if (!result.output.empty()) {
     html += fmt::format("<p>What the device under test printed, its end:</p>\n<pre>{}</pre>\n",
-                        escaped_for_html(result.output));
+                        markup(result.output));
   }
   return html;
 }
@@ -112,7 +93,7 @@ std::string section_of(const CaseResult& result) {
 std::string row_of(const CaseResult& result) {
   const std::string_view word = word_of(result.verdict);
   const std::string detail = result.verdict == Verdict::kPass ? checks_table(result) : std::string();
-  const std::string name = escaped_for_html(result.name);
+  const std::string name = markup(result.name);
   return fmt::format(
       "<tr><td>{}<td class={}>{}<td class=n>{:.6g}<td class=n>{}</tr>\n",
       detail.empty() ? name : fmt::format("<details><summary>{}</summary>{}</details>", name, detail), word,
@@ -122,7 +103,7 @@ std::string row_of(const CaseResult& result) {
 }  // namespace
 
 std::string html_report(const std::string& suite, std::span<const CaseResult> results) {
-  const std::string name = escaped_for_html(suite);
+  const std::string name = markup(suite);
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=en><meta charset=utf-8><title>{0}</title><style>{1}</style>\n"
       "<h1>{0}</h1>\n<p>{2}</p>\n<table><tr><th>case<th>verdict<th>bench time [s]<th>checks</tr>\n",

@@ -1,36 +1,15 @@
 #include <fmt/format.h>
 
 #include "clients/regression/reports/reports.hpp"
-#include "protocols/text.hpp"
+#include "protocols/markup.hpp"
 
 namespace drivebench::regression {
 namespace {
 
-/// For text and attributes of XML 1.0, which has no other control characters than these three.
-std::string escaped_for_xml(std::string_view raw) {
-  std::string out;
-  for (const char c : utf8(raw)) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '"') {
-      out += "&quot;";
-    } else if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') {
-      out += c;
-    } else {
-      out += '?';
-    }
-  }
-  return out;
-}
-
 std::string outcome_xml(const CaseResult& result) {
   if (result.verdict == Verdict::kPass) return {};
   if (result.verdict == Verdict::kSkipped) {
-    return fmt::format("      <skipped message=\"{}\"/>\n", escaped_for_xml(result.reason));
+    return fmt::format("      <skipped message=\"{}\"/>\n", markup(result.reason));
   }
   std::string text;
   const std::vector<std::string> reasons = reasons_of(result);
@@ -38,18 +17,18 @@ std::string outcome_xml(const CaseResult& result) {
     text += reason + '\n';
   const char* const element = result.verdict == Verdict::kFail ? "failure" : "error";
   return fmt::format("      <{0} type=\"{1}\" message=\"{2}\">{3}</{0}>\n", element, word_of(result.verdict),
-                     escaped_for_xml(reasons.empty() ? "" : reasons.front()), escaped_for_xml(text));
+                     markup(reasons.empty() ? "" : reasons.front()), markup(text));
 }
 
 std::string case_xml(const std::string& suite, const CaseResult& result) {
   std::string inner = outcome_xml(result);
   if (!result.output.empty()) {
-    inner += fmt::format("      <system-out>{}</system-out>\n", escaped_for_xml(result.output));
+    inner += fmt::format("      <system-out>{}</system-out>\n", markup(result.output));
   }
   // The time is that of the bench: equal runs give equal reports.
-  const std::string start = fmt::format(
-      "    <testcase classname=\"{}\" name=\"{}\" file=\"{}\" time=\"{:.6f}\"", escaped_for_xml(suite),
-      escaped_for_xml(result.name), escaped_for_xml(result.file), result.bench_s);
+  const std::string start =
+      fmt::format("    <testcase classname=\"{}\" name=\"{}\" file=\"{}\" time=\"{:.6f}\"", markup(suite),
+                  markup(result.name), markup(result.file), result.bench_s);
   return inner.empty() ? start + "/>\n" : start + ">\n" + inner + "    </testcase>\n";
 }
 
@@ -67,8 +46,8 @@ std::string to_junit(const std::string& suite, std::span<const CaseResult> resul
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
       "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.6f}\">\n"
       "{}  </testsuite>\n</testsuites>\n",
-      escaped_for_xml(suite), results.size(), totals.failed, totals.errors + totals.invalid, totals.skipped,
-      bench_s, cases);
+      markup(suite), results.size(), totals.failed, totals.errors + totals.invalid, totals.skipped, bench_s,
+      cases);
 }
 
 }  // namespace drivebench::regression

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "clients/link/tcp/mode_name.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::web {
@@ -70,19 +71,6 @@ class Exposition {
 constexpr std::string_view kCounter = "counter";
 constexpr std::string_view kGauge = "gauge";
 
-const char* name_of_mode(v1::Mode mode) noexcept {
-  switch (mode) {
-    case v1::MODE_REALTIME:
-      return "realtime";
-    case v1::MODE_LOCKSTEP:
-      return "lockstep";
-    case v1::MODE_FREE:
-      return "free";
-    default:
-      return "unknown";
-  }
-}
-
 std::uint64_t resident_bytes() {
   std::ifstream file("/proc/self/statm");
   std::uint64_t total = 0;
@@ -112,7 +100,7 @@ void add_bench(Exposition& out, const Reading& reading) {
   out.family("drivebench_info", kGauge, "The bench: its name, mode and build.");
   out.value(
       std::uint64_t{1},
-      {{"bench", reading.bench.name()}, {"mode", name_of_mode(status.mode())}, {"build", reading.build_id}});
+      {{"bench", reading.bench.name()}, {"mode", link::name_of(status.mode())}, {"build", reading.build_id}});
   out.single("drivebench_period_seconds", kGauge, "Sample period.", reading.bench.period_s());
   out.single("drivebench_ticks_total", kCounter, "Ticks since the start.", status.tick());
   out.single("drivebench_late_ticks_total", kCounter, "Ticks that started after their time.",
@@ -193,7 +181,7 @@ std::string health_json(const Reading& reading) {
   if (reading.problem.empty()) {
     health = {{"status", "ok"},
               {"bench", utf8(reading.bench.name())},
-              {"mode", name_of_mode(reading.status.mode())},
+              {"mode", link::name_of(reading.status.mode())},
               {"tick", reading.status.tick()},
               {"late_ticks", reading.status.late_ticks()}};
   } else {

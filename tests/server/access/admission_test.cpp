@@ -60,8 +60,8 @@ TEST_F(AdmissionTest, SEC_04_TheWaitDoublesAndARightTokenEndsIt) {
   EXPECT_TRUE(try_with("right").admitted) << "after a right token the wait is short again";
 }
 
-// Catches: a client that shows no token first, as a browser does, and is refused with the right one; and a wait
-// that such a client ends or gets around.
+// Catches: a client that shows no token first, as a browser does, and is refused with the right one; and a
+// wait that such a client ends or gets around.
 TEST_F(AdmissionTest, SEC_04_NoTokenIsNoGuess) {
   for (int client = 0; client < 10; ++client)
     EXPECT_FALSE(try_with("").admitted);
