@@ -7,7 +7,7 @@
 
 #include "clients/identification/motors/bldc_motor.hpp"
 #include "clients/identification/motors/dc_motor.hpp"
-#include "clients/identification/motors/induction_motor.hpp"
+#include "clients/identification/motors/induction/induction_motor.hpp"
 #include "clients/identification/motors/pm_motor.hpp"
 #include "clients/identification/refinement/refine.hpp"
 

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "clients/identification/math/runge_kutta.hpp"
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 #include "clients/identification/motors/motor_models.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/motors/terminal_voltages.hpp"

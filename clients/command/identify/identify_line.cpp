@@ -3,7 +3,7 @@
 #include "clients/command/common/command_line.hpp"
 #include "clients/command/identify/filter.hpp"
 #include "clients/command/identify/identify.hpp"
-#include "clients/command/identify/track.hpp"
+#include "clients/command/identify/track/track.hpp"
 
 namespace drivebench::command {
 namespace {

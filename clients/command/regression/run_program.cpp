@@ -82,7 +82,7 @@ class RecordedServer {
   Process process_;
 };
 
-/// The newest tick of a bench that somebody else drives.
+/// Asks a bench for its newest tick while the device under test drives it.
 class TickView {
  public:
   explicit TickView(const std::string& address)

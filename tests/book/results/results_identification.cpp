@@ -6,8 +6,8 @@
 
 #include "clients/identification/identify.hpp"
 #include "clients/identification/math/elimination.hpp"
-#include "clients/identification/motors/induction_motor.hpp"
-#include "clients/identification/motors/resistance_tracking.hpp"
+#include "clients/identification/motors/induction/induction_motor.hpp"
+#include "clients/identification/motors/induction/resistance_tracking.hpp"
 #include "tests/book/results/results.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 

@@ -118,7 +118,7 @@ class Roles(UsersTest):
         changes = [{"write_parameter": pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.0)},
                    {"set_load": pb.SetLoad(load_nm=0.25)}, {"inject_fault": pb.InjectFault(name="bus_sag", value=0.5)},
                    {"shaft_bump": pb.ShaftBump(impulse_nms=1e-4)}]
-        for change in changes:  # who does not say that he conducts disturbs nobody by mistake
+        for change in changes:  # a session without `conducts` in its hello needs the lease, whatever its role
             self.assertRefused(modest.ask(**change), pb.REFUSAL_NOT_OWNER, "axis")
         conductor = self.user(server, "cora", conducts=True)
         for change in changes:

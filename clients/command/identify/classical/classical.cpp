@@ -1,4 +1,4 @@
-#include "clients/command/identify/classical.hpp"
+#include "clients/command/identify/classical/classical.hpp"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
-#include "clients/command/identify/classical_report.hpp"
+#include "clients/command/identify/classical/classical_report.hpp"
 #include "clients/command/identify/identify_data.hpp"
 #include "clients/command/identify/identify_server.hpp"
 #include "clients/command/identify/identify_steps.hpp"

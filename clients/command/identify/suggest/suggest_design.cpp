@@ -1,4 +1,4 @@
-#include "clients/command/identify/suggest_design.hpp"
+#include "clients/command/identify/suggest/suggest_design.hpp"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "clients/command/identify/identify_data.hpp"
-#include "clients/identification/motors/classical_tests.hpp"
+#include "clients/identification/motors/induction/classical_tests.hpp"
 #include "clients/identification/named_experiments.hpp"
 
 namespace drivebench::command {

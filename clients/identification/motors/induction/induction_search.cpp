@@ -1,11 +1,11 @@
-#include "clients/identification/motors/induction_search.hpp"
+#include "clients/identification/motors/induction/induction_search.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "clients/identification/motors/induction_polynomial.hpp"
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_polynomial.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 
 namespace drivebench::identification {
 namespace {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "clients/command/identify/identify.hpp"
-#include "clients/command/identify/suggest_design.hpp"
-#include "clients/command/identify/suggest_forecast.hpp"
+#include "clients/command/identify/suggest/suggest_design.hpp"
+#include "clients/command/identify/suggest/suggest_forecast.hpp"
 
 namespace drivebench::command {
 

@@ -4,7 +4,7 @@
 #include <iterator>
 
 #include "clients/command/common/json.hpp"
-#include "clients/command/identify/suggest.hpp"
+#include "clients/command/identify/suggest/suggest.hpp"
 
 namespace drivebench::command {
 namespace {

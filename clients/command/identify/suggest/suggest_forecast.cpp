@@ -1,4 +1,4 @@
-#include "clients/command/identify/suggest_forecast.hpp"
+#include "clients/command/identify/suggest/suggest_forecast.hpp"
 
 #include <fmt/format.h>
 

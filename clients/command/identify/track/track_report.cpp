@@ -1,4 +1,4 @@
-#include "clients/command/identify/track_report.hpp"
+#include "clients/command/identify/track/track_report.hpp"
 
 #include <fmt/format.h>
 

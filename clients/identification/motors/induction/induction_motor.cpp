@@ -1,4 +1,4 @@
-#include "clients/identification/motors/induction_motor.hpp"
+#include "clients/identification/motors/induction/induction_motor.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <complex>
 
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 
 namespace drivebench::identification {
 namespace {

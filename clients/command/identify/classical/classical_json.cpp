@@ -1,6 +1,6 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/experiment/experiment_json.hpp"
-#include "clients/command/identify/classical_report.hpp"
+#include "clients/command/identify/classical/classical_report.hpp"
 
 namespace drivebench::command {
 

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "clients/identification/data/settings.hpp"
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 
 namespace drivebench::identification {
 

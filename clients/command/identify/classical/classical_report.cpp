@@ -1,4 +1,4 @@
-#include "clients/command/identify/classical_report.hpp"
+#include "clients/command/identify/classical/classical_report.hpp"
 
 #include <fmt/format.h>
 

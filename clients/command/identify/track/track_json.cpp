@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "clients/command/common/json.hpp"
-#include "clients/command/identify/track_report.hpp"
+#include "clients/command/identify/track/track_report.hpp"
 
 namespace drivebench::command {
 

@@ -6,7 +6,7 @@
 #include "clients/command/identify/identify.hpp"
 #include "clients/command/identify/identify_data.hpp"
 #include "clients/command/identify/identify_server.hpp"
-#include "clients/command/identify/suggest_design.hpp"
+#include "clients/command/identify/suggest/suggest_design.hpp"
 #include "clients/identification/data/result.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/named_experiments.hpp"

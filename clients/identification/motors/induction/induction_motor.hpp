@@ -1,7 +1,7 @@
 #pragma once
 
 #include "clients/identification/data/settings.hpp"
-#include "clients/identification/motors/induction_search.hpp"
+#include "clients/identification/motors/induction/induction_search.hpp"
 
 namespace drivebench::identification {
 

@@ -1,4 +1,4 @@
-#include "clients/command/identify/track.hpp"
+#include "clients/command/identify/track/track.hpp"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "clients/command/common/session.hpp"
 #include "clients/command/identify/identify_data.hpp"
 #include "clients/command/identify/identify_steps.hpp"
-#include "clients/command/identify/track_report.hpp"
+#include "clients/command/identify/track/track_report.hpp"
 #include "clients/command/motor/motor_file.hpp"
 #include "protocols/signals/catalogue.hpp"
 

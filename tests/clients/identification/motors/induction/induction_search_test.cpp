@@ -1,4 +1,4 @@
-#include "clients/identification/motors/induction_search.hpp"
+#include "clients/identification/motors/induction/induction_search.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <random>
 
-#include "clients/identification/motors/induction_polynomial.hpp"
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_polynomial.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 
 namespace drivebench::identification {
 namespace {

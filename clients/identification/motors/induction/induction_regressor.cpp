@@ -1,4 +1,4 @@
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 
 namespace drivebench::identification {
 namespace {

@@ -1,4 +1,4 @@
-#include "clients/identification/motors/resistance_tracking.hpp"
+#include "clients/identification/motors/induction/resistance_tracking.hpp"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identification/motors/resistance_tracking.hpp"
+#include "clients/identification/motors/induction/resistance_tracking.hpp"
 
 namespace drivebench::command {
 

@@ -1,4 +1,4 @@
-#include "clients/command/identify/suggest.hpp"
+#include "clients/command/identify/suggest/suggest.hpp"
 
 #include <fmt/format.h>
 

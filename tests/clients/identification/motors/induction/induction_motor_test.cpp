@@ -1,4 +1,4 @@
-#include "clients/identification/motors/induction_motor.hpp"
+#include "clients/identification/motors/induction/induction_motor.hpp"
 #include "clients/identification/identify.hpp"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <complex>
 #include <random>
 
-#include "clients/identification/motors/induction_regressor.hpp"
+#include "clients/identification/motors/induction/induction_regressor.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
 namespace drivebench::identification {
