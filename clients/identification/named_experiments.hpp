@@ -9,7 +9,7 @@
 
 namespace drivebench::identification {
 
-/// A test at the terminals whose steady state is read as meters would (motors/induction/classical_tests.hpp),
+/// A test at the terminals whose steady state is read as meters would (motors/classical_tests.hpp),
 /// in the place of an identification from samples.
 enum class TerminalTest : std::uint8_t { kNone, kDcResistance, kNoLoad, kBlockedRotor, kAll };
 

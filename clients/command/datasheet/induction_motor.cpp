@@ -11,7 +11,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/datasheet/motor_kind.hpp"
-#include "clients/identification/motors/induction/classical_tests.hpp"
+#include "clients/identification/motors/classical_tests.hpp"
 #include "clients/models/induction_circuit.hpp"
 #include "clients/models/induction_forms.hpp"
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "clients/command/identify/identify_data.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
 #include "clients/identification/data/result.hpp"
 #include "clients/identification/data/settings.hpp"
 #include "clients/identification/resimulation.hpp"

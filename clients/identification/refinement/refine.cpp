@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "clients/identification/data/noise.hpp"
-#include "clients/identification/motors/induction/bending_induction.hpp"
+#include "clients/identification/motors/bending_induction.hpp"
 #include "clients/identification/refinement/bend.hpp"
 #include "clients/identification/refinement/gauss_newton.hpp"
 #include "clients/identification/refinement/predictor.hpp"

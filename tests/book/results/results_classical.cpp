@@ -2,7 +2,7 @@
 #include <numbers>
 #include <utility>
 
-#include "clients/identification/motors/induction/classical_tests.hpp"
+#include "clients/identification/motors/classical_tests.hpp"
 #include "tests/book/results/results.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 

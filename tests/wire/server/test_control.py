@@ -17,7 +17,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from recording import Recording
 from wire_client import PATIENCE_S, SERVER, pb
-from wire_test import SERVO_TEXT, TWO_AXES, TWO_DRIVES, WireTest, until
+from wire_test import PATIENT_TEXT, SERVO_TEXT, TWO_AXES, TWO_DRIVES, WireTest, until
 
 
 class Exchange(WireTest):
@@ -298,7 +298,7 @@ class Realtime(WireTest):
 
     def test_state_01_the_first_commands_do_not_drive_the_axis(self):
         """Catches: an axis that moves with the first frame of a controller that is only starting."""
-        server = self.server("--mode", "realtime")
+        server = self.server("--mode", "realtime", text=PATIENT_TEXT)
         owner, viewer = self.client(server), self.client(server)
         self.assertEqual(owner.welcome.bench.arming_commands, 10)
         self.assertDone(viewer.ask(subscribe=pb.Subscribe(decimation=1, signals=["tick", "state", "u_a_v", "command_tick"])))

@@ -15,9 +15,9 @@
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/identify/classical/classical_report.hpp"
-#include "clients/command/identify/identify_data.hpp"
-#include "clients/command/identify/identify_server.hpp"
-#include "clients/command/identify/identify_steps.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
+#include "clients/command/identify/data/identify_server.hpp"
+#include "clients/command/identify/data/identify_steps.hpp"
 
 namespace drivebench::command {
 namespace {

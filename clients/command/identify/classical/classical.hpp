@@ -1,6 +1,6 @@
 #pragma once
 
-#include "clients/command/identify/identify.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/named_experiments.hpp"
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/identify/identify_data.hpp"
-#include "clients/identification/motors/induction/classical_tests.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
+#include "clients/identification/motors/classical_tests.hpp"
 #include "clients/identification/named_experiments.hpp"
 
 namespace drivebench::command {

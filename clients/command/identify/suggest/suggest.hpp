@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/identify/identify.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
 #include "clients/command/identify/suggest/suggest_design.hpp"
 #include "clients/command/identify/suggest/suggest_forecast.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/session.hpp"
-#include "clients/command/identify/identify_steps.hpp"
+#include "clients/command/identify/data/identify_steps.hpp"
 #include "clients/identification/identify.hpp"
 #include "clients/link/common/requests.hpp"
 

@@ -3,9 +3,9 @@
 #include <limits>
 #include <string>
 
-#include "clients/command/identify/identify.hpp"
-#include "clients/command/identify/identify_data.hpp"
-#include "clients/command/identify/identify_server.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
+#include "clients/command/identify/data/identify_server.hpp"
 #include "clients/command/identify/suggest/suggest_design.hpp"
 #include "clients/identification/data/result.hpp"
 #include "clients/identification/motors/motors.hpp"

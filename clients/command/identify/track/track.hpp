@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "clients/command/identify/identify.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
 
 namespace drivebench::command {
 

@@ -1,4 +1,4 @@
-#include "clients/command/identify/identify_data.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

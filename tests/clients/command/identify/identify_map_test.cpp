@@ -1,4 +1,4 @@
-#include "clients/command/identify/identify_map.hpp"
+#include "clients/command/identify/data/identify_map.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/identification/motors/induction/classical_tests.hpp"
+#include "clients/identification/motors/classical_tests.hpp"
 
 namespace drivebench::identification {
 namespace {

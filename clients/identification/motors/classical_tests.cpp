@@ -1,4 +1,4 @@
-#include "clients/identification/motors/induction/classical_tests.hpp"
+#include "clients/identification/motors/classical_tests.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "clients/command/identify/identify_data.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "clients/command/common/errors.hpp"
-#include "clients/command/identify/identify.hpp"
-#include "clients/command/identify/identify_map.hpp"
+#include "clients/command/identify/data/identify_map.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
 #include "clients/command/recording/recorded_configuration.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "protocols/document.hpp"

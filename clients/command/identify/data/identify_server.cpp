@@ -1,4 +1,4 @@
-#include "clients/command/identify/identify_server.hpp"
+#include "clients/command/identify/data/identify_server.hpp"
 
 #include <fmt/format.h>
 

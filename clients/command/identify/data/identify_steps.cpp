@@ -1,4 +1,4 @@
-#include "clients/command/identify/identify_steps.hpp"
+#include "clients/command/identify/data/identify_steps.hpp"
 
 #include <fmt/format.h>
 

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "clients/command/identify/identify.hpp"
-#include "clients/command/identify/identify_data.hpp"
-#include "clients/command/identify/identify_server.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
+#include "clients/command/identify/data/identify_server.hpp"
 #include "clients/identification/data/settings.hpp"
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/named_experiments.hpp"

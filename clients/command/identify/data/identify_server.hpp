@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "clients/command/experiment/experiment_file.hpp"
-#include "clients/command/identify/identify.hpp"
-#include "clients/command/identify/identify_data.hpp"
+#include "clients/command/identify/data/identify_data.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
 
 namespace drivebench::command {
 

@@ -1,4 +1,4 @@
-#include "clients/command/identify/identify_map.hpp"
+#include "clients/command/identify/data/identify_map.hpp"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/text.hpp"
-#include "clients/command/identify/identify.hpp"
+#include "clients/command/identify/data/identify_options.hpp"
 #include "protocols/document.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "protocols/text.hpp"
