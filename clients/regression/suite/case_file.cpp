@@ -15,7 +15,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kLongestCase_s = 1e6;
-constexpr std::int64_t kMostSeed = std::int64_t{1} << 53;
 
 /// `{a = {b = 1.0}}` as `a.b = 1.0`, as gains are named.
 void flatten(const ConfigNode& table, const std::string& prefix, KeyTable& gains, DeviceUnderTest& device) {
@@ -180,6 +179,18 @@ std::string with_values(const std::string& name,
   return text.empty() ? name : fmt::format("{}[{}]", name, text);
 }
 
+/// Whether there were problems; they are in the other list now.
+bool moved(ProblemList& from, ProblemList& to) {
+  try {
+    from.throw_if_any();
+  } catch (const ConfigError& error) {
+    for (const ConfigProblem& each : error.problems())
+      to.add(each.file, each.line, each.key, each.rule);
+    return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<Case> read_case_file(const fs::path& file, const std::string& name, ProblemList& problems) {
@@ -191,21 +202,16 @@ std::vector<Case> read_case_file(const fs::path& file, const std::string& name, 
   }
   const std::optional<ConfigNode> root = parse_document(content.text, path, problems);
   if (!root) return {};
-  const Matrix matrix(*root, path, problems);
+  ProblemList found;
+  const Matrix matrix(*root, path, found);
+  if (moved(found, problems)) return {};
   std::vector<Case> cases;
   for (std::size_t i = 0; i < matrix.size(); ++i) {
-    ProblemList found;  // the other combinations would tell most of it again
     auto values = matrix.values_at(i);
     const ConfigNode whole = matrix.at(i, *root, path, found);
     Case& c = cases.emplace_back(read_case(whole, file, with_values(name, values), found));
     c.values = std::move(values);
-    try {
-      found.throw_if_any();
-    } catch (const ConfigError& error) {
-      for (const ConfigProblem& each : error.problems())
-        problems.add(each.file, each.line, each.key, each.rule);
-      break;
-    }
+    if (moved(found, problems)) break;  // the other combinations would tell most of it again
   }
   return cases;
 }

@@ -4,22 +4,15 @@
 #include <utility>
 #include <vector>
 
-#include "protocols/document.hpp"
+#include "clients/regression/suite/draws.hpp"
 
 namespace drivebench::regression {
 
-/// A key of the case that takes several values, one after the other.
-struct MatrixAxis {
-  std::vector<std::string> path;  ///< `step.0.load_nm`: tables by key, elements of arrays by number or name
-  std::string label;              ///< the shortest end of the path that no other axis has
-  std::vector<ConfigNode> values;
-  int line = 0;
-};
-
-/// Every combination of values: all axes multiply, the last one fastest.
+/// Every combination of values: the lists of `[matrix]` multiply with each other and with the draws of
+/// `[draw]`, the last list faster than those before it, the draws fastest.
 class Matrix {
  public:
-  /// Reads `[matrix]` of a case; without one there is a single combination. Problems go to the list.
+  /// Without the two tables there is a single combination. Problems go to the list.
   Matrix(const ConfigNode& root, const std::string& file, ProblemList& problems);
 
   std::size_t size() const noexcept;
@@ -30,9 +23,15 @@ class Matrix {
   std::vector<std::pair<std::string, std::string>> values_at(std::size_t combination) const;
 
  private:
-  std::size_t index_of(std::size_t combination, std::size_t axis) const noexcept;
+  struct Choice {
+    const Variation* variation;
+    std::size_t index;
+  };
+  std::vector<Choice> choices_at(std::size_t combination) const;
+  void label();
 
-  std::vector<MatrixAxis> axes_;
+  std::vector<Variation> axes_{};
+  Draws draws_;
 };
 
 }  // namespace drivebench::regression
