@@ -64,25 +64,16 @@ std::string plot_of(const Finding& finding, const Trace& trace, const Trace::Col
   return svg_of(finding.name, "time of the bench [s]", x, {panel});
 }
 
-std::string plots_of(const CaseResult& result) {
-  std::string html;
-  for (const Finding& finding : result.findings) {
-    if (finding.passed || !finding.applied) continue;
-    const auto column = std::ranges::find_if(result.trace.columns, [&finding](const Trace::Column& each) {
-      return each.axis == finding.axis && each.signal->name == finding.signal;
-    });
-    if (column != result.trace.columns.end()) html += plot_of(finding, result.trace, *column);
-  }
-  return html;
-}
-
 std::string section_of(const CaseResult& result) {
   const std::string_view word = word_of(result.verdict);
   std::string html = fmt::format("<h2>{} <span class={}>{}</span></h2>\n<p>{}</p>\n<ul>\n",
                                  markup(result.name), word, word, markup(result.file));
   for (const std::string& reason : reasons_of(result))
     html += fmt::format("<li>{}</li>\n", markup(reason));
-  html += "</ul>\n" + plots_of(result) + checks_table(result);
+  html += "</ul>\n";
+  for (const std::string& plot : result.plots)
+    html += plot;
+  html += checks_table(result);
   if (!result.output.empty()) {
     html += fmt::format("<p>What the device under test printed, its end:</p>\n<pre>{}</pre>\n",
                         markup(result.output));
@@ -102,6 +93,18 @@ std::string row_of(const CaseResult& result) {
 
 }  // namespace
 
+std::vector<std::string> plots_of(const CaseResult& result) {
+  std::vector<std::string> plots;
+  for (const Finding& finding : result.findings) {
+    if (finding.passed || !finding.applied) continue;
+    const auto column = std::ranges::find_if(result.trace.columns, [&finding](const Trace::Column& each) {
+      return each.axis == finding.axis && each.signal->name == finding.signal;
+    });
+    if (column != result.trace.columns.end()) plots.push_back(plot_of(finding, result.trace, *column));
+  }
+  return plots;
+}
+
 std::string html_report(const std::string& suite, std::span<const CaseResult> results) {
   const std::string name = markup(suite);
   std::string html = fmt::format(
@@ -112,7 +115,7 @@ std::string html_report(const std::string& suite, std::span<const CaseResult> re
     html += row_of(result);
   html += "</table>\n";
   for (const CaseResult& result : results) {
-    if (result.verdict != Verdict::kPass && result.verdict != Verdict::kSkipped) html += section_of(result);
+    if (!regression::is_good(result)) html += section_of(result);
   }
   return html + "</html>\n";
 }

@@ -22,13 +22,6 @@ using regression::RunFacts;
 
 namespace {
 
-/// A bench by its path from the case file, or else by its path from here or its name.
-fs::path bench_file_of(const Case& c) {
-  std::error_code ignored;
-  const fs::path beside = fs::path(c.file).parent_path() / c.bench;
-  return fs::is_regular_file(beside, ignored) ? beside : find_config(c.bench);
-}
-
 RunFacts facts_of(const v1::BenchDescription& bench) {
   RunFacts facts{.period_s = bench.period_s()};
   for (const v1::AxisDescription& axis : bench.axes())
@@ -104,6 +97,12 @@ TemporaryFolder::TemporaryFolder() {
 TemporaryFolder::~TemporaryFolder() {
   std::error_code ignored;
   fs::remove_all(path_, ignored);
+}
+
+fs::path bench_file_of(const Case& c) {
+  std::error_code ignored;
+  const fs::path beside = fs::path(c.file).parent_path() / c.bench;
+  return fs::is_regular_file(beside, ignored) ? beside : find_config(c.bench);
 }
 
 std::vector<control::Gain> gains_of(const DeviceUnderTest& device) {

@@ -33,6 +33,10 @@ struct PreparedCase {
   regression::RunFacts facts{};
 };
 
+/// The bench of a case: by its path from the case file, or else by its path from here or its name. Throws
+/// UsageError.
+std::filesystem::path bench_file_of(const regression::Case& c);
+
 /// The gains of a preset, as control takes them.
 std::vector<control::Gain> gains_of(const regression::DeviceUnderTest& device);
 

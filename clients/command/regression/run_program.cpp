@@ -14,6 +14,7 @@
 #include "clients/command/recording/recording_file.hpp"
 #include "clients/command/regression/run_case.hpp"
 #include "protocols/sample_codec.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -152,7 +153,7 @@ CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder
   program.wait(Process::in(kFarewell));
   judge_recording(server.recording(), prepared.facts, judge);
   CaseResult result = failure.empty() ? judge.result() : judge.failure(Verdict::kError, failure);
-  result.output = without_place(tail_of(output), server.link());
+  result.output = utf8(without_place(tail_of(output), server.link()));
   return result;
 }
 

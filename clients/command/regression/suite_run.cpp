@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "clients/command/regression/html_report.hpp"
 #include "clients/command/regression/run_case.hpp"
 
 namespace drivebench::command {
@@ -41,8 +42,11 @@ class Crew {
     for (std::size_t index = next_++; index < cases_.size(); index = next_++) {
       const fs::path folder = folder_ / std::to_string(index);
       fs::create_directory(folder);
-      CaseResult result = run_case(cases_[index], folder, settings_.keeps_traces);
+      CaseResult result = run_case(cases_[index], folder, settings_.draws_plots);
+      result.plots = plots_of(result);
+      result.trace = {};
       keep(cases_[index], folder, result);
+      store(result);
       std::error_code ignored;
       fs::remove_all(folder, ignored);
       const std::lock_guard lock(mutex_);
@@ -59,6 +63,16 @@ class Crew {
       keep_case(prepared, folder, settings_.keep_folder);
     } catch (const std::exception& error) {
       result.reason += fmt::format("{}not kept: {}", result.reason.empty() ? "" : "; ", error.what());
+    }
+  }
+
+  void store(CaseResult& result) const {
+    if (!settings_.store) return;
+    try {
+      settings_.store(result);
+    } catch (const std::exception& error) {
+      result.verdict = regression::Verdict::kError;
+      result.reason = error.what();
     }
   }
 

@@ -17,6 +17,9 @@ struct TestOptions {
   std::string json_file{};
   std::string html_file{};
   std::string keep_folder{};
+  std::string shard{};                        ///< `2/4` or `auto`; empty: all cases
+  std::string results_folder{};               ///< where results are kept between runs
+  std::vector<std::string> merged_folders{};  ///< nothing runs: the results are there
   bool tap = false;
   bool github = false;
 };

@@ -22,6 +22,16 @@ void add_test_command(CommandLine& line) {
   sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network");
   sub.add_option("--keep", o.keep_folder,
                  "keep recording, composed bench and output of cases that have not passed in this folder");
+  sub.add_option(
+      "--shard", o.shard,
+      "run only every N-th case from the I-th on, as I/N, or as the environment of Slurm, GitLab or "
+      "Kubernetes says: auto");
+  auto* const results = sub.add_option("--results", o.results_folder,
+                                       "keep each result in this folder, and run only cases without one");
+  sub.add_option("--merge", o.merged_folders,
+                 "run nothing: report the results of this folder; several: of all of them")
+      ->allow_extra_args(false)
+      ->excludes(results);
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
   sub.add_flag("--github", o.github, "print annotations for GitHub");
 }

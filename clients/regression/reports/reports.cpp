@@ -64,6 +64,10 @@ Totals totals_of(std::span<const CaseResult> results) noexcept {
           .skipped = count(Verdict::kSkipped)};
 }
 
+bool is_good(const CaseResult& result) noexcept {
+  return result.verdict == Verdict::kPass || result.verdict == Verdict::kSkipped;
+}
+
 std::string totals_text(const Totals& totals) {
   std::string text;
   for (const std::string& part : {counted(totals.passed, "passed"), counted(totals.failed, "failed"),
@@ -104,7 +108,7 @@ std::string to_tap(std::span<const CaseResult> results) {
   std::string text = fmt::format("TAP version 13\n1..{}\n", results.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
     const CaseResult& result = results[i];
-    const bool good = result.verdict == Verdict::kPass || result.verdict == Verdict::kSkipped;
+    const bool good = is_good(result);
     std::string name = in_a_line(result.name);
     std::ranges::replace(name, '#', '_');  // begins a directive
     text += fmt::format("{} {} - {}", good ? "ok" : "not ok", i + 1, name);
@@ -120,7 +124,7 @@ std::string to_tap(std::span<const CaseResult> results) {
 std::string to_github(std::span<const CaseResult> results) {
   std::string text;
   for (const CaseResult& result : results) {
-    if (result.verdict == Verdict::kPass || result.verdict == Verdict::kSkipped) continue;
+    if (is_good(result)) continue;
     std::string reasons;
     for (const std::string& reason : reasons_of(result))
       reasons += (reasons.empty() ? "" : "\n") + reason;

@@ -18,6 +18,9 @@ struct Totals {
 };
 Totals totals_of(std::span<const CaseResult> results) noexcept;
 
+/// Passed or skipped.
+bool is_good(const CaseResult& result) noexcept;
+
 /// `12 passed, 1 failed, 1 skipped`; kinds that did not occur are left out.
 std::string totals_text(const Totals& totals);
 

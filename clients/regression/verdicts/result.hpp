@@ -46,8 +46,9 @@ struct CaseResult {
   std::uint64_t samples = 0;  ///< of all axes
   std::uint64_t hash = 0;     ///< of all samples: equal hashes mean equal runs
   double wall_s = 0.0;
-  std::string output{};  ///< what the device under test printed, its end
-  Trace trace{};
+  std::string output{};              ///< what the device under test printed, its end
+  Trace trace{};                     ///< empty once the plots are drawn
+  std::vector<std::string> plots{};  ///< of failed checks, as SVG
 };
 
 }  // namespace drivebench::regression

@@ -52,6 +52,11 @@ void ClientConnection::cut(std::string_view why) {
   close();
 }
 
+void ClientConnection::note_loss(const boost::system::error_code& error) {
+  // The kernel ends a connection whose peer acknowledges nothing, often before the timer here has begun.
+  if (open_ && error == asio::error::timed_out) cut("it took nothing for too long");
+}
+
 void ClientConnection::audit(std::string_view event, std::string_view why_not,
                              std::optional<std::uint32_t> axis) const {
   if (shared_.audit == nullptr) return;
@@ -80,7 +85,10 @@ asio::awaitable<void> ClientConnection::run() {
     const std::span<std::uint8_t> space = reader_.free_space();
     const std::size_t count = co_await socket_.async_read_some(
         asio::buffer(space.data(), space.size()), asio::redirect_error(asio::use_awaitable, error));
-    if (error) break;
+    if (error) {
+      note_loss(error);
+      break;
+    }
     reader_.received(count);
     while (open_) {
       const auto adu = reader_.next();
@@ -121,6 +129,7 @@ asio::awaitable<bool> ClientConnection::flush() {
     stop_timer();
   }
   out_.clear();
+  if (error) note_loss(error);
   co_return !error;
 }
 

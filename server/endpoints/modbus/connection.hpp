@@ -79,6 +79,8 @@ class ClientConnection : public std::enable_shared_from_this<ClientConnection> {
  private:
   using Bytes = std::span<const std::uint8_t>;
 
+  /// Counts a peer that the kernel has given up as cut off.
+  void note_loss(const boost::system::error_code& error);
   /// Closes the connection unless stopped in time.
   void start_timer();
   void stop_timer() {
