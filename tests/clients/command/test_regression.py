@@ -151,6 +151,48 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertEqual(reports[0], reports[1])
         self.assertEqual(len(xml.etree.ElementTree.fromstring(reports[0][2]).findall("./testsuite/testcase")), 6)
 
+    def reports(self, *arguments, code=OK):
+        """The bytes of all reports."""
+        names = [self.folder / f"report.{kind}" for kind in ("json", "xml", "html")]
+        out = self.run_test(self.folder / "suite", *arguments, "--tap", "--json", names[0], "--junit", names[1], "--html", names[2],
+                            code=code).stdout
+        return out, *(name.read_bytes() for name in names)
+
+    def test_shards_in_any_number_and_order_merge_to_the_same_bytes(self):
+        """Catches: a case that no shard runs, a result that a killed or repeated task leaves wrong, a report that depends on who
+        ran what."""
+        self.write("servo.toml", SERVO + "[matrix]\nseed = {from = 1, to = 6}\ncheck.0.abs = [5.4, 6.0]\n")
+        whole = self.reports(code=FAILED)
+        self.assertIn(b"<svg", whole[3])
+        for count in (1, 4, 15):
+            folders = [self.folder / f"{count}-{index}" for index in range(count)]
+            for index, folder in enumerate(folders):
+                shard = ("--shard", f"{index + 1}/{count}", "--results", folder)
+                subprocess.run(["timeout", "-s", "KILL", "0.05", COMMAND, "test", self.folder / "suite", *map(str, shard)], check=False,
+                               env=self.environment, capture_output=True)
+                for _ in range(2):
+                    has_failed = any(place % 2 == 0 for place in range(index, 12, count))
+                    self.run_test(self.folder / "suite", *shard, code=FAILED if has_failed else OK)
+            merged = [word for folder in reversed(folders) for word in ("--merge", folder)]
+            self.assertEqual(self.reports(*merged, code=FAILED), whole, count)
+        done = self.run_test(self.folder / "suite", "--merge", self.folder / "4-0", code=FAILED)
+        self.assertIn("no folder has a result of this case as it is now", done.stdout)
+        self.assertIn("9 errors", done.stdout)
+        self.run_test(self.folder / "suite", "--merge", self.folder / "none", code=USAGE)
+        self.run_test(self.folder / "suite", "--shard", "5/4", code=USAGE)
+
+    def test_a_run_goes_on_where_an_earlier_one_ended(self):
+        """Catches: cases that run again for nothing, and results of a case as it was before it changed."""
+        self.write("servo.toml", SERVO + "[matrix]\nseed = {from = 1, to = 6}\n")
+        suite, kept = self.folder / "suite", ("--results", self.folder / "results")
+        self.run_test(suite, "--filter", "seed=3", *kept)
+        self.assertIn("1 of the results are from before", self.run_test(suite, *kept).stdout)
+        again = self.run_test(suite, *kept).stdout
+        self.assertIn("6 passed", again)
+        self.assertIn("6 of the results are from before", again)
+        self.write("servo.toml", SERVO + "[matrix]\nseed = {from = 1, to = 7}\n")
+        self.assertNotIn("from before", self.run_test(suite, *kept).stdout)
+
     def test_a_failed_case_is_kept_and_can_be_replayed(self):
         """Catches: a recording of another run than the one that failed, a bench that nobody can serve."""
         self.write("servo.toml", SERVO.replace("6.0", "5.0") + "[matrix]\ncheck.0.abs = [5.0, 6.0]\n")

@@ -298,7 +298,7 @@ class Realtime(WireTest):
 
     def test_state_01_the_first_commands_do_not_drive_the_axis(self):
         """Catches: an axis that moves with the first frame of a controller that is only starting."""
-        server = self.server("--mode", "realtime", text=PATIENT_TEXT)
+        server = self.server("--mode", "realtime", text=PATIENT_TEXT.replace("period_us = 125", "period_us = 1000"))
         owner, viewer = self.client(server), self.client(server)
         self.assertEqual(owner.welcome.bench.arming_commands, 10)
         self.assertDone(viewer.ask(subscribe=pb.Subscribe(decimation=1, signals=["tick", "state", "u_a_v", "command_tick"])))
