@@ -6,6 +6,7 @@
 #include <charconv>
 #include <system_error>
 
+#include "protocols/pages/write_pages.hpp"
 #include "server/config/config.hpp"
 #include "server/host/build_id.hpp"
 
@@ -51,17 +52,24 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
       "controllers.");
   app.set_version_flag("--version",
                        fmt::format("drivebench-server {}, build {}", project_version(), build_id()));
-  auto* config = app.add_option("config", o.config, "bench file (TOML)");
+  app.footer(
+      "Exit codes: 0 done, 1 a replay differs or a recording lost entries, 2 configuration, command line or file "
+      "unusable, 3 later than --fail-on-late allows, or a replayed recording that is equal and has no end.");
+  auto* config = app.add_option("config", o.config, "bench file (TOML)")->type_name("FILE");
   auto* replay =
       app.add_option("--replay", o.replay, "re-simulate a recording and compare it bit for bit; no server")
+          ->type_name("FILE")
           ->check(not_empty);
   config->excludes(replay);
   app.add_option("--mode", o.mode, "instead of the mode in the bench file")
       ->check(CLI::IsMember({"realtime", "lockstep", "free"}));
   app.add_option("--port", o.port, "TCP port; 0: chosen by the system")->check(whole_between(0, 65535));
-  app.add_option("--unix", o.unix_path, "also listen on this unix socket")->check(not_empty);
-  auto* record =
-      app.add_option("--record", o.record, "write an MCAP recording to this new file")->check(not_empty);
+  app.add_option("--unix", o.unix_path, "also listen on this unix socket")
+      ->type_name("FILE")
+      ->check(not_empty);
+  auto* record = app.add_option("--record", o.record, "write an MCAP recording to this new file")
+                     ->type_name("FILE")
+                     ->check(not_empty);
   app.add_option("--record-file-s", o.file_s,
                  "a new file after this much plant time [s]: FILE.mcap, FILE.2.mcap ...")
       ->check(real_between(1e-9, kMost_s))
@@ -84,8 +92,11 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   app.add_flag("--json", o.json, "print JSON lines");
   app.add_flag("--check-config", o.check_config, "only check the bench file");
   app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them")
+      ->type_name("FOLDER")
       ->check(not_empty);
-  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines")->check(not_empty);
+  app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines")
+      ->type_name("FILE")
+      ->check(not_empty);
   app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");
@@ -93,6 +104,10 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
       ->check(CLI::IsMember({"dbc", "can-table", "modbus-map", "modbus-csv"}));
   app.add_option("--bus", o.bus, "which [[can]] section --print is about, from 1 on")
       ->check(whole_between(1, kMaxCanBuses));
+  pages::add_write_pages(app, {.name = "drivebench-server",
+                               .version = fmt::format("drivebench {}", project_version()),
+                               .section = "8",
+                               .see_also = {"drivebench(1)"}});
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

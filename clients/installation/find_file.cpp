@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <iterator>
 #include <system_error>
-#include <vector>
 
 #include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
@@ -91,6 +90,15 @@ fs::path search(std::string_view kind, std::string_view what, std::string_view c
                  did_you_mean(fs::path(choice).stem().string(), there) + "; looked for" + places);
 }
 
+template <class Add>
+std::vector<std::string> names_in(std::string_view kind, Add add) {
+  std::vector<std::string> names;
+  for (const fs::path& folder : folders_to_search())
+    add(folder / kind, names);
+  names.erase(std::ranges::unique(names).begin(), names.end());
+  return names;
+}
+
 bool is_file(const fs::path& path) {
   std::error_code ignored;
   return fs::is_regular_file(path, ignored);
@@ -113,6 +121,14 @@ fs::path find_file(std::string_view kind, std::string_view what, std::string_vie
 fs::path find_folder(std::string_view kind, std::string_view what, std::string_view choice) {
   if (is_folder(choice) || is_file(choice)) return choice;
   return search(kind, what, choice, choice, is_folder, add_folders);
+}
+
+std::vector<std::string> file_names(std::string_view kind) {
+  return names_in(kind, add_names);
+}
+
+std::vector<std::string> folder_names(std::string_view kind) {
+  return names_in(kind, add_folders);
 }
 
 fs::path find_page() {

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 /// The files that come with drivebench.
 namespace drivebench::installation {
@@ -25,6 +26,10 @@ std::filesystem::path find_file(std::string_view kind, std::string_view what, st
 /// A folder, or a single TOML file: `choice` as a path, or else a folder by its name in `kind` ("suites") of
 /// the same folders.
 std::filesystem::path find_folder(std::string_view kind, std::string_view what, std::string_view choice);
+
+/// The names that find_file() and find_folder() know in `kind`, in their order.
+std::vector<std::string> file_names(std::string_view kind);
+std::vector<std::string> folder_names(std::string_view kind);
 
 /// The folder with the page of `drivebench web`: `web` in `share/drivebench` in a folder above own_file().
 std::filesystem::path find_page();

@@ -32,7 +32,7 @@ void add_watch(CommandLine& line) {
   const auto [sub, o] = line.add<WatchOptions>("watch", "live values of an axis", run_watch);
   add_link(sub, o.link);
   sub.add_option("--axis", o.axis, "number or name")->capture_default_str();
-  sub.add_option("--signals", o.signals, "names, separated by commas")->delimiter(',');
+  sub.add_option("--signals", o.signals, "names, separated by commas")->type_name("SIGNAL")->delimiter(',');
   sub.add_option("--rate", o.rate_hz, "samples per second of the bench's time")
       ->check(finite_between(1e-6, kMost))
       ->capture_default_str();
@@ -96,7 +96,9 @@ void add_take(CommandLine& line) {
 Verb<PrintOptions> add_print(CommandLine& line, const std::string& name, const std::string& description) {
   const Verb<PrintOptions> verb = line.add<PrintOptions>(name, description, run_print);
   verb.options.what = name;
-  verb.app.add_option("CONFIG", verb.options.config, "bench file or its name")->capture_default_str();
+  verb.app.add_option("CONFIG", verb.options.config, "bench file or its name")
+      ->type_name("BENCH")
+      ->capture_default_str();
   return verb;
 }
 

@@ -21,7 +21,7 @@ void add_can_log(CommandLine& line) {
   const auto [sub, o] =
       line.add<CanLogOptions>("can-log", "write what is on a CAN bus, as candump -l does", run_can_log);
   sub.add_option("LINK", o.address, "can:BACKEND:CHANNEL, for example can:socketcan:vcan0")->required();
-  sub.add_option("--output", o.out_file, "instead of standard output");
+  sub.add_option("--output", o.out_file, "instead of standard output")->type_name("FILE");
   sub.add_option("--count", o.count, "end after so many frames; 0: never")
       ->check(not_negative())
       ->capture_default_str();

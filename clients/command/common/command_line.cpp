@@ -7,6 +7,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
+#include "clients/command/common/pages.hpp"
 #include "clients/command/common/version.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
 #include "protocols/nearest_name.hpp"
@@ -17,6 +18,7 @@ namespace drivebench::command {
 CommandLine::CommandLine() {
   app_.require_subcommand(1);
   app_.set_version_flag("--version", version_line());
+  pages::add_write_pages(app_, program_of_pages());
   app_.footer("Exit codes: 0 ok, 1 the run failed, 2 usage or configuration, 3 cannot connect.");
 }
 

@@ -6,4 +6,8 @@ const char* version_line() noexcept {
   return "drivebench " DRIVEBENCH_PROJECT_VERSION ", build " DRIVEBENCH_BUILD_ID;
 }
 
+const char* release_line() noexcept {
+  return "drivebench " DRIVEBENCH_PROJECT_VERSION;
+}
+
 }  // namespace drivebench::command

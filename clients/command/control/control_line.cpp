@@ -86,8 +86,10 @@ int run_control_or_compare(const ControlLine& line) {
 
 void add_compare(CLI::App& sub, CompareOptions& o) {
   sub.add_option("--compare", o.recording,
-                 "MCAP recording of your controller: what the preset's would have commanded");
-  sub.add_option("--with", o.other, "--compare: recording of the preset's own run, compared too");
+                 "MCAP recording of your controller: what the preset's would have commanded")
+      ->type_name("FILE");
+  sub.add_option("--with", o.other, "--compare: recording of the preset's own run, compared too")
+      ->type_name("FILE");
   sub.add_option("--from", o.from_tick, "--compare: tick at which the run starts")->check(not_negative());
   sub.add_option("--threshold", o.threshold,
                  "--compare: [V] or [A]; exit code 1 if a command differs by more, or the recording does "
@@ -100,14 +102,14 @@ void add_control(CommandLine& line) {
       line.add<ControlLine>("control", "run the reference controller on a move", run_control_or_compare);
   add_link(sub, o.link,
            std::string(kStreamLinks) + ", inproc:BENCH, can:BACKEND:CHANNEL?node=N, modbus:HOST:PORT?unit=N");
-  sub.add_option("--preset", o.preset, "gains and move by name")->capture_default_str();
+  sub.add_option("--preset", o.preset, "gains and move by name")->type_name("PRESET")->capture_default_str();
   sub.add_flag("--list", o.list, "print the presets and end; with --gains all their gains");
   sub.add_flag("--gains", o.gains, "print the gains of the preset and end");
   add_gains(sub, o.overrides);
   add_compare(sub, o.compare);
   sub.add_option("--axis", o.axis, "number or name; CAN and Modbus links name it themselves")
       ->capture_default_str();
-  sub.add_option("--csv", o.csv_file, "write every sample to this file");
+  sub.add_option("--csv", o.csv_file, "write every sample to this file")->type_name("FILE");
   add_parsed(sub, "--load", o.loads, parse_load,
              "NM@SECONDS: load torque at a time after the start of the trajectory; put back at the end");
   add_parsed(sub, "--set", o.settings, parse_setting,
@@ -117,9 +119,9 @@ void add_control(CommandLine& line) {
 
 void add_plot(CommandLine& line) {
   const auto [sub, o] = line.add<PlotOptions>("plot", "a run of a recording as an SVG picture", run_plot);
-  sub.add_option("FILE", o.recording, "an MCAP recording")->required();
-  sub.add_option("--out", o.out_file, "instead of standard output");
-  sub.add_option("--preset", o.preset, "draws its trajectory and the error too");
+  sub.add_option("FILE", o.recording, "an MCAP recording")->type_name("FILE")->required();
+  sub.add_option("--out", o.out_file, "instead of standard output")->type_name("FILE");
+  sub.add_option("--preset", o.preset, "draws its trajectory and the error too")->type_name("PRESET");
   add_gains(sub, o.overrides);
   sub.add_option("--axis", o.axis, "name; default: the first in the file");
   sub.add_option("--from", o.from_tick,
@@ -132,6 +134,7 @@ void add_plot(CommandLine& line) {
          "controller beside the truth: speed-estimate, flux, load; separated by commas")
       ->delimiter(',');
   sub.add_option("--signals", o.signals, "by name, a panel for each unit; separated by commas")
+      ->type_name("SIGNAL")
       ->delimiter(',')
       ->excludes("--panels");
   sub.add_option("--title", o.title, "default: the preset, or else the file");

@@ -56,7 +56,9 @@ void add_new_motor(CommandLine& line, CLI::App& parent, const MotorKind& kind) {
 void add_new_bench(CommandLine& line, CLI::App& parent) {
   const auto [sub, o] =
       line.add<NewBenchOptions>(parent, "bench", "a bench file for a motor file", run_new_bench);
-  sub.add_option("MOTOR", o.motor, "a motor file, or the name of one of configs/motors")->required();
+  sub.add_option("MOTOR", o.motor, "a motor file, or the name of one of configs/motors")
+      ->type_name("MOTOR")
+      ->required();
   sub.add_option("--mode", o.mode, "lockstep: time waits for the controller; realtime: it does not")
       ->check(CLI::IsMember({"lockstep", "realtime"}))
       ->type_name("MODE")

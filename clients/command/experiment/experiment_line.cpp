@@ -7,7 +7,7 @@ namespace drivebench::command {
 namespace {
 
 void add_file_options(CLI::App& sub, ExperimentOptions& o) {
-  sub.add_option("--out", o.out_file, "CSV, or the recording if it ends with .mcap");
+  sub.add_option("--out", o.out_file, "CSV, or the recording if it ends with .mcap")->type_name("FILE");
   sub.add_option("--patience", o.server.patience_s, "seconds that a broken link may stay broken")
       ->check(finite_between(0.0, kMost_s))
       ->capture_default_str();
@@ -35,7 +35,7 @@ void add_experiment_commands(CommandLine& line) {
   parent.require_subcommand(1);
   const auto [run, o] =
       add(line, parent, "run", "queue an experiment and fetch its data", run_experiment_run);
-  run.add_option("FILE", o.file, "what to do, in TOML")->required();
+  run.add_option("FILE", o.file, "what to do, in TOML")->type_name("EXPERIMENT")->required();
   run.add_option("--user", o.server.user, "a name that every client sees; default: USER");
   run.add_flag("--detach", o.detach, "do not wait for its end");
   add_file_options(run, o);

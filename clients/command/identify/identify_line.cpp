@@ -13,7 +13,8 @@ void add_measurement(CLI::App& sub, IdentifyOptions& o) {
   sub.add_option("--experiment", o.experiment,
                  "by name, or a file that ends with .toml; default: the motor's first");
   sub.add_flag("--list", o.list, "print motors and experiments and end");
-  sub.add_option("--bench", o.bench, "start a server on this bench, file or name, for the experiment");
+  sub.add_option("--bench", o.bench, "start a server on this bench, file or name, for the experiment")
+      ->type_name("BENCH");
   o.server = server_of_environment();
   add_link_with_help(sub, o.server.link,
                      std::string(kStreamLinks) +
@@ -22,7 +23,8 @@ void add_measurement(CLI::App& sub, IdentifyOptions& o) {
   sub.get_option("--link")->each([&named = o.link_was_named](const std::string&) { named = true; });
   sub.add_option("--owner", o.server.owner,
                  "the secret that opens the data; else from DRIVEBENCH_OWNER, else this user's own");
-  sub.add_option("--from", o.from_file, "a recording (.mcap) or a CSV file in the place of an experiment");
+  sub.add_option("--from", o.from_file, "a recording (.mcap) or a CSV file in the place of an experiment")
+      ->type_name("FILE");
   sub.add_option("--axis", o.axis, "--from a recording: name; default: the first in the file");
   sub.add_option("--map", o.maps,
                  "--from CSV: HEADER=SIGNAL, HEADER=SIGNAL*FACTOR+OFFSET, or a column-map file (.toml)");
@@ -99,16 +101,18 @@ void add_suggestion(CLI::App& sub, IdentifyOptions& o) {
       ->group(kGroup)
       ->needs("--suggest");
   sub.add_option("--suggest-file", o.suggestion.file, "write the experiment (.toml), for --experiment")
+      ->type_name("FILE")
       ->group(kGroup)
       ->needs("--suggest");
 }
 
 void add_files(CLI::App& sub, IdentifyOptions& o) {
-  sub.add_option("--markdown", o.markdown_file, "write the report");
+  sub.add_option("--markdown", o.markdown_file, "write the report")->type_name("FILE");
   sub.add_option("--plot", o.plot_file,
-                 "write an SVG picture: measured against re-simulated, and what is left between them");
-  sub.add_option("--motor-file", o.motor_file, "write a TOML file for configs/motors");
-  sub.add_option("--data", o.data_file, "write what was measured as CSV");
+                 "write an SVG picture: measured against re-simulated, and what is left between them")
+      ->type_name("FILE");
+  sub.add_option("--motor-file", o.motor_file, "write a TOML file for configs/motors")->type_name("FILE");
+  sub.add_option("--data", o.data_file, "write what was measured as CSV")->type_name("FILE");
 }
 
 void add_identify(CommandLine& line) {
@@ -128,13 +132,15 @@ void add_track(CommandLine& line) {
       "track", "stator resistance and rotor time constant of an induction motor while it runs", run_track);
   add_link(sub, o.data.server.link);
   sub.add_option("--axis", o.data.axis, "number or name; default: the first");
-  sub.add_option("--from", o.data.from_file, "a recording (.mcap) or a CSV file in the place of a bench");
+  sub.add_option("--from", o.data.from_file, "a recording (.mcap) or a CSV file in the place of a bench")
+      ->type_name("FILE");
   sub.add_option("--map", o.data.maps, "--from CSV: as of identify");
   sub.add_option("--time", o.data.time, "--from CSV: header of the time [s]; default: time_s");
   sub.add_option("--period", o.data.period_s,
                  "--from CSV: seconds between two rows, without a column of time")
       ->check(finite_between(1e-12, kMost_s));
-  sub.add_option("--motor-file", o.motor_file, "the inductances: a file or name of configs/motors");
+  sub.add_option("--motor-file", o.motor_file, "the inductances: a file or name of configs/motors")
+      ->type_name("MOTOR");
   sub.add_option("--stator-inductance", o.stator_inductance_h, "L_S [H]; default: the bench's")
       ->check(finite_between(1e-9, 1e6));
   sub.add_option("--leakage", o.leakage, "sigma = 1 - M^2/(L_S L_R); default: the bench's")
@@ -157,14 +163,15 @@ void add_track(CommandLine& line) {
   sub.add_option("--phases", o.data.phases)->check(CLI::IsMember({2, 3}));
   sub.add_option("--voltage-shift", o.data.voltage_shift, "as of identify; default: that of the drive")
       ->check(finite_between(-100.0, 100.0));
-  sub.add_option("--plot", o.plot_file, "write an SVG picture of both over time, with the truth of a bench");
+  sub.add_option("--plot", o.plot_file, "write an SVG picture of both over time, with the truth of a bench")
+      ->type_name("FILE");
   sub.footer("Exit codes: 0 ok, 1 nothing could be told, 2 usage, file or configuration, 3 cannot connect.");
 }
 
 void add_filter(CommandLine& line) {
   const auto [sub, o] = line.add<FilterOptions>(
       "filter", "the numbers of a Butterworth low-pass, or a column of a CSV file through it", run_filter);
-  sub.add_option("FILE", o.file, "a CSV file; without it the numbers are printed");
+  sub.add_option("FILE", o.file, "a CSV file; without it the numbers are printed")->type_name("FILE");
   sub.add_option("--order", o.order)->check(CLI::Range(1, 10))->capture_default_str();
   sub.add_option("--cutoff-hz", o.cutoff_hz, "corner")
       ->check(finite_between(1e-6, 1e9))
@@ -175,7 +182,8 @@ void add_filter(CommandLine& line) {
   sub.add_option("--time", o.time, "header of the time [s]")->capture_default_str();
   sub.add_option("--out", o.out_file,
                  "instead of standard output: the column as it was, filtered once, filtered there and back, "
-                 "and the slope of that");
+                 "and the slope of that")
+      ->type_name("FILE");
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace {
 void add_replay(CommandLine& line) {
   const auto [sub, o] =
       line.add<ReplayOptions>("replay", "re-simulate a recording and compare it bit for bit", run_replay);
-  sub.add_option("FILE", o.recording, "an MCAP recording")->required();
+  sub.add_option("FILE", o.recording, "an MCAP recording")->type_name("FILE")->required();
   sub.footer("Exit code 3: the recording has no end; what it holds is equal.");
 }
 
@@ -25,10 +25,10 @@ void add_export(CommandLine& line) {
       ->capture_default_str();
   sub.add_flag("--classic", o.classic, "candump: classic frames instead of FD");
   sub.add_option("--profile", o.profile, "candump: as in a can: link, current_unit_a=0.01&extended=1");
-  sub.add_option("FILE", o.recording, "an MCAP recording")->required();
-  sub.add_option("--out", o.out_file, "instead of standard output");
+  sub.add_option("FILE", o.recording, "an MCAP recording")->type_name("FILE")->required();
+  sub.add_option("--out", o.out_file, "instead of standard output")->type_name("FILE");
   sub.add_option("--axis", o.axis, "name; default: the first in the file");
-  sub.add_option("--signals", o.signals, "names, separated by commas")->delimiter(',');
+  sub.add_option("--signals", o.signals, "names, separated by commas")->type_name("SIGNAL")->delimiter(',');
   sub.add_option("--from", o.from_tick, "first tick")->check(not_negative());
   sub.add_option("--to", o.to_tick, "last tick")->check(not_negative());
   sub.footer("Exit code 3: the recording has no end or lost entries; what it holds was written.");

@@ -9,6 +9,7 @@ void add_test_command(CommandLine& line) {
   const auto [sub, o] = line.add<TestOptions>("test", "run a suite of regression cases", run_test);
   sub.add_option("SUITE", o.suite,
                  "a folder of cases, a case file, or the name of a suite that came with drivebench")
+      ->type_name("SUITE")
       ->required();
   sub.add_option("--jobs", o.jobs, "cases at the same time")
       ->capture_default_str()
@@ -17,19 +18,24 @@ void add_test_command(CommandLine& line) {
   sub.add_option("--filter", o.filter, "only cases whose name contains this text");
   sub.add_option("--tag", o.wanted_tags, "only cases with this tag; several: with all of them")
       ->allow_extra_args(false);
-  sub.add_option("--junit", o.junit_file, "write a JUnit XML report");
-  sub.add_option("--json", o.json_file, "write a JSON report");
-  sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network");
+  sub.add_option("--junit", o.junit_file, "write a JUnit XML report")->type_name("FILE");
+  sub.add_option("--json", o.json_file, "write a JSON report")->type_name("FILE");
+  sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network")
+      ->type_name("FILE");
   sub.add_option("--keep", o.keep_folder,
-                 "keep recording, composed bench and output of cases that have not passed in this folder");
+                 "keep recording, composed bench and output of cases that have not passed in this folder")
+      ->type_name("FOLDER");
   sub.add_option(
-      "--shard", o.shard,
-      "run only every N-th case from the I-th on, as I/N, or as the environment of Slurm, GitLab or "
-      "Kubernetes says: auto");
+         "--shard", o.shard,
+         "run only every N-th case from the I-th on, as I/N, or as the environment of Slurm, GitLab or "
+         "Kubernetes says: auto")
+      ->type_name("I/N");
   auto* const results = sub.add_option("--results", o.results_folder,
-                                       "keep each result in this folder, and run only cases without one");
+                                       "keep each result in this folder, and run only cases without one")
+                            ->type_name("FOLDER");
   sub.add_option("--merge", o.merged_folders,
                  "run nothing: report the results of this folder; several: of all of them")
+      ->type_name("FOLDER")
       ->allow_extra_args(false)
       ->excludes(results);
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");

@@ -9,9 +9,10 @@ void add_web_command(CommandLine& line) {
   const auto [sub, o] = line.add<WebOptions>("web", "the bench in a browser, and its metrics", run_web);
   add_link(sub, o.link);
   sub.add_option("--listen", o.listen, "ADDRESS:PORT; port 0: the system chooses one")->capture_default_str();
-  sub.add_option("--certificate", o.certificate, "TLS: certificate chain, PEM");
-  sub.add_option("--key", o.key, "TLS: private key, PEM");
-  sub.add_option("--browser-token", o.browser_token, "file with the token that browsers must show");
+  sub.add_option("--certificate", o.certificate, "TLS: certificate chain, PEM")->type_name("FILE");
+  sub.add_option("--key", o.key, "TLS: private key, PEM")->type_name("FILE");
+  sub.add_option("--browser-token", o.browser_token, "file with the token that browsers must show")
+      ->type_name("FILE");
 }
 
 }  // namespace drivebench::command

@@ -33,6 +33,7 @@ NOT_RUN = {
     "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH]":
         "a synopsis; test_commands.py tries each option",
     "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
+    "drivebench-server --write-pages FOLDER": "a synopsis; test_pages.py writes them",
     "drivebench can check can0       # the problems of bit timing, state and queue, each with the line that cures it":
         "needs an adapter; can_check_test and test_socketcan.py try it",
     "drivebench doctor                                   # whether this machine is fit for real time and CAN, and what mends it":
