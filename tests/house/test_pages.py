@@ -16,7 +16,7 @@ from wire_client import PATIENCE_S, REPOSITORY, SERVER  # noqa: E402
 
 CLIENT = SERVER.parent / "drivebench"
 NEEDED = ("bash", "zsh", "mandoc", "groff")
-ASK = "\x01\x05"  # control keys that move the cursor to the start and back: harmless, and echoed by nothing
+SHOW = r"""show() { printf '\074%s\076\n' "$*"; }"""  # in angle brackets, which the echo of this line has not
 
 
 def run(*command, code=0, text=None, **options):
@@ -51,7 +51,7 @@ class Shell:
     def completed(self, line):
         """The line after the tab key, as the shell then runs it: `show` prints its arguments."""
         self.type(f"{line}\t\x01show \x05\n")  # to the start of the line, the word, to its end
-        return re.search(r"\[([^\[\]]*)\]", self.read_until(r"\[[^\[\]]*\]\s"))[1]
+        return re.search("<([^<>]*)>", self.read_until("<[^<>]*>"))[1].strip()
 
     def close(self):
         os.close(self.terminal)
@@ -104,7 +104,7 @@ class Pages(unittest.TestCase):
     def test_bash_completes_verbs_options_and_values(self):
         shell = Shell(self.work, "bash", "--norc", "--noprofile", "-i")
         self.addCleanup(shell.close)
-        shell.type("show() { printf '[%s]\\n' \"$*\"; }; bind 'set bell-style none'; . "
+        shell.type(SHOW + "; bind 'set bell-style none'; . "
                    f"{self.pages}/bash-completion/completions/drivebench; PS1='\\$ '\n")
         self.check(shell)
         self.assertEqual(shell.completed("drivebench export --format=cand"), "drivebench export --format=candump")
@@ -114,8 +114,7 @@ class Pages(unittest.TestCase):
     def test_zsh_completes_verbs_options_and_values(self):
         shell = Shell(self.work, "zsh", "-f", "-i")
         self.addCleanup(shell.close)
-        shell.type(f"fpath=({self.pages}/zsh/site-functions $fpath); autoload -U compinit; compinit -D; setopt no_beep; bindkey -e; PS1='$ '; "
-                   "show() { print -r -- \"[$*]\" }\n")
+        shell.type(f"fpath=({self.pages}/zsh/site-functions $fpath); autoload -U compinit; compinit -D; setopt no_beep no_auto_remove_slash; bindkey -e; PS1='$ '; {SHOW}\n")
         self.check(shell)
 
     def check(self, shell):
@@ -134,7 +133,7 @@ class Pages(unittest.TestCase):
                             ("drivebench serve servo --mode real", "drivebench serve servo --mode realtime"),
                             ("drivebench-server --print modbus-c", "drivebench-server --print modbus-csv"),
                             ("drivebench-server on", "drivebench-server one.mcap")):
-            self.assertEqual(shell.completed(line).strip(), whole, shell.command[0])
+            self.assertEqual(shell.completed(line), whole, shell.command[0])
 
     # Catches: a folder that cannot be written reported as done.
     def test_a_folder_that_cannot_be_written_is_refused(self):
