@@ -59,7 +59,7 @@ LineOption describe_option(const CLI::Option& from) {
     for (const std::string& name : from.get_lnames())
       option.names.push_back("--" + name);
   }
-  if (from.get_type_size_max() > 0) read_type(from.get_type_name(), option);
+  read_type(from.get_type_name(), option);
   return option;
 }
 
