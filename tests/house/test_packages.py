@@ -45,7 +45,8 @@ class Packages(unittest.TestCase):
         for release in ("0", "1"):  # the build before, and this one
             run("cpack", "-G", "DEB", "-B", cls.folder / release, "-D", f"CPACK_DEBIAN_PACKAGE_RELEASE={release}", "-D",
                 f"CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS=adduser, libdrivebench1 (= 0.1.0-{release})", "-D",
-                f"CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS=libdrivebench1 (= 0.1.0-{release})", cwd=BUILD)
+                f"CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS=libdrivebench1 (= 0.1.0-{release})", "-D",
+                f"CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS=python3 (>= 3.11), libdrivebench1 (= 0.1.0-{release})", cwd=BUILD)
         run("debootstrap", "--variant=minbase", "bookworm", cls.root, mirror(), seconds=600)
         shutil.copy("/etc/resolv.conf", cls.root / "etc/resolv.conf")
         for release in ("0", "1"):
@@ -66,8 +67,13 @@ class Packages(unittest.TestCase):
 
     def install(self, release):
         packages = [f"/packages/{release}/{file.name}" for file in (self.root / "packages" / release).glob("*.deb")]
-        self.assertEqual(len(packages), 3)
+        self.assertEqual(len(packages), 4)
         return self.inside("apt-get", "install", "-y", "--no-install-recommends", "-o", "Dpkg::Options::=--force-confold", *packages)
+
+    # Catches: what Debian's own checker calls an error or a warning: no change log, man page or trigger, a wrong place.
+    def test_lintian_finds_nothing(self):
+        packages = sorted((self.folder / "1").glob("*.deb"))
+        self.assertEqual(run("lintian", "--no-cfg", "--allow-root", "--fail-on", "error,warning", *packages), "")
 
     # Catches: a library, a file or a rule that a package forgets, a configuration or a recording lost by an upgrade, what
     # stays behind after a purge, a program that works only on the machine that built it.
@@ -82,9 +88,13 @@ class Packages(unittest.TestCase):
         self.assertRegex(said, r'"replay": \{\s*"equal": true')
         self.assertIn("/etc/drivebench/bench.toml: ", self.inside("drivebench-server", "--check-config", "/etc/drivebench/bench.toml"))
         self.assertRegex(self.inside("drivebench", "--version"), r"drivebench 0\.1\.0, build ")
+        [libraries] = {file.parent for file in (self.root / "usr/lib").rglob("libdrivebench.so")}
         run("cc", REPOSITORY / "clients/examples/blink.c", "-o", self.root / "root/blink", f"-I{self.root}/usr/include",
-            f"-L{self.root}/usr/lib", "-ldrivebench", f"-Wl,-rpath-link,{self.root}/usr/lib")
+            f"-L{libraries}", "-ldrivebench", f"-Wl,-rpath-link,{libraries}")
         self.assertIn(SPINS, self.inside("/root/blink"))
+        shutil.copy(REPOSITORY / "clients/python/examples/speed_loop.py", self.root / "root")
+        self.assertIn("50.000 rad/s of 50.000", self.inside("python3", "/root/speed_loop.py", "inproc:dc-a-voltage"))
+        self.assertEqual(self.inside("python3", "-c", "import importlib.metadata as m; print(m.version('drivebench'))"), "0.1.0\n")
         self.assertIn("drivebench:", (self.root / "etc/passwd").read_text(encoding="utf-8"))
         unit = (self.root / "usr/lib/systemd/system/drivebench-server.service").read_text(encoding="utf-8")
         self.assertIn("ExecStart=/usr/bin/drivebench-server /etc/drivebench/bench.toml", unit)
@@ -100,7 +110,7 @@ class Packages(unittest.TestCase):
         self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
         self.assertIn(SPINS, self.inside("/root/blink"))
 
-        self.inside("dpkg", "--purge", "drivebench", "libdrivebench-dev", "libdrivebench1")
+        self.inside("dpkg", "--purge", "python3-drivebench", "drivebench", "libdrivebench-dev", "libdrivebench1")
         self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
         shutil.rmtree(work)
         self.inside("apt-get", "purge", "-y", *needed)
@@ -115,6 +125,8 @@ def reason_to_skip():
         return "apt names no mirror of Debian 12"
     if shutil.which("debootstrap") is None or shutil.which("dpkg-shlibdeps") is None:
         return "debootstrap or dpkg-dev is missing"
+    if shutil.which("lintian") is None:
+        return "lintian is missing"
     if subprocess.run(["unshare", "--mount", "--pid", "--fork", "true"], check=False).returncode != 0:
         return "this machine gives no namespaces"
     return None
