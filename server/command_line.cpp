@@ -53,7 +53,8 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   app.set_version_flag("--version",
                        fmt::format("drivebench-server {}, build {}", project_version(), build_id()));
   app.footer(
-      "Exit codes: 0 done, 1 a replay differs or a recording lost entries, 2 configuration, command line or file "
+      "Exit codes: 0 done, 1 a replay differs or a recording lost entries, 2 configuration, command line or "
+      "file "
       "unusable, 3 later than --fail-on-late allows, or a replayed recording that is equal and has no end.");
   auto* config = app.add_option("config", o.config, "bench file (TOML)")->type_name("FILE");
   auto* replay =
@@ -97,6 +98,9 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   app.add_option("--audit", o.audit, "append the audit log to this file, as JSON lines")
       ->type_name("FILE")
       ->check(not_empty);
+  app.add_option("--log-format", o.log_format, "of standard error; json: an object in each line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
   app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");

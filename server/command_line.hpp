@@ -24,6 +24,7 @@ struct ServerOptions {
   bool allow_odd = false;
   std::string experiments;
   std::string audit;
+  std::string log_format = "text";
   double file_s = 0.0;         ///< plant time in each file of a recording; 0: no limit
   std::uint64_t file_mib = 0;  ///< size of each file of a recording; 0: no limit
   double chunk_ms = 0.0;       ///< plant time that a kill may cost a recording; 0: the default

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -19,6 +20,7 @@
 #include "server/engine/supervisor.hpp"
 #include "server/host/asio.hpp"
 #include "server/host/build_id.hpp"
+#include "server/host/json_log.hpp"
 #include "server/host/memory.hpp"
 #include "server/host/print_line.hpp"
 #include "server/host/service_notification.hpp"
@@ -314,7 +316,15 @@ int use_bench(const ServerOptions& o) {
 int run(int argc, char** argv) {
   ServerOptions o;
   if (const std::optional<bool> done = read_command_line(argc, argv, o)) return *done ? kOk : kUnusable;
-  return o.replay.empty() ? use_bench(o) : replay_command(o.replay, o.json);
+  const bool json_log = o.log_format == "json";
+  if (json_log) log_as_json();
+  try {
+    return o.replay.empty() ? use_bench(o) : replay_command(o.replay, o.json);
+  } catch (const std::exception& error) {
+    if (!json_log) throw;
+    fmt::print(stderr, "{}\n", json_log_line(std::chrono::system_clock::now(), "critical", error.what()));
+    return kUnusable;
+  }
 }
 
 }  // namespace
