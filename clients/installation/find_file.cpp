@@ -95,7 +95,7 @@ std::vector<std::string> names_in(std::string_view kind, Add add) {
   std::vector<std::string> names;
   for (const fs::path& folder : folders_to_search())
     add(folder / kind, names);
-  names.erase(std::ranges::unique(names).begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
   return names;
 }
 

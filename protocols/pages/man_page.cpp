@@ -96,7 +96,8 @@ void add_options(std::string& page, const LineVerb& verb) {
     if (!option.positional && std::ranges::find(groups, option.group) == groups.end())
       groups.push_back(option.group);
   }
-  std::ranges::stable_partition(groups, [](const std::string& group) { return group == "Options"; });
+  std::stable_partition(groups.begin(), groups.end(),
+                        [](const std::string& group) { return group == "Options"; });
   add_section(page, "OPTIONS");
   for (const std::string& group : groups) {
     if (group != "Options") page += ".SS " + roff(group) + "\n";
