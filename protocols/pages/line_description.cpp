@@ -1,6 +1,5 @@
 #include "protocols/pages/line_description.hpp"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <string_view>
 
@@ -36,6 +35,7 @@ void read_type(std::string_view type, LineOption& option) {
 
 std::vector<std::string> sorted_names(const std::set<CLI::Option*>& options) {
   std::vector<std::string> names;  // a set of pointers has an order of its own at each run
+  names.reserve(options.size());
   for (const CLI::Option* option : options)
     names.push_back(option->get_name());
   std::ranges::sort(names);

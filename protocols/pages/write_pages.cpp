@@ -1,6 +1,5 @@
 #include "protocols/pages/write_pages.hpp"
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
