@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
 try:
@@ -20,10 +21,32 @@ except ImportError:
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "helpers"))
 from web_client import PAGE, Gateway
-from wire_client import BENCHES, REPOSITORY, Server
+from wire_client import BENCHES, REPOSITORY, Server, pb
+from wire_test import until
 
 PATIENCE_S = 180
-VERA = '[[token]]\nname = "vera"\nrole = "viewer"\ntoken = "vera-secret"\n'
+USERS = "".join(f'[[token]]\nname = "{name}"\nrole = "{role}"\ntoken = "{name}-secret"\n'
+                for name, role in (("vera", "viewer"), ("otto", "operator"), ("cora", "conductor")))
+
+
+class Controller(threading.Thread):
+    """Drives an axis in lockstep until it is stopped, slowly enough that a browser follows. What it did stands in `samples`."""
+
+    def __init__(self, client):
+        super().__init__()
+        self.client = client
+        self.samples = []
+        self.over = threading.Event()
+        client.lease()
+        self.start()
+
+    def run(self):
+        while not self.over.wait(0.001):
+            self.samples.append(self.client.step(len(self.samples)))
+
+    def stop(self):
+        self.over.set()
+        self.join()
 
 
 def missing():
@@ -86,6 +109,14 @@ class Page(PageTest):
         text = text.replace("period_us = 100\n", "period_us = 1000\nsubsteps = 20\n")
         return self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
 
+    def for_users(self):
+        """A bench in lockstep that knows a viewer, an operator and a conductor."""
+        tokens = self.folder / "tokens"
+        tokens.write_text(USERS, encoding="utf-8")
+        tokens.chmod(0o600)
+        text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        return self.serve("--mode", "lockstep", text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{tokens}"'))
+
     def test_the_page_finds_the_bench_and_shows_its_speed(self):
         """Catches: a page that stays empty, decodes wrongly, or exports another thing than it shows."""
         shown = self.play("look", self.gateway(self.on_the_line()).url)
@@ -123,15 +154,45 @@ class Page(PageTest):
     def test_a_viewer_sees_no_knobs(self):
         """Catches: knobs that only the server's refusal stops, a token that the page does not ask for or keeps after a
         refusal."""
-        tokens = self.folder / "tokens"
-        tokens.write_text(VERA, encoding="utf-8")
-        tokens.chmod(0o600)
-        text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
-        server = self.serve("--mode", "lockstep", text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{tokens}"'))
-        shown = self.play("viewer", self.gateway(server).url, "vera-secret")
+        shown = self.play("viewer", self.gateway(self.for_users()).url, "vera-secret")
         self.assertIn("token", shown["asked"])
         self.assertIn("role viewer, user vera", shown["facts"])
         self.assertEqual((shown["knobs"], shown["buttons"]), (False, 0))
+
+    def test_a_conductor_changes_what_another_client_drives(self):
+        """Catches: knobs that want the lease of a driven axis, faults that end with another lease, a page that conducts
+        whatever its role, so that an operator is turned away."""
+        server = self.for_users()
+        url = self.gateway(server).url
+        client = server.client(token="otto-secret")
+        self.addCleanup(client.close)
+        controller = Controller(client)
+        self.addCleanup(controller.stop)
+        shown = self.play("beside", url, "otto-secret")
+        self.assertIn("role operator, user otto", shown["facts"])
+        for answer in shown["answers"].values():
+            self.assertIn("holds the lease of the axis: otto", answer)
+        shown = self.play("beside", url, "cora-secret")
+        self.assertIn("role conductor, user cora", shown["facts"])
+        self.assertIn("holds the lease of the axis: otto", shown["answers"].pop("Clear faults"))
+        for answer in shown["answers"].values():
+            self.assertIn("done at tick", answer)
+        fault, end = map(int, re.findall(r"\d+", shown["answers"]["Inject"].partition("done")[2]))
+        until(lambda: len(controller.samples) > end + 1, "the end of the fault")
+        controller.stop()
+        parameters = client.ask(read_parameters=pb.ReadParameters()).parameter_values.parameters
+        self.assertEqual({each.value for each in parameters if each.name == "machine.rotor_resistance_ohm"}, {2.5})
+        samples = controller.samples
+        self.assertEqual({each.owner for each in samples}, {client.owner})
+        self.assertEqual((samples[0].load_nm, samples[-1].load_nm), (0.0, 0.25))
+        self.assertEqual([each.tick for each in samples if each.injected], list(range(fault, end)))
+        self.assertGreater(max(abs(each.speed_rad_s) for each in samples), 1.0)
+
+    def test_an_operator_changes_an_axis_that_nobody_drives(self):
+        """Catches: a page that needs the right to conduct."""
+        shown = self.play("beside", self.gateway(self.for_users()).url, "otto-secret")
+        for answer in shown["answers"].values():
+            self.assertIn("done at tick", answer)
 
     def test_a_lost_server_is_shown_and_found_again(self):
         """Catches: a page that shows old values as if they were new, or must be loaded again."""

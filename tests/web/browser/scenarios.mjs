@@ -50,6 +50,14 @@ const measured = (page, signal) => page.evaluate((wanted) => {
   return row && Object.fromEntries([...row.children].map((cell, i) => [heads[i], cell.textContent]));
 }, signal);
 
+/** Shows the token for which the page asks. */
+async function enter(page, token) {
+  const asked = await text(page, "#alert", /token/);
+  await page.type("#token", token);
+  await page.keyboard.press("Enter");
+  return asked;
+}
+
 const isShown = (page, selector) => page.evaluate((where) => !document.querySelector(where).hidden, selector);
 
 /** The files that the page offers from now on, by their names. */
@@ -139,11 +147,27 @@ const scenarios = {
     return { refused, word, done, inForce, owner, released: await stateOf(page, "controller", /none/) };
   },
 
+  /** Every knob beside another controller. */
+  async beside(page, token) {
+    await enter(page, token);
+    const facts = await text(page, "#bench-facts", /role/);
+    await stateOf(page, "tick", /\d/);
+    const parameter = "machine.rotor_resistance_ohm";
+    const fields = [["load torque, N*m", "0.25"], ["impulse, N*m*s", "0.01"], [parameter, "2.5"], ["fault", "bus_sag"],
+      ["value of the fault", "0.5"], ["ticks that the fault lasts; 0: until it is ended", "7"]];
+    for (const [label, value] of fields) await set(page, label, value);
+    const answers = {};
+    for (const knob of ["Set load", "Bump", `set ${parameter}`, "Inject", "Clear faults"]) {
+      await page.$eval("#knobs .answer", (each) => { each.textContent = ""; });
+      await press(page, knob);
+      answers[knob] = await text(page, "#knobs .answer");
+    }
+    return { facts, answers };
+  },
+
   /** A user without rights, who first shows no token. */
   async viewer(page, token) {
-    const asked = await text(page, "#alert", /token/);
-    await page.type("#token", token);
-    await page.keyboard.press("Enter");
+    const asked = await enter(page, token);
     const facts = await text(page, "#bench-facts", /role/);
     return { asked, facts, knobs: await isShown(page, "#knobs"), buttons: await page.$$eval("#knobs button", (all) => all.length) };
   },

@@ -10,13 +10,18 @@ export class Bench {
   /** Samples that the server dropped because the page read too slowly. */
   dropped = 0;
 
-  constructor(readonly wire: Wire, readonly welcome: pb.Welcome) {
+  constructor(readonly wire: Wire, readonly welcome: pb.Welcome, readonly conducts: boolean) {
     this.description = welcome.bench as pb.BenchDescription;
     this.histories = this.description.axes.map(() => new History());
   }
 
   get mayChange(): boolean {
     return this.welcome.role !== pb.Role.ROLE_VIEWER;
+  }
+
+  /** Whether a change of an axis needs its lease. */
+  get changesUnderLease(): boolean {
+    return !this.conducts && this.description.mode !== pb.Mode.MODE_FREE;
   }
 
   get isLockstep(): boolean {

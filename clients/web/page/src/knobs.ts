@@ -22,7 +22,7 @@ export class Knobs {
     root.hidden = !bench.mayChange;
     root.replaceChildren();
     if (!bench.mayChange) return;
-    root.append(element("h2", {}, "Knobs"), this.answer,
+    root.append(element("h2", {}, "Knobs"), element("p", { class: "soft" }, leaseText(bench)), this.answer,
       ...bench.description.axes.map((axis, number) => element("details", { open: number === 0 },
         element("summary", {}, axis.name as string), this.leaseRow(number), this.loadRows(number), this.faultRows(number),
         this.parameterRows(number))));
@@ -59,22 +59,23 @@ export class Knobs {
   }
 
   /**
-   * Asks, under a lease of a moment if the page holds none, and shows the answer. The requests may depend on the present tick,
-   * and go out together.
+   * Asks and shows the answer; if the requests need a lease and the page holds none, under a lease of a moment. The requests
+   * may depend on the present tick, and go out together.
    */
-  private async change(axis: number, what: string, requests: (tick: number) => pb.IEnvelope[]): Promise<void> {
+  private async change(axis: number, what: string, requests: (tick: number) => pb.IEnvelope[],
+    underLease = this.bench.changesUnderLease): Promise<void> {
     const { ACTION_ACQUIRE, ACTION_RELEASE } = pb.LeaseRequest.Action;
-    const isOwner = this.owners[axis] !== 0;
+    const borrows = underLease && this.owners[axis] === 0;
     try {
-      if (!isOwner) await this.lease(axis, ACTION_ACQUIRE);
+      if (borrows) await this.lease(axis, ACTION_ACQUIRE);
       try {
         const { status } = await this.bench.wire.ask({ status_request: {} });
         const made = requests(status?.tick as number);
         const answers = await Promise.all(made.map((each) => this.bench.wire.ask(each)));
-        if (!isOwner) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
+        if (borrows) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
         this.tell(`${what}: done at tick ${answers.map((each) => each.done?.tick).join(" and ")}`);
       } finally {
-        if (!isOwner) await this.lease(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
+        if (borrows) await this.lease(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
       }
     } catch (problem) {
       this.tell(`${what}: ${(problem as Error).message}`, true);
@@ -114,7 +115,7 @@ export class Knobs {
       }
     });
     this.leases[axis] = toggle;
-    const clear = button("Clear faults", () => this.change(axis, "clear", () => [{ clear_faults: { axis } }]));
+    const clear = button("Clear faults", () => this.change(axis, "clear", () => [{ clear_faults: { axis } }], true));
     return element("div", { class: "bar" }, toggle, clear);
   }
 
@@ -215,6 +216,11 @@ export class Knobs {
       this.lease(axis, pb.LeaseRequest.Action.ACTION_RENEW).catch((problem: Error) => this.leaseTaken(axis, `lease: ${problem.message}`));
     });
   }
+}
+
+function leaseText(bench: Bench): string {
+  if (!bench.changesUnderLease) return "Load, bump, faults and parameters act beside a controller that drives.";
+  return "Each change takes the lease for a moment: while a controller drives, it is refused.";
 }
 
 function valueText(parameter: pb.ParameterDescription): string {

@@ -9,7 +9,7 @@ import { pb, Wire } from "./wire";
 const kStatusMs = 500;
 const kThemes = ["system", "light", "dark"];
 const kModes = ["?", "real time", "lockstep", "free"];
-const kRoles = ["?", "viewer", "operator", "admin"];
+const kRoles = ["?", "viewer", "operator", "admin", "conductor"];
 
 class Page {
   private readonly wire: Wire;
@@ -21,7 +21,7 @@ class Page {
 
   constructor() {
     this.wire = new Wire({
-      welcome: (welcome) => this.welcome(welcome),
+      welcome: (welcome, conducts) => this.welcome(welcome, conducts),
       samples: (samples) => this.take(samples),
       notice: (notice) => this.alert(notice),
       tokenWanted: (sentence) => this.wantToken(sentence),
@@ -38,10 +38,10 @@ class Page {
     setInterval(() => this.askStatus(), kStatusMs);
   }
 
-  private welcome(welcome: pb.Welcome): void {
+  private welcome(welcome: pb.Welcome, conducts: boolean): void {
     this.scope?.end();
     this.knobs?.end();
-    const bench = new Bench(this.wire, welcome);
+    const bench = new Bench(this.wire, welcome, conducts);
     this.bench = bench;
     this.subscribed = [];
     const { name, mode, period_s: period } = bench.description;

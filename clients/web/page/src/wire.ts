@@ -18,7 +18,8 @@ export class Refused extends Error {
 }
 
 export interface Listener {
-  welcome(welcome: pb.Welcome): void;
+  /** `conducts`: the session may change axes that other sessions hold. */
+  welcome(welcome: pb.Welcome, conducts: boolean): void;
   samples(samples: pb.Samples): void;
   notice(notice: pb.Notice): void;
   /** The bench turned the page away: it wants another token. */
@@ -42,17 +43,22 @@ export class Wire {
 
   constructor(private readonly listener: Listener) {}
 
-  connect(): void {
+  /** A role is known only after its hello, and a hello beyond its role ends the session: so the first hello asks for nothing. */
+  connect(conducts = false): void {
     const socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/bench`);
     socket.binaryType = "arraybuffer";
     this.rest = new Uint8Array(0);
     let refused = false;
+    let mayConduct = false;
     socket.onopen = async () => {
       try {
-        const hello = { protocol_min: 1, protocol_max: 1, client: "browser", token: sessionStorage.getItem("token") ?? "" };
-        this.listener.welcome((await this.ask({ hello })).welcome as pb.Welcome);
+        const hello = { protocol_min: 1, protocol_max: 1, client: "browser", token: sessionStorage.getItem("token") ?? "", conducts };
+        const welcome = (await this.ask({ hello })).welcome as pb.Welcome;
+        mayConduct = !conducts && isConductor(welcome.role);
+        if (mayConduct) socket.close();
+        else this.listener.welcome(welcome, conducts);
       } catch (problem) {
-        if (!(problem instanceof Refused)) return;
+        if (!(problem instanceof Refused) || problem.refusal.code !== pb.RefusalCode.REFUSAL_UNAUTHENTICATED) return;
         refused = true;
         this.listener.tokenWanted(problem.message);
       }
@@ -63,6 +69,7 @@ export class Wire {
       this.waiting.clear();
       if (this.socket === socket) this.socket = null;
       if (refused) return;
+      if (mayConduct) return this.connect(true);
       this.listener.lost(event.reason || `the gateway does not answer (${event.code})`);
       setTimeout(() => this.connect(), kRetryMs);
     };
@@ -112,4 +119,8 @@ export class Wire {
     if (envelope.refusal) waiting?.reject(new Refused(envelope.refusal as pb.Refusal));
     else waiting?.resolve(envelope);
   }
+}
+
+function isConductor(role: pb.Role): boolean {
+  return role === pb.Role.ROLE_CONDUCTOR || role === pb.Role.ROLE_ADMIN;
 }
