@@ -130,6 +130,19 @@ class Page(PageTest):
         self.assertAlmostEqual(int(row[0]) * 1e-3, float(row[1]))
         self.assertIn("<svg", shown["svg"])
 
+    def test_a_pane_shows_a_locus_and_a_spectrum(self):
+        """Catches: axes without units, x and y exchanged, a locus without the dot of a cursor, a spectrum of other samples than
+        those of the window or with another amplitude than the motor's supply gives it."""
+        server = self.on_the_line()
+        shown = self.play("kinds", self.gateway(server).url)
+        self.assertEqual((shown["size"], shown["chips"][0]), (320, "X: i_a_a×"))
+        for words in ("i_a_a [A]", "[A]", "i_b_a", "i_c_a", "time [s]"):
+            self.assertIn(f">{words}</text>", shown["svg"])
+        self.assertEqual(shown["ends"][:3], ["to 500 Hz", "to 200 Hz", "to 100 Hz"])
+        self.assertIn(">amplitude [V]</text>", shown["spectrum"])
+        for phase in "abc":  # the line has 169.83 V and 60 Hz
+            self.assertRegex(shown["peaks"], rf"u_{phase}_v: 169\.8 V at (59\.99|60\.0[01]) Hz")
+
     def test_a_trigger_catches_a_fault_of_one_tick(self):
         """Catches: a trigger on what is drawn instead of every sample, a window at the wrong tick, a spike that decimation
         loses."""
@@ -214,7 +227,7 @@ class Page(PageTest):
         """Catches: a control that only a mouse reaches, and plots without keys."""
         shown = self.play("keyboard", self.gateway(self.on_the_line()).url)
         for control in ("Pause", "window", "trigger condition", "Take the lease", "Clear faults", "Set load", "Bump", "Inject",
-                        "set machine.rotor_resistance_ohm", "add a signal to this pane", "theme: system"):
+                        "set machine.rotor_resistance_ohm", "add a signal to this pane", "kind of this pane", "theme: system"):
             self.assertIn(control, shown["reached"])
         self.assertTrue(shown["paused"])
         self.assertIn("Between the cursors", shown["caption"])

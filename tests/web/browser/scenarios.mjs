@@ -43,6 +43,12 @@ async function set(page, label, value) {
 const press = (page, words) => page.evaluate((wanted) =>
   [...document.querySelectorAll("button")].find((each) => (each.ariaLabel ?? each.textContent) === wanted).click(), words);
 
+/** Sets the kind of a pane. */
+const kind = (pane, value) => pane.$eval('[aria-label="kind of this pane"]', (field, wanted) => {
+  field.value = wanted;
+  field.dispatchEvent(new Event("change"));
+}, value);
+
 /** The cells of a row of measurements by its signal. */
 const measured = (page, signal) => page.evaluate((wanted) => {
   const row = [...document.querySelectorAll(".measurements tbody tr")].find((each) => each.querySelector("th").textContent === wanted);
@@ -95,6 +101,33 @@ const scenarios = {
       speed: JSON.parse(row), plots: (await page.$$(".pane canvas")).length, knobs: await isShown(page, "#knobs"),
       csv: (await file(/\.csv/)).split("\n").slice(0, 4), svg: (await file(/\.svg/)).slice(0, 200),
     };
+  },
+
+  /** A pane of currents becomes a locus, one of voltages a spectrum. */
+  async kinds(page) {
+    await stateOf(page, "speed", /^[1-9]/);
+    await set(page, "window", "0.5");
+    const [, currents, voltages] = await page.$$(".pane");
+    const chips = () => currents.$$eval(".chip", (all) => all.map((each) => each.textContent));
+    await kind(currents, "xy");
+    const [size, ofXy] = [await currents.$eval("canvas", (canvas) => canvas.clientHeight), await chips()];
+    await press(page, "Pause");
+    await page.focus(".panes");
+    const inkOf = () => currents.$eval("canvas", (canvas) => canvas.toDataURL());
+    const before = await inkOf();
+    await page.keyboard.press("a");
+    await page.keyboard.press("ArrowLeft");
+    await until(async () => String((await inkOf()) !== before), /true/); // the dot of the cursor
+    const file = await catchFiles(page);
+    await press(page, "SVG");
+    const svg = await file(/\.svg/);
+    await page.keyboard.press("Escape");
+    await kind(voltages, "spectrum");
+    await page.evaluate(() => { window.offered = {}; });
+    const peaks = await until(() => voltages.$eval(".peaks", (each) => each.textContent), / at /);
+    const ends = await voltages.$$eval('[aria-label="highest frequency"] option', (all) => all.map((each) => each.textContent));
+    await press(page, "SVG");
+    return { size, chips: ofXy, svg, peaks, ends, spectrum: await file(/frequency \[Hz\]/) };
   },
 
   /** A fault of one tick, and a trigger on it. */
@@ -209,6 +242,9 @@ const scenarios = {
   /** What axe-core says against the page, in both themes. */
   async axe(page) {
     await stateOf(page, "tick", /[1-9]/);
+    const [, locus, spectrum] = await page.$$(".pane");
+    await kind(locus, "xy");
+    await kind(spectrum, "spectrum");
     const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
     const found = [];
     for (const theme of ["light", "dark"]) {
@@ -224,7 +260,18 @@ const scenarios = {
   async picture(page, theme, path) {
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
     await stateOf(page, "speed", /^[1-9]/);
-    await set(page, "window", "0.1");
+    await set(page, "window", "0.2");
+    const [, , voltages] = await page.$$(".pane");
+    await kind(voltages, "spectrum");
+    await press(page, "Add pane");
+    const locus = (await page.$$(".pane"))[3];
+    await kind(locus, "xy");
+    for (const signal of ["0:i_a_a", "0:i_b_a"]) {
+      await locus.$eval('[aria-label="add a signal to this pane"]', (field, wanted) => {
+        field.value = wanted;
+        field.dispatchEvent(new Event("change"));
+      }, signal);
+    }
     await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"[1-9]/);
     await new Promise((done) => setTimeout(done, 1000));
     await page.screenshot({ path });

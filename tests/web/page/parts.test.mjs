@@ -8,12 +8,13 @@ import test from "node:test";
 const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
-    contents: ["history", "measurements", "trigger", "numbers", "view", "exports"].map((each) => `export * from "./${each}";`).join("\n"),
+    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },
   bundle: true, write: false, format: "esm",
 });
-const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf } =
+const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
+  spectrumOf, peaksOf, sinceLastGap } =
   await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
 
 function historyOf(ticks, valueOf) {
@@ -108,7 +109,60 @@ test("exports of two axes", () => {
   const view = { from: 0, to: 4, origin: 0, rows };
   const channels = [{ axis: 0, signal: "x", title: "a.x [A]" }, { axis: 1, signal: "x", title: "b.x [A]" }];
   assert.equal(csvOf(channels, view, 0.5), "tick,time_s,a.x [A],b.x [A]\n0,0,0,\n1,0.5,1,7\n2,1,2,\n3,1.5,3,7\n");
-  const svg = svgOf([{ units: "[A]", lines: [{ ...channels[0], title: "<b>&", colour: "red" }] }], view, 0.5);
+  const { x, lines } = timeCurves(view, [channels[0]], 0.5, 100);
+  const svg = svgOf([{ x, labels: { x: "time [s]", y: "[A]" }, lines: [{ ...lines[0], title: "<b>&", colour: "red" }] }]);
   assert.match(svg, /&lt;b>&amp;/);
   assert.match(svg, /<path d="M[0-9.]+ [0-9.]+L/);
+});
+
+const sine = (count, amplitude, frequency, rate, mean = 0) =>
+  Float64Array.from(range(0, count), (i) => mean + amplitude * Math.sin((2 * Math.PI * frequency * i) / rate + 0.7));
+
+// Catches: a factor of 2 for the negative frequencies or of the window, a step of the wrong width, an amplitude that depends on
+// where between two steps the sine lies, a mean that counts as a low frequency.
+test("a sine has its amplitude at its frequency, and the shape of the Hann window around it", () => {
+  const [count, rate, amplitude] = [3000, 8000, 2.5];
+  for (const frequency of [400, 401, 401.333, 402.7]) {
+    const spectrum = spectrumOf(sine(count, amplitude, frequency, rate, 10), 1 / rate);
+    spectrum.amplitudes.forEach((shown, k) => {
+      const d = ((k * spectrum.stepHz - frequency) * count) / rate; // in bins
+      const isSpecial = Math.abs(d) < 1e-9 || Math.abs(Math.abs(d) - 1) < 1e-9;
+      const shape = isSpecial ? (Math.abs(d) < 0.5 ? 1 : 0.5) : Math.sin(Math.PI * d) / (Math.PI * d * (1 - d * d));
+      // The image at the negative frequency adds (2 · 150 bins)^-3 here.
+      assert.ok(Math.abs(shown - amplitude * Math.abs(shape)) < 1e-5 * amplitude, `${frequency} Hz, step ${k}`);
+    });
+    const [peak] = peaksOf(spectrum, 5);
+    // The parabola errs by less than this at this width of the steps, 0.37 of a bin.
+    assert.ok(Math.abs(peak.amplitude / amplitude - 1) < 1e-4, `${frequency} Hz: ${peak.amplitude}`);
+    assert.ok(Math.abs(peak.frequency - frequency) < (1e-3 * rate) / count, `${frequency} Hz: ${peak.frequency}`);
+  }
+});
+
+// Catches: side lobes that are named as harmonics, peaks in the wrong order, a small one that a large one hides.
+test("harmonics are the largest peaks", () => {
+  const parts = [[10, 50.3], [0.5, 251.5], [1, 352.1]];
+  const values = sine(8000, 0, 0, 8000).map((_, i) => parts.reduce((sum, [a, f]) => sum + a * Math.sin((2 * Math.PI * f * i) / 8000), 0));
+  const peaks = peaksOf(spectrumOf(values, 1 / 8000), 4);
+  [[10, 50.3], [1, 352.1], [0.5, 251.5]].forEach(([amplitude, frequency], i) => {
+    assert.ok(Math.abs(peaks[i].amplitude / amplitude - 1) < 1e-3 && Math.abs(peaks[i].frequency - frequency) < 0.01);
+  });
+  assert.ok(peaks.length < 4 || peaks[3].amplitude < 1e-3);
+});
+
+// Catches: a gap that counts as zeros, or takes all of the spectrum with it.
+test("the spectrum is that of the samples after the last gap", () => {
+  assert.deepEqual([...sinceLastGap(Float64Array.from([1, NaN, 2, 3]))], [2, 3]);
+  assert.equal(sinceLastGap(Float64Array.from([1, NaN])).length, 0);
+  assert.equal(spectrumOf(new Float64Array(15), 1), null);
+});
+
+// Catches: samples of different ticks in one point, x and y exchanged, a spike that the XY view leaves out.
+test("XY pairs the samples of the same ticks", () => {
+  const rows = [historyOf(range(0, 6), (tick) => tick), historyOf([1, 2, 4, 7], (tick) => 10 * tick)].map((each) => each.rows(0, 10));
+  const view = { from: 0, to: 10, origin: 0, rows };
+  rows[0].columns.set("y", rows[0].ticks.map((tick) => 2 * tick));
+  const { lines } = xyCurves(view, [{ axis: 0, signal: "x" }, { axis: 1, signal: "x" }, { axis: 0, signal: "y" }]);
+  assert.deepEqual(lines.map(({ x, y }) => [[...x], [...y]]),
+    [[[1, 2, 4], [10, 20, 40]], [range(0, 6), range(0, 6).map((tick) => 2 * tick)]]);
+  assert.deepEqual(xyCurves(view, []).lines, []);
 });

@@ -1,5 +1,6 @@
 /** Files of what the scope shows. */
-import { envelope, lowerBound } from "./history";
+import { extentOf, Line } from "./curves";
+import { lowerBound } from "./history";
 import { plain } from "./numbers";
 import { Channel, View } from "./view";
 
@@ -20,59 +21,63 @@ export function csvOf(channels: (Channel & { title: string })[], view: View, per
 }
 
 interface SvgPane {
-  units: string;
-  lines: (Channel & { title: string; colour: string })[];
+  /** null: as wide as the lines. */
+  x: [number, number] | null;
+  labels: { x: string; y: string };
+  lines: (Line & { title: string; colour: string })[];
 }
 
+/** Columns of a plot over time. */
+export const kColumns = 1200;
 const kWidth = 1000;
-const kHeight = 220;
+const kHeight = 236;
 const kLeft = 70;
-const kParts = 1200;
 
 /** The panes one below the other. */
-export function svgOf(panes: SvgPane[], view: View, periodS: number): string {
-  const start = (view.from - view.origin) * periodS;
-  const end = (view.to - view.origin) * periodS;
-  const bodies = panes.map((pane, i) => `<g transform="translate(0 ${i * kHeight})">${paneSvg(pane, view, start, end)}</g>`);
+export function svgOf(panes: SvgPane[]): string {
+  const bodies = panes.map((pane, i) => `<g transform="translate(0 ${i * kHeight})">${paneSvg(pane)}</g>`);
   return `<svg xmlns="http://www.w3.org/2000/svg" width="${kWidth}" height="${panes.length * kHeight}" `
     + `font-family="sans-serif" font-size="12">\n<rect width="100%" height="100%" fill="white"/>\n${bodies.join("\n")}\n</svg>\n`;
 }
 
-function paneSvg(pane: SvgPane, view: View, start: number, end: number): string {
-  const points = pane.lines.map((line) => envelope(view.rows[line.axis], line.signal, view.from, view.to, kParts));
-  let [low, high] = [Infinity, -Infinity];
-  for (const value of points.flat()) {
-    if (value === null || value === undefined) continue;
-    low = Math.min(low, value);
-    high = Math.max(high, value);
-  }
-  if (!(low <= high)) [low, high] = [0, 1];
-  if (low === high) [low, high] = [low - 1, high + 1];
-  const [top, bottom, right] = [24, kHeight - 30, kWidth - 12];
+function paneSvg({ x, labels, lines }: SvgPane): string {
+  const [start, end] = x ?? visible(extentOf(lines.map((each) => each.x)));
+  const [low, high] = visible(extentOf(lines.map((each) => each.y)));
+  const [top, bottom, right] = [24, kHeight - 46, kWidth - 12];
+  const xOf = (value: number) => kLeft + ((value - start) / (end - start)) * (right - kLeft);
   const yOf = (value: number) => bottom - ((value - low) / (high - low)) * (bottom - top);
   const grid = [0, 0.25, 0.5, 0.75, 1].map((share) => {
-    const y = bottom - share * (bottom - top);
-    const x = kLeft + share * (right - kLeft);
-    return `<path d="M${kLeft} ${y}H${right}M${x} ${top}V${bottom}" stroke="#ccc"/>`
-      + `<text x="${kLeft - 6}" y="${y + 4}" text-anchor="end">${plain(low + share * (high - low))}</text>`
-      + `<text x="${x}" y="${bottom + 16}" text-anchor="middle">${plain(start + share * (end - start))} s</text>`;
+    const gridY = bottom - share * (bottom - top);
+    const gridX = kLeft + share * (right - kLeft);
+    return `<path d="M${kLeft} ${gridY}H${right}M${gridX} ${top}V${bottom}" stroke="#ccc"/>`
+      + `<text x="${kLeft - 6}" y="${gridY + 4}" text-anchor="end">${plain(low + share * (high - low))}</text>`
+      + `<text x="${gridX}" y="${bottom + 16}" text-anchor="middle">${plain(start + share * (end - start))}</text>`;
   });
-  const lines = pane.lines.map((line, i) => `<path d="${pathOf(points[i], yOf, right)}" fill="none" stroke="${line.colour}"/>`
-    + `<text x="${kLeft + 150 * i}" y="16" fill="${line.colour}">${escaped(line.title)}</text>`);
-  return `${grid.join("")}<text x="4" y="16">${escaped(pane.units)}</text>${lines.join("")}`;
+  const drawn = lines.map((line, i) => `<path d="${pathOf(line, xOf, yOf)}" fill="none" stroke="${line.colour}"/>`
+    + `<text x="${kLeft + 150 * (i + 1)}" y="16" fill="${line.colour}">${escaped(line.title)}</text>`);
+  return `${grid.join("")}<text x="4" y="16">${escaped(labels.y)}</text>`
+    + `<text x="${(kLeft + right) / 2}" y="${bottom + 34}" text-anchor="middle">${escaped(labels.x)}</text>${drawn.join("")}`;
 }
 
-function pathOf(points: (number | null | undefined)[], yOf: (value: number) => number, right: number): string {
+function pathOf({ x, y }: Line, xOf: (value: number) => number, yOf: (value: number) => number): string {
   let path = "";
   let isUp = true;
-  points.forEach((value, i) => {
-    if (value === null) isUp = true;
-    if (value === null || value === undefined) return;
-    const x = kLeft + (((i >> 1) + 0.5) / kParts) * (right - kLeft);
-    path += `${isUp ? "M" : "L"}${x.toFixed(1)} ${yOf(value).toFixed(1)}`;
+  for (let i = 0; i < y.length; ++i) {
+    const value = y[i];
+    if (value === undefined) continue;
+    if (value === null || Number.isNaN(value) || Number.isNaN(x[i])) {
+      isUp = true;
+      continue;
+    }
+    path += `${isUp ? "M" : "L"}${xOf(x[i]).toFixed(1)} ${yOf(value).toFixed(1)}`;
     isUp = false;
-  });
+  }
   return path;
+}
+
+/** A range of some width. */
+function visible([low, high]: [number, number]): [number, number] {
+  return low === high ? [low - 1, high + 1] : [low, high];
 }
 
 function escaped(text: string): string {

@@ -4,7 +4,7 @@ import { element } from "./dom";
 import { measure } from "./measurements";
 import { withUnit } from "./numbers";
 import { Pane } from "./pane";
-import { part, valueAt, View } from "./view";
+import { betweenCursors, valueAt, View } from "./view";
 
 const kHeads = ["signal", "newest", "A", "B", "B − A", "minimum", "maximum", "mean", "rms", "peak to peak", "frequency"];
 
@@ -21,7 +21,7 @@ export class MeasurementTable {
   draw(panes: Pane[], view: View, [a, b]: (number | null)[]): void {
     const periodS = this.bench.description.period_s as number;
     const isBetween = a !== null && b !== null && a !== b;
-    const window = isBetween ? part(view, Math.min(a, b), Math.max(a, b)) : view;
+    const window = betweenCursors(view, [a, b]);
     this.caption.textContent = isBetween
       ? `Between the cursors: B − A = ${withUnit((b - a) * periodS, "s")}, ${b - a} ticks, ${withUnit(1 / Math.abs((b - a) * periodS), "Hz")}`
       : "Of the whole window; click twice into a plot to set the cursors A and B, drag to zoom";

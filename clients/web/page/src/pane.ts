@@ -1,14 +1,11 @@
-/** A pane of the scope: channels over one axis of time. */
-import uPlot from "uplot";
+/** A pane of the scope: its channels, and a plot of them of one of several kinds. */
 import { Bench } from "./bench";
-import { button, element } from "./dom";
-import { envelope } from "./history";
-import { Channel, View } from "./view";
-
-export interface Cursors {
-  a: number | null;
-  b: number | null;
-}
+import { Curves, Kind, spectraOf, spectrumCurves, timeCurves, xyCurves } from "./curves";
+import { button, choice, element, setText } from "./dom";
+import { plain, withUnit } from "./numbers";
+import { cssVariable, Dot, Plot } from "./plot";
+import { peaksOf, Spectrum } from "./spectrum";
+import { Channel, valueAt, View } from "./view";
 
 export interface PaneListener {
   changed(): void;
@@ -17,71 +14,87 @@ export interface PaneListener {
   selected(fromTime: number, toTime: number): void;
 }
 
-const kHeight = 190;
+const kHeights = { time: 190, xy: 320, spectrum: 190 };
 const kColours = 8;
-
-function cssVariable(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-}
+const kPeaks = 5;
+/** Peaks below this part of the largest are not named. */
+const kLeastPeak = 0.005;
 
 export class Pane {
   readonly root = element("div", { class: "pane" });
+  kind: Kind = "time";
   private readonly chips = element("div", { class: "chips" });
   private readonly plotPlace = element("div", { class: "plot" });
+  private readonly peaks = element("p", { class: "soft peaks", hidden: true });
   private readonly add: HTMLSelectElement;
-  private plot: uPlot | null = null;
-  private times = [0, 1];
-  private marks: number[] = [];
+  private readonly highest: HTMLSelectElement;
+  private plot: Plot | null = null;
 
   constructor(private readonly bench: Bench, readonly channels: Channel[], private readonly listener: PaneListener) {
     this.add = element("select", { "aria-label": "add a signal to this pane", change: () => this.addChosen() });
     this.fillChoice();
-    this.root.append(element("div", { class: "pane-head" }, this.chips, this.add,
-      button("×", () => listener.removed(this), { class: "small", "aria-label": "remove this pane" })), this.plotPlace);
+    this.highest = choice("highest frequency", frequenciesUpTo(0.5 / this.periodS).map((each) => [String(each), `to ${plain(each)} Hz`]),
+      () => this.listener.changed());
+    this.root.append(element("div", { class: "pane-head" }, this.chips,
+      choice("kind of this pane", [["time", "over time"], ["xy", "XY"], ["spectrum", "spectrum"]], (kind) => {
+        this.kind = kind as Kind;
+        this.rebuild();
+        this.listener.changed();
+      }), this.highest, this.add,
+      button("×", () => listener.removed(this), { class: "small", "aria-label": "remove this pane" })), this.plotPlace, this.peaks);
     this.rebuild();
-    new ResizeObserver(() => this.resize()).observe(this.plotPlace);
+    new ResizeObserver(() => {
+      this.plot?.resize();
+      this.listener.changed();
+    }).observe(this.plotPlace);
   }
 
-  /** The units of the channels, each once. */
-  get units(): string[] {
-    return [...new Set(this.channels.map((each) => this.bench.signal(each.signal).unit as string))];
+  /** What stands beside the axes. */
+  get labels(): { x: string; y: string } {
+    const units = (channels: Channel[]) => [...new Set(channels.map((each) => `[${this.unitOf(each)}]`))].join(" ");
+    if (this.kind === "time") return { x: "time [s]", y: units(this.channels) };
+    if (this.kind === "spectrum") return { x: "frequency [Hz]", y: `amplitude ${units(this.channels)}` };
+    const [first, ...others] = this.channels;
+    return { x: first === undefined ? "" : `${this.nameOf(first)} [${this.unitOf(first)}]`, y: units(others) };
   }
 
-  /** Makes the plot anew, for other channels or another theme. */
+  /** Makes the plot anew, for other channels, another kind or another theme. */
   rebuild(): void {
-    this.plot?.destroy();
+    this.plot?.end();
     this.showChips();
-    const ink = cssVariable("--ink-soft");
-    const grid = { stroke: cssVariable("--grid"), width: 1 };
-    const line = { stroke: ink, grid, ticks: grid, font: "12px system-ui", labelFont: "12px system-ui" };
-    this.plot = new uPlot({
-      width: Math.max(this.plotPlace.clientWidth, 100),
-      height: kHeight,
-      legend: { show: false },
-      cursor: { sync: { key: "scope" }, drag: { x: true, y: false, setScale: false }, points: { show: false } },
-      scales: { x: { time: false, range: () => [this.times[0], this.times[1]] } },
-      axes: [{ ...line, label: "time [s]", labelSize: 16, size: 28, values: (_plot, ticks) => ticks.map((each) => String(Number(each.toPrecision(9)))) },
-        { ...line, label: this.units.map((each) => `[${each}]`).join(" "), labelSize: 18, size: 62 }],
-      series: [{}, ...this.channels.map((each) => ({
-        label: each.signal, stroke: this.colourOf(each), width: 1.3, points: { show: false },
-      }))],
-      hooks: { draw: [(plot) => this.drawMarks(plot)], setSelect: [(plot) => this.select(plot)] },
-    }, [[], ...this.channels.map(() => [])], this.plotPlace);
-    this.plot.over.addEventListener("click", (event) => {
-      this.listener.clicked(this.plot!.posToVal(event.offsetX, "x"));
+    this.highest.hidden = this.peaks.hidden = this.kind !== "spectrum";
+    const isOverTime = this.kind === "time";
+    const { x: xLabel, y: yLabel } = this.labels;
+    this.plot = new Plot(this.plotPlace, {
+      height: kHeights[this.kind], xLabel, yLabel, isOverTime,
+      colours: (this.kind === "xy" ? this.channels.slice(1) : this.channels).map((each) => this.colourOf(each)),
+      isEqualScale: this.kind === "xy" && new Set(this.channels.map((each) => this.unitOf(each))).size === 1,
+    }, {
+      clicked: (time) => isOverTime && this.listener.clicked(time),
+      selected: (from, to) => this.listener.selected(from, to),
     });
   }
 
-  /** Draws a view; the marks are times. */
-  draw(view: View, periodS: number, marks: number[]): void {
-    if (this.plot === null) return;
-    const count = Math.max(Math.floor(this.plot.over.clientWidth), 50);
-    this.times = [(view.from - view.origin) * periodS, (view.to - view.origin) * periodS];
-    this.marks = marks;
-    const step = (this.times[1] - this.times[0]) / count;
-    const times = Array.from({ length: 2 * count }, (_, i) => this.times[0] + ((i >> 1) + 0.5) * step);
-    this.plot.setData([times, ...this.channels.map((each) =>
-      envelope(view.rows[each.axis], each.signal, view.from, view.to, count))] as uPlot.AlignedData);
+  /** Draws a view. The cursors are ticks. */
+  draw(view: View, cursors: (number | null)[]): void {
+    if (this.kind === "spectrum") {
+      const spectra = spectraOf(view, this.channels, this.periodS);
+      setText(this.peaks, this.channels.map((each, i) => this.peaksText(each, spectra[i])).join("; "));
+      this.plot?.draw(spectrumCurves(spectra, this.channels, Number(this.highest.value)), [], []);
+    } else if (this.kind === "xy") {
+      this.plot?.draw(xyCurves(view, this.channels), [], this.dotsOf(view, cursors));
+    } else {
+      const marks = cursors.filter((each) => each !== null).map((each) => (each! - view.origin) * this.periodS);
+      if (view.origin !== 0) marks.push(0); // the trigger
+      this.plot?.draw(timeCurves(view, this.channels, this.periodS, this.plot.columns), marks, []);
+    }
+  }
+
+  /** What the pane draws of a view, for a file. */
+  curvesOf(view: View, columns: number): Curves {
+    if (this.kind === "xy") return xyCurves(view, this.channels);
+    if (this.kind === "time") return timeCurves(view, this.channels, this.periodS, columns);
+    return spectrumCurves(spectraOf(view, this.channels, this.periodS), this.channels, Number(this.highest.value));
   }
 
   colourOf(channel: Channel): string {
@@ -92,39 +105,33 @@ export class Pane {
     return this.bench.histories.length > 1 ? `${this.bench.axisName(channel.axis)}.${channel.signal}` : channel.signal;
   }
 
-  private drawMarks(plot: uPlot): void {
-    const context = plot.ctx;
-    context.save();
-    context.setLineDash([4, 4]);
-    context.lineWidth = 1;
-    context.strokeStyle = cssVariable("--ink");
-    for (const time of this.marks) {
-      const x = Math.round(plot.valToPos(time, "x", true)) + 0.5;
-      if (x < plot.bbox.left || x > plot.bbox.left + plot.bbox.width) continue;
-      context.beginPath();
-      context.moveTo(x, plot.bbox.top);
-      context.lineTo(x, plot.bbox.top + plot.bbox.height);
-      context.stroke();
-    }
-    context.restore();
+  private get periodS(): number {
+    return this.bench.description.period_s as number;
   }
 
-  private select(plot: uPlot): void {
-    if (plot.select.width < 4) return;
-    const from = plot.posToVal(plot.select.left, "x");
-    const to = plot.posToVal(plot.select.left + plot.select.width, "x");
-    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-    this.listener.selected(from, to);
+  private unitOf(channel: Channel): string {
+    return this.bench.signal(channel.signal).unit as string;
   }
 
-  private resize(): void {
-    if (this.plotPlace.clientWidth > 0) this.plot?.setSize({ width: this.plotPlace.clientWidth, height: kHeight });
-    this.listener.changed();
+  /** Where the cursors stand, and the newest sample. */
+  private dotsOf(view: View, [a, b]: (number | null)[]): Dot[] {
+    const [first, ...others] = this.channels;
+    const places: [number | null, string][] = [[view.to, ""], [a, "A"], [b, "B"]];
+    return places.flatMap(([tick, text]) => tick === null ? [] : others.map((each) =>
+      ({ x: valueAt(view, first, tick), y: valueAt(view, each, tick), text })));
+  }
+
+  private peaksText(channel: Channel, spectrum: Spectrum | null): string {
+    if (spectrum === null) return `${this.nameOf(channel)}: too few samples`;
+    const peaks = peaksOf(spectrum, kPeaks);
+    const named = peaks.filter((each) => each.amplitude > kLeastPeak * peaks[0].amplitude)
+      .map((each) => `${withUnit(each.amplitude, this.unitOf(channel))} at ${withUnit(each.frequency, "Hz")}`);
+    return `${this.nameOf(channel)}: ${named.join(", ") || "no peak"}`;
   }
 
   private showChips(): void {
     this.chips.replaceChildren(...this.channels.map((channel, i) => element("span", { class: "chip" },
-      element("span", { class: `swatch line-${i % kColours}` }), this.nameOf(channel),
+      this.kind === "xy" && i === 0 ? "X: " : element("span", { class: `swatch line-${i % kColours}` }), this.nameOf(channel),
       button("×", () => this.remove(channel), { class: "small", "aria-label": `remove ${this.nameOf(channel)}` }))));
   }
 
@@ -151,4 +158,10 @@ export class Pane {
     this.rebuild();
     this.listener.changed();
   }
+}
+
+/** A frequency and the round ones below it, down to 10 Hz. */
+function frequenciesUpTo(highest: number): number[] {
+  const round = [5000, 2000, 1000, 500, 200, 100, 50, 20, 10];
+  return [highest, ...round.filter((each) => each < highest)];
 }

@@ -1,12 +1,12 @@
 /** The scope: panes, time base, trigger, cursors and measurements. */
 import { Bench, usualPanes } from "./bench";
 import { button, choice, element, save, setText } from "./dom";
-import { csvOf, svgOf } from "./exports";
+import { csvOf, kColumns, svgOf } from "./exports";
 import { MeasurementTable } from "./measurement_table";
 import { Pane } from "./pane";
 import { Trigger } from "./trigger";
 import { TriggerBar } from "./trigger_bar";
-import { frozen, part, rollingView, View, viewOf } from "./view";
+import { betweenCursors, frozen, part, rollingView, View, viewOf } from "./view";
 
 const kWindows_s = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30];
 const kFrameMs = 25;
@@ -34,7 +34,7 @@ export class Scope {
   private isDirty = true;
   private nextDraw = 0;
   private isTableDirty = true;
-  private tableDrawn = 0;
+  private nextTable = 0;
   private autoShown = 0;
   private isOver = false;
 
@@ -105,7 +105,7 @@ export class Scope {
 
   private channelsChanged(): void {
     this.isDirty = true;
-    this.tableDrawn = 0;
+    this.nextTable = 0;
     this.subscribe();
   }
 
@@ -148,16 +148,17 @@ export class Scope {
       this.isDirty = false;
       this.sweep();
       const view = this.view();
-      const marks = this.cursors.filter((each) => each !== null).map((each) => (each! - view.origin) * this.periodS);
-      if (view.origin !== 0) marks.push(0); // the trigger
-      for (const pane of this.panes) pane.draw(view, this.periodS, marks);
+      for (const pane of this.panes) if (pane.kind !== "spectrum") pane.draw(view, this.cursors);
       this.isTableDirty = true;
       this.nextDraw = now + Math.max(kFrameMs, kDrawShare * (performance.now() - now));
     }
-    if (this.isTableDirty && now - this.tableDrawn > kTableMs) {
-      this.tableDrawn = now;
+    if (this.isTableDirty && now > this.nextTable) {
       this.isTableDirty = false;
-      this.table.draw(this.panes, this.view(), this.cursors);
+      const view = this.view();
+      this.table.draw(this.panes, view, this.cursors);
+      const window = betweenCursors(view, this.cursors);
+      for (const pane of this.panes) if (pane.kind === "spectrum") pane.draw(window, this.cursors);
+      this.nextTable = now + Math.max(kTableMs, kDrawShare * (performance.now() - now));
       setText(this.note, this.bench.dropped === 0 ? "" : `${this.bench.dropped} samples lost: the browser reads too slowly`);
     }
   }
@@ -198,7 +199,7 @@ export class Scope {
   private putCursor(time: number): void {
     this.cursors[this.active] = this.ticksAt(time);
     this.active = 1 - this.active;
-    this.tableDrawn = 0;
+    this.nextTable = 0;
     this.isDirty = true;
   }
 
@@ -223,7 +224,7 @@ export class Scope {
     else if (event.key === "Escape") [this.cursors, this.zoom] = [[null, null], null];
     else return;
     event.preventDefault();
-    this.tableDrawn = 0;
+    this.nextTable = 0;
     this.isDirty = true;
   }
 
@@ -234,10 +235,12 @@ export class Scope {
   }
 
   private exportSvg(): void {
-    const panes = this.panes.map((pane) => ({
-      units: pane.units.map((each) => `[${each}]`).join(" "),
-      lines: pane.channels.map((each) => ({ ...each, title: pane.nameOf(each), colour: pane.colourOf(each) })),
-    }));
-    save(`${this.bench.description.name}.svg`, "image/svg+xml", svgOf(panes, this.view(), this.periodS));
+    const view = this.view();
+    const window = betweenCursors(view, this.cursors);
+    const panes = this.panes.map((pane) => {
+      const { x, lines } = pane.curvesOf(pane.kind === "spectrum" ? window : view, kColumns);
+      return { x, labels: pane.labels, lines: lines.map((each) => ({ ...each, title: pane.nameOf(each.channel), colour: pane.colourOf(each.channel) })) };
+    });
+    save(`${this.bench.description.name}.svg`, "image/svg+xml", svgOf(panes));
   }
 }

@@ -34,6 +34,11 @@ export function part(view: View, from: number, to: number): View {
   return { ...view, from, to, rows: view.rows.map((each) => between(each, from, to)) };
 }
 
+/** The part between the cursors where both stand, else all of it. */
+export function betweenCursors(view: View, [a, b]: (number | null)[]): View {
+  return a === null || b === null || a === b ? view : part(view, Math.min(a, b), Math.max(a, b));
+}
+
 /** The value of the sample at or before a tick; NaN before the first. */
 export function valueAt(view: View, channel: Channel, tick: number): number {
   const rows = between(view.rows[channel.axis], -Infinity, tick);

@@ -1,0 +1,174 @@
+/** Curves in a picture with axes. uPlot draws the axes and the cursor of the mouse. */
+import uPlot from "uplot";
+import { Curves, extentOf, Line } from "./curves";
+
+export interface Look {
+  height: number;
+  xLabel: string;
+  yLabel: string;
+  colours: string[];
+  /** Both axes have the same unit, and a circle is a circle. */
+  isEqualScale: boolean;
+  /** The cursor of the mouse is one for all plots over time, and may select. */
+  isOverTime: boolean;
+}
+
+/** A dot with a letter. */
+export interface Dot {
+  x: number;
+  y: number;
+  text: string;
+}
+
+export interface PlotListener {
+  clicked(x: number): void;
+  selected(from: number, to: number): void;
+}
+
+export function cssVariable(name: string): string {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+export class Plot {
+  private readonly plot: uPlot;
+  private readonly ink = cssVariable("--ink");
+  private curves: Curves = { x: [0, 1], lines: [] };
+  private marks: number[] = [];
+  private dots: Dot[] = [];
+
+  constructor(private readonly place: HTMLElement, private readonly look: Look, listener: PlotListener) {
+    const soft = cssVariable("--ink-soft");
+    const grid = { stroke: cssVariable("--grid"), width: 1 };
+    const line = { stroke: soft, grid, ticks: grid, font: "12px system-ui", labelFont: "12px system-ui" };
+    const range = (index: number) => (plot: uPlot): [number, number] => [plot.data[index][0] as number, plot.data[index][1] as number];
+    this.plot = new uPlot({
+      width: this.width,
+      height: look.height,
+      legend: { show: false },
+      cursor: {
+        ...(look.isOverTime ? { sync: { key: "scope" } } : {}),
+        drag: { x: look.isOverTime, y: false, setScale: false }, points: { show: false },
+      },
+      scales: { x: { time: false, range: range(0) }, y: { range: range(1) } },
+      axes: [{ ...line, label: look.xLabel, labelSize: 16, size: 28, values: (_plot, ticks) => ticks.map((each) => String(Number(each.toPrecision(9)))) },
+        { ...line, label: look.yLabel, labelSize: 18, size: 62 }],
+      series: [{}, { paths: () => null, points: { show: false } }],
+      hooks: {
+        draw: [(plot) => this.paint(plot)],
+        setSelect: [(plot) => {
+          if (plot.select.width < 4) return;
+          const [from, to] = [plot.select.left, plot.select.left + plot.select.width].map((each) => plot.posToVal(each, "x"));
+          plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+          listener.selected(from, to);
+        }],
+      },
+    }, [[0, 1], [0, 1]], place);
+    this.plot.over.addEventListener("click", (event) => listener.clicked(this.plot.posToVal(event.offsetX, "x")));
+  }
+
+  /** The pixels from side to side. */
+  get columns(): number {
+    return Math.max(Math.floor(this.plot.over.clientWidth), 50);
+  }
+
+  resize(): void {
+    if (this.place.clientWidth > 0) this.plot.setSize({ width: this.width, height: this.look.height });
+  }
+
+  end(): void {
+    this.plot.destroy();
+  }
+
+  /** The marks are upright lines. */
+  draw(curves: Curves, marks: number[], dots: Dot[]): void {
+    [this.curves, this.marks, this.dots] = [curves, marks, dots];
+    let x = curves.x ?? padded(extentOf(curves.lines.map((each) => each.x)));
+    let y = padded(extentOf(curves.lines.map((each) => each.y)));
+    if (this.look.isEqualScale) [x, y] = equalScale(x, y, this.plot.over.clientWidth, this.plot.over.clientHeight);
+    this.plot.setData([x, y]);
+  }
+
+  private get width(): number {
+    return Math.max(this.place.clientWidth, 100);
+  }
+
+  private paint(plot: uPlot): void {
+    const { ctx: context, bbox } = plot;
+    const ratio = devicePixelRatio;
+    const [xOf, yOf] = [scaleOf(plot, "x"), scaleOf(plot, "y")];
+    context.save();
+    context.beginPath();
+    context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    context.clip();
+    context.lineJoin = "round";
+    context.lineWidth = 1.3 * ratio;
+    this.curves.lines.forEach((line, i) => {
+      context.strokeStyle = this.look.colours[i];
+      stroke(context, line, xOf, yOf);
+    });
+    context.strokeStyle = context.fillStyle = this.ink;
+    context.font = `${12 * ratio}px system-ui`;
+    for (const { x, y, text } of this.dots) {
+      context.beginPath();
+      context.arc(xOf(x), yOf(y), 3.5 * ratio, 0, 2 * Math.PI);
+      context.fill();
+      context.fillText(text, xOf(x) + 6 * ratio, yOf(y) - 6 * ratio);
+    }
+    context.setLineDash([4, 4]);
+    context.lineWidth = 1;
+    for (const mark of this.marks) {
+      const x = Math.round(xOf(mark)) + 0.5;
+      context.beginPath();
+      context.moveTo(x, bbox.top);
+      context.lineTo(x, bbox.top + bbox.height);
+      context.stroke();
+    }
+    context.restore();
+  }
+}
+
+/** Draws a line; points less than half a pixel away from the last one are left out. */
+function stroke(context: CanvasRenderingContext2D, { x, y }: Line, xOf: (value: number) => number, yOf: (value: number) => number): void {
+  context.beginPath();
+  let isUp = true;
+  let lastX = 0;
+  let lastY = 0;
+  for (let i = 0; i < y.length; ++i) {
+    const value = y[i];
+    if (value === undefined) continue;
+    if (value === null || Number.isNaN(value) || Number.isNaN(x[i])) {
+      isUp = true;
+      continue;
+    }
+    const atX = xOf(x[i]);
+    const atY = yOf(value);
+    if (isUp) context.moveTo(atX, atY);
+    else if (Math.abs(atX - lastX) < 0.5 && Math.abs(atY - lastY) < 0.5) continue;
+    else context.lineTo(atX, atY);
+    isUp = false;
+    [lastX, lastY] = [atX, atY];
+  }
+  context.stroke();
+}
+
+/** From values to pixels of the canvas. */
+function scaleOf(plot: uPlot, scale: "x" | "y"): (value: number) => number {
+  const { min = 0, max = 1 } = plot.scales[scale];
+  const start = plot.valToPos(min, scale, true);
+  const perUnit = (plot.valToPos(max, scale, true) - start) / (max - min);
+  return (value) => start + (value - min) * perUnit;
+}
+
+function padded([low, high]: [number, number]): [number, number] {
+  return uPlot.rangeNum(low, high, 0.1, true) as [number, number];
+}
+
+/** Widens the range that has more pixels for its unit. */
+function equalScale(x: [number, number], y: [number, number], width: number, height: number): [[number, number], [number, number]] {
+  const perPixel = Math.max((x[1] - x[0]) / width, (y[1] - y[0]) / height);
+  const widened = ([low, high]: [number, number], pixels: number): [number, number] => {
+    const more = (perPixel * pixels - (high - low)) / 2;
+    return [low - more, high + more];
+  };
+  return [widened(x, width), widened(y, height)];
+}
