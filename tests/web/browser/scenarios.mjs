@@ -49,6 +49,12 @@ const kind = (pane, value) => pane.$eval('[aria-label="kind of this pane"]', (fi
   field.dispatchEvent(new Event("change"));
 }, value);
 
+/** Adds a signal to a pane. */
+const add = (pane, signal) => pane.$eval('[aria-label="add a signal to this pane"]', (field, wanted) => {
+  field.value = wanted;
+  field.dispatchEvent(new Event("change"));
+}, signal);
+
 /** The cells of a row of measurements by its signal. */
 const measured = (page, signal) => page.evaluate((wanted) => {
   const row = [...document.querySelectorAll(".measurements tbody tr")].find((each) => each.querySelector("th").textContent === wanted);
@@ -256,6 +262,45 @@ const scenarios = {
     return { found };
   },
 
+  /** How often the panes are drawn anew, beside the frames that an empty page gets. */
+  async frames(page, windowS, seconds) {
+    await stateOf(page, "speed", /^[1-9]/);
+    await set(page, "window", windowS);
+    const [first] = await page.$$(".pane");
+    await add(first, "0:torque_nm");
+    await page.evaluate(() => {
+      window.drawn = 0;
+      const clear = CanvasRenderingContext2D.prototype.clearRect;
+      CanvasRenderingContext2D.prototype.clearRect = function clearRect(...where) {
+        if (this.canvas === document.querySelector(".pane canvas")) ++window.drawn;
+        clear.apply(this, where);
+      };
+    });
+    const pause = (length) => new Promise((done) => setTimeout(done, length * 1000));
+    await pause(Number(windowS) + 2); // the window is full
+    const lost = () => page.$eval(".note", (each) => Number.parseInt(each.textContent || "0", 10));
+    const lostBefore = await lost();
+    await outside("begin");
+    const [before, start] = [await page.evaluate(() => window.drawn), Date.now()];
+    await pause(Number(seconds));
+    const drawn = (await page.evaluate(() => window.drawn)) - before;
+    const tookS = (Date.now() - start) / 1000;
+    await outside("end");
+    const result = { perSecond: drawn / tookS, lost: (await lost()) - lostBefore, signals: (await page.$$(".chip")).length };
+    await page.goto("about:blank");
+    const floor = await page.evaluate(() => new Promise((done) => {
+      let count = 0;
+      const end = performance.now() + 3000;
+      const frame = (now) => {
+        if (now > end) return done(count / 3);
+        ++count;
+        requestAnimationFrame(frame);
+      };
+      requestAnimationFrame(frame);
+    }));
+    return { ...result, floor };
+  },
+
   /** A picture of the page in a theme. */
   async picture(page, theme, path) {
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
@@ -266,12 +311,7 @@ const scenarios = {
     await press(page, "Add pane");
     const locus = (await page.$$(".pane"))[3];
     await kind(locus, "xy");
-    for (const signal of ["0:i_a_a", "0:i_b_a"]) {
-      await locus.$eval('[aria-label="add a signal to this pane"]', (field, wanted) => {
-        field.value = wanted;
-        field.dispatchEvent(new Event("change"));
-      }, signal);
-    }
+    for (const signal of ["0:i_a_a", "0:i_b_a"]) await add(locus, signal);
     await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"[1-9]/);
     await new Promise((done) => setTimeout(done, 1000));
     await page.screenshot({ path });

@@ -56,9 +56,8 @@ export class History {
   }
 }
 
-/** The number of values below the limit in rising values. */
-export function lowerBound(values: Float64Array, limit: number): number {
-  let low = 0;
+/** The number of values below the limit in rising values, of which those before `low` are known to be. */
+export function lowerBound(values: Float64Array, limit: number, low = 0): number {
   let high = values.length;
   while (low < high) {
     const middle = (low + high) >> 1;
@@ -89,22 +88,33 @@ export function between(rows: Rows, from: number, to: number): Rows {
  */
 export function envelope(rows: Rows, signal: string, from: number, to: number, count: number): (number | null | undefined)[] {
   const points = new Array<number | null | undefined>(2 * count);
-  const values = rows.columns.get(signal);
+  const { ticks, columns } = rows;
+  const values = columns.get(signal);
   if (values === undefined) return points;
   const perTick = count / (to - from);
   for (let row = 0; row < values.length;) {
-    const part = Math.min(Math.max(Math.floor((rows.ticks[row] - from) * perTick), 0), count - 1);
+    const part = Math.min(Math.max(Math.floor((ticks[row] - from) * perTick), 0), count - 1);
     const end = from + (part + 1) / perTick;
-    let least = row;
-    let greatest = row;
-    do {
-      if (values[row] < values[least] || Number.isNaN(values[least])) least = row;
-      if (values[row] > values[greatest] || Number.isNaN(values[greatest])) greatest = row;
-      ++row;
-    } while (row < values.length && (rows.ticks[row] < end || part === count - 1));
-    const isGap = Number.isNaN(values[least]);
-    points[2 * part] = isGap ? null : values[Math.min(least, greatest)];
-    points[2 * part + 1] = isGap ? null : values[Math.max(least, greatest)];
+    const first = row;
+    row = part === count - 1 ? values.length : lowerBound(ticks, end, row + 1);
+    let low = Infinity;
+    let high = -Infinity;
+    let lowAt = -1;
+    let highAt = -1;
+    for (let i = first; i < row; ++i) {
+      const value = values[i];
+      if (value < low) {
+        low = value;
+        lowAt = i;
+      }
+      if (value > high) {
+        high = value;
+        highAt = i;
+      }
+    }
+    const isGap = lowAt < 0;
+    points[2 * part] = isGap ? null : lowAt < highAt ? low : high;
+    points[2 * part + 1] = isGap ? null : lowAt < highAt ? high : low;
   }
   return points;
 }

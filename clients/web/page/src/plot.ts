@@ -100,8 +100,7 @@ export class Plot {
     context.beginPath();
     context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     context.clip();
-    context.lineJoin = "round";
-    context.lineWidth = 1.3 * ratio;
+    context.lineWidth = 1; // wider ones chromium paints as polygons: 4 redraws per second instead of 24, without a GPU
     this.curves.lines.forEach((line, i) => {
       context.strokeStyle = this.look.colours[i];
       stroke(context, line, xOf, yOf);

@@ -9,9 +9,9 @@ import { TriggerBar } from "./trigger_bar";
 import { betweenCursors, frozen, part, rollingView, View, viewOf } from "./view";
 
 const kWindows_s = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30];
-const kFrameMs = 25;
-/** Drawing takes at most one part in five of the time, so that a slow computer still reads its samples and obeys its user. */
-const kDrawShare = 5;
+const kFrameMs = 15;
+/** Drawing takes at most a third of the time, so that a slow computer still reads its samples and obeys its user. */
+const kDrawShare = 3;
 const kTableMs = 200;
 const kAutoMs = 500;
 
