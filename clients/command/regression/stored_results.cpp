@@ -1,14 +1,14 @@
 #include "clients/command/regression/stored_results.hpp"
 
 #include "clients/command/common/errors.hpp"
-#include "clients/command/common/version.hpp"
 #include "clients/command/regression/prepared_case.hpp"
 
 namespace drivebench::command {
 
 using regression::CaseResult;
 
-StoredResults::StoredResults(const std::vector<std::string>& folders) : fingerprints_(version_line()) {
+StoredResults::StoredResults(const std::string& program, const std::vector<std::string>& folders)
+    : fingerprints_(program) {
   try {
     for (const std::string& folder : folders)
       folders_.emplace_back(folder);

@@ -14,7 +14,7 @@ namespace drivebench::command {
 class StoredResults {
  public:
   /// Makes folders that are not there. Throws UsageError.
-  explicit StoredResults(const std::vector<std::string>& folders);
+  StoredResults(const std::string& program, const std::vector<std::string>& folders);
 
   /// The result of a case, if a folder has one of the case as it is now. Throws UsageError if the bench of
   /// the case cannot be read.

@@ -162,8 +162,8 @@ std::vector<CaseResult> results_of(const std::vector<Case>& cases, const TestOpt
   const bool merges = !options.merged_folders.empty();
   require_folders(options.merged_folders);
   std::optional<StoredResults> stored;
-  if (merges) stored.emplace(options.merged_folders);
-  if (!options.results_folder.empty()) stored.emplace(std::vector{options.results_folder});
+  if (merges) stored.emplace(options.program, options.merged_folders);
+  if (!options.results_folder.empty()) stored.emplace(options.program, std::vector{options.results_folder});
   std::vector<CaseResult> results;
   std::vector<Case> missing;
   std::vector<std::size_t> places;

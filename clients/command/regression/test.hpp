@@ -8,6 +8,7 @@ namespace drivebench::command {
 inline constexpr int kExitInvalid = 4;  ///< real time was not kept, and nothing failed
 
 struct TestOptions {
+  std::string program;  ///< version and build: results of another one are not taken for those of this one
   std::string suite;
   unsigned jobs = 1;
   bool list = false;

@@ -1,12 +1,14 @@
 #include "clients/command/regression/test_line.hpp"
 
 #include "clients/command/common/command_line.hpp"
+#include "clients/command/common/version.hpp"
 #include "clients/command/regression/test.hpp"
 
 namespace drivebench::command {
 
 void add_test_command(CommandLine& line) {
   const auto [sub, o] = line.add<TestOptions>("test", "run a suite of regression cases", run_test);
+  o.program = version_line();
   sub.add_option("SUITE", o.suite,
                  "a folder of cases, a case file, or the name of a suite that came with drivebench")
       ->type_name("SUITE")
