@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/command/recording/svg_plot.hpp"
+#include "clients/command/regression/html_statistics.hpp"
 #include "clients/regression/reports/reports.hpp"
 #include "protocols/markup.hpp"
 
@@ -24,6 +25,11 @@ constexpr std::string_view kStyle =
     ".pass{color:#00704f}.fail,.error{color:#b3261e;font-weight:bold}.invalid,.skipped{color:#8a5a00}"
     "pre{background:#f5f5f5;padding:.6em;overflow:auto;max-height:24em}svg{max-width:100%;height:auto}"
     "details{margin:.2em 0}h2{margin-top:2em;border-top:2px solid #ddd;padding-top:.6em}";
+
+/// With more cases the page shows statistics, and only those that have not passed.
+constexpr std::size_t kMostRows = 1000;
+/// So many are shown whole, that the page stays one that a browser can show.
+constexpr std::size_t kMostSections = 100;
 
 std::string number_cell(double value, std::string_view unit) {
   if (!std::isfinite(value)) return "<td class=n>-</td>";
@@ -106,17 +112,26 @@ std::vector<std::string> plots_of(const CaseResult& result) {
 }
 
 std::string html_report(const std::string& suite, std::span<const CaseResult> results) {
+  const bool are_many = results.size() > kMostRows;
   const std::string name = markup(suite);
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=en><meta charset=utf-8><title>{0}</title><style>{1}</style>\n"
-      "<h1>{0}</h1>\n<p>{2}</p>\n<table><tr><th>case<th>verdict<th>bench time [s]<th>checks</tr>\n",
+      "<h1>{0}</h1>\n<p>{2}</p>\n",
       name, kStyle, regression::totals_text(regression::totals_of(results)));
-  for (const CaseResult& result : results)
-    html += row_of(result);
-  html += "</table>\n";
+  if (are_many) html += statistics_table(results);
+  html += "<table><tr><th>case<th>verdict<th>bench time [s]<th>checks</tr>\n";
+  std::size_t rows = 0;
   for (const CaseResult& result : results) {
-    if (!regression::is_good(result)) html += section_of(result);
+    if (!are_many || (!regression::is_good(result) && rows++ < kMostRows)) html += row_of(result);
   }
+  html += "</table>\n";
+  std::size_t sections = 0;
+  for (const CaseResult& result : results) {
+    if (!regression::is_good(result) && sections++ < kMostSections) html += section_of(result);
+  }
+  if (sections > kMostSections)
+    html +=
+        fmt::format("<p>{} more have not passed; the JSON report has them.</p>\n", sections - kMostSections);
   return html + "</html>\n";
 }
 

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -180,6 +181,19 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertIn("9 errors", done.stdout)
         self.run_test(self.folder / "suite", "--merge", self.folder / "none", code=USAGE)
         self.run_test(self.folder / "suite", "--shard", "5/4", code=USAGE)
+
+    def test_a_page_of_many_cases_stays_small_and_shows_their_spread(self):
+        """Catches: a page that no browser can show; statistics without the extremes, or with the wrong case beside them."""
+        self.write("servo.toml", SERVO + '[matrix]\n"check.0.abs" = {from = 5.0, to = 7.0, count = 1100}\n')
+        page = self.folder / "page.html"
+        self.run_test(self.folder / "suite", "--jobs", 2, "--html", page, code=FAILED)
+        html = page.read_text(encoding="utf-8")
+        self.assertLess(len(html), 3_000_000)
+        self.assertIn("<td>current<td class=n>1100<td class=n>", html)
+        self.assertIn("servo[abs=5.0]</tr>", html)
+        failed = int(re.search(r"(\d+) failed", html)[1])
+        self.assertIn(f"<p>{failed - 100} more have not passed", html)
+        self.assertEqual(html.count("<h2>"), 100)
 
     def test_a_run_goes_on_where_an_earlier_one_ended(self):
         """Catches: cases that run again for nothing, and results of a case as it was before it changed."""

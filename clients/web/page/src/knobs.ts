@@ -73,7 +73,8 @@ export class Knobs {
         const made = requests(status?.tick as number);
         const answers = await Promise.all(made.map((each) => this.bench.wire.ask(each)));
         if (borrows) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
-        this.tell(`${what}: done at tick ${answers.map((each) => each.done?.tick).join(" and ")}`);
+        const ticks = made.map((each, i) => each.inject_fault?.at_tick || answers[i].done?.tick);
+        this.tell(`${what}: done at tick ${ticks.join(" and ")}`);
       } finally {
         if (borrows) await this.lease(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
       }

@@ -1,0 +1,98 @@
+#include "clients/command/regression/html_statistics.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "protocols/markup.hpp"
+
+namespace drivebench::command {
+namespace {
+
+using regression::CaseResult;
+using regression::Finding;
+
+constexpr std::size_t kBars = 30;
+constexpr int kBarWidth = 5;
+constexpr int kHeight = 28;
+
+/// The values of a check over the cases of its file.
+struct Measure {
+  std::string unit{};
+  std::vector<double> values{};
+  double room = std::numeric_limits<double>::infinity();  ///< to the limit; negative beyond it
+  std::string closest{};                                  ///< the case with the least room
+
+  void add(const Finding& finding, const std::string& name) {
+    if (!std::isfinite(finding.measured)) return;
+    unit = finding.unit == "1" ? "" : finding.unit;
+    values.push_back(finding.measured);
+    const double distance = std::abs(finding.limit - finding.measured);
+    const double here = finding.passed ? distance : -distance;
+    if (!(here < room)) return;
+    room = here;
+    closest = name;
+  }
+};
+
+/// The number of values in each of equal parts between the smallest and the largest.
+std::array<std::size_t, kBars> counted(const std::vector<double>& sorted) {
+  std::array<std::size_t, kBars> counts{};
+  const double width = (sorted.back() - sorted.front()) / static_cast<double>(kBars);
+  for (const double value : sorted) {
+    const double part = width > 0.0 ? (value - sorted.front()) / width : 0.0;
+    ++counts.at(std::min(kBars - 1, static_cast<std::size_t>(part)));
+  }
+  return counts;
+}
+
+std::string histogram(const std::vector<double>& sorted) {
+  const std::array<std::size_t, kBars> counts = counted(sorted);
+  const auto most = static_cast<double>(std::ranges::max(counts));
+  std::string svg = fmt::format("<svg width={} height={} role=img aria-label=\"histogram\">",
+                                static_cast<int>(kBars) * kBarWidth, kHeight);
+  for (std::size_t bar = 0; bar < kBars; ++bar) {
+    if (counts.at(bar) == 0) continue;
+    // A single case stays visible.
+    const double height = std::max(1.0, kHeight * static_cast<double>(counts.at(bar)) / most);
+    svg += fmt::format("<rect x={} y={:.1f} width={} height={:.1f} fill=\"#00704f\"/>",
+                       static_cast<int>(bar) * kBarWidth, kHeight - height, kBarWidth - 1, height);
+  }
+  return svg + "</svg>";
+}
+
+std::string row_of(const std::string& file, const std::string& check, Measure& measure) {
+  std::ranges::sort(measure.values);
+  const auto number = [&measure](double value) {
+    return fmt::format("<td class=n>{:.6g} {}", value, markup(measure.unit));
+  };
+  return fmt::format("<tr><td>{}<td>{}<td class=n>{}{}{}{}<td>{}<td>{}</tr>\n", markup(file), markup(check),
+                     measure.values.size(), number(measure.values.front()),
+                     number(measure.values[measure.values.size() / 2]), number(measure.values.back()),
+                     histogram(measure.values), markup(measure.closest));
+}
+
+}  // namespace
+
+std::string statistics_table(std::span<const CaseResult> results) {
+  std::map<std::pair<std::string, std::string>, Measure> measures;
+  for (const CaseResult& result : results) {
+    for (const Finding& finding : result.findings)
+      measures[{result.file, finding.name}].add(finding, result.name);
+  }
+  std::string html =
+      "<table><tr><th>file<th>check<th>cases<th>smallest<th>median<th>largest<th><th>closest to its "
+      "limit</tr>\n";
+  for (auto& [place, measure] : measures) {
+    if (!measure.values.empty()) html += row_of(place.first, place.second, measure);
+  }
+  return html + "</table>\n";
+}
+
+}  // namespace drivebench::command
