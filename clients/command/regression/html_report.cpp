@@ -6,8 +6,6 @@
 #include <cmath>
 
 #include "clients/command/recording/svg_plot.hpp"
-#include "clients/command/regression/html_statistics.hpp"
-#include "clients/regression/reports/reports.hpp"
 #include "protocols/markup.hpp"
 
 namespace drivebench::command {
@@ -111,27 +109,27 @@ std::vector<std::string> plots_of(const CaseResult& result) {
   return plots;
 }
 
-std::string html_report(const std::string& suite, std::span<const CaseResult> results) {
-  const bool are_many = results.size() > kMostRows;
+void HtmlReport::add(const CaseResult& result) {
+  statistics_.add(result);
+  const bool is_good = regression::is_good(result);
+  const std::string row = row_of(result);
+  if (cases_++ < kMostRows) rows_ += row;
+  if (is_good) return;
+  if (bad_ < kMostRows) bad_rows_ += row;
+  if (bad_++ < kMostSections) sections_ += section_of(result);
+}
+
+std::string HtmlReport::page(const std::string& suite, const regression::Totals& totals) const {
+  const bool are_many = cases_ > kMostRows;
   const std::string name = markup(suite);
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=en><meta charset=utf-8><title>{0}</title><style>{1}</style>\n"
-      "<h1>{0}</h1>\n<p>{2}</p>\n",
-      name, kStyle, regression::totals_text(regression::totals_of(results)));
-  if (are_many) html += statistics_table(results);
-  html += "<table><tr><th>case<th>verdict<th>bench time [s]<th>checks</tr>\n";
-  std::size_t rows = 0;
-  for (const CaseResult& result : results) {
-    if (!are_many || (!regression::is_good(result) && rows++ < kMostRows)) html += row_of(result);
-  }
-  html += "</table>\n";
-  std::size_t sections = 0;
-  for (const CaseResult& result : results) {
-    if (!regression::is_good(result) && sections++ < kMostSections) html += section_of(result);
-  }
-  if (sections > kMostSections)
-    html +=
-        fmt::format("<p>{} more have not passed; the JSON report has them.</p>\n", sections - kMostSections);
+      "<h1>{0}</h1>\n<p>{2}</p>\n{3}<table><tr><th>case<th>verdict<th>bench time [s]<th>checks</tr>\n"
+      "{4}</table>\n{5}",
+      name, kStyle, regression::totals_text(totals), are_many ? statistics_.table() : "",
+      are_many ? bad_rows_ : rows_, sections_);
+  if (bad_ > kMostSections)
+    html += fmt::format("<p>{} more have not passed; the JSON report has them.</p>\n", bad_ - kMostSections);
   return html + "</html>\n";
 }
 

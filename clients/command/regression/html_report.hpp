@@ -1,10 +1,10 @@
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 
-#include "clients/regression/verdicts/result.hpp"
+#include "clients/command/regression/html_statistics.hpp"
+#include "clients/regression/reports/reports.hpp"
 
 namespace drivebench::command {
 
@@ -15,6 +15,18 @@ std::vector<std::string> plots_of(const regression::CaseResult& result);
 /// and of those that have not passed the reasons, the signals of the failed checks with their limits, and
 /// what the device under test printed. Of more than a thousand cases it shows statistics of what the checks
 /// measured, and whole only the first hundred that have not passed.
-std::string html_report(const std::string& suite, std::span<const regression::CaseResult> results);
+class HtmlReport {
+ public:
+  void add(const regression::CaseResult& result);
+  std::string page(const std::string& suite, const regression::Totals& totals) const;
+
+ private:
+  HtmlStatistics statistics_;
+  std::size_t cases_ = 0;
+  std::size_t bad_ = 0;
+  std::string rows_;      ///< of the first cases
+  std::string bad_rows_;  ///< of the first that have not passed
+  std::string sections_;
+};
 
 }  // namespace drivebench::command

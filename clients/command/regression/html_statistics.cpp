@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <map>
-#include <utility>
 #include <vector>
 
 #include "protocols/markup.hpp"
@@ -21,25 +18,6 @@ using regression::Finding;
 constexpr std::size_t kBars = 30;
 constexpr int kBarWidth = 5;
 constexpr int kHeight = 28;
-
-/// The values of a check over the cases of its file.
-struct Measure {
-  std::string unit{};
-  std::vector<double> values{};
-  double room = std::numeric_limits<double>::infinity();  ///< to the limit; negative beyond it
-  std::string closest{};                                  ///< the case with the least room
-
-  void add(const Finding& finding, const std::string& name) {
-    if (!std::isfinite(finding.measured)) return;
-    unit = finding.unit == "1" ? "" : finding.unit;
-    values.push_back(finding.measured);
-    const double distance = std::abs(finding.limit - finding.measured);
-    const double here = finding.passed ? distance : -distance;
-    if (!(here < room)) return;
-    room = here;
-    closest = name;
-  }
-};
 
 /// The number of values in each of equal parts between the smallest and the largest.
 std::array<std::size_t, kBars> counted(const std::vector<double>& sorted) {
@@ -67,31 +45,40 @@ std::string histogram(const std::vector<double>& sorted) {
   return svg + "</svg>";
 }
 
-std::string row_of(const std::string& file, const std::string& check, Measure& measure) {
-  std::ranges::sort(measure.values);
+}  // namespace
+
+void HtmlStatistics::add(const CaseResult& result) {
+  for (const Finding& finding : result.findings) {
+    if (!std::isfinite(finding.measured)) continue;
+    Measure& measure = measures_[{result.file, finding.name}];
+    measure.unit = finding.unit == "1" ? "" : finding.unit;
+    measure.values.push_back(finding.measured);
+    const double distance = std::abs(finding.limit - finding.measured);
+    const double room = finding.passed ? distance : -distance;
+    if (!(room < measure.room)) continue;
+    measure.room = room;
+    measure.closest = result.name;
+  }
+}
+
+std::string HtmlStatistics::row_of(const std::pair<std::string, std::string>& place, const Measure& measure) {
+  std::vector<double> sorted = measure.values;
+  std::ranges::sort(sorted);
   const auto number = [&measure](double value) {
     return fmt::format("<td class=n>{:.6g} {}", value, markup(measure.unit));
   };
-  return fmt::format("<tr><td>{}<td>{}<td class=n>{}{}{}{}<td>{}<td>{}</tr>\n", markup(file), markup(check),
-                     measure.values.size(), number(measure.values.front()),
-                     number(measure.values[measure.values.size() / 2]), number(measure.values.back()),
-                     histogram(measure.values), markup(measure.closest));
+  return fmt::format("<tr><td>{}<td>{}<td class=n>{}{}{}{}<td>{}<td>{}</tr>\n", markup(place.first),
+                     markup(place.second), sorted.size(), number(sorted.front()),
+                     number(sorted[sorted.size() / 2]), number(sorted.back()), histogram(sorted),
+                     markup(measure.closest));
 }
 
-}  // namespace
-
-std::string statistics_table(std::span<const CaseResult> results) {
-  std::map<std::pair<std::string, std::string>, Measure> measures;
-  for (const CaseResult& result : results) {
-    for (const Finding& finding : result.findings)
-      measures[{result.file, finding.name}].add(finding, result.name);
-  }
+std::string HtmlStatistics::table() const {
   std::string html =
       "<table><tr><th>file<th>check<th>cases<th>smallest<th>median<th>largest<th><th>closest to its "
       "limit</tr>\n";
-  for (auto& [place, measure] : measures) {
-    if (!measure.values.empty()) html += row_of(place.first, place.second, measure);
-  }
+  for (const auto& [place, measure] : measures_)
+    html += row_of(place, measure);
   return html + "</table>\n";
 }
 

@@ -17,22 +17,23 @@ StoredResults::StoredResults(const std::string& program, const std::vector<std::
   }
 }
 
-std::optional<CaseResult> StoredResults::find(const regression::Case& c) {
-  std::string fingerprint;
+std::string StoredResults::fingerprint_of(const regression::Case& c) {
   try {
-    fingerprint = fingerprints_.of(c, bench_file_of(c));
+    return fingerprints_.of(c, bench_file_of(c));
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
-  of_case_.emplace(c.name, fingerprint);
+}
+
+std::optional<CaseResult> StoredResults::find(const std::string& name, const std::string& fingerprint) const {
   for (const regression::ResultsFolder& folder : folders_) {
-    if (std::optional<CaseResult> result = folder.find(c.name, fingerprint)) return result;
+    if (std::optional<CaseResult> result = folder.find(name, fingerprint)) return result;
   }
   return std::nullopt;
 }
 
-void StoredResults::put(const CaseResult& result) const {
-  folders_.front().put(result, of_case_.at(result.name));
+void StoredResults::put(const CaseResult& result, const std::string& fingerprint) const {
+  folders_.front().put(result, fingerprint);
 }
 
 }  // namespace drivebench::command

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,17 +15,18 @@ class StoredResults {
   /// Makes folders that are not there. Throws UsageError.
   StoredResults(const std::string& program, const std::vector<std::string>& folders);
 
-  /// The result of a case, if a folder has one of the case as it is now. Throws UsageError if the bench of
-  /// the case cannot be read.
-  std::optional<regression::CaseResult> find(const regression::Case& c);
+  /// Tells the case as it is now. Throws UsageError if its bench cannot be read.
+  std::string fingerprint_of(const regression::Case& c);
 
-  /// Keeps the result of a case that find() was asked for in the first folder. Any thread may call it.
-  void put(const regression::CaseResult& result) const;
+  /// The result of the case with this name and fingerprint, if a folder has it.
+  std::optional<regression::CaseResult> find(const std::string& name, const std::string& fingerprint) const;
+
+  /// Keeps a result in the first folder. Any thread may call it.
+  void put(const regression::CaseResult& result, const std::string& fingerprint) const;
 
  private:
   std::vector<regression::ResultsFolder> folders_;
   regression::Fingerprints fingerprints_;
-  std::map<std::string, std::string> of_case_;  ///< fingerprints by the names of cases
 };
 
 }  // namespace drivebench::command

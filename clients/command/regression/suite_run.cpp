@@ -46,7 +46,7 @@ class Crew {
       result.plots = plots_of(result);
       result.trace = {};
       keep(cases_[index], folder, result);
-      store(result);
+      store(index, result);
       std::error_code ignored;
       fs::remove_all(folder, ignored);
       const std::lock_guard lock(mutex_);
@@ -66,10 +66,10 @@ class Crew {
     }
   }
 
-  void store(CaseResult& result) const {
+  void store(std::size_t place, CaseResult& result) const {
     if (!settings_.store) return;
     try {
-      settings_.store(result);
+      settings_.store(place, result);
     } catch (const std::exception& error) {
       result.verdict = regression::Verdict::kError;
       result.reason = error.what();

@@ -12,9 +12,9 @@ struct SuiteSettings {
   unsigned jobs = 1;
   bool draws_plots = false;             ///< of failed checks
   std::filesystem::path keep_folder{};  ///< for cases that have not passed; empty: nothing is kept
-  /// Takes each result on the thread that made it, as soon as it is there. If it throws, the case is an
-  /// error.
-  std::function<void(const regression::CaseResult&)> store{};
+  /// Takes each result, with the place of its case, on the thread that made it, as soon as it is there. If it
+  /// throws, the case is an error.
+  std::function<void(std::size_t place, const regression::CaseResult&)> store{};
 };
 
 /// Runs cases on so many threads. `finished` hears of every result on the calling thread, in the order of the

@@ -25,6 +25,7 @@ namespace {
 
 using regression::Case;
 using regression::CaseResult;
+using regression::SuiteResults;
 
 bool is_wanted(const Case& c, const TestOptions& options) {
   const auto has_tag = [&c](const std::string& tag) {
@@ -43,22 +44,27 @@ regression::Shard wanted_shard(const TestOptions& options) {
   }
 }
 
-/// The cases of the suite that the options choose. One at least has the filter and the tags; the shard may
-/// have none of them.
-std::vector<Case> chosen_cases(const TestOptions& options, const std::filesystem::path& suite) {
-  std::vector<Case> cases;
+/// Shows the cases of the suite that the options choose. One at least has the filter and the tags; the shard
+/// may have none of them.
+void visit_chosen(const TestOptions& options, const std::filesystem::path& suite,
+                  const regression::SeeCase& see) {
+  const regression::Shard shard = wanted_shard(options);
+  std::size_t all = 0;
+  std::size_t wanted = 0;
   try {
-    cases = regression::read_suite(suite);
+    regression::visit_suite(suite, [&](Case c) {
+      ++all;
+      if (is_wanted(c, options) && shard.has(wanted++)) see(std::move(c));
+    });
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
-  const std::size_t all = cases.size();
-  std::erase_if(cases, [&](const Case& c) { return !is_wanted(c, options); });
-  if (cases.empty())
-    throw UsageError(fmt::format("none of the {} cases has this filter and these tags", all));
-  const regression::Shard shard = wanted_shard(options);
-  std::size_t place = 0;
-  std::erase_if(cases, [&](const Case&) { return !shard.has(place++); });
+  if (wanted == 0) throw UsageError(fmt::format("none of the {} cases has this filter and these tags", all));
+}
+
+std::vector<Case> chosen_cases(const TestOptions& options, const std::filesystem::path& suite) {
+  std::vector<Case> cases;
+  visit_chosen(options, suite, [&cases](Case c) { cases.push_back(std::move(c)); });
   return cases;
 }
 
@@ -93,10 +99,16 @@ struct ReportFiles {
   }
 };
 
-void write(std::optional<Output>& file, const std::string& text) {
+using WriteReport = void (*)(const SuiteResults&, const regression::Sink&);
+
+void write(std::optional<Output>& file, WriteReport report, const SuiteResults& results) {
   if (!file) return;
-  file->write(text);
+  report(results, [&file](std::string_view text) { file->write(text); });
   file->flush();
+}
+
+void print(WriteReport report, const SuiteResults& results) {
+  report(results, [](std::string_view text) { fmt::print("{}", text); });
 }
 
 int exit_code_of(const regression::Totals& totals) {
@@ -104,47 +116,80 @@ int exit_code_of(const regression::Totals& totals) {
   return totals.invalid != 0 ? kExitInvalid : kExitOk;
 }
 
-void print_summary(const std::vector<CaseResult>& results, std::size_t known, double wall_s) {
-  double bench_s = 0.0;
-  for (const CaseResult& result : results)
-    bench_s += result.bench_s;
-  fmt::print("{}; {:.4g} s of the bench in {:.3g} s{}\n",
-             regression::totals_text(regression::totals_of(results)), bench_s, wall_s,
-             known > 0 ? fmt::format("; {} of the results are from before", known) : "");
+/// The results that a folder has already, and the cases that it lacks.
+struct Work {
+  std::vector<CaseResult> results{};  ///< of all cases, in their order; blank where one is missing
+  std::vector<Case> missing{};
+  std::vector<std::size_t> places{};        ///< of the missing cases
+  std::vector<std::string> fingerprints{};  ///< of the missing cases, if results are kept
+  std::size_t known = 0;
+};
+
+Work work_of(std::vector<Case> cases, StoredResults* stored) {
+  Work work;
+  for (Case& c : cases) {
+    const std::string fingerprint = stored != nullptr ? stored->fingerprint_of(c) : std::string();
+    std::optional<CaseResult> found = stored != nullptr ? stored->find(c.name, fingerprint) : std::nullopt;
+    // In real time the machine may do better another time.
+    if (found && found->verdict == regression::Verdict::kInvalid) found.reset();
+    if (found) {
+      ++work.known;
+      work.results.push_back(std::move(*found));
+      continue;
+    }
+    work.places.push_back(work.results.size());
+    work.fingerprints.push_back(fingerprint);
+    work.results.emplace_back();
+    work.missing.push_back(std::move(c));
+  }
+  return work;
 }
 
-SuiteSettings settings_of(const TestOptions& options, StoredResults* stored) {
+SuiteSettings settings_of(const TestOptions& options, const Work& work, const StoredResults* stored) {
   SuiteSettings settings{.jobs = options.jobs,
                          .draws_plots = stored != nullptr || !options.html_file.empty(),
                          .keep_folder = options.keep_folder};
   if (stored != nullptr) {
-    settings.store = [stored](const CaseResult& result) {
-      if (!interrupted()) stored->put(result);
+    settings.store = [&work, stored](std::size_t place, const CaseResult& result) {
+      if (!interrupted()) stored->put(result, work.fingerprints[place]);
     };
   }
   return settings;
 }
 
-/// Runs cases, and prints a row for each.
-std::vector<CaseResult> run_all(const std::vector<Case>& cases, const TestOptions& options,
-                                StoredResults* stored) {
+/// Runs the missing cases, and prints a row for each.
+void run_missing(Work& work, const TestOptions& options, const StoredResults* stored) {
+  if (work.missing.empty()) return;
   const TemporaryFolder folder;
-  const std::vector<PreparedCase> prepared = prepared_or_refused(cases, folder.path());
+  const std::vector<PreparedCase> prepared = prepared_or_refused(work.missing, folder.path());
   catch_interrupts();
   Progress progress("test");
   const auto see = [&](const CaseResult& result, std::size_t ended) {
-    progress.update(static_cast<double>(ended) / static_cast<double>(cases.size()),
-                    fmt::format("{} of {} cases", ended, cases.size()));
+    progress.update(static_cast<double>(ended) / static_cast<double>(prepared.size()),
+                    fmt::format("{} of {} cases", ended, prepared.size()));
     if (!options.tap) fmt::print("{}", regression::table_row(result));
   };
-  return run_suite(prepared, folder.path(), settings_of(options, stored), see);
+  std::vector<CaseResult> made = run_suite(prepared, folder.path(), settings_of(options, work, stored), see);
+  for (std::size_t i = 0; i < made.size(); ++i)
+    work.results[work.places[i]] = std::move(made[i]);
 }
 
-/// The result of a case that no folder has.
-CaseResult no_result(const Case& c) {
-  CaseResult result{.name = c.name, .file = c.file, .line = c.line, .values = c.values, .tags = c.tags};
-  result.reason = "no folder has a result of this case as it is now";
-  return result;
+void print_bad(const CaseResult& result, const TestOptions& options) {
+  if (!options.tap && !regression::is_good(result)) fmt::print("{}", regression::table_row(result));
+}
+
+/// Runs the cases without a result. Of those that have one from before, the ones that have not passed are
+/// printed.
+Work run_cases(const TestOptions& options, const std::filesystem::path& suite) {
+  std::optional<StoredResults> stored;
+  if (!options.results_folder.empty()) stored.emplace(options.program, std::vector{options.results_folder});
+  Work work = work_of(chosen_cases(options, suite), stored ? &*stored : nullptr);
+  if (work.known > 0) {
+    for (const CaseResult& result : work.results)
+      if (!result.name.empty()) print_bad(result, options);
+  }
+  run_missing(work, options, stored ? &*stored : nullptr);
+  return work;
 }
 
 void require_folders(const std::vector<std::string>& folders) {
@@ -155,64 +200,73 @@ void require_folders(const std::vector<std::string>& folders) {
   }
 }
 
-/// The results of all cases, in their order: those that a folder has, and those of the cases that it lacks,
-/// which run now unless results are merged. Of the former, those that have not passed are printed.
-std::vector<CaseResult> results_of(const std::vector<Case>& cases, const TestOptions& options,
-                                   std::size_t& known) {
-  const bool merges = !options.merged_folders.empty();
-  require_folders(options.merged_folders);
-  std::optional<StoredResults> stored;
-  if (merges) stored.emplace(options.program, options.merged_folders);
-  if (!options.results_folder.empty()) stored.emplace(options.program, std::vector{options.results_folder});
-  std::vector<CaseResult> results;
-  std::vector<Case> missing;
-  std::vector<std::size_t> places;
-  for (const Case& c : cases) {
-    std::optional<CaseResult> found = stored ? stored->find(c) : std::nullopt;
-    // In real time the machine may do better another time.
-    if (found && !merges && found->verdict == regression::Verdict::kInvalid) found.reset();
-    if (found) ++known;
-    if (!found && !merges) {
-      missing.push_back(c);
-      places.push_back(results.size());
-    }
-    results.push_back(found ? std::move(*found) : no_result(c));
-    if ((found || merges) && !options.tap && !regression::is_good(results.back()))
-      fmt::print("{}", regression::table_row(results.back()));
+/// The results in the folders, read each time that they are shown.
+regression::EachResult merged_results(const TestOptions& options, const std::filesystem::path& suite,
+                                      StoredResults& stored) {
+  return [&options, suite, &stored](const regression::SeeResult& see) {
+    visit_chosen(options, suite, [&](const Case& c) {
+      if (const auto result = stored.find(c.name, stored.fingerprint_of(c))) return see(*result);
+      CaseResult none{.name = c.name, .file = c.file, .line = c.line, .values = c.values, .tags = c.tags};
+      none.reason = "no folder has a result of this case as it is now";
+      see(none);
+    });
+  };
+}
+
+/// Writes all reports. Returns the exit code.
+int report(const TestOptions& options, SuiteResults results, ReportFiles& files, const std::string& remark,
+           const regression::SeeResult& see_first) {
+  HtmlReport html;
+  results.each([&](const CaseResult& result) {
+    results.totals.add(result);
+    if (files.html) html.add(result);
+    see_first(result);
+  });
+  write(files.junit, regression::write_junit, results);
+  write(files.json, regression::write_json, results);
+  if (files.html) {
+    files.html->write(html.page(results.suite, results.totals));
+    files.html->flush();
   }
-  if (missing.empty()) return results;
-  std::vector<CaseResult> made = run_all(missing, options, stored ? &*stored : nullptr);
-  for (std::size_t i = 0; i < made.size(); ++i)
-    results[places[i]] = std::move(made[i]);
-  return results;
+  if (options.tap) {
+    print(regression::write_tap, results);
+  } else {
+    fmt::print("{}; {:.4g} s of the bench{}\n", regression::totals_text(results.totals),
+               results.totals.bench_s, remark);
+  }
+  if (options.github) print(regression::write_github, results);
+  return exit_code_of(results.totals);
+}
+
+int merge(const TestOptions& options, const std::filesystem::path& suite) {
+  require_folders(options.merged_folders);
+  ReportFiles files(options);
+  StoredResults stored(options.program, options.merged_folders);
+  return report(options, {suite.stem().string(), {}, merged_results(options, suite, stored)}, files, "",
+                [&options](const CaseResult& result) { print_bad(result, options); });
+}
+
+int run_and_report(const TestOptions& options, const std::filesystem::path& suite) {
+  ReportFiles files(options);
+  const auto started = std::chrono::steady_clock::now();
+  const Work work = run_cases(options, suite);
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  const auto each = [&work](const regression::SeeResult& see) { std::ranges::for_each(work.results, see); };
+  const std::string remark =
+      fmt::format(" in {:.3g} s{}", wall_s,
+                  work.known > 0 ? fmt::format("; {} of the results are from before", work.known) : "");
+  return report(options, {suite.stem().string(), {}, each}, files, remark, [](const CaseResult&) {});
 }
 
 }  // namespace
 
 int run_test(const TestOptions& options) {
   const std::filesystem::path suite = find_suite(options.suite);
-  const std::vector<Case> cases = chosen_cases(options, suite);
   if (options.list) {
-    print_list(cases);
+    print_list(chosen_cases(options, suite));
     return kExitOk;
   }
-  ReportFiles files(options);
-  const auto started = std::chrono::steady_clock::now();
-  std::size_t known = 0;
-  const std::vector<CaseResult> results = results_of(cases, options, known);
-  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-
-  const std::string name = suite.stem().string();
-  write(files.junit, regression::to_junit(name, results));
-  write(files.json, regression::to_json(name, results));
-  if (files.html) write(files.html, html_report(name, results));
-  if (options.tap) {
-    fmt::print("{}", regression::to_tap(results));
-  } else {
-    print_summary(results, known, wall_s);
-  }
-  if (options.github) fmt::print("{}", regression::to_github(results));
-  return exit_code_of(regression::totals_of(results));
+  return options.merged_folders.empty() ? run_and_report(options, suite) : merge(options, suite);
 }
 
 }  // namespace drivebench::command

@@ -2,17 +2,40 @@
 #include "clients/regression/reports/reports.hpp"
 
 namespace drivebench::regression {
+namespace {
 
-std::string to_json(const std::string& suite, std::span<const CaseResult> results) {
-  using Json = nlohmann::ordered_json;
-  const Totals totals = totals_of(results);
-  Json cases = Json::array();
-  for (const CaseResult& result : results)
-    cases.push_back(case_json(result));
-  const Json report = {{"suite", suite},          {"passed", totals.passed},   {"failed", totals.failed},
-                       {"errors", totals.errors}, {"invalid", totals.invalid}, {"skipped", totals.skipped},
-                       {"cases", cases}};
-  return report.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+using Json = nlohmann::ordered_json;
+
+std::string text_of(const Json& json) {
+  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// The lines of a text that stands so deep within another.
+std::string indented(const std::string& text) {
+  constexpr std::string_view kDeep = "  ";
+  std::string out(kDeep);
+  for (const char c : text) {
+    out += c;
+    if (c == '\n') out += kDeep;
+  }
+  return out;
+}
+
+}  // namespace
+
+void write_json(const SuiteResults& results, const Sink& sink) {
+  const Totals& totals = results.totals;
+  const Json head = {{"suite", results.suite},  {"passed", totals.passed},   {"failed", totals.failed},
+                     {"errors", totals.errors}, {"invalid", totals.invalid}, {"skipped", totals.skipped}};
+  std::string start = text_of(head);
+  start.erase(start.rfind('\n'));
+  sink(start + ",\n \"cases\": [");
+  bool is_first = true;
+  results.each([&](const CaseResult& result) {
+    sink((is_first ? "\n" : ",\n") + indented(text_of(case_json(result))));
+    is_first = false;
+  });
+  sink(is_first ? "]\n}\n" : "\n ]\n}\n");
 }
 
 }  // namespace drivebench::regression

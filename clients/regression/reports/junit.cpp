@@ -34,20 +34,15 @@ std::string case_xml(const std::string& suite, const CaseResult& result) {
 
 }  // namespace
 
-std::string to_junit(const std::string& suite, std::span<const CaseResult> results) {
-  const Totals totals = totals_of(results);
-  double bench_s = 0.0;
-  std::string cases;
-  for (const CaseResult& result : results) {
-    bench_s += result.bench_s;
-    cases += case_xml(suite, result);
-  }
-  return fmt::format(
+void write_junit(const SuiteResults& results, const Sink& sink) {
+  const Totals& totals = results.totals;
+  sink(fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
-      "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.6f}\">\n"
-      "{}  </testsuite>\n</testsuites>\n",
-      markup(suite), results.size(), totals.failed, totals.errors + totals.invalid, totals.skipped, bench_s,
-      cases);
+      "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.6f}\">\n",
+      markup(results.suite), totals.all(), totals.failed, totals.errors + totals.invalid, totals.skipped,
+      totals.bench_s));
+  results.each([&](const CaseResult& result) { sink(case_xml(results.suite, result)); });
+  sink("  </testsuite>\n</testsuites>\n");
 }
 
 }  // namespace drivebench::regression

@@ -53,15 +53,25 @@ int line_of(const CaseResult& result) {
 
 }  // namespace
 
-Totals totals_of(std::span<const CaseResult> results) noexcept {
-  const auto count = [results](Verdict verdict) {
-    return static_cast<std::size_t>(std::ranges::count(results, verdict, &CaseResult::verdict));
-  };
-  return {.passed = count(Verdict::kPass),
-          .failed = count(Verdict::kFail),
-          .errors = count(Verdict::kError),
-          .invalid = count(Verdict::kInvalid),
-          .skipped = count(Verdict::kSkipped)};
+void Totals::add(const CaseResult& result) noexcept {
+  bench_s += result.bench_s;
+  switch (result.verdict) {
+    case Verdict::kPass:
+      ++passed;
+      break;
+    case Verdict::kFail:
+      ++failed;
+      break;
+    case Verdict::kError:
+      ++errors;
+      break;
+    case Verdict::kInvalid:
+      ++invalid;
+      break;
+    case Verdict::kSkipped:
+      ++skipped;
+      break;
+  }
 }
 
 bool is_good(const CaseResult& result) noexcept {
@@ -104,37 +114,35 @@ std::string table_row(const CaseResult& result) {
   return text;
 }
 
-std::string to_tap(std::span<const CaseResult> results) {
-  std::string text = fmt::format("TAP version 13\n1..{}\n", results.size());
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    const CaseResult& result = results[i];
-    const bool good = is_good(result);
+void write_tap(const SuiteResults& results, const Sink& sink) {
+  sink(fmt::format("TAP version 13\n1..{}\n", results.totals.all()));
+  std::size_t number = 0;
+  results.each([&](const CaseResult& result) {
     std::string name = in_a_line(result.name);
     std::ranges::replace(name, '#', '_');  // begins a directive
-    text += fmt::format("{} {} - {}", good ? "ok" : "not ok", i + 1, name);
+    std::string text = fmt::format("{} {} - {}", is_good(result) ? "ok" : "not ok", ++number, name);
     if (result.verdict == Verdict::kSkipped) text += " # SKIP " + in_a_line(result.reason);
     text += '\n';
-    if (good) continue;
-    for (const std::string& reason : reasons_of(result))
-      text += fmt::format("# {}: {}\n", word_of(result.verdict), in_a_line(reason));
-  }
-  return text;
+    if (!is_good(result)) {
+      for (const std::string& reason : reasons_of(result))
+        text += fmt::format("# {}: {}\n", word_of(result.verdict), in_a_line(reason));
+    }
+    sink(text);
+  });
 }
 
-std::string to_github(std::span<const CaseResult> results) {
-  std::string text;
-  for (const CaseResult& result : results) {
-    if (is_good(result)) continue;
+void write_github(const SuiteResults& results, const Sink& sink) {
+  results.each([&sink](const CaseResult& result) {
+    if (is_good(result)) return;
     std::string reasons;
     for (const std::string& reason : reasons_of(result))
       reasons += (reasons.empty() ? "" : "\n") + reason;
-    text += fmt::format("::{} file={},line={},title={}::{}\n",
-                        result.verdict == Verdict::kInvalid ? "warning" : "error",
-                        escaped_for_github(result.file, true), line_of(result),
-                        escaped_for_github(fmt::format("{} {}", word_of(result.verdict), result.name), true),
-                        escaped_for_github(reasons, false));
-  }
-  return text;
+    const std::string title = fmt::format("{} {}", word_of(result.verdict), result.name);
+    sink(fmt::format("::{} file={},line={},title={}::{}\n",
+                     result.verdict == Verdict::kInvalid ? "warning" : "error",
+                     escaped_for_github(result.file, true), line_of(result), escaped_for_github(title, true),
+                     escaped_for_github(reasons, false)));
+  });
 }
 
 }  // namespace drivebench::regression

@@ -1,7 +1,10 @@
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <functional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "clients/regression/verdicts/result.hpp"
 
@@ -9,14 +12,23 @@
 /// order in which cases ended, so that equal runs give equal bytes.
 namespace drivebench::regression {
 
+using SeeResult = std::function<void(const CaseResult&)>;
+/// Shows every result of a run in the order of the cases; they need not be in memory at the same time.
+using EachResult = std::function<void(const SeeResult&)>;
+/// Takes a report part by part.
+using Sink = std::function<void(std::string_view)>;
+
 struct Totals {
   std::size_t passed = 0;
   std::size_t failed = 0;
   std::size_t errors = 0;
   std::size_t invalid = 0;
   std::size_t skipped = 0;
+  double bench_s = 0.0;  ///< how long all cases lasted on their benches
+
+  void add(const CaseResult& result) noexcept;
+  std::size_t all() const noexcept { return passed + failed + errors + invalid + skipped; }
 };
-Totals totals_of(std::span<const CaseResult> results) noexcept;
 
 /// Passed or skipped.
 bool is_good(const CaseResult& result) noexcept;
@@ -30,10 +42,17 @@ std::string table_row(const CaseResult& result);
 /// The reasons why a case has not passed, one each.
 std::vector<std::string> reasons_of(const CaseResult& result);
 
-std::string to_json(const std::string& suite, std::span<const CaseResult> results);
-std::string to_junit(const std::string& suite, std::span<const CaseResult> results);
-std::string to_tap(std::span<const CaseResult> results);
+/// What every report tells: the name of the suite, the totals, and the results.
+struct SuiteResults {
+  std::string suite;
+  Totals totals;
+  EachResult each;
+};
+
+void write_json(const SuiteResults& results, const Sink& sink);
+void write_junit(const SuiteResults& results, const Sink& sink);
+void write_tap(const SuiteResults& results, const Sink& sink);
 /// Workflow commands that GitHub shows as annotations: a line for each case that has not passed.
-std::string to_github(std::span<const CaseResult> results);
+void write_github(const SuiteResults& results, const Sink& sink);
 
 }  // namespace drivebench::regression

@@ -19,8 +19,7 @@ std::uint64_t text_hash(std::string_view text) noexcept {
 }
 
 std::string Fingerprints::of(const Case& c, const fs::path& bench_file) {
-  std::string text =
-      fmt::format("{}\n{}\n{:x}\n{}", program_, c.name, content(c.file), bench_text(bench_file));
+  std::string text = fmt::format("{}\n{}\n{:x}\n{:x}", program_, c.name, content(c.file), bench(bench_file));
   for (const CheckSpec& check : c.checks) {
     if (!check.golden_file.empty()) text += fmt::format("\n{:x}", content(check.golden_file));
   }
@@ -29,20 +28,19 @@ std::string Fingerprints::of(const Case& c, const fs::path& bench_file) {
   return fmt::format("{:016x}", text_hash(text));
 }
 
-const std::string& Fingerprints::bench_text(const fs::path& file) {
+std::uint64_t Fingerprints::bench(const fs::path& file) {
   const auto [place, is_new] = benches_.try_emplace(file);
   if (!is_new) return place->second;
   const Case blank{.name = {}, .file = {}, .bench = file.string()};
-  place->second = composed_bench(blank, file);
+  const std::string text = composed_bench(blank, file);
   // Curves stay in files of their own, which the text names by their absolute paths.
   constexpr std::string_view kEnd = ".csv\"";
   std::string curves;
-  for (std::size_t end = place->second.find(kEnd); end != std::string::npos;
-       end = place->second.find(kEnd, end + 1)) {
-    const std::size_t start = place->second.rfind('"', end) + 1;
-    curves += fmt::format("\n{:x}", content(place->second.substr(start, end + 4 - start)));
+  for (std::size_t end = text.find(kEnd); end != std::string::npos; end = text.find(kEnd, end + 1)) {
+    const std::size_t start = text.rfind('"', end) + 1;
+    curves += fmt::format("\n{:x}", content(text.substr(start, end + 4 - start)));
   }
-  place->second += curves;
+  place->second = text_hash(text + curves);
   return place->second;
 }
 

@@ -20,11 +20,11 @@ class Fingerprints {
   std::string of(const Case& c, const std::filesystem::path& bench_file);
 
  private:
-  const std::string& bench_text(const std::filesystem::path& file);
+  std::uint64_t bench(const std::filesystem::path& file);
   std::uint64_t content(const std::filesystem::path& file);
 
   std::string program_;
-  std::map<std::filesystem::path, std::string> benches_{};
+  std::map<std::filesystem::path, std::uint64_t> benches_{};
   std::map<std::filesystem::path, std::uint64_t> contents_{};
 };
 

@@ -191,32 +191,33 @@ bool moved(ProblemList& from, ProblemList& to) {
   return false;
 }
 
-}  // namespace
-
-std::vector<Case> read_case_file(const fs::path& file, const std::string& name, ProblemList& problems) {
+/// The cases of a file; `name` is that of the file within its suite. Problems go to the list.
+void visit_case_file(const fs::path& file, const std::string& name, ProblemList& problems,
+                     const SeeCase& see) {
   const std::string path = file.string();
   const FileText content = read_file(file, kMaxConfigBytes);
   if (!content.why_not.empty()) {
     problems.add(path, 0, "", content.why_not);
-    return {};
+    return;
   }
   const std::optional<ConfigNode> root = parse_document(content.text, path, problems);
-  if (!root) return {};
+  if (!root) return;
   ProblemList found;
   const Matrix matrix(*root, path, found);
-  if (moved(found, problems)) return {};
-  std::vector<Case> cases;
+  if (moved(found, problems)) return;
   for (std::size_t i = 0; i < matrix.size(); ++i) {
     auto values = matrix.values_at(i);
     const ConfigNode whole = matrix.at(i, *root, path, found);
-    Case& c = cases.emplace_back(read_case(whole, file, with_values(name, values), found));
+    Case c = read_case(whole, file, with_values(name, values), found);
+    if (moved(found, problems)) return;  // the other combinations would tell most of it again
     c.values = std::move(values);
-    if (moved(found, problems)) break;  // the other combinations would tell most of it again
+    see(std::move(c));
   }
-  return cases;
 }
 
-std::vector<Case> read_suite(const fs::path& suite) {
+}  // namespace
+
+void visit_suite(const fs::path& suite, const SeeCase& see) {
   ProblemList problems;
   std::vector<std::pair<std::string, fs::path>> files;
   std::error_code error;
@@ -232,10 +233,14 @@ std::vector<Case> read_suite(const fs::path& suite) {
     files.emplace_back(suite.stem().string(), suite);
   }
   std::ranges::sort(files);
-  std::vector<Case> cases;
   for (const auto& [name, file] : files)
-    std::ranges::move(read_case_file(file, name, problems), std::back_inserter(cases));
+    visit_case_file(file, name, problems, see);
   problems.throw_if_any();
+}
+
+std::vector<Case> read_suite(const fs::path& suite) {
+  std::vector<Case> cases;
+  visit_suite(suite, [&cases](Case c) { cases.push_back(std::move(c)); });
   return cases;
 }
 

@@ -1,19 +1,21 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "clients/regression/suite/case.hpp"
 
 namespace drivebench::regression {
 
-/// The cases of a file, one for each combination of its matrix. `name` is that of the file within its suite.
-/// Problems go to the list.
-std::vector<Case> read_case_file(const std::filesystem::path& file, const std::string& name,
-                                 ProblemList& problems);
+using SeeCase = std::function<void(Case)>;
 
-/// The cases of a TOML file, or of all TOML files in and below a folder, by name. Throws ConfigError with all
-/// problems, also for a suite without cases.
+/// Shows the cases of a TOML file, one for each combination of its matrix and its draws, or those of all TOML
+/// files in and below a folder, by name. Throws ConfigError with all problems, also for a suite without
+/// cases; some cases have been shown then.
+void visit_suite(const std::filesystem::path& suite, const SeeCase& see);
+
+/// All cases of a suite. Throws ConfigError with all problems.
 std::vector<Case> read_suite(const std::filesystem::path& suite);
 
 }  // namespace drivebench::regression

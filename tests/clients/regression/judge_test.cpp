@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "clients/regression/checks/check_reader.hpp"
 #include "clients/regression/reports/reports.hpp"
+#include "tests/clients/regression/report_text.hpp"
 
 namespace drivebench::regression {
 namespace {
@@ -120,14 +122,14 @@ std::vector<CaseResult> one_of_each() {
 // Catches: a kind of verdict that a report leaves out or counts as another.
 TEST(Reports, TellEveryVerdict) {
   const std::vector<CaseResult> results = one_of_each();
-  EXPECT_EQ(totals_text(totals_of(results)), "1 passed, 1 failed, 1 error, 1 invalid, 1 skipped");
+  EXPECT_EQ(totals_text(suite_results(results).totals), "1 passed, 1 failed, 1 error, 1 invalid, 1 skipped");
   EXPECT_EQ(
-      to_tap(results),
+      text_of(write_tap, results),
       "TAP version 13\n1..5\nok 1 - a <b>\nnot ok 2 - a <b>\n# fail: speed: at most 5 rad/s, max 4 rad/s, at "
       "0.01 s (line 12)\nnot ok 3 - dead\n# error: ended with code 1\nnot ok 4 - late\n# invalid: 2 ticks "
       "were "
       "late\nok 5 - not _ here # SKIP no board\n");
-  EXPECT_EQ(to_github(results),
+  EXPECT_EQ(text_of(write_github, results),
             "::error file=a.toml,line=12,title=fail a <b>::speed: at most 5 rad/s, max 4 rad/s, at 0.01 s "
             "(line 12)\n"
             "::error file=d%2C1.toml,line=1,title=error dead::ended with code 1\n"
@@ -136,7 +138,7 @@ TEST(Reports, TellEveryVerdict) {
 
 // Catches: text of a program that breaks the XML, or a failure without its sentence.
 TEST(Reports, JunitEscapesWhatProgramsPrint) {
-  const std::string xml = to_junit("s", one_of_each());
+  const std::string xml = text_of(write_junit, one_of_each());
   EXPECT_NE(xml.find("tests=\"5\" failures=\"1\" errors=\"2\" skipped=\"1\""), std::string::npos) << xml;
   EXPECT_NE(xml.find("name=\"a &lt;b&gt;\""), std::string::npos);
   EXPECT_NE(xml.find("<failure type=\"fail\" message=\"speed: at most 5 rad/s"), std::string::npos);
@@ -144,9 +146,19 @@ TEST(Reports, JunitEscapesWhatProgramsPrint) {
       << xml;
 }
 
+// Catches: a report of parts that are no document together.
+TEST(Reports, JsonOfPartsIsWhatAWholeDocumentWouldBe) {
+  for (const auto& results : {one_of_each(), std::vector<CaseResult>(), std::vector<CaseResult>(1)}) {
+    const std::string text = text_of(write_json, results);
+    const auto document = nlohmann::ordered_json::parse(text);
+    EXPECT_EQ(document.dump(1) + "\n", text);
+    EXPECT_EQ(document.at("cases").size(), results.size());
+  }
+}
+
 // Catches: a number that JSON does not have.
 TEST(Reports, JsonHasNoNumberThatIsNone) {
-  const std::string json = to_json("s", one_of_each());
+  const std::string json = text_of(write_json, one_of_each());
   EXPECT_EQ(json.find("nan"), std::string::npos);
   EXPECT_NE(json.find("\"verdict\": \"invalid\""), std::string::npos);
 }

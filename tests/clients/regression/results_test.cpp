@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "clients/regression/reports/reports.hpp"
 #include "clients/regression/results/fingerprints.hpp"
 #include "clients/regression/results/results_folder.hpp"
 #include "clients/regression/results/shard.hpp"
+#include "tests/clients/regression/report_text.hpp"
 
 namespace drivebench::regression {
 namespace {
@@ -73,7 +73,7 @@ class Results : public testing::Test {
  protected:
   ~Results() override { fs::remove_all(folder_); }
 
-  std::string text_of(const fs::path& file) const {
+  std::string content_of(const fs::path& file) const {
     std::ifstream in(file, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
@@ -112,9 +112,9 @@ TEST_F(Results, AreReadAsTheyWereWritten) {
   folder.put(result, "f1");
   const auto read = folder.find("a[x=1]", "f1");
   ASSERT_TRUE(read.has_value());
-  EXPECT_EQ(to_json("s", {&*read, 1}), to_json("s", {&result, 1}));
-  EXPECT_EQ(to_junit("s", {&*read, 1}), to_junit("s", {&result, 1}));
-  EXPECT_EQ(to_github({&*read, 1}), to_github({&result, 1}));
+  EXPECT_EQ(text_of(write_json, {*read}), text_of(write_json, {result}));
+  EXPECT_EQ(text_of(write_junit, {*read}), text_of(write_junit, {result}));
+  EXPECT_EQ(text_of(write_github, {*read}), text_of(write_github, {result}));
   EXPECT_EQ(read->plots, result.plots);
 }
 
@@ -127,7 +127,7 @@ TEST_F(Results, AnythingElseIsNoResult) {
   EXPECT_FALSE(folder.find("a[x=2]", "f1").has_value());
   ASSERT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
   const fs::path file = fs::directory_iterator(folder_)->path();
-  const std::string whole = text_of(file);
+  const std::string whole = content_of(file);
   for (std::size_t length = 0; length < whole.size() - 1; ++length) {
     std::ofstream(file, std::ios::binary) << whole.substr(0, length);
     EXPECT_FALSE(folder.find("a[x=1]", "f1").has_value()) << length;
@@ -151,7 +151,7 @@ TEST_F(Results, AFingerprintKnowsWhatARunDependsOn) {
   const fs::path bench = folder_ / "bench.toml";
   const fs::path motor = folder_ / "motor.toml";
   fs::copy_file(DRIVEBENCH_CONFIGS "/motors/servo-im.toml", motor);
-  std::string text = text_of(DRIVEBENCH_CONFIGS "/benches/servo.toml");
+  std::string text = content_of(DRIVEBENCH_CONFIGS "/benches/servo.toml");
   text.replace(text.find("../motors/servo-im.toml"), 23, "motor.toml");
   write("bench.toml", text);
   write("case.toml", "one");
