@@ -13,6 +13,7 @@ pages::CompletionFacts completion_facts() {
   for (const control::Preset& preset : control::presets())
     presets.emplace_back(preset.name);
   std::vector<std::string> signals;
+  signals.reserve(kSignals.size());
   for (const Signal& signal : kSignals)
     signals.emplace_back(signal.name);
   return {.names = {{.kind = "BENCH", .names = installation::file_names("benches"), .or_file = true},
