@@ -298,7 +298,8 @@ class Realtime(WireTest):
 
     def test_state_01_the_first_commands_do_not_drive_the_axis(self):
         """Catches: an axis that moves with the first frame of a controller that is only starting."""
-        server = self.server("--mode", "realtime", text=PATIENT_TEXT.replace("period_us = 125", "period_us = 1000"))
+        slow = PATIENT_TEXT.replace("period_us = 125", "period_us = 1000").replace("watchdog_ticks = 400000", "watchdog_ticks = 40000")
+        server = self.server("--mode", "realtime", text=slow)
         owner, viewer = self.client(server), self.client(server)
         self.assertEqual(owner.welcome.bench.arming_commands, 10)
         self.assertDone(viewer.ask(subscribe=pb.Subscribe(decimation=1, signals=["tick", "state", "u_a_v", "command_tick"])))
