@@ -12,8 +12,6 @@
 namespace drivebench::regression {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 /// JSON has no infinity and no NaN.
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);

@@ -4,8 +4,6 @@
 namespace drivebench::regression {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 std::string text_of(const Json& json) {
   return json.dump(1, ' ', false, Json::error_handler_t::replace);
 }

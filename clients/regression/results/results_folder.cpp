@@ -13,8 +13,6 @@
 namespace drivebench::regression {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
-
 ResultsFolder::ResultsFolder(fs::path folder) : folder_(std::move(folder)) {
   fs::create_directories(folder_);
 }
