@@ -122,7 +122,8 @@ struct Work {
   std::vector<Case> missing{};
   std::vector<std::size_t> places{};        ///< of the missing cases
   std::vector<std::string> fingerprints{};  ///< of the missing cases, if results are kept
-  std::size_t known = 0;
+
+  std::size_t known() const noexcept { return results.size() - places.size(); }
 };
 
 Work work_of(std::vector<Case> cases, StoredResults* stored) {
@@ -133,7 +134,6 @@ Work work_of(std::vector<Case> cases, StoredResults* stored) {
     // In real time the machine may do better another time.
     if (found && found->verdict == regression::Verdict::kInvalid) found.reset();
     if (found) {
-      ++work.known;
       work.results.push_back(std::move(*found));
       continue;
     }
@@ -184,10 +184,8 @@ Work run_cases(const TestOptions& options, const std::filesystem::path& suite) {
   std::optional<StoredResults> stored;
   if (!options.results_folder.empty()) stored.emplace(options.program, std::vector{options.results_folder});
   Work work = work_of(chosen_cases(options, suite), stored ? &*stored : nullptr);
-  if (work.known > 0) {
-    for (const CaseResult& result : work.results)
-      if (!result.name.empty()) print_bad(result, options);
-  }
+  for (const CaseResult& result : work.results)
+    if (!result.name.empty()) print_bad(result, options);
   run_missing(work, options, stored ? &*stored : nullptr);
   return work;
 }
@@ -254,7 +252,7 @@ int run_and_report(const TestOptions& options, const std::filesystem::path& suit
   const auto each = [&work](const regression::SeeResult& see) { std::ranges::for_each(work.results, see); };
   const std::string remark =
       fmt::format(" in {:.3g} s{}", wall_s,
-                  work.known > 0 ? fmt::format("; {} of the results are from before", work.known) : "");
+                  work.known() > 0 ? fmt::format("; {} of the results are from before", work.known()) : "");
   return report(options, {suite.stem().string(), {}, each}, files, remark, [](const CaseResult&) {});
 }
 

@@ -39,7 +39,8 @@ TEST(Shard, EveryPlaceIsInOneOfThem) {
   }
 }
 
-// Catches: a shard counted from 0 where it counts from 1; an array with gaps, whose cases nobody runs.
+// Catches: a run that takes the index of Kubernetes, which begins at 0, for one that begins at 1; an array of
+// Slurm that lacks a task, so that no task runs the cases of that shard.
 TEST(Shard, IsGivenOrReadFromTheEnvironment) {
   EXPECT_EQ(problem_of("2/4", {}), "2 of 4");
   EXPECT_EQ(problem_of("auto", {{"CI_NODE_INDEX", "1"}, {"CI_NODE_TOTAL", "3"}}), "1 of 3");

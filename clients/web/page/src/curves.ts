@@ -18,6 +18,21 @@ export interface Curves {
   lines: Line[];
 }
 
+/** Shows the points of a line in their order; `begins`: the line does not come from the point before. */
+export function eachPoint({ x, y }: Line, see: (x: number, y: number, begins: boolean) => void): void {
+  let begins = true;
+  for (let i = 0; i < y.length; ++i) {
+    const value = y[i];
+    if (value === undefined) continue;
+    if (value === null || Number.isNaN(value) || Number.isNaN(x[i])) {
+      begins = true;
+      continue;
+    }
+    see(x[i], value, begins);
+    begins = false;
+  }
+}
+
 /** The least and the greatest value in each of `count` columns. */
 export function timeCurves(view: View, channels: Channel[], periodS: number, count: number): Curves {
   const start = (view.from - view.origin) * periodS;

@@ -1,5 +1,5 @@
 /** Files of what the scope shows. */
-import { extentOf, Line } from "./curves";
+import { eachPoint, extentOf, Line } from "./curves";
 import { lowerBound } from "./history";
 import { plain } from "./numbers";
 import { Channel, View } from "./view";
@@ -59,19 +59,9 @@ function paneSvg({ x, labels, lines }: SvgPane): string {
     + `<text x="${(kLeft + right) / 2}" y="${bottom + 34}" text-anchor="middle">${escaped(labels.x)}</text>${drawn.join("")}`;
 }
 
-function pathOf({ x, y }: Line, xOf: (value: number) => number, yOf: (value: number) => number): string {
+function pathOf(line: Line, xOf: (value: number) => number, yOf: (value: number) => number): string {
   let path = "";
-  let isUp = true;
-  for (let i = 0; i < y.length; ++i) {
-    const value = y[i];
-    if (value === undefined) continue;
-    if (value === null || Number.isNaN(value) || Number.isNaN(x[i])) {
-      isUp = true;
-      continue;
-    }
-    path += `${isUp ? "M" : "L"}${xOf(x[i]).toFixed(1)} ${yOf(value).toFixed(1)}`;
-    isUp = false;
-  }
+  eachPoint(line, (x, y, begins) => path += `${begins ? "M" : "L"}${xOf(x).toFixed(1)} ${yOf(y).toFixed(1)}`);
   return path;
 }
 

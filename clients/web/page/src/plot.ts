@@ -1,6 +1,6 @@
 /** Curves in a picture with axes. uPlot draws the axes and the cursor of the mouse. */
 import uPlot from "uplot";
-import { Curves, extentOf, Line } from "./curves";
+import { Curves, eachPoint, extentOf, Line } from "./curves";
 
 export interface Look {
   height: number;
@@ -127,26 +127,18 @@ export class Plot {
 }
 
 /** Draws a line; points less than half a pixel away from the last one are left out. */
-function stroke(context: CanvasRenderingContext2D, { x, y }: Line, xOf: (value: number) => number, yOf: (value: number) => number): void {
+function stroke(context: CanvasRenderingContext2D, line: Line, xOf: (value: number) => number, yOf: (value: number) => number): void {
   context.beginPath();
-  let isUp = true;
   let lastX = 0;
   let lastY = 0;
-  for (let i = 0; i < y.length; ++i) {
-    const value = y[i];
-    if (value === undefined) continue;
-    if (value === null || Number.isNaN(value) || Number.isNaN(x[i])) {
-      isUp = true;
-      continue;
-    }
-    const atX = xOf(x[i]);
-    const atY = yOf(value);
-    if (isUp) context.moveTo(atX, atY);
-    else if (Math.abs(atX - lastX) < 0.5 && Math.abs(atY - lastY) < 0.5) continue;
+  eachPoint(line, (x, y, begins) => {
+    const atX = xOf(x);
+    const atY = yOf(y);
+    if (begins) context.moveTo(atX, atY);
+    else if (Math.abs(atX - lastX) < 0.5 && Math.abs(atY - lastY) < 0.5) return;
     else context.lineTo(atX, atY);
-    isUp = false;
     [lastX, lastY] = [atX, atY];
-  }
+  });
   context.stroke();
 }
 
