@@ -7,6 +7,7 @@
 #include "clients/command/demo/demo_line.hpp"
 #include "clients/command/doctor/doctor_line.hpp"
 #include "clients/command/experiment/experiment_line.hpp"
+#include "clients/command/fmu/fmu_line.hpp"
 #include "clients/command/identify/identify_line.hpp"
 #include "clients/command/motor/motor_line.hpp"
 #include "clients/command/recording/recording_line.hpp"
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
   add_convert_commands(line);
   add_datasheet_commands(line);
   add_can_commands(line);
+  add_fmu_command(line);
   add_doctor_command(line);
   add_test_command(line);
   add_web_command(line);

@@ -5,6 +5,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "protocols/text.hpp"
+#include "server/config/sections/plausible.hpp"
 
 namespace drivebench {
 namespace {
@@ -27,6 +28,13 @@ BenchConfig in_lockstep(BenchConfig config) {
 }
 
 }  // namespace
+
+BenchConfig load_inproc_config(const std::filesystem::path& bench_file) {
+  std::vector<ConfigProblem> odd;
+  BenchConfig config = load_config(bench_file, odd);
+  if (!odd.empty()) throw ConfigError(std::move(odd));
+  return config;
+}
 
 InprocBench::InprocBench(const BenchConfig& config) : config_(in_lockstep(config)), bench_(config_.setup) {
   schedule_events(config_, bench_);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@
 #include "server/config/config.hpp"
 
 namespace drivebench {
+
+/// The configuration in a bench file. Throws ConfigError, for implausible values as well.
+BenchConfig load_inproc_config(const std::filesystem::path& bench_file);
 
 /// A bench with one controller in the same process, without clock, thread or socket: what a lockstep server
 /// is to its first session. The same requests give the same samples, refusals and hash.

@@ -1,11 +1,7 @@
 #include <exception>
 #include <memory>
 #include <string>
-#include <utility>
-#include <vector>
 
-#include "server/config/config.hpp"
-#include "server/config/sections/plausible.hpp"
 #include "server/inproc/inproc_bench.hpp"
 
 namespace drivebench {
@@ -13,10 +9,7 @@ namespace {
 
 abi::Backend* open_bench(const char* bench_file, std::string& error) noexcept {
   try {
-    std::vector<ConfigProblem> odd;
-    const BenchConfig config = load_config(bench_file, odd);
-    if (!odd.empty()) throw ConfigError(std::move(odd));
-    return std::make_unique<InprocBench>(config).release();
+    return std::make_unique<InprocBench>(load_inproc_config(bench_file)).release();
   } catch (const std::exception& failure) {
     error = failure.what();
     return nullptr;

@@ -12,21 +12,6 @@
 /// Cases that are ready to run: their benches are composed, opened once and checked.
 namespace drivebench::command {
 
-/// A private temporary folder, removed at the end.
-class TemporaryFolder {
- public:
-  /// Throws std::system_error.
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::filesystem::path& path() const noexcept { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 struct PreparedCase {
   const regression::Case* what;
   std::filesystem::path bench_file;  ///< composed

@@ -12,6 +12,7 @@
 #include "clients/command/common/installation.hpp"
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
+#include "clients/command/common/temporary_folder.hpp"
 #include "clients/command/regression/html_report.hpp"
 #include "clients/command/regression/stored_results.hpp"
 #include "clients/command/regression/suite_run.hpp"
