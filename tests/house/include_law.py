@@ -38,7 +38,7 @@ SYSTEM = {
 # Rooms that stand in an order, low to high; in all other folders it is enough that the rooms form no circle. The files
 # beside the rooms stand above them all.
 ORDERED = {
-    "server": ("host", "bench", "config", "inproc", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
+    "server": ("host", "bench", "config", "inproc", "fmu", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
     "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
                         "salient", "presets"),
     "clients/identification": ("math", "data", "motors", "refinement", "wiring"),

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "clients/archive/zip_writer.hpp"
+#include "clients/command/common/composed_file.hpp"
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
 #include "clients/command/common/json.hpp"
@@ -49,11 +50,12 @@ std::string bytes_of(const fs::path& file) {
   return bytes;
 }
 
-void write(const fs::path& file, const std::string& bytes) {
-  std::ofstream out(file, std::ios::binary);
-  out << bytes;
-  out.close();
-  if (!out) throw std::runtime_error("cannot write " + file.string());
+client::Bench opened(const fs::path& composed) {
+  try {
+    return client::Bench("inproc:" + composed.string());
+  } catch (const client::Error& refusal) {
+    throw UsageError(about_the_bench(refusal.what(), composed));
+  }
 }
 
 /// Which axes have a lease of their own.
@@ -81,8 +83,8 @@ Unit unit_of(const fs::path& bench_file, fmu::Fmi version) {
   const std::vector<archive::Entry> resources = fmu::resources_of(bench_file);
   const TemporaryFolder folder;
   for (const archive::Entry& file : resources)
-    write(folder.path() / file.name, file.bytes);
-  client::Bench bench("inproc:" + (folder.path() / "bench.toml").string());
+    write_file(folder.path() / file.name, file.bytes);
+  client::Bench bench = opened(folder.path() / "bench.toml");
   const auto variables = fmi::variables_of(bench.describe(), commanded_axes(bench));
 
   const std::string name = bench.describe().name;
@@ -112,8 +114,6 @@ int run_fmu(const FmuOptions& options) {
       fmt::print("fmu: {} as FMI {}.0 for co-simulation, {} variables, to {}\n", unit.name, options.fmi,
                  unit.variables, out);
     }
-  } catch (const client::Error& refusal) {
-    throw UsageError(refusal.what());
   } catch (const archive::ZipError& failure) {
     throw UsageError(failure.what());
   }

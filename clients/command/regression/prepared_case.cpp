@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 #include <system_error>
 
+#include "clients/command/common/composed_file.hpp"
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/installation.hpp"
 #include "clients/command/control/control_axis.hpp"
@@ -48,25 +48,10 @@ std::uint64_t end_tick_of(const Case& c, double period_s, std::uint32_t arming_c
   return static_cast<std::uint64_t>(run->planned_samples()) + (arming_commands > 1 ? arming_commands : 0);
 }
 
-void write(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw std::runtime_error("cannot write " + file.string());
-}
-
-/// What the bench says about the composed file, which its reader never sees.
-std::string about_the_case(std::string sentence, const fs::path& composed) {
-  const std::string path = composed.string();
-  for (std::size_t at = sentence.find(path); at != std::string::npos; at = sentence.find(path, at))
-    sentence.replace(at, path.size(), "the composed bench");
-  return sentence;
-}
-
 PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& problems) {
   const fs::path bench = bench_file_of(c);
-  write(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
-                          fs::path(c.file).filename().string(), regression::composed_bench(c, bench)));
+  write_file(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
+                               fs::path(c.file).filename().string(), regression::composed_bench(c, bench)));
   const InprocAxis axis(file.string(), c.device.axis);
   PreparedCase prepared{.what = &c, .bench_file = file, .facts = facts_of(axis.bench())};
   std::optional<control::Run> run;
@@ -112,7 +97,7 @@ std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path
       for (const ConfigProblem& each : error.problems())
         problems.add(each.file, each.line, each.key, each.rule);
     } catch (const UsageError& error) {
-      problems.add(c.file, c.line, c.name + ":", about_the_case(error.what(), file));
+      problems.add(c.file, c.line, c.name + ":", about_the_bench(error.what(), file));
     }
     if (problems.full()) break;
   }
