@@ -3,9 +3,9 @@
 #include <bench.pb.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <iterator>
 #include <map>
 #include <optional>
 #include <span>
@@ -20,11 +20,15 @@
 #include "clients/command/common/signals.hpp"
 #include "clients/command/recording/export_can.hpp"
 #include "clients/command/recording/recording_file.hpp"
+#include "clients/command/recording/tables/sample_table.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::command {
 namespace {
+
+/// Bytes between two writes of text and two updates of the progress.
+constexpr std::size_t kPiece = 1U << 16U;
 
 /// The named signals; without names all but the tick, which begins every row.
 std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
@@ -36,29 +40,8 @@ std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names)
   return signals;
 }
 
-void append_row(std::string& text, const Sample& sample, std::uint64_t time_ns,
-                const std::vector<const Signal*>& signals) {
-  append_time(text, sample.tick, time_ns);
-  auto out = std::back_inserter(text);
-  for (const Signal* signal : signals) {
-    switch (signal->type) {
-      case SignalType::kUnsigned:
-        fmt::format_to(out, ",{}", sample.*signal->as_unsigned);
-        break;
-      case SignalType::kSigned:
-        fmt::format_to(out, ",{}", sample.*signal->as_signed);
-        break;
-      case SignalType::kReal:
-        fmt::format_to(out, ",{}", sample.*signal->as_real);  // the shortest text that reads back equal
-        break;
-    }
-  }
-  text += '\n';
-}
-
 struct Exported {
   std::string axis;
-  bool has_header = false;
   std::uint64_t rows = 0;  ///< or frames
   std::string other_axes;
   std::string problem;  ///< of the recording; empty: none
@@ -136,45 +119,39 @@ std::string problem_of(const McapSeries& reader, const End& end) {
   return {};
 }
 
-/// Gives every readable message to `take`, and writes the text that `take` leaves in `text` to the file.
+/// Gives every readable message to `take`.
 template <class Take>
-End for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
-                     std::string& text, Output& out, Take take) {
-  constexpr std::size_t kPiece = 1U << 16;
+End for_each_message(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size, Take take) {
   Progress progress("export");
   std::uint64_t seen_bytes = 0;
+  std::uint64_t shown_bytes = 0;
   End end;
   for (McapMessage message; reader.next(message);) {
     seen_bytes += message.payload.size() + 31;  // a message record's own bytes, for the progress only
     end.look_at(reader.reader(), message);
     take(message);
-    if (text.size() <= kPiece) continue;
-    out.write(text);
-    text.clear();
+    if (seen_bytes - shown_bytes < kPiece) continue;
+    shown_bytes = seen_bytes;
     progress.update(static_cast<double>(seen_bytes) / static_cast<double>(file_size), options.recording);
   }
   return end;
 }
 
 /// Exports every readable sample, row by row.
-Exported export_rows(McapSeries& reader, const ExportOptions& options,
-                     const std::vector<const Signal*>& signals, std::uint64_t file_size, Output& out) {
+Exported export_rows(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
+                     SampleTable& table) {
   Exported done;
   AxisChannels channels(options.axis);
-  std::string text;
-  const End end = for_each_message(reader, options, file_size, text, out, [&](const McapMessage& message) {
+  const End end = for_each_message(reader, options, file_size, [&](const McapMessage& message) {
     if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
-    if (!done.has_header) text += csv_header(signals);  // only above a first row
-    done.has_header = true;
     const std::optional<Sample> sample = decode_sample(message.payload);
     if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
-    append_row(text, *sample, message.header.log_time_ns, signals);
+    table.add(*sample, message.header.log_time_ns);
     ++done.rows;
   });
-  out.write(text);
-  out.flush();
-  done.problem = problem_of(reader, end);
   done.axis = channels.axis();
+  table.finish(done.axis);
+  done.problem = problem_of(reader, end);
   done.other_axes = channels.others();
   return done;
 }
@@ -196,8 +173,9 @@ link::CanAddress can_address_of(const ExportOptions& options) {
 }
 
 /// Exports the frames of all axes, or of the named one.
-Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files,
-                       Output& out) {
+Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files) {
+  check_suffix(options.out_file, {".log", ".txt"});
+  Output out(options.out_file);
   Exported done;
   CandumpText frames(can_address_of(options), is_lockstep(files));
   AxisChannels channels(options.axis);
@@ -220,7 +198,12 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
       frames.add(input, time_s);
     }
   };
-  const End end = for_each_message(reader, options, files.size(), frames.text(), out, take);
+  const End end = for_each_message(reader, options, files.size(), [&](const McapMessage& message) {
+    take(message);
+    if (frames.text().size() <= kPiece) return;
+    out.write(frames.text());
+    frames.text().clear();
+  });
   frames.finish();
   out.write(frames.text());
   out.flush();
@@ -231,23 +214,47 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
   return done;
 }
 
+/// Without those that are named twice, and without the tick, which every table has.
+Signals each_once(const Signals& signals) {
+  Signals once;
+  for (const Signal* signal : signals) {
+    if (signal->name != "tick" && std::ranges::find(once, signal) == once.end()) once.push_back(signal);
+  }
+  return once;
+}
+
+Exported export_table(McapSeries& reader, const ExportOptions& options, const Signals& signals,
+                      std::uint64_t file_size) {
+  if (options.format == "csv") {
+    check_suffix(options.out_file, {".csv", ".txt"});
+    Output out(options.out_file);
+    return export_rows(reader, options, file_size, *csv_table(out, signals));
+  }
+  const Signals columns = each_once(signals);
+  if (options.out_file.empty()) throw UsageError("--format " + options.format + " needs --out FILE");
+  if (options.format == "mat") {
+    check_suffix(options.out_file, {".mat", ".h5"});
+    return export_rows(reader, options, file_size, *mat_table(options.out_file, columns));
+  }
+  check_suffix(options.out_file, {".mf4"});
+  return export_rows(reader, options, file_size, *mdf_table(options.out_file, columns));
+}
+
 }  // namespace
 
 int run_export(const ExportOptions& options) {
-  const bool is_csv = options.format == "csv";
+  const bool is_table = options.format != "candump";
   const MappedSeries files = open_recording(options.recording);
   McapSeries reader(files.segments());
-  const std::vector<const Signal*> signals = chosen_signals(options.signals);
-  if (!is_csv) can_address_of(options);  // refuses wrong options before it creates the file
-  if (!is_csv && !options.signals.empty()) throw UsageError("--signals chooses columns of CSV");
+  const Signals signals = chosen_signals(options.signals);
+  if (!is_table) can_address_of(options);  // refuses wrong options before it creates the file
+  if (!is_table && !options.signals.empty()) throw UsageError("--signals chooses columns of a table");
   if (options.from_tick > options.to_tick) {
     throw UsageError(fmt::format("--from {} is behind --to {}", options.from_tick, options.to_tick));
   }
   check_files(reader, files, options);
-  check_suffix(options.out_file, {is_csv ? ".csv" : ".log", ".txt"});
-  Output out(options.out_file);
-  const Exported done = is_csv ? export_rows(reader, options, signals, files.size(), out)
-                               : export_frames(reader, options, files, out);
+  const Exported done =
+      is_table ? export_table(reader, options, signals, files.size()) : export_frames(reader, options, files);
 
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
   if (options.json) {
@@ -256,14 +263,14 @@ int run_export(const ExportOptions& options) {
         Json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}}
             .dump());
   } else {
-    fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_csv ? "samples" : "frames",
+    fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_table ? "samples" : "frames",
                done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);
   }
   if (!done.problem.empty()) {
     fmt::print(stderr, "drivebench: the recording is not whole: {}\n", done.problem);
     return kExitCutShort;
   }
-  if (is_csv && !done.other_axes.empty() && options.axis.empty()) {
+  if (is_table && !done.other_axes.empty() && options.axis.empty()) {
     fmt::print(stderr, "export: the recording also has {}; --axis chooses\n", done.other_axes);
   }
   return kExitOk;

@@ -15,9 +15,12 @@ void add_replay(CommandLine& line) {
 }
 
 void add_export(CommandLine& line) {
-  const auto [sub, o] = line.add<ExportOptions>("export", "a recording as CSV or as a CAN trace", run_export);
-  sub.add_option("--format", o.format, "csv: samples; candump: the frames that a CAN bus would have")
-      ->check(CLI::IsMember({"csv", "candump"}))
+  const auto [sub, o] =
+      line.add<ExportOptions>("export", "a recording as CSV, MATLAB, MDF or as a CAN trace", run_export);
+  sub.add_option(
+         "--format", o.format,
+         "csv, mat (MATLAB 7.3, which is HDF5), mdf (MDF 4.1): samples; candump: the frames of a CAN bus")
+      ->check(CLI::IsMember({"csv", "mat", "mdf", "candump"}))
       ->capture_default_str();
   sub.add_option("--interface", o.interface, "candump: name of the interface")->capture_default_str();
   sub.add_option("--node-base", o.node_base, "candump: node id of the first axis")

@@ -11,6 +11,8 @@ import unittest
 TESTS = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
+    import h5py
+    from mdf_file import MdfFile
     from wire_client import BENCHES, SERVER, Server, pb
 except ImportError as missing:
     print(f"skipped: {missing}")
@@ -79,6 +81,81 @@ class Recordings(unittest.TestCase):
             if field.name in row:
                 self.assertEqual(float(row[field.name]), float(getattr(last, field.name)), field.name)
         self.assertIn("speed_rad_s", row)
+
+
+class Tables(unittest.TestCase):
+    """Exports of a run, against its CSV."""
+
+    @classmethod
+    def setUpClass(cls):
+        temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(temporary.cleanup)
+        cls.folder = pathlib.Path(temporary.name)
+        cls.recording = cls.folder / "run.mcap"
+        text = (BENCHES / "servo.toml").read_text(encoding="utf-8") + LOAD
+        text = text.replace("../motors/", f"{BENCHES.parent / 'motors'}/")
+        with Server("--mode", "free", "--duration", "1.2", "--record", str(cls.recording), text=text) as server:
+            server.process.wait(timeout=60)
+        cls.export("csv", "run.csv")
+        with open(cls.folder / "run.csv", newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file))
+        cls.units = {column.split(" ")[0]: column.partition("[")[2].rstrip("]") for column in header}
+        cls.rows = [[float(value) for value in row] for row in rows]
+        cls.names = list(cls.units)
+
+    @classmethod
+    def export(cls, kind, name, *arguments):
+        done = run(DRIVEBENCH, "export", cls.recording, "--format", kind, "--out", cls.folder / name, *arguments)
+        if done.returncode != 0:
+            raise AssertionError(done.stderr)
+        return cls.folder / name
+
+    def column(self, name):
+        place = self.names.index(name)
+        return [row[place] for row in self.rows]
+
+    def test_hdf5_reads_the_matlab_file(self):
+        """Catches: a column that lost rows where its pieces meet, a transposed vector, a rounded value, a lost sign or
+        unit."""
+        with h5py.File(self.export("mat", "run.mat"), "r") as file:
+            self.assertEqual(set(file) - {"#refs#", "units"}, set(self.names))
+            for name in self.names:
+                self.assertEqual(file[name].shape, (1, 9601), name)
+                self.assertEqual([float(value) for value in file[name][0]], self.column(name), name)
+                unit = "".join(map(chr, file["units"][name][:, 0]))
+                self.assertEqual(unit, self.units[name] or {"tick": "1", "time_s": "s"}[name], name)
+            self.assertEqual(file["encoder_count"].attrs["MATLAB_class"], b"int64")
+            self.assertEqual(file["speed_rad_s"].attrs["MATLAB_class"], b"double")
+        self.assertEqual((self.folder / "run.mat").read_bytes()[:10], b"MATLAB 7.3")
+
+    def test_a_strict_reader_reads_the_mdf_file(self):
+        """Catches: a block that the standard forbids, a record that is shifted, a count that was not written at the end."""
+        mdf = MdfFile(self.export("mdf", "run.mf4"))
+        self.assertEqual((mdf.name, mdf.master, mdf.cycles), ("servo", "time_s", 9601))
+        self.assertEqual(set(mdf.columns), set(self.names))
+        for name in self.names:
+            self.assertEqual([float(value) for value in mdf.columns[name]], self.column(name), name)
+        self.assertEqual((mdf.units["speed_rad_s"], mdf.units["time_s"]), ("rad/s", "s"))
+
+    def test_tables_of_chosen_signals_and_ticks(self):
+        """Catches: --signals, --from and --to that only CSV obeys, a column that stands there twice."""
+        chosen = ("--signals", "tick,i_a_a", "--from", "10", "--to", "12")
+        mdf = MdfFile(self.export("mdf", "few.mf4", *chosen))
+        self.assertEqual((list(mdf.columns), mdf.columns["tick"]), (["time_s", "tick", "i_a_a"], [10, 11, 12]))
+        with h5py.File(self.export("mat", "few.h5", *chosen), "r") as file:
+            self.assertEqual(list(file["tick"][0]), [10, 11, 12])
+            self.assertEqual(set(file) - {"#refs#", "units"}, {"tick", "time_s", "i_a_a"})
+
+    def test_wrong_lines_are_refused_in_words(self):
+        """Catches: binary data on a terminal, and a file whose name promises another format."""
+        for arguments, sentence in ((("--format", "mat"), "--format mat needs --out FILE"),
+                                    (("--format", "mdf", "--out", "a.mat"), "must end with .mf4"),
+                                    (("--format", "mat", "--out", "a.csv"), "must end with .mat, .h5"),
+                                    (("--format", "mat", "--out", "none/a.mat"), "cannot write none/a.mat"),
+                                    (("--format", "mdf", "--out", "none/a.mf4"), "cannot write none/a.mf4")):
+            done = run(DRIVEBENCH, "export", self.recording, *arguments, cwd=self.folder)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(sentence, done.stderr)
 
 
 class Protocol(unittest.TestCase):
