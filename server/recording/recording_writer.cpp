@@ -13,6 +13,7 @@
 #include "protocols/descriptor_set.hpp"
 #include "protocols/mcap/mcap_series.hpp"
 #include "protocols/sample_codec.hpp"
+#include "protocols/signals/catalogue.hpp"
 #include "server/host/build_id.hpp"
 #include "server/recording/recording.hpp"
 
@@ -46,6 +47,14 @@ constexpr std::size_t kMaxRemarkBytes = 1000;
 /// Errors that a new file would have as well.
 bool is_of_space(int error) noexcept {
   return error == ENOSPC || error == EFBIG || error == EDQUOT;
+}
+
+/// The unit of each field of a sample, for viewers.
+McapMap units_of_signals() {
+  McapMap units;
+  for (const Signal& signal : kSignals)
+    units.emplace("unit." + std::string(signal.name), signal.unit);
+  return units;
 }
 
 }  // namespace
@@ -108,7 +117,7 @@ void RecordingWriter::begin(const std::string& path, std::unique_ptr<RecordingFi
   inputs_ = mcap_->add_channel(kInputTopic, schema("drivebench.v1.Input"), "protobuf");
   verdict_ = mcap_->add_channel(kVerdictTopic, schema("drivebench.v1.Verdict"), "protobuf");
   for (const AxisConfig& axis : config_.axes)
-    samples_.push_back(mcap_->add_channel(sample_topic(axis.name), sample, "protobuf"));
+    samples_.push_back(mcap_->add_channel(sample_topic(axis.name), sample, "protobuf", units_of_signals()));
 }
 
 /// Runs an action that fails if the disk or the memory does.

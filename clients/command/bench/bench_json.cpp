@@ -139,6 +139,7 @@ std::string sample_json(const Sample& sample, const v1::BenchDescription& bench,
   Json out = {{"bench", bench.name()},
               {"axis", axis},
               {"dropped", dropped},
+              {"tick", sample.tick},
               {"time_s", static_cast<double>(sample.tick) * bench.period_s()}};
   for (const Signal* signal : signals)
     out[std::string(signal->name)] = value_as_json(*signal, sample);

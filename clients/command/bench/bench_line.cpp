@@ -14,6 +14,10 @@ void add_serve(CommandLine& line) {
   CLI::App& sub = *line.app().add_subcommand(
       "serve", "start drivebench-server: serve [BENCH.toml or name, default servo] [its arguments]");
   sub.prefix_command();
+  sub.footer(
+      "Examples: drivebench serve bm500; drivebench serve my-bench.toml --mode realtime --record run.mcap\n"
+      "This is what people use. It becomes drivebench-server, which services and containers start, with the same\n"
+      "arguments behind the path of a bench file; drivebench-server --help lists them.");
   line.when_named(sub, [&sub] { return run_serve(sub.remaining()); });
 }
 

@@ -62,15 +62,13 @@ void refuse_latched_faults(link::AxisLink& bench) {
 /// Leases the axis and brings it to rest without latched faults, or throws with the cure.
 void prepare(link::AxisLink& bench, const ControlOptions& options, double counts_per_revolution) {
   bench.acquire();
-  if (options.clear_faults) {
-    bench.clear_faults();
-  } else {
-    refuse_latched_faults(bench);
-  }
+  // In lockstep no tick may have run since a fault came or was cleared: the newest sample is of before.
+  const bool is_lockstep = bench.bench().mode() == v1::MODE_LOCKSTEP;
+  if (options.clear_faults) bench.clear_faults();
+  if (!options.clear_faults && !is_lockstep) refuse_latched_faults(bench);
   apply_settings(bench, options.settings);
   let_rest(bench, counts_per_revolution);
-  // In lockstep no tick may have run since a fault came, so that no sample showed it before.
-  if (bench.bench().mode() == v1::MODE_LOCKSTEP) refuse_latched_faults(bench);
+  if (is_lockstep) refuse_latched_faults(bench);
 }
 
 /// Opened before the move, so that a missing folder does not cost the report.
@@ -125,28 +123,17 @@ void print_report(const ControlReport& r) {
   row("exchange max", "{:.1f}", r.exchange_max_us, what);
 }
 
-}  // namespace
-
-int run_control(const ControlOptions& options) {
-  if (options.list || options.gains) return run_list(options);
-  const control::Preset& preset = chosen_preset(options.preset);
-  control::Run run = made(preset, options.overrides);
-  const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
-  const v1::BenchDescription& description = axis->bench();
-  check_fit(*axis, preset, options, run.timing().sample_rate_hz);
-  if (!options.loads.empty() && !axis->can_set_load()) {
-    throw UsageError("--load needs a tcp:, tls: or unix: link");
-  }
+/// One move, from rest to its report.
+int run_once(link::AxisLink& axis, const control::Preset& preset, const ControlOptions& options) {
+  const v1::BenchDescription& description = axis.bench();
   std::ofstream csv = opened(options.csv_file);
-
-  catch_interrupts();
-  const double counts = counts_per_revolution(description, axis->axis(), needs_of(preset, options.overrides));
-  prepare(*axis, options, counts);
-  const double load_before_nm = options.loads.empty() ? 0.0 : axis->newest().load_nm;
-  ControlRun done = run_over(*axis, std::move(run), options.loads, counts);
+  const double counts = counts_per_revolution(description, axis.axis(), needs_of(preset, options.overrides));
+  prepare(axis, options, counts);
+  const double load_before_nm = options.loads.empty() ? 0.0 : axis.newest().load_nm;
+  ControlRun done = run_over(axis, made(preset, options.overrides), options.loads, counts);
   try {
-    if (!options.loads.empty()) axis->set_load({.load_nm = load_before_nm});
-    axis->release();
+    if (!options.loads.empty()) axis.set_load({.load_nm = load_before_nm});
+    axis.release();
   } catch (const link::RefusalError&) {
     // The lease may have ended; the report gives the reason.
   } catch (const link::LinkError& error) {
@@ -156,7 +143,7 @@ int run_control(const ControlOptions& options) {
   ControlReport report = summary_of(done, description.period_s());
   report.bench = description.name();
   report.mode = link::name_of(description.mode());
-  report.axis = description.axes(static_cast<int>(axis->axis())).name();
+  report.axis = description.axes(static_cast<int>(axis.axis())).name();
   report.preset = preset.name;
   if (options.json) {
     fmt::print("{}\n", control_json(report));
@@ -164,10 +151,33 @@ int run_control(const ControlOptions& options) {
     print_report(report);
   }
   write_csv(std::move(csv), options, done);
-  if (report.failure.empty()) return kExitOk;
   std::fflush(stdout);
-  fmt::print(stderr, "drivebench: the run did not end: {}\n", report.failure);
-  return kExitFailed;
+  if (!report.failure.empty()) {
+    fmt::print(stderr, "drivebench: the run did not end: {}\n", report.failure);
+    return kExitFailed;
+  }
+  const std::vector<std::string> missed = broken(options.limits, control_json(report));
+  for (const std::string& sentence : missed)
+    fmt::print(stderr, "drivebench: {}\n", sentence);
+  return missed.empty() ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+int run_control(const ControlOptions& options) {
+  if (options.list || options.gains) return run_list(options);
+  const control::Preset& preset = chosen_preset(options.preset);
+  const double sample_rate_hz = made(preset, options.overrides).timing().sample_rate_hz;
+  const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
+  check_fit(*axis, preset, options, sample_rate_hz);
+  if (!options.loads.empty() && !axis->can_set_load()) {
+    throw UsageError("--load needs a tcp:, tls: or unix: link");
+  }
+  catch_interrupts();
+  for (std::uint32_t runs = 1;; ++runs) {
+    const int code = run_once(*axis, preset, options);
+    if (code != kExitOk || runs == options.repeat || interrupted()) return code;
+  }
 }
 
 }  // namespace drivebench::command

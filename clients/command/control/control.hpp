@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "clients/command/common/link_choice.hpp"
+#include "clients/command/control/control_limits.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/control/gains/gains.hpp"
 
@@ -26,6 +28,8 @@ struct ControlOptions {
   std::vector<LoadAt> loads{};
   std::vector<ParameterSetting> settings{};
   bool clear_faults = false;
+  std::vector<Limit> limits{};  ///< for the numbers of the report
+  std::uint32_t repeat = 1;     ///< times; 0: until it is interrupted
 };
 int run_control(const ControlOptions& options);
 

@@ -115,6 +115,12 @@ void add_control(CommandLine& line) {
   add_parsed(sub, "--set", o.settings, parse_setting,
              "NAME=VALUE: write a parameter of the axis first; it stays");
   sub.add_flag("--clear", o.clear_faults, "clear latched faults first");
+  add_parsed(sub, "--expect", o.limits, parse_limit,
+             "NAME<=NUMBER or NAME>=NUMBER: exit code 1 if a number of the report (--json) is beyond it");
+  sub.add_option("--repeat", o.repeat, "make the move so many times, each with its report; 0: until Ctrl-C")
+      ->check(not_negative())
+      ->capture_default_str()
+      ->excludes("--csv");
 }
 
 void add_plot(CommandLine& line) {

@@ -42,8 +42,8 @@ class Recordings(unittest.TestCase):
         return package / "read_recording.mjs"
 
     def test_mcap_core_reads_our_recordings(self):
-        """Catches: a file that only our own reader understands; wrong counts, times or schemas; a sample that protobuf or
-        the CSV export reads differently from the recorder."""
+        """Catches: a file that only our own reader understands; wrong counts, times, schemas or units; a sample that protobuf
+        or the CSV export reads differently from the recorder."""
         reader = self.install_mcap_core()
         recording = self.folder / "run.mcap"
         text = (BENCHES / "servo.toml").read_text(encoding="utf-8") + LOAD
@@ -60,6 +60,9 @@ class Recordings(unittest.TestCase):
         self.assertEqual(channels["/servo/sample"]["messages"], 8001)
         self.assertEqual(channels["/servo/sample"]["last_log_time"], str(10**9))
         self.assertEqual(channels["/inputs"]["messages"], 1)
+        units = channels["/servo/sample"]["metadata"]
+        self.assertEqual(set(units), {f"unit.{field.name}" for field in pb.Sample.DESCRIPTOR.fields})
+        self.assertEqual((units["unit.speed_rad_s"], units["unit.tick"]), ("rad/s", "1"))
         self.assertEqual([a["name"] for a in found["attachments"]], ["bench.toml"])
 
         last = pb.Sample.FromString(bytes.fromhex(found["last"]["/servo/sample"]))

@@ -23,7 +23,7 @@ from own_network import in_own_network
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, SERVER, guarded
 
 READMES = ("README.md", "server/README.md", "clients/README.md", "clients/control/README.md", "clients/python/README.md",
-           "clients/regression/README.md", "protocols/can/README.md", "protocols/modbus/README.md")
+           "clients/regression/README.md", "clients/fmu/README.md", "protocols/can/README.md", "protocols/modbus/README.md")
 PROGRAMS = ("drivebench", "drivebench-server")
 
 # Lines that are not run, and why.

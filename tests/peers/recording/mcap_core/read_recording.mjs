@@ -20,8 +20,15 @@ class Summary {
     this.schemas.set(id, { name, encoding });
   }
 
-  addChannel({ id, topic }) {
-    if (!this.channels.has(id)) this.channels.set(id, { topic, messages: 0, first_log_time: null, last_log_time: null });
+  addChannel({ id, topic, metadata }) {
+    if (this.channels.has(id)) return;
+    this.channels.set(id, {
+      topic,
+      messages: 0,
+      first_log_time: null,
+      last_log_time: null,
+      metadata: Object.fromEntries(metadata),
+    });
   }
 
   addMessage({ channelId, logTime, data }) {
