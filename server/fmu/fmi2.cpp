@@ -86,6 +86,7 @@ std::unique_ptr<Unit> opened(String name, Kind kind, String token, String resour
 
 }  // namespace
 
+// NOLINTBEGIN(readability-identifier-naming): the names are those of the standard
 extern "C" {
 
 #define FMI2 __attribute__((visibility("default")))
@@ -223,3 +224,4 @@ FMI2 Status fmi2GetStringStatus(Component component, int, String*) {
 }
 
 }  // extern "C"
+// NOLINTEND(readability-identifier-naming)

@@ -97,6 +97,7 @@ Status set_all(Instance instance, std::span<const Reference> references, const V
 
 }  // namespace
 
+// NOLINTBEGIN(readability-identifier-naming): the names are those of the standard
 extern "C" {
 
 #define FMI3 __attribute__((visibility("default")))
@@ -157,6 +158,7 @@ FMI3 Status fmi3Reset(Instance instance) {
   return guarded(instance, [](Unit& unit) { return unit.told(unit.bench->reset()); });
 }
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a type has no parentheses
 #define FMI3_VARIABLES(Name, Value)                                                            \
   FMI3 Status fmi3Get##Name(Instance instance, const Reference* references, std::size_t count, \
                             Value* values, std::size_t value_count) {                          \
@@ -189,6 +191,7 @@ FMI3_NO_VARIABLES(UInt32, std::uint32_t)
 FMI3_NO_VARIABLES(Boolean, bool)
 FMI3_NO_VARIABLES(String, String)
 #undef FMI3_NO_VARIABLES
+// NOLINTEND(bugprone-macro-parentheses)
 
 FMI3 Status fmi3GetBinary(Instance instance, const Reference*, std::size_t count, std::size_t*,
                           const std::uint8_t**, std::size_t) {
@@ -273,3 +276,4 @@ FMI3_NOT_THERE(fmi3GetNumberOfContinuousStates, "model exchange")
 #undef FMI3_NOT_THERE
 
 }  // extern "C"
+// NOLINTEND(readability-identifier-naming)

@@ -38,7 +38,7 @@ fs::path library_file() {
   }
   link_map* place = nullptr;
   ::dlinfo(library, RTLD_DI_LINKMAP, static_cast<void*>(&place));
-  const fs::path file = place->l_name;
+  fs::path file = place->l_name;
   ::dlclose(library);
   return file;
 }

@@ -1,3 +1,4 @@
+#include <H5Epublic.h>
 #include <fmt/format.h>
 #include <matio.h>
 
@@ -38,6 +39,7 @@ class MatTable final : public SampleTable {
       columns_.push_back(
           {.name = std::string(signal->name), .unit = std::string(signal->unit), .type = signal->type});
     }
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // else HDF5 prints its own pages
     file_.reset(Mat_CreateVer(file.c_str(), "MATLAB 7.3 MAT-file, written by drivebench", MAT_FT_MAT73));
     if (!file_) throw UsageError(fmt::format("cannot write {}", file));
     write_units();
@@ -53,7 +55,7 @@ class MatTable final : public SampleTable {
 
   void finish(const std::string&) override {
     if (!columns_[0].words.empty()) write();
-    file_.reset();
+    check(Mat_Close(file_.release()) == 0);
   }
 
  private:
