@@ -82,13 +82,13 @@ class Refused(Exception):
 class Browser(Client):
     """A session with the bench in a WebSocket."""
 
-    def __init__(self, gateway, hello, token, receive_buffer, headers):
+    def __init__(self, gateway, hello, token, receive_buffer, headers, path="/bench"):
         sock = gateway.raw(receive_buffer)
         scheme = "https" if gateway.tls else "http"
         fields = {"Host": f"127.0.0.1:{gateway.port}", "Origin": f"{scheme}://127.0.0.1:{gateway.port}", "Upgrade": "websocket",
                   "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
                   "Sec-WebSocket-Key": base64.b64encode(os.urandom(16)).decode(), **headers}
-        lines = ["GET /bench HTTP/1.1", *(f"{name}: {value}" for name, value in fields.items() if value is not None)]
+        lines = [f"GET {path} HTTP/1.1", *(f"{name}: {value}" for name, value in fields.items() if value is not None)]
         sock.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
         head = b""
         while not head.endswith(b"\r\n\r\n"):
@@ -138,16 +138,19 @@ class Browser(Client):
         while len(self.buffer) < count:
             opcode, data = self.read_frame()
             if opcode == CLOSE:
-                if len(data) >= 2:
-                    (self.close_code,) = struct.unpack(">H", data[:2])
-                    self.close_reason = data[2:].decode()
-                raise Closed
+                self.closed_by(data)
             if opcode == PING:
                 self.send_frame(PONG, data)
             else:
                 self.buffer += data
         data, self.buffer = self.buffer[:count], self.buffer[count:]
         return data
+
+    def closed_by(self, data):
+        if len(data) >= 2:
+            (self.close_code,) = struct.unpack(">H", data[:2])
+            self.close_reason = data[2:].decode()
+        raise Closed
 
     def read_frame(self):
         first, second = self.read_exactly(2)

@@ -30,6 +30,7 @@ int run_web(const WebOptions& options) {
   gateway.certificate = options.certificate;
   gateway.key = options.key;
   if (!options.browser_token.empty()) gateway.browser_token = token_in(options.browser_token);
+  gateway.foxglove_origins = options.origins;
   gateway.page = find_page();
   try {
     gateway.listen = web::parse_listen_address(options.listen);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "clients/command/common/link_choice.hpp"
 
@@ -10,9 +11,10 @@ struct WebOptions {
   LinkChoice link{};
   bool json = false;
   std::string listen = "127.0.0.1:7380";
-  std::string certificate{};    ///< a file, PEM
-  std::string key{};            ///< a file, PEM
-  std::string browser_token{};  ///< a file with the token that browsers must show
+  std::string certificate{};           ///< a file, PEM
+  std::string key{};                   ///< a file, PEM
+  std::string browser_token{};         ///< a file with the token that browsers must show
+  std::vector<std::string> origins{};  ///< whose pages may open Foxglove's WebSocket
 };
 int run_web(const WebOptions& options);
 

@@ -13,6 +13,9 @@ void add_web_command(CommandLine& line) {
   sub.add_option("--key", o.key, "TLS: private key, PEM")->type_name("FILE");
   sub.add_option("--browser-token", o.browser_token, "file with the token that browsers must show")
       ->type_name("FILE");
+  sub.add_option("--allow-origin", o.origins,
+                 "a site whose page may read through Foxglove's WebSocket, such as https://app.foxglove.dev")
+      ->type_name("ORIGIN");
 }
 
 }  // namespace drivebench::command

@@ -28,9 +28,12 @@ bool is_own_host(const Door& door, std::string_view host) {
   return std::ranges::find(own, lower_case(host)) != own.end();
 }
 
-bool is_own_origin(const Door& door, const Visitor& visitor) {
+bool is_allowed_origin(const Door& door, const Visitor& visitor) {
   if (visitor.origin.empty()) return true;  // no browser
-  return lower_case(visitor.origin) == (door.tls ? "https://" : "http://") + lower_case(visitor.host);
+  const std::string origin = lower_case(visitor.origin);
+  const auto is_same = [&origin](const std::string& allowed) { return lower_case(allowed) == origin; };
+  if (visitor.is_foxglove && std::ranges::any_of(door.foxglove_origins, is_same)) return true;
+  return origin == (door.tls ? "https://" : "http://") + lower_case(visitor.host);
 }
 
 /// What stands behind the colon of `USER:PASSWORD` in base64; empty if there is no such thing.
@@ -67,7 +70,7 @@ std::optional<DoorRefusal> refusal_of(const Door& door, const Visitor& visitor) 
     return DoorRefusal{
         .status = 421, .name = "host", .sentence = "the Host of the request is no name of this gateway"};
   }
-  if (!is_own_origin(door, visitor)) {
+  if (!is_allowed_origin(door, visitor)) {
     return DoorRefusal{
         .status = 403, .name = "origin", .sentence = "the Origin of the request is not this page"};
   }
@@ -77,6 +80,14 @@ std::optional<DoorRefusal> refusal_of(const Door& door, const Visitor& visitor) 
                        .sentence = "a token is needed: as Bearer, or as the password of any user"};
   }
   return std::nullopt;
+}
+
+bool is_origin(std::string_view text) {
+  if (text == "file://") return true;
+  const std::size_t colon = text.find("://");
+  if (colon == 0 || colon == std::string_view::npos) return false;
+  const std::string_view host = text.substr(colon + 3);
+  return !host.empty() && host.find_first_of("/?#@* ,") == std::string_view::npos;
 }
 
 }  // namespace drivebench::web

@@ -1,55 +1,43 @@
 #include "clients/web/gateway/gateway.hpp"
 
-#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
-#include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <csignal>
 #include <exception>
 #include <list>
-#include <memory>
 #include <optional>
-#include <span>
 #include <string_view>
 #include <vector>
 
 #include "clients/web/gateway/asio.hpp"
 #include "clients/web/gateway/door.hpp"
-#include "clients/web/gateway/frames.hpp"
+#include "clients/web/gateway/foxglove_session.hpp"
 #include "clients/web/gateway/page_files.hpp"
+#include "clients/web/gateway/relay.hpp"
 #include "clients/web/gateway/reports.hpp"
-#include "clients/web/gateway/send_queue.hpp"
 #include "clients/web/gateway/tls_door.hpp"
-#include "protocols/framing.hpp"
 
 namespace drivebench::web {
 namespace {
 
-namespace beast = boost::beast;
-namespace http = beast::http;
-namespace websocket = beast::websocket;
 using asio::use_awaitable;
 using asio::ip::tcp;
 using boost::system::error_code;
 using namespace std::chrono_literals;
 
-using Request = http::request<http::empty_body>;
 using Response = http::response<http::string_body>;
-using Stream = beast::basic_stream<asio::generic::stream_protocol>;
 
 constexpr std::size_t kMaxConnections = 256;
 constexpr std::size_t kMaxBrowsers = 64;
 constexpr std::size_t kMaxHeader = 8192;
 constexpr std::size_t kMinToken = 16;
 constexpr int kSendBuffer = 64 * 1024;
-constexpr auto kRequestTime = 10s;      // for a handshake, a request or an answer
-constexpr auto kSilence = 30s;          // of a browser that answers no ping
-constexpr auto kBetweenMessages = 4ms;  // to a browser: many small frames become one message
-constexpr auto kWrongToken = 500ms;     // before the answer to a wrong token
-constexpr std::string_view kWebSocketPath = "/bench";
+constexpr auto kWrongToken = 500ms;               // before the answer to a wrong token
+constexpr std::string_view kPagePath = "/bench";  // of the page's WebSocket
+constexpr std::string_view kFoxglovePath = "/";   // of Foxglove's, which a user enters without a path
 
 /// No inline script or style, nothing from elsewhere, and no page that frames this one.
 constexpr std::string_view kContentPolicy =
@@ -77,134 +65,9 @@ struct Shared {
   GatewayCounts counts{};
   std::list<Place> places{};
   asio::thread_pool connecting{4};
+  RelayContext relays{
+      .bench = options.bench, .bench_token = options.bench_token, .counts = counts, .connecting = connecting};
   asio::thread_pool probing{1};
-};
-
-/// A browser's WebSocket and its session with the bench. Three coroutines share it; the one that sends to the
-/// browser also closes.
-class Relay : public std::enable_shared_from_this<Relay> {
- public:
-  Relay(Shared& shared, Stream stream)
-      : shared_(shared),
-        browser_(std::move(stream)),
-        bench_(browser_.get_executor()),
-        pause_(browser_.get_executor()) {
-    ++shared_.counts.browsers;
-  }
-  ~Relay() { --shared_.counts.browsers; }
-  Relay(const Relay&) = delete;
-  Relay& operator=(const Relay&) = delete;
-
-  asio::awaitable<void> run(Request request) {
-    browser_.set_option(websocket::stream_base::timeout{kRequestTime, kSilence, true});
-    browser_.read_message_max(kFrameHeaderSize + kMaxRequestFrame);
-    browser_.binary(true);
-    browser_.auto_fragment(false);
-    co_await browser_.async_accept(request, use_awaitable);
-    const bool is_connected = co_await connect();
-    if (is_connected) {
-      const auto self = shared_from_this();
-      asio::co_spawn(
-          browser_.get_executor(), [self] { return self->to_bench(); }, asio::detached);
-      asio::co_spawn(
-          browser_.get_executor(), [self] { return self->from_bench(); }, asio::detached);
-      co_await to_browser();
-    }
-    error_code ignored;
-    co_await browser_.async_close(reason_, asio::redirect_error(use_awaitable, ignored));
-    bench_.close(ignored);
-  }
-
- private:
-  /// Connects to the bench on another thread, since that may wait.
-  asio::awaitable<bool> connect() {
-    const auto open = [address = shared_.options.bench]() -> asio::awaitable<int> {
-      const link::FileDescriptor socket = link::connect_to(link::parse_address(address), 3000ms);
-      co_return ::fcntl(socket.get(), F_DUPFD_CLOEXEC, 0);
-    };
-    try {
-      const int socket = co_await asio::co_spawn(shared_.connecting, open, use_awaitable);
-      bench_.assign(asio::generic::stream_protocol(AF_UNSPEC, 0), socket);
-      co_return true;
-    } catch (const std::exception& error) {
-      end(websocket::close_code::try_again_later, error.what());
-    }
-    co_return false;
-  }
-
-  /// Notes the reason for the browser; the first one counts.
-  void end(websocket::close_code code, std::string_view why) {
-    if (reason_.code == websocket::close_code::none) {
-      reason_ = websocket::close_reason(
-          code, beast::string_view(why.data(), std::min<std::size_t>(why.size(), 120)));
-    }
-    error_code ignored;
-    bench_.close(ignored);
-    pause_.cancel();
-  }
-
-  asio::awaitable<void> to_bench() {
-    error_code error;
-    for (beast::flat_buffer buffer; !error; buffer.clear()) {
-      co_await browser_.async_read(buffer, asio::redirect_error(use_awaitable, error));
-      if (error) break;
-      const std::span message(static_cast<const std::byte*>(buffer.data().data()), buffer.size());
-      const std::string_view problem =
-          browser_.got_binary() ? problem_of_frames(message) : "messages are binary";
-      if (!problem.empty()) {
-        ++shared_.counts.refusals["frame"];
-        end(websocket::close_code::protocol_error, problem);
-        co_return;
-      }
-      shared_.counts.bytes_to_bench += message.size();
-      co_await asio::async_write(bench_, buffer.data(), asio::redirect_error(use_awaitable, error));
-    }
-    if (error == websocket::error::message_too_big) ++shared_.counts.refusals["size"];
-    end(websocket::close_code::normal, "");
-  }
-
-  /// Reads on however slow the browser is: the server would end a session that takes nothing.
-  asio::awaitable<void> from_bench() {
-    FrameReader reader(kMaxReplyFrame);
-    bool is_taken = true;
-    for (error_code error; !error && is_taken && reader.error().empty();) {
-      const std::span<std::byte> space = reader.free_space();
-      reader.received(co_await bench_.async_read_some(asio::buffer(space.data(), space.size()),
-                                                      asio::redirect_error(use_awaitable, error)));
-      while (const auto frame = reader.next())
-        is_taken = queue_.add(*frame) && is_taken;
-      pause_.cancel();
-      if (error) break;
-      asio::steady_timer between(browser_.get_executor(), kBetweenMessages);
-      co_await between.async_wait(use_awaitable);
-    }
-    end(websocket::close_code::going_away,
-        is_taken ? "the bench has ended the session" : "the browser reads too slowly");
-  }
-
-  asio::awaitable<void> to_browser() {
-    std::vector<std::byte> message;
-    for (error_code error; !error;) {
-      queue_.take(message);
-      if (message.empty()) {
-        if (reason_.code != websocket::close_code::none) co_return;
-        pause_.expires_at(asio::steady_timer::time_point::max());
-        co_await pause_.async_wait(asio::redirect_error(use_awaitable, error));
-        error = {};
-        continue;
-      }
-      co_await browser_.async_write(asio::buffer(message), asio::redirect_error(use_awaitable, error));
-      shared_.counts.bytes_to_browsers += message.size();
-    }
-    end(websocket::close_code::normal, "");
-  }
-
-  Shared& shared_;
-  websocket::stream<Stream> browser_;
-  asio::generic::stream_protocol::socket bench_;
-  asio::steady_timer pause_;  // of to_browser(), until there is something to send
-  SendQueue queue_{};
-  websocket::close_reason reason_{websocket::close_code::none};
 };
 
 beast::string_view view(std::string_view text) {
@@ -232,6 +95,8 @@ Response answer_of(const Request& request, unsigned status, std::string_view typ
   return response;
 }
 
+const std::string kNoSubprotocol = fmt::format("a WebSocket here offers one of the subprotocols {}\n",
+                                               fmt::join(kFoxgloveSubprotocols, ", "));
 constexpr std::string_view kText = "text/plain; charset=utf-8";
 
 asio::awaitable<Response> report(Shared& shared, const Request& request, bool is_metrics) {
@@ -254,10 +119,36 @@ asio::awaitable<Response> respond(Shared& shared, const Request& request) {
     Response response = co_await report(shared, request, target == "/metrics");
     co_return response;
   }
-  if (target == kWebSocketPath) co_return answer_of(request, 426, kText, "a WebSocket\n");
+  if (target == kFoxglovePath && websocket::is_upgrade(request)) {
+    co_return answer_of(request, 400, kText, kNoSubprotocol);
+  }
+  if (target == kPagePath) co_return answer_of(request, 426, kText, "a WebSocket\n");
   const auto file = shared.files.find(target);
   if (file == shared.files.end()) co_return answer_of(request, 404, kText, "no such page\n");
   co_return answer_of(request, 200, file->second.type, file->second.bytes);
+}
+
+/// The WebSocket that a request asks for.
+struct Wish {
+  bool is_page = false;
+  std::string_view subprotocol{};  ///< of Foxglove
+
+  bool is_foxglove() const noexcept { return !subprotocol.empty(); }
+  bool is_socket() const noexcept { return is_page || is_foxglove(); }
+};
+
+Wish wish_of(const Request& request) {
+  if (!websocket::is_upgrade(request)) return {};
+  const std::string_view target = view(request.target());
+  if (target == kPagePath) return {.is_page = true, .subprotocol = {}};
+  if (target != kFoxglovePath) return {};
+  return {.is_page = false,
+          .subprotocol = foxglove_subprotocol(view(request[http::field::sec_websocket_protocol]))};
+}
+
+asio::awaitable<void> relay(RelayContext& context, Stream stream, const Request& request, const Wish& wish) {
+  return wish.is_page ? relay_page(context, std::move(stream), request)
+                      : relay_foxglove(context, std::move(stream), request, wish.subprotocol);
 }
 
 asio::awaitable<void> converse(Shared& shared, Stream stream, Place& place) {
@@ -271,17 +162,18 @@ asio::awaitable<void> converse(Shared& shared, Stream stream, Place& place) {
     place.close = nullptr;
     const Request request = parser.release();
     ++shared.counts.requests;
+    const Wish wish = wish_of(request);
     std::optional<DoorRefusal> refusal =
         refusal_of(shared.door, {.host = view(request[http::field::host]),
                                  .origin = view(request[http::field::origin]),
-                                 .authorization = view(request[http::field::authorization])});
-    const bool is_browser = websocket::is_upgrade(request) && view(request.target()) == kWebSocketPath;
-    if (!refusal && is_browser && shared.counts.browsers >= kMaxBrowsers) {
+                                 .authorization = view(request[http::field::authorization]),
+                                 .is_foxglove = wish.is_foxglove()});
+    if (!refusal && wish.is_socket() && shared.counts.browsers >= kMaxBrowsers) {
       refusal = DoorRefusal{.status = 503, .name = "browsers", .sentence = "too many browsers are connected"};
     }
-    if (!refusal && is_browser) {
+    if (!refusal && wish.is_socket()) {
       stream.expires_never();
-      co_await std::make_shared<Relay>(shared, std::move(stream))->run(request);
+      co_await relay(shared.relays, std::move(stream), request, wish);
       co_return;
     }
     Response response;
@@ -355,6 +247,12 @@ void check(const GatewayOptions& options) {
         "--listen " + to_string(options.listen) +
         ": others can reach this address, so that it needs --certificate, --key and --browser-token");
   }
+  for (const std::string& origin : options.foxglove_origins) {
+    if (!is_origin(origin)) {
+      throw StartError("--allow-origin " + origin +
+                       ": an origin is SCHEME://HOST or SCHEME://HOST:PORT without a path, or file://");
+    }
+  }
   if (!options.browser_token.empty() && options.browser_token.size() < kMinToken) {
     throw StartError("--browser-token: the token must have at least " + std::to_string(kMinToken) +
                      " characters");
@@ -376,7 +274,10 @@ void run_gateway(const GatewayOptions& options, const std::function<void(const s
   Shared shared(options);
   asio::io_context io(1);
   tcp::acceptor acceptor = listen(io, options.listen);
-  shared.door = {.address = options.listen, .tls = shared.tls.has_value(), .token = options.browser_token};
+  shared.door = {.address = options.listen,
+                 .tls = shared.tls.has_value(),
+                 .token = options.browser_token,
+                 .foxglove_origins = options.foxglove_origins};
   shared.door.address.port = acceptor.local_endpoint().port();
   asio::co_spawn(io, admit(shared, acceptor), asio::detached);
   asio::signal_set signals(io, SIGINT, SIGTERM);

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "clients/web/gateway/listen_address.hpp"
 
@@ -12,10 +13,11 @@ struct GatewayOptions {
   std::string bench;        ///< its address
   std::string bench_token;  ///< of the gateway's own session; each browser shows its own
   ListenAddress listen;
-  std::filesystem::path certificate;  ///< PEM; empty: no TLS
-  std::filesystem::path key;          ///< PEM
-  std::string browser_token;          ///< that browsers must show; empty: none
-  std::filesystem::path page;         ///< the folder of its files
+  std::filesystem::path certificate;          ///< PEM; empty: no TLS
+  std::filesystem::path key;                  ///< PEM
+  std::string browser_token;                  ///< that browsers must show; empty: none
+  std::vector<std::string> foxglove_origins;  ///< whose pages may open Foxglove's WebSocket
+  std::filesystem::path page;                 ///< the folder of its files
 };
 
 /// Serves the page, its WebSocket and the reports until SIGINT or SIGTERM. Each WebSocket is a session of its

@@ -45,6 +45,34 @@ TEST(Door, WEB_01_TheOriginMustBeThisPage) {
   }
 }
 
+// Catches: an allowed site that comes in at the page's own socket, or one that only begins like an allowed
+// site.
+TEST(Door, WEB_06_AnAllowedSiteReadsThroughFoxglovesSocketAlone) {
+  Door door = local_door();
+  door.foxglove_origins = {"https://app.foxglove.dev", "file://"};
+  const auto named = [&door](const char* origin, bool is_foxglove) {
+    return name_of(
+        door, {.host = "localhost:7380", .origin = origin, .authorization = {}, .is_foxglove = is_foxglove});
+  };
+  for (const char* origin : {"https://app.foxglove.dev", "HTTPS://App.Foxglove.dev", "file://"}) {
+    EXPECT_EQ(named(origin, true), "in") << origin;
+    EXPECT_EQ(named(origin, false), "origin") << origin;
+  }
+  for (const char* origin :
+       {"http://app.foxglove.dev", "https://app.foxglove.dev.evil.example", "null", "file"})
+    EXPECT_EQ(named(origin, true), "origin") << origin;
+}
+
+// Catches: a pattern or an address that is taken for an origin and never matches.
+TEST(Door, AnOriginHasASchemeAHostAndNoPath) {
+  for (const char* origin :
+       {"https://app.foxglove.dev", "http://localhost:8080", "http://[::1]:80", "file://"})
+    EXPECT_TRUE(is_origin(origin)) << origin;
+  for (const char* other :
+       {"", "*", "https://*.foxglove.dev", "app.foxglove.dev", "://a", "https://", "https://a/", "file:///x"})
+    EXPECT_FALSE(is_origin(other)) << other;
+}
+
 // Catches: a token that is compared in part or in the wrong scheme, or that a user name replaces.
 TEST(Door, WEB_02_TheTokenIsBearerOrThePasswordOfBasic) {
   const auto named = [](const char* authorization) {
