@@ -79,6 +79,7 @@ class Peer(FoxgloveTest):
             controller.lease()
             tick = 0
             while peer.poll() is None:
+                self.assertLess(tick, 200_000, "the client does not get its samples")
                 controller.step(tick)
                 tick += 1
             topics = [f"/{axis.name}/sample" for axis in controller.welcome.bench.axes]

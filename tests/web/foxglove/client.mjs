@@ -15,10 +15,15 @@ const client = new FoxgloveClient({ ws: socket });
 let Sample;
 let subscription;
 
+let isOver = false;
+
 function end(problem) {
+  if (isOver) return;
+  isOver = true;
   if (problem) told.problem = String(problem);
   console.log(JSON.stringify({ ...told, subprotocol: socket.protocol }));
-  process.exit(problem ? 1 : 0);
+  process.exitCode = problem ? 1 : 0;
+  socket.terminate();
 }
 
 client.on("error", end);
@@ -36,6 +41,7 @@ client.on("advertise", (channels) => {
 });
 client.on("message", ({ subscriptionId, timestamp, data }) => {
   if (subscriptionId !== subscription) end(`a message of the subscription ${subscriptionId}`);
+  if (isOver) return;
   const sample = Sample.decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
   const { tick, speed_rad_s } = Sample.toObject(sample, { longs: Number, defaults: true });
   told.samples.push({ time: Number(timestamp), tick, speed: speed_rad_s });
