@@ -1,8 +1,6 @@
 #include "clients/archive/zip_writer.hpp"
 
-#include <zip.h>
-
-#include <memory>
+#include "clients/archive/zip_handle.hpp"
 
 namespace drivebench::archive {
 namespace {
@@ -10,26 +8,10 @@ namespace {
 constexpr std::uint16_t kFirstDate = (1U << 5U) | 1U;  // 1 January 1980
 constexpr std::uint16_t kMidnight = 0;
 
-struct Discard {
-  void operator()(zip_t* zip) const noexcept { zip_discard(zip); }
-};
-using Zip = std::unique_ptr<zip_t, Discard>;
-
-Zip opened(const std::filesystem::path& file) {
-  int code = 0;
-  Zip zip(zip_open(file.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &code));
-  if (zip != nullptr) return zip;
-  zip_error_t error;
-  zip_error_init_with_code(&error, code);
-  const std::string why = zip_error_strerror(&error);
-  zip_error_fini(&error);
-  throw ZipError("cannot write " + file.string() + ": " + why);
-}
-
 }  // namespace
 
 void write_zip(const std::filesystem::path& file, const std::vector<Entry>& entries) {
-  Zip zip = opened(file);
+  Zip zip = opened(file, ZIP_CREATE | ZIP_TRUNCATE, "write");
   for (const Entry& entry : entries) {
     zip_source_t* const source = zip_source_buffer(zip.get(), entry.bytes.data(), entry.bytes.size(), 0);
     const zip_int64_t index =
