@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
   add_can_commands(line);
   add_fmu_command(line);
   add_doctor_command(line);
-  add_test_command(line);
+  add_regression_commands(line);
   add_web_command(line);
   return line.run(argc, argv);
 }

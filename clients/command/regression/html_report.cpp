@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/command/recording/svg_plot.hpp"
+#include "clients/command/regression/bundles/bundle.hpp"
 #include "protocols/markup.hpp"
 
 namespace drivebench::command {
@@ -68,10 +69,21 @@ std::string plot_of(const Finding& finding, const Trace& trace, const Trace::Col
   return svg_of(finding.name, "time of the bench [s]", x, {panel});
 }
 
-std::string section_of(const CaseResult& result) {
+/// A path as a link has it.
+std::string percent_encoded(const std::string& path) {
+  std::string text;
+  for (const char c : path) {
+    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                          std::string_view("-._~/").find(c) != std::string_view::npos;
+    text += is_plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return text;
+}
+
+std::string section_of(const CaseResult& result, const std::string& link) {
   const std::string_view word = word_of(result.verdict);
-  std::string html = fmt::format("<h2>{} <span class={}>{}</span></h2>\n<p>{}</p>\n<ul>\n",
-                                 markup(result.name), word, word, markup(result.file));
+  std::string html = fmt::format("<h2>{} <span class={}>{}</span></h2>\n<p>{}{}</p>\n<ul>\n",
+                                 markup(result.name), word, word, markup(result.file), link);
   for (const std::string& reason : reasons_of(result))
     html += fmt::format("<li>{}</li>\n", markup(reason));
   html += "</ul>\n";
@@ -109,6 +121,16 @@ std::vector<std::string> plots_of(const CaseResult& result) {
   return plots;
 }
 
+std::string HtmlReport::link_to_bundle(const CaseResult& result) const {
+  if (bundles_.empty()) return {};
+  const std::filesystem::path bundle = bundle_of(bundles_, result.name);
+  std::error_code error;
+  if (!std::filesystem::exists(bundle, error)) return {};
+  const std::filesystem::path from = page_folder_.empty() ? "." : page_folder_;
+  const std::string path = std::filesystem::relative(bundle, from, error).generic_string();
+  return fmt::format(", <a href=\"{}\">bundle</a> for drivebench rerun", percent_encoded(path));
+}
+
 void HtmlReport::add(const CaseResult& result) {
   statistics_.add(result);
   const bool is_good = regression::is_good(result);
@@ -116,7 +138,7 @@ void HtmlReport::add(const CaseResult& result) {
   if (cases_++ < kMostRows) rows_ += row;
   if (is_good) return;
   if (bad_ < kMostRows) bad_rows_ += row;
-  if (bad_++ < kMostSections) sections_ += section_of(result);
+  if (bad_++ < kMostSections) sections_ += section_of(result, link_to_bundle(result));
 }
 
 std::string HtmlReport::page(const std::string& suite, const regression::Totals& totals) const {

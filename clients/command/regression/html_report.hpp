@@ -1,6 +1,8 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/command/regression/html_statistics.hpp"
@@ -17,10 +19,18 @@ std::vector<std::string> plots_of(const regression::CaseResult& result);
 /// measured, and whole only the first hundred that have not passed.
 class HtmlReport {
  public:
+  /// `bundles`: a folder whose bundles the page links to, from `page_folder`; empty: no links.
+  HtmlReport(std::filesystem::path bundles, std::filesystem::path page_folder)
+      : bundles_(std::move(bundles)), page_folder_(std::move(page_folder)) {}
+
   void add(const regression::CaseResult& result);
   std::string page(const std::string& suite, const regression::Totals& totals) const;
 
  private:
+  std::string link_to_bundle(const regression::CaseResult& result) const;
+
+  std::filesystem::path bundles_;
+  std::filesystem::path page_folder_;
   HtmlStatistics statistics_;
   std::size_t cases_ = 0;
   std::size_t bad_ = 0;

@@ -52,21 +52,7 @@ PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& probl
   const fs::path bench = bench_file_of(c);
   write_file(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
                                fs::path(c.file).filename().string(), regression::composed_bench(c, bench)));
-  const InprocAxis axis(file.string(), c.device.axis);
-  PreparedCase prepared{.what = &c, .bench_file = file, .facts = facts_of(axis.bench())};
-  std::optional<control::Run> run;
-  if (c.device.kind == DeviceUnderTest::Kind::kPreset) {
-    const control::Preset& preset = chosen_preset(c.device.preset);
-    run.emplace(made(preset, gains_of(c.device)));
-    if (const std::string why = misfit(c, axis, preset, *run); !why.empty()) {
-      problems.add(c.file, c.device.line, "dut.preset",
-                   fmt::format("is \"{}\", which does not fit the bench: {}", c.device.preset, why));
-    }
-  }
-  prepared.facts.end_tick =
-      end_tick_of(c, axis.bench().period_s(), axis.bench().arming_commands(), run ? &*run : nullptr);
-  regression::check_on_bench(c, prepared.facts, problems);
-  return prepared;
+  return prepared_on(c, file, problems);
 }
 
 }  // namespace
@@ -82,6 +68,24 @@ std::vector<control::Gain> gains_of(const DeviceUnderTest& device) {
   for (const auto& [name, value] : device.gains)
     gains.push_back({name, value});
   return gains;
+}
+
+PreparedCase prepared_on(const Case& c, const fs::path& bench, ProblemList& problems) {
+  const InprocAxis axis(bench.string(), c.device.axis);
+  PreparedCase prepared{.what = &c, .bench_file = bench, .facts = facts_of(axis.bench())};
+  std::optional<control::Run> run;
+  if (c.device.kind == DeviceUnderTest::Kind::kPreset) {
+    const control::Preset& preset = chosen_preset(c.device.preset);
+    run.emplace(made(preset, gains_of(c.device)));
+    if (const std::string why = misfit(c, axis, preset, *run); !why.empty()) {
+      problems.add(c.file, c.device.line, "dut.preset",
+                   fmt::format("is \"{}\", which does not fit the bench: {}", c.device.preset, why));
+    }
+  }
+  prepared.facts.end_tick =
+      end_tick_of(c, axis.bench().period_s(), axis.bench().arming_commands(), run ? &*run : nullptr);
+  regression::check_on_bench(c, prepared.facts, problems);
+  return prepared;
 }
 
 std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path& folder) {

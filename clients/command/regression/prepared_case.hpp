@@ -25,6 +25,10 @@ std::filesystem::path bench_file_of(const regression::Case& c);
 /// The gains of a preset, as control takes them.
 std::vector<control::Gain> gains_of(const regression::DeviceUnderTest& device);
 
+/// A case on a bench that is composed already. What does not fit goes to the list.
+PreparedCase prepared_on(const regression::Case& c, const std::filesystem::path& bench,
+                         ProblemList& problems);
+
 /// Composes the bench of every case into the folder, and opens it once. Throws ConfigError with everything
 /// that does not fit: nothing has run then. Skipped cases are left as they are.
 std::vector<PreparedCase> prepare(const std::vector<regression::Case>& cases,

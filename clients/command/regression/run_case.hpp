@@ -23,12 +23,11 @@ void drive(link::AxisLink& axis, const regression::Case& c, std::uint64_t end_ti
 regression::CaseResult run_program_case(const PreparedCase& prepared, const std::filesystem::path& folder,
                                         regression::Judge& judge);
 
-/// Runs the case of a preset, or of an open bench, once more over a server that records it.
-void record_case(const PreparedCase& prepared, const std::filesystem::path& folder);
+/// Where a case leaves its recording.
+std::filesystem::path recording_in(const std::filesystem::path& folder);
 
-/// Puts what a case left behind into a folder of its name: its composed bench, its recording, and what its
-/// device under test printed. Throws std::filesystem::filesystem_error.
-void keep_case(const PreparedCase& prepared, const std::filesystem::path& folder,
-               const std::filesystem::path& into);
+/// Runs the case of a preset, or of an open bench, once more over a server that records it. That of a program
+/// has its recording.
+void record_case(const PreparedCase& prepared, const std::filesystem::path& folder);
 
 }  // namespace drivebench::command

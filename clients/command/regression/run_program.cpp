@@ -11,9 +11,8 @@
 #include "clients/command/common/process.hpp"
 #include "clients/command/common/server_ready.hpp"
 #include "clients/command/common/session.hpp"
-#include "clients/command/recording/recording_file.hpp"
+#include "clients/command/recording/recorded_samples.hpp"
 #include "clients/command/regression/run_case.hpp"
-#include "protocols/sample_codec.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
@@ -51,7 +50,6 @@ std::string without_place(std::string text, const std::string& link) {
   return text;
 }
 
-constexpr const char* kRecording = "run.mcap";
 constexpr const char* kOutput = "output.txt";
 
 /// A server on the bench of the case.
@@ -59,7 +57,7 @@ class RecordedServer {
  public:
   RecordedServer(const PreparedCase& prepared, const fs::path& folder)
       : socket_(folder / "bench.sock"),
-        recording_(folder / kRecording),
+        recording_(recording_in(folder)),
         log_(folder / "server.log"),
         process_({server_executable().string(), prepared.bench_file.string(), "--json", "--port", "0",
                   "--unix", socket_.string(), "--record", recording_.string()},
@@ -122,17 +120,12 @@ std::string await_end(Process& program, TickView& bench, const Case& c, const Ru
 
 /// Shows the judge the samples of a recording, a tick at a time.
 void judge_recording(const fs::path& file, const RunFacts& facts, Judge& judge) {
-  const MappedSeries files = open_recording(file.string());
-  McapSeries mcap(files.segments());
+  RecordedSamples recorded(file, facts.axes);
   std::vector<Sample> samples(facts.axes.size());
-  for (McapMessage message; mcap.next(message);) {
-    const std::string_view axis = axis_of(mcap.reader().channels().at(message.header.channel).topic);
-    const auto place = static_cast<std::size_t>(std::ranges::find(facts.axes, axis) - facts.axes.begin());
-    if (axis.empty() || place == samples.size()) continue;
-    if (const std::optional<Sample> sample = decode_sample(message.payload)) samples[place] = *sample;
-    if (place + 1 == samples.size()) judge.see(samples);  // a tick brings the axes in their order
+  while (const auto row = recorded.next()) {
+    samples[row->axis] = row->sample;
+    if (row->axis + 1 == samples.size()) judge.see(samples);  // a tick brings the axes in their order
   }
-  if (mcap.problem()) throw std::runtime_error("the recording is not whole: " + mcap.problem()->what);
 }
 
 }  // namespace
@@ -157,29 +150,18 @@ CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder
   return result;
 }
 
+fs::path recording_in(const fs::path& folder) {
+  return folder / "run.mcap";
+}
+
 void record_case(const PreparedCase& prepared, const fs::path& folder) {
+  if (prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram) return;
   RecordedServer server(prepared, folder);
   {
     const auto axis = open_axis({.address = server.link(), .token = {}}, prepared.what->device.axis, "test");
     drive(*axis, *prepared.what, prepared.facts.end_tick, [] {});
   }
   server.end();
-}
-
-void keep_case(const PreparedCase& prepared, const fs::path& folder, const fs::path& into) {
-  std::string name = prepared.what->name;
-  std::ranges::replace(name, '/', '_');
-  const fs::path kept = into / name;
-  fs::create_directories(kept);
-  const auto keep = [&kept](const fs::path& file, const fs::path& as) {
-    std::error_code none;
-    if (fs::exists(file, none)) fs::copy_file(file, kept / as, fs::copy_options::overwrite_existing);
-  };
-  const bool is_recorded = prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram;
-  if (!is_recorded) record_case(prepared, folder);
-  keep(prepared.bench_file, "bench.toml");
-  keep(folder / kRecording, kRecording);
-  keep(folder / kOutput, kOutput);
 }
 
 }  // namespace drivebench::command

@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/html_report.hpp"
 #include "clients/command/regression/run_case.hpp"
 
@@ -60,7 +61,12 @@ class Crew {
     using enum regression::Verdict;
     if (settings_.keep_folder.empty() || result.verdict == kPass || result.verdict == kSkipped) return;
     try {
-      keep_case(prepared, folder, settings_.keep_folder);
+      record_case(prepared, folder);
+      write_bundle(bundle_of(settings_.keep_folder, result.name), {.what = *prepared.what,
+                                                                   .result = result,
+                                                                   .bench_file = prepared.bench_file,
+                                                                   .recording = recording_in(folder),
+                                                                   .program = settings_.program});
     } catch (const std::exception& error) {
       result.reason += fmt::format("{}not kept: {}", result.reason.empty() ? "" : "; ", error.what());
     }

@@ -11,7 +11,8 @@ namespace drivebench::command {
 struct SuiteSettings {
   unsigned jobs = 1;
   bool draws_plots = false;             ///< of failed checks
-  std::filesystem::path keep_folder{};  ///< for cases that have not passed; empty: nothing is kept
+  std::filesystem::path keep_folder{};  ///< for bundles of cases that have not passed; empty: none is kept
+  std::string program{};                ///< version and build, for the bundles
   /// Takes each result, with the place of its case, on the thread that made it, as soon as it is there. If it
   /// throws, the case is an error.
   std::function<void(std::size_t place, const regression::CaseResult&)> store{};

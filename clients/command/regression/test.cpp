@@ -13,6 +13,7 @@
 #include "clients/command/common/output.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/command/common/temporary_folder.hpp"
+#include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/html_report.hpp"
 #include "clients/command/regression/stored_results.hpp"
 #include "clients/command/regression/suite_run.hpp"
@@ -112,11 +113,6 @@ void print(WriteReport report, const SuiteResults& results) {
   report(results, [](std::string_view text) { fmt::print("{}", text); });
 }
 
-int exit_code_of(const regression::Totals& totals) {
-  if (totals.failed + totals.errors != 0) return kExitFailed;
-  return totals.invalid != 0 ? kExitInvalid : kExitOk;
-}
-
 /// The results that a folder has already, and the cases that it lacks.
 struct Work {
   std::vector<CaseResult> results{};  ///< of all cases, in their order; blank where one is missing
@@ -149,13 +145,24 @@ Work work_of(std::vector<Case> cases, StoredResults* stored) {
 SuiteSettings settings_of(const TestOptions& options, const Work& work, const StoredResults* stored) {
   SuiteSettings settings{.jobs = options.jobs,
                          .draws_plots = stored != nullptr || !options.html_file.empty(),
-                         .keep_folder = options.keep_folder};
+                         .keep_folder = options.keep_folder,
+                         .program = options.program};
   if (stored != nullptr) {
     settings.store = [&work, stored](std::size_t place, const CaseResult& result) {
       if (!interrupted()) stored->put(result, work.fingerprints[place]);
     };
   }
   return settings;
+}
+
+/// How to run a case again that has left a bundle; empty: it has left none.
+std::string rerun_line(const CaseResult& result, const TestOptions& options) {
+  using enum regression::Verdict;
+  if (options.keep_folder.empty() || result.verdict == kPass || result.verdict == kSkipped) return {};
+  const std::filesystem::path bundle = bundle_of(options.keep_folder, result.name);
+  std::error_code none;
+  if (!std::filesystem::exists(bundle, none)) return {};
+  return fmt::format("        drivebench rerun '{}'\n", bundle.string());
 }
 
 /// Runs the missing cases, and prints a row for each.
@@ -168,7 +175,7 @@ void run_missing(Work& work, const TestOptions& options, const StoredResults* st
   const auto see = [&](const CaseResult& result, std::size_t ended) {
     progress.update(static_cast<double>(ended) / static_cast<double>(prepared.size()),
                     fmt::format("{} of {} cases", ended, prepared.size()));
-    if (!options.tap) fmt::print("{}", regression::table_row(result));
+    if (!options.tap) fmt::print("{}{}", regression::table_row(result), rerun_line(result, options));
   };
   std::vector<CaseResult> made = run_suite(prepared, folder.path(), settings_of(options, work, stored), see);
   for (std::size_t i = 0; i < made.size(); ++i)
@@ -215,7 +222,7 @@ regression::EachResult merged_results(const TestOptions& options, const std::fil
 /// Writes all reports. Returns the exit code.
 int report(const TestOptions& options, SuiteResults results, ReportFiles& files, const std::string& remark,
            const regression::SeeResult& see_first) {
-  HtmlReport html;
+  HtmlReport html(options.keep_folder, std::filesystem::path(options.html_file).parent_path());
   results.each([&](const CaseResult& result) {
     results.totals.add(result);
     if (files.html) html.add(result);
@@ -258,6 +265,11 @@ int run_and_report(const TestOptions& options, const std::filesystem::path& suit
 }
 
 }  // namespace
+
+int exit_code_of(const regression::Totals& totals) {
+  if (totals.failed + totals.errors != 0) return kExitFailed;
+  return totals.invalid != 0 ? kExitInvalid : kExitOk;
+}
 
 int run_test(const TestOptions& options) {
   const std::filesystem::path suite = find_suite(options.suite);

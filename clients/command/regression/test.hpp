@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/regression/reports/reports.hpp"
+
 namespace drivebench::command {
 
 inline constexpr int kExitInvalid = 4;  ///< real time was not kept, and nothing failed
@@ -25,8 +27,11 @@ struct TestOptions {
   bool github = false;
 };
 
-/// Runs the cases of a suite. 0: all passed or were skipped, 1: one failed or had an error, 2: usage, 4: none
-/// failed, but real time was not kept in one.
+/// 0: all passed or were skipped, 1: one failed or had an error, 4: none failed, but real time was not kept
+/// in one.
+int exit_code_of(const regression::Totals& totals);
+
+/// Runs the cases of a suite. Returns exit_code_of() them, or 2: usage.
 int run_test(const TestOptions& options);
 
 }  // namespace drivebench::command

@@ -2,11 +2,26 @@
 
 #include "clients/command/common/command_line.hpp"
 #include "clients/command/common/version.hpp"
+#include "clients/command/regression/rerun.hpp"
 #include "clients/command/regression/test.hpp"
 
 namespace drivebench::command {
 
-void add_test_command(CommandLine& line) {
+namespace {
+
+void add_rerun_command(CommandLine& line) {
+  const auto [sub, o] =
+      line.add<RerunOptions>("rerun", "run the case of a bundle again, and compare", run_rerun);
+  o.program = version_line();
+  sub.add_option("BUNDLE", o.bundle, "a file that drivebench test --keep has made")
+      ->type_name("FILE")
+      ->required();
+  sub.add_flag("--plant-only", o.plant_only, "replay the recorded commands, without the device under test");
+}
+
+}  // namespace
+
+void add_regression_commands(CommandLine& line) {
   const auto [sub, o] = line.add<TestOptions>("test", "run a suite of regression cases", run_test);
   o.program = version_line();
   sub.add_option("SUITE", o.suite,
@@ -25,7 +40,7 @@ void add_test_command(CommandLine& line) {
   sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network")
       ->type_name("FILE");
   sub.add_option("--keep", o.keep_folder,
-                 "keep recording, composed bench and output of cases that have not passed in this folder")
+                 "keep a bundle of each case that has not passed in this folder, for drivebench rerun")
       ->type_name("FOLDER");
   sub.add_option(
          "--shard", o.shard,
@@ -42,6 +57,7 @@ void add_test_command(CommandLine& line) {
       ->excludes(results);
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
   sub.add_flag("--github", o.github, "print annotations for GitHub");
+  add_rerun_command(line);
 }
 
 }  // namespace drivebench::command

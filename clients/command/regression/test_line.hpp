@@ -4,7 +4,7 @@ namespace drivebench::command {
 
 class CommandLine;
 
-/// Adds `test`.
-void add_test_command(CommandLine& line);
+/// Adds `test` and `rerun`.
+void add_regression_commands(CommandLine& line);
 
 }  // namespace drivebench::command

@@ -238,6 +238,23 @@ void visit_suite(const fs::path& suite, const SeeCase& see) {
   problems.throw_if_any();
 }
 
+ConfigNode table_of(const Case& c) {
+  ProblemList problems;
+  const FileText content = read_file(c.file, kMaxConfigBytes);
+  if (!content.why_not.empty()) problems.add(c.file, 0, "", content.why_not);
+  const std::optional<ConfigNode> root =
+      content.why_not.empty() ? parse_document(content.text, c.file, problems) : std::nullopt;
+  problems.throw_if_any();
+  const Matrix matrix(*root, c.file, problems);
+  problems.throw_if_any();
+  for (std::size_t i = 0; i < matrix.size(); ++i) {
+    if (matrix.values_at(i) == c.values) return matrix.at(i, *root, c.file, problems);
+  }
+  problems.add(c.file, 0, "", "has changed: it has no case of these values");
+  problems.throw_if_any();
+  return {};
+}
+
 std::vector<Case> read_suite(const fs::path& suite) {
   std::vector<Case> cases;
   visit_suite(suite, [&cases](Case c) { cases.push_back(std::move(c)); });

@@ -15,6 +15,10 @@ using SeeCase = std::function<void(Case)>;
 /// cases; some cases have been shown then.
 void visit_suite(const std::filesystem::path& suite, const SeeCase& see);
 
+/// The file of a case as it is now, with the values of its matrix and draws in their places and without the
+/// two tables. Throws ConfigError.
+ConfigNode table_of(const Case& c);
+
 /// All cases of a suite. Throws ConfigError with all problems.
 std::vector<Case> read_suite(const std::filesystem::path& suite);
 

@@ -188,7 +188,7 @@ class Composer {
   }
 
   void make_portable() {
-    for (const std::string_view table : {"can", "modbus", "tls", "audit", "experiments", "tcp"})
+    for (const std::string_view table : kTablesOfAPlace)
       remove(bench_, table);
   }
 

@@ -12,6 +12,7 @@ import tempfile
 import time
 import unittest
 import xml.etree.ElementTree
+import zipfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
@@ -212,8 +213,10 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.write("servo.toml", SERVO.replace("6.0", "5.0") + "[matrix]\ncheck.0.abs = [5.0, 6.0]\n")
         kept, page = self.folder / "kept", self.folder / "page.html"
         self.run_test(self.folder / "suite", "--keep", kept, "--html", page, code=FAILED)
-        self.assertEqual([path.name for path in kept.iterdir()], ["servo[abs=5.0]"])
-        case = kept / "servo[abs=5.0]"
+        self.assertEqual([path.name for path in kept.iterdir()], ["servo[abs=5.0].zip"])
+        case = self.folder / "unpacked"
+        with zipfile.ZipFile(kept / "servo[abs=5.0].zip") as bundle:
+            bundle.extractall(case)
         subprocess.run([SERVER, "--check-config", case / "bench.toml"], check=True, capture_output=True)
         subprocess.run([SERVER, "--replay", case / "run.mcap"], check=True, capture_output=True)
         exported = subprocess.run([COMMAND, "export", case / "run.mcap", "--signals", "i_a_a"], check=True, capture_output=True,
@@ -221,6 +224,7 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertAlmostEqual(min(float(line.split(",")[2]) for line in exported[:1025]), -5.4648, places=4)
         html = page.read_text(encoding="utf-8")
         self.assertEqual(html.count("<svg"), 1)
+        self.assertIn('<a href="kept/servo%5Babs%3D5.0%5D.zip">', html)
         self.assertIn("current: at least -5.4648 A, min -5 A", html)
         self.assertNotIn("http://", html.replace("http://www.w3.org/2000/svg", ""))
 

@@ -1,0 +1,155 @@
+#include "clients/command/regression/rerun.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "clients/command/common/errors.hpp"
+#include "clients/command/common/installation.hpp"
+#include "clients/command/common/process.hpp"
+#include "clients/command/common/session.hpp"
+#include "clients/command/common/temporary_folder.hpp"
+#include "clients/command/recording/recorded_samples.hpp"
+#include "clients/command/regression/bundles/bundle.hpp"
+#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/test.hpp"
+#include "clients/regression/reports/reports.hpp"
+
+namespace drivebench::command {
+namespace {
+
+namespace fs = std::filesystem;
+using regression::CaseResult;
+using regression::RunFacts;
+
+constexpr auto kReplayPatience = std::chrono::hours(24);
+
+std::string text_of(const Signal& signal, const Sample& sample) {
+  switch (signal.type) {
+    case SignalType::kUnsigned:
+      return fmt::to_string(sample.*signal.as_unsigned);
+    case SignalType::kSigned:
+      return fmt::to_string(sample.*signal.as_signed);
+    case SignalType::kReal:
+      break;
+  }
+  return fmt::to_string(sample.*signal.as_real);
+}
+
+bool same_bits(const Signal& signal, const Sample& a, const Sample& b) noexcept {
+  switch (signal.type) {
+    case SignalType::kUnsigned:
+      return a.*signal.as_unsigned == b.*signal.as_unsigned;
+    case SignalType::kSigned:
+      return a.*signal.as_signed == b.*signal.as_signed;
+    case SignalType::kReal:
+      break;
+  }
+  return std::bit_cast<std::uint64_t>(a.*signal.as_real) == std::bit_cast<std::uint64_t>(b.*signal.as_real);
+}
+
+/// The samples of a recording up to the end of its case. The server may have gone on for some ticks.
+class CaseSamples {
+ public:
+  CaseSamples(const fs::path& file, const RunFacts& facts)
+      : recorded_(file, facts.axes), end_tick_(facts.end_tick) {}
+
+  std::optional<RecordedSamples::Row> next() {
+    const auto row = recorded_.next();
+    return row && row->sample.tick <= end_tick_ ? row : std::nullopt;
+  }
+
+ private:
+  RecordedSamples recorded_;
+  std::uint64_t end_tick_;
+};
+
+/// A sentence on where the two runs first differ.
+std::string comparison(const fs::path& before, const fs::path& now, const RunFacts& facts) {
+  CaseSamples old_samples(before, facts);
+  CaseSamples new_samples(now, facts);
+  for (std::uint64_t count = 0;; ++count) {
+    const auto was = old_samples.next();
+    const auto is = new_samples.next();
+    if (!was && !is) return fmt::format("the same to the bit: {} samples", count);
+    if (!was || !is) {
+      return fmt::format("the {} run ends first, before tick {}; up to there they are the same",
+                         was ? "new" : "recorded", was ? was->sample.tick : is->sample.tick);
+    }
+    for (const Signal& signal : kSignals) {
+      if (same_bits(signal, was->sample, is->sample)) continue;
+      return fmt::format("differs first at tick {}: {}.{} was {} and is {}", was->sample.tick,
+                         facts.axes[was->axis], signal.name, text_of(signal, was->sample),
+                         text_of(signal, is->sample));
+    }
+  }
+}
+
+void require_recording(const RerunOptions& options, const Unpacked& bundle) {
+  if (fs::exists(bundle.recording)) return;
+  throw UsageError(fmt::format("{}: entry \"run.mcap\": is missing: the case ended before its bench began",
+                               options.bundle));
+}
+
+/// Replays the commands of the recording on a bench, without the device under test.
+int replay_plant(const RerunOptions& options, const Unpacked& bundle) {
+  require_recording(options, bundle);
+  Process server({server_executable().string(), "--replay", bundle.recording.string(), "--json"});
+  const auto line = server.read_line(Process::in(kReplayPatience));
+  server.wait(Process::in(kReplayPatience));
+  if (!line) throw std::runtime_error("drivebench-server ended without a report");
+  const auto report = nlohmann::json::parse(*line);
+  const auto problem = report.at("problem").get<std::string>();
+  if (!report.at("usable").get<bool>())
+    throw UsageError(fmt::format("{}: entry \"run.mcap\": {}", options.bundle, problem));
+  if (!report.at("equal").get<bool>()) {
+    fmt::print("the plant differs: {}\n", problem);
+    return kExitFailed;
+  }
+  fmt::print("the plant is the same to the bit: {} samples, {} inputs\n",
+             report.at("samples").get<std::uint64_t>(), report.at("inputs").get<std::uint64_t>());
+  return kExitOk;
+}
+
+PreparedCase prepared_or_refused(const RerunOptions& options, const Unpacked& bundle) {
+  ProblemList problems;
+  try {
+    PreparedCase prepared = prepared_on(bundle.what, bundle.bench_file, problems);
+    problems.throw_if_any();
+    return prepared;
+  } catch (const ConfigError& error) {
+    throw UsageError(fmt::format("{}: {}", options.bundle, error.what()));
+  }
+}
+
+int run_again(const RerunOptions& options, const Unpacked& bundle, const fs::path& folder) {
+  const PreparedCase prepared = prepared_or_refused(options, bundle);
+  catch_interrupts();
+  const CaseResult result = run_case(prepared, folder, false);
+  fmt::print("{}", regression::table_row(result));
+  record_case(prepared, folder);
+  if (bundle.program != options.program)
+    fmt::print("the bundle is of {}, this is {}\n", bundle.program, options.program);
+  if (fs::exists(bundle.recording) && fs::exists(recording_in(folder)))
+    fmt::print("{}\n", comparison(bundle.recording, recording_in(folder), prepared.facts));
+  regression::Totals totals;
+  totals.add(result);
+  return exit_code_of(totals);
+}
+
+}  // namespace
+
+int run_rerun(const RerunOptions& options) {
+  const TemporaryFolder folder;
+  const fs::path parts = folder.path() / "bundle";
+  const fs::path run = folder.path() / "run";
+  fs::create_directory(parts);
+  fs::create_directory(run);
+  const Unpacked bundle = unpack_bundle(options.bundle, parts);
+  return options.plant_only ? replay_plant(options, bundle) : run_again(options, bundle, run);
+}
+
+}  // namespace drivebench::command

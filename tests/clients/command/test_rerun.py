@@ -1,0 +1,103 @@
+#!/usr/bin/python3
+"""`drivebench rerun`: bundles of failed cases run again, and hostile bundles are refused."""
+import os
+import shutil
+import subprocess
+import unittest
+import zipfile
+
+from test_regression import COMMAND, DRIVES, FAILED, OK, PATIENCE_S, PROGRAM, SERVO, USAGE, RegressionTest
+
+
+class Rerun(RegressionTest):
+    def failed_bundle(self, name, case, **files):
+        """Runs a case that fails. Returns its bundle; the suite is gone then."""
+        self.write(f"{name}.toml", case)
+        for file, text in files.items():
+            self.write(file.replace("_", "."), text)
+        self.run_test(self.folder / "suite", "--keep", self.folder / "kept", code=FAILED)
+        shutil.rmtree(self.folder / "suite")
+        (bundle,) = (self.folder / "kept").iterdir()
+        return bundle
+
+    def rerun(self, bundle, *arguments, code):
+        before = sorted(self.folder.iterdir())
+        done = subprocess.run([COMMAND, "rerun", bundle, *arguments], capture_output=True, text=True, env=self.environment,
+                              timeout=PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        self.assertEqual(sorted(self.folder.iterdir()), before)
+        return done.stdout + done.stderr
+
+    def changed(self, bundle, changes):
+        """A copy of the bundle in which entries have other bytes; None: they are missing."""
+        copy = self.folder / "changed.zip"
+        with zipfile.ZipFile(bundle) as old, zipfile.ZipFile(copy, "w") as new:
+            parts = {name: old.read(name) for name in old.namelist()}
+            for name, change in changes.items():
+                parts[name] = change(parts.get(name, b""))
+            for name, data in parts.items():
+                if data is not None:
+                    new.writestr(name, data)
+        return copy
+
+    def test_a_preset_runs_again_to_the_bit_and_a_change_shows_where(self):
+        """Catches: a bundle that lacks a curve or a value of the matrix, a comparison that finds no difference."""
+        bundle = self.failed_bundle("servo", SERVO.replace("6.0", "5.0") + """[matrix]
+override.axis.servo.machine.rotor_resistance_ohm = [4.0]
+[override.axis.servo.mechanics]
+load_profile = "load.csv"
+""", load_csv="0,0\n0.1,0.02\n")
+        said = self.rerun(bundle, code=FAILED)
+        self.assertRegex(said, r"(?m)^fail +servo\[rotor_resistance_ohm=4")
+        self.assertIn("the same to the bit: 1025 samples", said)
+        self.assertIn("the plant is the same to the bit: 1025 samples", self.rerun(bundle, "--plant-only", code=OK))
+        other = self.changed(bundle, {"bench.toml": lambda text: text.replace(b"rotor_resistance_ohm = 4.0", b"rotor_resistance_ohm = 4.01")})
+        self.assertRegex(self.rerun(other, code=FAILED), r"differs first at tick \d+: servo\.\w+ was \S+ and is \S+")
+
+    def test_a_program_runs_again_from_the_bundle_alone(self):
+        """Catches: a device under test that is not in the bundle, a verdict of the recording in the place of the new run."""
+        bundle = self.failed_bundle("case", PROGRAM.format(limit_s=30).replace("i_a_a < 30", "i_a_a < 0.5"),
+                                    device_py=DRIVES.format(until=10 ** 9))
+        self.assertIn("the same to the bit: 201 samples", self.rerun(bundle, code=FAILED))
+        self.assertIn("the plant is the same to the bit", self.rerun(bundle, "--plant-only", code=OK))
+        tamed = self.changed(bundle, {"case/device.py": lambda text: text.replace(b"voltages=5.0", b"voltages=0.1")})
+        said = self.rerun(tamed, code=OK)
+        self.assertRegex(said, r"(?m)^pass +case")
+        self.assertRegex(said, r"differs first at tick \d+: ")
+
+    def test_a_hostile_bundle_is_refused_with_entry_and_rule(self):
+        """Catches: a file outside the folder, a bomb that is unpacked, a foreign or damaged file that runs."""
+        bundle = self.failed_bundle("servo", SERVO.replace("6.0", "5.0"))
+        outside = self.folder.parent / "escaped-from-a-bundle"
+        for changes, sentence in (
+                ({"../../../escaped-from-a-bundle": lambda _: b"x"}, 'entry "../../../escaped-from-a-bundle": a name is the relative path'),
+                ({str(outside): lambda _: b"x"}, "a name is the relative path"),
+                ({"run.sh": lambda _: b"x"}, 'entry "run.sh": is no part of a bundle'),
+                ({"case/case.toml": lambda _: None}, 'entry "case/case.toml": is missing'),
+                ({"case/case.toml/x": lambda _: b"x"}, "is a file and a folder at once"),
+                ({"bundle.toml": lambda text: text.replace(b"format = 1", b"format = 2")}, "bundle.toml:1: format is 2"),
+                ({"bench.toml": lambda text: text + b'\n[audit]\nfile = "/tmp/x"\n'}, 'entry "bench.toml": has audit'),
+                ({"case/case.toml": lambda text: text + b"\n[matrix]\nseed = [1, 2]\n"}, "makes 2 cases but a bundle has one"),
+                ({"case/case.toml": lambda _: b"bench = "}, "case/case.toml:1"),
+                ({"run.mcap": lambda data: data[:1000]}, "recording is not whole")):
+            with self.subTest(sentence):
+                code = FAILED if "whole" in sentence else USAGE
+                self.assertIn(sentence, self.rerun(self.changed(bundle, changes), code=code))
+                self.assertFalse(outside.exists())
+        bomb = self.folder / "bomb.zip"
+        with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as file:
+            file.writestr("run.mcap", bytes(1000))
+        data = bytearray(bomb.read_bytes())
+        for at in (22, data.index(b"PK\x01\x02") + 24):  # the size that the two headers promise
+            data[at:at + 4] = (1 << 31).to_bytes(4, "little")
+        bomb.write_bytes(data)
+        self.assertIn('entry "run.mcap": makes more than 1073741824 bytes', self.rerun(bomb, code=USAGE))
+        whole = bundle.read_bytes()
+        for damaged in (whole[:-1], whole[:len(whole) // 2], b"", b"no ZIP file"):
+            bomb.write_bytes(damaged)
+            self.assertIn(os.fspath(bomb), self.rerun(bomb, code=USAGE))
+        self.assertIn("none.zip", self.rerun(self.folder / "none.zip", code=USAGE))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
