@@ -79,7 +79,8 @@ configure_file(${control}/python/METADATA.in packages/METADATA @ONLY)
 set(modules lib/python3/dist-packages)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/clients/python/src/drivebench DESTINATION ${modules}
   COMPONENT python EXCLUDE_FROM_ALL FILES_MATCHING PATTERN "*.py" PATTERN py.typed PATTERN __pycache__ EXCLUDE)
-install(FILES ${made}/METADATA DESTINATION ${modules}/drivebench-${PROJECT_VERSION}.dist-info
+file(CONFIGURE OUTPUT packages/entry_points.txt CONTENT "[pytest11]\ndrivebench = drivebench.pytest_plugin\n" @ONLY)
+install(FILES ${made}/METADATA ${made}/entry_points.txt DESTINATION ${modules}/drivebench-${PROJECT_VERSION}.dist-info
   COMPONENT python EXCLUDE_FROM_ALL)
 
 # The change log of the project under Debian's name for it, and the one that Debian asks for beside it.
