@@ -16,7 +16,8 @@ void add_serve(CommandLine& line) {
   sub.prefix_command();
   sub.footer(
       "Examples: drivebench serve bm500; drivebench serve my-bench.toml --mode realtime --record run.mcap\n"
-      "This is what people use. It becomes drivebench-server, which services and containers start, with the same\n"
+      "This is what people use. It becomes drivebench-server, which services and containers start, with the "
+      "same\n"
       "arguments behind the path of a bench file; drivebench-server --help lists them.");
   line.when_named(sub, [&sub] { return run_serve(sub.remaining()); });
 }

@@ -9,7 +9,7 @@ namespace drivebench::command {
 namespace fs = std::filesystem;
 
 TemporaryFolder::TemporaryFolder() {
-  std::string name = (fs::temp_directory_path() / "drivebench-XXXXXX").string();
+  std::string name = (fs::temp_directory_path() / "drivebench-work-XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) throw std::system_error(errno, std::generic_category(), name);
   path_ = name;
 }

@@ -338,14 +338,14 @@ class Programs(RegressionTest):
                                    env=self.environment)
         output, until = None, time.monotonic() + PATIENCE_S
         while output is None and time.monotonic() < until:
-            printed = [file.read_text() for file in self.folder.glob("drivebench-test-*/0/output.txt")]
+            printed = [file.read_text() for file in self.folder.glob("drivebench-work-*/0/output.txt")]
             output = next((text for text in printed if text.strip()), None)
         self.assertIsNotNone(output)
         running.send_signal(signal.SIGINT)
         out, _ = running.communicate(timeout=PATIENCE_S)
         self.assertEqual(running.returncode, FAILED)
         self.assertIn("interrupted", out)
-        self.assertEqual(list(self.folder.glob("drivebench-test-*")), [])
+        self.assertEqual(list(self.folder.glob("drivebench-work-*")), [])
         child = pathlib.Path(f"/proc/{output.strip()}/stat")
         until = time.monotonic() + PATIENCE_S
         while child.exists() and child.read_text().split()[2] != "Z" and time.monotonic() < until:

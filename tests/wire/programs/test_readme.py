@@ -205,7 +205,7 @@ class Readmes(unittest.TestCase):
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "control", "plot", "replay",
                           "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
-                          "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
+                          "fmu", "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
                           "convert winding", "convert frame", "test", "rerun", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor", "web")
         names = re.findall(r"^  ([a-z][a-z-]*) ", subprocess.run([SERVER.parent / "drivebench", "--help"], capture_output=True, text=True,
                                                           check=True).stdout, re.M)
