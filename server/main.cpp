@@ -1,7 +1,5 @@
 #include <fmt/core.h>
 #include <google/protobuf/stubs/logging.h>
-#include <spdlog/sinks/stdout_sinks.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <array>
@@ -21,6 +19,7 @@
 #include "server/host/asio.hpp"
 #include "server/host/build_id.hpp"
 #include "server/host/json_log.hpp"
+#include "server/host/log.hpp"
 #include "server/host/memory.hpp"
 #include "server/host/print_line.hpp"
 #include "server/host/service_notification.hpp"
@@ -39,7 +38,7 @@ BenchConfig load_plausible(const ServerOptions& o) {
   BenchConfig config = load_config(o.config, odd);
   if (odd.empty()) return config;
   if (!o.allow_odd) throw ConfigError(std::move(odd));
-  spdlog::warn("{}", ConfigError(std::move(odd)).what());
+  log::warn("{}", ConfigError(std::move(odd)).what());
   return config;
 }
 
@@ -91,7 +90,7 @@ void check_bus_loads(const ServerOptions& o, const BenchConfig& config) {
   if (config.mode != RunMode::kRealtime) return;
   for (const std::string& overload : bus_overloads(config)) {
     if (!o.allow_overload) throw std::runtime_error(overload + "; --allow-overload starts all the same");
-    spdlog::warn("{}", overload);
+    log::warn("{}", overload);
   }
 }
 
@@ -175,12 +174,6 @@ asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
   }
 }
 
-void set_log_level(LogLevel level) {
-  constexpr std::array kLevels{spdlog::level::debug, spdlog::level::info, spdlog::level::warn,
-                               spdlog::level::err, spdlog::level::off};
-  spdlog::set_level(kLevels[static_cast<std::size_t>(level)]);
-}
-
 /// At each SIGHUP reads the bench file again and applies only its tokens and log level. Opens the audit log
 /// again, so that a moved file is replaced by a new one.
 asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const ServerOptions& o,
@@ -193,14 +186,14 @@ asio::awaitable<void> reload_on_hangup(asio::signal_set& hangups, const ServerOp
       BenchConfig now = configure(o);
       details.emplace_back("configuration_hash", fmt::format("{:016x}", configuration_hash(now)));
       server.replace_grants(std::move(now.tcp));
-      set_log_level(now.log_level);
-      spdlog::info("SIGHUP: tokens and log level are those of {} now", o.config);
+      log::set_level(now.log_level);
+      log::info("SIGHUP: tokens and log level are those of {} now", o.config);
     } catch (const std::exception& error) {
       result = error.what();
-      spdlog::error("SIGHUP: everything stays as it is: {}", result);
+      log::error("SIGHUP: everything stays as it is: {}", result);
     }
     if (audit == nullptr) continue;
-    if (!audit->reopen()) spdlog::error("SIGHUP: the audit log cannot be opened again and stays the old one");
+    if (!audit->reopen()) log::error("SIGHUP: the audit log cannot be opened again and stays the old one");
     audit->note({.name = "reload", .result = result, .details = std::move(details)});
   }
 }
@@ -247,7 +240,7 @@ int exit_code(const ServerOptions& o, const Verdict& verdict) {
 }
 
 int serve(const ServerOptions& o, const BenchConfig& config) {
-  set_log_level(config.log_level);
+  log::set_level(config.log_level);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   asio::io_context io(1);
@@ -272,9 +265,9 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   transports.serve(*engine, audit.get());
   engine->on_end = [&io] { io.stop(); };
   for (const std::string& note : engine->notes())
-    spdlog::warn("{}", note);
+    log::warn("{}", note);
   print_ready(o, config, server, transports);
-  if (!notify_service_manager("READY=1")) spdlog::warn("the service manager did not take READY=1");
+  if (!notify_service_manager("READY=1")) log::warn("the service manager did not take READY=1");
   if (o.duration_s > 0.0 && ::isatty(STDERR_FILENO) != 0) {
     asio::co_spawn(io, show_progress(*engine, o.duration_s), asio::detached);
   }
@@ -285,7 +278,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   try {
     io.run();
   } catch (const std::exception& error) {
-    spdlog::critical("the run ends: {}", error.what());
+    log::critical(fmt::format("the run ends: {}", error.what()));
     broken = true;
   }
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r{:40}\r", "");
@@ -317,7 +310,7 @@ int run(int argc, char** argv) {
   ServerOptions o;
   if (const std::optional<bool> done = read_command_line(argc, argv, o)) return *done ? kOk : kUnusable;
   const bool json_log = o.log_format == "json";
-  if (json_log) log_as_json();
+  if (json_log) log::write_json();
   try {
     return o.replay.empty() ? use_bench(o) : replay_command(o.replay, o.json);
   } catch (const std::exception& error) {
@@ -333,11 +326,10 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   drivebench::end_without_memory(drivebench::kUnusable);
   drivebench::use_small_stacks();
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("drivebench"));
   google::protobuf::SetLogHandler(nullptr);  // a peer could fill the log with texts that are not UTF-8
   try {
     if (drivebench::force_arithmetic()) {
-      spdlog::warn("a library has changed how this program rounds; set back");
+      drivebench::log::warn("a library has changed how this program rounds; set back");
     }
     return drivebench::run(argc, argv);
   } catch (const std::exception& error) {

@@ -1,5 +1,6 @@
 #include "protocols/pages/line_description.hpp"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <string_view>
 

@@ -1,5 +1,6 @@
 #include "protocols/pages/write_pages.hpp"
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <cerrno>
 #include <cstdlib>

@@ -1,11 +1,14 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
 
 #include "protocols/pages/completion.hpp"
 #include "protocols/pages/man_page.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace drivebench::pages {
 

@@ -1,6 +1,6 @@
 #include "server/access/admission.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 

@@ -1,13 +1,14 @@
 #include "server/access/audit.hpp"
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "plant/parameters/parameters.hpp"
+#include "protocols/json.hpp"
 #include "server/access/address.hpp"
+#include "server/host/log.hpp"
 #include "server/host/wall_time.hpp"
 
 namespace drivebench {
@@ -176,9 +177,9 @@ void Audit::note(Event event) {
   if (left_out_ > 0) line["details"]["left_out_before"] = left_out_;
   if (lost_ > 0) line["details"]["lost_before"] = lost_;
   // All but ASCII is escaped, so that the name of a client can neither break a line nor control a terminal.
-  if (file_.append(line.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace))) {
+  if (file_.append(ascii_json_text(line))) {
     left_out_ = 0;
-    if (std::exchange(failing_, false)) spdlog::warn("the audit log can be written again");
+    if (std::exchange(failing_, false)) log::warn("the audit log can be written again");
   } else {
     fail();
   }
@@ -187,7 +188,7 @@ void Audit::note(Event event) {
 void Audit::fail() {
   ++lost_;
   const bool is_news = !std::exchange(failing_, true);
-  if (is_news) spdlog::error("the audit log cannot be written: {}", std::generic_category().message(errno));
+  if (is_news) log::error("the audit log cannot be written: {}", std::generic_category().message(errno));
   if (on_failure_ != AuditFailure::kSafe || engine_ == nullptr) return;
   // The log fails for these losses too and calls fail() again, but by then the leases are gone from seen_.
   for (std::uint32_t axis = 0; axis < seen_.size(); ++axis) {

@@ -14,6 +14,7 @@
 #include "server/bench/bench.hpp"
 #include "server/bench/change_requests.hpp"
 #include "server/config/grants.hpp"
+#include "server/host/log_level.hpp"
 
 namespace drivebench {
 
@@ -105,9 +106,6 @@ struct AuditConfig {
   AuditFailure on_failure = AuditFailure::kContinue;
 };
 
-/// Section [log]: the least severe level that goes to standard error.
-enum class LogLevel { kDebug, kInfo, kWarn, kError, kOff };
-
 /// A change of an axis that the bench file sets: a load, a parameter value, a fault, a bump.
 struct AxisEvent {
   Tick tick = 0;  ///< of the change, or the ticks between its trigger and it
@@ -136,7 +134,8 @@ struct BenchConfig {
   ExperimentsConfig experiments;
   TlsConfig tls;
   AuditConfig audit;
-  LogLevel log_level = LogLevel::kInfo;
+  LogLevel log_level =
+      LogLevel::kInfo;  ///< section [log]: the least severe level that goes to standard error
 };
 
 /// Reads a bench file and the motor files that it names (relative to it). Throws ConfigError.

@@ -1,7 +1,6 @@
 #include "server/experiments/experiments.hpp"
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -11,6 +10,7 @@
 
 #include "protocols/text.hpp"
 #include "server/config/experiment_limits.hpp"
+#include "server/host/log.hpp"
 #include "server/recording/input_codec.hpp"
 
 namespace drivebench {

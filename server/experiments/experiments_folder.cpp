@@ -1,6 +1,5 @@
 // The folder of the experiments: loading, storing and deleting.
 #include <fcntl.h>
-#include <spdlog/spdlog.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,6 +19,7 @@
 #include "server/experiments/experiments.hpp"
 #include "server/experiments/row_file.hpp"
 #include "server/host/holder.hpp"
+#include "server/host/log.hpp"
 #include "server/recording/recording_file.hpp"
 
 namespace drivebench {
@@ -74,9 +74,9 @@ void check_rights(const std::filesystem::path& folder) {
   struct stat status = {};
   if (::stat(folder.c_str(), &status) != 0) refuse_folder(folder, std::generic_category().message(errno));
   if ((status.st_mode & S_IWOTH) != 0) refuse_folder(folder, "every user may write into it: chmod 700 it");
-  if ((status.st_mode & S_IWGRP) != 0) spdlog::warn("the group of {} may write into it", folder.string());
+  if ((status.st_mode & S_IWGRP) != 0) log::warn("the group of {} may write into it", folder.string());
   if (status.st_uid != ::geteuid() && status.st_uid != 0) {
-    spdlog::warn("{} belongs to user {}, which may write into it", folder.string(), status.st_uid);
+    log::warn("{} belongs to user {}, which may write into it", folder.string(), status.st_uid);
   }
 }
 
@@ -127,8 +127,8 @@ void Experiments::load() {
     if (*number > 0 && *number <= kMaxExperimentId) {
       found.insert(*number);
     } else {
-      spdlog::warn("{} is not an experiment: its number must lie between 1 and {}", entry.path().string(),
-                   kMaxExperimentId);
+      log::warn("{} is not an experiment: its number must lie between 1 and {}", entry.path().string(),
+                kMaxExperimentId);
     }
   }
   for (const std::filesystem::path& table : old_tables) {
@@ -166,7 +166,7 @@ Experiments::Pointer Experiments::load_one(const std::filesystem::path& file, st
   const std::string_view rule =
       is_read ? rule_broken_by(stored, id) : "it must be a StoredExperiment of 4 MiB at most";
   if (!rule.empty()) {
-    spdlog::warn("{} is not an experiment: {}", file.string(), rule);
+    log::warn("{} is not an experiment: {}", file.string(), rule);
     return nullptr;
   }
   auto experiment = std::make_shared<Experiment>();
@@ -197,7 +197,7 @@ void Experiments::try_to_store(const Experiment& experiment, const v1::Experimen
   try {
     store(experiment, info);
   } catch (const std::exception& error) {
-    spdlog::error("experiment {}: {}", experiment.id, error.what());
+    log::error("experiment {}: {}", experiment.id, error.what());
   }
 }
 

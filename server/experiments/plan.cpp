@@ -1,6 +1,6 @@
 #include "server/experiments/plan.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

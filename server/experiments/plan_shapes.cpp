@@ -1,6 +1,6 @@
 #include "server/experiments/plan_shapes.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 

@@ -11,7 +11,4 @@ namespace drivebench {
 std::string json_log_line(std::chrono::system_clock::time_point time, std::string_view level,
                           std::string_view message);
 
-/// The log of this program writes json_log_line() from now on.
-void log_as_json();
-
 }  // namespace drivebench

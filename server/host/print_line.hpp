@@ -3,8 +3,9 @@
 #include <fmt/core.h>
 
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <string>
+
+#include "protocols/json.hpp"
 
 namespace drivebench {
 
@@ -16,7 +17,7 @@ inline void print_line(const std::string& line) {
 
 /// Prints JSON in one line. Strings that are not valid UTF-8, such as file names, get replacement characters.
 inline void print_line(const nlohmann::json& line) {
-  print_line(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  print_line(json_text(line));
 }
 
 }  // namespace drivebench

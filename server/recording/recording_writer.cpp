@@ -1,7 +1,6 @@
 #include "server/recording/recording_writer.hpp"
 
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +14,7 @@
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "server/host/build_id.hpp"
+#include "server/host/log.hpp"
 #include "server/recording/recording.hpp"
 
 namespace drivebench {
@@ -268,7 +268,7 @@ void RecordingWriter::look_at_file() {
 }
 
 void RecordingWriter::remark(const std::string& what) {
-  spdlog::error("recording {}", what);
+  log::error("recording {}", what);
   if (remarks_.size() > kMaxRemarkBytes) return;
   remarks_ += (remarks_.empty() ? "" : "; ") + what;
 }

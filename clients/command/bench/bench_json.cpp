@@ -1,10 +1,11 @@
 #include "clients/command/bench/bench_json.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "clients/command/common/json.hpp"
 #include "clients/command/common/session.hpp"
 #include "clients/link/tcp/mode_name.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -96,7 +97,7 @@ std::string describe_json(const v1::Welcome& welcome) {
                                         {"integer", f.integer()},
                                         {"meaning", f.meaning()}});
   }
-  return out.dump(2);
+  return json_text(out, 2);
 }
 
 std::string status_json(const v1::Status& status, const v1::BenchDescription& bench) {
@@ -131,7 +132,7 @@ std::string status_json(const v1::Status& status, const v1::BenchDescription& be
       axis[std::string(signal.name)] = value_as_json(signal, sample);
     out["axes"].push_back(axis);
   }
-  return out.dump(2);
+  return json_text(out, 2);
 }
 
 std::string sample_json(const Sample& sample, const v1::BenchDescription& bench, std::uint32_t axis,
@@ -143,18 +144,17 @@ std::string sample_json(const Sample& sample, const v1::BenchDescription& bench,
               {"time_s", static_cast<double>(sample.tick) * bench.period_s()}};
   for (const Signal* signal : signals)
     out[std::string(signal->name)] = value_as_json(*signal, sample);
-  return out.dump();
+  return json_text(out);
 }
 
 std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick) {
-  return Json{{"axis", axis}, {"name", name}, {"value", value}, {"tick", tick}}.dump();
+  return json_text(Json{{"axis", axis}, {"name", name}, {"value", value}, {"tick", tick}});
 }
 
 std::string clear_json(const v1::BenchDescription& bench, std::uint32_t axis, std::uint64_t cleared,
                        std::uint64_t tick) {
-  return Json{
-      {"axis", axis}, {"name", "clear"}, {"cleared", names_in(bench.faults(), cleared)}, {"tick", tick}}
-      .dump();
+  return json_text(Json{
+      {"axis", axis}, {"name", "clear"}, {"cleared", names_in(bench.faults(), cleared)}, {"tick", tick}});
 }
 
 }  // namespace drivebench::command

@@ -1,6 +1,6 @@
 #include "clients/command/bench/describe.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cstdio>
 #include <string>

@@ -1,6 +1,6 @@
 #include "clients/command/bench/status.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <string>
 

@@ -1,11 +1,12 @@
 #include "clients/command/can/can_check.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -108,7 +109,7 @@ void print(const std::string& interface, const std::vector<CanFinding>& findings
     for (const CanFinding& finding : findings)
       list.push_back({{"problem", finding.problem}, {"what", finding.what}, {"cure", finding.cure}});
     const Json all = {{"interface", interface}, {"findings", list}};
-    fmt::print("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
+    fmt::print("{}\n", json_text(all, 2));
     return;
   }
   for (const CanFinding& finding : findings) {

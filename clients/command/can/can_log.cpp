@@ -1,6 +1,6 @@
 #include "clients/command/can/can_log.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <chrono>

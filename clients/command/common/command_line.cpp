@@ -1,6 +1,6 @@
 #include "clients/command/common/command_line.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -10,6 +10,7 @@
 #include "clients/command/common/pages.hpp"
 #include "clients/command/common/version.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
+#include "protocols/json.hpp"
 #include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 
@@ -64,7 +65,7 @@ int CommandLine::fail(int code, std::string_view kind, std::string_view message,
   std::fflush(stdout);
   if (json_) {
     const Json error = {{"error", {{"kind", kind}, {"message", message}, {"field", field}}}};
-    fmt::print("{}\n", error.dump());
+    fmt::print("{}\n", json_text(error));
   }
   fmt::print(stderr, "drivebench: {}\n", message);
   return code;

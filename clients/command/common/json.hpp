@@ -4,6 +4,8 @@
 #include <optional>
 #include <string_view>
 
+#include "protocols/json.hpp"
+
 /// JSON helpers of all rooms. The parser costs 1.4 s in every file that includes this header, so only the
 /// rooms' *_json.cpp and files that print a few keys include it.
 namespace nlohmann {
@@ -32,7 +34,7 @@ using Json = nlohmann::ordered_json;
 template <class T>
 std::optional<T> parsed(std::string_view line, std::string_view event = {}) {
   try {
-    const nlohmann::json object = nlohmann::json::parse(line);
+    const nlohmann::json object = parse_json(line);
     if (!object.is_object()) return std::nullopt;
     if (!event.empty() && object.value("event", std::string()) != event) return std::nullopt;
     return object.get<T>();

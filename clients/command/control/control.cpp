@@ -1,6 +1,6 @@
 #include "clients/command/control/control.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cstdio>
 #include <fstream>

@@ -1,6 +1,6 @@
 #include "clients/command/control/control_axis.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <numbers>

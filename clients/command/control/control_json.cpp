@@ -3,6 +3,7 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/control/presets/presets.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
@@ -52,11 +53,11 @@ std::string presets_json() {
                    {"drives_second", needs.drives_second},
                    {"gains", as_json(preset.gains())}});
   }
-  return out.dump(2);
+  return json_text(out, 2);
 }
 
 std::string gains_json(const std::vector<control::Gain>& gains) {
-  return as_json(gains).dump(2);
+  return json_text(as_json(gains), 2);
 }
 
 std::string comparison_json(const Comparison& c) {
@@ -81,11 +82,11 @@ std::string comparison_json(const Comparison& c) {
                    {"commands", as_json(c.other_commands)},
                    {"angle_rad", as_json(c.other_angle_rad)}};
   }
-  return out.dump(2);
+  return json_text(out, 2);
 }
 
 std::string control_json(const ControlReport& report) {
-  return nlohmann::json(report).dump();
+  return json_text(nlohmann::json(report));
 }
 
 std::optional<ControlReport> parse_control(std::string_view line) {

@@ -10,6 +10,7 @@
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
 #include "clients/command/control/control_json.hpp"
+#include "protocols/json.hpp"
 #include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 
@@ -19,7 +20,7 @@ namespace {
 /// The numbers of a report, also those that only some links carry.
 std::vector<std::string> known_names() {
   std::vector<std::string> names;
-  const Json report = Json::parse(control_json(ControlReport{}));
+  const Json report = parse_ordered_json(control_json(ControlReport{}));
   for (const auto& [name, value] : report.items()) {
     if (value.is_number() || value.is_null()) names.push_back(name);
   }
@@ -56,7 +57,7 @@ Limit parse_limit(const std::string& text) {
 
 std::vector<std::string> broken(const std::vector<Limit>& limits, const std::string& report_json) {
   std::vector<std::string> sentences;
-  const Json report = Json::parse(report_json);
+  const Json report = parse_ordered_json(report_json);
   for (const Limit& limit : limits) {
     const std::string wanted =
         fmt::format("{} {} {}", limit.name, limit.at_most ? "<=" : ">=", shortest(limit.value));

@@ -1,6 +1,6 @@
 #include "clients/command/control/control_presets.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <stdexcept>

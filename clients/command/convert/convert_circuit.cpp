@@ -1,4 +1,4 @@
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <numbers>
@@ -8,6 +8,7 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/convert/convert.hpp"
 #include "clients/models/induction_forms.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -83,7 +84,7 @@ void print_json(const InductionWindings& given, const std::array<CircuitForm, 4>
                      {"stator_leakage_h", t.stator_leakage_h},
                      {"rotor_leakage_h", t.rotor_leakage_h}};
   }
-  fmt::print("{}\n", out.dump());
+  fmt::print("{}\n", json_text(out));
 }
 
 void print_table(const InductionWindings& given, const std::array<CircuitForm, 4>& forms) {

@@ -1,4 +1,4 @@
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <numbers>
@@ -8,6 +8,7 @@
 #include "clients/command/convert/convert.hpp"
 #include "clients/control/math/frames.hpp"
 #include "clients/models/two_phase.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -44,7 +45,7 @@ int run_convert_frame(const ConvertFrameOptions& options) {
                       {"angle_deg", options.angle_deg},
                       {"power_invariant", both(1.0)},
                       {"amplitude_invariant", both(amplitude)}};
-    fmt::print("{}\n", out.dump());
+    fmt::print("{}\n", json_text(out));
     return kExitOk;
   }
   fmt::print("phases a, b, c          {:12.6g}{:12.6g}{:12.6g}   (zero sequence {:.6g})\n", phases[0] + zero,

@@ -1,4 +1,4 @@
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <numbers>
@@ -9,6 +9,7 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/convert/convert.hpp"
 #include "clients/models/winding_factors.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -77,7 +78,7 @@ int run_convert_winding(const ConvertWindingOptions& options) {
                      {"winding", f.distribution * f.pitch},
                      {"even", even_distribution_factor(options.phases, f.harmonic)}});
     }
-    fmt::print("{}\n", out.dump());
+    fmt::print("{}\n", json_text(out));
     return kExitOk;
   }
   fmt::print("{:>8}{:>14}{:>10}{:>10}{:>26}\n", "harmonic", "distribution", "pitch", "winding",

@@ -1,5 +1,5 @@
 // What the options left out: asked for on a terminal, told elsewhere.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <algorithm>

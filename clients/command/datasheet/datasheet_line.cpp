@@ -1,6 +1,6 @@
 #include "clients/command/datasheet/datasheet_line.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "clients/command/common/command_line.hpp"
 #include "clients/command/datasheet/new_bench.hpp"

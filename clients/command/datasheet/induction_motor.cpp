@@ -1,5 +1,5 @@
 // An induction motor from its nameplate, and its equivalent circuit or the classical tests.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // Motors with magnets: DC, PM synchronous and brushless DC.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <numbers>

@@ -1,6 +1,6 @@
 #include "clients/command/datasheet/new_file.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <filesystem>
 

@@ -1,6 +1,6 @@
 #include "clients/command/datasheet/new_motor.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <iterator>

@@ -1,6 +1,6 @@
 #include "clients/command/datasheet/sheet.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,7 @@
 #include "clients/command/demo/demo_json.hpp"
 
 #include "clients/command/common/json.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
@@ -34,15 +35,15 @@ Json demo_run(const DemoRun& run) {
 }  // namespace
 
 std::string demo_json(const DemoReport& report) {
-  return Json{{"lockstep", demo_run(report.lockstep)},
-              {"realtime", demo_run(report.realtime)},
-              {"replay",
-               {{"equal", report.replay.equal},
-                {"ticks", report.replay.ticks},
-                {"samples", report.replay.samples},
-                {"state_hash", report.replay.state_hash},
-                {"problem", report.replay.problem}}}}
-      .dump(2);
+  return json_text(Json{{"lockstep", demo_run(report.lockstep)},
+                        {"realtime", demo_run(report.realtime)},
+                        {"replay",
+                         {{"equal", report.replay.equal},
+                          {"ticks", report.replay.ticks},
+                          {"samples", report.replay.samples},
+                          {"state_hash", report.replay.state_hash},
+                          {"problem", report.replay.problem}}}},
+                   2);
 }
 
 std::optional<ServerVerdict> parse_verdict(std::string_view line) {

@@ -1,6 +1,6 @@
 #include "clients/command/doctor/doctor.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +9,7 @@
 
 #include "clients/command/common/errors.hpp"
 #include "clients/command/common/json.hpp"
+#include "protocols/json.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
@@ -56,7 +57,7 @@ int run_doctor(const DoctorOptions& options) {
   const std::ptrdiff_t problems = problems_in(realtime) + problems_in(can);
   if (options.json) {
     const Json all = {{"problems", problems}, {"realtime", json_of(realtime)}, {"can", json_of(can)}};
-    fmt::print("{}\n", all.dump(2, ' ', false, Json::error_handler_t::replace));
+    fmt::print("{}\n", json_text(all, 2));
   } else {
     print_table("real time", realtime);
     print_table("CAN", can);

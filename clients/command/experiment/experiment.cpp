@@ -1,6 +1,6 @@
 #include "clients/command/experiment/experiment.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <stdexcept>
 

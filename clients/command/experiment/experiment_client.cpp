@@ -1,6 +1,6 @@
 #include "clients/command/experiment/experiment_client.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <sys/random.h>
 #include <sys/stat.h>
 

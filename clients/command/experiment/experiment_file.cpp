@@ -1,6 +1,6 @@
 #include "clients/command/experiment/experiment_file.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 

@@ -1,11 +1,12 @@
 #include "clients/command/experiment/experiment_json.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <vector>
 
 #include "clients/command/common/json.hpp"
 #include "clients/command/experiment/experiment_file.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
@@ -38,14 +39,14 @@ std::string experiment_json(const v1::ExperimentInfo& info, std::string_view out
   Json out = json_of(info);
   out["out"] = out_file;
   out["resumed"] = resumed;
-  return out.dump();
+  return json_text(out);
 }
 
 std::string experiments_json(const v1::ExperimentList& list) {
   Json out = Json::array();
   for (const v1::ExperimentInfo& info : list.experiments())
     out.push_back(json_of(info));
-  return Json{{"experiments", out}}.dump(2);
+  return json_text(Json{{"experiments", out}}, 2);
 }
 
 }  // namespace drivebench::command

@@ -22,6 +22,7 @@
 #include "clients/fmu/fmu_resources.hpp"
 #include "clients/fmu/model_description.hpp"
 #include "clients/sdk/drivebench.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace fs = std::filesystem;
@@ -109,7 +110,7 @@ int run_fmu(const FmuOptions& options) {
     const std::string out = options.out_file.empty() ? unit.name + ".fmu" : options.out_file;
     archive::write_zip(out, unit.entries);
     if (options.json) {
-      fmt::print("{}\n", Json{{"out", out}, {"fmi", options.fmi}, {"variables", unit.variables}}.dump());
+      fmt::print("{}\n", json_text(Json{{"out", out}, {"fmi", options.fmi}, {"variables", unit.variables}}));
     } else {
       fmt::print("fmu: {} as FMI {}.0 for co-simulation, {} variables, to {}\n", unit.name, options.fmi,
                  unit.variables, out);

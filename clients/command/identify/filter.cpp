@@ -15,6 +15,7 @@
 #include "clients/identification/data/measured_data.hpp"
 #include "clients/identification/data/signals.hpp"
 #include "clients/identification/math/filters.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -110,7 +111,7 @@ void print_json(const FilterOptions& o, const Numbers& n) {
                     {"trapezoidal", json_of(n.plain)},
                     {"trapezoidal_corner_hz", n.plain_corner_hz},
                     {"exact_at_corner", json_of(n.exact)}};
-  fmt::print("{}\n", out.dump());
+  fmt::print("{}\n", json_text(out));
 }
 
 /// The column filtered once, as a controller could, and there and back; and the slope of the latter.

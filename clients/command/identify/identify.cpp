@@ -1,6 +1,6 @@
 #include "clients/command/identify/identify.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

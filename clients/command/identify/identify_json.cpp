@@ -5,12 +5,13 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/experiment/experiment_json.hpp"
 #include "clients/identification/named_experiments.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
 std::string identify_json(const IdentifyReport& report) {
   const identification::Processing& p = report.settings.processing;
-  Json out = Json::parse(to_json(report.result));
+  Json out = parse_ordered_json(to_json(report.result));
   out["motor"] = report.motor;
   out["source"] = report.source;
   out["experiment"] = report.experiment ? json_of(*report.experiment) : Json(nullptr);
@@ -38,7 +39,7 @@ std::string identify_json(const IdentifyReport& report) {
   out["validation"] = Json{{"from_rest", report.validation && report.validation->from_rest},
                            {"signals", signals},
                            {"problem", report.validation_problem}};
-  return out.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(out, 2);
 }
 
 std::string named_experiments_json() {
@@ -50,7 +51,7 @@ std::string named_experiments_json() {
                        {"bench", each.bench},
                        {"summary", each.summary},
                        {"test", each.test != identification::TerminalTest::kNone}});
-  return Json{{"experiments", out}}.dump(2);
+  return json_text(Json{{"experiments", out}}, 2);
 }
 
 }  // namespace drivebench::command

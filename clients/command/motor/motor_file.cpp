@@ -1,6 +1,6 @@
 #include "clients/command/motor/motor_file.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

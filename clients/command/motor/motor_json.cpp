@@ -1,6 +1,7 @@
 #include "clients/command/motor/motor_json.hpp"
 
 #include "clients/command/common/json.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
@@ -38,7 +39,7 @@ std::string steady_state_json(const InductionMotorFile& file, const InductionCir
                          {"centre_reactive_a", -circle.centre_a.imag()},
                          {"radius_a", circle.radius_a}}},
                        {"left_out", file.left_out}};
-  return report.dump(2);
+  return json_text(report, 2);
 }
 
 }  // namespace drivebench::command

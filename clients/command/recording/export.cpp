@@ -1,7 +1,7 @@
 #include "clients/command/recording/export.hpp"
 
 #include <bench.pb.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -21,6 +21,7 @@
 #include "clients/command/recording/export_can.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "clients/command/recording/tables/sample_table.hpp"
+#include "protocols/json.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 
@@ -260,8 +261,8 @@ int run_export(const ExportOptions& options) {
   if (options.json) {
     fmt::print(
         told, "{}\n",
-        Json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}}
-            .dump());
+        json_text(Json{
+            {"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}}));
   } else {
     fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_table ? "samples" : "frames",
                done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);

@@ -1,6 +1,6 @@
 #include "clients/command/recording/export_can.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 

@@ -1,6 +1,6 @@
 #include "clients/command/recording/recorded_run.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdio>

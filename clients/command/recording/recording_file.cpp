@@ -1,6 +1,6 @@
 #include "clients/command/recording/recording_file.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <system_error>
 

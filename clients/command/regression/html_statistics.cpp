@@ -1,6 +1,6 @@
 #include "clients/command/regression/html_statistics.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

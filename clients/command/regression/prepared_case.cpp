@@ -1,6 +1,6 @@
 #include "clients/command/regression/prepared_case.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <system_error>

@@ -17,6 +17,7 @@
 #include "clients/command/regression/run_case.hpp"
 #include "clients/command/regression/test.hpp"
 #include "clients/regression/reports/reports.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -101,7 +102,7 @@ int replay_plant(const RerunOptions& options, const Unpacked& bundle) {
   const auto line = server.read_line(Process::in(kReplayPatience));
   server.wait(Process::in(kReplayPatience));
   if (!line) throw std::runtime_error("drivebench-server ended without a report");
-  const auto report = nlohmann::json::parse(*line);
+  const auto report = parse_json(*line);
   const auto problem = report.at("problem").get<std::string>();
   if (!report.at("usable").get<bool>())
     throw UsageError(fmt::format("{}: entry \"run.mcap\": {}", options.bundle, problem));

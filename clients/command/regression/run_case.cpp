@@ -1,6 +1,6 @@
 #include "clients/command/regression/run_case.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <chrono>
 #include <exception>

@@ -1,6 +1,6 @@
 #include "clients/command/regression/suite_run.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <atomic>

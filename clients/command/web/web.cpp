@@ -1,6 +1,6 @@
 #include "clients/command/web/web.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cstdio>
 #include <fstream>
@@ -9,6 +9,7 @@
 #include "clients/command/common/installation.hpp"
 #include "clients/command/common/json.hpp"
 #include "clients/web/gateway/gateway.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -35,7 +36,7 @@ int run_web(const WebOptions& options) {
   try {
     gateway.listen = web::parse_listen_address(options.listen);
     web::run_gateway(gateway, [&options](const std::string& url) {
-      fmt::print("{}\n", options.json ? Json{{"event", "ready"}, {"url", url}}.dump()
+      fmt::print("{}\n", options.json ? json_text(Json{{"event", "ready"}, {"url", url}})
                                       : "the bench in a browser: " + url);
       std::fflush(stdout);
     });

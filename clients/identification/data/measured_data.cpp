@@ -1,6 +1,6 @@
 #include "clients/identification/data/measured_data.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>

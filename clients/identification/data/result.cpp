@@ -1,11 +1,13 @@
 #include "clients/identification/data/result.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
+
+#include "protocols/json.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -259,7 +261,7 @@ std::string to_json(const Result& r) {
                            {"contradicts", fact.contradicts},
                            {"remark", fact.remark}};
   }
-  return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(all, 2);
 }
 
 std::string to_motor_toml(const Result& r, const MotorFile& file) {

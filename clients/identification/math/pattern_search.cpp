@@ -1,6 +1,6 @@
 #include "clients/identification/math/pattern_search.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "clients/identification/motors/terminal_reading.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

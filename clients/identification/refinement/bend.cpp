@@ -1,6 +1,6 @@
 #include "clients/identification/refinement/bend.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 

@@ -13,7 +13,7 @@ using Vector = Eigen::VectorXd;
 
 constexpr double kDifference = 1e-5;
 constexpr double kUnknownDeviation = 100.0;
-constexpr int kMostSteps = 15;
+constexpr int kMostGaussNewtonSteps = 15;
 constexpr double kSmallStep2 = 1e-4;  // of a step in its own standard deviations, squared
 constexpr Eigen::Index kParts = 64;
 
@@ -70,7 +70,7 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) 
   fit.sum = l.residual.squaredNorm();
   double damping = 0.0;
   Matrix tried;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMostGaussNewtonSteps; ++step) {
     if (!linearise(residuals, fit.at, l)) return fit;
     const Vector gradient = l.jacobian.transpose() * l.residual.col(0);
     bool better = false;

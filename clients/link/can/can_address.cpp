@@ -17,7 +17,7 @@
 namespace drivebench::link {
 namespace {
 
-constexpr std::string_view kScheme = "can:";
+constexpr std::string_view kCanScheme = "can:";
 
 struct UnitKey {
   std::string_view name;
@@ -134,11 +134,11 @@ void read_key(std::string_view text, std::string_view key, std::string_view valu
 }  // namespace
 
 bool is_can_address(std::string_view text) noexcept {
-  return text.starts_with(kScheme);
+  return text.starts_with(kCanScheme);
 }
 
 CanAddress parse_can_address(std::string_view text) {
-  const auto [place, keys] = split(is_can_address(text) ? text.substr(kScheme.size()) : text, '?');
+  const auto [place, keys] = split(is_can_address(text) ? text.substr(kCanScheme.size()) : text, '?');
   const auto [name, channel] = split(place, ':');
   CanAddress address;
   address.backend = backend_named(text, name);
@@ -167,7 +167,7 @@ unsigned can_mode_of(v1::Gates gates) noexcept {
 
 std::string to_string(const CanAddress& address) {
   std::string text =
-      std::string(kScheme) + std::string(can::name_of(address.backend)) + ":" + address.channel;
+      std::string(kCanScheme) + std::string(can::name_of(address.backend)) + ":" + address.channel;
   if (address.port != 0) text += ":" + std::to_string(address.port);
   return text;
 }

@@ -21,7 +21,7 @@ using modbus::Content;
 using modbus::Row;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::string_view kScheme = "modbus:";
+constexpr std::string_view kModbusScheme = "modbus:";
 
 /// The first of the fixed rows with this content.
 constexpr const Row& row_of(Content content) {
@@ -59,11 +59,11 @@ modbus::CommandMode mode_of(v1::Gates gates) {
 }  // namespace
 
 bool is_modbus_address(std::string_view text) noexcept {
-  return text.starts_with(kScheme);
+  return text.starts_with(kModbusScheme);
 }
 
 ModbusAddress parse_modbus_address(std::string_view text) {
-  std::string_view place = is_modbus_address(text) ? text.substr(kScheme.size()) : text;
+  std::string_view place = is_modbus_address(text) ? text.substr(kModbusScheme.size()) : text;
   ModbusAddress address;
   if (const std::size_t mark = place.find('?'); mark != std::string_view::npos) {
     const std::string_view key = place.substr(mark + 1);
@@ -93,7 +93,7 @@ void ModbusLink::Free::operator()(_modbus* context) const noexcept {
 }
 
 ModbusLink::ModbusLink(const ModbusAddress& address, std::chrono::milliseconds deadline)
-    : name_(std::string(kScheme) + address.host + ":" + address.port +
+    : name_(std::string(kModbusScheme) + address.host + ":" + address.port +
             "?unit=" + std::to_string(address.unit)),
       deadline_(deadline),
       modbus_(::modbus_new_tcp_pi(address.host.c_str(), address.port.c_str())),

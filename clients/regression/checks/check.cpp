@@ -1,6 +1,6 @@
 #include "clients/regression/checks/check.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>

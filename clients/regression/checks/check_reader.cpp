@@ -1,6 +1,6 @@
 #include "clients/regression/checks/check_reader.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 

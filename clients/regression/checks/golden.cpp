@@ -1,6 +1,6 @@
 #include "clients/regression/checks/golden.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <charconv>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "clients/regression/reports/case_json.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <charconv>

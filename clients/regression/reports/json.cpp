@@ -1,3 +1,4 @@
+#include "protocols/json.hpp"
 #include "clients/regression/reports/case_json.hpp"
 #include "clients/regression/reports/reports.hpp"
 
@@ -5,7 +6,7 @@ namespace drivebench::regression {
 namespace {
 
 std::string text_of(const Json& json) {
-  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+  return json_text(json, 1);
 }
 
 /// The lines of a text that stands so deep within another.

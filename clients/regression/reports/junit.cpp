@@ -1,4 +1,4 @@
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "clients/regression/reports/reports.hpp"
 #include "protocols/markup.hpp"

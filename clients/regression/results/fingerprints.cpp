@@ -1,6 +1,6 @@
 #include "clients/regression/results/fingerprints.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <fstream>
 #include <iterator>

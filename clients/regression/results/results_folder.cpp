@@ -1,6 +1,6 @@
 #include "clients/regression/results/results_folder.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <fstream>
 #include <iterator>
@@ -9,6 +9,7 @@
 
 #include "clients/regression/reports/case_json.hpp"
 #include "clients/regression/results/fingerprints.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::regression {
 
@@ -26,7 +27,7 @@ std::optional<CaseResult> ResultsFolder::find(const std::string& name, const std
   if (!in) return std::nullopt;
   const std::string text(std::istreambuf_iterator<char>(in), {});
   try {
-    const Json file = Json::parse(text);
+    const Json file = parse_ordered_json(text);
     if (file.at("fingerprint").get<std::string>() != fingerprint) return std::nullopt;
     CaseResult result = case_of(file.at("case"));
     if (result.name != name) return std::nullopt;
@@ -43,7 +44,7 @@ void ResultsFolder::put(const CaseResult& result, const std::string& fingerprint
   fs::path unfinished = target;
   unfinished += fmt::format(".{:08x}", std::random_device{}());  // others may write the same result
   std::ofstream out(unfinished, std::ios::binary);
-  out << file.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
+  out << json_text(file) << '\n';
   out.close();
   std::error_code error;
   if (out) fs::rename(unfinished, target, error);

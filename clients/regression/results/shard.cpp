@@ -1,6 +1,6 @@
 #include "clients/regression/results/shard.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <charconv>
 #include <optional>

@@ -1,6 +1,6 @@
 #include "clients/regression/suite/matrix.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

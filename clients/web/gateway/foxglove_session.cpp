@@ -1,6 +1,6 @@
 #include "clients/web/gateway/foxglove_session.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <openssl/evp.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "protocols/descriptor_set.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::web {
 namespace {
@@ -41,8 +42,16 @@ void put_little_endian(std::string& bytes, Number value) {
     bytes.push_back(static_cast<char>(value >> 8 * i & 0xff));
 }
 
+nlohmann::json parsed(std::string_view text) {
+  try {
+    return parse_json(text);
+  } catch (const nlohmann::json::parse_error&) {
+    throw Refused("the message is not JSON");
+  }
+}
+
 std::string shown(const nlohmann::json& value) {
-  const std::string text = value.dump(-1, ' ', true);
+  const std::string text = ascii_json_text(value);
   return text.size() <= kShown ? text : text.substr(0, kShown) + "...";
 }
 
@@ -115,11 +124,10 @@ std::string server_info(const v1::Welcome& welcome) {
     metadata["unit." + signal.name()] = signal.unit();
   for (const v1::AxisDescription& axis : bench.axes())
     metadata["machine." + axis.name()] = axis.machine();
-  return nlohmann::ordered_json{{"op", "serverInfo"},
-                                {"name", "drivebench: " + bench.name()},
-                                {"capabilities", {"time"}},
-                                {"metadata", std::move(metadata)}}
-      .dump();
+  return json_text(nlohmann::ordered_json{{"op", "serverInfo"},
+                                          {"name", "drivebench: " + bench.name()},
+                                          {"capabilities", {"time"}},
+                                          {"metadata", std::move(metadata)}});
 }
 
 }  // namespace
@@ -150,15 +158,14 @@ FoxgloveSession::FoxgloveSession(const v1::Welcome& welcome) : period_ns_(welcom
                         {"schemaEncoding", "protobuf"},
                         {"schema", schema}});
   }
-  put(true, nlohmann::ordered_json{{"op", "advertise"}, {"channels", std::move(channels)}}.dump());
+  put(true, json_text(nlohmann::ordered_json{{"op", "advertise"}, {"channels", std::move(channels)}}));
   if (welcome.bench().mode() == v1::MODE_LOCKSTEP)
     tell(kInfo, "The bench runs in lockstep: time stands still until a controller drives it.", "lockstep");
 }
 
 std::vector<v1::Subscribe> FoxgloveSession::text(std::string_view text) {
   try {
-    const nlohmann::json message = nlohmann::json::parse(text, nullptr, false);
-    if (message.is_discarded()) throw Refused("the message is not JSON");
+    const nlohmann::json message = parsed(text);
     const nlohmann::json& op = field_of(message, "op", "");
     std::vector<FoxgloveChannel> channels = channels_;
     if (op == "subscribe") {
@@ -210,7 +217,7 @@ void FoxgloveSession::put(bool is_text, std::string bytes) {
 void FoxgloveSession::tell(int level, std::string_view sentence, std::string_view id) {
   nlohmann::ordered_json status{{"op", "status"}, {"level", level}, {"message", sentence}};
   if (!id.empty()) status["id"] = id;  // replaces the status before it
-  put(true, status.dump());
+  put(true, json_text(status));
 }
 
 void FoxgloveSession::send(const v1::Samples& samples) {

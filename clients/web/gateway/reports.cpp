@@ -1,6 +1,6 @@
 #include "clients/web/gateway/reports.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "clients/link/tcp/mode_name.hpp"
+#include "protocols/json.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::web {
@@ -187,7 +188,7 @@ std::string health_json(const Reading& reading) {
   } else {
     health = {{"status", "no bench"}, {"problem", utf8(reading.problem)}};
   }
-  return health.dump() + "\n";
+  return json_text(health) + "\n";
 }
 
 }  // namespace drivebench::web

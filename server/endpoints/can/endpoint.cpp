@@ -1,10 +1,11 @@
 #include "server/endpoints/can/endpoint.hpp"
 
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "server/host/log.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -129,8 +130,8 @@ void Endpoint::on_frame(const Frame& frame, std::int64_t stamp_ns) {
 
 void Endpoint::log_refusal(const Node& node, std::string_view what, std::string_view why) {
   if (!refusal_log_.allow()) return;
-  spdlog::warn("{}: {} for axis {} was refused: {} ({} more before)", bus_->name(), what, node.axis, why,
-               refusal_log_.held_back());
+  log::warn("{}: {} for axis {} was refused: {} ({} more before)", bus_->name(), what, node.axis, why,
+            refusal_log_.held_back());
 }
 
 void Endpoint::on_request(Node& node, const Values& values) {
@@ -260,16 +261,16 @@ void Endpoint::lose(Node& node, const char* why) {
 
 void Endpoint::log_loss(const Node& node, std::string_view why) {
   if (!loss_log_.allow()) return;
-  spdlog::warn("{}: axis {} loses its controller: {} ({} more before)", bus_->name(), node.axis, why,
-               loss_log_.held_back());
+  log::warn("{}: axis {} loses its controller: {} ({} more before)", bus_->name(), node.axis, why,
+            loss_log_.held_back());
 }
 
 void Endpoint::on_state() {
   const BusState state = bus_->status().state;
   if (state == last_state_) return;
   if (state_log_.allow()) {
-    spdlog::warn("{}: {}, was {} ({} more changes before)", bus_->name(), name_of(state),
-                 name_of(last_state_), state_log_.held_back());
+    log::warn("{}: {}, was {} ({} more changes before)", bus_->name(), name_of(state), name_of(last_state_),
+              state_log_.held_back());
   }
   const bool appeared = last_state_ == BusState::kAbsent;
   last_state_ = state;

@@ -1,10 +1,10 @@
 // Notices frames from elsewhere that have identifiers of this bench.
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 
 #include "server/endpoints/can/endpoint.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench::can {
 
@@ -18,7 +18,7 @@ void Endpoint::note_conflict(const Frame& frame, Node* node) {
   if (node == nullptr) sync_conflict_.note(now);
   if (!conflict_log_.allow()) return;
   const Conflict& conflict = node == nullptr ? sync_conflict_ : node->conflict;
-  spdlog::error(
+  log::error(
       "{}: ID_CONFLICT: a frame with identifier {:#x} of this bench came from elsewhere; {} silent for "
       "{} s ({} more before)",
       bus_->name(), frame.id, node == nullptr ? "all axes are" : fmt::format("axis {} is", node->axis),

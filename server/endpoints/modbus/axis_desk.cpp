@@ -1,12 +1,11 @@
 #include "server/endpoints/modbus/axis_desk.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <utility>
 
 #include "plant/faults.hpp"
 #include "server/access/address.hpp"
 #include "server/endpoints/modbus/map_info.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench::modbus {
 
@@ -185,8 +184,8 @@ void AxisDesk::watch() {
     if (seat_.notice_end()) return forget_holder();
     if (waiting_ || !seat_.is_silent(Clock::now(), patience())) return watch();
     if (lapsed_log_.allow()) {
-      spdlog::warn("modbus: the owner of axis {} {} and loses its lease ({} more since the last such line)",
-                   axis_, holder_ != 0 ? "has fallen silent" : "went away", lapsed_log_.held_back());
+      log::warn("modbus: the owner of axis {} {} and loses its lease ({} more since the last such line)",
+                axis_, holder_ != 0 ? "has fallen silent" : "went away", lapsed_log_.held_back());
     }
     forget_holder();
     seat_.lose();
@@ -261,7 +260,7 @@ bool AxisDesk::opens(std::uint16_t key, Visitor visitor) {
   last_wrong_key_ = key;
   const std::chrono::duration<double> wait = guesses_.wait_of(address, now);
   if (wait.count() > 0.0 && guess_log_.allow()) {
-    spdlog::warn(
+    log::warn(
         "modbus: a wrong key for axis {} from {}: the next one is read in {:.1f} s ({} more since the last "
         "such line)",
         axis_, address, wait.count(), guess_log_.held_back());

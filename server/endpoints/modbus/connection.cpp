@@ -1,10 +1,11 @@
 #include "server/endpoints/modbus/connection.hpp"
 
 #include <poll.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <string_view>
+
+#include "server/host/log.hpp"
 
 namespace drivebench::modbus {
 namespace {
@@ -45,8 +46,7 @@ void ClientConnection::close() noexcept {
 void ClientConnection::cut(std::string_view why) {
   ++shared_.counts.cut;
   if (shared_.cut_log.allow()) {
-    spdlog::warn("{}: cut off: {} ({} more since the last such line)", name_, why,
-                 shared_.cut_log.held_back());
+    log::warn("{}: cut off: {} ({} more since the last such line)", name_, why, shared_.cut_log.held_back());
   }
   audit("limit", why);
   close();
@@ -276,8 +276,8 @@ void ClientConnection::note_refused_write(AxisDesk& desk, Refused why) {
     audit("forbidden", sentence_of(why), desk.axis());
   }
   if (!shared_.refused_writes_log.allow()) return;
-  spdlog::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_,
-               desk.axis(), sentence_of(why), shared_.refused_writes_log.held_back());
+  log::warn("{}: a write to axis {} was refused: {} ({} more since the last such line)", name_, desk.axis(),
+            sentence_of(why), shared_.refused_writes_log.held_back());
 }
 
 bool ClientConnection::is_peer_gone() {

@@ -2,13 +2,13 @@
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <map>
 #include <stdexcept>
 
 #include "server/endpoints/modbus/map_info.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench {
 namespace {
@@ -59,8 +59,8 @@ std::string ModbusServer::address() const {
 
 void ModbusServer::serve(Engine& engine, Audit* audit) {
   if (!is_loopback(config_.address)) {
-    spdlog::warn("Modbus knows no passwords: every client that reaches {} can read this bench{}", address(),
-                 config_.allow_writes ? " and drive its motors" : "");
+    log::warn("Modbus knows no passwords: every client that reaches {} can read this bench{}", address(),
+              config_.allow_writes ? " and drive its motors" : "");
   }
   identification_.emplace(engine.config().name);
   maps_ = modbus::maps_of(engine.config());
@@ -91,8 +91,8 @@ std::string ModbusServer::name_of(modbus::Visitor visitor) const {
 
 void ModbusServer::note_takeover(std::uint32_t axis, const Client& by, const std::string& from) {
   if (shared_->takeover_log.allow()) {
-    spdlog::warn("modbus: {} took axis {} from {} with its key ({} more since the last such line)", by.peer,
-                 axis, from, shared_->takeover_log.held_back());
+    log::warn("modbus: {} took axis {} from {} with its key ({} more since the last such line)", by.peer,
+              axis, from, shared_->takeover_log.held_back());
   }
   if (shared_->audit == nullptr) return;
   shared_->audit->note({.name = "take",
@@ -112,8 +112,8 @@ asio::awaitable<void> ModbusServer::accept() {
     if (error == asio::error::operation_aborted) co_return;
     if (error) {
       if (log.allow()) {
-        spdlog::warn("cannot accept a Modbus client: {} ({} more since the last such line)", error.message(),
-                     log.held_back());
+        log::warn("cannot accept a Modbus client: {} ({} more since the last such line)", error.message(),
+                  log.held_back());
       }
       ServerTimer pause(io_, kAcceptPause);
       co_await pause.async_wait(asio::use_awaitable);
@@ -122,7 +122,7 @@ asio::awaitable<void> ModbusServer::accept() {
     try {
       start(std::move(socket));
     } catch (const std::exception& problem) {
-      spdlog::error("a Modbus client could not be taken: {}", problem.what());
+      log::error("a Modbus client could not be taken: {}", problem.what());
     }
   }
 }
@@ -133,7 +133,7 @@ void ModbusServer::start(tcp::socket socket) {
   if (connections_.size() >= config_.max_connections && !make_room(connection->peer())) {
     ++shared_->counts.turned_away;
     if (shared_->turned_away_log.allow()) {
-      spdlog::warn(
+      log::warn(
           "modbus: {} was turned away: {} connections are all there may be ({} more since the last "
           "such line)",
           connection->peer().to_string(), config_.max_connections, shared_->turned_away_log.held_back());
@@ -180,7 +180,7 @@ asio::awaitable<void> ModbusServer::run(std::shared_ptr<modbus::ClientConnection
   try {
     co_await connection->run();
   } catch (const std::exception& error) {
-    spdlog::error("a Modbus connection ended: {}", error.what());
+    log::error("a Modbus connection ended: {}", error.what());
   }
   connection->end();
   std::erase(connections_, connection);

@@ -2,13 +2,13 @@
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <spdlog/spdlog.h>
 
 #include <filesystem>
 #include <stdexcept>
 
 #include "server/access/address.hpp"
 #include "server/host/holder.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench {
 namespace {
@@ -159,8 +159,8 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
       if (error == asio::error::operation_aborted) co_return;
       if (error) {
         if (log.allow()) {
-          spdlog::warn("cannot accept a client: {} ({} more since the last such line)", error.message(),
-                       log.held_back());
+          log::warn("cannot accept a client: {} ({} more since the last such line)", error.message(),
+                    log.held_back());
         }
         ServerTimer pause(io_, kAcceptPause);
         co_await pause.async_wait(asio::use_awaitable);
@@ -169,7 +169,7 @@ asio::awaitable<void> StreamServer::accept_from(Acceptor& acceptor) {
       tune(socket);
       receive(std::move(socket));
     } catch (const std::exception& problem) {
-      spdlog::error("a client could not be taken: {}", problem.what());
+      log::error("a client could not be taken: {}", problem.what());
     }
   }
 }
@@ -256,7 +256,7 @@ asio::awaitable<void> StreamServer::run(std::shared_ptr<Session> session) {
   try {
     co_await session->run();
   } catch (const std::exception& error) {
-    spdlog::error("a session ended: {}", error.what());
+    log::error("a session ended: {}", error.what());
     session->close();
   }
   std::erase(sessions_, session);

@@ -2,7 +2,6 @@
 #include <malloc.h>
 
 #include <google/protobuf/stubs/logging.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,6 +15,7 @@
 #include <string>
 #include <string_view>
 
+#include "server/host/log.hpp"
 #include "tests/adversity/simulator/week.hpp"
 #include "tests/adversity/simulator/world/world.hpp"
 #include "tests/server/recording/run_config.hpp"
@@ -177,7 +177,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   std::signal(SIGPIPE, SIG_IGN);
-  spdlog::set_level(spdlog::level::off);
+  drivebench::log::set_level(drivebench::LogLevel::kOff);
   google::protobuf::SetLogHandler(nullptr);
   if (options.minutes > 0) return drivebench::simulator::run_long(options.minutes * 60, 1);
   return drivebench::simulator::run(options);

@@ -45,10 +45,6 @@ double back_from(Message message, bool fd, std::string_view name, double value) 
   return decode(*find_message(message, fd), profile_of(fd), frame)[index_of(message, fd, name)];
 }
 
-Frame sent(Message message, bool fd) {
-  return encode_sample(*find_message(message, fd), profile_of(fd), 5, a_sample());
-}
-
 // Catches: a byte order, a place or a scale that changes: the bytes on the wire are a promise.
 TEST(CanCodec, ClassicFramesHaveTheseBytes) {
   EXPECT_EQ(data_of(sent(Message::kSync, false)), "8967452300");

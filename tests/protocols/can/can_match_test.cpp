@@ -15,10 +15,6 @@ Frame a_frame(Message message, bool fd, std::uint32_t node = 1) {
   return encode(*find_message(message, fd), profile_of(fd), node, Values{});
 }
 
-FrameProblem problem_of(const Profile& profile, const Frame& frame) {
-  return match(profile, frame).problem;
-}
-
 // Catches: a message that is taken for another, or for another node's, at the ends of the ranges.
 TEST(CanMatch, EveryMessageOfEveryNodeIsRecognised) {
   for (const bool fd : {false, true}) {

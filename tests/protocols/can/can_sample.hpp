@@ -85,4 +85,16 @@ inline Sample a_sample() {
   return sample;
 }
 
+inline Frame sent(Message message, bool fd) {
+  return encode_sample(*find_message(message, fd), profile_of(fd), 5, a_sample());
+}
+
+inline FrameProblem problem_of(const Profile& profile, const Frame& frame) {
+  return match(profile, frame).problem;
+}
+
+inline bool contains(const std::string& text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
+
 }  // namespace drivebench::can

@@ -5,6 +5,7 @@
 #include "protocols/can/budget.hpp"
 #include "protocols/can/dbc.hpp"
 #include "protocols/can/table_text.hpp"
+#include "tests/protocols/can/can_sample.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -110,10 +111,6 @@ TEST(CanTexts, EveryEnumeratedFieldListsItsChoices) {
   EXPECT_EQ(modes[0].label, "real time");
   EXPECT_EQ(modes[1].number, 1u);
   EXPECT_EQ(modes[1].label, "lockstep");
-}
-
-bool contains(const std::string& text, std::string_view part) {
-  return text.find(part) != std::string::npos;
 }
 
 // Catches: the lines of a DBC file that programs depend on, by the letter. canmatrix checks the rest

@@ -15,17 +15,6 @@
 namespace drivebench::can {
 namespace {
 
-FrameProblem problem_of(const Profile& profile, const Frame& frame) {
-  return match(profile, frame).problem;
-}
-
-bool contains(const std::string& text, std::string_view part) {
-  return text.find(part) != std::string::npos;
-}
-
-Frame sent(Message message, bool fd) {
-  return encode_sample(*find_message(message, fd), profile_of(fd), 5, a_sample());
-}
 Frame sent_by_wide(Message message, bool fd, Page page = Page{}) {
   return encode_sample(*find_message(message, fd, true), profile_of(fd), 5, a_sample(), page);
 }

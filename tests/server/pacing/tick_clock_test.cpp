@@ -26,14 +26,14 @@ class ScriptedPacer final : public Pacer {
   std::size_t next_ = 0;
 };
 
-constexpr std::int64_t kPeriodNs = 125'000;
+constexpr std::int64_t kClockPeriodNs = 125'000;
 constexpr std::int64_t kMaxLatenessNs = 1'000'000;
-const std::vector<std::int64_t> kLatenessesNs = {0, kPeriodNs - 1, kPeriodNs, kMaxLatenessNs,
+const std::vector<std::int64_t> kLatenessesNs = {0, kClockPeriodNs - 1, kClockPeriodNs, kMaxLatenessNs,
                                                  kMaxLatenessNs + 1};
 
 BenchConfig paced_bench() {
   BenchConfig config = servo_bench();
-  config.setup.period_ns = kPeriodNs;
+  config.setup.period_ns = kClockPeriodNs;
   config.realtime.max_lateness_ns = kMaxLatenessNs;
   return config;
 }

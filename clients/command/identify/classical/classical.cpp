@@ -1,6 +1,6 @@
 #include "clients/command/identify/classical/classical.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

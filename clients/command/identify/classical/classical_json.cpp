@@ -1,11 +1,12 @@
 #include "clients/command/common/json.hpp"
 #include "clients/command/experiment/experiment_json.hpp"
 #include "clients/command/identify/classical/classical_report.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
 std::string classical_json(const ClassicalReport& report) {
-  Json out = Json::parse(to_json(report.result));
+  Json out = parse_ordered_json(to_json(report.result));
   out["motor"] = "im";
   out["experiment"] = report.experiment;
   Json readings = Json::object();
@@ -42,7 +43,7 @@ std::string classical_json(const ClassicalReport& report) {
                          {"slip_angle", report.losses->slip_angle},
                          {"inductance_bias", report.losses->inductance_bias}};
   }
-  return out.dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(out, 2);
 }
 
 }  // namespace drivebench::command

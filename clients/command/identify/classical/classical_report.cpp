@@ -1,6 +1,6 @@
 #include "clients/command/identify/classical/classical_report.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <cmath>

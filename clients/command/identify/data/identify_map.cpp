@@ -1,6 +1,6 @@
 #include "clients/command/identify/data/identify_map.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "clients/command/identify/data/identify_server.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdlib>

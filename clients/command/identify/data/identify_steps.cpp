@@ -1,6 +1,6 @@
 #include "clients/command/identify/data/identify_steps.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstddef>

@@ -1,6 +1,6 @@
 #include "clients/command/identify/suggest/suggest.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <string_view>

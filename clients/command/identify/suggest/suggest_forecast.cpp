@@ -1,6 +1,6 @@
 #include "clients/command/identify/suggest/suggest_forecast.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -5,6 +5,7 @@
 
 #include "clients/command/common/json.hpp"
 #include "clients/command/identify/suggest/suggest.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -84,19 +85,19 @@ std::string suggest_json(const SuggestReport& report) {
   Json existing = Json::array();
   for (const ExperimentForecast& each : report.existing)
     existing.push_back(json_of(each));
-  return Json{
-      {"motor", report.motor},
-      {"bench", report.bench},
-      {"limits",
-       {{"current_a", report.limits.current_a},
-        {"voltage_v", report.limits.voltage_v},
-        {"speed_rad_s", report.limits.speed_rad_s > 0.0 ? Json(report.limits.speed_rad_s) : Json(nullptr)},
-        {"duration_s", report.limits.duration_s}}},
-      {"existing", existing},
-      {"suggested", json_of(report.suggested)},
-      {"trials", report.trials},
-      {"experiment", report.toml}}
-      .dump(2, ' ', false, Json::error_handler_t::replace);
+  return json_text(Json{{"motor", report.motor},
+                        {"bench", report.bench},
+                        {"limits",
+                         {{"current_a", report.limits.current_a},
+                          {"voltage_v", report.limits.voltage_v},
+                          {"speed_rad_s",
+                           report.limits.speed_rad_s > 0.0 ? Json(report.limits.speed_rad_s) : Json(nullptr)},
+                          {"duration_s", report.limits.duration_s}}},
+                        {"existing", existing},
+                        {"suggested", json_of(report.suggested)},
+                        {"trials", report.trials},
+                        {"experiment", report.toml}},
+                   2);
 }
 
 }  // namespace drivebench::command

@@ -1,6 +1,6 @@
 #include "clients/command/identify/track/track.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <array>
 #include <chrono>

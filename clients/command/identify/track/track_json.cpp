@@ -3,6 +3,7 @@
 
 #include "clients/command/common/json.hpp"
 #include "clients/command/identify/track/track_report.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::command {
 
@@ -15,17 +16,16 @@ std::string track_row_json(const TrackRow& row) {
                 {"interval", number(interval)},
                 {"truth", row.truth ? Json(*row.truth.*truth) : Json(nullptr)}};
   };
-  return Json{{"time_s", row.time_s},
-              {"R_S", parameter("R_S", e.stator_resistance_ohm, e.stator_interval_ohm,
-                                &TrackTruth::stator_resistance_ohm)},
-              {"T_R", parameter("T_R", e.rotor_time_constant_s, e.rotor_interval_s,
-                                &TrackTruth::rotor_time_constant_s)},
-              {"verdict", e.excitation.verdict}}
-      .dump();
+  return json_text(Json{{"time_s", row.time_s},
+                        {"R_S", parameter("R_S", e.stator_resistance_ohm, e.stator_interval_ohm,
+                                          &TrackTruth::stator_resistance_ohm)},
+                        {"T_R", parameter("T_R", e.rotor_time_constant_s, e.rotor_interval_s,
+                                          &TrackTruth::rotor_time_constant_s)},
+                        {"verdict", e.excitation.verdict}});
 }
 
 std::string track_gap_json(std::uint64_t missing, double time_s) {
-  return Json{{"time_s", time_s}, {"missing", missing}}.dump();
+  return json_text(Json{{"time_s", time_s}, {"missing", missing}});
 }
 
 }  // namespace drivebench::command

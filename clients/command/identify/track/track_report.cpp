@@ -1,6 +1,6 @@
 #include "clients/command/identify/track/track_report.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdio>

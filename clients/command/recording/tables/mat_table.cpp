@@ -1,5 +1,5 @@
 #include <H5Epublic.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <matio.h>
 
 #include <array>

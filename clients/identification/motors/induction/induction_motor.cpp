@@ -1,6 +1,6 @@
 #include "clients/identification/motors/induction/induction_motor.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "clients/identification/motors/induction/resistance_tracking.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

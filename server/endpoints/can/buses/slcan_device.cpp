@@ -1,7 +1,6 @@
 #include "server/endpoints/can/buses/slcan_device.hpp"
 
 #include <fcntl.h>
-#include <spdlog/spdlog.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
@@ -16,6 +15,7 @@
 #include "server/endpoints/can/buses/text_peer.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 #include "server/endpoints/log_limit.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -139,7 +139,7 @@ void SlcanDevice::take_line(const SlcanReader::Line& line) {
   if (line.refusal) {
     if (Clock::now() - opened_ < kHandshake) return;
     ++status_.send_dropped;
-    if (refusal_log_.allow()) spdlog::warn("{}: the adapter refuses what it is sent", name());
+    if (refusal_log_.allow()) log::warn("{}: the adapter refuses what it is sent", name());
     return;
   }
   if (const auto frame = line.too_long ? std::nullopt : parse_slcan(line.text)) {

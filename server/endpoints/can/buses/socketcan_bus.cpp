@@ -3,14 +3,14 @@
 #include "server/endpoints/can/buses/backends.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
+#include "server/host/log.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <linux/can/raw.h>
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
 #include <net/if.h>
 #include <net/if_arp.h>
-#include <spdlog/spdlog.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
@@ -74,7 +74,7 @@ SocketCanBus::SocketCanBus(asio::io_context& io, const CanConfig& config, bool c
   problem_ = open();
   if (problem_.empty()) return;
   if (config_.required) throw std::runtime_error(fmt::format("{}: {}", name(), problem_));
-  spdlog::warn("{}: {}; it is tried again every 100 ms", name(), problem_);
+  log::warn("{}: {}; it is tried again every 100 ms", name(), problem_);
   probe_later();
 }
 
@@ -124,8 +124,8 @@ void SocketCanBus::set_buffer(int fd) {
   int granted = 0;
   socklen_t size = sizeof granted;
   if (::getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &granted, &size) == 0 && granted < bytes * 2) {
-    spdlog::info("{}: the receive buffer holds {} ms of a full bus; for 100: sysctl net.core.rmem_max={}",
-                 name(), 100 * std::int64_t{granted} / (2 * std::int64_t{bytes}), bytes);
+    log::info("{}: the receive buffer holds {} ms of a full bus; for 100: sysctl net.core.rmem_max={}",
+              name(), 100 * std::int64_t{granted} / (2 * std::int64_t{bytes}), bytes);
   }
 }
 
@@ -139,14 +139,14 @@ void SocketCanBus::set_filter(const std::vector<std::uint32_t>& ids) {
   filter_ = filters_for(ids);
   filtered_ = filter_.size() <= CAN_RAW_FILTER_MAX;
   if (!filtered_) {
-    spdlog::warn("{}: the kernel takes {} filters, not {}; foreign frames wake the bench", name(),
-                 CAN_RAW_FILTER_MAX, filter_.size());
+    log::warn("{}: the kernel takes {} filters, not {}; foreign frames wake the bench", name(),
+              CAN_RAW_FILTER_MAX, filter_.size());
   }
   if (!stream_.is_open()) return;
   try {
     apply_filter(stream_.native_handle());
   } catch (const std::system_error& error) {
-    spdlog::warn("{}: {}; foreign frames wake the bench", name(), error.what());
+    log::warn("{}: {}; foreign frames wake the bench", name(), error.what());
   }
 }
 
@@ -180,7 +180,7 @@ std::string SocketCanBus::open() {
   const bool up = ::ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP) != 0;
   set_state(up ? BusState::kUp : BusState::kDown);
   if (!up) {
-    spdlog::warn("{}: the interface is down; ip link set {} up", name(), config_.channel);
+    log::warn("{}: the interface is down; ip link set {} up", name(), config_.channel);
     probe_later();
   }
   wait();
@@ -375,9 +375,9 @@ void SocketCanBus::probe() {
   if (!stream_.is_open()) {
     const std::string problem = open();
     if (problem.empty()) {
-      spdlog::info("{}: open", name());
+      log::info("{}: open", name());
     } else {
-      if (problem != problem_) spdlog::warn("{}: {}", name(), problem);
+      if (problem != problem_) log::warn("{}: {}", name(), problem);
       probe_later();
     }
     problem_ = problem;

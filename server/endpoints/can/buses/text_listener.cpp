@@ -1,6 +1,5 @@
 #include "server/endpoints/can/buses/text_listener.hpp"
 
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 
 #include "protocols/can/formats/text.hpp"
 #include "server/config/config.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -77,8 +77,8 @@ void TextListener::accept() {
     if (alive.expired() || error == asio::error::operation_aborted) return;
     if (error) {
       if (log_.allow()) {
-        spdlog::warn("cannot accept a CAN client: {} ({} more since the last such line)", error.message(),
-                     log_.held_back());
+        log::warn("cannot accept a CAN client: {} ({} more since the last such line)", error.message(),
+                  log_.held_back());
       }
       return accept_later();
     }

@@ -4,7 +4,6 @@
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <netinet/in.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include "server/endpoints/can/buses/send_queue.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 #include "server/endpoints/log_limit.hpp"
+#include "server/host/log.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -305,7 +305,7 @@ bool UdpMulticastBus::is_from_here(const Address& sender) {
     if (is_known()) return true;
   }
   if (stranger_log_.allow())
-    spdlog::warn("{}: ignores what {} sends, which is not this computer", name(), sender.text());
+    log::warn("{}: ignores what {} sends, which is not this computer", name(), sender.text());
   return false;
 }
 

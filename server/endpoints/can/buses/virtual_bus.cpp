@@ -1,6 +1,5 @@
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +7,8 @@
 #include <chrono>
 #include <stdexcept>
 #include <system_error>
+
+#include "server/host/log.hpp"
 
 namespace drivebench::can {
 namespace {
@@ -24,7 +25,7 @@ void VirtualBus::start() {
 }
 
 void VirtualBus::lost(const std::string& why) {
-  spdlog::warn("{} is not there, waiting for it: {}", name(), why);
+  log::warn("{} is not there, waiting for it: {}", name(), why);
   set_state(BusState::kAbsent);
   try_later();
 }
@@ -34,7 +35,7 @@ void VirtualBus::try_later() {
   retry_.async_wait([this, alive = alive()](const boost::system::error_code& error) {
     if (alive.expired() || error) return;
     if (!open().empty()) return try_later();
-    spdlog::info("{} is there", name());
+    log::info("{} is there", name());
     set_state(BusState::kUp);
   });
 }

@@ -1,6 +1,6 @@
 #include "server/endpoints/tcp/session/request_bounds.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -32,7 +32,7 @@ TEST(IdentifyMap, AColumnHasHeaderSignalFactorAndOffset) {
   EXPECT_EQ(parse_column("raw=i_c_a*2+1").offset, 1.0);
 }
 
-std::string refusal(const std::string& text) {
+std::string refusal_of(const std::string& text) {
   try {
     parse_column(text);
   } catch (const UsageError& error) {
@@ -43,15 +43,15 @@ std::string refusal(const std::string& text) {
 
 // Catches: a wrong column that is read as something else, and a refusal that does not tell the rule.
 TEST(IdentifyMap, AWrongColumnIsRefusedWithTheRule) {
-  EXPECT_NE(refusal("I_A").find("should be HEADER=SIGNAL"), std::string::npos);
-  EXPECT_NE(refusal("=i_a_a").find("HEADER=SIGNAL"), std::string::npos);
-  EXPECT_NE(refusal("I_A=").find("HEADER=SIGNAL"), std::string::npos);
-  EXPECT_NE(refusal("I_A=current").find("there are i_a_a, i_b_a"), std::string::npos);
+  EXPECT_NE(refusal_of("I_A").find("should be HEADER=SIGNAL"), std::string::npos);
+  EXPECT_NE(refusal_of("=i_a_a").find("HEADER=SIGNAL"), std::string::npos);
+  EXPECT_NE(refusal_of("I_A=").find("HEADER=SIGNAL"), std::string::npos);
+  EXPECT_NE(refusal_of("I_A=current").find("there are i_a_a, i_b_a"), std::string::npos);
   for (const char* wrong :
        {"I=i_a_a*", "I=i_a_a*0", "I=i_a_a*nan", "I=i_a_a*1e999", "I=i_a_a*2+", "I=i_a_a*2+x"})
-    EXPECT_NE(refusal(wrong).find("a factor other than 0"), std::string::npos)
-        << wrong << ": " << refusal(wrong);
-  EXPECT_EQ(refusal(std::string("I\x1b[2J=x")).find('\x1b'), std::string::npos);
+    EXPECT_NE(refusal_of(wrong).find("a factor other than 0"), std::string::npos)
+        << wrong << ": " << refusal_of(wrong);
+  EXPECT_EQ(refusal_of(std::string("I\x1b[2J=x")).find('\x1b'), std::string::npos);
 }
 
 // Catches: a key of the file that does nothing.

@@ -1,6 +1,6 @@
 #include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

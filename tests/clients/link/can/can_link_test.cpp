@@ -15,7 +15,6 @@ namespace {
 using namespace std::chrono_literals;
 using can::Message;
 
-constexpr std::uint32_t kNode = 3;
 constexpr CanLinkOptions kImpatient = {.deadline = 30ms, .repeat_after = 1ms};
 
 bool is(const can::Frame& frame, can::Profile profile, Message message) {

@@ -17,8 +17,7 @@
 namespace drivebench::link {
 namespace {
 
-constexpr std::uint32_t kNode = 3;
-constexpr CanLinkOptions kImpatient = {.deadline = std::chrono::milliseconds(30)};
+constexpr CanLinkOptions kQuick = {.deadline = std::chrono::milliseconds(30)};
 
 CanAddress address_with(bool fd, can::IdSet set) {
   CanAddress address;
@@ -33,7 +32,7 @@ std::string failure_with(std::deque<can::Frame> frames, const CanAddress& addres
   auto silent = std::make_unique<FakeCanBench>(address.profile, kNode);
   silent->coming = std::move(frames);
   try {
-    CanLink(std::move(silent), address, "can:test", kImpatient);
+    CanLink(std::move(silent), address, "can:test", kQuick);
   } catch (const ConnectError& error) {
     return error.what();
   }
@@ -89,7 +88,7 @@ TEST(CanVersions, ALinkSpeaksToABenchWithTheIdentifiersOfCanopen) {
   const CanAddress address = address_with(true, can::IdSet::kCanopen);
   auto bench = std::make_unique<FakeCanBench>(address.profile, kNode);
   const FakeCanBench& peer = *bench;
-  CanLink link(std::move(bench), address, "can:test", kImpatient);
+  CanLink link(std::move(bench), address, "can:test", kQuick);
   link.acquire();
   EXPECT_EQ(peer.sent.at(0).id, 0x300U + kNode);
   EXPECT_EQ(link.exchange({.tick = 0, .gates = v1::GATES_VOLTAGE, .u_a_v = 1.0}).tick, 1U);

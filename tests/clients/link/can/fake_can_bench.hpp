@@ -12,6 +12,8 @@
 
 namespace drivebench::link {
 
+inline constexpr std::uint32_t kNode = 3;
+
 /// A bench with one axis behind a bus in memory. It does in lockstep what the native profile says, and loses
 /// the frames that `loses` picks, in either direction.
 class FakeCanBench final : public CanBus {

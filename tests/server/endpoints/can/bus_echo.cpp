@@ -3,7 +3,6 @@
 // frames as its first two bytes say (low byte first), sent at once, identifiers counting up from 0. Prints
 // the name of the bus when it is open and the counters of the bus for each line that comes in on standard
 // input; ends with that.
-#include <spdlog/spdlog.h>
 
 #include <charconv>
 #include <cstdio>
@@ -14,6 +13,7 @@
 
 #include "server/endpoints/can/buses/backends.hpp"
 #include "server/host/asio.hpp"
+#include "server/host/log.hpp"
 
 namespace {
 
@@ -60,7 +60,7 @@ void serve_console(asio::io_context& io, asio::posix::stream_descriptor& console
 int main(int count, char** arguments) try {
   if (count != 4) return 2;
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  spdlog::set_level(spdlog::level::off);
+  drivebench::log::set_level(drivebench::LogLevel::kOff);
   CanConfig config;
   config.channel = arguments[2];
   std::from_chars(arguments[3], arguments[3] + std::strlen(arguments[3]), config.port);

@@ -1,6 +1,6 @@
 #include "server/endpoints/tcp/session/requests/fetch.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <google/protobuf/io/coded_stream.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <utility>
 
