@@ -6,7 +6,7 @@
 #include "protocols/pages/completion.hpp"
 #include "protocols/pages/man_page.hpp"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): as CLI11 names it
 class App;
 }
 

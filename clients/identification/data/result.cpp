@@ -7,8 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "protocols/json.hpp"
-
 namespace drivebench::identification {
 namespace {
 
@@ -261,7 +259,7 @@ std::string to_json(const Result& r) {
                            {"contradicts", fact.contradicts},
                            {"remark", fact.remark}};
   }
-  return json_text(all, 2);
+  return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 std::string to_motor_toml(const Result& r, const MotorFile& file) {

@@ -40,11 +40,11 @@ TEST_F(ConflictTest, CAN_11_AfterAStrayFrameTheAxisPausesAndGoesOn) {
   CanBench bench;
   const std::uint8_t lease = bench.acquire();
   bench.command(0, 1.0, 0.0, lease);
-  testing::internal::CaptureStdout();  // the log goes there by default
+  testing::internal::CaptureStderr();
   bench.received.clear();
   disturb(bench);
   EXPECT_NE(
-      testing::internal::GetCapturedStdout().find("ID_CONFLICT: a frame with identifier 0x61 of this bench "
+      testing::internal::GetCapturedStderr().find("ID_CONFLICT: a frame with identifier 0x61 of this bench "
                                                   "came from elsewhere; axis 0 is silent for 1 s"),
       std::string::npos);
   EXPECT_EQ(state(bench), "ID_CONFLICT");

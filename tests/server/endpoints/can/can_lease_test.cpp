@@ -234,13 +234,13 @@ TEST(CanLease, AnAxisThatWasTakenAwayIsFreeAtOnce) {
 
 // Catches: a peer that fills the log by taking the axis and saying that it has stopped, again and again.
 TEST(CanLease, LostControllersDoNotFillTheLog) {
-  testing::internal::CaptureStdout();  // the log goes there by default
+  testing::internal::CaptureStderr();
   CanBench bench;
   for (int i = 0; i < 100; ++i) {
     EXPECT_NE(bench.acquire(), 0);
     bench.send(Message::kControllerHeartbeat, std::array{4.0});
   }
-  const std::string text = testing::internal::GetCapturedStdout();
+  const std::string text = testing::internal::GetCapturedStderr();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
   EXPECT_NE(text.find("axis 0 loses its controller"), std::string::npos) << text;
 }

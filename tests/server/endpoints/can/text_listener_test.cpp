@@ -23,7 +23,7 @@ TEST(TextListener, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
     ::close(fd);
   };
   ASSERT_EQ(listener.open({.address = "127.0.0.1", .port = 0}), "");
-  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
   asio::ip::tcp::socket client(io);
   client.connect({asio::ip::make_address("127.0.0.1"), listener.port()});
   rlimit limit{};
@@ -37,7 +37,7 @@ TEST(TextListener, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
   EXPECT_EQ(accepted, 0);
   while (accepted == 0)
     io.run_one();
-  const std::string text = testing::internal::GetCapturedStdout();
+  const std::string text = testing::internal::GetCapturedStderr();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
   EXPECT_NE(text.find("cannot accept a CAN client"), std::string::npos) << text;
 }

@@ -132,10 +132,10 @@ TEST_F(Keys, SEC_07_ATakeoverByTheKeyIsLogged) {
       EXPECT_EQ(owner->write(400, {kKey}), 0) << "connects for each request";
     }
     EXPECT_EQ(lines_of(file, "take").size(), 0u);
-    testing::internal::CaptureStdout();  // the log goes there by default
+    testing::internal::CaptureStderr();
     Client thief(bench.port(), "127.0.0.2");
     EXPECT_EQ(thief.write(400, {kKey}), 0);
-    const std::string log = testing::internal::GetCapturedStdout();
+    const std::string log = testing::internal::GetCapturedStderr();
     EXPECT_NE(log.find("took axis 0 from 127.0.0.1:"), std::string::npos) << log;
     ASSERT_EQ(lines_of(file, "take").size(), 1u);
     const std::string line = lines_of(file, "take")[0];

@@ -17,7 +17,7 @@ int lines_with(const std::string& words, const std::string& log) {
 
 // Catches: one peer that takes every place and keeps the owner of an axis out.
 TEST(Modbus, OnePeerCannotTakeAllConnections) {
-  testing::internal::CaptureStdout();  // the default place of the log
+  testing::internal::CaptureStderr();  // the default place of the log
   {
     BenchConfig config = modbus_bench_config();
     config.modbus.max_connections = 4;
@@ -47,7 +47,7 @@ TEST(Modbus, OnePeerCannotTakeAllConnections) {
     EXPECT_EQ(bench.count("cut"), 2u);
     EXPECT_EQ(bench.count("connections"), 4u);
   }
-  const std::string log = testing::internal::GetCapturedStdout();
+  const std::string log = testing::internal::GetCapturedStderr();
   EXPECT_EQ(lines_with("127.0.0.2 was turned away", log), 1);
   EXPECT_EQ(lines_with("turned away", log), 1) << "the second within the limit of the log";
 }
@@ -56,7 +56,7 @@ TEST(Modbus, OnePeerCannotTakeAllConnections) {
 TEST(Modbus, LapsedLeasesAreLoggedOnceAndByTheirReason) {
   BenchConfig config = modbus_bench_config();
   config.setup.lease_ticks = 20'000'000 / config.setup.period_ns;
-  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
   {
     ModbusBench bench(config);
     for (int i = 0; i < 3; ++i) {
@@ -67,19 +67,19 @@ TEST(Modbus, LapsedLeasesAreLoggedOnceAndByTheirReason) {
       bench.until([&] { return bench.owner() == 0; });
     }
   }
-  const std::string goodbyes = testing::internal::GetCapturedStdout();
+  const std::string goodbyes = testing::internal::GetCapturedStderr();
   EXPECT_EQ(lines_with("the owner of axis 0 went away", goodbyes), 1);
   EXPECT_EQ(lines_with("loses its lease", goodbyes), 1);
   EXPECT_EQ(lines_with("silent", goodbyes), 0);
   config.modbus.idle_timeout_ms = 20;
-  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
   {
     ModbusBench bench(config);
     Client client(bench.port());
     ASSERT_EQ(client.write(400, {7}), 0);
     bench.until([&] { return bench.owner() == 0; });
   }
-  EXPECT_EQ(lines_with("the owner of axis 0 has fallen silent", testing::internal::GetCapturedStdout()), 1);
+  EXPECT_EQ(lines_with("the owner of axis 0 has fallen silent", testing::internal::GetCapturedStderr()), 1);
 }
 
 // Catches: a connection that is cut although nothing has been refused yet.
