@@ -35,6 +35,15 @@ SYSTEM = {
     "protocols": re.compile(r"(?!boost/|sys/socket|sys/un|netinet/|arpa/|netdb|openssl/|modbus/|spdlog/|thread|mutex)"),
 }
 
+# Headers that cost seconds in each file that includes them, and the files that may.
+COSTLY = {
+    "spdlog/": ("server/host/log.cpp",),
+    "toml++/": ("protocols/document.cpp",),
+    "CLI/": ("protocols/pages", "server/command_line.cpp", "clients/command/common/command_line.hpp"),
+    "boost/beast": ("clients/web/gateway",),
+    "boost/multiprecision": ("clients/identification/math",),
+}
+
 # Rooms that stand in an order, low to high; in all other folders it is enough that the rooms form no circle. The files
 # beside the rooms stand above them all.
 ORDERED = {
@@ -101,6 +110,9 @@ def broken_alone(include, root):
     file, _, target, angled = include
     top = file.partition("/")[0]
     if angled:
+        for costly, places in COSTLY.items():
+            if target.startswith(costly) and not any(within(file, place) for place in places):
+                return f"<{target}> takes seconds to read: only {' and '.join(places)} may include it"
         for folder in sorted(SYSTEM, key=len, reverse=True):
             if within(file, folder):
                 return None if SYSTEM[folder].match(target) else f"{folder} may not include <{target}>"
