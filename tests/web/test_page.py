@@ -130,6 +130,17 @@ class Page(PageTest):
         self.assertAlmostEqual(int(row[0]) * 1e-3, float(row[1]))
         self.assertIn("<svg", shown["svg"])
 
+    def test_the_drive_train_is_drawn_and_its_rotor_turns(self):
+        """Catches: a rotor that stands while the motor turns, values of another axis or in other units, an amplitude that is
+        that of one phase at one moment."""
+        shown = self.play("train", self.gateway(self.on_the_line()).url)
+        self.assertEqual(shown["titles"], ["source", "induction", "load"])
+        self.assertGreater(shown["angles"], 5)
+        self.assertRegex(shown["note"], r"^drawn \d+ times slower$")
+        self.assertEqual(shown["values"]["voltage"], "u 169.8 V")  # the line has 169.83 V
+        for name, unit in (("current", "A"), ("torque", "N\\*m"), ("load", "N\\*m"), ("speed", "rad/s")):
+            self.assertRegex(shown["values"][name], rf"^(i )?-?[\d.]+ [nmµk]?{unit}$")
+
     def test_a_pane_shows_a_locus_and_a_spectrum(self):
         """Catches: axes without units, x and y exchanged, a locus without the dot of a cursor, a spectrum of other samples than
         those of the window or with another amplitude than the motor's supply gives it."""

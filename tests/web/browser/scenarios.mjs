@@ -109,6 +109,23 @@ const scenarios = {
     };
   },
 
+  /** The drawing of the drive train while the motor turns. */
+  async train(page) {
+    await stateOf(page, "speed", /^[1-9]/);
+    const shown = async (name) => text(page, `.train .${name}`, /./);
+    const rotor = () => page.$eval(".train .rotor", (each) => each.getAttribute("transform"));
+    const note = await shown("note");
+    const angles = new Set();
+    for (let i = 0; i < 20; ++i) {
+      angles.add(await rotor());
+      await new Promise((done) => setTimeout(done, 50));
+    }
+    const titles = await page.$$eval(".train > .title", (all) => all.map((each) => each.textContent));
+    const values = {};
+    for (const name of ["voltage", "current", "torque", "load", "speed"]) values[name] = await shown(name);
+    return { note, angles: angles.size, titles, values };
+  },
+
   /** A pane of currents becomes a locus, one of voltages a spectrum. */
   async kinds(page) {
     await stateOf(page, "speed", /^[1-9]/);

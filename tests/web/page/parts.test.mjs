@@ -8,13 +8,13 @@ import test from "node:test";
 const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
-    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum"].map((each) => `export * from "./${each}";`).join("\n"),
+    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },
   bundle: true, write: false, format: "esm",
 });
 const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
-  spectrumOf, peaksOf, sinceLastGap } =
+  spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed } =
   await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
 
 function historyOf(ticks, valueOf) {
@@ -90,6 +90,23 @@ test("the conditions of the trigger", () => {
   assert.ok(fires("bit", 1, 5, 4) && !fires("bit", 4, 4, 4) && !fires("bit", NaN, 4, 4));
   assert.ok(!fires("off", 0, 1, 1));
   assert.ok(hasBit(2 ** 40 + 1, 2 ** 40) && !hasBit(2 ** 41, 2 ** 40));
+});
+
+// Catches: a common voltage of the terminals that counts as amplitude, the sum of three phases for their vector.
+test("the amplitude of terminals", () => {
+  const three = (angle) => [0, 1, 2].map((phase) => 24 + 10 * Math.cos(angle - (phase * 2 * Math.PI) / 3));
+  for (const angle of [0, 0.4, 2]) assert.ok(Math.abs(amplitude(three(angle)) - 10) < 1e-12);
+  assert.equal(amplitude([3, -4]), 5);
+  assert.equal(amplitude([-6]), -6);
+});
+
+// Catches: a rotor that is drawn so fast that it seems to stand or to turn backwards, and a drawing that keeps silent about it.
+test("a fast rotor is drawn slower", () => {
+  assert.deepEqual(drawnSpeed(-3), { speed_rad_s: -3, note: "" });
+  const { speed_rad_s: drawn, note } = drawnSpeed(-100 * Math.PI);
+  assert.ok(Math.abs(drawn + 2 * Math.PI) < 1e-12);
+  assert.equal(note, "drawn 50 times slower");
+  assert.equal(drawnSpeed(3 * Math.PI).note, "drawn 1.5 times slower");
 });
 
 // Catches: 8.5e-170 for nothing, a prefix for a count, a word that is read as a number.

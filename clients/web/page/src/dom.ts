@@ -15,6 +15,14 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
+/** The same for a part of a drawing (SVG). */
+export function drawing(tag: string, attributes: Record<string, string | number> = {}, ...children: (Node | string)[]): SVGElement {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+  made.append(...children);
+  return made;
+}
+
 export function button(text: string, act: () => void, more: Properties = {}): HTMLButtonElement {
   return element("button", { type: "button", click: act, ...more }, text);
 }

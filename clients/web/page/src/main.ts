@@ -41,6 +41,7 @@ class Page {
   private welcome(welcome: pb.Welcome, conducts: boolean): void {
     this.scope?.end();
     this.knobs?.end();
+    this.panel?.end();
     const bench = new Bench(this.wire, welcome, conducts);
     this.bench = bench;
     this.subscribed = [];
@@ -105,6 +106,7 @@ class Page {
   private lost(sentence: string): void {
     this.bench = null;
     this.knobs?.end();
+    this.panel?.end();
     this.showLink("lost, looking for it", "bad");
     this.showAlert(sentence);
     byId("knobs").hidden = true;

@@ -1,6 +1,7 @@
 /** The state of the bench and of each axis. */
 import { Bench, namesOfBits } from "./bench";
 import { element, setText } from "./dom";
+import { DriveTrain } from "./drive_train";
 import { plain, withUnit } from "./numbers";
 import { pb } from "./wire";
 
@@ -26,18 +27,30 @@ class Facts {
 export class StatePanel {
   private readonly bench = new Facts();
   private readonly axes: Facts[];
+  private readonly trains: DriveTrain[];
+  private readonly stillness = matchMedia("(prefers-reduced-motion: reduce)");
+  private drawn: { tick: number; at_ms: number } | null = null;
+  private turned_ms = performance.now();
+  private ended = false;
   private readonly notes = element("ul", { class: "notes" });
 
   constructor(root: HTMLElement, private readonly of: Bench, private readonly ownerOf: (axis: number) => number) {
     this.axes = of.description.axes.map(() => new Facts());
+    this.trains = of.description.axes.map((axis) => new DriveTrain(axis));
     root.replaceChildren(element("h2", {}, "Bench"), this.bench.root, this.notes, ...this.axes.flatMap((facts, axis) => {
       const { name, machine, machine_kind: kind } = of.description.axes[axis];
-      return [element("h2", {}, `Axis ${axis}: ${name}`), element("p", { class: "soft" }, `${machine}, ${kind}`), facts.root];
+      return [element("h2", {}, `Axis ${axis}: ${name}`), element("p", { class: "soft" }, `${machine}, ${kind}`), this.trains[axis].root, facts.root];
     }));
+    this.turn();
+  }
+
+  end(): void {
+    this.ended = true;
   }
 
   draw(status: pb.Status): void {
     const tick = status.tick as number;
+    const pace = this.pace(tick);
     this.bench.set("tick", String(tick));
     this.bench.set("time", `${(tick * (this.of.description.period_s as number)).toFixed(3)} s`);
     if (status.mode === pb.Mode.MODE_REALTIME) {
@@ -49,7 +62,27 @@ export class StatePanel {
     this.bench.set("sessions", String(status.sessions));
     this.bench.set("recording", recordingText(status), (status.recording_gaps as number) > 0 ? "warn" : "");
     this.showNotes(status);
-    for (const each of status.axes) this.drawAxis(each.axis as number, each.sample as pb.Sample);
+    for (const each of status.axes) {
+      this.drawAxis(each.axis as number, each.sample as pb.Sample);
+      this.trains[each.axis as number].draw(each.sample as pb.Sample, this.stillness.matches ? 0 : pace);
+    }
+  }
+
+  /** Seconds of the bench for each second of the clock since the status before. */
+  private pace(tick: number): number {
+    const before = this.drawn;
+    this.drawn = { tick, at_ms: performance.now() };
+    if (before === null || tick < before.tick || this.drawn.at_ms === before.at_ms) return 0;
+    return ((tick - before.tick) * (this.of.description.period_s as number)) / (1e-3 * (this.drawn.at_ms - before.at_ms));
+  }
+
+  /** Turns the rotors once for each picture of the browser. */
+  private turn(): void {
+    if (this.ended) return;
+    const now_ms = performance.now();
+    for (const train of this.trains) train.turn(1e-3 * (now_ms - this.turned_ms));
+    this.turned_ms = now_ms;
+    requestAnimationFrame(() => this.turn());
   }
 
   private drawAxis(axis: number, sample: pb.Sample): void {
