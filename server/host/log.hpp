@@ -10,7 +10,7 @@
 /// The log of this program, on standard error. Any thread may write.
 namespace drivebench::log {
 
-/// Lines below this level are left out; kOff leaves out all but critical ones. Before the first call: kInfo.
+/// Lines below this level are left out, with kOff all. Before the first call: kInfo.
 void set_level(LogLevel level);
 /// Each line is a json_log_line() from now on.
 void write_json();

@@ -74,15 +74,15 @@ WholePolynomial induction_polynomial(const Triangle& factor) {
 
 namespace {
 
-using Column = Eigen::Matrix<double, static_cast<int>(kRows), 1>;
+using Vector = Eigen::Matrix<double, static_cast<int>(kRows), 1>;
 
-Eigen::Index at(std::size_t n) {
+Eigen::Index index(std::size_t n) {
   return static_cast<Eigen::Index>(n);
 }
 
 /// d^m/dK_8^m of R times the monomials of one factor.
-Column column_at(const Triangle& factor, InductionFactor which, double k8, int derivative) {
-  Column sum = Column::Zero();
+Vector column_at(const Triangle& factor, InductionFactor which, double k8, int derivative) {
+  Vector sum = Vector::Zero();
   for (std::size_t j = 0; j < kInductionParameters; ++j) {
     const auto [of, power] = kInductionMonomials[j];
     if (of != which) continue;
@@ -92,7 +92,7 @@ Column column_at(const Triangle& factor, InductionFactor which, double k8, int d
     if (value == 0.0) continue;
     value *= std::pow(k8, power - derivative);
     for (std::size_t i = 0; i <= j; ++i)
-      sum(at(i)) += factor(i, j) * value;
+      sum(index(i)) += factor(i, j) * value;
   }
   return sum;
 }
@@ -100,17 +100,17 @@ Column column_at(const Triangle& factor, InductionFactor which, double k8, int d
 /// Signals of the error W K - y at a point: its value and derivatives by K_8, and the columns of the linear
 /// unknowns.
 struct ErrorAt {
-  std::array<Column, 3> column;
-  std::array<Column, 3> column_slope;
-  Column error;
-  Column slope;
-  Column bend;
+  std::array<Vector, 3> column;
+  std::array<Vector, 3> column_slope;
+  Vector error;
+  Vector slope;
+  Vector bend;
 };
 
-Column target(const Triangle& factor) {
-  Column y;
+Vector target(const Triangle& factor) {
+  Vector y;
   for (std::size_t i = 0; i < kRows; ++i)
-    y(at(i)) = factor(i, kLast);
+    y(index(i)) = factor(i, kLast);
   return y;
 }
 
@@ -136,9 +136,9 @@ ErrorAt error_at(const Triangle& factor, const std::array<double, 3>& linear, do
 std::array<double, 3> projected(const Triangle& factor, double k8) {
   Eigen::Matrix<double, static_cast<int>(kRows), 3> w;
   for (std::size_t n = 0; n < 3; ++n)
-    w.col(at(n)) = column_at(factor, kLinear[n], k8, 0);
+    w.col(index(n)) = column_at(factor, kLinear[n], k8, 0);
   const Eigen::Vector3d scale = w.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  const Column y = target(factor) - column_at(factor, InductionFactor::kOne, k8, 0);
+  const Vector y = target(factor) - column_at(factor, InductionFactor::kOne, k8, 0);
   const Eigen::Vector3d k =
       scale.asDiagonal() * (w * scale.asDiagonal()).colPivHouseholderQr().solve(y).eval();
   return {k(0), k(1), k(2)};
