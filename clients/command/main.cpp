@@ -1,6 +1,6 @@
 #include "clients/command/bench/bench_line.hpp"
 #include "clients/command/can/can_line.hpp"
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/control/control_line.hpp"
 #include "clients/command/convert/convert_line.hpp"
 #include "clients/command/datasheet/datasheet_line.hpp"

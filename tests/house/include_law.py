@@ -39,7 +39,7 @@ SYSTEM = {
 COSTLY = {
     "spdlog/": ("server/host/log.cpp",),
     "toml++/": ("protocols/document.cpp",),
-    "CLI/": ("protocols/pages", "server/command_line.cpp", "clients/command/common/command_line.hpp"),
+    "CLI/": ("protocols/pages", "server/command_line.cpp", "clients/command/common/line/command_line.hpp"),
     "boost/beast": ("clients/web/gateway",),
     "boost/multiprecision": ("clients/identification/math",),
 }

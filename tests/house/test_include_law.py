@@ -76,7 +76,7 @@ class IncludeLaw(unittest.TestCase):
         for room in ("control", "models", "identification"):
             self.assert_one(f"clients/{room} may include", {f"clients/{room}/math/b.hpp": ['"clients/link/address.hpp"']})
         self.assert_one("clients/models may include", {"clients/models/machine.hpp": ['"clients/control/loop/run.hpp"']})
-        self.assert_one("clients/link may include", {"clients/link/address.hpp": ['"clients/command/common/json.hpp"']})
+        self.assert_one("clients/link may include", {"clients/link/address.hpp": ['"clients/command/common/basics/json.hpp"']})
 
     def test_nothing_includes_tests(self):
         self.assert_one("nothing but tests may include tests", {"server/main.cpp": ['"tests/wire/server.hpp"']})

@@ -2,8 +2,8 @@
 
 #include <fmt/core.h>
 
-#include "clients/command/common/json.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/json.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/link/tcp/mode_name.hpp"
 #include "protocols/json.hpp"
 

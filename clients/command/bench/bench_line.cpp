@@ -5,7 +5,7 @@
 #include "clients/command/bench/serve.hpp"
 #include "clients/command/bench/status.hpp"
 #include "clients/command/bench/watch.hpp"
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 
 namespace drivebench::command {
 namespace {

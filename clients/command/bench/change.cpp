@@ -7,9 +7,9 @@
 #include <cstdio>
 
 #include "clients/command/bench/bench_json.hpp"
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 

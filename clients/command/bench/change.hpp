@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "clients/command/common/link_choice.hpp"
+#include "clients/command/common/session/link_choice.hpp"
 
 /// Verbs that change an axis without controlling it.
 namespace drivebench::command {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "clients/command/common/link_choice.hpp"
+#include "clients/command/common/session/link_choice.hpp"
 
 namespace drivebench::command {
 

@@ -1,7 +1,7 @@
 #include "clients/command/bench/serve.hpp"
 
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
 
 namespace drivebench::command {
 

@@ -8,9 +8,9 @@
 #include <cstdio>
 
 #include "clients/command/bench/bench_json.hpp"
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/signals.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/signals.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/link_choice.hpp"
+#include "clients/command/common/session/link_choice.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::command {

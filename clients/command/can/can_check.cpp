@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "protocols/json.hpp"
 
 namespace drivebench::command {

@@ -2,7 +2,7 @@
 
 #include "clients/command/can/can_check.hpp"
 #include "clients/command/can/can_log.hpp"
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/link/can/can_bus.hpp"
 #include "protocols/can/formats/candump.hpp"
 

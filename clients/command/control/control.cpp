@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"

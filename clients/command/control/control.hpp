@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/link_choice.hpp"
+#include "clients/command/common/session/link_choice.hpp"
 #include "clients/command/control/control_limits.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/control/gains/gains.hpp"

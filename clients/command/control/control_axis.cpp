@@ -6,8 +6,8 @@
 #include <numbers>
 #include <optional>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/link/tcp/tcp_axis.hpp"
 
 namespace drivebench::command {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"

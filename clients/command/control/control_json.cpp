@@ -1,6 +1,6 @@
 #include "clients/command/control/control_json.hpp"
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/control/presets/presets.hpp"
 #include "protocols/json.hpp"

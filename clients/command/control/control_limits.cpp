@@ -7,8 +7,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "protocols/json.hpp"
 #include "protocols/nearest_name.hpp"

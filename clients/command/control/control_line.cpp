@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "clients/command/common/command_line.hpp"
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/control/control.hpp"
 #include "clients/command/control/control_compare.hpp"
 #include "clients/command/control/plot.hpp"

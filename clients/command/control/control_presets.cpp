@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "protocols/nearest_name.hpp"
 

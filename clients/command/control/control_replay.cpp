@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/control/control_loop.hpp"
 
 namespace drivebench::command {

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <numbers>
 
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
 
 namespace drivebench::command {

@@ -11,9 +11,9 @@
 #include <optional>
 #include <span>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/signals.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/basics/signals.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_replay.hpp"

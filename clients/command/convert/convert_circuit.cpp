@@ -4,8 +4,8 @@
 #include <numbers>
 #include <string>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/convert/convert.hpp"
 #include "clients/models/induction_forms.hpp"
 #include "protocols/json.hpp"

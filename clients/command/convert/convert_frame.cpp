@@ -3,8 +3,8 @@
 #include <array>
 #include <numbers>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/convert/convert.hpp"
 #include "clients/control/math/frames.hpp"
 #include "clients/models/two_phase.hpp"

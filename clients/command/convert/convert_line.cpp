@@ -1,6 +1,6 @@
 #include "clients/command/convert/convert_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/convert/convert.hpp"
 
 namespace drivebench::command {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/convert/convert.hpp"
 #include "clients/models/winding_factors.hpp"
 #include "protocols/json.hpp"

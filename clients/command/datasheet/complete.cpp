@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
 #include "clients/command/datasheet/sheet.hpp"
 #include "protocols/text.hpp"
 

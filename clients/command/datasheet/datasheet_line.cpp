@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/datasheet/new_bench.hpp"
 #include "clients/command/datasheet/new_motor.hpp"
 

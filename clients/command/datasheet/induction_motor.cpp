@@ -9,7 +9,7 @@
 #include <optional>
 #include <span>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/datasheet/motor_kind.hpp"
 #include "clients/identification/motors/classical_tests.hpp"
 #include "clients/models/induction_circuit.hpp"

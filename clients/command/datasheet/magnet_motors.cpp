@@ -4,7 +4,7 @@
 #include <array>
 #include <numbers>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/datasheet/motor_kind.hpp"
 
 namespace drivebench::command {

@@ -9,9 +9,9 @@
 #include <iterator>
 #include <numbers>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
 #include "clients/command/datasheet/new_file.hpp"
 #include "clients/command/motor/motor_file.hpp"
 #include "protocols/text.hpp"

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {

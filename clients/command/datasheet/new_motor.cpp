@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/datasheet/new_file.hpp"
 #include "protocols/text.hpp"
 

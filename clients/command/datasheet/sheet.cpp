@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 
 namespace drivebench::command {
 namespace {

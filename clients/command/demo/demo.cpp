@@ -9,10 +9,10 @@
 #include <ctime>
 #include <filesystem>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
-#include "clients/command/common/server_ready.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
+#include "clients/command/common/programs/server_ready.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/demo/demo_json.hpp"
 

@@ -1,6 +1,6 @@
 #include "clients/command/demo/demo_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/demo/demo.hpp"
 
 namespace drivebench::command {

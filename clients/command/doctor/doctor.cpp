@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <iterator>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "protocols/json.hpp"
 #include "protocols/text.hpp"
 

@@ -1,6 +1,6 @@
 #include "clients/command/doctor/doctor_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/doctor/doctor.hpp"
 
 namespace drivebench::command {

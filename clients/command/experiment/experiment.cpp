@@ -4,9 +4,9 @@
 
 #include <stdexcept>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/experiment/experiment_client.hpp"
 #include "clients/command/experiment/experiment_data.hpp"
 #include "clients/command/experiment/experiment_json.hpp"

@@ -12,8 +12,8 @@
 #include <thread>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "protocols/document.hpp"
 
 namespace drivebench::command {

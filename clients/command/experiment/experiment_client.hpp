@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "clients/command/common/link_choice.hpp"
+#include "clients/command/common/session/link_choice.hpp"
 #include "clients/command/experiment/experiment_file.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
 

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "clients/command/common/signals.hpp"
+#include "clients/command/common/basics/signals.hpp"
 
 namespace drivebench::command {
 namespace {

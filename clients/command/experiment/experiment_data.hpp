@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/command/common/output.hpp"
+#include "clients/command/common/basics/output.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::command {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/experiment/experiment_file.hpp"
 #include "protocols/json.hpp"
 

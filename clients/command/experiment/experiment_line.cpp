@@ -1,6 +1,6 @@
 #include "clients/command/experiment/experiment_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/experiment/experiment.hpp"
 
 namespace drivebench::command {

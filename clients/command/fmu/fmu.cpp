@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "clients/archive/zip_writer.hpp"
-#include "clients/command/common/composed_file.hpp"
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/json.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/temporary_folder.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/programs/composed_file.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/fmu/fmu_resources.hpp"
 #include "clients/fmu/model_description.hpp"
 #include "clients/sdk/drivebench.hpp"

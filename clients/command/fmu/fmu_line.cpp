@@ -1,6 +1,6 @@
 #include "clients/command/fmu/fmu_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/fmu/fmu.hpp"
 
 namespace drivebench::command {

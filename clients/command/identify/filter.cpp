@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
-#include "clients/command/common/output.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
+#include "clients/command/common/basics/output.hpp"
 #include "clients/identification/data/measured_data.hpp"
 #include "clients/identification/data/signals.hpp"
 #include "clients/identification/math/filters.hpp"

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/basics/text.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/identify/classical/classical.hpp"
 #include "clients/command/identify/data/identify_data.hpp"
 #include "clients/command/identify/data/identify_server.hpp"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/experiment/experiment_json.hpp"
 #include "clients/identification/named_experiments.hpp"
 #include "protocols/json.hpp"

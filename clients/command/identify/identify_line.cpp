@@ -1,6 +1,6 @@
 #include "clients/command/identify/identify_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/identify/filter.hpp"
 #include "clients/command/identify/identify.hpp"
 #include "clients/command/identify/track/track.hpp"

@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
 

@@ -1,6 +1,6 @@
 #include "clients/command/motor/motor_json.hpp"
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "protocols/json.hpp"
 
 namespace drivebench::command {

@@ -1,6 +1,6 @@
 #include "clients/command/motor/motor_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/motor/steady_state.hpp"
 
 namespace drivebench::command {

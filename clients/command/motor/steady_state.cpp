@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
 #include "clients/command/motor/motor_file.hpp"
 #include "clients/command/motor/motor_json.hpp"
 #include "clients/command/motor/steady_state_plot.hpp"

@@ -13,11 +13,11 @@
 #include <system_error>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/json.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/signals.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/basics/signals.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/export_can.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "clients/command/recording/tables/sample_table.hpp"

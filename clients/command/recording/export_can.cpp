@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/link/common/requests.hpp"
 #include "protocols/can/codec.hpp"
 #include "protocols/can/command.hpp"

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/recording/recorded_configuration.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "protocols/sample_codec.hpp"

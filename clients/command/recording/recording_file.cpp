@@ -4,7 +4,7 @@
 
 #include <system_error>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 
 namespace drivebench::command {
 

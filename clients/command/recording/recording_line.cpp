@@ -1,6 +1,6 @@
 #include "clients/command/recording/recording_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/recording/export.hpp"
 #include "clients/command/recording/replay.hpp"
 

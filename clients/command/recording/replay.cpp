@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
 
 namespace drivebench::command {
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <system_error>
 
-#include "clients/command/common/composed_file.hpp"
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/composed_file.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/regression/suite/compose.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/inproc_axis.hpp"
+#include "clients/command/common/session/inproc_axis.hpp"
 #include "clients/control/presets/preset.hpp"
 #include "clients/regression/verdicts/judge.hpp"
 

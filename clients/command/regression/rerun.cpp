@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/temporary_folder.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
+#include "clients/command/common/programs/temporary_folder.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/run_case.hpp"

@@ -6,7 +6,7 @@
 #include <exception>
 #include <optional>
 
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
 #include "clients/command/control/control_presets.hpp"
 

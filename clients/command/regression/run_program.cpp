@@ -7,10 +7,10 @@
 #include <sstream>
 #include <thread>
 
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
-#include "clients/command/common/server_ready.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
+#include "clients/command/common/programs/server_ready.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
 #include "clients/command/regression/run_case.hpp"
 #include "protocols/text.hpp"

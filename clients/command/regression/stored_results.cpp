@@ -1,6 +1,6 @@
 #include "clients/command/regression/stored_results.hpp"
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/regression/prepared_case.hpp"
 
 namespace drivebench::command {

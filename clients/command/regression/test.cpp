@@ -8,11 +8,11 @@
 #include <optional>
 #include <stdexcept>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/temporary_folder.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/temporary_folder.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/html_report.hpp"
 #include "clients/command/regression/stored_results.hpp"

@@ -1,7 +1,7 @@
 #include "clients/command/regression/test_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
-#include "clients/command/common/version.hpp"
+#include "clients/command/common/line/command_line.hpp"
+#include "clients/command/common/line/version.hpp"
 #include "clients/command/regression/rerun.hpp"
 #include "clients/command/regression/test.hpp"
 

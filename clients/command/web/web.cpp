@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <fstream>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/json.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "clients/web/gateway/gateway.hpp"
 #include "protocols/json.hpp"
 

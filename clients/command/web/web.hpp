@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/link_choice.hpp"
+#include "clients/command/common/session/link_choice.hpp"
 
 namespace drivebench::command {
 

@@ -1,6 +1,6 @@
 #include "clients/command/web/web_line.hpp"
 
-#include "clients/command/common/command_line.hpp"
+#include "clients/command/common/line/command_line.hpp"
 #include "clients/command/web/web.hpp"
 
 namespace drivebench::command {

@@ -12,13 +12,13 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/web/gateway/asio.hpp"
-#include "clients/web/gateway/door.hpp"
-#include "clients/web/gateway/foxglove_session.hpp"
+#include "clients/web/gateway/doors/asio.hpp"
+#include "clients/web/gateway/doors/door.hpp"
+#include "clients/web/gateway/doors/tls_door.hpp"
 #include "clients/web/gateway/page_files.hpp"
-#include "clients/web/gateway/relay.hpp"
-#include "clients/web/gateway/reports.hpp"
-#include "clients/web/gateway/tls_door.hpp"
+#include "clients/web/gateway/relays/foxglove_session.hpp"
+#include "clients/web/gateway/relays/relay.hpp"
+#include "clients/web/gateway/reports/reports.hpp"
 
 namespace drivebench::web {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/web/gateway/listen_address.hpp"
+#include "clients/web/gateway/doors/listen_address.hpp"
 
 namespace drivebench::web {
 

@@ -9,8 +9,8 @@
 #include <optional>
 #include <thread>
 
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
 #include "protocols/modbus/register_map.hpp"
 #include "tests/benchmark/crowd/abusers.hpp"
 #include "tests/benchmark/exchange/plain_modbus.hpp"

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
 #include "tests/benchmark/crowd/viewers.hpp"
 #include "tests/benchmark/harness/machine.hpp"

@@ -7,7 +7,7 @@
 #include <ctime>
 #include <thread>
 
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "server/pacing/pacer.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"

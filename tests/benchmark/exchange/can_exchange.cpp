@@ -7,7 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "protocols/can/codec.hpp"
 #include "tests/benchmark/exchange/can_wire.hpp"
 #include "tests/benchmark/harness/canary.hpp"

@@ -8,7 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/child.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "protocols/modbus/register_map.hpp"
 #include "tests/benchmark/exchange/plain_modbus.hpp"
 #include "tests/benchmark/harness/canary.hpp"

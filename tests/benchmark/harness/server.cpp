@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/command/common/installation.hpp"
+#include "clients/command/common/programs/installation.hpp"
 
 namespace drivebench::speed {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/process.hpp"
+#include "clients/command/common/programs/process.hpp"
 #include "plant/math/frames.hpp"
 #include "server/config/config.hpp"
 

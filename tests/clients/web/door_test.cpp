@@ -1,4 +1,4 @@
-#include "clients/web/gateway/door.hpp"
+#include "clients/web/gateway/doors/door.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clients/web/gateway/foxglove_session.hpp"
+#include "clients/web/gateway/relays/foxglove_session.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clients/web/gateway/frames.hpp"
+#include "clients/web/gateway/relays/frames.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clients/web/gateway/send_queue.hpp"
+#include "clients/web/gateway/relays/send_queue.hpp"
 
 #include <bench.pb.h>
 #include <gtest/gtest.h>

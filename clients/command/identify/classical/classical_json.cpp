@@ -1,4 +1,4 @@
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/experiment/experiment_json.hpp"
 #include "clients/command/identify/classical/classical_report.hpp"
 #include "protocols/json.hpp"

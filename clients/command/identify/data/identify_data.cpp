@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/identify/data/identify_map.hpp"
 #include "clients/command/identify/data/identify_options.hpp"
 #include "clients/command/recording/recorded_configuration.hpp"

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <optional>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
 #include "clients/command/identify/data/identify_options.hpp"
 #include "protocols/document.hpp"
 #include "protocols/signals/catalogue.hpp"

@@ -9,12 +9,12 @@
 #include <optional>
 #include <system_error>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/process.hpp"
-#include "clients/command/common/server_ready.hpp"
-#include "clients/command/common/session.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
+#include "clients/command/common/programs/server_ready.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/experiment/experiment_client.hpp"
 #include "clients/command/experiment/experiment_data.hpp"
 

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <string_view>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/installation.hpp"
-#include "clients/command/common/text.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
+#include "clients/command/common/programs/installation.hpp"
 #include "protocols/document.hpp"
 #include "protocols/text.hpp"
 

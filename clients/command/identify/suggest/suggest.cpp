@@ -6,9 +6,9 @@
 #include <string_view>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/identify/data/identify_steps.hpp"
 #include "clients/identification/math/pattern_search.hpp"
 

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/identify/data/identify_steps.hpp"
 #include "clients/identification/identify.hpp"
 #include "clients/link/common/requests.hpp"

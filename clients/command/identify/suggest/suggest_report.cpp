@@ -3,7 +3,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/identify/suggest/suggest.hpp"
 #include "protocols/json.hpp"
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "clients/command/common/errors.hpp"
-#include "clients/command/common/output.hpp"
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/output.hpp"
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/identify/data/identify_data.hpp"
 #include "clients/command/identify/data/identify_steps.hpp"
 #include "clients/command/identify/track/track_report.hpp"

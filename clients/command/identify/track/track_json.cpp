@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/command/common/json.hpp"
+#include "clients/command/common/basics/json.hpp"
 #include "clients/command/identify/track/track_report.hpp"
 #include "protocols/json.hpp"
 

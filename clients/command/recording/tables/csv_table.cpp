@@ -2,7 +2,7 @@
 
 #include <iterator>
 
-#include "clients/command/common/signals.hpp"
+#include "clients/command/common/basics/signals.hpp"
 #include "clients/command/recording/tables/sample_table.hpp"
 
 namespace drivebench::command {

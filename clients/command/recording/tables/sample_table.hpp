@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/output.hpp"
+#include "clients/command/common/basics/output.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 /// Samples as a table in a file, a row for each. Its first columns are tick and time.

@@ -4,8 +4,8 @@
 #include <array>
 
 #include "clients/archive/zip_reader.hpp"
-#include "clients/command/common/composed_file.hpp"
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/composed_file.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/regression/suite/case_file.hpp"
 #include "clients/regression/suite/compose.hpp"

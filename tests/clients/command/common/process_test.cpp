@@ -1,11 +1,11 @@
-#include "clients/command/common/process.hpp"
+#include "clients/command/common/programs/process.hpp"
 
 #include <gtest/gtest.h>
 
 #include <csignal>
 #include <optional>
 
-#include "clients/command/common/server_ready.hpp"
+#include "clients/command/common/programs/server_ready.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -1,5 +1,5 @@
 // The parts of subcommands that need no bench. The wire tests try the rest against the real server.
-#include "clients/command/common/session.hpp"
+#include "clients/command/common/session/session.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "clients/command/bench/status.hpp"
 #include "clients/command/bench/watch.hpp"
 #include "clients/command/can/can_log.hpp"
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/experiment/experiment.hpp"
 #include "clients/command/identify/identify.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "clients/command/identify/identify.hpp"
 #include "protocols/document.hpp"
 

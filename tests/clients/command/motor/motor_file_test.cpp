@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "protocols/document.hpp"
 
 namespace drivebench::command {

@@ -11,7 +11,7 @@
 #include <span>
 #include <sstream>
 
-#include "clients/command/common/errors.hpp"
+#include "clients/command/common/basics/errors.hpp"
 #include "protocols/mcap/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 

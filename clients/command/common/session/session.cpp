@@ -1,0 +1,148 @@
+#include "clients/command/common/session/session.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+
+#include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
+#include "clients/command/common/session/inproc_axis.hpp"
+#include "clients/link/can/can_link.hpp"
+#include "clients/link/modbus/modbus_link.hpp"
+
+namespace drivebench::command {
+namespace {
+
+volatile std::sig_atomic_t interrupt_count = 0;
+
+template <class Descriptions>
+std::string names_of(const Descriptions& descriptions, std::uint64_t bits) {
+  std::string names;
+  for (const auto& each : descriptions) {
+    if ((bits & each.bit()) == 0) continue;
+    bits &= ~each.bit();
+    names += (names.empty() ? "" : " ") + each.name();
+  }
+  if (bits != 0) names += fmt::format("{}{:#x}", names.empty() ? "" : " ", bits);
+  return names.empty() ? "none" : names;
+}
+
+}  // namespace
+
+link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
+  if (link::is_can_address(choice.address) || link::is_modbus_address(choice.address)) {
+    throw UsageError(fmt::format(
+        "{} needs a tcp:, tls: or unix: link; over CAN and Modbus there is only control", subcommand));
+  }
+  try {
+    return link::Link(choice.address, {.client = fmt::format("drivebench {}", subcommand),
+                                       .token = choice.token,
+                                       .conducts = choice.conducts});
+  } catch (const link::RefusalError& refused) {
+    throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
+  }
+}
+
+std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
+                                          std::string_view subcommand) {
+  constexpr std::string_view kInproc = "inproc:";
+  if (choice.address.starts_with(kInproc)) {
+    return std::make_unique<InprocAxis>(choice.address.substr(kInproc.size()), axis);
+  }
+  const bool is_can = link::is_can_address(choice.address);
+  if (!is_can && !link::is_modbus_address(choice.address)) {
+    std::unique_ptr<link::Link> bench(new link::Link(open_link(choice, subcommand)));  // it does not move
+    const std::uint32_t number = axis_number(bench->welcome().bench(), axis);
+    return std::make_unique<link::TcpAxis>(std::move(bench), number);
+  }
+  if (axis != "0") {
+    throw UsageError(fmt::format("the address names the axis: {}", is_can ? "?node=N" : "?unit=N"));
+  }
+  try {
+    if (is_can) return std::make_unique<link::CanLink>(link::parse_can_address(choice.address));
+    return std::make_unique<link::ModbusLink>(link::parse_modbus_address(choice.address));
+  } catch (const link::RefusalError& refused) {
+    throw NotLetIn(fmt::format("{} turns this client away: {}", choice.address, refused.what()));
+  }
+}
+
+std::optional<std::uint32_t> find_axis(const v1::BenchDescription& bench, std::string_view choice) {
+  for (int i = 0; i < bench.axes_size(); ++i) {
+    if (bench.axes(i).name() == choice || fmt::format("{}", i) == choice) {
+      return static_cast<std::uint32_t>(i);
+    }
+  }
+  return std::nullopt;
+}
+
+std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice) {
+  if (const auto number = find_axis(bench, choice)) return *number;
+  const std::string known = listed(
+      bench.axes(), [n = 0](const auto& axis) mutable { return fmt::format("{} ({})", n++, axis.name()); });
+  throw UsageError(fmt::format("no axis '{}'; this bench has {}", choice, known));
+}
+
+const char* name_of_state(std::uint64_t state) noexcept {
+  constexpr std::array kNames = {"idle", "run", "hold", "timeout", "fault", "ready"};
+  return state < kNames.size() ? kNames[state] : "unknown";
+}
+
+std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults) {
+  return names_of(bench.faults(), faults);
+}
+
+std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected) {
+  return names_of(bench.injectable_faults(), injected);
+}
+
+std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults) {
+  std::uint64_t latched = 0;
+  for (const v1::FaultDescription& fault : bench.faults()) {
+    if (fault.latched()) latched |= fault.bit();
+  }
+  return faults & latched;
+}
+
+std::string latched_text(const v1::BenchDescription& bench, const Sample& sample) {
+  if (bench.faults_size() != 0) {
+    const std::uint64_t latched = latched_faults(bench, sample.faults);
+    return latched == 0 ? "" : fault_names(bench, latched);
+  }
+  constexpr std::uint64_t kTimeout = 3;
+  constexpr std::uint64_t kFault = 4;
+  if (sample.state != kTimeout && sample.state != kFault) return {};
+  return fmt::format("{}, fault word {:#x}", name_of_state(sample.state), sample.faults);
+}
+
+void catch_interrupts() {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { interrupt_count = interrupt_count + 1; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    ::sigaction(signal, &action, nullptr);
+  }
+}
+
+bool interrupted() noexcept {
+  return interrupt_count != 0;
+}
+
+Progress::~Progress() {
+  if (drawn_) std::fputs("\r\x1b[K", stderr);
+}
+
+void Progress::update(double fraction, std::string_view doing) {
+  using namespace std::chrono_literals;
+  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
+  const Clock::time_point now = Clock::now();
+  if (now - started_ < 1s || now - shown_ < (is_terminal ? 100ms : 5000ms)) return;
+  shown_ = now;
+  const std::string line = fmt::format("{}: {:.0f} % {}", what_, 100.0 * fraction, doing);
+  fmt::print(stderr, "{}{}{}", is_terminal ? "\r" : "", line, is_terminal ? "\x1b[K" : "\n");
+  drawn_ = is_terminal;
+}
+
+}  // namespace drivebench::command
