@@ -68,9 +68,13 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   app.add_option("--unix", o.unix_path, "also listen on this unix socket")
       ->type_name("FILE")
       ->check(not_empty);
+  auto* from = app.add_option("--from", o.from, "begin with this state, which drivebench save has written")
+                   ->type_name("FILE")
+                   ->check(not_empty);
   auto* record = app.add_option("--record", o.record, "write an MCAP recording to this new file")
                      ->type_name("FILE")
                      ->check(not_empty);
+  record->excludes(from);
   app.add_option("--record-file-s", o.file_s,
                  "a new file after this much plant time [s]: FILE.mcap, FILE.2.mcap ...")
       ->check(real_between(1e-9, kMost_s))

@@ -12,6 +12,7 @@ struct ServerOptions {
   std::string config;
   std::string mode;
   std::string replay;
+  std::string from;  ///< a saved state to begin with
   std::string record;
   std::string unix_path;
   int port = -1;

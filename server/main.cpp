@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "protocols/document.hpp"
 #include "server/access/audit.hpp"
 #include "server/command_line.hpp"
 #include "server/config/config.hpp"
@@ -162,6 +163,17 @@ std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& c
   return make_threaded_engine(config, std::move(recorder), io, max_ticks);
 }
 
+/// Throws if the file is no state of this bench.
+void go_to_saved_state(Engine& engine, const std::string& file) {
+  constexpr std::size_t kLargestState = std::size_t{16} << 20;
+  const FileText saved = read_file(file, kLargestState);
+  if (!saved.why_not.empty()) throw std::runtime_error(fmt::format("--from: {} {}", file, saved.why_not));
+  if (!engine.restore(std::as_bytes(std::span(saved.text)))) {
+    throw std::runtime_error(
+        fmt::format("--from: {} is no state of the bench {}", file, engine.config().name));
+  }
+}
+
 /// Shows the progress of a run of known length twice a second if standard error is a terminal.
 asio::awaitable<void> show_progress(const Engine& engine, double duration_s) {
   ServerTimer timer(co_await asio::this_coro::executor);
@@ -256,6 +268,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   std::unique_ptr<Experiments> experiments;
   if (!config.experiments.folder.empty()) experiments = std::make_unique<Experiments>(io, config);
   const std::unique_ptr<Engine> engine = make_engine(o, config, io);
+  if (!o.from.empty()) go_to_saved_state(*engine, o.from);
   if (audit) audit->watch(*engine);
   if (audit) note_start(*audit, *engine);
   server.serve(

@@ -109,4 +109,26 @@ int LinkBackend::state_hash(std::uint64_t& hash) noexcept {
   return carry_out(*this, [&] { hash = link_.status().state_hash(); });
 }
 
+int LinkBackend::reset() noexcept {
+  return carry_out(*this, [&] {
+    link_.reset();
+    keep(link_.exchange({}));
+  });
+}
+
+int LinkBackend::save(std::vector<std::byte>& state) noexcept {
+  return carry_out(*this, [&] {
+    const std::string saved = link_.save_state().state;
+    const std::span<const std::byte> bytes = std::as_bytes(std::span(saved));
+    state.assign(bytes.begin(), bytes.end());
+  });
+}
+
+int LinkBackend::restore(std::span<const std::byte> state) noexcept {
+  return carry_out(*this, [&] {
+    link_.restore_state({reinterpret_cast<const char*>(state.data()), state.size()});
+    keep(link_.exchange({}));
+  });
+}
+
 }  // namespace drivebench::sdk

@@ -37,6 +37,9 @@ class LinkBackend final : public abi::Backend {
   int bump(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick) noexcept override;
 
   int state_hash(std::uint64_t& hash) noexcept override;
+  int reset() noexcept override;
+  int save(std::vector<std::byte>& state) noexcept override;
+  int restore(std::span<const std::byte> state) noexcept override;
 
  private:
   void keep(const v1::ExchangeReply& reply);

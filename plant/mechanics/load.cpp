@@ -1,5 +1,7 @@
 #include "plant/mechanics/load.hpp"
 
+#include <cmath>
+
 namespace drivebench {
 
 void LoadTorque::go_to(double target_nm, Tick tick, Tick ramp_ticks) noexcept {
@@ -14,6 +16,12 @@ double LoadTorque::at(Tick tick) const noexcept {
   if (elapsed >= ramp_ticks_) return target_nm_;
   return start_nm_ +
          (target_nm_ - start_nm_) * (static_cast<double>(elapsed) / static_cast<double>(ramp_ticks_));
+}
+
+bool LoadTorque::is_possible() const noexcept {
+  constexpr Tick kLatest = Tick{1} << 53;
+  return std::isfinite(start_nm_) && std::isfinite(target_nm_) && start_tick_ >= 0 &&
+         start_tick_ <= kLatest && ramp_ticks_ >= 0 && ramp_ticks_ <= kLatest;
 }
 
 }  // namespace drivebench

@@ -11,6 +11,8 @@ class LoadTorque {
   void go_to(double target_nm, Tick tick, Tick ramp_ticks) noexcept;
   /// The torque that holds during this tick.
   double at(Tick tick) const noexcept;
+  /// Whether go_to() can have made it: for one that comes from bytes.
+  bool is_possible() const noexcept;
 
  private:
   double start_nm_ = 0.0;

@@ -45,11 +45,13 @@ class Backend {
   virtual int bump(std::uint32_t axis, double impulse_nms, std::uint64_t at_tick) noexcept = 0;
 
   /// An event of describe(), whose number is right.
-  virtual int event_tick(std::size_t, std::int64_t&) noexcept { return only_in_process("event_tick"); }
+  virtual int event_tick(std::size_t, std::int64_t&) noexcept {
+    return not_over_it("event_tick works in process only (inproc:BENCH)");
+  }
   virtual int state_hash(std::uint64_t& hash) noexcept = 0;
-  virtual int reset() noexcept { return only_in_process("reset"); }
-  virtual int save(std::vector<std::byte>&) noexcept { return only_in_process("save"); }
-  virtual int restore(std::span<const std::byte>) noexcept { return only_in_process("restore"); }
+  virtual int reset() noexcept { return not_over_it(kNoStates); }
+  virtual int save(std::vector<std::byte>&) noexcept { return not_over_it(kNoStates); }
+  virtual int restore(std::span<const std::byte>) noexcept { return not_over_it(kNoStates); }
 
   const std::string& error() const noexcept { return error_; }
   const std::string& error_field() const noexcept { return field_; }
@@ -65,9 +67,10 @@ class Backend {
   }
 
  private:
-  int only_in_process(const char* what) noexcept {
-    return fail(DRIVEBENCH_NOT_AVAILABLE, std::string(what) + " works in process only (inproc:BENCH)");
-  }
+  static constexpr const char* kNoStates =
+      "reset, save and restore work in process and over tcp, tls and unix; this link does not have them";
+
+  int not_over_it(const char* sentence) noexcept { return fail(DRIVEBENCH_NOT_AVAILABLE, sentence); }
 
   std::string error_;
   std::string field_;

@@ -333,14 +333,21 @@ DRIVEBENCH_API int drivebench_event_tick(drivebench_bench* bench, size_t event, 
 /** The hash of the state and of all samples so far: equal hashes mean equal runs. Lockstep only. */
 DRIVEBENCH_API int drivebench_state_hash(drivebench_bench* bench, uint64_t* hash);
 
-/** Back to tick 0, as after drivebench_open(): no lease, no changes. In process only. */
+/**
+ * Back to tick 0, without any changes. Leases stay with their holders. In process and over tcp, tls and unix;
+ * a server refuses while another session holds an axis (DRIVEBENCH_OWNED) and while it records
+ * (DRIVEBENCH_NOT_AVAILABLE). The same holds for drivebench_restore().
+ */
 DRIVEBENCH_API int drivebench_reset(drivebench_bench* bench);
 /**
- * Saves the whole state: machines, sensors, noise, leases, scheduled changes. `*size` is the room in `state`
- * before and the length of the state after; with a null `state` only the length is told. In process only.
+ * Saves the whole state: machines, sensors, noise, commands, scheduled changes. `*size` is the room in `state`
+ * before and the length of the state after; with a null `state` only the length is told.
  */
 DRIVEBENCH_API int drivebench_save(drivebench_bench* bench, void* state, size_t* size);
-/** Goes on from a saved state of the same bench, in this process or another. In process only. */
+/**
+ * Goes on from a saved state of the same bench, in this process, another one or a server. Leases stay with their
+ * holders: acquire an axis that the state drives before you restore it, or it has lost its controller.
+ */
 DRIVEBENCH_API int drivebench_restore(drivebench_bench* bench, const void* state, size_t size);
 
 /** The version of the library, for example "0.1.0". */

@@ -68,11 +68,14 @@ Refused Bench::submit(const Input& input) noexcept {
 
 Refused Bench::repeat(const Input& input) noexcept {
   if (input.axis >= axes_.size()) return Refused::kUnknownAxis;
-  if (input.tick <= tick_) {
+  if (input.tick < tick_) {
     Input now = input;
     now.tick = tick_;
-    observer_->on_input(tick_, now);
-    return apply(now);
+    return repeat(now);
+  }
+  if (input.tick == tick_) {  // as commands do: no copy of what the caller has just written
+    observer_->on_input(tick_, input);
+    return apply(input);
   }
   observer_->on_input(tick_, input);
   if (scheduled_ == kMaxScheduled) return Refused::kBusy;

@@ -140,8 +140,12 @@ class Bench {
 
   /// The whole state as bytes, for restore() on a bench with the same setup, in any process.
   std::vector<std::byte> save() const;
-  /// Returns false and changes nothing if the bytes are not a state of such a bench.
+  /// Returns false and changes nothing if the bytes are not a state that such a bench can have.
   bool restore(std::span<const std::byte> saved);
+  /// The same, but leases stay with those who hold them now: the holder of an axis takes the place of the
+  /// controller in the state, scheduled inputs included. Without a holder that controller has gone: an axis
+  /// that it drove acts safely and latches the loss.
+  bool restore_for_holders(std::span<const std::byte> saved);
 
   static constexpr std::size_t kMaxScheduled = 256;
 
@@ -219,6 +223,10 @@ class Bench {
   void miss_command(AxisRuntime& a) noexcept;
   PhaseCommand drive_with(AxisRuntime& a, const PhaseCommand& command) noexcept;
   void take_sample(std::size_t index) noexcept;
+  void hand_over(std::size_t axis, Owner holder) noexcept;
+  /// Whether a tick can go on from here: for a state that comes from bytes.
+  bool can_go_on() const noexcept;
+  bool can_go_on(const AxisRuntime& a) const noexcept;
   PhaseCommand safe_command(AxisRuntime& a) noexcept;
 
   /// Calls visit(block) for every piece of the state, each a struct of 8-byte members.

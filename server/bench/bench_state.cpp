@@ -1,5 +1,6 @@
 // Saves, restores and hashes the state of the bench. The state is a list of blocks of 8-byte words; the
 // header identifies the setup, the last word is a digest of all words before it.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -7,6 +8,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "server/bench/bench.hpp"
+#include "server/bench/state_limits.hpp"
 
 namespace drivebench {
 namespace {
@@ -107,13 +109,17 @@ void Bench::for_each_block(Self& self, Visitor visit) {
     visit(state);
     AxisParameters parameters = a.axis.parameters();
     for (const Parameter& row : axis_parameters(parameters)) {
-      double value = row.get(parameters);
+      const double before = row.get(parameters);
+      double value = before;
       visit_value(row, value, visit);
-      if constexpr (!std::is_const_v<Self>) row.set(parameters, value);
+      if constexpr (!std::is_const_v<Self>) {
+        // The limits first: a conversion to an integer is defined only within them.
+        if (value == before || !breaks_a_rule(row, value)) row.set(parameters, value);
+      }
     }
     if constexpr (!std::is_const_v<Self>) {
-      a.axis.restore(state);
-      a.axis.set_parameters(parameters);
+      if (is_possible(state)) a.axis.restore(state);
+      if (!breaks_a_rule(parameters)) a.axis.set_parameters(parameters);
     }
   }
 }
@@ -160,18 +166,70 @@ bool Bench::restore(std::span<const std::byte> saved) {
   for_each_block(restored, take);
   for (AwaitedInput& awaited : restored.awaited_)
     take(awaited.state);
-  if (restored.scheduled_ > kMaxScheduled) return false;
-  for (const PackedInput& input : restored.schedule_) {
-    if (input.axis >= axes_.size()) return false;
-  }
-  for (const AxisRuntime& a : restored.axes_) {
-    const std::size_t rows = axis_parameters(a.axis.parameters()).size();
-    for (const ParameterRamp& ramp : a.ramps.ramp) {
-      if (a.ramps.count > kMaxRamps || ramp.row >= rows) return false;
-    }
-  }
+  // What an axis cannot have has stayed out, so that a state which holds it is not the same any more.
+  if (!restored.can_go_on() || !std::ranges::equal(restored.save(), saved)) return false;
+  for (AxisRuntime& a : restored.axes_)
+    ++a.parameter_changes;
   *this = std::move(restored);
   return true;
+}
+
+bool Bench::restore_for_holders(std::span<const std::byte> saved) {
+  std::vector<Owner> holders;
+  holders.reserve(axes_.size());
+  for (const AxisRuntime& a : axes_)
+    holders.push_back(a.control.owner);
+  if (!restore(saved)) return false;
+  for (std::size_t axis = 0; axis < axes_.size(); ++axis)
+    hand_over(axis, holders[axis]);
+  for (AxisRuntime& a : axes_)
+    a.sample.owner = control_of(a).owner;
+  return true;
+}
+
+/// Gives the lease of the restored state, with the inputs that its controller has scheduled, to `holder`.
+void Bench::hand_over(std::size_t axis, Owner holder) noexcept {
+  Control& c = axes_[axis].control;
+  const Owner before = c.owner;
+  if (holder == before) return;
+  if (holder == 0) return lose_controller(axis, kLeaseLost);
+  if (before == 0) {
+    change_lease(axis, LeaseAction::kAcquire, holder);
+    return;
+  }
+  c.owner = holder;
+  for (PackedInput& input : std::span(schedule_).first(scheduled_)) {
+    if (axes_[input.axis].amplifier == axis && input.owner == before) input.owner = holder;
+  }
+}
+
+bool Bench::can_go_on() const noexcept {
+  if (!is_possible_count(tick_) || tick_ < 0 || scheduled_ > kMaxScheduled) return false;
+  if (late_now_ != 0 && late_now_ != 1) return false;
+  const auto scheduled = std::span(schedule_).first(scheduled_);
+  const auto may_act = [this](const PackedInput& input) {
+    return input.axis < axes_.size() && is_possible_count(input.tick) && input.tick >= 0 &&
+           may_be_scheduled(unpack(input).action);
+  };
+  return std::ranges::all_of(scheduled, may_act) &&
+         std::ranges::all_of(axes_, [this](const AxisRuntime& a) { return can_go_on(a); });
+}
+
+bool Bench::can_go_on(const AxisRuntime& a) const noexcept {
+  const Control& c = a.control;
+  const auto is_latest = [this](Tick tick) { return tick >= -1 && tick <= tick_; };
+  if (c.state > ControlState::kReady || !is_latest(c.renewed) || !is_latest(c.newest.answers) ||
+      !is_latest(c.in_force.answers)) {
+    return false;
+  }
+  const std::size_t rows = axis_parameters(a.axis.parameters()).size();
+  const auto is_ramp = [rows](const ParameterRamp& r) {
+    return r.row < rows && std::isfinite(r.from) && std::isfinite(r.to) && is_possible_count(r.start) &&
+           is_possible_count(r.ticks) && r.start >= 0 && r.ticks >= 0;
+  };
+  return a.ramps.count <= kMaxRamps && std::ranges::all_of(a.ramps.ramp, is_ramp) &&
+         is_possible_count(c.silent_ticks) && is_possible_count(c.good_commands) && is_possible(c.newest) &&
+         is_possible(c.in_force) && is_possible(c.last);
 }
 
 }  // namespace drivebench

@@ -51,6 +51,10 @@ void Engine::refuse_to_take(std::uint32_t axis, Owner by, Refused why, const Ans
   answer(why, tick());
 }
 
+std::string_view Engine::objection_to_restore() const {
+  return recorder_ != nullptr ? "the bench records, and a recording holds one run from its start" : "";
+}
+
 ChangeView Engine::change_view(std::size_t axis) const {
   return drivebench::change_view(config_, axis, parameters_[axis], tick());
 }

@@ -4,7 +4,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/bench/bench.hpp"
@@ -44,6 +46,18 @@ class Engine {
   /// Gives the axis to `by`, even if another owner holds it: that owner loses the lease as at the end of its
   /// session, and in the same tick `by` gets it. Calls on_taken.
   virtual void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer);
+  /// The whole state after the last tick: Bench::save(). In real time no tick runs meanwhile.
+  virtual std::vector<std::byte> save() = 0;
+  /// Goes on from a saved state, with the leases as they are: Bench::restore_for_holders(). Calls
+  /// on_set_back, then on_tick and on_newest with the sample of the state. False, and nothing has changed:
+  /// the bytes are no state of this bench. Not while objection_to_restore() has one.
+  virtual bool restore(std::span<const std::byte> state) = 0;
+  /// Goes on from tick 0.
+  void reset() { restore(start_); }
+  /// Bytes of every state of this bench.
+  std::size_t state_size() const { return start_.size(); }
+  /// The reason why the bench cannot go to another state; empty: it can.
+  std::string_view objection_to_restore() const;
   /// Ends the run: takes the safe action and closes the recording.
   virtual Verdict stop() = 0;
   /// The hash of the current state; 0 while another thread changes it.
@@ -68,6 +82,8 @@ class Engine {
   Listeners on_tick;
   /// Called after on_tick, unless a newer tick is already waiting for its on_tick.
   Listeners on_newest;
+  /// Called when the bench has gone to another state, before on_tick: its tick may be any.
+  Listeners on_set_back;
   /// Called once at the end of a run of fixed length.
   std::function<void()> on_end;
   /// Called with every answer to a request, before the session that asked has it; `from` may be null.
@@ -131,6 +147,7 @@ class Engine {
   std::vector<TickEdges> edges_;  ///< empty: no bus sends them
   std::vector<std::string> notes_;
   std::vector<AxisParameters> parameters_;  ///< parameters(), by axis
+  std::vector<std::byte> start_;            ///< the state at tick 0
 
  private:
   std::uint64_t configuration_hash_;

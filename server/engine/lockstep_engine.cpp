@@ -17,6 +17,7 @@ class LockstepEngine final : public Engine {
         shown_changes_(config_.axes.size()) {
     if (io != nullptr) disk_timer_.emplace(*io);
     schedule_events(config_, bench_);
+    start_ = bench_.save();
     show();
   }
 
@@ -55,11 +56,20 @@ class LockstepEngine final : public Engine {
       const TickMark mark;
       bench_.step();
     }
-    for (std::size_t i = 0; i < edges_.size(); ++i)
-      edges_[i] = edges_of(bench_, i);
     show();
     on_tick();
     on_newest();
+  }
+
+  std::vector<std::byte> save() override { return bench_.save(); }
+
+  bool restore(std::span<const std::byte> state) override {
+    if (!bench_.restore_for_holders(state)) return false;
+    show();
+    on_set_back();
+    on_tick();
+    on_newest();
+    return true;
   }
 
   void submit(const Input& input, Answer answer) override {
@@ -107,6 +117,8 @@ class LockstepEngine final : public Engine {
   }
 
   void show() {
+    for (std::size_t i = 0; i < edges_.size(); ++i)
+      edges_[i] = edges_of(bench_, i);
     for (std::size_t i = 0; i < newest_.size(); ++i) {
       newest_[i] = bench_.sample(i);
       if (std::exchange(shown_changes_[i], bench_.parameter_changes(i)) != bench_.parameter_changes(i)) {

@@ -24,6 +24,9 @@ namespace {
 
 constexpr std::size_t kRequestCapacity = 256;
 
+/// Whether the ticks stand still for the I/O thread.
+enum class Hold { kNone, kWanted, kStanding, kOver /* the last tick has run */ };
+
 class ThreadedEngine final : public Engine {
  public:
   ThreadedEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context& io,
@@ -37,20 +40,14 @@ class ThreadedEngine final : public Engine {
         events_(4096 + 64 * config_.axes.size()),
         tap_(recorder_.get(), events_),
         bench_(config_.setup, &tap_),
-        command_mail_(config_.axes.size()),
         parameter_mail_(config_.axes.size()),
         lease_mail_(config_.axes.size()),
         wake_(io, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         clock_(config_.mode, config_, std::move(pacer)) {
     schedule_events(config_, bench_);
-    for (std::size_t i = 0; i < parameter_mail_.size(); ++i) {
-      parameters_[i] = bench_.axis(i).parameters();
-      parameter_mail_[i].in_force = ParameterMail::values_of(parameters_[i]);
-      parameter_mail_[i].sent = bench_.parameter_changes(i);
-    }
+    start_ = bench_.save();
     if (!edges_.empty()) tap_.send_edges_of(bench_);
-    for (std::size_t i = 0; i < newest_.size(); ++i)
-      newest_[i] = bench_.sample(i);
+    read_bench();
     await_wake();
   }
 
@@ -140,6 +137,23 @@ class ThreadedEngine final : public Engine {
                         .passed_axis = passes ? std::optional(input.axis) : std::nullopt});
   }
 
+  std::vector<std::byte> save() override {
+    const TicksHeld held(*this);
+    return bench_.save();
+  }
+
+  bool restore(std::span<const std::byte> state) override {
+    const TicksHeld held(*this);
+    drain_events();  // what the ticks so far have answered
+    if (!bench_.restore_for_holders(state)) return false;
+    clock_.begin_anew();
+    read_bench();
+    on_set_back();
+    on_tick();
+    on_newest();
+    return true;
+  }
+
   Verdict stop() override {
     stop_.store(true);
     if (thread_.joinable()) thread_.join();
@@ -181,14 +195,25 @@ class ThreadedEngine final : public Engine {
     pthread_setname_np(pthread_self(), "ticks");
     if (config_.mode == RunMode::kRealtime) notes_ = enter_realtime(config_.realtime);
     ready.store(true);
-    while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_))
+    while (!stop_.load(std::memory_order_relaxed) && (!max_ticks_ || bench_.tick() < *max_ticks_)) {
       run_tick();
+      if (hold_.load(std::memory_order_relaxed) == Hold::kWanted) hold_ticks();
+    }
     send_parameters();
+    hold_.store(Hold::kOver);
+    hold_.notify_all();
     while (!events_.push(RunEnded{}) && !stop_.load()) {
       notify();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     notify();
+  }
+
+  /// Stands still between two ticks until the I/O thread lets the ticks go on.
+  void hold_ticks() noexcept {
+    hold_.store(Hold::kStanding);
+    hold_.notify_all();
+    hold_.wait(Hold::kStanding);
   }
 
   /// Takes every lease back.
@@ -228,6 +253,40 @@ class ThreadedEngine final : public Engine {
   }
 
   // ---- I/O thread ----
+
+  /// No tick runs while it lives, so that the I/O thread may look at the bench and change it.
+  class TicksHeld {
+   public:
+    explicit TicksHeld(ThreadedEngine& engine) : hold_(engine.hold_) {
+      Hold before = Hold::kNone;
+      if (!engine.thread_.joinable() || !hold_.compare_exchange_strong(before, Hold::kWanted)) return;
+      hold_.wait(Hold::kWanted);
+    }
+    ~TicksHeld() {
+      Hold standing = Hold::kStanding;
+      if (hold_.compare_exchange_strong(standing, Hold::kNone)) hold_.notify_all();
+    }
+    TicksHeld(const TicksHeld&) = delete;
+    TicksHeld& operator=(const TicksHeld&) = delete;
+
+   private:
+    std::atomic<Hold>& hold_;
+  };
+
+  /// Takes over what the tick thread would send, while it does not run.
+  void read_bench() {
+    command_mail_ = std::deque<CommandMail>(config_.axes.size());
+    for (std::size_t i = 0; i < newest_.size(); ++i) {
+      newest_[i] = bench_.sample(i);
+      ParameterMail& mail = parameter_mail_[i];
+      mail.newest.take();
+      mail.in_force = ParameterMail::values_of(bench_.axis(i).parameters());
+      mail.sent = bench_.parameter_changes(i);
+      parameters_[i] = bench_.axis(i).parameters();
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i)
+      edges_[i] = edges_of(bench_, i);
+  }
 
   bool has_room() noexcept { return ends_.empty() && requests_.room() > 0; }
   /// The holder of the lease once the requests on their way have acted.
@@ -345,6 +404,7 @@ class ThreadedEngine final : public Engine {
   std::deque<RequestOutcome> outcomes_;  // results that wait for the samples of their tick
   TickClock clock_;
   std::atomic<bool> stop_{false};
+  std::atomic<Hold> hold_{Hold::kNone};
   std::thread thread_;
 };
 

@@ -187,7 +187,7 @@ int InprocBench::save(std::vector<std::byte>& state) noexcept {
 }
 
 int InprocBench::restore(std::span<const std::byte> state) noexcept {
-  if (bench_.restore(state)) return DRIVEBENCH_OK;
+  if (bench_.restore_for_holders(state)) return DRIVEBENCH_OK;
   return fail(DRIVEBENCH_MALFORMED,
               "these " + std::to_string(state.size()) + " bytes are no state of this bench", "state");
 }

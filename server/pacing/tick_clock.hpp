@@ -28,6 +28,9 @@ class TickClock {
   /// faults knew nothing of this one, which would otherwise be gone before a sample shows it.
   void report_lateness(Bench& bench) noexcept;
 
+  /// The next tick is due at once, and the others after it. While no tick runs.
+  void begin_anew() noexcept { pacer_->resynchronise(); }
+
   /// The latenesses of all ticks so far; empty outside real time. For the tick thread only.
   const LatenessHistogram& lateness() const noexcept { return lateness_; }
   /// The largest lateness so far; for every thread.

@@ -151,6 +151,12 @@ std::string change_json(std::uint32_t axis, std::string_view name, double value,
   return json_text(Json{{"axis", axis}, {"name", name}, {"value", value}, {"tick", tick}});
 }
 
+std::string state_json(std::string_view done, std::uint64_t tick, const std::string& file) {
+  Json json{{"done", done}, {"tick", tick}};
+  if (!file.empty()) json["file"] = file;
+  return json_text(json);
+}
+
 std::string clear_json(const v1::BenchDescription& bench, std::uint32_t axis, std::uint64_t cleared,
                        std::uint64_t tick) {
   return json_text(Json{

@@ -21,6 +21,9 @@ std::string sample_json(const Sample& sample, const v1::BenchDescription& bench,
 std::string clear_json(const v1::BenchDescription& bench, std::uint32_t axis, std::uint64_t cleared,
                        std::uint64_t tick);
 
+/// {done: "saved" or "restored" or "reset to", tick, file if there is one}
+std::string state_json(std::string_view done, std::uint64_t tick, const std::string& file);
+
 std::string change_json(std::uint32_t axis, std::string_view name, double value, std::uint64_t tick);
 
 }  // namespace drivebench::command

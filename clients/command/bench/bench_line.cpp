@@ -3,6 +3,7 @@
 #include "clients/command/bench/change.hpp"
 #include "clients/command/bench/describe.hpp"
 #include "clients/command/bench/serve.hpp"
+#include "clients/command/bench/state.hpp"
 #include "clients/command/bench/status.hpp"
 #include "clients/command/bench/watch.hpp"
 #include "clients/command/common/line/command_line.hpp"
@@ -97,6 +98,43 @@ void add_take(CommandLine& line) {
   sub.add_option("--reason", o.reason, "what the session is told, and what the audit log keeps")->required();
 }
 
+void add_branch(CommandLine& line) {
+  CLI::App& sub = *line.app().add_subcommand(
+      "branch", "start a second server that goes on from the present state of a bench");
+  const auto o = std::make_shared<BranchOptions>();
+  add_link(sub, o->link);
+  add_conduct(sub, o->link);
+  sub.add_option("BENCH", o->config, "its bench file or name, then arguments of the new server")
+      ->required()
+      ->type_name("BENCH");
+  sub.prefix_command();
+  line.when_named(sub, [&sub, o] {
+    o->arguments = sub.remaining();
+    return run_branch(*o);
+  });
+}
+
+void add_save(CommandLine& line) {
+  const auto [sub, o] =
+      line.add<SaveOptions>("save", "write the whole state of a bench to a file", run_save);
+  add_link(sub, o.link);
+  add_conduct(sub, o.link);
+  sub.add_option("STATE", o.file, "a new file")->required()->type_name("FILE");
+}
+
+void add_restore(CommandLine& line) {
+  const auto [sub, o] = line.add<RestoreOptions>("restore", "go on from a saved state", run_restore);
+  add_link(sub, o.link);
+  add_conduct(sub, o.link);
+  sub.add_option("STATE", o.file, "from save, of the same bench")->required()->type_name("FILE");
+}
+
+void add_reset(CommandLine& line) {
+  const auto [sub, o] = line.add<ResetOptions>("reset", "bring a bench back to tick 0", run_reset);
+  add_link(sub, o.link);
+  add_conduct(sub, o.link);
+}
+
 /// A verb that prints a description of a bench file by the server.
 Verb<PrintOptions> add_print(CommandLine& line, const std::string& name, const std::string& description) {
   const Verb<PrintOptions> verb = line.add<PrintOptions>(name, description, run_print);
@@ -132,6 +170,10 @@ void add_bench_commands(CommandLine& line) {
   add_bump(line);
   add_clear(line);
   add_take(line);
+  add_save(line);
+  add_restore(line);
+  add_reset(line);
+  add_branch(line);
   add_prints(line);
 }
 

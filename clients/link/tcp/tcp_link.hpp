@@ -27,6 +27,12 @@ struct LinkOptions {
   std::chrono::milliseconds deadline{5000};  ///< for connecting and for every answer
 };
 
+/// The whole state of a bench.
+struct SavedState {
+  std::uint64_t tick;
+  std::string state;
+};
+
 /// The client side of the wire (protocols/bench.proto) on one blocking socket, for one thread.
 ///
 /// Every request throws RefusalError if the bench refuses it, and LinkError if the link fails or no answer
@@ -75,6 +81,13 @@ class Link {
   std::uint64_t clear_faults(std::uint32_t axis);
 
   const v1::Status& status();
+
+  // ---- states: see bench.proto ----
+  SavedState save_state();
+  /// Goes on from a saved state, with the leases as they are. Returns its tick.
+  std::uint64_t restore_state(std::string_view state);
+  /// Goes on from tick 0.
+  void reset();
 
   /// Subscribes to every `decimation`-th tick; 0 ends the subscription. Without signals: all.
   void subscribe(std::uint32_t axis, std::uint32_t decimation, std::span<const std::string> signals = {});

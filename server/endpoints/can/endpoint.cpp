@@ -73,6 +73,7 @@ void Endpoint::serve(Engine& engine, Audit* audit) {
   bus_->on_refused = [this](const std::string& peer, std::string_view why) { note_client(peer, why); };
   bus_->set_filter(ids);
   last_state_ = bus_->status().state;
+  engine.on_set_back.add([this] { on_set_back(); });
   engine.on_tick.add([this] { on_tick(); });
   engine.on_newest.add([this] { on_newest(); });
   for (const Node& node : nodes_)

@@ -102,6 +102,7 @@ class Endpoint {
   void look_at_conflicts(Clock::time_point now);
   bool has_conflict() const;
 
+  void on_set_back();
   void on_tick();
   void on_newest();
   void on_timer();

@@ -27,6 +27,16 @@ void Endpoint::send_sample(Message message, const Node& node, const Sample& samp
   put(node, encode_sample(*row, config_.profile, node.id, sample, page));
 }
 
+/// What was sent or commanded in ticks of another run says nothing about this one.
+void Endpoint::on_set_back() {
+  for (Node& node : nodes_) {
+    node.commanded_at = -1;
+    node.index_tick = -1;
+    node.edges_tick = -1;
+    node.due.reset();
+  }
+}
+
 void Endpoint::on_tick() {
   for (Node& node : nodes_) {
     notice_end(node);

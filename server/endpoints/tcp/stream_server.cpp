@@ -128,6 +128,7 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
         sessions_[i]->on_experiments();
     };
   }
+  engine.on_set_back.add([this] { audience_->on_set_back(); });
   engine.on_tick.add([this] { audience_->on_tick(); });
   engine.on_newest.add([this] { audience_->on_newest(); });
   engine.on_taken.push_back([this](const Taken& taken) {

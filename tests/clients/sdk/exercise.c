@@ -75,6 +75,35 @@ static void change(void) {
   tell("another axis", drivebench_set_load(bench, 7, 0.0, 0, 0));
 }
 
+/* The last ticks once more from a saved state, then all from tick 0: what comes back is as the first time. */
+static void go_back(uint64_t until) {
+  static unsigned char state[65536];
+  size_t size = sizeof state;
+  uint64_t hash = 0;
+  drivebench_sample sample;
+  tell("save", drivebench_save(bench, state, &size));
+  printf("%u bytes\n", (unsigned)size);
+  drivebench_newest(bench, 0, &sample);
+  run(sample, until);
+  drivebench_state_hash(bench, &hash);
+  printf("hash %016" PRIx64 "\n", hash);
+  tell("restore", drivebench_restore(bench, state, size));
+  drivebench_newest(bench, 0, &sample);
+  run(sample, until);
+  drivebench_state_hash(bench, &hash);
+  printf("hash again %016" PRIx64 "\n", hash);
+  tell("restore a part", drivebench_restore(bench, state, size / 2));
+  state[100] ^= 1;
+  tell("restore what is damaged", drivebench_restore(bench, state, size));
+  tell("restore too much", drivebench_restore(bench, state, sizeof state));
+  tell("reset", drivebench_reset(bench));
+  drivebench_newest(bench, 0, &sample);
+  printf("tick %" PRIu64 "\n", sample.tick);
+  run(sample, 400);
+  drivebench_state_hash(bench, &hash);
+  printf("hash %016" PRIx64 "\n", hash);
+}
+
 static void describe(void) {
   const drivebench_description* d = drivebench_describe(bench);
   size_t i;
@@ -164,6 +193,7 @@ int main(int argc, char** argv) {
   sample = run(sample, 900);
   if (!is_bus) {
     tell("hash", drivebench_state_hash(bench, &hash));
+    go_back(1000);
     printf("hash %016" PRIx64 ", digest %016" PRIx64 "\n", hash, digest);
   }
   tell("release", drivebench_release(bench, 0));

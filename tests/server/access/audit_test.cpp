@@ -149,6 +149,8 @@ class ShownEngine final : public Engine {
   Refused check(std::uint32_t, Owner, const Command&) const override { return Refused::kNot; }
   Refused command(std::uint32_t, Owner, const Command&) override { return Refused::kNot; }
   void advance() override {}
+  std::vector<std::byte> save() override { return {}; }
+  bool restore(std::span<const std::byte>) override { return false; }
   Verdict stop() override { return {}; }
   std::uint64_t state_hash() const override { return 0; }
   std::int64_t worst_lateness_ns() const override { return 0; }

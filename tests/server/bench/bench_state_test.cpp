@@ -191,6 +191,91 @@ TEST(BenchState, DamagedBytesAreRefusedAndChangeNothing) {
   EXPECT_TRUE(other.restore(saved));
 }
 
+/// The bytes with other words and the digest that fits them: what a client can send that knows the format.
+std::vector<std::byte> forged(std::vector<std::byte> saved, std::size_t word, std::uint64_t value) {
+  std::memcpy(saved.data() + 8 * word, &value, 8);
+  Digest digest;
+  for (std::size_t at = 0; at + 8 < saved.size(); at += 8) {
+    std::uint64_t each = 0;
+    std::memcpy(&each, saved.data() + at, 8);
+    digest.add(each);
+  }
+  const std::uint64_t sum = digest.value();
+  std::memcpy(saved.data() + saved.size() - 8, &sum, 8);
+  return saved;
+}
+
+// Every word becomes a number that no bench comes to, with a digest that fits. Catches: a state from a client
+// that harms the bench, or that restore() takes for another one than it is; run with the sanitizers, too.
+TEST(BenchState, AForgedStateIsRefusedOrRuns) {
+  Bench original(rich_setup());
+  run_to(original, 300);
+  const std::vector<std::byte> saved = original.save();
+  ASSERT_TRUE(Bench(rich_setup()).restore(forged(saved, 0, 0x3374'6174'7362'7264u)));
+  int taken = 0;
+  for (const std::uint64_t value :
+       {std::bit_cast<std::uint64_t>(std::nan("")), std::bit_cast<std::uint64_t>(1e300), ~std::uint64_t{0},
+        std::uint64_t{1} << 62}) {
+    const std::size_t schedule_end = Bench::kMaxScheduled * sizeof(PackedInput) / 8;
+    for (std::size_t word = 0; word + 1 < saved.size() / 8; word += word + 13 < schedule_end ? 13 : 1) {
+      const std::vector<std::byte> bytes = forged(saved, word, value);
+      Bench bench(rich_setup());
+      const std::uint64_t before = bench.state_hash();
+      if (!bench.restore(bytes)) {
+        ASSERT_EQ(bench.state_hash(), before) << word;
+        continue;
+      }
+      ++taken;
+      ASSERT_EQ(bench.save(), bytes) << word;
+      bench.step();
+      bench.step();
+    }
+  }
+  EXPECT_GT(taken, 100);  // counters of samples, for example, can be anything
+}
+
+// Catches: an axis that another session holds given to the owner that the state names, a lease that ends with
+// a restore, inputs of the controller that are lost, or a run that goes on otherwise under the same owner.
+TEST(BenchState, LeasesStayWithTheirHolders) {
+  Bench original(servo_setup());
+  submit_lease(original, LeaseAction::kAcquire, kOwner);
+  for (int i = 0; i < 10; ++i) {
+    submit_volts(original, kOwner, 5.0);
+    original.step();
+  }
+  const Tick later = original.tick() + 5;
+  original.submit(
+      {.tick = later, .axis = 0, .owner = kOwner, .action = fault_of("current_sensor_gain", 0.1)});
+  const std::vector<std::byte> driven = original.save();
+  const std::vector<std::byte> start = Bench(servo_setup()).save();
+
+  for (const Owner holder : {kOwner, Owner{8}}) {
+    Bench other(servo_setup());
+    submit_lease(other, LeaseAction::kAcquire, holder);
+    ASSERT_TRUE(other.restore_for_holders(driven));
+    EXPECT_EQ(other.owner(0), holder);
+    EXPECT_EQ(other.sample(0).owner, holder);
+    EXPECT_EQ(other.state_hash() == original.state_hash(), holder == kOwner);
+    while (other.tick() < later) {
+      submit_volts(other, holder, 5.0);
+      other.step();
+    }
+    EXPECT_EQ(other.sample(0).faults & kLatchedFaults, 0u);
+    other.step();
+    EXPECT_NE(other.sample(0).injected, 0u);
+    EXPECT_EQ(other.sample(0).refused_commands, 0u);
+    ASSERT_TRUE(other.restore_for_holders(start));
+    EXPECT_EQ(other.owner(0), holder);
+    EXPECT_EQ(other.tick(), 0);
+  }
+
+  Bench alone(servo_setup());
+  ASSERT_TRUE(alone.restore_for_holders(driven));
+  EXPECT_EQ(alone.owner(0), 0u);
+  alone.step();
+  EXPECT_EQ(alone.sample(0).faults & kLatchedFaults, std::uint64_t{kLeaseLost});
+}
+
 // Catches: a state that is taken for that of a bench with another motor, timing or seed.
 TEST(BenchState, AStateOfAnotherSetupIsRefused) {
   Bench original(rich_setup());

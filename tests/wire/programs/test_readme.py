@@ -203,7 +203,7 @@ class Readmes(unittest.TestCase):
     def test_every_option_of_a_command_is_documented(self):
         """Catches: an option that only its --help names."""
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")
-        commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "control", "plot", "replay",
+        commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "save", "restore", "reset", "branch", "control", "plot", "replay",
                           "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
                           "fmu", "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
                           "convert winding", "convert frame", "test", "rerun", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor", "web")

@@ -227,13 +227,13 @@ class Bench:
         return value.value
 
     def reset(self) -> None:
-        """Back to tick 0, as after opening: no lease, no changes. In process only."""
+        """Back to tick 0, without any changes; leases stay. In process and over tcp, tls and unix."""
         with self._handle.lock:
             self._call("reset")
             self._ticks.clear()
 
     def save(self) -> bytes:
-        """The whole state: machines, sensors, noise, leases, scheduled changes. In process only."""
+        """The whole state: machines, sensors, noise, commands, scheduled changes."""
         with self._handle.lock:
             size = ctypes.c_size_t()
             self._call("save", None, ctypes.byref(size))
@@ -242,7 +242,10 @@ class Bench:
         return state.raw
 
     def restore(self, state: bytes) -> None:
-        """Goes on from a saved state of the same bench, of this process or another. In process only."""
+        """Goes on from a saved state of the same bench, of this process, another one or a server.
+
+        Leases stay with their holders: acquire an axis that the state drives before you restore it.
+        """
         if not isinstance(state, bytes):
             raise BadArgument(f"state is of type {type(state).__name__} but must be bytes from save()", "state")
         with self._handle.lock:

@@ -44,6 +44,11 @@ void Audience::drop_unread_feeds() {
   std::erase_if(feeds_, [](const auto& feed) { return feed.use_count() == 1; });
 }
 
+void Audience::on_set_back() {
+  for (const auto& feed : feeds_)
+    feed->begin_anew(engine_.newest(feed->axis()));
+}
+
 void Audience::on_tick() {
   drop_unread_feeds();
   for (const auto& feed : feeds_)

@@ -52,6 +52,7 @@ class Audience {
   std::shared_ptr<const SampleFeed> feed(std::uint32_t axis, std::uint32_t decimation);
 
   /// The engine calls these like its listeners.
+  void on_set_back();
   void on_tick();
   void on_newest();
 

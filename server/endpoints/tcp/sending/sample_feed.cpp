@@ -13,6 +13,11 @@ void SampleFeed::take(const Sample& newest) {
   if (is_due) ring_[taken_++ % kDepth] = newest;
 }
 
+void SampleFeed::begin_anew(const Sample& first) {
+  last_tick_ = first.tick;
+  if (first.tick % decimation_ == 0) ring_[taken_++ % kDepth] = first;
+}
+
 std::span<const Sample> SampleFeed::read(Reader& reader, std::size_t at_most) const {
   reader.dropped += skipped_ - std::exchange(reader.skipped, skipped_);
   if (taken_ - reader.next > kDepth) {

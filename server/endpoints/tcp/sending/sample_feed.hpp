@@ -31,6 +31,8 @@ class SampleFeed {
 
   /// Called after each tick.
   void take(const Sample& newest);
+  /// The bench has gone to another state, whose sample this is; no sample counts as lost.
+  void begin_anew(const Sample& first);
   /// A new reader, for the samples from now on.
   Reader reader() const noexcept { return {.next = taken_, .skipped = skipped_, .dropped = 0}; }
   /// The next samples for the reader: as many as lie in one piece, and at most `at_most`. Empty if it has

@@ -20,22 +20,16 @@ using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 
 constexpr auto kRequestKinds = std::to_array<v1::Envelope::KindCase>({
-    v1::Envelope::kHello,
-    v1::Envelope::kLease,
-    v1::Envelope::kExchange,
-    v1::Envelope::kSubscribe,
-    v1::Envelope::kReadParameters,
-    v1::Envelope::kWriteParameter,
-    v1::Envelope::kSetLoad,
-    v1::Envelope::kClearFaults,
-    v1::Envelope::kStatusRequest,
-    v1::Envelope::kInjectFault,
-    v1::Envelope::kShaftBump,
-    v1::Envelope::kRunExperiment,
-    v1::Envelope::kUploadTable,
-    v1::Envelope::kListExperiments,
-    v1::Envelope::kFetchExperiment,
-    v1::Envelope::kCancelExperiment,
+    v1::Envelope::kHello,           v1::Envelope::kLease,
+    v1::Envelope::kExchange,        v1::Envelope::kSubscribe,
+    v1::Envelope::kReadParameters,  v1::Envelope::kWriteParameter,
+    v1::Envelope::kSetLoad,         v1::Envelope::kClearFaults,
+    v1::Envelope::kStatusRequest,   v1::Envelope::kInjectFault,
+    v1::Envelope::kShaftBump,       v1::Envelope::kRunExperiment,
+    v1::Envelope::kUploadTable,     v1::Envelope::kListExperiments,
+    v1::Envelope::kFetchExperiment, v1::Envelope::kCancelExperiment,
+    v1::Envelope::kSaveState,       v1::Envelope::kRestoreState,
+    v1::Envelope::kResetBench,
 });
 
 /// The repeated fields of all requests.

@@ -34,6 +34,7 @@ Session::Session(Outbox::Socket socket, Client client, SessionContext& context, 
       subscriptions_(dialogue_),
       leases_(dialogue_),
       exchanges_(dialogue_, leases_, subscriptions_),
+      states_(dialogue_, leases_),
       uploads_(dialogue_),
       fetch_(dialogue_),
       place_(place),
@@ -183,6 +184,15 @@ bool Session::dispatch(const v1::Envelope& request) {
       break;
     case v1::Envelope::kClearFaults:
       clear_faults(dialogue_, leases_, request.clear_faults());
+      break;
+    case v1::Envelope::kSaveState:
+      states_.save();
+      break;
+    case v1::Envelope::kRestoreState:
+      states_.restore(request.restore_state());
+      break;
+    case v1::Envelope::kResetBench:
+      states_.reset();
       break;
     case v1::Envelope::kStatusRequest:
       report_status(dialogue_);

@@ -14,6 +14,7 @@
 #include "server/endpoints/tcp/session/requests/exchanges.hpp"
 #include "server/endpoints/tcp/session/requests/fetch.hpp"
 #include "server/endpoints/tcp/session/requests/leases.hpp"
+#include "server/endpoints/tcp/session/requests/states.hpp"
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 #include "server/endpoints/tcp/session/requests/uploads.hpp"
 
@@ -70,6 +71,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Subscriptions subscriptions_;
   Leases leases_;
   Exchanges exchanges_;
+  States states_;
   Uploads uploads_;
   Fetch fetch_;
   Places::Number place_;

@@ -33,6 +33,8 @@ class SlowEngine final : public Engine {
     inputs.push_back(input);
     answers_.push_back(std::move(answer));
   }
+  std::vector<std::byte> save() override { return {}; }
+  bool restore(std::span<const std::byte>) override { return false; }
   drivebench::Verdict stop() override { return {}; }
   std::uint64_t state_hash() const override { return 0; }
   std::int64_t worst_lateness_ns() const override { return 0; }

@@ -81,6 +81,16 @@ bool Leases::may_change(std::uint32_t axis) {
   return false;
 }
 
+bool Leases::has_bench_to_itself() {
+  if (dialogue_.conducts()) return true;
+  for (std::uint32_t axis = 0; axis < dialogue_.axis_count(); ++axis) {
+    if (engine_.owner(axis) == 0 || sender(axis) != 0) continue;
+    refuse_owned(dialogue_.id(), axis);
+    return false;
+  }
+  return true;
+}
+
 Owner Leases::sender(std::uint32_t axis) const {
   const Owner owner = dialogue_.owner();
   return owner == engine_.owner(axis) ? owner : 0;

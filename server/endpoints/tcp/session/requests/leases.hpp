@@ -28,6 +28,8 @@ class Leases {
   /// Whether the session may change this axis, as its holder, as a conductor or in a free run; if not,
   /// refuses the request.
   bool may_change(std::uint32_t axis);
+  /// Whether no other session holds an axis, or the session conducts; if not, refuses the request.
+  bool has_bench_to_itself();
   /// The owner number of the session on an axis that it holds; 0, no owner, on any other.
   Owner sender(std::uint32_t axis) const;
   /// The reason why the session does not hold the axis, for a refusal.

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "plant/axis_state.hpp"
+#include "server/bench/safe_action.hpp"
+
+/// What a saved state may hold: bytes from a client can be anything, and their digest is no signature.
+namespace drivebench {
+
+/// Whether a tick can go on from this state of an axis: finite quantities, counters and ticks that are exact
+/// as doubles, gates and flags that exist.
+bool is_possible(const AxisState& state) noexcept;
+
+bool is_possible(const Command& command) noexcept;
+bool is_possible(const LastCommands& last) noexcept;
+
+/// Whether the number is a tick or a count that a bench can have come to: within kMaxTick, either sign.
+bool is_possible_count(std::int64_t number) noexcept;
+
+}  // namespace drivebench
