@@ -229,6 +229,8 @@ TEST(BenchState, AForgedStateIsRefusedOrRuns) {
       ASSERT_EQ(bench.save(), bytes) << word;
       bench.step();
       bench.step();
+      for (std::size_t axis = 0; axis < 2; ++axis)
+        ASSERT_EQ(bench.sample(axis).faults & kDiverged, 0u) << word;
     }
   }
   EXPECT_GT(taken, 100);  // counters of samples, for example, can be anything
