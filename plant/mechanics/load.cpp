@@ -20,7 +20,8 @@ double LoadTorque::at(Tick tick) const noexcept {
 
 bool LoadTorque::is_possible() const noexcept {
   constexpr Tick kLatest = Tick{1} << 53;
-  return std::isfinite(start_nm_) && std::isfinite(target_nm_) && start_tick_ >= 0 &&
+  constexpr double kLargestNm = 1e6;
+  return std::abs(start_nm_) <= kLargestNm && std::abs(target_nm_) <= kLargestNm && start_tick_ >= 0 &&
          start_tick_ <= kLatest && ramp_ticks_ >= 0 && ramp_ticks_ <= kLatest;
 }
 

@@ -63,7 +63,7 @@ bool is_possible(const PhaseCommand& command) noexcept {
 
 bool is_possible(const DriveMemory& m) noexcept {
   return std::ranges::all_of(m.commands, [](const PhaseCommand& c) { return is_possible(c); }) &&
-         m.pwm_segment >= 0 && m.pwm_segment < kMaxPwmSegments;
+         m.pwm_segment >= 0 && m.pwm_segment < kMaxPwmSegments && is_quantity(m.bus_v);
 }
 
 /// The faults keep to the limits that a client meets.
