@@ -94,7 +94,10 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
       ->check(whole_between(0, 1));
   app.add_option("--fail-on-late", o.fail_on_late, "exit 3 if more ticks than this were late")
       ->check(whole_between(0, 1'000'000'000'000'000));
-  app.add_flag("--json", o.json, "print JSON lines");
+  auto* json = app.add_flag("--json", o.json, "print JSON lines");
+  app.add_flag("--measure-answers", o.measure_answers,
+               "tell in the verdict how long after the samples the commands came")
+      ->needs(json);
   app.add_flag("--check-config", o.check_config, "only check the bench file");
   app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them")
       ->type_name("FOLDER")

@@ -30,7 +30,8 @@ struct ServerOptions {
   std::uint64_t file_mib = 0;  ///< size of each file of a recording; 0: no limit
   double chunk_ms = 0.0;       ///< plant time that a kill may cost a recording; 0: the default
   bool require_realtime = false;
-  std::string print;  ///< prints the description of an interface instead of a run
+  bool measure_answers = false;  ///< for the verdict in JSON
+  std::string print;             ///< prints the description of an interface instead of a run
   std::size_t bus = 1;
 };
 

@@ -106,23 +106,31 @@ nlohmann::json lateness_rows(const LatenessHistogram& lateness) {
   return rows;
 }
 
-void print_verdict(const ServerOptions& o, const Verdict& v) {
+/// When the commands came, by axis.
+nlohmann::json answer_rows(const Engine& engine) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const AnswerClock& clock : engine.answer_clocks())
+    rows.push_back(answer_times_json(clock.times()));
+  return rows;
+}
+
+void print_verdict(const ServerOptions& o, const Verdict& v, const Engine& engine) {
   if (o.json) {
-    const nlohmann::json verdict{
-        {"event", "verdict"},
-        {"mode", name_of(v.mode)},
-        {"ticks", v.ticks},
-        {"late_ticks", v.late_ticks},
-        {"lateness_p50_us", static_cast<double>(v.lateness.percentile_ns(0.5)) * 1e-3},
-        {"lateness_p99_us", static_cast<double>(v.lateness.percentile_ns(0.99)) * 1e-3},
-        {"worst_lateness_us", static_cast<double>(v.lateness.worst_ns()) * 1e-3},
-        {"lateness_histogram", lateness_rows(v.lateness)},
-        {"exact", v.exact()},
-        {"realtime_valid", v.realtime_valid()},
-        {"gaps", v.gaps},
-        {"state_hash", fmt::format("{:016x}", v.state_hash)},
-        {"recording", v.recording},
-        {"sentence", v.sentence()}};
+    nlohmann::json verdict{{"event", "verdict"},
+                           {"mode", name_of(v.mode)},
+                           {"ticks", v.ticks},
+                           {"late_ticks", v.late_ticks},
+                           {"lateness_p50_us", static_cast<double>(v.lateness.percentile_ns(0.5)) * 1e-3},
+                           {"lateness_p99_us", static_cast<double>(v.lateness.percentile_ns(0.99)) * 1e-3},
+                           {"worst_lateness_us", static_cast<double>(v.lateness.worst_ns()) * 1e-3},
+                           {"lateness_histogram", lateness_rows(v.lateness)},
+                           {"exact", v.exact()},
+                           {"realtime_valid", v.realtime_valid()},
+                           {"gaps", v.gaps},
+                           {"state_hash", fmt::format("{:016x}", v.state_hash)},
+                           {"recording", v.recording},
+                           {"sentence", v.sentence()}};
+    if (o.measure_answers) verdict["answers"] = answer_rows(engine);
     return print_line(verdict);
   }
   print_line(fmt::format("{}; state hash {:016x}", v.sentence(), v.state_hash));
@@ -269,6 +277,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   if (!config.experiments.folder.empty()) experiments = std::make_unique<Experiments>(io, config);
   const std::unique_ptr<Engine> engine = make_engine(o, config, io);
   if (!o.from.empty()) go_to_saved_state(*engine, o.from);
+  if (o.measure_answers) engine->measure_answers();
   if (audit) audit->watch(*engine);
   if (audit) note_start(*audit, *engine);
   server.serve(
@@ -303,7 +312,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   transports.close();
   server.close();
   if (audit) note_end(*audit, *engine, verdict);
-  print_verdict(o, verdict);
+  print_verdict(o, verdict, *engine);
   return broken ? kFailed : exit_code(o, verdict);
 }
 

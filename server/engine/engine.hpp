@@ -12,6 +12,7 @@
 #include "server/bench/bench.hpp"
 #include "server/bench/change_requests.hpp"
 #include "server/config/config.hpp"
+#include "server/engine/answer_clock.hpp"
 #include "server/engine/owners.hpp"
 #include "server/engine/tick_edges.hpp"
 #include "server/engine/watch.hpp"
@@ -112,6 +113,11 @@ class Engine {
   /// Sentences for people about the rights that the operating system did not grant.
   const std::vector<std::string>& notes() const { return notes_; }
 
+  /// From now on measures when commands come.
+  void measure_answers() { answer_clocks_.resize(config_.axes.size()); }
+  /// What it measured, by axis; empty if it did not.
+  const std::vector<AnswerClock>& answer_clocks() const { return answer_clocks_; }
+
   /// For the supervisor, which watches the ticks from another thread.
   Watch& watch() noexcept { return watch_; }
 
@@ -148,6 +154,7 @@ class Engine {
   std::vector<std::string> notes_;
   std::vector<AxisParameters> parameters_;  ///< parameters(), by axis
   std::vector<std::byte> start_;            ///< the state at tick 0
+  std::vector<AnswerClock> answer_clocks_;
 
  private:
   std::uint64_t configuration_hash_;

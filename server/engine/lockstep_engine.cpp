@@ -31,7 +31,11 @@ class LockstepEngine final : public Engine {
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = has_room() ? Refused::kNot : check(axis, owner, command);
     if (why != Refused::kNot) return why;  // not counted: that would be an input
-    return bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
+    const Refused refused =
+        bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
+    if (refused == Refused::kNot && axis < answer_clocks_.size())
+      answer_clocks_[axis].command_comes(owner, command, {});
+    return refused;
   }
 
   void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
@@ -57,6 +61,8 @@ class LockstepEngine final : public Engine {
       bench_.step();
     }
     show();
+    for (AnswerClock& clock : answer_clocks_)
+      clock.sample_leaves(bench_.tick());
     on_tick();
     on_newest();
   }

@@ -83,6 +83,7 @@ class ThreadedEngine final : public Engine {
     const Refused why = check(axis, owner, command);
     if (why == Refused::kNot) {
       command_mail_[axis].send(owner, command);
+      if (!answer_clocks_.empty()) answer_clocks_[axis].command_comes(owner, command, period_of(command));
     } else if (!lacks_lease(why)) {
       request({.tick = 0, .axis = axis, .owner = owner, .action = RefusedCommand{are_bad_values(why)}},
               [](Refused, Tick) {});
@@ -174,6 +175,7 @@ class ThreadedEngine final : public Engine {
   /// Runs one tick with its requests, commands and answers.
   void run_tick() noexcept {
     clock_.wait_for_tick();
+    first_due_ns_.store(clock_.due_ns() - bench_.tick() * config_.setup.period_ns, std::memory_order_relaxed);
     {
       const TickMark mark;
       watch_.beat();
@@ -288,6 +290,15 @@ class ThreadedEngine final : public Engine {
       edges_[i] = edges_of(bench_, i);
   }
 
+  /// The period in which the sample is the newest that a command answers: it begins when the tick that makes
+  /// the sample is due, and ends when the next tick takes the command.
+  AnswerClock::Period period_of(const Command& command) const noexcept {
+    if (config_.mode != RunMode::kRealtime) return {};
+    const std::int64_t length_ns = config_.setup.period_ns;
+    return {.begin_ns = first_due_ns_.load(std::memory_order_relaxed) + (command.answers - 1) * length_ns,
+            .length_ns = length_ns};
+  }
+
   bool has_room() noexcept { return ends_.empty() && requests_.room() > 0; }
   /// The holder of the lease once the requests on their way have acted.
   Owner holder_of(std::uint32_t axis) const noexcept { return lease_mail_[axis].holder(newest_[axis].owner); }
@@ -325,6 +336,7 @@ class ThreadedEngine final : public Engine {
 
   void handle(const TickedSample& s) {
     newest_[s.axis] = s.sample;
+    if (!answer_clocks_.empty()) answer_clocks_[s.axis].sample_leaves(static_cast<Tick>(s.sample.tick));
     if (s.axis + 1 < newest_.size()) return;
     answer_outcomes();
     on_tick();
@@ -403,6 +415,8 @@ class ThreadedEngine final : public Engine {
   std::deque<Waiting> answers_;          // of the requests in flight, in order
   std::deque<RequestOutcome> outcomes_;  // results that wait for the samples of their tick
   TickClock clock_;
+  /// When tick 0 was due, or would have been since the clock began anew.
+  std::atomic<std::int64_t> first_due_ns_{0};
   std::atomic<bool> stop_{false};
   std::atomic<Hold> hold_{Hold::kNone};
   std::thread thread_;

@@ -51,6 +51,7 @@ class RealtimePacer final : public Pacer {
   }
 
   void resynchronise() noexcept override { due_ns_ = now_ns(); }
+  std::int64_t due_ns() const noexcept override { return due_ns_; }
 
  private:
   std::int64_t period_ns_;

@@ -18,6 +18,8 @@ class Pacer {
   virtual std::int64_t wait() noexcept = 0;
   /// Makes the time of the due tick the new time zero.
   virtual void resynchronise() noexcept = 0;
+  /// The time on CLOCK_MONOTONIC at which the tick of the last wait() was due [ns]; 0 without a clock.
+  virtual std::int64_t due_ns() const noexcept { return 0; }
 };
 
 /// A pacer with absolute deadlines on CLOCK_MONOTONIC. `sleep` relies on the kernel's timer; `sleep+spin`

@@ -27,6 +27,8 @@ class TickClock {
   /// Tells the bench how late that tick is, after the requests that had come before: one of them that clears
   /// faults knew nothing of this one, which would otherwise be gone before a sample shows it.
   void report_lateness(Bench& bench) noexcept;
+  /// The time on CLOCK_MONOTONIC at which that tick was due [ns]; 0 outside real time. For the tick thread.
+  std::int64_t due_ns() const noexcept { return pacer_->due_ns(); }
 
   /// The next tick is due at once, and the others after it. While no tick runs.
   void begin_anew() noexcept { pacer_->resynchronise(); }
