@@ -3,7 +3,9 @@
 #include <fmt/core.h>
 
 #include <chrono>
+#include <cmath>
 #include <exception>
+#include <memory>
 #include <optional>
 
 #include "clients/command/common/session/session.hpp"
@@ -28,10 +30,20 @@ class Interrupted : public std::exception {};
 /// its gates stay off until the end.
 class CaseWatcher final : public LoopWatcher {
  public:
-  CaseWatcher(const v1::BenchDescription& bench, std::uint64_t end_tick, const SeeTick& see)
-      : latched_faults_(latched_faults(bench, ~std::uint64_t{0})), end_tick_(end_tick), see_(see) {}
+  CaseWatcher(const v1::BenchDescription& bench, std::uint64_t end_tick, const SeeTick& see,
+              TimeHistogram* computing)
+      : latched_faults_(latched_faults(bench, ~std::uint64_t{0})),
+        end_tick_(end_tick),
+        see_(see),
+        computing_(computing) {}
+
+  const Sample& answered(const Sample& next) override {
+    if (computing_ != nullptr) sample_came_ = Clock::now();
+    return next;
+  }
 
   Answer answering(const LoopStep& step) override {
+    if (sample_came_) computing_->add(std::chrono::nanoseconds(Clock::now() - *sample_came_).count());
     see_();
     if (interrupted()) throw Interrupted();
     if (step.sample.tick >= end_tick_) return Answer::kEnd;
@@ -41,7 +53,11 @@ class CaseWatcher final : public LoopWatcher {
  private:
   std::uint64_t latched_faults_;
   std::uint64_t end_tick_;
+  using Clock = std::chrono::steady_clock;
+
   const SeeTick& see_;
+  TimeHistogram* computing_;
+  std::optional<Clock::time_point> sample_came_{};
 };
 
 /// Gates off to the end of the case, or `until_armed`.
@@ -63,26 +79,45 @@ CaseResult skipped(const Case& c) {
   return result;
 }
 
-CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& folder, bool keeps_trace) {
+/// A preset, or no device at all, on a bench in this process.
+CaseResult run_in_process(const PreparedCase& prepared, const RunWishes& wishes, Judge& judge) {
+  const Case& c = *prepared.what;
+  const bool is_timed = wishes.timing && c.device.kind == DeviceUnderTest::Kind::kPreset;
+  const auto timing = is_timed ? std::make_shared<regression::DeviceTiming>() : nullptr;
+  const std::size_t place = find_axis(prepared.facts, c.device.axis);
+  InprocAxis axis(prepared.bench_file.string(), c.device.axis);
+  const auto see = [&] {
+    judge.see(axis.all());
+    if (timing) timing->missed.see(axis.all()[place]);
+  };
+  drive(axis, c, judge.end_tick(), see, timing ? &timing->answers.after_sample : nullptr);
+  CaseResult result = judge.result();
+  if (timing) timing->period_ns = std::llround(prepared.facts.period_s * 1e9);
+  result.timing = timing;
+  return result;
+}
+
+CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& folder,
+                  const RunWishes& wishes) {
   const Case& c = *prepared.what;
   if (!c.skip.empty()) return skipped(c);
-  Judge judge(c, prepared.facts, keeps_trace);
+  Judge judge(c, prepared.facts, wishes.trace);
   if (interrupted()) return judge.failure(Verdict::kError, "interrupted");
   try {
-    if (c.device.kind == DeviceUnderTest::Kind::kProgram) return run_program_case(prepared, folder, judge);
-    InprocAxis axis(prepared.bench_file.string(), c.device.axis);
-    drive(axis, c, judge.end_tick(), [&] { judge.see(axis.all()); });
+    if (c.device.kind == DeviceUnderTest::Kind::kProgram)
+      return run_program_case(prepared, folder, wishes, judge);
+    return run_in_process(prepared, wishes, judge);
   } catch (const Interrupted&) {
     return judge.failure(Verdict::kError, "interrupted");
   } catch (const std::exception& error) {
     return judge.failure(Verdict::kError, error.what());
   }
-  return judge.result();
 }
 
 }  // namespace
 
-void drive(link::AxisLink& axis, const Case& c, std::uint64_t end_tick, const SeeTick& see) {
+void drive(link::AxisLink& axis, const Case& c, std::uint64_t end_tick, const SeeTick& see,
+           TimeHistogram* computing) {
   axis.acquire();
   if (c.device.kind == DeviceUnderTest::Kind::kNone) {
     keep_off(axis, end_tick, see, false);
@@ -90,13 +125,14 @@ void drive(link::AxisLink& axis, const Case& c, std::uint64_t end_tick, const Se
   }
   control::Run run = made(chosen_preset(c.device.preset), gains_of(c.device));
   if (axis.bench().arming_commands() > 1) keep_off(axis, end_tick, see, true);
-  CaseWatcher watcher(axis.bench(), end_tick, see);
+  CaseWatcher watcher(axis.bench(), end_tick, see, computing);
   control_loop(axis, run, watcher);
 }
 
-CaseResult run_case(const PreparedCase& prepared, const std::filesystem::path& folder, bool keeps_trace) {
+CaseResult run_case(const PreparedCase& prepared, const std::filesystem::path& folder,
+                    const RunWishes& wishes) {
   const auto started = std::chrono::steady_clock::now();
-  CaseResult result = judged(prepared, folder, keeps_trace);
+  CaseResult result = judged(prepared, folder, wishes);
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return result;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <sstream>
 #include <thread>
@@ -13,6 +14,7 @@
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
 #include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/server_answers.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
@@ -55,13 +57,11 @@ constexpr const char* kOutput = "output.txt";
 /// A server on the bench of the case.
 class RecordedServer {
  public:
-  RecordedServer(const PreparedCase& prepared, const fs::path& folder)
+  RecordedServer(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes)
       : socket_(folder / "bench.sock"),
         recording_(recording_in(folder)),
         log_(folder / "server.log"),
-        process_({server_executable().string(), prepared.bench_file.string(), "--json", "--port", "0",
-                  "--unix", socket_.string(), "--record", recording_.string()},
-                 {.error_file = log_.string()}) {
+        process_(line_of(prepared, wishes), {.error_file = log_.string()}) {
     if (!process_.await(Process::in(kServerStart), parse_ready)) {
       throw std::runtime_error("the server did not start: " + tail_of(log_));
     }
@@ -69,12 +69,29 @@ class RecordedServer {
 
   std::string link() const { return "unix:" + socket_.string(); }
   const fs::path& recording() const noexcept { return recording_; }
-  void end() {
+  /// Returns when the commands for each axis came; nothing if that was not measured.
+  std::vector<AnswerTimes> end() {
     process_.terminate();
+    auto answers = process_.await(Process::in(kServerEnd), parse_answers);
     if (!process_.wait(Process::in(kServerEnd))) throw std::runtime_error("the server did not end");
+    return std::move(answers).value_or(std::vector<AnswerTimes>());
   }
 
  private:
+  std::vector<std::string> line_of(const PreparedCase& prepared, const RunWishes& wishes) const {
+    std::vector<std::string> line{server_executable().string(),
+                                  prepared.bench_file.string(),
+                                  "--json",
+                                  "--port",
+                                  "0",
+                                  "--unix",
+                                  socket_.string(),
+                                  "--record",
+                                  recording_.string()};
+    if (wishes.timing) line.emplace_back("--measure-answers");
+    return line;
+  }
+
   fs::path socket_;
   fs::path recording_;
   fs::path log_;
@@ -118,22 +135,24 @@ std::string await_end(Process& program, TickView& bench, const Case& c, const Ru
   }
 }
 
-/// Shows the judge the samples of a recording, a tick at a time.
-void judge_recording(const fs::path& file, const RunFacts& facts, Judge& judge) {
+/// Shows the samples of a recording, a tick at a time.
+template <class See>
+void show_recording(const fs::path& file, const RunFacts& facts, See see) {
   RecordedSamples recorded(file, facts.axes);
   std::vector<Sample> samples(facts.axes.size());
   while (const auto row = recorded.next()) {
     samples[row->axis] = row->sample;
-    if (row->axis + 1 == samples.size()) judge.see(samples);  // a tick brings the axes in their order
+    if (row->axis + 1 == samples.size()) see(samples);  // a tick brings the axes in their order
   }
 }
 
 }  // namespace
 
-CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder, Judge& judge) {
+CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes,
+                            Judge& judge) {
   const Case& c = *prepared.what;
   const fs::path output = folder / kOutput;
-  RecordedServer server(prepared, folder);
+  RecordedServer server(prepared, folder, wishes);
   TickView bench(server.link());
   Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + server.link()},
                                      .folder = fs::absolute(fs::path(c.file).parent_path()).string(),
@@ -141,12 +160,25 @@ CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder
                                      .joins_output = true,
                                      .own_group = true});
   const std::string failure = await_end(program, bench, c, prepared.facts);
-  server.end();
+  const std::vector<AnswerTimes> answers = server.end();
   if (!program.wait(Process::in(failure.empty() ? kFarewell : 0s))) program.terminate();
   program.wait(Process::in(kFarewell));
-  judge_recording(server.recording(), prepared.facts, judge);
+  const std::size_t place = find_axis(prepared.facts, c.device.axis);
+  regression::MissedTicks missed;
+  show_recording(server.recording(), prepared.facts, [&](const std::vector<Sample>& samples) {
+    judge.see(samples);
+    if (samples[place].tick <= judge.end_tick()) missed.see(samples[place]);
+  });
   CaseResult result = failure.empty() ? judge.result() : judge.failure(Verdict::kError, failure);
   result.output = utf8(without_place(tail_of(output), server.link()));
+  if (place < answers.size()) {
+    using enum regression::DeviceTiming::Way;
+    result.timing = std::make_shared<regression::DeviceTiming>(
+        regression::DeviceTiming{.way = c.is_realtime ? kRealtime : kLockstep,
+                                 .period_ns = std::llround(prepared.facts.period_s * 1e9),
+                                 .answers = answers[place],
+                                 .missed = missed});
+  }
   return result;
 }
 
@@ -156,10 +188,11 @@ fs::path recording_in(const fs::path& folder) {
 
 void record_case(const PreparedCase& prepared, const fs::path& folder) {
   if (prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram) return;
-  RecordedServer server(prepared, folder);
+  RecordedServer server(prepared, folder, {});
   {
     const auto axis = open_axis({.address = server.link(), .token = {}}, prepared.what->device.axis, "test");
-    drive(*axis, *prepared.what, prepared.facts.end_tick, [] {});
+    drive(
+        *axis, *prepared.what, prepared.facts.end_tick, [] {}, nullptr);
   }
   server.end();
 }

@@ -43,7 +43,8 @@ class Crew {
     for (std::size_t index = next_++; index < cases_.size(); index = next_++) {
       const fs::path folder = folder_ / std::to_string(index);
       fs::create_directory(folder);
-      CaseResult result = run_case(cases_[index], folder, settings_.draws_plots);
+      CaseResult result = run_case(cases_[index], folder,
+                                   {.trace = settings_.draws_plots, .timing = settings_.measures_timing});
       result.plots = plots_of(result);
       result.trace = {};
       keep(cases_[index], folder, result);
@@ -105,6 +106,7 @@ std::vector<CaseResult> run_suite(const std::vector<PreparedCase>& cases, const 
     std::size_t ended = 0;
     results.push_back(crew.result_of(i, ended));
     finished(results.back(), ended);
+    results.back().timing.reset();
   }
   return results;
 }

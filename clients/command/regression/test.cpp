@@ -20,6 +20,7 @@
 #include "clients/regression/reports/reports.hpp"
 #include "clients/regression/results/shard.hpp"
 #include "clients/regression/suite/case_file.hpp"
+#include "clients/regression/timing/timing_report.hpp"
 #include "protocols/nearest_name.hpp"
 
 namespace drivebench::command {
@@ -93,11 +94,13 @@ struct ReportFiles {
   std::optional<Output> junit{};
   std::optional<Output> json{};
   std::optional<Output> html{};
+  std::optional<Output> timing{};
 
   explicit ReportFiles(const TestOptions& options) {
     if (!options.junit_file.empty()) junit.emplace(options.junit_file);
     if (!options.json_file.empty()) json.emplace(options.json_file);
     if (!options.html_file.empty()) html.emplace(options.html_file);
+    if (!options.timing_file.empty()) timing.emplace(options.timing_file);
   }
 };
 
@@ -145,6 +148,7 @@ Work work_of(std::vector<Case> cases, StoredResults* stored) {
 SuiteSettings settings_of(const TestOptions& options, const Work& work, const StoredResults* stored) {
   SuiteSettings settings{.jobs = options.jobs,
                          .draws_plots = stored != nullptr || !options.html_file.empty(),
+                         .measures_timing = !options.timing_file.empty(),
                          .keep_folder = options.keep_folder,
                          .program = options.program};
   if (stored != nullptr) {
@@ -166,7 +170,8 @@ std::string rerun_line(const CaseResult& result, const TestOptions& options) {
 }
 
 /// Runs the missing cases, and prints a row for each.
-void run_missing(Work& work, const TestOptions& options, const StoredResults* stored) {
+void run_missing(Work& work, const TestOptions& options, const StoredResults* stored,
+                 regression::TimingReport& timing) {
   if (work.missing.empty()) return;
   const TemporaryFolder folder;
   const std::vector<PreparedCase> prepared = prepared_or_refused(work.missing, folder.path());
@@ -176,6 +181,7 @@ void run_missing(Work& work, const TestOptions& options, const StoredResults* st
     progress.update(static_cast<double>(ended) / static_cast<double>(prepared.size()),
                     fmt::format("{} of {} cases", ended, prepared.size()));
     if (!options.tap) fmt::print("{}{}", regression::table_row(result), rerun_line(result, options));
+    if (result.timing) timing.add(result.name, *result.timing);
   };
   std::vector<CaseResult> made = run_suite(prepared, folder.path(), settings_of(options, work, stored), see);
   for (std::size_t i = 0; i < made.size(); ++i)
@@ -188,13 +194,14 @@ void print_bad(const CaseResult& result, const TestOptions& options) {
 
 /// Runs the cases without a result. Of those that have one from before, the ones that have not passed are
 /// printed.
-Work run_cases(const TestOptions& options, const std::filesystem::path& suite) {
+Work run_cases(const TestOptions& options, const std::filesystem::path& suite,
+               regression::TimingReport& timing) {
   std::optional<StoredResults> stored;
   if (!options.results_folder.empty()) stored.emplace(options.program, std::vector{options.results_folder});
   Work work = work_of(chosen_cases(options, suite), stored ? &*stored : nullptr);
   for (const CaseResult& result : work.results)
     if (!result.name.empty()) print_bad(result, options);
-  run_missing(work, options, stored ? &*stored : nullptr);
+  run_missing(work, options, stored ? &*stored : nullptr, timing);
   return work;
 }
 
@@ -252,16 +259,33 @@ int merge(const TestOptions& options, const std::filesystem::path& suite) {
                 [&options](const CaseResult& result) { print_bad(result, options); });
 }
 
+regression::TimingReport empty_timing_report(const TestOptions& options) {
+  using enum regression::TimingReport::Format;
+  if (!options.timing_file.empty() && !std::filesystem::path(options.timing_file).has_extension())
+    throw UsageError(
+        fmt::format("cannot write {}: the name must end with .json or .html", options.timing_file));
+  check_suffix(options.timing_file, {".json", ".html"});
+  return regression::TimingReport(options.timing_file.ends_with(".json") ? kJson : kPage);
+}
+
 int run_and_report(const TestOptions& options, const std::filesystem::path& suite) {
+  regression::TimingReport timing = empty_timing_report(options);
   ReportFiles files(options);
   const auto started = std::chrono::steady_clock::now();
-  const Work work = run_cases(options, suite);
+  const Work work = run_cases(options, suite, timing);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   const auto each = [&work](const regression::SeeResult& see) { std::ranges::for_each(work.results, see); };
   const std::string remark =
       fmt::format(" in {:.3g} s{}", wall_s,
                   work.known() > 0 ? fmt::format("; {} of the results are from before", work.known()) : "");
-  return report(options, {suite.stem().string(), {}, each}, files, remark, [](const CaseResult&) {});
+  const int code =
+      report(options, {suite.stem().string(), {}, each}, files, remark, [](const CaseResult&) {});
+  if (files.timing) {
+    files.timing->write(timing.text(suite.stem().string()));
+    files.timing->flush();
+    if (!options.tap) fmt::print("{}", timing.summary());
+  }
+  return code;
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ struct TestOptions {
   std::string junit_file{};
   std::string json_file{};
   std::string html_file{};
+  std::string timing_file{};  ///< `.json` or `.html`
   std::string keep_folder{};
   std::string shard{};                        ///< `2/4` or `auto`; empty: all cases
   std::string results_folder{};               ///< where results are kept between runs

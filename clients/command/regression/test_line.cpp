@@ -50,11 +50,16 @@ void add_regression_commands(CommandLine& line) {
   auto* const results = sub.add_option("--results", o.results_folder,
                                        "keep each result in this folder, and run only cases without one")
                             ->type_name("FOLDER");
+  auto* const timing =
+      sub.add_option("--timing", o.timing_file,
+                     "write how fast the devices under test answered, as FILE.json or as a page FILE.html")
+          ->type_name("FILE");
   sub.add_option("--merge", o.merged_folders,
                  "run nothing: report the results of this folder; several: of all of them")
       ->type_name("FOLDER")
       ->allow_extra_args(false)
-      ->excludes(results);
+      ->excludes(results)
+      ->excludes(timing);
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
   sub.add_flag("--github", o.github, "print annotations for GitHub");
   add_rerun_command(line);

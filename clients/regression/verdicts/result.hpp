@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "clients/regression/checks/check.hpp"
+#include "clients/regression/timing/device_timing.hpp"
 
 namespace drivebench::regression {
 
@@ -46,9 +48,10 @@ struct CaseResult {
   std::uint64_t samples = 0;  ///< of all axes
   std::uint64_t hash = 0;     ///< of all samples: equal hashes mean equal runs
   double wall_s = 0.0;
-  std::string output{};              ///< what the device under test printed, its end
-  Trace trace{};                     ///< empty once the plots are drawn
-  std::vector<std::string> plots{};  ///< of failed checks, as SVG
+  std::string output{};                          ///< what the device under test printed, its end
+  Trace trace{};                                 ///< empty once the plots are drawn
+  std::vector<std::string> plots{};              ///< of failed checks, as SVG
+  std::shared_ptr<const DeviceTiming> timing{};  ///< if it was measured; in no report but its own
 };
 
 }  // namespace drivebench::regression
