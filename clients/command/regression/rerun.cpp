@@ -68,6 +68,11 @@ class CaseSamples {
   std::uint64_t end_tick_;
 };
 
+/// "1 sample", "2 samples".
+std::string counted(std::uint64_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 /// A sentence on where the two runs first differ.
 std::string comparison(const fs::path& before, const fs::path& now, const RunFacts& facts) {
   CaseSamples old_samples(before, facts);
@@ -75,7 +80,7 @@ std::string comparison(const fs::path& before, const fs::path& now, const RunFac
   for (std::uint64_t count = 0;; ++count) {
     const auto was = old_samples.next();
     const auto is = new_samples.next();
-    if (!was && !is) return fmt::format("the same to the bit: {} samples", count);
+    if (!was && !is) return fmt::format("the same to the bit: {}", counted(count, "sample"));
     if (!was || !is) {
       return fmt::format("the {} run ends first, before tick {}; up to there they are the same",
                          was ? "new" : "recorded", was ? was->sample.tick : is->sample.tick);
@@ -110,8 +115,9 @@ int replay_plant(const RerunOptions& options, const Unpacked& bundle) {
     fmt::print("the plant differs: {}\n", problem);
     return kExitFailed;
   }
-  fmt::print("the plant is the same to the bit: {} samples, {} inputs\n",
-             report.at("samples").get<std::uint64_t>(), report.at("inputs").get<std::uint64_t>());
+  fmt::print("the plant is the same to the bit: {}, {}\n",
+             counted(report.at("samples").get<std::uint64_t>(), "sample"),
+             counted(report.at("inputs").get<std::uint64_t>(), "input"));
   return kExitOk;
 }
 
@@ -129,7 +135,7 @@ PreparedCase prepared_or_refused(const RerunOptions& options, const Unpacked& bu
 int run_again(const RerunOptions& options, const Unpacked& bundle, const fs::path& folder) {
   const PreparedCase prepared = prepared_or_refused(options, bundle);
   catch_interrupts();
-  const CaseResult result = run_case(prepared, folder, false);
+  const CaseResult result = run_case(prepared, folder, {});
   fmt::print("{}", regression::table_row(result));
   record_case(prepared, folder);
   if (bundle.program != options.program)

@@ -54,14 +54,18 @@ std::string without_place(std::string text, const std::string& link) {
 
 constexpr const char* kOutput = "output.txt";
 
-/// A server on the bench of the case.
+constexpr const char* kSocket = "bench.sock";
+
+/// A server on the bench of the case. It runs in the folder of the case and knows its socket by a name
+/// without a folder: the recording tells that name, and equal runs have equal recordings.
 class RecordedServer {
  public:
   RecordedServer(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes)
-      : socket_(folder / "bench.sock"),
-        recording_(recording_in(folder)),
-        log_(folder / "server.log"),
-        process_(line_of(prepared, wishes), {.error_file = log_.string()}) {
+      : socket_(fs::absolute(folder / kSocket)),
+        recording_(fs::absolute(recording_in(folder))),
+        log_(fs::absolute(folder / "server.log")),
+        process_(line_of(prepared, wishes),
+                 {.folder = fs::absolute(folder).string(), .error_file = log_.string()}) {
     if (!process_.await(Process::in(kServerStart), parse_ready)) {
       throw std::runtime_error("the server did not start: " + tail_of(log_));
     }
@@ -80,12 +84,12 @@ class RecordedServer {
  private:
   std::vector<std::string> line_of(const PreparedCase& prepared, const RunWishes& wishes) const {
     std::vector<std::string> line{server_executable().string(),
-                                  prepared.bench_file.string(),
+                                  fs::absolute(prepared.bench_file).string(),
                                   "--json",
                                   "--port",
                                   "0",
                                   "--unix",
-                                  socket_.string(),
+                                  kSocket,
                                   "--record",
                                   recording_.string()};
     if (wishes.timing) line.emplace_back("--measure-answers");

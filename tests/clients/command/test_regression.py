@@ -228,6 +228,15 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertIn("current: at least -5.4648 A, min -5 A", html)
         self.assertNotIn("http://", html.replace("http://www.w3.org/2000/svg", ""))
 
+    def test_equal_runs_leave_equal_bundles(self):
+        """Catches: a date or the name of a temporary folder in a bundle, so that two of them cannot be compared as files."""
+        self.write("servo.toml", SERVO.replace("6.0", "5.0"))
+        bundles = []
+        for kept in (self.folder / "one", self.folder / "two"):
+            self.run_test(self.folder / "suite", "--keep", kept, code=FAILED)
+            bundles.append((kept / "servo.zip").read_bytes())
+        self.assertEqual(bundles[0], bundles[1])
+
     def test_nothing_runs_when_a_case_has_a_mistake(self):
         """Catches: a mistake that is told only after an hour of other cases, or without its line."""
         self.write("a.toml", SERVO)
