@@ -13,7 +13,8 @@ namespace drivebench::regression {
 std::span<const CheckKind> check_kinds() noexcept {
   static const std::vector<CheckKind> kAll = [] {
     std::vector<CheckKind> all;
-    for (const auto family : {value_checks(), step_checks(), condition_checks(), tube_checks()})
+    for (const auto family :
+         {value_checks(), step_checks(), spectrum_checks(), condition_checks(), tube_checks()})
       all.insert(all.end(), family.begin(), family.end());
     return all;
   }();
@@ -33,7 +34,7 @@ std::string problem_on_bench(const CheckSpec& spec, const RunFacts& facts) {
   if (spec.to_s && *spec.to_s > end_s * (1.0 + 1e-12)) {
     return fmt::format("to_s is {:.6g} but the case ends at {:.6g} s", *spec.to_s, end_s);
   }
-  return {};
+  return spec.kind->problem_on_bench != nullptr ? spec.kind->problem_on_bench(spec, facts) : std::string();
 }
 
 }  // namespace drivebench::regression

@@ -34,6 +34,8 @@ struct CheckKind {
   /// The rule between numbers that the spec breaks; empty: none. May be null.
   std::string (*problem)(const CheckSpec& spec);
   std::unique_ptr<Check> (*make)(const CheckSpec& spec, const RunFacts& facts);
+  /// The rule of its own that the spec breaks on a bench; empty: none. May be null.
+  std::string (*problem_on_bench)(const CheckSpec& spec, const RunFacts& facts) = nullptr;
 };
 
 /// The kinds, in the order of the README.
@@ -46,6 +48,7 @@ std::string problem_on_bench(const CheckSpec& spec, const RunFacts& facts);
 
 std::span<const CheckKind> value_checks() noexcept;      ///< bounds, rms, ripple, steady_state
 std::span<const CheckKind> step_checks() noexcept;       ///< settles, overshoot, rise_time
+std::span<const CheckKind> spectrum_checks() noexcept;   ///< thd
 std::span<const CheckKind> condition_checks() noexcept;  ///< always, never, eventually, reaction, fault_count
 std::span<const CheckKind> tube_checks() noexcept;       ///< tube
 

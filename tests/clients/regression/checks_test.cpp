@@ -8,70 +8,10 @@
 #include <limits>
 #include <string>
 
-#include "clients/regression/checks/check_reader.hpp"
+#include "tests/clients/regression/check_on_course.hpp"
 
 namespace drivebench::regression {
 namespace {
-
-constexpr double kPeriod_s = 0.001;
-
-/// A speed over ticks, and the fault word beside it.
-struct Course {
-  std::function<double(std::uint64_t)> speed = [](std::uint64_t) { return 0.0; };
-  std::function<std::uint64_t(std::uint64_t)> faults = [](std::uint64_t) { return std::uint64_t{0}; };
-};
-
-RunFacts facts_to(std::uint64_t end_tick) {
-  return {.period_s = kPeriod_s, .end_tick = end_tick, .axes = {"one"}, .faults = {{"trip", 256}}};
-}
-
-/// The check that this table of a case asks for; its problem instead of a check.
-std::optional<CheckSpec> spec_of(const std::string& keys, std::string& problem) {
-  ProblemList problems;
-  const std::string file = "case.toml";
-  const auto node = parse_document(keys, file, problems);
-  std::optional<CheckSpec> spec;
-  if (node) {
-    KeyTable table(*node, "check[0]", 1, file, problems);
-    spec = read_check(table, std::filesystem::temp_directory_path());
-  }
-  try {
-    problems.throw_if_any();
-  } catch (const ConfigError& error) {
-    problem = error.what();
-    return std::nullopt;
-  }
-  return spec;
-}
-
-std::string problem_of(const std::string& keys) {
-  std::string problem;
-  spec_of(keys, problem);
-  return problem;
-}
-
-Finding found(const std::string& keys, const Course& course, std::uint64_t end_tick = 100) {
-  std::string problem;
-  std::optional<CheckSpec> spec = spec_of(keys, problem);
-  if (!spec) throw std::runtime_error(problem);
-  spec->axis = "one";
-  const RunFacts facts = facts_to(end_tick);
-  const std::unique_ptr<Check> check = spec->kind->make(*spec, facts);
-  for (std::uint64_t tick = 0; tick <= end_tick; ++tick) {
-    Sample sample;
-    sample.tick = tick;
-    sample.speed_rad_s = course.speed(tick);
-    sample.faults = course.faults(tick);
-    check->see(std::span(&sample, 1));
-  }
-  return check->finish();
-}
-
-constexpr const char* kSpeed = "signal = \"speed_rad_s\"\n";
-
-std::string speed_check(const std::string& kind, const std::string& keys) {
-  return "kind = \"" + kind + "\"\n" + kSpeed + keys;
-}
 
 /// From 0 to 10 within the ticks 10 to 20, at 12 from 21 to 30, then 10.
 double step_with_overshoot(std::uint64_t tick) {
@@ -207,7 +147,7 @@ TEST(Checks, AReactionIsCountedFromItsTrigger) {
   const Finding late = found(reaction + "within_ticks = 2", course);
   EXPECT_FALSE(late.passed);
   EXPECT_EQ(late.measured, 3.0);
-  EXPECT_NE(problem_of("kind = \"reaction\"\ncondition = \"state == 4\"\nwithin_ticks = 2")
+  EXPECT_NE(problem_of_check("kind = \"reaction\"\ncondition = \"state == 4\"\nwithin_ticks = 2")
                 .find("after is missing"),
             std::string::npos);
 }
@@ -244,7 +184,7 @@ TEST(Checks, ATubeFollowsTheGoldenRunTickByTick) {
   EXPECT_FALSE(far.passed);
   EXPECT_EQ(far.at_s, 0.025);
   EXPECT_TRUE(found(speed_check("tube", golden + "rel = 0.05"), off).passed);
-  EXPECT_NE(problem_of("kind = \"tube\"\nsignal = \"torque_nm\"\nabs = 1\n" + golden)
+  EXPECT_NE(problem_of_check("kind = \"tube\"\nsignal = \"torque_nm\"\nabs = 1\n" + golden)
                 .find("has no column torque_nm"),
             std::string::npos);
   std::filesystem::remove(file);
@@ -253,7 +193,7 @@ TEST(Checks, ATubeFollowsTheGoldenRunTickByTick) {
 // Catches: a mistake in a case file that is taken for a check.
 TEST(Checks, MistakesAreRefusedWithKeyAndRule) {
   const auto has = [](const std::string& keys, std::string_view part) {
-    const std::string problem = problem_of(keys);
+    const std::string problem = problem_of_check(keys);
     EXPECT_NE(problem.find(part), std::string::npos) << problem;
   };
   has("kind = \"bound\"",
