@@ -88,7 +88,8 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
       ->needs(record);
   app.add_flag("--require-rt", o.require_realtime,
                "do not start without real-time scheduling and locked memory");
-  app.add_option("--duration", o.duration_s, "stop after this much plant time [s] (realtime and free)")
+  app.add_option("--duration", o.duration_s,
+                 "stop after this much plant time [s]; in lockstep time then stands still until the end")
       ->check(real_between(1e-9, kMost_s));
   app.add_option("--command-delay-ticks", o.command_delay_ticks, "0 or 1, instead of the bench file's")
       ->check(whole_between(0, 1));

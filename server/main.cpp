@@ -56,9 +56,6 @@ BenchConfig configure(const ServerOptions& o) {
   if (!o.experiments.empty()) config.experiments.folder = o.experiments;
   if (!o.audit.empty()) config.audit.file = o.audit;
   if (o.command_delay_ticks >= 0) config.setup.command_delay_ticks = o.command_delay_ticks;
-  if (o.duration_s != 0.0 && config.mode == RunMode::kLockstep) {
-    throw std::runtime_error("--duration: a lockstep run ends when its controller does");
-  }
   if (config.mode == RunMode::kRealtime && config.setup.command_delay_ticks == 0) {
     throw std::runtime_error(
         "--command-delay-ticks 0: in real time a command holds from the next tick on, 1");
@@ -163,12 +160,12 @@ std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& c
     recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
                                           recording_options(o, config));
   }
-  if (config.mode == RunMode::kLockstep) return make_lockstep_engine(config, std::move(recorder), io);
   std::optional<Tick> max_ticks;
   if (o.duration_s > 0.0) {
     max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
   }
-  return make_threaded_engine(config, std::move(recorder), io, max_ticks);
+  return config.mode == RunMode::kLockstep ? make_lockstep_engine(config, std::move(recorder), io, max_ticks)
+                                           : make_threaded_engine(config, std::move(recorder), io, max_ticks);
 }
 
 /// Throws if the file is no state of this bench.

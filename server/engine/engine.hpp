@@ -162,9 +162,10 @@ class Engine {
 };
 
 /// Runs ticks on the I/O thread, in the call that brings the last command, or later when the recorder has
-/// room.
+/// room. After max_ticks, if given, time stands still, and what clients ask for is no input of the run.
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
-                                             boost::asio::io_context& io);
+                                             boost::asio::io_context& io,
+                                             std::optional<Tick> max_ticks = std::nullopt);
 /// Without a recording.
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config);
 

@@ -11,8 +11,10 @@ namespace {
 
 class LockstepEngine final : public Engine {
  public:
-  LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context* io)
+  LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context* io,
+                 std::optional<Tick> max_ticks)
       : Engine(config, std::move(recorder)),
+        max_ticks_(max_ticks),
         bench_(config_.setup, recorder_.get()),
         shown_changes_(config_.axes.size()) {
     if (io != nullptr) disk_timer_.emplace(*io);
@@ -31,6 +33,7 @@ class LockstepEngine final : public Engine {
   Refused command(std::uint32_t axis, Owner owner, const Command& command) override {
     const Refused why = has_room() ? Refused::kNot : check(axis, owner, command);
     if (why != Refused::kNot) return why;  // not counted: that would be an input
+    if (is_over()) return check(axis, owner, command);
     const Refused refused =
         bench_.submit({.tick = bench_.tick(), .axis = axis, .owner = owner, .action = command});
     if (refused == Refused::kNot && axis < answer_clocks_.size())
@@ -39,7 +42,7 @@ class LockstepEngine final : public Engine {
   }
 
   void take(std::uint32_t axis, Owner by, const std::string& reason, Answer answer) override {
-    if (!has_room()) return refuse_to_take(axis, by, Refused::kBusy, answer);
+    if (!has_room() || is_over()) return refuse_to_take(axis, by, Refused::kBusy, answer);
     is_taking_ = true;  // no tick between the two inputs
     Engine::take(axis, by, reason, std::move(answer));
     is_taking_ = false;
@@ -47,7 +50,7 @@ class LockstepEngine final : public Engine {
   }
 
   void advance() override {
-    if (is_taking_) return;
+    if (is_taking_ || is_over()) return;
     if (recorder_ && !recorder_->has_room()) return try_again_soon();
     bool commanded = false;
     for (std::size_t i = 0; i < bench_.axis_count(); ++i) {
@@ -79,6 +82,8 @@ class LockstepEngine final : public Engine {
   }
 
   void submit(const Input& input, Answer answer) override {
+    // A controller may leave, as it would at any time; stop() dismisses it.
+    if (is_over()) return answer(ends_lease(input) ? Refused::kNot : Refused::kBusy, bench_.tick());
     const bool may_be_recorded = has_room() || is_taking_ || ends_own_lease(input);
     const Refused refused = may_be_recorded ? bench_.submit(input) : Refused::kBusy;
     if (std::holds_alternative<ParameterWrite>(input.action) && input.axis < parameters_.size()) {
@@ -97,7 +102,9 @@ class LockstepEngine final : public Engine {
   }
 
   Owner owner(std::size_t axis) const override { return bench_.owner(axis); }
-  bool may_be_acquired(std::uint32_t axis) override { return Engine::may_be_acquired(axis) && has_room(); }
+  bool may_be_acquired(std::uint32_t axis) override {
+    return Engine::may_be_acquired(axis) && has_room() && !is_over();
+  }
   std::uint64_t state_hash() const override { return bench_.state_hash(); }
   std::int64_t worst_lateness_ns() const override { return 0; }
 
@@ -105,6 +112,8 @@ class LockstepEngine final : public Engine {
   /// Whether inputs that may come without end may be recorded. The commands of a tick and the end of a lease
   /// always may.
   bool has_room() const noexcept { return !recorder_ || (!waits_for_disk_ && recorder_->has_room()); }
+
+  bool is_over() const noexcept { return max_ticks_ && bench_.tick() >= *max_ticks_; }
 
   bool ends_own_lease(const Input& input) const noexcept {
     return ends_lease(input) && input.owner != 0 && input.axis < bench_.axis_count() &&
@@ -133,6 +142,7 @@ class LockstepEngine final : public Engine {
     }
   }
 
+  std::optional<Tick> max_ticks_;
   Bench bench_;
   std::vector<std::uint64_t> shown_changes_;
   bool is_taking_ = false;
@@ -143,12 +153,12 @@ class LockstepEngine final : public Engine {
 }  // namespace
 
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config) {
-  return std::make_unique<LockstepEngine>(config, nullptr, nullptr);
+  return std::make_unique<LockstepEngine>(config, nullptr, nullptr, std::nullopt);
 }
 
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
-                                             asio::io_context& io) {
-  return std::make_unique<LockstepEngine>(config, std::move(recorder), &io);
+                                             asio::io_context& io, std::optional<Tick> max_ticks) {
+  return std::make_unique<LockstepEngine>(config, std::move(recorder), &io, max_ticks);
 }
 
 }  // namespace drivebench

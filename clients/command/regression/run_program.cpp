@@ -56,8 +56,9 @@ constexpr const char* kOutput = "output.txt";
 
 constexpr const char* kSocket = "bench.sock";
 
-/// A server on the bench of the case. It runs in the folder of the case and knows its socket by a name
-/// without a folder: the recording tells that name, and equal runs have equal recordings.
+/// A server on the bench of the case. Equal runs have equal recordings: it runs in the folder of the case and
+/// knows its socket by a name without a folder, which the recording tells; and in lockstep time stands still
+/// from the last tick on, however late the runner sees that.
 class RecordedServer {
  public:
   RecordedServer(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes)
@@ -92,6 +93,12 @@ class RecordedServer {
                                   kSocket,
                                   "--record",
                                   recording_.string()};
+    const bool ends_in_lockstep =
+        !prepared.what->is_realtime && prepared.facts.end_tick != RunFacts{}.end_tick;
+    if (ends_in_lockstep) {
+      line.emplace_back("--duration");
+      line.push_back(fmt::to_string(static_cast<double>(prepared.facts.end_tick) * prepared.facts.period_s));
+    }
     if (wishes.timing) line.emplace_back("--measure-answers");
     return line;
   }

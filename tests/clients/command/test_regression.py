@@ -229,12 +229,15 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertNotIn("http://", html.replace("http://www.w3.org/2000/svg", ""))
 
     def test_equal_runs_leave_equal_bundles(self):
-        """Catches: a date or the name of a temporary folder in a bundle, so that two of them cannot be compared as files."""
+        """Catches: a date or the name of a temporary folder in a bundle, ticks after the end of a case."""
         self.write("servo.toml", SERVO.replace("6.0", "5.0"))
+        self.write("case.toml", PROGRAM.format(limit_s=60).replace("i_a_a < 30", "i_a_a < 0.1"))
+        self.write("device.py", "import sys\nsys.tracebacklimit = 0\n" + DRIVES.format(until=10 ** 9).replace(
+            "    sample = bench.newest()", "    sample = bench.newest()\n    print(bench.describe().name)"))
         bundles = []
         for kept in (self.folder / "one", self.folder / "two"):
             self.run_test(self.folder / "suite", "--keep", kept, code=FAILED)
-            bundles.append((kept / "servo.zip").read_bytes())
+            bundles.append([(kept / name).read_bytes() for name in ("servo.zip", "case.zip")])
         self.assertEqual(bundles[0], bundles[1])
 
     def test_nothing_runs_when_a_case_has_a_mistake(self):
