@@ -69,7 +69,7 @@ class CaseSamples {
 };
 
 /// "1 sample", "2 samples".
-std::string counted(std::uint64_t count, std::string_view noun) {
+std::string count_text(std::uint64_t count, std::string_view noun) {
   return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }
 
@@ -80,7 +80,7 @@ std::string comparison(const fs::path& before, const fs::path& now, const RunFac
   for (std::uint64_t count = 0;; ++count) {
     const auto was = old_samples.next();
     const auto is = new_samples.next();
-    if (!was && !is) return fmt::format("the same to the bit: {}", counted(count, "sample"));
+    if (!was && !is) return fmt::format("the same to the bit: {}", count_text(count, "sample"));
     if (!was || !is) {
       return fmt::format("the {} run ends first, before tick {}; up to there they are the same",
                          was ? "new" : "recorded", was ? was->sample.tick : is->sample.tick);
@@ -116,8 +116,8 @@ int replay_plant(const RerunOptions& options, const Unpacked& bundle) {
     return kExitFailed;
   }
   fmt::print("the plant is the same to the bit: {}, {}\n",
-             counted(report.at("samples").get<std::uint64_t>(), "sample"),
-             counted(report.at("inputs").get<std::uint64_t>(), "input"));
+             count_text(report.at("samples").get<std::uint64_t>(), "sample"),
+             count_text(report.at("inputs").get<std::uint64_t>(), "input"));
   return kExitOk;
 }
 

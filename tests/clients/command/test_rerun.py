@@ -1,12 +1,20 @@
 #!/usr/bin/python3
 """`drivebench rerun`: bundles of failed cases run again, and hostile bundles are refused."""
 import os
+import pathlib
 import shutil
 import subprocess
+import sys
 import unittest
 import zipfile
 
-from test_regression import COMMAND, DRIVES, FAILED, OK, PATIENCE_S, PROGRAM, SERVO, USAGE, RegressionTest
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
+try:
+    from regression_case import COMMAND, DRIVES, FAILED, OK, PROGRAM, SERVO, USAGE, RegressionTest
+    from wire_client import PATIENCE_S
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(77)
 
 
 class Rerun(RegressionTest):
@@ -50,9 +58,15 @@ load_profile = "load.csv"
         said = self.rerun(bundle, code=FAILED)
         self.assertRegex(said, r"(?m)^fail +servo\[rotor_resistance_ohm=4")
         self.assertIn("the same to the bit: 1025 samples", said)
-        self.assertIn("the plant is the same to the bit: 1025 samples", self.rerun(bundle, "--plant-only", code=OK))
+        # One more: at its end the bench dismisses the controller and takes the safe action.
+        self.assertIn("the plant is the same to the bit: 1026 samples", self.rerun(bundle, "--plant-only", code=OK))
         other = self.changed(bundle, {"bench.toml": lambda text: text.replace(b"rotor_resistance_ohm = 4.0", b"rotor_resistance_ohm = 4.01")})
         self.assertRegex(self.rerun(other, code=FAILED), r"differs first at tick \d+: servo\.\w+ was \S+ and is \S+")
+
+    def test_a_case_that_never_began_is_told_as_one_sample(self):
+        """Catches: a comparison of runs without a tick that fails, or that counts in bad English."""
+        bundle = self.failed_bundle("case", PROGRAM.format(limit_s=30), device_py="raise SystemExit(3)\n")
+        self.assertRegex(self.rerun(bundle, code=FAILED), r"(?m)^the same to the bit: 1 sample$")
 
     def test_a_program_runs_again_from_the_bundle_alone(self):
         """Catches: a device under test that is not in the bundle, a verdict of the recording in the place of the new run."""
