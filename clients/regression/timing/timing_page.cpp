@@ -26,7 +26,8 @@ constexpr std::string_view kTimingWords =
     "the same while time goes on. Jitter is the deviation from p50. The phase of an answer is its arrival "
     "after the start of its tick; one that comes after the end of that tick is late. A tick without a "
     "command "
-    "is missed. These are times of the machine that ran the suite.</p>\n";
+    "is missed. The bars are as high as the logarithms of their counts. These are times of the machine that "
+    "ran the suite.</p>\n";
 
 constexpr double kWidth = 720.0;
 constexpr double kHeight = 170.0;
