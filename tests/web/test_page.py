@@ -102,13 +102,6 @@ class PageTest(unittest.TestCase):
         return shown
 
 
-class Page(PageTest):
-    def on_the_line(self):
-        """A motor on the line turns by itself. At 1 kHz, which the browser of a busy machine can follow."""
-        text = (BENCHES / "im-b.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
-        text = text.replace("period_us = 100\n", "period_us = 1000\nsubsteps = 20\n")
-        return self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
-
     def for_users(self):
         """A bench in lockstep that knows a viewer, an operator and a conductor."""
         tokens = self.folder / "tokens"
@@ -116,6 +109,14 @@ class Page(PageTest):
         tokens.chmod(0o600)
         text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
         return self.serve("--mode", "lockstep", text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{tokens}"'))
+
+
+class Page(PageTest):
+    def on_the_line(self):
+        """A motor on the line turns by itself. At 1 kHz, which the browser of a busy machine can follow."""
+        text = (BENCHES / "im-b.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        text = text.replace("period_us = 100\n", "period_us = 1000\nsubsteps = 20\n")
+        return self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
 
     def test_the_page_finds_the_bench_and_shows_its_speed(self):
         """Catches: a page that stays empty, decodes wrongly, or exports another thing than it shows."""

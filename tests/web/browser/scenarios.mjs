@@ -6,6 +6,7 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { createInterface } from "node:readline";
 import puppeteer from "puppeteer-core";
+import { driveScenarios } from "./drive_scenarios.mjs";
 
 const kPatienceMs = 60_000;
 const lines = createInterface({ input: process.stdin })[Symbol.asyncIterator]();
@@ -93,7 +94,22 @@ async function catchFiles(page) {
   }, /./);
 }
 
+/** What axe-core says against the page, in both themes. */
+async function axeFinds(page) {
+  const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+  const found = [];
+  for (const theme of ["light", "dark"]) {
+    await page.evaluate((chosen) => { document.documentElement.dataset.theme = chosen; }, theme);
+    await page.evaluate(source);
+    const { violations } = await page.evaluate(() => window.axe.run());
+    found.push(...violations.map(({ id, impact, nodes }) => ({ theme, id, impact, nodes: nodes.slice(0, 3).map((each) => each.html) })));
+  }
+  return { found };
+}
+
 const scenarios = {
+  ...driveScenarios({ axeFinds, enter, outside, press, set, stateOf, text, until }),
+
   /** A user opens the page and looks. */
   async look(page) {
     await stateOf(page, "speed", /^[1-9]/);
@@ -262,21 +278,13 @@ const scenarios = {
     return { reached: [...reached], paused, caption, missing };
   },
 
-  /** What axe-core says against the page, in both themes. */
+  /** Every kind of pane, for axe-core. */
   async axe(page) {
     await stateOf(page, "tick", /[1-9]/);
     const [, locus, spectrum] = await page.$$(".pane");
     await kind(locus, "xy");
     await kind(spectrum, "spectrum");
-    const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-    const found = [];
-    for (const theme of ["light", "dark"]) {
-      await page.evaluate((chosen) => { document.documentElement.dataset.theme = chosen; }, theme);
-      await page.evaluate(source);
-      const { violations } = await page.evaluate(() => window.axe.run());
-      found.push(...violations.map(({ id, impact, nodes }) => ({ theme, id, impact, nodes: nodes.slice(0, 3).map((each) => each.html) })));
-    }
-    return { found };
+    return axeFinds(page);
   },
 
   /** How often the panes are drawn anew, beside the frames that an empty page gets. */

@@ -8,13 +8,13 @@ import test from "node:test";
 const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
-    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train"].map((each) => `export * from "./${each}";`).join("\n"),
+    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },
   bundle: true, write: false, format: "esm",
 });
 const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
-  spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed } =
+  spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf } =
   await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
 
 function historyOf(ticks, valueOf) {
@@ -182,4 +182,35 @@ test("XY pairs the samples of the same ticks", () => {
   assert.deepEqual(lines.map(({ x, y }) => [[...x], [...y]]),
     [[[1, 2, 4], [10, 20, 40]], [range(0, 6), range(0, 6).map((tick) => 2 * tick)]]);
   assert.deepEqual(xyCurves(view, []).lines, []);
+});
+
+const axisOf = (connection, more = {}) => ({ connection, phases: 3, drive_kind: "averaged_inverter", ...more });
+
+// Catches: commands for a source, currents for a drive without a loop, fields in another unit, a duty of a star that is no half at
+// rest, a field winding without its field.
+test("a drive asks an axis for what it takes", () => {
+  assert.deepEqual(gatesOf(axisOf("star", { drive_kind: "source" })), []);
+  assert.deepEqual(gatesOf(axisOf("star", { shares_amplifier_with: "first" })), []);
+  assert.deepEqual(gatesOf(axisOf("star")), ["voltage", "duty"]);
+  assert.equal(gatesOf(axisOf("star", { drive_kind: "current_amplifier" }))[0], "current");
+  assert.deepEqual(wavesOf(axisOf("armature", { phases: 1 })), ["terminals"]);
+  const shown = (...what) => fieldsOf(...what).map(({ label, value }) => `${label}=${value}`);
+  assert.deepEqual(shown("terminals", "voltage", axisOf("armature", { phases: 1, field_winding: true })),
+    ["terminal a, V=0", "field winding, V=0", "ramp, s=1"]);
+  assert.deepEqual(shown("terminals", "duty", axisOf("star")), ["terminal a=0.5", "terminal b=0.5", "terminal c=0.5", "ramp, s=1"]);
+});
+
+// Catches: another transform than the power-invariant one, a beta that turns backwards, an amplitude that misses its target for
+// the boost or for a negative frequency, duties around another value than a half.
+test("the targets of a drive", () => {
+  const standing = (axis, gates, alpha, beta) => targetOf(1, axis, "standing", gates, { alpha, beta, ramp: 2 });
+  const [a, b, c] = standing(axisOf("star"), "voltage", 3, 4).constant;
+  assert.ok(Math.abs(a + b + c) < 1e-12 && Math.abs(a * a + b * b + c * c - 25) < 1e-12); // the power of a vector of length 5
+  assert.ok(Math.abs(b - c - 4 * Math.sqrt(2)) < 1e-12);
+  assert.deepEqual(standing(axisOf("two_phase"), "voltage", 3, 4).constant.slice(0, 2), [3, 4]);
+  assert.ok(Math.abs(standing(axisOf("star"), "duty", 0.3, 0).constant[0] - 0.5 - 0.3 * Math.sqrt(2 / 3)) < 1e-12);
+  const turning = targetOf(0, axisOf("star"), "rotating", "duty", { frequency: -20, amplitude: 0.4, boost: 0.1, ramp: 1 });
+  assert.deepEqual(turning.constant, [0.5, 0.5, 0.5, 0]);
+  assert.ok(Math.abs(turning.boost + turning.per_hz * 20 - 0.4) < 1e-12);
+  assert.equal(turning.frequency_hz, -20);
 });

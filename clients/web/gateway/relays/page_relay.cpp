@@ -1,8 +1,12 @@
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "clients/web/gateway/drive/drive.hpp"
 #include "clients/web/gateway/relays/frames.hpp"
 #include "clients/web/gateway/relays/relay.hpp"
 #include "clients/web/gateway/relays/send_queue.hpp"
@@ -17,10 +21,18 @@ using namespace std::chrono_literals;
 
 constexpr auto kBetweenMessages = 4ms;  // to a browser: many small frames become one message
 
-/// Three coroutines share it.
+Drive::Time now() {
+  return std::chrono::steady_clock::now();
+}
+
+/// Four coroutines share it. Binary messages of the page are frames for the bench; texts are orders of its
+/// drive, whose requests go out between those frames.
 class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
  public:
-  using Relay::Relay;
+  PageRelay(RelayContext& context, Stream stream)
+      : Relay(context, std::move(stream)),
+        turn_(client_.get_executor()),
+        turnstile_(client_.get_executor()) {}
 
   asio::awaitable<void> run(Request request) {
     client_.binary(true);
@@ -28,34 +40,63 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     const bool is_connected = co_await connect();
     if (is_connected) {
       const auto self = shared_from_this();
+      const auto executor = client_.get_executor();
       asio::co_spawn(
-          client_.get_executor(), [self] { return self->to_bench(); }, asio::detached);
+          executor, [self] { return self->from_browser(); }, asio::detached);
       asio::co_spawn(
-          client_.get_executor(), [self] { return self->from_bench(); }, asio::detached);
+          executor, [self] { return self->from_bench(); }, asio::detached);
+      asio::co_spawn(
+          executor, [self] { return self->drive(); }, asio::detached);
       co_await to_browser();
     }
     co_await close();
   }
 
  private:
-  asio::awaitable<void> to_bench() {
+  asio::awaitable<void> from_browser() {
     error_code error;
     for (beast::flat_buffer buffer; !error; buffer.clear()) {
       co_await client_.async_read(buffer, asio::redirect_error(use_awaitable, error));
       if (error) break;
       const std::span message(static_cast<const std::byte*>(buffer.data().data()), buffer.size());
       const std::string_view problem =
-          client_.got_binary() ? problem_of_frames(message) : "messages are binary";
+          client_.got_binary() ? problem_of_frames(message) : problem_of_order(message);
       if (!problem.empty()) {
         ++context_.counts.refusals["frame"];
-        end(websocket::close_code::protocol_error, problem);
+        leave(websocket::close_code::protocol_error, problem);
         co_return;
       }
-      context_.counts.bytes_to_bench += message.size();
-      co_await asio::async_write(bench_, buffer.data(), asio::redirect_error(use_awaitable, error));
+      if (client_.got_binary()) co_await write(buffer.data(), error);
     }
     if (error == websocket::error::message_too_big) ++context_.counts.refusals["size"];
-    end(websocket::close_code::normal, "");
+    leave(websocket::close_code::normal, "");
+  }
+
+  /// Gives a text to the drive, which answers a wrong one; the reason why it cannot, or nothing.
+  std::string_view problem_of_order(std::span<const std::byte> message) {
+    if (!drive_) return "before the welcome of the bench messages are binary";
+    try {
+      drive_->order({reinterpret_cast<const char*>(message.data()), message.size()}, now());
+    } catch (const OrderError& error) {
+      ++context_.counts.refusals["order"];
+      drive_->tell(error.what());
+    }
+    turn_.cancel();
+    return {};
+  }
+
+  /// Writes whole, one coroutine after the other.
+  asio::awaitable<void> write(asio::const_buffer bytes, error_code& error) {
+    while (is_writing_) {
+      error_code cancelled;
+      turnstile_.expires_at(asio::steady_timer::time_point::max());
+      co_await turnstile_.async_wait(asio::redirect_error(use_awaitable, cancelled));
+    }
+    is_writing_ = true;
+    context_.counts.bytes_to_bench += bytes.size();
+    co_await asio::async_write(bench_, bytes, asio::redirect_error(use_awaitable, error));
+    is_writing_ = false;
+    turnstile_.cancel();
   }
 
   /// Reads on however slow the browser is: the server would end a session that takes nothing.
@@ -67,32 +108,103 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
       reader.received(co_await bench_.async_read_some(asio::buffer(space.data(), space.size()),
                                                       asio::redirect_error(use_awaitable, error)));
       while (const auto frame = reader.next())
-        is_taken = queue_.add(*frame) && is_taken;
+        is_taken = pass_on(*frame) && is_taken;
       pause_.cancel();
       if (error) break;
-      asio::steady_timer between(client_.get_executor(), kBetweenMessages);
-      co_await between.async_wait(use_awaitable);
+      if (!is_driving()) co_await rest();  // a drive answers at once
     }
     end(websocket::close_code::going_away,
         is_taken ? "the bench has ended the session" : "the browser reads too slowly");
+    turn_.cancel();
+  }
+
+  bool pass_on(std::span<const std::byte> frame) {
+    if (!drive_) begin_drive(frame);
+    if (drive_ && drive_->take(frame, now())) {
+      turn_.cancel();
+      return true;
+    }
+    return leaving_ || queue_.add(frame);
+  }
+
+  /// The welcome has what the drive must know.
+  void begin_drive(std::span<const std::byte> frame) {
+    v1::Envelope envelope;
+    if (envelope.ParseFromArray(frame.data(), static_cast<int>(frame.size())) && envelope.has_welcome())
+      drive_.emplace(envelope.welcome());
+  }
+
+  /// Sends the requests of the drive, until the bench has gone or, without a browser, the drive is over.
+  asio::awaitable<void> drive() {
+    for (error_code error; !error && bench_.is_open();) {
+      const Drive::Turn turn = drive_ ? drive_->next(now()) : Drive::Turn{};
+      if (!turn.bytes.empty()) {
+        co_await write(asio::buffer(turn.bytes), error);
+        continue;
+      }
+      pause_.cancel();  // for its report
+      if (leaving_ && !is_driving()) end(leaving_->code, leaving_->why);
+      if (!bench_.is_open()) break;
+      error_code cancelled;
+      turn_.expires_at(turn.again);
+      co_await turn_.async_wait(asio::redirect_error(use_awaitable, cancelled));
+    }
   }
 
   asio::awaitable<void> to_browser() {
     std::vector<std::byte> message;
-    for (error_code error; !error;) {
+    for (error_code error; !error && !leaving_;) {
       queue_.take(message);
-      if (message.empty()) {
-        const bool goes_on = co_await wait();
-        if (!goes_on) co_return;
+      const std::string report = drive_ ? drive_->report(now()) : std::string();
+      if (!message.empty()) {
+        co_await client_.async_write(asio::buffer(message), asio::redirect_error(use_awaitable, error));
+      }
+      if (!report.empty() && !error) {
+        client_.text(true);
+        co_await client_.async_write(asio::buffer(report), asio::redirect_error(use_awaitable, error));
+        client_.binary(true);
+      }
+      context_.counts.bytes_to_browsers += message.size() + report.size();
+      if (!message.empty() || !report.empty()) {
+        if (is_driving()) co_await rest();
         continue;
       }
-      co_await client_.async_write(asio::buffer(message), asio::redirect_error(use_awaitable, error));
-      context_.counts.bytes_to_browsers += message.size();
+      const bool goes_on = co_await wait();
+      if (!goes_on) co_return;
     }
-    end(websocket::close_code::normal, "");
+    leave(websocket::close_code::normal, "");
+    for (bool goes_on = true; goes_on;)
+      goes_on = co_await wait();
   }
 
+  asio::awaitable<void> rest() {
+    asio::steady_timer between(client_.get_executor(), kBetweenMessages);
+    co_await between.async_wait(use_awaitable);
+  }
+
+  bool is_driving() const noexcept { return drive_ && !drive_->is_over(); }
+
+  /// The browser has gone, or must: its drive ends first.
+  void leave(websocket::close_code code, std::string_view why) {
+    if (!is_driving()) return end(code, why);
+    if (leaving_) return;
+    leaving_ = Leaving{.code = code, .why = std::string(why)};
+    drive_->leave(now());
+    turn_.cancel();
+  }
+
+  /// The browser has gone, its drive has not.
+  struct Leaving {
+    websocket::close_code code;
+    std::string why;
+  };
+
   SendQueue queue_{};
+  std::optional<Drive> drive_{};  // after the welcome
+  asio::steady_timer turn_;       // of the drive
+  asio::steady_timer turnstile_;  // of what is written to the bench
+  bool is_writing_ = false;
+  std::optional<Leaving> leaving_{};
 };
 
 }  // namespace

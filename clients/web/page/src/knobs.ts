@@ -1,6 +1,7 @@
 /** What an operator changes of an axis: parameters, load, bumps, faults, the lease. The server judges each request. */
 import { Bench } from "./bench";
 import { button, choice, element, setText } from "./dom";
+import { Leases } from "./leases";
 import { numberIn, plain } from "./numbers";
 import { pb } from "./wire";
 
@@ -10,15 +11,12 @@ const kPatienceMs = 1500;
 const kAhead_s = 0.5;
 
 export class Knobs {
-  /** The numbers under which samples show this page as owner, by axis; 0: it holds no lease. */
-  private readonly owners: number[];
   private readonly answer = element("p", { class: "answer", role: "status" });
   private readonly values = new Map<string, HTMLElement>();
-  private readonly leases: HTMLButtonElement[] = [];
-  private readonly timers: number[] = [];
+  private readonly leaseButtons: HTMLButtonElement[] = [];
+  private timer = 0;
 
-  constructor(root: HTMLElement, private readonly bench: Bench) {
-    this.owners = bench.histories.map(() => 0);
+  constructor(root: HTMLElement, private readonly bench: Bench, private readonly leases: Leases) {
     root.hidden = !bench.mayChange;
     root.replaceChildren();
     if (!bench.mayChange) return;
@@ -26,36 +24,22 @@ export class Knobs {
       ...bench.description.axes.map((axis, number) => element("details", { open: number === 0 },
         element("summary", {}, axis.name as string), this.leaseRow(number), this.loadRows(number), this.faultRows(number),
         this.parameterRows(number))));
-    this.timers.push(window.setInterval(() => this.readParameters(), kReadMs),
-      window.setInterval(() => this.renew(), ((bench.description.lease_s as number) * 1000) / 3));
+    this.timer = window.setInterval(() => this.readParameters(), kReadMs);
+    leases.watch((axis, sentence) => this.leaseChanged(axis, sentence));
   }
 
   end(): void {
-    this.timers.forEach((each) => clearInterval(each));
+    clearInterval(this.timer);
   }
 
-  ownerOf(axis: number): number {
-    return this.owners[axis];
-  }
-
-  /** The bench has taken the lease away. */
-  leaseTaken(axis: number, sentence: string): void {
-    this.setOwner(axis, 0);
-    this.tell(sentence, true);
+  private leaseChanged(axis: number, sentence: string): void {
+    setText(this.leaseButtons[axis], this.leases.holds(axis) ? "Release the lease" : "Take the lease");
+    if (sentence !== "") this.tell(sentence, true);
   }
 
   private tell(text: string, isBad = false): void {
     setText(this.answer, text);
     this.answer.classList.toggle("bad", isBad);
-  }
-
-  private lease(axis: number, action: pb.LeaseRequest.Action): Promise<pb.Envelope> {
-    return this.bench.wire.ask({ lease: { axis, action } });
-  }
-
-  private setOwner(axis: number, owner: number): void {
-    this.owners[axis] = owner;
-    setText(this.leases[axis], owner === 0 ? "Take the lease" : "Release the lease");
   }
 
   /**
@@ -64,20 +48,17 @@ export class Knobs {
    */
   private async change(axis: number, what: string, requests: (tick: number) => pb.IEnvelope[],
     underLease = this.bench.changesUnderLease): Promise<void> {
-    const { ACTION_ACQUIRE, ACTION_RELEASE } = pb.LeaseRequest.Action;
-    const borrows = underLease && this.owners[axis] === 0;
+    const borrows = underLease && !this.leases.holds(axis);
+    const act = async () => {
+      const { status } = await this.bench.wire.ask({ status_request: {} });
+      const made = requests(status?.tick as number);
+      const answers = await Promise.all(made.map((each) => this.bench.wire.ask(each)));
+      if (borrows) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
+      return made.map((each, i) => each.inject_fault?.at_tick || answers[i].done?.tick);
+    };
     try {
-      if (borrows) await this.lease(axis, ACTION_ACQUIRE);
-      try {
-        const { status } = await this.bench.wire.ask({ status_request: {} });
-        const made = requests(status?.tick as number);
-        const answers = await Promise.all(made.map((each) => this.bench.wire.ask(each)));
-        if (borrows) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
-        const ticks = made.map((each, i) => each.inject_fault?.at_tick || answers[i].done?.tick);
-        this.tell(`${what}: done at tick ${ticks.join(" and ")}`);
-      } finally {
-        if (borrows) await this.lease(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
-      }
+      const ticks = await (underLease ? this.leases.under(axis, act) : act());
+      this.tell(`${what}: done at tick ${ticks.join(" and ")}`);
     } catch (problem) {
       this.tell(`${what}: ${(problem as Error).message}`, true);
     }
@@ -106,16 +87,14 @@ export class Knobs {
   private leaseRow(axis: number): HTMLElement {
     const toggle = button("Take the lease", async () => {
       try {
-        const isOwner = this.owners[axis] !== 0;
-        const { ACTION_ACQUIRE, ACTION_RELEASE } = pb.LeaseRequest.Action;
-        const answer = await this.lease(axis, isOwner ? ACTION_RELEASE : ACTION_ACQUIRE);
-        this.setOwner(axis, isOwner ? 0 : answer.done?.owner as number);
+        const isOwner = this.leases.holds(axis);
+        await (isOwner ? this.leases.release(axis) : this.leases.acquire(axis));
         this.tell(isOwner ? "the lease is released" : "this page holds the lease; other controllers are refused");
       } catch (problem) {
         this.tell(`lease: ${(problem as Error).message}`, true);
       }
     });
-    this.leases[axis] = toggle;
+    this.leaseButtons[axis] = toggle;
     const clear = button("Clear faults", () => this.change(axis, "clear", () => [{ clear_faults: { axis } }], true));
     return element("div", { class: "bar" }, toggle, clear);
   }
@@ -209,13 +188,6 @@ export class Knobs {
         return; // a lost connection is told elsewhere
       }
     }
-  }
-
-  private renew(): void {
-    this.owners.forEach((owner, axis) => {
-      if (owner === 0) return;
-      this.lease(axis, pb.LeaseRequest.Action.ACTION_RENEW).catch((problem: Error) => this.leaseTaken(axis, `lease: ${problem.message}`));
-    });
   }
 }
 

@@ -1,7 +1,9 @@
 /** The page of `drivebench web`. */
 import { Bench } from "./bench";
 import { byId, setText } from "./dom";
+import { DrivePanel } from "./drive_panel";
 import { Knobs } from "./knobs";
+import { Leases } from "./leases";
 import { Scope } from "./scope";
 import { StatePanel } from "./state_panel";
 import { pb, Wire } from "./wire";
@@ -16,7 +18,9 @@ class Page {
   private bench: Bench | null = null;
   private scope: Scope | null = null;
   private panel: StatePanel | null = null;
+  private leases: Leases | null = null;
   private knobs: Knobs | null = null;
+  private drive: DrivePanel | null = null;
   private subscribed: string[] = [];
 
   constructor() {
@@ -24,6 +28,7 @@ class Page {
       welcome: (welcome, conducts) => this.welcome(welcome, conducts),
       samples: (samples) => this.take(samples),
       notice: (notice) => this.alert(notice),
+      drive: (report) => this.drive?.take(report),
       tokenWanted: (sentence) => this.wantToken(sentence),
       lost: (sentence) => this.lost(sentence),
     });
@@ -40,8 +45,7 @@ class Page {
 
   private welcome(welcome: pb.Welcome, conducts: boolean): void {
     this.scope?.end();
-    this.knobs?.end();
-    this.panel?.end();
+    this.endPanels();
     const bench = new Bench(this.wire, welcome, conducts);
     this.bench = bench;
     this.subscribed = [];
@@ -52,9 +56,11 @@ class Page {
       + (welcome.subject ? `, user ${welcome.subject}` : ""));
     this.showLink("connected", "good");
     byId("alert").hidden = true;
-    const knobs = new Knobs(byId("knobs"), bench);
-    this.knobs = knobs;
-    this.panel = new StatePanel(byId("state"), bench, (axis) => knobs.ownerOf(axis));
+    const leases = new Leases(bench);
+    this.leases = leases;
+    this.knobs = new Knobs(byId("knobs"), bench, leases);
+    this.drive = new DrivePanel(byId("drive"), bench, leases);
+    this.panel = new StatePanel(byId("state"), bench, (axis) => leases.ownerOf(axis));
     this.scope = new Scope(byId("scope"), bench, () => this.subscribe());
     this.subscribe();
     this.askStatus();
@@ -100,16 +106,23 @@ class Page {
 
   private alert(notice: pb.Notice): void {
     this.showAlert(notice.message as string);
-    if (notice.kind === pb.Notice.Kind.KIND_LEASE_TAKEN) this.knobs?.leaseTaken(notice.axis as number, notice.message as string);
+    if (notice.kind === pb.Notice.Kind.KIND_LEASE_TAKEN) this.leases?.lost(notice.axis as number, notice.message as string);
   }
 
   private lost(sentence: string): void {
     this.bench = null;
-    this.knobs?.end();
-    this.panel?.end();
+    this.endPanels();
     this.showLink("lost, looking for it", "bad");
     this.showAlert(sentence);
     byId("knobs").hidden = true;
+    byId("drive").hidden = true;
+  }
+
+  private endPanels(): void {
+    this.leases?.end();
+    this.knobs?.end();
+    this.drive?.end();
+    this.panel?.end();
   }
 
   private wantToken(sentence: string): void {

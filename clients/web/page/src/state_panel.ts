@@ -106,7 +106,7 @@ export class StatePanel {
   private showNotes(status: pb.Status): void {
     const notes = [...status.notes];
     if (this.of.isLockstep && status.axes.every((each) => each.sample?.owner === 0)) {
-      notes.push("lockstep: time stands still until a controller drives the bench, `drivebench control` for example");
+      notes.push("lockstep: time stands still until a controller drives the bench: `drivebench control` for example, or Open loop below");
     }
     if (this.notes.childElementCount !== notes.length) this.notes.replaceChildren(...notes.map((each) => element("li", {}, each)));
   }

@@ -1,4 +1,4 @@
-/** The wire to the bench: frames of bench.proto in a WebSocket, which the gateway passes on. */
+/** The wire to the bench: frames of bench.proto in a WebSocket, which the gateway passes on; texts are for its drive. */
 import { Reader } from "protobufjs/minimal.js";
 import { drivebench } from "./bench_messages.js";
 
@@ -17,11 +17,19 @@ export class Refused extends Error {
   }
 }
 
+/** What the gateway says about the axes that it drives for the page. */
+export interface DriveReport {
+  state: "idle" | "drives" | "ends" | "over";
+  problem: string;
+  axes: { axis: number; gates: "off" | "voltage" | "current" | "duty"; frequency_hz: number; amplitude: number }[];
+}
+
 export interface Listener {
   /** `conducts`: the session may change axes that other sessions hold. */
   welcome(welcome: pb.Welcome, conducts: boolean): void;
   samples(samples: pb.Samples): void;
   notice(notice: pb.Notice): void;
+  drive(report: DriveReport): void;
   /** The bench turned the page away: it wants another token. */
   tokenWanted(sentence: string): void;
   lost(sentence: string): void;
@@ -63,7 +71,8 @@ export class Wire {
         this.listener.tokenWanted(problem.message);
       }
     };
-    socket.onmessage = (event) => this.take(new Uint8Array(event.data as ArrayBuffer));
+    socket.onmessage = ({ data }) => typeof data === "string" ? this.listener.drive(JSON.parse(data) as DriveReport)
+      : this.take(new Uint8Array(data as ArrayBuffer));
     socket.onclose = (event) => {
       for (const each of this.waiting.values()) each.reject(new Error("the connection to the bench is lost"));
       this.waiting.clear();
@@ -91,6 +100,11 @@ export class Wire {
       this.waiting.set(id, { resolve, reject });
       this.socket.send(frame);
     });
+  }
+
+  /** Orders the gateway's drive; what came of it is told by reports. */
+  order(order: object): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(order));
   }
 
   private take(message: Uint8Array): void {

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+#include "clients/web/gateway/drive/open_loop.hpp"
+
+namespace drivebench::web {
+
+/// A text that is no order: what() names field, value and rule.
+struct OrderError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// What the page asks of the drive. As JSON:
+///
+///   {"op": "drive", "axes": [{"axis": 0, "gates": "voltage", "constant": [a, b, c, f], "boost": U,
+///                             "per_hz": U, "frequency_hz": f, "ramp_s": t}]}
+///   {"op": "pace", "pace": x}
+///   {"op": "step", "ticks": n}
+///   {"op": "alive"}
+///
+/// `drive` names all axes of the drive: without any it switches off and gives the leases back. `pace` is for
+/// lockstep, the seconds of the bench in a second, 0 to 1; at 0 time stands still, but for the ticks of
+/// `step`, 1 to 1,000,000.
+struct Order {
+  enum class Kind { kDrive, kPace, kStep, kAlive };
+  struct Axis {
+    std::uint32_t axis = 0;
+    OpenLoopTarget target{};
+  };
+
+  Kind kind = Kind::kAlive;
+  std::vector<Axis> axes{};
+  double pace = 0.0;
+  std::uint64_t ticks = 0;
+};
+
+/// For a bench with so many axes. Throws OrderError.
+Order parse_order(std::string_view text, std::size_t axis_count);
+
+/// The word of an order for gates; empty: no order has them.
+std::string_view word_of(v1::Gates gates) noexcept;
+
+}  // namespace drivebench::web

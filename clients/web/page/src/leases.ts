@@ -1,0 +1,84 @@
+/** The leases that this page holds. */
+import { Bench } from "./bench";
+import { pb } from "./wire";
+
+const { ACTION_ACQUIRE, ACTION_RELEASE, ACTION_RENEW } = pb.LeaseRequest.Action;
+
+export class Leases {
+  /** The numbers under which samples show this page as owner, by axis; 0: it holds no lease. */
+  private readonly owners: number[];
+  private readonly listeners: ((axis: number, sentence: string) => void)[] = [];
+  private readonly timer: number;
+  /** The gateway commands the axes of all leases. */
+  areDriven = false;
+
+  constructor(private readonly bench: Bench) {
+    this.owners = bench.histories.map(() => 0);
+    this.timer = window.setInterval(() => this.renew(), ((bench.description.lease_s as number) * 1000) / 3);
+  }
+
+  end(): void {
+    clearInterval(this.timer);
+  }
+
+  /** `change` is called with each lease that comes or goes, and with a sentence if the bench has taken it away. */
+  watch(change: (axis: number, sentence: string) => void): void {
+    this.listeners.push(change);
+  }
+
+  ownerOf(axis: number): number {
+    return this.owners[axis];
+  }
+
+  holds(axis: number): boolean {
+    return this.owners[axis] !== 0;
+  }
+
+  /** The axes whose leases the page holds. */
+  get held(): number[] {
+    return [...this.owners.keys()].filter((axis) => this.holds(axis));
+  }
+
+  async acquire(axis: number): Promise<void> {
+    if (this.holds(axis)) return;
+    this.set(axis, (await this.ask(axis, ACTION_ACQUIRE)).done?.owner as number);
+  }
+
+  async release(axis: number): Promise<void> {
+    if (!this.holds(axis)) return;
+    if (this.areDriven) throw new Error("the gateway drives the axis: give it back under Open loop");
+    await this.ask(axis, ACTION_RELEASE);
+    this.set(axis, 0);
+  }
+
+  /** Acts under a lease, which the page borrows for so long if it holds none. */
+  async under<T>(axis: number, act: () => Promise<T>): Promise<T> {
+    if (this.holds(axis)) return act();
+    await this.ask(axis, ACTION_ACQUIRE);
+    try {
+      return await act();
+    } finally {
+      await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
+    }
+  }
+
+  /** The lease has gone, for the reason that the sentence gives. */
+  lost(axis: number, sentence: string): void {
+    this.set(axis, 0, sentence);
+  }
+
+  private ask(axis: number, action: pb.LeaseRequest.Action): Promise<pb.Envelope> {
+    return this.bench.wire.ask({ lease: { axis, action } });
+  }
+
+  private set(axis: number, owner: number, sentence = ""): void {
+    this.owners[axis] = owner;
+    for (const each of this.listeners) each(axis, sentence);
+  }
+
+  private renew(): void {
+    for (const axis of this.held) {
+      this.ask(axis, ACTION_RENEW).catch((problem: Error) => this.lost(axis, `lease: ${problem.message}`));
+    }
+  }
+}

@@ -1,0 +1,294 @@
+#include "clients/web/gateway/drive/drive.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "protocols/framing.hpp"
+
+namespace drivebench::web {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr char kOneVolt[] =
+    R"({"op":"drive","axes":[{"axis":0,"gates":"voltage","constant":[1,0,0,0],"boost":0,"per_hz":0,)"
+    R"("frequency_hz":0,"ramp_s":0}]})";
+constexpr char kSlowTwoVolts[] =
+    R"({"op":"drive","axes":[{"axis":0,"gates":"voltage","constant":[2,0,0,0],"boost":0,"per_hz":0,)"
+    R"("frequency_hz":0,"ramp_s":100}]})";
+
+v1::Welcome welcome_of(v1::Mode mode) {
+  v1::Welcome welcome;
+  welcome.mutable_bench()->set_mode(mode);
+  welcome.mutable_bench()->set_period_s(1e-3);
+  v1::AxisDescription& axis = *welcome.mutable_bench()->add_axes();
+  axis.set_phases(3);
+  axis.set_connection("star");
+  return welcome;
+}
+
+/// A drive and a bench that answers it.
+class DriveTest : public testing::Test {
+ protected:
+  /// The requests that the drive makes until it wants to wait.
+  std::vector<v1::Envelope> asked() {
+    std::vector<v1::Envelope> requests;
+    for (Drive::Turn turn = drive_.next(now_); !turn.bytes.empty(); turn = drive_.next(now_)) {
+      FrameReader reader(kMaxRequestFrame);
+      const std::span<std::byte> space = reader.free_space();
+      std::ranges::copy(std::as_bytes(std::span(turn.bytes)), space.begin());
+      reader.received(turn.bytes.size());
+      while (const auto payload = reader.next()) {
+        requests.emplace_back().ParseFromArray(payload->data(), static_cast<int>(payload->size()));
+      }
+    }
+    return requests;
+  }
+
+  bool answer(const v1::Envelope& envelope) {
+    const std::string bytes = envelope.SerializeAsString();
+    return drive_.take(std::as_bytes(std::span(bytes)), now_);
+  }
+
+  void answer_with_tick(const v1::Envelope& request, std::uint64_t tick) {
+    v1::Envelope reply;
+    reply.set_id(request.id());
+    reply.mutable_exchange_reply()->add_samples()->mutable_sample()->set_tick(tick);
+    EXPECT_TRUE(answer(reply));
+  }
+
+  void refuse(const v1::Envelope& request, v1::RefusalCode code, const std::string& sentence) {
+    v1::Envelope reply;
+    reply.set_id(request.id());
+    reply.mutable_refusal()->set_code(code);
+    reply.mutable_refusal()->set_message(sentence);
+    EXPECT_TRUE(answer(reply));
+  }
+
+  /// The command of the only request.
+  v1::Command command_at(std::uint64_t tick) {
+    const std::vector<v1::Envelope> requests = asked();
+    EXPECT_EQ(requests.size(), 1u);
+    if (requests.empty()) return {};
+    answer_with_tick(requests[0], tick);
+    return requests[0].exchange().commands_size() == 1 ? requests[0].exchange().commands(0) : v1::Command();
+  }
+
+  /// Drives from tick 5 on.
+  void begin(const std::string& order) {
+    drive_.order(order, now_);
+    const std::vector<v1::Envelope> requests = asked();
+    ASSERT_EQ(requests.size(), 1u);
+    EXPECT_TRUE(requests[0].exchange().commands().empty());
+    answer_with_tick(requests[0], 5);
+  }
+
+  Drive::Time now_{1000s};
+  Drive drive_{welcome_of(v1::MODE_REALTIME)};
+};
+
+// Catches: a command for a tick that the bench has not told, two requests at a time, an answer of the page
+// that the drive swallows.
+TEST_F(DriveTest, EachAnswerHasItsCommand) {
+  begin(kOneVolt);
+  const v1::Command first = command_at(6);
+  EXPECT_EQ(first.tick(), 5u);
+  EXPECT_EQ(first.gates(), v1::GATES_VOLTAGE);
+  EXPECT_EQ(first.u_a_v(), 1.0);
+  const std::vector<v1::Envelope> second = asked();
+  ASSERT_EQ(second.size(), 1u);
+  EXPECT_EQ(second[0].exchange().commands(0).tick(), 6u);
+  EXPECT_TRUE(asked().empty());
+  v1::Envelope of_page;
+  of_page.set_id(7);
+  of_page.mutable_done();
+  EXPECT_FALSE(answer(of_page));
+}
+
+// Catches: a page that has gone and a drive that goes on, gates that stay on while the lease goes back, a
+// ramp as long as the operator's own.
+TEST_F(DriveTest, ASilentPageIsRampedDownAndGivesTheLeaseBack) {
+  begin(kOneVolt);
+  drive_.order(kSlowTwoVolts, now_);
+  command_at(6);
+  now_ += Drive::kSilence - 1ms;
+  EXPECT_EQ(command_at(7).gates(), v1::GATES_VOLTAGE);
+  now_ += 1ms;
+  EXPECT_EQ(command_at(507).gates(), v1::GATES_VOLTAGE);
+  EXPECT_NEAR(command_at(1100).u_a_v(), 0.5, 0.01);  // half of the ramp of a second
+  command_at(1101);
+  const v1::Command off = command_at(1102);
+  EXPECT_EQ(off.gates(), v1::GATES_OFF);
+  const std::vector<v1::Envelope> last = asked();
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_EQ(last[0].lease().action(), v1::LeaseRequest::ACTION_RELEASE);
+  EXPECT_TRUE(drive_.is_over());
+  EXPECT_NE(drive_.report(now_).find("silent"), std::string::npos);
+}
+
+// Catches: a page that is heard and yet given up.
+TEST_F(DriveTest, APageThatIsHeardDrivesOn) {
+  begin(kOneVolt);
+  for (std::uint64_t tick = 6; tick < 20; ++tick) {
+    now_ += 1s;
+    drive_.order(R"({"op":"alive"})", now_);
+    EXPECT_EQ(command_at(tick).gates(), v1::GATES_VOLTAGE);
+  }
+}
+
+// Catches: set-points that come back after a refusal, a drive that repeats what is refused for ever, a
+// sentence that is not the bench's.
+TEST_F(DriveTest, ARefusalSwitchesOffAndASecondOneEnds) {
+  begin(kOneVolt);
+  refuse(asked().at(0), v1::REFUSAL_LATCHED, "a fault is latched");
+  EXPECT_NE(drive_.report(now_).find("a fault is latched"), std::string::npos);
+  EXPECT_EQ(command_at(8).gates(), v1::GATES_OFF);  // asks for the tick anew
+  const std::vector<v1::Envelope> off = asked();
+  EXPECT_EQ(off.at(0).exchange().commands(0).gates(), v1::GATES_OFF);
+  EXPECT_EQ(off.at(0).exchange().commands(0).tick(), 8u);
+  refuse(off[0], v1::REFUSAL_STALE, "the command is stale");
+  EXPECT_EQ(asked().at(0).lease().action(), v1::LeaseRequest::ACTION_RELEASE);
+  EXPECT_TRUE(drive_.is_over());
+}
+
+// Catches: the end of a drive whose last command the bench never answers, such as in lockstep beside a
+// controller that has stopped.
+TEST_F(DriveTest, AnAnswerThatNeverComesDoesNotKeepTheLease) {
+  begin(kOneVolt);
+  EXPECT_EQ(asked().size(), 1u);
+  drive_.order(R"({"op":"drive","axes":[]})", now_);
+  EXPECT_TRUE(asked().empty());
+  now_ += 1s;
+  EXPECT_TRUE(asked().at(0).has_lease());
+}
+
+// Catches: lockstep that runs as fast as it can, that does not stand still, a step of another number of
+// ticks, a pause that is caught up.
+TEST_F(DriveTest, LockstepRunsAtItsPace) {
+  drive_ = Drive(welcome_of(v1::MODE_LOCKSTEP));
+  drive_.order(R"({"op":"pace","pace":0.1})", now_);
+  begin(kOneVolt);
+  const auto ticks_in = [this](std::chrono::milliseconds time) {
+    int count = 0;
+    for (const Drive::Time end = now_ + time; now_ < end; now_ += 1ms) {
+      for (std::vector<v1::Envelope> all = asked(); !all.empty(); all = asked()) {
+        ++count;
+        answer_with_tick(all[0], 6 + all[0].exchange().commands(0).tick());
+      }
+    }
+    return count;
+  };
+  EXPECT_NEAR(ticks_in(1000ms), 100, 1);
+  drive_.order(R"({"op":"pace","pace":0})", now_);
+  EXPECT_EQ(ticks_in(500ms), 0);
+  drive_.order(R"({"op":"step","ticks":7})", now_);
+  EXPECT_EQ(ticks_in(500ms), 7);
+  drive_.order(R"({"op":"pace","pace":1})", now_);
+  EXPECT_NEAR(ticks_in(100ms), 100, 1);
+}
+
+// Catches: an order that is carried out in part, a text that ends the gateway, a refusal without field or
+// rule.
+TEST_F(DriveTest, AnOrderIsCarriedOutWholeOrRefused) {
+  const auto problem_of = [this](const std::string& text) -> std::string {
+    try {
+      drive_.order(text, now_);
+    } catch (const OrderError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  const std::string axis =
+      R"("gates":"voltage","constant":[1,0,0,0],"boost":0,"per_hz":0,"frequency_hz":0,"ramp_s":0)";
+  const auto axes = [](const std::string& list) { return R"({"op":"drive","axes":[)" + list + "]}"; };
+  EXPECT_EQ(problem_of("hello"), "the text is not JSON");
+  EXPECT_EQ(problem_of(R"({"op":"pace","pace":1e999})"), "the text is not JSON");
+  EXPECT_EQ(problem_of("[]"), "op: is missing");
+  EXPECT_EQ(problem_of(R"({"op":"fly"})"), R"(op: "fly" is not one of drive, pace, step, alive)");
+  EXPECT_EQ(problem_of(R"({"op":"pace","pace":2})"), "pace: 2 is no number from 0 to 1");
+  EXPECT_EQ(problem_of(R"({"op":"step","ticks":1.5})"), "ticks: 1.5 is no whole number");
+  EXPECT_EQ(problem_of(axes(R"({"axis":1,)" + axis + "}")), "axis: 1 is no number from 0 to 0");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,)" + axis + R"(},{"axis":0,)" + axis + "}")), "axis: 0 comes twice");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,"gates":"on"})")),
+            R"(gates: "on" is not one of off, voltage, current, duty)");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,"gates":"duty","constant":[1]})")),
+            "constant: is no list of four numbers");
+  EXPECT_TRUE(drive_.is_over());
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,)" + axis + "}")), "");
+  EXPECT_FALSE(drive_.is_over());
+}
+
+OpenLoop star_axis() {
+  return {2, 1e-3, {.phases = 3, .two_phase = false, .star = true}};
+}
+
+// Catches: phases that turn the other way round, an amplitude without boost, an angle that jumps with the
+// frequency or counts commands in the place of ticks.
+TEST(OpenLoop, TheAmplitudeRisesWithTheFrequency) {
+  OpenLoop axis = star_axis();
+  axis.follow({.gates = v1::GATES_VOLTAGE,
+               .constant = {},
+               .boost = 2.0,
+               .per_hz = 0.5,
+               .frequency_hz = 20.0,
+               .ramp_s = 1.0});
+  EXPECT_EQ(axis.command(100).u_a_v(), 2.0);  // the boost is there at once
+  axis.command(350);
+  axis.command(600);
+  EXPECT_DOUBLE_EQ(axis.frequency_hz(), 10.0);
+  EXPECT_DOUBLE_EQ(axis.amplitude(), 7.0);
+  const v1::Command half = axis.command(604);
+  // 20 Hz/s: after t the angle is a turn times 10 t².
+  const double angle_rad = 2.0 * std::numbers::pi * 10.0 * 0.504 * 0.504;
+  const double amplitude_v = 2.0 + 0.5 * 20.0 * 0.504;
+  EXPECT_NEAR(half.u_a_v(), amplitude_v * std::cos(angle_rad), 1e-9);
+  EXPECT_NEAR(half.u_b_v(), amplitude_v * std::cos(angle_rad - 2.0 * std::numbers::pi / 3.0), 1e-9);
+  EXPECT_NEAR(half.u_a_v() + half.u_b_v() + half.u_c_v(), 0.0, 1e-9);
+  EXPECT_EQ(half.axis(), 2u);
+}
+
+// Catches: duties of a star that begin or end at the negative rail, which is a voltage of half the link.
+TEST(OpenLoop, DutiesOfAStarRestAtTheMiddle) {
+  OpenLoop axis = star_axis();
+  axis.follow({.gates = v1::GATES_DUTY,
+               .constant = {.a = 0.6, .b = 0.5, .c = 0.4, .f = 0.0},
+               .boost = 0.0,
+               .per_hz = 0.0,
+               .frequency_hz = 0.0,
+               .ramp_s = 1.0});
+  EXPECT_EQ(axis.command(0).d_a(), 0.5);
+  EXPECT_NEAR(axis.command(500).d_a(), 0.55, 1e-12);
+  axis.ramp_down(0.1);
+  EXPECT_NEAR(axis.command(550).d_a(), 0.525, 1e-12);
+  EXPECT_EQ(axis.command(600).d_c(), 0.5);
+  EXPECT_TRUE(axis.has_arrived());
+}
+
+// Catches: a second start that jumps to the frequency of the first, or takes the time between them for one
+// step.
+TEST(OpenLoop, AStartAfterGatesOffBeginsAtRest) {
+  OpenLoop axis = star_axis();
+  const OpenLoopTarget target = {.gates = v1::GATES_CURRENT,
+                                 .constant = {},
+                                 .boost = 1.0,
+                                 .per_hz = 0.1,
+                                 .frequency_hz = 50.0,
+                                 .ramp_s = 1.0};
+  axis.follow(target);
+  axis.command(0);
+  axis.command(900);
+  axis.switch_off();
+  const v1::Command off = axis.command(901);
+  EXPECT_EQ(off.gates(), v1::GATES_OFF);
+  EXPECT_EQ(off.i_a_a(), 0.0);
+  axis.follow(target);
+  EXPECT_EQ(axis.command(5000).i_a_a(), 1.0);
+  EXPECT_EQ(axis.frequency_hz(), 0.0);
+}
+
+}  // namespace
+}  // namespace drivebench::web

@@ -1,0 +1,101 @@
+/** Scenarios of an operator who drives an axis open loop. */
+export function driveScenarios({ axeFinds, enter, outside, press, set, stateOf, text, until }) {
+  const answer = (page, pattern) => text(page, "#drive .answer", pattern);
+  const now = (page, pattern) => text(page, "#drive .value", pattern);
+  const tickOf = async (page) => Number(await stateOf(page, "tick", /^\d+$/));
+
+  /** Fills in a V/f start. */
+  async function fill(page, values) {
+    await stateOf(page, "tick", /\d/);
+    for (const [label, value] of Object.entries(values)) await set(page, `${label} (servo)`, value);
+  }
+
+  const kStart = { "target frequency, Hz": "20", "amplitude at the target, V": "30", "boost: amplitude at standstill, V": "10", "ramp, s": "0.5" };
+
+  return {
+    /** Lockstep: drive, turn a knob, hold the time, make steps, stop and give back; keys alone from the fields on. */
+    async drive(page, token) {
+      await enter(page, token);
+      await fill(page, kStart);
+      const before = await text(page, "#state .notes", /stands still/);
+      await page.focus('[aria-label="drive servo"]');
+      await page.keyboard.press("Enter");
+      const owner = await stateOf(page, "controller", /this page/);
+      const arrived = await now(page, /^20\.00 Hz/);
+      const speed = await stateOf(page, "speed", /^4\d\.\d* rad/);
+      await set(page, "impulse, N*m*s", "0.0001");
+      await press(page, "Bump");
+      const bump = await text(page, "#knobs .answer", /:/);
+      await press(page, "Release the lease");
+      const kept = await text(page, "#knobs .answer", /lease/);
+      await press(page, "Hold the time");
+      await until(async () => {
+        const first = await tickOf(page);
+        await new Promise((done) => setTimeout(done, 1200));
+        return String((await tickOf(page)) - first);
+      }, /^0$/);
+      const held = await tickOf(page);
+      await set(page, "ticks of a step", "7");
+      await press(page, "Step");
+      const stepped = await stateOf(page, "tick", new RegExp(`^(?!${held}$)\\d+$`));
+      await press(page, "Let the time run");
+      await page.focus(".panes");
+      await page.keyboard.press("Escape");
+      const stopped = await answer(page, /stopped/);
+      const off = await now(page, /off/);
+      await stateOf(page, "speed", /^[0-2]?\d\.\d* rad/); // it coasts
+      await outside("stopped");
+      await press(page, "give servo back");
+      const given = await answer(page, /given back/);
+      const isStopShown = () => page.$eval("#stop", (each) => String(!each.hidden));
+      await until(isStopShown, /false/);
+      return { before, owner, arrived, speed, bump, kept, steps: Number(stepped) - held, stopped, off, given, free: await stateOf(page, "controller", /none/) };
+    },
+
+    /** Real time: the page goes while the motor turns. */
+    async gone(page) {
+      await fill(page, kStart);
+      await press(page, "drive servo");
+      await now(page, /^20\.00 Hz/);
+      const speed = await stateOf(page, "speed", /^4\d\.\d* rad/);
+      await outside("turning");
+      await page.goto("about:blank");
+      await outside("gone");
+      return { speed };
+    },
+
+    /** What the page may not do, and fields that are no numbers. */
+    async refused(page) {
+      await fill(page, { ...kStart, "ramp, s": "-1" });
+      await press(page, "drive servo");
+      const ramp = await answer(page, /ramp/);
+      await set(page, "ramp, s (servo)", "0.5");
+      await outside("take the lease");
+      await press(page, "drive servo");
+      const owned = await answer(page, /lease:/);
+      await outside("free the lease");
+      await set(page, "amplitude at the target, V (servo)", "1e9");
+      await press(page, "drive servo");
+      const beyond = await answer(page, /1e9/);
+      return { ramp, owned, beyond };
+    },
+
+    /** For axe-core: while the page drives, with each wave and unit once. */
+    async driveAxe(page) {
+      await fill(page, kStart);
+      await press(page, "drive servo");
+      await now(page, /Hz/);
+      const fields = {};
+      for (const wave of ["rotating", "standing", "terminals"]) {
+        for (const gates of ["voltage", "duty"]) {
+          await set(page, "wave of servo", wave);
+          await set(page, "set-points of servo", gates);
+          fields[`${wave} ${gates}`] = await page.$$eval("#drive .fields input", (all) => all.map((each) => `${each.ariaLabel}=${each.value}`));
+        }
+      }
+      const tabbed = await page.evaluate(() => [...document.querySelectorAll("#drive button, #drive input, #drive select, #stop")]
+        .filter((each) => !each.disabled && (!each.checkVisibility() || each.tabIndex < 0)).map((each) => each.outerHTML));
+      return { ...(await axeFinds(page)), fields, tabbed };
+    },
+  };
+}

@@ -1,0 +1,87 @@
+#!/usr/bin/python3
+"""An operator drives an axis open loop from the page of `drivebench web`: browser/drive_scenarios.mjs in Debian's chromium."""
+import sys
+import unittest
+
+from test_page import BENCHES, REPOSITORY, PageTest, missing, pb, until
+
+IDLE, RUN, HOLD = 0, 1, 2
+LATCHED = 512  # the fault of a controller that is lost
+
+
+class DrivePage(PageTest):
+    def in_real_time(self):
+        """The servo at 1 kHz, with a watchdog that the pauses of a busy machine do not reach."""
+        text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        for before, after in (("period_us = 125 ", "period_us = 1000"), ("substeps = 5", "substeps = 40"),
+                              ("watchdog_ticks = 20 ", "watchdog_ticks = 5000"), ("lease_s = 2.0", "lease_s = 10.0")):
+            self.assertIn(before, text)
+            text = text.replace(before, after)
+        return self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
+
+    def test_an_operator_drives_in_lockstep_by_keys(self):
+        """Catches: a drive that needs more than the role operator, knobs that its own lease locks out, a time that does not
+        stand still or makes other steps than it is told, Escape that leaves the gates on, a lease that the page keeps."""
+        server = self.for_users()
+        client = server.client(token="vera-secret")
+        self.addCleanup(client.close)
+        samples = []
+        shown = self.play("drive", self.gateway(server).url, "otto-secret", outside=lambda _: samples.append(client.newest()))
+        self.assertIn("lockstep: time stands still", shown["before"])
+        self.assertEqual((shown["owner"], shown["free"]), ("this page", "none"))
+        self.assertEqual(shown["arrived"], "20.00 Hz, 30.00 V")
+        self.assertAlmostEqual(float(shown["speed"].split()[0]), 41.9, delta=1.0)  # 2 pi 20 Hz / 3 pole pairs
+        self.assertIn("done at tick", shown["bump"])
+        self.assertIn("give it back", shown["kept"])
+        self.assertEqual(shown["steps"], 7)
+        self.assertIn("gates are off", shown["stopped"])
+        self.assertEqual((samples[0].faults & LATCHED, samples[0].state), (0, RUN))
+        self.assertLess(abs(samples[0].true_i_a_a), 1e-9)
+
+    def test_a_page_that_goes_ends_its_drive_in_order(self):
+        """Catches: a motor that turns on without its operator, a session that ends with the gates on, which the bench latches as
+        a loss of its controller, a lease that stays."""
+        server = self.in_real_time()
+        client = server.client()
+        self.addCleanup(client.close)
+        samples = {}
+
+        def outside(what):
+            if what == "gone":
+                until(lambda: client.newest().owner == 0, "the lease of the page")
+            samples[what] = client.newest()
+
+        self.play("gone", self.gateway(server).url, outside=outside)
+        self.assertIn(samples["turning"].state, (RUN, HOLD))
+        self.assertEqual((samples["gone"].state, samples["gone"].faults & LATCHED), (IDLE, 0))
+        self.assertLess(samples["gone"].speed_rad_s, 20.0)
+        self.assertLess(abs(samples["gone"].true_i_a_a), 1e-9)
+
+    def test_refusals_are_told_in_the_words_of_the_bench(self):
+        """Catches: a refusal that the page swallows or rewords, and a number that it sends although it is none."""
+        server = self.in_real_time()
+        client = server.client()
+        self.addCleanup(client.close)
+
+        def outside(what):
+            client.lease(pb.LeaseRequest.ACTION_ACQUIRE if what == "take" else pb.LeaseRequest.ACTION_RELEASE)
+
+        shown = self.play("refused", self.gateway(server).url, outside=outside)
+        self.assertIn("ramp, s: '-1' is no number from 0 to 3600", shown["ramp"])
+        self.assertIn("target, V: '1e9' is no number from -1000000 to 1000000", shown["beyond"])
+        self.assertRegex(shown["owned"], "^lease: .*holds the lease of the axis")
+
+    def test_axe_finds_no_serious_fault_while_the_page_drives(self):
+        """Catches: a control of the drive without a name or out of the reach of keys, a Stop that one cannot read, fields in
+        another unit than that of their set-points."""
+        shown = self.play("driveAxe", self.gateway(self.serve("--mode", "lockstep")).url)
+        self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
+        self.assertEqual(shown["tabbed"], [])
+        self.assertIn("amplitude at the target, V (servo)=0", shown["fields"]["rotating voltage"])
+
+
+if __name__ == "__main__":
+    if reason := missing():
+        print(f"SKIPPED: {reason}")
+        sys.exit(77)
+    unittest.main(verbosity=2)
