@@ -107,8 +107,7 @@ void add_tables(Tables& tables, const std::string& function, const LineVerb& ver
   std::vector<std::string> below;
   std::size_t place = 0;
   for (const LineOption& option : verb.options) {
-    const std::string kind =
-        option.positional && option.value == "TEXT" ? option.names.front() : option.value;
+    const std::string& kind = option.value;
     const std::string command = action(function, kind, option.words, facts);
     if (option.positional) {
       add_row(tables.places, line + " " + std::to_string(place++), command);

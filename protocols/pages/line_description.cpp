@@ -2,10 +2,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdlib>
 #include <string_view>
 
 namespace drivebench::pages {
 namespace {
+
+/// The line above the examples of a footer.
+constexpr const char* kExample = "Example:";
 
 std::vector<std::string> split(std::string_view text, char at) {
   std::vector<std::string> parts;
@@ -17,17 +21,16 @@ std::vector<std::string> split(std::string_view text, char at) {
   }
 }
 
-/// CLI11 keeps type and validators as one text: `TEXT:{csv,candump}`, `INT:INT in [1 - 127]`.
-void read_type(std::string_view type, LineOption& option) {
-  const std::size_t colon = type.find(':');
-  const std::string_view kind = type.substr(0, colon);
-  option.value = kind == "INT" || kind == "UINT" || kind == "FLOAT" ? "NUMBER" : kind;
-  if (colon == std::string_view::npos) return;
-  const std::string_view rule = type.substr(colon + 1);
-  const std::size_t open = rule.find_first_of("{[");
-  if (open == std::string_view::npos) return;
-  const std::string_view inside = rule.substr(open + 1, rule.find_first_of("}]", open) - open - 1);
-  if (rule[open] == '{') {
+/// CLI11 keeps type and validators as one text: `MODE:{realtime,lockstep}`, `FROM:TO`, `NUMBER:INT in [1 -
+/// 127]`.
+void read_type(const std::string& type, LineOption& option) {
+  const std::size_t rule = std::min(
+      {type.find(":{"), type.find(":["), type.find(":INT in ["), type.find(":UINT in ["), type.size()});
+  option.value = type.substr(0, rule);
+  const std::size_t open = type.find_first_of("{[", rule);
+  if (open == std::string::npos) return;
+  const std::string inside = type.substr(open + 1, type.find_first_of("}]", open) - open - 1);
+  if (type[open] == '{') {
     option.words = split(inside, ',');
   } else {
     option.range = inside;
@@ -44,6 +47,7 @@ std::vector<std::string> sorted_names(const std::set<CLI::Option*>& options) {
 }
 
 LineOption describe_option(const CLI::Option& from) {
+  const bool many = from.get_expected_max() >= CLI::detail::expected_max_vector_size;
   LineOption option = {.text = from.get_description(),
                        .group = from.get_group(),
                        .default_value = from.get_default_str(),
@@ -51,7 +55,8 @@ LineOption describe_option(const CLI::Option& from) {
                        .excludes = sorted_names(from.get_excludes()),
                        .positional = from.get_positional(),
                        .required = from.get_required(),
-                       .list = from.get_delimiter() == ','};
+                       .list = many && from.get_delimiter() == ',',
+                       .repeats = many && from.get_delimiter() != ','};
   if (option.positional) {
     option.names.push_back(from.get_name(true));
   } else {
@@ -64,28 +69,132 @@ LineOption describe_option(const CLI::Option& from) {
   return option;
 }
 
+/// The footer has examples as indented lines, exit codes as lines that start with "Exit code", and notes.
+void read_footer(std::string_view footer, LineVerb& verb) {
+  for (const std::string& line : split(footer, '\n')) {
+    if (line.starts_with("  ")) {
+      verb.examples.push_back(line.substr(2));
+    } else if (line.starts_with("Exit code")) {
+      verb.exit_codes.push_back(line);
+    } else if (!line.empty() && line != kExample) {
+      verb.notes.push_back(line);
+    }
+  }
+}
+
+/// CLI11 hands the footer of a verb on to those below. Of it they take the exit codes, if they have none.
+void read_footers(const CLI::App& app, LineVerb& verb) {
+  const CLI::App* const above = app.get_parent();
+  if (above == nullptr || app.get_footer() != above->get_footer()) read_footer(app.get_footer(), verb);
+  if (above == nullptr || verb.passes_on || !verb.exit_codes.empty()) return;
+  LineVerb whole;
+  read_footers(*above, whole);
+  verb.exit_codes = std::move(whole.exit_codes);
+}
+
 LineVerb describe(const CLI::App& app, std::vector<std::string> path) {
-  LineVerb verb = {.path = std::move(path),
-                   .text = app.get_description(),
-                   .footer = app.get_footer(),
-                   .passes_on = app.get_prefix_command()};
+  LineVerb verb = {
+      .path = std::move(path), .text = app.get_description(), .passes_on = app.get_prefix_command()};
+  read_footers(app, verb);
   for (const CLI::Option* option : app.get_options()) {
-    if (!option->get_group().empty()) verb.options.push_back(describe_option(*option));
+    if (option->get_group().empty()) continue;
+    verb.options.push_back(describe_option(*option));
+    if (option == app.get_help_ptr()) verb.options.back().group = kHelp;
   }
   for (const CLI::App* sub : app.get_subcommands(nullptr)) {
     std::vector<std::string> below = verb.path;
     below.push_back(sub->get_name());
     verb.verbs.push_back(describe(*sub, std::move(below)));
   }
+  if (!verb.examples.empty()) return verb;
+  for (const LineVerb& below : verb.verbs) {
+    if (!below.examples.empty()) verb.examples.push_back(below.examples.front());
+  }
   return verb;
+}
+
+void arrange(std::vector<LineVerb>& verbs, const std::vector<VerbGroup>& groups) {
+  std::vector<LineVerb> arranged;
+  for (const VerbGroup& group : groups) {
+    for (const std::string& name : group.verbs) {
+      const auto found =
+          std::ranges::find_if(verbs, [&](const LineVerb& verb) { return verb.path.back() == name; });
+      if (found == verbs.end()) continue;
+      found->group = group.heading;
+      arranged.push_back(std::move(*found));
+      verbs.erase(found);
+    }
+  }
+  std::ranges::move(verbs, std::back_inserter(arranged));
+  verbs = std::move(arranged);
+}
+
+/// `1 - 127` in words. A limit that is there only so that numbers cannot overflow is not told.
+std::string range_in_words(const std::string& range) {
+  const std::size_t dash = range.find(" - ");
+  if (dash == std::string::npos) return "";
+  const std::string low = range.substr(0, dash);
+  const std::string high = range.substr(dash + 3);
+  const double least = std::strtod(low.c_str(), nullptr);
+  const double most = std::strtod(high.c_str(), nullptr);
+  constexpr double kNoLimit = 1e6;
+  constexpr double kAlmostZero = 1e-4;
+  const bool almost_zero = least > 0.0 && least <= kAlmostZero;
+  const std::string from = almost_zero ? "more than 0" : low;
+  if (most < kNoLimit) return almost_zero ? from + ", at most " + high : from + " to " + high;
+  if (least <= -kNoLimit) return "";
+  return almost_zero ? from : from + " or more";
+}
+
+std::string with_names(std::string_view before, const std::vector<std::string>& names) {
+  return names.empty() ? "" : std::string(before) + joined(names, ", ");
 }
 
 }  // namespace
 
-LineVerb describe_line(const CLI::App& app, const std::string& name) {
-  LineVerb line = describe(app, {name});
+LineVerb describe_line(const CLI::App& app, const std::string& name, const std::vector<VerbGroup>& groups) {
+  std::vector<std::string> path;
+  for (const CLI::App* verb = &app; verb->get_parent() != nullptr; verb = verb->get_parent())
+    path.insert(path.begin(), verb->get_name());
+  path.insert(path.begin(), name);
+  LineVerb line = describe(app, std::move(path));
+  if (app.get_parent() == nullptr) arrange(line.verbs, groups);
   if (line.text.starts_with(name + ": ")) line.text.erase(0, name.size() + 2);
   return line;
+}
+
+std::vector<std::string> option_groups(const LineVerb& verb) {
+  std::vector<std::string> groups;
+  for (const LineOption& option : verb.options) {
+    if (!option.positional && std::ranges::find(groups, option.group) == groups.end())
+      groups.push_back(option.group);
+  }
+  const auto place = [](const std::string& group) {
+    return group == kConnection ? 0 : group == kOutput ? 2 : group == kHelp ? 3 : 1;
+  };
+  std::ranges::stable_sort(groups, {}, place);
+  return groups;
+}
+
+std::vector<std::string> verb_groups(const LineVerb& verb) {
+  std::vector<std::string> groups;
+  for (const LineVerb& below : verb.verbs)
+    if (groups.empty() || groups.back() != below.group) groups.push_back(below.group);
+  return groups;
+}
+
+std::string remarks(const LineOption& option) {
+  std::string text;
+  const auto add = [&text](const std::string& part) {
+    if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
+  };
+  add(range_in_words(option.range));
+  if (!option.default_value.empty()) add("default: " + option.default_value);
+  if (option.required && !option.positional) add("must be given");
+  if (option.repeats) add("may be given several times");
+  add(with_names("needs ", option.needs));
+  add(with_names("not together with ", option.excludes));
+  return text.empty() ? "" : " (" + text + ")";
 }
 
 std::vector<const LineVerb*> all_verbs(const LineVerb& verb) {

@@ -46,8 +46,9 @@ void add_section(std::string& page, std::string_view title) {
   page += "\n";
 }
 
-/// `FILE`, `csv|candump`.
+/// `FILE`, `SIGNAL,...`, `csv|candump`.
 std::string value_of(const LineOption& option) {
+  if (option.list) return italic(option.value) + ",...";
   if (option.words.empty()) return italic(option.value);
   std::string words;
   for (const std::string& word : option.words)
@@ -63,44 +64,15 @@ std::string heading(const LineOption& option) {
   return option.value.empty() ? names : names + " " + value_of(option);
 }
 
-std::string remark(std::string_view before, const std::vector<std::string>& names) {
-  std::string text(before);
-  for (const std::string& name : names)
-    text += (&name == &names.front() ? " " : ", ") + name;
-  return names.empty() ? "" : text;
-}
-
-/// What an option's text does not say: its bounds, its default, what it goes with.
-std::string remarks(const LineOption& option) {
-  std::string text;
-  const auto add = [&text](const std::string& part) {
-    if (!part.empty()) text += (text.empty() ? "" : "; ") + part;
-  };
-  if (const std::size_t dash = option.range.find(" - "); dash != std::string::npos)
-    add(option.range.substr(0, dash) + " to " + option.range.substr(dash + 3));
-  if (!option.default_value.empty()) add("default: " + option.default_value);
-  if (option.required && !option.positional) add("must be given");
-  add(remark("needs", option.needs));
-  add(remark("not together with", option.excludes));
-  return text.empty() ? "" : " (" + text + ")";
-}
-
 void add_option(std::string& page, const LineOption& option) {
   const std::string text = option.text + remarks(option);
   page += ".TP\n" + heading(option) + "\n" + (text.empty() ? "\\&" : roff(text)) + "\n";
 }
 
 void add_options(std::string& page, const LineVerb& verb) {
-  std::vector<std::string> groups;
-  for (const LineOption& option : verb.options) {
-    if (!option.positional && std::ranges::find(groups, option.group) == groups.end())
-      groups.push_back(option.group);
-  }
-  std::stable_partition(groups.begin(), groups.end(),
-                        [](const std::string& group) { return group == "Options"; });
   add_section(page, "OPTIONS");
-  for (const std::string& group : groups) {
-    if (group != "Options") page += ".SS " + roff(group) + "\n";
+  for (const std::string& group : option_groups(verb)) {
+    page += ".SS " + roff(group) + "\n";
     for (const LineOption& option : verb.options)
       if (!option.positional && option.group == group) add_option(page, option);
   }
@@ -115,9 +87,12 @@ void add_synopsis(std::string& page, const LineVerb& verb) {
     page += " [" + italic("OPTION") + " ...]";
   }
   for (const LineOption& option : verb.options) {
-    if (!option.positional) continue;
-    const std::string name = italic(option.names.front());
-    page += option.required ? " " + name : " [" + name + "]";
+    if (option.positional) {
+      const std::string name = italic(option.names.front());
+      page += option.required ? " " + name : " [" + name + "]";
+    } else if (option.required) {
+      page += " " + heading(option);
+    }
   }
   if (!verb.verbs.empty()) page += " " + italic("VERB") + " [" + italic("ARGUMENT") + " ...]";
   page += "\n";
@@ -135,40 +110,29 @@ std::string sentence(const std::string& text) {
 
 void add_verbs(std::string& page, const LineVerb& verb, const ManHead& head) {
   add_section(page, "VERBS");
-  for (const LineVerb& below : verb.verbs) {
-    page += ".TP\n" + bold(joined(below.path, "-")) + "(" + head.section + ")\n";
-    page += roff(below.text) + "\n";
+  for (const std::string& group : verb_groups(verb)) {
+    if (!group.empty()) page += ".SS " + roff(group) + "\n";
+    for (const LineVerb& below : verb.verbs) {
+      if (below.group != group) continue;
+      page += ".TP\n" + bold(joined(below.path, "-")) + "(" + head.section + ")\n";
+      page += roff(below.text) + "\n";
+    }
   }
 }
 
-/// The paragraphs of the footer of --help: `Example:` with indented lines, `Exit codes: ...`, and notes.
-void add_footer(std::string& page, std::string_view footer) {
-  std::string notes;
-  std::string codes;
-  std::string examples;
-  while (!footer.empty()) {
-    const std::string_view line = footer.substr(0, footer.find('\n'));
-    footer.remove_prefix(std::min(footer.size(), line.size() + 1));
-    if (line.starts_with("  ")) {
-      examples += roff(line.substr(2)) + "\n";
-    } else if (line.starts_with("Exit code")) {
-      codes += roff(line) + "\n";
-    } else if (!line.empty() && line != "Example:") {
-      notes += roff(line) + "\n";
-    }
-  }
-  if (!notes.empty()) {
-    add_section(page, "NOTES");
-    page += notes;
-  }
-  if (!examples.empty()) {
-    add_section(page, "EXAMPLES");
-    page += ".nf\n" + examples + ".fi\n";
-  }
-  if (!codes.empty()) {
-    add_section(page, "EXIT STATUS");
-    page += codes;
-  }
+/// What stands below the options of --help.
+void add_footer(std::string& page, const LineVerb& verb) {
+  const auto add = [&page](std::string_view title, const std::vector<std::string>& lines, bool as_they_are) {
+    if (lines.empty()) return;
+    add_section(page, title);
+    if (as_they_are) page += ".nf\n";
+    for (const std::string& line : lines)
+      page += roff(line) + "\n";
+    if (as_they_are) page += ".fi\n";
+  };
+  add("NOTES", verb.notes, false);
+  add("EXAMPLES", verb.examples, true);
+  add("EXIT STATUS", verb.exit_codes, false);
 }
 
 void add_see_also(std::string& page, const LineVerb& verb, const ManHead& head) {
@@ -207,7 +171,7 @@ std::string man_page(const LineVerb& verb, const ManHead& head) {
       if (option.positional) add_option(page, option);
   }
   add_options(page, verb);
-  add_footer(page, verb.footer);
+  add_footer(page, verb);
   add_see_also(page, verb, head);
   return page;
 }

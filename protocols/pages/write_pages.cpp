@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "protocols/pages/help_text.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::pages {
@@ -37,7 +38,7 @@ std::string date() {
 }
 
 void write(const CLI::App& app, const Program& program, const fs::path& folder) {
-  const LineVerb line = describe_line(app, program.name);
+  const LineVerb line = describe_line(app, program.name, program.groups);
   const CompletionFacts facts = program.facts();
   const ManHead head = {
       .section = program.section, .version = program.version, .date = date(), .see_also = program.see_also};
@@ -49,9 +50,25 @@ void write(const CLI::App& app, const Program& program, const fs::path& folder) 
   write_file(folder / "zsh/site-functions" / ("_" + program.name), zsh_completion(line, facts));
 }
 
+/// CLI11's message about an error, without its words for types and verbs.
+std::string in_our_words(const CLI::App*, const CLI::Error& error) {
+  std::string text = error.what();
+  if (error.get_name() == "ArgumentMismatch" && text.ends_with(" missing")) {
+    text = text.substr(0, text.find(": ")) + ": its value is missing";
+  } else if (text == "A subcommand is required") {
+    text = "a verb is missing";
+  }
+  return text + "\nRun with --help for more information.\n";
+}
+
 }  // namespace
 
-void add_write_pages(CLI::App& app, const Program& program) {
+void add_pages(CLI::App& app, const Program& program) {
+  app.set_help_flag("-h,--help", "print this help and end");
+  app.failure_message(in_our_words);
+  app.formatter_fn([program](const CLI::App* verb, const std::string&, CLI::AppFormatMode) {
+    return help_text(describe_line(*verb, program.name, program.groups));
+  });
   app.add_option_function<std::string>(
          "--write-pages",
          [&app, program](const std::string& folder) {
@@ -63,7 +80,8 @@ void add_write_pages(CLI::App& app, const Program& program) {
            throw CLI::Success();
          },
          "write man pages, and completions for bash and zsh, into a folder like ~/.local/share, and end")
-      ->type_name("FOLDER");
+      ->type_name("FOLDER")
+      ->group(kHelp);
 }
 
 }  // namespace drivebench::pages

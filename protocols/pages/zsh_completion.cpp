@@ -35,7 +35,7 @@ std::string action(const std::string& kind, const std::vector<std::string>& word
 }
 
 std::string action(const LineOption& option, const CompletionFacts& facts) {
-  const std::string kind = option.positional && option.value == "TEXT" ? option.names.front() : option.value;
+  const std::string& kind = option.value;
   const std::string found = action(kind, option.words, option.list, facts);
   const bool command = found.starts_with("_alternative");
   return ":" + quoted(kind, ":") + ":" + (command ? "{" + found + "}" : found);
@@ -60,10 +60,15 @@ std::string function_of(const LineVerb& verb) {
 void add_below(std::string& script, const LineVerb& verb) {
   script +=
       " \\\n    '1:VERB:->verb' '*::ARGUMENT:->rest' && return\n  case $state in\n    verb)\n      local -a "
-      "verbs=(";
-  for (const LineVerb& below : verb.verbs)
-    script += "\n        '" + quoted(below.path.back(), ":") + ":" + quoted(below.text, "") + "'";
-  script += ")\n      _describe verb verbs ;;\n    rest)\n      case $words[1] in\n";
+      "verbs";
+  for (const std::string& group : verb_groups(verb)) {
+    script += "\n      verbs=(";
+    for (const LineVerb& below : verb.verbs)
+      if (below.group == group)
+        script += "\n        '" + quoted(below.path.back(), ":") + ":" + quoted(below.text, "") + "'";
+    script += ")\n      _describe -V '" + quoted(group.empty() ? "verb" : group, "") + "' verbs";
+  }
+  script += " ;;\n    rest)\n      case $words[1] in\n";
   for (const LineVerb& below : verb.verbs)
     script += "        " + below.path.back() + ") " + function_of(below) + " ;;\n";
   script += "      esac ;;\n  esac\n";

@@ -12,6 +12,7 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "helpers"))
+from help_text import examples, headings, help_of, rows, verbs  # noqa: E402
 from wire_client import PATIENCE_S, REPOSITORY, SERVER  # noqa: E402
 
 CLIENT = SERVER.parent / "drivebench"
@@ -71,27 +72,22 @@ class Pages(unittest.TestCase):
         (cls.work / "many").mkdir(parents=True)
         (cls.work / "one.mcap").write_bytes(b"")
 
-    def verbs(self, *path):
-        """Every verb that --help names, with those below it."""
-        said = run(CLIENT, *path, "--help")
-        yield path
-        for name in re.findall(r"^  ([a-z-]+) ", said.partition("Subcommands:")[2], re.MULTILINE):
-            yield from self.verbs(*path, name)
-
-    # Catches: a verb without a page, a page that lacks an option of --help or tells another text.
+    # Catches: a verb without a page, a page that lacks an option, a heading or an example of --help or tells another text.
     def test_every_verb_has_a_page_with_the_texts_of_help(self):
-        verbs = list(self.verbs())
-        self.assertEqual({"-".join(("drivebench", *path)) + ".1" for path in verbs}, {file.name for file in (self.pages / "man/man1").iterdir()})
-        for program, path, page in [(CLIENT, path, "man1/" + "-".join(("drivebench", *path)) + ".1") for path in verbs] + [
-                (SERVER, (), "man8/drivebench-server.8")]:
-            shown = " ".join(run("man", "-l", self.pages / "man" / page, env={"MANWIDTH": "200", "PATH": os.environ["PATH"], "LANG": "C.UTF-8"}).split())
-            if path == ("serve",):
-                continue  # --help belongs to the program behind it
-            for line in run(program, *path, "--help").splitlines():
-                if option := re.match(r"  (-h,)?(--[a-z0-9-]+)", line):
-                    self.assertIn(option[2], shown, page)
-                elif text := re.match(r" {30}(\S.*)", line):
-                    self.assertIn(" ".join(text[1].split()), shown, page)
+        found = {"-".join(("drivebench", *path)) + ".1": text for path, text in verbs()}
+        self.assertEqual(set(found), {file.name for file in (self.pages / "man/man1").iterdir()})
+        del found["drivebench-serve.1"]  # its --help is that of the program behind it
+        for page, text in {**found, "drivebench-server.8": help_of("drivebench-server")}.items():
+            shown = " ".join(run("man", "-l", self.pages / f"man/man{page[-1]}" / page,
+                                 env={"MANWIDTH": "200", "PATH": os.environ["PATH"], "LANG": "C.UTF-8"}).split())
+            for name, said in rows(text):
+                if name.startswith("-"):
+                    self.assertIn(name, shown, page)
+                self.assertIn(said, shown, page)
+            for heading in headings(text):
+                self.assertIn(heading.upper() if heading in ("Arguments", "Verbs") else heading, shown, page)
+            for example in examples(text):
+                self.assertIn(" ".join(example.split()), shown.partition(" EXAMPLES ")[2], page)
 
     # Catches: text that troff takes for a request, a macro that does not exist, a date that no program reads.
     def test_mandoc_and_groff_have_nothing_to_say_about_them(self):

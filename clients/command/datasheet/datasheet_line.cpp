@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <cctype>
+
 #include "clients/command/common/line/command_line.hpp"
 #include "clients/command/datasheet/new_bench.hpp"
 #include "clients/command/datasheet/new_motor.hpp"
@@ -9,44 +11,57 @@
 namespace drivebench::command {
 namespace {
 
-/// An option for each form of a quantity, in a group of its own.
+/// Where the options of a quantity stand: in a group of its own if there are several.
+std::string group_of(const Quantity& quantity) {
+  if (quantity.forms.size() > 1) {
+    const char first = static_cast<char>(std::toupper(static_cast<unsigned char>(quantity.title.front())));
+    return fmt::format("{}{}, in one of these forms{}", first, quantity.title.substr(1),
+                       quantity.required ? "" : " (may be left out)");
+  }
+  return quantity.required ? "Numbers that must be known" : "Numbers that may be left out";
+}
+
+/// An option for each form of a quantity.
 void add_forms(CLI::App& sub, std::span<const Quantity> quantities, Sheet& sheet) {
   for (const Quantity& quantity : quantities) {
     const bool choice = quantity.forms.size() > 1;
-    const std::string group = fmt::format("{}{}{}", quantity.title, choice ? ", in one of these forms" : "",
-                                          quantity.required ? "" : " (may be left out)");
     for (const Form& form : quantity.forms) {
       if (sub.get_option_no_throw(fmt::format("--{}", form.name)) != nullptr) continue;  // of two quantities
       sub.add_option_function<double>(
              fmt::format("--{}", form.name),
              [&sheet, name = std::string(form.name)](double x) { sheet.given[name] = x; },
-             std::string(form.meaning))
+             choice ? std::string(form.meaning) : fmt::format("{}, {}", quantity.title, form.meaning))
           ->type_name(std::string(form.unit))
           ->check(finite_between(form.least, form.most))
-          ->group(group);
+          ->group(group_of(quantity));
     }
   }
 }
 
 void add_out(CLI::App& sub, std::string& out_file) {
   sub.add_option("--out", out_file, "write to this file, which must be new; default: standard output")
-      ->type_name("FILE.toml");
+      ->type_name("FILE.toml")
+      ->group(kOutput);
 }
 
 void add_new_motor(CommandLine& line, CLI::App& parent, const MotorKind& kind) {
   const auto [sub, o] = line.add<NewMotorOptions>(
       parent, std::string(kind.name), std::string(kind.title),
       [&kind](const NewMotorOptions& options) { return run_new_motor(kind, options); });
-  sub.add_option("--name", o.name, "of the motor, for people")->type_name("TEXT");
-  sub.add_option("--source", o.source, "where its numbers are from")
-      ->type_name("TEXT")
-      ->capture_default_str();
-  add_out(sub, o.out_file);
-  if (kind.phases) sub.add_flag("--delta", o.sheet.delta, "phase numbers are those of the phases of a delta");
   for (const auto quantities : {kind.machine_values, kind.shaft_values, kind.other_values})
     add_forms(sub, quantities, o.sheet);
+  if (kind.phases) {
+    sub.add_flag("--delta", o.sheet.delta, "phase numbers are those of the phases of a delta")
+        ->group("What the numbers mean");
+  }
+  begin_group(sub, kOutput);
+  sub.add_option("--name", o.name, "name of the motor, for people")->type_name("NAME");
+  sub.add_option("--source", o.source, "where its numbers are from")
+      ->type_name("SOURCE")
+      ->capture_default_str();
+  add_out(sub, o.out_file);
   sub.footer(fmt::format(
-      "Example:\n  drivebench new motor {} {} --out motor.toml\n\n"
+      "Example:\n  drivebench new motor {0} {1} --out my-{0}.toml\n"
       "What is missing is asked for on a terminal. Give a quantity in several forms, and they must "
       "agree within a tenth.\n"
       "Exit codes: 0 written, 2 a number is missing, impossible or contradicts another.",
@@ -55,23 +70,23 @@ void add_new_motor(CommandLine& line, CLI::App& parent, const MotorKind& kind) {
 
 void add_new_bench(CommandLine& line, CLI::App& parent) {
   const auto [sub, o] =
-      line.add<NewBenchOptions>(parent, "bench", "a bench file for a motor file", run_new_bench);
+      line.add<NewBenchOptions>(parent, "bench", "make a bench file for a motor file", run_new_bench);
   sub.add_option("MOTOR", o.motor, "a motor file, or the name of one of configs/motors")
       ->type_name("MOTOR")
       ->required();
+  add_forms(sub, bench_quantities(), o.sheet);
+  begin_group(sub, "Time");
   sub.add_option("--mode", o.mode, "lockstep: time waits for the controller; realtime: it does not")
       ->check(CLI::IsMember({"lockstep", "realtime"}))
       ->type_name("MODE")
       ->capture_default_str();
-  sub.add_option("--period-us", o.period_us, "of a tick, the controller's sample period")
+  sub.add_option("--period-us", o.period_us, "period of a tick, the controller's sample period")
       ->check(finite_between(1.0, 1e6))
-      ->type_name("us")
+      ->type_name("MICROSECONDS")
       ->capture_default_str();
   add_out(sub, o.out_file);
-  add_forms(sub, bench_quantities(), o.sheet);
   sub.footer(
-      "Example:\n  drivebench new bench motor.toml --bus-v 24 --max-current-a 10 --lines 500 --out "
-      "bench.toml\n\n"
+      "Example:\n  drivebench new bench my-dc.toml --bus-v 24 --max-current-a 10 --lines 500 --out bench.toml\n"
       "What is missing is asked for on a terminal; the server checks the file.\n"
       "Exit codes: 0 written and accepted, 2 a number is missing or the server does not accept the file.");
 }
@@ -79,10 +94,11 @@ void add_new_bench(CommandLine& line, CLI::App& parent) {
 }  // namespace
 
 void add_datasheet_commands(CommandLine& line) {
-  CLI::App& made = *line.app().add_subcommand("new", "motor and bench files from the numbers of data sheets");
+  CLI::App& made =
+      *line.app().add_subcommand("new", "make motor and bench files from the numbers of data sheets");
   made.require_subcommand(1);
   CLI::App& motor =
-      *made.add_subcommand("motor", "a motor file from a data sheet, with every conversion shown");
+      *made.add_subcommand("motor", "make a motor file from a data sheet, with every conversion shown");
   motor.require_subcommand(1);
   for (const MotorKind* const kind : kMotorKinds)
     add_new_motor(line, motor, *kind);

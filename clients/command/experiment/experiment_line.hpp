@@ -1,8 +1,12 @@
 #pragma once
 
+#include "clients/command/common/line/command_line.hpp"
+#include "clients/command/experiment/experiment_client.hpp"
+
 namespace drivebench::command {
 
-class CommandLine;
+/// Adds --owner, with the default of `server`.
+void add_owner(CLI::App& sub, ExperimentServer& server);
 
 /// experiment run, list, fetch and cancel.
 void add_experiment_commands(CommandLine& line);

@@ -13,40 +13,39 @@ void add_rerun_command(CommandLine& line) {
   const auto [sub, o] =
       line.add<RerunOptions>("rerun", "run the case of a bundle again, and compare", run_rerun);
   o.program = version_line();
-  sub.add_option("BUNDLE", o.bundle, "a file that drivebench test --keep has made")
+  sub.add_option("BUNDLE", o.bundle, "a file that `drivebench test --keep` has made")
       ->type_name("FILE")
       ->required();
+  begin_group(sub, kWhat);
   sub.add_flag("--plant-only", o.plant_only, "replay the recorded commands, without the device under test");
+  sub.footer("Example:\n  drivebench rerun kept/servo-position.zip");
 }
 
-}  // namespace
-
-void add_regression_commands(CommandLine& line) {
-  const auto [sub, o] = line.add<TestOptions>("test", "run a suite of regression cases", run_test);
-  o.program = version_line();
+void add_choice(CLI::App& sub, TestOptions& o) {
   sub.add_option("SUITE", o.suite,
                  "a folder of cases, a case file, or the name of a suite that came with drivebench")
       ->type_name("SUITE")
       ->required();
-  sub.add_option("--jobs", o.jobs, "cases at the same time")
-      ->capture_default_str()
-      ->check(CLI::Range(1U, 1024U));
+  begin_group(sub, kWhat);
   sub.add_flag("--list", o.list, "print the cases and end");
-  sub.add_option("--filter", o.filter, "only cases whose name contains this text");
+  sub.add_option("--filter", o.filter, "only cases whose name contains this text")->type_name("NAME");
   sub.add_option("--tag", o.wanted_tags, "only cases with this tag; several: with all of them")
+      ->type_name("TAG")
       ->allow_extra_args(false);
-  sub.add_option("--junit", o.junit_file, "write a JUnit XML report")->type_name("FILE");
-  sub.add_option("--json", o.json_file, "write a JSON report")->type_name("FILE");
-  sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network")
-      ->type_name("FILE");
-  sub.add_option("--keep", o.keep_folder,
-                 "keep a bundle of each case that has not passed in this folder, for drivebench rerun")
-      ->type_name("FOLDER");
   sub.add_option(
          "--shard", o.shard,
          "run only every N-th case from the I-th on, as I/N, or as the environment of Slurm, GitLab or "
          "Kubernetes says: auto")
       ->type_name("I/N");
+  begin_group(sub, kLimits);
+  sub.add_option("--jobs", o.jobs, "cases that run at the same time")
+      ->type_name("NUMBER")
+      ->capture_default_str()
+      ->check(CLI::Range(1U, 1024U));
+}
+
+void add_reports(CLI::App& sub, TestOptions& o) {
+  begin_group(sub, "Results between runs");
   auto* const results = sub.add_option("--results", o.results_folder,
                                        "keep each result in this folder, and run only cases without one")
                             ->type_name("FOLDER");
@@ -60,8 +59,31 @@ void add_regression_commands(CommandLine& line) {
       ->allow_extra_args(false)
       ->excludes(results)
       ->excludes(timing);
+  sub.add_option("--keep", o.keep_folder,
+                 "keep a bundle of each case that has not passed in this folder, for `drivebench rerun`")
+      ->type_name("FOLDER");
+  begin_group(sub, kOutput);
+  sub.add_option("--junit", o.junit_file, "write a JUnit XML report")->type_name("FILE");
+  sub.add_option("--json", o.json_file, "write a JSON report")->type_name("FILE");
+  sub.add_option("--html", o.html_file, "write a report with plots, as one page that needs no network")
+      ->type_name("FILE");
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
   sub.add_flag("--github", o.github, "print annotations for GitHub");
+}
+
+}  // namespace
+
+void add_regression_commands(CommandLine& line) {
+  const auto [sub, o] = line.add<TestOptions>("test", "run a suite of regression cases", run_test);
+  o.program = version_line();
+  add_choice(sub, o);
+  add_reports(sub, o);
+  sub.footer(
+      "Example:\n"
+      "  drivebench test reference --list\n"
+      "  drivebench test reference --jobs 2 --junit report.xml --keep kept\n"
+      "Exit codes: 0 all passed or were skipped, 1 one failed or had an error, 2 usage or configuration, 4 "
+      "none failed, but real time was not kept.");
   add_rerun_command(line);
 }
 

@@ -1,10 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "protocols/pages/completion.hpp"
+#include "protocols/pages/help_text.hpp"
+#include "protocols/pages/limits.hpp"
 #include "protocols/pages/man_page.hpp"
+#include "protocols/pages/write_pages.hpp"
 
 namespace drivebench::pages {
 namespace {
@@ -67,6 +72,91 @@ TEST(Pages, TextsOfACompletionStayInTheirPlace) {
       << script;
   EXPECT_NE(script.find("'*--mode=[the way\\]: it'\\''s]:TEXT:(fast slow)'"), std::string::npos);
   EXPECT_EQ(bash_completion(hostile_line(), {}).find("it's"), std::string::npos);
+}
+
+// Catches: a limit against overflow told as if it were one of the motor's, a bound that is left out or told
+// on the wrong side, and a colon in the name of a value taken for the start of a rule.
+TEST(Pages, LimitsAreToldInWords) {
+  CLI::App app("tool");
+  double real = 0.0;
+  int whole = 0;
+  std::string text;
+  app.add_option("--any", real)->type_name("NM")->check(finite_between(-1e15, 1e15));
+  app.add_option("--positive", real)->type_name("OHM")->check(finite_between(1e-9, 1e9));
+  app.add_option("--ratio", real)->type_name("SIGMA")->check(finite_between(1e-6, 0.5));
+  app.add_option("--least", real)->type_name("SECONDS")->check(finite_between(0.25, 1e9));
+  app.add_option("--port", whole)->type_name("PORT")->check(whole_between(0, 65535));
+  app.add_option("--window", text)->type_name("FROM:TO");
+  const LineVerb line = describe_line(app, "tool");
+  std::vector<std::string> told;
+  for (std::size_t i = 0; i < 6; ++i)
+    told.push_back(option(line, i).value + remarks(option(line, i)));
+  EXPECT_EQ(told, (std::vector<std::string>{"NM", "OHM (more than 0)", "SIGMA (more than 0, at most 0.5)",
+                                            "SECONDS (0.25 or more)", "PORT (0 to 65535)", "FROM:TO"}));
+}
+
+// Catches: a line that a terminal of 80 columns breaks, an option outside its heading, a list shown as one
+// value, a required option that the usage does not name, exit codes that a verb does not take from its
+// program.
+TEST(Pages, HelpHasHeadingsExamplesAndExitCodes) {
+  CLI::App app("tool: works");
+  add_pages(app, {.name = "tool", .groups = {{"Every day", {"run"}}}});
+  app.footer("Example:\n  tool run --number 1\nExit codes: 0 ok.");
+  CLI::App& sub = *app.add_subcommand("run", "do the work");
+  std::vector<std::string> signals;
+  int number = 0;
+  sub.option_defaults()->group(kOutput);
+  sub.add_option("--signals", signals, "what is shown")->type_name("SIGNAL")->delimiter(',');
+  sub.option_defaults()->group(kConnection);
+  sub.add_option("--number", number, "a number that is told in a sentence which is too long for one line")
+      ->type_name("NUMBER")
+      ->required();
+  sub.footer("Example:\n  tool run --number 2");
+  EXPECT_TRUE(
+      app.help().starts_with("tool: works\n"
+                             "\n"
+                             "Usage: tool VERB [ARGUMENT ...]\n"
+                             "\n"
+                             "Every day:\n"
+                             "  run                     do the work\n"
+                             "\n"
+                             "Help:\n"))
+      << app.help();
+  EXPECT_EQ(sub.help(),
+            "tool run: do the work\n"
+            "\n"
+            "Usage: tool run --number NUMBER [OPTION ...]\n"
+            "\n"
+            "Connection:\n"
+            "  --number NUMBER         a number that is told in a sentence which is too long\n"
+            "                          for one line (must be given)\n"
+            "\n"
+            "Output:\n"
+            "  --signals SIGNAL,...    what is shown\n"
+            "\n"
+            "Help:\n"
+            "  -h, --help              print this help and end\n"
+            "\n"
+            "Example:\n"
+            "  tool run --number 2\n"
+            "\n"
+            "Exit codes: 0 ok.\n");
+}
+
+// Catches: a message with CLI11's name for a type.
+TEST(Pages, ErrorsSpeakInTheSameWords) {
+  CLI::App app("tool");
+  add_pages(app, {.name = "tool"});
+  int number = 0;
+  app.add_option("--number", number)->type_name("NUMBER")->check(whole_between(0, 3));
+  std::ostringstream out;
+  std::ostringstream problems;
+  try {
+    app.parse("--number");
+  } catch (const CLI::ParseError& error) {
+    app.exit(error, out, problems);
+  }
+  EXPECT_EQ(problems.str(), "--number: its value is missing\nRun with --help for more information.\n");
 }
 
 }  // namespace

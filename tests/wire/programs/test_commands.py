@@ -45,7 +45,7 @@ class WithoutABench(CommandTest):
                 (["control", "--set", "machine"], "NAME=VALUE"), (["control", "--set", "a=1,5"], "not a number"),
                 (["watch", "--rate", "0"], "--rate"), (["watch", "--rate", "nan"], "--rate"),
                 (["watch", "--count", "-1"], "negative"), (["watch", "--signals", "volts"], "no signal 'volts'"),
-                (["wacth"], "no subcommand 'wacth'; did you mean \"watch\"?"),
+                (["wacth"], "no verb 'wacth'; did you mean \"watch\"?"),
                 (["watch", "--signals", "sped_rad_s"], "did you mean \"speed_rad_s\"?"),
                 (["demo", "--bench", "x"], "--bench"),
                 (["dbc", "srevo"], "no bench file 'srevo'; did you mean \"servo\"?"),

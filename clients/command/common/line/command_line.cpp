@@ -18,9 +18,15 @@ namespace drivebench::command {
 
 CommandLine::CommandLine() {
   app_.require_subcommand(1);
-  app_.set_version_flag("--version", version_line());
-  pages::add_write_pages(app_, program_of_pages());
-  app_.footer("Exit codes: 0 ok, 1 the run failed, 2 usage or configuration, 3 cannot connect.");
+  pages::add_pages(app_, program_of_pages());
+  app_.set_version_flag("--version", version_line(), "print version and build and end")->group(pages::kHelp);
+  app_.footer(
+      "Example:\n"
+      "  drivebench demo                     # a servo move, in lockstep and in real time\n"
+      "  drivebench serve                    # a bench; in another terminal:\n"
+      "  drivebench control                  # the reference controller moves its motor\n"
+      "VERB --help tells the options of a verb.\n"
+      "Exit codes: 0 ok, 1 the run failed, 2 usage or configuration, 3 cannot connect.");
 }
 
 void CommandLine::when_named(CLI::App& sub, std::function<int()> action) {
@@ -52,8 +58,8 @@ int CommandLine::parse_and_run(int argc, char** argv) {
       std::vector<std::string> verbs;
       for (const CLI::App* sub : app_.get_subcommands(nullptr))
         verbs.push_back(sub->get_name());
-      throw UsageError(fmt::format("no subcommand '{}'{}; --help lists them", printable(argv[1]),
-                                   did_you_mean(argv[1], verbs)));
+      throw UsageError(
+          fmt::format("no verb '{}'{}; --help lists them", printable(argv[1]), did_you_mean(argv[1], verbs)));
     }
   }
   app_.parse(argc, argv);
@@ -72,7 +78,7 @@ int CommandLine::fail(int code, std::string_view kind, std::string_view message,
 }
 
 void add_link(CLI::App& sub, LinkChoice& link, const std::string& links) {
-  add_link_with_help(sub, link, links + "; else from DRIVEBENCH_LINK");
+  add_link_with_help(sub, link, "address of the bench: " + links + "; else from DRIVEBENCH_LINK");
   sub.get_option("--link")->capture_default_str();
 }
 
@@ -80,25 +86,10 @@ void add_link_with_help(CLI::App& sub, LinkChoice& link, const std::string& help
   // Not CLI11's envname(): it lets the options of subcommands that were not named overwrite ours.
   if (const char* address = std::getenv("DRIVEBENCH_LINK"); address != nullptr) link.address = address;
   if (const char* token = std::getenv("DRIVEBENCH_TOKEN"); token != nullptr) link.token = token;
-  sub.add_option("--link", link.address, help);
-  sub.add_option("--token", link.token, "what the server asks for; else from DRIVEBENCH_TOKEN");
-}
-
-CLI::Validator not_negative() {
-  return {[](std::string& text) {
-            return text.find('-') == std::string::npos ? std::string() : text + " is negative";
-          },
-          ""};
-}
-
-CLI::Validator finite_between(double low, double high) {
-  return {[low, high](std::string& text) {
-            double value = 0.0;
-            const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-            return good ? std::string()
-                        : fmt::format("{} is not a number from {:g} to {:g}", text, low, high);
-          },
-          ""};
+  sub.add_option("--link", link.address, help)->type_name("ADDRESS")->group(pages::kConnection);
+  sub.add_option("--token", link.token, "the secret that the server asks for; else from DRIVEBENCH_TOKEN")
+      ->type_name("TOKEN")
+      ->group(pages::kConnection);
 }
 
 }  // namespace drivebench::command

@@ -6,6 +6,8 @@
 #include <string>
 
 #include "clients/command/common/session/link_choice.hpp"
+#include "protocols/pages/limits.hpp"
+#include "protocols/pages/line_description.hpp"
 
 namespace drivebench::command {
 
@@ -33,7 +35,7 @@ class CommandLine {
     CLI::App& sub = *parent.add_subcommand(name, description);
     const auto options = std::make_shared<Options>();
     if constexpr (requires { options->json; }) {
-      sub.add_flag("--json", json_, "print JSON");
+      sub.add_flag("--json", json_, "print JSON instead of text")->group(pages::kOutput);
       when_named(sub, [this, options, action] {
         options->json = json_;
         return action(*options);
@@ -69,17 +71,21 @@ void add_link(CLI::App& sub, LinkChoice& link, const std::string& links = kStrea
 /// add_link() with another help text.
 void add_link_with_help(CLI::App& sub, LinkChoice& link, const std::string& help);
 
-// ---- validators ----
+/// The options that are added next stand under this heading in --help and on the man page.
+inline void begin_group(CLI::App& sub, const char* heading) {
+  sub.option_defaults()->group(heading);
+}
 
-/// For unsigned options: without it -1 is 2^64 - 1.
-CLI::Validator not_negative();
-
-/// For real options. CLI11's own ranges let NaN pass, with which no comparison is true.
-CLI::Validator finite_between(double low, double high);
+// What the options of every room use.
+using pages::finite_between;
+using pages::kConnection;
+using pages::kLimits;
+using pages::kMost_s;
+using pages::kOutput;
+using pages::kWhat;
+using pages::not_negative;
 
 /// The upper limit of options without a limit of their own.
 inline constexpr double kMost = 1e15;
-/// The upper limit of options in seconds: their nanoseconds fit into 64 bits.
-inline constexpr double kMost_s = 1e9;
 
 }  // namespace drivebench::command

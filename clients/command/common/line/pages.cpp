@@ -26,12 +26,28 @@ pages::CompletionFacts completion_facts() {
           .other_first_kind = "BENCH"};
 }
 
+/// The list of --help, by what a user wants.
+std::vector<pages::VerbGroup> verb_groups() {
+  return {
+      {.heading = "The first minute", .verbs = {"demo", "doctor"}},
+      {.heading = "Serve a bench", .verbs = {"serve", "describe", "status", "take"}},
+      {.heading = "Drive and watch", .verbs = {"control", "watch", "web"}},
+      {.heading = "Change it while it runs", .verbs = {"set", "inject", "bump", "clear"}},
+      {.heading = "Keep its state", .verbs = {"save", "restore", "reset", "branch"}},
+      {.heading = "Recordings and plots", .verbs = {"replay", "export", "plot"}},
+      {.heading = "Experiments and identification", .verbs = {"experiment", "identify", "track", "filter"}},
+      {.heading = "Regression tests", .verbs = {"test", "rerun"}},
+      {.heading = "CAN and Modbus", .verbs = {"can", "can-log", "dbc", "can-table", "modbus-map"}},
+      {.heading = "Motors and models", .verbs = {"new", "steady-state", "convert", "fmu"}}};
+}
+
 }  // namespace
 
 pages::Program program_of_pages() {
   return {.name = "drivebench",
           .version = release_line(),
           .see_also = {"drivebench-server(8)"},
+          .groups = verb_groups(),
           .facts = completion_facts};
 }
 

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+
+/// Validators of numbers. CLI11's own let NaN pass, with which no comparison is true, read -1 as the largest
+/// unsigned number, and print limits with 309 digits. --help shows these limits in words.
+namespace drivebench::pages {
+
+/// A real number, limits included.
+CLI::Validator finite_between(double low, double high);
+
+/// A whole number, limits included.
+CLI::Validator whole_between(std::int64_t low, std::int64_t high);
+
+/// For unsigned options.
+CLI::Validator not_negative();
+
+/// The upper limit of options in seconds: their nanoseconds fit into 64 bits.
+inline constexpr double kMost_s = 1e9;
+
+}  // namespace drivebench::pages
