@@ -6,7 +6,7 @@ import unittest
 from test_page import BENCHES, REPOSITORY, PageTest, missing, pb, until
 
 IDLE, RUN, HOLD = 0, 1, 2
-LATCHED = 512  # the fault of a controller that is lost
+LATCHED = 512 + 1024  # the faults of a controller that is late or lost
 
 
 class DrivePage(PageTest):

@@ -245,6 +245,26 @@ class Abuse(GatewayTest):
         self.assertEqual(self.web.get("/health")[0], 200)
 
 
+class Drive(GatewayTest):
+    def test_a_browser_that_goes_ends_its_drive_in_order(self):
+        """Catches: a session that ends with the gates on, which the bench latches as a loss of its controller, and a motor that is
+        switched off at full frequency."""
+        server = self.server("--mode", "lockstep")
+        gateway = self.gateway(server=server)
+        axis = {"axis": 0, "gates": "voltage", "constant": [0, 0, 0, 0], "boost": 10, "per_hz": 1, "frequency_hz": 20, "ramp_s": 0.5}
+        with server.client() as other:
+            latched = sum(each.bit for each in other.welcome.bench.faults if each.latched)
+            browser = gateway.browser()
+            browser.lease()
+            browser.send_frame(TEXT, json.dumps({"op": "drive", "axes": [axis]}).encode())
+            until(lambda: other.newest().speed_rad_s > 40, "the speed")
+            browser.close()
+            until(lambda: other.lease().WhichOneof("kind") == "done", "the lease of the browser")
+            last = other.step(other.newest().tick, 0.0, 0.0)
+        self.assertEqual(last.faults & latched, 0)
+        self.assertLess(last.speed_rad_s, 20)
+
+
 class Reports(GatewayTest):
     def test_metrics_are_those_of_the_bench(self):
         """Catches: a name, a type or a text that Prometheus does not read, and a number that is not the bench's."""
