@@ -57,7 +57,7 @@ std::string usage(const LineVerb& verb) {
   }
   for (const LineOption& option : verb.options)
     if (!option.positional && option.required) line += " " + name_of(option);
-  line += verb.verbs.empty() ? " [OPTION ...]" : " VERB [ARGUMENT ...]";
+  line += verb.passes_on ? " [ARGUMENT ...]" : verb.verbs.empty() ? " [OPTION ...]" : " VERB [ARGUMENT ...]";
   return wrapped(line, 0);
 }
 

@@ -76,7 +76,6 @@ class Pages(unittest.TestCase):
     def test_every_verb_has_a_page_with_the_texts_of_help(self):
         found = {"-".join(("drivebench", *path)) + ".1": text for path, text in verbs()}
         self.assertEqual(set(found), {file.name for file in (self.pages / "man/man1").iterdir()})
-        del found["drivebench-serve.1"]  # its --help is that of the program behind it
         for page, text in {**found, "drivebench-server.8": help_of("drivebench-server")}.items():
             shown = " ".join(run("man", "-l", self.pages / f"man/man{page[-1]}" / page,
                                  env={"MANWIDTH": "200", "PATH": os.environ["PATH"], "LANG": "C.UTF-8"}).split())

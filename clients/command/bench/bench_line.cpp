@@ -13,13 +13,13 @@ namespace {
 
 void add_serve(CommandLine& line) {
   CLI::App& sub = *line.app().add_subcommand(
-      "serve", "start a bench: serve [BENCH, a file or a name; default: servo] [ARGUMENT ...]");
+      "serve", "start a bench, a file or a name (default: servo), with arguments of drivebench-server");
   sub.prefix_command();
   sub.footer(
       "Example:\n"
       "  drivebench serve\n"
       "  drivebench serve bm500\n"
-      "  drivebench serve servo --mode realtime --record run.mcap\n"
+      "  drivebench serve servo --mode realtime --record live.mcap\n"
       "This is what people use. It becomes drivebench-server, which services and containers start, with the "
       "same arguments behind the path of a bench file; drivebench-server --help lists them.");
   line.when_named(sub, [&sub] { return run_serve(sub.remaining()); });

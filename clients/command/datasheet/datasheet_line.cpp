@@ -86,7 +86,8 @@ void add_new_bench(CommandLine& line, CLI::App& parent) {
       ->capture_default_str();
   add_out(sub, o.out_file);
   sub.footer(
-      "Example:\n  drivebench new bench my-dc.toml --bus-v 24 --max-current-a 10 --lines 500 --out bench.toml\n"
+      "Example:\n  drivebench new bench my-dc.toml --bus-v 24 --max-current-a 10 --lines 500 --out "
+      "bench.toml\n"
       "What is missing is asked for on a terminal; the server checks the file.\n"
       "Exit codes: 0 written and accepted, 2 a number is missing or the server does not accept the file.");
 }

@@ -49,9 +49,7 @@ void add_experiment_commands(CommandLine& line) {
   parent.require_subcommand(1);
   const auto [run, o] =
       add(line, parent, "run", "queue an experiment and fetch its data", run_experiment_run);
-  run.add_option("FILE", o.file, "what to do, in TOML")
-      ->type_name("FILE")
-      ->required();
+  run.add_option("FILE", o.file, "what to do, in TOML")->type_name("FILE")->required();
   begin_group(run, kWhat);
   run.add_option("--user", o.server.user, "a name that every client sees; default: USER")->type_name("NAME");
   run.add_flag("--detach", o.detach, "do not wait for its end");

@@ -18,7 +18,7 @@ std::uint64_t Link::restore_state(std::string_view state) {
     const std::string_view part = state.substr(0, kPart);
     state.remove_prefix(part.size());
     v1::Envelope& request = new_request();
-    request.mutable_restore_state()->set_part(part.data(), part.size());
+    request.mutable_restore_state()->set_state(part.data(), part.size());
     request.mutable_restore_state()->set_more(!state.empty());
     const std::uint64_t tick = ask(request, Kind::kDone).done().tick();
     if (state.empty()) return tick;

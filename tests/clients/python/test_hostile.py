@@ -194,7 +194,7 @@ class Servers(unittest.TestCase):
     # Catches: a server that does not start, and no word of why.
     def test_a_server_that_does_not_start_says_why(self):
         for words, why in ((["nope"], "no bench file 'nope'"), (["servo", "--mode", "soon"], "--mode"),
-                           (["servo", "--duration", "1"], "lockstep")):
+                           (["servo", "--duration", "0"], "--duration")):
             with self.assertRaisesRegex(ServerFailed, why):
                 drivebench.serve(*words)
         with self.assertRaisesRegex(BadArgument, "options"):

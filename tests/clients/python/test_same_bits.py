@@ -120,7 +120,7 @@ class SameBits(unittest.TestCase):
 
 
 class InProcess(unittest.TestCase):
-    # Catches: a state without the noise or the leases, and a step that answers a tick of before the restore.
+    # Catches: a state without the noise, a lease that a restore gives or takes, and a step that answers a tick of before the restore.
     def test_a_saved_state_goes_on_with_the_same_samples(self):
         with drivebench.Bench("inproc:servo") as bench, drivebench.Bench("inproc:servo") as other:
             bench.acquire()
@@ -129,10 +129,12 @@ class InProcess(unittest.TestCase):
             first = bench.run(rotating, 50)
             bench.restore(state)
             self.assertEqual(bench.run(rotating, 50), first)
+            other.acquire()
             other.restore(state)
             self.assertEqual(other.run(rotating, 50), first)
             bench.restore(state)
             self.assertEqual(bench.step(off=True).tick, 51)
+            bench.release()
             bench.reset()
             self.assertEqual(bench.newest().tick, 0)
             with self.assertRaises(drivebench.Refused) as refused:

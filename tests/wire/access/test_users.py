@@ -79,10 +79,11 @@ class Roles(UsersTest):
                      "set_load": pb.SetLoad(load_nm=1.0), "inject_fault": pb.InjectFault(name="bus_sag", value=1.0),
                      "shaft_bump": pb.ShaftBump(impulse_nms=1.0), "clear_faults": pb.ClearFaults(),
                      "run_experiment": pb.RunExperiment(), "upload_table": pb.UploadTable(),
-                     "cancel_experiment": pb.CancelExperiment(id=1)}
+                     "cancel_experiment": pb.CancelExperiment(id=1), "save_state": pb.SaveState(),
+                     "restore_state": pb.RestoreState(), "reset_bench": pb.ResetBench()}
         asked = {field.name for field in pb.Envelope.DESCRIPTOR.oneofs_by_name["kind"].fields} & {*allowed, *forbidden}
         answers = {"id", "hello", "welcome", "refusal", "done", "exchange_reply", "samples", "parameter_values", "status",
-                   "experiment_info", "table_info", "experiment_list", "experiment_data", "notice"}
+                   "experiment_info", "table_info", "experiment_list", "experiment_data", "notice", "saved_state"}
         every = {field.name for field in pb.Envelope.DESCRIPTOR.fields}
         self.assertEqual(every, asked | answers, "a new request needs its roles here")
         for kind, request in allowed.items():

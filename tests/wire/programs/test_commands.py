@@ -37,7 +37,7 @@ class WithoutABench(CommandTest):
     def test_a_wrong_command_line_is_2_and_names_the_mistake(self):
         """Catches: an option that is ignored, a number that is half read, NaN that passes every comparison, -1 that is 2^64 - 1."""
         for arguments, fact in (
-                ([], "subcommand"), (["nope"], "nope"), (["status", "--nope"], "--nope"), (["status", "more"], "more"),
+                ([], "a verb is missing"), (["nope"], "nope"), (["status", "--nope"], "--nope"), (["status", "more"], "more"),
                 (["control", "--preset", "book/8.2"], 'did you mean "book/8.2.2"'),
                 (["control", "--load", "0.1"], "NM@SECONDS"), (["control", "--load", "0.1x@0"], "not a number"),
                 (["control", "--load", "nan@0"], "not a number"), (["control", "--load", "0.1@-1"], "between 0 and"),

@@ -34,7 +34,7 @@ class States(WireTest):
     def restore(self, client, state, part=32000):
         for at in range(0, len(state), part):
             more = at + part < len(state)
-            answer = client.ask(restore_state=pb.RestoreState(part=state[at:at + part], more=more))
+            answer = client.ask(restore_state=pb.RestoreState(state=state[at:at + part], more=more))
             if answer.WhichOneof("kind") == "refusal":
                 return answer
         return answer
@@ -93,10 +93,10 @@ class States(WireTest):
         viewer, owner, stranger, second = (self.client(server, token=f"{name}-secret") for name in ("vera", "otto", "otto", "otto"))
         conductor = self.client(server, token="carla-secret", conducts=True)
         start = self.save(stranger)
-        for request in (SAVE, RESET, {"restore_state": pb.RestoreState(part=start.state[:30000], more=True)}):
+        for request in (SAVE, RESET, {"restore_state": pb.RestoreState(state=start.state[:30000], more=True)}):
             self.assertRefused(viewer.ask(**request), pb.REFUSAL_FORBIDDEN)
         owner.lease()
-        for request in (SAVE, RESET, {"restore_state": pb.RestoreState(part=start.state[:30000], more=True)}):
+        for request in (SAVE, RESET, {"restore_state": pb.RestoreState(state=start.state[:30000], more=True)}):
             refused = stranger.ask(**request)
             self.assertRefused(refused, pb.REFUSAL_OWNED, "axis")
             self.assertIn("otto", refused.refusal.holder)
@@ -130,14 +130,14 @@ class States(WireTest):
         before, state = self.hash(owner), self.save(owner).state
         foreign = self.save(self.client(self.server(config=BENCHES / "bm500.toml"))).state
         for bad in (b"", b"x", state[:-1], state[:8] + b"\0" + state[9:], foreign, bytes(len(state))):
-            answer = owner.ask(restore_state=pb.RestoreState(part=bad))
+            answer = owner.ask(restore_state=pb.RestoreState(state=bad))
             self.assertEqual(answer.WhichOneof("kind"), "refusal", len(bad))
             self.assertIn(answer.refusal.code, (pb.REFUSAL_MALFORMED, pb.REFUSAL_OUT_OF_RANGE))
-        self.assertDone(owner.ask(restore_state=pb.RestoreState(part=state[:20000], more=True)))
-        refused = owner.ask(restore_state=pb.RestoreState(part=state[:20000], more=True))
-        self.assertRefused(refused, pb.REFUSAL_OUT_OF_RANGE, "part")
-        self.assertIn(f"the parts have 40000 bytes but a state of this bench has {len(state)}", refused.refusal.message)
-        self.assertRefused(owner.ask(restore_state=pb.RestoreState(part=state[20000:])), pb.REFUSAL_MALFORMED, "part")
+        self.assertDone(owner.ask(restore_state=pb.RestoreState(state=state[:20000], more=True)))
+        refused = owner.ask(restore_state=pb.RestoreState(state=state[:20000], more=True))
+        self.assertRefused(refused, pb.REFUSAL_OUT_OF_RANGE, "state")
+        self.assertIn(f"a state of this bench has {len(state)} bytes", refused.refusal.message)
+        self.assertRefused(owner.ask(restore_state=pb.RestoreState(state=state[20000:])), pb.REFUSAL_MALFORMED, "state")
         self.assertEqual(self.hash(owner), before)
         self.assertDone(self.restore(owner, state))
 
@@ -146,7 +146,7 @@ class States(WireTest):
         with tempfile.TemporaryDirectory() as folder:
             client = self.client(self.server("--record", f"{folder}/run.mcap", text=SERVO_TEXT))
             state = self.save(client).state
-            for request in (RESET, {"restore_state": pb.RestoreState(part=state)}):
+            for request in (RESET, {"restore_state": pb.RestoreState(state=state)}):
                 refused = client.ask(**request)
                 self.assertRefused(refused, pb.REFUSAL_NOT_AVAILABLE)
                 self.assertIn("records", refused.refusal.message)

@@ -20,15 +20,15 @@ void States::restore(const v1::RestoreState& r) {
   Engine& engine = dialogue_.engine();
   std::vector<std::byte> state = std::exchange(parts_, {});
   if (!may_set_back()) return;
-  const std::size_t end = state.size() + r.part().size();
+  const std::size_t end = state.size() + r.state().size();
   if (end > engine.state_size()) {
-    return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
-                            "the parts have " + std::to_string(end) +
-                                " bytes but a state of this bench has " + std::to_string(engine.state_size()),
-                            "part");
+    return dialogue_.refuse(
+        dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
+        "a state of this bench has " + std::to_string(engine.state_size()) + " bytes, and this one is longer",
+        "state");
   }
-  const auto* const bytes = reinterpret_cast<const std::byte*>(r.part().data());
-  state.insert(state.end(), bytes, bytes + r.part().size());
+  const auto* const bytes = reinterpret_cast<const std::byte*>(r.state().data());
+  state.insert(state.end(), bytes, bytes + r.state().size());
   if (r.more()) {
     parts_ = std::move(state);
     return dialogue_.done(dialogue_.id(), engine.tick());
@@ -36,7 +36,7 @@ void States::restore(const v1::RestoreState& r) {
   const Tick before = engine.tick();
   if (engine.restore(state)) return done("restore", before);
   dialogue_.refuse(dialogue_.id(), v1::REFUSAL_MALFORMED,
-                   "these " + std::to_string(state.size()) + " bytes are no state of this bench", "part");
+                   "these " + std::to_string(state.size()) + " bytes are no state of this bench", "state");
 }
 
 void States::reset() {
