@@ -43,7 +43,7 @@ std::string row(const std::string& name, const std::string& text) {
 
 /// `-h, --help`, `--mode realtime|lockstep`, `--port PORT`, `--signals SIGNAL,...`.
 std::string name_of(const LineOption& option) {
-  const std::string names = joined(option.names, ", ");
+  std::string names = joined(option.names, ", ");
   if (option.positional || option.value.empty()) return names;
   if (option.list) return names + " " + option.value + ",...";
   return names + " " + (option.words.empty() ? option.value : joined(option.words, "|"));
