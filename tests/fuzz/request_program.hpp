@@ -121,9 +121,9 @@ inline std::string frame_of(std::span<const std::uint8_t> program) {
 /// parts. Gives the program of the frame with the highest score; for the same scores the same one.
 template <class Score>
 std::vector<std::uint8_t> worst_program(Score score, std::uint64_t seed) {
-  constexpr std::size_t kDrawn = 1200;
+  constexpr std::size_t kDrawn = 1000;
   constexpr std::size_t kKept = 24;
-  constexpr std::size_t kSteps = 1000;
+  constexpr std::size_t kSteps = 800;
   constexpr std::size_t kMaxParts = 16;
   struct Program {
     double points = 0.0;
