@@ -170,8 +170,7 @@ std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& c
 
 /// Throws if the file is no state of this bench.
 void go_to_saved_state(Engine& engine, const std::string& file) {
-  constexpr std::size_t kLargestState = std::size_t{16} << 20;
-  const FileText saved = read_file(file, kLargestState);
+  const FileText saved = read_file(file, engine.state_size());
   if (!saved.why_not.empty()) throw std::runtime_error(fmt::format("--from: {} {}", file, saved.why_not));
   if (!engine.restore(std::as_bytes(std::span(saved.text)))) {
     throw std::runtime_error(

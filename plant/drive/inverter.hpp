@@ -49,6 +49,9 @@ constexpr double duty(double voltage_v, double rail_v, double dead_part) noexcep
 double averaged_voltage_v(double voltage_v, double rail_v, double dead_part, double current_a,
                           double band_a) noexcept;
 
+/// Of a PWM period: those between four commutations for each of three terminals.
+inline constexpr std::size_t kMaxPwmSegments = 13;
+
 /// The commutations of the terminals within one PWM period. Each on-interval and each dead time is centred on
 /// the ideal instant, so that what is at the start of the period is there at its end. A terminal that stays
 /// at the upper rail for a whole period leaves it at the period's end without a dead time.
@@ -101,7 +104,7 @@ class SwitchingPattern {
     double until_s = kNever;
     std::uint64_t passed = 0;  ///< kBits for each terminal
   };
-  std::array<Segment, 13> segments_{};  ///< four commutations for each of three terminals
+  std::array<Segment, kMaxPwmSegments> segments_{};
 };
 
 }  // namespace drivebench

@@ -18,11 +18,9 @@ double LoadTorque::at(Tick tick) const noexcept {
          (target_nm_ - start_nm_) * (static_cast<double>(elapsed) / static_cast<double>(ramp_ticks_));
 }
 
-bool LoadTorque::is_possible() const noexcept {
-  constexpr Tick kLatest = Tick{1} << 53;
-  constexpr double kLargestNm = 1e6;
-  return std::abs(start_nm_) <= kLargestNm && std::abs(target_nm_) <= kLargestNm && start_tick_ >= 0 &&
-         start_tick_ <= kLatest && ramp_ticks_ >= 0 && ramp_ticks_ <= kLatest;
+bool LoadTorque::is_within(double largest_nm, Tick latest) const noexcept {
+  return std::abs(start_nm_) <= largest_nm && std::abs(target_nm_) <= largest_nm && start_tick_ >= 0 &&
+         start_tick_ <= latest && ramp_ticks_ >= 0 && ramp_ticks_ <= latest;
 }
 
 }  // namespace drivebench

@@ -11,8 +11,8 @@ class LoadTorque {
   void go_to(double target_nm, Tick tick, Tick ramp_ticks) noexcept;
   /// The torque that holds during this tick.
   double at(Tick tick) const noexcept;
-  /// Whether go_to() can have made it: for one that comes from bytes.
-  bool is_possible() const noexcept;
+  /// Whether both torques are within +-largest_nm, and the ticks from 0 to `latest`: for a load from bytes.
+  bool is_within(double largest_nm, Tick latest) const noexcept;
 
  private:
   double start_nm_ = 0.0;

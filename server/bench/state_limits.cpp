@@ -13,9 +13,6 @@ namespace {
 
 // The largest speed and current of a machine that has not diverged, and more than any set-point.
 constexpr double kLargestQuantity = 1e9;
-// Of a PWM period: four commutations for each of three terminals.
-constexpr std::int64_t kMaxPwmSegments = 13;
-constexpr double kWithinATurnRad = 6.2831853071795869;
 
 bool is_quantity(double x) noexcept {
   return std::isfinite(x) && std::abs(x) <= kLargestQuantity;
@@ -47,7 +44,7 @@ bool is_flag(std::int64_t number) noexcept {
 
 bool is_possible(const TwoMassState& shaft) noexcept {
   return is_quantity(shaft.speed_rad_s) && is_quantity(shaft.load_speed_rad_s) &&
-         is_quantity(shaft.twist_rad) && shaft.angle_rad >= 0.0 && shaft.angle_rad <= kWithinATurnRad;
+         is_quantity(shaft.twist_rad) && shaft.angle_rad >= 0.0 && shaft.angle_rad <= kTurnRad;
 }
 
 bool is_possible(const EncoderState& e) noexcept {
@@ -63,7 +60,8 @@ bool is_possible(const PhaseCommand& command) noexcept {
 
 bool is_possible(const DriveMemory& m) noexcept {
   return std::ranges::all_of(m.commands, [](const PhaseCommand& c) { return is_possible(c); }) &&
-         m.pwm_segment >= 0 && m.pwm_segment < kMaxPwmSegments && is_quantity(m.bus_v);
+         m.pwm_segment >= 0 && m.pwm_segment < static_cast<std::int64_t>(kMaxPwmSegments) &&
+         is_quantity(m.bus_v);
 }
 
 /// The faults keep to the limits that a client meets.
@@ -91,9 +89,18 @@ bool is_possible(const LastCommands& last) noexcept {
 
 bool is_possible(const AxisState& s) noexcept {
   return has_possible_words(s) && std::ranges::all_of(s.machine, is_quantity) && is_possible(s.shaft) &&
-         is_possible_count(s.turns) && is_possible(s.encoder) && s.load.is_possible() &&
-         is_possible(s.drive) && is_possible_count(s.sensors.tick) && s.sensors.tick >= 0 &&
-         is_possible(s.injected) && s.open_terminals <= kAllLegs;
+         is_possible_count(s.turns) && is_possible(s.encoder) &&
+         s.load.is_within(kMaxLoadNm, static_cast<Tick>(kMaxTick)) && is_possible(s.drive) &&
+         is_possible_count(s.sensors.tick) && s.sensors.tick >= 0 && is_possible(s.injected) &&
+         s.open_terminals <= kAllLegs;
+}
+
+std::string no_state(std::size_t bytes) {
+  return "these " + std::to_string(bytes) + " bytes are no state of this bench";
+}
+
+std::string longer_than_a_state(std::size_t state_bytes) {
+  return "a state of this bench has " + std::to_string(state_bytes) + " bytes, and this one is longer";
 }
 
 }  // namespace drivebench

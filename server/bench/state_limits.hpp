@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
 #include "plant/axis_state.hpp"
 #include "server/bench/safe_action.hpp"
 
@@ -15,5 +19,9 @@ bool is_possible(const LastCommands& last) noexcept;
 
 /// Whether the number is a tick or a count that a bench can have come to: within kMaxTick, either sign.
 bool is_possible_count(std::int64_t number) noexcept;
+
+/// Sentences about bytes that Bench::restore() does not take.
+std::string no_state(std::size_t bytes);
+std::string longer_than_a_state(std::size_t state_bytes);
 
 }  // namespace drivebench

@@ -5,6 +5,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "protocols/text.hpp"
+#include "server/bench/state_limits.hpp"
 #include "server/config/sections/plausible.hpp"
 
 namespace drivebench {
@@ -188,14 +189,10 @@ int InprocBench::save(std::vector<std::byte>& state) noexcept {
 
 int InprocBench::restore(std::span<const std::byte> state) noexcept {
   if (state.size() > start_.size()) {
-    return fail(
-        DRIVEBENCH_OUT_OF_RANGE,
-        "a state of this bench has " + std::to_string(start_.size()) + " bytes, and this one is longer",
-        "state");
+    return fail(DRIVEBENCH_OUT_OF_RANGE, longer_than_a_state(start_.size()), "state");
   }
   if (bench_.restore_for_holders(state)) return DRIVEBENCH_OK;
-  return fail(DRIVEBENCH_MALFORMED,
-              "these " + std::to_string(state.size()) + " bytes are no state of this bench", "state");
+  return fail(DRIVEBENCH_MALFORMED, no_state(state.size()), "state");
 }
 
 }  // namespace drivebench

@@ -251,6 +251,24 @@ TEST(OpenLoop, TheAmplitudeRisesWithTheFrequency) {
   EXPECT_EQ(half.axis(), 2u);
 }
 
+// Catches: a ramp that jumps to its end because the bench was reset: ticks that go back are no time.
+TEST(OpenLoop, ABenchThatGoesBackTakesTheRampNoFurther) {
+  OpenLoop axis = star_axis();
+  axis.follow({.gates = v1::GATES_VOLTAGE,
+               .constant = {},
+               .boost = 2.0,
+               .per_hz = 0.5,
+               .frequency_hz = 20.0,
+               .ramp_s = 1.0});
+  axis.command(1000);
+  axis.command(1500);
+  const double before_v = axis.command(0).u_a_v();
+  EXPECT_DOUBLE_EQ(axis.frequency_hz(), 10.0);
+  EXPECT_EQ(axis.command(0).u_a_v(), before_v);
+  axis.command(250);
+  EXPECT_DOUBLE_EQ(axis.frequency_hz(), 15.0);
+}
+
 // Catches: duties of a star that begin or end at the negative rail, which is a voltage of half the link.
 TEST(OpenLoop, DutiesOfAStarRestAtTheMiddle) {
   OpenLoop axis = star_axis();

@@ -62,7 +62,9 @@ void OpenLoop::ramp_down(double longest_s) {
 }
 
 v1::Command OpenLoop::command(std::uint64_t tick) {
-  if (has_tick_ && gates() != v1::GATES_OFF) advance(static_cast<double>(tick - tick_) * period_s_);
+  const bool has_gone_back = tick < tick_;  // the bench was reset or restored
+  if (has_tick_ && !has_gone_back && gates() != v1::GATES_OFF)
+    advance(static_cast<double>(tick - tick_) * period_s_);
   tick_ = tick;
   has_tick_ = true;
   const double lag_rad = terminals_.two_phase ? kTurn / 4.0 : kTurn / 3.0;

@@ -1,8 +1,9 @@
 #include "server/endpoints/tcp/session/requests/states.hpp"
 
-#include <cstring>
 #include <string>
 #include <utility>
+
+#include "server/bench/state_limits.hpp"
 
 namespace drivebench {
 
@@ -22,10 +23,8 @@ void States::restore(const v1::RestoreState& r) {
   if (!may_set_back()) return;
   const std::size_t end = state.size() + r.state().size();
   if (end > engine.state_size()) {
-    return dialogue_.refuse(
-        dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
-        "a state of this bench has " + std::to_string(engine.state_size()) + " bytes, and this one is longer",
-        "state");
+    return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE,
+                            longer_than_a_state(engine.state_size()), "state");
   }
   const auto* const bytes = reinterpret_cast<const std::byte*>(r.state().data());
   state.insert(state.end(), bytes, bytes + r.state().size());
@@ -35,8 +34,7 @@ void States::restore(const v1::RestoreState& r) {
   }
   const Tick before = engine.tick();
   if (engine.restore(state)) return done("restore", before);
-  dialogue_.refuse(dialogue_.id(), v1::REFUSAL_MALFORMED,
-                   "these " + std::to_string(state.size()) + " bytes are no state of this bench", "state");
+  dialogue_.refuse(dialogue_.id(), v1::REFUSAL_MALFORMED, no_state(state.size()), "state");
 }
 
 void States::reset() {
