@@ -96,7 +96,7 @@ class Week {
   void command(Tick tick) {
     if (bench_.owner(0) != owner_) {
       submit(LeaseAction::kAcquire);
-      account_.granted(owner_, tick, [] { return false; });
+      account_.granted(owner_, tick, account_.forces(), [] { return false; });
     }
     if (bench_.is_latched(0) && submit(ClearFaults{}) == Refused::kNot) account_.clear_done(owner_, tick);
     Command c = turn_[static_cast<std::size_t>(tick) % kAngles];

@@ -162,11 +162,11 @@ void AxisAccount::io_done(Owner owner) {
   }
 }
 
-void AxisAccount::granted(Owner owner, Tick tick, std::function<bool()> is_there) {
+void AxisAccount::granted(Owner owner, Tick tick, std::uint64_t forces, std::function<bool()> is_there) {
   Lease& lease = leases_[owner];
   lease.renewed = std::max(lease.renewed, tick);
-  lease.may_go = forces_ > 0;
-  lease.gave_back = lease.gave_back || forces_ > 0;
+  lease.may_go = forces_ > 0 || forces != force_changes_;
+  lease.gave_back = lease.gave_back || lease.may_go;
   lease.is_there = std::move(is_there);
 }
 
@@ -177,6 +177,7 @@ void AxisAccount::may_go(Owner owner) {
 
 void AxisAccount::force_begins() {
   ++forces_;
+  ++force_changes_;
   for (auto& [owner, lease] : leases_)
     lease.may_go = lease.gave_back = true;
 }

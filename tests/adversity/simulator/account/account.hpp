@@ -33,8 +33,9 @@ class AxisAccount {
   // ---- reports of the clients ----
 
   /// This owner has, or had, the lease, renewed at this tick; `is_there` says whether its session is still
-  /// connected.
-  void granted(Owner owner, Tick tick, std::function<bool()> is_there);
+  /// connected, and `forces` is what forces() was when it asked: an answer that was on its way while an
+  /// administrator took the axis does not say who came first.
+  void granted(Owner owner, Tick tick, std::uint64_t forces, std::function<bool()> is_there);
   /// The owner has asked for its lease to end.
   void may_go(Owner owner);
   /// The owner's session is gone without a release: the axis must be free soon. `asks`: a request for the
@@ -44,7 +45,12 @@ class AxisAccount {
   void forget(Owner owner) { leases_.erase(owner); }
   /// An administrator asks for the axis, with any owner, until `force_ends`.
   void force_begins();
-  void force_ends() { --forces_; }
+  void force_ends() {
+    --forces_;
+    ++force_changes_;
+  }
+  /// How often an administrator has begun or ended to take the axis.
+  std::uint64_t forces() const noexcept { return force_changes_; }
   /// An administrator has taken the lease by force; in lockstep the sample that shows it is still to come.
   void came_by_force(Owner owner) {
     if (before_.owner != owner) by_force_.insert(owner);
@@ -112,7 +118,8 @@ class AxisAccount {
   std::vector<Tick> clearings_;  ///< of cleared faults whose request is not known yet
   std::set<Tick> clears_done_;   ///< not yet shown by a sample
   std::set<Owner> by_force_;
-  int forces_ = 0;                          ///< under way
+  int forces_ = 0;  ///< under way
+  std::uint64_t force_changes_ = 0;
   std::map<std::string, Time> kept_until_;  ///< by transport, at the latest
   std::uint64_t commands_ = 0;
   std::uint64_t copies_ = 0;  ///< of commands, perhaps made by the injected fault

@@ -14,7 +14,7 @@ constexpr Owner kAnna = 9;
 class AccountTest : public testing::Test {
  protected:
   AccountTest() {
-    account_.granted(kAnna, 0, [] { return true; });
+    account_.granted(kAnna, 0, account_.forces(), [] { return true; });
     see(ControlState::kRun);
   }
 
@@ -45,6 +45,20 @@ TEST_F(AccountTest, ALeaseGivenBackAndTakenAgainBeginsAnewAlsoForASessionThatHas
   account_.gone(kAnna, false);
   see(ControlState::kIdle);
   EXPECT_EQ(broken_, std::vector<std::string>{});
+}
+
+// Catches: an account that blames the bench for a lease that an administrator took while its answer was on
+// its way; one that lets an axis change its owner ever after.
+TEST_F(AccountTest, AnAnswerThatWasUnderWayDuringAForceSaysNothing) {
+  const std::uint64_t asked = account_.forces();
+  account_.force_begins();
+  account_.force_ends();
+  for (const std::uint64_t forces : {asked, account_.forces()}) {
+    account_.granted(kAnna, static_cast<Tick>(tick_), forces, [] { return true; });
+    account_.see({.tick = ++tick_, .state = static_cast<std::uint64_t>(ControlState::kRun), .owner = 5}, 0);
+    EXPECT_EQ(broken_.empty(), forces == asked);
+    see(ControlState::kRun);
+  }
 }
 
 // Catches: an account that lets the lease of a closed session stay.

@@ -230,7 +230,7 @@ void StreamClient::on_done(const Asked& asked, const v1::Done& done) {
     if (asked.action == v1::LeaseRequest::ACTION_TAKE) account.came_by_force(owner_);
     leased_[asked.axis] = asked.action != v1::LeaseRequest::ACTION_RELEASE;
     if (!leased_[asked.axis]) return;
-    account.granted(owner_, tick, [wire = std::weak_ptr(wire_)] {
+    account.granted(owner_, tick, asked.forces, [wire = std::weak_ptr(wire_)] {
       const auto there = wire.lock();
       return there && there->is_connected();
     });

@@ -62,9 +62,10 @@ class StreamClient final : public Player {
     v1::Envelope::KindCase kind;
     std::uint32_t axis;  ///< commanded, leased or cleared
     v1::LeaseRequest::Action action;
-    bool counts;         ///< a command for one axis, that is counted if it is refused
-    std::uint64_t tick;  ///< that a command answers
-    std::uint64_t sent;  ///< tick of the axis when a command was sent
+    bool counts;           ///< a command for one axis, that is counted if it is refused
+    std::uint64_t tick;    ///< that a command answers
+    std::uint64_t sent;    ///< tick of the axis when a command was sent
+    std::uint64_t forces;  ///< AxisAccount::forces() when a lease was asked for
   };
   struct Subscription {
     std::uint32_t every = 0;

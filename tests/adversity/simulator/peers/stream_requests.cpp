@@ -34,7 +34,8 @@ std::uint64_t StreamClient::ask(v1::Envelope& request, std::uint32_t axis, bool 
                       request.lease().action(),
                       counts,
                       tick,
-                      counts ? scene_.axes[axis].tick() : 0};
+                      counts ? scene_.axes[axis].tick() : 0,
+                      request.has_lease() ? scene_.axes[axis].forces() : 0};
   send(request);
   return last_id_;
 }
@@ -188,6 +189,7 @@ void StreamClient::babble() {
   for (AxisAccount& axis : scene_.axes) {
     axis.command_sent();
     axis.clear_unanswered();
+    axis.may_go(owner_);  // the bench may end the session, and run a tick before it closes the socket
   }
   wire_->send(bytes);
 }
