@@ -26,7 +26,7 @@ namespace drivebench::web {
 class Drive {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  static constexpr std::chrono::seconds kSilence{2};
+  static constexpr std::chrono::seconds kSilence{5};
   static constexpr std::chrono::seconds kRampDown{1};  ///< the longest ramp of a drive whose page has gone
   /// Requests of the drive have ids from here on; a page counts from 1.
   static constexpr std::uint64_t kFirstId = std::uint64_t{1} << 62;
