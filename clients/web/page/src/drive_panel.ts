@@ -186,7 +186,7 @@ function nowText(now: DriveReport["axes"][number]): string {
 }
 
 function explanation(bench: Bench): string {
-  const common = "Escape stops: gates off. If the page falls silent for 2 s, the gateway ramps down, switches off and gives the lease back.";
+  const common = "Escape stops: gates off. If the page falls silent for 5 s, the gateway ramps down, switches off and gives the lease back.";
   return bench.isLockstep ? `While the page drives, the gateway lets the time run. ${common}`
     : `The gateway sends a command each tick; the page sets the targets. ${common}`;
 }
