@@ -63,9 +63,9 @@ int LinkBackend::newest(std::uint32_t axis) noexcept {
   return carry_out(*this, [&] { keep(link_.exchange({})); });
 }
 
-void LinkBackend::keep(const v1::ExchangeReply& reply) {
-  for (const v1::AxisSample& each : reply.samples()) {
-    if (each.axis() < samples_.size()) samples_[each.axis()] = link::plain(each.sample());
+void LinkBackend::keep(std::span<const link::AxisSample> samples) {
+  for (const link::AxisSample& each : samples) {
+    if (each.axis < samples_.size()) samples_[each.axis] = each.sample;
   }
 }
 

@@ -42,7 +42,7 @@ class LinkBackend final : public abi::Backend {
   int restore(std::span<const std::byte> state) noexcept override;
 
  private:
-  void keep(const v1::ExchangeReply& reply);
+  void keep(std::span<const link::AxisSample> samples);
 
   link::Link link_;
   std::unique_ptr<const abi::Description> description_;

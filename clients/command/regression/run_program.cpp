@@ -114,7 +114,7 @@ class TickView {
  public:
   explicit TickView(const std::string& address)
       : link_(address, {.client = "drivebench test", .token = {}}) {}
-  std::uint64_t tick() { return link_.exchange({}).samples(0).sample().tick(); }
+  std::uint64_t tick() { return link_.exchange({}).front().sample.tick; }
 
  private:
   link::Link link_;

@@ -12,8 +12,11 @@
 #include <cerrno>
 #include <charconv>
 #include <memory>
+#include <optional>
 #include <system_error>
 #include <utility>
+
+#include "protocols/shm/segment.hpp"
 
 namespace drivebench::link {
 namespace {
@@ -22,10 +25,46 @@ namespace {
   throw AddressError("'" + std::string(text) + "' is not an address: " + std::string(rule));
 }
 
-bool is_port(std::string_view text) {
+/// The number that the text is; nothing if it is none.
+std::optional<unsigned> number_in(std::string_view text) {
   unsigned value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size() && value >= 1 && value <= 65535;
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+bool is_port(std::string_view text) {
+  const unsigned port = number_in(text).value_or(0);
+  return port >= 1 && port <= 65535;
+}
+
+std::string socket_path(std::string_view text, std::string_view path) {
+  if (path.empty()) {
+    bad_address(text,
+                "after " + std::string(text.substr(0, text.find(':'))) + ": comes the path of a socket");
+  }
+  if (path.size() >= sizeof(sockaddr_un::sun_path)) {
+    bad_address(text, "the path of a unix socket has at most 107 bytes");
+  }
+  return std::string(path);
+}
+
+/// Parses the part of a shm: address behind the colon.
+Address shm_address(std::string_view text, std::string_view place) {
+  constexpr std::string_view kSpin = "spin_us=";
+  Address address{.host = {}, .port = {}, .path = {}, .shares_memory = true};
+  const std::size_t mark = std::min(place.rfind('?'), place.size());
+  if (mark < place.size()) {
+    const std::string_view query = place.substr(mark + 1);
+    const auto spin =
+        query.starts_with(kSpin) ? number_in(query.substr(kSpin.size())) : std::optional<unsigned>{};
+    if (!spin || *spin > shm::kMaxSpinUs) {
+      bad_address(text, "behind the ? stands spin_us=N with N from 0 to " + std::to_string(shm::kMaxSpinUs));
+    }
+    address.spin = std::chrono::microseconds(*spin);
+  }
+  address.path = socket_path(text, place.substr(0, mark));
+  return address;
 }
 
 /// Parses the part of a tls: address behind the question mark.
@@ -113,15 +152,12 @@ FileDescriptor connect_tcp(const Address& address, std::chrono::milliseconds dea
 
 Address parse_address(std::string_view text) {
   constexpr std::string_view kUnix = "unix:";
+  constexpr std::string_view kShm = "shm:";
   constexpr std::string_view kTcp = "tcp:";
   if (text.starts_with(kUnix)) {
-    const std::string_view path = text.substr(kUnix.size());
-    if (path.empty()) bad_address(text, "after unix: comes the path of a socket");
-    if (path.size() >= sizeof(sockaddr_un::sun_path)) {
-      bad_address(text, "the path of a unix socket has at most 107 bytes");
-    }
-    return {.host = {}, .port = {}, .path = std::string(path)};
+    return {.host = {}, .port = {}, .path = socket_path(text, text.substr(kUnix.size()))};
   }
+  if (text.starts_with(kShm)) return shm_address(text, text.substr(kShm.size()));
   constexpr std::string_view kTls = "tls:";
   Address address{.host = {}, .port = {}, .path = {}, .tls = text.starts_with(kTls), .files = {}};
   std::string_view place = text.starts_with(kTcp) || address.tls ? text.substr(kTcp.size()) : text;
@@ -137,7 +173,8 @@ Address parse_address(std::string_view text) {
     port = place.substr(colon + 1);
   }
   if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  if (host.empty()) bad_address(text, "expected tcp:HOST:PORT, HOST:PORT, tls:HOST:PORT or unix:PATH");
+  if (host.empty())
+    bad_address(text, "expected tcp:HOST:PORT, HOST:PORT, tls:HOST:PORT, unix:PATH or shm:PATH");
   if (host.find('/') != std::string_view::npos) {
     bad_address(text, "a host has no '/'; a unix socket is written unix:PATH");
   }
@@ -149,7 +186,7 @@ Address parse_address(std::string_view text) {
 }
 
 std::string to_string(const Address& address) {
-  if (!address.path.empty()) return "unix:" + address.path;
+  if (!address.path.empty()) return (address.shares_memory ? "shm:" : "unix:") + address.path;
   const bool is_ipv6 = address.host.find(':') != std::string::npos;
   return (address.tls ? "tls:" : "tcp:") + (is_ipv6 ? "[" + address.host + "]" : address.host) + ":" +
          address.port;

@@ -31,19 +31,23 @@ class AddressError : public std::invalid_argument {
 inline constexpr std::string_view kDefaultAddress = "tcp:127.0.0.1:7300";
 
 /// The address of a bench: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300),
-/// `tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE` (each file may be left out) or `unix:PATH`.
+/// `tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE` (each file may be left out), `unix:PATH`, or
+/// `shm:PATH?spin_us=N`: the unix socket of the bench, and exchanges through shared memory.
 struct Address {
   std::string host;
   std::string port;
   std::string path;  ///< of a unix socket; then host and port are empty
   bool tls = false;
   TlsFiles files{};
+  bool shares_memory = false;
+  /// With shared memory: for so long both sides look for each other's word before they sleep.
+  std::chrono::microseconds spin{20};
 };
 
 /// Throws AddressError.
 Address parse_address(std::string_view text);
 
-/// `tcp:HOST:PORT`, `tls:HOST:PORT` without the files, or `unix:PATH`.
+/// `tcp:HOST:PORT`, `tls:HOST:PORT` without the files, `unix:PATH` or `shm:PATH`.
 std::string to_string(const Address& address);
 
 /// Returns a connected, blocking stream socket without Nagle's delay; for a tls: address it leads through a

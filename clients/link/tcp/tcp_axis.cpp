@@ -1,6 +1,5 @@
 #include "clients/link/tcp/tcp_axis.hpp"
 
-#include <cstddef>
 #include <span>
 #include <string>
 
@@ -27,40 +26,18 @@ const Sample& TcpAxis::exchange(const AxisCommand& command) {
   return keep(link_->exchange(std::span(&ours, 1)));
 }
 
-const Sample& TcpAxis::keep(const v1::ExchangeReply& reply) {
+const Sample& TcpAxis::keep(std::span<const AxisSample> samples) {
   bool found = false;
-  for (const v1::AxisSample& each : reply.samples()) {
-    if (each.axis() == axis_) {
-      sample_ = plain(each.sample());
+  for (const AxisSample& each : samples) {
+    if (each.axis == axis_) {
+      sample_ = each.sample;
       found = true;
-    } else if (each.axis() == second_axis_) {
-      second_ = plain(each.sample());
+    } else if (each.axis == second_axis_) {
+      second_ = each.sample;
     }
   }
   if (found) return sample_;
   throw LinkError(link_->peer() + " answered without a sample of axis " + std::to_string(axis_));
-}
-
-Sample plain(const v1::Sample& message) {
-  const google::protobuf::Descriptor& fields = *v1::Sample::descriptor();
-  const google::protobuf::Reflection& read = *message.GetReflection();
-  Sample sample;
-  for (std::size_t i = 0; i < kSignals.size(); ++i) {
-    const Signal& signal = kSignals[i];
-    const auto* field = fields.field(static_cast<int>(i));
-    switch (signal.type) {
-      case SignalType::kUnsigned:
-        sample.*signal.as_unsigned = read.GetUInt64(message, field);
-        break;
-      case SignalType::kSigned:
-        sample.*signal.as_signed = read.GetInt64(message, field);
-        break;
-      case SignalType::kReal:
-        sample.*signal.as_real = read.GetDouble(message, field);
-        break;
-    }
-  }
-  return sample;
 }
 
 }  // namespace drivebench::link

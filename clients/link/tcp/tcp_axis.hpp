@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -33,7 +34,7 @@ class TcpAxis final : public AxisLink {
   void set_load(const LoadChange& change) override { link_->set_load(axis_, change); }
 
  private:
-  const Sample& keep(const v1::ExchangeReply& reply);
+  const Sample& keep(std::span<const AxisSample> samples);
 
   std::unique_ptr<Link> link_;
   std::uint32_t axis_;
@@ -44,8 +45,5 @@ class TcpAxis final : public AxisLink {
 
 /// The axis that shares the amplifier of this one.
 std::optional<std::uint32_t> sharer_of_amplifier(const v1::BenchDescription& bench, std::uint32_t axis);
-
-/// Converts a message to a sample.
-Sample plain(const v1::Sample& message);
 
 }  // namespace drivebench::link

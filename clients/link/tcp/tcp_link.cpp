@@ -37,8 +37,9 @@ std::string seconds(std::chrono::milliseconds duration) {
 
 }  // namespace
 
-Link::Link(std::string_view address, const LinkOptions& options)
-    : Link(connect_to(parse_address(address), options.deadline), to_string(parse_address(address)), options) {
+Link::Link(const Address& address, const LinkOptions& options)
+    : Link(connect_to(address, options.deadline), to_string(address), options) {
+  if (address.shares_memory) share_memory(address.spin);
 }
 
 Link::Link(FileDescriptor socket, std::string peer, const LinkOptions& options)
@@ -72,31 +73,6 @@ void Link::set_deadline(std::chrono::milliseconds deadline) {
   const timeval limit = {.tv_sec = deadline_.count() / 1000, .tv_usec = deadline_.count() % 1000 * 1000};
   ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   ::setsockopt(socket_.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
-}
-
-const v1::ExchangeReply& Link::exchange(std::span<const AxisCommand> commands) {
-  v1::Envelope& request = new_request();
-  v1::Exchange& exchange = *request.mutable_exchange();
-  for (const AxisCommand& from : commands) {
-    v1::Command& to = *exchange.add_commands();
-    to.set_axis(from.axis);
-    to.set_tick(from.tick);
-    to.set_gates(from.gates);
-    to.set_u_a_v(from.u_a_v);
-    to.set_u_b_v(from.u_b_v);
-    to.set_u_c_v(from.u_c_v);
-    to.set_u_f_v(from.u_f_v);
-    to.set_i_a_a(from.i_a_a);
-    to.set_i_b_a(from.i_b_a);
-    to.set_i_c_a(from.i_c_a);
-    to.set_i_f_a(from.i_f_a);
-    to.set_d_a(from.d_a);
-    to.set_d_b(from.d_b);
-    to.set_d_c(from.d_c);
-    to.set_d_f(from.d_f);
-    to.set_legs_off(from.legs_off);
-  }
-  return ask(request, Kind::kExchangeReply).exchange_reply();
 }
 
 std::uint64_t Link::lease(std::uint32_t axis, v1::LeaseRequest::Action action) {
@@ -303,7 +279,7 @@ const v1::Envelope& Link::await_answer() {
     if (!first) {
       const Clock::time_point now = Clock::now();
       if (!give_up) give_up = now + deadline_;
-      if (now > *give_up) fail("gave no answer within " + seconds(deadline_));
+      if (now > *give_up) fail_late();
     }
     receive_some();
   }
@@ -326,12 +302,17 @@ void Link::receive_some() {
   if (!socket_.is_open()) throw LinkError("the link to " + peer_ + " is closed");
   const std::span<std::byte> space = reader_.free_space();
   for (;;) {
-    const ssize_t received = ::recv(socket_.get(), space.data(), space.size(), 0);
+    const std::ptrdiff_t received = taken_ == nullptr ? ::recv(socket_.get(), space.data(), space.size(), 0)
+                                                      : receive_with_descriptors(space);
     if (received > 0) return reader_.received(static_cast<std::size_t>(received));
     if (received == 0) fail("closed the connection");
-    if (errno == EAGAIN) fail("gave no answer within " + seconds(deadline_));
+    if (errno == EAGAIN) fail_late();
     if (errno != EINTR) fail("closed the connection: " + std::generic_category().message(errno));
   }
+}
+
+void Link::fail_late() {
+  fail("gave no answer within " + seconds(deadline_));
 }
 
 void Link::fail(const std::string& what) {

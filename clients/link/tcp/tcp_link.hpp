@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -16,6 +17,7 @@
 
 #include "clients/link/common/address.hpp"
 #include "clients/link/common/requests.hpp"
+#include "clients/link/shm/shared_memory.hpp"
 #include "protocols/framing.hpp"
 
 namespace drivebench::link {
@@ -26,6 +28,9 @@ struct LinkOptions {
   bool conducts = false;  ///< changes axes that other sessions hold; needs the role conductor
   std::chrono::milliseconds deadline{5000};  ///< for connecting and for every answer
 };
+
+/// The newest sample of an axis in the answer to an exchange.
+using AxisSample = shm::SampleRecord;
 
 /// The whole state of a bench.
 struct SavedState {
@@ -42,7 +47,9 @@ struct SavedState {
 class Link {
  public:
   /// Connects and says hello. Throws AddressError, ConnectError, LinkError, RefusalError.
-  explicit Link(std::string_view address, const LinkOptions& options = {});
+  explicit Link(std::string_view address, const LinkOptions& options = {})
+      : Link(parse_address(address), options) {}
+  Link(const Address& address, const LinkOptions& options);
   /// Uses a connected stream socket; `peer` is its name in errors.
   Link(FileDescriptor socket, std::string peer, const LinkOptions& options = {});
   Link(const Link&) = delete;
@@ -57,7 +64,7 @@ class Link {
   /// Commands in, samples out: see Exchange in bench.proto. Lockstep: tick k runs, sample k+1 comes back.
   /// Real time: the first sample taken after the commands came in. No commands: the newest sample of every
   /// axis.
-  const v1::ExchangeReply& exchange(std::span<const AxisCommand> commands);
+  std::span<const AxisSample> exchange(std::span<const AxisCommand> commands);
 
   /// The number that Sample.owner shows for this session.
   std::uint64_t acquire(std::uint32_t axis);
@@ -117,9 +124,13 @@ class Link {
   const v1::Envelope& await_answer();
   v1::Envelope* next_envelope();
   void receive_some();
+  std::ptrdiff_t receive_with_descriptors(std::span<std::byte> space);
+  void share_memory(std::chrono::microseconds spin);
+  std::span<const AxisSample> exchange_in_memory(std::span<const AxisCommand> commands);
   std::uint64_t lease(std::uint32_t axis, v1::LeaseRequest::Action action);
   void keep(const v1::Samples& samples);
   void keep(const v1::Notice& notice);
+  [[noreturn]] void fail_late();
   [[noreturn]] void fail(const std::string& what);
 
   FileDescriptor socket_;
@@ -134,7 +145,14 @@ class Link {
   std::deque<v1::Samples> kept_;
   std::size_t kept_samples_ = 0;
   std::vector<v1::Notice> notices_;
-  std::uint64_t dropped_ = 0;  // samples lost from kept_ since the last call
+  std::uint64_t dropped_ = 0;        // samples lost from kept_ since the last call
+  std::vector<AxisSample> samples_;  // of the last exchange over the socket
+  std::vector<FileDescriptor>* taken_ =
+      nullptr;  // where to keep descriptors that come; null: they are closed
+  std::unique_ptr<SharedMemory> memory_;
 };
+
+/// Converts a message to a sample.
+Sample plain(const v1::Sample& message);
 
 }  // namespace drivebench::link

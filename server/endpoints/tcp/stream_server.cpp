@@ -111,9 +111,11 @@ void StreamServer::serve(Engine& engine, std::function<std::vector<TransportRepo
     return reports;
   };
   audience_.emplace(io_, engine);
+  spinner_.emplace(io_);
   context_.emplace(SessionContext{.engine = engine,
                                   .admission = Admission(config_.asks_for_token, config_.grants),
                                   .audience = *audience_,
+                                  .spinner = *spinner_,
                                   .session_count = [this] { return sessions_.size(); },
                                   .transports = all_reports,
                                   .experiments = experiments,

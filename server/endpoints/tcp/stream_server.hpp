@@ -49,6 +49,7 @@ class StreamServer {
   asio::io_context& io_;
   TcpConfig config_;
   std::optional<Audience> audience_;
+  std::optional<Spinner> spinner_;
   std::optional<SessionContext> context_;
   asio::ip::tcp::acceptor tcp_;
   asio::local::stream_protocol::acceptor unix_;

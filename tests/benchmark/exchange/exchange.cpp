@@ -37,7 +37,7 @@ class Controller {
  public:
   explicit Controller(const std::string& address) : link_(address) {
     link_.acquire(0);
-    tick_ = link_.exchange({}).samples(0).sample().tick();
+    tick_ = link_.exchange({}).front().sample.tick;
     for (std::size_t k = 0; k < 2 * kBlock; ++k)
       exchange();
   }
@@ -45,9 +45,9 @@ class Controller {
   void exchange() {
     const TwoPhase& u = line_voltages()[tick_ % line_voltages().size()];
     command_ = {.axis = 0, .tick = tick_, .gates = v1::GATES_VOLTAGE, .u_a_v = u.a, .u_b_v = u.b};
-    const v1::Sample& sample = link_.exchange({&command_, 1}).samples(0).sample();
-    if (sample.tick() != tick_ + 1) throw std::runtime_error("an exchange did not run exactly one tick");
-    tick_ = sample.tick();
+    const Sample& sample = link_.exchange({&command_, 1}).front().sample;
+    if (sample.tick != tick_ + 1) throw std::runtime_error("an exchange did not run exactly one tick");
+    tick_ = sample.tick;
   }
 
   Sizes sizes() {
@@ -59,11 +59,11 @@ class Controller {
     command.set_gates(v1::GATES_VOLTAGE);
     command.set_u_a_v(u.a);
     command.set_u_b_v(u.b);
-    v1::Envelope reply;
-    reply.set_id(tick_);
-    *reply.mutable_exchange_reply() = link_.exchange({});
-    return {.request = kFrameHeaderSize + request.ByteSizeLong(),
-            .reply = kFrameHeaderSize + reply.ByteSizeLong()};
+    const link::AxisSample& newest = link_.exchange({}).front();
+    const AxisSampleView view{static_cast<std::uint32_t>(newest.axis), &newest.sample};
+    std::vector<std::byte> reply;
+    append_exchange_reply(reply, tick_, {&view, 1});
+    return {.request = kFrameHeaderSize + request.ByteSizeLong(), .reply = reply.size()};
   }
 
  private:

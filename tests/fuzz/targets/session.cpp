@@ -62,6 +62,7 @@ class World {
         context_{.engine = *engine_,
                  .admission = Admission(false, {}),
                  .audience = audience_,
+                 .spinner = spinner_,
                  .session_count = [] { return kPeers; },
                  .transports = [] { return std::vector<TransportReport>{}; },
                  .experiments = nullptr} {
@@ -379,6 +380,7 @@ class World {
   asio::io_context io_{1};
   std::unique_ptr<Engine> engine_;
   Audience audience_;
+  Spinner spinner_;
   SessionContext context_;
   std::array<Peer, kPeers> peers_;
   std::array<bool, 2> cleared_{};

@@ -15,6 +15,7 @@
 #include "server/access/places.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
 #include "server/endpoints/tcp/sending/outbox.hpp"
+#include "server/endpoints/tcp/sending/spinner.hpp"
 #include "server/endpoints/tcp/session/refusal_log.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine/engine.hpp"
@@ -27,6 +28,7 @@ struct SessionContext {
   Engine& engine;
   Admission admission;
   Audience& audience;
+  Spinner& spinner;
   std::function<std::size_t()> session_count;
   std::function<std::vector<TransportReport>()> transports;  ///< reports of all transports
   Experiments* experiments;                                  ///< null: this bench has no experiments

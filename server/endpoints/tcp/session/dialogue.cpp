@@ -28,6 +28,11 @@ v1::Envelope& Dialogue::begin_reply(std::uint64_t id) {
 }
 
 void Dialogue::send_reply() {
+  encode_reply();
+  send_scratch();
+}
+
+std::vector<std::byte>& Dialogue::encode_reply() {
   const v1::Envelope& envelope = context_.reply;
   std::vector<std::byte>& bytes = context_.scratch;
   const std::size_t size = envelope.ByteSizeLong();
@@ -36,7 +41,7 @@ void Dialogue::send_reply() {
   std::copy(header.begin(), header.end(), bytes.begin());
   envelope.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(bytes.data()) + kFrameHeaderSize);
   bytes_in_turn_ += bytes.size();
-  send_scratch();
+  return bytes;
 }
 
 void Dialogue::send_scratch() {
@@ -93,10 +98,12 @@ void Dialogue::audit(std::string_view event, std::string_view result, std::vecto
 
 bool Dialogue::axis_exists(std::uint32_t axis) {
   if (axis < axis_count()) return true;
-  refuse(id(), v1::REFUSAL_UNKNOWN_AXIS,
-         "axis " + std::to_string(axis) + " does not exist; the bench has " + std::to_string(axis_count()),
-         "axis");
+  refuse(id(), v1::REFUSAL_UNKNOWN_AXIS, no_such_axis(axis), "axis");
   return false;
+}
+
+std::string Dialogue::no_such_axis(std::uint64_t axis) const {
+  return "axis " + std::to_string(axis) + " does not exist; the bench has " + std::to_string(axis_count());
 }
 
 }  // namespace drivebench

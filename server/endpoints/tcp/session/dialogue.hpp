@@ -44,6 +44,8 @@ class Dialogue {
   /// An empty message that answers the request with this id; send_reply() sends it.
   v1::Envelope& begin_reply(std::uint64_t id);
   void send_reply();
+  /// The frame of the answer, in scratch().
+  std::vector<std::byte>& encode_reply();
   /// For frames without an Envelope: send_scratch() sends the content of scratch().
   std::vector<std::byte>& scratch() noexcept { return context_.scratch; }
   void send_scratch();
@@ -64,6 +66,8 @@ class Dialogue {
 
   /// Whether the bench has this axis; if not, refuses the request.
   bool axis_exists(std::uint32_t axis);
+  /// The reason why it has not.
+  std::string no_such_axis(std::uint64_t axis) const;
 
   /// Counts the bytes of replies from here on.
   void begin_turn() noexcept { bytes_in_turn_ = 0; }

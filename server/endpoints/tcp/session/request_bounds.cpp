@@ -29,7 +29,7 @@ constexpr auto kRequestKinds = std::to_array<v1::Envelope::KindCase>({
     v1::Envelope::kUploadTable,     v1::Envelope::kListExperiments,
     v1::Envelope::kFetchExperiment, v1::Envelope::kCancelExperiment,
     v1::Envelope::kSaveState,       v1::Envelope::kRestoreState,
-    v1::Envelope::kResetBench,
+    v1::Envelope::kResetBench,      v1::Envelope::kShareMemory,
 });
 
 /// The repeated fields of all requests.

@@ -34,6 +34,7 @@ Session::Session(Outbox::Socket socket, Client client, SessionContext& context, 
       subscriptions_(dialogue_),
       leases_(dialogue_),
       exchanges_(dialogue_, leases_, subscriptions_),
+      shared_exchanges_(dialogue_, exchanges_),
       states_(dialogue_, leases_),
       uploads_(dialogue_),
       fetch_(dialogue_),
@@ -194,6 +195,9 @@ bool Session::dispatch(const v1::Envelope& request) {
     case v1::Envelope::kResetBench:
       states_.reset();
       break;
+    case v1::Envelope::kShareMemory:
+      shared_exchanges_.share(request.share_memory());
+      break;
     case v1::Envelope::kStatusRequest:
       report_status(dialogue_);
       break;
@@ -287,6 +291,7 @@ void Session::close() {
   Audience& audience = dialogue_.context().audience;
   audience.remove_subscriber(subscriptions_);
   audience.remove_waiting(exchanges_);
+  shared_exchanges_.close();
   identity_.stop_watching();
   silence_.call_off();
   dialogue_.context().places.leave(place_);

@@ -17,6 +17,7 @@
 #include "server/endpoints/tcp/session/requests/states.hpp"
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 #include "server/endpoints/tcp/session/requests/uploads.hpp"
+#include "server/endpoints/tcp/session/shared_memory/shared_exchanges.hpp"
 
 namespace drivebench {
 
@@ -71,6 +72,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Subscriptions subscriptions_;
   Leases leases_;
   Exchanges exchanges_;
+  SharedExchanges shared_exchanges_;
   States states_;
   Uploads uploads_;
   Fetch fetch_;

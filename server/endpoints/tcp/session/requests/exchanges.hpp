@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "protocols/sample_codec.hpp"
@@ -14,13 +15,33 @@
 
 namespace drivebench {
 
+/// A command and the axis that it is for.
+struct AxisCommand {
+  std::uint32_t axis;
+  Command command;
+};
+
 /// The exchanges of a session: commands in, the samples of their tick out. One exchange may wait for its
 /// tick.
 class Exchanges final : public Audience::Waiter {
  public:
+  /// The way by which an exchange came and by which its answer goes back.
+  class Way {
+   public:
+    virtual void answer(std::uint64_t id, std::span<const AxisSampleView> samples) = 0;
+    virtual void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& sentence,
+                        const char* field) = 0;
+
+   protected:
+    ~Way() = default;
+  };
+
   Exchanges(Dialogue& dialogue, const Leases& leases, Subscriptions& subscriptions);
 
+  /// Over the socket of the session.
   void exchange(const v1::Exchange& request);
+  /// No commands: the newest sample of every axis.
+  void exchange(std::span<const AxisCommand> commands, Way& way, std::uint64_t id);
   /// After a tick: answers the exchange that waits for it.
   void on_newest() override;
   /// Refuses an exchange that waits for a tick of this axis: the session no longer holds it, so the tick
@@ -29,23 +50,41 @@ class Exchanges final : public Audience::Waiter {
 
   ExcessLimit& excess() noexcept { return excess_; }
 
+  /// The reason why a command has no such gates or legs, and its field.
+  static std::string not_a_command(std::int64_t gates, std::uint64_t legs_off);
+  static const char* field_of_not_a_command(std::int64_t gates) noexcept;
+
  private:
+  /// Frames on the socket.
+  class Frames final : public Way {
+   public:
+    explicit Frames(Dialogue& dialogue) : dialogue_(dialogue) {}
+    void answer(std::uint64_t id, std::span<const AxisSampleView> samples) override;
+    void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& sentence,
+                const char* field) override;
+
+   private:
+    Dialogue& dialogue_;
+  };
   struct Waiting {
+    Way* way;
     std::uint64_t id;
-    std::vector<std::uint32_t> axes;
   };
 
-  /// The axes of the commands; nothing after it has refused the request.
-  std::optional<std::vector<std::uint32_t>> axes_of(const v1::Exchange& request);
-  bool are_taken(const v1::Exchange& request);
-  void add_shared(std::vector<std::uint32_t>& axes) const;
-  void reply(std::uint64_t id, std::span<const std::uint32_t> axes);
+  /// Puts the axes of the commands into axes_; false after it has refused the request.
+  bool axes_exist(std::span<const AxisCommand> commands, Way& way, std::uint64_t id);
+  bool are_taken(std::span<const AxisCommand> commands, Way& way, std::uint64_t id);
+  void add_shared();
+  void answer(Way& way, std::uint64_t id);
 
   Dialogue& dialogue_;
   Engine& engine_;
   const Leases& leases_;
   Subscriptions& subscriptions_;
+  Frames frames_;
   ExcessLimit excess_;
+  std::vector<AxisCommand> commands_;  // of the present frame
+  std::vector<std::uint32_t> axes_;    // of the present exchange, or of the one that waits
   std::vector<AxisSampleView> views_;
   std::optional<Waiting> waiting_;
 };
