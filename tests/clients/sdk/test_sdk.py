@@ -30,13 +30,13 @@ class Sdk(unittest.TestCase):
         return file
 
     # Catches: a request, a refusal, a sentence or a bit that differs between the bench in process and the server.
-    def test_in_process_tcp_and_unix_say_the_same(self):
+    def test_in_process_tcp_unix_and_shared_memory_say_the_same(self):
         with tempfile.TemporaryDirectory() as folder:
             said = [exercise(f"inproc:{self.bench_file(folder)}")]
-            for way in ("tcp", "unix"):
+            for way in ("tcp", "unix", "shm"):
                 path = f"{folder}/{way}.sock"
                 with Server("--unix", path, text=PATIENT_TEXT) as server:
-                    said.append(exercise(f"unix:{path}" if way == "unix" else "tcp:%s:%d" % server.address))
+                    said.append(exercise("tcp:%s:%d" % server.address if way == "tcp" else f"{way}:{path}"))
         self.assertIn("hash ", said[0])
         self.assertIn("tick 900: encoder", said[0])
         for other in said[1:]:
@@ -69,6 +69,8 @@ class Sdk(unittest.TestCase):
     def test_what_cannot_be_opened_says_why(self):
         for address, why in (("inproc:servoo", 'did you mean "servo"'), ("inproc:", "no bench file ''"),
                              ("tcp:127.0.0.1:1", "Connection refused"), ("unix:/nowhere/socket", "No such file"),
+                             ("shm:/nowhere/socket", "No such file"), ("shm:/tmp/x?spin_us=101", "0 to 100"),
+                             ("shm:", "path of a socket"),
                              ("tcp:127.0.0.1:99999", "99999"), ("can:nothing:vcan0", "nothing"),
                              ("modbus:127.0.0.1:1", "Connection refused"), ("", "")):
             self.assertIn(why, exercise(address, code=1), address)
@@ -84,15 +86,16 @@ class Sdk(unittest.TestCase):
 
     # Catches: a call that waits for ever when the server dies, or that goes on as if nothing were.
     def test_a_server_that_dies_is_a_lost_link(self):
-        with Server(text=PATIENT_TEXT) as server:
-            holder = subprocess.Popen([EXERCISE, "tcp:%s:%d" % server.address, "die"], stdin=subprocess.PIPE,
-                                      stdout=subprocess.PIPE, text=True)
-            self.assertEqual(holder.stdout.readline(), "ready\n")
-            server.process.kill()
-            server.process.wait()
-            said, _ = holder.communicate("\n", timeout=PATIENCE_S)
-        self.assertRegex(said, r"step: -3 'tcp:127\.0\.0\.1:\d+ closed the connection.*'")
-        self.assertRegex(said, r"again: -3 'the link to .* is closed'")
+        for way in ("tcp", "shm"):
+            with Server(text=PATIENT_TEXT, unix=True) as server:
+                address = "tcp:%s:%d" % server.address if way == "tcp" else f"shm:{server.unix_path}"
+                holder = subprocess.Popen([EXERCISE, address, "die"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+                self.assertEqual(holder.stdout.readline(), "ready\n")
+                server.process.kill()
+                server.process.wait()
+                said, _ = holder.communicate("\n", timeout=PATIENCE_S)
+            self.assertRegex(said, rf"step: -3 '{way}:\S+ closed the connection.*'")
+            self.assertRegex(said, r"again: -3 'the link to .* is closed'")
 
 
 if __name__ == "__main__":

@@ -27,14 +27,13 @@ Exchanges::Exchanges(Dialogue& dialogue, const Leases& leases, Subscriptions& su
       frames_(dialogue),
       excess_(dialogue) {}
 
-std::string Exchanges::not_a_command(std::int64_t gates, std::uint64_t legs_off) {
-  return v1::Gates_IsValid(static_cast<int>(gates))
-             ? "legs_off is " + std::to_string(legs_off) + " but must be 0 to 7"
-             : "gates is " + std::to_string(gates) + " but must be 0 to 4";
-}
-
-const char* Exchanges::field_of_not_a_command(std::int64_t gates) noexcept {
-  return v1::Gates_IsValid(static_cast<int>(gates)) ? "commands.legs_off" : "commands.gates";
+void Exchanges::Way::refuse_as_no_command(std::uint64_t id, std::int64_t gates, std::uint64_t legs_off) {
+  if (are_gates(gates)) {
+    return refuse(id, v1::REFUSAL_OUT_OF_RANGE,
+                  "legs_off is " + std::to_string(legs_off) + " but must be 0 to 7", "commands.legs_off");
+  }
+  refuse(id, v1::REFUSAL_OUT_OF_RANGE, "gates is " + std::to_string(gates) + " but must be 0 to 4",
+         "commands.gates");
 }
 
 void Exchanges::exchange(const v1::Exchange& r) {
@@ -42,10 +41,7 @@ void Exchanges::exchange(const v1::Exchange& r) {
   commands_.clear();
   for (const v1::Command& from : r.commands()) {
     const std::optional<Command> command = decode_command(from);
-    if (!command) {
-      return dialogue_.refuse(id, v1::REFUSAL_OUT_OF_RANGE, not_a_command(from.gates(), from.legs_off()),
-                              field_of_not_a_command(from.gates()));
-    }
+    if (!command) return frames_.refuse_as_no_command(id, from.gates(), from.legs_off());
     commands_.push_back({.axis = from.axis(), .command = *command});
   }
   exchange(commands_, frames_, id);

@@ -21,6 +21,10 @@ struct AxisCommand {
   Command command;
 };
 
+constexpr bool are_gates(std::int64_t number) noexcept {
+  return number >= 0 && number <= static_cast<std::int64_t>(Gates::kDuty);
+}
+
 /// The exchanges of a session: commands in, the samples of their tick out. One exchange may wait for its
 /// tick.
 class Exchanges final : public Audience::Waiter {
@@ -31,6 +35,8 @@ class Exchanges final : public Audience::Waiter {
     virtual void answer(std::uint64_t id, std::span<const AxisSampleView> samples) = 0;
     virtual void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& sentence,
                         const char* field) = 0;
+    /// Refuses a command whose gates or legs do not exist.
+    void refuse_as_no_command(std::uint64_t id, std::int64_t gates, std::uint64_t legs_off);
 
    protected:
     ~Way() = default;
@@ -49,10 +55,6 @@ class Exchanges final : public Audience::Waiter {
   void abandon(std::uint32_t axis);
 
   ExcessLimit& excess() noexcept { return excess_; }
-
-  /// The reason why a command has no such gates or legs, and its field.
-  static std::string not_a_command(std::int64_t gates, std::uint64_t legs_off);
-  static const char* field_of_not_a_command(std::int64_t gates) noexcept;
 
  private:
   /// Frames on the socket.

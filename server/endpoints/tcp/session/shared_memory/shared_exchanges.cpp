@@ -20,11 +20,6 @@ void copy_text(std::array<char, n>& to, std::string_view from) noexcept {
   to[size] = '\0';
 }
 
-bool is_a_command(const shm::CommandRecord& record) noexcept {
-  return record.gates >= 0 && record.gates <= static_cast<std::int64_t>(Gates::kDuty) &&
-         record.legs_off <= kAllLegs;
-}
-
 Command command_in(const shm::CommandRecord& record) noexcept {
   return {.answers = static_cast<Tick>(record.tick),
           .phases = {.gates = static_cast<Gates>(record.gates),
@@ -144,9 +139,8 @@ void SharedExchanges::exchange(std::uint32_t number) {
   commands_.clear();
   for (std::size_t i = 0; i < count; ++i) {
     const shm::CommandRecord record = request.commands[i];  // a copy: the client might change it meanwhile
-    if (!is_a_command(record)) {
-      return refuse(number, v1::REFUSAL_OUT_OF_RANGE, Exchanges::not_a_command(record.gates, record.legs_off),
-                    Exchanges::field_of_not_a_command(record.gates));
+    if (!are_gates(record.gates) || record.legs_off > kAllLegs) {
+      return refuse_as_no_command(number, record.gates, record.legs_off);
     }
     if (record.axis >= dialogue_.axis_count()) {
       return refuse(number, v1::REFUSAL_UNKNOWN_AXIS, dialogue_.no_such_axis(record.axis), "axis");
