@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 
@@ -16,6 +18,7 @@
 #include "server/endpoints/tcp/session/session.hpp"
 #include "server/host/asio.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/peer_memory.hpp"
 #include "tests/fuzz/session_program.hpp"
 #include "tests/server/recording/run_config.hpp"
 
@@ -38,6 +41,7 @@ struct Peer {
     bool possible;  ///< all its numbers are finite
   };
   std::map<std::uint64_t, Asked> asked;  ///< not answered yet, by id
+  std::unique_ptr<PeerMemory> memory;    ///< that its session shares
   bool raw = false;                      ///< it sent bytes that are no requests of this program
   bool greeted = false;
   bool came = false;
@@ -135,6 +139,7 @@ class World {
   void disconnect(Peer& peer) {
     if (peer.socket >= 0) ::close(peer.socket);
     peer.socket = -1;
+    peer.memory.reset();
   }
 
   /// Runs until no work is left; all messages of the sessions are then with the peers.
@@ -152,7 +157,7 @@ class World {
     std::array<char, 65536> buffer;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled by recv
     std::size_t total = 0;
     for (;;) {
-      const ssize_t count = ::recv(peer.socket, buffer.data(), buffer.size(), MSG_DONTWAIT);
+      const ssize_t count = receive_some(peer, buffer);
       if (count <= 0) break;
       peer.received.append(buffer.data(), static_cast<std::size_t>(count));
       total += static_cast<std::size_t>(count);
@@ -160,6 +165,27 @@ class World {
     while (read_answer(peer)) {
     }
     return total;
+  }
+
+  /// Takes descriptors that come with the bytes: the memory that the session shares.
+  static ssize_t receive_some(Peer& peer, std::span<char> buffer) {
+    std::array<int, 2> descriptors{-1, -1};
+    alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof descriptors)> control{};
+    iovec part{.iov_base = buffer.data(), .iov_len = buffer.size()};
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const ssize_t count = ::recvmsg(peer.socket, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+    if (count <= 0) return count;
+    if (const cmsghdr* const rights = CMSG_FIRSTHDR(&message); rights != nullptr) {
+      require(rights->cmsg_len == CMSG_LEN(sizeof descriptors) && !peer.memory,
+              "a session shares memory once");
+      std::memcpy(descriptors.data(), CMSG_DATA(rights), sizeof descriptors);
+      peer.memory = std::make_unique<PeerMemory>(descriptors[0], descriptors[1]);
+    }
+    return count;
   }
 
   bool read_answer(Peer& peer) {
@@ -339,10 +365,41 @@ class World {
         peer.raw = true;
         steps_allowed_ = 64;
         return send(peer, program.next_bytes());
+      case 22:
+        request.mutable_share_memory()->set_spin_us(which < 32 ? 101
+                                                               : 0);  // spinning would depend on the clock
+        break;
+      case 23:
+        return write_to_memory(peer, which, program);
       default:
         break;  // an empty Envelope
     }
     ask(peer, request, program.all_finite());
+  }
+
+  /// An exchange in shared memory, or whatever the program says.
+  void write_to_memory(Peer& peer, unsigned which, Program& program) {
+    if (!peer.memory) return;
+    shm::Request& request = peer.memory->segment().request;
+    if (which % 4 == 0) {
+      peer.raw = true;
+      steps_allowed_ = 64;
+      const std::string bytes = program.next_bytes();
+      const std::size_t at = which / 4 < 32 ? 0 : program.next() * 16 % sizeof(shm::Segment);
+      const std::size_t size = std::min(bytes.size(), sizeof(shm::Segment) - at);
+      std::memcpy(reinterpret_cast<char*>(&peer.memory->segment()) + at, bytes.data(), size);
+    } else {
+      request.count = which % 4 - 1;
+      for (std::uint64_t i = 0; i < request.count; ++i) {
+        request.commands.at(i) = {.axis = i,
+                                  .tick = static_cast<std::uint64_t>(engine_->tick()),
+                                  .gates = static_cast<std::int64_t>(which / 4 % 7),
+                                  .legs_off = 0,
+                                  .setpoint = {.a = program.value(), .b = program.value()}};
+      }
+      ++request.number;
+    }
+    peer.memory->ring();
   }
 
   /// Some ticks with commands of this peer, as a healthy controller sends them.
@@ -380,7 +437,7 @@ class World {
   asio::io_context io_{1};
   std::unique_ptr<Engine> engine_;
   Audience audience_;
-  Spinner spinner_;
+  Spinner spinner_{io_};
   SessionContext context_;
   std::array<Peer, kPeers> peers_;
   std::array<bool, 2> cleared_{};

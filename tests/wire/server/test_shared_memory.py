@@ -245,6 +245,23 @@ class SharedMemory(WireTest):
             second.post(command(tick, axis=1))
             self.assertEqual((first.answer(), second.answer()), ([tick + 1], [tick + 1]))
 
+    def test_a_session_that_asks_nothing_takes_no_time(self):
+        """Catches: a bench that spins while its client sleeps, or that one ring wakes for ever."""
+        server = self.server(text=PATIENT_TEXT, unix=True)
+        clients = [self.sharer(server) for _ in range(4)]
+        for client in clients:
+            self.assertEqual(client.swap(), [0])
+            client.ring()
+
+        def ticks():  # of 10 ms
+            fields = pathlib.Path(f"/proc/{server.process.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
+            return int(fields[11]) + int(fields[12])
+
+        clients[0].status()
+        before = ticks()
+        time.sleep(1.0)
+        self.assertLess(ticks() - before, 20)
+
     def test_a_flood_in_real_time_is_throttled(self):
         """Catches: a client that makes the bench answer as often as it likes."""
         server = self.server("--mode", "realtime", text=PATIENT_TEXT, unix=True)

@@ -185,11 +185,13 @@ void SharedExchanges::expect() {
 /// False: there is an exchange to serve first.
 bool SharedExchanges::fall_asleep() {
   if (!std::exchange(waits_for_bell_, true)) {
-    bell_->async_wait(asio::posix::stream_descriptor::wait_read,
-                      [this, self = dialogue_.keep_alive()](const boost::system::error_code& error) {
-                        waits_for_bell_ = false;
-                        if (!error && !is_over_) expect();
-                      });
+    // Reads the rings as well: what is not read would wake the bench again at once.
+    bell_->async_read_some(
+        asio::buffer(&rings_, sizeof rings_),
+        [this, self = dialogue_.keep_alive()](const boost::system::error_code& error, std::size_t) {
+          waits_for_bell_ = false;
+          if (!error && !is_over_) expect();
+        });
   }
   segment_->reply().asleep.store(1);
   return segment_->request().number.load() == number_;

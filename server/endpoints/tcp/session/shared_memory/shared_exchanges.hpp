@@ -53,6 +53,7 @@ class SharedExchanges final : public Spinner::Door, public Exchanges::Way {
   Spinner::Clock::time_point asked_{};  // the last exchange
   std::vector<AxisCommand> commands_;
   std::uint32_t number_ = 0;  // of the last exchange
+  std::uint64_t rings_ = 0;   // of the bell
   bool is_serving_ = false;
   bool waits_for_tick_ = false;
   bool waits_for_bell_ = false;
