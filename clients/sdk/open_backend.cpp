@@ -48,7 +48,7 @@ std::unique_ptr<abi::Backend> open_any(std::string_view address, const link::Lin
   const bool is_bus = link::is_can_address(address) || link::is_modbus_address(address);
   if (options.conducts && (is_bus || address.starts_with(kInproc))) {
     throw OpenError(DRIVEBENCH_NOT_AVAILABLE,
-                    "conducts works over tcp:, tls: and unix: only: elsewhere there is no "
+                    "conducts works over tcp:, tls:, unix: and shm: only: elsewhere there is no "
                     "other session whose axis could be changed, or no way to ask for it");
   }
   if (address.starts_with(kInproc)) return open_inproc(address.substr(kInproc.size()));

@@ -68,7 +68,7 @@ class Backend {
 
  private:
   static constexpr const char* kNoStates =
-      "reset, save and restore work in process and over tcp, tls and unix; this link does not have them";
+      "reset, save and restore work in process and over tcp, tls, unix and shm; this link does not have them";
 
   int not_over_it(const char* sentence) noexcept { return fail(DRIVEBENCH_NOT_AVAILABLE, sentence); }
 

@@ -7,10 +7,11 @@
  * drivebench tcp:HOST:PORT, HOST:PORT     a drivebench-server (`drivebench serve`), port 7300 unless named
  *   tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE
  *   unix:PATH
+ *   shm:PATH?spin_us=N           the unix socket of the server, and exchanges through memory that both share
  *   can:BACKEND:CHANNEL?node=N   one axis over the native CAN profile
  *   modbus:HOST:PORT?unit=N      one axis over Modbus TCP
  *
- * Over inproc, tcp, tls and unix the same calls give the same samples, bit for bit. CAN FD and Modbus carry
+ * Over inproc, tcp, tls, unix and shm the same calls give the same samples, bit for bit. CAN FD and Modbus carry
  * float32, classic CAN scaled integers: they round.
  *
  * Time counts in ticks. In lockstep, and always in process, drivebench_step() runs the tick whose commands it

@@ -23,6 +23,7 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"control", "updates of the reference controllers, closed loops in process", measure_control},
     {"free", "free mode with recording", measure_free_mode},
     {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
+    {"shm", "lockstep exchanges through shared memory against a futex", measure_shared_memory},
     {"sdk", "a step behind the C ABI in process against the bench itself", measure_sdk},
     {"experiment", "data of an experiment against a copy of the same bytes", measure_experiment},
     {"identification", "an induction motor, 600 random motors", measure_identification},

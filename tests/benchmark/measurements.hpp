@@ -20,6 +20,8 @@ std::vector<Row> measure_machines(const Plan& plan);
 std::vector<Row> measure_free_mode(const Plan& plan);
 /// A lockstep exchange against a blocking ping-pong of the same sizes.
 std::vector<Row> measure_exchange(const Plan& plan);
+/// A lockstep exchange through shared memory against two processes that wake each other by a futex.
+std::vector<Row> measure_shared_memory(const Plan& plan);
 /// A step of the bench in process behind the C ABI against the same step without it.
 std::vector<Row> measure_sdk(const Plan& plan);
 /// The pacers against a bare clock_nanosleep loop; the server in real time.

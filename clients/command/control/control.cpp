@@ -171,7 +171,7 @@ int run_control(const ControlOptions& options) {
   const std::unique_ptr<link::AxisLink> axis = open_axis(options.link, options.axis, "control");
   check_fit(*axis, preset, options, sample_rate_hz);
   if (!options.loads.empty() && !axis->can_set_load()) {
-    throw UsageError("--load needs a tcp:, tls: or unix: link");
+    throw UsageError("--load needs a tcp:, tls:, unix: or shm: link");
   }
   catch_interrupts();
   for (std::uint32_t runs = 1;; ++runs) {

@@ -51,13 +51,11 @@ std::string socket_path(std::string_view text, std::string_view path) {
 
 /// Parses the part of a shm: address behind the colon.
 Address shm_address(std::string_view text, std::string_view place) {
-  constexpr std::string_view kSpin = "spin_us=";
+  constexpr std::string_view kSpin = "?spin_us=";
   Address address{.host = {}, .port = {}, .path = {}, .shares_memory = true};
-  const std::size_t mark = std::min(place.rfind('?'), place.size());
+  const std::size_t mark = std::min(place.rfind(kSpin), place.size());
   if (mark < place.size()) {
-    const std::string_view query = place.substr(mark + 1);
-    const auto spin =
-        query.starts_with(kSpin) ? number_in(query.substr(kSpin.size())) : std::optional<unsigned>{};
+    const auto spin = number_in(place.substr(mark + kSpin.size()));
     if (!spin || *spin > shm::kMaxSpinUs) {
       bad_address(text, "behind the ? stands spin_us=N with N from 0 to " + std::to_string(shm::kMaxSpinUs));
     }

@@ -56,7 +56,7 @@ class Controller {
       const link::AxisCommand command{
           .axis = 0, .tick = tick, .gates = v1::GATES_VOLTAGE, .u_a_v = u.a, .u_b_v = u.b};
       try {
-        tick = link_.exchange({&command, 1}).samples(0).sample().tick();
+        tick = link_.exchange({&command, 1}).front().sample.tick;
         ++exchanges_;
       } catch (const link::RefusalError&) {  // on a busy machine a command may come too late for the watchdog
         ++timeouts_;
@@ -66,7 +66,7 @@ class Controller {
     }
   }
 
-  std::uint64_t newest_tick() { return link_.exchange({}).samples(0).sample().tick(); }
+  std::uint64_t newest_tick() { return link_.exchange({}).front().sample.tick; }
 
   link::Link link_;
   std::atomic<bool> stop_{false};

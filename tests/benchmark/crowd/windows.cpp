@@ -22,8 +22,8 @@ constexpr int kRounds = 5;            // of windows of each kind, in turn
 constexpr double kMaxMoreLate = 5.0;  // of 10,000 ticks: windows of one kind differ by as much
 
 Window watch(link::Link& client) {
-  const auto newest = [&client] { return client.exchange({}).samples(0).sample(); };
-  const v1::Sample first = newest();
+  const auto newest = [&client] { return client.exchange({}).front().sample; };
+  const Sample first = newest();
   std::vector<double> us;
   const auto end = std::chrono::steady_clock::now() + kWindow;
   while (std::chrono::steady_clock::now() < end) {
@@ -32,10 +32,10 @@ Window watch(link::Link& client) {
     us.push_back(static_cast<double>(now_ns() - begin) * 1e-3);
     std::this_thread::sleep_for(2ms);
   }
-  const v1::Sample last = newest();
+  const Sample last = newest();
   return {.p99_us = percentile(us, 0.99),
-          .ticks = static_cast<double>(last.tick() - first.tick()),
-          .late_ticks = static_cast<double>(last.late_ticks() - first.late_ticks())};
+          .ticks = static_cast<double>(last.tick - first.tick),
+          .late_ticks = static_cast<double>(last.late_ticks - first.late_ticks)};
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace drivebench::command {
 
 /// The addresses that --link accepts, for its help.
-inline constexpr const char* kStreamLinks = "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE or unix:PATH";
+inline constexpr const char* kStreamLinks = "tcp:HOST:PORT, tls:HOST:PORT?ca=FILE, unix:PATH or shm:PATH";
 
 /// A subcommand and its options; both live as long as the command line.
 template <class Options>

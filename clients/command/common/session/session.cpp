@@ -35,7 +35,7 @@ std::string names_of(const Descriptions& descriptions, std::uint64_t bits) {
 link::Link open_link(const LinkChoice& choice, std::string_view subcommand) {
   if (link::is_can_address(choice.address) || link::is_modbus_address(choice.address)) {
     throw UsageError(fmt::format(
-        "{} needs a tcp:, tls: or unix: link; over CAN and Modbus there is only control", subcommand));
+        "{} needs a tcp:, tls:, unix: or shm: link; over CAN and Modbus there is only control", subcommand));
   }
   try {
     return link::Link(choice.address, {.client = fmt::format("drivebench {}", subcommand),

@@ -57,13 +57,13 @@ class Bench:
     """An open bench; a context manager, which closes it.
 
     address: "inproc:BENCH" (in this process: a bench file, or the name of one that came with drivebench),
-        "tcp:HOST:PORT", "tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE", "unix:PATH", "can:BACKEND:CHANNEL?node=N",
-        "modbus:HOST:PORT?unit=N". The samples are the same, bit for bit, but over can and modbus, which round.
+        "tcp:HOST:PORT", "tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE", "unix:PATH", "shm:PATH" (the unix socket
+        of the bench, and memory that both share), "can:BACKEND:CHANNEL?node=N", "modbus:HOST:PORT?unit=N". The samples are the same, bit for bit, but over can and modbus, which round.
     token: of the bench; None: the environment variable DRIVEBENCH_TOKEN, if it is set.
     deadline_s: [s] for connecting and for each answer.
     clear: acquire() clears what a controller before has left latched.
-    conducts: set(), set_load(), inject() and bump() also change axes that other sessions hold: over tcp, tls and unix,
-        with the role conductor.
+    conducts: set(), set_load(), inject() and bump() also change axes that other sessions hold: over tcp, tls, unix
+        and shm, with the role conductor.
 
     Every method raises DrivebenchError. `axis` is a number or a name. Several threads may call: they take turns.
     """
@@ -227,7 +227,7 @@ class Bench:
         return value.value
 
     def reset(self) -> None:
-        """Back to tick 0, without any changes; leases stay. In process and over tcp, tls and unix."""
+        """Back to tick 0, without any changes; leases stay. In process and over tcp, tls, unix and shm."""
         with self._handle.lock:
             self._call("reset")
             self._ticks.clear()

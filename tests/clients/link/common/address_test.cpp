@@ -32,13 +32,38 @@ TEST(Address, ReadsEveryForm) {
   EXPECT_EQ(secure.files.certificate, "c.pem");
   EXPECT_EQ(secure.files.key, "k.pem");
   EXPECT_FALSE(parse_address("tcp:bench").tls);
+  EXPECT_EQ(round_trip("shm:/run/a:b?c"), "shm:/run/a:b?c");
+  const Address shared = parse_address("shm:/run/a?b?spin_us=100");
+  EXPECT_EQ(shared.path, "/run/a?b");
+  EXPECT_EQ(shared.spin, 100us);
+  EXPECT_TRUE(shared.shares_memory);
+  EXPECT_FALSE(parse_address("unix:/run/a").shares_memory);
 }
 
 // Catches: an address that would connect somewhere else than written, or a path that is cut off.
 TEST(Address, RefusesInvalidTexts) {
-  for (const std::string text : {"", "tcp:", ":7300", "host:", "host:0", "host:65536", "host:12x", "unix:",
-                                 "/run/bench.sock", "http://host:80", "tls:", "tls:a?ca=", "tls:a?b=c",
-                                 "tls:a?key=k", "tls:a?certificate=c&ca=d", "tcp:a?ca=b"}) {
+  for (const std::string text : {"",
+                                 "tcp:",
+                                 ":7300",
+                                 "host:",
+                                 "host:0",
+                                 "host:65536",
+                                 "host:12x",
+                                 "unix:",
+                                 "/run/bench.sock",
+                                 "http://host:80",
+                                 "tls:",
+                                 "tls:a?ca=",
+                                 "tls:a?b=c",
+                                 "tls:a?key=k",
+                                 "tls:a?certificate=c&ca=d",
+                                 "tcp:a?ca=b",
+                                 "shm:",
+                                 "shm:?spin_us=1",
+                                 "shm:/a?spin_us=",
+                                 "shm:/a?spin_us=101",
+                                 "shm:/a?spin_us=-1",
+                                 "shm:/a?spin_us=1x"}) {
     EXPECT_THROW(parse_address(text), AddressError) << text;
   }
   EXPECT_THROW(parse_address("unix:/" + std::string(107, 'a')), AddressError);

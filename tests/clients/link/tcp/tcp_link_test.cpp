@@ -111,26 +111,26 @@ TEST(Link, SendsEveryFieldOfACommandAndReturnsItsSamples) {
                                      .d_c = 1.0,
                                      .d_f = -0.75,
                                      .legs_off = 6}};
-    const v1::ExchangeReply& reply = link.exchange(commands);
-    ASSERT_EQ(reply.samples_size(), 3);
-    EXPECT_EQ(reply.samples(0).axis(), 3U);
-    EXPECT_EQ(reply.samples(0).sample().tick(), tick + 1);
-    EXPECT_EQ(reply.samples(0).sample().u_a_v(), 1.5);
-    EXPECT_EQ(reply.samples(0).sample().u_b_v(), -2.5);
-    EXPECT_EQ(reply.samples(0).sample().u_c_v(), 3.5);
-    EXPECT_EQ(reply.samples(0).sample().u_f_v(), -4.5);
-    EXPECT_EQ(reply.samples(0).sample().state(), 2U);
-    const v1::Sample& second = reply.samples(1).sample();
-    EXPECT_EQ(second.u_a_v(), 4.0);
-    EXPECT_EQ((std::array{second.i_a_a(), second.i_b_a(), second.i_c_a(), second.i_f_a()}),
+    const std::span<const AxisSample> reply = link.exchange(commands);
+    ASSERT_EQ(reply.size(), 3);
+    EXPECT_EQ(reply[0].axis, 3U);
+    EXPECT_EQ(reply[0].sample.tick, tick + 1);
+    EXPECT_EQ(reply[0].sample.u_a_v, 1.5);
+    EXPECT_EQ(reply[0].sample.u_b_v, -2.5);
+    EXPECT_EQ(reply[0].sample.u_c_v, 3.5);
+    EXPECT_EQ(reply[0].sample.u_f_v, -4.5);
+    EXPECT_EQ(reply[0].sample.state, 2U);
+    const Sample& second = reply[1].sample;
+    EXPECT_EQ(second.u_a_v, 4.0);
+    EXPECT_EQ((std::array{second.i_a_a, second.i_b_a, second.i_c_a, second.i_f_a}),
               (std::array{5.0, -6.0, 7.0, -8.0}));
-    EXPECT_EQ(second.state(), 3U);
-    const v1::Sample& third = reply.samples(2).sample();
-    EXPECT_EQ(third.state(), 4U);
-    EXPECT_EQ((std::array{third.terminal_a_v(), third.terminal_b_v(), third.terminal_c_v(),
-                          third.terminal_a_mean_v()}),
-              (std::array{0.25, 0.5, 1.0, -0.75}));
-    EXPECT_EQ(third.faults(), 6U);
+    EXPECT_EQ(second.state, 3U);
+    const Sample& third = reply[2].sample;
+    EXPECT_EQ(third.state, 4U);
+    EXPECT_EQ(
+        (std::array{third.terminal_a_v, third.terminal_b_v, third.terminal_c_v, third.terminal_a_mean_v}),
+        (std::array{0.25, 0.5, 1.0, -0.75}));
+    EXPECT_EQ(third.faults, 6U);
   }
 }
 
