@@ -13,9 +13,10 @@
 /// one way, its samples or its refusal the other. One exchange is under way at a time.
 ///
 /// The client fills Request and then counts its number up; the bench answers and then sets the number of
-/// Reply to the same value. So neither side reads what the other one is writing. Who finds nothing new may
-/// sleep: it first says so (`waits`, `asleep`) and then looks once more, and the other side wakes it after a
-/// change. The client sleeps on the futex Reply::number, the bench in its poll of the eventfd.
+/// Reply to the same value. So neither side reads what the other one is writing. A side that finds nothing
+/// new may sleep: it first says so (`waits`, `asleep`) and then looks once more, and the other side wakes it
+/// after a change. The client sleeps on the futex Reply::number, the bench until a byte comes through the
+/// bell, a socket.
 ///
 /// All of it is in the byte order and the layout of the machine, which both sides share.
 namespace drivebench::shm {
@@ -48,7 +49,7 @@ struct CommandRecord {
 struct Request {
   std::atomic<std::uint32_t> number{0};  ///< of the newest exchange, from 1 on
   std::atomic<std::uint32_t> waits{0};   ///< 1: the client sleeps until Reply::number changes
-  std::int64_t cpu = -1;                 ///< on which the client runs: who shares it should not spin
+  std::int64_t cpu = -1;                 ///< on which the client runs: a bench on the same one does not spin
   std::uint64_t count = 0;               ///< commands; 0 asks for the newest sample of every axis
   std::array<CommandRecord, kMaxAxes> commands{};
 };
@@ -62,7 +63,7 @@ struct SampleRecord {
 /// Written by the bench.
 struct Reply {
   std::atomic<std::uint32_t> number{0};  ///< of the exchange that this answers
-  std::atomic<std::uint32_t> asleep{0};  ///< 1: the bench waits for the eventfd
+  std::atomic<std::uint32_t> asleep{0};  ///< 1: the bench waits for the bell
   std::int64_t cpu = -1;                 ///< on which the bench runs
   std::uint64_t code = 0;                ///< a RefusalCode; 0: samples follow
   std::uint64_t count = 0;               ///< samples

@@ -103,8 +103,6 @@ void encode_input(Tick received, const Input& input, const ParameterTables& tabl
   std::visit(ActionWriter{message, tables}, input.action);
 }
 
-namespace {
-
 PhaseValues setpoint_of(const v1::Command& m) {
   if (m.gates() == v1::GATES_CURRENT)
     return {.a = m.i_a_a(), .b = m.i_b_a(), .c = m.i_c_a(), .field = m.i_f_a()};
@@ -112,7 +110,7 @@ PhaseValues setpoint_of(const v1::Command& m) {
   return {.a = m.u_a_v(), .b = m.u_b_v(), .c = m.u_c_v(), .field = m.u_f_v()};
 }
 
-}  // namespace
+namespace {
 
 std::optional<Command> decode_command(const v1::Command& message) {
   if (!v1::Gates_IsValid(message.gates()) || message.legs_off() > kAllLegs) return std::nullopt;
@@ -121,6 +119,8 @@ std::optional<Command> decode_command(const v1::Command& message) {
                             .legs_off = message.legs_off(),
                             .setpoint = setpoint_of(message)}};
 }
+
+}  // namespace
 
 std::optional<Input> decode_input(const v1::Input& message, const ParameterTables& tables) {
   Input input{.tick = static_cast<Tick>(message.tick()),

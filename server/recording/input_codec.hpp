@@ -22,8 +22,8 @@ void encode_input(Tick received, const Input& input, const ParameterTables& tabl
 /// Decodes a recorded input; nothing if its axis, parameter or fault does not exist.
 std::optional<Input> decode_input(const v1::Input& message, const ParameterTables& tables);
 
-/// Decodes a command; nothing if its gates are unknown.
-std::optional<Command> decode_command(const v1::Command& message);
+/// The set-points of a command that its gates need.
+PhaseValues setpoint_of(const v1::Command& message);
 
 void encode_verdict(const Verdict& verdict, v1::Verdict& message);
 

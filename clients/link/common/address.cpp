@@ -53,9 +53,11 @@ std::string socket_path(std::string_view text, std::string_view path) {
 Address shm_address(std::string_view text, std::string_view place) {
   constexpr std::string_view kSpin = "?spin_us=";
   Address address{.host = {}, .port = {}, .path = {}, .shares_memory = true};
-  const std::size_t mark = std::min(place.rfind(kSpin), place.size());
+  const std::size_t mark = std::min(place.rfind('?'), place.size());
   if (mark < place.size()) {
-    const auto spin = number_in(place.substr(mark + kSpin.size()));
+    const std::string_view option = place.substr(mark);
+    const auto spin =
+        option.starts_with(kSpin) ? number_in(option.substr(kSpin.size())) : std::optional<unsigned>{};
     if (!spin || *spin > shm::kMaxSpinUs) {
       bad_address(text, "behind the ? stands spin_us=N with N from 0 to " + std::to_string(shm::kMaxSpinUs));
     }

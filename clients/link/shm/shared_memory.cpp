@@ -5,10 +5,12 @@
 #include <poll.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <ctime>
 #include <string_view>
@@ -42,7 +44,7 @@ bool has_ended(int socket) noexcept {
   return ::poll(&session, 1, 0) > 0;
 }
 
-/// The size of the memory; 0 if somebody could make it shorter.
+/// The size of the memory; 0 if another program could make it shorter.
 std::size_t sealed_size(int memory) noexcept {
   struct stat facts {};
   const int seals = ::fcntl(memory, F_GET_SEALS);
@@ -58,7 +60,8 @@ SharedMemory::SharedMemory(const FileDescriptor& memory, FileDescriptor bell, in
   const auto fail = [&peer](std::string_view what) {
     throw LinkError(peer + " shared memory that " + std::string(what));
   };
-  if (bytes_ < sizeof(shm::Segment)) fail("is shorter than its head, or whose size is not sealed");
+  if (bytes_ == 0) fail("another program could make shorter");
+  if (bytes_ < sizeof(shm::Segment)) fail("is shorter than its head");
   void* const address =
       ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, memory.get(), 0);
   if (address == MAP_FAILED) fail("cannot be mapped");
@@ -88,8 +91,7 @@ SharedMemory::Outcome SharedMemory::exchange(std::span<const AxisCommand> comman
   request.cpu = ::sched_getcpu();
   request.number.store(++number_);
   if (segment_->reply.asleep.load() != 0) {
-    const std::uint64_t ring = 1;
-    static_cast<void>(!::write(bell_.get(), &ring, sizeof ring));  // a full counter rings as well
+    static_cast<void>(::send(bell_.get(), "", 1, MSG_DONTWAIT | MSG_NOSIGNAL));  // a full one rings as well
   }
   return await_answer(deadline);
 }
@@ -122,12 +124,14 @@ SharedMemory::Outcome SharedMemory::sleep_until_answered(Clock::time_point give_
   }
 }
 
-SharedMemory::Outcome SharedMemory::outcome() const noexcept {
-  return segment_->reply.code == 0 ? Outcome::kSamples : Outcome::kRefused;
-}
-
-std::span<const shm::SampleRecord> SharedMemory::samples() const noexcept {
-  return {shm::samples_of(*segment_), std::min<std::size_t>(segment_->reply.count, axes_)};
+SharedMemory::Outcome SharedMemory::outcome() {
+  const shm::Reply& reply = segment_->reply;
+  if (reply.code != 0) return Outcome::kRefused;
+  const std::size_t count = std::min<std::size_t>(std::uint64_t{reply.count}, axes_);
+  const shm::SampleRecord* const from = shm::samples_of(*segment_);
+  samples_.assign(from, from + count);
+  std::atomic_thread_fence(std::memory_order_seq_cst);
+  return is_answered() ? Outcome::kSamples : Outcome::kSessionOver;  // the bench has taken its memory back
 }
 
 v1::Refusal SharedMemory::refusal() const {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "clients/link/common/file_descriptor.hpp"
 #include "clients/link/common/requests.hpp"
@@ -30,7 +31,7 @@ class SharedMemory {
   /// See Link::exchange().
   Outcome exchange(std::span<const AxisCommand> commands, std::chrono::milliseconds deadline);
   /// After kSamples, until the next exchange.
-  std::span<const shm::SampleRecord> samples() const noexcept;
+  std::span<const shm::SampleRecord> samples() const noexcept { return samples_; }
   /// After kRefused.
   v1::Refusal refusal() const;
 
@@ -40,7 +41,7 @@ class SharedMemory {
   bool is_answered() const noexcept { return segment_->reply.number.load() == number_; }
   Outcome await_answer(std::chrono::milliseconds deadline);
   Outcome sleep_until_answered(Clock::time_point give_up);
-  Outcome outcome() const noexcept;
+  Outcome outcome();
 
   std::size_t bytes_;
   std::size_t axes_ = 0;
@@ -49,6 +50,7 @@ class SharedMemory {
   std::chrono::microseconds spin_;
   shm::Segment* segment_ = nullptr;
   std::uint32_t number_ = 0;  // of the last exchange
+  std::vector<shm::SampleRecord> samples_;
 };
 
 }  // namespace drivebench::link

@@ -1,8 +1,10 @@
 // Exchanges: over the socket, or in memory that the session shares with the bench.
-#include <poll.h>
 #include <sys/socket.h>
 
+#include <array>
+#include <cerrno>
 #include <cstring>
+#include <string>
 #include <utility>
 
 #include "clients/link/tcp/tcp_link.hpp"
@@ -61,7 +63,8 @@ void Link::share_memory(std::chrono::microseconds spin) {
     throw;
   }
   taken_ = nullptr;
-  if (taken.size() != 2) fail("shared no memory but " + std::to_string(taken.size()) + " descriptors");
+  if (taken.size() != 2)
+    fail("sent " + std::to_string(taken.size()) + " descriptors with its shared memory where 2 were due");
   memory_ = std::make_unique<SharedMemory>(taken[0], std::move(taken[1]), socket_.get(), spin, peer_);
 }
 
@@ -89,22 +92,26 @@ std::ptrdiff_t Link::receive_with_descriptors(std::span<std::byte> space) {
 
 std::span<const AxisSample> Link::exchange_in_memory(std::span<const AxisCommand> commands) {
   if (!socket_.is_open()) throw LinkError("the link to " + peer_ + " is closed");
-  switch (memory_->exchange(commands, deadline_)) {
-    case SharedMemory::Outcome::kSamples:
-      return memory_->samples();
-    case SharedMemory::Outcome::kRefused:
-      throw RefusalError(memory_->refusal());
-    case SharedMemory::Outcome::kTooLate:
-      fail_late();
-    case SharedMemory::Outcome::kSessionOver:
-      break;
+  const SharedMemory::Outcome outcome = memory_->exchange(commands, deadline_);
+  if (outcome == SharedMemory::Outcome::kSamples) {
+    if (is_subscribed_) keep_waiting_messages();
+    return memory_->samples();
   }
-  // A notice may say why.
+  keep_waiting_messages();  // a notice may say why
+  if (outcome == SharedMemory::Outcome::kRefused) throw RefusalError(memory_->refusal());
+  if (outcome == SharedMemory::Outcome::kTooLate) fail_late();
+  fail("closed the connection");
+}
+
+/// Reads what has come over the socket meanwhile: the bench cuts off a session that does not.
+void Link::keep_waiting_messages() {
   for (;;) {
-    while (const v1::Envelope* envelope = next_envelope()) {
-      if (envelope->kind_case() == Kind::kNotice) keep(envelope->notice());
-    }
-    receive_some();  // throws at the end of the stream
+    while (const v1::Envelope* envelope = next_envelope())
+      keep_unasked(*envelope);
+    const std::span<std::byte> space = reader_.free_space();
+    const ssize_t received = ::recv(socket_.get(), space.data(), space.size(), MSG_DONTWAIT);
+    if (received <= 0) return;  // the next request finds an end or an error
+    reader_.received(static_cast<std::size_t>(received));
   }
 }
 

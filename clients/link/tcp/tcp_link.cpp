@@ -170,6 +170,7 @@ void Link::subscribe(std::uint32_t axis, std::uint32_t decimation, std::span<con
   for (const std::string& name : signals)
     subscribe.add_signals(name);
   ask(request, Kind::kDone);
+  is_subscribed_ = true;
 }
 
 std::optional<v1::Samples> Link::next_samples(std::chrono::milliseconds wait) {
@@ -177,15 +178,7 @@ std::optional<v1::Samples> Link::next_samples(std::chrono::milliseconds wait) {
   arena_.Reset();
   while (kept_.empty()) {
     if (const v1::Envelope* envelope = next_envelope()) {
-      if (envelope->kind_case() == Kind::kRefusal) throw RefusalError(envelope->refusal());
-      if (envelope->kind_case() == Kind::kNotice) {
-        keep(envelope->notice());
-        continue;
-      }
-      if (envelope->kind_case() != Kind::kSamples) {
-        fail("sent " + name_of(envelope->kind_case()) + " where nothing was asked");
-      }
-      keep(envelope->samples());
+      keep_unasked(*envelope);
       continue;
     }
     if (!socket_.is_open()) throw LinkError("the link to " + peer_ + " is closed");
@@ -203,6 +196,19 @@ std::optional<v1::Samples> Link::next_samples(std::chrono::milliseconds wait) {
   kept_samples_ -= static_cast<std::size_t>(oldest.samples_size());
   oldest.set_dropped(oldest.dropped() + std::exchange(dropped_, 0));
   return oldest;
+}
+
+void Link::keep_unasked(const v1::Envelope& envelope) {
+  switch (envelope.kind_case()) {
+    case Kind::kSamples:
+      return keep(envelope.samples());
+    case Kind::kNotice:
+      return keep(envelope.notice());
+    case Kind::kRefusal:
+      throw RefusalError(envelope.refusal());
+    default:
+      fail("sent " + name_of(envelope.kind_case()) + " where nothing was asked");
+  }
 }
 
 void Link::keep(const v1::Samples& samples) {

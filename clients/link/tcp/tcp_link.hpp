@@ -127,9 +127,11 @@ class Link {
   std::ptrdiff_t receive_with_descriptors(std::span<std::byte> space);
   void share_memory(std::chrono::microseconds spin);
   std::span<const AxisSample> exchange_in_memory(std::span<const AxisCommand> commands);
+  void keep_waiting_messages();
   std::uint64_t lease(std::uint32_t axis, v1::LeaseRequest::Action action);
   void keep(const v1::Samples& samples);
   void keep(const v1::Notice& notice);
+  void keep_unasked(const v1::Envelope& envelope);
   [[noreturn]] void fail_late();
   [[noreturn]] void fail(const std::string& what);
 
@@ -150,6 +152,7 @@ class Link {
   std::vector<FileDescriptor>* taken_ =
       nullptr;  // where to keep descriptors that come; null: they are closed
   std::unique_ptr<SharedMemory> memory_;
+  bool is_subscribed_ = false;
 };
 
 /// Converts a message to a sample.

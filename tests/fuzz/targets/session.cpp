@@ -385,7 +385,7 @@ class World {
       peer.raw = true;
       steps_allowed_ = 64;
       const std::string bytes = program.next_bytes();
-      const std::size_t at = which / 4 < 32 ? 0 : program.next() * 16 % sizeof(shm::Segment);
+      const std::size_t at = which / 4 < 32 ? 0 : program.next() * 32 % sizeof(shm::Segment);
       const std::size_t size = std::min(bytes.size(), sizeof(shm::Segment) - at);
       std::memcpy(reinterpret_cast<char*>(&peer.memory->segment()) + at, bytes.data(), size);
     } else {

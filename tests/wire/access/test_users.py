@@ -83,7 +83,7 @@ class Roles(UsersTest):
                      "restore_state": pb.RestoreState(), "reset_bench": pb.ResetBench(), "share_memory": pb.ShareMemory()}
         asked = {field.name for field in pb.Envelope.DESCRIPTOR.oneofs_by_name["kind"].fields} & {*allowed, *forbidden}
         answers = {"id", "hello", "welcome", "refusal", "done", "exchange_reply", "samples", "parameter_values", "status",
-                   "experiment_info", "table_info", "experiment_list", "experiment_data", "notice", "saved_state"}
+                   "experiment_info", "table_info", "experiment_list", "experiment_data", "notice", "saved_state", "shared_memory"}
         every = {field.name for field in pb.Envelope.DESCRIPTOR.fields}
         self.assertEqual(every, asked | answers, "a new request needs its roles here")
         for kind, request in allowed.items():

@@ -69,7 +69,10 @@ class Sharer(Client):
                 os.close(descriptor)
 
     def ring(self):
-        os.write(self.descriptors[1], struct.pack("=Q", 1))
+        try:
+            os.write(self.descriptors[1], b"\0")
+        except BlockingIOError:
+            pass  # the rings before wake it as well
 
     def post(self, *commands, count=None, number=None):
         """An exchange without waiting for its answer."""
@@ -79,6 +82,12 @@ class Sharer(Client):
         self.number = self.number + 1 if number is None else number
         self.asked.value = self.number
         self.ring()
+
+    def post_and_settle(self, *commands):
+        """The same; returns when the bench has read it: after two answers it has served all that came before them."""
+        self.post(*commands)
+        for _ in range(2):
+            self.status()
 
     def answered(self):
         return self.replied.value == self.number
@@ -107,6 +116,10 @@ def command(tick, axis=0, gates=1, legs_off=0, a=1.0, b=0.0):
 
 
 class SharedMemory(WireTest):
+    def cpu_s(self, server):
+        fields = pathlib.Path(f"/proc/{server.process.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def server_with_users(self, text):
         folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-shm-"))
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
@@ -154,7 +167,7 @@ class SharedMemory(WireTest):
         client = self.sharer(server)
         client.lease()
         for wrong, code, field in (
-                (dict(count=2), pb.REFUSAL_OUT_OF_RANGE, "commands"),
+                (dict(count=2), pb.REFUSAL_OUT_OF_RANGE, "commands.axis"),
                 (dict(count=65), pb.REFUSAL_OUT_OF_RANGE, "commands"),
                 (dict(count=(1 << 64) - 1), pb.REFUSAL_OUT_OF_RANGE, "commands"),
                 (dict(axis=1), pb.REFUSAL_UNKNOWN_AXIS, "axis"),
@@ -253,14 +266,61 @@ class SharedMemory(WireTest):
             self.assertEqual(client.swap(), [0])
             client.ring()
 
-        def ticks():  # of 10 ms
-            fields = pathlib.Path(f"/proc/{server.process.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
-            return int(fields[11]) + int(fields[12])
-
         clients[0].status()
-        before = ticks()
+        before = self.cpu_s(server)
         time.sleep(1.0)
-        self.assertLess(ticks() - before, 20)
+        self.assertLess(self.cpu_s(server) - before, 0.2)
+
+    def test_a_bell_without_an_exchange_wakes_the_bench_once(self):
+        """Catches: a client that keeps the bench spinning by ringing now and then."""
+        server = self.server(text=PATIENT_TEXT, unix=True)
+        client = self.sharer(server, shares=False)
+        client.share(spin_us=100)
+        struct.pack_into("=q", client.memory, REQUEST + 8, 1000)  # a processor that the bench does not run on
+        self.assertEqual(client.swap(), [0])
+        before, end = self.cpu_s(server), time.monotonic() + 1.0
+        while time.monotonic() < end:
+            client.ring()
+            time.sleep(0.0001)
+        self.assertLess(self.cpu_s(server) - before, 0.25)
+
+    def test_a_bell_that_blocks_or_is_cut_holds_nobody_up(self):
+        """Catches: a descriptor whose flags or whose content the client can change under the bench."""
+        server = self.server(text=PATIENT_TEXT, unix=True)
+        other = self.client(server)
+        blocking, cut = self.sharer(server), self.sharer(server)
+        os.set_blocking(blocking.descriptors[1], True)
+        blocking.ring()
+        self.assertEqual(other.newest().tick, 0)
+        with socket.socket(fileno=os.dup(cut.descriptors[1])) as bell:
+            bell.shutdown(socket.SHUT_RDWR)
+        for _ in range(3):
+            self.assertEqual(other.newest().tick, 0)
+
+    def test_memory_and_socket_take_turns(self):
+        """Catches: two exchanges of a session under way at once, and an answer that goes the other way."""
+        server = self.server(text=PATIENT_AXES, unix=True)
+        client, other = self.sharer(server), self.client(server)
+        client.lease()
+        other.lease(axis=1)
+        client.post_and_settle(command(0))
+        self.assertRefused(client.exchange(0, 1.0), pb.REFUSAL_BUSY, "commands")
+        other.step(0, axis=1)
+        self.assertEqual(client.answer(), [1])
+        waiting = client.send(exchange=pb.Exchange(commands=[pb.Command(axis=0, tick=1, gates=pb.GATES_VOLTAGE)]))
+        self.assertEqual(client.swap(command(1))[0], pb.REFUSAL_BUSY)
+        other.step(1, axis=1)
+        self.assertEqual(client.answer_to(waiting).exchange_reply.samples[0].sample.tick, 2)
+        client.post_and_settle(command(2))
+        self.assertDone(self.client(server, conducts=True).ask(reset_bench=pb.ResetBench()))
+        self.assertEqual(client.answer(), [0], "the sample of the bench that was set back")
+
+    def test_numbers_go_on_after_the_last_one(self):
+        """Catches: a session that ends after 2^32 exchanges, some hours."""
+        client = self.sharer(self.server(text=PATIENT_TEXT, unix=True))
+        self.assertEqual(client.swap(number=0xFFFFFFFD)[2], "number")
+        for number in (0xFFFFFFFE, 0xFFFFFFFF, 0, 1):
+            self.assertEqual(client.swap(number=number), [0])
 
     def test_a_flood_in_real_time_is_throttled(self):
         """Catches: a client that makes the bench answer as often as it likes."""

@@ -58,7 +58,8 @@ class Bench:
 
     address: "inproc:BENCH" (in this process: a bench file, or the name of one that came with drivebench),
         "tcp:HOST:PORT", "tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE", "unix:PATH", "shm:PATH" (the unix socket
-        of the bench, and memory that both share), "can:BACKEND:CHANNEL?node=N", "modbus:HOST:PORT?unit=N". The samples are the same, bit for bit, but over can and modbus, which round.
+        of the bench, and memory that both share), "can:BACKEND:CHANNEL?node=N", "modbus:HOST:PORT?unit=N". The samples
+        are the same, bit for bit, but over can and modbus, which round.
     token: of the bench; None: the environment variable DRIVEBENCH_TOKEN, if it is set.
     deadline_s: [s] for connecting and for each answer.
     clear: acquire() clears what a controller before has left latched.

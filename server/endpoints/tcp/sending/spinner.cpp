@@ -13,19 +13,21 @@ void Spinner::watch(Door& door) {
   asio::post(io_, [this] { take_turn(); });
 }
 
-void Spinner::leave(const Door& door) {
-  std::replace(doors_.begin(), doors_.end(), const_cast<Door*>(&door), static_cast<Door*>(nullptr));
+void Spinner::leave(Door& door) {
+  std::replace(doors_.begin(), doors_.end(), &door, static_cast<Door*>(nullptr));
 }
 
 void Spinner::take_turn() {
-  const Clock::time_point end = Clock::now() + kTurn;
-  for (Clock::time_point now = end - kTurn; now < end && !doors_.empty(); now = Clock::now()) {
-    // By index: serving a door may bring others, or make some leave.
-    for (std::size_t i = 0; i < doors_.size(); ++i) {
-      if (doors_[i] != nullptr && !doors_[i]->look(now)) doors_[i] = nullptr;
+  Clock::time_point now = Clock::now();
+  for (const Clock::time_point end = now + kTurn; now < end && !doors_.empty(); now = Clock::now()) {
+    if (next_ >= doors_.size()) {
+      std::erase(doors_, nullptr);
+      next_ = 0;
+      shm::spin();
+      continue;
     }
-    std::erase(doors_, nullptr);
-    shm::spin();
+    const std::size_t n = next_++;  // an index: a look may bring other doors
+    if (doors_[n] != nullptr && !doors_[n]->look(now)) doors_[n] = nullptr;
   }
   turn_to_come_ = !doors_.empty();
   if (turn_to_come_) asio::post(io_, [this] { take_turn(); });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <vector>
 
 #include "server/host/asio.hpp"
@@ -16,7 +17,8 @@ class Spinner {
   /// A place that a client may write at any time.
   class Door {
    public:
-    /// Serves what the client has asked for. False: there is no need to look again before the next watch().
+    /// Serves one request of the client, if there is one. False: there is no need to look again before the
+    /// next watch().
     virtual bool look(Clock::time_point now) = 0;
 
    protected:
@@ -28,7 +30,7 @@ class Spinner {
   /// Looks at the door from now on.
   void watch(Door& door);
   /// Does not look at it any more.
-  void leave(const Door& door);
+  void leave(Door& door);
 
  private:
   static constexpr auto kTurn = std::chrono::microseconds(20);
@@ -37,6 +39,7 @@ class Spinner {
 
   asio::io_context& io_;
   std::vector<Door*> doors_;  // null: has left
+  std::size_t next_ = 0;      // of doors_
   bool turn_to_come_ = false;
 };
 

@@ -42,7 +42,7 @@ struct SessionContext {
     std::uint64_t wrong_tokens = 0;     ///< hellos
     std::uint64_t not_owner = 0;        ///< requests without the lease, which are no part of the run
     std::uint64_t excess_commands = 0;  ///< exchanges, in real time, that no tick can use
-    std::uint64_t throttled = 0;        ///< pauses in reading a session
+    std::uint64_t throttled = 0;        ///< pauses in serving a session
     std::uint64_t cut = 0;              ///< sessions whose peer read nothing or was silent
   } counts{};
   std::shared_ptr<OutboxPool> outboxes = std::make_shared<OutboxPool>();

@@ -291,11 +291,11 @@ void Session::close() {
   Audience& audience = dialogue_.context().audience;
   audience.remove_subscriber(subscriptions_);
   audience.remove_waiting(exchanges_);
-  shared_exchanges_.close();
   identity_.stop_watching();
   silence_.call_off();
   dialogue_.context().places.leave(place_);
   dialogue_.outbox().close();
+  shared_exchanges_.close();
 }
 
 }  // namespace drivebench

@@ -64,9 +64,9 @@ class FakeMemory {
 TEST(SharedMemory, SHM_02_IsRefusedIfItIsNotThatOfABenchOfThisBuild) {
   EXPECT_EQ(FakeMemory().problem(), "");
   EXPECT_EQ(FakeMemory(shm::kMaxAxes).problem(), "");
-  EXPECT_EQ(FakeMemory(1, false).problem(),
-            "peer shared memory that is shorter than its head, or whose size is not sealed");
-  EXPECT_NE(FakeMemory(0, true, sizeof(shm::Segment) - 100).problem(), "");
+  EXPECT_EQ(FakeMemory(1, false).problem(), "peer shared memory that another program could make shorter");
+  EXPECT_EQ(FakeMemory(0, true, sizeof(shm::Segment) - 100).problem(),
+            "peer shared memory that is shorter than its head");
   EXPECT_NE(FakeMemory(1, true, 8).problem(), "") << "shorter than its axes need";
   const auto problem_with = [](const std::function<void(shm::Head&)>& change) {
     FakeMemory memory;

@@ -9,14 +9,14 @@
 namespace drivebench {
 
 /// Limits the exchanges of a session that no tick can use, in real time: kAtOnce may come together, and one
-/// more with every tick. Beyond that the server pauses in reading the session.
+/// more with every tick. Beyond that the server pauses in serving the session.
 class ExcessLimit {
  public:
   explicit ExcessLimit(Dialogue& dialogue);
 
   /// Counts an exchange that no tick can use.
   void charge();
-  /// The pause in reading the session, so long that it sends at most about two exchanges a tick.
+  /// The pause in serving the session, so long that it sends at most about two exchanges a tick.
   ServerClock::duration pause();
 
  private:

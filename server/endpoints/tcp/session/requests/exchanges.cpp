@@ -27,27 +27,19 @@ Exchanges::Exchanges(Dialogue& dialogue, const Leases& leases, Subscriptions& su
       frames_(dialogue),
       excess_(dialogue) {}
 
-void Exchanges::Way::refuse_as_no_command(std::uint64_t id, std::int64_t gates, std::uint64_t legs_off) {
-  if (are_gates(gates)) {
-    return refuse(id, v1::REFUSAL_OUT_OF_RANGE,
-                  "legs_off is " + std::to_string(legs_off) + " but must be 0 to 7", "commands.legs_off");
-  }
-  refuse(id, v1::REFUSAL_OUT_OF_RANGE, "gates is " + std::to_string(gates) + " but must be 0 to 4",
-         "commands.gates");
-}
-
 void Exchanges::exchange(const v1::Exchange& r) {
-  const std::uint64_t id = dialogue_.id();
-  commands_.clear();
-  for (const v1::Command& from : r.commands()) {
-    const std::optional<Command> command = decode_command(from);
-    if (!command) return frames_.refuse_as_no_command(id, from.gates(), from.legs_off());
-    commands_.push_back({.axis = from.axis(), .command = *command});
+  frame_.clear();
+  for (const v1::Command& command : r.commands()) {
+    frame_.push_back({.axis = command.axis(),
+                      .tick = command.tick(),
+                      .gates = command.gates(),
+                      .legs_off = command.legs_off(),
+                      .setpoint = setpoint_of(command)});
   }
-  exchange(commands_, frames_, id);
+  exchange(frame_, frames_, dialogue_.id());
 }
 
-void Exchanges::exchange(std::span<const AxisCommand> commands, Way& way, std::uint64_t id) {
+void Exchanges::exchange(std::span<const shm::CommandRecord> commands, Way& way, std::uint64_t id) {
   if (waiting_) {
     excess_.charge();
     return way.refuse(id, v1::REFUSAL_BUSY, "an exchange of this session is still waiting for its tick",
@@ -58,33 +50,51 @@ void Exchanges::exchange(std::span<const AxisCommand> commands, Way& way, std::u
     std::iota(axes_.begin(), axes_.end(), 0u);
     return answer(way, id);
   }
-  if (!axes_exist(commands, way, id) || !are_taken(commands, way, id)) return;
+  if (!read(commands, way, id) || !are_taken(way, id)) return;
   add_shared();
   waiting_ = Waiting{.way = &way, .id = id};
   dialogue_.context().audience.add_waiting(*this);
   engine_.advance();
 }
 
-bool Exchanges::axes_exist(std::span<const AxisCommand> commands, Way& way, std::uint64_t id) {
+bool Exchanges::read(std::span<const shm::CommandRecord> sent, Way& way, std::uint64_t id) {
+  commands_.clear();
   axes_.clear();
-  for (const AxisCommand& command : commands) {
-    if (command.axis >= dialogue_.axis_count()) {
-      way.refuse(id, v1::REFUSAL_UNKNOWN_AXIS, dialogue_.no_such_axis(command.axis), "axis");
+  for (const shm::CommandRecord& record : sent) {
+    if (record.axis >= dialogue_.axis_count()) {
+      way.refuse(id, v1::REFUSAL_UNKNOWN_AXIS, dialogue_.no_such_axis(record.axis), "axis");
       return false;
     }
-    if (std::find(axes_.begin(), axes_.end(), command.axis) != axes_.end()) {
+    const auto axis = static_cast<std::uint32_t>(record.axis);
+    if (std::find(axes_.begin(), axes_.end(), axis) != axes_.end()) {
       way.refuse(id, v1::REFUSAL_OUT_OF_RANGE, "two commands for one axis", "commands.axis");
       return false;
     }
-    axes_.push_back(command.axis);
+    if (record.gates < 0 || record.gates > static_cast<std::int64_t>(Gates::kDuty)) {
+      way.refuse(id, v1::REFUSAL_OUT_OF_RANGE,
+                 "gates is " + std::to_string(record.gates) + " but must be 0 to 4", "commands.gates");
+      return false;
+    }
+    if (record.legs_off > kAllLegs) {
+      way.refuse(id, v1::REFUSAL_OUT_OF_RANGE,
+                 "legs_off is " + std::to_string(record.legs_off) + " but must be 0 to 7",
+                 "commands.legs_off");
+      return false;
+    }
+    axes_.push_back(axis);
+    commands_.push_back({.axis = axis,
+                         .command = {.answers = static_cast<Tick>(record.tick),
+                                     .phases = {.gates = static_cast<Gates>(record.gates),
+                                                .legs_off = static_cast<std::uint32_t>(record.legs_off),
+                                                .setpoint = record.setpoint}}});
   }
   return true;
 }
 
 /// Gives the bench all commands or none: after an accepted command its axis would refuse the next try.
-bool Exchanges::are_taken(std::span<const AxisCommand> commands, Way& way, std::uint64_t id) {
+bool Exchanges::are_taken(Way& way, std::uint64_t id) {
   const Owner owner = dialogue_.owner();
-  for (const AxisCommand& each : commands) {
+  for (const AxisCommand& each : commands_) {
     if (engine_.check(each.axis, owner, each.command) == Refused::kNot) continue;
     const Refused why = engine_.command(each.axis, owner, each.command);
     excess_.charge();
@@ -95,7 +105,7 @@ bool Exchanges::are_taken(std::span<const AxisCommand> commands, Way& way, std::
                why == Refused::kWrongDrive ? "commands.gates" : "commands");
     return false;
   }
-  for (const AxisCommand& each : commands)
+  for (const AxisCommand& each : commands_)
     engine_.command(each.axis, owner, each.command);
   return true;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocols/sample_codec.hpp"
+#include "protocols/shm/segment.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
 #include "server/endpoints/tcp/session/requests/excess_limit.hpp"
@@ -14,16 +15,6 @@
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 
 namespace drivebench {
-
-/// A command and the axis that it is for.
-struct AxisCommand {
-  std::uint32_t axis;
-  Command command;
-};
-
-constexpr bool are_gates(std::int64_t number) noexcept {
-  return number >= 0 && number <= static_cast<std::int64_t>(Gates::kDuty);
-}
 
 /// The exchanges of a session: commands in, the samples of their tick out. One exchange may wait for its
 /// tick.
@@ -35,8 +26,6 @@ class Exchanges final : public Audience::Waiter {
     virtual void answer(std::uint64_t id, std::span<const AxisSampleView> samples) = 0;
     virtual void refuse(std::uint64_t id, v1::RefusalCode code, const std::string& sentence,
                         const char* field) = 0;
-    /// Refuses a command whose gates or legs do not exist.
-    void refuse_as_no_command(std::uint64_t id, std::int64_t gates, std::uint64_t legs_off);
 
    protected:
     ~Way() = default;
@@ -47,7 +36,7 @@ class Exchanges final : public Audience::Waiter {
   /// Over the socket of the session.
   void exchange(const v1::Exchange& request);
   /// No commands: the newest sample of every axis.
-  void exchange(std::span<const AxisCommand> commands, Way& way, std::uint64_t id);
+  void exchange(std::span<const shm::CommandRecord> commands, Way& way, std::uint64_t id);
   /// After a tick: answers the exchange that waits for it.
   void on_newest() override;
   /// Refuses an exchange that waits for a tick of this axis: the session no longer holds it, so the tick
@@ -73,9 +62,14 @@ class Exchanges final : public Audience::Waiter {
     std::uint64_t id;
   };
 
-  /// Puts the axes of the commands into axes_; false after it has refused the request.
-  bool axes_exist(std::span<const AxisCommand> commands, Way& way, std::uint64_t id);
-  bool are_taken(std::span<const AxisCommand> commands, Way& way, std::uint64_t id);
+  struct AxisCommand {
+    std::uint32_t axis;
+    Command command;
+  };
+
+  /// Puts the commands into commands_ and their axes into axes_; false after it has refused the request.
+  bool read(std::span<const shm::CommandRecord> sent, Way& way, std::uint64_t id);
+  bool are_taken(Way& way, std::uint64_t id);
   void add_shared();
   void answer(Way& way, std::uint64_t id);
 
@@ -85,8 +79,9 @@ class Exchanges final : public Audience::Waiter {
   Subscriptions& subscriptions_;
   Frames frames_;
   ExcessLimit excess_;
-  std::vector<AxisCommand> commands_;  // of the present frame
-  std::vector<std::uint32_t> axes_;    // of the present exchange, or of the one that waits
+  std::vector<shm::CommandRecord> frame_;  // the commands of the present frame
+  std::vector<AxisCommand> commands_;      // of the present exchange
+  std::vector<std::uint32_t> axes_;        // of the present exchange, or of the one that waits
   std::vector<AxisSampleView> views_;
   std::optional<Waiting> waiting_;
 };

@@ -2,7 +2,9 @@
 
 #include <sched.h>
 
+#include <atomic>
 #include <cerrno>
+#include <exception>
 #include <system_error>
 #include <utility>
 
@@ -20,31 +22,28 @@ void copy_text(std::array<char, n>& to, std::string_view from) noexcept {
   to[size] = '\0';
 }
 
-Command command_in(const shm::CommandRecord& record) noexcept {
-  return {.answers = static_cast<Tick>(record.tick),
-          .phases = {.gates = static_cast<Gates>(record.gates),
-                     .legs_off = static_cast<std::uint32_t>(record.legs_off),
-                     .setpoint = record.setpoint}};
-}
-
 }  // namespace
 
 SharedExchanges::SharedExchanges(Dialogue& dialogue, Exchanges& exchanges)
-    : dialogue_(dialogue), exchanges_(exchanges), pause_(dialogue.socket().get_executor()) {}
+    : dialogue_(dialogue),
+      exchanges_(exchanges),
+      pause_(dialogue.socket().get_executor()),
+      bell_(dialogue.socket().get_executor()) {}
 
 void SharedExchanges::share(const v1::ShareMemory& r) {
   if (!may_share(r)) return;
   try {
     segment_.emplace(dialogue_.axis_count());
-    if (!send_reply())
-      throw std::system_error(errno, std::generic_category(), "the socket takes no descriptors");
-    bell_.emplace(dialogue_.socket().get_executor(), segment_->take_bell());
-  } catch (const std::system_error& error) {
+    bell_.assign(asio::local::stream_protocol(), segment_->take_bell());
+    send_reply();
+  } catch (const std::exception& error) {
     segment_.reset();
+    boost::system::error_code ignored;
+    bell_.close(ignored);
     return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_BUSY, error.what(), "kind");
   }
   spin_ = std::chrono::microseconds(r.spin_us());
-  commands_.reserve(dialogue_.axis_count());
+  commands_.reserve(shm::kMaxAxes);
   expect();
 }
 
@@ -72,16 +71,15 @@ bool SharedExchanges::may_share(const v1::ShareMemory& r) {
   return true;
 }
 
-/// Whether the client has got the answer and the descriptors.
-bool SharedExchanges::send_reply() {
+/// Sends the answer and the descriptors.
+void SharedExchanges::send_reply() {
   dialogue_.begin_reply(dialogue_.id()).mutable_shared_memory()->set_bytes(segment_->bytes());
   std::vector<std::byte>& bytes = dialogue_.encode_reply();
   const std::ptrdiff_t sent =
       segment_->send_with(dialogue_.socket().native_handle(), bytes.data(), bytes.size());
-  if (sent < 0) return false;
+  if (sent < 0) throw std::system_error(errno, std::generic_category(), "the socket takes no descriptors");
   bytes.erase(bytes.begin(), bytes.begin() + sent);
   if (!bytes.empty()) dialogue_.send_scratch();
-  return true;
 }
 
 void SharedExchanges::close() {
@@ -89,15 +87,22 @@ void SharedExchanges::close() {
   dialogue_.context().spinner.leave(*this);
   pause_.cancel();
   boost::system::error_code ignored;
-  bell_->close(ignored);
-  segment_->wake_client();  // the socket shows it the end
+  bell_.close(ignored);
+  segment_->forget();
+  segment_->wake_client();  // its socket shows the end
 }
 
 bool SharedExchanges::look(Spinner::Clock::time_point now) {
   if (is_over_ || waits_for_tick_ || rests_) return false;
-  if (serve()) {
-    asked_ = now;
-    return !is_over_ && !waits_for_tick_ && !rests_;
+  try {
+    if (serve()) {
+      asked_ = now;
+      return !is_over_ && !waits_for_tick_ && !rests_;
+    }
+  } catch (const std::exception& error) {  // ends this session and nothing else
+    is_serving_ = false;
+    dialogue_.outbox().cut(error.what());
+    return false;
   }
   return (now - asked_ < spin_ && client_has_own_cpu()) || !fall_asleep();
 }
@@ -119,6 +124,7 @@ bool SharedExchanges::serve() {
   if (is_next) {
     exchange(number);
   } else {
+    exchanges_.excess().charge();
     refuse(number, v1::REFUSAL_MALFORMED, "the number of an exchange is not that of the last one and 1 more",
            "number");
   }
@@ -130,23 +136,14 @@ bool SharedExchanges::serve() {
 void SharedExchanges::exchange(std::uint32_t number) {
   const shm::Request& request = segment_->request();
   const std::uint64_t count = request.count;
-  if (count > dialogue_.axis_count()) {
+  if (count > shm::kMaxAxes) {
     return refuse(number, v1::REFUSAL_OUT_OF_RANGE,
-                  std::to_string(count) + " commands, but the bench has " +
-                      std::to_string(dialogue_.axis_count()) + " axes",
+                  std::to_string(count) + " commands, but there are at most " + std::to_string(shm::kMaxAxes),
                   "commands");
   }
-  commands_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    const shm::CommandRecord record = request.commands[i];  // a copy: the client might change it meanwhile
-    if (!are_gates(record.gates) || record.legs_off > kAllLegs) {
-      return refuse_as_no_command(number, record.gates, record.legs_off);
-    }
-    if (record.axis >= dialogue_.axis_count()) {
-      return refuse(number, v1::REFUSAL_UNKNOWN_AXIS, dialogue_.no_such_axis(record.axis), "axis");
-    }
-    commands_.push_back({.axis = static_cast<std::uint32_t>(record.axis), .command = command_in(record)});
-  }
+  // A copy: the client might change them meanwhile.
+  commands_.assign(request.commands.begin(), request.commands.begin() + static_cast<std::ptrdiff_t>(count));
+  std::atomic_signal_fence(std::memory_order_seq_cst);
   exchanges_.exchange(commands_, *this, number);
 }
 
@@ -185,13 +182,12 @@ void SharedExchanges::expect() {
 /// False: there is an exchange to serve first.
 bool SharedExchanges::fall_asleep() {
   if (!std::exchange(waits_for_bell_, true)) {
-    // Reads the rings as well: what is not read would wake the bench again at once.
-    bell_->async_read_some(
-        asio::buffer(&rings_, sizeof rings_),
-        [this, self = dialogue_.keep_alive()](const boost::system::error_code& error, std::size_t) {
-          waits_for_bell_ = false;
-          if (!error && !is_over_) expect();
-        });
+    bell_.async_read_some(asio::buffer(rings_), [this, self = dialogue_.keep_alive()](
+                                                    const boost::system::error_code& error, std::size_t) {
+      waits_for_bell_ = false;
+      // Looks once: a ring without an exchange gives no right to be looked at for longer.
+      if (!error && !is_over_) dialogue_.context().spinner.watch(*this);
+    });
   }
   segment_->reply().asleep.store(1);
   return segment_->request().number.load() == number_;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -24,7 +26,7 @@ class SharedExchanges final : public Spinner::Door, public Exchanges::Way {
 
   /// Answers with the memory, or refuses the request.
   void share(const v1::ShareMemory& request);
-  /// The session ends.
+  /// The session has ended.
   void close();
 
   bool look(Spinner::Clock::time_point now) override;
@@ -34,7 +36,7 @@ class SharedExchanges final : public Spinner::Door, public Exchanges::Way {
 
  private:
   bool may_share(const v1::ShareMemory& request);
-  bool send_reply();
+  void send_reply();
   bool client_has_own_cpu();
   bool serve();
   void exchange(std::uint32_t number);
@@ -48,12 +50,12 @@ class SharedExchanges final : public Spinner::Door, public Exchanges::Way {
   Exchanges& exchanges_;
   ServerTimer pause_;
   std::optional<SharedSegment> segment_;
-  std::optional<asio::posix::stream_descriptor> bell_;
+  asio::local::stream_protocol::socket bell_;
   Spinner::Clock::duration spin_{};
   Spinner::Clock::time_point asked_{};  // the last exchange
-  std::vector<AxisCommand> commands_;
-  std::uint32_t number_ = 0;  // of the last exchange
-  std::uint64_t rings_ = 0;   // of the bell
+  std::vector<shm::CommandRecord> commands_;
+  std::uint32_t number_ = 0;           // of the last exchange
+  std::array<std::byte, 64> rings_{};  // of the bell, whose content means nothing
   bool is_serving_ = false;
   bool waits_for_tick_ = false;
   bool waits_for_bell_ = false;
