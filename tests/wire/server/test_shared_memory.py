@@ -308,6 +308,7 @@ class SharedMemory(WireTest):
         other.step(0, axis=1)
         self.assertEqual(client.answer(), [1])
         waiting = client.send(exchange=pb.Exchange(commands=[pb.Command(axis=0, tick=1, gates=pb.GATES_VOLTAGE)]))
+        client.status()  # behind it
         self.assertEqual(client.swap(command(1))[0], pb.REFUSAL_BUSY)
         other.step(1, axis=1)
         self.assertEqual(client.answer_to(waiting).exchange_reply.samples[0].sample.tick, 2)
