@@ -32,6 +32,16 @@ void add_run(CLI::App& app, ServerOptions& o) {
   app.add_option("--from", o.from, "begin with this state, which drivebench save has written")
       ->type_name("FILE")
       ->check(not_empty);
+  auto* repeat = app.add_option("--repeat", o.repeat,
+                                "in lockstep: begin with the run in this recording up to --until, where its "
+                                "controllers give their leases up")
+                     ->type_name("FILE")
+                     ->check(not_empty)
+                     ->excludes("--from");
+  repeat->needs(app.add_option("--until", o.until, "the tick up to which --repeat goes")
+                    ->type_name("TICK")
+                    ->check(whole_between(0, static_cast<std::int64_t>(kMaxTick)))
+                    ->needs(repeat));
   app.add_option("--duration", o.duration_s,
                  "stop after this much plant time; in lockstep time then stands still until the end")
       ->type_name("SECONDS")

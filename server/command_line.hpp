@@ -13,6 +13,8 @@ struct ServerOptions {
   std::string mode;
   std::string replay;
   std::string from;  ///< a saved state to begin with
+  std::string repeat;  ///< a recording to begin with, up to `until`
+  std::int64_t until = -1;
   std::string record;
   std::string unix_path;
   int port = -1;

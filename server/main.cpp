@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "protocols/document.hpp"
+#include "protocols/mcap/mcap_series.hpp"
 #include "server/access/audit.hpp"
 #include "server/command_line.hpp"
 #include "server/config/config.hpp"
@@ -26,6 +27,7 @@
 #include "server/host/service_notification.hpp"
 #include "server/host/stop_signal.hpp"
 #include "server/interface_text.hpp"
+#include "server/recording/replay.hpp"
 #include "server/replay_command.hpp"
 
 namespace drivebench {
@@ -154,7 +156,28 @@ void require_realtime(const BenchConfig& config) {
   if (!notes.empty()) throw std::runtime_error("--require-rt: " + notes.front());
 }
 
+/// Runs the bench as the recording says, and ends the leases of its controllers. Throws.
+BeginRun repetition(const ServerOptions& o, const BenchConfig& config) {
+  // At tick 0 a bench has no input but its own events.
+  if (o.repeat.empty() || o.until == 0) return {};
+  if (config.mode != RunMode::kLockstep)
+    throw std::runtime_error("--repeat: time waits for a controller in lockstep only; see --mode");
+  return [&o](Bench& bench, Recorder* recorder) {
+    const MappedSeries series(o.repeat);
+    const auto wait = [recorder] {
+      if (recorder != nullptr) recorder->wait_for_room();
+    };
+    try {
+      repeat(series.segments(), bench, {.until = o.until, .before_tick = wait});
+    } catch (const std::runtime_error& problem) {
+      throw std::runtime_error(fmt::format("--repeat: {}: {}", o.repeat, problem.what()));
+    }
+    bench.release_leases();
+  };
+}
+
 std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& config, asio::io_context& io) {
+  const BeginRun begin = repetition(o, config);
   std::unique_ptr<Recorder> recorder;
   if (!o.record.empty()) {
     recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
@@ -164,8 +187,9 @@ std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& c
   if (o.duration_s > 0.0) {
     max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
   }
-  return config.mode == RunMode::kLockstep ? make_lockstep_engine(config, std::move(recorder), io, max_ticks)
-                                           : make_threaded_engine(config, std::move(recorder), io, max_ticks);
+  return config.mode == RunMode::kLockstep
+             ? make_lockstep_engine(config, std::move(recorder), io, max_ticks, begin)
+             : make_threaded_engine(config, std::move(recorder), io, max_ticks);
 }
 
 /// Throws if the file is no state of this bench.

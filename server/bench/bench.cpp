@@ -99,6 +99,7 @@ void Bench::submit_triggered() noexcept {
     state.held = awaited.trigger.condition.holds(axes_[awaited.trigger.axis].sample) ? state.held + 1 : 0;
     if (state.held <= awaited.trigger.for_ticks) continue;
     state.triggered = tick_;
+    if (only_watches_) continue;
     Input input = awaited.input;
     input.tick += tick_;
     if (repeat(input) != Refused::kNot) ++axes_[input.axis].control.refused;
@@ -273,6 +274,14 @@ void Bench::dismiss_controllers() noexcept {
     dismissed = true;
   }
   if (dismissed) step();
+}
+
+void Bench::release_leases() noexcept {
+  for (std::uint32_t axis = 0; axis < axes_.size(); ++axis) {
+    const Owner holder = owner(axis);
+    if (holder == 0 || takes_voltages(axis)) continue;
+    submit({.tick = tick_, .axis = axis, .owner = holder, .action = LeaseAction::kRelease});
+  }
 }
 
 PhaseCommand Bench::safe_command(AxisRuntime& a) noexcept {

@@ -105,6 +105,9 @@ class Bench {
   /// sees. The bench submits it then like an input of the configuration, so that the observer sees it and a
   /// recording repeats it. Before the first tick; allocates.
   void await(const Trigger& trigger, const Input& input);
+  /// While inputs of a recording come through repeat(): conditions are watched, but what they let happen is
+  /// among those inputs.
+  void only_watch_triggers(bool only) noexcept { only_watches_ = only; }
   /// The tick in which the input of the n-th await() was submitted; -1: not yet.
   Tick triggered_at(std::size_t n) const noexcept { return awaited_[n].state.triggered; }
 
@@ -113,6 +116,9 @@ class Bench {
 
   /// The end of a run: takes every lease back and, if an axis had one, runs a tick of safe action.
   void dismiss_controllers() noexcept;
+
+  /// Gives up every lease, as the controllers would do themselves. No tick runs.
+  void release_leases() noexcept;
 
   /// Whether a fault is latched on an axis. The bench then refuses commands, except those with the gates off.
   bool is_latched(std::size_t axis) const noexcept {
@@ -137,6 +143,9 @@ class Bench {
   /// A hash of the state and of every sample so far, without the inputs that wait for a trigger: a replay,
   /// which finds them among the recorded inputs, has the same hash.
   std::uint64_t state_hash() const noexcept;
+
+  /// A hash of the setup: of all that is the same in every run of the bench, events left out.
+  std::uint64_t setup_hash() const noexcept;
 
   /// The whole state as bytes, for restore() on a bench with the same setup, in any process.
   std::vector<std::byte> save() const;
@@ -215,7 +224,7 @@ class Bench {
   void lose_controller(std::size_t axis, std::uint64_t fault) noexcept;
   void apply_due() noexcept;
   void submit_triggered() noexcept;
-  std::uint64_t setup_hash() const noexcept;
+  std::uint64_t setup_and_events_hash() const noexcept;
   void forget_scheduled(std::size_t axis, Owner owner) noexcept;
   PhaseCommand supervise(std::size_t axis) noexcept;
   void take_command(Control& c) noexcept;
@@ -244,6 +253,7 @@ class Bench {
   std::array<PackedInput, kMaxScheduled> schedule_{};  ///< sorted by tick, first come first served within one
   std::vector<AxisRuntime> axes_;
   std::vector<AwaitedInput> awaited_;
+  bool only_watches_ = false;  ///< the inputs of awaited_ come from elsewhere
 };
 
 }  // namespace drivebench

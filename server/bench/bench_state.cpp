@@ -84,6 +84,12 @@ std::uint64_t digest_of(std::span<const std::byte> words) noexcept {
 std::uint64_t Bench::setup_hash() const noexcept {
   Digest digest;
   add_setup(setup_, digest);
+  return digest.value();
+}
+
+std::uint64_t Bench::setup_and_events_hash() const noexcept {
+  Digest digest;
+  add_setup(setup_, digest);
   for (const AwaitedInput& awaited : awaited_) {
     digest.add_block(pack(awaited.input));
     digest.add_block(awaited.trigger.condition);
@@ -138,7 +144,7 @@ std::vector<std::byte> Bench::save() const {
     std::memcpy(saved.data() + end, &block, sizeof(block));
   };
   append(kMagic);
-  append(setup_hash());
+  append(setup_and_events_hash());
   for_each_block(*this, append);
   for (const AwaitedInput& awaited : awaited_)
     append(awaited.state);
@@ -161,7 +167,7 @@ bool Bench::restore(std::span<const std::byte> saved) {
   take(word);
   if (word != kMagic) return false;
   take(word);
-  if (word != setup_hash()) return false;
+  if (word != setup_and_events_hash()) return false;
   Bench restored(*this);
   for_each_block(restored, take);
   for (AwaitedInput& awaited : restored.awaited_)

@@ -72,17 +72,29 @@ std::vector<std::string> axis_names(const BenchConfig& config) {
   return names;
 }
 
-void schedule_events(const BenchConfig& config, Bench& bench) {
+namespace {
+
+template <class See>
+void each_event(const BenchConfig& config, See see) {
   for (std::uint32_t axis = 0; axis < config.axes.size(); ++axis) {
-    for (const AxisEvent& event : config.axes[axis].events) {
-      const Input input{.tick = event.tick, .axis = axis, .owner = 0, .action = event.action};
-      if (event.trigger) {
-        bench.await(*event.trigger, input);
-      } else {
-        bench.submit(input);
-      }
-    }
+    for (const AxisEvent& event : config.axes[axis].events)
+      see(event, Input{.tick = event.tick, .axis = axis, .owner = 0, .action = event.action});
   }
+}
+
+}  // namespace
+
+void await_events(const BenchConfig& config, Bench& bench) {
+  each_event(config, [&bench](const AxisEvent& event, const Input& input) {
+    if (event.trigger) bench.await(*event.trigger, input);
+  });
+}
+
+void schedule_events(const BenchConfig& config, Bench& bench) {
+  await_events(config, bench);
+  each_event(config, [&bench](const AxisEvent& event, const Input& input) {
+    if (!event.trigger) bench.submit(input);
+  });
 }
 
 std::vector<EventState> event_states(const BenchConfig& config, const Bench& bench) {

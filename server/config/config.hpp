@@ -168,6 +168,9 @@ std::vector<std::string> axis_names(const BenchConfig& config);
 /// Gives the bench the events of the configuration, as inputs for later ticks or behind a trigger.
 void schedule_events(const BenchConfig& config, Bench& bench);
 
+/// Only those that wait for a condition: the others are inputs of a recording that the bench repeats.
+void await_events(const BenchConfig& config, Bench& bench);
+
 /// An event of the configuration as people read it, and what has come of it.
 struct EventState {
   std::size_t axis;

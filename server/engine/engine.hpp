@@ -161,11 +161,16 @@ class Engine {
   Owners owners_;
 };
 
+/// Brings a new bench, which awaits its events, to where the run begins. `recorder` may be null.
+using BeginRun = std::function<void(Bench&, Recorder* recorder)>;
+
 /// Runs ticks on the I/O thread, in the call that brings the last command, or later when the recorder has
 /// room. After max_ticks, if given, time stands still, and what clients ask for is no input of the run.
+/// Without `begin` the run begins at tick 0.
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
                                              boost::asio::io_context& io,
-                                             std::optional<Tick> max_ticks = std::nullopt);
+                                             std::optional<Tick> max_ticks = std::nullopt,
+                                             const BeginRun& begin = {});
 /// Without a recording.
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config);
 

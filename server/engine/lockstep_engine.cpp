@@ -12,15 +12,24 @@ namespace {
 class LockstepEngine final : public Engine {
  public:
   LockstepEngine(const BenchConfig& config, std::unique_ptr<Recorder> recorder, asio::io_context* io,
-                 std::optional<Tick> max_ticks)
+                 std::optional<Tick> max_ticks, const BeginRun& begin)
       : Engine(config, std::move(recorder)),
         max_ticks_(max_ticks),
         bench_(config_.setup, recorder_.get()),
         shown_changes_(config_.axes.size()) {
     if (io != nullptr) disk_timer_.emplace(*io);
-    schedule_events(config_, bench_);
-    start_ = bench_.save();
+    if (begin) {
+      start_ = state_at_start();
+      await_events(config_, bench_);
+      begin(bench_, recorder_.get());
+    } else {
+      schedule_events(config_, bench_);
+      start_ = bench_.save();
+    }
     show();
+    // The newest samples are from before the end of the leases with which a repetition ends.
+    for (std::size_t i = 0; i < newest_.size(); ++i)
+      newest_[i].owner = bench_.owner(i);
   }
 
   /// While time waits for the disk each axis accepts one command and no newer ones, which would be recorded
@@ -109,6 +118,12 @@ class LockstepEngine final : public Engine {
   std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
+  std::vector<std::byte> state_at_start() const {
+    Bench bench(config_.setup);
+    schedule_events(config_, bench);
+    return bench.save();
+  }
+
   /// Whether inputs that may come without end may be recorded. The commands of a tick and the end of a lease
   /// always may.
   bool has_room() const noexcept { return !recorder_ || (!waits_for_disk_ && recorder_->has_room()); }
@@ -153,12 +168,13 @@ class LockstepEngine final : public Engine {
 }  // namespace
 
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config) {
-  return std::make_unique<LockstepEngine>(config, nullptr, nullptr, std::nullopt);
+  return std::make_unique<LockstepEngine>(config, nullptr, nullptr, std::nullopt, BeginRun());
 }
 
 std::unique_ptr<Engine> make_lockstep_engine(const BenchConfig& config, std::unique_ptr<Recorder> recorder,
-                                             asio::io_context& io, std::optional<Tick> max_ticks) {
-  return std::make_unique<LockstepEngine>(config, std::move(recorder), &io, max_ticks);
+                                             asio::io_context& io, std::optional<Tick> max_ticks,
+                                             const BeginRun& begin) {
+  return std::make_unique<LockstepEngine>(config, std::move(recorder), &io, max_ticks, begin);
 }
 
 }  // namespace drivebench

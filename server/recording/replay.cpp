@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <map>
+#include <stdexcept>
 
 #include "bench.pb.h"
 #include "protocols/mcap/mcap_series.hpp"
@@ -49,6 +50,13 @@ class Replayer {
       bytes_ += segment.size();
   }
 
+  /// Replays on this bench, in the place of one of its own, and ends with this tick.
+  Replayer(const std::vector<std::span<const std::byte>>& segments, Bench& bench, const Repetition& what)
+      : Replayer(segments) {
+    bench_ = &bench;
+    what_ = &what;
+  }
+
   ReplayReport run(void (*on_progress)(double)) {
     bool more = true;
     for (McapMessage message; more && series_.next(message);) {
@@ -56,7 +64,7 @@ class Replayer {
         unusable(series_.problem()->what);  // in an earlier file: what follows it has no beginning
         break;
       }
-      if (!bench_ && !build_bench()) break;
+      if (axes_.empty() && !build_bench()) break;
       const std::string_view topic = reader().channels().at(message.header.channel).topic;
       if (has_verdict_) {
         more = unusable("something follows its verdict");
@@ -73,7 +81,7 @@ class Replayer {
       }
     }
     conclude();
-    if (!report_.problem.empty() && bench_ && !report_.same_build) {
+    if (!report_.problem.empty() && bench_ != nullptr && !report_.same_build) {
       report_.problem +=
           fmt::format("; it was recorded by {}, this is {}", report_.recorded_by, recorder_name());
     }
@@ -98,7 +106,10 @@ class Replayer {
         return unusable(fmt::format("its configuration cannot be read: {}", error.what()));
       }
       tables_ = parameter_tables(config_.setup);
-      bench_.emplace(config_.setup);
+      own_bench_.emplace(config_.setup);
+      if (what_ != nullptr && own_bench_->setup_hash() != bench_->setup_hash())
+        return different("the bench is not the one of the recording");
+      if (what_ == nullptr) bench_ = &*own_bench_;
       for (std::size_t i = 0; i < config_.axes.size(); ++i)
         axes_[sample_topic(config_.axes[i].name)] = i;
       return true;
@@ -171,7 +182,7 @@ class Replayer {
       return different(fmt::format("after {} samples, up to tick {}, follows one of {} at tick {}",
                                    report_.samples, bench_->tick(), config_.axes[axis].name, tick));
     }
-    if (next_tick) bench_->step();
+    if (next_tick) step();
     ++report_.samples;
     const Sample& replayed = bench_->sample(axis);
     for (const Signal& signal : kSignals) {
@@ -185,7 +196,15 @@ class Replayer {
                                    report_.difference->axis, signal.name, report_.difference->recorded,
                                    report_.difference->replayed));
     }
-    return true;
+    if (what_ == nullptr || tick < what_->until || axis + 1 != config_.axes.size()) return true;
+    report_.result = ReplayReport::Result::kEqual;
+    stopped_ = true;
+    return false;
+  }
+
+  void step() {
+    if (what_ != nullptr) what_->before_tick();
+    bench_->step();
   }
 
   bool judge(std::span<const std::byte> payload) {
@@ -199,7 +218,7 @@ class Replayer {
   }
 
   void conclude() {
-    if (bench_) {
+    if (bench_ != nullptr) {
       report_.ticks = static_cast<std::uint64_t>(bench_->tick());
       report_.state_hash = bench_->state_hash();
     }
@@ -207,7 +226,7 @@ class Replayer {
     const McapProblem* const problem = series_.problem() ? &*series_.problem() : nullptr;
     if (problem != nullptr && problem->kind != McapProblem::Kind::kTruncated) {
       unusable(problem->what);
-    } else if (!bench_ || report_.samples < config_.axes.size()) {
+    } else if (axes_.empty() || report_.samples < config_.axes.size()) {
       unusable(problem != nullptr ? problem->what : "it holds no samples");
     } else if (!has_verdict_) {
       end_early(problem != nullptr ? problem->what : "it holds no verdict");
@@ -234,7 +253,9 @@ class Replayer {
   std::uint64_t seen_ = 0;
   BenchConfig config_;
   ParameterTables tables_;
-  std::optional<Bench> bench_;
+  std::optional<Bench> own_bench_;
+  Bench* bench_ = nullptr;
+  const Repetition* what_ = nullptr;  ///< null: the whole recording
   std::map<std::string, std::size_t, std::less<>> axes_;
   v1::Verdict verdict_;
   ReplayReport report_;
@@ -251,6 +272,16 @@ ReplayReport replay(std::span<const std::byte> recording, void (*on_progress)(do
 
 ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, void (*on_progress)(double)) {
   return Replayer(segments).run(on_progress);
+}
+
+void repeat(const std::vector<std::span<const std::byte>>& segments, Bench& bench, const Repetition& what) {
+  bench.only_watch_triggers(true);
+  const ReplayReport report = Replayer(segments, bench, what).run(nullptr);
+  bench.only_watch_triggers(false);
+  using enum ReplayReport::Result;
+  if (report.result == kDifferent || report.result == kUnusable) throw std::runtime_error(report.problem);
+  if (bench.tick() < what.until)
+    throw std::runtime_error(fmt::format("it ends at tick {}, before tick {}", bench.tick(), what.until));
 }
 
 }  // namespace drivebench

@@ -2,10 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "server/bench/bench.hpp"
 
 namespace drivebench {
 
@@ -43,5 +46,17 @@ struct ReplayReport {
 ReplayReport replay(std::span<const std::byte> recording, void (*on_progress)(double));
 /// Replays a recording in several files.
 ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, void (*on_progress)(double));
+
+/// How much of a recording a bench repeats.
+struct Repetition {
+  Tick until;                         ///< above 0
+  std::function<void()> before_tick;  ///< called before each tick
+};
+
+/// Gives a bench at tick 0 the inputs of a recording up to a tick, and compares every sample. The bench has
+/// the setup of the recorded one, had no input, and awaits the events of its configuration: their conditions
+/// are watched meanwhile. Throws std::runtime_error with the reason for which it is not where the recorded
+/// one was.
+void repeat(const std::vector<std::span<const std::byte>>& segments, Bench& bench, const Repetition& what);
 
 }  // namespace drivebench

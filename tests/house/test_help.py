@@ -23,7 +23,7 @@ ONLY_PARSED = {
     "drivebench branch servo --port 0": "serves until it is ended",
     "drivebench can check can0": "needs an adapter",
     "drivebench doctor --period-us 125": "its exit code is this machine's",
-    "drivebench rerun kept/servo-position.zip": "needs a case that has failed",
+    **{f"drivebench rerun kept/servo-position.zip{more}": "needs a case that has failed" for more in ("", " --from 0.03s", " --interactive")},
 }
 SERVING = ("drivebench web --listen 127.0.0.1:7380", "drivebench branch servo --port 0")
 # The bench that the examples of a verb need, where it is not a servo; and what comes before them.

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 
 #include "clients/command/common/basics/errors.hpp"
@@ -15,9 +18,11 @@
 #include "clients/command/recording/recorded_samples.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/serve_failure.hpp"
 #include "clients/command/regression/test.hpp"
 #include "clients/regression/reports/reports.hpp"
 #include "protocols/json.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -26,6 +31,7 @@ namespace fs = std::filesystem;
 using regression::CaseResult;
 using regression::RunFacts;
 
+constexpr double kMostTicks = 1e15;
 constexpr auto kReplayPatience = std::chrono::hours(24);
 
 std::string text_of(const Signal& signal, const Sample& sample) {
@@ -100,6 +106,36 @@ void require_recording(const RerunOptions& options, const Unpacked& bundle) {
                                options.bundle));
 }
 
+/// The tick in `--from`: a whole number, or a time with its unit.
+std::uint64_t tick_of(const std::string& from, double period_s) {
+  const bool is_time = from.ends_with('s');
+  const std::string_view digits(from.data(), from.size() - (is_time ? 1 : 0));
+  double number = -1.0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  const double tick = is_time ? std::round(number / period_s) : number;
+  const bool is_whole = tick >= 0.0 && tick <= kMostTicks && tick == std::floor(tick);
+  if (error != std::errc{} || end != digits.data() + digits.size() || !is_whole) {
+    throw UsageError(fmt::format(
+        "--from: is \"{}\" but must be a tick, as 304, or a time of the bench, as 0.038s", printable(from)));
+  }
+  return static_cast<std::uint64_t>(tick);
+}
+
+/// The part of the recorded run that is repeated; nothing: the run begins with the device under test.
+std::optional<RepeatedPart> repeated_part(const RerunOptions& options, const Unpacked& bundle,
+                                          const PreparedCase& prepared) {
+  if (options.from.empty() && !options.interactive) return std::nullopt;
+  require_recording(options, bundle);
+  const JudgedRecording run = judged_recording(prepared, bundle.recording);
+  if (options.from.empty()) return RepeatedPart{bundle.recording, run.failure_tick};
+  const RepeatedPart part{bundle.recording, tick_of(options.from, prepared.facts.period_s)};
+  if (part.until > run.last_tick) {
+    throw UsageError(
+        fmt::format("--from: is tick {}, but the recorded run ends at tick {}", part.until, run.last_tick));
+  }
+  return part;
+}
+
 /// Replays the commands of the recording on a bench, without the device under test.
 int replay_plant(const RerunOptions& options, const Unpacked& bundle) {
   require_recording(options, bundle);
@@ -132,16 +168,37 @@ PreparedCase prepared_or_refused(const RerunOptions& options, const Unpacked& bu
   }
 }
 
-int run_again(const RerunOptions& options, const Unpacked& bundle, const fs::path& folder) {
-  const PreparedCase prepared = prepared_or_refused(options, bundle);
+bool is_program(const PreparedCase& prepared) {
+  return prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram;
+}
+
+/// A sentence on a program that was started in the middle of the recorded run.
+std::string beginning(const RepeatedPart& part, double period_s) {
+  return fmt::format(
+      "the run up to tick {} ({:.6g} s) is the recorded one, to the bit; the device under test was started "
+      "there, so that later samples are not compared",
+      part.until, static_cast<double>(part.until) * period_s);
+}
+
+int run_again(const RerunOptions& options, const Unpacked& bundle, const PreparedCase& prepared,
+              const fs::path& folder) {
+  const std::optional<RepeatedPart> part = repeated_part(options, bundle, prepared);
+  if (part && prepared.what->is_realtime) {
+    throw UsageError(
+        "--from: the case runs in real time, where the bench waits for no device; --interactive serves it in "
+        "lockstep");
+  }
   catch_interrupts();
-  const CaseResult result = run_case(prepared, folder, {});
+  const CaseResult result = run_case(prepared, folder, {.repeats = part});
   fmt::print("{}", regression::table_row(result));
-  record_case(prepared, folder);
+  record_case(prepared, folder, part);
   if (bundle.program != options.program)
     fmt::print("the bundle is of {}, this is {}\n", bundle.program, options.program);
-  if (fs::exists(bundle.recording) && fs::exists(recording_in(folder)))
+  if (part && is_program(prepared)) {
+    if (fs::exists(recording_in(folder))) fmt::print("{}\n", beginning(*part, prepared.facts.period_s));
+  } else if (fs::exists(bundle.recording) && fs::exists(recording_in(folder))) {
     fmt::print("{}\n", comparison(bundle.recording, recording_in(folder), prepared.facts));
+  }
   regression::Totals totals;
   totals.add(result);
   return exit_code_of(totals);
@@ -156,7 +213,10 @@ int run_rerun(const RerunOptions& options) {
   fs::create_directory(parts);
   fs::create_directory(run);
   const Unpacked bundle = unpack_bundle(options.bundle, parts);
-  return options.plant_only ? replay_plant(options, bundle) : run_again(options, bundle, run);
+  if (options.plant_only) return replay_plant(options, bundle);
+  const PreparedCase prepared = prepared_or_refused(options, bundle);
+  if (!options.interactive) return run_again(options, bundle, prepared, run);
+  return serve_bench(prepared, *repeated_part(options, bundle, prepared), options.port);
 }
 
 }  // namespace drivebench::command

@@ -11,6 +11,7 @@
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
 #include "clients/command/control/control_presets.hpp"
+#include "clients/command/regression/repeated_axis.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -90,7 +91,10 @@ CaseResult run_in_process(const PreparedCase& prepared, const RunWishes& wishes,
     judge.see(axis.all());
     if (timing) timing->missed.see(axis.all()[place]);
   };
-  drive(axis, c, judge.end_tick(), see, timing ? &timing->answers.after_sample : nullptr);
+  drive(axis, c, see,
+        {.end_tick = judge.end_tick(),
+         .repeats = wishes.repeats,
+         .computing = timing ? &timing->answers.after_sample : nullptr});
   CaseResult result = judge.result();
   if (timing) timing->period_ns = std::llround(prepared.facts.period_s * 1e9);
   result.timing = timing;
@@ -116,16 +120,18 @@ CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& fol
 
 }  // namespace
 
-void drive(link::AxisLink& axis, const Case& c, std::uint64_t end_tick, const SeeTick& see,
-           TimeHistogram* computing) {
+void drive(link::AxisLink& bench, const Case& c, const SeeTick& see, const Drive& how) {
+  std::optional<RepeatedAxis> repeated;
+  if (how.repeats) repeated.emplace(bench, *how.repeats);
+  link::AxisLink& axis = repeated ? static_cast<link::AxisLink&>(*repeated) : bench;
   axis.acquire();
   if (c.device.kind == DeviceUnderTest::Kind::kNone) {
-    keep_off(axis, end_tick, see, false);
+    keep_off(axis, how.end_tick, see, false);
     return;
   }
   control::Run run = made(chosen_preset(c.device.preset), gains_of(c.device));
-  if (axis.bench().arming_commands() > 1) keep_off(axis, end_tick, see, true);
-  CaseWatcher watcher(axis.bench(), end_tick, see, computing);
+  if (axis.bench().arming_commands() > 1) keep_off(axis, how.end_tick, see, true);
+  CaseWatcher watcher(axis.bench(), how.end_tick, see, how.computing);
   control_loop(axis, run, watcher);
 }
 

@@ -1,16 +1,25 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
+#include <optional>
 
 #include "clients/command/regression/prepared_case.hpp"
 #include "clients/regression/verdicts/result.hpp"
 
 namespace drivebench::command {
 
-/// What a result has beside the verdict.
+/// The beginning of a run that a recording has: its commands and other inputs act again.
+struct RepeatedPart {
+  std::filesystem::path recording;
+  std::uint64_t until;  ///< the tick from which the device under test drives
+};
+
+/// What a result has beside the verdict, and where the run begins.
 struct RunWishes {
   bool trace = false;   ///< the signals of the checks, for plots
   bool timing = false;  ///< of the device under test
+  std::optional<RepeatedPart> repeats{};
 };
 
 /// Runs one case to its verdict: a preset, and an open bench, in this process; a program against a server of
@@ -21,10 +30,16 @@ regression::CaseResult run_case(const PreparedCase& prepared, const std::filesys
 /// Hears of every tick of a run, when its samples are there.
 using SeeTick = std::function<void()>;
 
-/// Drives the axis with the preset of a case, or with its gates off, until its last tick. The computing times
-/// of the preset go to `computing`, if given.
-void drive(link::AxisLink& axis, const regression::Case& c, std::uint64_t end_tick, const SeeTick& see,
-           TimeHistogram* computing);
+/// How a case is driven without a program.
+struct Drive {
+  std::uint64_t end_tick;
+  const std::optional<RepeatedPart>& repeats;
+  TimeHistogram* computing = nullptr;  ///< takes the computing times of the preset, if given
+};
+
+/// Drives the axis with the preset of a case, or with its gates off, until its last tick. A preset sees the
+/// part that is repeated, but the recorded commands act.
+void drive(link::AxisLink& bench, const regression::Case& c, const SeeTick& see, const Drive& how);
 
 /// The case of a program: a drivebench-server in lockstep (or in real time) on a unix socket, recorded, the
 /// program beside it, and the samples from the recording.
@@ -36,6 +51,7 @@ std::filesystem::path recording_in(const std::filesystem::path& folder);
 
 /// Runs the case of a preset, or of an open bench, once more over a server that records it. That of a program
 /// has its recording.
-void record_case(const PreparedCase& prepared, const std::filesystem::path& folder);
+void record_case(const PreparedCase& prepared, const std::filesystem::path& folder,
+                 const std::optional<RepeatedPart>& repeats = {});
 
 }  // namespace drivebench::command

@@ -100,6 +100,10 @@ class RecordedServer {
       line.push_back(fmt::to_string(static_cast<double>(prepared.facts.end_tick) * prepared.facts.period_s));
     }
     if (wishes.timing) line.emplace_back("--measure-answers");
+    if (wishes.repeats) {
+      line.insert(line.end(), {"--repeat", fs::absolute(wishes.repeats->recording).string(), "--until",
+                               fmt::to_string(wishes.repeats->until)});
+    }
     return line;
   }
 
@@ -197,13 +201,13 @@ fs::path recording_in(const fs::path& folder) {
   return folder / "run.mcap";
 }
 
-void record_case(const PreparedCase& prepared, const fs::path& folder) {
+void record_case(const PreparedCase& prepared, const fs::path& folder,
+                 const std::optional<RepeatedPart>& repeats) {
   if (prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram) return;
   RecordedServer server(prepared, folder, {});
   {
     const auto axis = open_axis({.address = server.link(), .token = {}}, prepared.what->device.axis, "test");
-    drive(
-        *axis, *prepared.what, prepared.facts.end_tick, [] {}, nullptr);
+    drive(*axis, *prepared.what, [] {}, {.end_tick = prepared.facts.end_tick, .repeats = repeats});
   }
   server.end();
 }

@@ -17,8 +17,27 @@ void add_rerun_command(CommandLine& line) {
       ->type_name("FILE")
       ->required();
   begin_group(sub, kWhat);
-  sub.add_flag("--plant-only", o.plant_only, "replay the recorded commands, without the device under test");
-  sub.footer("Example:\n  drivebench rerun kept/servo-position.zip");
+  auto* const plant_only = sub.add_flag("--plant-only", o.plant_only,
+                                        "replay the recorded commands, without the device under test");
+  sub.add_option(
+         "--from", o.from,
+         "repeat the recorded run up to this tick, or this time as 0.03s; the device under test begins "
+         "there")
+      ->type_name("TICK")
+      ->excludes(plant_only);
+  auto* const interactive =
+      sub.add_flag("--interactive", o.interactive,
+                   "serve the bench as it was at the failure, or at --from, with free leases, until Ctrl-C")
+          ->excludes(plant_only);
+  sub.add_option("--port", o.port, "TCP port of --interactive; 0: chosen by the system")
+      ->type_name("PORT")
+      ->check(CLI::Range(0U, 65535U))
+      ->needs(interactive);
+  sub.footer(
+      "Example:\n"
+      "  drivebench rerun kept/servo-position.zip\n"
+      "  drivebench rerun kept/servo-position.zip --from 0.03s\n"
+      "  drivebench rerun kept/servo-position.zip --interactive");
 }
 
 void add_choice(CLI::App& sub, TestOptions& o) {

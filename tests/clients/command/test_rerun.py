@@ -2,7 +2,9 @@
 """`drivebench rerun`: bundles of failed cases run again, and hostile bundles are refused."""
 import os
 import pathlib
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import unittest
@@ -15,6 +17,14 @@ try:
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
+
+
+DRIVES_A_TICK = """import sys
+import drivebench
+with drivebench.Bench(sys.argv[1]) as bench:
+    bench.acquire()
+    print(bench.newest().tick, bench.step(off=True).tick)
+"""
 
 
 class Rerun(RegressionTest):
@@ -78,6 +88,60 @@ load_profile = "load.csv"
         said = self.rerun(tamed, code=OK)
         self.assertRegex(said, r"(?m)^pass +case")
         self.assertRegex(said, r"differs first at tick \d+: ")
+
+    def test_a_program_begins_in_the_middle_of_the_recorded_run(self):
+        """Catches: a bench that is not where the recorded one was, a condition that is forgotten, a lease that is still held."""
+        bundle = self.failed_bundle("case", PROGRAM.format(limit_s=30).replace("i_a_a < 30", "i_a_a < 0.5") + """[[step]]
+when = "i_a_a > 1"
+for_s = 0.001
+load_nm = 0.01
+""", device_py=DRIVES.format(until=10 ** 9).replace("sample = bench.newest()", "sample = bench.newest(); print(sample.tick, sample.load_nm)"))
+        said = self.rerun(bundle, "--from", "0.01s", code=FAILED)
+        self.assertIn("up to tick 100 (0.01 s) is the recorded one, to the bit; the device under test was started there", said)
+        self.assertNotIn("differs", said)
+        # The rest of the run is that of the new device, which is asked for another voltage from there on.
+        still = self.changed(bundle, {"case/device.py": lambda text: text.replace(b"voltages=5.0", b"voltages=0.0"),
+                                      "case/case.toml": lambda text: text.replace(b"i_a_a < 0.5", b"i_a_a < 30")})
+        self.assertRegex(self.rerun(still, "--from", "100", code=OK), r"(?m)^pass +case")
+        never = self.changed(bundle, {"case/case.toml": lambda text: text.replace(b"i_a_a < 0.5", b"load_nm == 0")})
+        self.assertRegex(self.rerun(never, "--from", "100", code=FAILED), r"load_nm == 0")
+        other = self.changed(bundle, {"bench.toml": lambda text: text.replace(b"armature_resistance_ohm = 2.0", b"armature_resistance_ohm = 2.5")})
+        self.assertIn("the bench is not the one of the recording", self.rerun(other, "--from", "100", code=FAILED))
+        for wrong, rule in (("201", "is tick 201, but the recorded run ends at tick 200"), ("0.5", 'is "0.5" but must be a tick'),
+                            ("-1", "must be a tick"), ("nans", "must be a tick"), ("1e99", "must be a tick")):
+            with self.subTest(wrong):
+                self.assertIn(rule, self.rerun(bundle, f"--from={wrong}", code=USAGE))
+
+    def test_a_preset_goes_on_from_the_recorded_commands(self):
+        """Catches: a preset that begins its plan anew, or whose own answers act before the tick."""
+        bundle = self.failed_bundle("servo", SERVO.replace("6.0", "5.0"))
+        for tick in ("0", "200", "1024"):
+            self.assertIn("the same to the bit: 1025 samples", self.rerun(bundle, "--from", tick, code=FAILED))
+        softer = self.changed(bundle, {"case/case.toml": lambda text: text.replace(
+            b"[dut]\n", b"[dut]\ngains.position.proportional_per_s2 = 300000.0\n")})
+        first = r"differs first at tick (\d+): "
+        self.assertLess(int(re.search(first, self.rerun(softer, code=FAILED)).group(1)), 400)
+        self.assertGreater(int(re.search(first, self.rerun(softer, "--from", "400", code=FAILED)).group(1)), 400)
+
+    def test_an_interactive_bench_stands_at_the_failure(self):
+        """Catches: a bench at another tick, one that nobody may drive, a server that outlives its verb."""
+        bundle = self.failed_bundle("servo", SERVO.replace("6.0", "5.0"))
+        tick = re.search(r"at (\S+) s \(line", self.rerun(bundle, code=FAILED)).group(1)
+        for more, at in (((), round(float(tick) * 8000)), (("--from", "100"), 100)):
+            bench = subprocess.Popen([COMMAND, "rerun", bundle, "--interactive", *more], stdout=subprocess.PIPE, text=True,
+                                     env=self.environment)
+            self.addCleanup(bench.wait)
+            self.addCleanup(bench.kill)
+            self.addCleanup(bench.stdout.close)
+            link = re.search(rf"at tick {at} \(\S+ s\) on (tcp:\S+)", bench.stdout.readline()).group(1)
+            status = subprocess.run([COMMAND, "status", "--link", link], capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+            self.assertIn(f"tick {at} (", status)
+            self.assertIn("owner none", status)
+            drives = subprocess.run([sys.executable, "-c", DRIVES_A_TICK, link], capture_output=True, text=True, env=self.environment,
+                                    timeout=PATIENCE_S, check=True).stdout
+            self.assertEqual(drives.split(), [str(at), str(at + 1)])
+            bench.send_signal(signal.SIGINT)
+            self.assertEqual(bench.wait(timeout=PATIENCE_S), OK)
 
     def test_a_hostile_bundle_is_refused_with_entry_and_rule(self):
         """Catches: a file outside the folder, a bomb that is unpacked, a foreign or damaged file that runs."""

@@ -27,17 +27,24 @@ namespace {
 using Result = ReplayReport::Result;
 using Bytes = std::vector<std::byte>;
 
-/// A lockstep run with every event that a recording can hold: two axes, a lease, commands, loads from the
-/// file, one of them behind a trigger, and from clients, a parameter write and a ramp, a fault, a bump,
-/// refused commands, a clear.
-Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
-  const TestFolder folder;
+/// Axes of a servo, with loads and a bump on the second one, some of them behind a trigger.
+BenchConfig bench_with_events(std::size_t axes) {
   BenchConfig config = servo_bench(axes);
   const auto load = static_cast<std::uint64_t>(find_signal("load_nm") - kSignals.data());
   const Trigger loaded{.axis = 1, .condition = {.signal = load, .number = 0.01}};
   config.axes[1].events = {
       {.tick = 5, .action = LoadChange{.load_nm = 0.02, .ramp_ticks = 3}},
-      {.tick = 2, .action = LoadChange{.load_nm = 0.01, .ramp_ticks = 0}, .trigger = loaded}};
+      {.tick = 2, .action = LoadChange{.load_nm = 0.01, .ramp_ticks = 0}, .trigger = loaded},
+      {.tick = 3, .action = ShaftBump{2e-4}, .trigger = loaded}};
+  return config;
+}
+
+/// A lockstep run with every event that a recording can hold: two axes, a lease, commands, loads from the
+/// file, one of them behind a trigger, and from clients, a parameter write and a ramp, a fault, a bump,
+/// refused commands, a clear.
+Bytes record(Tick ticks, std::uint64_t* state_hash = nullptr, std::size_t axes = 2) {
+  const TestFolder folder;
+  const BenchConfig config = bench_with_events(axes);
   asio::io_context io(1);
   const auto engine =
       make_lockstep_engine(config, std::make_unique<Recorder>(folder / "run.mcap", config), io);
@@ -110,12 +117,50 @@ TEST(Replay, REC_12_ARunReplaysBitForBit) {
   EXPECT_EQ(report.result, Result::kEqual) << report.problem;
   EXPECT_EQ(report.ticks, 501u);
   EXPECT_EQ(report.samples, 2 * 502u) << "of two axes, with those of tick 0";
-  EXPECT_EQ(report.inputs, 8 + 2 + 500u + 1) << "the last one takes the lease back";
+  EXPECT_EQ(report.inputs, 8 + 3 + 500u + 1) << "the last one takes the lease back";
   EXPECT_EQ(report.state_hash, state_hash);
   EXPECT_NE(report.recorded_by.find("drivebench"), std::string::npos);
   EXPECT_FALSE(report.difference);
   // Rewriting by itself changes nothing.
   EXPECT_EQ(replayed(rewritten(recording, [](Entry&) { return true; })).result, Result::kEqual);
+}
+
+// Catches: an event that is lost or that acts twice because the recording has it too, a lease that stays, a
+// tick too many, a bench of other parameters that is taken for the recorded one.
+TEST(Replay, ABenchRepeatsARecordingUpToATickAndGoesOn) {
+  const Bytes recording = record(60);
+  std::vector<Sample> recorded;  // of the axis that nobody drives
+  McapReader reader(recording);
+  for (McapMessage message; reader.next(message);) {
+    const std::string_view topic = reader.channels().at(message.header.channel).topic;
+    if (topic == sample_topic(bench_with_events(2).axes[1].name))
+      recorded.push_back(*decode_sample(message.payload));
+  }
+  for (const Tick until : {1, 4, 7, 8, 9, 12, 50}) {
+    const BenchConfig config = bench_with_events(2);
+    Bench bench(config.setup);
+    await_events(config, bench);
+    Tick ticks = 0;
+    repeat({recording}, bench, {.until = until, .before_tick = [&ticks] { ++ticks; }});
+    EXPECT_EQ(bench.tick(), until);
+    EXPECT_EQ(ticks, until);
+    bench.release_leases();
+    EXPECT_EQ(bench.owner(0), 0u);
+    EXPECT_EQ(bench.sample(0).faults & kLatchedFaults, 0u);
+    for (; bench.tick() < 20; bench.step()) {
+      const Sample& then = recorded.at(static_cast<std::size_t>(bench.tick()));
+      EXPECT_EQ(bench.sample(1).load_nm, then.load_nm);
+      if (until > 4) {
+        EXPECT_EQ(bench.sample(1).speed_rad_s, then.speed_rad_s) << "a client's inputs came by then";
+      }
+    }
+  }
+  BenchConfig other = bench_with_events(2);
+  other.setup.seed += 1;
+  Bench bench(other.setup);
+  EXPECT_THROW(repeat({recording}, bench, {.until = 5, .before_tick = [] {}}), std::runtime_error);
+  Bench short_run(bench_with_events(2).setup);
+  EXPECT_THROW(repeat({recording}, short_run, {.until = 100, .before_tick = [] {}}), std::runtime_error);
 }
 
 // Catches: a right recording of another build that is refused, or a wrong one whose report does not name the
