@@ -51,7 +51,7 @@ ORDERED = {
     "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
                         "salient", "presets"),
     "clients/identification": ("math", "data", "motors", "refinement", "wiring"),
-    "clients/regression": ("tables", "checks", "suite", "timing", "verdicts", "reports", "results"),
+    "clients/regression": ("tables", "checks", "suite", "shrink", "timing", "verdicts", "reports", "results"),
 }
 
 # Files beside rooms that the rooms may include. They count as rooms of their own in the search for circles.

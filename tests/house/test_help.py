@@ -24,6 +24,7 @@ ONLY_PARSED = {
     "drivebench can check can0": "needs an adapter",
     "drivebench doctor --period-us 125": "its exit code is this machine's",
     **{f"drivebench rerun kept/servo-position.zip{more}": "needs a case that has failed" for more in ("", " --from 0.03s", " --interactive")},
+    "drivebench test hil --filter servo --shrink hil/small.toml": "needs a case that fails",
 }
 SERVING = ("drivebench web --listen 127.0.0.1:7380", "drivebench branch servo --port 0")
 # The bench that the examples of a verb need, where it is not a servo; and what comes before them.

@@ -57,7 +57,6 @@ int serve_bench(const PreparedCase& prepared, const RepeatedPart& part, unsigned
   fmt::print("{} at tick {} ({:.6g} s) on tcp:{}\n", prepared.what->name, part.until,
              static_cast<double>(part.until) * prepared.facts.period_s, ready->tcp);
   fmt::print("time stands still until a controller takes the lease; Ctrl-C ends\n");
-  fmt::print("  drivebench status --link tcp:{}\n", ready->tcp);
   std::fflush(stdout);
   while (!interrupted()) {
     if (server.wait(Process::in(kLook))) throw std::runtime_error("the server has ended");

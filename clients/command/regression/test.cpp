@@ -15,6 +15,7 @@
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/html_report.hpp"
+#include "clients/command/regression/shrink_case.hpp"
 #include "clients/command/regression/stored_results.hpp"
 #include "clients/command/regression/suite_run.hpp"
 #include "clients/regression/reports/reports.hpp"
@@ -296,10 +297,21 @@ int exit_code_of(const regression::Totals& totals) {
 }
 
 int run_test(const TestOptions& options) {
+  const ShrinkOptions shrink{.file = options.shrunk_file, .most_runs = options.shrink_runs};
+  if (!shrink.file.empty() && options.suite.ends_with(".zip"))
+    return run_shrink_bundle(shrink, options.suite);
   const std::filesystem::path suite = find_suite(options.suite);
   if (options.list) {
     print_list(chosen_cases(options, suite));
     return kExitOk;
+  }
+  if (!shrink.file.empty()) {
+    const std::vector<Case> cases = chosen_cases(options, suite);
+    if (cases.size() != 1) {
+      throw UsageError(fmt::format(
+          "--shrink: there are {} cases, but one is made smaller: choose it with --filter", cases.size()));
+    }
+    return run_shrink(shrink, cases.front());
   }
   return options.merged_folders.empty() ? run_and_report(options, suite) : merge(options, suite);
 }

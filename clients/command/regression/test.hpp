@@ -24,6 +24,8 @@ struct TestOptions {
   std::string shard{};                        ///< `2/4` or `auto`; empty: all cases
   std::string results_folder{};               ///< where results are kept between runs
   std::vector<std::string> merged_folders{};  ///< nothing runs: the results are there
+  std::string shrunk_file{};                  ///< takes a smaller case that fails in the same way
+  std::size_t shrink_runs = 300;              ///< at most
   bool tap = false;
   bool github = false;
 };

@@ -81,6 +81,19 @@ void add_reports(CLI::App& sub, TestOptions& o) {
   sub.add_option("--keep", o.keep_folder,
                  "keep a bundle of each case that has not passed in this folder, for `drivebench rerun`")
       ->type_name("FOLDER");
+  begin_group(sub, "A smaller case");
+  auto* const shrink = sub.add_option("--shrink", o.shrunk_file,
+                                      "make the one failing case that is chosen, or a bundle in the place of "
+                                      "the suite, smaller; writes it to "
+                                      "this new file beside the case")
+                           ->type_name("FILE")
+                           ->excludes(results)
+                           ->excludes(timing);
+  sub.add_option("--shrink-runs", o.shrink_runs, "the most runs that it may cost")
+      ->type_name("NUMBER")
+      ->capture_default_str()
+      ->check(CLI::Range(1U, 100'000U))
+      ->needs(shrink);
   begin_group(sub, kOutput);
   sub.add_option("--junit", o.junit_file, "write a JUnit XML report")->type_name("FILE");
   sub.add_option("--json", o.json_file, "write a JSON report")->type_name("FILE");
@@ -101,6 +114,7 @@ void add_regression_commands(CommandLine& line) {
       "Example:\n"
       "  drivebench test reference --list\n"
       "  drivebench test reference --jobs 2 --junit report.xml --keep kept\n"
+      "  drivebench test hil --filter servo --shrink hil/small.toml\n"
       "Exit codes: 0 all passed or were skipped, 1 one failed or had an error, 2 usage or configuration, 4 "
       "none failed, but real time was not kept.");
   add_rerun_command(line);

@@ -255,6 +255,13 @@ ConfigNode table_of(const Case& c) {
   return {};
 }
 
+Case case_in(const ConfigNode& table, const fs::path& file, const std::string& name) {
+  ProblemList problems;
+  Case c = read_case(table, file, name, problems);
+  problems.throw_if_any();
+  return c;
+}
+
 std::vector<Case> read_suite(const fs::path& suite) {
   std::vector<Case> cases;
   visit_suite(suite, [&cases](Case c) { cases.push_back(std::move(c)); });

@@ -19,6 +19,10 @@ void visit_suite(const std::filesystem::path& suite, const SeeCase& see);
 /// two tables. Throws ConfigError.
 ConfigNode table_of(const Case& c);
 
+/// The case in a table as table_of() gives it, with the names of its files relative to `file`. Throws
+/// ConfigError.
+Case case_in(const ConfigNode& table, const std::filesystem::path& file, const std::string& name);
+
 /// All cases of a suite. Throws ConfigError with all problems.
 std::vector<Case> read_suite(const std::filesystem::path& suite);
 
