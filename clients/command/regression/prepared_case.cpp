@@ -88,6 +88,10 @@ PreparedCase prepared_on(const Case& c, const fs::path& bench, ProblemList& prob
   return prepared;
 }
 
+std::string in_lockstep(const fs::path& composed) {
+  return regression::composed_bench({.name = "", .file = composed.string(), .bench = ""}, composed);
+}
+
 std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path& folder) {
   ProblemList problems;
   std::vector<PreparedCase> prepared;

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <thread>
 
+#include "clients/command/common/programs/composed_file.hpp"
 #include "clients/command/common/programs/installation.hpp"
 #include "clients/command/common/programs/process.hpp"
 #include "clients/command/common/programs/server_ready.hpp"
@@ -73,7 +74,6 @@ class RecordedServer {
   }
 
   std::string link() const { return "unix:" + socket_.string(); }
-  const fs::path& recording() const noexcept { return recording_; }
   /// Returns when the commands for each axis came; nothing if that was not measured.
   std::vector<AnswerTimes> end() {
     process_.terminate();
@@ -161,10 +161,28 @@ void show_recording(const fs::path& file, const RunFacts& facts, See see) {
   }
 }
 
-}  // namespace
+/// What a run in real time must tell to be repeated in lockstep.
+struct RealtimeRun {
+  std::uint64_t leased_tick = 0;  ///< the last one before the device took its lease
+  std::uint64_t last_tick = 0;
+  bool was_leased = false;
 
-CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes,
-                            Judge& judge) {
+  void see(const Sample& sample) noexcept {
+    was_leased = was_leased || sample.owner != 0;
+    if (!was_leased) leased_tick = sample.tick;
+    last_tick = sample.tick;
+  }
+};
+
+/// The end of a program beside a bench.
+struct ProgramEnd {
+  std::string failure;  ///< the reason why the run is none; empty: it is one
+  std::vector<AnswerTimes> answers;
+  std::string output;
+};
+
+/// Runs the device under test beside a server of its own, which leaves its recording in the folder.
+ProgramEnd run_beside_server(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes) {
   const Case& c = *prepared.what;
   const fs::path output = folder / kOutput;
   RecordedServer server(prepared, folder, wishes);
@@ -174,26 +192,72 @@ CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder
                                      .error_file = output.string(),
                                      .joins_output = true,
                                      .own_group = true});
-  const std::string failure = await_end(program, bench, c, prepared.facts);
-  const std::vector<AnswerTimes> answers = server.end();
-  if (!program.wait(Process::in(failure.empty() ? kFarewell : 0s))) program.terminate();
+  ProgramEnd end{
+      .failure = await_end(program, bench, c, prepared.facts), .answers = server.end(), .output = {}};
+  if (!program.wait(Process::in(end.failure.empty() ? kFarewell : 0s))) program.terminate();
   program.wait(Process::in(kFarewell));
+  end.output = utf8(without_place(tail_of(output), server.link()));
+  return end;
+}
+
+/// The signals of the checks in the recording in a folder.
+regression::Trace traced(const PreparedCase& prepared, const fs::path& folder) {
+  Judge judge(*prepared.what, prepared.facts, true);
+  show_recording(recording_in(folder), prepared.facts,
+                 [&](const std::vector<Sample>& samples) { judge.see(samples); });
+  return judge.failure(Verdict::kPass, "").trace;
+}
+
+/// The case in lockstep: the run in real time is repeated up to the tick in which the device took its lease,
+/// and the device starts there anew.
+regression::MissedEffect effect_of_missed(const PreparedCase& prepared, const fs::path& folder,
+                                          const RealtimeRun& run) {
+  const double from_s = static_cast<double>(run.leased_tick) * prepared.facts.period_s;
+  const fs::path in_time = folder / "in-time";
+  fs::create_directory(in_time);
+  Case c = *prepared.what;
+  c.is_realtime = false;
+  PreparedCase again{.what = &c, .bench_file = in_time / "bench.toml", .facts = prepared.facts};
+  again.facts.end_tick = run.last_tick;
+  try {
+    write_file(again.bench_file, in_lockstep(prepared.bench_file));
+    const ProgramEnd end =
+        run_beside_server(again, in_time, {.repeats = RepeatedPart{recording_in(folder), run.leased_tick}});
+    if (!end.failure.empty()) return {.from_s = from_s, .problem = "in lockstep " + end.failure};
+    return regression::missed_effect(traced(prepared, folder), traced(again, in_time), from_s);
+  } catch (const std::exception& error) {
+    return {.from_s = from_s, .problem = error.what()};
+  }
+}
+
+}  // namespace
+
+CaseResult run_program_case(const PreparedCase& prepared, const fs::path& folder, const RunWishes& wishes,
+                            Judge& judge) {
+  const Case& c = *prepared.what;
+  const ProgramEnd end = run_beside_server(prepared, folder, wishes);
   const std::size_t place = find_axis(prepared.facts, c.device.axis);
   regression::MissedTicks missed;
-  show_recording(server.recording(), prepared.facts, [&](const std::vector<Sample>& samples) {
+  RealtimeRun run;
+  show_recording(recording_in(folder), prepared.facts, [&](const std::vector<Sample>& samples) {
     judge.see(samples);
-    if (samples[place].tick <= judge.end_tick()) missed.see(samples[place]);
+    if (samples[place].tick > judge.end_tick()) return;
+    missed.see(samples[place]);
+    run.see(samples[place]);
   });
-  CaseResult result = failure.empty() ? judge.result() : judge.failure(Verdict::kError, failure);
-  result.output = utf8(without_place(tail_of(output), server.link()));
-  if (place < answers.size()) {
-    using enum regression::DeviceTiming::Way;
-    result.timing = std::make_shared<regression::DeviceTiming>(
-        regression::DeviceTiming{.way = c.is_realtime ? kRealtime : kLockstep,
-                                 .period_ns = std::llround(prepared.facts.period_s * 1e9),
-                                 .answers = answers[place],
-                                 .missed = missed});
-  }
+  CaseResult result = end.failure.empty() ? judge.result() : judge.failure(Verdict::kError, end.failure);
+  result.output = end.output;
+  if (place >= end.answers.size()) return result;
+  using enum regression::DeviceTiming::Way;
+  const auto timing = std::make_shared<regression::DeviceTiming>(
+      regression::DeviceTiming{.way = c.is_realtime ? kRealtime : kLockstep,
+                               .period_ns = std::llround(prepared.facts.period_s * 1e9),
+                               .answers = end.answers[place],
+                               .missed = missed});
+  const bool came_late = timing->answers.late != 0 || missed.all != 0;
+  if (c.is_realtime && came_late && run.was_leased && end.failure.empty())
+    timing->effect = effect_of_missed(prepared, folder, run);
+  result.timing = timing;
   return result;
 }
 

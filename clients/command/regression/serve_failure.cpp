@@ -9,9 +9,11 @@
 #include <stdexcept>
 
 #include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/composed_file.hpp"
 #include "clients/command/common/programs/installation.hpp"
 #include "clients/command/common/programs/process.hpp"
 #include "clients/command/common/programs/server_ready.hpp"
+#include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
 
@@ -49,9 +51,11 @@ JudgedRecording judged_recording(const PreparedCase& prepared, const std::filesy
 
 int serve_bench(const PreparedCase& prepared, const RepeatedPart& part, unsigned port) {
   catch_interrupts();
-  Process server({server_executable().string(), prepared.bench_file.string(), "--json", "--mode", "lockstep",
-                  "--port", std::to_string(port), "--repeat", part.recording.string(), "--until",
-                  std::to_string(part.until)});
+  const TemporaryFolder folder;
+  const std::filesystem::path bench = folder.path() / "bench.toml";
+  write_file(bench, in_lockstep(prepared.bench_file));
+  Process server({server_executable().string(), bench.string(), "--json", "--port", std::to_string(port),
+                  "--repeat", part.recording.string(), "--until", std::to_string(part.until)});
   const auto ready = server.await(Process::in(kRepetitionPatience), parse_ready);
   if (!ready) throw std::runtime_error("the server did not start");
   fmt::print("{} at tick {} ({:.6g} s) on tcp:{}\n", prepared.what->name, part.until,

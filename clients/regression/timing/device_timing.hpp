@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
+#include "clients/regression/timing/missed_effect.hpp"
 #include "protocols/signals/sample.hpp"
 #include "protocols/timing/answer_times.hpp"
 
@@ -44,6 +46,7 @@ struct DeviceTiming {
   std::int64_t period_ns = 0;  ///< of the bench
   AnswerTimes answers{};
   MissedTicks missed{};
+  std::optional<MissedEffect> effect{};  ///< in real time, if answers were late or missed
 };
 
 /// "in process", "lockstep" or "real time".

@@ -41,6 +41,20 @@ void put_timing(TimingJson& object, const DeviceTiming& timing) {
   object["longest_burst"] = timing.missed.longest_burst;
 }
 
+TimingJson effect_json(const MissedEffect& effect) {
+  TimingJson signals = TimingJson::array();
+  for (const SignalEffect& each : effect.signals)
+    signals.push_back({{"axis", each.axis},
+                       {"signal", each.signal},
+                       {"unit", each.unit},
+                       {"rms_difference", each.rms},
+                       {"worst_difference", each.worst},
+                       {"at_s", each.worst_s}});
+  return {{"from_s", effect.from_s},
+          {"problem", effect.problem.empty() ? TimingJson(nullptr) : TimingJson(effect.problem)},
+          {"signals", signals}};
+}
+
 TimingJson group_json(const TimingGroup& group) {
   TimingJson object{{"way", word_of(group.all.way)}, {"cases", group.cases}};
   if (group.all.way == DeviceTiming::Way::kRealtime)
@@ -56,6 +70,7 @@ std::string timing_case_json(std::string_view name, const DeviceTiming& timing) 
                     {"way", word_of(timing.way)},
                     {"period_us", in_us(static_cast<double>(timing.period_ns))}};
   put_timing(object, timing);
+  object["effect"] = timing.effect ? effect_json(*timing.effect) : TimingJson(nullptr);
   return json_text(object);
 }
 

@@ -125,6 +125,22 @@ std::string svg_timing(const DeviceTiming& timing) {
                        static_cast<double>(timing.period_ns));
 }
 
+std::string effect_text(const DeviceTiming& timing) {
+  if (!timing.effect) return {};
+  const MissedEffect& effect = *timing.effect;
+  if (!effect.problem.empty())
+    return fmt::format("<p>What late and missed answers changed is not known: {}.</p>\n",
+                       markup(effect.problem));
+  std::string text = fmt::format(
+      "<p>What late and missed answers changed: the run, and beside it the same one in lockstep from {:.6g} "
+      "s on, where every "
+      "answer came in time.</p>\n",
+      effect.from_s);
+  for (const SignalEffect& each : effect.signals)
+    text += svg_effect(each);
+  return text;
+}
+
 std::string group_name(const TimingGroup& group) {
   const bool is_realtime = group.all.way == DeviceTiming::Way::kRealtime;
   return fmt::format("{} case{}{}", group.cases, group.cases == 1 ? "" : "s",
@@ -136,12 +152,14 @@ std::string group_name(const TimingGroup& group) {
 }  // namespace
 
 std::string timing_case_row(std::string_view name, const DeviceTiming& timing, bool draws) {
-  const std::string text = markup(name);
-  const std::string drawing = draws ? svg_timing(timing) : std::string();
-  return fmt::format(
-      "<tr><td>{}{}",
-      drawing.empty() ? text : fmt::format("<details><summary>{}</summary>{}</details>", text, drawing),
-      number_cells(timing));
+  const std::string drawing = draws ? svg_timing(timing) + effect_text(timing) : std::string();
+  std::string rows = fmt::format("<tr><td>{}{}", markup(name), number_cells(timing));
+  // A row of its own, as wide as the table.
+  if (!drawing.empty()) {
+    rows +=
+        fmt::format("<tr><td colspan=12><details><summary>drawings</summary>{}</details></tr>\n", drawing);
+  }
+  return rows;
 }
 
 std::string timing_page(std::string_view suite, const std::vector<TimingGroup>& groups,

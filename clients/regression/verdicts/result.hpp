@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/regression/checks/check.hpp"
+#include "clients/regression/checks/trace.hpp"
 #include "clients/regression/timing/device_timing.hpp"
 
 namespace drivebench::regression {
@@ -22,17 +23,6 @@ enum class Verdict {
 
 /// "pass", "fail", "error", "invalid" or "skipped".
 std::string_view word_of(Verdict verdict) noexcept;
-
-/// Signals of a run as they were seen, for plots.
-struct Trace {
-  std::vector<double> time_s{};
-  struct Column {
-    std::string axis;
-    const Signal* signal;
-    std::vector<double> values;
-  };
-  std::vector<Column> columns{};
-};
 
 /// The outcome of a case.
 struct CaseResult {

@@ -34,6 +34,7 @@ class Timing(RegressionTest):
         timing, out = self.timing_of()
         case = timing["cases"][0]
         self.assertEqual((case["name"], case["way"], case["period_us"], case["phase"]), ("case", "lockstep", 100.0, None))
+        self.assertIsNone(case["effect"])
         answers = case["answers"]
         self.assertGreaterEqual(answers["count"], 190)
         self.assertGreaterEqual(answers["p50_us"], 990.0)
@@ -69,6 +70,12 @@ with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
         self.assertGreaterEqual(case["missed"], 1.5 * case["phase"]["count"])
         self.assertGreaterEqual(case["longest_burst"], 2)
         self.assertGreaterEqual(case["phase"]["p50_us"], case["answers"]["p50_us"])
+        # The same device in lockstep, from the tick on in which it took its lease.
+        effect = case["effect"]
+        self.assertIsNone(effect["problem"])
+        self.assertGreater(effect["from_s"], 0.0)
+        self.assertEqual([(each["axis"], each["signal"], each["unit"]) for each in effect["signals"]], [("dc-a", "i_a_a", "A")])
+        self.assertLess(effect["signals"][0]["rms_difference"], 5.0)
 
     def test_reports_are_the_same_bytes_with_timing(self):
         """Catches: a time of the wall clock in a report that is compared."""

@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "clients/regression/timing/log_bins.hpp"
+#include "clients/regression/timing/missed_effect.hpp"
 #include "clients/regression/timing/timing_report.hpp"
 #include "protocols/json.hpp"
 
@@ -49,6 +52,39 @@ TEST(LogBins, HoldEveryEntryOnce) {
   EXPECT_LE(bins.back().from_ns, times.worst_ns());
   EXPECT_GT(bins.back().to_ns, times.worst_ns());
   EXPECT_TRUE(log_bins({}).empty());
+}
+
+/// Two runs of a second, of which the second one is later by a constant from 0.4 s on.
+Trace ramp(double later) {
+  Trace trace;
+  trace.columns.push_back({.axis = "servo", .signal = find_signal("speed_rad_s"), .values = {}});
+  for (int i = 0; i <= 1000; ++i) {
+    const double time_s = i * 1e-3;
+    trace.time_s.push_back(time_s);
+    trace.columns[0].values.push_back(time_s - (i >= 400 ? later : 0.0) - (i == 777 ? later : 0.0));
+  }
+  return trace;
+}
+
+// Catches: a difference of samples of different ticks, the part before the device took its lease counted, a
+// worst place that the drawing leaves out.
+TEST(MissedEffect, IsTheDifferenceOfTheTwoRuns) {
+  const MissedEffect effect = missed_effect(ramp(0.25), ramp(0.0), 0.2);
+  ASSERT_EQ(effect.signals.size(), 1u);
+  const SignalEffect& speed = effect.signals[0];
+  EXPECT_EQ(speed.axis + "." + speed.signal + " " + speed.unit, "servo.speed_rad_s rad/s");
+  EXPECT_DOUBLE_EQ(speed.worst, 0.5);
+  EXPECT_DOUBLE_EQ(speed.worst_s, 0.777);
+  // 600 samples of 0.25 and one of 0.5 among the 801 from 0.2 s on.
+  EXPECT_NEAR(speed.rms, std::sqrt((600 * 0.0625 + 0.25) / 801.0), 1e-12);
+  EXPECT_LE(speed.points.size(), 500u);
+  EXPECT_DOUBLE_EQ(speed.points.front().time_s, 0.2);
+  EXPECT_TRUE(std::ranges::any_of(speed.points, [](const auto& point) { return point.time_s == 0.777; }));
+  const std::string drawing = svg_effect(speed);
+  EXPECT_NE(drawing.find("servo.speed_rad_s [rad/s]"), std::string::npos);
+  EXPECT_NE(drawing.find("at most 0.5 rad/s at 0.777 s"), std::string::npos);
+  EXPECT_EQ(missed_effect(ramp(0.1), ramp(0.1), 0.0).signals[0].worst, 0.0);
+  EXPECT_NE(missed_effect(ramp(0.1), ramp(0.1), 2.0).problem, "");
 }
 
 DeviceTiming timing(DeviceTiming::Way way, std::int64_t period_ns, std::int64_t answer_ns) {
