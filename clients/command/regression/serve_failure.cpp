@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
+#include <vector>
 
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/programs/composed_file.hpp"
@@ -16,6 +17,7 @@
 #include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
+#include "clients/regression/checks/check_kinds.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -27,24 +29,59 @@ constexpr auto kRepetitionPatience = std::chrono::hours(24);
 constexpr auto kServerFarewell = 20s;
 constexpr auto kLook = 100ms;
 
+/// Shows the samples of a recording, a tick at a time, while `see` wants more.
+template <class See>
+void see_recording(const std::filesystem::path& file, const regression::RunFacts& facts, See see) {
+  RecordedSamples recorded(file, facts.axes);
+  std::vector<Sample> samples(facts.axes.size());
+  while (const auto row = recorded.next()) {
+    samples[row->axis] = row->sample;
+    if (row->axis + 1 == samples.size() && !see(samples)) return;
+  }
+}
+
+/// The first tick after which one of the checks has failed, which all do at a sample.
+std::uint64_t first_failure(const PreparedCase& prepared, const std::filesystem::path& file) {
+  regression::Judge judge(*prepared.what, prepared.facts, false);
+  std::uint64_t tick = 0;
+  see_recording(file, prepared.facts, [&](const std::vector<Sample>& samples) {
+    judge.see(samples);
+    tick = samples[0].tick;
+    return std::ranges::none_of(judge.result().findings, [](const regression::Finding& finding) {
+      return !finding.passed && finding.applied;
+    });
+  });
+  return tick;
+}
+
 }  // namespace
 
 JudgedRecording judged_recording(const PreparedCase& prepared, const std::filesystem::path& file) {
   regression::Judge judge(*prepared.what, prepared.facts, false);
   JudgedRecording run;
-  RecordedSamples recorded(file, prepared.facts.axes);
-  std::vector<Sample> samples(prepared.facts.axes.size());
-  while (const auto row = recorded.next()) {
-    samples[row->axis] = row->sample;
-    if (row->axis + 1 != samples.size() || row->sample.tick > judge.end_tick()) continue;
+  see_recording(file, prepared.facts, [&](const std::vector<Sample>& samples) {
+    if (samples[0].tick > judge.end_tick()) return false;
     judge.see(samples);
-    run.last_tick = row->sample.tick;
-  }
+    run.last_tick = samples[0].tick;
+    return true;
+  });
   run.failure_tick = run.last_tick;
-  for (const regression::Finding& finding : judge.result().findings) {
-    if (finding.passed || !finding.applied || !std::isfinite(finding.at_s)) continue;
-    const auto tick = static_cast<std::uint64_t>(std::llround(finding.at_s / prepared.facts.period_s));
-    run.failure_tick = std::min(run.failure_tick, tick);
+  regression::Case at_once = *prepared.what;
+  at_once.checks.clear();
+  const std::vector<regression::Finding> findings = judge.result().findings;
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    const regression::Finding& finding = findings[i];
+    if (finding.passed || !finding.applied) continue;
+    if (regression::fails_at_once(finding.kind)) {
+      at_once.checks.push_back(prepared.what->checks[i]);
+    } else if (std::isfinite(finding.at_s)) {
+      const auto tick = static_cast<std::uint64_t>(std::llround(finding.at_s / prepared.facts.period_s));
+      run.failure_tick = std::min(run.failure_tick, tick);
+    }
+  }
+  if (!at_once.checks.empty()) {
+    run.failure_tick = std::min(
+        run.failure_tick, first_failure({.what = &at_once, .bench_file = {}, .facts = prepared.facts}, file));
   }
   return run;
 }

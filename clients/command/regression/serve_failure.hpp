@@ -9,7 +9,8 @@ namespace drivebench::command {
 /// What the checks of a case see in a recording of it.
 struct JudgedRecording {
   std::uint64_t last_tick = 0;
-  /// Where the first of the checks that failed was worst, as the report tells; the last tick if none failed.
+  /// Where the first of the checks that failed did so; of one that judges its window as a whole, where it was
+  /// worst. The last tick if none failed.
   std::uint64_t failure_tick = 0;
 };
 

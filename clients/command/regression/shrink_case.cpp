@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
@@ -16,6 +15,7 @@
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/run_case.hpp"
+#include "clients/regression/checks/check_kinds.hpp"
 #include "clients/regression/reports/reports.hpp"
 #include "clients/regression/shrink/shrink.hpp"
 #include "clients/regression/suite/case_file.hpp"
@@ -30,11 +30,6 @@ using regression::Case;
 using regression::CaseResult;
 using regression::Finding;
 using regression::Verdict;
-
-/// Kinds of checks that fail at a sample, whatever comes after it. Others judge the window as a whole, and
-/// say something else of a shorter run.
-constexpr auto kFailAtOnce =
-    std::to_array<std::string_view>({"bounds", "tube", "always", "never", "overshoot", "ripple"});
 
 /// How a case fails: the first check that does, or the error.
 struct Failure {
@@ -172,8 +167,7 @@ regression::ShrinkPlan plan_for(const ShrinkOptions& options, const CaseResult& 
   regression::ShrinkPlan plan{.check = 0, .most_runs = options.most_runs};
   const Finding* const failed = failed_check(first);
   if (failed != nullptr) plan.check = static_cast<std::size_t>(failed - first.findings.data());
-  if (failed == nullptr || std::ranges::find(kFailAtOnce, failed->kind) != kFailAtOnce.end())
-    plan.longest_s = first.bench_s;
+  if (failed == nullptr || regression::fails_at_once(failed->kind)) plan.longest_s = first.bench_s;
   return plan;
 }
 

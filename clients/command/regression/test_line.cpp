@@ -101,6 +101,9 @@ void add_reports(CLI::App& sub, TestOptions& o) {
       ->type_name("FILE");
   sub.add_flag("--tap", o.tap, "print the Test Anything Protocol instead of the table");
   sub.add_flag("--github", o.github, "print annotations for GitHub");
+  for (const char* other :
+       {"--list", "--shard", "--merge", "--keep", "--junit", "--json", "--html", "--tap", "--github"})
+    shrink->excludes(sub.get_option(other));
 }
 
 }  // namespace

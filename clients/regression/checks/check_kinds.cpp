@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "protocols/nearest_name.hpp"
@@ -19,6 +20,12 @@ std::span<const CheckKind> check_kinds() noexcept {
     return all;
   }();
   return kAll;
+}
+
+bool fails_at_once(std::string_view kind) noexcept {
+  static constexpr auto kAtOnce =
+      std::to_array<std::string_view>({"bounds", "tube", "always", "never", "overshoot", "ripple"});
+  return std::ranges::find(kAtOnce, kind) != kAtOnce.end();
 }
 
 std::string problem_on_bench(const CheckSpec& spec, const RunFacts& facts) {

@@ -41,6 +41,10 @@ struct CheckKind {
 /// The kinds, in the order of the README.
 std::span<const CheckKind> check_kinds() noexcept;
 
+/// Whether a check of this kind fails at a sample, whatever comes after it. Others judge their window as a
+/// whole, and say something else of a shorter run.
+bool fails_at_once(std::string_view kind) noexcept;
+
 /// The rule that a check breaks on this bench, such as an unknown fault or an empty window; empty: none.
 std::string problem_on_bench(const CheckSpec& spec, const RunFacts& facts);
 
