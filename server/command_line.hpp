@@ -12,7 +12,7 @@ struct ServerOptions {
   std::string config;
   std::string mode;
   std::string replay;
-  std::string from;  ///< a saved state to begin with
+  std::string from;    ///< a saved state to begin with
   std::string repeat;  ///< a recording to begin with, up to `until`
   std::int64_t until = -1;
   std::string record;
