@@ -176,6 +176,8 @@ class ThreadedEngine final : public Engine {
   void run_tick() noexcept {
     clock_.wait_for_tick();
     first_due_ns_.store(clock_.due_ns() - bench_.tick() * config_.setup.period_ns, std::memory_order_relaxed);
+    if (const auto base = clock_.new_time_base(bench_.tick()); base && recorder_)
+      recorder_->on_time_base(*base);
     {
       const TickMark mark;
       watch_.beat();

@@ -47,6 +47,7 @@ class ExperimentRun {
     }
     while (keep_row() && may_go_on()) {
       clock_.wait_for_tick();
+      if (const auto base = clock_.new_time_base(bench_.tick())) recorder_.on_time_base(*base);
       submit_events();
       if (plan_.has_commands()) submit_command();
       clock_.report_lateness(bench_);

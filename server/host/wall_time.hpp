@@ -5,8 +5,7 @@
 #include <string>
 #include <string_view>
 
-/// Wall time in RFC 3339, for the expiry of tokens and the audit log. No other part of the server reads the
-/// wall clock.
+/// Wall time in RFC 3339, for the expiry of tokens and the audit log.
 namespace drivebench {
 
 /// Parses "2026-11-22T18:00:00Z", also with an offset such as "+01:00", from 1970 to 2199, without fractions

@@ -20,9 +20,9 @@ constexpr std::int64_t kSecondNs = 1'000'000'000;
 // sleep+spin wakes this much before the deadline: about the p99 of the wake-up latency of an idle core.
 constexpr std::int64_t kSpinNs = 30'000;
 
-std::int64_t now_ns() noexcept {
+std::int64_t now_ns(clockid_t clock = CLOCK_MONOTONIC) noexcept {
   timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
+  clock_gettime(clock, &t);
   return t.tv_sec * kSecondNs + t.tv_nsec;
 }
 
@@ -38,7 +38,10 @@ class RealtimePacer final : public Pacer {
       : period_ns_(period_ns), spin_ns_(spin_ns) {}
 
   std::int64_t wait() noexcept override {
-    if (due_ns_ == 0) due_ns_ = now_ns() - period_ns_;
+    if (due_ns_ == 0) {
+      resynchronise();
+      due_ns_ -= period_ns_;
+    }
     due_ns_ += period_ns_;
     std::int64_t now = now_ns();
     if (now < due_ns_ - spin_ns_) {
@@ -50,13 +53,18 @@ class RealtimePacer final : public Pacer {
     return now - due_ns_;
   }
 
-  void resynchronise() noexcept override { due_ns_ = now_ns(); }
+  void resynchronise() noexcept override {
+    due_ns_ = now_ns();
+    unix_ahead_ns_ = now_ns(CLOCK_REALTIME) - due_ns_;
+  }
   std::int64_t due_ns() const noexcept override { return due_ns_; }
+  std::int64_t due_unix_ns() const noexcept override { return due_ns_ + unix_ahead_ns_; }
 
  private:
   std::int64_t period_ns_;
   std::int64_t spin_ns_;
   std::int64_t due_ns_ = 0;
+  std::int64_t unix_ahead_ns_ = 0;  ///< of CLOCK_MONOTONIC, when time zero was set
 };
 
 class FreePacer final : public Pacer {

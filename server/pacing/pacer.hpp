@@ -20,6 +20,8 @@ class Pacer {
   virtual void resynchronise() noexcept = 0;
   /// The time on CLOCK_MONOTONIC at which the tick of the last wait() was due [ns]; 0 without a clock.
   virtual std::int64_t due_ns() const noexcept { return 0; }
+  /// The same moment in UTC since 1970 [ns], by the wall clock when time zero was set; 0 without a clock.
+  virtual std::int64_t due_unix_ns() const noexcept { return 0; }
 };
 
 /// A pacer with absolute deadlines on CLOCK_MONOTONIC. `sleep` relies on the kernel's timer; `sleep+spin`

@@ -3,8 +3,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
+#include "protocols/mcap/time_base.hpp"
 #include "server/bench/bench.hpp"
 #include "server/config/config.hpp"
 #include "server/pacing/pacer.hpp"
@@ -29,9 +31,15 @@ class TickClock {
   void report_lateness(Bench& bench) noexcept;
   /// The time on CLOCK_MONOTONIC at which that tick was due [ns]; 0 outside real time. For the tick thread.
   std::int64_t due_ns() const noexcept { return pacer_->due_ns(); }
+  /// The wall time of the bench, if its due times begin with that tick of this number; nothing outside real
+  /// time. A tick ends when it is due, with the sample of the next one.
+  std::optional<TimeBase> new_time_base(Tick tick) const noexcept;
 
   /// The next tick is due at once, and the others after it. While no tick runs.
-  void begin_anew() noexcept { pacer_->resynchronise(); }
+  void begin_anew() noexcept {
+    pacer_->resynchronise();
+    begins_ = true;
+  }
 
   /// The latenesses of all ticks so far; empty outside real time. For the tick thread only.
   const LatenessHistogram& lateness() const noexcept { return lateness_; }
@@ -44,6 +52,8 @@ class TickClock {
   std::int64_t max_lateness_ns_;
   std::unique_ptr<Pacer> pacer_;
   std::int64_t lateness_ns_ = 0;  ///< of the tick that is due
+  bool begins_ = true;            ///< the due times begin with the next tick
+  bool has_begun_ = false;        ///< they began with the tick that is due
   LatenessHistogram lateness_;
   std::atomic<std::int64_t> worst_ns_{0};
 };

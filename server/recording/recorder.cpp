@@ -53,6 +53,10 @@ void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
   count_gap(!ring_.emplace(std::in_place_type<TickedSample>, axis, sample));
 }
 
+void Recorder::on_time_base(const TimeBase& base) noexcept {
+  count_gap(!ring_.emplace(std::in_place_type<TimeBase>, base));
+}
+
 void Recorder::count_gap(bool lost) noexcept {
   if (lost) gaps_.fetch_add(1, std::memory_order_relaxed);
 }

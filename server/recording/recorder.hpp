@@ -10,6 +10,7 @@
 #include <thread>
 #include <variant>
 
+#include "protocols/mcap/time_base.hpp"
 #include "server/bench/bench.hpp"
 #include "server/config/config.hpp"
 #include "server/pacing/verdict.hpp"
@@ -27,7 +28,7 @@ struct ReceivedInput {
   Tick received;
   Input input;
 };
-using RecordedEntry = std::variant<TickedSample, ReceivedInput>;
+using RecordedEntry = std::variant<TickedSample, ReceivedInput, TimeBase>;
 
 /// The space that recordings leave free on their disk for other writers: the audit log, the system.
 inline constexpr std::uint64_t kDiskReserveBytes = std::uint64_t{64} << 20;
@@ -62,6 +63,8 @@ class Recorder final : public BenchObserver {
 
   void on_input(Tick now, const Input& input) noexcept override;
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override;
+  /// From here on the ticks are due by this wall time. Called by the tick thread between ticks.
+  void on_time_base(const TimeBase& base) noexcept;
 
   /// Whether the ring has room for a tick. Called by the tick thread between ticks.
   bool has_room() noexcept { return ring_.room() >= room_for_tick_; }

@@ -106,6 +106,7 @@ void RecordingWriter::begin(const std::string& path, std::unique_ptr<RecordingFi
                 McapWriterOptions{.profile = std::string(kRecordingProfile), .library = recorder_name()});
   if (number_ > 1)
     mcap_->add_metadata(kSegmentMetadata, {{std::string(kSegmentNumber), std::to_string(number_)}});
+  if (time_base_) mcap_->add_metadata(kTimeBaseMetadata, entries_of(*time_base_));
   mcap_->add_attachment(kConfigurationAttachment, "application/toml", 0, bytes_of(to_toml(config_)));
   for (const Attachment& a : attachments_)
     mcap_->add_attachment(a.name, a.media_type, 0, bytes_of(a.data));
@@ -175,6 +176,12 @@ void RecordingWriter::put(const ReceivedInput& entry) {
   count_entry();
   encode_input(entry.received, entry.input, tables_, input_);
   add(inputs_, input_sequence_++, static_cast<std::uint64_t>(entry.received), input_);
+}
+
+void RecordingWriter::put(const TimeBase& base) {
+  count_entry();
+  time_base_ = base;
+  mcap_->add_metadata(kTimeBaseMetadata, entries_of(base));
 }
 
 void RecordingWriter::put(const Verdict& verdict) {

@@ -12,6 +12,7 @@
 
 #include "bench.pb.h"
 #include "protocols/mcap/mcap.hpp"
+#include "protocols/mcap/time_base.hpp"
 #include "server/config/config.hpp"
 #include "server/host/clock.hpp"
 #include "server/pacing/verdict.hpp"
@@ -71,6 +72,7 @@ class RecordingWriter {
   }
   void put(const TickedSample& entry);
   void put(const ReceivedInput& entry);
+  void put(const TimeBase& base);
   void put(const Verdict& verdict);
   void add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t tick,
            const google::protobuf::Message& message);
@@ -99,6 +101,7 @@ class RecordingWriter {
   std::vector<std::uint32_t> sequences_;  // of the samples, by axis
   std::uint32_t input_sequence_ = 0;
   v1::Input input_;
+  std::optional<TimeBase> time_base_;  // the newest; each file begins with it
   Clock::time_point last_sync_ = Clock::now();
   std::uint64_t lost_ = 0;
   std::uint64_t unlooked_bytes_ = 0;  // written since the last check of the free space

@@ -20,7 +20,10 @@ class MdfFile:
         check(self.raw[:8] == b"MDF     " and self.raw[8:16] == b"4.10    ", "identification")
         check(struct.unpack_from("<H", self.raw, 28) == (410,), "version number")
         check(self.raw[60:64] == bytes(4), "the file says that it was not finalised")
-        links, _ = self.block(ID_BYTES, b"##HD")
+        links, start = self.block(ID_BYTES, b"##HD")
+        self.start_ns, zone_min, saving_min, flags, clock, angles = struct.unpack_from("<QhhBBB", start)
+        check(zone_min == saving_min == clock == angles == 0, "the start is in UTC")
+        check(flags == (2 if self.start_ns else 0), "a start in UTC has its offsets, none has no flags")
         self.check_history(links[1])
         self.read_group(links[0])
 

@@ -14,6 +14,7 @@ class Recording:
         self.damaged = 0
         self.finished = data.endswith(self.MAGIC) and len(data) > 16
         self.topics = {}
+        self.metadata = []  # (name, entries), in order
         at = 8
         while at + 9 <= len(data):
             opcode, (size,) = data[at], struct.unpack_from("<Q", data, at + 1)
@@ -21,6 +22,8 @@ class Recording:
                 break
             if opcode == 0x06:
                 self.chunk(data[at + 9:at + 9 + size])
+            elif opcode == 0x0C:
+                self.metadata.append(self.metadata_in(data[at + 9:at + 9 + size]))
             at += 9 + size
         self.tail = len(data) - at  # bytes of a record that is not whole
 
@@ -28,6 +31,19 @@ class Recording:
     def messages(self):
         """Topic -> number."""
         return {topic: len(found) for topic, found in self.contents.items()}
+
+    @staticmethod
+    def metadata_in(content):
+        texts, at = [], 0
+        while at < len(content):
+            (length,) = struct.unpack_from("<I", content, at)
+            at += 4
+            if len(texts) == 1:  # the length of all entries
+                texts.append(None)
+                continue
+            texts.append(content[at:at + length].decode())
+            at += length
+        return texts[0], dict(zip(texts[2::2], texts[3::2]))
 
     def chunk(self, content):
         crc, length = struct.unpack_from("<I", content, 24)[0], struct.unpack_from("<I", content, 28)[0]

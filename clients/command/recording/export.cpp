@@ -4,7 +4,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -22,6 +24,7 @@
 #include "clients/command/recording/recording_file.hpp"
 #include "clients/command/recording/tables/sample_table.hpp"
 #include "protocols/json.hpp"
+#include "protocols/mcap/time_base.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 
@@ -47,6 +50,32 @@ struct Exported {
   std::string other_axes;
   std::string problem;  ///< of the recording; empty: none
 };
+
+/// The wall time of a recording in real time; it precedes the first sample after tick 0. None of others.
+Epoch epoch_of(const MappedSeries& files) {
+  McapSeries reader(files.segments());
+  for (McapMessage message; reader.next(message);) {
+    if (const auto base = time_base_at(reader.reader())) return base->epoch_unix_ns;
+    if (message.header.log_time_ns > 0) break;
+  }
+  return std::nullopt;
+}
+
+/// UTC at which the message was due, by the time base in force; the epoch holds before the first one.
+std::int64_t unix_ns_of(const McapSeries& reader, std::uint64_t log_time_ns, const Epoch& epoch) {
+  const TimeBase first{.since_tick = 0, .epoch_unix_ns = epoch.value_or(0)};
+  return (epoch ? time_base_at(reader.reader()) : std::nullopt).value_or(first).unix_ns(log_time_ns);
+}
+
+std::string utc_text(std::int64_t unix_ns) {
+  const std::int64_t below_second_ns = (unix_ns % 1'000'000'000 + 1'000'000'000) % 1'000'000'000;
+  const std::time_t second = (unix_ns - below_second_ns) / 1'000'000'000;
+  std::tm utc{};
+  gmtime_r(&second, &utc);
+  std::array<char, 32> text{};
+  const std::size_t size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc);
+  return fmt::format("{}.{:06}Z", std::string_view(text.data(), size), below_second_ns / 1000);
+}
 
 /// Finds the messages of an axis by their channel.
 class AxisChannels {
@@ -140,14 +169,15 @@ End for_each_message(McapSeries& reader, const ExportOptions& options, std::uint
 
 /// Exports every readable sample, row by row.
 Exported export_rows(McapSeries& reader, const ExportOptions& options, std::uint64_t file_size,
-                     SampleTable& table) {
+                     const Epoch& epoch, SampleTable& table) {
   Exported done;
   AxisChannels channels(options.axis);
   const End end = for_each_message(reader, options, file_size, [&](const McapMessage& message) {
     if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
     const std::optional<Sample> sample = decode_sample(message.payload);
     if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
-    table.add(*sample, message.header.log_time_ns);
+    const std::uint64_t time_ns = message.header.log_time_ns;
+    table.add(*sample, {.bench_ns = time_ns, .unix_ns = unix_ns_of(reader, time_ns, epoch)});
     ++done.rows;
   });
   done.axis = channels.axis();
@@ -173,8 +203,10 @@ link::CanAddress can_address_of(const ExportOptions& options) {
                                              options.profile.empty() ? "" : "&", options.profile));
 }
 
-/// Exports the frames of all axes, or of the named one.
-Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files) {
+/// Exports the frames of all axes, or of the named one. In real time they have the wall's time, as those of
+/// candump have.
+Exported export_frames(McapSeries& reader, const ExportOptions& options, const MappedSeries& files,
+                       const Epoch& epoch) {
   check_suffix(options.out_file, {".log", ".txt"});
   Output out(options.out_file);
   Exported done;
@@ -183,7 +215,8 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
   std::optional<std::uint32_t> only;  // the named axis, from its first sample on
   const auto take = [&](const McapMessage& message) {
     const auto& place = channels.find(reader.reader(), message.header.channel);
-    const double time_s = static_cast<double>(message.header.log_time_ns) * 1e-9;
+    const auto time_ns = static_cast<double>(unix_ns_of(reader, message.header.log_time_ns, epoch));
+    const double time_s = time_ns * 1e-9;
     if (place.is_sample) {
       if (!options.axis.empty() && !place.is_wanted) return;
       only = place.number;
@@ -225,20 +258,20 @@ Signals each_once(const Signals& signals) {
 }
 
 Exported export_table(McapSeries& reader, const ExportOptions& options, const Signals& signals,
-                      std::uint64_t file_size) {
+                      std::uint64_t file_size, const Epoch& epoch) {
   if (options.format == "csv") {
     check_suffix(options.out_file, {".csv", ".txt"});
     Output out(options.out_file);
-    return export_rows(reader, options, file_size, *csv_table(out, signals));
+    return export_rows(reader, options, file_size, epoch, *csv_table(out, signals, epoch));
   }
   const Signals columns = each_once(signals);
   if (options.out_file.empty()) throw UsageError("--format " + options.format + " needs --out FILE");
   if (options.format == "mat") {
     check_suffix(options.out_file, {".mat", ".h5"});
-    return export_rows(reader, options, file_size, *mat_table(options.out_file, columns));
+    return export_rows(reader, options, file_size, epoch, *mat_table(options.out_file, columns, epoch));
   }
   check_suffix(options.out_file, {".mf4"});
-  return export_rows(reader, options, file_size, *mdf_table(options.out_file, columns));
+  return export_rows(reader, options, file_size, epoch, *mdf_table(options.out_file, columns, epoch));
 }
 
 }  // namespace
@@ -254,18 +287,19 @@ int run_export(const ExportOptions& options) {
     throw UsageError(fmt::format("--from {} is behind --to {}", options.from_tick, options.to_tick));
   }
   check_files(reader, files, options);
-  const Exported done =
-      is_table ? export_table(reader, options, signals, files.size()) : export_frames(reader, options, files);
+  const Epoch epoch = epoch_of(files);
+  const Exported done = is_table ? export_table(reader, options, signals, files.size(), epoch)
+                                 : export_frames(reader, options, files, epoch);
 
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
   if (options.json) {
-    fmt::print(
-        told, "{}\n",
-        json_text(Json{
-            {"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}}));
+    Json json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}};
+    if (epoch) json["epoch_unix_ns"] = *epoch;
+    fmt::print(told, "{}\n", json_text(json));
   } else {
-    fmt::print(told, "export: {} {} of axis {}{}{}\n", done.rows, is_table ? "samples" : "frames",
-               done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file);
+    fmt::print(told, "export: {} {} of axis {}{}{}{}\n", done.rows, is_table ? "samples" : "frames",
+               done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file,
+               epoch ? "; in real time, tick 0 began at " + utc_text(*epoch) : "");
   }
   if (!done.problem.empty()) {
     fmt::print(stderr, "drivebench: the recording is not whole: {}\n", done.problem);

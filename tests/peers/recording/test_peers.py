@@ -86,6 +86,30 @@ class Recordings(unittest.TestCase):
         self.assertIn("speed_rad_s", row)
 
 
+    def test_foreign_readers_find_the_wall_time(self):
+        """Catches: metadata that @mcap/core does not find or reads otherwise, a start of the MDF file in other units, a column
+        `unix_ns` that a double has rounded."""
+        recording = self.folder / "run.mcap"
+        with Server("--mode", "realtime", "--duration", "0.2", "--record", str(recording)) as server:
+            server.process.wait(timeout=60)
+        for name in ("run.mat", "run.mf4"):
+            kind = {"mat": "mat", "mf4": "mdf"}[name[4:]]
+            done = run(DRIVEBENCH, "export", recording, "--format", kind, "--out", self.folder / name, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        epoch = json.loads(done.stdout)["epoch_unix_ns"]
+        times = [epoch + tick * 125_000 for tick in range(1601)]
+        mdf = MdfFile(self.folder / "run.mf4")
+        self.assertEqual((mdf.start_ns, mdf.columns["unix_ns"], mdf.units["unix_ns"]), (epoch, times, "ns"))
+        with h5py.File(self.folder / "run.mat", "r") as file:
+            self.assertEqual(file["unix_ns"].attrs["MATLAB_class"], b"int64")
+            self.assertEqual([int(value) for value in file["unix_ns"][0]], times)
+            self.assertEqual([float(value) for value in file["time_s"][0]], mdf.columns["time_s"])
+        read = run("node", self.install_mcap_core(), recording)
+        self.assertEqual(read.returncode, 0, read.stderr)
+        base = json.loads(read.stdout)["metadata"]["drivebench.time_base"]
+        self.assertEqual((base["epoch_unix_ns"], base["since_tick"]), (str(epoch), "0"))
+
+
 class Tables(unittest.TestCase):
     """Exports of a run, against its CSV."""
 
@@ -139,6 +163,7 @@ class Tables(unittest.TestCase):
         for name in self.names:
             self.assertEqual([float(value) for value in mdf.columns[name]], self.column(name), name)
         self.assertEqual((mdf.units["speed_rad_s"], mdf.units["time_s"]), ("rad/s", "s"))
+        self.assertEqual(mdf.start_ns, 0, "a free run has no time of day")
 
     def test_tables_of_chosen_signals_and_ticks(self):
         """Catches: --signals, --from and --to that only CSV obeys, a column that stands there twice."""

@@ -99,6 +99,29 @@ TEST_P(RealtimePacer, ResynchroniseMakesTheTickThatIsDueTheNewZero) {
     EXPECT_TRUE(apart(zero, wait(*pacer_), tick)) << tick;
 }
 
+std::int64_t unix_now_ns() {
+  timespec t{};
+  clock_gettime(CLOCK_REALTIME, &t);
+  return t.tv_sec * 1'000'000'000 + t.tv_nsec;
+}
+
+// Catches: a wall time of the call and not of the due time, of another clock, or one that resynchronise()
+// forgets. Holds while no program sets the clock.
+TEST_P(RealtimePacer, TheDueTimeIsKnownByTheWallClock) {
+  EXPECT_EQ(pacer_->due_unix_ns(), 0);
+  const std::int64_t before = unix_now_ns();
+  wait(*pacer_);
+  EXPECT_GE(pacer_->due_unix_ns(), before);
+  EXPECT_LE(pacer_->due_unix_ns(), unix_now_ns());
+  const std::int64_t first = pacer_->due_unix_ns();
+  stall(20 * kPeriodNs);
+  wait(*pacer_);
+  EXPECT_EQ(pacer_->due_unix_ns(), first + kPeriodNs);
+  const std::int64_t standstill_over = unix_now_ns();
+  pacer_->resynchronise();
+  EXPECT_GE(pacer_->due_unix_ns(), standstill_over);
+}
+
 // Catches: a free run that takes wall time.
 TEST(FreePacer, IsNeverLate) {
   const auto pacer = make_free_pacer();

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,9 @@ class ScriptedPacer final : public Pacer {
       : lateness_ns_(std::move(lateness_ns)), resynchronised_(resynchronised) {}
   std::int64_t wait() noexcept override { return lateness_ns_[next_++]; }
   void resynchronise() noexcept override { ++resynchronised_; }
+  std::int64_t due_unix_ns() const noexcept override { return kUnixNs; }
+
+  static constexpr std::int64_t kUnixNs = 1'800'000'000'000'000'000;
 
  private:
   std::vector<std::int64_t> lateness_ns_;
@@ -57,6 +61,28 @@ TEST(TickClock, OS_03_TellsTheBenchOfLateTicksAndOverruns) {
   EXPECT_EQ(bench.sample(0).faults, kBenchOverrun);
   EXPECT_EQ(resynchronised, 1);
   EXPECT_EQ(clock.lateness().count(), kLatenessesNs.size());
+}
+
+// Catches: a wall time of each tick, one that an overrun or a restored state does not renew, one that is a
+// period off, or one of a free run.
+TEST(TickClock, TellsTheWallTimeWhenItsDueTimesBegin) {
+  const BenchConfig config = paced_bench();
+  int resynchronised = 0;
+  const std::vector<std::int64_t> latenesses = {0, 0, kMaxLatenessNs + 1, 0, 0, 0};
+  TickClock clock(RunMode::kRealtime, config, std::make_unique<ScriptedPacer>(latenesses, resynchronised));
+  TickClock free(RunMode::kFree, config, std::make_unique<ScriptedPacer>(latenesses, resynchronised));
+  for (Tick tick = 0; tick < 6; ++tick) {
+    if (tick == 4) clock.begin_anew();
+    clock.wait_for_tick();
+    free.wait_for_tick();
+    EXPECT_EQ(free.new_time_base(tick), std::nullopt);
+    const std::optional<TimeBase> base = clock.new_time_base(tick);
+    EXPECT_EQ(base.has_value(), tick == 0 || tick == 2 || tick == 4) << tick;
+    if (!base) continue;
+    EXPECT_EQ(base->since_tick, static_cast<std::uint64_t>(tick));
+    EXPECT_EQ(base->unix_ns(static_cast<std::uint64_t>((tick + 1) * kClockPeriodNs)), ScriptedPacer::kUnixNs)
+        << "the tick's sample is due with it";
+  }
 }
 
 // Catches: a free run that depends on the time that it takes.

@@ -23,8 +23,8 @@ std::vector<const Signal*> signals_named(const std::vector<std::string>& names) 
   return signals;
 }
 
-std::string csv_header(const std::vector<const Signal*>& signals) {
-  std::string header = "tick,time_s";
+std::string csv_header(const std::vector<const Signal*>& signals, std::string_view further_times) {
+  std::string header = fmt::format("tick,time_s{}", further_times);
   for (const Signal* signal : signals)
     header += fmt::format(",{} [{}]", signal->name, signal->unit);
   return header + "\n";

@@ -32,9 +32,11 @@ struct Column {
 
 class MatTable final : public SampleTable {
  public:
-  MatTable(const std::string& file, const Signals& signals) : path_(file), signals_(signals) {
+  MatTable(const std::string& file, const Signals& signals, bool has_epoch)
+      : path_(file), signals_(signals), has_epoch_(has_epoch) {
     columns_.push_back({.name = "tick", .unit = "1", .type = SignalType::kUnsigned});
     columns_.push_back({.name = "time_s", .unit = "s", .type = SignalType::kReal});
+    if (has_epoch_) columns_.push_back({.name = "unix_ns", .unit = "ns", .type = SignalType::kSigned});
     for (const Signal* signal : signals) {
       columns_.push_back(
           {.name = std::string(signal->name), .unit = std::string(signal->unit), .type = signal->type});
@@ -45,11 +47,13 @@ class MatTable final : public SampleTable {
     write_units();
   }
 
-  void add(const Sample& sample, std::uint64_t time_ns) override {
-    columns_[0].words.push_back(sample.tick);
-    columns_[1].words.push_back(std::bit_cast<std::uint64_t>(seconds(time_ns)));
-    for (std::size_t k = 0; k < signals_.size(); ++k)
-      columns_[k + 2].words.push_back(word_of(*signals_[k], sample));
+  void add(const Sample& sample, const RowTime& time) override {
+    auto column = columns_.begin();
+    (column++)->words.push_back(sample.tick);
+    (column++)->words.push_back(std::bit_cast<std::uint64_t>(seconds(time.bench_ns)));
+    if (has_epoch_) (column++)->words.push_back(static_cast<std::uint64_t>(time.unix_ns));
+    for (const Signal* signal : signals_)
+      (column++)->words.push_back(word_of(*signal, sample));
     if (columns_[0].words.size() == kRowsAtOnce) write();
   }
 
@@ -96,14 +100,15 @@ class MatTable final : public SampleTable {
 
   std::string path_;
   const Signals& signals_;
+  bool has_epoch_;
   std::vector<Column> columns_;
   std::unique_ptr<mat_t, CloseMat> file_;
 };
 
 }  // namespace
 
-std::unique_ptr<SampleTable> mat_table(const std::string& file, const Signals& signals) {
-  return std::make_unique<MatTable>(file, signals);
+std::unique_ptr<SampleTable> mat_table(const std::string& file, const Signals& signals, const Epoch& epoch) {
+  return std::make_unique<MatTable>(file, signals, epoch.has_value());
 }
 
 }  // namespace drivebench::command

@@ -89,15 +89,16 @@ struct ChannelRow {
 
 class MdfTable final : public SampleTable {
  public:
-  MdfTable(const std::string& file, const Signals& signals)
-      : path_(file), signals_(signals), out_(file, std::ios::binary | std::ios::trunc) {
+  MdfTable(const std::string& file, const Signals& signals, const Epoch& epoch)
+      : path_(file), signals_(signals), epoch_(epoch), out_(file, std::ios::binary | std::ios::trunc) {
     if (!out_) throw UsageError(fmt::format("cannot write {}", file));
     out_ << head();
   }
 
-  void add(const Sample& sample, std::uint64_t time_ns) override {
+  void add(const Sample& sample, const RowTime& time) override {
     Bytes record;
-    record.put_real(seconds(time_ns)).put(sample.tick);
+    record.put_real(seconds(time.bench_ns)).put(sample.tick);
+    if (epoch_) record.put(time.unix_ns);
     for (const Signal* signal : signals_)
       record.put(word_of(*signal, sample));
     out_ << record.text();
@@ -116,7 +117,7 @@ class MdfTable final : public SampleTable {
   }
 
  private:
-  std::uint64_t record_bytes() const noexcept { return 8 * (signals_.size() + 2); }
+  std::uint64_t record_bytes() const noexcept { return 8 * (signals_.size() + (epoch_ ? 3 : 2)); }
 
   std::vector<ChannelRow> channels() const {
     std::vector<ChannelRow> rows{{.name = "time_s",
@@ -129,6 +130,13 @@ class MdfTable final : public SampleTable {
                                   .meaning = "sample period",
                                   .type = SignalType::kUnsigned,
                                   .is_time = false}};
+    if (epoch_) {
+      rows.push_back({.name = "unix_ns",
+                      .unit = "ns",
+                      .meaning = "UTC since 1970 at which the sample was due",
+                      .type = SignalType::kSigned,
+                      .is_time = false});
+    }
     for (const Signal* signal : signals_) {
       rows.push_back({.name = std::string(signal->name),
                       .unit = std::string(signal->unit),
@@ -170,7 +178,13 @@ class MdfTable final : public SampleTable {
   /// Everything before the records.
   std::string head() {
     Blocks blocks;
-    const std::uint64_t header = blocks.add("##HD", 6, Bytes().zeros(32));
+    // Start time, time zone and daylight saving [min]; whether these two are known: then the time is UTC.
+    const std::uint64_t header = blocks.add("##HD", 6,
+                                            Bytes()
+                                                .put(epoch_.value_or(0))
+                                                .zeros(4)
+                                                .put(std::uint8_t{epoch_ ? kZoneIsKnown : std::uint8_t{0}})
+                                                .zeros(19));
     const std::uint64_t history = blocks.add("##FH", 2, Bytes().zeros(16));
     const std::uint64_t group = blocks.add("##DG", 4, Bytes().zeros(8));
     const std::uint64_t records =
@@ -198,8 +212,11 @@ class MdfTable final : public SampleTable {
     out_ << Bytes().put(value).text();
   }
 
+  static constexpr std::uint8_t kZoneIsKnown = 2;
+
   std::string path_;
   const Signals& signals_;
+  Epoch epoch_;
   std::ofstream out_;
   std::uint64_t rows_ = 0;
   std::uint64_t axis_link_at_ = 0;
@@ -209,8 +226,8 @@ class MdfTable final : public SampleTable {
 
 }  // namespace
 
-std::unique_ptr<SampleTable> mdf_table(const std::string& file, const Signals& signals) {
-  return std::make_unique<MdfTable>(file, signals);
+std::unique_ptr<SampleTable> mdf_table(const std::string& file, const Signals& signals, const Epoch& epoch) {
+  return std::make_unique<MdfTable>(file, signals, epoch);
 }
 
 }  // namespace drivebench::command
