@@ -1,7 +1,9 @@
 #include "protocols/pages/write_pages.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -9,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "protocols/nearest_name.hpp"
 #include "protocols/pages/help_text.hpp"
 #include "protocols/text.hpp"
 
@@ -50,13 +53,51 @@ void write(const CLI::App& app, const Program& program, const fs::path& folder) 
   write_file(folder / "zsh/site-functions" / ("_" + program.name), zsh_completion(line, facts));
 }
 
+/// The verb that the user named, with the verbs around it: "drivebench new motor"; the program where none is.
+std::string path_of(const CLI::App& verb) {
+  const CLI::App* const around = verb.get_parent();
+  return around == nullptr ? verb.get_name() : path_of(*around) + " " + verb.get_name();
+}
+
+const CLI::App& named_verb(const CLI::App& app) {
+  const std::vector<CLI::App*> named = app.get_subcommands();
+  return named.empty() ? app : named_verb(*named.back());
+}
+
+bool is_option(std::string_view word) {
+  return word.size() > 1 && word[0] == '-' && std::isdigit(static_cast<unsigned char>(word[1])) == 0;
+}
+
+/// About the first word that a verb does not know: of an option first, because the words behind it may be its
+/// values.
+std::string about_unknown_word(const CLI::App& app, std::string_view otherwise) {
+  const std::vector<std::string> words = app.remaining(true);
+  if (words.empty()) return std::string(otherwise);
+  const CLI::App& verb = named_verb(app);
+  const auto option = std::ranges::find_if(words, is_option);
+  if (option == words.end()) {
+    std::vector<std::string> verbs;
+    for (const CLI::App* sub : verb.get_subcommands(nullptr))
+      verbs.push_back(sub->get_name());
+    return "`" + path_of(verb) + "` takes no " + (verbs.empty() ? "further word" : "verb") + " '" +
+           printable(words.front()) + "'" + did_you_mean(words.front(), verbs);
+  }
+  std::vector<std::string> known;
+  for (const CLI::Option* each : verb.get_options()) {
+    if (!each->get_lnames().empty()) known.push_back("--" + each->get_lnames().front());
+  }
+  const std::string name = option->substr(0, option->find('='));
+  return "`" + path_of(verb) + "` has no option " + printable(name) + did_you_mean(name, known);
+}
+
 /// CLI11's message about an error, without its words for types and verbs.
-std::string in_our_words(const CLI::App*, const CLI::Error& error) {
+std::string in_our_words(const CLI::App* app, const CLI::Error& error) {
   std::string text = error.what();
-  if (error.get_name() == "ArgumentMismatch" && text.ends_with(" missing")) {
+  const bool lacks_verb = text == "A subcommand is required";
+  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) || lacks_verb) {
+    text = about_unknown_word(*app, lacks_verb ? "a verb is missing" : text);
+  } else if (error.get_name() == "ArgumentMismatch" && text.ends_with(" missing")) {
     text = text.substr(0, text.find(": ")) + ": its value is missing";
-  } else if (text == "A subcommand is required") {
-    text = "a verb is missing";
   }
   return text + "\nRun with --help for more information.\n";
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "plant/faults.hpp"
 #include "protocols/text.hpp"
 #include "server/config/sections/events.hpp"
 #include "server/config/words.hpp"
@@ -56,7 +57,23 @@ ChangeView change_view(const BenchConfig& config, std::size_t axis, const AxisPa
           .tick = tick};
 }
 
-std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis) {
+namespace {
+
+/// The names of the latched faults among these, behind a sentence; empty if the sample does not show them
+/// yet.
+std::string latched_names(std::uint64_t faults) {
+  std::string names;
+  for (const FaultInfo& fault : kFaultTable) {
+    if ((faults & fault.bit & kLatchedFaults) != 0)
+      names.append(names.empty() ? ": " : " ").append(fault.name);
+  }
+  return names;
+}
+
+}  // namespace
+
+std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis, std::uint64_t faults) {
+  if (why == Refused::kLatched) return std::string(sentence_of(why)) + latched_names(faults);
   const std::optional<std::size_t> owner =
       axis < config.axes.size() ? config.setup.axes[axis].shares_amplifier_with : std::nullopt;
   if (why != Refused::kSharedAmplifier || !owner) return std::string(sentence_of(why));

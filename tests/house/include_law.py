@@ -66,6 +66,7 @@ FOUNDATIONS = {
     "plant/windings.hpp",
     "plant/machines/field_winding.hpp",
     "protocols/can/frame.hpp",
+    "protocols/nearest_name.hpp",
     "protocols/refusals.hpp",
     "protocols/text.hpp",
     "server/config/config.hpp",

@@ -101,6 +101,11 @@ constexpr Form kLineInductance = {"inductance-line-mh",
                                   [](double x, const Sheet&) { return 1e-3 * x / 2.0; },
                                   "{x} * 1e-3 / 2",
                                   kSynchronousWhy};
+constexpr Form kLineInductanceSmall = {
+    "inductance-line-uh", "uH",
+    "the same",           1e-3,
+    kMostGiven,           [](double x, const Sheet&) { return 1e-6 * x / 2.0; },
+    "{x} * 1e-6 / 2",     kSynchronousWhy};
 constexpr Form kPhaseInductance = {"inductance-phase-mh",
                                    "mH",
                                    "of a phase, the others included (synchronous)",
@@ -111,6 +116,7 @@ constexpr Form kPhaseInductance = {"inductance-phase-mh",
                                    kSynchronousWhy};
 constexpr auto kPmInductance = std::to_array<Form>({
     kLineInductance,
+    kLineInductanceSmall,
     kPhaseInductance,
     {"ld-mh", "mH", "along the magnet, of a motor with buried magnets", 1e-6, kMostGiven,
      [](double x, const Sheet& s) { return 1e-3 * third(s) * x; }, "{x} * 1e-3{third}", kSynchronousWhy},
@@ -193,7 +199,8 @@ std::vector<std::string> check_pm(const Sheet& s) {
 
 constexpr std::string_view kBlockWhy =
     "Two phases in series carry the supply's current: each of them makes half of torque and voltage.";
-constexpr auto kBldcInductance = std::to_array<Form>({kLineInductance, kPhaseInductance});
+constexpr auto kBldcInductance =
+    std::to_array<Form>({kLineInductance, kLineInductanceSmall, kPhaseInductance});
 constexpr auto kBldcConstant = std::to_array<Form>({
     {"kt", "N*m/A", "torque over the supply's current, block commutation", 1e-9, kMostGiven,
      [](double x, const Sheet&) { return x / 2.0; }, "{x} / 2", kBlockWhy},

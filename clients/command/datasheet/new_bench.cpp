@@ -102,7 +102,11 @@ int check(const std::string& file) {
   if (const auto code = server.wait(Process::in(30s)); code != kExitOk)
     throw UsageError(
         fmt::format("{} is written, but the server does not accept it: see above", printable(file)));
-  fmt::print(stderr, "{0} is written, and the server accepts it; run it: drivebench serve {0}\n", file);
+  fmt::print(
+      stderr,
+      "{0} is written, and the server accepts it; run it: drivebench serve {0}, or open inproc:{0} in a "
+      "program\n",
+      file);
   return kExitOk;
 }
 

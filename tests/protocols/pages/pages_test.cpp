@@ -159,5 +159,39 @@ TEST(Pages, ErrorsSpeakInTheSameWords) {
   EXPECT_EQ(problems.str(), "--number: its value is missing\nRun with --help for more information.\n");
 }
 
+/// What a tool with the verb `new`, and in it `motor` with the options --kv-rms and --poles, says about a
+/// line.
+std::string problem_with(const std::string& line) {
+  CLI::App app;
+  app.name("tool");
+  add_pages(app, {.name = "tool"});
+  CLI::App& motor = *app.add_subcommand("new")->add_subcommand("motor");
+  double number = 0.0;
+  motor.add_option("--kv-rms", number);
+  motor.add_option("--poles", number);
+  std::ostringstream out;
+  std::ostringstream problems;
+  try {
+    app.parse(line);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error, out, problems);
+  }
+  return problems.str().substr(0, problems.str().find('\n'));
+}
+
+// Catches: CLI11's list of what was left over, in reverse order; a value that is named in the place of its
+// option; an option of another verb as the suggestion; a terminal that a strange word controls.
+TEST(Pages, AnUnknownWordIsNamedWithItsVerb) {
+  EXPECT_EQ(problem_with("new motor --poles 4 --kv 270"),
+            "`tool new motor` has no option --kv; did you mean \"--kv-rms\"?");
+  EXPECT_EQ(problem_with("new motor --pole=4"),
+            "`tool new motor` has no option --pole; did you mean \"--poles\"?");
+  EXPECT_EQ(problem_with("new motor --nothing-like-it 1 2"),
+            "`tool new motor` has no option --nothing-like-it");
+  EXPECT_EQ(problem_with("new motor -1 2"), "`tool new motor` takes no further word '-1'");
+  EXPECT_EQ(problem_with("new moter"), "`tool new` takes no verb 'moter'; did you mean \"motor\"?");
+  EXPECT_EQ(problem_with("new motor --\x1b[2J"), "`tool new motor` has no option --?[2J");
+}
+
 }  // namespace
 }  // namespace drivebench::pages

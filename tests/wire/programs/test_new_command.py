@@ -166,6 +166,8 @@ class Conversions(NewTest):
         """Catches: a line taken for a phase, a delta for a star, poles for pairs, g cm^2 for kg cm^2."""
         star = self.machine("pm", *PM, "--kt-rms", 0.52)
         self.assertEqual((star["stator_resistance_ohm"], star["inductance_d_h"], star["inductance_q_h"]), (0.65, 1.6e-3, 1.6e-3))
+        in_uh = ["--inductance-line-uh" if word == "--inductance-line-mh" else "3200" if word == "3.2" else word for word in PM]
+        self.assertEqual(self.machine("pm", *in_uh, "--kt-rms", 0.52), star)
         delta = self.machine("pm", "--poles", 8, "--resistance-phase-ohm", 1.95, "--ld-mh", 4.8, "--lq-mh", 9.6, "--delta", "--lambda-wb",
                              0.05 * math.sqrt(3), "--inertia-gcm2", 330)
         self.assertEqual((delta["pole_pairs"], delta["stator_resistance_ohm"], delta["inductance_d_h"], delta["inductance_q_h"]),

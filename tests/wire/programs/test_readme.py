@@ -112,6 +112,34 @@ class Readmes(unittest.TestCase):
             bench.stop()
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "turned by 3.142 rad of 3.142\n", ""))
 
+    def test_an_own_controller_turns_an_own_motor(self):
+        """Catches: a way from a data sheet to a controller that breaks off, or takes other steps than those that are shown; a
+        motor file with other numbers than the program has."""
+        section = (REPOSITORY / "README.md").read_text(encoding="utf-8").split("## Your motor, your controller")[1].split("\n## ")[0]
+        said = []
+        with tempfile.TemporaryDirectory(prefix="drivebench-readme-") as folder:
+            bench = Bench(pathlib.Path(folder))
+            self.addCleanup(bench.kill)
+            (pathlib.Path(folder) / "clients").symlink_to(REPOSITORY / "clients")
+            for line in code_lines(section):
+                if line.startswith("drivebench"):
+                    bench.do(line)
+                    continue
+                path, *words = line.split()
+                address = bench.environment["DRIVEBENCH_LINK"] if words[-1].startswith("tcp:") else words[-1]
+                library = SERVER.parent.parent / "lib/libdrivebench.so.1"
+                done = subprocess.run([*words[:-1], address], capture_output=True, text=True, timeout=4 * PATIENCE_S, check=False,
+                                      cwd=folder, env={**bench.environment, "DRIVEBENCH_LIBRARY": str(library),
+                                                       "PYTHONPATH": path.removeprefix("PYTHONPATH=")})
+                self.assertEqual(done.returncode, 0, done.stderr)
+                said.append(done.stdout)
+            bench.moved = True
+            bench.do("drivebench plot my-run.mcap --out my-run.svg")
+        self.assertEqual(said[0], said[1], "in process and over TCP")
+        demo = (REPOSITORY / "bench").read_text(encoding="utf-8").split("  demo)\n")[1].split(";;")[0]
+        self.assertIn("drivebench_shared drivebench_inproc", demo, "the README says that ./bench demo builds what this needs")
+        self.assertIn(re.search(r"prints `(300.0 rad/s of 300.0)`", section)[1], said[0])
+
     def test_every_option_of_a_command_is_documented(self):
         """Catches: an option that only its --help names."""
         told = (REPOSITORY / "clients/README.md").read_text(encoding="utf-8")

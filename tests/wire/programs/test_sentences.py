@@ -61,7 +61,9 @@ class Sentences(unittest.TestCase):
                 for name in ("configs", "README.md"):
                     os.symlink(REPOSITORY / name, f"{folder}/{name}")
                 environment = {**os.environ, "PATH": f"{SERVER.parent}:{os.environ['PATH']}",
-                               "DRIVEBENCH_LINK": "tcp:%s:%d" % server.address}
+                               "DRIVEBENCH_LINK": "tcp:%s:%d" % server.address,
+                               "DRIVEBENCH_LIBRARY": str(SERVER.parent.parent / "lib/libdrivebench.so.1"),
+                               "PYTHONPATH": str(REPOSITORY / "clients/python/src")}
                 self.assertTrue(steps)
                 for command, expected in steps:
                     if command == CRASH:

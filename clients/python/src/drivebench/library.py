@@ -211,7 +211,7 @@ def load() -> Library:
     try:
         return Library(chosen or next(_places()))
     except LibraryNotFound as error:
-        raise LibraryNotFound(f"{error}; DRIVEBENCH_LIBRARY names the file, or install drivebench, or build it") from error
+        raise LibraryNotFound(f"{error}; DRIVEBENCH_LIBRARY names the file, or install drivebench, or build it with ./bench demo") from error
 
 
 def version() -> str:
