@@ -71,6 +71,29 @@ HostFinding isolation(const HostFacts& f) {
           "of yours"};
 }
 
+HostFinding interrupts(const HostFacts& f) {
+  constexpr const char* kWhy = "a tick on an isolated CPU waits for an interrupt that acts there";
+  if (f.isolated.empty())
+    return {Health::kFine, "interrupts", "no CPU is isolated that they could disturb", kWhy};
+  if (f.interrupts_on_isolated.empty())
+    return {Health::kFine, "interrupts", fmt::format("none acts on the isolated CPUs {}", f.isolated), kWhy};
+  return {
+      Health::kNote, "interrupts",
+      fmt::format("{} on the isolated CPUs {}: {}", f.interrupts_on_isolated.size(), f.isolated,
+                  fmt::join(f.interrupts_on_isolated, ", ")),
+      kWhy,
+      fmt::format("IRQBALANCE_BANNED_CPULIST={} in /etc/default/irqbalance, or for each: echo 0 | sudo tee "
+                  "/proc/irq/{}/smp_affinity_list, with a CPU that is not isolated",
+                  f.isolated, f.interrupts_on_isolated.front())};
+}
+
+HostFinding wall_clock(bool is_kept) {
+  constexpr const char* kWhy =
+      "recordings in real time, the audit log and the ends of tokens have its time; ticks do not";
+  if (is_kept) return {Health::kFine, "wall clock", "kept by a time service", kWhy};
+  return {Health::kNote, "wall clock", "no time service keeps it", kWhy, "sudo apt-get install chrony"};
+}
+
 HostFinding kernel(const HostFacts& f) {
   constexpr const char* kWhy = "without it the kernel's own work may delay a tick by a millisecond";
   if (f.preempt_rt) return {Health::kFine, "PREEMPT_RT", "this kernel has it", kWhy};
@@ -135,7 +158,8 @@ HostFinding can_modules(const HostFacts& f) {
 
 std::vector<HostFinding> realtime_findings(const HostFacts& facts, double period_us) {
   std::vector<HostFinding> found = {scheduling(facts), memory(facts), governor(facts), isolation(facts),
-                                    kernel(facts),     timer(facts),  steal(facts)};
+                                    interrupts(facts), kernel(facts), timer(facts),    steal(facts)};
+  if (facts.is_wall_clock_kept) found.push_back(wall_clock(*facts.is_wall_clock_kept));
   if (facts.wake_ups) found.push_back(wake_ups(*facts.wake_ups, period_us));
   return found;
 }

@@ -1,12 +1,14 @@
 #include "clients/command/doctor/host_facts.hpp"
 
 #include <net/if.h>
+#include <sys/timex.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -69,6 +71,35 @@ std::vector<std::string> governors_of(const fs::path& cpus) {
       governors.push_back(std::move(governor));
   }
   return governors;
+}
+
+/// The CPUs of a list such as "0-2,5".
+std::set<unsigned> cpus_in(const std::string& list) {
+  constexpr unsigned kMostCpus = 8192;  // of the kernel
+  std::set<unsigned> cpus;
+  std::istringstream parts(list);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const std::optional<unsigned> first = number_in<unsigned>(part);
+    const std::size_t dash = part.find('-');
+    const std::optional<unsigned> last =
+        dash == std::string::npos ? first : number_in<unsigned>(part.substr(dash + 1));
+    for (unsigned cpu = first.value_or(1); first && last && cpu <= std::min(*last, kMostCpus); ++cpu)
+      cpus.insert(cpu);
+  }
+  return cpus;
+}
+
+/// The interrupts that the kernel has directed to one of these CPUs, or that may act there where it does not
+/// say.
+std::vector<std::string> interrupts_on(const std::set<unsigned>& cpus, const fs::path& irq) {
+  std::vector<std::string> found;
+  for (const fs::path& folder : entries_of(irq)) {
+    std::string list = line_of_file(folder / "effective_affinity_list");
+    if (list.empty()) list = line_of_file(folder / "smp_affinity_list");
+    if (std::ranges::any_of(cpus_in(list), [&](unsigned cpu) { return cpus.contains(cpu); }))
+      found.push_back(folder.filename().string());
+  }
+  return found;
 }
 
 /// Time stolen and time in all, in the first line of /proc/stat.
@@ -148,6 +179,7 @@ HostFacts read_host(const fs::path& root) {
                      line_of_file(proc / "version").find("PREEMPT_RT") != std::string::npos;
   facts.governors = governors_of(cpus);
   facts.isolated = line_of_file(cpus / "isolated");
+  facts.interrupts_on_isolated = interrupts_on(cpus_in(facts.isolated), proc / "irq");
   facts.clock_source = line_of_file(root / "sys/devices/system/clocksource/clocksource0/current_clocksource");
   facts.steal = part_stolen({}, cpu_times(proc));
   read_can(root, facts);
@@ -159,6 +191,9 @@ void measure_host(HostFacts& facts, double duration_s, std::int64_t period_ns) {
   facts.wake_ups = measure_wake_ups(duration_s, period_ns);
   facts.steal_now = part_stolen(before, cpu_times("/proc"));
   facts.resolution_ns = clock_resolution_ns();
+  timex clock{};
+  if (const int state = adjtimex(&clock); state >= 0)
+    facts.is_wall_clock_kept = state != TIME_ERROR && (clock.status & STA_UNSYNC) == 0;
 }
 
 }  // namespace drivebench::command

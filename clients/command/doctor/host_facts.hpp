@@ -19,14 +19,16 @@ struct HostFacts {
   bool may_schedule = false;                         ///< CAP_SYS_NICE
   bool may_lock = false;                             ///< root with CAP_IPC_LOCK
   bool preempt_rt = false;
-  std::vector<std::string> governors{};  ///< of each CPU that has one
-  std::string isolated{};                ///< list of CPUs; empty: none
+  std::vector<std::string> governors{};               ///< of each CPU that has one
+  std::string isolated{};                             ///< list of CPUs; empty: none
+  std::vector<std::string> interrupts_on_isolated{};  ///< numbers of those that act on a CPU of that list
   std::string clock_source{};
   double steal = 0.0;  ///< part of the time that a hypervisor took, since the start of the machine
 
   std::optional<std::int64_t> resolution_ns{};  ///< of CLOCK_MONOTONIC
   std::optional<WakeUps> wake_ups{};
-  std::optional<double> steal_now{};  ///< while the wake-ups were measured
+  std::optional<double> steal_now{};         ///< while the wake-ups were measured
+  std::optional<bool> is_wall_clock_kept{};  ///< a program such as chrony disciplines it
 
   bool has_can = false;                    ///< the kernel speaks SocketCAN now
   std::vector<std::string> can_modules{};  ///< of can, can_raw, vcan: those that are loaded

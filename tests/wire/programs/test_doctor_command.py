@@ -25,6 +25,9 @@ GOOD = {
     "proc/net/can/version": "rev 20170425 abi 9\n",
     "sys/kernel/realtime": "1\n",
     "sys/devices/system/cpu/isolated": "3\n",
+    "proc/irq/9/smp_affinity_list": "0-2\n",
+    "proc/irq/24/smp_affinity_list": "0-3\n",
+    "proc/irq/24/effective_affinity_list": "1\n",
     "sys/devices/system/cpu/cpu0/cpufreq/scaling_governor": "performance\n",
     "sys/devices/system/cpu/cpu1/cpufreq/scaling_governor": "performance\n",
     "sys/devices/system/clocksource/clocksource0/current_clocksource": "tsc\n",
@@ -63,7 +66,7 @@ class Doctor(CommandTest):
         found = self.examined()
         self.assertEqual({each["health"] for each in found.values()}, {"fine"})
         self.assertEqual({each["mend"] for each in found.values()}, {""})
-        self.assertEqual(set(found), {"SCHED_FIFO", "memlock", "governor", "isolated CPUs", "PREEMPT_RT", "timer", "steal", "kernel CAN", "can0"})
+        self.assertEqual(set(found), {"SCHED_FIFO", "memlock", "governor", "isolated CPUs", "interrupts", "PREEMPT_RT", "timer", "steal", "kernel CAN", "can0"})
 
     def test_each_problem_is_found_alone_with_its_mend(self):
         """Catches: a rule that is turned round, a limit read from another column, a right in another bit, a file with another name."""
@@ -99,6 +102,17 @@ class Doctor(CommandTest):
         self.examined({"sys/class/net/can0/mtu": "16\n"}, "--classic")
         virtual = self.examined({"sys/class/net/can0/tx_queue_len": "0\n", "sys/class/net/can0/device/uevent": None})
         self.assertEqual(virtual["can0"]["health"], "fine")
+
+    def test_interrupts_keep_away_from_the_tick(self):
+        """Catches: a list of CPUs that is read as one number, an interrupt that may act on a CPU taken for one that does, a note
+        where no CPU is isolated."""
+        found = self.examined({"proc/irq/9/smp_affinity_list": "0,2-4\n", "proc/irq/24/effective_affinity_list": "3\n"})["interrupts"]
+        self.assertEqual((found["health"], found["what"]), ("note", "2 on the isolated CPUs 3: 24, 9"))
+        self.assertIn("IRQBALANCE_BANNED_CPULIST=3", found["mend"])
+        self.assertIn("/proc/irq/24/smp_affinity_list", found["mend"])
+        for isolated, list_ in (("3\n", "0-2,4-99999999999\n"), ("3\n", "x-\n"), ("\n", "0-3\n"), ("5-6\n", "0-4,7\n")):
+            found = self.examined({"sys/devices/system/cpu/isolated": isolated, "proc/irq/9/smp_affinity_list": list_}, code=OK)
+            self.assertEqual(found["interrupts"]["health"], "fine", (isolated, list_))
 
     def test_this_machine(self):
         """Catches: an exit code that does not follow the findings, a measurement that is left out, text and JSON that differ."""
