@@ -69,6 +69,7 @@ string(REPLACE "../motors/" "/usr/share/drivebench/motors/" bench "${bench}")
 file(CONFIGURE OUTPUT packages/bench.toml CONTENT "${bench}" @ONLY)
 install(FILES ${made}/drivebench-server.service DESTINATION lib/systemd/system COMPONENT programs EXCLUDE_FROM_ALL)
 install(FILES ${made}/bench.toml DESTINATION /etc/drivebench COMPONENT programs EXCLUDE_FROM_ALL)
+install(FILES ${control}/programs/logrotate DESTINATION /etc/logrotate.d RENAME drivebench COMPONENT programs EXCLUDE_FROM_ALL)
 
 # pip has its own way to install the Python package; this one is for the interpreter of the system.
 file(STRINGS ${PROJECT_SOURCE_DIR}/clients/python/pyproject.toml summary REGEX "^description = ")

@@ -1,4 +1,5 @@
 """The Debian packages in a bare Debian 12: installed, used, upgraded with their data, removed without leftovers."""
+import json
 import os
 import pathlib
 import re
@@ -75,10 +76,28 @@ class Packages(unittest.TestCase):
         packages = sorted((self.folder / "1").glob("*.deb"))
         self.assertEqual(run("lintian", "--no-cfg", "--allow-root", "--fail-on", "error,warning", *packages), "")
 
+    # Catches: an instruction that no builder takes, a package that the image lacks, a container that runs as root or without its bench.
+    def test_the_containerfile_builds_and_its_image_serves(self):
+        store = self.folder / "images"
+        buildah = ("buildah", "--root", store / "root", "--runroot", store / "run", "--storage-driver", "vfs")
+        base = run(*buildah, "from", "scratch").strip()  # the bare Debian in the place of the registry's
+        run(*buildah, "add", base, self.root, "/")
+        run(*buildah, "commit", "--rm", base, "localhost/bare")
+        run(*buildah, "bud", "--isolation", "chroot", "--build-arg", "BASE=localhost/bare", "--file", REPOSITORY / "configs/packages/Containerfile",
+            "--tag", "localhost/drivebench", self.folder / "1", seconds=600)
+        image = json.loads(run(*buildah, "inspect", "--type", "image", "localhost/drivebench"))["OCIv1"]["config"]
+        self.assertEqual((image["User"], image["WorkingDir"]), ("drivebench", "/var/lib/drivebench"))
+        container = run(*buildah, "from", "localhost/drivebench").strip()
+        words = [*image["Entrypoint"], *image["Cmd"], "--port", "0", "--duration", "0.1", "--record", "run.mcap"]
+        said = run(*buildah, "run", "--isolation", "chroot", container, "--", *words, code=(0, 1))
+        self.assertIn("ready tcp=127.0.0.1:", said)
+        self.assertIn("recorded in run.mcap", said)
+        self.assertEqual(run(*buildah, "run", "--isolation", "chroot", container, "--", "id", "-un").strip(), "drivebench")
+
     # Catches: a library, a file or a rule that a package forgets, a configuration or a recording lost by an upgrade, what
     # stays behind after a purge, a program that works only on the machine that built it.
     def test_a_bare_debian_installs_runs_upgrades_and_removes_them(self):
-        self.inside("apt-get", "install", "-y", "--no-install-recommends", "adduser")
+        self.inside("apt-get", "install", "-y", "--no-install-recommends", "adduser", "logrotate")
         before = self.files()
         self.install("0")
         needed = self.inside("apt-mark", "showauto").split()
@@ -98,6 +117,14 @@ class Packages(unittest.TestCase):
         self.assertIn("drivebench:", (self.root / "etc/passwd").read_text(encoding="utf-8"))
         unit = (self.root / "usr/lib/systemd/system/drivebench-server.service").read_text(encoding="utf-8")
         self.assertIn("ExecStart=/usr/bin/drivebench-server /etc/drivebench/bench.toml", unit)
+
+        log = self.root / "var/lib/drivebench/audit.jsonl"
+        self.inside("install", "-d", "-o", "drivebench", "-g", "drivebench", "/var/lib/drivebench")
+        log.write_text("{}\n", encoding="utf-8")
+        self.inside("chown", "drivebench:drivebench", "/var/lib/drivebench/audit.jsonl")
+        self.inside("logrotate", "--force", "--state", "/tmp/rotated", "/etc/logrotate.d/drivebench")
+        self.assertEqual([file.name for file in log.parent.iterdir()], ["audit.jsonl.1"], "the server makes the new one, with its mode")
+        shutil.rmtree(log.parent)
 
         bench = self.root / "etc/drivebench/bench.toml"
         bench.write_text(bench.read_text(encoding="utf-8") + "\n# ours\n", encoding="utf-8")
@@ -125,8 +152,9 @@ def reason_to_skip():
         return "apt names no mirror of Debian 12"
     if shutil.which("debootstrap") is None or shutil.which("dpkg-shlibdeps") is None:
         return "debootstrap or dpkg-dev is missing"
-    if shutil.which("lintian") is None:
-        return "lintian is missing"
+    for program in ("lintian", "buildah"):
+        if shutil.which(program) is None:
+            return f"{program} is missing"
     if subprocess.run(["unshare", "--mount", "--pid", "--fork", "true"], check=False).returncode != 0:
         return "this machine gives no namespaces"
     return None

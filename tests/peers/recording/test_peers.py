@@ -11,6 +11,7 @@ import unittest
 TESTS = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
+    import can
     import h5py
     from mdf_file import MdfFile
     from wire_client import BENCHES, SERVER, Server, pb
@@ -88,7 +89,7 @@ class Recordings(unittest.TestCase):
 
     def test_foreign_readers_find_the_wall_time(self):
         """Catches: metadata that @mcap/core does not find or reads otherwise, a start of the MDF file in other units, a column
-        `unix_ns` that a double has rounded."""
+        `unix_ns` that a double has rounded, a trace whose lines python-can does not take."""
         recording = self.folder / "run.mcap"
         with Server("--mode", "realtime", "--duration", "0.2", "--record", str(recording)) as server:
             server.process.wait(timeout=60)
@@ -104,6 +105,12 @@ class Recordings(unittest.TestCase):
             self.assertEqual(file["unix_ns"].attrs["MATLAB_class"], b"int64")
             self.assertEqual([int(value) for value in file["unix_ns"][0]], times)
             self.assertEqual([float(value) for value in file["time_s"][0]], mdf.columns["time_s"])
+        done = run(DRIVEBENCH, "export", recording, "--format", "candump", "--out", self.folder / "run.log")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        frames = list(can.CanutilsLogReader(str(self.folder / "run.log")))
+        self.assertGreater(len(frames), 1600)
+        self.assertAlmostEqual(frames[0].timestamp, epoch / 1e9, delta=2e-6)
+        self.assertAlmostEqual(frames[-1].timestamp, times[-1] / 1e9, delta=2e-6)
         read = run("node", self.install_mcap_core(), recording)
         self.assertEqual(read.returncode, 0, read.stderr)
         base = json.loads(read.stdout)["metadata"]["drivebench.time_base"]
