@@ -6,6 +6,7 @@
 
 #include "clients/command/common/line/command_line.hpp"
 #include "clients/command/datasheet/new_bench.hpp"
+#include "clients/command/datasheet/new_case.hpp"
 #include "clients/command/datasheet/new_motor.hpp"
 
 namespace drivebench::command {
@@ -92,11 +93,39 @@ void add_new_bench(CommandLine& line, CLI::App& parent) {
       "Exit codes: 0 written and accepted, 2 a number is missing or the server does not accept the file.");
 }
 
+void add_new_case(CommandLine& line, CLI::App& parent) {
+  const auto [sub, o] = line.add<NewCaseOptions>(
+      parent, "case", "make a case of a regression suite for a program of yours", run_new_case);
+  sub.add_option("BENCH", o.bench, "a bench file, or the name of one of configs/benches")
+      ->type_name("BENCH")
+      ->required();
+  begin_group(sub, kWhat);
+  sub.add_option("--command", o.command, "your program and its arguments, in quotes")
+      ->type_name("COMMAND")
+      ->required();
+  sub.add_option("--speed-rad-s", o.speed_rad_s, "speed to which it brings the motor")
+      ->type_name("RAD/S")
+      ->check(finite_between(-1e6, 1e6))
+      ->required();
+  sub.add_option("--load-nm", o.load_nm, "load that comes in the middle; default: none")
+      ->type_name("NM")
+      ->check(finite_between(-1e6, 1e6));
+  sub.add_option("--duration-s", o.duration_s, "length of the run in the bench's time")
+      ->type_name("SECONDS")
+      ->check(finite_between(1e-3, 1e6))
+      ->capture_default_str();
+  add_out(sub, o.out_file);
+  sub.footer(
+      "Example:\n  drivebench new case dc-a-voltage --command ./speed_loop --speed-rad-s 50 --load-nm 0.005 "
+      "--out speed.toml\n"
+      "Exit codes: 0 written and accepted, 2 an option or the bench is wrong.");
+}
+
 }  // namespace
 
 void add_datasheet_commands(CommandLine& line) {
-  CLI::App& made =
-      *line.app().add_subcommand("new", "make motor and bench files from the numbers of data sheets");
+  CLI::App& made = *line.app().add_subcommand(
+      "new", "make motor and bench files from the numbers of data sheets, and cases for tests");
   made.require_subcommand(1);
   CLI::App& motor =
       *made.add_subcommand("motor", "make a motor file from a data sheet, with every conversion shown");
@@ -104,6 +133,7 @@ void add_datasheet_commands(CommandLine& line) {
   for (const MotorKind* const kind : kMotorKinds)
     add_new_motor(line, motor, *kind);
   add_new_bench(line, made);
+  add_new_case(line, made);
 }
 
 }  // namespace drivebench::command

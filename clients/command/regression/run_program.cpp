@@ -188,7 +188,7 @@ ProgramEnd run_beside_server(const PreparedCase& prepared, const fs::path& folde
   RecordedServer server(prepared, folder, wishes);
   TickView bench(server.link());
   Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + server.link()},
-                                     .folder = fs::absolute(fs::path(c.file).parent_path()).string(),
+                                     .folder = fs::absolute(c.file).parent_path().string(),
                                      .error_file = output.string(),
                                      .joins_output = true,
                                      .own_group = true});

@@ -1,7 +1,9 @@
 #!/usr/bin/python3
-"""Field-oriented speed control of a motor of your own, a second long. Argument: the address of its bench. The numbers are
-those of a data sheet, for 24 V: change them, and the two files that `drivebench new` makes, to your motor's."""
+"""Field-oriented speed control of a motor of your own, a second long. Argument: the address of its bench, else
+that of DRIVEBENCH_LINK. The numbers are those of a data sheet, for 24 V: change them, and the two files that
+`drivebench new` makes, to your motor's."""
 import math
+import os
 import sys
 
 import drivebench
@@ -37,7 +39,7 @@ d_loop, q_loop = (Pi(PHASE_H * CURRENT_LOOP_RAD_S, PHASE_OHM * CURRENT_LOOP_RAD_
 speed_gain = INERTIA_KGM2 * SPEED_LOOP_RAD_S / NM_PER_A
 speed_loop = Pi(speed_gain, speed_gain * SPEED_LOOP_RAD_S / 4, CURRENT_LIMIT_A)
 
-with drivebench.Bench(sys.argv[1], clear=True) as bench:
+with drivebench.Bench(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRIVEBENCH_LINK"], clear=True) as bench:
     bench.acquire()
     about = bench.describe()
     sample = bench.newest()

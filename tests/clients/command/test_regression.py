@@ -261,6 +261,13 @@ class Programs(RegressionTest):
         case = self.verdict_of(DRIVES.format(until=10 ** 9), code=OK)
         self.assertEqual((case["verdict"], case["samples"], case["bench_s"]), ("pass", 201, 0.02))
 
+    def test_a_case_may_be_named_from_its_own_folder(self):
+        """Catches: a case file without a folder in its name, whose program then starts nowhere."""
+        self.verdict_of(DRIVES.format(until=10 ** 9), code=OK)
+        done = subprocess.run([COMMAND, "test", "case.toml"], capture_output=True, text=True, env=self.environment, cwd=self.folder / "suite",
+                              timeout=4 * PATIENCE_S, check=False)
+        self.assertEqual(done.returncode, OK, done.stdout + done.stderr)
+
     def test_a_program_that_dies_or_never_drives_is_an_error(self):
         """Catches: a device under test that died, and a case that passes or blames its checks."""
         for device, limit_s, sentence in (

@@ -146,6 +146,24 @@ class MadeMotorsRun(NewTest):
         return tomllib.loads((self.folder / "motor.toml").read_text(encoding="utf-8"))["mechanics"]["coulomb_friction_nm"]
 
 
+class Cases(NewTest):
+    def test_a_case_without_a_load_and_one_on_a_bench_by_name(self):
+        """Catches: a load that nobody asked for, a path from the wrong folder, a word of the command that is lost or runs together."""
+        text = self.new("case", "dc-a-voltage", "--command", "./a  'b\"", "--speed-rad-s", 0).stdout
+        case = tomllib.loads(text)
+        self.assertEqual((case["bench"], case["dut"]["command"]), ("dc-a-voltage", ["./a", "'b\""]))
+        self.assertNotIn("step", case)
+        self.assertEqual([check["kind"] for check in case["check"]], ["settles", "fault_count"])
+        self.bench("dc", *DC, "--kt", 0.05, bus_v=24, max_current_a=10)
+        (self.folder / "suite").mkdir()
+        self.new("case", "bench.toml", "--command", "x", "--speed-rad-s", -50, "--load-nm", 0.01, "--out", "suite/case.toml")
+        case = tomllib.loads((self.folder / "suite/case.toml").read_text(encoding="utf-8"))
+        self.assertEqual((case["bench"], case["check"][0]["band"], case["step"][0]["load_nm"]), ("../bench.toml", 1.0, 0.01))
+        for wrong, rule in ((("--command", " "), "--command is empty but must name a program"),
+                            (("--command", "x\ny"), "plain text"), (("--command", "x", "--out", "suite/case.toml"), "is there already")):
+            self.assertIn(rule, self.new("case", "bench.toml", "--speed-rad-s", 1, *wrong, code=USAGE).stderr)
+
+
 class Conversions(NewTest):
     def test_one_pm_motor_in_every_form(self):
         """Catches: a factor in one of the forms. From the flux of a phase: its peak emf over speed is n_p lambda, the torque over

@@ -125,17 +125,17 @@ class Readmes(unittest.TestCase):
                 if line.startswith("drivebench"):
                     bench.do(line)
                     continue
-                path, *words = line.split()
-                address = bench.environment["DRIVEBENCH_LINK"] if words[-1].startswith("tcp:") else words[-1]
-                library = SERVER.parent.parent / "lib/libdrivebench.so.1"
-                done = subprocess.run([*words[:-1], address], capture_output=True, text=True, timeout=4 * PATIENCE_S, check=False,
-                                      cwd=folder, env={**bench.environment, "DRIVEBENCH_LIBRARY": str(library),
-                                                       "PYTHONPATH": path.removeprefix("PYTHONPATH=")})
-                self.assertEqual(done.returncode, 0, done.stderr)
+                line = line.replace("tcp:127.0.0.1:7300", bench.environment.get("DRIVEBENCH_LINK", ""))
+                environment = {**bench.environment, "PATH": f"{SERVER.parent}:{os.environ['PATH']}",
+                               "DRIVEBENCH_LIBRARY": str(SERVER.parent.parent / "lib/libdrivebench.so.1")}
+                done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=4 * PATIENCE_S, check=False,
+                                      cwd=folder, env=environment)
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
                 said.append(done.stdout)
             bench.moved = True
             bench.do("drivebench plot my-run.mcap --out my-run.svg")
         self.assertEqual(said[0], said[1], "in process and over TCP")
+        self.assertRegex(said[2], r"(?m)^pass +my-case +1 s +3 checks$")
         demo = (REPOSITORY / "bench").read_text(encoding="utf-8").split("  demo)\n")[1].split(";;")[0]
         self.assertIn("drivebench_shared drivebench_inproc", demo, "the README says that ./bench demo builds what this needs")
         self.assertIn(re.search(r"prints `(300.0 rad/s of 300.0)`", section)[1], said[0])
@@ -146,7 +146,7 @@ class Readmes(unittest.TestCase):
         commands_there = ("demo", "describe", "status", "watch", "inject", "set", "bump", "clear", "take", "save", "restore", "reset", "branch", "control", "plot", "replay",
                           "export", "identify", "track", "filter", "experiment run", "experiment list", "experiment fetch", "experiment cancel",
                           "fmu", "dbc", "can-table", "modbus-map", "can-log", "can check", "steady-state", "convert circuit",
-                          "convert winding", "convert frame", "test", "rerun", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "doctor", "web")
+                          "convert winding", "convert frame", "test", "rerun", "new motor dc", "new motor pm", "new motor bldc", "new motor im", "new bench", "new case", "doctor", "web")
         names = [path[0] for path, _ in verbs() if len(path) == 1]
         self.assertEqual({command.split()[0] for command in commands_there} | {"serve"}, set(names))
         for command in commands_there:
