@@ -1,5 +1,5 @@
 # Debian packages by CPack: `cpack -G DEB` in a build. The programs, the shared libraries, what a program needs to be
-# built, and the Python package. A test holds them against lintian.
+# built, the Python package, and the documents. A test holds them against lintian.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR drivebench)
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "") # each package has its own, the first line of its description
@@ -7,7 +7,7 @@ set(CPACK_PACKAGE_CONTACT "drivebench maintainers <maintainers@drivebench.exampl
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL programs libraries development python)
+set(CPACK_COMPONENTS_ALL programs libraries development python documentation)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
@@ -57,6 +57,14 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS drivebench) # the benches by name, an
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-numpy, python3-pandas")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${control}/python/postinst ${control}/python/prerm)
 
+set(CPACK_COMPONENT_DOCUMENTATION_DESCRIPTION "test bench for electric drives, the documents
+What is modelled and how exactly, every wire and file format, every command,
+how a bench is kept in operation, and examples in C, C++ and Python.")
+set(CPACK_DEBIAN_DOCUMENTATION_PACKAGE_NAME drivebench-doc)
+set(CPACK_DEBIAN_DOCUMENTATION_PACKAGE_SECTION doc)
+set(CPACK_DEBIAN_DOCUMENTATION_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_DOCUMENTATION_PACKAGE_SUGGESTS drivebench)
+
 set(made ${CMAKE_CURRENT_BINARY_DIR}/packages)
 
 # The unit of the packages starts the program and the bench file that they install.
@@ -84,6 +92,22 @@ file(CONFIGURE OUTPUT packages/entry_points.txt CONTENT "[pytest11]\ndrivebench 
 install(FILES ${made}/METADATA ${made}/entry_points.txt DESTINATION ${modules}/drivebench-${PROJECT_VERSION}.dist-info
   COMPONENT python EXCLUDE_FROM_ALL)
 
+# In the places that they have in the sources, so that their links hold.
+set(programs ${PROJECT_SOURCE_DIR}/clients)
+set(patterns ${programs}/examples/*.c ${programs}/examples/*.cpp ${programs}/python/examples/*.py)
+foreach(folder plant protocols server clients configs)
+  foreach(kind *.md *.svg *.png)
+    list(APPEND patterns ${PROJECT_SOURCE_DIR}/${folder}/${kind})
+  endforeach()
+endforeach()
+file(GLOB_RECURSE documents RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS ${patterns})
+list(FILTER documents EXCLUDE REGEX node_modules)
+foreach(document README.md ${documents})
+  get_filename_component(folder ${document} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/${document} DESTINATION share/doc/drivebench-doc/${folder}
+    COMPONENT documentation EXCLUDE_FROM_ALL)
+endforeach()
+
 # The change log of the project under Debian's name for it, and the one that Debian asks for beside it.
 set(ENV{SOURCE_DATE_EPOCH} ${DRIVEBENCH_DATE})
 string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
@@ -91,7 +115,8 @@ unset(ENV{SOURCE_DATE_EPOCH})
 configure_file(${control}/changelog.Debian.in packages/changelog.Debian @ONLY)
 configure_file(${PROJECT_SOURCE_DIR}/CHANGELOG.md packages/changelog COPYONLY)
 execute_process(COMMAND gzip -9nkf changelog.Debian changelog WORKING_DIRECTORY ${made} COMMAND_ERROR_IS_FATAL ANY)
-foreach(pair programs:drivebench libraries:${library} development:libdrivebench-dev python:python3-drivebench)
+foreach(pair programs:drivebench libraries:${library} development:libdrivebench-dev python:python3-drivebench
+    documentation:drivebench-doc)
   string(REPLACE ":" ";" pair ${pair})
   list(GET pair 0 component)
   list(GET pair 1 package)
