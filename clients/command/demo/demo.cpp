@@ -163,6 +163,7 @@ void print_next_steps(const DemoReport& r) {
   fmt::print("  {} serve            and in another terminal\n", program);
   fmt::print("  {} control --load 0.1@0.0365 --set machine.rotor_resistance_ohm=5.85\n", program);
   fmt::print("  {} control --preset book/8.2.2-clipped      the book's trap: 7 counts\n", program);
+  fmt::print("  {} new motor --help    your own motor, from its data sheet\n", program);
 }
 
 }  // namespace

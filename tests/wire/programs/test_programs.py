@@ -371,7 +371,7 @@ class Demo(CommandTest):
         said = self.demo().stdout
         self.assertSays(said, "lockstep", "real time", "peak error [counts]", "peak phase current [A]", "late ticks",
                         "exchange p99 [us]", "state hash", "lockstep exact: 1024 ticks", "equal, bit for bit",
-                        "what to try next", "recorded in recordings/demo-")
+                        "what to try next", "new motor --help", "recorded in recordings/demo-")
         self.assertEqual(len(list((self.folder / "recordings").glob("demo-*-lockstep.mcap"))), 1)
 
 
