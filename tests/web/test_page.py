@@ -101,14 +101,15 @@ class PageTest(unittest.TestCase):
         self.assertEqual(shown.pop("complaints"), [], "the browser complains: scripts, or what the policy forbids")
         return shown
 
-
-    def for_users(self):
+    def for_users(self, *options, bench="servo"):
         """A bench in lockstep that knows a viewer, an operator and a conductor."""
         tokens = self.folder / "tokens"
         tokens.write_text(USERS, encoding="utf-8")
         tokens.chmod(0o600)
-        text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
-        return self.serve("--mode", "lockstep", text=text.replace("[tcp]", f'[tcp]\ntokens_file = "{tokens}"'))
+        text = (BENCHES / f"{bench}.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        access = f'[tcp]\ntokens_file = "{tokens}"'
+        text = text.replace("[tcp]", access) if "[tcp]" in text else f"{text}\n{access}\n"
+        return self.serve("--mode", "lockstep", *options, text=text)
 
 
 class Page(PageTest):
@@ -144,7 +145,8 @@ class Page(PageTest):
 
     def test_a_pane_shows_a_locus_and_a_spectrum(self):
         """Catches: axes without units, x and y exchanged, a locus without the dot of a cursor, a spectrum of other samples than
-        those of the window or with another amplitude than the motor's supply gives it."""
+        those of the window or with another amplitude than the motor's supply gives it, a logarithmic axis with linear numbers, a cursor
+        that keys do not move."""
         server = self.on_the_line()
         shown = self.play("kinds", self.gateway(server).url)
         self.assertEqual((shown["size"], shown["chips"][0]), (320, "X: i_a_a×"))
@@ -154,6 +156,11 @@ class Page(PageTest):
         self.assertIn(">amplitude [V]</text>", shown["spectrum"])
         for phase in "abc":  # the line has 169.83 V and 60 Hz
             self.assertRegex(shown["peaks"], rf"u_{phase}_v: 169\.8 V at (59\.99|60\.0[01]) Hz")
+        at_cursor = re.match(r"at 60\.00 Hz: u_a_v ([\d.]+) V, u_b_v", shown["cursor"])
+        self.assertAlmostEqual(float(at_cursor[1]), 169.8, delta=7.0)  # between two steps up to 4 % lower
+        self.assertLess(shown["steps"], 2.0)
+        self.assertNotEqual(shown["above"][:12], shown["cursor"][:12])
+        self.assertIn(">1000</text>", shown["logarithmic"])  # the decade above 169.8 V
 
     def test_a_trigger_catches_a_fault_of_one_tick(self):
         """Catches: a trigger on what is drawn instead of every sample, a window at the wrong tick, a spike that decimation

@@ -9,20 +9,21 @@ import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
 BUILD = pathlib.Path(os.environ["DRIVEBENCH_SERVER"]).parents[1]
-PACKAGES = BUILD / "clients/web/page/node_modules"
+PAGE = BUILD / "clients/web/page"  # the sources as they were built, with the messages of bench.proto
+PACKAGES = PAGE / "node_modules"
 
 
 class Parts(unittest.TestCase):
     def test_the_parts_calculate_rightly(self):
         """Catches: what each test in page/parts.test.mjs names."""
-        environment = {**os.environ, "PAGE_SOURCES": str(HERE.parents[1] / "clients/web/page/src"), "PAGE_PACKAGES": str(PACKAGES)}
+        environment = {**os.environ, "PAGE_SOURCES": str(PAGE / "src"), "PAGE_PACKAGES": str(PACKAGES)}
         done = subprocess.run(["node", "--test", HERE / "page/parts.test.mjs"], capture_output=True, text=True, env=environment,
                               timeout=300, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
 
 if __name__ == "__main__":
-    if shutil.which("node") is None or not PACKAGES.exists():
-        print(f"SKIPPED: needs node, and npm's packages in {PACKAGES}")
+    if shutil.which("node") is None or not (PAGE / "src/bench_messages.js").exists():
+        print(f"SKIPPED: needs node, and the page built in {PAGE}")
         sys.exit(77)
     unittest.main(verbosity=2)

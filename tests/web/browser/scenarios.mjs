@@ -7,6 +7,7 @@ import { createRequire } from "node:module";
 import { createInterface } from "node:readline";
 import puppeteer from "puppeteer-core";
 import { driveScenarios } from "./drive_scenarios.mjs";
+import { experimentScenarios } from "./experiment_scenarios.mjs";
 
 const kPatienceMs = 60_000;
 const lines = createInterface({ input: process.stdin })[Symbol.asyncIterator]();
@@ -34,8 +35,8 @@ const stateOf = (page, name, pattern = /./) => until(() => page.evaluate((wanted
   [...document.querySelectorAll("#state dt")].find((each) => each.textContent === wanted)?.nextElementSibling.textContent,
 name), pattern);
 
-async function set(page, label, value) {
-  await page.$eval(`[aria-label="${label}"]`, (field, wanted) => {
+async function set(page, label, value, within = page) {
+  await within.$eval(`[aria-label="${label}"]`, (field, wanted) => {
     field.value = wanted;
     field.dispatchEvent(new Event(field.type === "range" ? "input" : "change", { bubbles: true }));
   }, value);
@@ -109,6 +110,7 @@ async function axeFinds(page) {
 
 const scenarios = {
   ...driveScenarios({ axeFinds, enter, outside, press, set, stateOf, text, until }),
+  ...experimentScenarios({ axeFinds, catchFiles, enter, isShown, outside, press, set, stateOf, text, until }),
 
   /** A user opens the page and looks. */
   async look(page) {
@@ -166,7 +168,17 @@ const scenarios = {
     const peaks = await until(() => voltages.$eval(".peaks", (each) => each.textContent), / at /);
     const ends = await voltages.$$eval('[aria-label="highest frequency"] option', (all) => all.map((each) => each.textContent));
     await press(page, "SVG");
-    return { size, chips: ofXy, svg, peaks, ends, spectrum: await file(/frequency \[Hz\]/) };
+    const spectrum = await file(/frequency \[Hz\]/);
+    await set(page, "axes of the spectrum", "xy", voltages);
+    const field = await voltages.$('[aria-label="cursor of the spectrum, Hz"]');
+    await field.type("60");
+    const cursor = await until(() => voltages.$eval(".peaks", (each) => each.textContent), /^at 60/);
+    const steps = await field.evaluate((each) => Number(each.step));
+    await page.keyboard.press("ArrowUp");
+    const above = await until(() => voltages.$eval(".peaks", (each) => each.textContent), /^at 6[01](?!\.00 )/);
+    await page.evaluate(() => { window.offered = {}; });
+    await press(page, "SVG");
+    return { size, chips: ofXy, svg, peaks, ends, spectrum, cursor, steps, above, logarithmic: await file(/frequency \[Hz\]/) };
   },
 
   /** A fault of one tick, and a trigger on it. */

@@ -8,13 +8,15 @@ import test from "node:test";
 const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
-    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target"].map((each) => `export * from "./${each}";`).join("\n"),
+    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target", "wire",
+      "player/recorded", "player/mcap", "experiments/fetch", "experiments/request"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },
-  bundle: true, write: false, format: "esm",
+  bundle: true, write: false, format: "esm", alias: { long: `${process.env.PAGE_SOURCES}/no_long.js` },
 });
 const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
-  spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf } =
+  spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, pb, Track,
+  recordedRows, recordedFile, csvOfRows, Pieces, shareOf, valueOf, logRange, spectrumCurves, amplitudeAt, inputsOf, channelsOf, fieldsOfShape, shapeOf, eventOf, identification } =
   await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
 
 function historyOf(ticks, valueOf) {
@@ -127,7 +129,7 @@ test("exports of two axes", () => {
   const channels = [{ axis: 0, signal: "x", title: "a.x [A]" }, { axis: 1, signal: "x", title: "b.x [A]" }];
   assert.equal(csvOf(channels, view, 0.5), "tick,time_s,a.x [A],b.x [A]\n0,0,0,\n1,0.5,1,7\n2,1,2,\n3,1.5,3,7\n");
   const { x, lines } = timeCurves(view, [channels[0]], 0.5, 100);
-  const svg = svgOf([{ x, labels: { x: "time [s]", y: "[A]" }, lines: [{ ...lines[0], title: "<b>&", colour: "red" }] }]);
+  const svg = svgOf([{ x, labels: { x: "time [s]", y: "[A]" }, logarithmic: { x: false, y: false }, lines: [{ ...lines[0], title: "<b>&", colour: "red" }] }]);
   assert.match(svg, /&lt;b>&amp;/);
   assert.match(svg, /<path d="M[0-9.]+ [0-9.]+L/);
 });
@@ -213,4 +215,133 @@ test("the targets of a drive", () => {
   assert.deepEqual(turning.constant, [0.5, 0.5, 0.5, 0]);
   assert.ok(Math.abs(turning.boost + turning.per_hz * 20 - 0.4) < 1e-12);
   assert.equal(turning.frequency_hz, -20);
+});
+
+const kBench = { name: "b", period_s: 1, axes: [{ name: "x", phases: 3 }, { name: "y", phases: 3 }],
+  signals: [{ name: "tick", unit: "ticks" }, { name: "i_a_a", unit: "A" }, { name: "speed_rad_s", unit: "rad/s" }] };
+
+// Catches: columns exchanged, big-endian numbers, ticks that forget the decimation, rows beyond the position of the player.
+test("rows of an experiment become a track up to its position", () => {
+  const view = new DataView(new ArrayBuffer(48));
+  [1, 10, 2, 20, 3, 30].forEach((value, i) => view.setFloat64(8 * i, value, true));
+  const info = { axis: 1, signals: ["i_a_a", "speed_rad_s"], decimation: 5, period_s: 0.25 };
+  const recorded = recordedRows(kBench, info, new Uint8Array(view.buffer));
+  assert.deepEqual([recorded.description.axes.map((each) => each.name), recorded.sampleS], [["y"], 1.25]);
+  assert.deepEqual(recorded.description.signals.map((each) => each.name), info.signals);
+  const [track] = recorded.histories;
+  track.choose(["speed_rad_s", "torque_nm"]);
+  const all = track.rows(0, 100);
+  assert.deepEqual([[...all.ticks], [...all.columns.get("speed_rad_s")], [...all.columns.get("torque_nm")]], [[0, 5, 10], [10, 20, 30], [NaN, NaN, NaN]]);
+  track.lastTick = 7;
+  assert.deepEqual([[...track.rows(0, 100).ticks], track.sample().i_a_a], [[0, 5], 2]);
+  assert.equal(csvOfRows(track, kBench.signals, info.signals, 0.25),
+    "tick,time_s,i_a_a [A],speed_rad_s [rad/s]\n0,0.000000000,1,10\n5,1.250000000,2,20\n10,2.500000000,3,30\n");
+});
+
+/** A record of an MCAP file. */
+const record = (kind, ...parts) => {
+  const content = Buffer.concat(parts);
+  const size = Buffer.alloc(8);
+  size.writeBigUInt64LE(BigInt(content.length));
+  return Buffer.concat([Buffer.from([kind]), size, content]);
+};
+const u16 = (value) => { const bytes = Buffer.alloc(2); bytes.writeUInt16LE(value); return bytes; };
+const u32 = (value) => { const bytes = Buffer.alloc(4); bytes.writeUInt32LE(value); return bytes; };
+const u64 = (value) => { const bytes = Buffer.alloc(8); bytes.writeBigUInt64LE(BigInt(value)); return bytes; };
+const words = (text) => Buffer.concat([u32(text.length), Buffer.from(text)]);
+const kMagic = Buffer.from("\x89MCAP0\r\n", "latin1");
+const channel = (id, topic) => record(4, u16(id), u16(1), words(topic), words("protobuf"), u32(0));
+const message = (id, tick, speed) => record(5, u16(id), u32(0), u64(1000 + 125_000 * tick), u64(0), pb.Sample.encode({ tick, speed_rad_s: speed }).finish());
+const chunk = (compression, ...records) => {
+  const content = Buffer.concat(records);
+  return record(6, u64(0), u64(0), u64(content.length), u32(0), words(compression), u64(content.length), content);
+};
+
+// Catches: messages of inputs that are read as samples, axes exchanged, a period from a clock that does not begin at 0, a torn
+// end or a hostile length that throws or reads beyond the file.
+test("a recording gives the samples of its axes, as far as it is whole", () => {
+  const content = [kMagic, record(1, words(""), words("")), chunk("", channel(0, "/inputs"), channel(1, "/x/sample"), channel(2, "/z/sample"),
+    message(1, 8, 1), message(2, 8, -1), message(0, 8, 99), message(1, 9, 2)), chunk("", message(1, 10, 3))];
+  const whole = Buffer.concat(content);
+  const recorded = recordedFile(kBench, whole);
+  assert.deepEqual(recorded.description.axes.map((each) => each.name), ["x", "z"]);
+  assert.deepEqual([recorded.description.period_s, recorded.firstTick], [0.000125, 8]);
+  const [x, z] = recorded.histories;
+  for (const each of [x, z]) each.choose(["speed_rad_s"]);
+  assert.deepEqual([[...x.column("speed_rad_s")], [...z.column("speed_rad_s")]], [[1, 2, 3], [-1]]);
+  assert.equal(recordedFile(kBench, whole.subarray(0, whole.length - 3)).histories[0].ticks.length, 2);
+  for (let end = 0; end < whole.length; ++end) {
+    try {
+      recordedFile(kBench, whole.subarray(0, end));
+    } catch (problem) {
+      assert.match(problem.message, /no recording|no samples/);
+    }
+  }
+  const hostile = Buffer.concat([kMagic, Buffer.from([6]), Buffer.alloc(8, 0xff), Buffer.alloc(64)]);
+  assert.throws(() => recordedFile(kBench, hostile), /no samples/);
+  assert.throws(() => recordedFile(kBench, Buffer.concat([kMagic, chunk("zstd", message(1, 8, 1))])), /compressed/);
+});
+
+// Catches: pieces that come twice after a broken connection and stand twice, a hole that is filled with zeros.
+test("pieces that come twice count once", () => {
+  const pieces = new Pieces();
+  pieces.take(0, Uint8Array.from([1, 2, 3]));
+  pieces.take(1, Uint8Array.from([2, 3, 4]));
+  pieces.take(0, Uint8Array.from([1, 2]));
+  assert.deepEqual([...pieces.all], [1, 2, 3, 4]);
+  assert.throws(() => pieces.take(5, Uint8Array.from([6])), /left out/);
+  const big = new Uint8Array(300_000).fill(7);
+  pieces.take(4, big);
+  assert.equal(pieces.size, 300_004);
+  assert.ok(pieces.all.subarray(4).every((each) => each === 7));
+});
+
+// Catches: a shape on the channel of another, an input that the drive cannot take, a field whose name the bench does not know.
+test("an experiment asks for what its form says", () => {
+  const star = { drive_kind: "voltage_amplifier", connection: "star", phases: 3 };
+  const { INPUT_KIND_SOURCE, INPUT_KIND_DQ_VOLTAGES, INPUT_KIND_PHASE_VOLTAGES, INPUT_KIND_NONE, INPUT_KIND_PHASE_CURRENTS } = pb.InputKind;
+  assert.deepEqual(inputsOf({ ...star, drive_kind: "source" }), [INPUT_KIND_SOURCE]);
+  assert.deepEqual(inputsOf({ ...star, shares_amplifier_with: "other" }), [INPUT_KIND_NONE]);
+  assert.deepEqual(inputsOf({ drive_kind: "voltage_amplifier", connection: "armature", phases: 1 }), [INPUT_KIND_PHASE_VOLTAGES, INPUT_KIND_NONE]);
+  assert.deepEqual(channelsOf(INPUT_KIND_DQ_VOLTAGES, { ...star, field_winding: true }).map(([, name]) => name), ["q", "d", "f"]);
+  assert.deepEqual(channelsOf(INPUT_KIND_PHASE_VOLTAGES, { ...star, phases: 2 }).map(([, name]) => name), ["a", "b"]);
+  assert.equal(fieldsOfShape("sine", INPUT_KIND_PHASE_CURRENTS)[0].label, "amplitude, A");
+  for (const kind of ["constant", "ramp", "sine", "three_phase", "chirp", "prbs", "multisine"]) {
+    const values = Object.fromEntries(fieldsOfShape(kind, INPUT_KIND_PHASE_VOLTAGES).map(({ name }, i) => [name, i + 2]));
+    const sent = pb.Envelope.decode(pb.Envelope.encode({ run_experiment: { input: { shapes: [shapeOf(kind, pb.Channel.CHANNEL_B, 1, 2, values)] } } }).finish());
+    const [{ channel: on, start_s: start, end_s: end, [kind]: shape }] = sent.run_experiment.input.shapes;
+    assert.deepEqual([on, start, end], [kind === "three_phase" ? 0 : pb.Channel.CHANNEL_B, 1, 2]);
+    if (kind === "multisine") assert.deepEqual([shape.amplitude, shape.base_hz, shape.harmonics], [2, 3, [1, 2, 3, 4]]);
+    else for (const [name, value] of Object.entries(values)) assert.equal(shape[name], value);
+  }
+  assert.deepEqual(eventOf("load", 1, 2, 3), { at_s: 1, ramp_s: 3, load_nm: 2 });
+  assert.deepEqual(eventOf("fault:open_phase", 1, 2, 0), { at_s: 1, ramp_s: 0, fault: { name: "open_phase", value: 2 } });
+  assert.equal(identification({ machine_kind: "pm_synchronous" }, "e.mcap"), "drivebench identify --motor pm --from e.mcap");
+  assert.equal(identification({ machine_kind: "shunt_dc" }, "e.mcap"), "");
+});
+
+// Catches: a logarithm of 0 that leaves the picture, a range that cuts the largest value or is empty, an axis that begins at 0.
+test("logarithmic axes", () => {
+  assert.deepEqual([1, 10, 100, 0, -5].map((each) => shareOf(each, [1, 100], true)), [0, 0.5, 1, 0, 0]);
+  assert.deepEqual([0, 0.5, 1].map((each) => Math.round(valueOf(each, [1, 100], true))), [1, 10, 100]);
+  assert.equal(valueOf(0.5, [1, 100], false), 50.5);
+  assert.deepEqual(logRange("y", [0.02, 169]), [0.01, 1000]);
+  assert.deepEqual(logRange("y", [0, 169]), [0.001, 1000]);
+  assert.deepEqual(logRange("x", [0.25, 500]), [0.25, 500]);
+  assert.deepEqual(logRange("x", [1e-9, 500]), [0.05, 500]);
+  for (const extent of [[0, 0], [0, 1], [5, 5]]) {
+    const [low, high] = logRange("y", extent);
+    assert.ok(low > 0 && high > low && high >= extent[1]);
+  }
+});
+
+// Catches: the cursor of a spectrum beside the step at which it stands.
+test("the amplitude at the cursor of a spectrum", () => {
+  const spectrum = spectrumOf(Float64Array.from(range(0, 1000), (tick) => 3 * Math.sin(2 * Math.PI * 0.125 * tick)), 0.001);
+  assert.ok(Math.abs(amplitudeAt(spectrum, 125) - 3) < 0.12);
+  assert.ok(amplitudeAt(spectrum, 200) < 1e-3);
+  assert.ok(Number.isNaN(amplitudeAt(spectrum, 1000)));
+  const channels = [{ axis: 0, signal: "x" }];
+  assert.deepEqual(spectrumCurves([spectrum], channels, 500, false).x, [0, 500]);
+  assert.deepEqual(spectrumCurves([spectrum], channels, 500, true).x, [spectrum.stepHz, 500]);
 });

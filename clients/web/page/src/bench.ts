@@ -1,11 +1,36 @@
 /** What the page knows of the bench. */
-import { History } from "./history";
+import { History, Rows } from "./history";
 import { hasBit } from "./trigger";
 import { pb, Wire } from "./wire";
 
-export class Bench {
+/** Samples of an axis, of which those up to the last tick are shown. */
+export interface Timeline {
+  lastTick: number;
+  rows(from: number, to: number): Rows;
+}
+
+/** What the scope shows: the bench, or something recorded. */
+export interface Source {
+  readonly description: pb.BenchDescription;
+  readonly histories: Timeline[];
+  readonly firstTick: number;
+  /** The time between two samples. [s] */
+  readonly sampleS: number;
+  readonly dropped: number;
+}
+
+export function axisName(source: Source, axis: number): string {
+  return source.description.axes[axis].name as string;
+}
+
+export function signalOf(source: Source, name: string): pb.SignalDescription {
+  return source.description.signals.find((each) => each.name === name) as pb.SignalDescription;
+}
+
+export class Bench implements Source {
   readonly description: pb.BenchDescription;
   readonly histories: History[];
+  readonly firstTick = 0;
   status: pb.Status | null = null;
   /** Samples that the server dropped because the page read too slowly. */
   dropped = 0;
@@ -28,12 +53,8 @@ export class Bench {
     return this.description.mode === pb.Mode.MODE_LOCKSTEP;
   }
 
-  axisName(axis: number): string {
-    return this.description.axes[axis].name as string;
-  }
-
-  signal(name: string): pb.SignalDescription {
-    return this.description.signals.find((each) => each.name === name) as pb.SignalDescription;
+  get sampleS(): number {
+    return this.description.period_s as number;
   }
 
   sampleOf(axis: number): pb.Sample | null {

@@ -18,6 +18,35 @@ export interface Curves {
   lines: Line[];
 }
 
+/** Which axes of a plot are logarithmic. */
+export interface Logarithms {
+  x: boolean;
+  y: boolean;
+}
+
+/** Decades below the largest value that a logarithmic axis shows. */
+const kDecades = { x: 4, y: 6 };
+
+/** From values to 0 at `low` and 1 at `high`. Below a logarithmic axis all is at 0. */
+export function shareOf(value: number, [low, high]: [number, number], isLog: boolean): number {
+  if (isLog) return value <= low ? 0 : Math.log(value / low) / Math.log(high / low);
+  return (value - low) / (high - low);
+}
+
+/** The value at a share. */
+export function valueOf(share: number, [low, high]: [number, number], isLog: boolean): number {
+  return isLog ? low * (high / low) ** share : low + share * (high - low);
+}
+
+/** The range of a logarithmic axis: whole decades in y; in x up to the end. */
+export function logRange(axis: "x" | "y", [low, high]: [number, number]): [number, number] {
+  if (!(high > 0)) return [1e-3, 1];
+  const top = axis === "y" ? 10 ** Math.ceil(Math.log10(high)) : high;
+  const least = top / 10 ** kDecades[axis];
+  if (!(low > least)) return [least, top];
+  return [axis === "y" ? Math.min(10 ** Math.floor(Math.log10(low)), top / 10) : Math.min(low, top / 10), top];
+}
+
 /** Shows the points of a line in their order; `begins`: the line does not come from the point before. */
 export function eachPoint({ x, y }: Line, see: (x: number, y: number, begins: boolean) => void): void {
   let begins = true;
@@ -74,9 +103,11 @@ export function spectraOf(view: View, channels: Channel[], periodS: number): (Sp
     spectrumOf(sinceLastGap(view.rows[axis].columns.get(signal) ?? new Float64Array(0)), periodS));
 }
 
-export function spectrumCurves(spectra: (Spectrum | null)[], channels: Channel[], highestHz: number): Curves {
+/** From 0, on a logarithmic axis from the first step on. */
+export function spectrumCurves(spectra: (Spectrum | null)[], channels: Channel[], highestHz: number, isLog: boolean): Curves {
+  const least = Math.min(...spectra.map((each) => each?.stepHz ?? Infinity), highestHz);
   return {
-    x: [0, highestHz],
+    x: isLog ? logRange("x", [least, highestHz]) : [0, highestHz],
     lines: spectra.map((spectrum, i) => {
       const y = spectrum?.amplitudes.subarray(0, Math.floor(highestHz / spectrum.stepHz) + 2) ?? new Float64Array(0);
       return { channel: channels[i], x: y.map((_, k) => k * (spectrum?.stepHz ?? 0)), y };

@@ -1,5 +1,5 @@
 /** Drives axes open loop: the page sets targets, the gateway sends the commands. */
-import { Bench } from "./bench";
+import { axisName, Bench } from "./bench";
 import { button, byId, choice, element, setText } from "./dom";
 import { Field, fieldsOf, Gates, gatesOf, switchedOff, Target, targetOf, unitOf, Wave, wavesOf } from "./drive_target";
 import { Leases } from "./leases";
@@ -88,7 +88,7 @@ export class DrivePanel {
     try {
       await this.leases.acquire(axis);
       this.targets.set(axis, target);
-      this.tell(`axis ${this.bench.axisName(axis)}: the gateway drives it`);
+      this.tell(`axis ${axisName(this.bench, axis)}: the gateway drives it`);
       this.send();
     } catch (problem) {
       this.tell(`lease: ${(problem as Error).message}`, true);

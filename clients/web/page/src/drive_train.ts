@@ -58,7 +58,8 @@ export class DriveTrain {
     this.show("torque", withUnit(value("torque_nm"), "N*m"));
     this.show("load", withUnit(value("load_nm"), "N*m"));
     this.show("speed", withUnit(value("speed_rad_s"), "rad/s"));
-    const drawn = drawnSpeed(value("speed_rad_s") * pace);
+    const speed = value("speed_rad_s") * pace; // a recording may lack it
+    const drawn = drawnSpeed(Number.isFinite(speed) ? speed : 0);
     this.show("note", drawn.note);
     this.speed_rad_s = drawn.speed_rad_s;
     if (this.speed_rad_s === 0) this.turnTo(value("angle_rad"));
@@ -70,6 +71,7 @@ export class DriveTrain {
   }
 
   private turnTo(angle_rad: number): void {
+    if (!Number.isFinite(angle_rad)) return;
     this.angle_rad = angle_rad % (2 * Math.PI);
     this.rotor.setAttribute("transform", `rotate(${((-this.angle_rad * 180) / Math.PI).toFixed(1)})`); // counterclockwise
   }

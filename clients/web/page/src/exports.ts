@@ -1,8 +1,10 @@
 /** Files of what the scope shows. */
-import { eachPoint, extentOf, Line } from "./curves";
+import { eachPoint, extentOf, Line, Logarithms, logRange, shareOf, valueOf } from "./curves";
 import { lowerBound } from "./history";
 import { plain } from "./numbers";
+import { Track } from "./player/recorded";
 import { Channel, View } from "./view";
+import { pb } from "./wire";
 
 /** All samples of the view at full rate: a row for each tick, empty where an axis has none. */
 export function csvOf(channels: (Channel & { title: string })[], view: View, periodS: number): string {
@@ -20,10 +22,21 @@ export function csvOf(channels: (Channel & { title: string })[], view: View, per
   return lines.join("\n") + "\n";
 }
 
+/** The rows of a track as `drivebench experiment fetch` writes them. */
+export function csvOfRows(track: Track, descriptions: pb.ISignalDescription[], signals: string[], periodS: number): string {
+  track.choose(signals);
+  const columns = signals.map((each) => track.column(each));
+  const heads = signals.map((each) => `${each} [${descriptions.find(({ name }) => name === each)?.unit}]`);
+  const lines = [["tick", "time_s", ...heads].join(",")];
+  track.ticks.forEach((tick, row) => lines.push([tick, (tick * periodS).toFixed(9), ...columns.map((each) => each[row])].join(",")));
+  return lines.join("\n") + "\n";
+}
+
 interface SvgPane {
   /** null: as wide as the lines. */
   x: [number, number] | null;
   labels: { x: string; y: string };
+  logarithmic: Logarithms;
   lines: (Line & { title: string; colour: string })[];
 }
 
@@ -40,18 +53,19 @@ export function svgOf(panes: SvgPane[]): string {
     + `font-family="sans-serif" font-size="12">\n<rect width="100%" height="100%" fill="white"/>\n${bodies.join("\n")}\n</svg>\n`;
 }
 
-function paneSvg({ x, labels, lines }: SvgPane): string {
-  const [start, end] = x ?? visible(extentOf(lines.map((each) => each.x)));
-  const [low, high] = visible(extentOf(lines.map((each) => each.y)));
+function paneSvg({ x, labels, logarithmic, lines }: SvgPane): string {
+  const across = x ?? visible(extentOf(lines.map((each) => each.x)));
+  const heights = extentOf(lines.map((each) => each.y));
+  const up = logarithmic.y ? logRange("y", heights) : visible(heights);
   const [top, bottom, right] = [24, kHeight - 46, kWidth - 12];
-  const xOf = (value: number) => kLeft + ((value - start) / (end - start)) * (right - kLeft);
-  const yOf = (value: number) => bottom - ((value - low) / (high - low)) * (bottom - top);
+  const xOf = (value: number) => kLeft + shareOf(value, across, logarithmic.x) * (right - kLeft);
+  const yOf = (value: number) => bottom - shareOf(value, up, logarithmic.y) * (bottom - top);
   const grid = [0, 0.25, 0.5, 0.75, 1].map((share) => {
     const gridY = bottom - share * (bottom - top);
     const gridX = kLeft + share * (right - kLeft);
     return `<path d="M${kLeft} ${gridY}H${right}M${gridX} ${top}V${bottom}" stroke="#ccc"/>`
-      + `<text x="${kLeft - 6}" y="${gridY + 4}" text-anchor="end">${plain(low + share * (high - low))}</text>`
-      + `<text x="${gridX}" y="${bottom + 16}" text-anchor="middle">${plain(start + share * (end - start))}</text>`;
+      + `<text x="${kLeft - 6}" y="${gridY + 4}" text-anchor="end">${plain(valueOf(share, up, logarithmic.y))}</text>`
+      + `<text x="${gridX}" y="${bottom + 16}" text-anchor="middle">${plain(valueOf(share, across, logarithmic.x))}</text>`;
   });
   const drawn = lines.map((line, i) => `<path d="${pathOf(line, xOf, yOf)}" fill="none" stroke="${line.colour}"/>`
     + `<text x="${kLeft + 150 * (i + 1)}" y="16" fill="${line.colour}">${escaped(line.title)}</text>`);

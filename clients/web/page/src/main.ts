@@ -1,9 +1,11 @@
 /** The page of `drivebench web`. */
-import { Bench } from "./bench";
+import { Bench, usualPanes } from "./bench";
 import { byId, setText } from "./dom";
 import { DrivePanel } from "./drive_panel";
+import { ExperimentsPanel } from "./experiments/panel";
 import { Knobs } from "./knobs";
 import { Leases } from "./leases";
+import { PlayerPlace } from "./player/player";
 import { Scope } from "./scope";
 import { StatePanel } from "./state_panel";
 import { pb, Wire } from "./wire";
@@ -21,6 +23,8 @@ class Page {
   private leases: Leases | null = null;
   private knobs: Knobs | null = null;
   private drive: DrivePanel | null = null;
+  private experiments: ExperimentsPanel | null = null;
+  private readonly player = new PlayerPlace(byId("player"));
   private subscribed: string[] = [];
 
   constructor() {
@@ -61,7 +65,8 @@ class Page {
     this.knobs = new Knobs(byId("knobs"), bench, leases);
     this.drive = new DrivePanel(byId("drive"), bench, leases);
     this.panel = new StatePanel(byId("state"), bench, (axis) => leases.ownerOf(axis));
-    this.scope = new Scope(byId("scope"), bench, () => this.subscribe());
+    this.scope = new Scope(byId("scope"), bench, usualPanes(bench.description.axes[0]), () => this.subscribe());
+    this.experiments = new ExperimentsPanel(byId("experiments"), bench, this.player);
     this.subscribe();
     this.askStatus();
   }
@@ -116,6 +121,7 @@ class Page {
     this.showAlert(sentence);
     byId("knobs").hidden = true;
     byId("drive").hidden = true;
+    byId("experiments").hidden = true;
   }
 
   private endPanels(): void {
@@ -123,6 +129,7 @@ class Page {
     this.knobs?.end();
     this.drive?.end();
     this.panel?.end();
+    this.experiments?.end();
   }
 
   private wantToken(sentence: string): void {
@@ -144,11 +151,15 @@ class Page {
   }
 
   private theme(): void {
+    const recolour = () => {
+      this.scope?.recolour();
+      this.player.recolour();
+    };
     const show = (theme: string) => {
       setText(byId("theme"), `theme: ${theme}`);
       if (theme === "system") delete document.documentElement.dataset.theme;
       else document.documentElement.dataset.theme = theme;
-      this.scope?.recolour();
+      recolour();
     };
     let theme = localStorage.getItem("theme") ?? "system";
     show(theme);
@@ -157,7 +168,7 @@ class Page {
       localStorage.setItem("theme", theme);
       show(theme);
     });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.scope?.recolour());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
   }
 }
 

@@ -1,5 +1,5 @@
 /** The table below the panes: what the scope measures of each channel. */
-import { Bench } from "./bench";
+import { signalOf, Source } from "./bench";
 import { element } from "./dom";
 import { measure } from "./measurements";
 import { withUnit } from "./numbers";
@@ -15,18 +15,18 @@ export class MeasurementTable {
     element("table", { class: "measurements" }, this.caption,
       element("thead", {}, element("tr", {}, ...kHeads.map((each) => element("th", { scope: "col" }, each)))), this.body));
 
-  constructor(private readonly bench: Bench) {}
+  constructor(private readonly source: Source) {}
 
   /** Measures between the cursors where both stand, else over the whole view. */
   draw(panes: Pane[], view: View, [a, b]: (number | null)[]): void {
-    const periodS = this.bench.description.period_s as number;
+    const periodS = this.source.description.period_s as number;
     const isBetween = a !== null && b !== null && a !== b;
     const window = betweenCursors(view, [a, b]);
     this.caption.textContent = isBetween
       ? `Between the cursors: B − A = ${withUnit((b - a) * periodS, "s")}, ${b - a} ticks, ${withUnit(1 / Math.abs((b - a) * periodS), "Hz")}`
       : "Of the whole window; click twice into a plot to set the cursors A and B, drag to zoom";
     const rows = panes.flatMap((pane) => pane.channels.map((channel, number) => {
-      const unit = this.bench.signal(channel.signal).unit as string;
+      const unit = signalOf(this.source, channel.signal).unit as string;
       const { ticks, columns } = window.rows[channel.axis];
       const m = measure(columns.get(channel.signal) ?? new Float64Array(0), ticks, periodS);
       const [atA, atB] = [a, b].map((each) => (each === null ? NaN : valueAt(view, channel, each)));

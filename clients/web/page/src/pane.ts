@@ -1,10 +1,10 @@
 /** A pane of the scope: its channels, and a plot of them of one of several kinds. */
-import { Bench } from "./bench";
-import { Curves, Kind, spectraOf, spectrumCurves, timeCurves, xyCurves } from "./curves";
+import { axisName, signalOf, Source } from "./bench";
+import { Curves, Kind, Logarithms, spectraOf, spectrumCurves, timeCurves, xyCurves } from "./curves";
 import { button, choice, element, setText } from "./dom";
-import { plain, withUnit } from "./numbers";
+import { numberIn, plain, withUnit } from "./numbers";
 import { cssVariable, Dot, Plot } from "./plot";
-import { peaksOf, Spectrum } from "./spectrum";
+import { amplitudeAt, peaksOf, Spectrum } from "./spectrum";
 import { Channel, valueAt, View } from "./view";
 
 export interface PaneListener {
@@ -28,19 +28,22 @@ export class Pane {
   private readonly peaks = element("p", { class: "soft peaks", hidden: true });
   private readonly add: HTMLSelectElement;
   private readonly highest: HTMLSelectElement;
+  private readonly scales = choice("axes of the spectrum", [["", "linear"], ["y", "log amplitude"], ["xy", "log both"]], () => this.look());
+  /** Arrows move it by a step of the spectrum. */
+  private readonly cursor = element("input", { type: "number", min: 0, "aria-label": "cursor of the spectrum, Hz", placeholder: "cursor, Hz", input: () => this.listener.changed() });
   private plot: Plot | null = null;
 
-  constructor(private readonly bench: Bench, readonly channels: Channel[], private readonly listener: PaneListener) {
+  constructor(private readonly source: Source, readonly channels: Channel[], private readonly listener: PaneListener) {
     this.add = element("select", { "aria-label": "add a signal to this pane", change: () => this.addChosen() });
     this.fillChoice();
-    this.highest = choice("highest frequency", frequenciesUpTo(0.5 / this.periodS).map((each) => [String(each), `to ${plain(each)} Hz`]),
+    this.highest = choice("highest frequency", frequenciesUpTo(0.5 / source.sampleS).map((each) => [String(each), `to ${plain(each)} Hz`]),
       () => this.listener.changed());
     this.root.append(element("div", { class: "pane-head" }, this.chips,
       choice("kind of this pane", [["time", "over time"], ["xy", "XY"], ["spectrum", "spectrum"]], (kind) => {
         this.kind = kind as Kind;
         this.rebuild();
         this.listener.changed();
-      }), this.highest, this.add,
+      }), this.highest, this.scales, this.cursor, this.add,
       button("×", () => listener.removed(this), { class: "small", "aria-label": "remove this pane" })), this.plotPlace, this.peaks);
     this.rebuild();
     new ResizeObserver(() => {
@@ -62,25 +65,34 @@ export class Pane {
   rebuild(): void {
     this.plot?.end();
     this.showChips();
-    this.highest.hidden = this.peaks.hidden = this.kind !== "spectrum";
+    this.highest.hidden = this.scales.hidden = this.cursor.hidden = this.peaks.hidden = this.kind !== "spectrum";
     const isOverTime = this.kind === "time";
     const { x: xLabel, y: yLabel } = this.labels;
     this.plot = new Plot(this.plotPlace, {
-      height: kHeights[this.kind], xLabel, yLabel, isOverTime,
+      height: kHeights[this.kind], xLabel, yLabel, isOverTime, logarithmic: this.logarithms,
       colours: (this.kind === "xy" ? this.channels.slice(1) : this.channels).map((each) => this.colourOf(each)),
       isEqualScale: this.kind === "xy" && new Set(this.channels.map((each) => this.unitOf(each))).size === 1,
     }, {
-      clicked: (time) => isOverTime && this.listener.clicked(time),
+      clicked: (x) => this.clicked(x),
       selected: (from, to) => this.listener.selected(from, to),
     });
+  }
+
+  /** Which axes are logarithmic: of a spectrum as its user likes. */
+  get logarithms(): Logarithms {
+    const chosen = this.kind === "spectrum" ? this.scales.value : "";
+    return { x: chosen.includes("x"), y: chosen.includes("y") };
   }
 
   /** Draws a view. The cursors are ticks. */
   draw(view: View, cursors: (number | null)[]): void {
     if (this.kind === "spectrum") {
-      const spectra = spectraOf(view, this.channels, this.periodS);
-      setText(this.peaks, this.channels.map((each, i) => this.peaksText(each, spectra[i])).join("; "));
-      this.plot?.draw(spectrumCurves(spectra, this.channels, Number(this.highest.value)), [], []);
+      const spectra = spectraOf(view, this.channels, this.source.sampleS);
+      const known = spectra.find((each) => each !== null);
+      if (known) this.cursor.step = String(Number(known.stepHz.toPrecision(9)));
+      const at = numberIn(this.cursor.value);
+      setText(this.peaks, [...(at >= 0 ? [this.cursorText(at, spectra)] : []), ...this.channels.map((each, i) => this.peaksText(each, spectra[i]))].join("; "));
+      this.plot?.draw(spectrumCurves(spectra, this.channels, Number(this.highest.value), this.logarithms.x), at >= 0 ? [at] : [], []);
     } else if (this.kind === "xy") {
       this.plot?.draw(xyCurves(view, this.channels), [], this.dotsOf(view, cursors));
     } else {
@@ -94,7 +106,7 @@ export class Pane {
   curvesOf(view: View, columns: number): Curves {
     if (this.kind === "xy") return xyCurves(view, this.channels);
     if (this.kind === "time") return timeCurves(view, this.channels, this.periodS, columns);
-    return spectrumCurves(spectraOf(view, this.channels, this.periodS), this.channels, Number(this.highest.value));
+    return spectrumCurves(spectraOf(view, this.channels, this.source.sampleS), this.channels, Number(this.highest.value), this.logarithms.x);
   }
 
   colourOf(channel: Channel): string {
@@ -102,15 +114,15 @@ export class Pane {
   }
 
   nameOf(channel: Channel): string {
-    return this.bench.histories.length > 1 ? `${this.bench.axisName(channel.axis)}.${channel.signal}` : channel.signal;
+    return this.source.histories.length > 1 ? `${axisName(this.source, channel.axis)}.${channel.signal}` : channel.signal;
   }
 
   private get periodS(): number {
-    return this.bench.description.period_s as number;
+    return this.source.description.period_s as number;
   }
 
   private unitOf(channel: Channel): string {
-    return this.bench.signal(channel.signal).unit as string;
+    return signalOf(this.source, channel.signal).unit as string;
   }
 
   /** Where the cursors stand, and the newest sample. */
@@ -119,6 +131,28 @@ export class Pane {
     const places: [number | null, string][] = [[view.to, ""], [a, "A"], [b, "B"]];
     return places.flatMap(([tick, text]) => tick === null ? [] : others.map((each) =>
       ({ x: valueAt(view, first, tick), y: valueAt(view, each, tick), text })));
+  }
+
+  /** A click puts the cursor: in a spectrum that of the pane, over time one of all panes. */
+  private clicked(x: number): void {
+    if (this.kind === "time") this.listener.clicked(x);
+    if (this.kind !== "spectrum") return;
+    const step = Number(this.cursor.step) || 1;
+    this.cursor.value = String(Number((Math.round(x / step) * step).toPrecision(9)));
+    this.listener.changed();
+  }
+
+  private look(): void {
+    this.rebuild();
+    this.listener.changed();
+  }
+
+  private cursorText(at: number, spectra: (Spectrum | null)[]): string {
+    const values = this.channels.map((channel, i) => {
+      const spectrum = spectra[i];
+      return `${this.nameOf(channel)} ${spectrum === null ? "–" : withUnit(amplitudeAt(spectrum, at), this.unitOf(channel))}`;
+    });
+    return `at ${withUnit(at, "Hz")}: ${values.join(", ")}`;
   }
 
   private peaksText(channel: Channel, spectrum: Spectrum | null): string {
@@ -143,8 +177,8 @@ export class Pane {
 
   private fillChoice(): void {
     this.add.append(element("option", { value: "" }, "+ signal"));
-    this.bench.description.axes.forEach((axis, number) => {
-      this.add.append(element("optgroup", { label: axis.name as string }, ...this.bench.description.signals.map((signal) =>
+    this.source.description.axes.forEach((axis, number) => {
+      this.add.append(element("optgroup", { label: axis.name as string }, ...this.source.description.signals.map((signal) =>
         element("option", { value: `${number}:${signal.name}`, title: signal.meaning as string },
           `${signal.name} [${signal.unit}]`))));
     });

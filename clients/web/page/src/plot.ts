@@ -1,6 +1,6 @@
 /** Curves in a picture with axes. uPlot draws the axes and the cursor of the mouse. */
 import uPlot from "uplot";
-import { Curves, eachPoint, extentOf, Line } from "./curves";
+import { Curves, eachPoint, extentOf, Line, Logarithms, logRange, shareOf } from "./curves";
 
 export interface Look {
   height: number;
@@ -9,6 +9,7 @@ export interface Look {
   colours: string[];
   /** Both axes have the same unit, and a circle is a circle. */
   isEqualScale: boolean;
+  logarithmic: Logarithms;
   /** The cursor of the mouse is one for all plots over time, and may select. */
   isOverTime: boolean;
 }
@@ -49,9 +50,9 @@ export class Plot {
         ...(look.isOverTime ? { sync: { key: "scope" } } : {}),
         drag: { x: look.isOverTime, y: false, setScale: false }, points: { show: false },
       },
-      scales: { x: { time: false, range: range(0) }, y: { range: range(1) } },
-      axes: [{ ...line, label: look.xLabel, labelSize: 16, size: 28, values: (_plot, ticks) => ticks.map((each) => String(Number(each.toPrecision(9)))) },
-        { ...line, label: look.yLabel, labelSize: 18, size: 62 }],
+      scales: { x: { time: false, range: range(0), ...scaleKind(look.logarithmic.x) }, y: { range: range(1), ...scaleKind(look.logarithmic.y) } },
+      axes: [{ ...line, label: look.xLabel, labelSize: 16, size: 28, values: (_plot, ticks) => ticks.map((each) => (each === null ? "" : String(Number(each.toPrecision(9))))) },
+        { ...line, label: look.yLabel, labelSize: 18, size: 62, ...(look.logarithmic.y ? { values: (_plot, ticks) => ticks.map((each) => (each === null ? "" : each.toExponential(0))) } : {}) }],
       series: [{}, { paths: () => null, points: { show: false } }],
       hooks: {
         draw: [(plot) => this.paint(plot)],
@@ -62,7 +63,7 @@ export class Plot {
           listener.selected(from, to);
         }],
       },
-    }, [[0, 1], [0, 1]], place);
+    }, [emptyRange(look.logarithmic.x), emptyRange(look.logarithmic.y)], place);
     this.plot.over.addEventListener("click", (event) => listener.clicked(this.plot.posToVal(event.offsetX, "x")));
   }
 
@@ -83,7 +84,8 @@ export class Plot {
   draw(curves: Curves, marks: number[], dots: Dot[]): void {
     [this.curves, this.marks, this.dots] = [curves, marks, dots];
     let x = curves.x ?? padded(extentOf(curves.lines.map((each) => each.x)));
-    let y = padded(extentOf(curves.lines.map((each) => each.y)));
+    const heights = extentOf(curves.lines.map((each) => each.y));
+    let y = this.look.logarithmic.y ? logRange("y", heights) : padded(heights);
     if (this.look.isEqualScale) [x, y] = equalScale(x, y, this.plot.over.clientWidth, this.plot.over.clientHeight);
     this.plot.setData([x, y]);
   }
@@ -95,7 +97,8 @@ export class Plot {
   private paint(plot: uPlot): void {
     const { ctx: context, bbox } = plot;
     const ratio = devicePixelRatio;
-    const [xOf, yOf] = [scaleOf(plot, "x"), scaleOf(plot, "y")];
+    const { x: isLogX, y: isLogY } = this.look.logarithmic;
+    const [xOf, yOf] = [scaleOf(plot, "x", isLogX), scaleOf(plot, "y", isLogY)];
     context.save();
     context.beginPath();
     context.rect(bbox.left, bbox.top, bbox.width, bbox.height);
@@ -143,11 +146,22 @@ function stroke(context: CanvasRenderingContext2D, line: Line, xOf: (value: numb
 }
 
 /** From values to pixels of the canvas. */
-function scaleOf(plot: uPlot, scale: "x" | "y"): (value: number) => number {
+function scaleOf(plot: uPlot, scale: "x" | "y", isLog: boolean): (value: number) => number {
   const { min = 0, max = 1 } = plot.scales[scale];
   const start = plot.valToPos(min, scale, true);
-  const perUnit = (plot.valToPos(max, scale, true) - start) / (max - min);
+  const size = plot.valToPos(max, scale, true) - start;
+  if (isLog) return (value) => start + shareOf(value, [min, max], true) * size;
+  const perUnit = size / (max - min);
   return (value) => start + (value - min) * perUnit;
+}
+
+/** Of an axis before its first curves: a logarithmic one has no 0. */
+function emptyRange(isLog: boolean): [number, number] {
+  return isLog ? [1, 10] : [0, 1];
+}
+
+function scaleKind(isLog: boolean): uPlot.Scale {
+  return isLog ? { distr: 3, log: 10 } : {};
 }
 
 function padded([low, high]: [number, number]): [number, number] {

@@ -1,5 +1,5 @@
 /** The scope: panes, time base, trigger, cursors and measurements. */
-import { Bench, usualPanes } from "./bench";
+import { signalOf, Source } from "./bench";
 import { button, choice, element, save, setText } from "./dom";
 import { csvOf, kColumns, svgOf } from "./exports";
 import { MeasurementTable } from "./measurement_table";
@@ -15,6 +15,7 @@ const kDrawShare = 3;
 const kTableMs = 200;
 const kAutoMs = 500;
 
+/** Of the bench, or of something that is played: without trigger, and its pause is the player's. */
 export class Scope {
   private readonly panes: Pane[] = [];
   private readonly place = element("div", { class: "panes", tabindex: 0, role: "group",
@@ -39,16 +40,22 @@ export class Scope {
   private isOver = false;
 
   /** `subscribe` is called when other signals are needed. */
-  constructor(root: HTMLElement, private readonly bench: Bench, private readonly subscribe: () => void) {
-    this.bar = new TriggerBar(bench, this.trigger, () => this.arm());
-    this.table = new MeasurementTable(bench);
-    this.time = choice("window", kWindows_s.map((each) => [String(each), each < 1 ? `${each * 1000} ms` : `${each} s`]),
-      (value) => this.setWindow(Number(value)));
+  constructor(root: HTMLElement, private readonly source: Source, panes: string[][], private readonly subscribe: () => void,
+    private readonly played?: { lengthS: number; togglePause(): void }) {
+    this.bar = new TriggerBar(source, this.trigger, () => this.arm());
+    this.table = new MeasurementTable(source);
+    const windows = kWindows_s.filter((each) => played === undefined || each < played.lengthS)
+      .map((each): [string, string] => [String(each), each < 1 ? `${each * 1000} ms` : `${each} s`]);
+    if (played !== undefined) {
+      this.windowS = played.lengthS;
+      windows.unshift([String(played.lengthS), "all"]);
+    }
+    this.time = choice(played === undefined ? "window" : "window of the player", windows, (value) => this.setWindow(Number(value)));
     this.time.value = String(this.windowS);
-    root.replaceChildren(element("div", { class: "bar" }, "Window", this.time, this.pauseButton,
+    root.replaceChildren(element("div", { class: "bar" }, "Window", this.time, ...(played === undefined ? [this.pauseButton] : []),
       button("Add pane", () => this.addPane([])), button("CSV", () => this.exportCsv()), button("SVG", () => this.exportSvg()),
-      this.note), this.bar.root, this.place, this.table.root);
-    for (const signals of usualPanes(bench.description.axes[0])) this.addPane(signals);
+      this.note), ...(played === undefined ? [this.bar.root] : []), this.place, this.table.root);
+    for (const signals of panes) this.addPane(signals);
     this.place.addEventListener("keydown", (event) => this.key(event));
     this.frame();
   }
@@ -68,6 +75,11 @@ export class Scope {
     return signals;
   }
 
+  /** Something that is played stands at another tick. */
+  moved(): void {
+    this.isDirty = true;
+  }
+
   see(axis: number, sample: Record<string, number>): void {
     this.trigger.see(axis, sample);
     this.isDirty ||= this.held === null || this.trigger.isArmed;
@@ -80,7 +92,7 @@ export class Scope {
   }
 
   private get periodS(): number {
-    return this.bench.description.period_s as number;
+    return this.source.description.period_s as number;
   }
 
   private get windowTicks(): number {
@@ -88,7 +100,7 @@ export class Scope {
   }
 
   private addPane(signals: string[]): void {
-    const pane = new Pane(this.bench, signals.map((signal) => ({ axis: 0, signal })), {
+    const pane = new Pane(this.source, signals.map((signal) => ({ axis: 0, signal })), {
       changed: () => this.channelsChanged(),
       removed: (gone) => {
         this.panes.splice(this.panes.indexOf(gone), 1);
@@ -128,10 +140,11 @@ export class Scope {
   }
 
   private togglePause(): void {
+    if (this.played !== undefined) return this.played.togglePause();
     this.isPaused = !this.isPaused;
     setText(this.pauseButton, this.isPaused ? "Run" : "Pause");
     if (this.isPaused) {
-      this.held ??= frozen(rollingView(this.bench, this.windowTicks));
+      this.held ??= frozen(rollingView(this.source, this.windowTicks));
     } else {
       this.held = null;
       this.zoom = null;
@@ -159,12 +172,12 @@ export class Scope {
       const window = betweenCursors(view, this.cursors);
       for (const pane of this.panes) if (pane.kind === "spectrum") pane.draw(window, this.cursors);
       this.nextTable = now + Math.max(kTableMs, kDrawShare * (performance.now() - now));
-      setText(this.note, this.bench.dropped === 0 ? "" : `${this.bench.dropped} samples lost: the browser reads too slowly`);
+      setText(this.note, this.source.dropped === 0 ? "" : `${this.source.dropped} samples lost: the browser reads too slowly`);
     }
   }
 
   private view(): View {
-    const view = this.held ?? rollingView(this.bench, this.windowTicks);
+    const view = this.held ?? rollingView(this.source, this.windowTicks);
     return this.zoom === null ? view : part(view, ...this.zoom);
   }
 
@@ -179,15 +192,15 @@ export class Scope {
     if (firedTick === null) {
       this.bar.show("armed");
       if (settings.sweep === "auto" && performance.now() - this.autoShown > kAutoMs) this.held = null;
-      else if (this.held === null && settings.sweep !== "auto") this.held = frozen(viewOf(this.bench, 0, -1, 0));
+      else if (this.held === null && settings.sweep !== "auto") this.held = frozen(viewOf(this.source, 0, -1, 0));
       return;
     }
     const from = firedTick - settings.before * this.windowTicks;
     const to = from + this.windowTicks;
-    this.held = frozen(viewOf(this.bench, from, to, firedTick));
+    this.held = frozen(viewOf(this.source, from, to, firedTick));
     this.autoShown = performance.now();
     this.bar.show(`triggered at tick ${firedTick}`);
-    if (this.bench.histories[settings.axis].lastTick < to) return;
+    if (this.source.histories[settings.axis].lastTick < to) return;
     if (settings.sweep === "single") this.trigger.isArmed = false;
     else this.trigger.arm();
   }
@@ -204,7 +217,7 @@ export class Scope {
   }
 
   private zoomTo(fromTime: number, toTime: number): void {
-    if (this.held === null) this.togglePause();
+    if (this.held === null && this.played === undefined) this.togglePause();
     const [from, to] = [this.ticksAt(fromTime), this.ticksAt(toTime)];
     if (to - from >= 2) this.zoom = [from, to];
     this.isDirty = true;
@@ -230,8 +243,8 @@ export class Scope {
 
   private exportCsv(): void {
     const channels = this.panes.flatMap((pane) => pane.channels.map((each) => ({
-      ...each, title: `${pane.nameOf(each)} [${this.bench.signal(each.signal).unit}]` })));
-    save(`${this.bench.description.name}.csv`, "text/csv", csvOf(channels, this.view(), this.periodS));
+      ...each, title: `${pane.nameOf(each)} [${signalOf(this.source, each.signal).unit}]` })));
+    save(`${this.source.description.name}.csv`, "text/csv", csvOf(channels, this.view(), this.periodS));
   }
 
   private exportSvg(): void {
@@ -239,8 +252,8 @@ export class Scope {
     const window = betweenCursors(view, this.cursors);
     const panes = this.panes.map((pane) => {
       const { x, lines } = pane.curvesOf(pane.kind === "spectrum" ? window : view, kColumns);
-      return { x, labels: pane.labels, lines: lines.map((each) => ({ ...each, title: pane.nameOf(each.channel), colour: pane.colourOf(each.channel) })) };
+      return { x, labels: pane.labels, logarithmic: pane.logarithms, lines: lines.map((each) => ({ ...each, title: pane.nameOf(each.channel), colour: pane.colourOf(each.channel) })) };
     });
-    save(`${this.bench.description.name}.svg`, "image/svg+xml", svgOf(panes));
+    save(`${this.source.description.name}.svg`, "image/svg+xml", svgOf(panes));
   }
 }

@@ -46,6 +46,11 @@ export function spectrumOf(values: Float64Array, periodS: number): Spectrum | nu
   return { amplitudes, stepHz: 1 / (size * periodS), stepsInBin: size / count };
 }
 
+/** The amplitude at the step that is nearest to a frequency; NaN beyond the spectrum. */
+export function amplitudeAt({ amplitudes, stepHz }: Spectrum, frequencyHz: number): number {
+  return amplitudes[Math.round(frequencyHz / stepHz)] ?? NaN;
+}
+
 /**
  * The largest peaks, the largest first. Between the steps by a parabola through the fifth roots of three of them: the fifth root
  * of the Hann window's main lobe is a parabola up to terms of the sixth order.

@@ -1,28 +1,12 @@
 /** The state of the bench and of each axis. */
 import { Bench, namesOfBits } from "./bench";
-import { element, setText } from "./dom";
+import { element } from "./dom";
 import { DriveTrain } from "./drive_train";
+import { Facts } from "./facts";
 import { plain, withUnit } from "./numbers";
 import { pb } from "./wire";
 
 const kStates = ["idle", "run", "hold", "timeout", "fault", "ready"];
-
-/** A list of names and values, whose values change in place. */
-class Facts {
-  readonly root = element("dl");
-  private readonly values = new Map<string, HTMLElement>();
-
-  set(name: string, text: string, kind = ""): void {
-    let value = this.values.get(name);
-    if (value === undefined) {
-      value = element("dd");
-      this.values.set(name, value);
-      this.root.append(element("dt", {}, name), value);
-    }
-    setText(value, text);
-    value.className = kind;
-  }
-}
 
 export class StatePanel {
   private readonly bench = new Facts();

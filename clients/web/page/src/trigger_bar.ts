@@ -1,5 +1,5 @@
 /** The row of the scope that sets its trigger. */
-import { Bench } from "./bench";
+import { Source } from "./bench";
 import { button, choice, element, setText } from "./dom";
 import { numberIn } from "./numbers";
 import { Condition, Sweep, Trigger } from "./trigger";
@@ -18,8 +18,8 @@ export class TriggerBar {
   private condition: Condition = "off";
   private sweep: Sweep = "normal";
 
-  constructor(bench: Bench, private readonly trigger: Trigger, private readonly changed: () => void) {
-    const { axes, signals, faults, injectable_faults: injectable } = bench.description;
+  constructor(source: Source, private readonly trigger: Trigger, private readonly changed: () => void) {
+    const { axes, signals, faults, injectable_faults: injectable } = source.description;
     this.source = choice("trigger signal", axes.flatMap((axis, number) => signals.map((each): [string, string] =>
       [`${number}:${each.name}`, axes.length > 1 ? `${axis.name}.${each.name}` : each.name as string])), () => this.apply());
     this.source.value = "0:speed_rad_s";

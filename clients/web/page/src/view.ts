@@ -1,5 +1,5 @@
 /** What the scope shows: a window that rolls with time, or one that stands still. */
-import { Bench } from "./bench";
+import { Source } from "./bench";
 import { between, copyOf, Rows } from "./history";
 
 /** A window in ticks, with the samples of every axis. Times are shown from the origin on. */
@@ -15,13 +15,13 @@ export interface Channel {
   signal: string;
 }
 
-export function rollingView(bench: Bench, windowTicks: number): View {
-  const newest = Math.max(...bench.histories.map((each) => each.lastTick), windowTicks);
-  return viewOf(bench, newest - windowTicks, newest, 0);
+export function rollingView(source: Source, windowTicks: number): View {
+  const newest = Math.max(...source.histories.map((each) => each.lastTick), source.firstTick + windowTicks);
+  return viewOf(source, newest - windowTicks, newest, 0);
 }
 
-export function viewOf(bench: Bench, from: number, to: number, origin: number): View {
-  return { from, to, origin, rows: bench.histories.map((each) => each.rows(from, to)) };
+export function viewOf(source: Source, from: number, to: number, origin: number): View {
+  return { from, to, origin, rows: source.histories.map((each) => each.rows(from, to)) };
 }
 
 /** A copy that stays as it is. */

@@ -36,6 +36,8 @@ export interface Listener {
 }
 
 interface Waiting {
+  /** Whether more answers follow this one. */
+  goesOn(answer: pb.Envelope): boolean;
   resolve(answer: pb.Envelope): void;
   reject(problem: Error): void;
 }
@@ -48,8 +50,10 @@ export class Wire {
   private waiting = new Map<number, Waiting>();
   private lastId = 0;
   private rest = new Uint8Array(0);
+  private isOver = false;
 
-  constructor(private readonly listener: Listener) {}
+  /** `mayConduct`: a session whose role allows it asks for the right to conduct. */
+  constructor(private readonly listener: Listener, private readonly mayConduct = true) {}
 
   /** A role is known only after its hello, and a hello beyond its role ends the session: so the first hello asks for nothing. */
   connect(conducts = false): void {
@@ -62,7 +66,7 @@ export class Wire {
       try {
         const hello = { protocol_min: 1, protocol_max: 1, client: "browser", token: sessionStorage.getItem("token") ?? "", conducts };
         const welcome = (await this.ask({ hello })).welcome as pb.Welcome;
-        mayConduct = !conducts && isConductor(welcome.role);
+        mayConduct = this.mayConduct && !conducts && isConductor(welcome.role);
         if (mayConduct) socket.close();
         else this.listener.welcome(welcome, conducts);
       } catch (problem) {
@@ -77,16 +81,22 @@ export class Wire {
       for (const each of this.waiting.values()) each.reject(new Error("the connection to the bench is lost"));
       this.waiting.clear();
       if (this.socket === socket) this.socket = null;
-      if (refused) return;
+      if (refused || this.isOver) return;
       if (mayConduct) return this.connect(true);
       this.listener.lost(event.reason || `the gateway does not answer (${event.code})`);
-      setTimeout(() => this.connect(), kRetryMs);
+      setTimeout(() => this.isOver || this.connect(), kRetryMs);
     };
     this.socket = socket;
   }
 
-  /** The answer; throws Refused, or Error when the connection ends first. */
-  ask(kind: pb.IEnvelope): Promise<pb.Envelope> {
+  /** Ends the session; no other follows. */
+  end(): void {
+    this.isOver = true;
+    this.socket?.close();
+  }
+
+  /** The answer, the last one where several come; throws Refused, or Error when the connection ends first. */
+  ask(kind: pb.IEnvelope, goesOn: (answer: pb.Envelope) => boolean = () => false): Promise<pb.Envelope> {
     const id = ++this.lastId;
     const payload = pb.Envelope.encode({ ...kind, id } as pb.Envelope).finish();
     const frame = new Uint8Array(4 + payload.length);
@@ -97,7 +107,7 @@ export class Wire {
         reject(new Error("there is no connection to the bench"));
         return;
       }
-      this.waiting.set(id, { resolve, reject });
+      this.waiting.set(id, { goesOn, resolve, reject });
       this.socket.send(frame);
     });
   }
@@ -129,6 +139,7 @@ export class Wire {
     if (envelope.samples) return this.listener.samples(envelope.samples as pb.Samples);
     if (envelope.notice) return this.listener.notice(envelope.notice as pb.Notice);
     const waiting = this.waiting.get(envelope.id as number);
+    if (!envelope.refusal && waiting?.goesOn(envelope)) return;
     this.waiting.delete(envelope.id as number);
     if (envelope.refusal) waiting?.reject(new Refused(envelope.refusal as pb.Refusal));
     else waiting?.resolve(envelope);
