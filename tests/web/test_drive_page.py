@@ -71,6 +71,15 @@ class DrivePage(PageTest):
         self.assertIn("target, V: '1e9' is no number from -1000000 to 1000000", shown["beyond"])
         self.assertRegex(shown["owned"], "^lease: .*holds the lease of the axis")
 
+    def test_two_motors_on_one_amplifier_have_one_lease(self):
+        """Catches: knobs of the second motor that want a lease which the bench gives to no session, a page that does not know that it
+        holds both."""
+        shown = self.play("shared", self.gateway(self.for_users(bench="two-steppers")).url, "otto-secret")
+        for answer in shown["answers"].values():
+            self.assertIn("load: done at tick", answer)
+        self.assertEqual((shown["driven"], shown["taken"]), ("this page,this page",) * 2)
+        self.assertEqual(shown["held"], ["Release the lease"] * 2)
+
     def test_axe_finds_no_serious_fault_while_the_page_drives(self):
         """Catches: a control of the drive without a name or out of the reach of keys, a Stop that one cannot read, fields in
         another unit than that of their set-points."""

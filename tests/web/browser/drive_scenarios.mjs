@@ -80,6 +80,33 @@ export function driveScenarios({ axeFinds, enter, outside, press, set, stateOf, 
       return { ramp, owned, beyond };
     },
 
+    /** Two motors on one amplifier: a lease of one is that of both. */
+    async shared(page, token) {
+      await enter(page, token);
+      await stateOf(page, "tick", /\d/);
+      const answers = {};
+      const load = async (name) => {
+        await page.$eval("#knobs .answer", (each) => { each.textContent = ""; });
+        await page.evaluate(() => [...document.querySelectorAll("#knobs details")][1].querySelector("form button").click());
+        answers[name] = await text(page, "#knobs .answer", /:/);
+      };
+      const controllers = () => page.$$eval("#state dt", (all) => all.filter((each) => each.textContent === "controller").map((each) => each.nextElementSibling.textContent).join());
+      const buttons = () => page.$$eval("#knobs button", (all) => all.map((each) => each.textContent).filter((each) => each.endsWith("the lease")));
+      await load("borrowed");
+      for (const [label, value] of Object.entries(kStart)) await set(page, `${label} (first)`, value);
+      await press(page, "drive first");
+      const driven = await until(controllers, /this page,this page/);
+      const held = await buttons();
+      await load("driven");
+      await page.keyboard.press("Escape");
+      await answer(page, /stopped/);
+      await press(page, "give first back");
+      await answer(page, /given back/);
+      await page.evaluate(() => [...document.querySelectorAll("#knobs details")][1].querySelector("button").click());
+      const taken = await until(controllers, /this page,this page/);
+      return { answers, driven, held, taken };
+    },
+
     /** For axe-core: while the page drives, with each wave and unit once. */
     async driveAxe(page) {
       await fill(page, kStart);

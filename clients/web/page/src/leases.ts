@@ -1,4 +1,4 @@
-/** The leases that this page holds. */
+/** The leases that this page holds. An axis that shares an amplifier has the lease of the axis to which the amplifier belongs. */
 import { Bench } from "./bench";
 import { pb } from "./wire";
 
@@ -7,13 +7,17 @@ const { ACTION_ACQUIRE, ACTION_RELEASE, ACTION_RENEW } = pb.LeaseRequest.Action;
 export class Leases {
   /** The numbers under which samples show this page as owner, by axis; 0: it holds no lease. */
   private readonly owners: number[];
+  /** The axis whose lease is that of an axis. */
+  private readonly leased: number[];
   private readonly listeners: ((axis: number, sentence: string) => void)[] = [];
   private readonly timer: number;
   /** The gateway commands the axes of all leases. */
   areDriven = false;
 
   constructor(private readonly bench: Bench) {
-    this.owners = bench.histories.map(() => 0);
+    const axes = bench.description.axes;
+    this.owners = axes.map(() => 0);
+    this.leased = axes.map((axis, number) => (axis.shares_amplifier_with ? axes.findIndex((each) => each.name === axis.shares_amplifier_with) : number));
     this.timer = window.setInterval(() => this.renew(), ((bench.description.lease_s as number) * 1000) / 3);
   }
 
@@ -27,16 +31,16 @@ export class Leases {
   }
 
   ownerOf(axis: number): number {
-    return this.owners[axis];
+    return this.owners[this.leased[axis]];
   }
 
   holds(axis: number): boolean {
-    return this.owners[axis] !== 0;
+    return this.ownerOf(axis) !== 0;
   }
 
-  /** The axes whose leases the page holds. */
+  /** The axes whose leases the page holds, without those that have the lease of another one. */
   get held(): number[] {
-    return [...this.owners.keys()].filter((axis) => this.holds(axis));
+    return [...this.owners.keys()].filter((axis) => this.owners[axis] !== 0);
   }
 
   async acquire(axis: number): Promise<void> {
@@ -68,12 +72,15 @@ export class Leases {
   }
 
   private ask(axis: number, action: pb.LeaseRequest.Action): Promise<pb.Envelope> {
-    return this.bench.wire.ask({ lease: { axis, action } });
+    return this.bench.wire.ask({ lease: { axis: this.leased[axis], action } });
   }
 
   private set(axis: number, owner: number, sentence = ""): void {
-    this.owners[axis] = owner;
-    for (const each of this.listeners) each(axis, sentence);
+    const leased = this.leased[axis];
+    this.owners[leased] = owner;
+    this.leased.forEach((each, sharing) => {
+      if (each === leased) for (const tell of this.listeners) tell(sharing, sharing === leased ? sentence : "");
+    });
   }
 
   private renew(): void {
