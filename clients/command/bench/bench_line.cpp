@@ -68,7 +68,9 @@ void add_watch(CommandLine& line) {
       ->type_name("NUMBER")
       ->check(not_negative())
       ->capture_default_str();
-  sub.footer("Example:\n  drivebench watch --signals speed_rad_s,i_a_a --rate 20");
+  sub.footer(
+      "Example:\n  drivebench watch --signals speed_rad_s,i_a_a --rate 20\n"
+      "In a terminal keys choose the signals; the last line tells which keys.");
 }
 
 void add_conduct(CLI::App& sub, LinkChoice& link) {

@@ -4,19 +4,26 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "clients/command/bench/bench_json.hpp"
+#include "clients/command/bench/watch_screen.hpp"
+#include "clients/command/bench/watch_text.hpp"
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/basics/signals.hpp"
 #include "clients/command/common/session/session.hpp"
-#include "clients/link/tcp/mode_name.hpp"
 
 namespace drivebench::command {
 namespace {
 
 using namespace std::chrono_literals;
+
+constexpr auto kSilence = 1000ms;  // of the bench, that is told
+constexpr auto kKeyTime = 50ms;    // until a key acts
+constexpr auto kBlockTime = 30ms;  // between two blocks, however fast the bench runs
 
 /// The default signals: those of the terminals that the machine has.
 std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
@@ -31,13 +38,6 @@ std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
   return names;
 }
 
-std::string value_text(const Signal& signal, const Sample& sample, const v1::BenchDescription& bench) {
-  if (signal.name == "state") return name_of_state(sample.state);
-  if (signal.name == "faults") return fault_names(bench, sample.faults);
-  if (signal.name == "injected") return injected_names(bench, sample.injected);
-  return shown_value(signal, sample);
-}
-
 /// `i_a_a [A]`; a plain number has no unit.
 std::string heading(const Signal& signal) {
   const bool plain_number = signal.unit == "1" || signal.unit == "enum" || signal.unit == "bits";
@@ -45,7 +45,7 @@ std::string heading(const Signal& signal) {
 }
 
 /// Shows samples one after the other: as lines of text or of JSON, or in a terminal as a block that is drawn
-/// again and again.
+/// again and again and that obeys keys.
 class View {
  public:
   enum class Form { kLines, kJson, kBlock };
@@ -54,23 +54,30 @@ class View {
       : form_(form),
         bench_(bench),
         axis_(axis),
-        signals_(signals_named(options.signals.empty() ? usual_signals(description()) : options.signals)),
+        screen_(bench, axis,
+                signals_named(options.signals.empty() ? usual_signals(bench.axes(static_cast<int>(axis)))
+                                                      : options.signals),
+                speaks_utf8()),
         has_time_(options.signals.empty()) {
-    if (form_ == Form::kLines) fmt::print(stderr, "watch: {}\n", title());
+    if (form_ == Form::kLines) fmt::print(stderr, "watch: {}\n", watch_title(bench_, axis_));
+    if (form_ == Form::kBlock) keyboard_.emplace();
   }
 
-  const std::vector<const Signal*>& signals() const noexcept { return signals_; }
+  const std::vector<const Signal*>& signals() const noexcept { return screen_.signals(); }
+  bool has_keys() const noexcept { return keyboard_ && keyboard_->is_there(); }
 
   void show(const Sample& sample, std::uint64_t dropped) {
     switch (form_) {
       case Form::kJson:
-        fmt::print("{}\n", sample_json(sample, bench_, axis_, dropped, signals_));
+        fmt::print("{}\n", sample_json(sample, bench_, axis_, dropped, signals()));
         break;
       case Form::kLines:
         show_line(sample);
         break;
       case Form::kBlock:
-        show_block(sample);
+        screen_.take(sample);
+        has_news_ = true;
+        if (std::chrono::steady_clock::now() >= next_draw_) draw_news();
         break;
     }
     if (form_ != Form::kJson && dropped != 0) note(fmt::format("too slow, {} samples lost", dropped));
@@ -78,33 +85,44 @@ class View {
     is_started_ = true;
   }
 
+  /// Draws the newest sample if it was too soon for it before.
+  void draw_news() {
+    if (has_news_) draw();
+  }
+
   /// A word about the samples, for people; in a block it stands until the next sample.
   void note(const std::string& text) {
     if (form_ == Form::kBlock) {
-      fmt::print("\x1b[1A{}\x1b[K\n", text);
-      std::fflush(stdout);
+      screen_.note(text);
+      draw();
     } else {
       fmt::print(stderr, "watch: {}\n", text);
     }
   }
 
- private:
-  const v1::AxisDescription& description() const { return bench_.axes(static_cast<int>(axis_)); }
-  std::string title() const {
-    return fmt::format("axis {} ({}) of bench {}, {}", axis_, description().name(), bench_.name(),
-                       link::name_of(bench_.mode()));
-  }
-  std::string time_text(const Sample& sample) const {
-    return fmt::format("{:.6f}", static_cast<double>(sample.tick) * bench_.period_s());
+  /// What the keys did since the last call.
+  struct Pressed {
+    bool ends = false;
+    bool has_other_signals = false;
+  };
+  Pressed obey_keys() {
+    Pressed pressed;
+    if (!has_keys()) return pressed;
+    const std::vector<Key> keys = keyboard_->read();
+    for (const Key key : keys) {
+      pressed.ends = pressed.ends || key == Key::kQuit;
+      pressed.has_other_signals = screen_.press(key) || pressed.has_other_signals;
+    }
+    if (!keys.empty()) draw();
+    return pressed;
   }
 
-  void show_block(const Sample& sample) const {
-    if (is_started_) fmt::print("\x1b[{}A", signals_.size() + 2);
-    fmt::print("{}: tick {}, {} s\x1b[K\n", title(), sample.tick, time_text(sample));
-    for (const Signal* signal : signals_) {
-      fmt::print("{:<24}{:>16}\x1b[K\n", heading(*signal), value_text(*signal, sample, bench_));
-    }
-    fmt::print("\x1b[K\n");  // the place of a note
+ private:
+  void draw() {
+    has_news_ = false;
+    next_draw_ = std::chrono::steady_clock::now() + kBlockTime;
+    fmt::print("{}", screen_.draw(terminal_size(), has_keys()));
+    std::fflush(stdout);
   }
 
   void show_line(const Sample& sample) const {
@@ -114,9 +132,10 @@ class View {
       heads += fmt::format("  {:>12}", head);
       values += fmt::format("  {:>{}}", value, std::max<std::size_t>(head.size(), 12));
     };
-    for (const Signal* signal : signals_) {
-      add(heading(*signal), value_text(*signal, sample, bench_));
-      if (has_time_ && signal->name == "tick") add("time_s", time_text(sample));
+    for (const Signal* signal : signals()) {
+      add(heading(*signal), watched_text(*signal, sample, bench_));
+      if (has_time_ && signal->name == "tick")
+        add("time_s", fmt::format("{:.6f}", static_cast<double>(sample.tick) * bench_.period_s()));
     }
     if (!is_started_) fmt::print("{}\n", heads);
     fmt::print("{}\n", values);
@@ -125,9 +144,12 @@ class View {
   Form form_;
   const v1::BenchDescription& bench_;
   std::uint32_t axis_;
-  std::vector<const Signal*> signals_;
-  bool has_time_;  // the signals are the usual ones, so that a column of time fits
+  WatchScreen screen_;
+  std::optional<Keyboard> keyboard_{};  // of a block
+  bool has_time_;                       // the signals are the usual ones, so that a column of time fits
   bool is_started_ = false;
+  bool has_news_ = false;  // a sample that the block does not show yet
+  std::chrono::steady_clock::time_point next_draw_{};
 };
 
 /// The signals of the view and the tick, each once.
@@ -153,13 +175,6 @@ bool is_driven(const v1::Status& status) {
 
 }  // namespace
 
-std::string shown_value(const Signal& signal, const Sample& sample) {
-  if (signal.type != SignalType::kReal) return fmt::format("{:.0f}", value_of(signal, sample));
-  const double value = sample.*signal.as_real;
-  const double usual = std::max(std::abs(signal.minimum), std::abs(signal.maximum));
-  return fmt::format("{:.6g}", std::abs(value) < 1e-11 * usual ? 0.0 : value);
-}
-
 int run_watch(const WatchOptions& options) {
   signals_named(options.signals);  // reports a wrong name before it looks for a bench
   link::Link bench_link = open_link(options.link, "watch");
@@ -173,29 +188,42 @@ int run_watch(const WatchOptions& options) {
                           : View::Form::kLines,
             bench, axis, options);
   // Subscribed first, so that no sample is lost between the present one and those that follow.
-  bench_link.subscribe(axis, static_cast<std::uint32_t>(ticks), names_of(view.signals()));
+  const auto subscribe = [&] {
+    bench_link.subscribe(axis, static_cast<std::uint32_t>(ticks), names_of(view.signals()));
+  };
+  subscribe();
   const v1::Status& status = bench_link.status();
   const Sample present = plain(status.axes(static_cast<int>(axis)).sample());
   view.show(present, 0);
   if (options.count == 1) return kExitOk;
   // Reports a lockstep without a controller at once, any other silence after a second.
-  auto patience = bench.mode() == v1::MODE_LOCKSTEP && !is_driven(status) ? 0ms : 1000ms;
+  auto patience = bench.mode() == v1::MODE_LOCKSTEP && !is_driven(status) ? 0ms : kSilence;
+  auto heard = std::chrono::steady_clock::now();
   bool is_silent = false;
   for (std::uint64_t shown = 1; !interrupted();) {
-    const std::optional<v1::Samples> samples = bench_link.next_samples(patience);
-    patience = 1000ms;
+    const View::Pressed pressed = view.obey_keys();
+    if (pressed.ends) return kExitOk;
+    if (pressed.has_other_signals) subscribe();
+    const std::optional<v1::Samples> samples =
+        bench_link.next_samples(view.has_keys() ? std::min(patience, kKeyTime) : patience);
     if (!samples) {
-      if (!is_silent && !interrupted()) view.note(silence_text(bench.mode()));
-      is_silent = true;
+      view.draw_news();
+      const bool is_over = std::chrono::steady_clock::now() - heard >= patience;
+      if (is_over && !is_silent && !interrupted()) view.note(silence_text(bench.mode()));
+      is_silent = is_silent || is_over;
       continue;
     }
+    patience = kSilence;
+    heard = std::chrono::steady_clock::now();
     is_silent = false;
     std::uint64_t dropped = samples->dropped();
     for (const v1::Sample& sample : samples->samples()) {
       if (sample.tick() <= present.tick) continue;
       view.show(plain(sample), dropped);
       dropped = 0;
-      if (++shown == options.count) return kExitOk;
+      if (++shown != options.count) continue;
+      view.draw_news();
+      return kExitOk;
     }
   }
   return kExitOk;

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "clients/command/common/session/link_choice.hpp"
-#include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::command {
 
@@ -18,8 +17,5 @@ struct WatchOptions {
   std::uint64_t count = 0;             ///< 0: until interrupted
 };
 int run_watch(const WatchOptions& options);
-
-/// A value with six digits. A magnitude far below the usual range of the signal shows as 0.
-std::string shown_value(const Signal& signal, const Sample& sample);
 
 }  // namespace drivebench::command

@@ -3,11 +3,13 @@
 import json
 import os
 import pathlib
+import re
 import select
 import signal
 import socket
 import subprocess
 import sys
+import termios
 import threading
 import time
 import unittest
@@ -237,10 +239,48 @@ class Observing(CommandTest):
                 break
         lines = drawn.decode().replace("\r", "").split("\n")
         self.assertSays(lines[0], "axis 0 (servo) of bench servo, lockstep: tick 0, 0.000000 s")
-        self.assertEqual([lines[1].split()[:2], lines[2].split()[:3]], [["state", "idle\x1b[K"], ["i_a_a", "[A]", "0\x1b[K"]])
-        self.assertSays(lines[4], "\x1b[1A", self.STILL)
-        self.assertSays(lines[5], "\x1b[4A", "tick 1000, 0.125000 s")
+        self.assertEqual([lines[1].split()[:2], lines[2].split()[:3]], [["state", "idle\x1b[K"], ["i_a_a", "0", "A\x1b[K"]])
+        self.assertSays(lines[4], "\x1b[4A", "tick 0, 0.000000 s")  # again, with the note below, which needs two lines
+        self.assertSays(lines[7], self.STILL)
+        self.assertSays(lines[9], "\x1b[5A", "tick 1000, 0.125000 s")
+        self.assertEqual(lines[-1], "\x1b[J")  # the second line of the note is gone
         self.assertEqual(watching.stderr.read(), "")
+
+    def test_keys_choose_the_signals_that_watch_shows(self):
+        """Catches: keys that the terminal echoes or that act at the end of a line alone, a signal that is chosen and gets no samples, a
+        terminal that stays without echo, curves that do not come."""
+        ours, theirs = os.openpty()
+        self.addCleanup(os.close, ours)
+        termios.tcsetwinsize(theirs, (20, 100))
+        before = termios.tcgetattr(theirs)
+        with self.server("--mode", "free") as server:
+            watching = subprocess.Popen([DRIVEBENCH, "watch", "--signals", "state,i_a_a", "--rate", "50"], stdin=theirs, stdout=theirs,
+                                        stderr=subprocess.PIPE, cwd=self.folder, env={**environment(link_of(server)), "LC_ALL": "C.UTF-8"})
+            self.addCleanup(watching.communicate)
+            self.addCleanup(watching.kill)
+            drawn = [b""]
+
+            def shows(pattern, keys=b""):
+                drawn[0] = b""
+                os.write(ours, keys)
+                end = time.monotonic() + PATIENCE_S
+                while not re.search(pattern, drawn[0].decode(errors="replace")):
+                    left = max(end - time.monotonic(), 0.0)
+                    self.assertTrue(select.select([ours], [], [], left)[0] and left, f"no {pattern} in {drawn[0]}")
+                    drawn[0] = (drawn[0] + os.read(ours, 4096))[-20_000:]
+
+            shows(r"> state .*\x1b\[K\r?\n  i_a_a +0 A  ▁▁▁▁")
+            self.assertEqual(termios.tcgetattr(theirs)[3] & (termios.ECHO | termios.ICANON), 0)
+            shows(r"> \[ \] tick ", b"\t")  # the list of all signals
+            shows(r"> \[ \] command_tick ", b"\x1b[B")
+            shows(r"> \[x\] command_tick ", b" ")
+            shows(r"  i_a_a .*\n  command_tick +-1  ▁", b"\t")
+            shows(r"  i_a_a .*\n> command_tick ", b"\x1b[B\x1b[B")
+            shows(r"> i_a_a .*\n[^>]*up, down", b" ")  # it is left out
+            os.write(ours, b"q")
+            self.assertEqual(watching.wait(PATIENCE_S), OK)
+        self.assertEqual(termios.tcgetattr(theirs), before)
+        os.close(theirs)
 
     def test_watch_prints_the_requested_number_of_samples_at_the_rate_of_the_bench(self):
         """Catches: a rate in wall time, which in lockstep means nothing; a --count that is one off."""

@@ -1,4 +1,4 @@
-#include "clients/command/bench/watch.hpp"
+#include "clients/command/bench/watch_text.hpp"
 
 #include <gtest/gtest.h>
 

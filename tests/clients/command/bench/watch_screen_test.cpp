@@ -1,0 +1,114 @@
+#include "clients/command/bench/watch_screen.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "clients/command/bench/watch_text.hpp"
+
+namespace drivebench::command {
+namespace {
+
+std::string with_unit(std::string_view name, const Sample& sample, bool utf8 = true) {
+  return value_with_unit(*find_signal(name), sample, utf8);
+}
+
+// Catches: a prefix of the neighbour decade, four digits and a half where rounding makes the next prefix,
+// prefixes of radians, a unit for words, noise of a model at rest in nanoamperes.
+TEST(Watch, ShowsAValueWithItsUnitAndAPrefix) {
+  EXPECT_EQ(with_unit("i_a_a", {.i_a_a = -0.00123456}), "-1.2346 mA");
+  EXPECT_EQ(with_unit("i_a_a", {.i_a_a = 0.99999999}), "1 A");
+  EXPECT_EQ(with_unit("i_a_a", {.i_a_a = 4.5e-5}), "45 µA");
+  EXPECT_EQ(with_unit("i_a_a", {.i_a_a = 4.5e-5}, false), "45 uA");
+  EXPECT_EQ(with_unit("u_a_v", {.u_a_v = 12345.6}), "12.346 kV");
+  EXPECT_EQ(with_unit("u_a_v", {}), "0 V");
+  EXPECT_EQ(with_unit("i_a_a", {.i_a_a = -2.2e-16}), "0 A");
+  EXPECT_EQ(with_unit("speed_rad_s", {.speed_rad_s = 1234.5}), "1234.5 rad/s");
+  EXPECT_EQ(with_unit("encoder_count", {.encoder_count = -12345}), "-12345 counts");
+  EXPECT_EQ(with_unit("faults", {.faults = 512}), "512");
+}
+
+// Catches: a curve upside down, one that shows the oldest values, a flat one at the top, division by a range
+// of 0.
+TEST(Watch, DrawsTheNewestValuesFromTheLeastToTheGreatest) {
+  const std::array<double, 5> rising = {100.0, 0.0, 1.0, 2.0, 8.0};
+  EXPECT_EQ(sparkline(rising, 4, false), "_.:#");
+  EXPECT_EQ(sparkline(rising, 4, true), "▁▂▃█");
+  EXPECT_EQ(sparkline(std::array<double, 3>{5.0, 5.0, 5.0}, 8, false), "___");
+  EXPECT_EQ(sparkline(std::array<double, 1>{5.0}, 8, false), "");
+  EXPECT_EQ(sparkline(rising, 0, false), "");
+}
+
+// Catches: a sequence that two reads split, letters of an unknown sequence that act as keys.
+TEST(Watch, TakesKeysAlsoFromPiecesOfSequences) {
+  std::string bytes = "\x1b";
+  EXPECT_TRUE(take_keys(bytes).empty());
+  bytes += "[";
+  EXPECT_TRUE(take_keys(bytes).empty());
+  bytes += "A\x1b[B \tq\x1b[1;5qz";
+  EXPECT_EQ(take_keys(bytes), (std::vector<Key>{Key::kUp, Key::kDown, Key::kToggle, Key::kList, Key::kQuit}));
+  EXPECT_TRUE(bytes.empty());
+}
+
+v1::BenchDescription bench() {
+  v1::BenchDescription description;
+  description.set_name("b");
+  description.set_mode(v1::MODE_FREE);
+  description.set_period_s(0.001);
+  description.add_axes()->set_name("x");
+  return description;
+}
+
+std::size_t lines_of(const std::string& block) {
+  return static_cast<std::size_t>(std::ranges::count(block, '\n'));
+}
+
+// Catches: a mark that leaves the list, a signal that comes twice, a curve that goes on from another time,
+// lines of the longer block that stay.
+TEST(Watch, KeysChooseTheSignals) {
+  const v1::BenchDescription description = bench();
+  WatchScreen screen(description, 0, {find_signal("i_a_a"), find_signal("u_a_v")}, false);
+  screen.take({.tick = 1, .i_a_a = 1.0});
+  screen.take({.tick = 2, .i_a_a = 2.0});
+  const std::string first = screen.draw({}, true);
+  EXPECT_NE(first.find("> i_a_a" + std::string(34, ' ') + "2 A  _#"), std::string::npos) << first;
+  EXPECT_EQ(lines_of(first), 4U);
+  EXPECT_FALSE(screen.press(Key::kUp));
+  EXPECT_TRUE(screen.press(Key::kToggle));
+  const std::string second = screen.draw({}, true);
+  EXPECT_TRUE(second.starts_with("\x1b[4A")) << second;
+  EXPECT_TRUE(second.ends_with("\x1b[J")) << second;
+  EXPECT_EQ(screen.signals(), (std::vector<const Signal*>{find_signal("u_a_v")}));
+  EXPECT_FALSE(screen.press(Key::kList));
+  for (std::size_t i = 0; i < 2 * kSignals.size(); ++i)
+    EXPECT_FALSE(screen.press(Key::kDown));
+  EXPECT_TRUE(screen.press(Key::kToggle));  // the last one
+  EXPECT_EQ(screen.signals(), (std::vector<const Signal*>{find_signal("u_a_v"), &kSignals.back()}));
+  const std::string list = screen.draw({.columns = 30, .rows = 10}, true);
+  EXPECT_EQ(lines_of(list), 9U);  // it leaves the last line of the terminal free
+  EXPECT_NE(list.find("> [x] " + std::string(kSignals.back().name)), std::string::npos) << list;
+}
+
+// Catches: a block higher than the terminal, which creeps, and a curve that breaks the line.
+TEST(Watch, TheBlockFitsIntoTheTerminal) {
+  const v1::BenchDescription description = bench();
+  std::vector<const Signal*> all;
+  for (const Signal& each : kSignals)
+    all.push_back(&each);
+  WatchScreen screen(description, 0, all, false);
+  for (std::uint64_t tick = 0; tick < 500; ++tick)
+    screen.take({.tick = tick, .u_a_v = static_cast<double>(tick)});
+  const std::string block = screen.draw({.columns = 60, .rows = 12}, true);
+  EXPECT_EQ(lines_of(block), 11U);
+  std::size_t begin = block.find('\n') + 1;
+  for (std::size_t end = block.find("\x1b[K\n", begin); end != std::string::npos;
+       end = block.find("\x1b[K\n", begin)) {
+    EXPECT_LE(end - begin, 60U) << block.substr(begin, end - begin);
+    begin = end + 4;
+  }
+}
+
+}  // namespace
+}  // namespace drivebench::command
