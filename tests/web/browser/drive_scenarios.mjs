@@ -1,5 +1,5 @@
 /** Scenarios of an operator who drives an axis open loop. */
-export function driveScenarios({ axeFinds, enter, outside, press, set, stateOf, text, until }) {
+export function driveScenarios({ axeFinds, enter, outside, pictureOf, press, set, stateOf, text, until }) {
   const answer = (page, pattern) => text(page, "#drive .answer", pattern);
   const now = (page, pattern) => text(page, "#drive .value", pattern);
   const tickOf = async (page) => Number(await stateOf(page, "tick", /^\d+$/));
@@ -105,6 +105,16 @@ export function driveScenarios({ axeFinds, enter, outside, press, set, stateOf, 
       await page.evaluate(() => [...document.querySelectorAll("#knobs details")][1].querySelector("button").click());
       const taken = await until(controllers, /this page,this page/);
       return { answers, driven, held, taken };
+    },
+
+    /** A picture of the state and of the drive while the motor turns. */
+    async drivePicture(page, theme, path) {
+      await fill(page, { ...kStart, "amplitude at the target, V": "12", "boost: amplitude at standstill, V": "4", "ramp, s": "2" });
+      await press(page, "drive servo");
+      await now(page, /^20\.00 Hz/);
+      await stateOf(page, "speed", /^4[012]\.\d* rad/);
+      await pictureOf(page, theme, path, "#state", "#drive");
+      return {};
     },
 
     /** For axe-core: while the page drives, with each wave and unit once. */

@@ -1,5 +1,5 @@
 /** Scenarios with experiments and with what is played. */
-export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, outside, press, set, stateOf, text, until }) {
+export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pictureOf, press, set, stateOf, text, until }) {
   const answer = (page, pattern) => text(page, "#experiments .answer", pattern);
   const facts = (page) => page.$$eval("#player dt", (all) => Object.fromEntries(all.map((each) => [each.textContent, each.nextElementSibling.textContent])));
 
@@ -140,6 +140,22 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, outs
       const chips = await page.$$eval("#player .chip", (all) => all.map((each) => each.textContent));
       const row = JSON.parse(await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"[1-9]/));
       return { opened, title, chips, row, time: await position(page), refused: await open(bad), still: await text(page, "#player h2") };
+    },
+
+    /** A picture of the form and of a recording that is played. */
+    async experimentPicture(page, theme, path) {
+      await stateOf(page, "tick", /\d/);
+      await queue(page, { ...kSpin, "amplitude, V (shape 1)": "20" });
+      await answer(page, /completed/);
+      await press(page, "Play recording experiment 1");
+      await text(page, "#player h2", /recording/);
+      await answer(page, /completed/);
+      await page.$eval('[aria-label="tick of the player"]', (field) => {
+        field.value = "1600";
+        field.dispatchEvent(new Event("input"));
+      });
+      await pictureOf(page, theme, path, "#experiments", "#player");
+      return {};
     },
 
     /** A bench that keeps no experiments. */

@@ -108,9 +108,21 @@ async function axeFinds(page) {
   return { found };
 }
 
+/** A picture of the part of the page from one section to another, in a theme. */
+async function pictureOf(page, theme, path, first, last) {
+  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
+  await new Promise((done) => setTimeout(done, 1000));
+  const clip = await page.evaluate((from, to) => {
+    scrollTo(0, 0); // the head stays above the picture
+    const [begin, end] = [from, to].map((each) => document.querySelector(each).getBoundingClientRect());
+    return { x: begin.left - 8, y: begin.top - 8, width: Math.max(begin.width, end.width) + 16, height: end.bottom - begin.top + 16 };
+  }, first, last);
+  await page.screenshot({ path, clip, captureBeyondViewport: true });
+}
+
 const scenarios = {
-  ...driveScenarios({ axeFinds, enter, outside, press, set, stateOf, text, until }),
-  ...experimentScenarios({ axeFinds, catchFiles, enter, isShown, outside, press, set, stateOf, text, until }),
+  ...driveScenarios({ axeFinds, enter, outside, pictureOf, press, set, stateOf, text, until }),
+  ...experimentScenarios({ axeFinds, catchFiles, enter, isShown, pictureOf, press, set, stateOf, text, until }),
 
   /** A user opens the page and looks. */
   async look(page) {

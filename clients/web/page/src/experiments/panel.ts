@@ -127,17 +127,18 @@ export class ExperimentsPanel {
   private rows(fetched: Fetched): Played {
     const recorded = recordedRows(this.bench.description, fetched.info, fetched.bytes);
     const name = `experiment-${fetched.info.id}.csv`;
-    return { title: titleOf(fetched.info, "data"), recorded, facts: this.factsOf(fetched.info),
+    return { title: titleOf(fetched.info, "data"), recorded, facts: this.factsOf(fetched.info, "play its recording, save it"),
       file: { name, type: "text/csv", content: () => csvOfRows(recorded.histories[0], recorded.description.signals, fetched.info.signals, recorded.description.period_s as number) } };
   }
 
   private recording(fetched: Fetched): Played {
     const name = `experiment-${fetched.info.id}.mcap`;
-    return { title: titleOf(fetched.info, "recording"), recorded: recordedFile(this.bench.description, fetched.bytes), facts: this.factsOf(fetched.info),
+    return { title: titleOf(fetched.info, "recording"), recorded: recordedFile(this.bench.description, fetched.bytes), facts: this.factsOf(fetched.info, "save it"),
       file: { name, type: "application/octet-stream", content: () => fetched.bytes } };
   }
 
-  private factsOf(info: pb.ExperimentInfo): [string, string][] {
+  /** `first`: what its user does before the motor is identified. */
+  private factsOf(info: pb.ExperimentInfo, first: string): [string, string][] {
     const axis = this.bench.description.axes[info.axis as number];
     const period = info.period_s as number;
     const command = identification(axis, `experiment-${info.id}.mcap`);
@@ -148,7 +149,7 @@ export class ExperimentsPanel {
       ["data", `${info.rows} rows of ${info.signals.length} signals, one every ${withUnit((info.decimation as number) * period, "s")}`],
       ["verdict", info.verdict?.sentence as string ?? ""],
       ["state hash", ((info.verdict?.state_hash ?? 0) as number | bigint).toString(16).padStart(16, "0")],
-      ...(command === "" ? [] : [["identify", `play its recording, save it, then ${command}`] as [string, string]]),
+      ...(command === "" ? [] : [["identify", `${first}, then ${command}`] as [string, string]]),
     ];
   }
 
