@@ -1,6 +1,7 @@
 # Builds the page of `drivebench web` from a copy of its sources, so that the checkout stays clean: packages as
 # package-lock.json has them, messages from bench.proto, checked types, one script. Without a network there is no page, and
 # the rest of the build goes on; the next build tries again.
+file(REMOVE_RECURSE ${BUILD}/src)
 file(COPY ${SOURCE}/ DESTINATION ${BUILD} PATTERN node_modules EXCLUDE)
 if(NOT EXISTS ${BUILD}/node_modules/.package-lock.json OR ${BUILD}/package-lock.json IS_NEWER_THAN ${BUILD}/installed)
   execute_process(COMMAND ${NPM} ci --no-audit --no-fund --ignore-scripts --loglevel=error
