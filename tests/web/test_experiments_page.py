@@ -17,8 +17,8 @@ class ExperimentsPage(PageTest):
         self.addCleanup(folder.cleanup)
         return folder.name
 
-    def bench(self):
-        return self.serve("--mode", "lockstep", "--experiments", self.kept())
+    def bench(self, name="servo"):
+        return self.serve("--mode", "lockstep", "--experiments", self.kept(), config=BENCHES / f"{name}.toml")
 
     def test_an_experiment_runs_and_its_data_are_shown(self):
         """Catches: a number that the page sends although it is none, a refusal that it swallows, data of other signals or ticks than
@@ -57,6 +57,14 @@ class ExperimentsPage(PageTest):
         self.assertLess(float(shown["stood"].split()[0]), 0.5)
         self.assertRegex(shown["newestSpeed"], r"^41\.\d+ rad/s")
         self.assertFalse(shown["shown"])
+
+    def test_a_recording_of_two_axes_begins_with_that_of_the_experiment(self):
+        """Catches: a recording that shows the signals of the other axis first, a command that identifies the other motor."""
+        shown = self.play("second", self.gateway(self.bench("dynamometer")).url)
+        self.assertEqual(shown["data"], ["speed_rad_s×", "i_a_a×", "u_a_v×"])
+        self.assertEqual(shown["recording"], ["load.speed_rad_s×", "load.i_a_a×", "load.u_a_v×"])
+        self.assertEqual(shown["trains"], 2)
+        self.assertEqual(shown["identify"], "save it, then drivebench identify --motor dc --from experiment-1.mcap --axis load")
 
     def test_an_experiment_is_given_up(self):
         """Catches: a list without progress, a cancel that does not reach the bench."""

@@ -105,6 +105,19 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
       return { title, atEnd, start, atStart, empty, next, playing, angles: angles.size, stood, stands, over, newestSpeed, shown: await isShown(page, "#player") };
     },
 
+    /** An experiment of the second axis: its recording has both. */
+    async second(page) {
+      await stateOf(page, "tick", /\d/);
+      await set(page, "axis of the experiment", "1");
+      await queue(page, { "length of the experiment, s": "0.1" });
+      await answer(page, /completed/);
+      const data = await page.$$eval("#player .chip", (all) => all.map((each) => each.textContent));
+      await press(page, "Play recording experiment 1");
+      await text(page, "#player h2", /recording/);
+      const recording = await page.$$eval("#player .chip", (all) => all.map((each) => each.textContent));
+      return { data, recording, trains: (await page.$$("#player .train")).length, identify: (await facts(page)).identify };
+    },
+
     /** A long experiment is given up. */
     async cancelled(page) {
       await stateOf(page, "tick", /\d/);

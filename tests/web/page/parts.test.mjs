@@ -316,8 +316,10 @@ test("an experiment asks for what its form says", () => {
   }
   assert.deepEqual(eventOf("load", 1, 2, 3), { at_s: 1, ramp_s: 3, load_nm: 2 });
   assert.deepEqual(eventOf("fault:open_phase", 1, 2, 0), { at_s: 1, ramp_s: 0, fault: { name: "open_phase", value: 2 } });
-  assert.equal(identification({ machine_kind: "pm_synchronous" }, "e.mcap"), "drivebench identify --motor pm --from e.mcap");
-  assert.equal(identification({ machine_kind: "shunt_dc" }, "e.mcap"), "");
+  const machines = [{ name: "x", machine_kind: "shunt_dc" }, { name: "y", machine_kind: "pm_synchronous" }];
+  assert.equal(identification(machines.slice(1), 0, "e.mcap"), "drivebench identify --motor pm --from e.mcap");
+  assert.equal(identification(machines, 1, "e.mcap"), "drivebench identify --motor pm --from e.mcap --axis y");
+  assert.equal(identification(machines, 0, "e.mcap"), "");
 });
 
 // Catches: a logarithm of 0 that leaves the picture, a range that cuts the largest value or is empty, an axis that begins at 0.

@@ -41,7 +41,7 @@ export class Scope {
 
   /** `subscribe` is called when other signals are needed. */
   constructor(root: HTMLElement, private readonly source: Source, panes: string[][], private readonly subscribe: () => void,
-    private readonly played?: { lengthS: number; togglePause(): void }) {
+    private readonly played?: { lengthS: number; axis: number; togglePause(): void }) {
     this.bar = new TriggerBar(source, this.trigger, () => this.arm());
     this.table = new MeasurementTable(source);
     const windows = kWindows_s.filter((each) => played === undefined || each < played.lengthS)
@@ -55,7 +55,7 @@ export class Scope {
     root.replaceChildren(element("div", { class: "bar" }, "Window", this.time, ...(played === undefined ? [this.pauseButton] : []),
       button("Add pane", () => this.addPane([])), button("CSV", () => this.exportCsv()), button("SVG", () => this.exportSvg()),
       this.note), ...(played === undefined ? [this.bar.root] : []), this.place, this.table.root);
-    for (const signals of panes) this.addPane(signals);
+    for (const signals of panes) this.addPane(signals, played?.axis);
     this.place.addEventListener("keydown", (event) => this.key(event));
     this.frame();
   }
@@ -99,8 +99,8 @@ export class Scope {
     return Math.max(this.windowS / this.periodS, 2);
   }
 
-  private addPane(signals: string[]): void {
-    const pane = new Pane(this.source, signals.map((signal) => ({ axis: 0, signal })), {
+  private addPane(signals: string[], axis = 0): void {
+    const pane = new Pane(this.source, signals.map((signal) => ({ axis, signal })), {
       changed: () => this.channelsChanged(),
       removed: (gone) => {
         this.panes.splice(this.panes.indexOf(gone), 1);

@@ -127,13 +127,16 @@ export class ExperimentsPanel {
   private rows(fetched: Fetched): Played {
     const recorded = recordedRows(this.bench.description, fetched.info, fetched.bytes);
     const name = `experiment-${fetched.info.id}.csv`;
-    return { title: titleOf(fetched.info, "data"), recorded, facts: this.factsOf(fetched.info, "play its recording, save it"),
+    return { title: titleOf(fetched.info, "data"), recorded, axis: 0, facts: this.factsOf(fetched.info, "play its recording, save it"),
       file: { name, type: "text/csv", content: () => csvOfRows(recorded.histories[0], recorded.description.signals, fetched.info.signals, recorded.description.period_s as number) } };
   }
 
   private recording(fetched: Fetched): Played {
     const name = `experiment-${fetched.info.id}.mcap`;
-    return { title: titleOf(fetched.info, "recording"), recorded: recordedFile(this.bench.description, fetched.bytes), facts: this.factsOf(fetched.info, "save it"),
+    const recorded = recordedFile(this.bench.description, fetched.bytes);
+    const own = this.bench.description.axes[fetched.info.axis as number].name;
+    const axis = recorded.description.axes.findIndex((each) => each.name === own);
+    return { title: titleOf(fetched.info, "recording"), recorded, axis: Math.max(axis, 0), facts: this.factsOf(fetched.info, "save it"),
       file: { name, type: "application/octet-stream", content: () => fetched.bytes } };
   }
 
@@ -141,7 +144,7 @@ export class ExperimentsPanel {
   private factsOf(info: pb.ExperimentInfo, first: string): [string, string][] {
     const axis = this.bench.description.axes[info.axis as number];
     const period = info.period_s as number;
-    const command = identification(axis, `experiment-${info.id}.mcap`);
+    const command = identification(this.bench.description.axes, info.axis as number, `experiment-${info.id}.mcap`);
     return [
       ["state", `${kStateNames[info.state]}${info.reason ? `: ${info.reason}` : ""}`],
       ["axis", axis.name as string],
@@ -160,7 +163,7 @@ export class ExperimentsPanel {
     try {
       if (file.size > kMostBytes) throw new Error(`the page plays recordings of at most ${kMostBytes >> 20} MiB, and this one has ${Math.ceil(file.size / 2 ** 20)}`);
       const bytes = new Uint8Array(await file.arrayBuffer());
-      this.player.open({ title: `Recording ${file.name}`, recorded: recordedFile(this.bench.description, bytes), facts: [],
+      this.player.open({ title: `Recording ${file.name}`, recorded: recordedFile(this.bench.description, bytes), axis: 0, facts: [],
         file: { name: file.name, type: "application/octet-stream", content: () => bytes } });
       this.tell(`${file.name} is open`);
     } catch (problem) {

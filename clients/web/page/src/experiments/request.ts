@@ -76,7 +76,8 @@ export function eventOf(what: string, atS: number, value: number, rampS: number)
 }
 
 /** How the program identifies the motor from the recording, which has all that it must know; empty: it knows no such machine. */
-export function identification(axis: pb.IAxisDescription, file: string): string {
+export function identification(axes: pb.IAxisDescription[], number: number, file: string): string {
+  const axis = axes[number];
   const motor = ({ induction: "im", pm_synchronous: "pm", pm_dc: "dc", bldc: "bldc" } as Record<string, string>)[axis.machine_kind as string];
-  return motor === undefined ? "" : `drivebench identify --motor ${motor} --from ${file}`;
+  return motor === undefined ? "" : `drivebench identify --motor ${motor} --from ${file}${axes.length > 1 ? ` --axis ${axis.name}` : ""}`;
 }

@@ -15,6 +15,8 @@ const kMostPanes = 6;
 export interface Played {
   title: string;
   recorded: Recorded;
+  /** The axis whose signals it shows first. */
+  axis: number;
   /** What is told beside the samples. */
   facts: [string, string][];
   /** The file that Save offers. */
@@ -38,7 +40,7 @@ class Player {
   private drawnMs = 0;
 
   constructor(private readonly root: HTMLElement, private readonly played: Played, closed: () => void) {
-    const { title, recorded, facts, file } = played;
+    const { title, recorded, axis, facts, file } = played;
     const { histories, description } = recorded;
     this.periodS = description.period_s as number;
     this.firstTick = recorded.firstTick;
@@ -61,8 +63,8 @@ class Player {
     root.hidden = false;
     let scope: Scope | null = null; // its panes ask for their signals while it is being made
     const subscribe = () => scope !== null && histories.forEach((track, axis) => track.choose([...(scope as Scope).signalsOf(axis)]));
-    scope = new Scope(place, recorded, panesOf(recorded), subscribe,
-      { lengthS: Math.max((this.endTick - this.firstTick) * this.periodS, 2 * recorded.sampleS), togglePause: () => this.toggle() });
+    scope = new Scope(place, recorded, panesOf(recorded, axis), subscribe,
+      { lengthS: Math.max((this.endTick - this.firstTick) * this.periodS, 2 * recorded.sampleS), axis, togglePause: () => this.toggle() });
     this.scope = scope;
     subscribe();
     this.seek(this.endTick);
@@ -144,11 +146,11 @@ export class PlayerPlace {
   }
 }
 
-/** The usual signals of the first axis where they were recorded; else a pane for each unit. */
-function panesOf({ description }: Recorded): string[][] {
+/** The usual signals of an axis where they were recorded; else a pane for each unit. */
+function panesOf({ description }: Recorded, axis: number): string[][] {
   const signals = description.signals.filter((each) => each.kind !== pb.SignalDescription.Kind.KIND_STATUS);
   const names = new Set(signals.map((each) => each.name as string));
-  const usual = usualPanes(description.axes[0]);
+  const usual = usualPanes(description.axes[axis]);
   if (usual.every((pane) => pane.every((each) => names.has(each)))) return usual;
   const panes = new Map<string, string[]>();
   for (const { name, unit } of signals) panes.set(unit as string, [...(panes.get(unit as string) ?? []), name as string]);
