@@ -101,9 +101,10 @@ class ExperimentsPage(PageTest):
         self.assertEqual(shown["still"], "Recording live.mcap")
 
     def test_a_bench_without_experiments_says_so(self):
-        """Catches: an empty list where the bench refuses, a refusal in other words than the bench's."""
+        """Catches: an empty list where the bench refuses, a refusal in other words than the bench's, a form that leads to nothing."""
         shown = self.play("none", self.gateway(self.serve("--mode", "lockstep")).url)
         self.assertIn("this bench keeps no experiments", shown["note"])
+        self.assertFalse(shown["form"])
 
     def test_axe_finds_no_serious_fault(self):
         """Catches: a field of the form without a name or out of the reach of keys."""

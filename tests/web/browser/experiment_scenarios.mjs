@@ -18,6 +18,7 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
   }, signal);
 
   async function fill(page, values) {
+    await until(() => page.$eval("#experiments details", (each) => String(!each.hidden)), /true/); // once the bench has told its list
     await page.$eval("#experiments details", (each) => { each.open = true; });
     for (const [label, value] of Object.entries(values)) await set(page, label, value);
   }
@@ -173,7 +174,7 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
 
     /** A bench that keeps no experiments. */
     async none(page) {
-      return { note: await text(page, "#experiments .table p") };
+      return { note: await text(page, "#experiments .table p"), form: await isShown(page, "#experiments details") };
     },
 
     /** The open form and the player, for axe-core and the keys. */

@@ -335,7 +335,7 @@ const scenarios = {
     const drawn = (await page.evaluate(() => window.drawn)) - before;
     const tookS = (Date.now() - start) / 1000;
     await outside("end");
-    const result = { perSecond: drawn / tookS, lost: (await lost()) - lostBefore, signals: (await page.$$(".chip")).length };
+    const result = { perSecond: drawn / tookS, lost: (await lost()) - lostBefore, signals: (await page.$$("#scope .chip")).length };
     await page.goto("about:blank");
     const floor = await page.evaluate(() => new Promise((done) => {
       let count = 0;

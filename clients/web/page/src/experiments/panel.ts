@@ -22,6 +22,8 @@ export class ExperimentsPanel {
   private readonly ended = new AbortController();
   private fetching: AbortController | null = null;
   private timer = 0;
+  /** Hidden where the bench keeps no experiments, or its user may not ask for one. */
+  private readonly form = element("details", { hidden: true }, element("summary", {}, "New experiment"));
   /** Experiments of this page whose data it shows when they end. */
   private readonly awaited = new Set<number>();
 
@@ -35,15 +37,15 @@ export class ExperimentsPanel {
     const file = element("input", { type: "file", accept: ".mcap", "aria-label": "recording to play", change: () => void this.open(file) });
     root.replaceChildren(element("h2", {}, "Experiments and recordings"),
       element("p", { class: "soft" }, "An experiment runs on a bench of its own, from rest at tick 0. It does not touch the bench above."),
-      ...(bench.mayChange ? [element("details", {}, element("summary", {}, "New experiment"),
-        new ExperimentForm(bench, (request) => void this.queue(request), (sentence) => this.tell(sentence, true)).root)] : []),
-      this.answer, this.list.root,
+      this.form, this.answer, this.list.root,
       element("div", { class: "bar" }, element("label", {}, "Play a recording of this computer ", file),
         element("form", { class: "bar", submit: (event) => {
           event.preventDefault();
           localStorage.setItem("owner", this.owner.value);
           this.ask();
         } }, "Secret", this.owner, element("button", { type: "submit", title: "drivebench experiment ... --owner SECRET, or DRIVEBENCH_OWNER" }, "Use the secret"))));
+    if (bench.mayChange)
+      this.form.append(new ExperimentForm(bench, (request) => void this.queue(request), (sentence) => this.tell(sentence, true)).root);
     root.hidden = false;
     this.ask();
   }
@@ -73,6 +75,7 @@ export class ExperimentsPanel {
       const { experiment_list: list } = await this.bench.wire.ask({ list_experiments: { owner: this.owner.value } });
       const all = (list?.experiments ?? []) as pb.ExperimentInfo[];
       this.list.show(all);
+      this.form.hidden = !this.bench.mayChange;
       const done = all.find((each) => this.awaited.has(each.id as number) && hasEnded(each.state));
       if (done !== undefined) {
         this.awaited.delete(done.id as number);
@@ -81,6 +84,7 @@ export class ExperimentsPanel {
       return all.some((each) => !hasEnded(each.state));
     } catch (problem) {
       this.list.refused((problem as Error).message);
+      this.form.hidden = true;
       return false;
     }
   }
