@@ -49,14 +49,14 @@ void check_input(const v1::Input& message) {
   require(equal(*input, unpack(pack(*input))), "an input survives a saved state");
 }
 
-/// A session's work on the commands of an exchange, and their form in a recording.
+/// The commands of an exchange, in the form of a recording.
 void check_commands(const v1::Exchange& exchange) {
   for (const v1::Command& each : exchange.commands()) {
-    const std::optional<Command> command = decode_command(each);
-    require(command.has_value() == (v1::Gates_IsValid(each.gates()) && each.legs_off() <= kAllLegs),
-            "only known gates and legs make a command");
     v1::Input recorded;
     *recorded.mutable_command() = each;
+    require(decode_input(recorded, tables()).has_value() ==
+                (v1::Gates_IsValid(each.gates()) && each.legs_off() <= kAllLegs),
+            "only known gates and legs make a command");
     check_input(recorded);
   }
 }
