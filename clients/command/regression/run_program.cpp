@@ -68,12 +68,15 @@ class RecordedServer {
         log_(fs::absolute(folder / "server.log")),
         process_(line_of(prepared, wishes),
                  {.folder = fs::absolute(folder).string(), .error_file = log_.string()}) {
-    if (!process_.await(Process::in(kServerStart), parse_ready)) {
-      throw std::runtime_error("the server did not start: " + tail_of(log_));
-    }
+    const auto ready = process_.await(Process::in(kServerStart), parse_ready);
+    if (!ready) throw std::runtime_error("the server did not start: " + tail_of(log_));
+    tcp_ = "tcp:" + ready->tcp;
   }
 
-  std::string link() const { return "unix:" + socket_.string(); }
+  std::string link(regression::DeviceUnderTest::Link way = regression::DeviceUnderTest::Link::kUnix) const {
+    if (way == regression::DeviceUnderTest::Link::kTcp) return tcp_;
+    return (way == regression::DeviceUnderTest::Link::kUnix ? "unix:" : "shm:") + socket_.string();
+  }
   /// Returns when the commands for each axis came; nothing if that was not measured.
   std::vector<AnswerTimes> end() {
     process_.terminate();
@@ -111,6 +114,7 @@ class RecordedServer {
   fs::path recording_;
   fs::path log_;
   Process process_;
+  std::string tcp_;
 };
 
 /// Asks a bench for its newest tick while the device under test drives it.
@@ -187,7 +191,8 @@ ProgramEnd run_beside_server(const PreparedCase& prepared, const fs::path& folde
   const fs::path output = folder / kOutput;
   RecordedServer server(prepared, folder, wishes);
   TickView bench(server.link());
-  Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + server.link()},
+  const std::string link = server.link(c.device.link);
+  Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + link},
                                      .folder = fs::absolute(c.file).parent_path().string(),
                                      .error_file = output.string(),
                                      .joins_output = true,
@@ -196,7 +201,7 @@ ProgramEnd run_beside_server(const PreparedCase& prepared, const fs::path& folde
       .failure = await_end(program, bench, c, prepared.facts), .answers = server.end(), .output = {}};
   if (!program.wait(Process::in(end.failure.empty() ? kFarewell : 0s))) program.terminate();
   program.wait(Process::in(kFarewell));
-  end.output = utf8(without_place(tail_of(output), server.link()));
+  end.output = utf8(without_place(tail_of(output), link));
   return end;
 }
 

@@ -23,6 +23,8 @@ struct DeviceUnderTest {
   std::string preset{};
   std::vector<std::pair<std::string, double>> gains{};
   std::vector<std::string> command{};
+  enum class Link { kUnix, kTcp, kSharedMemory };
+  Link link = Link::kUnix;  ///< of a program
   std::string axis = "0";
   double time_limit_s = 60.0;  ///< of the wall clock, for a program
 };

@@ -31,6 +31,20 @@ void flatten(const ConfigNode& table, const std::string& prefix, KeyTable& gains
   }
 }
 
+void read_link(KeyTable& table, DeviceUnderTest& device) {
+  using Link = DeviceUnderTest::Link;
+  const auto word = table.text("link");
+  if (!word) return;
+  if (device.kind != DeviceUnderTest::Kind::kProgram) table.report("link", "belongs to a command");
+  if (*word == "shm") {
+    device.link = Link::kSharedMemory;
+  } else if (*word == "tcp") {
+    device.link = Link::kTcp;
+  } else if (*word != "unix") {
+    table.report("link", "is \"" + *word + "\" but must be \"unix\", \"tcp\" or \"shm\"");
+  }
+}
+
 DeviceUnderTest read_device(KeyTable& table) {
   DeviceUnderTest device;
   device.line = table.line();
@@ -48,6 +62,7 @@ DeviceUnderTest read_device(KeyTable& table) {
     table.require("preset");
   }
   if (preset && table.has("command")) table.report("command", "cannot stand beside preset");
+  read_link(table, device);
   if (gains != nullptr && !preset) table.report("gains", "belongs to a preset");
   if (gains != nullptr) {
     if (auto inner = table.table("gains")) flatten(*gains, "", *inner, device);

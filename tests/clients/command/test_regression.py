@@ -261,6 +261,26 @@ class Programs(RegressionTest):
         case = self.verdict_of(DRIVES.format(until=10 ** 9), code=OK)
         self.assertEqual((case["verdict"], case["samples"], case["bench_s"]), ("pass", 201, 0.02))
 
+    def test_a_program_gets_the_link_that_it_asks_for(self):
+        """Catches: a word of the case that is passed over, and a run that depends on the link."""
+        self.write("device.py", DRIVES.format(until=10 ** 9).replace(
+            "import drivebench", "import drivebench\nprint(os.environ['DRIVEBENCH_LINK'].partition(':')[0], flush=True)"))
+        cases = {}
+        for link in ("unix", "tcp", "shm"):
+            self.write("case.toml", PROGRAM.format(limit_s=30).replace("[dut]", f'[dut]\nlink = "{link}"'))
+            cases[link] = self.suite()["cases"][0]
+            self.assertTrue(cases[link].pop("output").startswith(link), link)
+            self.assertEqual(cases[link]["verdict"], "pass")
+        self.assertEqual(cases["tcp"], cases["unix"])
+        self.assertEqual(cases["shm"], cases["unix"])
+        for case, why in ((PROGRAM.format(limit_s=30).replace("[dut]", '[dut]\nlink = "udp"'), 'is "udp" but must be'),
+                          (SERVO.replace("[dut]", '[dut]\nlink = "shm"'), "belongs to a command")):
+            self.write("case.toml", case)
+            refused = subprocess.run([COMMAND, "test", str(self.folder / "suite")], capture_output=True, text=True,
+                                     env=self.environment, timeout=PATIENCE_S, check=False)
+            self.assertEqual(refused.returncode, USAGE)
+            self.assertIn(why, refused.stderr)
+
     def test_a_case_may_be_named_from_its_own_folder(self):
         """Catches: a case file without a folder in its name, whose program then starts nowhere."""
         self.verdict_of(DRIVES.format(until=10 ** 9), code=OK)

@@ -52,9 +52,9 @@ class WithoutABench(CommandTest):
                 (["demo", "--bench", "x"], "--bench"),
                 (["dbc", "srevo"], "no bench file 'srevo'; did you mean \"servo\"?"),
                 (["control", "--compare", "none.mcap", "--from", "-1"], "negative"), (["plot", "none.mcap", "--from", "-1"], "negative"),
-                (["experiment", "fetch", "-1"], "negative"), (["status", "--link", "can:socketcan:can0"], "tcp:, tls: or unix:"),
+                (["experiment", "fetch", "-1"], "negative"), (["status", "--link", "can:socketcan:can0"], "tcp:, tls:, unix: or shm:"),
                 (["status", "--link", "tcp:host:port"], "not an address"),
-                (["status", "--link", "tcp::7300"], "tls:HOST:PORT or unix:PATH"), (["replay"], "FILE"), (["export"], "FILE"),
+                (["status", "--link", "tcp::7300"], "tls:HOST:PORT, unix:PATH or shm:PATH"), (["replay"], "FILE"), (["export"], "FILE"),
                 (["export", "none.mcap"], "none.mcap"), (["replay", "none.mcap"], "none.mcap"),
                 (["serve", "none"], "no bench file 'none'"), (["serve", "servo", "--nope"], "--nope"),
                 (["demo", "--keep", "/proc/none"], "/proc/none")):
