@@ -130,7 +130,8 @@ int run_once(link::AxisLink& axis, const control::Preset& preset, const ControlO
   const double counts = counts_per_revolution(description, axis.axis(), needs_of(preset, options.overrides));
   prepare(axis, options, counts);
   const double load_before_nm = options.loads.empty() ? 0.0 : axis.newest().load_nm;
-  ControlRun done = run_over(axis, made(preset, options.overrides), options.loads, counts);
+  ControlRun done = run_over(axis, made(preset, options.overrides), options.loads, counts,
+                             options.follow > 0.0 ? 1.0 / options.follow : 0.0);
   try {
     if (!options.loads.empty()) axis.set_load({.load_nm = load_before_nm});
     axis.release();
@@ -172,6 +173,9 @@ int run_control(const ControlOptions& options) {
   check_fit(*axis, preset, options, sample_rate_hz);
   if (!options.loads.empty() && !axis->can_set_load()) {
     throw UsageError("--load needs a tcp:, tls:, unix: or shm: link");
+  }
+  if (options.follow > 0.0 && axis->bench().mode() == v1::MODE_REALTIME) {
+    throw UsageError("--follow slows a bench in lockstep down; the time of this one goes with the clock");
   }
   catch_interrupts();
   for (std::uint32_t runs = 1;; ++runs) {

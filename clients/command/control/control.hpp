@@ -30,6 +30,7 @@ struct ControlOptions {
   bool clear_faults = false;
   std::vector<Limit> limits{};  ///< for the numbers of the report
   std::uint32_t repeat = 1;     ///< times; 0: until it is interrupted
+  double follow = 0.0;  ///< most seconds of the bench in a second of the clock; 0: as fast as possible
 };
 int run_control(const ControlOptions& options);
 

@@ -124,6 +124,12 @@ void add_run(CLI::App& sub, ControlLine& o) {
       ->type_name("NUMBER")
       ->check(not_negative())
       ->capture_default_str();
+  sub.add_option("--follow", o.follow,
+                 "in lockstep: at most this many times as fast as the clock, so that watch and web show the "
+                 "move; 0.01 "
+                 "makes 60 ms last 6 s")
+      ->type_name("SPEED")
+      ->check(finite_between(0.001, 1000.0));
 }
 
 void add_control(CommandLine& line) {
@@ -143,6 +149,7 @@ void add_control(CommandLine& line) {
       "Example:\n"
       "  drivebench control --list\n"
       "  drivebench control --preset book/8.2.2 --csv move.csv\n"
+      "  drivebench control --follow 0.05\n"
       "  drivebench control --load 0.1@0 --set machine.rotor_resistance_ohm=5.85\n"
       "  drivebench control --link inproc:servo --expect 'peak_error_counts<=2'");
 }

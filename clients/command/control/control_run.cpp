@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <thread>
 
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
@@ -86,8 +87,8 @@ void append_telemetry(ControlRun& into, const control::Controller& controller) {
 class RowKeeper final : public LoopWatcher {
  public:
   RowKeeper(link::AxisLink& bench, const control::Run& run, const std::vector<LoadAt>& loads,
-            ControlRun& into)
-      : bench_(bench), run_(run), loads_(loads), into_(into) {}
+            ControlRun& into, double slowness)
+      : bench_(bench), run_(run), loads_(loads), into_(into), slowness_(slowness) {}
 
   Answer answering(const LoopStep& step) override {
     const Sample& sample = step.sample;
@@ -105,6 +106,7 @@ class RowKeeper final : public LoopWatcher {
     append_telemetry(into_, run_.controller());
     into_.failure = obstacle(bench_, sample, step.measured, into_.rows.size() == 1);
     if (!into_.failure.empty()) return Answer::kEnd;
+    if (slowness_ > 0.0) wait_until_due(sample.tick - into_.rows.front().tick);
     asked_ = Clock::now();
     return Answer::kSend;
   }
@@ -123,10 +125,18 @@ class RowKeeper final : public LoopWatcher {
   }
 
  private:
+  void wait_until_due(std::uint64_t ticks) const {
+    const double after_s = slowness_ * static_cast<double>(ticks) / run_.timing().sample_rate_hz;
+    std::this_thread::sleep_until(
+        started_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(after_s)));
+  }
+
   link::AxisLink& bench_;
   const control::Run& run_;
   const std::vector<LoadAt>& loads_;
   ControlRun& into_;
+  double slowness_;
+  Clock::time_point started_ = Clock::now();
   Progress progress_{"control"};
   double start_rad_ = 0.0;
   std::uint64_t first_late_ = 0;
@@ -162,7 +172,7 @@ TerminalValues terminal_values_of(const control::Setpoint& x) {
 }
 
 ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<LoadAt>& loads,
-                    double counts_per_revolution) {
+                    double counts_per_revolution, double slowness) {
   ControlRun into;
   into.knows_angle = bench.knows("angle_rad");
   into.knows_speed = bench.knows("speed_rad_s");
@@ -175,7 +185,7 @@ ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<L
   into.telemetry.reserve(into.rows.capacity() * names.size());
   const Clock::time_point started = Clock::now();
   try {
-    RowKeeper keeper(bench, run, loads, into);
+    RowKeeper keeper(bench, run, loads, into, slowness);
     control_loop(bench, run, keeper);
   } catch (const link::RefusalError& refused) {
     into.failure = fmt::format("the bench refused: {}", refused.what());

@@ -96,9 +96,10 @@ struct ControlRun {
 };
 
 /// Runs a controller over the link, sample by sample, on an axis that is leased and at rest.
-/// `counts_per_revolution` converts angles to counts for the report; 0: no encoder.
+/// `counts_per_revolution` converts angles to counts for the report; 0: no encoder. A second of the bench
+/// lasts at least `slowness` seconds.
 ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<LoadAt>& loads,
-                    double counts_per_revolution);
+                    double counts_per_revolution, double slowness = 0.0);
 
 /// The numbers of the report that follow from the rows.
 ControlReport summary_of(const ControlRun& run, double period_s);

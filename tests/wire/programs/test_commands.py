@@ -23,7 +23,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from command_test import (
     DRIVEBENCH, FAILED, NO_BENCH, NO_CONNECT, OK, SERVO, USAGE, CommandTest, environment, link_of, until)
-from wire_client import PATIENCE_S, REPOSITORY, pb
+from wire_client import BENCHES, PATIENCE_S, REPOSITORY, Server, pb
 
 
 class WithoutABench(CommandTest):
@@ -340,6 +340,20 @@ class Controlling(CommandTest):
         self.assertLessEqual(report["final_error_counts"], 1.0)
         self.assertGreater(report["first_tick"], 1024)
         self.assertEqual((report["failure"], report["samples"], report["missed_ticks"]), ("", 1024, 0))
+
+    def test_a_move_that_is_followed_is_slow_and_the_same(self):
+        """Catches: a bench that runs ahead of the clock, a command that changes with its pace, a promise in real time."""
+        moved = [self.drivebench("control", "--json", *more, link=f"inproc:{BENCHES / 'servo.toml'}").stdout
+                 for more in ((), ("--follow", "0.25"))]
+        fast, slow = map(json.loads, moved)
+        self.assertGreaterEqual(slow["wall_s"], 1023 * 125e-6 / 0.25)
+        for report in (fast, slow):
+            for name in ("wall_s", "exchange_p50_us", "exchange_p99_us", "exchange_max_us"):
+                report.pop(name)
+        self.assertEqual(slow, fast)
+        with Server("--mode", "realtime") as server:
+            refused = self.drivebench("control", "--follow", "1", link="tcp:%s:%d" % server.address, code=USAGE)
+            self.assertSays(refused.stderr, "--follow", "lockstep")
 
     def test_set_stays_and_load_is_put_back(self):
         """Catches: a --set that ends with its session, a --load that spins the motor afterwards."""
