@@ -28,6 +28,7 @@ set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_CONTROL_EXTRA ${control}/programs/postinst ${control}/programs/postrm ${control}/programs/conffiles)
 # `drivebench test` and inproc: links load the bench as a library.
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "adduser, ${this_library}")
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS logrotate)
 
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION "test bench for electric drives, the libraries
 The bench behind one C ABI: in the process of its controller, or over TCP, CAN
@@ -92,7 +93,7 @@ file(CONFIGURE OUTPUT packages/entry_points.txt CONTENT "[pytest11]\ndrivebench 
 install(FILES ${made}/METADATA ${made}/entry_points.txt DESTINATION ${modules}/drivebench-${PROJECT_VERSION}.dist-info
   COMPONENT python EXCLUDE_FROM_ALL)
 
-# In the places that they have in the sources, so that their links hold.
+# In the places that they have in the sources, so that links from one to another hold.
 set(programs ${PROJECT_SOURCE_DIR}/clients)
 set(patterns ${programs}/examples/*.c ${programs}/examples/*.cpp ${programs}/python/examples/*.py)
 foreach(folder plant protocols server clients configs)

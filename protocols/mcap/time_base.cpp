@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "protocols/text.hpp"
+
 namespace drivebench {
 namespace {
 
@@ -17,16 +19,20 @@ constexpr std::string_view kReading =
     "samples "
     "after since_tick; the ticks follow CLOCK_MONOTONIC, also when the wall clock is set";
 
-template <class Integer>
-Integer number_in(const McapMetadata& metadata, std::string_view key) {
+// The range of dates that every reader of exports has.
+constexpr std::uint64_t kMostEpochNs = 7'258'118'400'000'000'000;  // the year 2200
+constexpr std::uint64_t kMostTick = std::uint64_t{1} << 62;
+
+/// A whole number from 0 to `most`.
+std::uint64_t number_in(const McapMetadata& metadata, std::string_view key, std::uint64_t most) {
   const auto entry = metadata.entries.find(key);
   const std::string_view text = entry == metadata.entries.end() ? std::string_view() : entry->second;
-  Integer value{};
+  std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size()) return value;
-  throw std::runtime_error("the metadata " + std::string(metadata.name) +
-                           " of the recording: " + std::string(key) + " is '" + std::string(text) +
-                           "', not a whole number of 64 bits");
+  if (error == std::errc() && end == text.data() + text.size() && value <= most) return value;
+  throw std::runtime_error(
+      "the metadata " + std::string(metadata.name) + " of the recording: " + std::string(key) + " is '" +
+      printable(text.substr(0, 32)) + "', not a whole number from 0 to " + std::to_string(most));
 }
 
 }  // namespace
@@ -42,8 +48,8 @@ std::optional<TimeBase> time_base_at(const McapReader& reader) {
   const auto newest = std::find_if(metadata.rbegin(), metadata.rend(),
                                    [](const McapMetadata& each) { return each.name == kTimeBaseMetadata; });
   if (newest == metadata.rend()) return std::nullopt;
-  return TimeBase{.since_tick = number_in<std::uint64_t>(*newest, kSinceTick),
-                  .epoch_unix_ns = number_in<std::int64_t>(*newest, kEpoch)};
+  return TimeBase{.since_tick = number_in(*newest, kSinceTick, kMostTick),
+                  .epoch_unix_ns = static_cast<std::int64_t>(number_in(*newest, kEpoch, kMostEpochNs))};
 }
 
 }  // namespace drivebench

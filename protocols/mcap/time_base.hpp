@@ -8,9 +8,9 @@
 
 /// The wall clock of a recording made in real time: a metadata record, from which its log times become UTC.
 /// The due times of the ticks follow CLOCK_MONOTONIC, so a wall clock that is set during the run changes
-/// nothing. They begin anew after a tick that was later than `max_lateness`; then another record follows,
-/// which holds for the samples behind it. Recordings in lockstep and free mode have none: their time is no
-/// wall time, and equal runs give equal bytes.
+/// nothing. They begin anew after a tick that was later than `max_lateness`; then the wall clock is read
+/// again and another record follows, which holds for the samples behind it. Recordings in lockstep and free
+/// mode have none: their time is no wall time, and equal runs give equal bytes.
 namespace drivebench {
 
 inline constexpr std::string_view kTimeBaseMetadata = "drivebench.time_base";

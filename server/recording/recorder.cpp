@@ -50,11 +50,12 @@ void Recorder::on_input(Tick now, const Input& input) noexcept {
 }
 
 void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
+  if (new_base_) offer_time_base();
   count_gap(!ring_.emplace(std::in_place_type<TickedSample>, axis, sample));
 }
 
-void Recorder::on_time_base(const TimeBase& base) noexcept {
-  count_gap(!ring_.emplace(std::in_place_type<TimeBase>, base));
+void Recorder::offer_time_base() noexcept {
+  if (ring_.emplace(std::in_place_type<TimeBase>, *new_base_)) new_base_.reset();
 }
 
 void Recorder::count_gap(bool lost) noexcept {

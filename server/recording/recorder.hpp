@@ -64,7 +64,10 @@ class Recorder final : public BenchObserver {
   void on_input(Tick now, const Input& input) noexcept override;
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override;
   /// From here on the ticks are due by this wall time. Called by the tick thread between ticks.
-  void on_time_base(const TimeBase& base) noexcept;
+  void on_time_base(const TimeBase& base) noexcept {
+    new_base_ = base;
+    offer_time_base();
+  }
 
   /// Whether the ring has room for a tick. Called by the tick thread between ticks.
   bool has_room() noexcept { return ring_.room() >= room_for_tick_; }
@@ -93,10 +96,12 @@ class Recorder final : public BenchObserver {
   void count_gap(bool lost) noexcept;
   void run();
   bool drain(std::size_t most) noexcept;
+  void offer_time_base() noexcept;
   void tell_state() noexcept;
 
   SpscRing<RecordedEntry> ring_;
   std::size_t room_for_tick_;
+  std::optional<TimeBase> new_base_;  // tick thread: not in the ring yet, which was full
   std::unique_ptr<RecordingWriter> writer_;
   std::atomic<std::uint64_t> gaps_{0};
   std::atomic<bool> is_over_{false};

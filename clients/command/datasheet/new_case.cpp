@@ -78,9 +78,9 @@ std::string checks_text(const NewCaseOptions& o) {
              real(o.speed_rad_s), real(band_rad_s), real(o.duration_s * 0.4), real(o.duration_s / 2.0)) +
          (o.load_nm ? load_text(o, band_rad_s) : "") +
          "\n[[check]]\n"
-         "name = \"never trips\"\n"
+         "name = \"keeps below its current limit\"\n"
          "kind = \"fault_count\"\n"
-         "fault = \"over_current_trip\"\n"
+         "fault = \"over_current\"\n"
          "\n# [matrix] makes many cases of this one: values multiply, of any key.\n"
          "# override.axis.0.mechanics.viscous_friction_nms = [0.0, 1e-5]\n";
 }

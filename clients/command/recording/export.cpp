@@ -61,11 +61,27 @@ Epoch epoch_of(const MappedSeries& files) {
   return std::nullopt;
 }
 
-/// UTC at which the message was due, by the time base in force; the epoch holds before the first one.
-std::int64_t unix_ns_of(const McapSeries& reader, std::uint64_t log_time_ns, const Epoch& epoch) {
-  const TimeBase first{.since_tick = 0, .epoch_unix_ns = epoch.value_or(0)};
-  return (epoch ? time_base_at(reader.reader()) : std::nullopt).value_or(first).unix_ns(log_time_ns);
-}
+/// UTC at which messages were due, by the time base in force; the epoch holds before the first one.
+class WallTime {
+ public:
+  explicit WallTime(const Epoch& epoch)
+      : is_known_(epoch.has_value()), base_{.since_tick = 0, .epoch_unix_ns = epoch.value_or(0)} {}
+
+  std::int64_t unix_ns_of(const McapReader& file, std::uint64_t log_time_ns) {
+    if (is_known_ && (&file != file_ || file.metadata().size() != seen_)) {
+      file_ = &file;
+      seen_ = file.metadata().size();
+      base_ = time_base_at(file).value_or(base_);
+    }
+    return base_.unix_ns(log_time_ns);
+  }
+
+ private:
+  bool is_known_;
+  TimeBase base_;
+  const McapReader* file_ = nullptr;
+  std::size_t seen_ = 0;  ///< metadata of the file
+};
 
 std::string utc_text(std::int64_t unix_ns) {
   const std::int64_t below_second_ns = (unix_ns % 1'000'000'000 + 1'000'000'000) % 1'000'000'000;
@@ -172,12 +188,13 @@ Exported export_rows(McapSeries& reader, const ExportOptions& options, std::uint
                      const Epoch& epoch, SampleTable& table) {
   Exported done;
   AxisChannels channels(options.axis);
+  WallTime wall(epoch);
   const End end = for_each_message(reader, options, file_size, [&](const McapMessage& message) {
     if (!channels.find(reader.reader(), message.header.channel).is_wanted) return;
     const std::optional<Sample> sample = decode_sample(message.payload);
     if (!sample || sample->tick < options.from_tick || sample->tick > options.to_tick) return;
     const std::uint64_t time_ns = message.header.log_time_ns;
-    table.add(*sample, {.bench_ns = time_ns, .unix_ns = unix_ns_of(reader, time_ns, epoch)});
+    table.add(*sample, {.bench_ns = time_ns, .unix_ns = wall.unix_ns_of(reader.reader(), time_ns)});
     ++done.rows;
   });
   done.axis = channels.axis();
@@ -212,10 +229,11 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
   Exported done;
   CandumpText frames(can_address_of(options), is_lockstep(files));
   AxisChannels channels(options.axis);
+  WallTime wall(epoch);
   std::optional<std::uint32_t> only;  // the named axis, from its first sample on
   const auto take = [&](const McapMessage& message) {
     const auto& place = channels.find(reader.reader(), message.header.channel);
-    const auto time_ns = static_cast<double>(unix_ns_of(reader, message.header.log_time_ns, epoch));
+    const auto time_ns = static_cast<double>(wall.unix_ns_of(reader.reader(), message.header.log_time_ns));
     const double time_s = time_ns * 1e-9;
     if (place.is_sample) {
       if (!options.axis.empty() && !place.is_wanted) return;
