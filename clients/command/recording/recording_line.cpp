@@ -56,6 +56,8 @@ void add_export(CommandLine& line) {
       "  drivebench export run.mcap --out run.csv\n"
       "  drivebench export run.mcap --signals tick,speed_rad_s --from 100 --to 200\n"
       "  drivebench export run.mcap --format candump --out run.log\n"
+      "A recording made in real time also gives the UTC at which each sample was due: unix_ns, and the times "
+      "of candump.\n"
       "Exit codes: 0 written, 1 failed, 2 usage or file, 3 the recording has no end or lost entries; what it "
       "holds was written.");
 }
