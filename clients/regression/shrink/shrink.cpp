@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -123,8 +124,9 @@ ConfigNode without(ConfigNode root, std::vector<Place>::const_iterator begin,
   return root;
 }
 
+/// Infinite for the largest numbers. std::stod would throw for the smallest ones.
 double with_digits(double value, int digits) {
-  return std::stod(fmt::format("{:.{}e}", value, digits - 1));
+  return std::strtod(fmt::format("{:.{}e}", value, digits - 1).c_str(), nullptr);
 }
 
 ConfigNode scalar_of(const ConfigNode& like, double value) {
@@ -158,7 +160,7 @@ class Shrinker {
   }
 
  private:
-  bool has_runs() const noexcept { return runs_ < plan_.most_runs; }
+  bool has_runs() const { return runs_ < plan_.most_runs && !plan_.is_stopped(); }
 
   /// Takes a table that fails as the first one did. None is tried twice.
   bool attempt(const ConfigNode& candidate) {
@@ -231,6 +233,7 @@ class Shrinker {
       const double value = number_in(node_at(table_, place)).value_or(0.0);
       for (const double round : {0.0, with_digits(value, 1), with_digits(value, 2)}) {
         if (round == value) break;
+        if (!std::isfinite(round)) continue;
         ConfigNode candidate = table_;
         ConfigNode& number = node_at(candidate, place);
         number = scalar_of(number, round);

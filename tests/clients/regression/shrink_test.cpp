@@ -141,6 +141,43 @@ TEST(Shrink, RunsAreBoundedAndNoTableRunsTwice) {
   }
 }
 
+// Catches: a search that goes on after it was stopped, or that loses what it has found.
+TEST(Shrink, ASearchThatIsStoppedGivesTheSmallestTableSoFar) {
+  std::size_t runs = 0;
+  const auto count = [&runs](const ConfigNode& table) {
+    ++runs;
+    return fails(table);
+  };
+  const Shrunk part =
+      shrink(parsed(kCase),
+             {.check = 1, .longest_s = 1.0, .most_runs = 300, .is_stopped = [&] { return runs == 7; }}, count,
+             [](const std::string&, std::size_t) {});
+  EXPECT_EQ(part.runs, 7u);
+  EXPECT_FALSE(part.is_smallest);
+  EXPECT_EQ(toml_text(part.table), toml_text(shrunk(7).table));
+}
+
+// Catches: a rounder number that no double can have, which ended the search with "stod" or was tried.
+TEST(Shrink, TheSmallestAndTheLargestNumbersBecomeRounder) {
+  const ConfigNode extremes = parsed(R"(
+bench = "servo"
+[[step]]
+at_s = 3.21e-310
+load_nm = 1.797e308
+[[check]]
+name = "first"
+)");
+  const auto has_both = [](const ConfigNode& table) {
+    const std::string text = toml_text(table);
+    EXPECT_EQ(text.find("inf"), std::string::npos);
+    return text.find("at_s = 3") != std::string::npos && text.find("load_nm = 1") != std::string::npos;
+  };
+  const Shrunk result = shrink(extremes, {.check = 0}, has_both, [](const std::string&, std::size_t) {});
+  const ConfigNode& step = find_child(result.table, "step")->children.front();
+  EXPECT_EQ(number_in(*find_child(step, "at_s")), 3e-310);
+  EXPECT_EQ(number_in(*find_child(step, "load_nm")), 1.797e308);
+}
+
 // Catches: a length that is changed although the check judges the run as a whole, a case that cannot become
 // smaller and changes all the same.
 TEST(Shrink, WhatCannotBecomeSmallerStays) {
