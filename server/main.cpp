@@ -156,36 +156,47 @@ void require_realtime(const BenchConfig& config) {
   if (!notes.empty()) throw std::runtime_error("--require-rt: " + notes.front());
 }
 
+void repeat_recording(const ServerOptions& o, Bench& bench, const std::function<void()>& before_tick) {
+  const MappedSeries series(o.repeat);
+  try {
+    repeat(series.segments(), bench, {.until = o.until, .before_tick = before_tick});
+  } catch (const std::runtime_error& problem) {
+    throw std::runtime_error(fmt::format("--repeat: {}: {}", o.repeat, problem.what()));
+  }
+}
+
 /// Runs the bench as the recording says, and ends the leases of its controllers. Throws.
-BeginRun repetition(const ServerOptions& o, const BenchConfig& config) {
-  // At tick 0 a bench has no input but its own events.
-  if (o.repeat.empty() || o.until == 0) return {};
+BeginRun repetition(const ServerOptions& o, const BenchConfig& config, std::optional<Tick> max_ticks) {
+  if (o.repeat.empty()) return {};
   if (config.mode != RunMode::kLockstep)
     throw std::runtime_error("--repeat: time waits for a controller in lockstep only; see --mode");
+  if (max_ticks && *max_ticks < o.until) {
+    throw std::runtime_error(
+        fmt::format("--duration: ends at tick {}, but --until is {}", *max_ticks, o.until));
+  }
+  if (o.until == 0) {  // nothing has acted then: the run begins as any other, if the recorded one was of it
+    Bench bench(config.setup);
+    repeat_recording(o, bench, [] {});
+    return {};
+  }
   return [&o](Bench& bench, Recorder* recorder) {
-    const MappedSeries series(o.repeat);
-    const auto wait = [recorder] {
+    repeat_recording(o, bench, [recorder] {
       if (recorder != nullptr) recorder->wait_for_room();
-    };
-    try {
-      repeat(series.segments(), bench, {.until = o.until, .before_tick = wait});
-    } catch (const std::runtime_error& problem) {
-      throw std::runtime_error(fmt::format("--repeat: {}: {}", o.repeat, problem.what()));
-    }
+    });
     bench.release_leases();
   };
 }
 
 std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& config, asio::io_context& io) {
-  const BeginRun begin = repetition(o, config);
+  std::optional<Tick> max_ticks;
+  if (o.duration_s > 0.0) {
+    max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
+  }
+  const BeginRun begin = repetition(o, config, max_ticks);
   std::unique_ptr<Recorder> recorder;
   if (!o.record.empty()) {
     recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
                                           recording_options(o, config));
-  }
-  std::optional<Tick> max_ticks;
-  if (o.duration_s > 0.0) {
-    max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
   }
   return config.mode == RunMode::kLockstep
              ? make_lockstep_engine(config, std::move(recorder), io, max_ticks, begin)

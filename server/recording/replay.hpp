@@ -49,7 +49,7 @@ ReplayReport replay(const std::vector<std::span<const std::byte>>& segments, voi
 
 /// How much of a recording a bench repeats.
 struct Repetition {
-  Tick until;                         ///< above 0
+  Tick until;                         ///< 0: only the first samples are compared
   std::function<void()> before_tick;  ///< called before each tick
 };
 

@@ -159,6 +159,10 @@ TEST(Replay, ABenchRepeatsARecordingUpToATickAndGoesOn) {
   other.setup.seed += 1;
   Bench bench(other.setup);
   EXPECT_THROW(repeat({recording}, bench, {.until = 5, .before_tick = [] {}}), std::runtime_error);
+  EXPECT_THROW(repeat({recording}, bench, {.until = 0, .before_tick = [] {}}), std::runtime_error);
+  Bench at_start(bench_with_events(2).setup);
+  repeat({recording}, at_start, {.until = 0, .before_tick = [] { ADD_FAILURE(); }});
+  EXPECT_EQ(at_start.tick(), 0);
   Bench short_run(bench_with_events(2).setup);
   EXPECT_THROW(repeat({recording}, short_run, {.until = 100, .before_tick = [] {}}), std::runtime_error);
 }
