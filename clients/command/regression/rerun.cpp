@@ -4,7 +4,6 @@
 
 #include <bit>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/run_case.hpp"
 #include "clients/command/regression/serve_failure.hpp"
+#include "clients/command/regression/server_answers.hpp"
 #include "clients/command/regression/test.hpp"
 #include "clients/regression/reports/reports.hpp"
 #include "protocols/json.hpp"
@@ -32,7 +32,6 @@ using regression::CaseResult;
 using regression::RunFacts;
 
 constexpr double kMostTicks = 1e15;
-constexpr auto kReplayPatience = std::chrono::hours(24);
 
 std::string text_of(const Signal& signal, const Sample& sample) {
   switch (signal.type) {
@@ -84,6 +83,7 @@ std::string comparison(const fs::path& before, const fs::path& now, const RunFac
   CaseSamples old_samples(before, facts);
   CaseSamples new_samples(now, facts);
   for (std::uint64_t count = 0;; ++count) {
+    end_if_interrupted();
     const auto was = old_samples.next();
     const auto is = new_samples.next();
     if (!was && !is) return fmt::format("the same to the bit: {}", count_text(count, "sample"));
@@ -140,8 +140,8 @@ std::optional<RepeatedPart> repeated_part(const RerunOptions& options, const Unp
 int replay_plant(const RerunOptions& options, const Unpacked& bundle) {
   require_recording(options, bundle);
   Process server({server_executable().string(), "--replay", bundle.recording.string(), "--json"});
-  const auto line = server.read_line(Process::in(kReplayPatience));
-  server.wait(Process::in(kReplayPatience));
+  const auto line = await_answer(server, kRepetitionPatience,
+                                 [](std::string_view text) { return std::optional(std::string(text)); });
   if (!line) throw std::runtime_error("drivebench-server ended without a report");
   const auto report = parse_json(*line);
   const auto problem = report.at("problem").get<std::string>();
@@ -188,7 +188,6 @@ int run_again(const RerunOptions& options, const Unpacked& bundle, const Prepare
         "--from: the case runs in real time, where the bench waits for no device; --interactive serves it in "
         "lockstep");
   }
-  catch_interrupts();
   const CaseResult result = run_case(prepared, folder, {.repeats = part});
   fmt::print("{}", regression::table_row(result));
   record_case(prepared, folder, part);
@@ -207,12 +206,14 @@ int run_again(const RerunOptions& options, const Unpacked& bundle, const Prepare
 }  // namespace
 
 int run_rerun(const RerunOptions& options) {
+  catch_interrupts();
   const TemporaryFolder folder;
   const fs::path parts = folder.path() / "bundle";
   const fs::path run = folder.path() / "run";
   fs::create_directory(parts);
   fs::create_directory(run);
   const Unpacked bundle = unpack_bundle(options.bundle, parts);
+  end_if_interrupted();
   if (options.plant_only) return replay_plant(options, bundle);
   const PreparedCase prepared = prepared_or_refused(options, bundle);
   if (!options.interactive) return run_again(options, bundle, prepared, run);

@@ -7,6 +7,7 @@
 #include <exception>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
@@ -23,9 +24,6 @@ using regression::Judge;
 using regression::Verdict;
 
 constexpr std::uint64_t kRun = 1;
-
-/// The user has ended the run.
-class Interrupted : public std::exception {};
 
 /// Shows every sample, and ends the loop with the case. A bench that has latched a fault refuses commands:
 /// its gates stay off until the end.
@@ -46,7 +44,7 @@ class CaseWatcher final : public LoopWatcher {
   Answer answering(const LoopStep& step) override {
     if (sample_came_) computing_->add(std::chrono::nanoseconds(Clock::now() - *sample_came_).count());
     see_();
-    if (interrupted()) throw Interrupted();
+    end_if_interrupted();
     if (step.sample.tick >= end_tick_) return Answer::kEnd;
     return (step.sample.faults & latched_faults_) != 0 ? Answer::kGatesOff : Answer::kSend;
   }
@@ -66,7 +64,7 @@ void keep_off(link::AxisLink& axis, std::uint64_t end_tick, const SeeTick& see, 
   const Sample* sample = &axis.newest();
   while (sample->tick < end_tick && !(until_armed && sample->state == kRun)) {
     see();
-    if (interrupted()) throw Interrupted();
+    end_if_interrupted();
     sample = &axis.exchange({.tick = sample->tick, .gates = v1::GATES_OFF});
   }
   if (!until_armed) see();
@@ -106,19 +104,21 @@ CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& fol
   const Case& c = *prepared.what;
   if (!c.skip.empty()) return skipped(c);
   Judge judge(c, prepared.facts, wishes.trace);
-  if (interrupted()) return judge.failure(Verdict::kError, "interrupted");
   try {
+    end_if_interrupted();
     if (c.device.kind == DeviceUnderTest::Kind::kProgram)
       return run_program_case(prepared, folder, wishes, judge);
     return run_in_process(prepared, wishes, judge);
-  } catch (const Interrupted&) {
-    return judge.failure(Verdict::kError, "interrupted");
   } catch (const std::exception& error) {
     return judge.failure(Verdict::kError, error.what());
   }
 }
 
 }  // namespace
+
+void end_if_interrupted() {
+  if (interrupted()) throw std::runtime_error("interrupted");
+}
 
 void drive(link::AxisLink& bench, const Case& c, const SeeTick& see, const Drive& how) {
   std::optional<RepeatedAxis> repeated;

@@ -46,6 +46,9 @@ void drive(link::AxisLink& bench, const regression::Case& c, const SeeTick& see,
 regression::CaseResult run_program_case(const PreparedCase& prepared, const std::filesystem::path& folder,
                                         const RunWishes& wishes, regression::Judge& judge);
 
+/// Throws std::runtime_error once the user has interrupted what runs.
+void end_if_interrupted();
+
 /// Where a case leaves its recording.
 std::filesystem::path recording_in(const std::filesystem::path& folder);
 

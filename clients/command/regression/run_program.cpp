@@ -68,7 +68,10 @@ class RecordedServer {
         log_(fs::absolute(folder / "server.log")),
         process_(line_of(prepared, wishes),
                  {.folder = fs::absolute(folder).string(), .error_file = log_.string()}) {
-    const auto ready = process_.await(Process::in(kServerStart), parse_ready);
+    // A server that repeats a run is ready only after that.
+    const std::chrono::milliseconds patience =
+        wishes.repeats ? kRepetitionPatience : std::chrono::milliseconds(kServerStart);
+    const auto ready = await_answer(process_, patience, parse_ready);
     if (!ready) throw std::runtime_error("the server did not start: " + tail_of(log_));
     tcp_ = "tcp:" + ready->tcp;
   }
@@ -160,6 +163,7 @@ void show_recording(const fs::path& file, const RunFacts& facts, See see) {
   RecordedSamples recorded(file, facts.axes);
   std::vector<Sample> samples(facts.axes.size());
   while (const auto row = recorded.next()) {
+    end_if_interrupted();
     samples[row->axis] = row->sample;
     if (row->axis + 1 == samples.size()) see(samples);  // a tick brings the axes in their order
   }

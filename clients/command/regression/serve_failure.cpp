@@ -17,6 +17,7 @@
 #include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
+#include "clients/command/regression/server_answers.hpp"
 #include "clients/regression/checks/check_kinds.hpp"
 
 namespace drivebench::command {
@@ -24,8 +25,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A long run is repeated before the bench is ready.
-constexpr auto kRepetitionPatience = std::chrono::hours(24);
 constexpr auto kServerFarewell = 20s;
 constexpr auto kLook = 100ms;
 
@@ -35,6 +34,7 @@ void see_recording(const std::filesystem::path& file, const regression::RunFacts
   RecordedSamples recorded(file, facts.axes);
   std::vector<Sample> samples(facts.axes.size());
   while (const auto row = recorded.next()) {
+    end_if_interrupted();
     samples[row->axis] = row->sample;
     if (row->axis + 1 == samples.size() && !see(samples)) return;
   }
@@ -52,6 +52,20 @@ std::uint64_t first_failure(const PreparedCase& prepared, const std::filesystem:
     });
   });
   return tick;
+}
+
+/// A fault that the recorded run has latched stays, and refuses commands.
+void print_latched(const std::string& address) {
+  link::Link bench(address, {.client = "drivebench rerun", .token = {}});
+  const v1::BenchDescription& description = bench.welcome().bench();
+  for (const link::AxisSample& each : bench.exchange({})) {
+    const auto axis = static_cast<int>(each.axis);
+    if (!description.axes(axis).shares_amplifier_with().empty()) continue;  // latches with the owner
+    const std::string latched = latched_text(description, each.sample);
+    if (latched.empty()) continue;
+    const std::string& name = description.axes(axis).name();
+    fmt::print("{} has latched {}; first: drivebench clear {} --link {}\n", name, latched, name, address);
+  }
 }
 
 }  // namespace
@@ -87,16 +101,17 @@ JudgedRecording judged_recording(const PreparedCase& prepared, const std::filesy
 }
 
 int serve_bench(const PreparedCase& prepared, const RepeatedPart& part, unsigned port) {
-  catch_interrupts();
   const TemporaryFolder folder;
   const std::filesystem::path bench = folder.path() / "bench.toml";
   write_file(bench, in_lockstep(prepared.bench_file));
   Process server({server_executable().string(), bench.string(), "--json", "--port", std::to_string(port),
                   "--repeat", part.recording.string(), "--until", std::to_string(part.until)});
-  const auto ready = server.await(Process::in(kRepetitionPatience), parse_ready);
+  const auto ready = await_answer(server, kRepetitionPatience, parse_ready);
   if (!ready) throw std::runtime_error("the server did not start");
-  fmt::print("{} at tick {} ({:.6g} s) on tcp:{}\n", prepared.what->name, part.until,
-             static_cast<double>(part.until) * prepared.facts.period_s, ready->tcp);
+  const std::string address = "tcp:" + ready->tcp;
+  fmt::print("{} at tick {} ({:.6g} s) on {}\n", prepared.what->name, part.until,
+             static_cast<double>(part.until) * prepared.facts.period_s, address);
+  print_latched(address);
   fmt::print("time stands still until a controller takes the lease; Ctrl-C ends\n");
   std::fflush(stdout);
   while (!interrupted()) {

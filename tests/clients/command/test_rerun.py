@@ -7,13 +7,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 import unittest
 import zipfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
     from regression_case import COMMAND, DRIVES, FAILED, OK, PROGRAM, SERVO, USAGE, RegressionTest
-    from wire_client import PATIENCE_S
+    from wire_client import PATIENCE_S, SERVER
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
@@ -24,6 +25,10 @@ import drivebench
 with drivebench.Bench(sys.argv[1]) as bench:
     bench.acquire()
     print(bench.newest().tick, bench.step(off=True).tick)
+"""
+TRIPS = """[override.axis.0.amplifier]
+over_current_a = 0.3
+over_current_trip = true
 """
 
 
@@ -146,6 +151,52 @@ load_nm = 0.01
             self.assertEqual(drives.split(), [str(at), str(at + 1)])
             bench.send_signal(signal.SIGINT)
             self.assertEqual(bench.wait(timeout=PATIENCE_S), OK)
+
+    def test_an_interactive_bench_tells_what_it_has_latched(self):
+        """Catches: a bench that refuses every command of the one who drives on, without a word on why."""
+        bundle = self.failed_bundle("case", PROGRAM.format(limit_s=30) + TRIPS, device_py=DRIVES.format(until=10 ** 9))
+        bench = subprocess.Popen([COMMAND, "rerun", bundle, "--interactive"], stdout=subprocess.PIPE, text=True, env=self.environment)
+        self.addCleanup(bench.wait)
+        self.addCleanup(bench.kill)
+        self.addCleanup(bench.stdout.close)
+        link = re.search(r"at tick \d+ \(\S+ s\) on (tcp:\S+)", bench.stdout.readline()).group(1)
+        said = re.search(r"has latched \S.*; first: drivebench (clear \S+ --link \S+)\n", bench.stdout.readline())
+        subprocess.run([COMMAND, *said.group(1).split()], capture_output=True, timeout=PATIENCE_S, check=True)
+        subprocess.run([sys.executable, "-c", DRIVES_A_TICK, link], capture_output=True, env=self.environment, timeout=PATIENCE_S, check=True)
+        status = subprocess.run([COMMAND, "status", "--link", link], capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
+        self.assertNotIn("latched:", status)
+
+    def test_an_interrupt_leaves_nothing_behind(self):
+        """Catches: an unpacked bundle, or a server, that outlives the interrupt of a verb that reads or repeats."""
+        bundle = self.failed_bundle("servo", SERVO.replace("6.0", "5.0"))
+        before = sorted(self.folder.iterdir())
+        for delay_s in (0.005, 0.01, 0.02, 0.03, 0.05, 0.1):
+            with self.subTest(delay_s):
+                verb = subprocess.Popen([COMMAND, "rerun", bundle, "--interactive"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                        env=self.environment)
+                time.sleep(delay_s)
+                verb.terminate()
+                verb.wait(timeout=PATIENCE_S)
+                self.assertEqual(sorted(self.folder.iterdir()), before)
+
+    def test_a_repetition_up_to_its_beginning_reads_its_file(self):
+        """Catches: --until 0 with any file or bench, a run that ends before its repetition does."""
+        bundle = self.failed_bundle("case", PROGRAM.format(limit_s=30).replace("i_a_a < 30", "i_a_a < 0.5"),
+                                    device_py=DRIVES.format(until=10 ** 9))
+        self.assertIn("the run up to tick 0 (0 s) is the recorded one", self.rerun(bundle, "--from", "0", code=FAILED))
+        other = self.changed(bundle, {"bench.toml": lambda text: text.replace(b"armature_resistance_ohm = 2.0", b"armature_resistance_ohm = 2.5")})
+        self.assertIn("the bench is not the one of the recording", self.rerun(other, "--from", "0", code=FAILED))
+        bench, recording = self.folder / "bench.toml", self.folder / "run.mcap"
+        with zipfile.ZipFile(bundle) as parts:
+            bench.write_bytes(parts.read("bench.toml"))
+            recording.write_bytes(parts.read("run.mcap"))
+        for arguments, rule in ((("--repeat", self.folder / "none.mcap", "--until", "0"), "none.mcap"),
+                                (("--repeat", bench, "--until", "0"), "--repeat: "),
+                                (("--repeat", recording, "--until", "100", "--duration", "0.005"), "--duration: ends at tick 50, but --until is 100")):
+            with self.subTest(rule):
+                done = subprocess.run([SERVER, bench, "--port", "0", *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+                self.assertEqual(done.returncode, USAGE)
+                self.assertIn(rule, done.stderr)
 
     def test_a_hostile_bundle_is_refused_with_entry_and_rule(self):
         """Catches: a file outside the folder, a bomb that is unpacked, a foreign or damaged file that runs."""
