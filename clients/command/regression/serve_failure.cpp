@@ -115,7 +115,8 @@ int serve_bench(const PreparedCase& prepared, const RepeatedPart& part, unsigned
   fmt::print("time stands still until a controller takes the lease; Ctrl-C ends\n");
   std::fflush(stdout);
   while (!interrupted()) {
-    if (server.wait(Process::in(kLook))) throw std::runtime_error("the server has ended");
+    // Ctrl-C in a terminal ends the server, too.
+    if (server.wait(Process::in(kLook)) && !interrupted()) throw std::runtime_error("the server has ended");
   }
   server.terminate();
   if (!server.wait(Process::in(kServerFarewell))) throw std::runtime_error("the server did not end");

@@ -26,8 +26,9 @@ auto await_answer(Process& server, std::chrono::milliseconds patience, Parse par
   const Process::Deadline deadline = Process::in(patience);
   while (std::chrono::steady_clock::now() < deadline) {
     if (auto found = server.await(Process::in(kSlice), parse)) return found;
+    const bool has_ended = server.wait(Process::in(std::chrono::milliseconds(0))).has_value();
     end_if_interrupted();
-    if (server.wait(Process::in(std::chrono::milliseconds(0)))) break;
+    if (has_ended) break;
   }
   return std::nullopt;
 }

@@ -3,7 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
+#include <fstream>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -36,11 +39,16 @@ struct Failure {
   Verdict verdict;
   std::string check;    ///< its name; empty: an error
   bool applied = true;  ///< whether the check saw anything
-  std::string reason;   ///< of an error, without its numbers
+  std::string reason;   ///< of an error, without its times
 };
 
-std::string without_numbers(std::string text) {
-  std::erase_if(text, [](char c) { return (c >= '0' && c <= '9') || c == '.'; });
+/// "ended with code 2 at 0.01 s of 0.02 s" keeps its code: the numbers from " at " on are times. In a reason
+/// without that word any number may be one.
+std::string without_times(std::string text) {
+  const std::size_t at = text.find(" at ");
+  const auto from = text.begin() + static_cast<std::ptrdiff_t>(at == std::string::npos ? 0 : at);
+  text.erase(std::remove_if(from, text.end(), [](char c) { return (c >= '0' && c <= '9') || c == '.'; }),
+             text.end());
   return text;
 }
 
@@ -54,7 +62,18 @@ Failure failure_of(const CaseResult& result) {
   return {.verdict = result.verdict,
           .check = failed != nullptr ? failed->name : "",
           .applied = failed == nullptr || failed->applied,
-          .reason = failed != nullptr ? "" : without_numbers(result.reason)};
+          .reason = failed != nullptr ? "" : without_times(result.reason)};
+}
+
+bool is_same(const Failure& before, const CaseResult& result) {
+  if (before.check.empty()) {
+    const Failure now = failure_of(result);
+    return now.verdict == before.verdict && now.check.empty() && now.reason == before.reason;
+  }
+  const auto same = [&before](const Finding& each) {
+    return each.name == before.check && !each.passed && each.applied == before.applied;
+  };
+  return result.verdict == Verdict::kFail && std::ranges::any_of(result.findings, same);
 }
 
 /// Runs one table after the other, each in a folder of its own.
@@ -74,30 +93,21 @@ class Laboratory {
         folder, {});
     std::error_code ignored;
     fs::remove_all(folder, ignored);
-    if (interrupted()) throw std::runtime_error("interrupted");
     return result;
   }
 
-  bool fails_as(const Failure& before, const ConfigNode& table) {
+  /// The result of a table that fails as the first one; nothing: it does not, or the run was interrupted.
+  std::optional<CaseResult> failing(const Failure& before, const ConfigNode& table) {
     try {
-      const CaseResult result = run(table);
-      if (before.check.empty()) return same_error(before, failure_of(result));
-      const auto same = [&before](const Finding& each) {
-        return each.name == before.check && !each.passed && each.applied == before.applied;
-      };
-      return result.verdict == Verdict::kFail && std::ranges::any_of(result.findings, same);
+      CaseResult result = run(table);
+      if (!interrupted() && is_same(before, result)) return result;
     } catch (const ConfigError&) {
-      return false;
     } catch (const UsageError&) {
-      return false;
     }
+    return std::nullopt;
   }
 
  private:
-  static bool same_error(const Failure& before, const Failure& now) {
-    return now.verdict == before.verdict && now.check.empty() && now.reason == before.reason;
-  }
-
   const Case& case_;
   TemporaryFolder folder_;
   std::size_t runs_ = 0;
@@ -140,6 +150,15 @@ std::vector<std::pair<fs::path, fs::path>> files_beside(const Case& c, const Shr
   return files;
 }
 
+/// Throws UsageError if the smaller case cannot be written: the search would be in vain.
+void require_writable(const ShrinkOptions& options) {
+  std::error_code error;
+  fs::create_directories(fs::absolute(options.file).parent_path(), error);
+  if (!error && !std::ofstream(options.file)) error = std::error_code(errno, std::generic_category());
+  if (error) throw UsageError(fmt::format("--shrink: cannot write {}: {}", options.file, error.message()));
+  fs::remove(options.file);
+}
+
 std::size_t leaves_in(const ConfigNode& table, std::string_view key) {
   const ConfigNode* const node = regression::find_child(table, key);
   return node == nullptr ? 0 : regression::leaf_count(*node);
@@ -150,6 +169,17 @@ std::size_t elements_in(const ConfigNode& table, std::string_view key) {
   return node == nullptr ? 0 : node->children.size();
 }
 
+/// The length that a case asks for, or else that of its run [s].
+double length_s(const ConfigNode& table, const CaseResult& result) {
+  const ConfigNode* const given = regression::find_child(table, "duration_s");
+  return given == nullptr ? result.bench_s : regression::number_in(*given).value_or(result.bench_s);
+}
+
+/// The values of a case without its length, which is told by itself.
+std::size_t values_in(const ConfigNode& table) {
+  return regression::leaf_count(table) - leaves_in(table, "duration_s");
+}
+
 void print_outcome(const ShrinkOptions& options, const ConfigNode& before, const regression::Shrunk& shrunk,
                    const CaseResult& first, const CaseResult& last) {
   fmt::print("{}", regression::table_row(last));
@@ -158,17 +188,24 @@ void print_outcome(const ShrinkOptions& options, const ConfigNode& before, const
       "runs{}\n",
       options.file, elements_in(shrunk.table, "step"), elements_in(before, "step"),
       elements_in(shrunk.table, "check"), elements_in(before, "check"), leaves_in(shrunk.table, "override"),
-      leaves_in(before, "override"), last.bench_s, first.bench_s, regression::leaf_count(shrunk.table),
-      regression::leaf_count(before), shrunk.runs,
+      leaves_in(before, "override"), length_s(shrunk.table, last), length_s(before, first),
+      values_in(shrunk.table), values_in(before), shrunk.runs,
       shrunk.is_smallest ? "" : "; it may become smaller with more, see --shrink-runs");
 }
 
 regression::ShrinkPlan plan_for(const ShrinkOptions& options, const CaseResult& first) {
-  regression::ShrinkPlan plan{.check = 0, .most_runs = options.most_runs};
+  regression::ShrinkPlan plan{.check = 0, .most_runs = options.most_runs, .is_stopped = interrupted};
   const Finding* const failed = failed_check(first);
   if (failed != nullptr) plan.check = static_cast<std::size_t>(failed - first.findings.data());
   if (failed == nullptr || regression::fails_at_once(failed->kind)) plan.longest_s = first.bench_s;
   return plan;
+}
+
+/// Writes the smaller case under a comment on how sure it is.
+void write_smaller(const ShrinkOptions& options, const Case& c, const ConfigNode& table,
+                   std::string_view how) {
+  write_file(options.file,
+             fmt::format("# {}, made smaller: {}.\n{}", c.name, how, regression::toml_text(table)));
 }
 
 int shrink_into_file(const ShrinkOptions& options, const Case& c,
@@ -176,32 +213,51 @@ int shrink_into_file(const ShrinkOptions& options, const Case& c,
   const ConfigNode table = regression::table_of(c);
   Laboratory laboratory(c);
   const CaseResult first = laboratory.run(table);
+  end_if_interrupted();
   if (regression::is_good(first)) throw UsageError(fmt::format("--shrink: {} passes", c.name));
   fmt::print("{}", regression::table_row(first));
   const Failure failure = failure_of(first);
+  CaseResult smallest = first;
+  const auto still_fails = [&](const ConfigNode& candidate) {
+    std::optional<CaseResult> result = laboratory.failing(failure, candidate);
+    if (result) smallest = std::move(*result);
+    return result.has_value();
+  };
   const regression::Shrunk shrunk = regression::shrink(
-      table, plan_for(options, first),
-      [&](const ConfigNode& candidate) { return laboratory.fails_as(failure, candidate); },
+      table, plan_for(options, first), still_fails,
       [](const std::string& what, std::size_t runs) { fmt::print("run {:>4}  {}\n", runs, what); });
   for (const auto& [from, to] : files) {
     fs::create_directories(to.parent_path());
     fs::copy_file(from, to);
   }
-  write_file(options.file, fmt::format("# {}, made smaller: it fails in the same way.\n{}", c.name,
-                                       regression::toml_text(shrunk.table)));
-  const std::vector<Case> written = regression::read_suite(options.file);
-  print_outcome(options, table, shrunk, first, laboratory.run(written.front()));
+  write_smaller(options, c, shrunk.table, "it failed in the same way");
+  const CaseResult last = laboratory.run(regression::read_suite(options.file).front());
+  if (interrupted()) {
+    print_outcome(options, table, shrunk, first, smallest);
+    fmt::print("interrupted: {} is the smallest case so far, and was not run again\n", options.file);
+    return kExitOk;
+  }
+  print_outcome(options, table, shrunk, first, last);
+  if (!is_same(failure, last)) {
+    write_smaller(options, c, shrunk.table, "it failed in the same way once, but does not fail each time");
+    fmt::print("the case does not fail each time\n");
+    return kExitFailed;
+  }
+  write_smaller(options, c, shrunk.table, "it fails in the same way");
   return kExitOk;
 }
 
 int shrink(const ShrinkOptions& options, const Case& c, bool brings_its_files) {
-  catch_interrupts();
   refuse_what_cannot_shrink(options, c);
-  if (!brings_its_files) require_same_folder(options, c);
+  std::vector<std::pair<fs::path, fs::path>> files;
+  if (brings_its_files) {
+    files = files_beside(c, options);
+  } else {
+    require_same_folder(options, c);
+  }
+  require_writable(options);
   try {
-    return shrink_into_file(
-        options, c,
-        brings_its_files ? files_beside(c, options) : std::vector<std::pair<fs::path, fs::path>>());
+    return shrink_into_file(options, c, files);
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
@@ -210,10 +266,12 @@ int shrink(const ShrinkOptions& options, const Case& c, bool brings_its_files) {
 }  // namespace
 
 int run_shrink(const ShrinkOptions& options, const Case& c) {
+  catch_interrupts();
   return shrink(options, c, false);
 }
 
 int run_shrink_bundle(const ShrinkOptions& options, const std::string& bundle) {
+  catch_interrupts();
   const TemporaryFolder folder;
   return shrink(options, unpack_bundle(bundle, folder.path()).what, true);
 }

@@ -298,8 +298,11 @@ int exit_code_of(const regression::Totals& totals) {
 
 int run_test(const TestOptions& options) {
   const ShrinkOptions shrink{.file = options.shrunk_file, .most_runs = options.shrink_runs};
-  if (!shrink.file.empty() && options.suite.ends_with(".zip"))
+  if (!shrink.file.empty() && options.suite.ends_with(".zip")) {
+    if (!options.filter.empty() || !options.wanted_tags.empty())
+      throw UsageError("--filter and --tag choose from a suite, but a bundle has one case");
     return run_shrink_bundle(shrink, options.suite);
+  }
   const std::filesystem::path suite = find_suite(options.suite);
   if (options.list) {
     print_list(chosen_cases(options, suite));

@@ -38,11 +38,24 @@ load_nm = 0.0
 step.0.load_nm = [0.013, 0.02]
 """
 
+# A device under test that counts its runs in its folder.
+COUNTS = """import os
+import pathlib
+import signal
+import time
+count = pathlib.Path("count")
+run = int(count.read_text()) + 1 if count.exists() else 1
+count.write_text(str(run))
+"""
+A_STEP = "[[step]]\nat_s = 0.0\nload_nm = 0.01\n"
+
 
 class Shrink(RegressionTest):
     def shrink(self, *arguments, name="small.toml", code=OK):
         small = self.folder / "suite" / name
         done = self.run_test(*arguments, "--shrink", small, code=code)
+        for left, of in re.findall(r"(\S+) of (\S+) values", done.stdout):
+            self.assertLessEqual(int(left), int(of))
         return done.stdout + done.stderr, small
 
     def test_a_case_of_a_preset_becomes_small_and_fails_the_same(self):
@@ -76,6 +89,51 @@ class Shrink(RegressionTest):
         self.assertIn("fail", self.run_test(small.parent, code=FAILED).stdout)
         said, _ = self.shrink(bundle, name="other.toml", code=USAGE)
         self.assertIn("device.py, which exists already", said)
+
+    def test_a_program_that_ends_with_another_code_fails_in_another_way(self):
+        """Catches: a usage error that counts as the crash, a length that is compared with the time of the crash."""
+        self.write("case.toml", PROGRAM.format(limit_s=30) + A_STEP)
+        self.write("device.py", DRIVES.format(until=8) + "import sys\nos.abort() if sample.load_nm > 0 else sys.exit(2)\n")
+        said, small = self.shrink(self.folder / "suite")
+        self.assertRegex(said, r"1 of 1 steps, .*, 0\.00\d+ s of 0\.02 s, ")
+        self.assertIn("ended with code 134", self.run_test(small, code=FAILED).stdout)
+        self.assertIn("made smaller: it fails in the same way.", small.read_text(encoding="utf-8"))
+
+    def test_a_case_that_does_not_fail_each_time_is_told(self):
+        """Catches: a last run that passes under the claim that the case fails."""
+        self.write("case.toml", PROGRAM.format(limit_s=30) + A_STEP)
+        self.write("device.py", COUNTS + "if run <= 2:\n    raise SystemExit(3)\n" + DRIVES.format(until=10 ** 9))
+        said, small = self.shrink(self.folder / "suite", "--shrink-runs", "1", code=FAILED)
+        self.assertIn("the case does not fail each time", said)
+        self.assertIn("does not fail each time", small.read_text(encoding="utf-8").splitlines()[0])
+
+    def test_an_interrupted_search_writes_what_it_has(self):
+        """Catches: an interrupted search that loses everything, or that takes the interrupted run for the failure."""
+        self.write("case.toml", PROGRAM.format(limit_s=30) + A_STEP)
+        self.write("device.py", COUNTS + "if run == 3:\n    os.kill(os.getppid(), signal.SIGTERM)\n    time.sleep(60)\nraise SystemExit(3)\n")
+        said, small = self.shrink(self.folder / "suite")
+        self.assertIn("0 of 1 steps left", said)
+        self.assertIn("is the smallest case so far, and was not run again", said)
+        text = small.read_text(encoding="utf-8")
+        self.assertIn("it failed in the same way.", text)
+        self.assertNotIn("step", text)
+        self.assertIn("ended with code 3", self.run_test(small, code=FAILED).stdout)
+
+    def test_the_place_of_a_smaller_bundle_is_made_before_the_search(self):
+        """Catches: a search whose result cannot be written, a choice among the one case of a bundle that is ignored."""
+        suite = self.write("servo.toml", SERVO.replace("6.0", "5.0")).parent
+        self.run_test(suite, "--keep", self.folder / "kept", code=FAILED)
+        (bundle,) = (self.folder / "kept").iterdir()
+        said, small = self.shrink(bundle, name="new/folder/small.toml")
+        self.assertIn("0 of 0 steps", said)
+        self.assertTrue(small.exists())
+        said, _ = self.shrink(bundle, name="servo.toml/small.toml", code=USAGE)
+        self.assertRegex(said, r"--shrink: cannot write \S+/servo\.toml/small\.toml: Not a directory")
+        self.assertNotIn("fail ", said)
+        for choice in (("--filter", "other"), ("--tag", "slow")):
+            said, small = self.shrink(bundle, *choice, name="chosen.toml", code=USAGE)
+            self.assertIn("a bundle has one case", said)
+            self.assertFalse(small.exists())
 
     def test_what_cannot_shrink_is_refused_with_its_reason(self):
         """Catches: a passing case that runs for ever, a file that is overwritten or that lacks the files of its case."""
