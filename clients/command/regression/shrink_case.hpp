@@ -13,8 +13,8 @@ struct ShrinkOptions {
 };
 
 /// Makes a case that fails smaller, and writes it into the folder of the case. Returns the exit code: 0, the
-/// smaller case fails as the first one did; 1, it does not each time. When the user interrupts the search, the
-/// smallest case so far is written. Throws UsageError.
+/// smaller case fails as the first one did; 1, it does not each time. When the user interrupts the search,
+/// the smallest case so far is written. Throws UsageError.
 int run_shrink(const ShrinkOptions& options, const regression::Case& c);
 
 /// The same for the case of a bundle, whose files get into the folder of the smaller case. The bench must be
