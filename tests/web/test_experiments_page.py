@@ -89,16 +89,27 @@ class ExperimentsPage(PageTest):
 
     def test_a_file_is_played_and_another_is_refused(self):
         """Catches: a reader that takes any file, or that reads a recording of the live bench wrongly: its time, its axis."""
-        recording, bad = self.folder / "live.mcap", self.folder / "bad.mcap"
+        recording, bad = self.recording(), self.folder / "bad.mcap"
         bad.write_bytes(b"no recording at all")
-        with_motor = self.serve("--mode", "free", "--duration", "0.25", "--record", str(recording),
-                                config=BENCHES / "im-b.toml")
-        with_motor.process.wait(PATIENCE_S)
         shown = self.play("files", self.gateway(self.bench()).url, recording, bad)
         self.assertEqual((shown["opened"], shown["title"]), ("live.mcap is open", "Recording live.mcap"))
         self.assertRegex(shown["time"], r"^0\.2499 s of 249\.9 ms|^0\.2500 s of 250\.0 ms")
         self.assertIn("file is no recording: it does not begin like an MCAP file", shown["refused"])
         self.assertEqual(shown["still"], "Recording live.mcap")
+
+    def recording(self):
+        """Of a quarter of a second of a motor that starts."""
+        path = self.folder / "live.mcap"
+        self.serve("--mode", "free", "--duration", "0.25", "--record", str(path), config=BENCHES / "im-b.toml").process.wait(PATIENCE_S)
+        return path
+
+    def test_a_player_that_closes_gives_its_plots_back(self):
+        """Catches: plots, and with them whole recordings, that stay when the player opens another one or a pane goes; a drag in the
+        player that zooms and pauses the scope of the bench."""
+        shown = self.play("reopened", self.gateway(self.bench()).url, self.recording())
+        self.assertEqual((shown["often"], shown["live"]), (shown["once"], "Pause"))
+        self.assertLess(shown["closed"], shown["once"])
+        self.assertLess(shown["removed"], shown["closed"])
 
     def test_a_bench_without_experiments_says_so(self):
         """Catches: an empty list where the bench refuses, a refusal in other words than the bench's, a form that leads to nothing."""

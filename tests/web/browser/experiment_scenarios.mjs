@@ -156,6 +156,42 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
       return { opened, title, chips, row, time: await position(page), refused: await open(bad), still: await text(page, "#player h2") };
     },
 
+    /** A recording that is opened again and again, and a drag in its plots. */
+    async reopened(page, path) {
+      await stateOf(page, "tick", /\d/);
+      const canvases = async () => {
+        await pause(300); // uPlot draws once more
+        const handle = await page.evaluateHandle(() => HTMLCanvasElement.prototype);
+        const all = await page.queryObjects(handle); // collects garbage first
+        const count = await page.evaluate((each) => each.length, all);
+        await Promise.all([all.dispose(), handle.dispose()]); // they hold what they name
+        return count;
+      };
+      const open = async () => {
+        await page.$eval("#experiments .answer", (each) => { each.textContent = ""; });
+        const [field] = await page.$$('[aria-label="recording to play"]');
+        await field.uploadFile(path);
+        await answer(page, /is open/);
+      };
+      await open();
+      const once = await canvases();
+      for (let i = 0; i < 4; ++i) await open();
+      const often = await canvases();
+      const plot = await page.$("#player .u-over");
+      await plot.scrollIntoView();
+      const { x, y, width, height } = await plot.boundingBox();
+      await page.mouse.move(x + 0.2 * width, y + height / 2);
+      await page.mouse.down();
+      await page.mouse.move(x + 0.6 * width, y + height / 2, { steps: 5 });
+      await page.mouse.up();
+      await pause(300);
+      const live = await page.$eval("#scope .bar button", (each) => each.textContent);
+      await press(page, "close the player");
+      const closed = await canvases();
+      await page.$eval('#scope [aria-label="remove this pane"]', (each) => each.click());
+      return { once, often, live, closed, removed: await canvases() };
+    },
+
     /** A picture of the form and of a recording that is played. */
     async experimentPicture(page, theme, path) {
       await stateOf(page, "tick", /\d/);

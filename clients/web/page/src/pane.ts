@@ -32,8 +32,13 @@ export class Pane {
   /** Arrows move it by a step of the spectrum. */
   private readonly cursor = element("input", { type: "number", min: 0, "aria-label": "cursor of the spectrum, Hz", placeholder: "cursor, Hz", input: () => this.listener.changed() });
   private plot: Plot | null = null;
+  private readonly resized = new ResizeObserver(() => {
+    this.plot?.resize();
+    this.listener.changed();
+  });
 
-  constructor(private readonly source: Source, readonly channels: Channel[], private readonly listener: PaneListener) {
+  /** `cursorOf`: a word that the panes of one scope share. */
+  constructor(private readonly source: Source, readonly channels: Channel[], private readonly cursorOf: string, private readonly listener: PaneListener) {
     this.add = element("select", { "aria-label": "add a signal to this pane", change: () => this.addChosen() });
     this.fillChoice();
     this.highest = choice("highest frequency", frequenciesUpTo(0.5 / source.sampleS).map((each) => [String(each), `to ${plain(each)} Hz`]),
@@ -46,10 +51,15 @@ export class Pane {
       }), this.highest, this.scales, this.cursor, this.add,
       button("×", () => listener.removed(this), { class: "small", "aria-label": "remove this pane" })), this.plotPlace, this.peaks);
     this.rebuild();
-    new ResizeObserver(() => {
-      this.plot?.resize();
-      this.listener.changed();
-    }).observe(this.plotPlace);
+    this.resized.observe(this.plotPlace);
+  }
+
+  /** Gives its plot and its samples back. */
+  end(): void {
+    this.resized.disconnect();
+    this.plot?.end();
+    this.plot = null;
+    this.root.remove();
   }
 
   /** What stands beside the axes. */
@@ -66,10 +76,9 @@ export class Pane {
     this.plot?.end();
     this.showChips();
     this.highest.hidden = this.scales.hidden = this.cursor.hidden = this.peaks.hidden = this.kind !== "spectrum";
-    const isOverTime = this.kind === "time";
     const { x: xLabel, y: yLabel } = this.labels;
     this.plot = new Plot(this.plotPlace, {
-      height: kHeights[this.kind], xLabel, yLabel, isOverTime, logarithmic: this.logarithms,
+      height: kHeights[this.kind], xLabel, yLabel, cursorOf: this.kind === "time" ? this.cursorOf : null, logarithmic: this.logarithms,
       colours: (this.kind === "xy" ? this.channels.slice(1) : this.channels).map((each) => this.colourOf(each)),
       isEqualScale: this.kind === "xy" && new Set(this.channels.map((each) => this.unitOf(each))).size === 1,
     }, {

@@ -10,8 +10,8 @@ export interface Look {
   /** Both axes have the same unit, and a circle is a circle. */
   isEqualScale: boolean;
   logarithmic: Logarithms;
-  /** The cursor of the mouse is one for all plots over time, and may select. */
-  isOverTime: boolean;
+  /** The cursor of the mouse may select, and is one for all plots over time with this word; null: a plot of something else. */
+  cursorOf: string | null;
 }
 
 /** A dot with a letter. */
@@ -47,8 +47,8 @@ export class Plot {
       height: look.height,
       legend: { show: false },
       cursor: {
-        ...(look.isOverTime ? { sync: { key: "scope" } } : {}),
-        drag: { x: look.isOverTime, y: false, setScale: false }, points: { show: false },
+        ...(look.cursorOf === null ? {} : { sync: { key: look.cursorOf } }),
+        drag: { x: look.cursorOf !== null, y: false, setScale: false }, points: { show: false },
       },
       scales: { x: { time: false, range: range(0), ...scaleKind(look.logarithmic.x) }, y: { range: range(1), ...scaleKind(look.logarithmic.y) } },
       axes: [{ ...line, label: look.xLabel, labelSize: 16, size: 28, values: (_plot, ticks) => ticks.map((each) => (each === null ? "" : String(Number(each.toPrecision(9))))) },
@@ -76,6 +76,7 @@ export class Plot {
     if (this.place.clientWidth > 0) this.plot.setSize({ width: this.width, height: this.look.height });
   }
 
+  /** uPlot keeps a plot, and what it draws, until this is called. */
   end(): void {
     this.plot.destroy();
   }

@@ -60,9 +60,10 @@ export class Scope {
     this.frame();
   }
 
-  /** Ends the drawing, for a page that gets another bench. */
+  /** Ends the drawing and gives the plots back, for a page that gets another bench or a player that closes. */
   end(): void {
     this.isOver = true;
+    for (const pane of this.panes) pane.end();
   }
 
   signalsOf(axis: number): Set<string> {
@@ -100,11 +101,11 @@ export class Scope {
   }
 
   private addPane(signals: string[], axis = 0): void {
-    const pane = new Pane(this.source, signals.map((signal) => ({ axis, signal })), {
+    const pane = new Pane(this.source, signals.map((signal) => ({ axis, signal })), this.played === undefined ? "bench" : "player", {
       changed: () => this.channelsChanged(),
       removed: (gone) => {
         this.panes.splice(this.panes.indexOf(gone), 1);
-        gone.root.remove();
+        gone.end();
         this.channelsChanged();
       },
       clicked: (time) => this.putCursor(time),
