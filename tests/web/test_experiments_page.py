@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Experiments and recordings in the page of `drivebench web`: browser/experiment_scenarios.mjs in Debian's chromium."""
 import csv
+import pathlib
 import re
 import sys
 import tempfile
@@ -12,7 +13,7 @@ from experiment_test import endless, request
 
 class ExperimentsPage(PageTest):
     def kept(self):
-        """A folder for the experiments of a server."""
+        """A folder for the experiments or a recording of a server."""
         folder = tempfile.TemporaryDirectory(prefix="drivebench-experiments-")
         self.addCleanup(folder.cleanup)
         return folder.name
@@ -99,7 +100,7 @@ class ExperimentsPage(PageTest):
 
     def recording(self):
         """Of a quarter of a second of a motor that starts."""
-        path = self.folder / "live.mcap"
+        path = pathlib.Path(self.kept()) / "live.mcap"
         self.serve("--mode", "free", "--duration", "0.25", "--record", str(path), config=BENCHES / "im-b.toml").process.wait(PATIENCE_S)
         return path
 
@@ -111,6 +112,11 @@ class ExperimentsPage(PageTest):
         self.assertLess(shown["closed"], shown["once"])
         self.assertLess(shown["removed"], shown["closed"])
 
+    def test_the_player_stays_with_its_user(self):
+        """Catches: an experiment that ends and puts its data in the place of what is played."""
+        shown = self.play("undisturbed", self.gateway(self.bench()).url, self.recording())
+        self.assertEqual(shown, {"told": "experiment 1: completed", "title": "Recording live.mcap", "progress": False})
+
     def test_a_bench_without_experiments_says_so(self):
         """Catches: an empty list where the bench refuses, a refusal in other words than the bench's, a form that leads to nothing."""
         shown = self.play("none", self.gateway(self.serve("--mode", "lockstep")).url)
@@ -118,11 +124,11 @@ class ExperimentsPage(PageTest):
         self.assertFalse(shown["form"])
 
     def test_axe_finds_no_serious_fault(self):
-        """Catches: a field of the form without a name or out of the reach of keys."""
+        """Catches: a field of the form without a name or out of the reach of keys, a focus that goes with a row, a position of the
+        player that a screen reader tells with each picture."""
         shown = self.play("experimentAxe", self.gateway(self.bench()).url)
         self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
-        self.assertEqual(shown["missing"], [])
-
+        self.assertEqual((shown["missing"], shown["focus"], shown["live"]), ([], "Add shape", "off"))
 
 
 if __name__ == "__main__":

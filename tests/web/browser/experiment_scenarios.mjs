@@ -156,6 +156,18 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
       return { opened, title, chips, row, time: await position(page), refused: await open(bad), still: await text(page, "#player h2") };
     },
 
+    /** An experiment ends while its user looks at something else. */
+    async undisturbed(page, path) {
+      await stateOf(page, "tick", /\d/);
+      const [field] = await page.$$('[aria-label="recording to play"]');
+      await field.uploadFile(path);
+      await answer(page, /is open/);
+      await queue(page, kSpin);
+      const told = await answer(page, /completed/);
+      await pause(1000);
+      return { told, title: await text(page, "#player h2"), progress: await isShown(page, '[aria-label="progress of the data"]') };
+    },
+
     /** A recording that is opened again and again, and a drag in its plots. */
     async reopened(page, path) {
       await stateOf(page, "tick", /\d/);
@@ -220,11 +232,12 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
       for (const words of ["Add parameter", "Add event", "Add shape"]) await press(page, words);
       await set(page, "time of event 1, s", "0.1");
       await press(page, "remove shape 2");
+      const focus = await page.evaluate(() => document.activeElement.textContent);
       await press(page, "Queue the experiment");
       await answer(page, /completed|stopped/);
       const missing = await page.evaluate(() => [...document.querySelectorAll("button, input, select, summary")]
         .filter((each) => !each.disabled && each.checkVisibility() && each.tabIndex < 0).map((each) => each.outerHTML));
-      return { ...(await axeFinds(page)), missing };
+      return { ...(await axeFinds(page)), missing, focus, live: await page.$eval("#player output", (each) => each.getAttribute("aria-live")) };
     },
   };
 }

@@ -9,14 +9,15 @@ const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
     contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target", "wire",
-      "player/recorded", "player/mcap", "experiments/fetch", "experiments/request"].map((each) => `export * from "./${each}";`).join("\n"),
+      "player/recorded", "player/mcap", "experiments/fetch", "experiments/request", "experiments/words"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },
   bundle: true, write: false, format: "esm", alias: { long: `${process.env.PAGE_SOURCES}/no_long.js` },
 });
 const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
   spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, pb, Track,
-  recordedRows, recordedFile, csvOfRows, Pieces, shareOf, valueOf, logRange, spectrumCurves, amplitudeAt, inputsOf, channelsOf, fieldsOfShape, shapeOf, eventOf, identification } =
+  recordedRows, recordedFile, csvOfRows, Pieces, shareOf, valueOf, logRange, spectrumCurves, amplitudeAt, inputsOf, channelsOf, fieldsOfShape, shapeOf, eventOf, identification,
+  fetchExperiment, RequestKeys, fileNameOf, factsOf, arrivalOf } =
   await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].text).toString("base64")}`);
 
 function historyOf(ticks, valueOf) {
@@ -123,11 +124,11 @@ test("numbers for people", () => {
 });
 
 // Catches: columns under the wrong title, rows of gaps, and an SVG that a title can break.
-test("exports of two axes", () => {
+test("exports of two axes", async () => {
   const rows = [historyOf(range(0, 4), (tick) => tick), historyOf([1, 3], () => 7)].map((each) => each.rows(0, 10));
   const view = { from: 0, to: 4, origin: 0, rows };
   const channels = [{ axis: 0, signal: "x", title: "a.x [A]" }, { axis: 1, signal: "x", title: "b.x [A]" }];
-  assert.equal(csvOf(channels, view, 0.5), "tick,time_s,a.x [A],b.x [A]\n0,0,0,\n1,0.5,1,7\n2,1,2,\n3,1.5,3,7\n");
+  assert.equal((await csvOf(channels, view, 0.5)).join(""), "tick,time_s,a.x [A],b.x [A]\n0,0,0,\n1,0.5,1,7\n2,1,2,\n3,1.5,3,7\n");
   const { x, lines } = timeCurves(view, [channels[0]], 0.5, 100);
   const svg = svgOf([{ x, labels: { x: "time [s]", y: "[A]" }, logarithmic: { x: false, y: false }, lines: [{ ...lines[0], title: "<b>&", colour: "red" }] }]);
   assert.match(svg, /&lt;b>&amp;/);
@@ -221,7 +222,7 @@ const kBench = { name: "b", period_s: 1, axes: [{ name: "x", phases: 3 }, { name
   signals: [{ name: "tick", unit: "ticks" }, { name: "i_a_a", unit: "A" }, { name: "speed_rad_s", unit: "rad/s" }] };
 
 // Catches: columns exchanged, big-endian numbers, ticks that forget the decimation, rows beyond the position of the player.
-test("rows of an experiment become a track up to its position", () => {
+test("rows of an experiment become a track up to its position", async () => {
   const view = new DataView(new ArrayBuffer(48));
   [1, 10, 2, 20, 3, 30].forEach((value, i) => view.setFloat64(8 * i, value, true));
   const info = { axis: 1, signals: ["i_a_a", "speed_rad_s"], decimation: 5, period_s: 0.25 };
@@ -234,8 +235,21 @@ test("rows of an experiment become a track up to its position", () => {
   assert.deepEqual([[...all.ticks], [...all.columns.get("speed_rad_s")], [...all.columns.get("torque_nm")]], [[0, 5, 10], [10, 20, 30], [NaN, NaN, NaN]]);
   track.lastTick = 7;
   assert.deepEqual([[...track.rows(0, 100).ticks], track.sample().i_a_a], [[0, 5], 2]);
-  assert.equal(csvOfRows(track, kBench.signals, info.signals, 0.25),
+  assert.equal((await csvOfRows(track, kBench.signals, info.signals, 0.25)).join(""),
     "tick,time_s,i_a_a [A],speed_rad_s [rad/s]\n0,0.000000000,1,10\n5,1.250000000,2,20\n10,2.500000000,3,30\n");
+});
+
+// Catches: a large table that is one text, or during which the page does nothing else, so that the gateway gives up an axis that it drives.
+test("a large table comes in parts, between which the page does other work", async () => {
+  const rows = 200_000;
+  const track = new Track(Float64Array.from({ length: rows }, (_, row) => row), (row) => ({ tick: row, i_a_a: 0.5 * row }));
+  let turns = 0;
+  const others = setInterval(() => ++turns, 1);
+  const parts = await csvOfRows(track, kBench.signals, ["i_a_a"], 0.001);
+  clearInterval(others);
+  const lines = parts.join("").split("\n");
+  assert.ok(turns > 1 && parts.length > 3, `${turns} turns, ${parts.length} parts`);
+  assert.deepEqual([lines.length, lines[0], lines[rows]], [rows + 2, "tick,time_s,i_a_a [A]", "199999,199.999000000,99999.5"]);
 });
 
 /** A record of an MCAP file. */
@@ -280,6 +294,99 @@ test("a recording gives the samples of its axes, as far as it is whole", () => {
   const hostile = Buffer.concat([kMagic, Buffer.from([6]), Buffer.alloc(8, 0xff), Buffer.alloc(64)]);
   assert.throws(() => recordedFile(kBench, hostile), /no samples/);
   assert.throws(() => recordedFile(kBench, Buffer.concat([kMagic, chunk("zstd", message(1, 8, 1))])), /compressed/);
+});
+
+// Catches: a period of 0 or less, with which the player never ends, tracks without end, an axis that stands twice, a call for each
+// nested chunk until there is no stack, a sentence of the decoder.
+test("a damaged recording is refused in words, or played with the period of the bench", () => {
+  const at = (timeNs, tick) => record(5, u16(1), u32(0), u64(timeNs), u64(0), pb.Sample.encode({ tick }).finish());
+  const file = (...records) => Buffer.concat([kMagic, chunk("", channel(1, "/x/sample"), ...records)]);
+  for (const times of [[5, 5], [9, 5]]) {
+    const recorded = recordedFile(kBench, file(at(times[0], 1), at(times[1], 2)));
+    assert.equal(recorded.description.period_s, kBench.period_s);
+  }
+  assert.equal(recordedFile(kBench, file(channel(1, "/x/sample"), message(1, 8, 1))).histories.length, 1);
+  assert.throws(() => recordedFile(kBench, file(channel(2, "/x/sample"))), /two channels of axis 'x'/);
+  const many = Array.from({ length: 64 }, (_, i) => channel(2 + i, `/axis${i}/sample`));
+  assert.equal(recordedFile(kBench, file(...many.slice(1), message(1, 8, 1))).histories.length, 1);
+  assert.throws(() => recordedFile(kBench, file(...many)), /more than 64 axes/);
+  assert.throws(() => recordedFile(kBench, file(chunk("", message(1, 8, 1)))), /a chunk lies in a chunk/);
+  assert.throws(() => recordedFile(kBench, file(record(5, u16(1), u32(0), u64(0), u64(0), Buffer.from([0x09, 1])))), /sample 1 of axis 'x' cannot be read/);
+});
+
+/** Fetches from a gateway that `serve` plays; the timers do not wait. */
+async function fetched(serve) {
+  const before = globalThis.setTimeout;
+  class Socket {
+    static OPEN = 1;
+    readyState = 1;
+    constructor() { queueMicrotask(() => serve(this)); }
+    close() {}
+  }
+  Object.assign(globalThis, { WebSocket: Socket, location: { protocol: "http:", host: "h" }, sessionStorage: { getItem: () => null },
+    setTimeout: (act) => queueMicrotask(act) });
+  const told = [];
+  try {
+    await fetchExperiment(1, "owner", false, { progress: () => undefined, waits: (sentence) => told.push(sentence) }, new AbortController().signal);
+    return { told };
+  } catch (problem) {
+    return { told, problem: problem.message };
+  } finally {
+    globalThis.setTimeout = before;
+  }
+}
+const answered = (socket, envelope) => {
+  const payload = Buffer.from(pb.Envelope.encode(envelope).finish());
+  const size = Buffer.alloc(4);
+  size.writeUInt32BE(payload.length);
+  socket.onmessage({ data: Uint8Array.from(Buffer.concat([size, payload])).buffer });
+};
+
+// Catches: a fetch that tries for ever without a word, the bench's sentence that is lost, an exception after which it waits for ever.
+test("a fetch that is not let in says why, and gives up", async () => {
+  const full = await fetched((socket) => socket.onclose({ code: 1006, reason: "" }));
+  assert.deepEqual(full.told, Array(9).fill("the gateway does not answer (1006)"));
+  assert.equal(full.problem, "the gateway does not answer (1006); given up after 10 tries");
+  const busy = await fetched((socket) => {
+    socket.close = () => socket.onclose({ code: 1005, reason: "" });
+    socket.send = (frame) => answered(socket, { id: pb.Envelope.decode(new Uint8Array(frame).subarray(4)).id,
+      refusal: { code: pb.RefusalCode.REFUSAL_BUSY, message: "too many sessions" } });
+    socket.onopen();
+  });
+  assert.equal(busy.problem, "too many sessions; given up after 10 tries");
+  const torn = await fetched((socket) => {
+    socket.send = (frame) => {
+      const { id, hello } = pb.Envelope.decode(new Uint8Array(frame).subarray(4));
+      if (hello) return answered(socket, { id, welcome: {} });
+      answered(socket, { id, experiment_info: { id: 1, signals: ["i_a_a"], decimation: 1, rows: 9, state: 3 } });
+      answered(socket, { id, experiment_data: { first: 5, data: new Uint8Array(8) } });
+    };
+    socket.onopen();
+  });
+  assert.equal(torn.problem, "the bench left out a piece of the data");
+});
+
+// Catches: a second experiment for a press whose answer a broken connection lost, one key for two experiments.
+test("a request keeps its key until it is answered", () => {
+  const keys = new RequestKeys();
+  const first = keys.keyOf({ label: "a" });
+  assert.equal(keys.keyOf({ label: "a" }), first);
+  assert.notEqual(keys.keyOf({ label: "b" }), first);
+  const other = keys.keyOf({ label: "b" });
+  keys.answered();
+  assert.notEqual(keys.keyOf({ label: "b" }), other);
+});
+
+// Catches: the first part of the data that passes for all of them, in the page, in a file's name or before an identification.
+test("shortened data say so", () => {
+  const info = { id: 7, axis: 0, state: 3, period_s: 0.001, tick: 9, ticks: 9, rows: 10, signals: ["i_a_a"], decimation: 1 };
+  const axes = [{ name: "x", machine_kind: "induction" }];
+  const [whole, part] = [true, false].map((isWhole) => ({ info, isWhole }));
+  assert.deepEqual([fileNameOf(whole, "csv"), fileNameOf(part, "mcap")], ["experiment-7.csv", "experiment-7-first-128MiB.mcap"]);
+  const [all, some] = [whole, part].map((each) => Object.fromEntries(factsOf(axes, each, "save it")));
+  assert.deepEqual([all.identify, all.shortened, some.identify], ["save it, then drivebench identify --motor im --from experiment-7.mcap", undefined, undefined]);
+  for (const text of [some.shortened, arrivalOf(part)]) assert.match(text, /the first 128 MiB; drivebench experiment fetch 7 has all/);
+  assert.equal(arrivalOf(whole), "experiment 7: completed");
 });
 
 // Catches: pieces that come twice after a broken connection and stand twice, a hole that is filled with zeros.

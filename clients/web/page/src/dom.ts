@@ -42,9 +42,31 @@ export function setText(node: HTMLElement, text: string): void {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** Offers a text or bytes as a file. */
-export function save(name: string, type: string, content: string | Uint8Array<ArrayBuffer>): void {
-  const url = URL.createObjectURL(new Blob([content], { type }));
-  element("a", { href: url, download: name }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
+export interface SavedFile {
+  name: string;
+  type: string;
+  /** The parts, one after the other: a text of more than half a gigabyte is none. */
+  content(): Promise<BlobPart[]>;
+}
+
+/** A button that offers a file, and the words beside it while the file is made or if it cannot be. */
+export function saveButton(text: string, fileOf: () => SavedFile, more: Properties = {}): HTMLElement {
+  const words = element("span", { class: "soft", role: "status" });
+  let isBusy = false;
+  const act = async () => {
+    if (isBusy) return;
+    isBusy = true;
+    setText(words, "making the file");
+    try {
+      const { name, type, content } = fileOf();
+      const url = URL.createObjectURL(new Blob(await content(), { type }));
+      element("a", { href: url, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 1000);
+      setText(words, "");
+    } catch (problem) {
+      setText(words, `the file cannot be made: ${(problem as Error).message}`);
+    }
+    isBusy = false;
+  };
+  return element("span", { class: "bar" }, button(text, () => void act(), more), words);
 }

@@ -6,30 +6,43 @@ import { Track } from "./player/recorded";
 import { Channel, View } from "./view";
 import { pb } from "./wire";
 
-/** All samples of the view at full rate: a row for each tick, empty where an axis has none. */
-export function csvOf(channels: (Channel & { title: string })[], view: View, periodS: number): string {
+/** Cells of a table that are written in one go: some ten milliseconds. */
+const kCellsAtOnce = 1 << 17;
+
+/** A table in parts. Between them the page does the rest of its work: it must be heard while it drives an axis. */
+async function tableOf(heads: string[], rows: number, rowOf: (row: number) => (string | number)[]): Promise<string[]> {
+  const parts = [heads.join(",") + "\n"];
+  const atOnce = Math.ceil(kCellsAtOnce / heads.length);
+  for (let from = 0; from < rows; from += atOnce) {
+    const lines = Array.from({ length: Math.min(atOnce, rows - from) }, (_, i) => rowOf(from + i).join(","));
+    parts.push(lines.join("\n") + "\n");
+    await new Promise((done) => setTimeout(done));
+  }
+  return parts;
+}
+
+/** All samples of a view that stays, at full rate: a row for each tick, empty where an axis has none. */
+export function csvOf(channels: (Channel & { title: string })[], view: View, periodS: number): Promise<string[]> {
   const axes = [...new Set(channels.map((each) => each.axis))];
   const ticks = [...new Set(axes.flatMap((axis) => [...view.rows[axis].ticks]))].filter(Number.isInteger).sort((a, b) => a - b);
-  const lines = [["tick", "time_s", ...channels.map((each) => each.title)].join(",")];
-  for (const tick of ticks) {
+  return tableOf(["tick", "time_s", ...channels.map((each) => each.title)], ticks.length, (place) => {
+    const tick = ticks[place];
     const cells = channels.map(({ axis, signal }) => {
       const row = lowerBound(view.rows[axis].ticks, tick);
       const value = view.rows[axis].ticks[row] === tick ? view.rows[axis].columns.get(signal)?.[row] : undefined;
       return value === undefined || Number.isNaN(value) ? "" : String(value);
     });
-    lines.push([tick, tick * periodS, ...cells].join(","));
-  }
-  return lines.join("\n") + "\n";
+    return [tick, tick * periodS, ...cells];
+  });
 }
 
 /** The rows of a track as `drivebench experiment fetch` writes them. */
-export function csvOfRows(track: Track, descriptions: pb.ISignalDescription[], signals: string[], periodS: number): string {
-  track.choose(signals);
-  const columns = signals.map((each) => track.column(each));
+export function csvOfRows(track: Track, descriptions: pb.ISignalDescription[], signals: string[], periodS: number): Promise<string[]> {
   const heads = signals.map((each) => `${each} [${descriptions.find(({ name }) => name === each)?.unit}]`);
-  const lines = [["tick", "time_s", ...heads].join(",")];
-  track.ticks.forEach((tick, row) => lines.push([tick, (tick * periodS).toFixed(9), ...columns.map((each) => each[row])].join(",")));
-  return lines.join("\n") + "\n";
+  return tableOf(["tick", "time_s", ...heads], track.ticks.length, (row) => {
+    const values = track.read(row);
+    return [track.ticks[row], (track.ticks[row] * periodS).toFixed(9), ...signals.map((each) => values[each])];
+  });
 }
 
 interface SvgPane {

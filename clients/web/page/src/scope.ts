@@ -1,6 +1,6 @@
 /** The scope: panes, time base, trigger, cursors and measurements. */
 import { signalOf, Source } from "./bench";
-import { button, choice, element, save, setText } from "./dom";
+import { button, choice, element, SavedFile, saveButton, setText } from "./dom";
 import { csvOf, kColumns, svgOf } from "./exports";
 import { MeasurementTable } from "./measurement_table";
 import { Pane } from "./pane";
@@ -53,7 +53,7 @@ export class Scope {
     this.time = choice(played === undefined ? "window" : "window of the player", windows, (value) => this.setWindow(Number(value)));
     this.time.value = String(this.windowS);
     root.replaceChildren(element("div", { class: "bar" }, "Window", this.time, ...(played === undefined ? [this.pauseButton] : []),
-      button("Add pane", () => this.addPane([])), button("CSV", () => this.exportCsv()), button("SVG", () => this.exportSvg()),
+      button("Add pane", () => this.addPane([])), saveButton("CSV", () => this.csv()), saveButton("SVG", () => this.svg()),
       this.note), ...(played === undefined ? [this.bar.root] : []), this.place, this.table.root);
     for (const signals of panes) this.addPane(signals, played?.axis);
     this.place.addEventListener("keydown", (event) => this.key(event));
@@ -242,19 +242,20 @@ export class Scope {
     this.isDirty = true;
   }
 
-  private exportCsv(): void {
+  private csv(): SavedFile {
     const channels = this.panes.flatMap((pane) => pane.channels.map((each) => ({
       ...each, title: `${pane.nameOf(each)} [${signalOf(this.source, each.signal).unit}]` })));
-    save(`${this.source.description.name}.csv`, "text/csv", csvOf(channels, this.view(), this.periodS));
+    const view = this.played === undefined ? frozen(this.view()) : this.view(); // the bench goes on
+    return { name: `${this.source.description.name}.csv`, type: "text/csv", content: () => csvOf(channels, view, this.periodS) };
   }
 
-  private exportSvg(): void {
+  private svg(): SavedFile {
     const view = this.view();
     const window = betweenCursors(view, this.cursors);
     const panes = this.panes.map((pane) => {
       const { x, lines } = pane.curvesOf(pane.kind === "spectrum" ? window : view, kColumns);
       return { x, labels: pane.labels, logarithmic: pane.logarithms, lines: lines.map((each) => ({ ...each, title: pane.nameOf(each.channel), colour: pane.colourOf(each.channel) })) };
     });
-    save(`${this.source.description.name}.svg`, "image/svg+xml", svgOf(panes));
+    return { name: `${this.source.description.name}.svg`, type: "image/svg+xml", content: () => Promise.resolve([svgOf(panes)]) };
   }
 }

@@ -60,7 +60,8 @@ export class Wire {
     const socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/bench`);
     socket.binaryType = "arraybuffer";
     this.rest = new Uint8Array(0);
-    let refused = false;
+    let isToken = false;
+    let refusal = "";
     let mayConduct = false;
     socket.onopen = async () => {
       try {
@@ -70,9 +71,11 @@ export class Wire {
         if (mayConduct) socket.close();
         else this.listener.welcome(welcome, conducts);
       } catch (problem) {
-        if (!(problem instanceof Refused) || problem.refusal.code !== pb.RefusalCode.REFUSAL_UNAUTHENTICATED) return;
-        refused = true;
-        this.listener.tokenWanted(problem.message);
+        if (!(problem instanceof Refused)) return;
+        refusal = problem.message;
+        if (problem.refusal.code !== pb.RefusalCode.REFUSAL_UNAUTHENTICATED) return socket.close();
+        isToken = true;
+        this.listener.tokenWanted(refusal);
       }
     };
     socket.onmessage = ({ data }) => typeof data === "string" ? this.listener.drive(JSON.parse(data) as DriveReport)
@@ -81,9 +84,9 @@ export class Wire {
       for (const each of this.waiting.values()) each.reject(new Error("the connection to the bench is lost"));
       this.waiting.clear();
       if (this.socket === socket) this.socket = null;
-      if (refused || this.isOver) return;
+      if (isToken || this.isOver) return;
       if (mayConduct) return this.connect(true);
-      this.listener.lost(event.reason || `the gateway does not answer (${event.code})`);
+      this.listener.lost(refusal || event.reason || `the gateway does not answer (${event.code})`);
       setTimeout(() => this.isOver || this.connect(), kRetryMs);
     };
     this.socket = socket;

@@ -5,6 +5,8 @@ import { pb, Refused, Wire } from "../wire";
 /** The most that the page keeps of an experiment. */
 export const kMostBytes = 128 * 2 ** 20;
 const kFirstBytes = 2 ** 16;
+/** Sessions that bring nothing, one a second, until it gives up. */
+const kTries = 10;
 
 export interface Fetched {
   info: pb.ExperimentInfo;
@@ -36,27 +38,48 @@ export class Pieces {
   }
 }
 
+export interface FetchListener {
+  /** The part of the data that is there. */
+  progress(part: number): void;
+  /** It was not let in, or lost its session, and tries again. */
+  waits(sentence: string): void;
+}
+
 /** The rows of an experiment that has ended, or its recording. `ended` gives up. */
-export function fetchExperiment(id: number, owner: string, recording: boolean, progress: (bytes: number) => void, ended: AbortSignal): Promise<Fetched> {
+export function fetchExperiment(id: number, owner: string, recording: boolean, listener: FetchListener, ended: AbortSignal): Promise<Fetched> {
   return new Promise((resolve, reject) => {
     const pieces = new Pieces();
     let info: pb.ExperimentInfo | null = null;
+    let tries = 0;
     const bytesInStep = () => (recording ? 1 : (8 * (info as pb.ExperimentInfo).signals.length) / (info as pb.ExperimentInfo).decimation);
     const done = (act: () => void) => {
       wire.end();
       act();
     };
-    const take = (answer: pb.Envelope): boolean => {
+    const read = (answer: pb.Envelope): boolean => {
+      tries = 0;
       if (answer.experiment_info) info = answer.experiment_info as pb.ExperimentInfo;
       if (info === null) return true;
       const { experiment_data: data } = answer;
       if (data) pieces.take(Math.round((data.first as number) * bytesInStep()), data.data as Uint8Array);
       const total = (recording ? info.recording_bytes : (info.rows as number) * 8 * info.signals.length) as number;
-      progress(total === 0 ? 1 : pieces.size / total);
+      listener.progress(total === 0 ? 1 : pieces.size / total);
       if (pieces.size < Math.min(total, kMostBytes) || !hasEnded(info.state)) return true;
       const fetched = { info, bytes: pieces.all, isWhole: pieces.size >= total };
       done(() => resolve(fetched));
       return false;
+    };
+    const take = (answer: pb.Envelope): boolean => {
+      try {
+        return read(answer);
+      } catch (problem) {
+        done(() => reject(problem as Error));
+        return false;
+      }
+    };
+    const lost = (sentence: string) => {
+      if (++tries >= kTries) done(() => reject(new Error(`${sentence}; given up after ${kTries} tries`)));
+      else listener.waits(sentence);
     };
     const begin = () => {
       const from = info === null ? 0 : Math.round(pieces.size / bytesInStep());
@@ -70,7 +93,7 @@ export function fetchExperiment(id: number, owner: string, recording: boolean, p
       notice: () => undefined,
       drive: () => undefined,
       tokenWanted: (sentence) => done(() => reject(new Error(sentence))),
-      lost: () => undefined,
+      lost,
     }, false);
     ended.addEventListener("abort", () => done(() => reject(new Error("given up"))));
     wire.connect();

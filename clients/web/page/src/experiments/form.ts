@@ -28,16 +28,17 @@ export class ExperimentForm {
   private readonly speed = input("speed at the start, rad/s", "0");
   private readonly limits = { current_a: input("stop above this current, A; 0: no limit", "0"), speed_rad_s: input("stop above this speed, rad/s; 0: no limit", "0"),
     angle_rad: input("stop beyond this angle, rad; 0: no limit", "0") };
+  private readonly submit = element("button", { type: "submit" }, "Queue the experiment");
   private signals: string[] = [];
 
-  /** `queue` gets the request without what belongs to the user; `tell` a sentence about a wrong field. */
-  constructor(private readonly bench: Bench, queue: (request: pb.IRunExperiment) => void, tell: (sentence: string) => void) {
+  /** `queue` gets the request without what belongs to the user, and ends with its answer; `tell` a sentence about a wrong field. */
+  constructor(private readonly bench: Bench, private readonly queue: (request: pb.IRunExperiment) => Promise<void>, tell: (sentence: string) => void) {
     this.axis = choice("axis of the experiment", bench.description.axes.map((axis, number) => [String(number), axis.name as string]), () => this.axisChanged());
     const row = (...nodes: (Node | string)[]) => element("div", { class: "bar" }, ...nodes);
     this.root = element("form", { class: "experiment", submit: (event) => {
       event.preventDefault();
       try {
-        queue(this.request());
+        void this.ask(this.request());
       } catch (problem) {
         if (!(problem instanceof NotANumber)) throw problem;
         tell(problem.message);
@@ -50,10 +51,19 @@ export class ExperimentForm {
     element("h3", {}, "Events"), this.events.root,
     element("h3", {}, "Limits, whose first breach ends it (0: none)"),
     row("current", this.limits.current_a, "A, speed", this.limits.speed_rad_s, "rad/s, angle", this.limits.angle_rad, "rad"),
-    row(element("button", { type: "submit" }, "Queue the experiment")));
+    row(this.submit));
     this.addSignal.append(element("option", { value: "" }, "+ signal"), ...bench.description.signals.map((signal) =>
       element("option", { value: signal.name as string, title: signal.meaning as string }, `${signal.name} [${signal.unit}]`)));
     this.axisChanged();
+  }
+
+  /** One request at a time. */
+  private async ask(request: pb.IRunExperiment): Promise<void> {
+    const hasFocus = document.activeElement === this.submit;
+    this.submit.disabled = true;
+    await this.queue(request);
+    this.submit.disabled = false;
+    if (hasFocus && (document.activeElement === null || document.activeElement === document.body)) this.submit.focus();
   }
 
   private get axisOf(): pb.IAxisDescription {

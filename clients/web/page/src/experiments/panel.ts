@@ -2,21 +2,23 @@
 import { Bench } from "../bench";
 import { element, setText } from "../dom";
 import { csvOfRows } from "../exports";
-import { withUnit } from "../numbers";
 import { recordedFile } from "../player/mcap";
 import { Played, PlayerPlace } from "../player/player";
 import { recordedRows } from "../player/recorded";
-import { pb } from "../wire";
+import { pb, Refused } from "../wire";
 import { Fetched, fetchExperiment, hasEnded, kMostBytes } from "./fetch";
 import { ExperimentForm } from "./form";
 import { ExperimentList } from "./list";
-import { identification } from "./request";
+import { RequestKeys } from "./request";
 import { kStateNames } from "./states";
+import { arrivalOf, factsOf, fileNameOf, titleOf } from "./words";
 
 const [kBusyMs, kIdleMs] = [500, 3000];
+const kKeys = new RequestKeys(); // outlives the panel, which each session makes anew
 
 export class ExperimentsPanel {
   private readonly answer = element("p", { class: "answer", role: "status" });
+  private readonly progress = element("progress", { max: 1, "aria-label": "progress of the data", hidden: true });
   private readonly owner = element("input", { type: "password", autocomplete: "off", "aria-label": "secret that opens the data", size: 14 });
   private readonly list: ExperimentList;
   private readonly ended = new AbortController();
@@ -24,7 +26,7 @@ export class ExperimentsPanel {
   private timer = 0;
   /** Hidden where the bench keeps no experiments, or its user may not ask for one. */
   private readonly form = element("details", { hidden: true }, element("summary", {}, "New experiment"));
-  /** Experiments of this page whose data it shows when they end. */
+  /** Experiments of this page whose end it tells, and whose data it shows then unless its user looks at others. */
   private readonly awaited = new Set<number>();
 
   constructor(root: HTMLElement, private readonly bench: Bench, private readonly player: PlayerPlace) {
@@ -37,7 +39,7 @@ export class ExperimentsPanel {
     const file = element("input", { type: "file", accept: ".mcap", "aria-label": "recording to play", change: () => void this.open(file) });
     root.replaceChildren(element("h2", {}, "Experiments and recordings"),
       element("p", { class: "soft" }, "An experiment runs on a bench of its own, from rest at tick 0. It does not touch the bench above."),
-      this.form, this.answer, this.list.root,
+      this.form, this.answer, this.progress, this.list.root,
       element("div", { class: "bar" }, element("label", {}, "Play a recording of this computer ", file),
         element("form", { class: "bar", submit: (event) => {
           event.preventDefault();
@@ -45,7 +47,7 @@ export class ExperimentsPanel {
           this.ask();
         } }, "Secret", this.owner, element("button", { type: "submit", title: "drivebench experiment ... --owner SECRET, or DRIVEBENCH_OWNER" }, "Use the secret"))));
     if (bench.mayChange)
-      this.form.append(new ExperimentForm(bench, (request) => void this.queue(request), (sentence) => this.tell(sentence, true)).root);
+      this.form.append(new ExperimentForm(bench, (request) => this.queue(request), (sentence) => this.tell(sentence, true)).root);
     root.hidden = false;
     this.ask();
   }
@@ -76,11 +78,7 @@ export class ExperimentsPanel {
       const all = (list?.experiments ?? []) as pb.ExperimentInfo[];
       this.list.show(all);
       this.form.hidden = !this.bench.mayChange;
-      const done = all.find((each) => this.awaited.has(each.id as number) && hasEnded(each.state));
-      if (done !== undefined) {
-        this.awaited.delete(done.id as number);
-        this.play(done, false);
-      }
+      for (const each of all) if (hasEnded(each.state) && this.awaited.delete(each.id as number)) this.over(each);
       return all.some((each) => !hasEnded(each.state));
     } catch (problem) {
       this.list.refused((problem as Error).message);
@@ -89,15 +87,22 @@ export class ExperimentsPanel {
     }
   }
 
+  /** One of this page has ended. */
+  private over(info: pb.ExperimentInfo): void {
+    if (info.rows !== 0 && this.fetching === null && !this.player.isOpen) this.play(info, false);
+    else this.tell(`experiment ${info.id}: ${kStateNames[info.state]}${info.reason ? `: ${info.reason}` : ""}`);
+  }
+
   private async queue(request: pb.IRunExperiment): Promise<void> {
-    const key = crypto.randomUUID();
+    const wanted = { ...request, owner: this.owner.value, user: this.bench.welcome.subject || "browser" };
     try {
-      const { experiment_info: info } = await this.bench.wire.ask({ run_experiment: { ...request, owner: this.owner.value,
-        user: this.bench.welcome.subject || "browser", request_key: key } });
+      const { experiment_info: info } = await this.bench.wire.ask({ run_experiment: { ...wanted, request_key: kKeys.keyOf(wanted) } });
+      kKeys.answered();
       this.awaited.add(info?.id as number);
       this.tell(`experiment ${info?.id} is queued`);
       this.ask();
     } catch (problem) {
+      if (problem instanceof Refused) kKeys.answered();
       this.tell(`experiment: ${(problem as Error).message}`, true);
     }
   }
@@ -118,46 +123,47 @@ export class ExperimentsPanel {
     const fetching = new AbortController();
     this.fetching = fetching;
     const what = `experiment ${id}`;
-    this.tell(`${what}: the data come`);
-    fetchExperiment(id as number, this.owner.value, recording, (part) => this.tell(`${what}: the data come, ${Math.floor(100 * part)} %`), fetching.signal)
+    const coming = `${what}: the data come`;
+    this.tell(coming);
+    this.progress.value = 0;
+    this.progress.hidden = false;
+    let isWaiting = false;
+    const listener = {
+      progress: (part: number) => {
+        this.progress.value = part;
+        if (isWaiting) this.tell(coming);
+        isWaiting = false;
+      },
+      waits: (sentence: string) => {
+        isWaiting = true;
+        this.tell(`${what}: ${sentence}; trying again`, true);
+      },
+    };
+    fetchExperiment(id as number, this.owner.value, recording, listener, fetching.signal)
       .then((fetched) => {
-        const { info, isWhole } = fetched;
         this.player.open(recording ? this.recording(fetched) : this.rows(fetched));
-        this.tell(isWhole ? `${what}: ${kStateNames[info.state]}` : `${what}: the page shows the first ${kMostBytes >> 20} MiB; drivebench experiment fetch ${id} has all`);
+        this.tell(arrivalOf(fetched));
       })
-      .catch((problem: Error) => fetching.signal.aborted || this.tell(`${what}: ${problem.message}`, true));
+      .catch((problem: Error) => fetching.signal.aborted || this.tell(`${what}: ${problem.message}`, true))
+      .finally(() => {
+        if (this.fetching !== fetching) return;
+        this.fetching = null;
+        this.progress.hidden = true;
+      });
   }
 
   private rows(fetched: Fetched): Played {
     const recorded = recordedRows(this.bench.description, fetched.info, fetched.bytes);
-    const name = `experiment-${fetched.info.id}.csv`;
-    return { title: titleOf(fetched.info, "data"), recorded, axis: 0, facts: this.factsOf(fetched.info, "play its recording, save it"),
-      file: { name, type: "text/csv", content: () => csvOfRows(recorded.histories[0], recorded.description.signals, fetched.info.signals, recorded.description.period_s as number) } };
+    return { title: titleOf(fetched.info, "data"), recorded, axis: 0, facts: factsOf(this.bench.description.axes, fetched, "play its recording, save it"),
+      file: { name: fileNameOf(fetched, "csv"), type: "text/csv", content: () => csvOfRows(recorded.histories[0], recorded.description.signals, fetched.info.signals, recorded.description.period_s as number) } };
   }
 
   private recording(fetched: Fetched): Played {
-    const name = `experiment-${fetched.info.id}.mcap`;
     const recorded = recordedFile(this.bench.description, fetched.bytes);
     const own = this.bench.description.axes[fetched.info.axis as number].name;
     const axis = recorded.description.axes.findIndex((each) => each.name === own);
-    return { title: titleOf(fetched.info, "recording"), recorded, axis: Math.max(axis, 0), facts: this.factsOf(fetched.info, "save it"),
-      file: { name, type: "application/octet-stream", content: () => fetched.bytes } };
-  }
-
-  /** `first`: what its user does before the motor is identified. */
-  private factsOf(info: pb.ExperimentInfo, first: string): [string, string][] {
-    const axis = this.bench.description.axes[info.axis as number];
-    const period = info.period_s as number;
-    const command = identification(this.bench.description.axes, info.axis as number, `experiment-${info.id}.mcap`);
-    return [
-      ["state", `${kStateNames[info.state]}${info.reason ? `: ${info.reason}` : ""}`],
-      ["axis", axis.name as string],
-      ["length", `${withUnit((info.tick as number) * period, "s")} of ${withUnit((info.ticks as number) * period, "s")}, ${info.tick} ticks`],
-      ["data", `${info.rows} rows of ${info.signals.length} signals, one every ${withUnit((info.decimation as number) * period, "s")}`],
-      ["verdict", info.verdict?.sentence as string ?? ""],
-      ["state hash", ((info.verdict?.state_hash ?? 0) as number | bigint).toString(16).padStart(16, "0")],
-      ...(command === "" ? [] : [["identify", `${first}, then ${command}`] as [string, string]]),
-    ];
+    return { title: titleOf(fetched.info, "recording"), recorded, axis: Math.max(axis, 0), facts: factsOf(this.bench.description.axes, fetched, "save it"),
+      file: { name: fileNameOf(fetched, "mcap"), type: "application/octet-stream", content: () => Promise.resolve([fetched.bytes]) } };
   }
 
   /** Plays a recording that its user has. */
@@ -168,17 +174,13 @@ export class ExperimentsPanel {
       if (file.size > kMostBytes) throw new Error(`the page plays recordings of at most ${kMostBytes >> 20} MiB, and this one has ${Math.ceil(file.size / 2 ** 20)}`);
       const bytes = new Uint8Array(await file.arrayBuffer());
       this.player.open({ title: `Recording ${file.name}`, recorded: recordedFile(this.bench.description, bytes), axis: 0, facts: [],
-        file: { name: file.name, type: "application/octet-stream", content: () => bytes } });
+        file: { name: file.name, type: "application/octet-stream", content: () => Promise.resolve([bytes]) } });
       this.tell(`${file.name} is open`);
     } catch (problem) {
       this.tell(`${file.name}: ${(problem as Error).message}`, true);
     }
     field.value = "";
   }
-}
-
-function titleOf(info: pb.ExperimentInfo, what: string): string {
-  return `Experiment ${info.id}, ${what}${info.label ? `: ${info.label}` : ""}`;
 }
 
 /** The secret of this browser. */

@@ -1,6 +1,22 @@
 /** What an experiment asks of the bench, from the numbers of the page. */
 import { pb } from "../wire";
 
+/** Keys under which the bench takes a request once: one that was not answered keeps its key when it is made again, also in a new session. */
+export class RequestKeys {
+  private waiting: { text: string; key: string } | null = null;
+
+  keyOf(request: pb.IRunExperiment): string {
+    const text = JSON.stringify(request);
+    if (this.waiting?.text !== text) this.waiting = { text, key: crypto.randomUUID() };
+    return this.waiting.key;
+  }
+
+  /** The bench took the request or refused it. */
+  answered(): void {
+    this.waiting = null;
+  }
+}
+
 export interface Field {
   name: string;
   label: string;

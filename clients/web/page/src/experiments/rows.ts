@@ -21,10 +21,12 @@ export class RowList<T> {
   readonly root: HTMLElement;
   private readonly list = element("ul", { class: "parameters" });
   private readonly rows: { root: HTMLElement; read(): T }[] = [];
+  private readonly addButton: HTMLButtonElement;
   private made = 0;
 
   constructor(title: string, private readonly what: string, private readonly make: (number: number) => { nodes: (Node | string)[]; read(): T }) {
-    this.root = element("div", { role: "group", "aria-label": title }, this.list, button(`Add ${what}`, () => this.add()));
+    this.addButton = button(`Add ${what}`, () => this.add());
+    this.root = element("div", { role: "group", "aria-label": title }, this.list, this.addButton);
   }
 
   add(): void {
@@ -34,6 +36,7 @@ export class RowList<T> {
       button("×", () => {
         this.rows.splice(this.rows.indexOf(row), 1);
         row.root.remove();
+        this.addButton.focus();
       }, { class: "small", "aria-label": `remove ${this.what} ${number}` }))), read };
     this.rows.push(row);
     this.list.append(row.root);

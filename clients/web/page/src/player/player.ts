@@ -1,6 +1,6 @@
 /** Plays samples that stay: a slider of time, pause, speed; the scope and the drawings of the drive trains follow. */
 import { usualPanes } from "../bench";
-import { button, choice, element, save, setText } from "../dom";
+import { button, choice, element, SavedFile, saveButton, setText } from "../dom";
 import { DriveTrain } from "../drive_train";
 import { Facts } from "../facts";
 import { withUnit } from "../numbers";
@@ -20,14 +20,14 @@ export interface Played {
   /** What is told beside the samples. */
   facts: [string, string][];
   /** The file that Save offers. */
-  file: { name: string; type: string; content: () => string | Uint8Array<ArrayBuffer> };
+  file: SavedFile;
 }
 
 class Player {
   private readonly scope: Scope;
   private readonly trains: DriveTrain[];
   private readonly slider: HTMLInputElement;
-  private readonly time = element("output", { "aria-label": "time of the player", class: "value" });
+  private readonly time = element("output", { "aria-label": "time of the player", "aria-live": "off", class: "value" });
   private readonly playButton = button("Play", () => this.toggle());
   private readonly periodS: number;
   private readonly firstTick: number;
@@ -39,7 +39,7 @@ class Player {
   private turnedMs = performance.now();
   private drawnMs = 0;
 
-  constructor(private readonly root: HTMLElement, private readonly played: Played, closed: () => void) {
+  constructor(root: HTMLElement, private readonly played: Played, closed: () => void) {
     const { title, recorded, axis, facts, file } = played;
     const { histories, description } = recorded;
     this.periodS = description.period_s as number;
@@ -56,7 +56,7 @@ class Player {
       element("div", { class: "bar" }, this.playButton,
         choice("speed of the player", kSpeeds.map((each) => [String(each), each === 1 ? "as the clock" : each < 1 ? `${Math.round(1 / each)} times slower` : `${each} times faster`]),
           (value) => { this.speed = Number(value); this.drawTrains(); }),
-        this.time, button("Save", () => save(file.name, file.type, file.content()), { "aria-label": `save ${file.name}`, title: file.name }),
+        this.time, saveButton("Save", () => file, { "aria-label": `save ${file.name}`, title: file.name }),
         button("Close", () => closed(), { "aria-label": "close the player" })),
       this.slider, element("div", { class: "trains" }, ...this.trains.map((each) => each.root)), place);
     (root.querySelector('[aria-label="speed of the player"]') as HTMLSelectElement).value = "1";
@@ -66,16 +66,19 @@ class Player {
     scope = new Scope(place, recorded, panesOf(recorded, axis), subscribe,
       { lengthS: Math.max((this.endTick - this.firstTick) * this.periodS, 2 * recorded.sampleS), axis, togglePause: () => this.toggle() });
     this.scope = scope;
-    subscribe();
-    this.seek(this.endTick);
+    try {
+      subscribe();
+      this.seek(this.endTick);
+    } catch (problem) {
+      scope.end();
+      throw problem;
+    }
     this.frame();
   }
 
   end(): void {
     this.isOver = true;
     this.scope.end();
-    this.root.hidden = true;
-    this.root.replaceChildren();
   }
 
   recolour(): void {
@@ -130,9 +133,19 @@ export class PlayerPlace {
 
   constructor(private readonly root: HTMLElement) {}
 
+  get isOpen(): boolean {
+    return this.player !== null;
+  }
+
+  /** Throws Error with a sentence where the samples cannot be shown; it is closed then. */
   open(played: Played): void {
-    this.player?.end();
-    this.player = new Player(this.root, played, () => this.close());
+    this.close();
+    try {
+      this.player = new Player(this.root, played, () => this.close());
+    } catch (problem) {
+      this.empty();
+      throw problem;
+    }
     this.root.scrollIntoView({ block: "nearest" });
   }
 
@@ -143,6 +156,12 @@ export class PlayerPlace {
   private close(): void {
     this.player?.end();
     this.player = null;
+    this.empty();
+  }
+
+  private empty(): void {
+    this.root.hidden = true;
+    this.root.replaceChildren();
   }
 }
 

@@ -12,7 +12,7 @@ export class Track implements Timeline {
   private readonly columns = new Map<string, Float64Array>();
 
   /** `read` gives the values of a row, by their signals. */
-  constructor(readonly ticks: Float64Array, private readonly read: (row: number) => Values) {
+  constructor(readonly ticks: Float64Array, readonly read: (row: number) => Values) {
     this.lastTick = this.endTick;
   }
 
