@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kSilence = 1000ms;  // of the bench, that is told
+constexpr auto kSilence = 1000ms;  // of the bench, that is told: so long, and two samples
 constexpr auto kKeyTime = 50ms;    // until a key acts
 constexpr auto kBlockTime = 30ms;  // between two blocks, however fast the bench runs
 
@@ -83,6 +83,12 @@ class View {
     if (form_ != Form::kJson && dropped != 0) note(fmt::format("too slow, {} samples lost", dropped));
     std::fflush(stdout);
     is_started_ = true;
+  }
+
+  /// The present values of other signals, which a block shows before the next sample.
+  void show_present(const Sample& present) {
+    screen_.show(present);
+    draw();
   }
 
   /// Draws the newest sample if it was too soon for it before.
@@ -169,6 +175,14 @@ std::string silence_text(v1::Mode mode) {
          "the values go on then";
 }
 
+/// How long a bench may be silent that owes a sample every so many seconds.
+std::chrono::milliseconds patience_for(double sample_s) {
+  constexpr double kDay = 86400.0;
+  return std::max<std::chrono::milliseconds>(
+      kSilence, std::chrono::ceil<std::chrono::milliseconds>(
+                    std::chrono::duration<double>(std::min(2.0 * sample_s, kDay))));
+}
+
 bool is_driven(const v1::Status& status) {
   return std::ranges::any_of(status.axes(), [](const auto& each) { return each.sample().owner() != 0; });
 }
@@ -193,17 +207,23 @@ int run_watch(const WatchOptions& options) {
   };
   subscribe();
   const v1::Status& status = bench_link.status();
-  const Sample present = plain(status.axes(static_cast<int>(axis)).sample());
+  Sample present = plain(status.axes(static_cast<int>(axis)).sample());
   view.show(present, 0);
   if (options.count == 1) return kExitOk;
   // Reports a lockstep without a controller at once, any other silence after a second.
-  auto patience = bench.mode() == v1::MODE_LOCKSTEP && !is_driven(status) ? 0ms : kSilence;
+  const std::chrono::milliseconds silence = patience_for(ticks * bench.period_s());
+  auto patience = bench.mode() == v1::MODE_LOCKSTEP && !is_driven(status) ? 0ms : silence;
   auto heard = std::chrono::steady_clock::now();
   bool is_silent = false;
   for (std::uint64_t shown = 1; !interrupted();) {
     const View::Pressed pressed = view.obey_keys();
     if (pressed.ends) return kExitOk;
-    if (pressed.has_other_signals) subscribe();
+    if (pressed.has_other_signals) {
+      subscribe();
+      // Samples up to this one may be those of the signals before, and are left out.
+      present = plain(bench_link.status().axes(static_cast<int>(axis)).sample());
+      view.show_present(present);
+    }
     const std::optional<v1::Samples> samples =
         bench_link.next_samples(view.has_keys() ? std::min(patience, kKeyTime) : patience);
     if (!samples) {
@@ -213,7 +233,7 @@ int run_watch(const WatchOptions& options) {
       is_silent = is_silent || is_over;
       continue;
     }
-    patience = kSilence;
+    patience = silence;
     heard = std::chrono::steady_clock::now();
     is_silent = false;
     std::uint64_t dropped = samples->dropped();

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,19 +28,24 @@ class WatchScreen {
 
   const std::vector<const Signal*>& signals() const noexcept { return signals_; }
 
+  /// The next sample: a point of each curve.
   void take(const Sample& sample);
+  /// Values alone, when other signals are chosen.
+  void show(const Sample& present);
   /// Whether the signals have changed.
   bool press(Key key);
-  /// A word for the last line, until the next sample.
+  /// A word for the last lines, until the next sample.
   void note(std::string text) { note_ = std::move(text); }
 
-  /// What to print: the block in the place of the one before. With keys its last line says which.
+  /// What to print: the block in the place of the one before. With keys its last lines say which.
   std::string draw(TerminalSize size, bool has_keys);
 
  private:
   // Their size is the room for them.
   std::vector<std::string> value_lines(TerminalSize size, bool has_keys) const;
   std::vector<std::string> list_lines(TerminalSize size) const;
+  std::vector<std::string> last_lines(TerminalSize size, bool has_keys) const;
+  std::string value_text(const Signal& signal) const;
   bool toggle(const Signal& signal);
 
   const v1::BenchDescription& bench_;
@@ -48,6 +54,7 @@ class WatchScreen {
   bool utf8_;
   Sample sample_{};
   std::map<const Signal*, std::vector<double>> curves_;
+  std::set<const Signal*> unseen_;  // chosen since the last sample, which has them not
   std::string note_;
   bool is_list_ = false;
   std::size_t mark_ = 0;         // a row of the values or of the list

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <string_view>
 
 namespace drivebench::command {
@@ -65,10 +66,20 @@ bool has_curve(const Signal& signal) noexcept {
 std::string sparkline(std::span<const double> values, std::size_t width, bool utf8) {
   const std::span<const double> newest = values.last(std::min(values.size(), width));
   if (newest.size() < 2) return {};
-  const auto [low, high] = std::ranges::minmax(newest);
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const double value : newest) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
   const auto& columns = utf8 ? kBlocks : kMarks;
   std::string line;
   for (const double value : newest) {
+    if (!std::isfinite(value)) {
+      line += ' ';
+      continue;
+    }
     const double share = high > low ? (value - low) / (high - low) : 0.0;
     line += columns[static_cast<std::size_t>(std::clamp(share * 8.0, 0.0, 7.0))];
   }

@@ -19,7 +19,7 @@ std::string value_with_unit(const Signal& signal, const Sample& sample, bool utf
 bool has_curve(const Signal& signal) noexcept;
 
 /// The newest `width` values as columns of eight heights from the least to the greatest of them; empty for
-/// fewer than two values.
+/// fewer than two values. One that is infinite or no number is a blank.
 std::string sparkline(std::span<const double> values, std::size_t width, bool utf8);
 
 /// Whether the locale of the environment speaks UTF-8.

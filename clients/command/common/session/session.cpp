@@ -12,6 +12,7 @@
 #include "clients/command/common/session/inproc_axis.hpp"
 #include "clients/link/can/can_link.hpp"
 #include "clients/link/modbus/modbus_link.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -24,7 +25,7 @@ std::string names_of(const Descriptions& descriptions, std::uint64_t bits) {
   for (const auto& each : descriptions) {
     if ((bits & each.bit()) == 0) continue;
     bits &= ~each.bit();
-    names += (names.empty() ? "" : " ") + each.name();
+    names += (names.empty() ? "" : " ") + printable(each.name());
   }
   if (bits != 0) names += fmt::format("{}{:#x}", names.empty() ? "" : " ", bits);
   return names.empty() ? "none" : names;

@@ -3,7 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/command/bench/watch_text.hpp"
@@ -41,6 +46,14 @@ TEST(Watch, DrawsTheNewestValuesFromTheLeastToTheGreatest) {
   EXPECT_EQ(sparkline(rising, 0, false), "");
 }
 
+// Catches: a height computed from a value that is no number, one infinite value that flattens the others.
+TEST(Watch, LeavesOutWhatIsNoNumber) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  const std::array<double, 5> values = {0.0, kInfinite, 1.0, std::nan(""), -kInfinite};
+  EXPECT_EQ(sparkline(values, 5, false), "_ #  ");
+  EXPECT_EQ(sparkline(std::array<double, 2>{kInfinite, kInfinite}, 5, false), "  ");
+}
+
 // Catches: a sequence that two reads split, letters of an unknown sequence that act as keys.
 TEST(Watch, TakesKeysAlsoFromPiecesOfSequences) {
   std::string bytes = "\x1b";
@@ -63,6 +76,24 @@ v1::BenchDescription bench() {
 
 std::size_t lines_of(const std::string& block) {
   return static_cast<std::size_t>(std::ranges::count(block, '\n'));
+}
+
+/// Whether a line of the block begins and ends so.
+bool has_line(const std::string& block, const std::string& begin, const std::string& end) {
+  std::istringstream lines(block);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with(begin) && line.ends_with(end + "\x1b[K")) return true;
+  }
+  return false;
+}
+
+/// Chooses a signal from the list of all.
+void choose(WatchScreen& screen, std::string_view name) {
+  screen.press(Key::kList);
+  for (std::ptrdiff_t row = find_signal(name) - kSignals.data(); row > 0; --row)
+    screen.press(Key::kDown);
+  screen.press(Key::kToggle);
+  screen.press(Key::kList);
 }
 
 // Catches: a mark that leaves the list, a signal that comes twice, a curve that goes on from another time,
@@ -89,6 +120,55 @@ TEST(Watch, KeysChooseTheSignals) {
   const std::string list = screen.draw({.columns = 30, .rows = 10}, true);
   EXPECT_EQ(lines_of(list), 9U);  // it leaves the last line of the terminal free
   EXPECT_NE(list.find("> [x] " + std::string(kSignals.back().name)), std::string::npos) << list;
+}
+
+// Catches: the 0 of a sample without the signal that passes for its value, and begins its curve.
+TEST(Watch, ASignalThatWasJustChosenHasNoValueYet) {
+  const v1::BenchDescription description = bench();
+  WatchScreen screen(description, 0, {find_signal("i_a_a")}, false);
+  screen.take({.tick = 1, .i_a_a = 1.0, .u_a_v = 5.0});
+  choose(screen, "u_a_v");
+  EXPECT_TRUE(has_line(screen.draw({}, true), "  u_a_v", "-"));
+  screen.show({.tick = 2, .u_a_v = 5.0});
+  EXPECT_TRUE(has_line(screen.draw({}, true), "  u_a_v", "5 V"));
+  screen.take({.tick = 3, .u_a_v = 6.0});
+  screen.take({.tick = 4, .u_a_v = 7.0});
+  EXPECT_TRUE(has_line(screen.draw({}, true), "  u_a_v", "7 V  _#"));
+}
+
+// Catches: keys that nobody can look up while the bench is silent, a note that leaves no room for values.
+TEST(Watch, ANoteStandsAboveTheKeysWhereThereIsRoom) {
+  const v1::BenchDescription description = bench();
+  WatchScreen screen(description, 0, {find_signal("i_a_a"), find_signal("u_a_v"), find_signal("angle_rad")},
+                     false);
+  screen.take({.tick = 1});
+  screen.note("waiting");
+  const std::string roomy = screen.draw({.columns = 80, .rows = 7}, true);
+  EXPECT_NE(roomy.find("waiting\x1b[K\nup, down"), std::string::npos) << roomy;
+  const std::string low = screen.draw({.columns = 80, .rows = 6}, true);
+  EXPECT_NE(low.find("waiting"), std::string::npos) << low;
+  EXPECT_EQ(low.find("up, down"), std::string::npos) << low;
+}
+
+// Catches: names that fill a narrow terminal and push the values out of it.
+TEST(Watch, ANarrowTerminalShowsValues) {
+  const v1::BenchDescription description = bench();
+  WatchScreen screen(description, 0, {find_signal("encoder_count"), find_signal("i_a_a")}, true);
+  screen.take({.tick = 1, .encoder_count = -1234567, .i_a_a = 4.5e-5});
+  const std::string block = screen.draw({.columns = 30, .rows = 10}, true);
+  EXPECT_TRUE(has_line(block, "> encoder_", " -1234567 counts")) << block;
+  EXPECT_TRUE(has_line(block, "  i_a_a", " 45 µA")) << block;
+}
+
+// Catches: a bench whose names move the cursor of the terminal.
+TEST(Watch, NamesArePrinted) {
+  v1::BenchDescription description = bench();
+  description.set_name("b\x1b[2J");
+  description.mutable_axes(0)->set_name("x\ny");
+  description.add_faults()->set_bit(1);
+  description.mutable_faults(0)->set_name("hot\x1b[H");
+  EXPECT_EQ(watch_title(description, 0), "axis 0 (x?y) of bench b?[2J, free");
+  EXPECT_EQ(watched_text(*find_signal("faults"), {.faults = 1}, description), "hot?[H");
 }
 
 // Catches: a block higher than the terminal, which creeps, and a curve that breaks the line.
