@@ -1,6 +1,7 @@
 #include "clients/command/bench/watch_keys.hpp"
 
 #include <poll.h>
+#include <signal.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -26,6 +27,22 @@ constexpr auto kKeyBytes = std::to_array<KeyBytes>({{"\x1b[A", Key::kUp},
                                                     {"\t", Key::kList},
                                                     {"q", Key::kQuit},
                                                     {"\x04", Key::kQuit}});
+
+constexpr std::array kEnds = {SIGHUP, SIGQUIT};  // they end the program where it stands
+termios terminal_before{};                       // what they give back
+
+/// A process in the background is stopped when it changes its terminal. A terminal that controls no processes
+/// stops none.
+bool is_in_front() {
+  const pid_t front = ::tcgetpgrp(STDIN_FILENO);
+  return front == -1 || front == ::getpgrp();
+}
+
+/// A handler of a signal, which then acts as ever.
+void give_back(int signal) {
+  if (is_in_front()) ::tcsetattr(STDIN_FILENO, TCSANOW, &terminal_before);
+  ::raise(signal);  // acts after the handler, which is no longer one
+}
 
 /// Bytes in the sequence that begins here; nothing while its end is missing.
 std::optional<std::size_t> sequence_size(std::string_view bytes) {
@@ -62,7 +79,16 @@ TerminalSize terminal_size() {
 }
 
 Keyboard::Keyboard() {
-  if (::isatty(STDIN_FILENO) == 0 || ::tcgetattr(STDIN_FILENO, &before_) != 0) return;
+  if (::isatty(STDIN_FILENO) == 0 || !is_in_front() || ::tcgetattr(STDIN_FILENO, &before_) != 0) return;
+  terminal_before = before_;
+  for (std::size_t i = 0; i < kEnds.size(); ++i) {
+    ::sigaction(kEnds[i], nullptr, &actions_before_[i]);
+    if (actions_before_[i].sa_handler == SIG_IGN) continue;  // of nohup
+    struct sigaction action = {};
+    action.sa_handler = give_back;
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    ::sigaction(kEnds[i], &action, nullptr);
+  }
   termios keys = before_;
   keys.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
   keys.c_cc[VMIN] = 0;
@@ -71,11 +97,14 @@ Keyboard::Keyboard() {
 }
 
 Keyboard::~Keyboard() {
-  if (is_there_) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  if (!is_there_) return;
+  if (is_in_front()) ::tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  for (std::size_t i = 0; i < kEnds.size(); ++i)
+    ::sigaction(kEnds[i], &actions_before_[i], nullptr);
 }
 
 std::vector<Key> Keyboard::read() {
-  if (!is_there_) return {};
+  if (!is_there_ || !is_in_front()) return {};
   std::array<char, 64> more{};
   pollfd waiting = {.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
   while (::poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0) {

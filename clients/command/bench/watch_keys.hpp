@@ -1,7 +1,9 @@
 #pragma once
 
+#include <signal.h>
 #include <termios.h>
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -21,10 +23,10 @@ struct TerminalSize {
 TerminalSize terminal_size();
 
 /// Keys of the terminal on standard input: each counts at once and is not echoed. Ctrl-C stays a signal.
-/// The destructor gives the terminal back as it was.
+/// The destructor gives the terminal back as it was, and so do the signals that end the program at once.
 class Keyboard {
  public:
-  /// Does nothing where standard input is no terminal.
+  /// Does nothing where standard input is no terminal, or one that belongs to programs in front of this one.
   Keyboard();
   ~Keyboard();
   Keyboard(const Keyboard&) = delete;
@@ -37,6 +39,7 @@ class Keyboard {
  private:
   bool is_there_ = false;
   termios before_{};
+  std::array<struct sigaction, 2> actions_before_{};
   std::string bytes_;
 };
 

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The subcommands of drivebench that talk to a bench: their output, as text and as JSON, and their exit codes."""
+import fcntl
 import json
 import os
 import pathlib
@@ -281,6 +282,48 @@ class Observing(CommandTest):
             self.assertEqual(watching.wait(PATIENCE_S), OK)
         self.assertEqual(termios.tcgetattr(theirs), before)
         os.close(theirs)
+
+    def in_a_terminal(self, *command):
+        """A program whose terminal controls it, and the other end of that terminal."""
+        ours, theirs = os.openpty()
+        self.addCleanup(os.close, ours)
+        self.addCleanup(os.close, theirs)
+
+        def take():
+            os.setsid()
+            fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+        process = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=subprocess.PIPE, cwd=self.folder,
+                                   env=environment(self.link), preexec_fn=take)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        return process, theirs
+
+    def test_a_signal_that_ends_watch_gives_the_terminal_back(self):
+        """Catches: a shell without echo after ctrl-\\ or a terminal that hangs up."""
+        for number in (signal.SIGQUIT, signal.SIGHUP, signal.SIGTERM):
+            watching, terminal = self.in_a_terminal(DRIVEBENCH, "watch")
+            before = termios.tcgetattr(terminal)
+            end = time.monotonic() + PATIENCE_S
+            while termios.tcgetattr(terminal)[3] & termios.ECHO:
+                self.assertLess(time.monotonic(), end)
+                time.sleep(0.01)
+            watching.send_signal(number)
+            self.assertEqual(watching.wait(PATIENCE_S), OK if number == signal.SIGTERM else -number)
+            self.assertEqual(termios.tcgetattr(terminal), before)
+
+    def test_watch_runs_in_the_background(self):
+        """Catches: a program in the background that the terminal stops because it asks for keys."""
+        shell, terminal = self.in_a_terminal("/bin/sh", "-mc", f"{DRIVEBENCH} watch --count 1 & wait $!; exit $?")
+        before = termios.tcgetattr(terminal)
+        self.assertEqual(shell.wait(PATIENCE_S), OK)
+        self.assertEqual(termios.tcgetattr(terminal), before)
+
+    def test_watch_waits_for_the_second_sample_before_it_says_that_none_comes(self):
+        """Catches: a bench that is called silent because it was asked for few samples."""
+        with self.server("--mode", "realtime") as server:
+            said = self.drivebench("watch", "--rate", "0.5", "--count", "2", link=link_of(server)).stderr
+        self.assertNotIn("sends no samples", said)
 
     def test_watch_prints_the_requested_number_of_samples_at_the_rate_of_the_bench(self):
         """Catches: a rate in wall time, which in lockstep means nothing; a --count that is one off."""
