@@ -314,7 +314,7 @@ class Observing(CommandTest):
 
     def test_watch_runs_in_the_background(self):
         """Catches: a program in the background that the terminal stops because it asks for keys."""
-        shell, terminal = self.in_a_terminal("/bin/sh", "-mc", f"{DRIVEBENCH} watch --count 1 & wait $!; exit $?")
+        shell, terminal = self.in_a_terminal("/bin/sh", "-mc", f"({DRIVEBENCH} watch --count 1 && touch ended) & wait; test -e ended")
         before = termios.tcgetattr(terminal)
         self.assertEqual(shell.wait(PATIENCE_S), OK)
         self.assertEqual(termios.tcgetattr(terminal), before)
