@@ -1,11 +1,11 @@
 #include "clients/command/bench/watch_keys.hpp"
 
 #include <poll.h>
-#include <signal.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <optional>
 #include <string_view>
 #include <utility>

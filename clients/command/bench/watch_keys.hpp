@@ -1,9 +1,9 @@
 #pragma once
 
-#include <signal.h>
 #include <termios.h>
 
 #include <array>
+#include <csignal>
 #include <cstddef>
 #include <string>
 #include <vector>
