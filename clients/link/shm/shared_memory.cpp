@@ -10,7 +10,6 @@
 #include <sys/syscall.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstring>
 #include <ctime>
 #include <string_view>
@@ -130,8 +129,10 @@ SharedMemory::Outcome SharedMemory::outcome() {
   const std::size_t count = std::min<std::size_t>(std::uint64_t{reply.count}, axes_);
   const shm::SampleRecord* const from = shm::samples_of(*segment_);
   samples_.assign(from, from + count);
-  std::atomic_thread_fence(std::memory_order_seq_cst);
-  return is_answered() ? Outcome::kSamples : Outcome::kSessionOver;  // the bench has taken its memory back
+  // Not before the copy, as a plain load could be: a bench takes its memory back at the end of the session.
+  std::uint32_t number = number_;
+  const bool is_still_there = segment_->reply.number.compare_exchange_strong(number, number);
+  return is_still_there ? Outcome::kSamples : Outcome::kSessionOver;
 }
 
 v1::Refusal SharedMemory::refusal() const {

@@ -26,8 +26,9 @@ std::optional<std::uint32_t> find_axis(const v1::BenchDescription& bench, std::s
 /// The axis with this number or name; otherwise throws UsageError with the list of axes.
 std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view choice);
 
-/// Connects to one axis over the transport of the address: tcp, tls, unix, shm, inproc, can or modbus. Addresses
-/// of the latter two name the axis, so that `axis` must be its default "0". As open_link() otherwise.
+/// Connects to one axis over the transport of the address: tcp, tls, unix, shm, inproc, can or modbus.
+/// Addresses of the latter two name the axis, so that `axis` must be its default "0". As open_link()
+/// otherwise.
 std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_view axis,
                                           std::string_view subcommand);
 
