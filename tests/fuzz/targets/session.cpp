@@ -275,8 +275,14 @@ class World {
     c.set_axis(axis);
     c.set_tick(static_cast<std::uint64_t>(tick));
     c.set_gates(static_cast<v1::Gates>(how / 8 < 20 ? 1 : how / 8 % 5));
-    c.set_u_a_v(program.value());
-    c.set_u_b_v(how % 3 == 0 ? 1.0 : program.value());
+    const double a = program.value();
+    const double b = how % 3 == 0 ? 1.0 : program.value();
+    c.set_u_a_v(a);  // the gates decide which of them counts
+    c.set_u_b_v(b);
+    c.set_i_a_a(a);
+    c.set_i_b_a(b);
+    c.set_d_a(a);
+    c.set_d_b(b);
   }
 
   /// The numbers stand in the corpus: only append.
