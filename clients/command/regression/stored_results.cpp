@@ -1,7 +1,7 @@
 #include "clients/command/regression/stored_results.hpp"
 
 #include "clients/command/common/basics/errors.hpp"
-#include "clients/command/regression/prepared_case.hpp"
+#include "clients/command/regression/cases/prepared_case.hpp"
 
 namespace drivebench::command {
 

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "clients/command/regression/bundles/bundle.hpp"
-#include "clients/command/regression/html_report.hpp"
-#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
+#include "clients/command/regression/pages/html_report.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "clients/command/regression/prepared_case.hpp"
+#include "clients/command/regression/cases/prepared_case.hpp"
 #include "clients/regression/verdicts/result.hpp"
 
 namespace drivebench::command {

@@ -129,7 +129,7 @@ TEST(Replay, REC_12_ARunReplaysBitForBit) {
 // tick too many, a bench of other parameters that is taken for the recorded one.
 TEST(Replay, ABenchRepeatsARecordingUpToATickAndGoesOn) {
   const Bytes recording = record(60);
-  std::vector<Sample> recorded;  // of the axis that nobody drives
+  std::vector<Sample> recorded;  // of the axis without a controller
   McapReader reader(recording);
   for (McapMessage message; reader.next(message);) {
     const std::string_view topic = reader.channels().at(message.header.channel).topic;

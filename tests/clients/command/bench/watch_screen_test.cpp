@@ -136,7 +136,7 @@ TEST(Watch, ASignalThatWasJustChosenHasNoValueYet) {
   EXPECT_TRUE(has_line(screen.draw({}, true), "  u_a_v", "7 V  _#"));
 }
 
-// Catches: keys that nobody can look up while the bench is silent, a note that leaves no room for values.
+// Catches: a note that takes the line of the keys while the bench is silent, or the lines of the values.
 TEST(Watch, ANoteStandsAboveTheKeysWhereThereIsRoom) {
   const v1::BenchDescription description = bench();
   WatchScreen screen(description, 0, {find_signal("i_a_a"), find_signal("u_a_v"), find_signal("angle_rad")},

@@ -1,4 +1,4 @@
-#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
 
 #include <fmt/core.h>
 
@@ -12,7 +12,7 @@
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
 #include "clients/command/control/control_presets.hpp"
-#include "clients/command/regression/repeated_axis.hpp"
+#include "clients/command/regression/cases/repeated_axis.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "clients/command/recording/recorded_run.hpp"
-#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
 #include "clients/link/common/axis_link.hpp"
 
 namespace drivebench::command {

@@ -1,4 +1,4 @@
-#include "clients/command/regression/html_report.hpp"
+#include "clients/command/regression/pages/html_report.hpp"
 
 #include <fmt/core.h>
 

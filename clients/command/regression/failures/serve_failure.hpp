@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
 
 namespace drivebench::command {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "clients/command/common/programs/process.hpp"
-#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
 #include "protocols/timing/answer_times.hpp"
 
 namespace drivebench::command {

@@ -1,4 +1,4 @@
-#include "clients/command/regression/html_statistics.hpp"
+#include "clients/command/regression/pages/html_statistics.hpp"
 
 #include <fmt/core.h>
 

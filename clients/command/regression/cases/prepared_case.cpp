@@ -1,4 +1,4 @@
-#include "clients/command/regression/prepared_case.hpp"
+#include "clients/command/regression/cases/prepared_case.hpp"
 
 #include <fmt/core.h>
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "clients/command/regression/html_statistics.hpp"
+#include "clients/command/regression/pages/html_statistics.hpp"
 #include "clients/regression/reports/reports.hpp"
 
 namespace drivebench::command {

@@ -1,4 +1,4 @@
-#include "clients/command/regression/serve_failure.hpp"
+#include "clients/command/regression/failures/serve_failure.hpp"
 
 #include <fmt/core.h>
 
@@ -17,7 +17,7 @@
 #include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
-#include "clients/command/regression/server_answers.hpp"
+#include "clients/command/regression/cases/server_answers.hpp"
 #include "clients/regression/checks/check_kinds.hpp"
 
 namespace drivebench::command {

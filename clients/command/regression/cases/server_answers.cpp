@@ -1,4 +1,4 @@
-#include "clients/command/regression/server_answers.hpp"
+#include "clients/command/regression/cases/server_answers.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -1,4 +1,4 @@
-#include "clients/command/regression/repeated_axis.hpp"
+#include "clients/command/regression/cases/repeated_axis.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "clients/command/regression/shrink_case.hpp"
+#include "clients/command/regression/failures/shrink_case.hpp"
 
 #include <fmt/core.h>
 
@@ -17,7 +17,7 @@
 #include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
-#include "clients/command/regression/run_case.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
 #include "clients/regression/checks/check_kinds.hpp"
 #include "clients/regression/reports/reports.hpp"
 #include "clients/regression/shrink/shrink.hpp"

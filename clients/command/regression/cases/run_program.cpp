@@ -14,8 +14,8 @@
 #include "clients/command/common/programs/server_ready.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/recording/recorded_samples.hpp"
-#include "clients/command/regression/run_case.hpp"
-#include "clients/command/regression/server_answers.hpp"
+#include "clients/command/regression/cases/run_case.hpp"
+#include "clients/command/regression/cases/server_answers.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
