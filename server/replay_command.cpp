@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocols/mcap/mcap_series.hpp"
+#include "protocols/mcap/time_base.hpp"
 #include "server/host/print_line.hpp"
 #include "server/recording/replay.hpp"
 
@@ -25,6 +26,7 @@ nlohmann::json as_json(const ReplayReport& report) {
                       {"recorded_by", report.recorded_by},
                       {"same_build", report.same_build},
                       {"problem", report.problem}};
+  if (report.begun_unix_ns) json["begun_utc"] = utc_text(*report.begun_unix_ns);
   if (report.difference) {
     json["first_difference"] = {{"tick", report.difference->tick},
                                 {"axis", report.difference->axis},
@@ -75,12 +77,13 @@ int replay_command(const std::string& file, bool json) {
   if (json) {
     print_line(as_json(report));
   } else {
-    print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {})",
+    print_line(fmt::format("{}: {} ({} ticks, {} samples, {} inputs, state hash {:016x}, recorded by {}{})",
                            file, verdict_of(report), report.ticks, report.samples, report.inputs,
                            report.state_hash,
                            report.recorded_by.empty() ? "an unknown program"
                            : report.same_build        ? report.recorded_by
-                                                      : report.recorded_by + ", not by this build"));
+                                                      : report.recorded_by + ", not by this build",
+                           report.begun_unix_ns ? ", begun " + utc_text(*report.begun_unix_ns) : ""));
     if (!report.problem.empty()) print_line("  " + report.problem);
   }
   return exit_code_of(report.result);

@@ -1,5 +1,5 @@
-# Debian packages by CPack: `cpack -G DEB` in a build. The programs, the shared libraries, what a program needs to be
-# built, the Python package, and the documents. A test holds them against lintian.
+# Debian packages by CPack: `cpack -G DEB` in a build. The server, the tools, the benches, the shared libraries, what a
+# program needs to be built, the Python package, and the documents. A test holds them against lintian.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR drivebench)
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "") # each package has its own, the first line of its description
@@ -7,7 +7,7 @@ set(CPACK_PACKAGE_CONTACT "drivebench maintainers <maintainers@drivebench.exampl
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL programs libraries development python documentation)
+set(CPACK_COMPONENTS_ALL server tools data libraries development python documentation)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
@@ -16,19 +16,37 @@ set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY ">=")
 set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS OFF)
 
 set(library libdrivebench${DRIVEBENCH_ABI})
-set(this_library "${library} (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
+set(this_build "(= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
+set(this_library "${library} ${this_build}")
+set(these_benches "drivebench-data ${this_build}")
 set(control ${CMAKE_CURRENT_LIST_DIR})
 
-set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "test bench in software for the controllers of electric drives
-The programs drivebench and drivebench-server: emulated motors, amplifiers,
-shafts and sensors in deterministic real time, over TCP, CAN and Modbus, with
-reference controllers and identification.")
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME drivebench)
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_CONTROL_EXTRA ${control}/programs/postinst ${control}/programs/postrm ${control}/programs/conffiles)
+set(CPACK_COMPONENT_SERVER_DESCRIPTION "test bench for electric drives, the server
+Emulated motors, amplifiers, shafts and sensors in deterministic real time,
+over TCP, CAN and Modbus, as a program and as a service.")
+set(CPACK_DEBIAN_SERVER_PACKAGE_NAME drivebench-server)
+set(CPACK_DEBIAN_SERVER_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${control}/server/postinst ${control}/server/postrm ${control}/server/conffiles)
+set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "adduser, ${these_benches}")
+set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS logrotate)
+
+set(CPACK_COMPONENT_TOOLS_DESCRIPTION "test bench in software for the controllers of electric drives
+The program drivebench: reference controllers, identification, regression
+tests, recordings and a page for the browser, with a bench of this computer
+or of another one.")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME drivebench)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 # `drivebench test` and inproc: links load the bench as a library.
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "adduser, ${this_library}")
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS logrotate)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${these_benches}, ${this_library}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS drivebench-server) # `drivebench serve` and `drivebench demo`
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS drivebench-doc)
+
+set(CPACK_COMPONENT_DATA_DESCRIPTION "test bench for electric drives, benches and motors
+The benches, motors, experiments and suites of regression tests that the
+programs and the library know by name.")
+set(CPACK_DEBIAN_DATA_PACKAGE_NAME drivebench-data)
+set(CPACK_DEBIAN_DATA_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_DATA_PACKAGE_ARCHITECTURE all)
 
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION "test bench for electric drives, the libraries
 The bench behind one C ABI: in the process of its controller, or over TCP, CAN
@@ -37,8 +55,7 @@ set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME ${library})
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_MULTIARCH same)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_CONTROL_EXTRA ${control}/libraries/triggers)
-# inproc: addresses name the benches of the programs' package.
-set(CPACK_DEBIAN_LIBRARIES_PACKAGE_RECOMMENDS drivebench)
+set(CPACK_DEBIAN_LIBRARIES_PACKAGE_RECOMMENDS drivebench-data) # inproc: addresses name benches
 
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "test bench for electric drives, to build programs with
 Headers for C and C++, the static library, and the files by which CMake and
@@ -54,7 +71,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-drivebench)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= 3.11), ${this_library}")
-set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS drivebench) # the benches by name, and drivebench.serve()
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "drivebench-data, drivebench-server") # benches by name, drivebench.serve()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-numpy, python3-pandas")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${control}/python/postinst ${control}/python/prerm)
 
@@ -76,9 +93,9 @@ file(CONFIGURE OUTPUT packages/drivebench-server.service CONTENT "${unit}" @ONLY
 file(READ ${PROJECT_SOURCE_DIR}/configs/benches/servo-realtime.toml bench)
 string(REPLACE "../motors/" "/usr/share/drivebench/motors/" bench "${bench}")
 file(CONFIGURE OUTPUT packages/bench.toml CONTENT "${bench}" @ONLY)
-install(FILES ${made}/drivebench-server.service DESTINATION lib/systemd/system COMPONENT programs EXCLUDE_FROM_ALL)
-install(FILES ${made}/bench.toml DESTINATION /etc/drivebench COMPONENT programs EXCLUDE_FROM_ALL)
-install(FILES ${control}/programs/logrotate DESTINATION /etc/logrotate.d RENAME drivebench COMPONENT programs EXCLUDE_FROM_ALL)
+install(FILES ${made}/drivebench-server.service DESTINATION lib/systemd/system COMPONENT server EXCLUDE_FROM_ALL)
+install(FILES ${made}/bench.toml DESTINATION /etc/drivebench COMPONENT server EXCLUDE_FROM_ALL)
+install(FILES ${control}/server/logrotate DESTINATION /etc/logrotate.d RENAME drivebench-server COMPONENT server EXCLUDE_FROM_ALL)
 
 # pip has its own way to install the Python package; this one is for the interpreter of the system.
 file(STRINGS ${PROJECT_SOURCE_DIR}/clients/python/pyproject.toml summary REGEX "^description = ")
@@ -93,21 +110,8 @@ file(CONFIGURE OUTPUT packages/entry_points.txt CONTENT "[pytest11]\ndrivebench 
 install(FILES ${made}/METADATA ${made}/entry_points.txt DESTINATION ${modules}/drivebench-${PROJECT_VERSION}.dist-info
   COMPONENT python EXCLUDE_FROM_ALL)
 
-# In the places that they have in the sources, so that links from one to another hold.
-set(programs ${PROJECT_SOURCE_DIR}/clients)
-set(patterns ${programs}/examples/*.c ${programs}/examples/*.cpp ${programs}/python/examples/*.py)
-foreach(folder plant protocols server clients configs)
-  foreach(kind *.md *.svg *.png)
-    list(APPEND patterns ${PROJECT_SOURCE_DIR}/${folder}/${kind})
-  endforeach()
-endforeach()
-file(GLOB_RECURSE documents RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS ${patterns})
-list(FILTER documents EXCLUDE REGEX node_modules)
-foreach(document README.md ${documents})
-  get_filename_component(folder ${document} DIRECTORY)
-  install(FILES ${PROJECT_SOURCE_DIR}/${document} DESTINATION share/doc/drivebench-doc/${folder}
-    COMPONENT documentation EXCLUDE_FROM_ALL)
-endforeach()
+install(CODE "set(SOURCES \"${PROJECT_SOURCE_DIR}\")" COMPONENT documentation EXCLUDE_FROM_ALL)
+install(SCRIPT ${control}/documents.cmake COMPONENT documentation EXCLUDE_FROM_ALL)
 
 # The change log of the project under Debian's name for it, and the one that Debian asks for beside it.
 set(ENV{SOURCE_DATE_EPOCH} ${DRIVEBENCH_DATE})
@@ -116,7 +120,7 @@ unset(ENV{SOURCE_DATE_EPOCH})
 configure_file(${control}/changelog.Debian.in packages/changelog.Debian @ONLY)
 configure_file(${PROJECT_SOURCE_DIR}/CHANGELOG.md packages/changelog COPYONLY)
 execute_process(COMMAND gzip -9nkf changelog.Debian changelog WORKING_DIRECTORY ${made} COMMAND_ERROR_IS_FATAL ANY)
-foreach(pair programs:drivebench libraries:${library} development:libdrivebench-dev python:python3-drivebench
+foreach(pair server:drivebench-server tools:drivebench data:drivebench-data libraries:${library} development:libdrivebench-dev python:python3-drivebench
     documentation:drivebench-doc)
   string(REPLACE ":" ";" pair ${pair})
   list(GET pair 0 component)

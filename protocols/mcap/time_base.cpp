@@ -1,7 +1,11 @@
 #include "protocols/mcap/time_base.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <ctime>
 #include <stdexcept>
 #include <string>
 
@@ -50,6 +54,16 @@ std::optional<TimeBase> time_base_at(const McapReader& reader) {
   if (newest == metadata.rend()) return std::nullopt;
   return TimeBase{.since_tick = number_in(*newest, kSinceTick, kMostTick),
                   .epoch_unix_ns = static_cast<std::int64_t>(number_in(*newest, kEpoch, kMostEpochNs))};
+}
+
+std::string utc_text(std::int64_t unix_ns) {
+  const std::int64_t below_second_ns = (unix_ns % 1'000'000'000 + 1'000'000'000) % 1'000'000'000;
+  const std::time_t second = (unix_ns - below_second_ns) / 1'000'000'000;
+  std::tm utc{};
+  gmtime_r(&second, &utc);
+  std::array<char, 32> text{};
+  const std::size_t size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc);
+  return fmt::format("{}.{:06}Z", std::string_view(text.data(), size), below_second_ns / 1000);
 }
 
 }  // namespace drivebench

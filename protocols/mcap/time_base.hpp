@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "protocols/mcap/mcap.hpp"
@@ -31,5 +32,8 @@ McapMap entries_of(const TimeBase& base);
 /// The time base in force at the reader's place in a file; nothing if none has come yet. Throws
 /// std::runtime_error if one of its numbers is none.
 std::optional<TimeBase> time_base_at(const McapReader& reader);
+
+/// Date and time of the day as ISO 8601 writes them, to the microsecond: "2026-11-27T15:39:25.123456Z".
+std::string utc_text(std::int64_t unix_ns);
 
 }  // namespace drivebench

@@ -65,6 +65,7 @@ class Replayer {
         break;
       }
       if (axes_.empty() && !build_bench()) break;
+      if (!report_.begun_unix_ns && !read_epoch()) break;
       const std::string_view topic = reader().channels().at(message.header.channel).topic;
       if (has_verdict_) {
         more = unusable("something follows its verdict");
@@ -115,6 +116,18 @@ class Replayer {
       return true;
     }
     return unusable("it has no configuration inside (attachment bench.toml)");
+  }
+
+  /// Later time bases, after standstills, do not change when the run began.
+  bool read_epoch() {
+    if (reader().metadata().size() == metadata_seen_) return true;
+    metadata_seen_ = reader().metadata().size();
+    try {
+      if (const auto base = time_base_at(reader())) report_.begun_unix_ns = base->epoch_unix_ns;
+      return true;
+    } catch (const std::runtime_error& error) {
+      return unusable(error.what());
+    }
   }
 
   bool unusable(std::string why) {
@@ -260,6 +273,7 @@ class Replayer {
   v1::Verdict verdict_;
   ReplayReport report_;
   std::uint64_t messages_ = 0;
+  std::size_t metadata_seen_ = 0;
   bool has_verdict_ = false;
   bool stopped_ = false;
 };

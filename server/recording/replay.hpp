@@ -35,8 +35,9 @@ struct ReplayReport {
   std::uint64_t samples = 0;
   std::uint64_t inputs = 0;
   std::uint64_t state_hash = 0;
-  std::string recorded_by;  ///< program and build
-  bool same_build = true;   ///< this build made the recording; another build may give other bits
+  std::string recorded_by;                    ///< program and build
+  std::optional<std::int64_t> begun_unix_ns;  ///< UTC since 1970 of tick 0; only of a recording in real time
+  bool same_build = true;  ///< this build made the recording; another build may give other bits
   std::optional<ReplayDifference> difference;
   std::string problem;  ///< a sentence; empty: none
 };

@@ -6,6 +6,7 @@
 
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/link/tcp/mode_name.hpp"
 
@@ -15,14 +16,14 @@ namespace {
 /// Currents and voltages of the terminals that the machine has.
 std::string terminals_text(const v1::Sample& s, const v1::AxisDescription& axis) {
   const std::uint32_t phases = axis.phases();
-  std::string text = fmt::format("i_a {:.3f} A, ", s.i_a_a());
-  if (phases >= 2) text += fmt::format("i_b {:.3f} A, ", s.i_b_a());
-  if (phases >= 3) text += fmt::format("i_c {:.3f} A, ", s.i_c_a());
-  if (axis.field_winding()) text += fmt::format("i_f {:.3f} A, ", s.i_f_a());
-  text += fmt::format("u_a {:.2f} V, ", s.u_a_v());
-  if (phases >= 2) text += fmt::format("u_b {:.2f} V, ", s.u_b_v());
-  if (phases >= 3) text += fmt::format("u_c {:.2f} V, ", s.u_c_v());
-  if (axis.field_winding()) text += fmt::format("u_f {:.2f} V, ", s.u_f_v());
+  std::string text = fmt::format("i_a {} A, ", number_text(s.i_a_a()));
+  if (phases >= 2) text += fmt::format("i_b {} A, ", number_text(s.i_b_a()));
+  if (phases >= 3) text += fmt::format("i_c {} A, ", number_text(s.i_c_a()));
+  if (axis.field_winding()) text += fmt::format("i_f {} A, ", number_text(s.i_f_a()));
+  text += fmt::format("u_a {} V, ", number_text(s.u_a_v()));
+  if (phases >= 2) text += fmt::format("u_b {} V, ", number_text(s.u_b_v()));
+  if (phases >= 3) text += fmt::format("u_c {} V, ", number_text(s.u_c_v()));
+  if (axis.field_winding()) text += fmt::format("u_f {} V, ", number_text(s.u_f_v()));
   return text;
 }
 
@@ -68,8 +69,8 @@ int run_status(const StatusOptions& options) {
           "controller\n",
           fault_names(bench, latched), i);
     }
-    fmt::print("  count {}, {}speed {:.3f} rad/s, load {:g} N*m\n", s.encoder_count(),
-               terminals_text(s, axis), s.speed_rad_s(), s.load_nm());
+    fmt::print("  count {}, {}speed {} rad/s, load {} N*m\n", s.encoder_count(), terminals_text(s, axis),
+               number_text(s.speed_rad_s()), number_text(s.load_nm()));
     fmt::print("  missed commands {}, refused commands {}\n", s.missed_commands(), s.refused_commands());
   }
   for (const v1::TransportStatus& transport : status.transports()) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
@@ -88,39 +89,37 @@ void write_csv(std::ofstream out, const ControlOptions& options, const ControlRu
 
 void print_report(const ControlReport& r) {
   fmt::print("{} on axis {} of bench {}, {}\n", r.preset, r.axis, r.bench, r.mode);
-  const auto row = [](std::string_view name, std::string_view format, double value, std::string_view unit) {
-    fmt::print("  {:<34}{:>12} {}\n", name, fmt::format(fmt::runtime(format), value), unit);
+  const auto row = [](std::string_view name, double value, std::string_view unit) {
+    fmt::print("  {:<34}{:>12} {}\n", name, number_text(value), unit);
   };
-  const auto known = [&row](std::string_view name, std::string_view format, std::optional<double> value,
-                            std::string_view unit) {
-    if (value) row(name, format, *value, unit);
+  const auto known = [&row](std::string_view name, std::optional<double> value, std::string_view unit) {
+    if (value) row(name, *value, unit);
   };
+  const auto counted = [](std::string_view name, auto value) { fmt::print("  {:<34}{:>12}\n", name, value); };
   const bool is_truth = r.angle_source == "truth";
-  known(is_truth ? "peak error (true angle)" : "peak error (encoder)", "{:.2f}", r.peak_error_counts,
-        "counts");
-  row("peak error", "{:.6f}", r.peak_error_rad, "rad");
-  known("final error (encoder)", "{:.2f}", r.final_error_counts, "counts");
-  known("final error (true angle)", "{:.2f}", r.final_true_error_counts, "counts");
-  row(r.speed_source == "truth" ? "peak speed" : "peak speed (observer)", "{:.2f}", r.peak_speed_rad_s,
-      "rad/s");
-  row("peak speed error", "{:.2f}", r.peak_speed_error_rad_s, "rad/s");
-  row("peak phase current", "{:.2f}", r.peak_current_a, "A");
-  if (r.peak_field_current_a > 0.0) row("peak field current", "{:.2f}", r.peak_field_current_a, "A");
-  known("peak phase voltage, asked for", "{:.1f}", r.peak_command_voltage_v, "V");
-  known("peak phase current, asked for", "{:.2f}", r.peak_command_current_a, "A");
-  known("peak phase voltage, applied", "{:.1f}", r.peak_voltage_v, "V");
-  row("samples at a limit", "{:.0f}", static_cast<double>(r.saturated_samples), "");
+  known(is_truth ? "peak error (true angle)" : "peak error (encoder)", r.peak_error_counts, "counts");
+  row("peak error", r.peak_error_rad, "rad");
+  known("final error (encoder)", r.final_error_counts, "counts");
+  known("final error (true angle)", r.final_true_error_counts, "counts");
+  row(r.speed_source == "truth" ? "peak speed" : "peak speed (observer)", r.peak_speed_rad_s, "rad/s");
+  row("peak speed error", r.peak_speed_error_rad_s, "rad/s");
+  row("peak phase current", r.peak_current_a, "A");
+  if (r.peak_field_current_a > 0.0) row("peak field current", r.peak_field_current_a, "A");
+  known("peak phase voltage, asked for", r.peak_command_voltage_v, "V");
+  known("peak phase current, asked for", r.peak_command_current_a, "A");
+  known("peak phase voltage, applied", r.peak_voltage_v, "V");
+  counted("samples at a limit", r.saturated_samples);
   for (const auto& [name, value] : r.peak_telemetry)
-    row("peak " + name, "{:.4g}", value, "");
-  row("duration", "{:.1f}", r.duration_s * 1e3, "ms of the bench's time");
-  row("wall time", "{:.1f}", r.wall_s * 1e3, "ms");
-  row("samples", "{:.0f}", static_cast<double>(r.samples), "");
-  row("samples missed here", "{:.0f}", static_cast<double>(r.missed_ticks), "");
-  row("late ticks of the bench", "{:.0f}", static_cast<double>(r.late_ticks), "");
+    row("peak " + name, value, "");
+  row("duration", r.duration_s * 1e3, "ms of the bench's time");
+  row("wall time", r.wall_s * 1e3, "ms");
+  counted("samples", r.samples);
+  counted("samples missed here", r.missed_ticks);
+  counted("late ticks of the bench", r.late_ticks);
   const char* what = r.mode == "realtime" ? "us, the wait for the next tick included" : "us";
-  row("exchange p50", "{:.1f}", r.exchange_p50_us, what);
-  row("exchange p99", "{:.1f}", r.exchange_p99_us, what);
-  row("exchange max", "{:.1f}", r.exchange_max_us, what);
+  row("exchange p50", r.exchange_p50_us, what);
+  row("exchange p99", r.exchange_p99_us, what);
+  row("exchange max", r.exchange_max_us, what);
 }
 
 /// One move, from rest to its report.

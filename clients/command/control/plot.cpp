@@ -20,6 +20,7 @@
 #include "clients/command/recording/recorded_run.hpp"
 #include "clients/command/recording/svg_plot.hpp"
 #include "clients/control/loop/run.hpp"
+#include "protocols/mcap/time_base.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -118,7 +119,7 @@ Panel estimate_panel(std::string_view name, const RecordedRun& run, const Estima
         column(run, [](const Answered& row) { return std::hypot(row.sample.psi_a_wb, row.sample.psi_b_wb); }),
         estimates.flux_wb);
   }
-  return with_estimate("load [N m]", "load",
+  return with_estimate("load [N*m]", "load",
                        column(run, [](const Answered& row) { return row.sample.load_nm; }),
                        estimates.load_nm);
 }
@@ -147,7 +148,7 @@ Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& pla
                      {&Sample::u_a_v, &Sample::u_b_v, &Sample::u_c_v, &Sample::u_f_v});
   }
   if (name == "torque") {
-    return panel_of("torque [N m]",
+    return panel_of("torque [N*m]",
                     {{"machine", column(run, [](const Answered& row) { return row.sample.torque_nm; })},
                      {"load", column(run, [](const Answered& row) { return row.sample.load_nm; })}});
   }
@@ -240,6 +241,12 @@ std::vector<Panel> panels_of(const PlotOptions& options, const RecordedRun& reco
   return panels;
 }
 
+/// In real time it says when time 0 was, so that the plot can be held against other logs of that hour.
+std::string time_label(const RecordedRun& run, double start_s) {
+  if (!run.is_real_time) return "time [ms]";
+  return "time [ms] since " + utc_text(run.rows.front().due_unix_ns + std::llround(start_s * 1e9));
+}
+
 }  // namespace
 
 int run_plot(const PlotOptions& options) {
@@ -258,7 +265,7 @@ int run_plot(const PlotOptions& options) {
                             : options.preset.empty() ? options.recording
                                                      : options.preset;
   Output out(options.out_file);
-  out.write(svg_of(title, "time [ms]", times_ms, panels));
+  out.write(svg_of(title, time_label(recorded, start_s), times_ms, panels));
   out.flush();
   return kExitOk;
 }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/common/basics/output.hpp"
 #include "clients/command/motor/motor_file.hpp"
 #include "clients/command/motor/motor_json.hpp"
@@ -40,14 +41,18 @@ void print_table(const InductionMotorFile& file, const InductionCircuit& circuit
         "behind {:g} ohm and {:g} H in each phase: the power and cos phi of the line are before these\n",
         circuit.line_resistance_ohm, circuit.line_inductance_h);
   }
-  fmt::print("{:<26}{:>10}{:>10}{:>10}{:>9}{:>8}{:>10}{:>11}{:>10}{:>10}{:>11}{:>7}\n", "", "slip", "rad/s",
-             "A rms", "V rms", "cos phi", "N*m", "line W", "R_S W", "R_R W", "shaft W", "eta");
+  std::string heading(26, ' ');
+  for (const char* name :
+       {"slip", "rad/s", "A rms", "V rms", "cos phi", "N*m", "line W", "R_S W", "R_R W", "shaft W", "eta"})
+    heading += fmt::format("{:>11}", name);
+  fmt::print("{}\n", heading);
   for (const auto& [name, p] : points) {
-    fmt::print(
-        "{:<26}{:>10.5f}{:>10.3f}{:>10.4f}{:>9.3f}{:>8.4f}{:>10.4f}{:>11.2f}{:>10.2f}{:>10.2f}{:>11.2f}{:>7."
-        "3f}\n",
-        name, p.slip, p.speed_rad_s, std::abs(p.stator_a), std::abs(p.terminal_v), p.power_factor(),
-        p.torque_nm, p.active_w, p.stator_loss_w, p.rotor_loss_w, p.mechanical_w, p.efficiency());
+    std::string line = fmt::format("{:<26}", name);
+    for (const double value :
+         {p.slip, p.speed_rad_s, std::abs(p.stator_a), std::abs(p.terminal_v), p.power_factor(), p.torque_nm,
+          p.active_w, p.stator_loss_w, p.rotor_loss_w, p.mechanical_w, p.efficiency()})
+      line += fmt::format(" {:>10}", number_text(value));
+    fmt::print("{}\n", line);
   }
   const InductionCircuit::Circle circle = circuit.circle();
   fmt::print("circle of the current: centre {:.5g} A active, {:.5g} A reactive, radius {:.5g} A\n",
@@ -61,7 +66,8 @@ void print_table(const InductionMotorFile& file, const InductionCircuit& circuit
 
 std::vector<NamedPoint> named_points(const InductionCircuit& circuit, double load_nm) {
   std::vector<NamedPoint> points = {{"synchronous", circuit.at(0.0)}};
-  if (const auto slip = circuit.slip_under(load_nm)) points.push_back({"load", circuit.at(*slip)});
+  if (const auto slip = circuit.slip_under(load_nm); slip && load_nm != 0.0)
+    points.push_back({"load", circuit.at(*slip)});
   points.push_back({"rated (sqrt(sigma) S_p)", circuit.at(circuit.rated_slip())});
   points.push_back({"largest power", circuit.at(circuit.largest_power_slip(Mode::kMotor))});
   points.push_back({"pull-out", circuit.at(circuit.pull_out_slip(Mode::kMotor))});

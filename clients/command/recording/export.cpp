@@ -4,9 +4,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -23,6 +21,7 @@
 #include "clients/command/recording/export_can.hpp"
 #include "clients/command/recording/recording_file.hpp"
 #include "clients/command/recording/tables/sample_table.hpp"
+#include "clients/command/recording/wall_time.hpp"
 #include "protocols/json.hpp"
 #include "protocols/mcap/time_base.hpp"
 #include "protocols/sample_codec.hpp"
@@ -50,48 +49,6 @@ struct Exported {
   std::string other_axes;
   std::string problem;  ///< of the recording; empty: none
 };
-
-/// The wall time of a recording in real time; it precedes the first sample after tick 0. None of others.
-Epoch epoch_of(const MappedSeries& files) {
-  McapSeries reader(files.segments());
-  for (McapMessage message; reader.next(message);) {
-    if (const auto base = time_base_at(reader.reader())) return base->epoch_unix_ns;
-    if (message.header.log_time_ns > 0) break;
-  }
-  return std::nullopt;
-}
-
-/// UTC at which messages were due, by the time base in force; the epoch holds before the first one.
-class WallTime {
- public:
-  explicit WallTime(const Epoch& epoch)
-      : is_known_(epoch.has_value()), base_{.since_tick = 0, .epoch_unix_ns = epoch.value_or(0)} {}
-
-  std::int64_t unix_ns_of(const McapReader& file, std::uint64_t log_time_ns) {
-    if (is_known_ && (&file != file_ || file.metadata().size() != seen_)) {
-      file_ = &file;
-      seen_ = file.metadata().size();
-      base_ = time_base_at(file).value_or(base_);
-    }
-    return base_.unix_ns(log_time_ns);
-  }
-
- private:
-  bool is_known_;
-  TimeBase base_;
-  const McapReader* file_ = nullptr;
-  std::size_t seen_ = 0;  ///< metadata of the file
-};
-
-std::string utc_text(std::int64_t unix_ns) {
-  const std::int64_t below_second_ns = (unix_ns % 1'000'000'000 + 1'000'000'000) % 1'000'000'000;
-  const std::time_t second = (unix_ns - below_second_ns) / 1'000'000'000;
-  std::tm utc{};
-  gmtime_r(&second, &utc);
-  std::array<char, 32> text{};
-  const std::size_t size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc);
-  return fmt::format("{}.{:06}Z", std::string_view(text.data(), size), below_second_ns / 1000);
-}
 
 /// Finds the messages of an axis by their channel.
 class AxisChannels {

@@ -11,6 +11,7 @@
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/recording/recorded_configuration.hpp"
 #include "clients/command/recording/recording_file.hpp"
+#include "clients/command/recording/wall_time.hpp"
 #include "protocols/sample_codec.hpp"
 
 namespace drivebench::command {
@@ -19,36 +20,41 @@ namespace {
 /// Reads the samples of one axis and joins them with the commands that answered them.
 class Reader {
  public:
-  explicit Reader(std::string axis) : wanted_(std::move(axis)) {}
+  Reader(std::string axis, const Epoch& epoch)
+      : wanted_(std::move(axis)), is_real_time_(epoch.has_value()), wall_time_(epoch) {}
 
   void take(const McapReader& file, const McapMessage& message) {
     const std::string_view topic = file.channels().at(message.header.channel).topic;
     if (topic == "/inputs") {
       take_input(message);
     } else if (const std::string_view axis = axis_of(topic); !axis.empty()) {
-      take_sample(axis, message);
+      take_sample(axis, file, message);
     }
   }
 
   RecordedRun joined() const {
-    RecordedRun out = {.axis = wanted_, .period_s = period_s_, .rows = {}};
+    RecordedRun out = empty_run();
     for (const v1::Command& command : commands_) {
       const auto sample = std::ranges::lower_bound(samples_, command.tick(), {}, &Sample::tick);
       if (sample == samples_.end() || sample->tick != command.tick()) continue;
       if (!out.rows.empty() && out.rows.back().sample.tick >= command.tick()) continue;
-      out.rows.push_back({.sample = *sample, .command = command});
+      out.rows.push_back({.sample = *sample,
+                          .command = command,
+                          .due_unix_ns = due_unix_ns_[static_cast<std::size_t>(sample - samples_.begin())]});
     }
     return out;
   }
   RecordedRun all() const {
-    RecordedRun out = {.axis = wanted_, .period_s = period_s_, .rows = {}};
+    RecordedRun out = empty_run();
     out.rows.reserve(samples_.size());
     auto command = commands_.begin();
-    for (const Sample& sample : samples_) {
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const Sample& sample = samples_[i];
       while (command != commands_.end() && command->tick() < sample.tick)
         ++command;
       const bool answered = command != commands_.end() && command->tick() == sample.tick;
-      out.rows.push_back({.sample = sample, .command = answered ? *command : v1::Command()});
+      out.rows.push_back(
+          {.sample = sample, .command = answered ? *command : v1::Command(), .due_unix_ns = due_unix_ns_[i]});
     }
     return out;
   }
@@ -57,6 +63,9 @@ class Reader {
   const std::string& axes() const noexcept { return axes_; }
 
  private:
+  RecordedRun empty_run() const {
+    return {.axis = wanted_, .period_s = period_s_, .rows = {}, .is_real_time = is_real_time_};
+  }
   void take_input(const McapMessage& message) {
     v1::Input input;
     if (!input.ParseFromArray(message.payload.data(), static_cast<int>(message.payload.size()))) return;
@@ -64,7 +73,7 @@ class Reader {
       commands_.push_back(input.command());
     }
   }
-  void take_sample(std::string_view axis, const McapMessage& message) {
+  void take_sample(std::string_view axis, const McapReader& file, const McapMessage& message) {
     if (!numbers_.contains(axis)) {
       // A tick brings the samples of all axes, in their order.
       const auto number = static_cast<std::uint32_t>(numbers_.size());
@@ -82,13 +91,17 @@ class Reader {
     }
     last_ns_ = message.header.log_time_ns;
     samples_.push_back(*sample);
+    due_unix_ns_.push_back(wall_time_.unix_ns_of(file, message.header.log_time_ns));
   }
 
   std::string wanted_;
+  bool is_real_time_;
+  WallTime wall_time_;
   std::string axes_;
   std::map<std::string, std::uint32_t, std::less<>> numbers_;
   std::optional<std::uint32_t> number_;
   std::vector<Sample> samples_;
+  std::vector<std::int64_t> due_unix_ns_;  // of the samples
   std::vector<v1::Command> commands_;
   std::uint64_t last_ns_ = 0;
   double period_s_ = 0.0;
@@ -120,8 +133,9 @@ std::string second_of(const McapReader& file, const std::string& axis) {
 }
 
 RecordedRun read(const std::string& path, const std::string& axis, bool all) {
-  Reader reader(axis);
   const MappedSeries files = open_recording(path);
+  const Epoch epoch = epoch_of(files);
+  Reader reader(axis, epoch);
   McapSeries mcap(files.segments());
   take_all(mcap, reader);
   refuse_other_files(mcap, path);
@@ -133,7 +147,7 @@ RecordedRun read(const std::string& path, const std::string& axis, bool all) {
   RecordedRun run = all ? reader.all() : reader.joined();
   run.is_whole = !mcap.problem();
   if (const std::string second = second_of(mcap.reader(), run.axis); !second.empty()) {
-    Reader other(second);
+    Reader other(second, epoch);
     McapSeries again(files.segments());
     take_all(again, other);
     run.second = other.take_samples();

@@ -15,6 +15,7 @@ namespace drivebench::command {
 struct Answered {
   Sample sample;
   v1::Command command;
+  std::int64_t due_unix_ns = 0;  ///< UTC since 1970 at which the sample was due; only of a run in real time
 };
 
 /// The run of one controller on one axis.
@@ -24,6 +25,7 @@ struct RecordedRun {
   std::vector<Answered> rows;  ///< in the order of their ticks, at least one
   /// All samples of the axis that shares the amplifier of this one, in the order of their ticks.
   std::vector<Sample> second{};
+  bool is_real_time = false;
   bool is_whole = true;  ///< false: a damaged or missing part of the file may belong to the run
 
   /// Null: there is none.

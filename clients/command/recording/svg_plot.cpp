@@ -20,6 +20,7 @@ constexpr double kTop = 34.0;
 constexpr double kPanelHeight = 120.0;
 constexpr double kGap = 14.0;
 constexpr double kBottom = 40.0;
+constexpr double kLegendRow = 12.0;      // the gap above a panel has room for the first row
 constexpr double kPixelsPerPoint = 2.0;  // keeps a file small
 // Colours that colour-blind readers distinguish too (Okabe and Ito).
 constexpr std::array<std::string_view, 6> kColours = {"#0072b2", "#d55e00", "#009e73",
@@ -139,6 +140,31 @@ void append_line(std::string& svg, const std::vector<double>& x, const PlotLine&
   svg += "'/>\n";
 }
 
+/// Where a name stands in the rows above its panel.
+struct LegendPlace {
+  double start_px;
+  int row;
+};
+
+std::vector<LegendPlace> legend_of(const Panel& panel) {
+  std::vector<LegendPlace> places;
+  LegendPlace next = {.start_px = kLeft + 8.0, .row = 0};
+  for (const PlotLine& line : panel.lines) {
+    const double width_px = 14.0 + 6.5 * static_cast<double>(line.name.size());
+    if (!places.empty() && next.start_px + width_px > kWidth - kRight) {
+      next = {.start_px = kLeft + 8.0, .row = next.row + 1};
+    }
+    places.push_back(next);
+    next.start_px += width_px;
+  }
+  return places;
+}
+
+/// Of the rows of its legend beyond the first.
+double room_above(const Panel& panel) {
+  return panel.lines.empty() ? 0.0 : kLegendRow * legend_of(panel).back().row;
+}
+
 void append_panel(std::string& svg, const Panel& panel, const std::vector<double>& x, const Scale& x_scale,
                   double top_px, bool is_last) {
   const auto out = std::back_inserter(svg);
@@ -147,14 +173,14 @@ void append_panel(std::string& svg, const Panel& panel, const std::vector<double
   fmt::format_to(
       out, "<text x='12' y='{0:.1f}' text-anchor='middle' transform='rotate(-90 12 {0:.1f})'>{1}</text>\n",
       top_px + kPanelHeight / 2.0, markup(panel.label));
-  double legend_px = kLeft + 8.0;
+  const std::vector<LegendPlace> legend = legend_of(panel);
   for (std::size_t i = 0; i < panel.lines.size(); ++i) {
     const std::string_view colour = kColours[i % kColours.size()];
     append_line(svg, x, panel.lines[i], x_scale, y_scale, colour);
     if (panel.lines.size() == 1) continue;
-    fmt::format_to(out, "<text x='{:.1f}' y='{:.1f}' class='l' style='fill:{}'>{}</text>\n", legend_px,
-                   top_px + 12.0, colour, markup(panel.lines[i].name));
-    legend_px += 14.0 + 6.5 * static_cast<double>(panel.lines[i].name.size());
+    const int rows_below = legend.back().row - legend[i].row;
+    fmt::format_to(out, "<text x='{:.1f}' y='{:.1f}' style='fill:{}'>{}</text>\n", legend[i].start_px,
+                   top_px - 4.0 - kLegendRow * rows_below, colour, markup(panel.lines[i].name));
   }
 }
 
@@ -162,11 +188,13 @@ void append_panel(std::string& svg, const Panel& panel, const std::vector<double
 
 std::string svg_of(std::string_view title, std::string_view x_label, const std::vector<double>& x,
                    const std::vector<Panel>& panels) {
-  const double height = kTop + static_cast<double>(panels.size()) * (kPanelHeight + kGap) - kGap + kBottom;
+  double height = kTop - kGap + kBottom;
+  for (const Panel& panel : panels)
+    height += room_above(panel) + kPanelHeight + kGap;
   std::string svg = fmt::format(
       "<svg xmlns='http://www.w3.org/2000/svg' width='{0}' height='{1}' viewBox='0 0 {0} {1}' "
       "font-family='sans-serif' font-size='10'>\n"
-      "<style>.g{{stroke:#ddd;stroke-width:0.7}} .l{{paint-order:stroke;stroke:#fff;stroke-width:3}} "
+      "<style>.g{{stroke:#ddd;stroke-width:0.7}} "
       "path{{fill:none;stroke-width:12;transform:scale(.1)}}</style>\n"
       "<rect width='100%' height='100%' fill='#fff'/>\n"
       "<text x='{2}' y='18' font-size='13'>{3}</text>\n",
@@ -177,6 +205,7 @@ std::string svg_of(std::string_view title, std::string_view x_label, const std::
   x_scale.start_px = kLeft + (x_scale.low - (x.empty() ? 0.0 : x.front())) * x_scale.pixels_per_unit;
   double top_px = kTop;
   for (const Panel& panel : panels) {
+    top_px += room_above(panel);
     append_panel(svg, panel, x, x_scale, top_px, &panel == &panels.back());
     top_px += kPanelHeight + kGap;
   }

@@ -97,7 +97,7 @@ std::vector<Preset> induction_servo_presets() {
       preset({"exercise/8.26",
               "Chiasson 2005, exercise 26 of chapter 8: book/8.2.2 on flux, speed and load observed in rotor "
               "coordinates, started 20 mWb off",
-              "peak error at most 2 counts; finds a load of 0.1 N m to 5 %", "servo"},
+              "peak error at most 2 counts; finds a load of 0.1 N*m to 5 %", "servo"},
              kOnRotorFrame),
       preset({"exercise/8.27",
               "Chiasson 2005, exercise 27 of chapter 8: book/8.2.2 on the flux observer of Martin and "

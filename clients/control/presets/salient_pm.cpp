@@ -81,7 +81,7 @@ std::vector<Preset> salient_pm_presets() {
               "tracks as well, with more current", "ipm-servo"},
              with(kServo, &SalientPmParameters::current, SalientCurrent::kQuadrature), kMove),
       preset({"book/9.11-detent", "book/9.11 at 5 rad/s, where the detent torque is felt 16 times a turn",
-              "the error that the gains leave of 0.05 N m at 80 rad/s", "ipm-servo"},
+              "the error that the gains leave of 0.05 N*m at 80 rad/s", "ipm-servo"},
              kServo, kSlowMove),
   };
 }

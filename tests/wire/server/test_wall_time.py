@@ -46,11 +46,14 @@ class WallTime(WireTest):
     def bases(self, file=None):
         return [entries for name, entries in Recording((file or self.file).read_bytes()).metadata if name == TIME_BASE]
 
-    def exported(self, *arguments, code=0):
-        done = subprocess.run([DRIVEBENCH, "export", self.file, *arguments], capture_output=True, text=True, timeout=PATIENCE_S,
+    def run_on_the_file(self, verb, *arguments, code=0):
+        done = subprocess.run([DRIVEBENCH, verb, self.file, *arguments], capture_output=True, text=True, timeout=PATIENCE_S,
                               check=False, cwd=self.folder)
         self.assertEqual(done.returncode, code, done.stderr)
         return done
+
+    def exported(self, *arguments, code=0):
+        return self.run_on_the_file("export", *arguments, code=code)
 
     def rows(self):
         self.exported("--signals", "speed_rad_s", "--out", "run.csv")
@@ -77,6 +80,12 @@ class WallTime(WireTest):
         self.assertEqual(json.loads(self.exported("--json", "--out", "a.csv").stdout)["epoch_unix_ns"], epoch)
         utc = datetime.datetime.fromtimestamp(epoch // 10**9, datetime.timezone.utc)
         self.assertIn(f"tick 0 began at {utc:%Y-%m-%dT%H:%M:%S}.{epoch % 10**9 // 1000:06}Z", self.exported("--out", "b.csv").stdout)
+        self.assertEqual(json.loads(self.run_on_the_file("replay", "--json").stdout)["begun_utc"][:19], f"{utc:%Y-%m-%dT%H:%M:%S}")
+        self.assertIn(f", begun {utc:%Y-%m-%dT%H:%M:%S}.", self.run_on_the_file("replay").stdout)
+        row = rows[len(rows) // 2]  # not tick 0: the time of the first sample that is drawn
+        due = datetime.datetime.fromtimestamp(int(row["unix_ns"]) // 10**9, datetime.timezone.utc)
+        self.assertIn(f">time [ms] since {due:%Y-%m-%dT%H:%M:%S}.{int(row['unix_ns']) % 10**9 // 1000:06}Z<",
+                      self.run_on_the_file("plot", "--from", row["tick"]).stdout)
         frame = self.exported("--format", "candump").stdout.splitlines()[0]
         self.assertAlmostEqual(float(frame[1:frame.index(")")]), epoch / 1e9, delta=2e-6)
 
@@ -143,6 +152,8 @@ class WallTime(WireTest):
         self.assertEqual(server.stop(), 0)
         self.assertEqual(self.bases(), [])
         self.assertNotIn("epoch_unix_ns", json.loads(self.exported("--json", "--out", "a.csv").stdout))
+        self.assertNotIn("begun", self.run_on_the_file("replay").stdout)
+        self.assertIn(">time [ms]<", self.run_on_the_file("plot").stdout)
 
     def test_a_damaged_epoch_is_named(self):
         """Catches: rows with times out of nothing."""
@@ -152,6 +163,7 @@ class WallTime(WireTest):
         refused = self.exported("--out", "a.csv", code=1)
         self.assertIn(f"{TIME_BASE} of the recording: epoch_unix_ns is 'xxx", refused.stderr)
         self.assertIn("not a whole number", refused.stderr)
+        self.assertIn("epoch_unix_ns is 'xxx", self.run_on_the_file("replay", code=2).stdout)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,8 @@ fs::path own_executable() {
 
 fs::path server_executable() {
   fs::path server = own_executable().parent_path() / "drivebench-server";
-  if (!fs::exists(server)) throw UsageError("there is no " + server.string());
+  if (!fs::exists(server))
+    throw UsageError("there is no " + server.string() + " (package drivebench-server)");
   return server;
 }
 

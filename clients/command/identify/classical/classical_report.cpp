@@ -8,6 +8,8 @@
 #include <numbers>
 #include <utility>
 
+#include "clients/command/common/basics/number_text.hpp"
+
 namespace drivebench::command {
 namespace {
 
@@ -35,7 +37,7 @@ std::string structural_text(const ClassicalReport& r, const Estimate& e) {
 
 std::string branch_text(const ClassicalReport& r, const Estimate& e) {
   if (!structural_error(r, e)) return "-";
-  return fmt::format("{:.5g}", identification::value_of(*r.with_branch, e.name));
+  return number_text(identification::value_of(*r.with_branch, e.name));
 }
 
 const TestRun* run_named(const ClassicalReport& r, TerminalTest test) {
@@ -115,13 +117,13 @@ std::vector<std::string> cells_of(const TestRun& run) {
   const bool dc = run.test == TerminalTest::kDcResistance;
   return {run.name,
           fmt::format("{:.4g}-{:.4g}", reading.from_s, reading.to_s),
-          dc ? "DC" : fmt::format("{:.3f}", m.frequency_hz),
-          fmt::format("{:.4f}", m.voltage_v),
-          fmt::format("{:.5f}", m.current_a),
-          fmt::format("{:.3f}", m.active_w),
-          dc ? "-" : fmt::format("{:.3f}", m.reactive_var),
-          fmt::format("{:.4f}", z.real()),
-          dc ? "-" : fmt::format("{:.4f}", z.imag()),
+          dc ? "DC" : number_text(m.frequency_hz),
+          number_text(m.voltage_v),
+          number_text(m.current_a),
+          number_text(m.active_w),
+          dc ? "-" : number_text(m.reactive_var),
+          number_text(z.real()),
+          dc ? "-" : number_text(z.imag()),
           slip_text(run)};
 }
 

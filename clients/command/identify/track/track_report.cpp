@@ -7,6 +7,7 @@
 #include <limits>
 #include <string_view>
 
+#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/recording/svg_plot.hpp"
 
 namespace drivebench::command {
@@ -19,7 +20,7 @@ bool is_seen(const ResistanceEstimate& e, std::string_view name) {
 }
 
 std::string cell(bool seen, double value, double interval) {
-  return seen ? fmt::format("{:.5g} +- {:.2g}", value, interval) : "not seen";
+  return seen ? fmt::format("{} +- {:.2g}", number_text(value), interval) : "not seen";
 }
 
 }  // namespace
@@ -54,7 +55,7 @@ void TrackReport::add(const TrackRow& row) {
     fmt::print("{}\n", track_row_json(row));
   } else {
     const auto truth = [&](double TrackTruth::*value) {
-      return row.truth ? fmt::format("{:.5g}", *row.truth.*value) : std::string("-");
+      return row.truth ? number_text(*row.truth.*value) : std::string("-");
     };
     std::string line = fmt::format("{:>10.4f}  {:>20} {:>10}  {:>22} {:>10}  {}", row.time_s,
                                    cell(stator, e.stator_resistance_ohm, e.stator_interval_ohm),
