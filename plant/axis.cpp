@@ -17,9 +17,10 @@ namespace {
 // Far outside of every machine of this bench; a state beyond it has diverged.
 constexpr double kEnvelope = 1e9;
 
-// Channels of noise of an axis: its analog sensors, then the corruption of commands.
+// Channels of noise of an axis: its analog sensors, then the corruption of commands, then its comparators.
 constexpr std::uint64_t kNoiseChannels = 32;
 constexpr std::uint64_t kCommandNoise = 16;
+constexpr std::uint64_t kComparatorNoise = 24;
 
 double pole_pairs_of(const MachineParameters& machine) noexcept {
   return std::visit([](const auto& p) { return drivebench::pole_pairs_of(p); }, machine);
@@ -42,6 +43,7 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
           .sensors =
               SensorBank(p.sensors, connection, timing.period_s, seed, noise,
                          timing.period_s / timing.substeps, kind_of(p.machine).field != FieldSupply::kNone),
+          .comparators = Comparators(p.sensors.comparator, timing.period_s, seed, noise + kComparatorNoise),
           .encoder = Encoder(p.encoder, timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};
@@ -77,6 +79,7 @@ void forget_negligible(AxisState& state) noexcept {
   for (double& value : state.sensors.filtered)
     value = kept(value);
   state.drive.filtered_v = by_phase(kept, state.drive.filtered_v);
+  state.comparators.filtered_v = by_phase(kept, state.comparators.filtered_v);
   state.shaft.speed_rad_s = kept(state.shaft.speed_rad_s);
 }
 
@@ -91,6 +94,7 @@ Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::
   adjust();
   state_.sensors =
       core_.sensors.settled({.bus_v = state_.drive.bus_v, .temperature_k = state_.thermal.temperature_k}, 0);
+  state_.comparators = core_.comparators.settled(state_.drive.bus_v);
 }
 
 Axis::Axis(const Axis& other)
@@ -110,6 +114,7 @@ void Axis::set_parameters(const AxisParameters& p) noexcept {
   core_.p = p;
   core_.drive.set_parameters(p.drive);
   core_.sensors.set_parameters(p.sensors);
+  core_.comparators.set_parameters(p.sensors.comparator);
   core_.shaft = constants_of(p.mechanics);
   core_.shaft_has_events = shaft_has_events(p.mechanics);
   adjust();
@@ -159,6 +164,7 @@ void Axis::look_inside() noexcept {
 
 void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
   state_.faults &= kLatchedFaults;
+  core_.tick = tick;
   core_.segment_count = 0;
   core_.last_tick_turn = state_.turns;
   core_.last_tick_encoder = state_.encoder;
@@ -166,7 +172,7 @@ void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
   if ((state_.faults & kOverCurrentTrip) != 0) core_.drive.switch_off(state_.drive);
   if (core_.p.sensors.terminals) state_.terminal_mean_v = {};
   core_.follows = core_.drive.follows() || core_.sensors.follows() || core_.p.thermal.enabled ||
-                  core_.p.sensors.terminals || has_impedance(core_.p.drive);
+                  core_.p.sensors.follow_terminals() || has_impedance(core_.p.drive);
 }
 
 double Axis::load_at(Tick tick) const noexcept {
@@ -308,6 +314,9 @@ Sample Axis::sample(Tick tick) const noexcept {
   s.terminal_a_mean_v = state_.terminal_mean_v.a;
   s.terminal_b_mean_v = state_.terminal_mean_v.b;
   s.terminal_c_mean_v = state_.terminal_mean_v.c;
+  core_.comparators.read(state_.comparators, tick, s);
+  s.encoder_timer = core_.encoder.timer(state_.encoder);
+  s.encoder_capture = core_.encoder.capture(state_.encoder);
   return s;
 }
 

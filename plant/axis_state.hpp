@@ -9,6 +9,7 @@
 #include "plant/injected_faults.hpp"
 #include "plant/mechanics/load.hpp"
 #include "plant/mechanics/shaft.hpp"
+#include "plant/sensors/comparators.hpp"
 #include "plant/sensors/encoder.hpp"
 #include "plant/sensors/sensor_bank.hpp"
 #include "plant/thermal.hpp"
@@ -46,8 +47,11 @@ struct AxisState {
   // Added later, and zero without SensorParameters::terminals: see kLaterWords.
   ThreePhase terminal_v{};       ///< against the negative rail at the end of the last tick
   ThreePhase terminal_mean_v{};  ///< over that tick; within a tick what its pieces have brought so far
+  // Later still, and zero without comparators.
+  ComparatorMemory comparators{};
 };
 
-inline constexpr std::size_t kLaterAxisWords = 6;
+/// Numbers of words, for kLaterWords.
+inline constexpr std::array<std::size_t, 2> kLaterAxisWords{6, sizeof(ComparatorMemory) / 8};
 
 }  // namespace drivebench

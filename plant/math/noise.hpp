@@ -43,6 +43,12 @@ constexpr double uniform_noise(std::uint64_t seed, std::uint64_t channel, std::u
   return noise_detail::unit_interval(noise_detail::hashed(seed, channel, tick));
 }
 
+/// The draw in (0, 1] behind gaussian_noise() of the same arguments, which is at most sqrt(-2 log draw) in
+/// magnitude: cheaper to ask where only large noise matters.
+constexpr double gaussian_draw(std::uint64_t seed, std::uint64_t channel, std::uint64_t tick) noexcept {
+  return noise_detail::unit_interval(noise_detail::hashed(seed, channel, tick)) + 0x1p-53;
+}
+
 /// Normal with mean 0 and variance 1 (Box-Muller). Always finite: the magnitude is at most sqrt(106·log 2)
 /// = 8.57. Not independent of uniform_noise of the same arguments: give each use its own channel.
 inline double gaussian_noise(std::uint64_t seed, std::uint64_t channel, std::uint64_t tick) noexcept {

@@ -28,19 +28,28 @@ constexpr bool is_sensor_delay(double ticks) noexcept {
 
 /// The reading of a channel, and whether its converter was at its end.
 struct AnalogReading {
-  double value;
-  bool saturated;
+  double value = 0.0;
+  bool saturated = false;
+  std::int64_t steps = 0;  ///< of the converter, from zero; 0 of an ideal one
 };
+
+/// The number of a converter of so many bits: 0 to 2^bits - 1, half way for a reading of 0.
+constexpr std::uint64_t converter_count(const AnalogReading& reading, int bits) noexcept {
+  return bits > 0 ? static_cast<std::uint64_t>(reading.steps + (std::int64_t{1} << (bits - 1))) : 0;
+}
 
 /// The converter: the nearest of 2^bits steps, limited to the range; a tie goes up. 0 bits: as it is.
 constexpr AnalogReading converted(double analog, int bits, double full_scale) noexcept {
-  if (bits == 0) return {.value = analog, .saturated = false};
-  const double steps_per_side = static_cast<double>(std::int64_t{1} << (bits - 1));
+  if (bits == 0) return {.value = analog};
+  const std::int64_t side = std::int64_t{1} << (bits - 1);
+  const double steps_per_side = static_cast<double>(side);
   const double step = full_scale / steps_per_side;
   const double steps = analog / step + 0.5;
-  if (steps >= steps_per_side) return {.value = (steps_per_side - 1.0) * step, .saturated = true};
-  if (steps < -steps_per_side) return {.value = -full_scale, .saturated = true};
-  return {.value = static_cast<double>(floor_to_integer(steps)) * step, .saturated = false};
+  if (steps >= steps_per_side)
+    return {.value = (steps_per_side - 1.0) * step, .saturated = true, .steps = side - 1};
+  if (steps < -steps_per_side) return {.value = -full_scale, .saturated = true, .steps = -side};
+  const std::int64_t whole = floor_to_integer(steps);
+  return {.value = static_cast<double>(whole) * step, .saturated = false, .steps = whole};
 }
 
 }  // namespace drivebench

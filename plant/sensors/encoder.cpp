@@ -299,6 +299,13 @@ std::uint32_t Encoder::levels(const EncoderState& state, const InjectedFaults& f
   return levels;
 }
 
+std::uint64_t Encoder::capture(const EncoderState& state) const noexcept {
+  const double clocks = state.period_s * p_.capture_hz;
+  if (!(clocks > 0.0)) return 0;
+  const std::uint64_t most = timer_mask();
+  return clocks < static_cast<double>(most) ? static_cast<std::uint64_t>(clocks) : most;
+}
+
 double Encoder::edge_age_s(const EncoderState& state, Tick tick) const noexcept {
   return static_cast<double>(tick - state.last_edge_tick) * period_s_ - state.last_edge_s;
 }

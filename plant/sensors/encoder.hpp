@@ -15,6 +15,8 @@ struct EncoderParameters {
   int counts_per_revolution = 2000;  ///< N, after quadrature; a multiple of 4
   bool half_count_offset = false;    ///< centres the quantisation error on zero
   bool swapped = false;              ///< A and B are exchanged: the count falls when the angle rises
+  int timer_bits = 0;                ///< of the timers that follow the lines; 0: there are none
+  double capture_hz = 0.0;  ///< clock of the timer that measures the time between edges; 0: there is none
 };
 
 /// The shaft between two integration nodes: its angle and speed at both ends. Between them the angle is the
@@ -90,6 +92,14 @@ class Encoder {
   /// Time since the last edge at the start of `tick`; since tick 0 if there was none.
   double edge_age_s(const EncoderState& state, Tick tick) const noexcept;
 
+  /// What a quadrature timer of timer_bits reads: the count, which wraps.
+  std::uint64_t timer(const EncoderState& state) const noexcept {
+    return static_cast<std::uint64_t>(state.count) & timer_mask();
+  }
+  /// Whole clocks of capture_hz between the last two edges, at most what timer_bits hold; 0 until there were
+  /// two.
+  std::uint64_t capture(const EncoderState& state) const noexcept;
+
   /// Calls visit(Edge) for every edge of the segments in the order of time: those that follow() counts. Not
   /// for the tick: the number of edges has no bound. `turn`, count and `ahead` of the state are those at the
   /// start of the tick.
@@ -105,6 +115,9 @@ class Encoder {
   }
 
  private:
+  /// The largest number of a timer; 0 without one.
+  std::uint64_t timer_mask() const noexcept { return (std::uint64_t{1} << p_.timer_bits) - 1; }
+
   /// A segment in counts, cut where the shaft reverses, so that the position is monotonic in it.
   struct Piece {
     double start_s;

@@ -272,37 +272,46 @@ AnalogReading SensorBank::read(const SensorMemory& m, Channel c, const Errors& e
 
 Sample SensorBank::readings(const SensorMemory& m, const InjectedFaults& faults, Tick tick) const noexcept {
   Sample s;
-  const auto current = [&](Channel c, double phase) {
+  const auto shown = [&](Channel c, const AnalogReading& reading, std::uint64_t& count) {
+    if (p_.counts) count = converter_count(reading, channels_[at(c)].bits);
+    return reading.value;
+  };
+  std::uint64_t none = 0;
+  const auto current = [&](Channel c, double phase, std::uint64_t& count) {
     const AnalogParameters& p = channels_[at(c)];
-    if (!p.enabled || faults.current_sensor_stuck == phase) return 0.0;
+    if (!p.enabled) return 0.0;
+    if (faults.current_sensor_stuck == phase) return shown(c, {}, count);
     const bool is_phase = c != Channel::kCurrentField;
     const Errors errors{.gain = p.gain * (1.0 + faults.current_sensor_gain),
                         .offset = p.offset + (is_phase ? faults.current_sensor_offset : 0.0),
                         .noise_rms = p.noise_rms + (is_phase ? faults.current_sensor_noise : 0.0)};
     const AnalogReading reading = read(m, c, errors, tick);
     if (reading.saturated) s.faults |= kCurrentSensorSaturated;
-    return reading.value;
+    return shown(c, reading, count);
   };
-  const auto other = [&](Channel c, bool lost = false) {
+  const auto counted = [&](Channel c, std::uint64_t& count, bool lost = false) {
     const AnalogParameters& p = channels_[at(c)];
     if (!p.enabled) return 0.0;
     const AnalogReading reading = read(m, c, {lost ? 0.0 : p.gain, p.offset, p.noise_rms}, tick);
     if (reading.saturated) s.faults |= kSensorSaturated;
-    return reading.value;
+    return shown(c, reading, count);
   };
-  s.i_a_a = current(Channel::kCurrentA, 1.0);
-  s.i_b_a = current(Channel::kCurrentB, 2.0);
-  s.i_c_a = current(Channel::kCurrentC, 3.0);
-  s.i_f_a = current(Channel::kCurrentField, 4.0);
+  const auto other = [&](Channel c, bool lost = false) { return counted(c, none, lost); };
+  s.i_a_a = current(Channel::kCurrentA, 1.0, s.i_a_counts);
+  s.i_b_a = current(Channel::kCurrentB, 2.0, s.i_b_counts);
+  s.i_c_a = current(Channel::kCurrentC, 3.0, s.i_c_counts);
+  s.i_f_a = current(Channel::kCurrentField, 4.0, none);
   const AnalogValues& now = m.history[slot_of(m.tick)];
-  const auto voltage = [&](Channel c) { return p_.voltage.enabled ? other(c) : now[at(c)]; };
-  s.u_a_v = voltage(Channel::kVoltageA);
-  s.u_b_v = voltage(Channel::kVoltageB);
-  s.u_c_v = voltage(Channel::kVoltageC);
-  s.u_f_v = voltage(Channel::kVoltageField);
-  s.bus_voltage_v = p_.bus.enabled ? other(Channel::kBus) : now[at(Channel::kBus)];
+  const auto voltage = [&](Channel c, std::uint64_t& count) {
+    return p_.voltage.enabled ? counted(c, count) : now[at(c)];
+  };
+  s.u_a_v = voltage(Channel::kVoltageA, s.u_a_counts);
+  s.u_b_v = voltage(Channel::kVoltageB, s.u_b_counts);
+  s.u_c_v = voltage(Channel::kVoltageC, s.u_c_counts);
+  s.u_f_v = voltage(Channel::kVoltageField, none);
+  s.bus_voltage_v = p_.bus.enabled ? counted(Channel::kBus, s.bus_counts) : now[at(Channel::kBus)];
   s.u_n_v = other(Channel::kNeutral);
-  s.temperature_k = other(Channel::kTemperature);
+  s.temperature_k = counted(Channel::kTemperature, s.temperature_counts);
   s.tachometer_v = other(Channel::kTachometer, faults.tachometer_loss != 0.0);
   s.resolver_sin_v = other(Channel::kResolverSine, faults.resolver_loss == 1.0);
   s.resolver_cos_v = other(Channel::kResolverCosine, faults.resolver_loss == 2.0);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "plant/sensors/analog_channel.hpp"
+#include "plant/sensors/comparators.hpp"
 #include "plant/sensors/current_sensor.hpp"
 #include "plant/sensors/hall.hpp"
 #include "plant/sensors/meter.hpp"
@@ -21,6 +22,11 @@ struct SensorParameters {
   HallParameters hall{};
   MeterParameters meter{};
   bool terminals = false;  ///< the terminals are shown against the negative rail
+  bool counts = false;     ///< the numbers of the converters are shown
+  ComparatorParameters comparator{};
+
+  /// Whether something follows the terminals against the negative rail.
+  bool follow_terminals() const noexcept { return terminals || comparator.enabled; }
 };
 
 }  // namespace drivebench

@@ -80,6 +80,16 @@ class DriveTrain final : public Train {
     Freed freed{};              ///< by an event of the shaft
   };
 
+  /// A piece of a tick from end to end.
+  struct Passed {
+    double start_s;
+    double duration_s;
+    const State& from;
+    const State& to;
+    const RotorMotion& from_motion;
+    const RotorMotion& to_motion;
+  };
+
   static State machine_of(const AxisState& state) noexcept;
   static void keep_machine(AxisState& state, const State& x) noexcept;
   static Shaft shaft_of(const AxisState& state) noexcept;
@@ -142,12 +152,18 @@ class DriveTrain final : public Train {
   void run_smooth(AxisCore& core, Whole& x, double start_s, double end_s, double load_nm) noexcept;
   void run_piece(AxisCore& core, AxisState& state, Whole& x, double start_s, double end_s,
                  double load_nm) noexcept;
-  void finish_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& from,
-                    const State& to, const RotorMotion& from_motion, const RotorMotion& to_motion) noexcept;
-  /// Adds the piece to the mean voltages against the negative rail. `end_v` are those after its event.
-  [[gnu::noinline]] void follow_terminals(const AxisCore& core, AxisState& state, double duration_s,
-                                          const State& to, const RotorMotion& motion,
+  void finish_piece(AxisCore& core, AxisState& state, const Passed& passed) noexcept;
+  /// The terminals against the negative rail during the piece: for comparators, and in the mean voltages.
+  /// `end_v` are those after its event.
+  [[gnu::noinline]] void follow_terminals(const AxisCore& core, AxisState& state, const Passed& passed,
                                           const PhaseValues& end_v) const noexcept;
+  /// The piece in its middle, by the values at its ends.
+  State middle_of(const Passed& passed) const noexcept;
+  RotorMotion middle_motion(const Passed& passed) const noexcept;
+  PhaseValues middle_v() const noexcept;
+  /// The voltages of all terminals where the piece has come to this state of the machine.
+  PhaseValues within_piece_v(const AxisCore& core, TerminalSet floating, const State& x,
+                             const RotorMotion& motion, const PhaseValues& driven_v) const noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
   /// Sets blocked currents to zero again, from which rounding lets them drift.
   void keep_open(const AxisCore& core, const AxisState& state, State& x,

@@ -148,10 +148,9 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state, double start_s,
-                                              double duration_s, const State& from, const State& to,
-                                              const RotorMotion& from_motion,
-                                              const RotorMotion& to_motion) noexcept {
+void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
+                                              const Passed& passed) noexcept {
+  const auto& [start_s, duration_s, from, to, from_motion, to_motion] = passed;
   if (core.follows) {
     const PhaseValues from_a = piece_.current_a;
     piece_.current_a = currents(core, state, to, to_motion);
@@ -161,9 +160,7 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state, 
     if (core.p.thermal.enabled) {
       state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
     }
-    if (core.p.sensors.terminals) {
-      follow_terminals(core, state, duration_s, to, to_motion, after.voltage_v);
-    }
+    if (core.p.sensors.follow_terminals()) follow_terminals(core, state, passed, after.voltage_v);
     follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
   }
   core.record({.start_s = start_s,
@@ -202,7 +199,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     }
     freed = cut.freed;
     const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
-    finish_piece(core, state, start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x));
+    finish_piece(core, state, {start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x)});
     start_s = cut.fraction < 1.0 ? start_s + passed_s : end_s;
   }
 }
@@ -371,7 +368,7 @@ void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double 
   const RotorMotion end = turned(to);
   if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
   keep_open(core, state, piece_.stage, end);
-  finish_piece(core, state, start_s, duration_s, piece_.from, piece_.stage, turned(from), end);
+  finish_piece(core, state, {start_s, duration_s, piece_.from, piece_.stage, turned(from), end});
   piece_.current_a = currents(core, state, piece_.stage, end);
   end_run(core, state, piece_.stage, end);
   keep_machine(state, piece_.stage);

@@ -123,35 +123,80 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
   }
 }
 
-/// A floating terminal goes linearly between the ends of a piece, at most a substep apart.
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisState& state, double duration_s,
-                                                  const State& to, const RotorMotion& motion,
+PhaseValues DriveTrain<Machine, Shaft>::within_piece_v(const AxisCore& core, TerminalSet floating,
+                                                       const State& x, const RotorMotion& motion,
+                                                       const PhaseValues& driven_v) const noexcept {
+  if (floating == 0) return driven_v;
+  const TerminalInput& u = piece_.circuit.constant ? piece_.circuit.start : piece_.circuit.end;
+  return with_floating(core.connection, floating, driven_v,
+                       piece_.open ? open_v(x, motion) : floating_v(x, motion, u));
+}
+
+template <class Machine, class Shaft>
+auto DriveTrain<Machine, Shaft>::middle_of(const Passed& passed) const noexcept -> State {
+  return advanced(passed.from, 0.5, advanced(passed.to, -1.0, passed.from));
+}
+
+/// Of the cubic with the angles and speeds at both ends.
+template <class Machine, class Shaft>
+RotorMotion DriveTrain<Machine, Shaft>::middle_motion(const Passed& passed) const noexcept {
+  const RotorMotion& from = passed.from_motion;
+  const RotorMotion& to = passed.to_motion;
+  return turned({.angle_rad = 0.5 * (from.angle_rad + to.angle_rad) +
+                              0.125 * passed.duration_s * (from.speed_rad_s - to.speed_rad_s),
+                 .speed_rad_s = 0.5 * (from.speed_rad_s + to.speed_rad_s),
+                 .electrical = from.electrical});
+}
+
+/// Of the terminals that do not float; mean_v is by Simpson's rule.
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::middle_v() const noexcept {
+  const TerminalCircuit& circuit = piece_.circuit;
+  if (circuit.constant) return circuit.start_v;
+  const auto middle = [](double start, double mean, double end) noexcept {
+    return 0.25 * (6.0 * mean - start - end);
+  };
+  return by_terminal(middle, circuit.start_v, circuit.mean_v, circuit.end_v);
+}
+
+/// In the means a floating terminal goes linearly between the ends of a piece, at most a substep apart; for
+/// comparators along the parabola through its middle.
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisState& state,
+                                                  const Passed& passed,
                                                   const PhaseValues& end_v) const noexcept {
   // One driven terminal of a star alone carries no current and does not float.
   const TerminalSet driven = driven_terminals(core.connection, piece_.drive);
   const TerminalSet floating = piece_.off & ~driven;
   const double rail_v = piece_.drive.rail_v;
   const auto above = [&](double v) noexcept { return above_negative_rail(core.connection, v, rail_v); };
-  ThreePhase mean_v = phases_of(piece_.circuit.mean_v);
-  if (floating != 0) {
-    const TerminalInput& u = piece_.circuit.constant ? piece_.circuit.start : piece_.circuit.end;
-    const WindingValues winding_v = piece_.open ? open_v(to, motion) : floating_v(to, motion, u);
-    const PhaseValues last_v = with_floating(core.connection, floating, piece_.circuit.end_v, winding_v);
-    const PhaseValues& first_v = piece_.circuit.start_v;
-    if ((floating & 1u) != 0) mean_v.a = 0.5 * (first_v.a + last_v.a);
-    if ((floating & 2u) != 0) mean_v.b = 0.5 * (first_v.b + last_v.b);
-    if ((floating & 4u) != 0) mean_v.c = 0.5 * (first_v.c + last_v.c);
-  }
   const auto against_rail = [&](const ThreePhase& v, TerminalSet afloat) noexcept {
     const ThreePhase result = existing(by_phase(above, v), terminal_count(core.connection));
     const bool open_star = core.connection == Connection::kStar && afloat == all_terminals(core.connection);
     return open_star ? within_rails(result, 2.0 * rail_v) : result;
   };
-  const double part = duration_s / core.timing.period_s;
-  const auto add = [part](double sum, double v) noexcept { return sum + part * v; };
-  state.terminal_mean_v = by_phase(add, state.terminal_mean_v, against_rail(mean_v, floating));
-  state.terminal_v = against_rail(phases_of(end_v), state.open_terminals & ~driven);
+  const PhaseValues& first_v = piece_.circuit.start_v;
+  const PhaseValues last_v =
+      within_piece_v(core, floating, passed.to, passed.to_motion, piece_.circuit.end_v);
+  if (core.p.sensors.terminals) {
+    ThreePhase mean_v = phases_of(piece_.circuit.mean_v);
+    if ((floating & 1u) != 0) mean_v.a = 0.5 * (first_v.a + last_v.a);
+    if ((floating & 2u) != 0) mean_v.b = 0.5 * (first_v.b + last_v.b);
+    if ((floating & 4u) != 0) mean_v.c = 0.5 * (first_v.c + last_v.c);
+    const double part = passed.duration_s / core.timing.period_s;
+    const auto add = [part](double sum, double v) noexcept { return sum + part * v; };
+    state.terminal_mean_v = by_phase(add, state.terminal_mean_v, against_rail(mean_v, floating));
+    state.terminal_v = against_rail(phases_of(end_v), state.open_terminals & ~driven);
+  }
+  if (!core.comparators.enabled()) return;
+  const PhaseValues half_v =
+      within_piece_v(core, floating, middle_of(passed), middle_motion(passed), middle_v());
+  core.comparators.follow(state.comparators, core.tick, passed.start_s, passed.duration_s,
+                          {.start_v = against_rail(phases_of(first_v), floating),
+                           .middle_v = against_rail(phases_of(half_v), floating),
+                           .end_v = against_rail(phases_of(last_v), floating),
+                           .link_v = state.drive.bus_v});
 }
 
 template <class Machine, class Shaft>

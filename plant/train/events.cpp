@@ -14,18 +14,4 @@ Crossing first_crossing(const EventValues& from, const EventValues& to) noexcept
   return first;
 }
 
-void Bracket::narrow(double at, double value) noexcept {
-  if (low_value * value < 0.0) {
-    high = at;
-    high_value = value;
-    if (side == -1) low_value *= 0.5;
-    side = -1;
-  } else {
-    low = at;
-    low_value = value;
-    if (side == 1) high_value *= 0.5;
-    side = 1;
-  }
-}
-
 }  // namespace drivebench

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "plant/math/bracket.hpp"
+
 namespace drivebench {
 
 /// Numbers whose passing through zero ends a piece of a tick: at most four of the shaft, and of each machine
@@ -22,18 +24,6 @@ struct Crossing {
   double fraction = 1.0;
 };
 Crossing first_crossing(const EventValues& from, const EventValues& to) noexcept;
-
-/// One step of the search for a zero between two points by the Illinois method.
-struct Bracket {
-  double low = 0.0;
-  double low_value;
-  double high = 1.0;
-  double high_value;
-  int side = 0;
-
-  double guess() const noexcept { return low + (high - low) * (low_value / (low_value - high_value)); }
-  void narrow(double at, double value) noexcept;
-};
 
 /// The event that comes first in a piece of which the values at both ends are known, and the part of the
 /// piece after which it comes. `values_after(fraction)` takes the step anew over this part of the piece; the

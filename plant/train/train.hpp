@@ -28,9 +28,11 @@ struct AxisCore {
   double pole_pairs;  ///< electrical over mechanical angle, for the Hall sensors
   Drive drive;
   SensorBank sensors;
+  Comparators comparators;
   Encoder encoder;
   ShaftConstants shaft;
   bool shaft_has_events;
+  Tick tick = 0;        ///< that is running
   bool follows = true;  ///< in this tick drive, sensors or thermal model need every piece
   std::array<AngleSegment, kMaxSegments> segments{};
   std::size_t segment_count = 0;

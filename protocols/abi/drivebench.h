@@ -11,8 +11,8 @@
  *   can:BACKEND:CHANNEL?node=N   one axis over the native CAN profile
  *   modbus:HOST:PORT?unit=N      one axis over Modbus TCP
  *
- * Over inproc, tcp, tls, unix and shm the same calls give the same samples, bit for bit. CAN FD and Modbus carry
- * float32, classic CAN scaled integers: they round.
+ * Over inproc, tcp, tls, unix and shm the same calls give the same samples, bit for bit. CAN FD and Modbus
+ * carry float32, classic CAN scaled integers: they round.
  *
  * Time counts in ticks. In lockstep, and always in process, drivebench_step() runs the tick whose commands it
  * brings, and nothing else moves time. In real time it returns with the next tick.
@@ -153,26 +153,47 @@ typedef struct drivebench_sample {
   double u_n_v;         /**< [V] neutral of the motor against the middle of the DC link */
   uint64_t hall_lines;  /**< Hall lines: 1 line 1, 2 line 2, 4 line 3 */
   double tachometer_v;  /**< [V] voltage of the tachometer */
-  double resolver_sin_v;    /**< [V] sine winding of the resolver, demodulated */
-  double resolver_cos_v;    /**< [V] cosine winding of the resolver, demodulated */
-  double temperature_k;     /**< [K] temperature of the windings */
-  double meter_u_rms_v;     /**< [V] power analyser, last whole window: rms voltage */
-  double meter_i_rms_a;     /**< [A] power analyser: rms current */
-  double meter_p_w;         /**< [W] power analyser: active power */
-  double meter_q_var;       /**< [var] power analyser: reactive power */
-  double meter_pf;          /**< power analyser: power factor */
-  double true_i_c_a;        /**< [A] true current of phase c */
-  double true_i_f_a;        /**< [A] true current of the field winding */
-  double load_angle_rad;    /**< [rad] true angle of the output: behind gear and elastic shaft */
-  double load_speed_rad_s;  /**< [rad/s] true speed of the output */
-  double load_position_m;   /**< [m] true position of the table on the screw */
-  uint64_t injected;        /**< injected faults in force; the description lists the bits */
-  double terminal_a_v;      /**< [V] terminal a against the negative rail at the end of the tick before */
-  double terminal_b_v;      /**< [V] terminal b against the negative rail at the end of the tick before */
-  double terminal_c_v;      /**< [V] terminal c against the negative rail at the end of the tick before */
-  double terminal_a_mean_v; /**< [V] terminal a against the negative rail, mean over the tick before */
-  double terminal_b_mean_v; /**< [V] terminal b against the negative rail, mean over the tick before */
-  double terminal_c_mean_v; /**< [V] terminal c against the negative rail, mean over the tick before */
+  double resolver_sin_v;       /**< [V] sine winding of the resolver, demodulated */
+  double resolver_cos_v;       /**< [V] cosine winding of the resolver, demodulated */
+  double temperature_k;        /**< [K] temperature of the windings */
+  double meter_u_rms_v;        /**< [V] power analyser, last whole window: rms voltage */
+  double meter_i_rms_a;        /**< [A] power analyser: rms current */
+  double meter_p_w;            /**< [W] power analyser: active power */
+  double meter_q_var;          /**< [var] power analyser: reactive power */
+  double meter_pf;             /**< power analyser: power factor */
+  double true_i_c_a;           /**< [A] true current of phase c */
+  double true_i_f_a;           /**< [A] true current of the field winding */
+  double load_angle_rad;       /**< [rad] true angle of the output: behind gear and elastic shaft */
+  double load_speed_rad_s;     /**< [rad/s] true speed of the output */
+  double load_position_m;      /**< [m] true position of the table on the screw */
+  uint64_t injected;           /**< injected faults in force; the description lists the bits */
+  double terminal_a_v;         /**< [V] terminal a against the negative rail at the end of the tick before */
+  double terminal_b_v;         /**< [V] terminal b against the negative rail at the end of the tick before */
+  double terminal_c_v;         /**< [V] terminal c against the negative rail at the end of the tick before */
+  double terminal_a_mean_v;    /**< [V] terminal a against the negative rail, mean over the tick before */
+  double terminal_b_mean_v;    /**< [V] terminal b against the negative rail, mean over the tick before */
+  double terminal_c_mean_v;    /**< [V] terminal c against the negative rail, mean over the tick before */
+  uint64_t comparator_levels;  /**< comparators of the terminals: 1 a, 2 b, 4 c above the reference */
+  uint64_t comparator_a_edges; /**< edges of the comparator of a since tick 0 */
+  uint64_t comparator_b_edges; /**< edges of the comparator of b since tick 0 */
+  uint64_t comparator_c_edges; /**< edges of the comparator of c since tick 0 */
+  double comparator_a_age_s; /**< [s] time since the last edge of the comparator of a; since tick 0 if none */
+  double comparator_b_age_s; /**< [s] time since the last edge of the comparator of b; since tick 0 if none */
+  double comparator_c_age_s; /**< [s] time since the last edge of the comparator of c; since tick 0 if none */
+  double comparator_a_v;     /**< [V] terminal a less the reference of its comparator, behind the RC */
+  double comparator_b_v;     /**< [V] terminal b less the reference of its comparator, behind the RC */
+  double comparator_c_v;     /**< [V] terminal c less the reference of its comparator, behind the RC */
+  uint64_t i_a_counts;       /**< [counts] converter of the current of phase a */
+  uint64_t i_b_counts;       /**< [counts] converter of the current of phase b */
+  uint64_t i_c_counts;       /**< [counts] converter of the current of phase c */
+  uint64_t u_a_counts;       /**< [counts] converter of the voltage at phase a */
+  uint64_t u_b_counts;       /**< [counts] converter of the voltage at phase b */
+  uint64_t u_c_counts;       /**< [counts] converter of the voltage at phase c */
+  uint64_t bus_counts;       /**< [counts] converter of the voltage of the DC link */
+  uint64_t temperature_counts; /**< [counts] converter of the temperature */
+  uint64_t encoder_timer;      /**< [counts] quadrature timer: the count, which wraps */
+  uint64_t
+      encoder_capture; /**< [clocks] clocks of the capture timer between the last two edges of the encoder */
 } drivebench_sample;
 
 enum drivebench_kind { DRIVEBENCH_KIND_STATUS = 1, DRIVEBENCH_KIND_SENSOR = 2, DRIVEBENCH_KIND_TRUTH = 3 };
@@ -341,13 +362,13 @@ DRIVEBENCH_API int drivebench_state_hash(drivebench_bench* bench, uint64_t* hash
  */
 DRIVEBENCH_API int drivebench_reset(drivebench_bench* bench);
 /**
- * Saves the whole state: machines, sensors, noise, commands, scheduled changes. `*size` is the room in `state`
- * before and the length of the state after; with a null `state` only the length is told.
+ * Saves the whole state: machines, sensors, noise, commands, scheduled changes. `*size` is the room in
+ * `state` before and the length of the state after; with a null `state` only the length is told.
  */
 DRIVEBENCH_API int drivebench_save(drivebench_bench* bench, void* state, size_t* size);
 /**
- * Goes on from a saved state of the same bench, in this process, another one or a server. Leases stay with their
- * holders: acquire an axis that the state drives before you restore it, or it has lost its controller.
+ * Goes on from a saved state of the same bench, in this process, another one or a server. Leases stay with
+ * their holders: acquire an axis that the state drives before you restore it, or it has lost its controller.
  */
 DRIVEBENCH_API int drivebench_restore(drivebench_bench* bench, const void* state, size_t size);
 

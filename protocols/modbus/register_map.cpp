@@ -71,6 +71,8 @@ RegisterMap::RegisterMap(std::span<const ParameterInfo> parameters, bool writabl
       block(7, kMoreCommand, "lease and command for all terminals"),
       block(8, kLegs, "legs of a command"),
       block(9, kRailSample, "terminals against the negative rail"),
+      block(10, kComparators, "comparators of the terminals"),
+      block(11, kConverters, "numbers of converters and timers"),
   };
 }
 

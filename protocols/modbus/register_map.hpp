@@ -17,7 +17,7 @@ namespace drivebench::modbus {
 inline constexpr std::uint16_t kSampleLength = map_detail::length_of(map_detail::kSample);
 
 /// The most registers from kSampleStart on that one request can read in whole values; they include every
-/// sensor but the terminals against the negative rail.
+/// sensor but those of the later blocks, from kRailSampleStart on.
 inline constexpr std::uint16_t kSensorsLength = [] {
   std::size_t end = kMoreSampleStart;
   for (const Row& row : map_detail::kMoreSample) {

@@ -25,6 +25,8 @@ inline constexpr std::uint16_t kProcessStart = 100;
 inline constexpr std::uint16_t kSampleStart = 200;
 inline constexpr std::uint16_t kMoreSampleStart = 286;
 inline constexpr std::uint16_t kRailSampleStart = 340;
+inline constexpr std::uint16_t kComparatorStart = 360;
+inline constexpr std::uint16_t kConverterStart = 440;
 inline constexpr std::uint16_t kCommandStart = 400;
 inline constexpr std::uint16_t kParameterStart = 1000;
 
@@ -201,6 +203,12 @@ inline constexpr auto kHeader = std::to_array<Row>({
     fixed(47, kUnsigned16, kBlockId, "rail_sample_id", "1", "9: terminals against the negative rail", 8),
     fixed(48, kUnsigned16, kBlockStart, "rail_sample_start", "1", "its first register", 8),
     fixed(49, kUnsigned16, kBlockLength, "rail_sample_length", "1", "its number of registers", 8),
+    fixed(50, kUnsigned16, kBlockId, "comparator_id", "1", "10: comparators of the terminals", 9),
+    fixed(51, kUnsigned16, kBlockStart, "comparator_start", "1", "its first register", 9),
+    fixed(52, kUnsigned16, kBlockLength, "comparator_length", "1", "its number of registers", 9),
+    fixed(53, kUnsigned16, kBlockId, "converter_id", "1", "11: numbers of converters and timers", 10),
+    fixed(54, kUnsigned16, kBlockStart, "converter_start", "1", "its first register", 10),
+    fixed(55, kUnsigned16, kBlockLength, "converter_length", "1", "its number of registers", 10),
 });
 
 inline constexpr auto kProcess = std::to_array<Row>({
@@ -257,12 +265,16 @@ inline constexpr auto kMoreProcess = std::to_array<Row>({
     low_bits(141, kUnsigned16, "tick", "more_snapshot", "as at the start of the block"),
 });
 
-// The numbers of signals, in the order of the catalogue, in the three blocks of the sample. A block never
-// grows.
+// The numbers of signals, in the order of the catalogue, in the blocks of the sample. A block never grows.
 inline constexpr std::size_t kFirstSignals = 28;
 inline constexpr std::size_t kMoreSignals = 21;
 inline constexpr std::size_t kRailSignals = 6;
-static_assert(kFirstSignals + kMoreSignals + kRailSignals == kSignals.size(), "others need a new block");
+inline constexpr std::size_t kComparatorSignals = 10;
+inline constexpr std::size_t kConverterSignals = 10;
+inline constexpr std::size_t kBeforeRail = kFirstSignals + kMoreSignals;
+inline constexpr std::size_t kBeforeComparators = kBeforeRail + kRailSignals;
+inline constexpr std::size_t kBeforeConverters = kBeforeComparators + kComparatorSignals;
+static_assert(kBeforeConverters + kConverterSignals == kSignals.size(), "others need a new block");
 
 constexpr Row sample_row(std::size_t index, std::uint16_t address) {
   const Signal& s = kSignals[index];
@@ -303,14 +315,23 @@ inline constexpr auto kMoreSample = [] {
   return rows;
 }();
 
-/// The tick and the terminals against the negative rail.
-inline constexpr auto kRailSample = [] {
-  std::array<Row, kRailSignals + 1> rows{};
-  rows[0] = low_bits(kRailSampleStart, kUnsigned64, "tick", "rail_snapshot", "the tick of these voltages");
-  for (std::size_t i = 0; i < kRailSignals; ++i)
-    rows[i + 1] = sample_row(kFirstSignals + kMoreSignals + i, static_cast<std::uint16_t>(rows[i].end()));
+/// The tick under this name and so many signals of the catalogue.
+template <std::size_t kCount>
+constexpr std::array<Row, kCount + 1> later_block(std::uint16_t start, std::size_t first,
+                                                  std::string_view snapshot, std::string_view meaning) {
+  std::array<Row, kCount + 1> rows{};
+  rows[0] = low_bits(start, kUnsigned64, "tick", snapshot, meaning);
+  for (std::size_t i = 0; i < kCount; ++i)
+    rows[i + 1] = sample_row(first + i, static_cast<std::uint16_t>(rows[i].end()));
   return rows;
-}();
+}
+
+inline constexpr auto kRailSample =
+    later_block<kRailSignals>(kRailSampleStart, kBeforeRail, "rail_snapshot", "the tick of these voltages");
+inline constexpr auto kComparators = later_block<kComparatorSignals>(
+    kComparatorStart, kBeforeComparators, "comparator_snapshot", "the tick of these comparators");
+inline constexpr auto kConverters = later_block<kConverterSignals>(
+    kConverterStart, kBeforeConverters, "converter_snapshot", "the tick of these numbers");
 
 inline constexpr std::string_view kModeMeaning =
     "0 gates off, 1 voltages, 2 zero voltage, 3 duties from the middle, 4 currents, 5 duties of legs";
@@ -360,8 +381,8 @@ inline constexpr auto kLegs = std::to_array<Row>({
 /// All parts in one array, sorted by address.
 inline constexpr auto kFixedRows = [] {
   std::array<Row, kHeader.size() + kProcess.size() + kMoreProcess.size() + kSample.size() +
-                      kMoreSample.size() + kRailSample.size() + kCommand.size() + kMoreCommand.size() +
-                      kLegs.size()>
+                      kMoreSample.size() + kRailSample.size() + kComparators.size() + kCommand.size() +
+                      kMoreCommand.size() + kLegs.size() + kConverters.size()>
       rows{};
   std::size_t n = 0;
   const auto append = [&](const auto& part) {
@@ -374,9 +395,11 @@ inline constexpr auto kFixedRows = [] {
   append(kSample);
   append(kMoreSample);
   append(kRailSample);
+  append(kComparators);
   append(kCommand);
   append(kMoreCommand);
   append(kLegs);
+  append(kConverters);
   return rows;
 }();
 

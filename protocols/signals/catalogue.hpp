@@ -89,8 +89,8 @@ constexpr const Signal* find_signal(std::string_view name) noexcept {
 }
 
 /// A set of signals: bit n is row n.
-using SignalMask = std::uint64_t;
-static_assert(kSignals.size() < 64);
+__extension__ using SignalMask = unsigned __int128;
+static_assert(kSignals.size() < 128);
 inline constexpr SignalMask kAllSignals = (SignalMask{1} << kSignals.size()) - 1;
 
 }  // namespace drivebench

@@ -19,9 +19,9 @@
 namespace drivebench {
 
 template <>
-inline constexpr std::size_t kLaterWords<Sample> = kLaterSampleWords;
+inline constexpr auto kLaterWords<Sample> = kLaterSampleWords;
 template <>
-inline constexpr std::size_t kLaterWords<AxisState> = kLaterAxisWords;
+inline constexpr auto kLaterWords<AxisState> = kLaterAxisWords;
 
 /// The control state of an axis, as in Sample.state. Only a clear by the controller ends timeout and fault;
 /// it leads to idle.

@@ -1,6 +1,7 @@
 // Saves, restores and hashes the state of the bench. The state is a list of blocks of 8-byte words; the
 // header identifies the setup, the last word is a digest of all words before it.
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -34,7 +35,7 @@ void visit_value(const Parameter& row, double& value, Visitor& visit) {
 }  // namespace
 
 template <>
-inline constexpr std::size_t kLaterWords<LaterValue> = 1;
+inline constexpr auto kLaterWords<LaterValue> = std::to_array<std::size_t>({1});
 
 namespace {
 

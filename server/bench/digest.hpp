@@ -9,10 +9,11 @@
 
 namespace drivebench {
 
-/// The number of words at the end of a block that later builds have added. A digest passes over them while
-/// all of them are zero: a bench that does not use them keeps its hashes, and with them its recordings.
+/// The groups of words at the end of a block that later builds have added, one after the other: the number of
+/// words of each. A digest passes over the last groups while all of their words are zero: a bench that does
+/// not use them keeps its hashes, and with them its recordings.
 template <class Block>
-inline constexpr std::size_t kLaterWords = 0;
+inline constexpr auto kLaterWords = std::array<std::size_t, 0>{};
 
 /// Mixes words into a 64-bit digest. Four lanes, so that the multiplications overlap; not cryptographic.
 class Digest {
@@ -28,13 +29,7 @@ class Digest {
     static_assert(std::is_trivially_copyable_v<Block> && sizeof(Block) % 8 == 0);
     constexpr std::size_t kWords = sizeof(Block) / 8;
     const auto* const bytes = reinterpret_cast<const unsigned char*>(&block);
-    if constexpr (kLaterWords<Block> == 0) {
-      add_words<kWords>(bytes);
-    } else {
-      constexpr std::size_t kFirst = kWords - kLaterWords<Block>;
-      add_words<kFirst>(bytes);
-      if (any_set<kLaterWords<Block>>(bytes + 8 * kFirst)) add_words<kLaterWords<Block>>(bytes + 8 * kFirst);
-    }
+    add_used<Block, kWords, kLaterWords<Block>.size()>(bytes);
   }
 
   /// The digest of the words so far, their order and their number.
@@ -50,6 +45,22 @@ class Digest {
     std::uint64_t result;
     std::memcpy(&result, bytes + 8 * n, 8);
     return result;
+  }
+
+  /// Adds the first words of a block, without the last of its first `kGroups` later groups if these are zero.
+  template <class Block, std::size_t kWords, std::size_t kGroups>
+  void add_used(const unsigned char* bytes) noexcept {
+    if constexpr (kGroups == 0) {
+      add_words<kWords>(bytes);
+    } else {
+      constexpr std::size_t kGroup = kLaterWords<Block>[kGroups - 1];
+      constexpr std::size_t kBefore = kWords - kGroup;
+      if (any_set<kGroup>(bytes + 8 * kBefore)) {
+        add_words<kWords>(bytes);
+      } else {
+        add_used<Block, kBefore, kGroups - 1>(bytes);
+      }
+    }
   }
 
   template <std::size_t kWords>

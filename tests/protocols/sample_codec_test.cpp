@@ -141,7 +141,7 @@ TEST(SampleCodec, MaskedSignalsAreLeftOut) {
   for (const Signal& signal : kSignals)
     set_word(sample, signal, 3);
   for (int round = 0; round < 500; ++round) {
-    const SignalMask mask = random() & kAllSignals;
+    const SignalMask mask = (SignalMask{random()} << 64 | random()) & kAllSignals;
     v1::Sample message;
     ASSERT_TRUE(message.ParseFromString(encoded(sample, mask)));
     for (std::size_t row = 0; row < kSignals.size(); ++row) {

@@ -103,7 +103,13 @@ TEST(ModbusMap, EverySignalStandsInTheSampleBlockOnce) {
   EXPECT_EQ(address_of("rail_snapshot"), 340);
   EXPECT_EQ(address_of("terminal_a_v"), 344);
   EXPECT_EQ(address_of("terminal_c_mean_v"), 354);
+  EXPECT_EQ(address_of("comparator_snapshot"), 360);
+  EXPECT_EQ(address_of("comparator_levels"), 364);
+  EXPECT_EQ(address_of("comparator_c_v"), 390);
   EXPECT_EQ(address_of("legs_off"), 433);
+  EXPECT_EQ(address_of("converter_snapshot"), 440);
+  EXPECT_EQ(address_of("i_a_counts"), 444);
+  EXPECT_EQ(address_of("encoder_capture"), 480);
   EXPECT_EQ(address_of("machine.b"), 1002);
 }
 
@@ -133,15 +139,16 @@ TEST(ModbusMap, TheProcessDataOfAllTerminalsHaveTheseAddresses) {
   }
 }
 
-// The terminals against the negative rail have a block of their own, with the tick. Catches: other sensors
-// that one request cannot read together with the tick.
+// The terminals against the negative rail, the comparators, and converters and timers have blocks of their
+// own, with the tick. Catches: other sensors that one request cannot read together with the tick.
 TEST(ModbusMap, OneRequestReadsEverySensor) {
   EXPECT_LE(kSensorsLength, 125);
   EXPECT_EQ(kSampleStart + kSensorsLength, 324);
   EXPECT_TRUE(map().find(kSampleStart, kSensorsLength));
   for (const Row& row : map().rows()) {
     if (row.content != Content::kSignal || row.address < kSampleStart) continue;
-    if (kSignals[row.index].kind == SignalKind::kTruth || row.name.starts_with("terminal_")) continue;
+    if (kSignals[row.index].kind == SignalKind::kTruth) continue;
+    if (row.index >= map_detail::kBeforeRail) continue;
     EXPECT_LE(row.end(), std::size_t{kSampleStart} + kSensorsLength) << row.name;
   }
 }
@@ -224,12 +231,16 @@ TEST(ModbusMap, ASampleComesBackAsItWasButForFloatRounding) {
     if (signal.type == SignalType::kSigned) sample.*signal.as_signed = std::bit_cast<std::int64_t>(value);
     if (signal.type == SignalType::kReal) sample.*signal.as_real = value;
   }
-  std::vector<std::uint16_t> words(map_detail::kRailSample.back().end() - kSampleStart);
+  std::vector<std::uint16_t> words(map_detail::kConverters.back().end() - kSampleStart);
   for (const Row& row : map_detail::kSample)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   for (const Row& row : map_detail::kMoreSample)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   for (const Row& row : map_detail::kRailSample)
+    put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
+  for (const Row& row : map_detail::kComparators)
+    put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
+  for (const Row& row : map_detail::kConverters)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   const Sample back = read_sample(words);
   const Sample first = read_sample(std::span(words).first(kSampleLength));
