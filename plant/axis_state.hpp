@@ -44,14 +44,11 @@ struct AxisState {
   PhaseValues voltage_v{};         ///< at the terminals at the end of the last tick
   double neutral_v = 0.0;          ///< of a star then
   std::uint64_t faults = 0;        ///< of the last tick, with the latched ones
-  // Added later, and zero without SensorParameters::terminals: see kLaterWords.
+  // Added later, and zero without SensorParameters::terminals: see kLaterWords<AxisState>.
   ThreePhase terminal_v{};       ///< against the negative rail at the end of the last tick
   ThreePhase terminal_mean_v{};  ///< over that tick; within a tick what its pieces have brought so far
   // Later still, and zero without comparators.
   ComparatorMemory comparators{};
 };
-
-/// Numbers of words, for kLaterWords.
-inline constexpr std::array<std::size_t, 2> kLaterAxisWords{6, sizeof(ComparatorMemory) / 8};
 
 }  // namespace drivebench

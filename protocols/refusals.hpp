@@ -150,7 +150,8 @@ inline constexpr auto kRefusals = [] {
       {R::kIncomplete,    "incomplete",        T::kMalformed,   C::kIncomplete,  M::kNone,        E::kIllegalValue,
        "phase c and the field of its tick are missing"},
       {R::kWrongDrive,    "wrong drive",       T::kWrongDrive,  C::kWrongDrive,  M::kWrongDrive,  E::kFailure,
-       "GATES_CURRENT needs a drive of kind \"current_amplifier\"; the drive of the axis is another"},
+       "GATES_CURRENT needs a drive of kind \"current_amplifier\", GATES_EDGES one of kind \"switched_inverter\"; the drive of "
+       "the axis is another"},
       {R::kOutOfRange,    "out of range",      T::kOutOfRange,  C::kMalformed,   M::kOutOfRange,  E::kIllegalValue,
        "a value is outside of its limits"},
       {R::kBeyondDrive,   "beyond drive",      T::kOutOfRange,  C::kBeyondDrive, M::kOutOfRange,  E::kIllegalValue,

@@ -45,6 +45,7 @@ int BusBackend::clear(std::uint32_t axis) noexcept {
 int BusBackend::step(std::span<const drivebench_command> commands) noexcept {
   for (const drivebench_command& command : commands) {
     if (const int code = check_axis(command.axis); code != DRIVEBENCH_OK) return code;
+    if (command.gates == DRIVEBENCH_GATES_EDGES) return not_carried("edges of legs");
   }
   if (commands.size() > 1) {
     return fail(DRIVEBENCH_OUT_OF_RANGE, "two commands for one axis", "commands.axis");

@@ -3,6 +3,7 @@
 
 #include <drivebench.h>
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -25,6 +26,7 @@ struct Command {
   double setpoint_c = 0.0;
   double setpoint_f = 0.0;
   std::uint64_t legs_off = 0;
+  std::array<std::array<drivebench_edge, DRIVEBENCH_MAX_EDGES>, 3> edges{};
 
   drivebench_command to_c() const noexcept { return std::bit_cast<drivebench_command>(*this); }
 };

@@ -7,6 +7,7 @@
 #include "clients/link/common/requests.hpp"
 #include "clients/link/tcp/tcp_link.hpp"
 #include "protocols/abi/backend.hpp"
+#include "protocols/abi/edges.hpp"
 
 namespace drivebench::sdk {
 
@@ -37,6 +38,9 @@ inline link::AxisCommand command_for(const drivebench_command& c) noexcept {
     to.i_b_a = c.setpoint_b;
     to.i_c_a = c.setpoint_c;
     to.i_f_a = c.setpoint_f;
+  } else if (c.gates == DRIVEBENCH_GATES_EDGES) {
+    to.d_f = c.setpoint_f;
+    to.edges = abi::edges_of(c);
   } else if (c.gates == DRIVEBENCH_GATES_DUTY) {
     to.d_a = c.setpoint_a;
     to.d_b = c.setpoint_b;

@@ -19,6 +19,11 @@ constexpr bool has_voltages(Gates gates) noexcept {
   return gates == Gates::kVoltage || gates == Gates::kDuty;
 }
 
+/// Whether switches hold the terminals.
+constexpr bool has_switches(Gates gates) noexcept {
+  return has_voltages(gates) || gates == Gates::kEdges;
+}
+
 }  // namespace
 
 SeriesImpedance series_impedance(const DriveParameters& p) noexcept {
@@ -83,7 +88,7 @@ void Drive::begin_tick(DriveMemory& m, const PhaseCommand& command, const Inject
   take_orders(m, faults, tick);
   follows_ = !stiff || filter_rate_per_s_ > 0.0 || kind_ == DriveKind::kCurrent;
   const bool one_order = later_s_ <= tolerance_s_;
-  switches_ = kind_ == DriveKind::kSwitched && has_voltages(orders_[1].gates) && !holds_;
+  switches_ = kind_ == DriveKind::kSwitched && has_switches(orders_[1].gates) && !holds_;
   if (one_order && !follows_ && (kind_ == DriveKind::kVoltage || switches_)) {
     steady_output_ = bridge_output(m, 0.0, period_s_, {});
     steady_ = true;
@@ -117,6 +122,7 @@ PhaseCommand Drive::corrupted(const PhaseCommand& command, double probability, T
     return uniform_noise(seed_, noise_channel_ + n, static_cast<std::uint64_t>(tick));
   };
   if (!(noise(0) < probability)) return command;
+  if (command.gates == Gates::kEdges) return {};  // a list that is damaged is recognised
   const bool duties = command.gates == Gates::kDuty;
   const double full_scale = duties                             ? 1.0
                             : command.gates == Gates::kCurrent ? p_.current_loop.limit_a
@@ -152,6 +158,8 @@ void Drive::take_orders(DriveMemory& m, const InjectedFaults& faults, Tick tick)
   const bool changes = later_s_ > tolerance_s_;
   take_order(orders_[1], of_tick(tick - whole), m);
   if (changes) take_order(orders_[0], of_tick(tick - whole - 1), m);
+  take_edges(orders_[1], m, tick, whole, later_s_);
+  if (changes) take_edges(orders_[0], m, tick, whole + 1, later_s_ - period_s_);
   has_edges_ = changes || kind_ == DriveKind::kSwitched;
 }
 
@@ -170,12 +178,29 @@ void Drive::take_order(Order& order, const PhaseCommand& command, DriveMemory& m
     if (kind_ == DriveKind::kSwitched) {
       const LimitedVoltages v = limited(m, order.gates, phases_of(wanted_voltages(m, order, {})));
       if (v.saturated) m.saturated = 1.0;
-      order.pattern = SwitchingPattern(v.voltage_v, terminals_, rail_v(m), p_.inverter.dead_time_s,
-                                       pwm_period_s_, order.legs_off);
+      order.pattern.set_voltages(v.voltage_v, terminals_, rail_v(m), p_.inverter.dead_time_s, pwm_period_s_,
+                                 order.legs_off);
     }
   } else if (command.gates == Gates::kZeroVoltage) {
     order.gates = Gates::kZeroVoltage;
   }
+}
+
+void Drive::take_edges(Order& order, const DriveMemory& m, Tick tick, Tick ago,
+                       double origin_s) const noexcept {
+  const auto size = static_cast<Tick>(m.commands.size());
+  const auto command = [&](Tick n) -> const PhaseCommand& {
+    return m.commands[static_cast<std::size_t>((tick - n + size) % size)];
+  };
+  if (command(ago).gates != Gates::kEdges || kind_ != DriveKind::kSwitched) return;
+  const auto edges = [&](Tick n) {
+    return n < size && command(n).gates == Gates::kEdges ? command(n).edges : LegEdges{};
+  };
+  order.gates = Gates::kEdges;
+  order.setpoint = {.field = command(ago).setpoint.field};
+  order.origin_s = origin_s;
+  order.pattern.set_edges({.now = edges(ago), .before = edges(ago + 1), .earlier = edges(ago + 2)},
+                          terminals_, p_.inverter.dead_time_s, period_s_, order.legs_off);
 }
 
 double Drive::pwm_start_s(double start_s) const noexcept {
@@ -195,10 +220,12 @@ double Drive::edge_after(const DriveMemory& m, double start_s) const noexcept {
   }
   if (later_s_ > instant_s) next_s = later_s_;
   if (kind_ == DriveKind::kSwitched) {
-    const double pwm_s = pwm_start_s(start_s);
-    const SwitchingPattern& pattern = order_at(start_s).pattern;
-    const double end_s = pattern.end_s(pattern.segment_at(instant_s - pwm_s, segment_hint(m)));
-    next_s = std::min(next_s, pwm_s + std::min(end_s, pwm_period_s_));
+    const Order& order = order_at(start_s);
+    const double pattern_s = pattern_start_s(order, start_s);
+    const double end_s =
+        order.pattern.end_s(order.pattern.segment_at(instant_s - pattern_s, segment_hint(m)));
+    const bool again = order.gates != Gates::kEdges;  // a carrier period begins after its end
+    next_s = std::min(next_s, pattern_s + (again ? std::min(end_s, pwm_period_s_) : end_s));
   }
   return next_s < period_s_ - tolerance_s_ ? next_s : kNoEdge;
 }
@@ -209,7 +236,7 @@ TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double durati
   const Gates gates = m.switched_off != 0.0 ? Gates::kOff : order.gates;
   TerminalDrive out;
   out.rail_v = rail_v(m);
-  if (has_voltages(gates) || gates == Gates::kCurrent) {
+  if (has_switches(gates) || gates == Gates::kCurrent) {
     drive_terminals(m, order, start_s, current_a, out);
   } else if (gates == Gates::kOff) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k)
@@ -237,7 +264,7 @@ PhaseValues Drive::loop_voltages(const DriveMemory& m, const PhaseValues& setpoi
 PhaseValues Drive::wanted_voltages(const DriveMemory& m, const Order& order,
                                    const PhaseValues& current_a) const noexcept {
   if (order.gates == Gates::kCurrent) return loop_voltages(m, order.setpoint, current_a);
-  if (order.gates != Gates::kDuty) return order.setpoint;
+  if (order.gates != Gates::kDuty && order.gates != Gates::kEdges) return order.setpoint;
   const double rail = rail_v(m);
   return amplified(p_.amplifier, {.a = order.setpoint.a * rail,
                                   .b = order.setpoint.b * rail,
@@ -269,7 +296,7 @@ void Drive::drive_terminals(DriveMemory& m, const Order& order, double start_s, 
 }
 
 void Drive::find_segment(DriveMemory& m, const Order& order, double start_s) const noexcept {
-  const double instant_s = start_s + tolerance_s_ - pwm_start_s(start_s);
+  const double instant_s = start_s + tolerance_s_ - pattern_start_s(order, start_s);
   m.pwm_segment = static_cast<std::int64_t>(order.pattern.segment_at(instant_s, segment_hint(m)));
 }
 

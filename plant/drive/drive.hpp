@@ -72,7 +72,9 @@ struct DriveMemory {
 ///
 /// Gates::kOff lets the currents flow through the diodes into the rails; Gates::kZeroVoltage drives every
 /// terminal at 0; Gates::kCurrent without a current loop is Gates::kOff. Gates::kDuty gives every leg its
-/// voltage alone: an inverter then neither shortens the vector of a star nor moves its common part. A leg
+/// voltage alone: an inverter then neither shortens the vector of a star nor moves its common part.
+/// Gates::kEdges switches the legs of a switched inverter at the instants of the command; other drives have
+/// their gates off then. A leg
 /// that the command switches off is on its diodes, whatever the gates of the others do. Commands before tick
 /// 0 are Gates::kOff. The field winding has the voltage source.field_v, if that is not 0, whatever the gates
 /// do; else the command's, which is 0 with the gates off.
@@ -144,6 +146,7 @@ class Drive {
     /// [V] behind gain and offset, or [A] within the limit; duties as parts of the rail, -1 to 1.
     PhaseValues setpoint{};
     SwitchingPattern pattern{};  ///< switched inverter
+    double origin_s = 0.0;       ///< Gates::kEdges: from which they count, within this tick or before it
   };
   /// A fault that holds a terminal whatever the command says.
   enum class Hold { kNone, kHigh, kLow, kOff, kOpen };
@@ -153,6 +156,8 @@ class Drive {
   PhaseCommand corrupted(const PhaseCommand& command, double probability, Tick tick) const noexcept;
   void take_orders(DriveMemory& m, const InjectedFaults& faults, Tick tick) noexcept;
   void take_order(Order& order, const PhaseCommand& command, DriveMemory& m) const noexcept;
+  /// The edges of the command of so many ticks ago, which count from origin_s.
+  void take_edges(Order& order, const DriveMemory& m, Tick tick, Tick ago, double origin_s) const noexcept;
   void begin_source(DriveMemory& m) noexcept;
 
   // the tick
@@ -181,6 +186,10 @@ class Drive {
     return orders_[start_s + tolerance_s_ >= later_s_ ? 1 : 0];
   }
   double pwm_start_s(double start_s) const noexcept;
+  /// The start of the pattern that is in force.
+  double pattern_start_s(const Order& order, double start_s) const noexcept {
+    return order.gates == Gates::kEdges ? order.origin_s : pwm_start_s(start_s);
+  }
   double source_angle_at(double time_s) const noexcept {
     return source_angle_rad_ + 2.0 * std::numbers::pi * p_.source.frequency_hz * time_s;
   }

@@ -7,6 +7,7 @@
 #include "plant/drive/amplifier.hpp"
 #include "plant/drive/phases.hpp"
 #include "plant/drive/terminal_drive.hpp"
+#include "protocols/signals/command.hpp"
 
 namespace drivebench {
 
@@ -49,18 +50,32 @@ constexpr double duty(double voltage_v, double rail_v, double dead_part) noexcep
 double averaged_voltage_v(double voltage_v, double rail_v, double dead_part, double current_a,
                           double band_a) noexcept;
 
-/// Of a PWM period: those between four commutations for each of three terminals.
-inline constexpr std::size_t kMaxPwmSegments = 13;
+/// Of a pattern: those between the commutations of three terminals, which for each edge may be two, and one
+/// that the tick before has left.
+inline constexpr std::size_t kMaxSegmentsOfPattern = 3 * (2 * kMaxLegEdges + 1) + 1;
 
-/// The commutations of the terminals within one PWM period. Each on-interval and each dead time is centred on
-/// the ideal instant, so that what is at the start of the period is there at its end. A terminal that stays
-/// at the upper rail for a whole period leaves it at the period's end without a dead time.
+/// The lists of a tick and of the two before it, which tell where the legs are when it starts.
+struct EdgeHistory {
+  LegEdges now{};
+  LegEdges before{};
+  LegEdges earlier{};
+};
+
+/// The commutations of the terminals within one PWM period, or by edges within a tick. By voltages each
+/// on-interval and each dead time is centred on the ideal instant, so that what is at the start of the period
+/// is there at its end. A terminal that stays at the upper rail for a whole period leaves it at the period's
+/// end without a dead time.
 class SwitchingPattern {
  public:
-  SwitchingPattern() = default;
   /// The voltages are within the rails. Both switches of the legs in `legs_off`, bit 0 for a, stay open.
-  SwitchingPattern(const ThreePhase& voltage_v, int terminals, double rail_v, double dead_time_s,
-                   double period_s, std::uint32_t legs_off = 0) noexcept;
+  void set_voltages(const ThreePhase& voltage_v, int terminals, double rail_v, double dead_time_s,
+                    double period_s, std::uint32_t legs_off = 0) noexcept;
+
+  /// By the edges of a tick of period_s. A switch closes dead_time_s after the other one of its leg has
+  /// opened, if that is later than its edge, and not at all if the next edge comes before. Both switches of
+  /// the legs in `legs_off` stay open.
+  void set_edges(const EdgeHistory& edges, int terminals, double dead_time_s, double period_s,
+                 std::uint32_t legs_off = 0) noexcept;
 
   /// The segment between two commutations in which this instant of the period lies. The search starts at
   /// `hint`, which speeds it up and changes nothing.
@@ -90,7 +105,8 @@ class SwitchingPattern {
  private:
   static constexpr double kNever = 1e300;
   static constexpr std::uint64_t kBits = 3;  ///< for the commutations that a terminal has passed: 0 to 4
-  static constexpr std::uint64_t kHigh = 2;  ///< of them make the upper switch closed
+  static constexpr std::uint64_t kLow = 0;   ///< of them leave the lower switch closed
+  static constexpr std::uint64_t kHigh = 2;  ///< make the upper switch closed
   static constexpr std::uint64_t kOff = 5;   ///< in place of their number: the leg is off
 
   // The connection of a terminal after so many commutations: lower switch, dead time, upper switch, dead
@@ -104,7 +120,7 @@ class SwitchingPattern {
     double until_s = kNever;
     std::uint64_t passed = 0;  ///< kBits for each terminal
   };
-  std::array<Segment, kMaxPwmSegments> segments_{};
+  std::array<Segment, kMaxSegmentsOfPattern> segments_{};
 };
 
 }  // namespace drivebench

@@ -88,8 +88,25 @@ enum drivebench_gates {
   DRIVEBENCH_GATES_CURRENT = 3, /**< set-points are currents [A]; only a drive of kind "current_amplifier" */
   /** Set-points are duties: of a leg of a star its mean voltage against the negative rail over the link's, 0
    * to 1; of a winding between two legs, and of the field, its voltage over the link's, -1 to 1. */
-  DRIVEBENCH_GATES_DUTY = 4
+  DRIVEBENCH_GATES_DUTY = 4,
+  DRIVEBENCH_GATES_EDGES = 5 /**< the legs switch at their edges; only a drive of kind "switched_inverter" */
 };
+
+/** The level of a leg. */
+enum drivebench_level {
+  DRIVEBENCH_LEVEL_NONE = 0, /**< no edge: the list ends */
+  DRIVEBENCH_LEVEL_OFF = 1,  /**< both switches open: the current flows on through a diode */
+  DRIVEBENCH_LEVEL_LOW = 2,  /**< at the negative rail */
+  DRIVEBENCH_LEVEL_HIGH = 3  /**< at the positive rail */
+};
+
+/** From this instant of the tick on a leg has this level. */
+typedef struct drivebench_edge {
+  uint32_t offset_ns;
+  uint32_t level; /**< a drivebench_level */
+} drivebench_edge;
+
+#define DRIVEBENCH_MAX_EDGES 8
 
 enum drivebench_mode { DRIVEBENCH_MODE_REALTIME = 1, DRIVEBENCH_MODE_LOCKSTEP = 2, DRIVEBENCH_MODE_FREE = 3 };
 
@@ -108,6 +125,11 @@ typedef struct drivebench_command {
   double setpoint_f; /**< field winding */
   uint64_t
       legs_off; /**< legs that are off, on their diodes, whatever the gates of the others do: 1 a, 2 b, 4 c */
+  /** With DRIVEBENCH_GATES_EDGES, of legs a, b, c: offsets rise and are below the period. Until its first
+   * edge a leg keeps the level that its list of the tick before ended with; after other gates it is off, and
+   * so is a leg without edges. A switch closes inverter.dead_time_s after the other one of its leg has
+   * opened. */
+  drivebench_edge edges[3][DRIVEBENCH_MAX_EDGES];
 } drivebench_command;
 
 /**

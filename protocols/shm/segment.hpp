@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "protocols/leg_edges.hpp"
 #include "protocols/signals/command.hpp"
 #include "protocols/signals/sample.hpp"
 
@@ -43,6 +44,7 @@ struct CommandRecord {
   std::int64_t gates;
   std::uint64_t legs_off;
   PhaseValues setpoint;  ///< [V]; by the gates [A] or duties
+  EdgeRecords edges;     ///< Gates::kEdges
 };
 
 /// Written by the client.

@@ -16,11 +16,10 @@ struct Sample {
 };
 
 inline constexpr std::size_t kSampleWords = sizeof(Sample) / 8;
-/// The last of them came when runs had been recorded, in these groups: from terminal_a_v on, from
-/// comparator_levels on, from i_a_counts on. Hashes pass over the groups while they are zero.
-inline constexpr std::array<std::size_t, 3> kLaterSampleWords{
-    (offsetof(Sample, comparator_levels) - offsetof(Sample, terminal_a_v)) / 8,
-    (offsetof(Sample, i_a_counts) - offsetof(Sample, comparator_levels)) / 8,
-    kSampleWords - offsetof(Sample, i_a_counts) / 8};
+/// The last of them came when runs had been recorded, in groups that begin with these words: at terminal_a_v,
+/// comparator_levels and i_a_counts. Hashes pass over a group while it is zero.
+inline constexpr std::array<std::size_t, 3> kLaterSampleGroups{offsetof(Sample, terminal_a_v) / 8,
+                                                               offsetof(Sample, comparator_levels) / 8,
+                                                               offsetof(Sample, i_a_counts) / 8};
 
 }  // namespace drivebench

@@ -197,6 +197,7 @@ CommandView Bench::command_view(std::size_t axis) const noexcept {
           .tick = tick_,
           .newest = a.control.newest,
           .is_latched = is_latched(axis),
+          .period_ns = setup_.period_ns,
           .step = a.command_step,
           .connection = a.axis.connection(),
           .rules = a.rules,

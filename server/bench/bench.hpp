@@ -11,33 +11,12 @@
 #include "plant/axis.hpp"
 #include "protocols/signals/sample.hpp"
 #include "server/bench/command_rules.hpp"
-#include "server/bench/digest.hpp"
+#include "server/bench/control.hpp"
 #include "server/bench/input.hpp"
 #include "server/bench/ramps.hpp"
 #include "server/bench/safe_action.hpp"
 
 namespace drivebench {
-
-template <>
-inline constexpr auto kLaterWords<Sample> = kLaterSampleWords;
-template <>
-inline constexpr auto kLaterWords<AxisState> = kLaterAxisWords;
-
-/// The control state of an axis, as in Sample.state. Only a clear by the controller ends timeout and fault;
-/// it leads to idle.
-enum class ControlState : std::uint64_t {
-  kIdle = 0,     ///< no commands arrive: safe action
-  kReady = 5,    ///< the first commands arrive, fewer than arming_commands: still safe action
-  kRun = 1,      ///< commands arrive and drive the axis
-  kHold = 2,     ///< commands are missing, the last one holds
-  kTimeout = 3,  ///< latched: too many were missing, or the controller left; safe action
-  kFault = 4,    ///< latched: trip, overrun or divergence; safe action
-};
-
-/// Whether commands drive the axis; if one is missing, the last one does.
-constexpr bool is_driven(ControlState state) noexcept {
-  return state == ControlState::kRun || state == ControlState::kHold;
-}
 
 /// The settings of an axis.
 struct AxisSetup {
@@ -159,22 +138,6 @@ class Bench {
   static constexpr std::size_t kMaxScheduled = 256;
 
  private:
-  /// The state of the control of an axis. 8-byte members only.
-  struct Control {
-    Owner owner = 0;
-    Tick renewed = 0;  ///< tick of the last renewal of the lease
-    ControlState state = ControlState::kIdle;
-    std::int64_t fresh = 0;  ///< 1: a command for this tick has arrived
-    Command newest{};        ///< the last command accepted
-    Command in_force{};
-    std::int64_t silent_ticks = 0;   ///< ticks without a command, late ones not counted
-    std::int64_t good_commands = 0;  ///< accepted ones in a row, until the axis is armed
-    std::int64_t bad_values = 0;     ///< 1: the controller's last command was refused for its values
-    std::uint64_t flags = 0;         ///< fault bits of the command in force
-    LastCommands last{};
-    std::uint64_t missed = 0;
-    std::uint64_t refused = 0;
-  };
   /// Whether and since when the condition of a trigger holds. 8-byte members only.
   struct TriggerState {
     Tick held = 0;  ///< samples in a row

@@ -35,7 +35,7 @@ void visit_value(const Parameter& row, double& value, Visitor& visit) {
 }  // namespace
 
 template <>
-inline constexpr auto kLaterWords<LaterValue> = std::to_array<std::size_t>({1});
+inline constexpr auto kLaterWords<LaterValue> = std::to_array<WordRange>({{.first = 0, .count = 1}});
 
 namespace {
 

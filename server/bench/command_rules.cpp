@@ -20,6 +20,7 @@ PhaseValues start_of(const PhaseCommand& before, Gates gates, Connection connect
 }
 
 bool is_beyond(const PhaseCommand& command, const CommandView& axis) noexcept {
+  if (command.gates == Gates::kEdges) return std::abs(command.setpoint.field) > 1.0;
   if (command.gates == Gates::kDuty) return largest(parts_of_rail(axis.connection, command.setpoint)) > 1.0;
   const double limit = command.gates == Gates::kCurrent ? axis.drive.current_loop.limit_a
                                                         : axis.drive.amplifier.voltage_limit_v;
@@ -30,6 +31,9 @@ Refused check_values(const PhaseCommand& command, const CommandView& axis) noexc
   if (!is_finite(command)) return Refused::kNotFinite;
   if (!suits(axis.drive.kind, command.gates)) return Refused::kWrongDrive;
   if (largest(command.setpoint) > kMaxSetpoint) return Refused::kBeyondDrive;
+  if (command.gates == Gates::kEdges && !are_in_order(command.edges, axis.period_ns)) {
+    return Refused::kBeyondDrive;
+  }
   if (axis.rules.on_excess == OnExcess::kSaturate) return Refused::kNot;
   return is_beyond(command, axis) ? Refused::kBeyondDrive : Refused::kNot;
 }
@@ -78,7 +82,8 @@ PhaseCommand slewed(const PhaseCommand& before, const PhaseCommand& command,
   const auto towards = [step](double a, double b) { return std::clamp(b, a - step, a + step); };
   return {.gates = command.gates,
           .legs_off = command.legs_off,
-          .setpoint = by_terminal(towards, from, command.setpoint)};
+          .setpoint = by_terminal(towards, from, command.setpoint),
+          .edges = command.edges};
 }
 
 }  // namespace drivebench

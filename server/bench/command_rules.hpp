@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "plant/drive/drive.hpp"
+#include "protocols/leg_edges.hpp"
 #include "server/bench/input.hpp"
 
 namespace drivebench {
@@ -28,7 +29,8 @@ struct CommandView {
   Tick tick = 0;     ///< of the newest sample
   Command newest{};  ///< the last command that the axis took under this lease; it answers -1 if there is none
   bool is_latched = false;
-  double step = 0.0;  ///< largest change of a set-point in a tick [V or A]; 0: any
+  std::int64_t period_ns = 0;  ///< of the bench
+  double step = 0.0;           ///< largest change of a set-point in a tick [V or A]; 0: any
   Connection connection = Connection::kTwoPhase;
   const CommandRules& rules;
   const DriveParameters& drive;

@@ -9,11 +9,17 @@
 
 namespace drivebench {
 
-/// The groups of words at the end of a block that later builds have added, one after the other: the number of
-/// words of each. A digest passes over the last groups while all of their words are zero: a bench that does
-/// not use them keeps its hashes, and with them its recordings.
+/// Words of a block, counted from its start.
+struct WordRange {
+  std::size_t first;
+  std::size_t count;
+};
+
+/// The words of a block that later builds have added, in the order in which they stand there. A digest passes
+/// over each range while all of its words are zero: a bench that does not use them keeps its hashes, and with
+/// them its recordings.
 template <class Block>
-inline constexpr auto kLaterWords = std::array<std::size_t, 0>{};
+inline constexpr auto kLaterWords = std::array<WordRange, 0>{};
 
 /// Mixes words into a 64-bit digest. Four lanes, so that the multiplications overlap; not cryptographic.
 class Digest {
@@ -27,9 +33,8 @@ class Digest {
   template <class Block>
   void add_block(const Block& block) noexcept {
     static_assert(std::is_trivially_copyable_v<Block> && sizeof(Block) % 8 == 0);
-    constexpr std::size_t kWords = sizeof(Block) / 8;
     const auto* const bytes = reinterpret_cast<const unsigned char*>(&block);
-    add_used<Block, kWords, kLaterWords<Block>.size()>(bytes);
+    add_from<Block, 0, 0>(bytes);
   }
 
   /// The digest of the words so far, their order and their number.
@@ -47,19 +52,18 @@ class Digest {
     return result;
   }
 
-  /// Adds the first words of a block, without the last of its first `kGroups` later groups if these are zero.
-  template <class Block, std::size_t kWords, std::size_t kGroups>
-  void add_used(const unsigned char* bytes) noexcept {
-    if constexpr (kGroups == 0) {
-      add_words<kWords>(bytes);
+  /// Adds the words of a block from kFirst on; kRange is the next of its ranges.
+  template <class Block, std::size_t kFirst, std::size_t kRange>
+  void add_from(const unsigned char* bytes) noexcept {
+    if constexpr (kRange == kLaterWords<Block>.size()) {
+      add_words<sizeof(Block) / 8 - kFirst>(bytes + 8 * kFirst);
     } else {
-      constexpr std::size_t kGroup = kLaterWords<Block>[kGroups - 1];
-      constexpr std::size_t kBefore = kWords - kGroup;
-      if (any_set<kGroup>(bytes + 8 * kBefore)) {
-        add_words<kWords>(bytes);
-      } else {
-        add_used<Block, kBefore, kGroups - 1>(bytes);
+      constexpr WordRange kLater = kLaterWords<Block>[kRange];
+      add_words<kLater.first - kFirst>(bytes + 8 * kFirst);
+      if (any_set<kLater.count>(bytes + 8 * kLater.first)) {
+        add_words<kLater.count>(bytes + 8 * kLater.first);
       }
+      add_from<Block, kLater.first + kLater.count, kRange + 1>(bytes);
     }
   }
 

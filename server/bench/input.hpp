@@ -77,7 +77,7 @@ struct Trigger {
   Tick for_ticks = 0;  ///< the condition holds in the samples of so many ticks before, too
 };
 
-/// An input as words, for saved states and hashes.
+/// An input as words, for saved states and hashes; without the edges of a command, which never waits.
 struct PackedInput {
   Tick tick = 0;
   std::uint64_t axis = 0;
@@ -122,8 +122,10 @@ constexpr bool are_bad_values(Refused why) noexcept {
 /// Whether all set-points are finite numbers.
 bool is_finite(const PhaseCommand& command) noexcept;
 
-/// Whether a drive of this kind takes set-points of this kind: only a current-mode amplifier takes currents.
+/// Whether a drive of this kind takes commands of this kind: only a current-mode amplifier takes currents,
+/// only a switched inverter edges.
 constexpr bool suits(DriveKind drive, Gates gates) noexcept {
+  if (gates == Gates::kEdges) return drive == DriveKind::kSwitched;
   return gates != Gates::kCurrent || drive == DriveKind::kCurrent;
 }
 

@@ -40,7 +40,7 @@ PhaseValues turned(const PhaseValues& x, double angle_rad, Connection connection
 /// its set-point, so that an armature brakes. All legs are on: a leg that was off belongs to one position of
 /// the rotor. The duties of a star get half for their common part, so that no leg comes to a rail on its way.
 PhaseCommand ramp_down(const LastCommands& last, Connection connection, Tick ramp_ticks) noexcept {
-  if (last.gone >= ramp_ticks) return {};
+  if (last.gone >= ramp_ticks || last.command.gates == Gates::kEdges) return {};  // edges have no angle
   const auto m = static_cast<double>(last.gone);
   const double part = m / static_cast<double>(ramp_ticks);
   PhaseCommand command = last.command;

@@ -54,13 +54,13 @@ bool is_possible(const EncoderState& e) noexcept {
 
 bool is_possible(const PhaseCommand& command) noexcept {
   const PhaseValues& x = command.setpoint;
-  return command.gates >= Gates::kOff && command.gates <= Gates::kDuty && command.legs_off <= kAllLegs &&
+  return command.gates >= Gates::kOff && command.gates <= Gates::kEdges && command.legs_off <= kAllLegs &&
          is_quantity(x.a) && is_quantity(x.b) && is_quantity(x.c) && is_quantity(x.field);
 }
 
 bool is_possible(const DriveMemory& m) noexcept {
   return std::ranges::all_of(m.commands, [](const PhaseCommand& c) { return is_possible(c); }) &&
-         m.pwm_segment >= 0 && m.pwm_segment < static_cast<std::int64_t>(kMaxPwmSegments) &&
+         m.pwm_segment >= 0 && m.pwm_segment < static_cast<std::int64_t>(kMaxSegmentsOfPattern) &&
          is_quantity(m.bus_v);
 }
 

@@ -72,6 +72,7 @@ class ThreadedEngine final : public Engine {
                                      {.owner = newest.owner,
                                       .tick = static_cast<Tick>(newest.tick),
                                       .is_latched = (newest.faults & kLatchedFaults) != 0,
+                                      .period_ns = config_.setup.period_ns,
                                       .step = largest_step(rules, config_.setup.period_ns),
                                       .connection = connection_of(parameters(axis).machine),
                                       .rules = rules,

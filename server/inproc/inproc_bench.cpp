@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "plant/parameters/parameters.hpp"
+#include "protocols/abi/edges.hpp"
 #include "protocols/text.hpp"
 #include "server/bench/state_limits.hpp"
 #include "server/config/sections/plausible.hpp"
@@ -12,11 +13,12 @@ namespace drivebench {
 namespace {
 
 Command command_of(const drivebench_command& c) noexcept {
-  return {.answers = static_cast<Tick>(c.tick),
-          .phases = {
-              .gates = static_cast<Gates>(c.gates),
-              .legs_off = static_cast<std::uint32_t>(c.legs_off),
-              .setpoint = {.a = c.setpoint_a, .b = c.setpoint_b, .c = c.setpoint_c, .field = c.setpoint_f}}};
+  return {
+      .answers = static_cast<Tick>(c.tick),
+      .phases = {.gates = static_cast<Gates>(c.gates),
+                 .legs_off = static_cast<std::uint32_t>(c.legs_off),
+                 .setpoint = {.a = c.setpoint_a, .b = c.setpoint_b, .c = c.setpoint_c, .field = c.setpoint_f},
+                 .edges = c.gates == DRIVEBENCH_GATES_EDGES ? leg_edges(abi::edges_of(c)) : LegEdges{}}};
 }
 
 std::string on_axis(std::uint32_t axis) {
@@ -86,13 +88,19 @@ int InprocBench::check_commands(std::span<const drivebench_command> commands) no
     if (std::ranges::any_of(commands.first(i), same)) {
       return fail(DRIVEBENCH_OUT_OF_RANGE, "two commands for one axis", "commands.axis");
     }
-    if (c.gates > DRIVEBENCH_GATES_DUTY) {
-      return fail(DRIVEBENCH_OUT_OF_RANGE, "gates is " + std::to_string(c.gates) + " but must be 0 to 4",
+    if (c.gates > DRIVEBENCH_GATES_EDGES) {
+      return fail(DRIVEBENCH_OUT_OF_RANGE, "gates is " + std::to_string(c.gates) + " but must be 0 to 5",
                   "commands.gates");
     }
     if (c.legs_off > kAllLegs) {
       return fail(DRIVEBENCH_OUT_OF_RANGE,
                   "legs_off is " + std::to_string(c.legs_off) + " but must be 0 to 7", "commands.legs_off");
+    }
+    if (c.gates == DRIVEBENCH_GATES_EDGES) {
+      EdgeProblem problem = problem_with(abi::edges_of(c), config_.setup.period_ns);
+      if (!problem.sentence.empty()) {
+        return fail(DRIVEBENCH_OUT_OF_RANGE, std::move(problem.sentence), std::move(problem.field));
+      }
     }
   }
   // A server would wait for the other controllers; here there is none.

@@ -12,8 +12,21 @@ static_assert(static_cast<int>(Gates::kVoltage) == v1::GATES_VOLTAGE);
 static_assert(static_cast<int>(Gates::kZeroVoltage) == v1::GATES_ZERO);
 static_assert(static_cast<int>(Gates::kCurrent) == v1::GATES_CURRENT);
 static_assert(static_cast<int>(Gates::kDuty) == v1::GATES_DUTY);
+static_assert(static_cast<int>(Gates::kEdges) == v1::GATES_EDGES);
+static_assert(static_cast<int>(LegLevel::kOff) == v1::LEG_LEVEL_OFF);
+static_assert(static_cast<int>(LegLevel::kLow) == v1::LEG_LEVEL_LOW);
+static_assert(static_cast<int>(LegLevel::kHigh) == v1::LEG_LEVEL_HIGH);
 static_assert(static_cast<int>(LeaseAction::kAcquire) == v1::LeaseRequest::ACTION_ACQUIRE);
 static_assert(static_cast<int>(LeaseAction::kLost) == v1::LeaseRequest::ACTION_LOST);
+
+void write_edges(const LegEdgeList& list, google::protobuf::RepeatedPtrField<v1::LegEdge>& out) {
+  for (const LegEdge& edge : list) {
+    if (edge.level() == LegLevel::kNone) break;
+    v1::LegEdge& added = *out.Add();
+    added.set_offset_ns(edge.offset_ns());
+    added.set_level(static_cast<v1::LegLevel>(edge.level()));
+  }
+}
 
 struct ActionWriter {
   v1::Input& message;
@@ -30,6 +43,11 @@ struct ActionWriter {
       out.set_i_b_a(x.b);
       out.set_i_c_a(x.c);
       out.set_i_f_a(x.field);
+    } else if (c.phases.gates == Gates::kEdges) {
+      out.set_d_f(x.field);
+      write_edges(c.phases.edges[0], *out.mutable_edges_a());
+      write_edges(c.phases.edges[1], *out.mutable_edges_b());
+      write_edges(c.phases.edges[2], *out.mutable_edges_c());
     } else if (c.phases.gates == Gates::kDuty) {
       out.set_d_a(x.a);
       out.set_d_b(x.b);
@@ -103,10 +121,23 @@ void encode_input(Tick received, const Input& input, const ParameterTables& tabl
   std::visit(ActionWriter{message, tables}, input.action);
 }
 
+EdgeProblem read_edges(const v1::Command& message, EdgeRecords& edges) {
+  const std::array lists{&message.edges_a(), &message.edges_b(), &message.edges_c()};
+  for (std::size_t leg = 0; leg < lists.size(); ++leg) {
+    const auto count = static_cast<std::size_t>(lists[leg]->size());
+    if (count > kMaxLegEdges) return too_many_edges(leg, count);
+    std::ranges::transform(*lists[leg], edges[leg].begin(), [](const v1::LegEdge& edge) {
+      return EdgeRecord{.offset_ns = edge.offset_ns(), .level = static_cast<std::uint32_t>(edge.level())};
+    });
+  }
+  return {};
+}
+
 PhaseValues setpoint_of(const v1::Command& m) {
   if (m.gates() == v1::GATES_CURRENT)
     return {.a = m.i_a_a(), .b = m.i_b_a(), .c = m.i_c_a(), .field = m.i_f_a()};
   if (m.gates() == v1::GATES_DUTY) return {.a = m.d_a(), .b = m.d_b(), .c = m.d_c(), .field = m.d_f()};
+  if (m.gates() == v1::GATES_EDGES) return {.field = m.d_f()};
   return {.a = m.u_a_v(), .b = m.u_b_v(), .c = m.u_c_v(), .field = m.u_f_v()};
 }
 
@@ -114,10 +145,14 @@ namespace {
 
 std::optional<Command> decode_command(const v1::Command& message) {
   if (!v1::Gates_IsValid(message.gates()) || message.legs_off() > kAllLegs) return std::nullopt;
+  EdgeRecords edges{};
+  if (message.gates() == v1::GATES_EDGES && !read_edges(message, edges).sentence.empty()) return std::nullopt;
+  if (!problem_with(edges, std::int64_t{kMaxOffsetNs} + 1).sentence.empty()) return std::nullopt;
   return Command{.answers = static_cast<Tick>(message.tick()),
                  .phases = {.gates = static_cast<Gates>(message.gates()),
                             .legs_off = message.legs_off(),
-                            .setpoint = setpoint_of(message)}};
+                            .setpoint = setpoint_of(message),
+                            .edges = leg_edges(edges)}};
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "bench.pb.h"
 #include "plant/parameters/parameters.hpp"
+#include "protocols/leg_edges.hpp"
 #include "server/bench/bench.hpp"
 #include "server/bench/input.hpp"
 #include "server/pacing/verdict.hpp"
@@ -21,6 +22,10 @@ void encode_input(Tick received, const Input& input, const ParameterTables& tabl
 
 /// Decodes a recorded input; nothing if its axis, parameter or fault does not exist.
 std::optional<Input> decode_input(const v1::Input& message, const ParameterTables& tables);
+
+/// The edges of a command; more than a list holds are a problem, and so are others in a list that is told to
+/// problem_with().
+EdgeProblem read_edges(const v1::Command& message, EdgeRecords& edges);
 
 /// The set-points of a command that its gates need.
 PhaseValues setpoint_of(const v1::Command& message);

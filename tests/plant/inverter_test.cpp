@@ -122,6 +122,13 @@ struct Times {
   int edges = 0;
 };
 
+SwitchingPattern pattern_of(const ThreePhase& voltage_v, int terminals, double rail_v, double dead_time_s,
+                            double period_s) {
+  SwitchingPattern pattern;
+  pattern.set_voltages(voltage_v, terminals, rail_v, dead_time_s, period_s);
+  return pattern;
+}
+
 Times times_of(const SwitchingPattern& pattern, double period_s) {
   Times times;
   std::size_t segment = 0;
@@ -157,7 +164,7 @@ TEST(Inverter, EveryPulseIsCentredAndHasItsLength) {
   for (const double dead_s : {0.0, 2e-6}) {
     for (int n = 0; n < 500; ++n) {
       const ThreePhase wanted{voltage(engine), voltage(engine), n % 7 == 0 ? 150.0 : voltage(engine)};
-      const Times times = times_of(SwitchingPattern(wanted, 3, 150.0, dead_s, kPeriod_s), kPeriod_s);
+      const Times times = times_of(pattern_of(wanted, 3, 150.0, dead_s, kPeriod_s), kPeriod_s);
       for (std::size_t k = 0; k < 3; ++k) {
         const double on = duty(phase_array(wanted)[k], 150.0, dead_s / kPeriod_s);
         const bool switches = on > 0.0 && on < 1.0;
@@ -172,7 +179,7 @@ TEST(Inverter, EveryPulseIsCentredAndHasItsLength) {
 
 // Catches: edges at one instant of which only one is taken.
 TEST(Inverter, TerminalsSwitchTogetherAtEqualVoltages) {
-  const Times times = times_of(SwitchingPattern({30.0, 30.0, 30.0}, 3, 150.0, 0.0, 100e-6), 100e-6);
+  const Times times = times_of(pattern_of({30.0, 30.0, 30.0}, 3, 150.0, 0.0, 100e-6), 100e-6);
   for (const double high_s : times.high_s)
     EXPECT_NEAR(high_s, 60e-6, 1e-18);
   EXPECT_LE(times.edges, 6);
@@ -180,7 +187,7 @@ TEST(Inverter, TerminalsSwitchTogetherAtEqualVoltages) {
 
 // Catches: a search that only goes forwards, or depends on where it starts.
 TEST(Inverter, TheHintOfTheSearchChangesNothing) {
-  const SwitchingPattern pattern({30.0, -60.0, 100.0}, 3, 150.0, 2e-6, 100e-6);
+  const SwitchingPattern pattern = pattern_of({30.0, -60.0, 100.0}, 3, 150.0, 2e-6, 100e-6);
   for (double instant_s = 0.0; instant_s < 100e-6; instant_s += 0.37e-6) {
     for (std::size_t hint = 0; hint < 20; ++hint)
       EXPECT_EQ(pattern.segment_at(instant_s, hint), pattern.segment_at(instant_s, 0));

@@ -44,6 +44,7 @@ void CandumpText::add(const v1::Input& input, double time_s) {
   if (!input.has_command()) return;
   end_tick();
   const v1::Command& command = input.command();
+  if (command.gates() == v1::GATES_EDGES) return;  // no frame carries them
   const link::Setpoints x = link::setpoints_of(command);
   const can::CommandFields setpoints{.tick = command.tick(),
                                      .mode = link::can_mode_of(command.gates()),

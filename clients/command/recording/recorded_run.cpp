@@ -111,7 +111,7 @@ class Reader {
 
 bool asks_for_something(const v1::Command& command) noexcept {
   return command.gates() == v1::GATES_VOLTAGE || command.gates() == v1::GATES_CURRENT ||
-         command.gates() == v1::GATES_DUTY;
+         command.gates() == v1::GATES_DUTY || command.gates() == v1::GATES_EDGES;
 }
 
 namespace {

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "protocols/leg_edges.hpp"
+
 /// The requests of a client over any link, and the refusal of the bench.
 namespace drivebench::link {
 
@@ -43,6 +45,7 @@ struct AxisCommand {
   double d_c = 0.0;
   double d_f = 0.0;
   std::uint32_t legs_off = 0;  ///< legs that are off: 1 a, 2 b, 4 c
+  EdgeRecords edges{};         ///< with GATES_EDGES, of which the field has the duty d_f
 };
 
 /// The set-points of a command by its gates.
@@ -55,13 +58,14 @@ struct Setpoints {
 
 constexpr Setpoints setpoints_of(const AxisCommand& x) noexcept {
   if (x.gates == v1::GATES_CURRENT) return {x.i_a_a, x.i_b_a, x.i_c_a, x.i_f_a};
-  if (x.gates == v1::GATES_DUTY) return {x.d_a, x.d_b, x.d_c, x.d_f};
+  if (x.gates == v1::GATES_DUTY || x.gates == v1::GATES_EDGES) return {x.d_a, x.d_b, x.d_c, x.d_f};
   return {x.u_a_v, x.u_b_v, x.u_c_v, x.u_f_v};
 }
 
 inline Setpoints setpoints_of(const v1::Command& x) {
   if (x.gates() == v1::GATES_CURRENT) return {x.i_a_a(), x.i_b_a(), x.i_c_a(), x.i_f_a()};
-  if (x.gates() == v1::GATES_DUTY) return {x.d_a(), x.d_b(), x.d_c(), x.d_f()};
+  if (x.gates() == v1::GATES_DUTY || x.gates() == v1::GATES_EDGES)
+    return {x.d_a(), x.d_b(), x.d_c(), x.d_f()};
   return {x.u_a_v(), x.u_b_v(), x.u_c_v(), x.u_f_v()};
 }
 

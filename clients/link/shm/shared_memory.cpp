@@ -29,7 +29,8 @@ shm::CommandRecord record_of(const AxisCommand& c) noexcept {
           .tick = c.tick,
           .gates = c.gates,
           .legs_off = c.legs_off,
-          .setpoint = {.a = to.a, .b = to.b, .c = to.c, .field = to.f}};
+          .setpoint = {.a = to.a, .b = to.b, .c = to.c, .field = to.f},
+          .edges = c.edges};
 }
 
 /// A text that the bench has written; it ends at its zero or with the array.

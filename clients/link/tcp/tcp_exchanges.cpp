@@ -22,6 +22,23 @@ Sample plain(const v1::Sample& message) {
   return sample;
 }
 
+namespace {
+
+/// All up to the last one with a level.
+void add_edges(const std::array<EdgeRecord, kMaxLegEdges>& list,
+               google::protobuf::RepeatedPtrField<v1::LegEdge>& out) {
+  std::size_t count = list.size();
+  while (count > 0 && list[count - 1].level == 0)
+    --count;
+  for (std::size_t n = 0; n < count; ++n) {
+    v1::LegEdge& edge = *out.Add();
+    edge.set_offset_ns(list[n].offset_ns);
+    edge.set_level(static_cast<v1::LegLevel>(list[n].level));
+  }
+}
+
+}  // namespace
+
 std::span<const AxisSample> Link::exchange(std::span<const AxisCommand> commands) {
   if (memory_) return exchange_in_memory(commands);
   v1::Envelope& request = new_request();
@@ -44,6 +61,11 @@ std::span<const AxisSample> Link::exchange(std::span<const AxisCommand> commands
     to.set_d_c(from.d_c);
     to.set_d_f(from.d_f);
     to.set_legs_off(from.legs_off);
+    if (from.gates == v1::GATES_EDGES) {
+      add_edges(from.edges[0], *to.mutable_edges_a());
+      add_edges(from.edges[1], *to.mutable_edges_b());
+      add_edges(from.edges[2], *to.mutable_edges_c());
+    }
   }
   samples_.clear();
   for (const v1::AxisSample& each : ask(request, Kind::kExchangeReply).exchange_reply().samples())

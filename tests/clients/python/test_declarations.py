@@ -23,6 +23,7 @@ TYPES = {"uint32_t": ctypes.c_uint32, "int32_t": ctypes.c_int32, "uint64_t": cty
          "const drivebench_fault*": ctypes.POINTER(library.FaultStruct),
          "const drivebench_injectable*": ctypes.POINTER(library.InjectableStruct),
          "int64_t*": ctypes.POINTER(ctypes.c_int64),
+         "drivebench_edge": library.EdgeStruct,
          "const drivebench_event*": ctypes.POINTER(library.EventStruct),
          "int": ctypes.c_int, "void": None, "const drivebench_description*": ctypes.POINTER(library.DescriptionStruct),
          "drivebench_bench*": ctypes.c_void_p, "const drivebench_bench*": ctypes.c_void_p,
@@ -35,7 +36,11 @@ TYPES = {"uint32_t": ctypes.c_uint32, "int32_t": ctypes.c_int32, "uint64_t": cty
 def variable(text):
     """(name, ctypes type) of a C declaration."""
     words = text.replace("*", "* ").split()
-    return words[-1], TYPES[re.sub(r" \*", "*", " ".join(words[:-1])).replace("* *", "**")]
+    name, *sizes = re.findall(r"\w+", words[-1])
+    kind = TYPES[re.sub(r" \*", "*", " ".join(words[:-1])).replace("* *", "**")]
+    for size in reversed(sizes):
+        kind = kind * int(re.search(rf"#define {size} (\d+)", HEADER)[1] if size.startswith("DRIVEBENCH_") else size)
+    return name, kind
 
 
 def members(name):
@@ -51,7 +56,7 @@ def enumerators(name):
 class Declarations(unittest.TestCase):
     # Catches: a member that is missing, in another place or of another size than in the header.
     def test_structs_are_those_of_the_header(self):
-        for name, struct in (("command", library.CommandStruct), ("signal", library.SignalStruct), ("axis", library.AxisStruct),
+        for name, struct in (("command", library.CommandStruct), ("edge", library.EdgeStruct), ("signal", library.SignalStruct), ("axis", library.AxisStruct),
                              ("parameter", library.ParameterStruct), ("fault", library.FaultStruct),
                              ("injectable", library.InjectableStruct), ("event", library.EventStruct),
                              ("description", library.DescriptionStruct),

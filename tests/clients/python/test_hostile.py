@@ -60,8 +60,14 @@ class Arguments(unittest.TestCase):
     # Catches: a command that is taken as another one because two were given, or none.
     def test_a_command_has_exactly_one_kind(self):
         for words in ({}, {"voltages": 1.0, "off": True}, {"short": True, "off": True}, {"voltages": 1.0, "currents": 1.0}):
-            with self.assertRaisesRegex(BadArgument, "exactly one of voltages, currents, duties, short and off"):
+            with self.assertRaisesRegex(BadArgument, "exactly one of voltages, currents, duties, edges, short and off"):
                 self.bench.step(**words)
+        for edges, why in (({"d": []}, "must be a mapping from the letters of legs"), ([], "must be a mapping"),
+                           ({"a": [(0, "up")]}, "is 'up' but must be \"off\", \"low\" or \"high\""),
+                           ({"b": [(n, "low") for n in range(9)]}, "leg b has 9 edges but may have 8"),
+                           ({"c": [(-1, "low")]}, "offset_ns is -1"), ({"c": [(1 << 32, "low")]}, "offset_ns is 4294967296")):
+            with self.assertRaisesRegex(BadArgument, why):
+                self.bench.step(edges=edges)
         with self.assertRaisesRegex(BadArgument, "legs_off is 'd' but must name legs"):
             self.bench.step(duties=0.1, legs_off="d")
 
@@ -69,6 +75,7 @@ class Arguments(unittest.TestCase):
     def test_what_the_bench_refuses_has_its_code(self):
         b = self.bench
         for call, code in ((lambda: b.step(voltages=NAN), Code.NOT_FINITE), (lambda: b.step(currents=1), Code.WRONG_DRIVE),
+                           (lambda: b.step(edges={"a": [(0, "low")]}), Code.WRONG_DRIVE),
                            (lambda: b.step(off=True, tick=0), Code.STALE), (lambda: b.set("nope", 1), Code.UNKNOWN_PARAMETER),
                            (lambda: b.set_load(NAN), Code.NOT_FINITE), (lambda: b.bump(math.inf), Code.NOT_FINITE),
                            (lambda: b.inject("nope", 1), Code.UNKNOWN_FAULT), (lambda: b.restore(b"x"), Code.MALFORMED),

@@ -51,7 +51,28 @@ def two_axes(bench):
     return [bytes(each) for each in samples.values()], bench.state_hash()
 
 
+def edges(bench):
+    """On `esc`: legs by their edges, which turn the vector."""
+    bench.acquire()
+    for tick in range(300):
+        late = 9000 + 10 * (tick % 50)
+        sample = bench.step(edges={"a": [(0, "low"), (late, "high"), (late + 400, "low")], "b": [(0, "low")], "c": [(5, "low"), (50, "off")]})
+    assert sample.true_i_a_a != 0.0 and sample.faults == 0
+    return [bytes(sample)], bench.state_hash()
+
+
 class SameBits(unittest.TestCase):
+    # Catches: edges of another leg or level than their letters and words say, or that a link changes.
+    def test_edges_are_the_same_in_process_and_over_tcp(self):
+        with drivebench.Bench("inproc:esc") as bench:
+            expected = edges(bench)
+            terminals = bench.newest()
+        # a is 400 ns of 20 us high, less the dead time where its current flows on in a diode; b is low.
+        self.assertAlmostEqual(terminals.terminal_a_mean_v, 14.8 * 400 / 20000, delta=14.8 * 450 / 20000)
+        self.assertEqual(terminals.terminal_b_mean_v, 0.0)
+        with drivebench.serve("esc") as server, drivebench.Bench(server.address) as bench:
+            self.assertEqual(edges(bench), expected)
+
     # Catches: a command with another tick, sign or terminal over one of the links; a sample whose columns are shifted.
     def test_a_program_has_the_same_samples_and_hash_in_process_and_over_tcp(self):
         with drivebench.Bench("inproc:servo") as bench:

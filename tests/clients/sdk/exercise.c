@@ -1,5 +1,6 @@
 /* The same requests over any way to a bench, in C99; prints all that comes back. Arguments: an address; "bus"
- * where only commands can go, "die" to lose the server. The bench is servo. */
+ * where only commands can go, "die" to lose the server, "edges" for edges of legs. The bench is servo, with
+ * "edges" esc. */
 #include <drivebench.h>
 #include <inttypes.h>
 #include <math.h>
@@ -151,6 +152,53 @@ static int die(void) {
   return 0;
 }
 
+static void refuse_edges(drivebench_command command) {
+  drivebench_edge* const a = command.edges[0];
+  a[0].offset_ns = 5000, a[0].level = DRIVEBENCH_LEVEL_HIGH;
+  a[1].offset_ns = 5000, a[1].level = DRIVEBENCH_LEVEL_LOW;
+  tell("two edges at once", drivebench_step(bench, &command, 1, NULL));
+  a[1].offset_ns = 20000;
+  tell("an edge at the end of the tick", drivebench_step(bench, &command, 1, NULL));
+  a[1].offset_ns = 6000, a[1].level = 4;
+  tell("a level that is none", drivebench_step(bench, &command, 1, NULL));
+  a[1].level = DRIVEBENCH_LEVEL_NONE, a[2].offset_ns = 7000, a[2].level = DRIVEBENCH_LEVEL_OFF;
+  tell("an edge behind the end of the list", drivebench_step(bench, &command, 1, NULL));
+  a[2].offset_ns = 4000000000u, a[1] = a[2], a[2].level = DRIVEBENCH_LEVEL_NONE;
+  tell("an offset beyond all ticks", drivebench_step(bench, &command, 1, NULL));
+}
+
+/* Each leg is high for some nanoseconds that turn about, and off at its end: what no duty can say. */
+static void run_edges(drivebench_sample sample) {
+  uint64_t hash = 0;
+  drivebench_command command;
+  memset(&command, 0, sizeof command);
+  command.gates = DRIVEBENCH_GATES_EDGES;
+  command.tick = sample.tick;
+  refuse_edges(command);
+  while (sample.tick < 2000) {
+    unsigned leg;
+    for (leg = 0; leg < 3; ++leg) {
+      drivebench_edge* const edges = command.edges[leg];
+      const unsigned width = (unsigned)((sample.tick / 40 + 4 * leg) % 12) * 90u + 1u;
+      edges[0].offset_ns = 0, edges[0].level = DRIVEBENCH_LEVEL_LOW;
+      edges[1].offset_ns = 4000 + leg, edges[1].level = DRIVEBENCH_LEVEL_HIGH;
+      edges[2].offset_ns = 4000 + leg + width, edges[2].level = DRIVEBENCH_LEVEL_LOW;
+      edges[3].offset_ns = 19000 - width,
+      edges[3].level = sample.tick % 7 == leg ? DRIVEBENCH_LEVEL_OFF : DRIVEBENCH_LEVEL_NONE;
+    }
+    command.tick = sample.tick;
+    if (drivebench_step(bench, &command, 1, &sample) != DRIVEBENCH_OK) {
+      tell("step", -1);
+      break;
+    }
+    count(&sample);
+  }
+  drivebench_state_hash(bench, &hash);
+  printf("tick %" PRIu64 ": faults %" PRIu64 ", %.17g A, %.17g V, %.17g rad\n", sample.tick, sample.faults,
+         sample.true_i_a_a, sample.terminal_b_mean_v, sample.angle_rad);
+  printf("hash %016" PRIx64 ", digest %016" PRIx64 "\n", hash, digest);
+}
+
 int main(int argc, char** argv) {
   const int is_bus = argc > 2 && strcmp(argv[2], "bus") == 0;
   drivebench_options options;
@@ -172,6 +220,11 @@ int main(int argc, char** argv) {
   tell("acquire", drivebench_acquire(bench, 0));
   tell("acquire another axis", drivebench_acquire(bench, 3));
   tell("newest", drivebench_newest(bench, 0, &sample));
+  if (argc > 2 && strcmp(argv[2], "edges") == 0) {
+    run_edges(sample);
+    drivebench_close(bench);
+    return 0;
+  }
   sample = run(sample, 400);
   if (!is_bus) {
     change();
@@ -185,6 +238,8 @@ int main(int argc, char** argv) {
     wrong.legs_off = 0;
     wrong.gates = DRIVEBENCH_GATES_CURRENT;
     tell("currents for a voltage drive", drivebench_step(bench, &wrong, 1, NULL));
+    wrong.gates = DRIVEBENCH_GATES_EDGES;
+    tell("edges for an amplifier", drivebench_step(bench, &wrong, 1, NULL));
     wrong.gates = DRIVEBENCH_GATES_VOLTAGE;
     wrong.setpoint_b = INFINITY;
     tell("an infinite voltage", drivebench_step(bench, &wrong, 1, NULL));

@@ -49,6 +49,28 @@ class Sdk(unittest.TestCase):
         self.assertEqual(len(again), 1)
         self.assertIn(f"\nhash {again[0]}\n", said[0])
 
+    # Catches: an edge that one of the ways rounds, leaves out or judges differently, or that a recording does not repeat.
+    def test_edges_of_legs_are_the_same_over_every_way(self):
+        text = (BENCHES / "esc.toml").read_text(encoding="utf-8").replace("../motors", MOTORS)
+        with tempfile.TemporaryDirectory() as folder:
+            said = [exercise("inproc:esc", "edges")]
+            for way in ("tcp", "unix", "shm"):
+                path, recording = f"{folder}/{way}.sock", f"{folder}/{way}.mcap"
+                with Server("--unix", path, "--record", recording, text=text) as server:
+                    said.append(exercise("tcp:%s:%d" % server.address if way == "tcp" else f"{way}:{path}", "edges"))
+                    server.stop()
+                replay = subprocess.run([SERVER, "--replay", recording], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+                self.assertEqual(replay.returncode, 0, replay.stdout + replay.stderr)
+        self.assertIn("tick 2000: faults 0", said[0])
+        for sentence in ("edge 2 of leg a is at 5000 ns but must be after the edge ahead of it, 5000 ns' field 'commands.edges_a'",
+                         "edge 2 of leg a is at 20000 ns but must be before the end of the tick, 20000 ns'",
+                         "the level of edge 2 of leg a is 4 but must be 1 (off), 2 (low) or 3 (high), or 0 after the last edge'",
+                         "edge 3 of leg a follows the end of the list'",
+                         "edge 2 of leg a is at 4000000000 ns but must be before the end of the tick, 20000 ns'"):
+            self.assertIn(sentence, said[0])
+        for other in said[1:]:
+            self.assertEqual(said[0].splitlines(), other.splitlines())
+
     # The example of a firmware without a sensor of the rotor: 80 % of the no-load speed by comparators alone, a load step that
     # it answers, and the same hash over every way and in the replay of its recording. Catches: a comparator, or the time of an
     # edge, that differs between the ways; a step of commutation that is lost; a recording that leaves comparators out.

@@ -151,9 +151,12 @@ class Exchange(WireTest):
                          {"write_parameter": pb.WriteParameter(axis=axis)}, {"clear_faults": pb.ClearFaults(axis=axis)},
                          {"inject_fault": pb.InjectFault(axis=axis)}, {"shaft_bump": pb.ShaftBump(axis=axis)}):
                 self.assertRefused(client.ask(**kind), pb.REFUSAL_UNKNOWN_AXIS, "axis")
-        self.assertRefused(client.exchange(0, gates=5), pb.REFUSAL_OUT_OF_RANGE, "commands.gates")
+        self.assertRefused(client.exchange(0, gates=6), pb.REFUSAL_OUT_OF_RANGE, "commands.gates")
         self.assertRefused(client.exchange(0, legs_off=8), pb.REFUSAL_OUT_OF_RANGE, "commands.legs_off")
         self.assertRefused(client.exchange(0, gates=3), pb.REFUSAL_WRONG_DRIVE, "commands.gates")
+        self.assertRefused(client.exchange(0, gates=pb.GATES_EDGES), pb.REFUSAL_WRONG_DRIVE, "commands.gates")
+        nine = [pb.LegEdge(offset_ns=n, level=pb.LEG_LEVEL_LOW) for n in range(9)]
+        self.assertRefused(client.exchange(0, gates=pb.GATES_EDGES, edges_b=nine), pb.REFUSAL_OUT_OF_RANGE, "commands.edges_b")
         both = pb.Exchange(commands=[pb.Command(tick=0), pb.Command(tick=0)])
         self.assertRefused(client.ask(exchange=both), pb.REFUSAL_OUT_OF_RANGE, "commands.axis")
 

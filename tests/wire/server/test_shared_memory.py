@@ -33,7 +33,7 @@ USERS = "".join(f'[[token]]\nname = "{name}"\nrole = "{role}"\ntoken = "{name}-s
 
 # protocols/shm/segment.hpp
 HEAD = struct.Struct("=8sIIQ")
-REQUEST, COMMANDS, COMMAND = 64, 64 + 24, struct.Struct("=QQqQdddd")
+REQUEST, COMMANDS, COMMAND = 64, 64 + 24, struct.Struct("=QQqQdddd192x")  # no edges
 REPLY = (COMMANDS + 64 * COMMAND.size + 63) // 64 * 64
 SAMPLES = (REPLY + 32 + 1024 + 64 + 63) // 64 * 64
 
@@ -172,7 +172,7 @@ class SharedMemory(WireTest):
                 (dict(count=(1 << 64) - 1), pb.REFUSAL_OUT_OF_RANGE, "commands"),
                 (dict(axis=1), pb.REFUSAL_UNKNOWN_AXIS, "axis"),
                 (dict(axis=1 << 32), pb.REFUSAL_UNKNOWN_AXIS, "axis"),
-                (dict(gates=5), pb.REFUSAL_OUT_OF_RANGE, "commands.gates"),
+                (dict(gates=6), pb.REFUSAL_OUT_OF_RANGE, "commands.gates"),
                 (dict(gates=-1), pb.REFUSAL_OUT_OF_RANGE, "commands.gates"),
                 (dict(gates=1 << 32), pb.REFUSAL_OUT_OF_RANGE, "commands.gates"),
                 (dict(legs_off=8), pb.REFUSAL_OUT_OF_RANGE, "commands.legs_off"),

@@ -107,7 +107,8 @@ const Sample& InprocAxis::exchange(const link::AxisCommand& command) {
                              .setpoint_b = x.b,
                              .setpoint_c = x.c,
                              .setpoint_f = x.f,
-                             .legs_off = command.legs_off};
+                             .legs_off = command.legs_off,
+                             .edges = {}};
   request([&] { samples_[axis_] = std::bit_cast<Sample>(bench_.step(ours)); });
   return samples_[axis_];
 }

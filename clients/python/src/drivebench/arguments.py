@@ -18,6 +18,14 @@ def number(name: str, value: SupportsFloat) -> float:
     raise BadArgument(f"{name} is {value!r:.80} but must be a number", name)
 
 
+def whole_32(name: str, value: SupportsIndex) -> int:
+    """A whole number of 32 bits."""
+    number_of_64 = whole(name, value)
+    if number_of_64 >= 1 << 32:
+        raise BadArgument(f"{name} is {value!r:.80} but must be a whole number from 0 to 2^32 - 1", name)
+    return number_of_64
+
+
 def whole(name: str, value: SupportsIndex) -> int:
     """A count of ticks: 0 to 2^64 - 1."""
     try:

@@ -11,10 +11,12 @@ from drivebench import arguments
 from drivebench.description import Description, description_of
 from drivebench.errors import BadArgument, Code
 from drivebench.handle import Handle
-from drivebench.library import ABI, CommandStruct, OptionsStruct, Sample, load
+from drivebench.library import ABI, MAX_EDGES, CommandStruct, EdgeStruct, OptionsStruct, Sample, load
 from drivebench.recorder import Recorder
 
 Setpoints = float | Sequence[float]
+Edges = Mapping[str, Sequence[tuple[int, str]]]
+_LEVELS = {"off": 1, "low": 2, "high": 3}
 
 
 class _Gates(enum.IntEnum):
@@ -23,17 +25,20 @@ class _Gates(enum.IntEnum):
     ZERO = 2
     CURRENT = 3
     DUTY = 4
+    EDGES = 5
 
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """What a controller asks of an axis for a tick: one of the five.
+    """What a controller asks of an axis for a tick: one of the six.
 
     voltages: at the terminals a, b, c [V], one number for each that the machine has; in a star against the middle of
         the DC link.
     currents: the same in [A], for a drive of kind "current_amplifier".
     duties: of a leg of a star its mean voltage against the negative rail over the link's, 0 to 1; of a winding between
         two legs its voltage over the link's, -1 to 1.
+    edges: of a switched inverter, for each leg by its letter a list of (offset in ns within the tick, "low", "high" or
+        "off"), offsets rising: {"a": [(0, "low"), (9000, "high")]}. A leg without a list is off.
     short: all terminals connected, an active short circuit.
     off: gates off; currents flow through the diodes until they are zero.
     field: of the field winding, [V], [A] or a duty like the others.
@@ -43,6 +48,7 @@ class Command:
     voltages: Setpoints | None = None
     currents: Setpoints | None = None
     duties: Setpoints | None = None
+    edges: Edges | None = None
     short: bool = False
     off: bool = False
     field: float = 0.0
@@ -131,11 +137,11 @@ class Bench:
         self._call("clear", self._number(axis))
 
     def step(self, axis: int | str = 0, *, voltages: Setpoints | None = None, currents: Setpoints | None = None,
-             duties: Setpoints | None = None, short: bool = False, off: bool = False, field: float = 0.0,
-             legs_off: str = "", tick: int | None = None) -> Sample:
+             duties: Setpoints | None = None, edges: Edges | None = None, short: bool = False, off: bool = False,
+             field: float = 0.0, legs_off: str = "", tick: int | None = None) -> Sample:
         """Gives the bench a command for one axis and returns the next sample.
 
-        The keywords are those of Command; exactly one of the first five is given. The command answers the sample that
+        The keywords are those of Command; exactly one of the first six is given. The command answers the sample that
         step(), newest() or run() returned last, or that of `tick`. In lockstep the tick runs when every axis that a
         controller holds has its command: several axes take step_all().
         """
@@ -143,7 +149,7 @@ class Bench:
         sample = self._sample_type()
         handle = self._handle
         with handle.lock:
-            command = self._command(number, tick, Command(voltages, currents, duties, short, off, field, legs_off))
+            command = self._command(number, tick, Command(voltages, currents, duties, edges, short, off, field, legs_off))
             code = self._library.step(handle.pointer, command, 1, ctypes.byref(sample))
             if code:
                 handle.fail(code)
@@ -170,8 +176,8 @@ class Bench:
         sample = self.newest(axis)
         for _ in range(arguments.whole("ticks", ticks)):
             c = _checked(controller(sample))
-            sample = self.step(axis, voltages=c.voltages, currents=c.currents, duties=c.duties, short=c.short, off=c.off,
-                               field=c.field, legs_off=c.legs_off, tick=sample.tick)
+            sample = self.step(axis, voltages=c.voltages, currents=c.currents, duties=c.duties, edges=c.edges, short=c.short,
+                               off=c.off, field=c.field, legs_off=c.legs_off, tick=sample.tick)
         return sample
 
     def newest(self, axis: int | str = 0) -> Sample:
@@ -275,8 +281,8 @@ class Bench:
         given = {"voltages": (_Gates.VOLTAGE, c.voltages), "currents": (_Gates.CURRENT, c.currents),
                  "duties": (_Gates.DUTY, c.duties)}
         setpoints = [(name, gates, values) for name, (gates, values) in given.items() if values is not None]
-        if len(setpoints) + bool(c.short) + bool(c.off) != 1:
-            raise BadArgument("a command has exactly one of voltages, currents, duties, short and off")
+        if len(setpoints) + (c.edges is not None) + bool(c.short) + bool(c.off) != 1:
+            raise BadArgument("a command has exactly one of voltages, currents, duties, edges, short and off")
         if tick is None:
             tick = self._ticks[number] if number in self._ticks else self.newest(number).tick
         else:
@@ -284,6 +290,9 @@ class Bench:
         legs_off = _legs(c.legs_off) if c.legs_off else 0
         for name, gates, values in setpoints:
             return CommandStruct(number, gates, tick, *self._setpoints(name, number, values, c.field), legs_off)
+        if c.edges is not None:
+            return CommandStruct(number, _Gates.EDGES, tick, setpoint_f=arguments.number("field", c.field), legs_off=legs_off,
+                                 edges=_edges(c.edges))
         return CommandStruct(number, _Gates.ZERO if c.short else _Gates.OFF, tick, legs_off=legs_off)
 
     def _setpoints(self, name: str, number: int, values: Setpoints, field: float) -> tuple[float, float, float, float]:
@@ -300,6 +309,21 @@ def _legs(letters: str) -> int:
     if not isinstance(letters, str) or not set(letters) <= set("abc"):
         raise BadArgument(f"legs_off is {letters!r:.80} but must name legs by their letters, such as \"c\" or \"ab\"", "legs_off")
     return sum(1 << "abc".index(letter) for letter in set(letters))
+
+
+def _edges(edges: Edges) -> Any:
+    """The edges of three legs as the library has them; it judges their order."""
+    rows = (EdgeStruct * MAX_EDGES * 3)()
+    if not isinstance(edges, Mapping) or not set(edges) <= set("abc"):
+        raise BadArgument(f"edges is {edges!r:.80} but must be a mapping from the letters of legs, a to c, to lists", "edges")
+    for letter, each in edges.items():
+        if len(each) > MAX_EDGES:
+            raise BadArgument(f"leg {letter} has {len(each)} edges but may have {MAX_EDGES}", "edges")
+        for n, (offset_ns, level) in enumerate(each):
+            if level not in _LEVELS:
+                raise BadArgument(f"a level of leg {letter} is {level!r:.80} but must be \"off\", \"low\" or \"high\"", "edges")
+            rows["abc".index(letter)][n] = EdgeStruct(arguments.whole_32("offset_ns", offset_ns), _LEVELS[level])
+    return rows
 
 
 def _checked(command: Command) -> Command:

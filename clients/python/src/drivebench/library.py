@@ -15,10 +15,18 @@ ABI = 1
 SIGNAL_BYTES = 8
 
 
+MAX_EDGES = 8
+
+
+class EdgeStruct(ctypes.Structure):
+    _fields_ = [("offset_ns", ctypes.c_uint32), ("level", ctypes.c_uint32)]
+
+
 class CommandStruct(ctypes.Structure):
     _fields_ = [("axis", ctypes.c_uint32), ("gates", ctypes.c_uint32), ("tick", ctypes.c_uint64),
                 ("setpoint_a", ctypes.c_double), ("setpoint_b", ctypes.c_double), ("setpoint_c", ctypes.c_double),
-                ("setpoint_f", ctypes.c_double), ("legs_off", ctypes.c_uint64)]
+                ("setpoint_f", ctypes.c_double), ("legs_off", ctypes.c_uint64),
+                ("edges", EdgeStruct * MAX_EDGES * 3)]
 
 
 class SignalStruct(ctypes.Structure):

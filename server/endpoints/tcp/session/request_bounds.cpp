@@ -10,6 +10,7 @@
 
 #include "protocols/framing.hpp"
 #include "protocols/signals/catalogue.hpp"
+#include "protocols/signals/command.hpp"
 #include "server/config/config.hpp"
 #include "server/experiments/plan.hpp"
 
@@ -41,6 +42,9 @@ struct Bound {
 constexpr std::size_t kMaxNames = 256;  // more than an axis has parameters
 constexpr auto kBounds = std::to_array<Bound>({
     {"exchange", "commands", kMaxAxes},
+    {"exchange", "commands.edges_a", kMaxAxes * kMaxLegEdges},
+    {"exchange", "commands.edges_b", kMaxAxes * kMaxLegEdges},
+    {"exchange", "commands.edges_c", kMaxAxes * kMaxLegEdges},
     {"subscribe", "signals", kSignals.size()},
     {"read_parameters", "names", kMaxNames},
     {"run_experiment", "signals", kSignals.size()},

@@ -34,7 +34,13 @@ void Exchanges::exchange(const v1::Exchange& r) {
                       .tick = command.tick(),
                       .gates = command.gates(),
                       .legs_off = command.legs_off(),
-                      .setpoint = setpoint_of(command)});
+                      .setpoint = setpoint_of(command),
+                      .edges = {}});
+    if (command.gates() != v1::GATES_EDGES) continue;
+    if (const EdgeProblem problem = read_edges(command, frame_.back().edges); !problem.sentence.empty()) {
+      return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_OUT_OF_RANGE, problem.sentence,
+                              problem.field.c_str());
+    }
   }
   exchange(frame_, frames_, dialogue_.id());
 }
@@ -70,9 +76,9 @@ bool Exchanges::read(std::span<const shm::CommandRecord> sent, Way& way, std::ui
       way.refuse(id, v1::REFUSAL_OUT_OF_RANGE, "two commands for one axis", "commands.axis");
       return false;
     }
-    if (record.gates < 0 || record.gates > static_cast<std::int64_t>(Gates::kDuty)) {
+    if (record.gates < 0 || record.gates > static_cast<std::int64_t>(Gates::kEdges)) {
       way.refuse(id, v1::REFUSAL_OUT_OF_RANGE,
-                 "gates is " + std::to_string(record.gates) + " but must be 0 to 4", "commands.gates");
+                 "gates is " + std::to_string(record.gates) + " but must be 0 to 5", "commands.gates");
       return false;
     }
     if (record.legs_off > kAllLegs) {
@@ -81,12 +87,21 @@ bool Exchanges::read(std::span<const shm::CommandRecord> sent, Way& way, std::ui
                  "commands.legs_off");
       return false;
     }
+    const bool has_edges = record.gates == static_cast<std::int64_t>(Gates::kEdges);
+    if (has_edges) {
+      const EdgeProblem problem = problem_with(record.edges, engine_.config().setup.period_ns);
+      if (!problem.sentence.empty()) {
+        way.refuse(id, v1::REFUSAL_OUT_OF_RANGE, problem.sentence, problem.field.c_str());
+        return false;
+      }
+    }
     axes_.push_back(axis);
     commands_.push_back({.axis = axis,
                          .command = {.answers = static_cast<Tick>(record.tick),
                                      .phases = {.gates = static_cast<Gates>(record.gates),
                                                 .legs_off = static_cast<std::uint32_t>(record.legs_off),
-                                                .setpoint = record.setpoint}}});
+                                                .setpoint = record.setpoint,
+                                                .edges = has_edges ? leg_edges(record.edges) : LegEdges{}}}});
   }
   return true;
 }
