@@ -1,22 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 
 #include "protocols/signals/command.hpp"
+#include "protocols/signals/edge_record.hpp"
 
 /// The edges of a command as they come from outside, and the rules for them: the offsets of a leg rise and
 /// are below the period, a level exists, and what follows the end of a list is empty.
 namespace drivebench {
-
-/// An edge before anything has looked at it. The layout is that of drivebench_edge.
-struct EdgeRecord {
-  std::uint32_t offset_ns = 0;
-  std::uint32_t level = 0;  ///< a LegLevel; 0 ends the list
-};
-using EdgeRecords = std::array<std::array<EdgeRecord, kMaxLegEdges>, 3>;
 
 /// What is wrong with edges: a sentence with leg, value and rule, and the field. Empty: nothing is.
 struct EdgeProblem {

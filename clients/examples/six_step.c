@@ -1,6 +1,7 @@
-/* Six-step commutation without a sensor of the rotor: a board support file, the firmware, and the timer that calls its
- * interrupt once in a PWM period. The rotor is aligned, turned open loop until its emf shows, and from then on commutated by
- * the comparators of the open phase alone, half a step after each crossing. Argument: the address of a bench (esc). */
+/* Six-step commutation without a sensor of the rotor: a board support file, the firmware, and the timer that
+ * calls its interrupt once in a PWM period. The rotor is aligned, turned open loop until its emf shows, and
+ * from then on commutated by the comparators of the open phase alone, 3/8 of a step after each crossing.
+ * Argument: the address of a bench (esc). */
 #include <drivebench.h>
 #include <math.h>
 #include <stdint.h>
@@ -31,7 +32,8 @@ static int comparator_level(int phase) {
 }
 /* The capture register: the timer at the last edge. */
 static uint32_t comparator_capture(int phase) {
-  const double age_s[3] = {sensors.comparator_a_age_s, sensors.comparator_b_age_s, sensors.comparator_c_age_s};
+  const double age_s[3] = {sensors.comparator_a_age_s, sensors.comparator_b_age_s,
+                           sensors.comparator_c_age_s};
   return timer_read() - (uint32_t)lround(age_s[phase] * 1e7);
 }
 
@@ -39,16 +41,17 @@ static uint32_t comparator_capture(int phase) {
 
 #define POLE_PAIRS 7
 #define START_DUTY 0.08f
-#define ALIGN_COUNTS 3000000u /* 300 ms */
-#define FIRST_STEP 200000u    /* 20 ms: 71 rpm */
-#define LAST_STEP 25000u      /* 2.5 ms: 571 rpm */
-#define GOOD_STEPS 6          /* in a row, before the comparators take over */
+#define ALIGN_COUNTS 3000000u                           /* 300 ms */
+#define FIRST_STEP 200000u                              /* 20 ms: 71 rpm */
+#define LAST_STEP 25000u                                /* 2.5 ms: 571 rpm */
+#define GOOD_STEPS 6                                    /* in a row, before the comparators take over */
 #define RPM_COUNTS (1e7f * 60.0f / (6.0f * POLE_PAIRS)) /* rpm times the counts of a step */
 
 typedef struct {
   int high, low, open, rises;
 } Step;
-static const Step steps[6] = {{1, 2, 0, 0}, {1, 0, 2, 1}, {2, 0, 1, 0}, {2, 1, 0, 1}, {0, 1, 2, 0}, {0, 2, 1, 1}};
+static const Step steps[6] = {{1, 2, 0, 0}, {1, 0, 2, 1}, {2, 0, 1, 0},
+                              {2, 1, 0, 1}, {0, 1, 2, 0}, {0, 2, 1, 1}};
 
 static enum { ALIGN, RAMP, RUN } state;
 static int step = 2, crossed, good, lost, commutations;
@@ -62,8 +65,8 @@ static void commutate(uint32_t now) {
   ++commutations;
 }
 
-/* Whether the open phase crosses the neutral, and when. Its current dies in a diode first: for a quarter of a step the
- * comparator does not count. */
+/* Whether the open phase crosses the neutral, and when. Its current dies in a diode first: for a quarter of a
+ * step the comparator does not count. */
 static int crossing(uint32_t now, uint32_t* at) {
   const uint32_t blanking = step_counts / 4, since = now - commutated;
   const int open = steps[step].open;
@@ -115,7 +118,8 @@ static void control_interrupt(void) {
       step_counts = (3 * step_counts + (at - last_crossing)) / 4;
       last_crossing = at;
       speed_rpm = RPM_COUNTS / (float)step_counts;
-      commutate_at = at + step_counts * 3 / 8; /* half a step, less 7.5 degrees for the current to turn over */
+      commutate_at =
+          at + step_counts * 3 / 8; /* half a step, less 7.5 degrees for the current to turn over */
     } else if (!crossed && now - commutated > 2 * step_counts) {
       ++lost; /* none came: on with the pace of before */
       last_crossing = now - step_counts / 2;
@@ -164,7 +168,8 @@ int main(int argc, char** argv) {
   drivebench_state_hash(bench, &hash);
   printf("%.0f rpm before the load step, at least %.0f after it, %.0f at the end\n", before_rpm, lowest_rpm,
          sensors.speed_rad_s * 9.5492966);
-  printf("%d commutations, %d without a crossing, hash %016llx\n", commutations, lost, (unsigned long long)hash);
+  printf("%d commutations, %d without a crossing, hash %016llx\n", commutations, lost,
+         (unsigned long long)hash);
   drivebench_close(bench);
   return 0;
 }

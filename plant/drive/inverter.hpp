@@ -50,9 +50,9 @@ constexpr double duty(double voltage_v, double rail_v, double dead_part) noexcep
 double averaged_voltage_v(double voltage_v, double rail_v, double dead_part, double current_a,
                           double band_a) noexcept;
 
-/// Of a pattern: those between the commutations of three terminals, which for each edge may be two, and one
-/// that the tick before has left.
-inline constexpr std::size_t kMaxSegmentsOfPattern = 3 * (2 * kMaxLegEdges + 1) + 1;
+/// Of a pattern: those between the commutations of three terminals, which may be two for each edge and for
+/// what the tick before has left.
+inline constexpr std::size_t kMaxSegmentsOfPattern = 3 * 2 * (kMaxLegEdges + 1) + 1;
 
 /// The lists of a tick and of the two before it, which tell where the legs are when it starts.
 struct EdgeHistory {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "protocols/abi/drivebench.h"
-#include "protocols/leg_edges.hpp"
+#include "protocols/signals/edge_record.hpp"
 
 namespace drivebench::abi {
 

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "protocols/leg_edges.hpp"
 #include "protocols/signals/command.hpp"
+#include "protocols/signals/edge_record.hpp"
 #include "protocols/signals/sample.hpp"
 
 /// The memory that a bench and one session share (ShareMemory in bench.proto): the commands of an exchange

@@ -5,6 +5,7 @@
 
 #include "plant/parameters/parameters.hpp"
 #include "protocols/abi/edges.hpp"
+#include "protocols/leg_edges.hpp"
 #include "protocols/text.hpp"
 #include "server/bench/state_limits.hpp"
 #include "server/config/sections/plausible.hpp"

@@ -179,6 +179,25 @@ TEST(Edges, CentredEdgesMoveTheMotorAsTheirDutiesDo) {
   EXPECT_GT(std::abs(by_edges.sample(300).true_i_a_a), 0.1);
 }
 
+// The most that three legs can do: a switch that still waits when the tick begins, and eight edges with a
+// dead time each. Catches: a pattern with too little room.
+TEST(Edges, ThreeFullListsWithDeadTimesHaveRoom) {
+  Leg leg(inverter(1e-6));
+  LegEdgeList full{};
+  for (std::uint32_t n = 0; n < kMaxLegEdges; ++n)
+    full[n] = LegEdge(10'000 * (n + 1), n % 2 == 0 ? kLow : kHigh);
+  const LegEdgeList waits = list({{0, kLow}, {kTickNs - 500, kHigh}});
+  leg.tick(edges(waits, waits, waits));
+  LegEdges shifted{full, full, full};
+  for (std::size_t k = 1; k < 3; ++k)
+    for (LegEdge& edge : shifted[k])
+      edge = LegEdge(edge.offset_ns() + static_cast<std::uint32_t>(100 * k), edge.level());
+  const std::vector<Place> seen = leg.tick(edges(shifted[0], shifted[1], shifted[2]));
+  EXPECT_EQ(seen.size(), kMaxSegmentsOfPattern - 5)
+      << "all start at 0, and end their first dead time together";
+  EXPECT_EQ(seen.back().voltage_v, kUp);
+}
+
 // Catches: a damaged list that leaves the pattern without an end, or a leg that the mask does not hold.
 TEST(Edges, AListOutOfOrderEndsAndTheMaskOfLegsHolds) {
   Leg leg(inverter(1e-6));

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "protocols/leg_edges.hpp"
+#include "protocols/signals/edge_record.hpp"
 
 /// The requests of a client over any link, and the refusal of the bench.
 namespace drivebench::link {

@@ -401,7 +401,8 @@ class World {
                                   .tick = static_cast<std::uint64_t>(engine_->tick()),
                                   .gates = static_cast<std::int64_t>(which / 4 % 7),
                                   .legs_off = 0,
-                                  .setpoint = {.a = program.value(), .b = program.value()}};
+                                  .setpoint = {.a = program.value(), .b = program.value()},
+                                  .edges = {}};
       }
       ++request.number;
     }

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <utility>
 
+#include "protocols/leg_edges.hpp"
 #include "server/recording/input_codec.hpp"
 
 namespace drivebench {
