@@ -156,6 +156,11 @@ void require_realtime(const BenchConfig& config) {
   if (!notes.empty()) throw std::runtime_error("--require-rt: " + notes.front());
 }
 
+/// A signal has ended the repetition of a run.
+struct Stopped {
+  Tick tick;
+};
+
 void repeat_recording(const ServerOptions& o, Bench& bench, const std::function<void()>& before_tick) {
   const MappedSeries series(o.repeat);
   try {
@@ -166,7 +171,8 @@ void repeat_recording(const ServerOptions& o, Bench& bench, const std::function<
 }
 
 /// Runs the bench as the recording says, and ends the leases of its controllers. Throws.
-BeginRun repetition(const ServerOptions& o, const BenchConfig& config, std::optional<Tick> max_ticks) {
+BeginRun repetition(const ServerOptions& o, const BenchConfig& config, std::optional<Tick> max_ticks,
+                    const StopSignal& stop_signal) {
   if (o.repeat.empty()) return {};
   if (config.mode != RunMode::kLockstep)
     throw std::runtime_error("--repeat: time waits for a controller in lockstep only; see --mode");
@@ -179,20 +185,22 @@ BeginRun repetition(const ServerOptions& o, const BenchConfig& config, std::opti
     repeat_recording(o, bench, [] {});
     return {};
   }
-  return [&o](Bench& bench, Recorder* recorder) {
-    repeat_recording(o, bench, [recorder] {
+  return [&o, &stop_signal](Bench& bench, Recorder* recorder) {
+    repeat_recording(o, bench, [&bench, &stop_signal, recorder] {
+      if (stop_signal.has_come()) throw Stopped{bench.tick()};
       if (recorder != nullptr) recorder->wait_for_room();
     });
     bench.release_leases();
   };
 }
 
-std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& config, asio::io_context& io) {
+std::unique_ptr<Engine> make_engine(const ServerOptions& o, const BenchConfig& config, asio::io_context& io,
+                                    const StopSignal& stop_signal) {
   std::optional<Tick> max_ticks;
   if (o.duration_s > 0.0) {
     max_ticks = static_cast<Tick>(o.duration_s * 1e9 / static_cast<double>(config.setup.period_ns) + 0.5);
   }
-  const BeginRun begin = repetition(o, config, max_ticks);
+  const BeginRun begin = repetition(o, config, max_ticks, stop_signal);
   std::unique_ptr<Recorder> recorder;
   if (!o.record.empty()) {
     recorder = std::make_unique<Recorder>(o.record, config, std::initializer_list<RecordingAttachment>{},
@@ -306,7 +314,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   if (!config.audit.file.empty()) audit = std::make_unique<Audit>(config.audit);
   std::unique_ptr<Experiments> experiments;
   if (!config.experiments.folder.empty()) experiments = std::make_unique<Experiments>(io, config);
-  const std::unique_ptr<Engine> engine = make_engine(o, config, io);
+  const std::unique_ptr<Engine> engine = make_engine(o, config, io, *stop_signal);
   if (!o.from.empty()) go_to_saved_state(*engine, o.from);
   if (o.measure_answers) engine->measure_answers();
   if (audit) audit->watch(*engine);
@@ -366,6 +374,9 @@ int run(int argc, char** argv) {
   if (json_log) log::write_json();
   try {
     return o.replay.empty() ? use_bench(o) : replay_command(o.replay, o.json);
+  } catch (const Stopped& stopped) {
+    log::error("stopped at tick {}, before the recorded run was repeated", stopped.tick);
+    return kFailed;
   } catch (const std::exception& error) {
     if (!json_log) throw;
     fmt::print(stderr, "{}\n", json_log_line(std::chrono::system_clock::now(), "critical", error.what()));

@@ -146,11 +146,14 @@ Refused Bench::apply_action(AxisRuntime& a, const Input& input) noexcept {
     return change_lease(input.axis, *lease, input.owner);
   if (const auto* load = std::get_if<LoadChange>(&input.action)) {
     if (!std::isfinite(load->load_nm)) return Refused::kNotFinite;
+    if (a.multisine.is_on(Multisine::Quantity::kLoad)) a.multisine = {};
     a.axis.set_load(load->load_nm, tick_, load->ramp_ticks);
   } else if (const auto* write = std::get_if<ParameterWrite>(&input.action)) {
     return write_parameter(a, *write);
   } else if (const auto* fault = std::get_if<InjectFault>(&input.action)) {
     return inject(a, *fault);
+  } else if (const auto* multisine = std::get_if<Multisine>(&input.action)) {
+    return begin_multisine(a, *multisine);
   } else if (const auto* bump = std::get_if<ShaftBump>(&input.action)) {
     if (!std::isfinite(bump->impulse_nms)) return Refused::kNotFinite;
     Axis& shaft = axes_[a.shaft].axis;
@@ -367,6 +370,7 @@ void Bench::step() noexcept {
   apply_due();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i].ramps.count != 0) follow_ramps(axes_[i]);
+    if (axes_[i].multisine.is_running()) follow_multisine(axes_[i]);
     if (!takes_voltages(i)) axes_[i].command = supervise(i);
   }
   for (std::size_t i = 0; i < axes_.size(); ++i) {

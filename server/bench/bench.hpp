@@ -13,10 +13,15 @@
 #include "server/bench/command_rules.hpp"
 #include "server/bench/control.hpp"
 #include "server/bench/input.hpp"
+#include "server/bench/multisine.hpp"
 #include "server/bench/ramps.hpp"
 #include "server/bench/safe_action.hpp"
 
 namespace drivebench {
+
+template <>
+inline constexpr auto kLaterWords<RunningMultisine> =
+    std::to_array<WordRange>({{.first = 0, .count = sizeof(RunningMultisine) / 8}});
 
 /// The settings of an axis.
 struct AxisSetup {
@@ -160,6 +165,7 @@ class Bench {
     std::size_t feeds = 0;        ///< the other axis on this amplifier; 0: none
     Control control{};
     ParameterRamps ramps{};
+    RunningMultisine multisine{};
     Sample sample{};
     PhaseCommand command{};  ///< for the present tick
     std::uint64_t parameter_changes = 0;
@@ -182,6 +188,10 @@ class Bench {
   bool set_parameter(AxisRuntime& a, std::size_t row, double value) noexcept;
   void change_parameters(AxisRuntime& a, const AxisParameters& p) noexcept;
   void follow_ramps(AxisRuntime& a) noexcept;
+  Refused begin_multisine(AxisRuntime& a, const Multisine& multisine) noexcept;
+  void follow_multisine(AxisRuntime& a) noexcept;
+  /// Sets the quantity of the multisine that runs.
+  void excite(AxisRuntime& a, double value) noexcept;
   Refused inject(AxisRuntime& a, const InjectFault& fault) noexcept;
   Refused change_lease(std::size_t axis, LeaseAction action, Owner owner) noexcept;
   void lose_controller(std::size_t axis, std::uint64_t fault) noexcept;

@@ -1,5 +1,5 @@
-// Changes of a running axis: parameters, at once or on a ramp, and injected faults. Those of a drive are for
-// the axis that owns it.
+// Changes of a running axis: parameters, at once or on a ramp, injected faults, and multisines. Those of a
+// drive are for the axis that owns it.
 #include <cmath>
 #include <span>
 
@@ -9,6 +9,8 @@
 
 namespace drivebench {
 namespace {
+
+constexpr std::size_t kCurrentOffsetRow = find_injectable_fault("current_sensor_offset");
 
 bool breaks_a_shared_rule(const DriveParameters& p) noexcept {
   Problems found;
@@ -91,8 +93,35 @@ Refused Bench::inject(AxisRuntime& a, const InjectFault& fault) noexcept {
   if (fault.row >= kInjectableFaultCount || breaks_a_rule(kInjectableFaults[fault.row], fault.value)) {
     return Refused::kOutOfRange;
   }
+  if (fault.row == kCurrentOffsetRow && a.multisine.is_on(Multisine::Quantity::kCurrentOffset)) {
+    a.multisine = {};
+  }
   a.axis.inject(fault.row, fault.value);
   return Refused::kNot;
+}
+
+Refused Bench::begin_multisine(AxisRuntime& a, const Multisine& multisine) noexcept {
+  if (!std::isfinite(multisine.amplitude)) return Refused::kNotFinite;
+  if (!is_possible(multisine)) return Refused::kOutOfRange;
+  if (a.multisine.is_running()) excite(a, a.multisine.base);
+  const bool is_load = multisine.quantity == Multisine::Quantity::kLoad;
+  a.multisine = begun(multisine, tick_,
+                      is_load ? a.axis.state().load.at(tick_) : a.axis.injected().current_sensor_offset);
+  return Refused::kNot;
+}
+
+void Bench::follow_multisine(AxisRuntime& a) noexcept {
+  const bool is_over = a.multisine.is_over(tick_);
+  excite(a, is_over ? a.multisine.base : value_at(a.multisine, tick_));
+  if (is_over) a.multisine = {};
+}
+
+void Bench::excite(AxisRuntime& a, double value) noexcept {
+  if (a.multisine.is_on(Multisine::Quantity::kLoad)) {
+    a.axis.set_load(value, tick_, 0);
+  } else {
+    a.axis.inject(kCurrentOffsetRow, value);
+  }
 }
 
 }  // namespace drivebench

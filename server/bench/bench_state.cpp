@@ -14,7 +14,7 @@
 namespace drivebench {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3374'6174'7362'7264u;  // "drbstat3"
+constexpr std::uint64_t kMagic = 0x3474'6174'7362'7264u;  // "drbstat4"
 // Far from every number of an axis, because a setup without a shared amplifier has no word for it.
 constexpr std::uint64_t kSharedAmplifier = 0x1'0000'0000u;
 
@@ -111,6 +111,7 @@ void Bench::for_each_block(Self& self, Visitor visit) {
   for (auto& a : self.axes_) {
     visit(a.control);
     visit(a.ramps);
+    visit(a.multisine);
     visit(a.sample);
     AxisState state = a.axis.state();
     visit(state);
@@ -236,7 +237,8 @@ bool Bench::can_go_on(const AxisRuntime& a) const noexcept {
   };
   return a.ramps.count <= kMaxRamps && std::ranges::all_of(a.ramps.ramp, is_ramp) &&
          is_possible_count(c.silent_ticks) && is_possible_count(c.good_commands) && is_possible(c.newest) &&
-         is_possible(c.in_force) && is_possible(c.last);
+         is_possible(c.in_force) && is_possible(c.last) && is_possible(a.multisine) &&
+         a.multisine.start <= tick_;
 }
 
 }  // namespace drivebench

@@ -73,6 +73,23 @@ void get(const Words& w, ShaftBump& bump) noexcept {
   bump.impulse_nms = std::bit_cast<double>(w[0]);
 }
 
+void put(Words& w, const Multisine& m) noexcept {
+  w[0] = std::uint64_t{static_cast<std::uint32_t>(m.quantity)} | std::uint64_t{m.periods} << 32;
+  w[1] = std::bit_cast<std::uint64_t>(m.amplitude);
+  w[2] = m.lines.period_ticks;
+  w[3] = std::uint64_t{m.lines.lowest} | std::uint64_t{m.lines.highest} << 32;
+  w[4] = std::bit_cast<std::uint64_t>(m.lines.ratio);
+}
+void get(const Words& w, Multisine& m) noexcept {
+  m.quantity = static_cast<Multisine::Quantity>(static_cast<std::uint32_t>(w[0]));
+  m.periods = static_cast<std::uint32_t>(w[0] >> 32);
+  m.amplitude = std::bit_cast<double>(w[1]);
+  m.lines = {.period_ticks = static_cast<std::uint32_t>(w[2]),
+             .lowest = static_cast<std::uint32_t>(w[3]),
+             .highest = static_cast<std::uint32_t>(w[3] >> 32),
+             .ratio = std::bit_cast<double>(w[4])};
+}
+
 void put(Words& w, const RefusedCommand& refused) noexcept {
   w[0] = refused.bad_values ? 1 : 0;
 }

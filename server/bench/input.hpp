@@ -9,6 +9,7 @@
 #include "plant/injected_faults.hpp"
 #include "plant/tick.hpp"
 #include "protocols/condition.hpp"
+#include "protocols/multisine.hpp"
 #include "protocols/refusals.hpp"
 #include "protocols/signals/command.hpp"
 
@@ -50,6 +51,16 @@ struct ShaftBump {
   double impulse_nms;  ///< positive like a machine torque
 };
 
+/// A sum of sines on a quantity of the axis, on top of the value in force: what a frequency response is
+/// measured with.
+struct Multisine {
+  enum class Quantity : std::uint32_t { kLoad, kCurrentOffset };
+  Quantity quantity;
+  std::uint32_t periods;
+  double amplitude;  ///< of each line [N·m] or [A]
+  MultisineLines lines;
+};
+
 struct ClearFaults {};  ///< by the owner only
 struct LateTick {};     ///< the tick of this input started late; concerns the whole bench
 struct Overrun {};      ///< late beyond the limit: safe action on every axis
@@ -59,7 +70,7 @@ struct RefusedCommand {
 };
 
 using Action = std::variant<ClearFaults, Command, LeaseAction, LoadChange, ParameterWrite, LateTick, Overrun,
-                            RefusedCommand, InjectFault, ShaftBump>;
+                            RefusedCommand, InjectFault, ShaftBump, Multisine>;
 
 /// Everything that can change a run from outside, with the tick at whose start it takes effect.
 struct Input {
@@ -94,7 +105,8 @@ Input unpack(const PackedInput& packed) noexcept;
 /// Whether an action may be given for a later tick. All others act in the tick in which they come.
 inline bool may_be_scheduled(const Action& action) noexcept {
   return std::holds_alternative<LoadChange>(action) || std::holds_alternative<ParameterWrite>(action) ||
-         std::holds_alternative<InjectFault>(action) || std::holds_alternative<ShaftBump>(action);
+         std::holds_alternative<InjectFault>(action) || std::holds_alternative<ShaftBump>(action) ||
+         std::holds_alternative<Multisine>(action);
 }
 
 /// Whether the input concerns the whole bench: the clock sends it, not a client.
@@ -103,9 +115,9 @@ inline bool concerns_all_axes(const Input& input) noexcept {
 }
 
 /// The reason why the sender has no right to the input while `holder` holds the lease of its axis; 0: no
-/// session does. Loads, parameters, faults and bumps may also come without an owner: from the configuration,
-/// from an experiment, or from a client of a free run. An axis that takes the voltages of another one has no
-/// lease of its own and no commands: the holder is that of the other axis.
+/// session does. Loads, parameters, faults, bumps and multisines may also come without an owner: from the
+/// configuration, from an experiment, or from a client of a free run. An axis that takes the voltages of
+/// another one has no lease of its own and no commands: the holder is that of the other axis.
 Refused check_sender(const Input& input, Owner holder, bool takes_voltages) noexcept;
 
 /// Whether the input gives a lease up.
@@ -140,5 +152,7 @@ inline constexpr std::uint64_t kMaxTick = std::uint64_t{1} << 53;
 /// Largest amounts, in both directions, that configurations and clients may ask for.
 inline constexpr double kMaxLoadNm = 1e6;
 inline constexpr double kMaxImpulseNms = 1e6;
+/// Of a line, so that the sum of all stays within a load or the offset of a sensor.
+inline constexpr double kMaxMultisineAmplitude = 1e4;
 
 }  // namespace drivebench

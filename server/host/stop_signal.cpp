@@ -54,6 +54,10 @@ StopSignal::StopSignal(asio::io_context& io, std::function<void()> on_stop)
   std::signal(SIGTERM, on_signal);
 }
 
+bool StopSignal::has_come() const noexcept {
+  return first_ns.load() != kNever;
+}
+
 StopSignal::~StopSignal() {
   event_.release();  // stays open: a handler in another thread may still write to it
   std::int64_t none = kNever;

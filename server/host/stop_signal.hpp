@@ -13,6 +13,8 @@ class StopSignal {
  public:
   /// `on_stop` is called on the I/O thread.
   StopSignal(asio::io_context& io, std::function<void()> on_stop);
+  /// Whether the first one has come: for work that keeps the I/O thread.
+  bool has_come() const noexcept;
   /// Afterwards the next signal ends the program.
   ~StopSignal();
   StopSignal(const StopSignal&) = delete;

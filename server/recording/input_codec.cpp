@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/bench/multisine.hpp"
+
 namespace drivebench {
 namespace {
 
-// Gates, lease actions and modes have the same numbers here and on the wire.
+// Gates, lease actions, modes and quantities have the same numbers here and on the wire.
 static_assert(static_cast<int>(Gates::kOff) == v1::GATES_OFF);
 static_assert(static_cast<int>(Gates::kVoltage) == v1::GATES_VOLTAGE);
 static_assert(static_cast<int>(Gates::kZeroVoltage) == v1::GATES_ZERO);
@@ -18,6 +20,9 @@ static_assert(static_cast<int>(LegLevel::kLow) == v1::LEG_LEVEL_LOW);
 static_assert(static_cast<int>(LegLevel::kHigh) == v1::LEG_LEVEL_HIGH);
 static_assert(static_cast<int>(LeaseAction::kAcquire) == v1::LeaseRequest::ACTION_ACQUIRE);
 static_assert(static_cast<int>(LeaseAction::kLost) == v1::LeaseRequest::ACTION_LOST);
+static_assert(static_cast<int>(Multisine::Quantity::kLoad) == v1::Multisine::QUANTITY_LOAD);
+static_assert(static_cast<int>(Multisine::Quantity::kCurrentOffset) ==
+              v1::Multisine::QUANTITY_CURRENT_OFFSET);
 
 void write_edges(const LegEdgeList& list, google::protobuf::RepeatedPtrField<v1::LegEdge>& out) {
   for (const LegEdge& edge : list) {
@@ -77,6 +82,16 @@ struct ActionWriter {
     message.mutable_inject()->set_value(fault.value);
   }
   void operator()(const ShaftBump& bump) const { message.mutable_bump()->set_impulse_nms(bump.impulse_nms); }
+  void operator()(const Multisine& m) const {
+    v1::Multisine& out = *message.mutable_multisine();
+    out.set_quantity(static_cast<v1::Multisine::Quantity>(m.quantity));
+    out.set_amplitude(m.amplitude);
+    out.set_period_ticks(m.lines.period_ticks);
+    out.set_periods(m.periods);
+    out.set_lowest(m.lines.lowest);
+    out.set_highest(m.lines.highest);
+    out.set_ratio(m.lines.ratio);
+  }
   void operator()(const ClearFaults&) const { message.set_clear(true); }
   void operator()(const LateTick&) const { message.set_late_tick(true); }
   void operator()(const Overrun&) const { message.set_overrun(true); }
@@ -101,6 +116,19 @@ std::optional<InjectFault> decode_fault(const v1::InjectFault& message) {
   if (row == kInjectableFaultCount) return std::nullopt;
   if (!problem_with(kInjectableFaults[row], message.value()).empty()) return std::nullopt;
   return InjectFault{.row = static_cast<std::uint32_t>(row), .value = message.value()};
+}
+
+std::optional<Multisine> decode_multisine(const v1::Multisine& message) {
+  if (!v1::Multisine::Quantity_IsValid(message.quantity())) return std::nullopt;
+  const Multisine multisine{.quantity = static_cast<Multisine::Quantity>(message.quantity()),
+                            .periods = message.periods(),
+                            .amplitude = message.amplitude(),
+                            .lines = {.period_ticks = message.period_ticks(),
+                                      .lowest = message.lowest(),
+                                      .highest = message.highest(),
+                                      .ratio = message.ratio()}};
+  if (!is_possible(multisine)) return std::nullopt;
+  return multisine;
 }
 
 }  // namespace
@@ -194,6 +222,12 @@ std::optional<Input> decode_input(const v1::Input& message, const ParameterTable
       if (!std::isfinite(message.bump().impulse_nms())) return std::nullopt;
       input.action = ShaftBump{message.bump().impulse_nms()};
       return input;
+    case v1::Input::kMultisine: {
+      const auto multisine = decode_multisine(message.multisine());
+      if (!multisine) return std::nullopt;
+      input.action = *multisine;
+      return input;
+    }
     case v1::Input::kClear:
       input.action = ClearFaults{};
       return input;

@@ -27,6 +27,8 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"sdk", "a step behind the C ABI in process against the bench itself", measure_sdk},
     {"experiment", "data of an experiment against a copy of the same bytes", measure_experiment},
     {"identification", "an induction motor, 600 random motors", measure_identification},
+    {"suite", "a regression suite over presets and over a program", measure_suite},
+    {"merge", "the reports of 100,000 results of a suite", measure_merge},
     {"realtime", "lateness of the pacers and of the server", measure_realtime},
     {"recorder", "ten axes at 20 kHz into the recorder", measure_recorder},
     {"can", "encoding and decoding of a CAN frame", measure_can_codec},

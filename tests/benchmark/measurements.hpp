@@ -40,6 +40,11 @@ std::vector<Row> measure_experiment(const Plan& plan);
 /// The identification of an induction motor, and of 600 random motors with their experiments.
 std::vector<Row> measure_identification(const Plan& plan);
 
+/// `drivebench test`: its speed over presets, on one core and on two, what checks and a single case cost.
+std::vector<Row> measure_suite(const Plan& plan);
+/// `drivebench test --merge` of 100,000 results: time, memory and the size of the page.
+std::vector<Row> measure_merge(const Plan& plan);
+
 /// Encoding and decoding of one CAN frame.
 std::vector<Row> measure_can_codec(const Plan& plan);
 /// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.

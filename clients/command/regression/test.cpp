@@ -16,6 +16,7 @@
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/failures/shrink_case.hpp"
 #include "clients/command/regression/pages/html_report.hpp"
+#include "clients/command/regression/slurm.hpp"
 #include "clients/command/regression/stored_results.hpp"
 #include "clients/command/regression/suite_run.hpp"
 #include "clients/regression/reports/reports.hpp"
@@ -289,6 +290,28 @@ int run_and_report(const TestOptions& options, const std::filesystem::path& suit
   return code;
 }
 
+/// Prints how many of the cases have a result, and what becomes of the job that was submitted for them.
+/// Returns 0 if all have one, and none is to run again.
+int print_status(const TestOptions& options, const std::filesystem::path& suite) {
+  StoredResults stored(options.program, {options.results_folder});
+  const Work work = work_of(chosen_cases(options, suite), &stored);
+  regression::Totals totals;
+  for (const CaseResult& result : work.results) {
+    if (!result.name.empty()) totals.add(result);
+  }
+  fmt::print("{} of {} cases have a result: {}\n", work.known(), work.results.size(),
+             regression::totals_text(totals));
+  if (const std::string state = slurm_state(options.results_folder); !state.empty())
+    fmt::print("{}\n", state);
+  return work.places.empty() ? kExitOk : kExitFailed;
+}
+
+/// A mistake in a case is told before anything is submitted.
+int submit(const TestOptions& options, const std::filesystem::path& suite) {
+  chosen_cases(options, suite);
+  return submit_to_slurm(options, suite);
+}
+
 }  // namespace
 
 int exit_code_of(const regression::Totals& totals) {
@@ -308,6 +331,8 @@ int run_test(const TestOptions& options) {
     print_list(chosen_cases(options, suite));
     return kExitOk;
   }
+  if (options.status) return print_status(options, suite);
+  if (options.slurm_tasks != 0) return submit(options, suite);
   if (!shrink.file.empty()) {
     const std::vector<Case> cases = chosen_cases(options, suite);
     if (cases.size() != 1) {

@@ -26,6 +26,8 @@ struct TestOptions {
   std::vector<std::string> merged_folders{};  ///< nothing runs: the results are there
   std::string shrunk_file{};                  ///< takes a smaller case that fails in the same way
   std::size_t shrink_runs = 300;              ///< at most
+  unsigned slurm_tasks = 0;  ///< an array of so many tasks is submitted; 0: the cases run here
+  bool status = false;       ///< nothing runs: how far the results are
   bool tap = false;
   bool github = false;
 };

@@ -81,6 +81,20 @@ void add_reports(CLI::App& sub, TestOptions& o) {
   sub.add_option("--keep", o.keep_folder,
                  "keep a bundle of each case that has not passed in this folder, for `drivebench rerun`")
       ->type_name("FOLDER");
+  begin_group(sub, "Slurm");
+  auto* const slurm =
+      sub.add_option("--slurm", o.slurm_tasks,
+                     "run nothing here: submit the cases to Slurm as an array of so many tasks, each "
+                     "with --jobs CPUs; sbatch reads SBATCH_PARTITION and others")
+          ->type_name("TASKS")
+          ->check(CLI::Range(1U, 1'000'000U))
+          ->needs(results);
+  auto* const status =
+      sub.add_flag("--status", o.status,
+                   "run nothing: print how many cases have a result, and the state of the Slurm job; "
+                   "exit code 1 while one is missing")
+          ->needs(results)
+          ->excludes(slurm);
   begin_group(sub, "A smaller case");
   auto* const shrink = sub.add_option("--shrink", o.shrunk_file,
                                       "make the one failing case that is chosen, or a bundle in the place of "
@@ -104,6 +118,11 @@ void add_reports(CLI::App& sub, TestOptions& o) {
   for (const char* other :
        {"--list", "--shard", "--merge", "--keep", "--junit", "--json", "--html", "--tap", "--github"})
     shrink->excludes(sub.get_option(other));
+  for (const char* other :
+       {"--list", "--shard", "--timing", "--junit", "--json", "--html", "--tap", "--github"}) {
+    slurm->excludes(sub.get_option(other));
+    status->excludes(sub.get_option(other));
+  }
 }
 
 }  // namespace
@@ -118,6 +137,7 @@ void add_regression_commands(CommandLine& line) {
       "  drivebench test reference --list\n"
       "  drivebench test reference --jobs 2 --junit report.xml --keep kept\n"
       "  drivebench test hil --filter servo --shrink hil/small.toml\n"
+      "  drivebench test hil --results /shared/results --slurm 32\n"
       "Exit codes: 0 all passed or were skipped, 1 one failed or had an error, 2 usage or configuration, 4 "
       "none failed, but real time was not kept.");
   add_rerun_command(line);

@@ -17,6 +17,15 @@ std::uint64_t ticks_in(double seconds, double period_s) noexcept {
 
 }  // namespace
 
+MultisineLines Excitation::lines(double tick_s) const noexcept {
+  const auto ticks = static_cast<std::uint32_t>(
+      std::clamp(std::round(period_s / tick_s), 0.0, static_cast<double>(kLongestMultisinePeriod) + 1.0));
+  return {.period_ticks = ticks,
+          .lowest = nearest_multiple(from_hz, ticks, tick_s),
+          .highest = nearest_multiple(to_hz, ticks, tick_s),
+          .ratio = ratio};
+}
+
 std::optional<double> CheckSpec::number(std::string_view key) const noexcept {
   for (const auto& [each, value] : numbers) {
     if (each == key) return value;
@@ -114,6 +123,7 @@ Finding Check::finish() const {
   finding.unit = found.unit;
   finding.sentence = std::move(found.sentence);
   finding.lines = std::move(found.lines);
+  finding.response = std::move(found.response);
   return finding;
 }
 

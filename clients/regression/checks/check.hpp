@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "clients/regression/checks/frequency_response.hpp"
 #include "protocols/condition.hpp"
+#include "protocols/multisine.hpp"
 #include "protocols/signals/catalogue.hpp"
 
 namespace drivebench::regression {
@@ -22,6 +24,21 @@ struct CaseCondition {
   NamedCondition named;
 };
 
+/// The multisine of a step, as its case file has it.
+struct Excitation {
+  bool is_load;      ///< else the offset of the current sensors
+  double amplitude;  ///< of each line
+  double begin_s;    ///< of the bench's time, or since the trigger of its step
+  bool has_trigger;
+  double period_s;
+  double periods;
+  double from_hz;
+  double to_hz;
+  double ratio;
+
+  MultisineLines lines(double tick_s) const noexcept;
+};
+
 /// A check as its case file asks for it.
 struct CheckSpec {
   const CheckKind* kind = nullptr;
@@ -31,10 +48,13 @@ struct CheckSpec {
   const Signal* signal = nullptr;
   double from_s = 0.0;           ///< of the window; with `after`, since the trigger
   std::optional<double> to_s{};  ///< empty: to the end
+  bool has_window = false;       ///< from_s or after stands in the case file
   std::optional<CaseCondition> after{};
   std::optional<CaseCondition> condition{};
   std::string fault{};
   std::string golden_file{};
+  std::optional<std::size_t> step{};                           ///< that excites what the check measures
+  std::optional<Excitation> excitation{};                      ///< of that step
   std::vector<std::pair<std::string_view, double>> numbers{};  ///< the other keys
 
   std::optional<double> number(std::string_view key) const noexcept;
@@ -84,9 +104,10 @@ struct Finding {
   double at_s = std::numeric_limits<double>::quiet_NaN();  ///< where it was worst
   double from_s = 0.0;                                     ///< the window, in the time of the bench
   double to_s = 0.0;
-  std::vector<double> lines{};  ///< limits of the signal, for a plot
-  std::string sentence{};       ///< for people
-  int line = 0;                 ///< in the case file
+  std::vector<double> lines{};            ///< limits of the signal, for a plot
+  std::vector<ResponsePoint> response{};  ///< of a frequency_response
+  std::string sentence{};                 ///< for people
+  int line = 0;                           ///< in the case file
 };
 
 /// Sees the samples of every tick in their order and judges them at the end.
@@ -113,6 +134,7 @@ class Check {
     std::string_view unit;
     std::string sentence;
     std::vector<double> lines{};
+    std::vector<ResponsePoint> response{};
   };
 
   double seconds(std::uint64_t ticks) const noexcept { return static_cast<double>(ticks) * facts_period_s_; }

@@ -14,8 +14,8 @@ namespace drivebench::regression {
 std::span<const CheckKind> check_kinds() noexcept {
   static const std::vector<CheckKind> kAll = [] {
     std::vector<CheckKind> all;
-    for (const auto family :
-         {value_checks(), step_checks(), spectrum_checks(), condition_checks(), tube_checks()})
+    for (const auto family : {value_checks(), step_checks(), spectrum_checks(), response_checks(),
+                              condition_checks(), tube_checks()})
       all.insert(all.end(), family.begin(), family.end());
     return all;
   }();

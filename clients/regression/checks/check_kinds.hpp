@@ -23,7 +23,7 @@ struct NumberKey {
 };
 
 /// What a check watches.
-enum class Watches { kSignal, kCondition, kFault, kGolden };
+enum class Watches { kSignal, kCondition, kFault, kGolden, kResponse };
 
 /// A kind of check: its keys, and how it is made.
 struct CheckKind {
@@ -53,6 +53,7 @@ std::string problem_on_bench(const CheckSpec& spec, const RunFacts& facts);
 std::span<const CheckKind> value_checks() noexcept;      ///< bounds, rms, ripple, steady_state
 std::span<const CheckKind> step_checks() noexcept;       ///< settles, overshoot, rise_time
 std::span<const CheckKind> spectrum_checks() noexcept;   ///< thd
+std::span<const CheckKind> response_checks() noexcept;   ///< frequency_response
 std::span<const CheckKind> condition_checks() noexcept;  ///< always, never, eventually, reaction, fault_count
 std::span<const CheckKind> tube_checks() noexcept;       ///< tube
 

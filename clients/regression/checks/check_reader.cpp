@@ -11,6 +11,7 @@ namespace drivebench::regression {
 namespace {
 
 constexpr double kLatest_s = 1e9;
+constexpr std::int64_t kMostSteps = 1000;
 
 const CheckKind* read_kind(KeyTable& table) {
   table.require("kind");
@@ -43,6 +44,10 @@ void read_watched(KeyTable& table, const std::filesystem::path& folder, CheckSpe
   } else if (spec.kind->watches == Watches::kFault) {
     table.require("fault");
     spec.fault = table.text("fault").value_or("");
+  } else if (spec.kind->watches == Watches::kResponse) {
+    if (table.has("signal")) spec.signal = read_signal(table);
+    table.node("signal");  // may stand here
+    if (const auto step = table.integer("step", 0, kMostSteps)) spec.step = static_cast<std::size_t>(*step);
   } else {
     spec.signal = read_signal(table);
   }
@@ -59,6 +64,8 @@ bool is_complete(const CheckSpec& spec) {
       return !spec.fault.empty();
     case Watches::kGolden:
       return spec.signal != nullptr && !spec.golden_file.empty();
+    case Watches::kResponse:
+      return true;
     case Watches::kSignal:
       break;
   }
@@ -68,6 +75,7 @@ bool is_complete(const CheckSpec& spec) {
 void read_window(KeyTable& table, CheckSpec& spec) {
   spec.from_s = table.number("from_s", 0.0, kLatest_s).value_or(0.0);
   spec.to_s = table.number("to_s", 0.0, kLatest_s);
+  spec.has_window = table.has("from_s") || table.has("after");
   if (spec.to_s && *spec.to_s < spec.from_s) {
     table.report("to_s",
                  fmt::format("is {:.6g} but must not lie before from_s, {:.6g}", *spec.to_s, spec.from_s));
@@ -80,7 +88,8 @@ void read_window(KeyTable& table, CheckSpec& spec) {
 std::string default_name(const CheckSpec& spec) {
   if (spec.condition) return fmt::format("{} {}", spec.kind->name, spec.condition->text);
   if (spec.signal != nullptr) return fmt::format("{} {}", spec.kind->name, spec.signal->name);
-  return fmt::format("{} {}", spec.kind->name, spec.fault);
+  if (!spec.fault.empty()) return fmt::format("{} {}", spec.kind->name, spec.fault);
+  return std::string(spec.kind->name);
 }
 
 }  // namespace

@@ -21,21 +21,42 @@ double number_of(const Json& value) {
   return value.is_null() ? std::nan("") : value.get<double>();
 }
 
+/// Rows of frequency [Hz], gain [dB], phase [deg], relative standard error.
+Json response_json(const std::vector<ResponsePoint>& points) {
+  Json rows = Json::array();
+  for (const ResponsePoint& p : points)
+    rows.push_back({p.hz, p.gain_db, p.phase_deg, p.error});
+  return rows;
+}
+
+std::vector<ResponsePoint> response_of(const Json& rows) {
+  std::vector<ResponsePoint> points;
+  for (const Json& row : rows) {
+    points.push_back({.hz = row.at(0).get<double>(),
+                      .gain_db = row.at(1).get<double>(),
+                      .phase_deg = row.at(2).get<double>(),
+                      .error = row.at(3).get<double>()});
+  }
+  return points;
+}
+
 Json finding_json(const Finding& finding) {
-  return {{"name", finding.name},
-          {"kind", finding.kind},
-          {"axis", finding.axis},
-          {"signal", finding.signal},
-          {"passed", finding.passed},
-          {"applied", finding.applied},
-          {"measured", number(finding.measured)},
-          {"limit", number(finding.limit)},
-          {"unit", finding.unit},
-          {"at_s", number(finding.at_s)},
-          {"from_s", finding.from_s},
-          {"to_s", finding.to_s},
-          {"line", finding.line},
-          {"sentence", finding.sentence}};
+  Json object = {{"name", finding.name},
+                 {"kind", finding.kind},
+                 {"axis", finding.axis},
+                 {"signal", finding.signal},
+                 {"passed", finding.passed},
+                 {"applied", finding.applied},
+                 {"measured", number(finding.measured)},
+                 {"limit", number(finding.limit)},
+                 {"unit", finding.unit},
+                 {"at_s", number(finding.at_s)},
+                 {"from_s", finding.from_s},
+                 {"to_s", finding.to_s},
+                 {"line", finding.line},
+                 {"sentence", finding.sentence}};
+  if (!finding.response.empty()) object["response"] = response_json(finding.response);
+  return object;
 }
 
 Finding finding_of(const Json& object) {
@@ -54,6 +75,7 @@ Finding finding_of(const Json& object) {
   object.at("to_s").get_to(finding.to_s);
   object.at("line").get_to(finding.line);
   object.at("sentence").get_to(finding.sentence);
+  if (object.contains("response")) finding.response = response_of(object.at("response"));
   return finding;
 }
 

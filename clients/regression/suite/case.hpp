@@ -23,7 +23,7 @@ struct DeviceUnderTest {
   std::string preset{};
   std::vector<std::pair<std::string, double>> gains{};
   std::vector<std::string> command{};
-  enum class Link { kUnix, kTcp, kSharedMemory };
+  enum class Link { kUnix, kTcp, kSharedMemory, kCan, kModbus };
   Link link = Link::kUnix;  ///< of a program
   std::string axis = "0";
   double time_limit_s = 60.0;  ///< of the wall clock, for a program
@@ -31,7 +31,7 @@ struct DeviceUnderTest {
 
 /// An input that the bench gives itself: at a time, or on a condition.
 struct Step {
-  enum class Action { kLoad, kParameter, kFault, kImpulse };
+  enum class Action { kLoad, kParameter, kFault, kImpulse, kMultisine };
   int line = 0;
   std::string axis = "0";
   std::optional<double> at_s{};
@@ -42,6 +42,8 @@ struct Step {
   std::string name{};  ///< of the parameter or the fault
   ConfigNode value{};  ///< a scalar; of a parameter also a word or a switch
   double ramp_s = 0.0;
+  ConfigNode multisine{};                  ///< the table of the event, without its time
+  std::optional<Excitation> excitation{};  ///< what checks need of it
 };
 
 /// One case: a bench, what drives it, what happens to it, and what must hold.

@@ -9,6 +9,7 @@
 
 #include "clients/regression/checks/check_reader.hpp"
 #include "clients/regression/suite/matrix.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::regression {
 namespace fs = std::filesystem;
@@ -33,15 +34,22 @@ void flatten(const ConfigNode& table, const std::string& prefix, KeyTable& gains
 
 void read_link(KeyTable& table, DeviceUnderTest& device) {
   using Link = DeviceUnderTest::Link;
+  static constexpr auto kWords =
+      std::to_array<std::pair<std::string_view, Link>>({{"unix", Link::kUnix},
+                                                        {"tcp", Link::kTcp},
+                                                        {"shm", Link::kSharedMemory},
+                                                        {"can", Link::kCan},
+                                                        {"modbus", Link::kModbus}});
   const auto word = table.text("link");
   if (!word) return;
   if (device.kind != DeviceUnderTest::Kind::kProgram) table.report("link", "belongs to a command");
-  if (*word == "shm") {
-    device.link = Link::kSharedMemory;
-  } else if (*word == "tcp") {
-    device.link = Link::kTcp;
-  } else if (*word != "unix") {
-    table.report("link", "is \"" + *word + "\" but must be \"unix\", \"tcp\" or \"shm\"");
+  const auto found = std::ranges::find(kWords, *word, &std::pair<std::string_view, Link>::first);
+  if (found != kWords.end()) {
+    device.link = found->second;
+  } else {
+    table.report("link",
+                 fmt::format("is \"{}\" but must be \"unix\", \"tcp\", \"shm\", \"can\" or \"modbus\"",
+                             printable(*word)));
   }
 }
 
@@ -71,6 +79,36 @@ DeviceUnderTest read_device(KeyTable& table) {
   return device;
 }
 
+/// What a check needs of a multisine; the bench judges the values.
+std::optional<Excitation> read_multisine(KeyTable& table, Step& step) {
+  std::optional<KeyTable> inner = table.table("multisine");
+  if (!inner) return std::nullopt;
+  step.multisine = *table.node("multisine");
+  const auto load_nm = inner->number("load_nm");
+  const auto offset_a = inner->number("current_offset_a");
+  if (inner->has("load_nm") == inner->has("current_offset_a")) {
+    inner->report("load_nm", "or else current_offset_a must stand in a multisine");
+  }
+  for (const std::string_view key : {"period_s", "periods", "from_hz", "to_hz"})
+    inner->require(key);
+  const auto period_s = inner->number("period_s", 0.0);
+  const auto periods = inner->integer("periods", 1, kMostMultisinePeriods);
+  const auto from_hz = inner->number("from_hz", 0.0);
+  const auto to_hz = inner->number("to_hz", 0.0);
+  const auto ratio = inner->number("ratio", kLeastMultisineRatio, kMostMultisineRatio);
+  inner->finish();
+  if ((!load_nm && !offset_a) || !period_s || !periods || !from_hz || !to_hz) return std::nullopt;
+  return Excitation{.is_load = load_nm.has_value(),
+                    .amplitude = load_nm.value_or(offset_a.value_or(0.0)),
+                    .begin_s = step.at_s.value_or(step.delay_s),
+                    .has_trigger = step.when.has_value(),
+                    .period_s = *period_s,
+                    .periods = static_cast<double>(*periods),
+                    .from_hz = *from_hz,
+                    .to_hz = *to_hz,
+                    .ratio = ratio.value_or(kDefaultMultisineRatio)};
+}
+
 /// Exactly one of the actions. The value of a parameter or a fault is for the bench to judge.
 void read_action(KeyTable& table, Step& step) {
   struct Row {
@@ -80,7 +118,8 @@ void read_action(KeyTable& table, Step& step) {
   static constexpr auto kActions = std::to_array<Row>({{"load_nm", Step::Action::kLoad},
                                                        {"parameter", Step::Action::kParameter},
                                                        {"fault", Step::Action::kFault},
-                                                       {"impulse_nms", Step::Action::kImpulse}});
+                                                       {"impulse_nms", Step::Action::kImpulse},
+                                                       {"multisine", Step::Action::kMultisine}});
   const bool has_name = table.has("parameter") || table.has("fault");
   std::size_t count = 0;
   for (const Row& row : kActions) {
@@ -90,7 +129,9 @@ void read_action(KeyTable& table, Step& step) {
     }
     ++count;
     step.action = row.action;
-    if (row.action == Step::Action::kParameter || row.action == Step::Action::kFault) {
+    if (row.action == Step::Action::kMultisine) {
+      step.excitation = read_multisine(table, step);
+    } else if (row.action == Step::Action::kParameter || row.action == Step::Action::kFault) {
       step.name = table.text(row.key).value_or("");
     } else if (table.number(row.key)) {
       step.value = *table.node(row.key);
@@ -98,8 +139,8 @@ void read_action(KeyTable& table, Step& step) {
   }
   if (count != 1) {
     table.report("load_nm",
-                 fmt::format("is one of load_nm, parameter, fault and impulse_nms, of which a step has "
-                             "exactly one; here are {}",
+                 fmt::format("is one of load_nm, parameter, fault, impulse_nms and multisine, of which a "
+                             "step has exactly one; here are {}",
                              count));
   }
   const ConfigNode* const value = table.node("value");
@@ -131,6 +172,56 @@ Step read_step(KeyTable& table) {
   }
   table.finish();
   return step;
+}
+
+/// The step of a case whose multisine a check is about; null after a problem.
+const Step* exciting_step(KeyTable& root, const Case& c, const CheckSpec& check) {
+  const auto excites = [](const Step& step) { return step.action == Step::Action::kMultisine; };
+  const auto report = [&](const std::string& rule) {
+    root.report("check", fmt::format("\"{}\" (line {}) {}", check.name, check.line, rule));
+    return nullptr;
+  };
+  if (check.step) {
+    if (*check.step < c.steps.size() && excites(c.steps[*check.step])) return &c.steps[*check.step];
+    return report(fmt::format("has step {}, which is no step with a multisine", *check.step));
+  }
+  const auto count = std::ranges::count_if(c.steps, excites);
+  if (count == 1) return &*std::ranges::find_if(c.steps, excites);
+  return report(count == 0 ? "needs a step with a multisine"
+                           : "needs the number of its step, because several have a multisine");
+}
+
+/// Whether a step beside this one changes the offset of the current sensors of its axis.
+bool changes_offset_again(const Case& c, const Step& exciting) {
+  return std::ranges::any_of(c.steps, [&exciting](const Step& step) {
+    const bool is_offset = (step.excitation && !step.excitation->is_load) ||
+                           (step.action == Step::Action::kFault && step.name == "current_sensor_offset");
+    return &step != &exciting && step.axis == exciting.axis && is_offset;
+  });
+}
+
+/// Gives a check the multisine of its step, the axis of the step, and without a window of its own that from
+/// the second period of the multisine to its end.
+void excite(KeyTable& root, const Case& c, CheckSpec& check) {
+  const Step* const step = exciting_step(root, c, check);
+  if (step == nullptr || !step->excitation) return;
+  const Excitation& excitation = *step->excitation;
+  check.excitation = excitation;
+  check.axis = step->axis;
+  const auto report = [&](std::string_view rule) {
+    root.report("check", fmt::format("\"{}\" (line {}) {}", check.name, check.line, rule));
+  };
+  if (!excitation.is_load && changes_offset_again(c, *step)) {
+    report("has a second step that changes the offset of the current sensors, so that it is not known");
+  }
+  if (step->when && !excitation.is_load && check.has_window) {
+    report("cannot have a window of its own: its step begins on a condition");
+  }
+  if (check.has_window) return;
+  if (step->for_s > 0.0) return report("cannot find its step, which has for_s");
+  check.after = step->when;
+  check.from_s = excitation.begin_s + excitation.period_s;
+  check.to_s = excitation.begin_s + excitation.periods * excitation.period_s;
 }
 
 void refuse_equal_names(KeyTable& root, const std::vector<CheckSpec>& checks) {
@@ -180,6 +271,9 @@ Case read_case(const ConfigNode& node, const fs::path& file, const std::string& 
     if (!check) continue;
     if (check->axis.empty()) check->axis = c.device.axis;
     c.checks.push_back(std::move(*check));
+  }
+  for (CheckSpec& check : c.checks) {
+    if (check.kind->watches == Watches::kResponse) excite(root, c, check);
   }
   check_whole(root, c);
   root.finish();

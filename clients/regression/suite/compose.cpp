@@ -93,6 +93,7 @@ class Composer {
     for (ConfigNode& axis : axes())
       merge_motor(axis);
     make_portable();
+    add_link();
     set_mode();
     if (case_.seed) set(bench_table(), "seed", *case_.seed);
     for (const Step& step : case_.steps)
@@ -192,6 +193,23 @@ class Composer {
       remove(bench_, table);
   }
 
+  /// A bus of its own for the device under test, at a port that the system chooses. Nodes of CAN count like
+  /// units of Modbus: from 1, in the order of the axes.
+  void add_link() {
+    if (case_.device.link == DeviceUnderTest::Link::kModbus) {
+      ConfigNode& modbus = child_or_new(bench_, "modbus", Kind::kTable);
+      set(modbus, "port", std::int64_t{0});
+      set(modbus, "allow_writes", true);
+    }
+    if (case_.device.link != DeviceUnderTest::Link::kCan) return;
+    ConfigNode bus = table_node("");
+    set(bus, "backend", std::string("slcan"));
+    set(bus, "channel", std::string("tcp:127.0.0.1:0"));
+    child_or_new(bench_, "can", Kind::kArray).children.push_back(std::move(bus));
+    for (std::size_t i = 0; i < axes().size(); ++i)
+      set(axes()[i], "can_node", static_cast<std::int64_t>(i) + 1);
+  }
+
   /// In lockstep the delay and the arming of the bench's own mode stay.
   void set_mode() {
     ConfigNode& bench = bench_table();
@@ -226,6 +244,8 @@ class Composer {
         return "fault";
       case Step::Action::kImpulse:
         return "bump";
+      case Step::Action::kMultisine:
+        return "multisine";
       case Step::Action::kLoad:
         break;
     }
@@ -233,6 +253,7 @@ class Composer {
   }
 
   static void add_action(ConfigNode& event, const Step& step) {
+    if (step.action == Step::Action::kMultisine) return merge(event, step.multisine);
     const std::string key = step.action == Step::Action::kLoad      ? "load_nm"
                             : step.action == Step::Action::kImpulse ? "impulse_nms"
                                                                     : "value";

@@ -15,6 +15,10 @@ std::string condition_text(const Trigger& trigger, const EventPlace& place) {
   return trigger.axis == place.axis ? text : place.names[trigger.axis] + "." + text;
 }
 
+std::string_view amplitude_key(Multisine::Quantity quantity) {
+  return quantity == Multisine::Quantity::kLoad ? "load_nm" : "current_offset_a";
+}
+
 /// Writes an event as a table.
 struct EventWriter {
   std::string& text;
@@ -53,6 +57,18 @@ struct EventWriter {
     begin("bump");
     line("impulse_nms", real_text(bump.impulse_nms));
   }
+  void operator()(const Multisine& m) const {
+    begin("multisine");
+    line(amplitude_key(m.quantity), real_text(m.amplitude));
+    line("period_ticks", std::to_string(m.lines.period_ticks));
+    line("periods", std::to_string(m.periods));
+    line("from_hz", real_text(frequency_hz(m.lines.lowest, m.lines)));
+    line("to_hz", real_text(frequency_hz(m.lines.highest, m.lines)));
+    line("ratio", real_text(m.lines.ratio));
+  }
+  double frequency_hz(std::uint32_t multiple, const MultisineLines& lines) const {
+    return multiple / (static_cast<double>(lines.period_ticks) * static_cast<double>(place.period_ns) * 1e-9);
+  }
   template <class Other>
   void operator()(const Other&) const {}  // a configuration has no other actions
 };
@@ -77,6 +93,11 @@ struct ActionText {
   }
   std::string operator()(const ShaftBump& bump) const {
     return "bump " + shortest(bump.impulse_nms) + " N*m*s";
+  }
+  std::string operator()(const Multisine& m) const {
+    return "multisine of " + std::to_string(lines_of(m.lines).count) + " lines, " +
+           std::string(amplitude_key(m.quantity)) + " = " + shortest(m.amplitude) + ", for " +
+           std::to_string(m.periods) + " periods of " + std::to_string(m.lines.period_ticks) + " ticks";
   }
   template <class Other>
   std::string operator()(const Other&) const {

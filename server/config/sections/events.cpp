@@ -17,6 +17,8 @@
 namespace drivebench {
 namespace {
 
+constexpr double kMaxHz = 1e9;
+
 constexpr auto kFaultNames = [] {
   std::array<std::string_view, kInjectableFaultCount> names{};
   for (std::size_t row = 0; row < names.size(); ++row)
@@ -45,6 +47,70 @@ void read_bumps(StrictTable& axis, const EventPlace& place, std::vector<AxisEven
     table.finish();
     events.push_back(
         {.tick = time.tick, .action = ShaftBump{impulse_nms.value_or(0.0)}, .trigger = time.trigger});
+  }
+}
+
+/// The lines of a multisine from its frequencies; a rule that they break is a problem.
+MultisineLines read_lines(StrictTable& table, const EventPlace& place) {
+  const auto period = read_ticks(table, "period_s", "period_ticks", place.period_ns);
+  const auto from_hz = table.real("from_hz", 0.0, kMaxHz);
+  const auto to_hz = table.real("to_hz", 0.0, kMaxHz);
+  const auto ratio = table.real("ratio", kLeastMultisineRatio, kMostMultisineRatio);
+  if (!table.has("period_ticks")) table.require("period_s");
+  table.require("from_hz");
+  table.require("to_hz");
+  if (!period || !from_hz || !to_hz) return {};
+  const std::string_view period_key = table.has("period_s") ? "period_s" : "period_ticks";
+  if (*period < kShortestMultisinePeriod || *period > kLongestMultisinePeriod) {
+    table.report(period_key, "comes to " + std::to_string(*period) + " ticks but must come to " +
+                                 std::to_string(kShortestMultisinePeriod) + " to " +
+                                 std::to_string(kLongestMultisinePeriod));
+    return {};
+  }
+  const auto ticks = static_cast<std::uint32_t>(*period);
+  const double tick_s = static_cast<double>(place.period_ns) * 1e-9;
+  const MultisineLines lines{.period_ticks = ticks,
+                             .lowest = nearest_multiple(*from_hz, ticks, tick_s),
+                             .highest = nearest_multiple(*to_hz, ticks, tick_s),
+                             .ratio = ratio.value_or(kDefaultMultisineRatio)};
+  const double least_hz = 1.0 / (static_cast<double>(ticks) * tick_s);
+  const double half_rate_hz = 0.5 / tick_s;
+  if (lines.lowest < 1) {
+    table.report("from_hz", "is " + shortest(*from_hz) + " but must come to one period in period_s, " +
+                                shortest(least_hz) + " Hz, at least");
+  } else if (lines.highest < lines.lowest) {
+    table.report("to_hz", "is " + shortest(*to_hz) + " but must not lie below from_hz");
+  } else if (lines.highest >= (ticks + 1) / 2) {
+    table.report("to_hz", "is " + shortest(*to_hz) + " but must lie below half the sample rate, " +
+                              shortest(half_rate_hz) + " Hz");
+  } else if (lines_of(lines).count > kMostMultisineLines) {
+    table.report(
+        table.has("ratio") ? "ratio" : "to_hz",
+        "makes more than " + std::to_string(kMostMultisineLines) + " lines: a larger ratio makes fewer");
+  }
+  return lines;
+}
+
+void read_multisines(StrictTable& axis, const EventPlace& place, std::vector<AxisEvent>& events) {
+  for (StrictTable& table : axis.tables("multisine", kMaxAxisEvents)) {
+    const EventTime time = read_event_time(table, place);
+    const auto load_nm = table.real("load_nm", -kMaxMultisineAmplitude, kMaxMultisineAmplitude);
+    const auto offset_a = table.real("current_offset_a", -kMaxMultisineAmplitude, kMaxMultisineAmplitude);
+    if (table.has("load_nm") == table.has("current_offset_a")) {
+      table.report("load_nm",
+                   "or else current_offset_a must stand in a multisine, with the amplitude of each line");
+    }
+    const auto periods = table.integer("periods", 1, kMostMultisinePeriods);
+    table.require("periods");
+    const MultisineLines lines = read_lines(table, place);
+    table.finish();
+    events.push_back({.tick = time.tick,
+                      .action = Multisine{.quantity = load_nm ? Multisine::Quantity::kLoad
+                                                              : Multisine::Quantity::kCurrentOffset,
+                                          .periods = static_cast<std::uint32_t>(periods.value_or(1)),
+                                          .amplitude = load_nm.value_or(offset_a.value_or(0.0)),
+                                          .lines = lines},
+                      .trigger = time.trigger});
   }
 }
 
@@ -186,7 +252,7 @@ int rank_of(const Action& action) {
   if (std::holds_alternative<LoadChange>(action)) return 0;
   if (std::holds_alternative<ParameterWrite>(action)) return 1;
   if (const auto* fault = std::get_if<InjectFault>(&action)) return fault->value == 0.0 ? 2 : 3;
-  return 4;
+  return std::holds_alternative<ShaftBump>(action) ? 4 : 5;
 }
 
 }  // namespace
@@ -206,6 +272,7 @@ std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, S
   read_settings(axis, p, shared, place, events);
   read_faults(axis, shared, place, events);
   read_bumps(axis, place, events);
+  read_multisines(axis, place, events);
   return in_order(std::move(events));
 }
 

@@ -15,8 +15,8 @@ struct SharedParts {
   bool drive = false;
 };
 
-/// Reads [[axis.load]], [[axis.set]], [[axis.fault]] and [[axis.bump]]. `p` are the initial parameters, or
-/// null if they are wrong: then only the keys of [[axis.set]] are checked.
+/// Reads [[axis.load]], [[axis.set]], [[axis.fault]], [[axis.bump]] and [[axis.multisine]]. `p` are the
+/// initial parameters, or null if they are wrong: then only the keys of [[axis.set]] are checked.
 std::vector<AxisEvent> read_events(StrictTable& axis, const AxisParameters* p, SharedParts shared,
                                    const EventPlace& place);
 

@@ -14,7 +14,7 @@ import zipfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
     from regression_case import COMMAND, DRIVES, FAILED, OK, PROGRAM, SERVO, USAGE, RegressionTest
-    from wire_client import PATIENCE_S, SERVER
+    from wire_client import PATIENCE_S, REPOSITORY, SERVER
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
@@ -197,6 +197,26 @@ load_nm = 0.01
                 done = subprocess.run([SERVER, bench, "--port", "0", *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
                 self.assertEqual(done.returncode, USAGE)
                 self.assertIn(rule, done.stderr)
+
+    def test_a_signal_ends_a_server_that_repeats_a_run(self):
+        """Catches: a server that repeats its run to the end first, however long that is. Substeps make it long."""
+        bench, recording = self.folder / "bench.toml", self.folder / "run.mcap"
+        text = (REPOSITORY / "configs/benches/dc-a.toml").read_text(encoding="utf-8")
+        bench.write_text(text.replace("../motors", str(REPOSITORY / "configs/motors")).replace("period_us = 500", "period_us = 500\nsubsteps = 500"),
+                         encoding="utf-8")
+        server = (SERVER, bench, "--port", "0")
+        subprocess.run([*server, "--duration", "10", "--record", recording], capture_output=True, timeout=PATIENCE_S, check=True)
+        with subprocess.Popen([*server, "--mode", "lockstep", "--repeat", recording, "--until", "20000"], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True) as running:
+            caught = 0
+            while not caught >> (signal.SIGTERM - 1) & 1:  # the handler is there before the repetition begins
+                status = pathlib.Path(f"/proc/{running.pid}/status").read_text(encoding="utf-8")
+                caught = int(re.search(r"SigCgt:\s*([0-9a-f]+)", status)[1], 16)
+            running.terminate()
+            out, errors = running.communicate(timeout=PATIENCE_S)
+        self.assertEqual(running.returncode, FAILED, errors)
+        self.assertIn("before the recorded run was repeated", errors)
+        self.assertNotIn("ready", out)
 
     def test_a_hostile_bundle_is_refused_with_entry_and_rule(self):
         """Catches: a file outside the folder, a bomb that is unpacked, a foreign or damaged file that runs."""

@@ -336,6 +336,36 @@ TEST_F(Compose, StepsAtATimeAreScheduledEvents) {
             std::string::npos);
 }
 
+// Catches: a multisine that does not reach the bench, a check that measures another step or the first period.
+TEST_F(Compose, AMultisineIsAnEventThatChecksKnow) {
+  const std::string sum = "periods = 5, period_s = 0.2, from_hz = 5.0, to_hz = 400.0}\n";
+  const std::string step = "[[step]]\nat_s = 0.1\naxis = \"second\"\nmultisine = {load_nm = 0.01, " + sum;
+  const std::string check =
+      "[[check]]\nkind = \"frequency_response\"\nname = \"loop\"\nmin_gain_margin_db = 6\n";
+  const ConfigNode bench = composed(step + check);
+  EXPECT_EQ(number_in(at(bench, {"axis", "1", "multisine", "0", "to_hz"})), 400.0);
+  EXPECT_EQ(number_in(at(bench, {"axis", "1", "multisine", "0", "at_s"})), 0.1);
+  const auto read = [this](const std::string& keys) {
+    return the_case("bench = \"b\"\nduration_s = 2\n" + keys);
+  };
+  const Case c = read(step + check);
+  const CheckSpec& spec = c.checks.back();
+  EXPECT_EQ(spec.axis, "second");
+  EXPECT_EQ(spec.from_s, 0.1 + 0.2);
+  EXPECT_EQ(spec.to_s, 0.1 + 5 * 0.2);
+  ASSERT_TRUE(spec.excitation);
+  EXPECT_TRUE(spec.excitation->is_load);
+  EXPECT_NE(refusal(check).find("\"loop\" (line "), std::string::npos);
+  EXPECT_NE(refusal(check).find("needs a step with a multisine"), std::string::npos);
+  EXPECT_NE(refusal(step + step + check).find("needs the number of its step"), std::string::npos);
+  EXPECT_EQ(read(step + step + check + "step = 1\n").checks.back().axis, "second");
+  EXPECT_NE(refusal(step + check + "step = 4\n").find("has step 4, which is no step"), std::string::npos);
+  const std::string offset = "[[step]]\nat_s = 0.1\nmultisine = {current_offset_a = 0.01, " + sum;
+  EXPECT_NE(refusal(offset + "[[step]]\nat_s = 0.2\nfault = \"current_sensor_offset\"\nvalue = 1.0\n" + check)
+                .find("has a second step that changes the offset"),
+            std::string::npos);
+}
+
 // Catches: a condition that is lost, or that acts on another axis than it should.
 TEST_F(Compose, StepsOnAConditionWaitInTheBench) {
   const ConfigNode bench = composed(

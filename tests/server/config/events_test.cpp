@@ -18,6 +18,11 @@ std::vector<AxisEvent> events_of(const std::string& more) {
   return parse(kBench + more).axes[0].events;
 }
 
+constexpr Multisine kSpeedLoop{.quantity = Multisine::Quantity::kLoad,
+                               .periods = 5,
+                               .amplitude = 0.01,
+                               .lines = {.period_ticks = 4000, .lowest = 1, .highest = 200, .ratio = 1.5}};
+
 const AxisParameters& parameters() {
   static const BenchConfig config = parse(kBench);
   return config.setup.axes[0].parameters;
@@ -32,7 +37,9 @@ TEST(ConfigEvents, EveryKindIsReadInOrder) {
       "[[axis.fault]]\nname = \"bus_sag\"\nvalue = 0.5\nat_tick = 0\nuntil_tick = 8\n" +
       kSet + "value = 5.85\nat_tick = 8\nramp_s = 0.5\n" +
       "[[axis.set]]\nparameter = \"amplifier.over_current_trip\"\nvalue = false\nat_s = 0.0010001\n"
-      "[[axis.load]]\nat_tick = 8\nload_nm = 1\n");
+      "[[axis.load]]\nat_tick = 8\nload_nm = 1\n"
+      "[[axis.multisine]]\nat_tick = 8\nload_nm = 0.01\nperiod_s = 0.5\nperiods = 5\nfrom_hz = 2.9\n"
+      "to_hz = 400.9\nratio = 1.5\n");
   const std::vector<AxisEvent> expected = {
       {0, fault_of("bus_sag", 0.5)},
       {8, LoadChange{1.0, 0}},
@@ -41,6 +48,7 @@ TEST(ConfigEvents, EveryKindIsReadInOrder) {
       {8, fault_of("bus_sag", 0.0)},
       {8, fault_of("bus_sag", 0.25)},
       {8, ShaftBump{-0.5}},
+      {8, kSpeedLoop},
       {80, fault_of("bus_sag", 0.0)},
   };
   expect_equal(events, expected);
@@ -55,6 +63,7 @@ TEST(ConfigEvents, AreWrittenAndReadBackBitForBit) {
                                     {4'000'000'000, fault_of("open_phase", 3.0)},
                                     {7, write_of(parameters(), "amplifier.gain", 0.1 + 0.2, 12'345)},
                                     {7, write_of(parameters(), "amplifier.over_current_trip", 1.0)},
+                                    {9, kSpeedLoop},
                                     {0, LoadChange{-0.0, 9}}});
   expect_equal(parse(to_toml(config)), config);
   EXPECT_EQ(to_toml(parse(to_toml(config))), to_toml(config));
@@ -65,9 +74,9 @@ TEST(ConfigEvents, TheHashDependsOnEachOfThem) {
   const BenchConfig base = parse(kBench);
   std::vector<std::uint64_t> hashes{configuration_hash(base)};
   for (const Action& action : std::vector<Action>{
-           LoadChange{1.0, 0}, LoadChange{1.0, 1}, fault_of("bus_sag", 0.5), fault_of("bus_sag", 0.25),
-           fault_of("open_phase", 1.0), ShaftBump{0.5}, write_of(parameters(), "amplifier.gain", 1.5),
-           write_of(parameters(), "amplifier.gain", 1.5, 2)}) {
+           kSpeedLoop, LoadChange{1.0, 0}, LoadChange{1.0, 1}, fault_of("bus_sag", 0.5),
+           fault_of("bus_sag", 0.25), fault_of("open_phase", 1.0), ShaftBump{0.5},
+           write_of(parameters(), "amplifier.gain", 1.5), write_of(parameters(), "amplifier.gain", 1.5, 2)}) {
     BenchConfig config = base;
     config.axes[0].events = {{5, action}};
     hashes.push_back(configuration_hash(config));
@@ -83,7 +92,21 @@ TEST(ConfigEvents, TheHashDependsOnEachOfThem) {
 // Catches: a rule that is not checked, one by one.
 TEST(ConfigEvents, EachRuleIsKept) {
   const std::string fault = "[[axis.fault]]\nname = \"open_phase\"\n";
+  const std::string sum = "[[axis.multisine]]\nat_s = 1\nperiods = 5\nperiod_s = 0.5\n";
+  const std::string lines = "from_hz = 2.0\nto_hz = 400.0\n";
   const std::vector<std::pair<std::string, std::string>> cases = {
+      {sum + lines, ":21: axis.multisine.load_nm or else current_offset_a must stand"},
+      {sum + lines + "load_nm = 1\ncurrent_offset_a = 1\n", ":27: axis.multisine.load_nm or else"},
+      {sum + lines + "load_nm = 1e5\n", ":27: axis.multisine.load_nm is 100000 but must lie"},
+      {sum + "load_nm = 1\nfrom_hz = 2.0\n", ":21: axis.multisine.to_hz is missing"},
+      {sum + "load_nm = 1\nfrom_hz = 0.5\nto_hz = 4.0\n",
+       ":26: axis.multisine.from_hz is 0.5 but must come to one period in period_s, 2 Hz"},
+      {sum + "load_nm = 1\nfrom_hz = 8.0\nto_hz = 4.0\n", ":27: axis.multisine.to_hz is 4 but must not lie"},
+      {sum + "load_nm = 1\nfrom_hz = 8.0\nto_hz = 4000.0\n",
+       ":27: axis.multisine.to_hz is 4000 but must lie below half the sample rate, 4000 Hz"},
+      {sum + lines + "load_nm = 1\nratio = 1.01\n", ":28: axis.multisine.ratio makes more than 64 lines"},
+      {"[[axis.multisine]]\nat_s = 1\nperiods = 5\nperiod_ticks = 7\nload_nm = 1\n" + lines,
+       ":24: axis.multisine.period_ticks comes to 7 ticks but must come to 8"},
       {fault + "at_tick = 1\n", ":21: axis.fault.value is missing"},
       {fault + "value = 1\n", ":21: axis.fault.at_s is missing"},
       {fault + "value = 1\nat_s = 1\nat_tick = 1\n", ":25: axis.fault.at_tick cannot stand beside at_s"},

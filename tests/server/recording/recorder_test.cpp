@@ -133,13 +133,17 @@ TEST(Recorder, EveryKindOfInputKeepsItsContents) {
   put(RefusedCommand{});
   put(fault_of("hall_offset", -0.25));
   put(ShaftBump{-0.5});
+  put(Multisine{.quantity = Multisine::Quantity::kCurrentOffset,
+                .periods = 6,
+                .amplitude = 0.25,
+                .lines = {.period_ticks = 800, .lowest = 3, .highest = 300, .ratio = 1.5}});
   put(Command{
       .answers = 4,
       .phases = {.gates = Gates::kCurrent, .setpoint = {.a = 1.0, .b = 2.0, .c = 3.0, .field = 4.0}}});
   recorder.finish({});
 
   const Recording recording(folder / "run.mcap");
-  ASSERT_EQ(recording.inputs.size(), 11u);
+  ASSERT_EQ(recording.inputs.size(), 12u);
   EXPECT_TRUE(recording.inputs[0].clear());
   EXPECT_EQ(recording.inputs[1].command().tick(), 3u);
   EXPECT_EQ(recording.inputs[1].command().gates(), v1::GATES_ZERO);
@@ -158,7 +162,15 @@ TEST(Recorder, EveryKindOfInputKeepsItsContents) {
   EXPECT_EQ(recording.inputs[8].inject().name(), "hall_offset");
   EXPECT_EQ(recording.inputs[8].inject().value(), -0.25);
   EXPECT_EQ(recording.inputs[9].bump().impulse_nms(), -0.5);
-  const v1::Command& currents = recording.inputs[10].command();
+  const v1::Multisine& sum = recording.inputs[10].multisine();
+  EXPECT_EQ(sum.quantity(), v1::Multisine::QUANTITY_CURRENT_OFFSET);
+  EXPECT_EQ(sum.periods(), 6u);
+  EXPECT_EQ(sum.amplitude(), 0.25);
+  EXPECT_EQ(sum.period_ticks(), 800u);
+  EXPECT_EQ(sum.lowest(), 3u);
+  EXPECT_EQ(sum.highest(), 300u);
+  EXPECT_EQ(sum.ratio(), 1.5);
+  const v1::Command& currents = recording.inputs[11].command();
   EXPECT_EQ(currents.gates(), v1::GATES_CURRENT);
   EXPECT_EQ(currents.u_a_v() + currents.u_b_v() + currents.u_c_v() + currents.u_f_v(), 0.0);
   EXPECT_EQ(currents.i_a_a(), 1.0);

@@ -4,7 +4,7 @@
 
 namespace drivebench::command {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerReady, tcp, mode, bench)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ServerReady, tcp, can, modbus, mode, bench)
 
 std::optional<ServerReady> parse_ready(std::string_view line) {
   return parsed<ServerReady>(line, "ready");

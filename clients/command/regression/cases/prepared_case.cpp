@@ -88,8 +88,10 @@ PreparedCase prepared_on(const Case& c, const fs::path& bench, ProblemList& prob
   return prepared;
 }
 
-std::string in_lockstep(const fs::path& composed) {
-  return regression::composed_bench({.name = "", .file = composed.string(), .bench = ""}, composed);
+std::string in_lockstep(const fs::path& composed, DeviceUnderTest::Link link) {
+  Case c{.name = "", .file = composed.string(), .bench = ""};
+  c.device.link = link;
+  return regression::composed_bench(c, composed);
 }
 
 std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path& folder) {

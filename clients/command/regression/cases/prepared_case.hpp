@@ -30,7 +30,7 @@ PreparedCase prepared_on(const regression::Case& c, const std::filesystem::path&
                          ProblemList& problems);
 
 /// The text of a composed bench in lockstep, with the delay and the arming that it has in real time.
-std::string in_lockstep(const std::filesystem::path& composed);
+std::string in_lockstep(const std::filesystem::path& composed, regression::DeviceUnderTest::Link link);
 
 /// Composes the bench of every case into the folder, and opens it once. Throws ConfigError with everything
 /// that does not fit: nothing has run then. Skipped cases are left as they are.

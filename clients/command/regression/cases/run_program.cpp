@@ -73,12 +73,26 @@ class RecordedServer {
         wishes.repeats ? kRepetitionPatience : std::chrono::milliseconds(kServerStart);
     const auto ready = await_answer(process_, patience, parse_ready);
     if (!ready) throw std::runtime_error("the server did not start: " + tail_of(log_));
-    tcp_ = "tcp:" + ready->tcp;
+    ready_ = *ready;
   }
 
-  std::string link(regression::DeviceUnderTest::Link way = regression::DeviceUnderTest::Link::kUnix) const {
-    if (way == regression::DeviceUnderTest::Link::kTcp) return tcp_;
-    return (way == regression::DeviceUnderTest::Link::kUnix ? "unix:" : "shm:") + socket_.string();
+  /// The address for a controller of the axis with this number.
+  std::string link(regression::DeviceUnderTest::Link way = regression::DeviceUnderTest::Link::kUnix,
+                   std::size_t axis = 0) const {
+    switch (way) {
+      using enum regression::DeviceUnderTest::Link;
+      case kTcp:
+        return "tcp:" + ready_.tcp;
+      case kSharedMemory:
+        return "shm:" + socket_.string();
+      case kCan:
+        return fmt::format("can:{}?fd=1&node={}", ready_.can.at(0), axis + 1);
+      case kModbus:
+        return fmt::format("modbus:{}?unit={}", ready_.modbus, axis + 1);
+      case kUnix:
+        break;
+    }
+    return "unix:" + socket_.string();
   }
   /// Returns when the commands for each axis came; nothing if that was not measured.
   std::vector<AnswerTimes> end() {
@@ -117,7 +131,7 @@ class RecordedServer {
   fs::path recording_;
   fs::path log_;
   Process process_;
-  std::string tcp_;
+  ServerReady ready_{};
 };
 
 /// Asks a bench for its newest tick while the device under test drives it.
@@ -195,7 +209,7 @@ ProgramEnd run_beside_server(const PreparedCase& prepared, const fs::path& folde
   const fs::path output = folder / kOutput;
   RecordedServer server(prepared, folder, wishes);
   TickView bench(server.link());
-  const std::string link = server.link(c.device.link);
+  const std::string link = server.link(c.device.link, find_axis(prepared.facts, c.device.axis));
   Process program(c.device.command, {.environment = {"DRIVEBENCH_LINK=" + link},
                                      .folder = fs::absolute(c.file).parent_path().string(),
                                      .error_file = output.string(),
@@ -229,7 +243,7 @@ regression::MissedEffect effect_of_missed(const PreparedCase& prepared, const fs
   PreparedCase again{.what = &c, .bench_file = in_time / "bench.toml", .facts = prepared.facts};
   again.facts.end_tick = run.last_tick;
   try {
-    write_file(again.bench_file, in_lockstep(prepared.bench_file));
+    write_file(again.bench_file, in_lockstep(prepared.bench_file, c.device.link));
     const ProgramEnd end =
         run_beside_server(again, in_time, {.repeats = RepeatedPart{recording_in(folder), run.leased_tick}});
     if (!end.failure.empty()) return {.from_s = from_s, .problem = "in lockstep " + end.failure};

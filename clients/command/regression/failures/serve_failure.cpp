@@ -103,7 +103,7 @@ JudgedRecording judged_recording(const PreparedCase& prepared, const std::filesy
 int serve_bench(const PreparedCase& prepared, const RepeatedPart& part, unsigned port) {
   const TemporaryFolder folder;
   const std::filesystem::path bench = folder.path() / "bench.toml";
-  write_file(bench, in_lockstep(prepared.bench_file));
+  write_file(bench, in_lockstep(prepared.bench_file, regression::DeviceUnderTest::Link::kUnix));
   Process server({server_executable().string(), bench.string(), "--json", "--port", std::to_string(port),
                   "--repeat", part.recording.string(), "--until", std::to_string(part.until)});
   const auto ready = await_answer(server, kRepetitionPatience, parse_ready);

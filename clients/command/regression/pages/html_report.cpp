@@ -7,6 +7,7 @@
 
 #include "clients/command/recording/svg_plot.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
+#include "clients/command/regression/pages/bode_plot.hpp"
 #include "protocols/markup.hpp"
 
 namespace drivebench::command {
@@ -99,7 +100,12 @@ std::string section_of(const CaseResult& result, const std::string& link) {
 
 std::string row_of(const CaseResult& result) {
   const std::string_view word = word_of(result.verdict);
-  const std::string detail = result.verdict == Verdict::kPass ? checks_table(result) : std::string();
+  std::string detail;
+  if (result.verdict == Verdict::kPass) {
+    detail = checks_table(result);
+    for (const std::string& plot : result.plots)
+      detail += plot;
+  }
   const std::string name = markup(result.name);
   return fmt::format(
       "<tr><td>{}<td class={}>{}<td class=n>{:.6g}<td class=n>{}</tr>\n",
@@ -112,6 +118,7 @@ std::string row_of(const CaseResult& result) {
 std::vector<std::string> plots_of(const CaseResult& result) {
   std::vector<std::string> plots;
   for (const Finding& finding : result.findings) {
+    if (!finding.response.empty()) plots.push_back(bode_plot(finding));
     if (finding.passed || !finding.applied) continue;
     const auto column = std::ranges::find_if(result.trace.columns, [&finding](const Trace::Column& each) {
       return each.axis == finding.axis && each.signal->name == finding.signal;

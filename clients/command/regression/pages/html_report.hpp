@@ -10,13 +10,14 @@
 
 namespace drivebench::command {
 
-/// The signals of the failed checks with their limits as SVG pictures, from the trace of the result.
+/// The signals of the failed checks with their limits as SVG pictures, from the trace of the result, and
+/// every frequency response.
 std::vector<std::string> plots_of(const regression::CaseResult& result);
 
 /// The results of a suite as a page of one file that needs no network: every case with its values and checks,
 /// and of those that have not passed the reasons, the signals of the failed checks with their limits, and
-/// what the device under test printed. Of more than a thousand cases it shows statistics of what the checks
-/// measured, and whole only the first hundred that have not passed.
+/// what the device under test printed; of all of them the frequency responses. Of more than a thousand cases
+/// it shows statistics of what the checks measured, and whole only the first hundred that have not passed.
 class HtmlReport {
  public:
   /// `bundles`: a folder whose bundles the page links to, from `page_folder`; empty: no links.

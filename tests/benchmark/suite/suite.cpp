@@ -1,0 +1,138 @@
+#include <fmt/core.h>
+
+#include <array>
+#include <fstream>
+
+#include "clients/command/common/programs/installation.hpp"
+#include "tests/benchmark/harness/canary.hpp"
+#include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/statistics.hpp"
+#include "tests/benchmark/measurements.hpp"
+#include "tests/benchmark/suite/suite_run.hpp"
+
+namespace drivebench::speed {
+namespace {
+
+constexpr std::size_t kRounds = 5;
+constexpr double kLong_s = 20.0;  ///< of the bench, so that the start of a case does not count
+constexpr int kLongCases = 4;     ///< an even number, for two cores
+constexpr int kShortCases = 100;
+constexpr int kProgramCases = 10;
+constexpr double kLeastSpeed = 100.0;
+constexpr double kLeastOnTwo = 1.9;
+constexpr double kMostForChecks = 1.25;
+constexpr double kMostOverhead_ms = 5.0;
+constexpr double kMostProgramOverhead_ms = 80.0;
+
+constexpr std::string_view kOneCheck = "[[check]]\nkind = \"never\"\ncondition = \"state == 4\"\n";
+
+/// A check of every kind that judges samples, but those that look for something else than a servo at rest.
+constexpr std::string_view kAllChecks =
+    "[[check]]\nkind = \"bounds\"\nsignal = \"i_a_a\"\nabs = 16.0\n"
+    "[[check]]\nkind = \"rms\"\nsignal = \"i_b_a\"\nmax = 16.0\n"
+    "[[check]]\nkind = \"ripple\"\nsignal = \"speed_rad_s\"\nmax = 500.0\n"
+    "[[check]]\nkind = \"steady_state\"\nsignal = \"speed_rad_s\"\nvalue = 0.0\nmax_error = 50.0\n"
+    "[[check]]\nkind = \"settles\"\nsignal = \"angle_rad\"\nvalue = 3.14159\nband = 0.05\nwithin_s = 1.0\n"
+    "[[check]]\nkind = \"overshoot\"\nsignal = \"angle_rad\"\nvalue = 3.14159\nmax_percent = 50.0\n"
+    "[[check]]\nkind = \"rise_time\"\nsignal = \"angle_rad\"\nvalue = 3.14159\nmax_s = 1.0\n"
+    "[[check]]\nkind = \"always\"\ncondition = \"bus_voltage_v >= 0\"\n"
+    "[[check]]\nkind = \"never\"\ncondition = \"state == 4\"\n"
+    "[[check]]\nkind = \"eventually\"\ncondition = \"speed_rad_s > 1\"\n"
+    "[[check]]\nkind = \"reaction\"\nafter = \"speed_rad_s > 1\"\ncondition = \"state == 1\"\nwithin_ticks = "
+    "5\n"
+    "[[check]]\nkind = \"fault_count\"\nfault = \"over_current\"\nmax = 1000000\n";
+
+/// The servo of the book at 8 kHz: it moves, then holds.
+std::string preset_case(double bench_s, int count, std::string_view checks) {
+  return fmt::format(
+      "bench = \"servo\"\nduration_s = {}\n[dut]\npreset = \"book/8.2.2\"\n[dut.gains]\n\"run.hold_s\" = "
+      "{}\n{}"
+      "[matrix]\nseed = {{from = 1, to = {}}}\n",
+      bench_s, bench_s, checks, count);
+}
+
+/// The same controller as a process.
+std::string program_case(double bench_s, int count) {
+  const auto program = command::server_executable().parent_path() / "drivebench";
+  return fmt::format(
+      "bench = \"servo\"\nduration_s = {}\n[dut]\ncommand = [\"/bin/sh\", \"-c\", "
+      "\"exec '{}' control --gain run.hold_s=1 --link \\\"$DRIVEBENCH_LINK\\\"\"]\n{}[matrix]\nseed = {{from "
+      "= 1, to = "
+      "{}}}\n",
+      bench_s, program.string(), kOneCheck, count);
+}
+
+/// A suite in a folder of its own.
+class SuiteFile {
+ public:
+  explicit SuiteFile(const std::string& text) : file_(folder_ / "suite.toml") {
+    std::ofstream(file_) << text;
+  }
+  double wall_s(int jobs) const { return run_suite({file_.string(), "--jobs", std::to_string(jobs)}).wall_s; }
+
+ private:
+  ScratchFolder folder_;
+  std::filesystem::path file_;
+};
+
+struct Round {
+  double one_s, two_s, one_check_s, short_s, longer_s, program_short_s, program_longer_s;
+};
+
+}  // namespace
+
+std::vector<Row> measure_suite(const Plan&) {
+  const CpuPair cpu = cpu_pair();
+  const SuiteFile all_checks(preset_case(kLong_s, kLongCases, kAllChecks));
+  const SuiteFile one_check(preset_case(kLong_s, kLongCases, kOneCheck));
+  const SuiteFile shorter(preset_case(0.1, kShortCases, kOneCheck));
+  const SuiteFile longer(preset_case(0.2, kShortCases, kOneCheck));
+  const SuiteFile program_shorter(program_case(0.1, kProgramCases));
+  const SuiteFile program_longer(program_case(0.2, kProgramCases));
+  const std::array cpus{cpu.near, cpu.far};
+  const Rounds<Round> rounds = undisturbed_rounds(cpus, kRounds, [&]() -> Round {
+    return {.one_s = all_checks.wall_s(1),
+            .two_s = all_checks.wall_s(2),
+            .one_check_s = one_check.wall_s(1),
+            .short_s = shorter.wall_s(1),
+            .longer_s = longer.wall_s(1),
+            .program_short_s = program_shorter.wall_s(1),
+            .program_longer_s = program_longer.wall_s(1)};
+  });
+  const auto figure = [&rounds](auto of) { return median(rounds.results, of); };
+  // Twice the short cases less those that last twice as long: what a case costs beside its ticks.
+  const auto overhead_ms = [&](double Round::*shortly, double Round::*for_longer, int count) {
+    return figure([=](const Round& r) { return 1e3 * (2.0 * (r.*shortly) - r.*for_longer) / count; });
+  };
+  return {{.name = "suite, a preset at 8 kHz with 12 checks",
+           .unit = "times real time",
+           .measured = figure([](const Round& r) { return kLong_s * kLongCases / r.one_s; }),
+           .limit = Limit{Limit::Kind::kAtLeast, kLeastSpeed},
+           .gone = rounds.gone,
+           .note = "one job"},
+          {.name = "suite, two jobs against one",
+           .unit = "times as fast",
+           .measured = figure([](const Round& r) { return r.one_s / r.two_s; }),
+           .limit = Limit{Limit::Kind::kAtLeast, kLeastOnTwo},
+           .gone = rounds.gone},
+          {.name = "suite, 12 checks against one",
+           .unit = "s",
+           .measured = figure(&Round::one_s),
+           .floor = figure(&Round::one_check_s),
+           .limit = Limit{Limit::Kind::kRatioAtMost, kMostForChecks},
+           .gone = rounds.gone,
+           .note = fmt::format("{:g} s of the bench", kLong_s * kLongCases)},
+          {.name = "case in process, beside its ticks",
+           .unit = "ms",
+           .measured = overhead_ms(&Round::short_s, &Round::longer_s, kShortCases),
+           .limit = Limit{Limit::Kind::kAtMost, kMostOverhead_ms},
+           .gone = rounds.gone},
+          {.name = "case with a program, beside its ticks",
+           .unit = "ms",
+           .measured = overhead_ms(&Round::program_short_s, &Round::program_longer_s, kProgramCases),
+           .limit = Limit{Limit::Kind::kAtMost, kMostProgramOverhead_ms},
+           .gone = rounds.gone,
+           .note = "drivebench control and a server, both started anew"}};
+}
+
+}  // namespace drivebench::speed
