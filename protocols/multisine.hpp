@@ -44,10 +44,11 @@ constexpr LineList lines_of(const MultisineLines& lines) noexcept {
   return list;
 }
 
-/// The phase by which the j-th of so many lines lags [turns], by Schroeder's rule: the peak of a few lines
-/// and of many stays at 1.2 to 1.8 times their amplitude times sqrt(count), where equal phases would add up.
-constexpr double line_phase(std::uint64_t j, std::uint64_t count) noexcept {
-  return static_cast<double>(j * (j + 1) % (2 * count)) / static_cast<double>(2 * count);
+/// The phase by which the j-th line lags [turns]. It keeps the peak at 1.5 to 2.5 times the amplitude times
+/// the root of the number of lines, where equal phases would add up; Schroeder's rule is for lines that are
+/// equally far from each other, and leaves up to 3.3 here.
+constexpr double line_phase(std::uint64_t j) noexcept {
+  return static_cast<double>(309 * j * j % 1000) / 1000.0;
 }
 
 /// Whether a period has samples for every line: at least one line, at most the most, all below half the rate.

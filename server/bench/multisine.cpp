@@ -36,7 +36,7 @@ double value_at(const RunningMultisine& m, Tick tick) noexcept {
   for (std::uint64_t j = 0; j < lines.count; ++j) {
     const auto turn =
         static_cast<double>(lines.multiple[j] * k % m.period_ticks) / static_cast<double>(m.period_ticks);
-    sum += sine(2.0 * std::numbers::pi * (turn - line_phase(j, lines.count)));
+    sum += sine(2.0 * std::numbers::pi * (turn - line_phase(j)));
   }
   return m.base + m.amplitude * sum;
 }

@@ -30,7 +30,7 @@ RunningMultisine begun(const Multisine& multisine, Tick start, double base) noex
 
 /// The value in force during a tick: with N lines, of which the j-th is the n_j-th multiple of 1/P,
 ///
-///   x_k = base + A · Σ sin(2π·(n_j·k/P − j·(j + 1)/(2N))),  j = 0 … N − 1,  k ticks after the start
+///   x_k = base + A · Σ sin(2π·(n_j·k/P − φ_j)),  φ_j = line_phase(j),  k ticks after the start
 ///
 /// n_j·k is reduced as an integer, so that each period has the same bits.
 double value_at(const RunningMultisine& m, Tick tick) noexcept;

@@ -150,7 +150,7 @@ std::string to_toml(const BenchConfig& config) {
     if (const auto other = config.setup.axes[i].shares_amplifier_with) {
       append(text, "shares_amplifier_with", in_quotes(config.axes[*other].name));
     }
-    append_axis(text, config, {.axis = i, .names = names}, Keys::kAll);
+    append_axis(text, config, {.axis = i, .names = names, .period_ns = config.setup.period_ns}, Keys::kAll);
   }
   return text;
 }
@@ -169,7 +169,8 @@ std::string physics_toml(const BenchConfig& config) {
     if (const auto other = config.setup.axes[i].shares_amplifier_with) {
       append(text, "shares_amplifier_with", numbers[*other]);
     }
-    append_axis(text, config, {.axis = i, .names = numbers}, Keys::kHashed);
+    append_axis(text, config, {.axis = i, .names = numbers, .period_ns = config.setup.period_ns},
+                Keys::kHashed);
   }
   return text;
 }

@@ -110,17 +110,18 @@ std::string slurm_state(const fs::path& results) {
   std::ifstream in(job_file(results));
   std::string job;
   if (!(in >> job) || job.find_first_not_of("0123456789") != std::string::npos) return {};
-  const Answer answer =
-      answer_of({"squeue", "--noheader", "--array", "--job=" + job, "--format=%T"}, "/dev/null");
+  // Of all jobs: a question for one that Slurm has forgotten fails like one without an answer.
+  const Answer answer = answer_of({"squeue", "--noheader", "--array", "--format=%F %T"}, "/dev/null");
   if (answer.code == kNoSuchProgram) return fmt::format("Slurm job {}: this machine has no squeue", job);
+  if (answer.code != 0) return fmt::format("Slurm job {}: squeue reaches no controller", job);
   std::map<std::string, int> tasks;  // by their state
   for (const std::string& line : answer.lines) {
-    std::string state = printable(line);
+    if (!line.starts_with(job + " ")) continue;
+    std::string state = printable(line.substr(job.size() + 1));
     std::ranges::transform(state, state.begin(),
                            [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
     ++tasks[state];
   }
-  // A job that Slurm has forgotten is an error of squeue.
   if (tasks.empty()) return fmt::format("Slurm job {} has ended", job);
   std::string text;
   for (const auto& [state, count] : tasks)

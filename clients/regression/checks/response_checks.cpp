@@ -110,7 +110,7 @@ class FrequencyResponse final : public Check {
     const auto multiple = static_cast<std::int64_t>(list_.multiple[j]);
     const double turns = static_cast<double>(multiple * k % period) / static_cast<double>(period);
     return std::polar(0.5 * spec().excitation->amplitude * static_cast<double>(period),
-                      2.0 * std::numbers::pi * (turns - line_phase(j, list_.count) - 0.25));
+                      2.0 * std::numbers::pi * (turns - line_phase(j) - 0.25));
   }
 
   ResponsePoint point_of(std::size_t j) const {

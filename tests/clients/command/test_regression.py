@@ -13,7 +13,7 @@ import zipfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
-    from regression_case import COMMAND, DRIVES, FAILED, OK, PROGRAM, SERVO, USAGE, RegressionTest
+    from regression_case import COMMAND, DRIVES, FAILED, INVALID, OK, PROGRAM, SERVO, USAGE, RegressionTest
     from wire_client import PATIENCE_S, REPOSITORY, SERVER
 except ImportError as missing:
     print(f"skipped: {missing}")
@@ -35,6 +35,31 @@ def with_gain(name, value):
 def with_text(old, new):
     return lambda case: case.replace(old, new)
 
+
+# Drives in real time, and once stops its bench, which it finds by the folder of its socket, for 30 ms.
+STOPS_ITS_BENCH = """import os, pathlib, signal, time
+import drivebench
+folder = os.path.dirname(os.environ["DRIVEBENCH_LINK"].split(":", 1)[1])
+def works_there(process):
+    try:
+        return os.readlink(process / "cwd") == folder
+    except OSError:
+        return False
+server = next(int(p.name) for p in pathlib.Path("/proc").iterdir() if p.name.isdigit() and works_there(p))
+with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
+    bench.acquire()
+    sample = bench.newest()
+    while sample.tick < 2000:
+        try:
+            sample = bench.step(voltages=1.0)
+        except drivebench.Refused:
+            sample = bench.newest()
+        if server and sample.tick > 1000:
+            os.kill(server, signal.SIGSTOP)
+            time.sleep(0.03)
+            os.kill(server, signal.SIGCONT)
+            server = 0
+"""
 
 # Defects of a controller: the case of the suite `reference`, what is wrong, and the check that tells it.
 DEFECTS = (
@@ -261,18 +286,30 @@ class Programs(RegressionTest):
         case = self.verdict_of(DRIVES.format(until=10 ** 9), code=OK)
         self.assertEqual((case["verdict"], case["samples"], case["bench_s"]), ("pass", 201, 0.02))
 
+    def test_a_bench_that_was_late_makes_the_run_invalid(self):
+        """Catches: a device that is blamed for its bench, and an invalid run that ends with 0 or is kept as a result."""
+        self.write("device.py", STOPS_ITS_BENCH)
+        self.write("case.toml", PROGRAM.format(limit_s=60).replace("duration_s = 0.02", 'mode = "realtime"')
+                   + "[override.bench]\ncommand_delay_ticks = 1\n")
+        results = self.folder / "results"
+        for _ in range(2):
+            done = self.run_test(self.folder / "suite", "--results", results, code=INVALID)
+            self.assertRegex(done.stdout, r"(?m)^invalid +case ")
+            self.assertRegex(done.stdout, r"\d+ ticks of the bench were late")
+            self.assertNotIn("from before", done.stdout)
+
     def test_a_program_gets_the_link_that_it_asks_for(self):
         """Catches: a word of the case that is passed over, and a run that depends on the link."""
         self.write("device.py", DRIVES.format(until=10 ** 9).replace(
             "import drivebench", "import drivebench\nprint(os.environ['DRIVEBENCH_LINK'].partition(':')[0], flush=True)"))
         cases = {}
-        for link in ("unix", "tcp", "shm"):
+        for link in ("unix", "tcp", "shm", "can", "modbus"):
             self.write("case.toml", PROGRAM.format(limit_s=30).replace("[dut]", f'[dut]\nlink = "{link}"'))
             cases[link] = self.suite()["cases"][0]
             self.assertTrue(cases[link].pop("output").startswith(link), link)
             self.assertEqual(cases[link]["verdict"], "pass")
-        self.assertEqual(cases["tcp"], cases["unix"])
-        self.assertEqual(cases["shm"], cases["unix"])
+        for link, case in cases.items():
+            self.assertEqual(case, cases["unix"], link)  # also over links of float32: 5 V are a float32
         for case, why in ((PROGRAM.format(limit_s=30).replace("[dut]", '[dut]\nlink = "udp"'), 'is "udp" but must be'),
                           (SERVO.replace("[dut]", '[dut]\nlink = "shm"'), "belongs to a command")):
             self.write("case.toml", case)

@@ -60,7 +60,8 @@ class Slurm(RegressionTest):
             killed = (running + pending)[:5]
             self.assertEqual(len(killed), 5)
             for task in killed:
-                cluster.ask("scancel", "--signal=KILL", "--full", f"{job}_{task}") if task in running else None
+                if task in running:
+                    cluster.ask("scancel", "--signal=KILL", "--full", f"{job}_{task}")
                 cluster.ask("scancel", f"{job}_{task}")
             cluster.lose_node("n3")
             state = self.run_test(self.folder / "suite", "--results", results, "--status", code=FAILED).stdout
@@ -73,8 +74,8 @@ class Slurm(RegressionTest):
             self.assertLess(len(before), 1000)
             again = self.submitted(results)
             cluster.wait_for_end(again)
-        state = self.run_test(self.folder / "suite", "--results", results, "--status", code=OK).stdout
-        self.assertIn("1000 of 1000 cases have a result: 900 passed, 100 failed", state)
+            state = self.run_test(self.folder / "suite", "--results", results, "--status", code=OK).stdout
+            self.assertIn("1000 of 1000 cases have a result: 900 passed, 100 failed", state)
         self.assertEqual({file: file.stat().st_mtime_ns for file in before}, before)
         outputs = [file.read_text(encoding="utf-8") for file in results.glob("slurm-*.out")]
         self.assertEqual(len(outputs), TASKS)
@@ -83,7 +84,11 @@ class Slurm(RegressionTest):
     def test_what_slurm_does_not_take_is_told(self):
         """Catches: an exit code of 0 for a job that was never submitted."""
         self.write("stays.toml", SUITE)
-        self.environment = {**self.environment, "SLURM_CONF": str(self.folder / "none.conf")}
+        refusing = self.folder / "refusing/sbatch"
+        refusing.parent.mkdir()
+        refusing.write_text("#!/bin/sh\necho 'sbatch: error: invalid partition' >&2\nexit 1\n", encoding="utf-8")
+        refusing.chmod(0o755)
+        self.environment = {**self.environment, "PATH": f"{refusing.parent}:/usr/bin:/bin"}
         done = self.run_test(self.folder / "suite", "--results", self.folder / "results", "--slurm", 4, code=USAGE)
         self.assertIn("sbatch has not taken", done.stderr)
         self.environment = {**self.environment, "PATH": "/nowhere"}

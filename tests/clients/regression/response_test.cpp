@@ -13,7 +13,6 @@
 
 #include "clients/regression/checks/frequency_response.hpp"
 #include "server/config/config.hpp"
-#include "server/config/events.hpp"
 #include "tests/clients/regression/check_on_course.hpp"
 
 // Loops whose gain is known in closed form, around the motor of problem 2.1 of the book, on the product's
@@ -133,14 +132,16 @@ constexpr Excitation kOnCurrent{.is_load = false,
                                 .to_hz = 4000.0,
                                 .ratio = 1.25};
 const std::string kCurrentEvent =
-    "\n[[axis.multisine]]\nat_s = 0.05\ncurrent_offset_a = 0.02\nperiod_s = 0.1\nperiods = 6\n"
+    "\n[[axis.fault]]\nat_s = 0.0\nname = \"blocked_rotor\"\nvalue = 1\n"
+    "[[axis.multisine]]\nat_s = 0.05\ncurrent_offset_a = 0.02\nperiod_s = 0.1\nperiods = 6\n"
     "from_hz = 20.0\nto_hz = 4000.0\n";
 
-/// The gain of a PI loop of the current with this delay of the command, back-EMF included.
+/// The gain of a PI loop around the winding of a blocked rotor, i' = (u - R·i)/L held over a tick, with this
+/// delay of the command.
 Complex current_loop(const Pi& pi, int delay_ticks, double hz) {
-  static const SampledMotor kMotor;
   const Complex z = z_at(hz);
-  return pi.at(z) * std::pow(z, -delay_ticks) * kMotor.response(z, 0, Eigen::Matrix2cd::Zero())[0];
+  const double a = std::exp(-kResistance_ohm / kInductance_h * kTick_s);
+  return pi.at(z) * std::pow(z, -delay_ticks) * (1.0 - a) / (kResistance_ohm * (z - a));
 }
 
 // Catches: an injection that is a sample early or late, a loop gain that is a closed one, margins at the

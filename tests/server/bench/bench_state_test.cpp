@@ -223,7 +223,7 @@ TEST(BenchState, AForgedStateIsRefusedOrRuns) {
   Bench original(rich_setup());
   run_to(original, 300);
   const std::vector<std::byte> saved = original.save();
-  ASSERT_TRUE(Bench(rich_setup()).restore(forged(saved, 0, 0x3374'6174'7362'7264u)));
+  ASSERT_TRUE(Bench(rich_setup()).restore(forged(saved, 0, 0x3474'6174'7362'7264u)));
   int taken = 0;
   for (const std::uint64_t value :
        {std::bit_cast<std::uint64_t>(std::nan("")), std::bit_cast<std::uint64_t>(1e300), std::uint64_t{255},

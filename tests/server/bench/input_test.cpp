@@ -29,7 +29,12 @@ std::vector<Input> one_of_each() {
           input_with(Overrun{}),
           input_with(RefusedCommand{}),
           input_with(InjectFault{.row = 27, .value = -0.5}),
-          input_with(ShaftBump{.impulse_nms = -1e-3})};
+          input_with(ShaftBump{.impulse_nms = -1e-3}),
+          input_with(Multisine{
+              .quantity = Multisine::Quantity::kCurrentOffset,
+              .periods = 1'000'000,
+              .amplitude = -0.7,
+              .lines = {.period_ticks = 1'000'000'007, .lowest = 5, .highest = 400'000'007, .ratio = 1.3}})};
 }
 
 // Catches: a field that packing loses, exchanges or narrows; a kind without its pair of functions.
@@ -67,6 +72,14 @@ TEST(Input, EveryKindSurvivesPackingWordForWord) {
   EXPECT_EQ(fault.row, 27u);
   EXPECT_EQ(fault.value, -0.5);
   EXPECT_EQ(std::get<ShaftBump>(unpack(pack(inputs[9])).action).impulse_nms, -1e-3);
+  const auto multisine = std::get<Multisine>(unpack(pack(inputs[10])).action);
+  EXPECT_EQ(multisine.quantity, Multisine::Quantity::kCurrentOffset);
+  EXPECT_EQ(multisine.periods, 1'000'000u);
+  EXPECT_EQ(multisine.amplitude, -0.7);
+  EXPECT_EQ(multisine.lines.period_ticks, 1'000'000'007u);
+  EXPECT_EQ(multisine.lines.lowest, 5u);
+  EXPECT_EQ(multisine.lines.highest, 400'000'007u);
+  EXPECT_EQ(multisine.lines.ratio, 1.3);
 }
 
 // Catches: words of the stack in a packed input, which would make equal states hash differently.
@@ -74,6 +87,7 @@ TEST(Input, UnusedWordsAreZero) {
   for (const Input& input : one_of_each()) {
     const PackedInput packed = pack(input);
     const std::size_t used = std::holds_alternative<Command>(input.action)          ? 6
+                             : std::holds_alternative<Multisine>(input.action)      ? 5
                              : std::holds_alternative<ParameterWrite>(input.action) ? 3
                              : std::holds_alternative<LoadChange>(input.action)     ? 2
                              : std::holds_alternative<InjectFault>(input.action)    ? 2
@@ -87,7 +101,7 @@ TEST(Input, UnusedWordsAreZero) {
 
 // Catches: a kind from a damaged file that reads past the table.
 TEST(Input, AnUnknownKindIsAClearWithoutAnOwner) {
-  for (const std::uint64_t kind : {std::uint64_t{10}, std::numeric_limits<std::uint64_t>::max()}) {
+  for (const std::uint64_t kind : {std::uint64_t{11}, std::numeric_limits<std::uint64_t>::max()}) {
     const Input input = unpack({.tick = 4, .axis = 1, .owner = 0, .kind = kind, .words = {1, 2, 3, 4, 5, 6}});
     EXPECT_TRUE(std::holds_alternative<ClearFaults>(input.action));
     EXPECT_EQ(input.owner, 0u);

@@ -44,7 +44,7 @@ TEST(Multisine, HasItsLinesAndNothingBetweenThem) {
         std::find(lines.multiple.begin(), lines.multiple.begin() + 11, n) != lines.multiple.begin() + 11;
     EXPECT_NEAR(amplitude_of(period, n), is_line ? 0.01 : 0.0, 1e-15) << n;
   }
-  EXPECT_LT(*std::max_element(period.begin(), period.end()), 0.01 * 1.8 * std::sqrt(11.0));
+  EXPECT_LT(*std::max_element(period.begin(), period.end()), 0.01 * 2.5 * std::sqrt(11.0));
   EXPECT_EQ(value_at(running, 75), value_at(running, 475));
 }
 

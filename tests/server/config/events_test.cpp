@@ -97,7 +97,7 @@ TEST(ConfigEvents, EachRuleIsKept) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {sum + lines, ":21: axis.multisine.load_nm or else current_offset_a must stand"},
       {sum + lines + "load_nm = 1\ncurrent_offset_a = 1\n", ":27: axis.multisine.load_nm or else"},
-      {sum + lines + "load_nm = 1e5\n", ":27: axis.multisine.load_nm is 100000 but must lie"},
+      {sum + lines + "load_nm = 1e5\n", ":27: axis.multisine.load_nm is 1e+05 but must lie"},
       {sum + "load_nm = 1\nfrom_hz = 2.0\n", ":21: axis.multisine.to_hz is missing"},
       {sum + "load_nm = 1\nfrom_hz = 0.5\nto_hz = 4.0\n",
        ":26: axis.multisine.from_hz is 0.5 but must come to one period in period_s, 2 Hz"},
