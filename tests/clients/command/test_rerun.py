@@ -26,6 +26,20 @@ with drivebench.Bench(sys.argv[1]) as bench:
     bench.acquire()
     print(bench.newest().tick, bench.step(off=True).tick)
 """
+LOOP = """bench = "dc-a-servo"
+[dut]
+preset = "book/2.21"
+[[step]]
+when = "tick >= 500"
+delay_s = 0.01
+multisine = {load_nm = 5e-4, from_hz = 10.0, to_hz = 1000.0, period_s = 0.1, periods = 4}
+[[check]]
+name = "speed loop"
+kind = "frequency_response"
+min_phase_margin_deg = 40.0
+[matrix]
+check.0.min_phase_margin_deg = [40.0, 170.0]
+"""
 TRIPS = """[override.axis.0.amplifier]
 over_current_a = 0.3
 over_current_trip = true
@@ -197,6 +211,23 @@ load_nm = 0.01
                 done = subprocess.run([SERVER, bench, "--port", "0", *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
                 self.assertEqual(done.returncode, USAGE)
                 self.assertIn(rule, done.stderr)
+
+    def test_the_margins_of_a_loop_are_drawn_and_measured_again(self):
+        """Catches: a multisine that a recording loses or replays elsewhere, a Bode plot of failed checks only."""
+        self.write("loop.toml", LOOP)
+        page, kept = self.folder / "page.html", self.folder / "kept"
+        cases = self.suite("--html", page, "--keep", kept, code=FAILED)["cases"]
+        self.assertEqual([case["verdict"] for case in cases], ["pass", "fail"])
+        rows = [case["checks"][0]["response"] for case in cases]
+        self.assertEqual(rows[0], rows[1])
+        self.assertEqual(rows[0], sorted(rows[0]))
+        html = page.read_text(encoding="utf-8")
+        self.assertEqual(html.count("speed loop: loop gain"), 2)
+        self.assertRegex(html, r">\d+\.\d\u00b0 at [\d.]+ Hz</text>")
+        (bundle,) = kept.glob("*.zip")
+        again = self.rerun(bundle, code=FAILED)
+        self.assertIn("the same to the bit", again)
+        self.assertRegex(again, r"phase margin [\d.]+ deg, crossover [\d.]+ Hz, .*, min 170 deg")
 
     def test_a_signal_ends_a_server_that_repeats_a_run(self):
         """Catches: a server that repeats its run to the end first, however long that is. Substeps make it long."""
