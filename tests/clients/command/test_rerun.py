@@ -27,12 +27,16 @@ with drivebench.Bench(sys.argv[1]) as bench:
     print(bench.newest().tick, bench.step(off=True).tick)
 """
 LOOP = """bench = "dc-a-servo"
+[override.axis.0.encoder]
+counts_per_revolution = 100000
 [dut]
 preset = "book/2.21"
+[dut.gains]
+"counts_per_revolution" = 100000
 [[step]]
 when = "tick >= 500"
 delay_s = 0.01
-multisine = {load_nm = 5e-4, from_hz = 10.0, to_hz = 1000.0, period_s = 0.1, periods = 4}
+multisine = {load_nm = 2e-3, from_hz = 10.0, to_hz = 300.0, period_s = 0.1, periods = 4}
 [[check]]
 name = "speed loop"
 kind = "frequency_response"
@@ -233,11 +237,11 @@ load_nm = 0.01
         """Catches: a server that repeats its run to the end first, however long that is. Substeps make it long."""
         bench, recording = self.folder / "bench.toml", self.folder / "run.mcap"
         text = (REPOSITORY / "configs/benches/dc-a.toml").read_text(encoding="utf-8")
-        bench.write_text(text.replace("../motors", str(REPOSITORY / "configs/motors")).replace("period_us = 500", "period_us = 500\nsubsteps = 500"),
+        bench.write_text(text.replace("../motors", str(REPOSITORY / "configs/motors")).replace("period_us = 500", "period_us = 500\nsubsteps = 64"),
                          encoding="utf-8")
         server = (SERVER, bench, "--port", "0")
-        subprocess.run([*server, "--duration", "10", "--record", recording], capture_output=True, timeout=PATIENCE_S, check=True)
-        with subprocess.Popen([*server, "--mode", "lockstep", "--repeat", recording, "--until", "20000"], stdout=subprocess.PIPE,
+        subprocess.run([*server, "--duration", "50", "--record", recording], capture_output=True, timeout=PATIENCE_S, check=True)
+        with subprocess.Popen([*server, "--mode", "lockstep", "--repeat", recording, "--until", "100000"], stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, text=True) as running:
             caught = 0
             while not caught >> (signal.SIGTERM - 1) & 1:  # the handler is there before the repetition begins

@@ -55,6 +55,8 @@ class Slurm(RegressionTest):
         with SlurmCluster(cluster_folder) as cluster:
             self.environment = {**self.environment, **cluster.environment}
             job = self.submitted(results)
+            state = self.run_test(self.folder / "suite", "--results", results, "--status", code=FAILED).stdout
+            self.assertRegex(state, rf"\A\d+ of 1000 cases have a result: .*\nSlurm job {job}: .*\d+ pending")
             cluster.wait_for(lambda: any(results.glob("*.json")), "the first result")
             running, pending = cluster.tasks(job, "RUNNING"), cluster.tasks(job, "PENDING")
             killed = (running + pending)[:5]
@@ -64,9 +66,6 @@ class Slurm(RegressionTest):
                     cluster.ask("scancel", "--signal=KILL", "--full", f"{job}_{task}")
                 cluster.ask("scancel", f"{job}_{task}")
             cluster.lose_node("n3")
-            state = self.run_test(self.folder / "suite", "--results", results, "--status", code=FAILED).stdout
-            self.assertRegex(state, r"\d+ of 1000 cases have a result: .*passed")
-            self.assertRegex(state, rf"Slurm job {job}: \d+ ")
             cluster.wait_for_end(job)
             state = self.run_test(self.folder / "suite", "--results", results, "--status", code=FAILED).stdout
             self.assertIn(f"Slurm job {job} has ended", state)
