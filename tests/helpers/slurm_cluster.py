@@ -8,7 +8,7 @@ import socket
 import subprocess
 import time
 
-from free_port import free_port
+from free_port import free_ports
 
 NODES, CPUS = 4, 2
 PATIENCE_S = 60.0
@@ -70,9 +70,10 @@ class SlurmCluster:
         user = subprocess.run(["id", "-un"], capture_output=True, text=True, check=True).stdout.strip()
         (self.folder / "state").mkdir()
         (self.folder / "spool").mkdir()
-        nodes = "\n".join(f"NodeName=n{n} NodeHostname={host} NodeAddr=127.0.0.1 Port={free_port()} CPUs={CPUS} State=UNKNOWN"
-                          for n in range(1, NODES + 1))
-        self.configuration.write_text(CONFIGURATION.format(host=host, port=free_port(), user=user, folder=self.folder, nodes=nodes),
+        controller_port, *ports = free_ports(1 + NODES)
+        nodes = "\n".join(f"NodeName=n{n} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs={CPUS} State=UNKNOWN"
+                          for n, port in enumerate(ports, 1))
+        self.configuration.write_text(CONFIGURATION.format(host=host, port=controller_port, user=user, folder=self.folder, nodes=nodes),
                                       encoding="utf-8")
         key = self.folder / "munge.key"
         key.write_bytes(secrets.token_bytes(1024))
@@ -109,7 +110,7 @@ class SlurmCluster:
         while not condition():
             if time.monotonic() > deadline:
                 logs = "\n".join(file.read_text(errors="replace")[-2000:] for file in self.folder.glob("*.log"))
-                raise TimeoutError(f"no end of waiting for {what}\n{logs}")
+                raise TimeoutError(f"no end of waiting for {what}\n{logs}\n{self.ask('sinfo', '--Node')}\n{self.ask('squeue', '--array')}")
             time.sleep(0.1)
 
     def tasks(self, job, state):
@@ -117,7 +118,14 @@ class SlurmCluster:
         return [int(task) for task in self.ask("squeue", "--noheader", "--array", f"--job={job}", f"--states={state}", "--format=%K").split()]
 
     def wait_for_end(self, job):
-        self.wait_for(lambda: self.ask("squeue", "--noheader", f"--job={job}") == "", f"job {job}")
+        """A task of a lost node may be completing for long, and Slurm would let two minutes pass before it starts it again."""
+        def has_ended():
+            waiting = self.tasks(job, "PENDING")
+            for task in waiting:
+                self.ask("scontrol", "update", f"JobId={job}_{task}", "StartTime=now")
+            return not waiting and self.tasks(job, "RUNNING,CONFIGURING") == []
+
+        self.wait_for(has_ended, f"job {job}")
 
     def started_processes(self, node=None):
         """Steps and jobs that slurmd started, which are not its children any more."""

@@ -59,8 +59,8 @@ class Slurm(RegressionTest):
             self.assertRegex(state, rf"\A\d+ of 1000 cases have a result: .*\nSlurm job {job}: .*\d+ pending")
             cluster.wait_for(lambda: any(results.glob("*.json")), "the first result")
             running, pending = cluster.tasks(job, "RUNNING"), cluster.tasks(job, "PENDING")
-            killed = (running + pending)[:5]
-            self.assertEqual(len(killed), 5)
+            killed = running[:3] + pending[-2:]  # those that wait have no result yet
+            self.assertGreaterEqual(len(pending), 2)
             for task in killed:
                 if task in running:
                     cluster.ask("scancel", "--signal=KILL", "--full", f"{job}_{task}")
@@ -68,7 +68,7 @@ class Slurm(RegressionTest):
             cluster.lose_node("n3")
             cluster.wait_for_end(job)
             state = self.run_test(self.folder / "suite", "--results", results, "--status", code=FAILED).stdout
-            self.assertIn(f"Slurm job {job} has ended", state)
+            self.assertRegex(state, rf"Slurm job {job}( has ended|: \d+ completing)\n")
             before = {file: file.stat().st_mtime_ns for file in results.glob("*.json")}
             self.assertLess(len(before), 1000)
             again = self.submitted(results)
