@@ -4,7 +4,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "clients/command/common/line/version.hpp"
+#include "clients/command/common/programs/installation.hpp"
+#include "clients/command/common/programs/process.hpp"
 #include "clients/command/regression/cases/prepared_case.hpp"
 #include "clients/command/regression/stored_results.hpp"
 #include "clients/regression/suite/case_file.hpp"
@@ -55,6 +56,13 @@ regression::CaseResult result_of(const regression::Case& c, int place) {
   return result;
 }
 
+/// Version and build, which the results of a run have in their fingerprints.
+std::string version_of_drivebench() {
+  command::Process program(
+      {(command::server_executable().parent_path() / "drivebench").string(), "--version"});
+  return program.read_line(command::Process::in(std::chrono::seconds(10))).value_or("");
+}
+
 }  // namespace
 
 std::vector<Row> measure_merge(const Plan&) {
@@ -63,7 +71,7 @@ std::vector<Row> measure_merge(const Plan&) {
   const std::filesystem::path page = folder / "merge.html";
   const std::string results = folder / "results";
   std::ofstream(suite) << kCase;
-  command::StoredResults stored(command::version_line(), {results});
+  command::StoredResults stored(version_of_drivebench(), {results});
   int place = 0;
   regression::visit_suite(
       suite, [&](const regression::Case& c) { stored.put(result_of(c, place++), stored.fingerprint_of(c)); });
