@@ -1,12 +1,21 @@
 #!/usr/bin/python3
-"""An operator drives an axis open loop from the page of `drivebench web`: browser/drive_scenarios.mjs in Debian's chromium."""
+"""An operator drives an axis from the page of `drivebench web`: browser/drive_scenarios.mjs in Debian's chromium."""
+import re
+import subprocess
 import sys
 import unittest
 
-from test_page import BENCHES, REPOSITORY, PageTest, missing, pb, until
+from test_page import BENCHES, PATIENCE_S, REPOSITORY, PageTest, missing, pb, until
+from command_test import DRIVEBENCH, environment, link_of
 
 IDLE, RUN, HOLD = 0, 1, 2
 LATCHED = 512 + 1024  # the faults of a controller that is late or lost
+
+
+def control(server, preset):
+    """`drivebench control` on the bench of a server."""
+    command = [DRIVEBENCH, "control", "--link", link_of(server), "--preset", preset]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=environment(), check=False)
 
 
 class DrivePage(PageTest):
@@ -70,6 +79,49 @@ class DrivePage(PageTest):
         self.assertIn("ramp, s: '-1' is no number from 0 to 3600", shown["ramp"])
         self.assertIn("target, V: '1e9' is no number from -1000000 to 1000000", shown["beyond"])
         self.assertRegex(shown["owned"], "^lease: .*holds the lease of the axis")
+
+    def test_a_reference_controller_runs_as_drivebench_control_runs_it(self):
+        """Catches: a preset that does not fit and is offered, a run that begins elsewhere or whose commands come for other ticks, numbers
+        that are not those of `drivebench control`, a table that axe finds at fault, a lease that stays."""
+        server = self.serve("--mode", "lockstep")
+        shown = self.play("preset", self.gateway(server).url, "servo", "book/8.2.2")
+        self.assertIn("book/8.2.2-backward-difference", shown["offered"])
+        self.assertNotIn("book/9.1.4", shown["offered"])
+        self.assertIn("8.2.2", shown["source"])
+        self.assertEqual(shown["words"], "book/8.2.2: done, the gates are off")
+        self.assertEqual((shown["owner"], shown["free"]), ("this page", "none"))
+        self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
+        alone = control(self.serve("--mode", "lockstep"), "book/8.2.2").stdout
+        rows = [re.split(r"  +", line.strip(), maxsplit=1) for line in alone.splitlines()[1:]]
+        expected = [row for row in rows if not row[0].startswith(("exchange", "wall"))]
+        self.assertEqual([[name, " ".join(value.split())] for name, value in expected], shown["numbers"])
+        self.assertEqual(len(expected), len(rows) - 4)
+
+    def test_a_run_is_stopped_refused_and_ended_in_order(self):
+        """Catches: Escape that leaves the gates on, a preset that does not fit and yet runs or is refused in other words than those
+        of `drivebench control`, a page that goes and leaves its controller or its lease behind."""
+        text = (BENCHES / "dc-unit.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        text = text.replace("period_us = 1000\n", "period_us = 1000\nwatchdog_ticks = 5000\nlease_s = 10.0\n")
+        server = self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
+        client = server.client()
+        self.addCleanup(client.close)
+        samples = {}
+
+        def outside(what):
+            if what != "running":
+                until(lambda: abs(client.newest().true_i_a_a) < 1e-6, "the end of the current")
+            if what == "gone":
+                until(lambda: client.newest().owner == 0, "the lease of the page")
+            samples[what] = client.newest()
+
+        shown = self.play("presetStopped", self.gateway(server).url, "dc-unit", "book/2-sine", "book/8.2.2", outside=outside)
+        self.assertEqual(shown["stopped"], ["stopped: the gates are off"] * 2)
+        self.assertEqual("drivebench: " + shown["refused"] + "\n", control(server, "book/8.2.2").stderr)
+        self.assertEqual(samples["running"].state, RUN)
+        self.assertGreater(abs(samples["running"].true_i_a_a), 1e-3)
+        for what in ("stopped", "gone"):
+            self.assertEqual(samples[what].faults & LATCHED, 0)
+        self.assertEqual(samples["gone"].state, IDLE)
 
     def test_two_motors_on_one_amplifier_have_one_lease(self):
         """Catches: knobs of the second motor that want a lease which the bench gives to no session, a page that does not know that it

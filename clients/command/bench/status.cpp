@@ -6,9 +6,9 @@
 
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/basics/errors.hpp"
-#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/link/tcp/mode_name.hpp"
+#include "protocols/number_text.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -9,37 +9,25 @@
 #include <utility>
 
 #include "clients/command/common/basics/errors.hpp"
-#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/link/tcp/mode_name.hpp"
+#include "clients/reference/preset_fit.hpp"
 
 namespace drivebench::command {
 namespace {
 
+reference::AxisView view_of(const link::AxisLink& axis) {
+  return {.bench = axis.bench(), .axis = axis.axis(), .known = axis.known()};
+}
+
 void check_fit(const link::AxisLink& axis, const control::Preset& preset, const ControlOptions& options,
                double sample_rate_hz) {
-  const auto mismatches_with = [&axis](const control::Requirements& needs, double rate_hz) {
-    return mismatches(axis.bench(), axis.axis(), needs, rate_hz, axis.known());
-  };
-  const std::vector<std::string> found = mismatches_with(needs_of(preset, options.overrides), sample_rate_hz);
-  if (found.empty()) return;
-  std::string text = fmt::format("preset {} does not fit this bench:", preset.name);
-  for (const std::string& each : found)
-    text += "\n  " + each;
-  const bool is_described =
-      !axis.bench().axes(static_cast<int>(axis.axis())).machine_kind().empty();  // else anything would fit
-  for (const control::Preset& other : control::presets()) {
-    if (!is_described) break;
-    const std::optional<control::Run> run = made_as_it_stands(other);
-    if (run && mismatches_with(other.needs, run->timing().sample_rate_hz).empty()) {
-      text += fmt::format("\n  {} would fit", other.name);
-    }
-  }
-  throw UsageError(text);
+  const std::string text = reference::misfit_text(view_of(axis), preset, options.overrides, sample_rate_hz);
+  if (!text.empty()) throw UsageError(text);
 }
 
 void apply_settings(link::AxisLink& bench, const std::vector<ParameterSetting>& settings) {
@@ -89,44 +77,16 @@ void write_csv(std::ofstream out, const ControlOptions& options, const ControlRu
 
 void print_report(const ControlReport& r) {
   fmt::print("{} on axis {} of bench {}, {}\n", r.preset, r.axis, r.bench, r.mode);
-  const auto row = [](std::string_view name, double value, std::string_view unit) {
-    fmt::print("  {:<34}{:>12} {}\n", name, number_text(value), unit);
-  };
-  const auto known = [&row](std::string_view name, std::optional<double> value, std::string_view unit) {
-    if (value) row(name, *value, unit);
-  };
-  const auto counted = [](std::string_view name, auto value) { fmt::print("  {:<34}{:>12}\n", name, value); };
-  const bool is_truth = r.angle_source == "truth";
-  known(is_truth ? "peak error (true angle)" : "peak error (encoder)", r.peak_error_counts, "counts");
-  row("peak error", r.peak_error_rad, "rad");
-  known("final error (encoder)", r.final_error_counts, "counts");
-  known("final error (true angle)", r.final_true_error_counts, "counts");
-  row(r.speed_source == "truth" ? "peak speed" : "peak speed (observer)", r.peak_speed_rad_s, "rad/s");
-  row("peak speed error", r.peak_speed_error_rad_s, "rad/s");
-  row("peak phase current", r.peak_current_a, "A");
-  if (r.peak_field_current_a > 0.0) row("peak field current", r.peak_field_current_a, "A");
-  known("peak phase voltage, asked for", r.peak_command_voltage_v, "V");
-  known("peak phase current, asked for", r.peak_command_current_a, "A");
-  known("peak phase voltage, applied", r.peak_voltage_v, "V");
-  counted("samples at a limit", r.saturated_samples);
-  for (const auto& [name, value] : r.peak_telemetry)
-    row("peak " + name, value, "");
-  row("duration", r.duration_s * 1e3, "ms of the bench's time");
-  row("wall time", r.wall_s * 1e3, "ms");
-  counted("samples", r.samples);
-  counted("samples missed here", r.missed_ticks);
-  counted("late ticks of the bench", r.late_ticks);
-  const char* what = r.mode == "realtime" ? "us, the wait for the next tick included" : "us";
-  row("exchange p50", r.exchange_p50_us, what);
-  row("exchange p99", r.exchange_p99_us, what);
-  row("exchange max", r.exchange_max_us, what);
+  for (const reference::ReportRow& row : reference::rows_of(r))
+    fmt::print("  {:<34}{:>12} {}\n", row.name, row.value, row.unit);
 }
 
 /// One move, from rest to its report.
 int run_once(link::AxisLink& axis, const control::Preset& preset, const ControlOptions& options) {
   const v1::BenchDescription& description = axis.bench();
   std::ofstream csv = opened(options.csv_file);
-  const double counts = counts_per_revolution(description, axis.axis(), needs_of(preset, options.overrides));
+  const double counts =
+      reference::counts_per_revolution(view_of(axis), reference::needs_of(preset, options.overrides));
   prepare(axis, options, counts);
   const double load_before_nm = options.loads.empty() ? 0.0 : axis.newest().load_nm;
   ControlRun done = run_over(axis, made(preset, options.overrides), options.loads, counts,

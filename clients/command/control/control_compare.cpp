@@ -7,13 +7,13 @@
 #include <numbers>
 
 #include "clients/command/common/basics/errors.hpp"
-#include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_replay.hpp"
 #include "clients/command/control/control_run.hpp"
 #include "clients/command/recording/recorded_run.hpp"
 #include "clients/link/common/requests.hpp"
+#include "clients/reference/preset_fit.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -41,7 +41,7 @@ void compare_commands(const RecordedRun& recorded, control::Run& run, Comparison
                       tick));
     }
     ++out.samples;
-    const TerminalValues reference = terminal_values_of(setpoint);
+    const TerminalValues reference = reference::terminal_values_of(setpoint);
     const TerminalValues there = asked_for(row.command);
     for (std::size_t i = 0; i < reference.size(); ++i) {
       const double difference = there[i] - reference[i];
@@ -129,7 +129,8 @@ int run_compare(const CompareOptions& options) {
   out.unit = run.controller().quantity() == control::Quantity::kVoltage ? "V" : "A";
   out.threshold = options.threshold.value_or(0.0);
   out.first_tick = recorded.rows.front().sample.tick;
-  out.counts_per_rad = needs_of(preset, options.overrides).counts_per_revolution / (2.0 * std::numbers::pi);
+  out.counts_per_rad =
+      reference::needs_of(preset, options.overrides).counts_per_revolution / (2.0 * std::numbers::pi);
   compare_commands(recorded, run, out);
   if (!options.other.empty()) {
     out.other = options.other;

@@ -5,7 +5,7 @@
 #include "clients/control/presets/presets.hpp"
 #include "protocols/json.hpp"
 
-namespace drivebench::command {
+namespace drivebench::reference {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ControlReport, bench, mode, axis, preset, failure, samples, missed_ticks,
                                    late_ticks, first_tick, duration_s, wall_s, angle_source, speed_source,
@@ -14,6 +14,10 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ControlReport, bench, mode, axis, preset, fai
                                    peak_current_a, peak_field_current_a, peak_command_voltage_v,
                                    peak_command_current_a, peak_voltage_v, saturated_samples, peak_telemetry,
                                    exchange_p50_us, exchange_p99_us, exchange_max_us)
+
+}  // namespace drivebench::reference
+
+namespace drivebench::command {
 
 namespace {
 

@@ -4,12 +4,12 @@
 
 #include "clients/control/loop/run.hpp"
 #include "clients/link/common/axis_link.hpp"
+#include "clients/reference/answers.hpp"
 
 /// The loop of a controller over any link: a sample comes in, its answer goes out.
 namespace drivebench::command {
 
-/// The measurement in a sample of a link with these signals; other values are zero.
-control::Measurement measurement_of(const Sample& sample, SignalMask known, const Sample* second = nullptr);
+using reference::measurement_of;
 
 /// A sample of the loop and the controller's answer to it.
 struct LoopStep {

@@ -51,14 +51,6 @@ control::Run made(const control::Preset& preset, std::span<const control::Gain> 
   }
 }
 
-std::optional<control::Run> made_as_it_stands(const control::Preset& preset) {
-  try {
-    return preset.make({});
-  } catch (const std::invalid_argument&) {
-    return std::nullopt;
-  }
-}
-
 std::vector<control::Gain> gains_with(const control::Preset& preset,
                                       std::span<const control::Gain> overrides) {
   std::vector<control::Gain> gains = preset.gains();

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
 
 #include "clients/command/control/control.hpp"
 #include "clients/control/presets/presets.hpp"
+#include "clients/reference/preset_fit.hpp"
 
 /// Finds and builds presets by their names on the command line.
 namespace drivebench::command {
@@ -16,8 +16,7 @@ const control::Preset& chosen_preset(const std::string& name);
 /// The run of a preset. Throws UsageError if a gain is impossible or the move exceeds a limit.
 control::Run made(const control::Preset& preset, std::span<const control::Gain> overrides);
 
-/// The run with the preset's own gains; nothing for a preset that exists to be refused.
-std::optional<control::Run> made_as_it_stands(const control::Preset& preset);
+using reference::made_as_it_stands;
 
 /// The gains of a preset, overridden.
 std::vector<control::Gain> gains_with(const control::Preset& preset,

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
-#include <numbers>
+#include <span>
 #include <thread>
 
 #include "clients/command/common/session/session.hpp"
@@ -16,16 +16,6 @@ namespace drivebench::command {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr std::size_t kField = 3;  // of TerminalValues
-
-double larger(double peak, double value) noexcept {
-  return std::max(peak, std::abs(value));
-}
-
-double larger_phase(double peak, const TerminalValues& x) noexcept {
-  return larger(larger(larger(peak, x[0]), x[1]), x[2]);
-}
 
 double microseconds(Clock::duration duration) noexcept {
   return std::chrono::duration<double, std::micro>(duration).count();
@@ -45,37 +35,6 @@ void schedule_loads(link::AxisLink& bench, const control::Run& run, const std::v
     const auto ticks = static_cast<std::uint64_t>(std::llround(after_s * run.timing().sample_rate_hz));
     bench.set_load({.load_nm = load.load_nm, .ramp_ticks = 0, .at_tick = first_tick + ticks});
   }
-}
-
-ControlRow row_of(const Sample& sample, const ControlRun& into, std::int64_t periods, double start_rad,
-                  const control::Run& run, const control::Setpoint& setpoint) {
-  const control::Controller& controller = run.controller();
-  ControlRow row = {.tick = sample.tick, .periods = periods, .time_s = run.time_s()};
-  row.reference = run.reference();
-  row.encoder_count = sample.encoder_count;
-  row.shaft_rad = into.knows_angle ? sample.angle_rad : 0.0;
-  row.angle_rad = into.knows_angle ? sample.angle_rad - start_rad : controller.angle_rad();
-  row.error_rad = row.reference.angle_rad - row.angle_rad;
-  row.measured_error_rad = row.reference.angle_rad - controller.angle_rad();
-  row.speed_observer_rad_s = controller.speed_rad_s();
-  row.speed_rad_s = into.knows_speed ? sample.speed_rad_s : row.speed_observer_rad_s;
-  row.current_a = {sample.i_a_a, sample.i_b_a, sample.i_c_a, sample.i_f_a};
-  row.setpoint = terminal_values_of(setpoint);
-  row.voltage_v = {sample.u_a_v, sample.u_b_v, sample.u_c_v, sample.u_f_v};
-  row.saturated = controller.saturated();
-  return row;
-}
-
-/// The reason why the run cannot continue with this sample; empty: it can.
-std::string obstacle(const link::AxisLink& bench, const Sample& sample, const control::Measurement& m,
-                     bool is_first) {
-  if (interrupted()) return "interrupted";
-  for (const double current_a : {m.i_a_a, m.i_b_a, m.i_c_a, m.i_f_a}) {
-    if (!std::isfinite(current_a)) return fmt::format("the sample of tick {} has no currents", sample.tick);
-  }
-  const std::string latched = latched_text(bench.bench(), sample);
-  // In lockstep the first sample is from before the faults were cleared.
-  return latched.empty() || is_first ? "" : "the bench latched " + latched;
 }
 
 void append_telemetry(ControlRun& into, const control::Controller& controller) {
@@ -102,9 +61,11 @@ class RowKeeper final : public LoopWatcher {
       return Answer::kEnd;
     }
     covered_ += step.periods;
-    into_.rows.push_back(row_of(sample, into_, step.periods, start_rad_, run_, step.setpoint));
+    into_.rows.push_back(reference::row_of(sample, into_, step.periods, start_rad_, run_, step.setpoint));
     append_telemetry(into_, run_.controller());
-    into_.failure = obstacle(bench_, sample, step.measured, into_.rows.size() == 1);
+    into_.failure = interrupted()
+                        ? "interrupted"
+                        : reference::obstacle(bench_.bench(), sample, step.measured, into_.rows.size() == 1);
     if (!into_.failure.empty()) return Answer::kEnd;
     if (slowness_ > 0.0) wait_until_due(sample.tick - into_.rows.front().tick);
     asked_ = Clock::now();
@@ -144,45 +105,14 @@ class RowKeeper final : public LoopWatcher {
   Clock::time_point asked_;
 };
 
-void add_to(ControlReport& report, const ControlRow& row) {
-  report.missed_ticks += row.periods - 1;
-  report.peak_error_rad = larger(report.peak_error_rad, row.error_rad);
-  report.peak_speed_rad_s = larger(report.peak_speed_rad_s, row.speed_rad_s);
-  report.peak_speed_error_rad_s =
-      larger(report.peak_speed_error_rad_s, row.reference.speed_rad_s - row.speed_rad_s);
-  report.peak_current_a = larger_phase(report.peak_current_a, row.current_a);
-  report.peak_field_current_a = larger(report.peak_field_current_a, row.current_a[kField]);
-  report.saturated_samples += row.saturated ? 1 : 0;
-}
-
-std::map<std::string, double> telemetry_peaks(const ControlRun& run) {
-  std::map<std::string, double> peaks;
-  const std::size_t columns = run.telemetry_names.size();
-  for (std::size_t i = 0; i < run.telemetry.size(); ++i) {
-    double& peak = peaks[run.telemetry_names[i % columns]];
-    peak = larger(peak, run.telemetry[i]);
-  }
-  return peaks;
-}
-
 }  // namespace
-
-TerminalValues terminal_values_of(const control::Setpoint& x) {
-  return {x.a, x.b, x.c, x.field};
-}
 
 ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<LoadAt>& loads,
                     double counts_per_revolution, double slowness) {
   ControlRun into;
-  into.knows_angle = bench.knows("angle_rad");
-  into.knows_speed = bench.knows("speed_rad_s");
-  into.knows_voltage = bench.knows("u_a_v");
-  into.quantity = run.controller().quantity();
-  into.counts_per_rad = counts_per_revolution / (2.0 * std::numbers::pi);
-  const std::span<const std::string_view> names = run.controller().telemetry_names();
-  into.telemetry_names.assign(names.begin(), names.end());
+  static_cast<reference::RunFacts&>(into) = reference::facts_of(run, bench.known(), counts_per_revolution);
   into.rows.reserve(static_cast<std::size_t>(run.planned_samples()));
-  into.telemetry.reserve(into.rows.capacity() * names.size());
+  into.telemetry.reserve(into.rows.capacity() * into.telemetry_names.size());
   const Clock::time_point started = Clock::now();
   try {
     RowKeeper keeper(bench, run, loads, into, slowness);
@@ -201,43 +131,20 @@ ControlRun run_over(link::AxisLink& bench, control::Run run, const std::vector<L
 }
 
 ControlReport summary_of(const ControlRun& run, double period_s) {
-  ControlReport report;
-  report.failure = run.failure;
-  if (!run.knows_angle) report.angle_source = "encoder";
-  if (!run.knows_speed) report.speed_source = "observer";
-  report.late_ticks = run.late_ticks;
-  report.wall_s = run.wall_s;
-  report.samples = static_cast<std::int64_t>(run.rows.size());
-  report.missed_ticks = run.missed_at_end;
-  if (run.rows.empty()) return report;
-
+  reference::RunNumbers numbers(run, period_s);
   std::vector<double> exchanges_us;
   exchanges_us.reserve(run.rows.size());
-  double peak_setpoint = 0.0;
-  double peak_voltage_v = 0.0;
-  double final_error_rad = 0.0;
+  const std::span<const double> telemetry = run.telemetry;
+  const std::size_t columns = run.telemetry_names.size();
   for (std::size_t i = 0; i < run.rows.size(); ++i) {
-    const ControlRow& row = run.rows[i];
-    add_to(report, row);
-    peak_setpoint = larger_phase(peak_setpoint, row.setpoint);
-    peak_voltage_v = larger_phase(peak_voltage_v, row.voltage_v);
-    if (i + 100 >= run.rows.size()) {
-      report.final_error_rad = larger(report.final_error_rad, row.measured_error_rad);
-      final_error_rad = larger(final_error_rad, row.error_rad);
-    }
-    if (row.exchange_us > 0.0) exchanges_us.push_back(row.exchange_us);
+    numbers.add(run.rows[i], telemetry.subspan(i * columns, columns));
+    if (run.rows[i].exchange_us > 0.0) exchanges_us.push_back(run.rows[i].exchange_us);
   }
-  if (run.counts_per_rad > 0.0) {
-    report.peak_error_counts = report.peak_error_rad * run.counts_per_rad;
-    report.final_error_counts = report.final_error_rad * run.counts_per_rad;
-    if (run.knows_angle) report.final_true_error_counts = final_error_rad * run.counts_per_rad;
-  }
-  (run.quantity == control::Quantity::kVoltage ? report.peak_command_voltage_v
-                                               : report.peak_command_current_a) = peak_setpoint;
-  if (run.knows_voltage) report.peak_voltage_v = peak_voltage_v;
-  report.peak_telemetry = telemetry_peaks(run);
-  report.first_tick = run.rows.front().tick;
-  report.duration_s = static_cast<double>(run.rows.back().tick + 1 - report.first_tick) * period_s;
+  ControlReport report = numbers.report();
+  report.failure = run.failure;
+  report.late_ticks = run.late_ticks;
+  report.wall_s = run.wall_s;
+  report.missed_ticks += run.missed_at_end;
   std::ranges::sort(exchanges_us);
   report.exchange_p50_us = quantile(exchanges_us, 0.50);
   report.exchange_p99_us = quantile(exchanges_us, 0.99);

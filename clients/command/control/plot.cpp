@@ -14,12 +14,12 @@
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/basics/output.hpp"
 #include "clients/command/common/basics/signals.hpp"
-#include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/command/control/control_replay.hpp"
 #include "clients/command/recording/recorded_run.hpp"
 #include "clients/command/recording/svg_plot.hpp"
 #include "clients/control/loop/run.hpp"
+#include "clients/reference/preset_fit.hpp"
 #include "protocols/mcap/time_base.hpp"
 
 namespace drivebench::command {
@@ -170,7 +170,8 @@ Plan planned(const PlotOptions& options, RecordedRun& recorded, double& start_s)
   const control::Preset& preset = chosen_preset(options.preset);
   const control::Run run = made(preset, options.overrides);
   start_s = run.timing().prepare_s;
-  plan.counts_per_rad = needs_of(preset, options.overrides).counts_per_revolution / (2.0 * std::numbers::pi);
+  plan.counts_per_rad =
+      reference::needs_of(preset, options.overrides).counts_per_revolution / (2.0 * std::numbers::pi);
   const std::uint64_t first = recorded.rows.front().sample.tick;
   std::erase_if(recorded.rows, [&](const Answered& row) {
     return static_cast<std::int64_t>(row.sample.tick - first) >= run.planned_samples();

@@ -5,12 +5,12 @@
 #include <optional>
 
 #include "clients/command/common/basics/errors.hpp"
-#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/common/basics/output.hpp"
 #include "clients/command/motor/motor_file.hpp"
 #include "clients/command/motor/motor_json.hpp"
 #include "clients/command/motor/steady_state_plot.hpp"
 #include "protocols/document.hpp"
+#include "protocols/number_text.hpp"
 
 namespace drivebench::command {
 namespace {

@@ -1,8 +1,11 @@
 #include "clients/control/loop/run.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
+
+#include "clients/control/moves/wind_down.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -57,6 +60,11 @@ Setpoint Run::step(const Measurement& m, std::int64_t periods) noexcept {
   phase_ = phase_at(sample_);
   reference_ = trajectory_->at(time_s());
   return controller_->update(m, reference_, periods);
+}
+
+void Run::wind_down(double duration_s) {
+  trajectory_ = std::make_shared<WindDown>(reference_, time_s(), duration_s);
+  planned_samples_ = std::max<std::int64_t>(sample_, 0) + samples_in(duration_s, timing_.sample_rate_hz);
 }
 
 RunPhase Run::phase_at(std::int64_t sample) const noexcept {

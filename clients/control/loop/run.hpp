@@ -42,6 +42,10 @@ class Run {
   /// bench's time when samples are lost. After the end it keeps holding.
   Setpoint step(const Measurement& m, std::int64_t periods = 1) noexcept;
 
+  /// Leaves the trajectory after the last sample: from its reference the speed goes to zero in a straight
+  /// line over `duration_s`, and then the run is done.
+  void wind_down(double duration_s);
+
   /// The phase of the last sample.
   RunPhase phase() const noexcept { return phase_; }
   bool done() const noexcept { return phase_ == RunPhase::kDone; }

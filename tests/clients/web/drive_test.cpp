@@ -57,7 +57,9 @@ class DriveTest : public testing::Test {
   void answer_with_tick(const v1::Envelope& request, std::uint64_t tick) {
     v1::Envelope reply;
     reply.set_id(request.id());
-    reply.mutable_exchange_reply()->add_samples()->mutable_sample()->set_tick(tick);
+    v1::Sample& sample = *reply.mutable_exchange_reply()->add_samples()->mutable_sample();
+    sample.set_tick(tick);
+    sample.set_state(1);  // run
     EXPECT_TRUE(answer(reply));
   }
 
@@ -208,18 +210,98 @@ TEST_F(DriveTest, AnOrderIsCarriedOutWholeOrRefused) {
   EXPECT_EQ(problem_of("hello"), "the text is not JSON");
   EXPECT_EQ(problem_of(R"({"op":"pace","pace":1e999})"), "the text is not JSON");
   EXPECT_EQ(problem_of("[]"), "op: is missing");
-  EXPECT_EQ(problem_of(R"({"op":"fly"})"), R"(op: "fly" is not one of drive, pace, step, alive)");
+  EXPECT_EQ(problem_of(R"({"op":"fly"})"), R"(op: "fly" is not one of drive, pace, step, presets, alive)");
   EXPECT_EQ(problem_of(R"({"op":"pace","pace":2})"), "pace: 2 is no number from 0 to 1");
   EXPECT_EQ(problem_of(R"({"op":"step","ticks":1.5})"), "ticks: 1.5 is no whole number");
   EXPECT_EQ(problem_of(axes(R"({"axis":1,)" + axis + "}")), "axis: 1 is no number from 0 to 0");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,)" + axis + R"(},{"axis":0,)" + axis + "}")), "axis: 0 comes twice");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,"gates":"on"})")),
             R"(gates: "on" is not one of off, voltage, current, duty)");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":7,"run":1})")), "preset: 7 is no name");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":"p"})")), "run: is missing");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":"p","run":1})")).substr(0, 13), "no preset 'p'");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,"gates":"duty","constant":[1]})")),
             "constant: is no list of four numbers");
   EXPECT_TRUE(drive_.is_over());
   EXPECT_EQ(problem_of(axes(R"({"axis":0,)" + axis + "}")), "");
   EXPECT_FALSE(drive_.is_over());
+}
+
+v1::Welcome servo_welcome() {
+  v1::Welcome welcome = welcome_of(v1::MODE_REALTIME);
+  welcome.mutable_bench()->set_period_s(125e-6);
+  welcome.mutable_bench()->mutable_axes(0)->set_machine_kind("induction");
+  welcome.mutable_bench()->mutable_axes(0)->set_drive_kind("voltage_amplifier");
+  return welcome;
+}
+
+std::string run_order(const std::string& preset, int number) {
+  return R"({"op":"drive","axes":[{"axis":0,"preset":")" + preset + R"(","run":)" + std::to_string(number) +
+         "}]}";
+}
+
+// Catches: an order that is repeated and begins the run anew, a second run that does not begin, an open loop
+// that the run goes on in, an order with a wrong preset that ends the run.
+TEST_F(DriveTest, ARunGoesOnUntilAnotherOrder) {
+  drive_ = Drive(servo_welcome());
+  begin(run_order("book/8.2.2", 1));
+  const auto run_text = [this] {
+    drive_.tell({});
+    const std::string report = drive_.report(now_);
+    const std::size_t at = report.find("\"run\"");
+    return at == std::string::npos ? std::string() : report.substr(at);
+  };
+  for (std::uint64_t tick = 6; tick < 30; ++tick)
+    EXPECT_EQ(command_at(tick).gates(), v1::GATES_OFF);  // the axis rests first
+  EXPECT_EQ(run_text().find(R"("run":{"number":1,"preset":"book/8.2.2","phase":"resting")"), 0u);
+  for (std::uint64_t tick = 30; tick < 500; ++tick)
+    command_at(tick);
+  const std::string before = run_text();
+  EXPECT_NE(before.find("preparing"), std::string::npos) << before;
+  drive_.order(run_order("book/8.2.2", 1), now_);
+  EXPECT_THROW(drive_.order(run_order("book/9.1.4", 2), now_), OrderError);
+  EXPECT_EQ(run_text(), before);
+  drive_.order(run_order("book/8.2.2", 2), now_);
+  EXPECT_NE(run_text().find("resting"), std::string::npos);
+  drive_.order(kOneVolt, now_);
+  EXPECT_EQ(run_text(), "");
+  EXPECT_EQ(command_at(501).u_a_v(), 1.0);
+}
+
+// Catches: a controller that drives on without its page, one that lets go of the motor at once, a refusal
+// that the run does not tell.
+TEST_F(DriveTest, ARunWindsDownWithoutItsPageAndEndsWithARefusal) {
+  drive_ = Drive(servo_welcome());
+  begin(run_order("book/8.2.2", 1));
+  std::uint64_t tick = 6;
+  for (; tick < 420; ++tick)
+    command_at(tick);
+  EXPECT_EQ(command_at(tick++).gates(), v1::GATES_VOLTAGE);
+  now_ += Drive::kSilence;
+  EXPECT_EQ(command_at(tick++).gates(), v1::GATES_VOLTAGE);
+  for (int k = 0; k < 7990; ++k)  // a second
+    EXPECT_EQ(command_at(tick++).gates(), v1::GATES_VOLTAGE);
+  for (int k = 0; k < 20 && !drive_.is_over(); ++k) {
+    const std::vector<v1::Envelope> requests = asked();
+    if (requests.at(0).has_exchange()) answer_with_tick(requests[0], tick++);
+  }
+  EXPECT_TRUE(drive_.is_over());
+  begin(run_order("book/8.2.2", 2));
+  refuse(asked().at(0), v1::REFUSAL_LATCHED, "a fault is latched");
+  EXPECT_NE(drive_.report(now_).find("the bench refused: a fault is latched"), std::string::npos);
+  EXPECT_EQ(command_at(tick + 5).gates(), v1::GATES_OFF);
+}
+
+// Catches: presets that the page must guess.
+TEST_F(DriveTest, TellsThePresetsThatFit) {
+  drive_ = Drive(servo_welcome());
+  drive_.order(R"({"op":"presets"})", now_);
+  const std::string report = drive_.report(now_);
+  EXPECT_NE(report.find(R"("presets":[[{"name":")"), std::string::npos) << report;
+  EXPECT_NE(report.find(R"("book/8.2.2")"), std::string::npos);
+  EXPECT_EQ(report.find(R"("book/9.1.4")"), std::string::npos);
+  drive_.tell({});
+  EXPECT_EQ(drive_.report(now_).find("presets"), std::string::npos);
 }
 
 OpenLoop star_axis() {

@@ -1,4 +1,4 @@
-/** Scenarios of an operator who drives an axis open loop. */
+/** Scenarios of an operator who drives an axis. */
 export function driveScenarios({ axeFinds, enter, outside, pictureOf, press, set, stateOf, text, until }) {
   const answer = (page, pattern) => text(page, "#drive .answer", pattern);
   const now = (page, pattern) => text(page, "#drive .value", pattern);
@@ -62,6 +62,49 @@ export function driveScenarios({ axeFinds, enter, outside, pictureOf, press, set
       await page.goto("about:blank");
       await outside("gone");
       return { speed };
+    },
+
+    /** The reference controllers that the page offers, and the run of one. */
+    async preset(page, axis, name) {
+      await stateOf(page, "tick", /\d/);
+      await page.waitForSelector(`[aria-label="preset of ${axis}"]`);
+      const offered = await page.$$eval(`[aria-label="preset of ${axis}"] option`, (all) => all.map((each) => each.value));
+      await set(page, `preset of ${axis}`, name);
+      const source = await text(page, ".preset .soft");
+      await press(page, `run the preset on ${axis}`);
+      const words = await text(page, '.preset [role="status"]', /done|did not/);
+      const numbers = await page.$$eval(".preset tbody tr", (all) => all.map((row) => [...row.children].map((each) => each.textContent)));
+      const owner = await stateOf(page, "controller", /this page/);
+      const { found } = await axeFinds(page);
+      await press(page, `give ${axis} back`);
+      return { offered, source, words, numbers, owner, found, free: await stateOf(page, "controller", /none/) };
+    },
+
+    /** A run that is stopped, one that is refused, and a page that goes in the middle of one. */
+    async presetStopped(page, axis, name, other) {
+      await stateOf(page, "tick", /\d/);
+      await page.waitForSelector(`[aria-label="preset of ${axis}"]`);
+      const words = (pattern) => text(page, '.preset [role="status"]', pattern);
+      await set(page, `preset of ${axis}`, name);
+      await press(page, `run the preset on ${axis}`);
+      await words(/moving/);
+      await outside("running");
+      await page.focus(".panes");
+      await page.keyboard.press("Escape");
+      const stopped = [await answer(page, /stopped/), await words(/stopped/)];
+      await outside("stopped");
+      await page.$eval(`[aria-label="preset of ${axis}"]`, (field, wanted) => {
+        field.append(new Option(wanted, wanted));
+        field.value = wanted;
+      }, other);
+      await press(page, `run the preset on ${axis}`);
+      const refused = await answer(page, /does not fit/);
+      await set(page, `preset of ${axis}`, name);
+      await press(page, `run the preset on ${axis}`);
+      await words(/moving/);
+      await page.goto("about:blank");
+      await outside("gone");
+      return { stopped, refused };
     },
 
     /** What the page may not do, and fields that are no numbers. */

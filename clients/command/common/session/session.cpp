@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include <array>
 #include <csignal>
 #include <cstdio>
 
@@ -12,24 +11,11 @@
 #include "clients/command/common/session/inproc_axis.hpp"
 #include "clients/link/can/can_link.hpp"
 #include "clients/link/modbus/modbus_link.hpp"
-#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
 
 volatile std::sig_atomic_t interrupt_count = 0;
-
-template <class Descriptions>
-std::string names_of(const Descriptions& descriptions, std::uint64_t bits) {
-  std::string names;
-  for (const auto& each : descriptions) {
-    if ((bits & each.bit()) == 0) continue;
-    bits &= ~each.bit();
-    names += (names.empty() ? "" : " ") + printable(each.name());
-  }
-  if (bits != 0) names += fmt::format("{}{:#x}", names.empty() ? "" : " ", bits);
-  return names.empty() ? "none" : names;
-}
 
 }  // namespace
 
@@ -84,38 +70,6 @@ std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view ch
   const std::string known = listed(
       bench.axes(), [n = 0](const auto& axis) mutable { return fmt::format("{} ({})", n++, axis.name()); });
   throw UsageError(fmt::format("no axis '{}'; this bench has {}", choice, known));
-}
-
-const char* name_of_state(std::uint64_t state) noexcept {
-  constexpr std::array kNames = {"idle", "run", "hold", "timeout", "fault", "ready"};
-  return state < kNames.size() ? kNames[state] : "unknown";
-}
-
-std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults) {
-  return names_of(bench.faults(), faults);
-}
-
-std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected) {
-  return names_of(bench.injectable_faults(), injected);
-}
-
-std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults) {
-  std::uint64_t latched = 0;
-  for (const v1::FaultDescription& fault : bench.faults()) {
-    if (fault.latched()) latched |= fault.bit();
-  }
-  return faults & latched;
-}
-
-std::string latched_text(const v1::BenchDescription& bench, const Sample& sample) {
-  if (bench.faults_size() != 0) {
-    const std::uint64_t latched = latched_faults(bench, sample.faults);
-    return latched == 0 ? "" : fault_names(bench, latched);
-  }
-  constexpr std::uint64_t kTimeout = 3;
-  constexpr std::uint64_t kFault = 4;
-  if (sample.state != kTimeout && sample.state != kFault) return {};
-  return fmt::format("{}, fault word {:#x}", name_of_state(sample.state), sample.faults);
 }
 
 void catch_interrupts() {

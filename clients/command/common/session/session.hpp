@@ -13,6 +13,7 @@
 #include "clients/command/common/session/link_choice.hpp"
 #include "clients/link/common/axis_link.hpp"
 #include "clients/link/tcp/tcp_axis.hpp"
+#include "clients/reference/fault_text.hpp"
 #include "protocols/signals/sample.hpp"
 
 /// Helpers of the subcommands that talk to a bench.
@@ -33,16 +34,11 @@ std::unique_ptr<link::AxisLink> open_axis(const LinkChoice& choice, std::string_
                                           std::string_view subcommand);
 
 using link::plain;
-
-const char* name_of_state(std::uint64_t state) noexcept;
-
-/// The names of the bits that are set, separated by blanks; "none".
-std::string fault_names(const v1::BenchDescription& bench, std::uint64_t faults);
-/// The names of the set bits of Sample.injected.
-std::string injected_names(const v1::BenchDescription& bench, std::uint64_t injected);
-std::uint64_t latched_faults(const v1::BenchDescription& bench, std::uint64_t faults);
-/// The latched faults for display; empty: none. For a link without fault descriptions the control state.
-std::string latched_text(const v1::BenchDescription& bench, const Sample& sample);
+using reference::fault_names;
+using reference::injected_names;
+using reference::latched_faults;
+using reference::latched_text;
+using reference::name_of_state;
 
 /// Makes the first SIGINT or SIGTERM only set interrupted(); the second one ends the process.
 void catch_interrupts();

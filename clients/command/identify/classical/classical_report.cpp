@@ -8,7 +8,8 @@
 #include <numbers>
 #include <utility>
 
-#include "clients/command/common/basics/number_text.hpp"
+#include "protocols/number_text.hpp"
+
 
 namespace drivebench::command {
 namespace {

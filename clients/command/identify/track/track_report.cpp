@@ -7,8 +7,8 @@
 #include <limits>
 #include <string_view>
 
-#include "clients/command/common/basics/number_text.hpp"
 #include "clients/command/recording/svg_plot.hpp"
+#include "protocols/number_text.hpp"
 
 namespace drivebench::command {
 namespace {

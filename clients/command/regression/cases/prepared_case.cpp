@@ -8,7 +8,6 @@
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/programs/composed_file.hpp"
 #include "clients/command/common/programs/installation.hpp"
-#include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_presets.hpp"
 #include "clients/regression/suite/compose.hpp"
 
@@ -34,8 +33,9 @@ std::string misfit(const Case& c, const InprocAxis& axis, const control::Preset&
                    const control::Run& run) {
   const std::vector<control::Gain> gains = gains_of(c.device);
   std::string text;
-  for (const std::string& each : mismatches(axis.bench(), axis.axis(), needs_of(preset, gains),
-                                            run.timing().sample_rate_hz, axis.known()))
+  const reference::AxisView view = {.bench = axis.bench(), .axis = axis.axis(), .known = axis.known()};
+  for (const std::string& each :
+       mismatches(view, reference::needs_of(preset, gains), run.timing().sample_rate_hz))
     text += (text.empty() ? "" : "; ") + each;
   return text;
 }

@@ -12,6 +12,7 @@ namespace drivebench::web {
 namespace {
 
 using namespace std::chrono_literals;
+using Json = nlohmann::ordered_json;
 
 constexpr auto kAnswerTime = 500ms;  // for the answer to the last command, before the leases go back
 constexpr auto kReportPeriod = 200ms;
@@ -34,10 +35,33 @@ Drive::Time::duration seconds(double value) noexcept {
   return std::chrono::duration_cast<Drive::Time::duration>(std::chrono::duration<double>(value));
 }
 
+Json run_json(const ReferenceRun& run) {
+  Json numbers = Json::array();
+  for (const reference::ReportRow& each : run.rows())
+    numbers.push_back({{"name", each.name}, {"value", each.value}, {"unit", each.unit}});
+  return {{"number", run.number()},     {"preset", run.preset()},   {"phase", run.phase()},
+          {"progress", run.progress()}, {"failure", run.failure()}, {"numbers", std::move(numbers)}};
+}
+
+/// For each axis the presets that fit it.
+Json presets_json(const v1::BenchDescription& bench) {
+  Json axes = Json::array();
+  for (int axis = 0; axis < bench.axes_size(); ++axis) {
+    Json presets = Json::array();
+    for (const control::Preset* const each : offered_presets(bench, static_cast<std::uint32_t>(axis)))
+      presets.push_back({{"name", each->name}, {"source", each->source}, {"expectation", each->expectation}});
+    axes.push_back(std::move(presets));
+  }
+  return axes;
+}
+
 }  // namespace
 
 Drive::Drive(const v1::Welcome& welcome)
-    : period_s_(welcome.bench().period_s()), is_lockstep_(welcome.bench().mode() == v1::MODE_LOCKSTEP) {
+    : period_s_(welcome.bench().period_s()),
+      is_lockstep_(welcome.bench().mode() == v1::MODE_LOCKSTEP),
+      bench_(std::make_shared<v1::BenchDescription>(welcome.bench())),
+      runs_(static_cast<std::size_t>(welcome.bench().axes_size())) {
   axes_.reserve(static_cast<std::size_t>(welcome.bench().axes_size()));
   for (const v1::AxisDescription& axis : welcome.bench().axes()) {
     axes_.emplace_back(static_cast<std::uint32_t>(axes_.size()), period_s_,
@@ -50,6 +74,7 @@ Drive::Drive(const v1::Welcome& welcome)
 void Drive::order(std::string_view text, Time now) {
   const Order order = parse_order(text, axes_.size());
   heard_ = now;
+  if (order.kind == Order::Kind::kPresets) has_news_ = is_asked_for_presets_ = true;
   if (stage_ != Stage::kOver && stage_ != Stage::kDriving) return;  // what ends is not taken up again
   if (order.kind == Order::Kind::kDrive) {
     set_targets(order, now);
@@ -63,6 +88,14 @@ void Drive::order(std::string_view text, Time now) {
 }
 
 void Drive::set_targets(const Order& order, Time now) {
+  const auto goes_on = [this](const Order::Axis& each) {
+    return runs_[each.axis] && runs_[each.axis]->number() == each.run;
+  };
+  std::vector<std::unique_ptr<ReferenceRun>> begun(runs_.size());
+  for (const Order::Axis& each : order.axes) {
+    if (!each.preset.empty() && !goes_on(each))
+      begun[each.axis] = std::make_unique<ReferenceRun>(bench_, each.axis, each.preset, each.run);
+  }
   tell({});
   if (order.axes.empty()) return switch_off_and_release(now);
   if (is_over()) {
@@ -72,10 +105,18 @@ void Drive::set_targets(const Order& order, Time now) {
   driven_.clear();
   for (const Order::Axis& each : order.axes) {
     driven_.push_back(each.axis);
-    axes_[each.axis].follow(each.target);
+    if (each.preset.empty()) {
+      axes_[each.axis].follow(each.target);
+      runs_[each.axis].reset();
+    } else if (begun[each.axis]) {
+      axes_[each.axis].switch_off();
+      runs_[each.axis] = std::move(begun[each.axis]);
+    }
   }
   for (OpenLoop& each : axes_) {
-    if (std::ranges::find(driven_, each.axis()) == driven_.end()) each.switch_off();
+    if (std::ranges::find(driven_, each.axis()) != driven_.end()) continue;
+    each.switch_off();
+    runs_[each.axis()].reset();
   }
   stage_ = Stage::kDriving;
   gave_back_ = false;
@@ -86,7 +127,7 @@ void Drive::switch_off_and_release(Time now) {
   stage_ = Stage::kSwitchingOff;
   deadline_ = now + kAnswerTime;
   is_off_sent_ = false;
-  switch_off();
+  switch_off("stopped");
 }
 
 void Drive::tell(std::string problem) {
@@ -101,8 +142,10 @@ void Drive::leave(Time now) {
   deadline_ = now + kRampDown + kAnswerTime;
   const double pace = is_lockstep_ ? pace_ : 1.0;
   const double longest_s = pace * std::chrono::duration<double>(kRampDown).count();
-  for (const std::uint32_t axis : driven_)
+  for (const std::uint32_t axis : driven_) {
+    if (runs_[axis]) runs_[axis]->wind_down(longest_s);
     axes_[axis].ramp_down(longest_s);
+  }
 }
 
 /// The stages that end the drive, one after the other.
@@ -146,6 +189,12 @@ bool Drive::take(std::span<const std::byte> payload, Time now) {
 
 void Drive::taken(const v1::ExchangeReply& reply) {
   if (reply.samples().empty()) return;
+  for (const v1::AxisSample& each : reply.samples()) {
+    if (each.axis() >= runs_.size() || !runs_[each.axis()]) continue;
+    const bool was_over = runs_[each.axis()]->is_over();
+    runs_[each.axis()]->take(each.sample());
+    has_news_ = has_news_ || was_over != runs_[each.axis()]->is_over();
+  }
   tick_ = reply.samples(0).sample().tick();
   knows_tick_ = true;
   if (stage_ == Stage::kSwitchingOff && is_off_sent_) stage_ = Stage::kReleasing;
@@ -155,24 +204,32 @@ void Drive::refused(const v1::Refusal& refusal) {
   tell(refusal.message());
   knows_tick_ = false;
   const bool is_hopeless = is_off() || refusal.code() == v1::REFUSAL_NOT_OWNER;
-  switch_off();
+  switch_off("the bench refused: " + refusal.message());
   if (is_hopeless) stage_ = Stage::kReleasing;
 }
 
-void Drive::switch_off() noexcept {
-  for (const std::uint32_t axis : driven_)
+void Drive::switch_off(const std::string& why) {
+  for (const std::uint32_t axis : driven_) {
     axes_[axis].switch_off();
+    if (runs_[axis]) runs_[axis]->switch_off(why);
+  }
 }
 
 bool Drive::is_off() const noexcept {
-  return std::ranges::all_of(driven_,
-                             [this](std::uint32_t axis) { return axes_[axis].gates() == v1::GATES_OFF; });
+  return std::ranges::all_of(driven_, [this](std::uint32_t axis) {
+    return runs_[axis] ? runs_[axis]->is_over() : axes_[axis].gates() == v1::GATES_OFF;
+  });
 }
 
 bool Drive::has_arrived() const noexcept {
   return std::ranges::all_of(driven_, [this](std::uint32_t axis) {
+    if (runs_[axis]) return runs_[axis]->is_over();
     return axes_[axis].gates() == v1::GATES_OFF || axes_[axis].has_arrived();
   });
+}
+
+v1::Command Drive::command(std::uint32_t axis) {
+  return runs_[axis] ? runs_[axis]->command(tick_) : axes_[axis].command(tick_);
 }
 
 std::string Drive::exchange(Time now) {
@@ -180,7 +237,7 @@ std::string Drive::exchange(Time now) {
   v1::Exchange& exchange = *request.mutable_exchange();
   if (knows_tick_) {
     for (const std::uint32_t axis : driven_)
-      *exchange.add_commands() = axes_[axis].command(tick_);
+      *exchange.add_commands() = command(axis);
     is_off_sent_ = stage_ == Stage::kSwitchingOff;
     if (steps_ > 0) --steps_;
     if (pace_ > 0.0) due_ = std::max(due_ + seconds(period_s_ / pace_), now - kLargestLag);
@@ -224,16 +281,18 @@ const char* Drive::state_word() const noexcept {
 std::string Drive::report(Time now) {
   if (!std::exchange(has_news_, false)) return {};
   reported_ = now;
-  nlohmann::ordered_json axes = nlohmann::ordered_json::array();
+  Json axes = Json::array();
   for (const std::uint32_t axis : driven_) {
     const OpenLoop& each = axes_[axis];
     axes.push_back({{"axis", axis},
                     {"gates", word_of(each.gates())},
                     {"frequency_hz", each.frequency_hz()},
                     {"amplitude", each.amplitude()}});
+    if (runs_[axis]) axes.back()["run"] = run_json(*runs_[axis]);
   }
-  return json_text(
-      nlohmann::ordered_json{{"state", state_word()}, {"problem", problem_}, {"axes", std::move(axes)}});
+  Json report = {{"state", state_word()}, {"problem", problem_}, {"axes", std::move(axes)}};
+  if (std::exchange(is_asked_for_presets_, false)) report["presets"] = presets_json(*bench_);
+  return json_text(report);
 }
 
 }  // namespace drivebench::web

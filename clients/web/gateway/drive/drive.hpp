@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,13 +13,14 @@
 
 #include "clients/web/gateway/drive/open_loop.hpp"
 #include "clients/web/gateway/drive/orders.hpp"
+#include "clients/web/gateway/drive/reference_run.hpp"
 
 namespace drivebench::web {
 
-/// Drives axes open loop for a page, in the page's own session and under its leases, without the socket. The
-/// page orders targets, and the drive answers every sample with a command: a timer of a browser is later than
-/// a watchdog allows. Real time: a command follows each answer. Lockstep: time runs at a pace of the page's
-/// choice, or in steps.
+/// Drives axes for a page, open loop or with a reference controller, in the page's own session and under its
+/// leases, without the socket. The page orders targets, and the drive answers every sample with a command: a
+/// timer of a browser is later than a watchdog allows. Real time: a command follows each answer. Lockstep:
+/// time runs at a pace of the page's choice, or in steps.
 ///
 /// A page that is silent for kSilence has gone: the drive ramps down, switches the gates off and gives the
 /// leases back. A refused command switches the gates of all driven axes off, and the drive goes on so; where
@@ -60,12 +62,13 @@ class Drive {
   void set_targets(const Order& order, Time now);
   void switch_off_and_release(Time now);
   void move_on(Time now);
-  void switch_off() noexcept;
+  void switch_off(const std::string& why);
   void taken(const v1::ExchangeReply& reply);
   void refused(const v1::Refusal& refusal);
   const char* state_word() const noexcept;
   bool is_off() const noexcept;
   bool has_arrived() const noexcept;
+  v1::Command command(std::uint32_t axis);
   /// When the next tick may run.
   Time due(Time now) const noexcept;
   std::string exchange(Time now);
@@ -74,7 +77,9 @@ class Drive {
 
   double period_s_;
   bool is_lockstep_;
-  std::vector<OpenLoop> axes_{};  // of the bench
+  std::shared_ptr<const v1::BenchDescription> bench_;
+  std::vector<OpenLoop> axes_{};                       // of the bench
+  std::vector<std::unique_ptr<ReferenceRun>> runs_{};  // in the place of the open loop of an axis
   std::vector<std::uint32_t> driven_{};
   Stage stage_ = Stage::kOver;
   Time heard_{};     // from the page
@@ -91,6 +96,7 @@ class Drive {
   bool gave_back_ = false;  // the leases, since the last order to drive
   Time reported_{};
   bool has_news_ = false;
+  bool is_asked_for_presets_ = false;
 };
 
 }  // namespace drivebench::web

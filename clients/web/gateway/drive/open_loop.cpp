@@ -13,6 +13,8 @@ double blend(double from, double to, double progress) noexcept {
   return progress >= 1.0 ? to : from + progress * (to - from);
 }
 
+}  // namespace
+
 void put_setpoints(v1::Command& command, const link::Setpoints& x) {
   if (command.gates() == v1::GATES_CURRENT) {
     command.set_i_a_a(x.a);
@@ -31,8 +33,6 @@ void put_setpoints(v1::Command& command, const link::Setpoints& x) {
     command.set_u_f_v(x.f);
   }
 }
-
-}  // namespace
 
 OpenLoopTarget OpenLoop::at_rest(const OpenLoopTarget& target) const noexcept {
   OpenLoopTarget rest = target;

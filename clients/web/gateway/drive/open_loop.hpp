@@ -21,6 +21,9 @@ struct OpenLoopTarget {
   double ramp_s = 0.0;  ///< until the target is reached; 0: at once
 };
 
+/// Writes the set-points of a command that has its gates.
+void put_setpoints(v1::Command& command, const link::Setpoints& x);
+
 /// The terminals of an axis as its commands see them.
 struct OpenLoopTerminals {
   std::uint32_t phases = 3;

@@ -17,6 +17,7 @@ constexpr double kLargest = 1e6;    // of a set-point, as in the bench's own rul
 constexpr double kSteepest = 1e12;  // of an amplitude over the frequency
 constexpr double kLongestRamp_s = 3600.0;
 constexpr double kMostSteps = 1e6;
+constexpr double kMostRuns = 1e15;
 
 struct GatesWord {
   v1::Gates gates;
@@ -68,9 +69,18 @@ link::Setpoints constant_of(const nlohmann::json& object) {
   return {.a = at(0), .b = at(1), .c = at(2), .f = at(3)};
 }
 
+std::string preset_of(const nlohmann::json& object) {
+  const nlohmann::json& name = object.at("preset");
+  if (!name.is_string()) throw OrderError(fmt::format("preset: {} is no name", ascii_json_text(name)));
+  return name.get<std::string>();
+}
+
 Order::Axis axis_of(const nlohmann::json& object, std::size_t axis_count) {
-  const std::uint64_t axis = count_of(object, "axis", 0.0, static_cast<double>(axis_count) - 1.0);
-  return {.axis = static_cast<std::uint32_t>(axis),
+  const auto axis =
+      static_cast<std::uint32_t>(count_of(object, "axis", 0.0, static_cast<double>(axis_count) - 1.0));
+  if (object.contains("preset"))
+    return {.axis = axis, .preset = preset_of(object), .run = count_of(object, "run", 1.0, kMostRuns)};
+  return {.axis = axis,
           .target = {.gates = gates_of(object),
                      .constant = constant_of(object),
                      .boost = number_of(object, "boost", -kLargest, kLargest),
@@ -105,8 +115,11 @@ Order order_of(const nlohmann::json& message, std::size_t axis_count) {
   } else if (op == "step") {
     order.kind = Order::Kind::kStep;
     order.ticks = count_of(message, "ticks", 1.0, kMostSteps);
+  } else if (op == "presets") {
+    order.kind = Order::Kind::kPresets;
   } else if (op != "alive") {
-    throw OrderError(fmt::format("op: {} is not one of drive, pace, step, alive", ascii_json_text(op)));
+    throw OrderError(
+        fmt::format("op: {} is not one of drive, pace, step, presets, alive", ascii_json_text(op)));
   }
   return order;
 }

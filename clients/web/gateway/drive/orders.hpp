@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -18,18 +19,24 @@ struct OrderError : std::runtime_error {
 ///
 ///   {"op": "drive", "axes": [{"axis": 0, "gates": "voltage", "constant": [a, b, c, f], "boost": U,
 ///                             "per_hz": U, "frequency_hz": f, "ramp_s": t}]}
+///   {"op": "drive", "axes": [{"axis": 0, "preset": "book/8.2.2", "run": n}]}
 ///   {"op": "pace", "pace": x}
 ///   {"op": "step", "ticks": n}
+///   {"op": "presets"}
 ///   {"op": "alive"}
 ///
-/// `drive` names all axes of the drive: without any it switches off and gives the leases back. `pace` is for
+/// `drive` names all axes of the drive, each with its target or with the preset of a reference controller:
+/// without any it switches off and gives the leases back. The same `run` of an axis goes on, another one
+/// begins. `pace` is for
 /// lockstep, the seconds of the bench in a second, 0 to 1; at 0 time stands still, but for the ticks of
-/// `step`, 1 to 1,000,000.
+/// `step`, 1 to 1,000,000. `presets` asks which presets fit the axes.
 struct Order {
-  enum class Kind { kDrive, kPace, kStep, kAlive };
+  enum class Kind { kDrive, kPace, kStep, kPresets, kAlive };
   struct Axis {
     std::uint32_t axis = 0;
     OpenLoopTarget target{};
+    std::string preset{};  ///< empty: open loop
+    std::uint64_t run = 0;
   };
 
   Kind kind = Kind::kAlive;

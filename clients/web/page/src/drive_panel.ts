@@ -1,9 +1,10 @@
-/** Drives axes open loop: the page sets targets, the gateway sends the commands. */
+/** Drives axes open loop or with a reference controller: the page sets targets, the gateway sends the commands. */
 import { axisName, Bench } from "./bench";
 import { button, byId, choice, element, setText } from "./dom";
-import { Field, fieldsOf, Gates, gatesOf, switchedOff, Target, targetOf, unitOf, Wave, wavesOf } from "./drive_target";
+import { Field, fieldsOf, Gates, gatesOf, switchedOff, PresetTarget, Target, targetOf, unitOf, Wave, wavesOf } from "./drive_target";
 import { Leases } from "./leases";
 import { numberIn, withUnit } from "./numbers";
+import { PresetRows } from "./preset_rows";
 import { DriveReport, pb } from "./wire";
 
 const kAliveMs = 500;
@@ -14,13 +15,15 @@ const kPaces = [1, 0.3, 0.1, 0.03, 0.01, 0.001];
 
 export class DrivePanel {
   private readonly answer = element("p", { class: "answer", role: "status" });
-  private readonly targets = new Map<number, Target>();
+  private readonly targets = new Map<number, Target | PresetTarget>();
   private readonly shown = new Map<number, HTMLElement>();
+  private readonly presets = new Map<number, PresetRows>();
   private readonly ended = new AbortController();
   private readonly timer: number;
   private pace = 1;
   private isPaused = false;
   private isDriving = false;
+  private runs = 0;
 
   constructor(root: HTMLElement, private readonly bench: Bench, private readonly leases: Leases) {
     const axes = bench.description.axes;
@@ -30,13 +33,14 @@ export class DrivePanel {
     this.timer = window.setInterval(() => this.isDriving && this.bench.wire.order({ op: "alive" }), kAliveMs);
     this.setDriving(false);
     if (!isUsed) return;
-    root.append(element("h2", {}, "Open loop"), element("p", { class: "soft" }, explanation(bench)), this.answer);
+    root.append(element("h2", {}, "Drive"), element("p", { class: "soft" }, explanation(bench)), this.answer);
     if (bench.isLockstep) root.append(this.timeRow());
     axes.forEach((axis, number) => root.append(this.axisRows(number, axis)));
     leases.watch((axis, sentence) => this.leaseChanged(axis, sentence));
     const { signal } = this.ended;
     byId("stop").addEventListener("click", () => this.stop(), { signal });
     document.addEventListener("keydown", (event) => event.key === "Escape" && this.stop(), { signal });
+    bench.wire.order({ op: "presets" });
   }
 
   end(): void {
@@ -51,8 +55,10 @@ export class DrivePanel {
     else if (report.state === "over" && this.isDriving) this.tell("the leases are given back");
     for (const [axis, place] of this.shown) {
       const now = report.axes.find((each) => each.axis === axis);
-      setText(place, now === undefined ? "" : nowText(now));
+      setText(place, now === undefined || now.run !== undefined ? "" : nowText(now));
+      this.presets.get(axis)?.show(now?.run);
     }
+    if (report.presets !== undefined) return report.presets.forEach((presets, axis) => this.presets.get(axis)?.offer(presets));
     if (!this.isDriving || (report.state !== "over" && report.state !== "idle")) return;
     this.targets.clear();
     this.setDriving(false);
@@ -84,7 +90,7 @@ export class DrivePanel {
     this.tell("stopped: the gates are off");
   }
 
-  private async drive(axis: number, target: Target): Promise<void> {
+  private async drive(axis: number, target: Target | PresetTarget): Promise<void> {
     try {
       await this.leases.acquire(axis);
       this.targets.set(axis, target);
@@ -157,6 +163,8 @@ export class DrivePanel {
     show();
     const now = element("span", { class: "value" });
     this.shown.set(number, now);
+    const presets = new PresetRows(name, (preset) => void this.drive(number, { axis: number, preset, run: ++this.runs }), () => this.stop());
+    this.presets.set(number, presets);
     const start = () => {
       const values: Record<string, number> = {};
       for (const [field, input] of fields) {
@@ -175,7 +183,7 @@ export class DrivePanel {
       } }, element("div", { class: "bar" }, wave, gates), place,
       element("div", { class: "bar" }, element("button", { type: "submit", "aria-label": `drive ${name}` }, "Drive"),
         button("Stop", () => this.stop(), { "aria-label": `stop ${name}` }),
-        button("Give back", () => this.giveBack(), { "aria-label": `give ${name} back` }), now)));
+        button("Give back", () => this.giveBack(), { "aria-label": `give ${name} back` }), now)), presets.root);
   }
 }
 

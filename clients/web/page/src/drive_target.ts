@@ -1,4 +1,4 @@
-/** What a drive open loop asks of an axis, from the numbers of the page. */
+/** What the page asks of an axis that it drives. */
 import { pb } from "./wire";
 
 export type Gates = "off" | "voltage" | "current" | "duty";
@@ -13,6 +13,13 @@ export interface Target {
   per_hz: number;
   frequency_hz: number;
   ramp_s: number;
+}
+
+/** An axis that the reference controller of a preset drives; another number is another run. */
+export interface PresetTarget {
+  axis: number;
+  preset: string;
+  run: number;
 }
 
 export interface Field {

@@ -50,7 +50,7 @@ export class Leases {
 
   async release(axis: number): Promise<void> {
     if (!this.holds(axis)) return;
-    if (this.areDriven) throw new Error("the gateway drives the axis: give it back under Open loop");
+    if (this.areDriven) throw new Error("the gateway drives the axis: give it back under Drive");
     await this.ask(axis, ACTION_RELEASE);
     this.set(axis, 0);
   }

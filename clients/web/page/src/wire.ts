@@ -21,7 +21,27 @@ export class Refused extends Error {
 export interface DriveReport {
   state: "idle" | "drives" | "ends" | "over";
   problem: string;
-  axes: { axis: number; gates: "off" | "voltage" | "current" | "duty"; frequency_hz: number; amplitude: number }[];
+  axes: { axis: number; gates: "off" | "voltage" | "current" | "duty"; frequency_hz: number; amplitude: number; run?: PresetRun }[];
+  /** For each axis, in a report that answers `presets`. */
+  presets?: Preset[][];
+}
+
+/** A reference controller with its move. */
+export interface Preset {
+  name: string;
+  source: string;
+  expectation: string;
+}
+
+/** The run of a preset on an axis. */
+export interface PresetRun {
+  number: number;
+  preset: string;
+  phase: "resting" | "preparing" | "moving" | "holding" | "done" | "failed";
+  progress: number;
+  failure: string;
+  /** Of a run that is over. */
+  numbers: { name: string; value: string; unit: string }[];
 }
 
 export interface Listener {

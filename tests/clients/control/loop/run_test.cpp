@@ -249,6 +249,31 @@ TEST(Run, PhasesLastTheirTimesAndTheEndHolds) {
   EXPECT_NEAR(move.time_s(), 899.0 / 8000.0, 1e-12);
 }
 
+// Catches: a reference that jumps where the trajectory is left, a speed that does not reach zero or reaches
+// it at another time, an angle that is not the integral of the speed.
+TEST(Run, WindsDownInAStraightLine) {
+  control::Run move = find_preset("book/8.2.2")->make({});
+  for (int k = 0; k < 500; ++k)
+    move.step({});
+  const Reference left = move.reference();
+  ASSERT_GT(left.speed_rad_s, 10.0);
+  move.wind_down(0.1);
+  double angle_rad = left.angle_rad;
+  double speed_rad_s = left.speed_rad_s;
+  for (int k = 1; k <= 800; ++k) {
+    ASSERT_FALSE(move.done());
+    move.step({});
+    const Reference& now = move.reference();
+    EXPECT_NEAR(now.speed_rad_s, left.speed_rad_s * (1.0 - k / 800.0), 1e-9);
+    angle_rad += 0.5 * (speed_rad_s + now.speed_rad_s) * move.period_s();  // exact for a straight line
+    speed_rad_s = now.speed_rad_s;
+    EXPECT_NEAR(now.angle_rad, angle_rad, 1e-9);
+  }
+  EXPECT_TRUE(move.done());
+  EXPECT_EQ(move.reference().speed_rad_s, 0.0);
+  EXPECT_EQ(move.reference().acceleration_rad_s2, 0.0);
+}
+
 // Catches: a build-up too short for the claim in the preset, judged by the true flux.
 TEST(Run, FluxStandsAtItsRatedValueWhenTheMoveStarts) {
   control::Run move = find_preset("book/8.2.2")->make({});

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace drivebench::command {
+namespace drivebench {
 
 /// A measured or calculated value, as every table and report prints it: five significant digits, so that a
 /// current of some milliamperes is as readable as one of some hundred amperes.
@@ -12,4 +12,4 @@ inline std::string number_text(double value) {
   return fmt::format("{:.5g}", value);
 }
 
-}  // namespace drivebench::command
+}  // namespace drivebench

@@ -1,10 +1,10 @@
-#include "clients/command/control/control_axis.hpp"
+#include "clients/reference/preset_fit.hpp"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-namespace drivebench::command {
+namespace drivebench::reference {
 namespace {
 
 // Catches: a preset that is run on a bench it was not made for.
@@ -21,24 +21,24 @@ TEST(Mismatches, NameKindsRateCountsPolePairsAndVoltage) {
   set("encoder.counts_per_revolution", 2000);
   set("machine.pole_pairs", 3);
   set("amplifier.voltage_limit_v", 80);
-  EXPECT_TRUE(mismatches(bench, 0, needs, 8000.0, kAllSignals).empty());  // a link without kinds
+  EXPECT_TRUE(mismatches({bench, 0}, needs, 8000.0).empty());  // a link without kinds
   axis.set_machine_kind("induction");
   axis.set_drive_kind("voltage_amplifier");
-  EXPECT_TRUE(mismatches(bench, 0, needs, 8000.0, kAllSignals).empty());
+  EXPECT_TRUE(mismatches({bench, 0}, needs, 8000.0).empty());
   control::Requirements field = needs;
   field.signal = "i_f_a";
-  EXPECT_TRUE(mismatches(bench, 0, field, 8000.0, kAllSignals).empty());
-  EXPECT_EQ(mismatches(bench, 0, field, 8000.0, 0).size(), 1U);
+  EXPECT_TRUE(mismatches({bench, 0}, field, 8000.0).empty());
+  EXPECT_EQ(mismatches({bench, 0, 0}, field, 8000.0).size(), 1U);
   control::Requirements currents = needs;
   currents.quantity = control::Quantity::kCurrent;
-  EXPECT_EQ(mismatches(bench, 0, currents, 8000.0, kAllSignals).size(), 1U);
+  EXPECT_EQ(mismatches({bench, 0}, currents, 8000.0).size(), 1U);
   axis.set_machine_kind("pm_dc");
   axis.set_drive_kind("current_amplifier");
-  EXPECT_EQ(mismatches(bench, 0, needs, 8000.0, kAllSignals).size(), 2U);
+  EXPECT_EQ(mismatches({bench, 0}, needs, 8000.0).size(), 2U);
   bench.set_period_s(250e-6);
   for (v1::ParameterDescription& row : *axis.mutable_parameters())
     row.set_value(row.value() / 2.0);
-  EXPECT_EQ(mismatches(bench, 0, needs, 8000.0, kAllSignals).size(), 6U);
+  EXPECT_EQ(mismatches({bench, 0}, needs, 8000.0).size(), 6U);
 }
 
 // Catches: a gain that changes the controller but not what it is checked against.
@@ -53,4 +53,4 @@ TEST(Mismatches, GainsThatDescribeTheAxisChangeTheRequirements) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::reference
