@@ -19,6 +19,9 @@ export interface Source {
   readonly dropped: number;
 }
 
+/** The states of an axis, as samples number them. */
+export const kStates = ["idle", "run", "hold", "timeout", "fault", "ready"];
+
 export function axisName(source: Source, axis: number): string {
   return source.description.axes[axis].name as string;
 }

@@ -191,7 +191,7 @@ export class Scope {
     }
     if (!this.trigger.isArmed) return;
     if (firedTick === null) {
-      this.bar.show("armed");
+      this.bar.show(this.trigger.holdsOff ? "hold-off" : "armed");
       if (settings.sweep === "auto" && performance.now() - this.autoShown > kAutoMs) this.held = null;
       else if (this.held === null && settings.sweep !== "auto") this.held = frozen(viewOf(this.source, 0, -1, 0));
       return;
@@ -203,7 +203,7 @@ export class Scope {
     this.bar.show(`triggered at tick ${firedTick}`);
     if (this.source.histories[settings.axis].lastTick < to) return;
     if (settings.sweep === "single") this.trigger.isArmed = false;
-    else this.trigger.arm();
+    else this.trigger.armAgain();
   }
 
   private ticksAt(time: number): number {
