@@ -1,12 +1,12 @@
 /** The state of the bench and of each axis. */
-import { Bench, namesOfBits } from "./bench";
+import { Bench, kStates, namesOfBits } from "./bench";
 import { element } from "./dom";
 import { DriveTrain } from "./drive_train";
 import { Facts } from "./facts";
 import { plain, withUnit } from "./numbers";
+import { Transports } from "./transports";
+import { verdictOf } from "./verdict";
 import { pb } from "./wire";
-
-const kStates = ["idle", "run", "hold", "timeout", "fault", "ready"];
 
 export class StatePanel {
   private readonly bench = new Facts();
@@ -17,11 +17,12 @@ export class StatePanel {
   private turned_ms = performance.now();
   private ended = false;
   private readonly notes = element("ul", { class: "notes" });
+  private readonly transports = new Transports();
 
   constructor(root: HTMLElement, private readonly of: Bench, private readonly ownerOf: (axis: number) => number) {
     this.axes = of.description.axes.map(() => new Facts());
     this.trains = of.description.axes.map((axis) => new DriveTrain(axis));
-    root.replaceChildren(element("h2", {}, "Bench"), this.bench.root, this.notes, ...this.axes.flatMap((facts, axis) => {
+    root.replaceChildren(element("h2", {}, "Bench"), this.bench.root, this.transports.root, this.notes, ...this.axes.flatMap((facts, axis) => {
       const { name, machine, machine_kind: kind } = of.description.axes[axis];
       return [element("h2", {}, `Axis ${axis}: ${name}`), element("p", { class: "soft" }, `${machine}, ${kind}`), this.trains[axis].root, facts.root];
     }));
@@ -41,10 +42,13 @@ export class StatePanel {
       const late = status.late_ticks as number;
       this.bench.set("late ticks", late === 0 ? "none" : `${late}, worst ${withUnit(status.worst_lateness_s as number, "s")}`, late > 0 ? "warn" : "");
     }
+    const verdict = verdictOf(status);
+    this.bench.set("verdict", verdict.text, verdict.isGood ? "" : "warn");
     const hash = status.state_hash as number | bigint;
     if (this.of.isLockstep) this.bench.set("state hash", hash.toString(16).padStart(16, "0"), "mono");
     this.bench.set("sessions", String(status.sessions));
     this.bench.set("recording", recordingText(status), (status.recording_gaps as number) > 0 ? "warn" : "");
+    this.transports.draw(status.transports);
     this.showNotes(status);
     for (const each of status.axes) {
       this.drawAxis(each.axis as number, each.sample as pb.Sample);
@@ -90,7 +94,7 @@ export class StatePanel {
   private showNotes(status: pb.Status): void {
     const notes = [...status.notes];
     if (this.of.isLockstep && status.axes.every((each) => each.sample?.owner === 0)) {
-      notes.push("lockstep: time stands still until a controller drives the bench: `drivebench control` for example, or Open loop below");
+      notes.push("lockstep: time stands still until a controller drives the bench: `drivebench control` for example, or Drive below");
     }
     if (this.notes.childElementCount !== notes.length) this.notes.replaceChildren(...notes.map((each) => element("li", {}, each)));
   }
