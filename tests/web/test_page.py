@@ -77,8 +77,8 @@ class PageTest(unittest.TestCase):
         self.addCleanup(server.__exit__)
         return server
 
-    def gateway(self, server, **more):
-        gateway = Gateway(server, **more)
+    def gateway(self, server, *options, **more):
+        gateway = Gateway(server, *options, **more)
         self.addCleanup(gateway.__exit__)
         return gateway
 
@@ -120,11 +120,15 @@ class Page(PageTest):
         return self.serve("--mode", "realtime", text=text + '\n[realtime]\npacer = "sleep"\nmax_lateness_ms = 60000\n')
 
     def test_the_page_finds_the_bench_and_shows_its_speed(self):
-        """Catches: a page that stays empty, decodes wrongly, or exports another thing than it shows."""
+        """Catches: a page that stays empty, decodes wrongly, or exports another thing than it shows; a verdict in other words than the
+        server's, a transport that is left out."""
         shown = self.play("look", self.gateway(self.on_the_line()).url)
         self.assertEqual((shown["name"], shown["link"]), ("im-b", "connected"))
         self.assertRegex(shown["facts"], r"^real time, 1000 Hz, role admin")
         self.assertEqual((shown["plots"], shown["knobs"]), (3, True))
+        self.assertRegex(shown["verdict"], r"^(real-time valid so far: \d+ ticks, none late|not real-time valid: \d+ of \d+ ticks late), worst lateness")
+        self.assertEqual(shown["transports"], "Transports: 1, all up")
+        self.assertRegex(shown["counts"], r"^sessions \d+, turned_away 0, ")
         self.assertGreater(float(shown["speed"]["maximum"].split()[0]), 1.0)
         self.assertEqual(shown["csv"][0], "im-b.csv")
         self.assertTrue(shown["csv"][1].startswith("tick,time_s,speed_rad_s [rad/s],i_a_a [A]"))
@@ -174,6 +178,22 @@ class Page(PageTest):
         self.assertEqual([each for each, word in injected.items() if word not in ("0", "")], [tick])
         self.assertLess(min(injected), tick - 50)
         self.assertGreater(max(injected), tick + 20)
+
+    def test_a_band_of_one_tick_triggers_and_the_hold_off_keeps_the_next_away(self):
+        """Catches: a band that is seen at the rate of drawing, a hold-off that does not hold or does not end, a band whose upper end
+        lies below the lower and is taken."""
+        shown = self.play("band", self.gateway(self.on_the_line()).url)
+        self.assertEqual(shown["invalid"], "true")
+        triggered = [[each for each in shown[part] if each.startswith("triggered")] for part in ("held", "after")]
+        self.assertEqual((len(triggered[0]), len(triggered[1])), (1, 2), shown)
+
+    def test_a_state_that_is_entered_triggers(self):
+        """Catches: a trigger on a state that lasts, on another state, or on the tick after."""
+        shown = self.play("stateEntered", self.gateway(self.serve("--mode", "lockstep")).url)
+        tick = int(re.search(r"triggered at tick (\d+)", shown["state"])[1])
+        rows = {int(row["tick"]): row["state [enum]"] for row in csv.DictReader(io.StringIO(shown["csv"].partition("\n")[2]))}
+        self.assertEqual(rows[tick], "1")
+        self.assertNotIn("1", {state for each, state in rows.items() if each < tick})
 
     def test_a_knob_out_of_range_is_refused_in_words(self):
         """Catches: a refusal that the page swallows or rewords, and a value that it sends although it is no number."""

@@ -33,6 +33,7 @@ int run_web(const WebOptions& options) {
   if (!options.browser_token.empty()) gateway.browser_token = token_in(options.browser_token);
   gateway.foxglove_origins = options.origins;
   gateway.page = find_page();
+  gateway.reports = options.reports;
   try {
     gateway.listen = web::parse_listen_address(options.listen);
     web::run_gateway(gateway, [&options](const std::string& url) {

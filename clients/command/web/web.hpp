@@ -14,6 +14,7 @@ struct WebOptions {
   std::string certificate{};           ///< a file, PEM
   std::string key{};                   ///< a file, PEM
   std::string browser_token{};         ///< a file with the token that browsers must show
+  std::string reports{};               ///< a folder of reports for the page
   std::vector<std::string> origins{};  ///< whose pages may open Foxglove's WebSocket
 };
 int run_web(const WebOptions& options);

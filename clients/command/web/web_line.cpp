@@ -16,6 +16,10 @@ void add_web_command(CommandLine& line) {
   sub.add_option("--key", o.key, "private key for TLS, PEM")->type_name("FILE");
   sub.add_option("--browser-token", o.browser_token, "file with the token that browsers must show")
       ->type_name("FILE");
+  sub.add_option("--reports", o.reports,
+                 "show the reports in this folder: .html of `drivebench test`, .json and .svg of `drivebench "
+                 "identify`")
+      ->type_name("FOLDER");
   sub.add_option("--allow-origin", o.origins,
                  "a site whose page may read through Foxglove's WebSocket, such as https://app.foxglove.dev")
       ->type_name("ORIGIN");

@@ -18,6 +18,7 @@
 #include "clients/web/gateway/page_files.hpp"
 #include "clients/web/gateway/relays/foxglove_session.hpp"
 #include "clients/web/gateway/relays/relay.hpp"
+#include "clients/web/gateway/report_folder.hpp"
 #include "clients/web/gateway/reports/reports.hpp"
 
 namespace drivebench::web {
@@ -34,6 +35,7 @@ constexpr std::size_t kMaxConnections = 256;
 constexpr std::size_t kMaxBrowsers = 64;
 constexpr std::size_t kMaxHeader = 8192;
 constexpr std::size_t kMinToken = 16;
+constexpr int kMostReports = 4;  // that are sent at the same time
 constexpr int kSendBuffer = 64 * 1024;
 constexpr auto kWrongToken = 500ms;               // before the answer to a wrong token
 constexpr std::string_view kPagePath = "/bench";  // of the page's WebSocket
@@ -45,6 +47,13 @@ constexpr std::string_view kContentPolicy =
     "'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// A report is a page of its own in a box: no script, nothing from elsewhere, and no part of this origin.
+constexpr std::string_view kReportPolicy =
+    "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action "
+    "'none'; "
+    "frame-ancestors 'none'";
+constexpr std::string_view kReportsPath = "/reports";
+
 /// A connection as the others see it. One that waits for a request may have to give way to a new one.
 struct Place {
   std::function<void()> close{};  ///< while it waits
@@ -55,12 +64,15 @@ struct Shared {
   explicit Shared(const GatewayOptions& chosen)
       : options(chosen), files(read_page_files(chosen.page)), probe(chosen.bench, chosen.bench_token) {
     if (!chosen.certificate.empty()) tls.emplace(chosen.certificate, chosen.key);
+    if (!chosen.reports.empty()) reports.emplace(chosen.reports);
   }
 
   GatewayOptions options;
   PageFiles files;
   Door door{};
   std::optional<TlsDoor> tls{};
+  std::optional<ReportFolder> reports{};
+  int sent_reports = 0;  ///< at this moment
   BenchProbe probe;
   GatewayCounts counts{};
   std::list<Place> places{};
@@ -110,6 +122,41 @@ asio::awaitable<Response> report(Shared& shared, const Request& request, bool is
   co_return answer_of(request, reading.problem.empty() ? 200 : 503, "application/json", health_json(reading));
 }
 
+/// The list of the reports, or one of them. A thread of its own waits for the disk.
+asio::awaitable<Response> respond_with_report(Shared& shared, const Request& request) {
+  const std::string_view target = view(request.target());
+  if (!shared.reports) {
+    co_return target == kReportsPath ? answer_of(request, 200, "application/json", "null")
+                                     : answer_of(request, 404, kText, "no folder of reports is shown\n");
+  }
+  if (target == kReportsPath) {
+    const auto list = [&folder = *shared.reports]() -> asio::awaitable<std::string> {
+      co_return folder.list();
+    };
+    std::string text = co_await asio::co_spawn(shared.probing, list, use_awaitable);
+    co_return answer_of(request, 200, "application/json", std::move(text));
+  }
+  if (shared.sent_reports > kMostReports) {
+    co_return answer_of(request, 503, kText, "other browsers read reports: try again\n");
+  }
+  const auto find = [&folder = *shared.reports, name = target.substr(kReportsPath.size() + 1)]()
+      -> asio::awaitable<std::optional<ReportFile>> { co_return folder.find(name); };
+  std::optional<ReportFile> file = co_await asio::co_spawn(shared.probing, find, use_awaitable);
+  if (!file) co_return answer_of(request, 404, kText, "no such report\n");
+  if (file->is_too_large) {
+    co_return answer_of(request, 413, kText,
+                        fmt::format("the report is larger than {} MiB\n", ReportFolder::kMostBytes >> 20));
+  }
+  Response response = answer_of(request, 200, file->type, std::move(file->bytes));
+  response.set("Content-Security-Policy", view(kReportPolicy));
+  co_return response;
+}
+
+bool asks_for_report(const Request& request) {
+  const std::string_view target = view(request.target());
+  return target == kReportsPath || (target.starts_with(kReportsPath) && target[kReportsPath.size()] == '/');
+}
+
 asio::awaitable<Response> respond(Shared& shared, const Request& request) {
   const std::string_view target = view(request.target());
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
@@ -117,6 +164,10 @@ asio::awaitable<Response> respond(Shared& shared, const Request& request) {
   }
   if (target == "/metrics" || target == "/health") {
     Response response = co_await report(shared, request, target == "/metrics");
+    co_return response;
+  }
+  if (asks_for_report(request)) {
+    Response response = co_await respond_with_report(shared, request);
     co_return response;
   }
   if (target == kFoxglovePath && websocket::is_upgrade(request)) {
@@ -151,6 +202,19 @@ asio::awaitable<void> relay(RelayContext& context, Stream stream, const Request&
                       : relay_foxglove(context, std::move(stream), request, wish.subprotocol);
 }
 
+/// Counts an answer while it is made and sent.
+class Sending {
+ public:
+  Sending(int& count, bool counts) : count_(count), counts_(counts) { count_ += counts_ ? 1 : 0; }
+  ~Sending() { count_ -= counts_ ? 1 : 0; }
+  Sending(const Sending&) = delete;
+  Sending& operator=(const Sending&) = delete;
+
+ private:
+  int& count_;
+  bool counts_;
+};
+
 asio::awaitable<void> converse(Shared& shared, Stream stream, Place& place) {
   beast::flat_buffer buffer;
   for (bool goes_on = true; goes_on;) {
@@ -176,6 +240,7 @@ asio::awaitable<void> converse(Shared& shared, Stream stream, Place& place) {
       co_await relay(shared.relays, std::move(stream), request, wish);
       co_return;
     }
+    const Sending sending(shared.sent_reports, !refusal && asks_for_report(request));
     Response response;
     if (refusal) {
       ++shared.counts.refusals[refusal->name];

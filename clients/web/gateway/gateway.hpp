@@ -18,6 +18,7 @@ struct GatewayOptions {
   std::string browser_token;                  ///< that browsers must show; empty: none
   std::vector<std::string> foxglove_origins;  ///< whose pages may open Foxglove's WebSocket
   std::filesystem::path page;                 ///< the folder of its files
+  std::filesystem::path reports;              ///< a folder of reports; empty: none are shown
 };
 
 /// Serves the page, its WebSocket and the reports until SIGINT or SIGTERM. Each WebSocket is a session of its

@@ -8,6 +8,7 @@ import { createInterface } from "node:readline";
 import puppeteer from "puppeteer-core";
 import { driveScenarios } from "./drive_scenarios.mjs";
 import { experimentScenarios } from "./experiment_scenarios.mjs";
+import { reportScenarios } from "./report_scenarios.mjs";
 
 const kPatienceMs = 60_000;
 const lines = createInterface({ input: process.stdin })[Symbol.asyncIterator]();
@@ -122,6 +123,7 @@ async function pictureOf(page, theme, path, first, last) {
 
 const scenarios = {
   ...driveScenarios({ axeFinds, enter, outside, pictureOf, press, set, stateOf, text, until }),
+  ...reportScenarios({ axeFinds, press, text }),
   ...experimentScenarios({ axeFinds, catchFiles, enter, isShown, pictureOf, press, set, stateOf, text, until }),
 
   /** A user opens the page and looks. */
@@ -134,7 +136,8 @@ const scenarios = {
     await press(page, "SVG");
     return {
       name: await text(page, "#bench-name"), facts: await text(page, "#bench-facts"), link: await text(page, "#link-state"),
-      speed: JSON.parse(row), plots: (await page.$$(".pane canvas")).length, knobs: await isShown(page, "#knobs"),
+      verdict: await stateOf(page, "verdict"), transports: await text(page, "#state details summary"),
+      counts: await text(page, "#state details dd .soft"), speed: JSON.parse(row), plots: (await page.$$(".pane canvas")).length, knobs: await isShown(page, "#knobs"),
       csv: (await file(/\.csv/)).split("\n").slice(0, 4), svg: (await file(/\.svg/)).slice(0, 200),
     };
   },
@@ -221,6 +224,67 @@ const scenarios = {
     const file = await catchFiles(page);
     await press(page, "CSV");
     return { armed, state, answer, row: JSON.parse(row), csv: await file(/\.csv/) };
+  },
+
+  /** A band that a signal leaves for one tick, and a hold-off in which it does so again. */
+  async band(page) {
+    await stateOf(page, "tick", /[1-9]/);
+    await set(page, "window", "0.05");
+    await set(page, "trigger condition", "leaves");
+    await set(page, "trigger signal", "0:injected");
+    await set(page, "lower end of the band", "0");
+    await set(page, "hold-off after a trigger", "1e6");
+    const stateShown = '[aria-label="trigger state"]';
+    await set(page, "upper end of the band", "-1");
+    const invalid = await page.$eval('[aria-label="upper end of the band"]', (each) => each.ariaInvalid);
+    await set(page, "upper end of the band", "0");
+    await text(page, stateShown, /armed/);
+    await page.evaluate((where) => {
+      const place = document.querySelector(where);
+      window.states = [place.textContent];
+      new MutationObserver(() => window.states.push(place.textContent)).observe(place, { childList: true, characterData: true, subtree: true });
+    }, stateShown);
+    for (const [label, value] of [["fault", "open_phase"], ["value of the fault", "1"], ["ticks that the fault lasts; 0: until it is ended", "1"]]) {
+      await set(page, label, value);
+    }
+    const inject = async () => {
+      await page.$eval("#knobs .answer", (each) => { each.textContent = ""; });
+      await press(page, "Inject");
+      const tick = Number((await text(page, "#knobs .answer", /at tick \d+/)).match(/at tick (\d+)/)[1]);
+      await stateOf(page, "tick", new RegExp("^\\d{4,}$"));
+      await until(async () => String(Number(await stateOf(page, "tick", /\d/)) > tick + 600), /true/);
+    };
+    await inject();
+    await text(page, stateShown, /hold-off/);
+    await inject();
+    const held = await page.evaluate(() => window.states);
+    await set(page, "unit of the hold-off", "ticks");
+    await set(page, "hold-off after a trigger", "0");
+    await inject();
+    return { invalid, held, after: await page.evaluate(() => window.states) };
+  },
+
+  /** The state of an axis that the page drives. */
+  async stateEntered(page) {
+    await stateOf(page, "tick", /\d/);
+    await set(page, "window", "0.05");
+    await set(page, "trigger condition", "state");
+    await page.evaluate(() => {
+      const states = document.querySelector('[aria-label="state that is entered"]');
+      states.value = [...states.options].find((each) => each.textContent === "servo: run").value;
+      states.dispatchEvent(new Event("change"));
+    });
+    await set(page, "trigger sweep", "single");
+    await set(page, "part of the window before the trigger, percent", "50");
+    await text(page, '[aria-label="trigger state"]', /armed/);
+    await press(page, "drive servo");
+    const state = await text(page, '[aria-label="trigger state"]', /triggered/);
+    const [pane] = await page.$$(".pane");
+    await add(pane, "0:state");
+    const file = await catchFiles(page);
+    await stateOf(page, "tick", /^\d{4,}$/);
+    await press(page, "CSV");
+    return { state, csv: await file(/\.csv/) };
   },
 
   /** Values out of range, words instead of numbers, and a value that is taken. */

@@ -8,13 +8,13 @@ import test from "node:test";
 const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
-    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target", "wire",
+    contents: ["history", "measurements", "trigger", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target", "preset_rows", "verdict", "transports", "reports/identification", "wire",
       "player/recorded", "player/mcap", "experiments/fetch", "experiments/request", "experiments/words"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },
   bundle: true, write: false, format: "esm", alias: { long: `${process.env.PAGE_SOURCES}/no_long.js` },
 });
-const { History, envelope, between, copyOf, measure, fires, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
+const { History, envelope, between, copyOf, measure, fires, Trigger, wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, hasBit, withUnit, numberIn, csvOf, svgOf, timeCurves, xyCurves,
   spectrumOf, peaksOf, sinceLastGap, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, pb, Track,
   recordedRows, recordedFile, csvOfRows, Pieces, shareOf, valueOf, logRange, spectrumCurves, amplitudeAt, inputsOf, channelsOf, fieldsOfShape, shapeOf, eventOf, identification,
   fetchExperiment, RequestKeys, fileNameOf, factsOf, arrivalOf } =
@@ -81,18 +81,54 @@ test("measurements of a noisy sine with a gap", () => {
   assert.ok(Number.isNaN(measure(Float64Array.from([1, 1, 1]), ticks, 1).frequency));
 });
 
-// Catches: an edge that fires on the first sample, on a touch from the wrong side, or twice; a bit beyond 32.
+// Catches: an edge that fires on the first sample, on a touch from the wrong side, or twice; a bit beyond 32; a band whose ends lie
+// outside, that fires on the first sample or twice, or on a jump from one side to the other; a state that lasts.
 test("the conditions of the trigger", () => {
-  assert.ok(fires("rising", 0.9, 1, 1));
-  assert.ok(!fires("rising", 1, 1.1, 1));
-  assert.ok(!fires("rising", NaN, 2, 1));
-  assert.ok(fires("falling", 1.1, 1, 1));
-  assert.ok(!fires("falling", 1, 0.9, 1));
-  assert.ok(fires("above", NaN, 2, 1) && !fires("above", NaN, 1, 1));
-  assert.ok(fires("below", NaN, 0, 1));
-  assert.ok(fires("bit", 1, 5, 4) && !fires("bit", 4, 4, 4) && !fires("bit", NaN, 4, 4));
-  assert.ok(!fires("off", 0, 1, 1));
+  const when = (condition, level, upper = 0) => (previous, value) => fires({ condition, level, upper }, previous, value);
+  const [rising, falling, above, below] = ["rising", "falling", "above", "below"].map((each) => when(each, 1));
+  assert.ok(rising(0.9, 1) && !rising(1, 1.1) && !rising(NaN, 2));
+  assert.ok(falling(1.1, 1) && !falling(1, 0.9));
+  assert.ok(above(NaN, 2) && !above(NaN, 1));
+  assert.ok(below(NaN, 0) && !below(NaN, 1));
+  const leaves = when("leaves", -1, 2);
+  assert.ok(leaves(2, 2.1) && leaves(-1, -1.1) && leaves(0, 9));
+  assert.ok(!leaves(NaN, 9) && !leaves(9, 8) && !leaves(9, -9) && !leaves(0, 2) && !leaves(0, NaN));
+  const enters = when("enters", -1, 2);
+  assert.ok(enters(2.1, 2) && enters(-9, -1) && !enters(NaN, 0) && !enters(0, 1) && !enters(-9, 9) && !enters(0, 9));
+  const bit = when("bit", 4);
+  assert.ok(bit(1, 5) && !bit(4, 4) && !bit(NaN, 4));
+  const state = when("state", 4);
+  assert.ok(state(1, 4) && !state(4, 4) && !state(NaN, 4) && !state(4, 1));
+  assert.ok(!when("off", 1)(0, 1));
   assert.ok(hasBit(2 ** 40 + 1, 2 ** 40) && !hasBit(2 ** 41, 2 ** 40));
+});
+
+// Catches: an event of one tick that a rate of drawing decides about, a hold-off of other ticks, one that begins at the end of the
+// capture, that outlasts the run of the bench or a new setting, an edge of the hold-off that counts afterwards.
+test("the hold-off of the trigger", () => {
+  const trigger = new Trigger();
+  trigger.settings = { ...trigger.settings, condition: "leaves", signal: "x", level: -1, upper: 1, holdOffTicks: 100 };
+  const fired = (ticks, xOf) => {
+    const found = [];
+    for (const tick of ticks) {
+      trigger.see(0, { tick, x: xOf(tick) });
+      if (trigger.firedTick === null) continue;
+      found.push(trigger.firedTick);
+      trigger.armAgain();
+    }
+    return found;
+  };
+  trigger.arm();
+  const every = (period) => (tick) => (tick % period === 7 ? 5 : 0); // for one tick
+  assert.deepEqual(fired(range(0, 1000), every(30)), [7, 127, 247, 367, 487, 607, 727, 847, 967]);
+  assert.deepEqual(fired(range(1000, 1100), (tick) => (tick === 1066 ? 5 : 0)), []); // 967 + 99
+  assert.deepEqual(fired(range(1100, 1102), (tick) => (tick === 1101 ? 5 : 0)), [1101]);
+  assert.deepEqual(fired(range(0, 60), every(50)), [7]); // the bench was reset
+  assert.deepEqual(fired(range(60, 300), (tick) => (tick >= 90 && tick < 120 ? 5 : 0)), []);
+  trigger.arm();
+  assert.deepEqual(fired(range(300, 320), every(50)), [307]);
+  trigger.arm();
+  assert.deepEqual(fired(range(320, 340), (tick) => (tick === 330 ? 5 : 0)), [330]);
 });
 
 // Catches: a common voltage of the terminals that counts as amplitude, the sum of three phases for their vector.
@@ -101,6 +137,54 @@ test("the amplitude of terminals", () => {
   for (const angle of [0, 0.4, 2]) assert.ok(Math.abs(amplitude(three(angle)) - 10) < 1e-12);
   assert.equal(amplitude([3, -4]), 5);
   assert.equal(amplitude([-6]), -6);
+});
+
+// Catches: a run that ended early and is called done, a part of a run that is rounded up to the whole.
+test("the words for the run of a preset", () => {
+  const run = { number: 1, preset: "p", phase: "moving", progress: 0.999, failure: "", numbers: [] };
+  assert.equal(wordsOf(run), "p: moving, 99 %");
+  assert.equal(wordsOf({ ...run, phase: "failed", failure: "the bench latched trip" }), "p did not end: the bench latched trip");
+  assert.match(wordsOf({ ...run, phase: "done", progress: 1 }), /done, the gates are off/);
+  assert.match(wordsOf({ ...run, phase: "resting", progress: 0 }), /gates off until/);
+});
+
+// Catches: a bench that is called valid with a late tick or a recording with gaps, a valid one that is not, other words than those
+// of the verdict at the end.
+test("the verdict so far", () => {
+  const status = { mode: pb.Mode.MODE_REALTIME, tick: 1599, late_ticks: 0, worst_lateness_s: 94.81e-6, recording_gaps: 0 };
+  assert.deepEqual(verdictOf(status), { text: "real-time valid so far: 1599 ticks, none late, worst lateness 94.8 us", isGood: true });
+  assert.deepEqual(verdictOf({ ...status, late_ticks: 2 }), { text: "not real-time valid: 2 of 1599 ticks late, worst lateness 94.8 us", isGood: false });
+  const lost = verdictOf({ ...status, mode: pb.Mode.MODE_LOCKSTEP, recording_gaps: 3 });
+  assert.deepEqual(lost, { text: "lockstep exact so far: 1599 ticks; the recording lost 3 entries and does not replay", isGood: false });
+  assert.ok(verdictOf({ ...status, mode: pb.Mode.MODE_FREE }).text.startsWith("free run exact so far"));
+});
+
+// Catches: a transport that is down and not counted, a count under another name.
+test("the transports in words", () => {
+  const can = { name: "can memory", state: "the bus is off", counts: [{ name: "frames", value: 7 }, { name: "errors", value: 1 }] };
+  assert.equal(summaryOf([{ name: "tcp", state: "up", counts: [] }, can]), "Transports: 2, 1 not up");
+  assert.equal(summaryOf([{ name: "tcp", state: "up", counts: [] }]), "Transports: 1, all up");
+  assert.equal(countsOf(can), "frames 7, errors 1");
+});
+
+// Catches: a file of another program that is shown as a result, one of another shape that breaks the page or shows what is no
+// number, an interval under another parameter.
+test("the report of an identification", () => {
+  const report = {
+    motor: "dc", method: "least squares", source: "experiment 1", verdict: "the data see every parameter", notes: ["a note", 7],
+    parameters: { R: { estimate: 2, unit: "ohm", interval: 0.01, truth: 2.005, inside: true }, L: { estimate: null, unit: "H", interval: null, truth: 0.002, inside: false } },
+    validation: { signals: { i_a_a: { unit: "A", rms_error: 0.00123, normalised: 0.025 }, w: { unit: "rad/s", rms_error: 1, normalised: null } }, problem: "" },
+  };
+  const found = identificationIn(JSON.parse(JSON.stringify(report)));
+  assert.deepEqual(found.parameters[0], { name: "R", unit: "ohm", estimate: 2, interval: 0.01, truth: 2.005, inside: true });
+  assert.deepEqual(found.parameters.map(isInside), ["yes", "no"]);
+  assert.equal(found.validation[0], "simulated again, i_a_a differs by 0.001230 A rms, 2.50 % of it");
+  assert.equal(found.validation[1], "simulated again, w differs by 1.000 rad/s rms");
+  assert.deepEqual(found.notes, ["a note", ""]);
+  for (const other of [null, 7, "dc", [], {}, { motor: "dc" }, { motor: 7, parameters: {} }, { motor: "dc", parameters: [1] }]) assert.equal(identificationIn(other), null);
+  const hostile = identificationIn({ motor: "dc", parameters: { __proto__x: 7, R: { estimate: "2", unit: {}, inside: "yes" } }, validation: 7, notes: { a: 1 }, verdict: 8 });
+  assert.deepEqual(hostile.parameters[1], { name: "R", unit: "", estimate: null, interval: null, truth: null, inside: null });
+  assert.deepEqual([hostile.verdict, hostile.notes], ["", []]);
 });
 
 // Catches: a rotor that is drawn so fast that it seems to stand or to turn backwards, and a drawing that keeps silent about it.

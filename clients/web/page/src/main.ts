@@ -6,6 +6,7 @@ import { ExperimentsPanel } from "./experiments/panel";
 import { Knobs } from "./knobs";
 import { Leases } from "./leases";
 import { PlayerPlace } from "./player/player";
+import { ReportsPanel } from "./reports/panel";
 import { Scope } from "./scope";
 import { StatePanel } from "./state_panel";
 import { pb, Wire } from "./wire";
@@ -44,6 +45,7 @@ class Page {
     });
     this.theme();
     this.wire.connect();
+    new ReportsPanel(byId("reports"));
     setInterval(() => this.askStatus(), kStatusMs);
   }
 
