@@ -126,6 +126,10 @@ std::string misfit_text(const AxisView& view, const control::Preset& preset,
   return text;
 }
 
+void prepare_presets() {
+  sample_rates_hz();
+}
+
 std::vector<const control::Preset*> fitting_presets(const AxisView& view) {
   std::vector<const control::Preset*> fitting;
   const std::vector<control::Preset>& all = control::presets();

@@ -36,8 +36,11 @@ std::vector<std::string> mismatches(const AxisView& view, const control::Require
 std::string misfit_text(const AxisView& view, const control::Preset& preset,
                         std::span<const control::Gain> overrides, double sample_rate_hz);
 
-/// The presets that fit the axis as they stand.
+/// The presets that fit the axis as they stand. The first call of the program, or prepare_presets(), takes
+/// some 0.2 s.
 std::vector<const control::Preset*> fitting_presets(const AxisView& view);
+
+void prepare_presets();
 
 /// The run with the preset's own gains; nothing for a preset that exists to be refused.
 std::optional<control::Run> made_as_it_stands(const control::Preset& preset);

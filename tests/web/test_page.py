@@ -189,11 +189,14 @@ class Page(PageTest):
 
     def test_a_state_that_is_entered_triggers(self):
         """Catches: a trigger on a state that lasts, on another state, or on the tick after."""
-        shown = self.play("stateEntered", self.gateway(self.serve("--mode", "lockstep")).url)
+        text = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+        self.assertIn("over_current_trip = false", text)
+        server = self.serve("--mode", "lockstep", text=text.replace("over_current_trip = false", "over_current_trip = true"))
+        shown = self.play("stateEntered", self.gateway(server).url)
         tick = int(re.search(r"triggered at tick (\d+)", shown["state"])[1])
         rows = {int(row["tick"]): row["state [enum]"] for row in csv.DictReader(io.StringIO(shown["csv"].partition("\n")[2]))}
-        self.assertEqual(rows[tick], "1")
-        self.assertNotIn("1", {state for each, state in rows.items() if each < tick})
+        self.assertEqual((rows[tick], rows[tick - 1]), ("4", "1"))  # fault after run
+        self.assertEqual({state for each, state in rows.items() if each >= tick}, {"4"})
 
     def test_a_knob_out_of_range_is_refused_in_words(self):
         """Catches: a refusal that the page swallows or rewords, and a value that it sends although it is no number."""

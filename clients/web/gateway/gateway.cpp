@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/reference/preset_fit.hpp"
 #include "clients/web/gateway/doors/asio.hpp"
 #include "clients/web/gateway/doors/door.hpp"
 #include "clients/web/gateway/doors/tls_door.hpp"
@@ -345,6 +346,7 @@ void run_gateway(const GatewayOptions& options, const std::function<void(const s
                  .foxglove_origins = options.foxglove_origins};
   shared.door.address.port = acceptor.local_endpoint().port();
   asio::co_spawn(io, admit(shared, acceptor), asio::detached);
+  asio::post(shared.connecting, reference::prepare_presets);  // before a page asks, and an axis waits for it
   asio::signal_set signals(io, SIGINT, SIGTERM);
   signals.async_wait([&io](const error_code&, int) { io.stop(); });
   ready((shared.door.tls ? "https://" : "http://") + to_string(shared.door.address) + "/");

@@ -80,9 +80,14 @@ class DriveTest : public testing::Test {
     return requests[0].exchange().commands_size() == 1 ? requests[0].exchange().commands(0) : v1::Command();
   }
 
+  void order(const std::string& text) {
+    const Order read = drive_.read(text);
+    drive_.carry_out(read, made_runs(drive_.bench(), drive_.beginnings_of(read)), now_);
+  }
+
   /// Drives from tick 5 on.
-  void begin(const std::string& order) {
-    drive_.order(order, now_);
+  void begin(const std::string& text) {
+    order(text);
     const std::vector<v1::Envelope> requests = asked();
     ASSERT_EQ(requests.size(), 1u);
     EXPECT_TRUE(requests[0].exchange().commands().empty());
@@ -115,7 +120,7 @@ TEST_F(DriveTest, EachAnswerHasItsCommand) {
 // ramp as long as the operator's own.
 TEST_F(DriveTest, ASilentPageIsRampedDownAndGivesTheLeaseBack) {
   begin(kOneVolt);
-  drive_.order(kSlowTwoVolts, now_);
+  order(kSlowTwoVolts);
   command_at(6);
   now_ += Drive::kSilence - 1ms;
   EXPECT_EQ(command_at(7).gates(), v1::GATES_VOLTAGE);
@@ -137,7 +142,7 @@ TEST_F(DriveTest, APageThatIsHeardDrivesOn) {
   begin(kOneVolt);
   for (std::uint64_t tick = 6; tick < 20; ++tick) {
     now_ += 1s;
-    drive_.order(R"({"op":"alive"})", now_);
+    order(R"({"op":"alive"})");
     EXPECT_EQ(command_at(tick).gates(), v1::GATES_VOLTAGE);
   }
 }
@@ -162,7 +167,7 @@ TEST_F(DriveTest, ARefusalSwitchesOffAndASecondOneEnds) {
 TEST_F(DriveTest, AnAnswerThatNeverComesDoesNotKeepTheLease) {
   begin(kOneVolt);
   EXPECT_EQ(asked().size(), 1u);
-  drive_.order(R"({"op":"drive","axes":[]})", now_);
+  order(R"({"op":"drive","axes":[]})");
   EXPECT_TRUE(asked().empty());
   now_ += 1s;
   EXPECT_TRUE(asked().at(0).has_lease());
@@ -172,7 +177,7 @@ TEST_F(DriveTest, AnAnswerThatNeverComesDoesNotKeepTheLease) {
 // ticks, a pause that is caught up.
 TEST_F(DriveTest, LockstepRunsAtItsPace) {
   drive_ = Drive(welcome_of(v1::MODE_LOCKSTEP));
-  drive_.order(R"({"op":"pace","pace":0.1})", now_);
+  order(R"({"op":"pace","pace":0.1})");
   begin(kOneVolt);
   const auto ticks_in = [this](std::chrono::milliseconds time) {
     int count = 0;
@@ -185,11 +190,11 @@ TEST_F(DriveTest, LockstepRunsAtItsPace) {
     return count;
   };
   EXPECT_NEAR(ticks_in(1000ms), 100, 1);
-  drive_.order(R"({"op":"pace","pace":0})", now_);
+  order(R"({"op":"pace","pace":0})");
   EXPECT_EQ(ticks_in(500ms), 0);
-  drive_.order(R"({"op":"step","ticks":7})", now_);
+  order(R"({"op":"step","ticks":7})");
   EXPECT_EQ(ticks_in(500ms), 7);
-  drive_.order(R"({"op":"pace","pace":1})", now_);
+  order(R"({"op":"pace","pace":1})");
   EXPECT_NEAR(ticks_in(100ms), 100, 1);
 }
 
@@ -198,7 +203,7 @@ TEST_F(DriveTest, LockstepRunsAtItsPace) {
 TEST_F(DriveTest, AnOrderIsCarriedOutWholeOrRefused) {
   const auto problem_of = [this](const std::string& text) -> std::string {
     try {
-      drive_.order(text, now_);
+      order(text);
     } catch (const OrderError& error) {
       return error.what();
     }
@@ -258,12 +263,12 @@ TEST_F(DriveTest, ARunGoesOnUntilAnotherOrder) {
     command_at(tick);
   const std::string before = run_text();
   EXPECT_NE(before.find("preparing"), std::string::npos) << before;
-  drive_.order(run_order("book/8.2.2", 1), now_);
-  EXPECT_THROW(drive_.order(run_order("book/9.1.4", 2), now_), OrderError);
+  order(run_order("book/8.2.2", 1));
+  EXPECT_THROW(order(run_order("book/9.1.4", 2)), OrderError);
   EXPECT_EQ(run_text(), before);
-  drive_.order(run_order("book/8.2.2", 2), now_);
+  order(run_order("book/8.2.2", 2));
   EXPECT_NE(run_text().find("resting"), std::string::npos);
-  drive_.order(kOneVolt, now_);
+  order(kOneVolt);
   EXPECT_EQ(run_text(), "");
   EXPECT_EQ(command_at(501).u_a_v(), 1.0);
 }
@@ -295,7 +300,7 @@ TEST_F(DriveTest, ARunWindsDownWithoutItsPageAndEndsWithARefusal) {
 // Catches: presets that the page must guess.
 TEST_F(DriveTest, TellsThePresetsThatFit) {
   drive_ = Drive(servo_welcome());
-  drive_.order(R"({"op":"presets"})", now_);
+  order(R"({"op":"presets"})");
   const std::string report = drive_.report(now_);
   EXPECT_NE(report.find(R"("presets":[[{"name":")"), std::string::npos) << report;
   EXPECT_NE(report.find(R"("book/8.2.2")"), std::string::npos);

@@ -264,23 +264,24 @@ const scenarios = {
     return { invalid, held, after: await page.evaluate(() => window.states) };
   },
 
-  /** The state of an axis that the page drives. */
+  /** An axis that the page drives trips. */
   async stateEntered(page) {
     await stateOf(page, "tick", /\d/);
     await set(page, "window", "0.05");
     await set(page, "trigger condition", "state");
     await page.evaluate(() => {
       const states = document.querySelector('[aria-label="state that is entered"]');
-      states.value = [...states.options].find((each) => each.textContent === "servo: run").value;
+      states.value = [...states.options].find((each) => each.textContent === "servo: fault").value;
       states.dispatchEvent(new Event("change"));
     });
     await set(page, "trigger sweep", "single");
     await set(page, "part of the window before the trigger, percent", "50");
     await text(page, '[aria-label="trigger state"]', /armed/);
-    await press(page, "drive servo");
-    const state = await text(page, '[aria-label="trigger state"]', /triggered/);
     const [pane] = await page.$$(".pane");
     await add(pane, "0:state");
+    await set(page, "boost: amplitude at standstill, V (servo)", "40"); // far more than the amplifier's 6 A
+    await press(page, "drive servo");
+    const state = await text(page, '[aria-label="trigger state"]', /triggered/);
     const file = await catchFiles(page);
     await stateOf(page, "tick", /^\d{4,}$/);
     await press(page, "CSV");

@@ -71,13 +71,26 @@ Drive::Drive(const v1::Welcome& welcome)
   }
 }
 
-void Drive::order(std::string_view text, Time now) {
-  const Order order = parse_order(text, axes_.size());
+Order Drive::read(std::string_view text) const {
+  return parse_order(text, axes_.size());
+}
+
+std::vector<Beginning> Drive::beginnings_of(const Order& order) const {
+  std::vector<Beginning> beginnings;
+  for (const Order::Axis& each : order.axes) {
+    const bool goes_on = runs_[each.axis] && runs_[each.axis]->number() == each.run;
+    if (!each.preset.empty() && !goes_on)
+      beginnings.push_back({.axis = each.axis, .preset = each.preset, .number = each.run});
+  }
+  return beginnings;
+}
+
+void Drive::carry_out(const Order& order, Runs begun, Time now) {
   heard_ = now;
   if (order.kind == Order::Kind::kPresets) has_news_ = is_asked_for_presets_ = true;
   if (stage_ != Stage::kOver && stage_ != Stage::kDriving) return;  // what ends is not taken up again
   if (order.kind == Order::Kind::kDrive) {
-    set_targets(order, now);
+    set_targets(order, std::move(begun), now);
   } else if (order.kind == Order::Kind::kPace) {
     pace_ = order.pace;
     steps_ = 0;
@@ -87,15 +100,7 @@ void Drive::order(std::string_view text, Time now) {
   }
 }
 
-void Drive::set_targets(const Order& order, Time now) {
-  const auto goes_on = [this](const Order::Axis& each) {
-    return runs_[each.axis] && runs_[each.axis]->number() == each.run;
-  };
-  std::vector<std::unique_ptr<ReferenceRun>> begun(runs_.size());
-  for (const Order::Axis& each : order.axes) {
-    if (!each.preset.empty() && !goes_on(each))
-      begun[each.axis] = std::make_unique<ReferenceRun>(bench_, each.axis, each.preset, each.run);
-  }
+void Drive::set_targets(const Order& order, Runs begun, Time now) {
   tell({});
   if (order.axes.empty()) return switch_off_and_release(now);
   if (is_over()) {
@@ -105,13 +110,13 @@ void Drive::set_targets(const Order& order, Time now) {
   driven_.clear();
   for (const Order::Axis& each : order.axes) {
     driven_.push_back(each.axis);
-    if (each.preset.empty()) {
-      axes_[each.axis].follow(each.target);
-      runs_[each.axis].reset();
-    } else if (begun[each.axis]) {
-      axes_[each.axis].switch_off();
-      runs_[each.axis] = std::move(begun[each.axis]);
-    }
+    if (!each.preset.empty()) continue;
+    axes_[each.axis].follow(each.target);
+    runs_[each.axis].reset();
+  }
+  for (std::unique_ptr<ReferenceRun>& each : begun) {
+    axes_[each->axis()].switch_off();
+    runs_[each->axis()] = std::move(each);
   }
   for (OpenLoop& each : axes_) {
     if (std::ranges::find(driven_, each.axis()) != driven_.end()) continue;

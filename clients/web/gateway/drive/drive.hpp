@@ -40,8 +40,14 @@ class Drive {
 
   explicit Drive(const v1::Welcome& welcome);
 
-  /// Carries out a text of the page whole, or throws OrderError.
-  void order(std::string_view text, Time now);
+  using Runs = std::vector<std::unique_ptr<ReferenceRun>>;
+
+  /// What a text of the page asks. Throws OrderError.
+  Order read(std::string_view text) const;
+  /// The runs that the order begins: made_runs() makes them, before it is carried out.
+  std::vector<Beginning> beginnings_of(const Order& order) const;
+  const std::shared_ptr<const v1::BenchDescription>& bench() const noexcept { return bench_; }
+  void carry_out(const Order& order, Runs begun, Time now);
   /// Tells the page a problem, such as that of an order.
   void tell(std::string problem);
   /// The page has gone.
@@ -59,7 +65,7 @@ class Drive {
  private:
   enum class Stage { kOver, kDriving, kRampingDown, kSwitchingOff, kReleasing };
 
-  void set_targets(const Order& order, Time now);
+  void set_targets(const Order& order, Runs begun, Time now);
   void switch_off_and_release(Time now);
   void move_on(Time now);
   void switch_off(const std::string& why);

@@ -145,6 +145,15 @@ std::vector<reference::ReportRow> ReferenceRun::rows() const {
   return reference::rows_of(report);
 }
 
+std::vector<std::unique_ptr<ReferenceRun>> made_runs(const std::shared_ptr<const v1::BenchDescription>& bench,
+                                                     const std::vector<Beginning>& beginnings) {
+  std::vector<std::unique_ptr<ReferenceRun>> runs;
+  runs.reserve(beginnings.size());
+  for (const Beginning& each : beginnings)
+    runs.push_back(std::make_unique<ReferenceRun>(bench, each.axis, each.preset, each.number));
+  return runs;
+}
+
 std::vector<const control::Preset*> offered_presets(const v1::BenchDescription& bench, std::uint32_t axis) {
   if (!bench.axes(static_cast<int>(axis)).shares_amplifier_with().empty()) return {};
   std::vector<const control::Preset*> offered = reference::fitting_presets({.bench = bench, .axis = axis});

@@ -37,6 +37,7 @@ class ReferenceRun {
   /// The gates are off for good.
   bool is_over() const noexcept { return stage_ == Stage::kDone || stage_ == Stage::kFailed; }
 
+  std::uint32_t axis() const noexcept { return axis_; }
   std::uint64_t number() const noexcept { return number_; }
   std::string_view preset() const noexcept { return preset_->name; }
   /// "resting", a phase of the run, or "failed".
@@ -68,6 +69,18 @@ class ReferenceRun {
   std::uint64_t first_late_ = 0;
   std::int64_t covered_ = 0;  // samples of the plan up to the newest one
 };
+
+/// The run that an order begins on an axis.
+struct Beginning {
+  std::uint32_t axis = 0;
+  std::string preset{};
+  std::uint64_t number = 0;
+};
+
+/// Makes the runs, each for some 30 ms at most: to be called where no axis waits for its command. Throws
+/// OrderError.
+std::vector<std::unique_ptr<ReferenceRun>> made_runs(const std::shared_ptr<const v1::BenchDescription>& bench,
+                                                     const std::vector<Beginning>& beginnings);
 
 /// The presets that the page offers for an axis: those that fit and drive one motor.
 std::vector<const control::Preset*> offered_presets(const v1::BenchDescription& bench, std::uint32_t axis);

@@ -59,30 +59,39 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
       co_await client_.async_read(buffer, asio::redirect_error(use_awaitable, error));
       if (error) break;
       const std::span message(static_cast<const std::byte*>(buffer.data().data()), buffer.size());
-      const std::string_view problem =
-          client_.got_binary() ? problem_of_frames(message) : problem_of_order(message);
+      const bool is_order = !client_.got_binary();
+      const std::string_view problem = is_order ? co_await carry_out(message) : problem_of_frames(message);
       if (!problem.empty()) {
         ++context_.counts.refusals["frame"];
         leave(websocket::close_code::protocol_error, problem);
         co_return;
       }
-      if (client_.got_binary()) co_await write(buffer.data(), error);
+      if (!is_order) co_await write(buffer.data(), error);
     }
     if (error == websocket::error::message_too_big) ++context_.counts.refusals["size"];
     leave(websocket::close_code::normal, "");
   }
 
-  /// Gives a text to the drive, which answers a wrong one; the reason why it cannot, or nothing.
-  std::string_view problem_of_order(std::span<const std::byte> message) {
-    if (!drive_) return "before the welcome of the bench messages are binary";
+  /// Gives a text to the drive, which answers a wrong one; the reason why it cannot, or nothing. Runs are
+  /// made on another thread: this one has the commands of all pages to send.
+  asio::awaitable<std::string_view> carry_out(std::span<const std::byte> message) {
+    if (!drive_) co_return "before the welcome of the bench messages are binary";
     try {
-      drive_->order({reinterpret_cast<const char*>(message.data()), message.size()}, now());
+      const Order order = drive_->read({reinterpret_cast<const char*>(message.data()), message.size()});
+      Drive::Runs begun;
+      if (const std::vector<Beginning> beginnings = drive_->beginnings_of(order); !beginnings.empty()) {
+        const auto make = [&]() -> asio::awaitable<Drive::Runs> {
+          co_return made_runs(drive_->bench(), beginnings);
+        };
+        begun = co_await asio::co_spawn(context_.connecting, make, use_awaitable);
+      }
+      drive_->carry_out(order, std::move(begun), now());
     } catch (const OrderError& error) {
       ++context_.counts.refusals["order"];
       drive_->tell(error.what());
     }
     turn_.cancel();
-    return {};
+    co_return std::string_view();
   }
 
   /// Writes whole, one coroutine after the other.

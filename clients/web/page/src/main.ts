@@ -9,7 +9,7 @@ import { PlayerPlace } from "./player/player";
 import { ReportsPanel } from "./reports/panel";
 import { Scope } from "./scope";
 import { StatePanel } from "./state_panel";
-import { pb, Wire } from "./wire";
+import { pb, Refused, Wire } from "./wire";
 
 const kStatusMs = 500;
 const kThemes = ["system", "light", "dark"];
@@ -83,7 +83,7 @@ class Page {
       if (this.subscribed[axis] === wanted) return;
       this.subscribed[axis] = wanted;
       history.choose(signals);
-      this.wire.ask({ subscribe: { axis, decimation: 1, signals } }).catch((problem: Error) => this.showAlert(problem.message));
+      this.wire.ask({ subscribe: { axis, decimation: 1, signals } }).catch((problem) => problem instanceof Refused && this.showAlert(problem.message));
     });
   }
 
