@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -13,6 +14,7 @@
 #include "clients/identification/motors/induction/induction_regressor.hpp"
 #include "clients/identification/motors/motor_models.hpp"
 #include "clients/identification/motors/motors.hpp"
+#include "clients/identification/motors/saturated_induction.hpp"
 #include "clients/identification/motors/terminal_voltages.hpp"
 
 namespace drivebench::identification {
@@ -48,14 +50,6 @@ struct Measured {
     return values;
   }
 };
-
-/// Whether the first samples have negligible speed and currents.
-bool begins_at_rest(const Measured& m) {
-  constexpr double kNoCurrent = 0.01;
-  constexpr double kNoSpeed = 0.05;  // the filter sees a start some samples early
-  if (std::abs(m.shaft.speed[0]) > kNoSpeed * largest(m.shaft.speed)) return false;
-  return std::ranges::all_of(m.i, [](SeriesView i) { return std::abs(i[0]) <= kNoCurrent * largest(i); });
-}
 
 /// One step from `begin` on, in periods after the sample, as `length`.
 template <class Model>
@@ -132,7 +126,7 @@ Resimulation run(const Model& model, typename Model::State x, const Measured& m,
 template <class Model>
 Resimulation run_from_measured(const Model& model, const Measured& m, const MeasuredData& data,
                                const SampleRange& range) {
-  const bool rest = begins_at_rest(m);
+  const bool rest = begins_at_rest(m.i, m.shaft.speed);
   const std::size_t start = rest ? 0 : range.first;
   auto x = model.state_of(m.currents(start), m.shaft.speed[start], m.input(start, 0.0));
   if (rest) x = {};
@@ -153,7 +147,7 @@ std::complex<double> flux_of(const InductionModel& model, const InductionInstant
 
 Resimulation run_induction(const InductionModel& model, const Measured& m, const MeasuredData& data,
                            const Settings& e, const SampleRange& range) {
-  if (begins_at_rest(m)) return run(model, {}, m, data, range, true);
+  if (begins_at_rest(m.i, m.shaft.speed)) return run(model, {}, m, data, range, true);
   const std::size_t start = range.first;
   const MotorInput in = m.input(start, 0.0);
   auto x = model.state_of(m.currents(start), m.shaft.speed[start], in);
@@ -161,6 +155,50 @@ Resimulation run_induction(const InductionModel& model, const Measured& m, const
   x[2] = phi.real();
   x[3] = phi.imag();
   return run(model, x, m, data, range, false);
+}
+
+/// The state with the flux that explains the currents of the first eighth of the window best: Gauss-Newton.
+SaturatedInductionModel::State with_best_flux(const SaturatedInductionModel& model,
+                                              SaturatedInductionModel::State x, const Measured& m,
+                                              const MeasuredData& data, const SampleRange& range) {
+  constexpr int kSteps = 6;
+  const SampleRange part{range.first, range.first + std::max<std::size_t>(50, range.count() / 8)};
+  const auto errors = [&](const SaturatedInductionModel::State& at) {
+    const Resimulation tried = run(model, at, m, data, part, false);
+    const auto samples = static_cast<Eigen::Index>(part.count());
+    Eigen::VectorXd e(samples * static_cast<Eigen::Index>(m.i.size()));
+    for (std::size_t phase = 0; phase < m.i.size(); ++phase) {
+      const Resimulated& s = tried.signals[phase];
+      for (std::size_t k = 0; k < part.count(); ++k)
+        e(samples * static_cast<Eigen::Index>(phase) + static_cast<Eigen::Index>(k)) =
+            s.simulated[k] - s.measured[k];
+    }
+    return e;
+  };
+  const double difference_wb = 1e-3 * model.curve.largest_wb();
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::VectorXd here = errors(x);
+    Eigen::MatrixXd slopes(here.size(), 2);
+    for (int k = 0; k < 2; ++k) {
+      SaturatedInductionModel::State moved = x;
+      moved[static_cast<std::size_t>(2 + k)] += difference_wb;
+      slopes.col(k) = (errors(moved) - here) / difference_wb;
+    }
+    const Eigen::Vector2d change = slopes.householderQr().solve(-here);
+    x[2] += change(0);
+    x[3] += change(1);
+  }
+  return x;
+}
+
+Resimulation run_saturated(const Result& result, const Measured& m, const MeasuredData& data,
+                           const Settings& e, const SampleRange& range) {
+  const SaturatedInductionModel model(result, e);
+  const bool rest = begins_at_rest(m.i, m.shaft.speed);
+  const std::size_t start = rest ? 0 : range.first;
+  const auto x = model.state_of(m.currents(start), m.shaft.speed[start], m.input(start, 0.0));
+  if (rest) return run(model, x, m, data, range, true);
+  return run(model, with_best_flux(model, x, m, data, range), m, data, range, false);
 }
 
 /// Throws if an estimate is not positive where a motor needs it.
@@ -211,6 +249,7 @@ Resimulation resimulate(const MeasuredData& measured, const Settings& settings, 
     case MotorKind::kDc:
       return run_from_measured(DcModel(result, e), m, data, range);
     case MotorKind::kInduction:
+      if (is_saturated(result)) return run_saturated(result, m, data, e, range);
       return run_induction(InductionModel(result, e), m, data, e, range);
     case MotorKind::kPmSynchronous:
       return run_from_measured(PmModel(result, e), m, data, range);

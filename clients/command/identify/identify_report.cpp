@@ -85,15 +85,19 @@ std::string identify_text(const IdentifyReport& r) {
   const Result& result = r.result;
   std::string text = fmt::format("{}\n{}\n{}\n\n", result.method, r.source, settings_text(r));
   auto out = std::back_inserter(text);
-  constexpr const char* kRow = "  {:<6} {:<12} {:>12} {:>10} {:>12} {:>10} {:>14} {:>10}  {}";
+  std::size_t width = 6;
+  for (const Estimate& e : result.parameters)
+    width = std::max(width, e.name.size());
+  constexpr const char* kRow = "  {:<{}} {:<12} {:>12} {:>10} {:>12} {:>10} {:>14} {:>10}  {}";
   const auto add = [&text](std::string line) {
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + '\n';
   };
-  add(fmt::format(kRow, "", "unit", "estimate", "95 %", "truth", "error", "by equations", "index", ""));
+  add(fmt::format(kRow, "", width, "unit", "estimate", "95 %", "truth", "error", "by equations", "index",
+                  ""));
   for (const Estimate& e : result.parameters) {
     const identification::EstimateText cell = text_of(result, e);
-    add(fmt::format(kRow, e.name, e.unit, cell.value, cell.interval, cell.truth, cell.error,
+    add(fmt::format(kRow, e.name, width, e.unit, cell.value, cell.interval, cell.truth, cell.error,
                     cell.by_equations, cell.index, inside_text(result, e)));
   }
   for (const Estimate& error : result.sensors)

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "clients/identification/data/magnetising_curve.hpp"
+
 namespace drivebench::identification {
 namespace {
 
@@ -41,6 +43,12 @@ std::vector<Row> machine_rows(const Result& r) {
             {"rotor_inductance_h", inductance, false},
             {"mutual_inductance_h", r.at("M"), false}};
   }
+  if (is_saturated(r)) {
+    return {{"stator_resistance_ohm", r.at("R_S"), false},
+            {"rotor_resistance_ohm", r.at("R_R"), false},
+            {"stator_leakage_h", r.at("l_s"), false},
+            {"rotor_leakage_h", r.at("l_r"), false}};
+  }
   if (r.kind == "pm_synchronous") {
     return {{"stator_resistance_ohm", r.at("R_S"), false},
             {"inductance_d_h", r.at(is_salient(r) ? "L_d" : "L_S"), false},
@@ -72,13 +80,33 @@ std::string toml_string(std::string_view text) {
   return out + '"';
 }
 
+std::string real_text(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";  // TOML tells integers from reals
+  return text;
+}
+
+/// The curve in so many equal steps of the flux that a straight line between two points is off by 0.1 % of
+/// the current at most.
+std::string curve_text(const MagnetisingCurve& curve) {
+  constexpr int kSteps = 100;
+  constexpr int kPerLine = 4;
+  if (!curve.rises())
+    throw IdentificationError("no motor file: the magnetising current found falls where the flux grows");
+  std::string text = "magnetising_curve = [";
+  for (int k = 0; k <= kSteps; ++k) {
+    const double flux_wb = curve.largest_wb() * k / kSteps;
+    text += fmt::format("{}[{}, {}],", k % kPerLine == 0 ? "\n  " : " ", real_text(curve.current_a(flux_wb)),
+                        real_text(flux_wb));
+  }
+  return text + "\n]\n";
+}
+
 std::string line_of(const Row& row) {
   if (!std::isfinite(row.value) || row.value < 0.0 || (row.value == 0.0 && !row.may_be_zero))
     throw IdentificationError(
         fmt::format("no motor file: {} = {} is no value for a motor", row.key, row.value));
-  std::string text = fmt::format("{}", row.value);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";  // TOML tells integers from reals
-  return fmt::format("{} = {}\n", row.key, text);
+  return fmt::format("{} = {}\n", row.key, real_text(row.value));
 }
 
 }  // namespace
@@ -100,6 +128,14 @@ double Result::at(std::string_view name) const {
 
 bool Result::is_unseen(std::string_view name) const noexcept {
   return std::find(excitation.unseen.begin(), excitation.unseen.end(), name) != excitation.unseen.end();
+}
+
+std::string curve_name(double flux_wb) {
+  return fmt::format("i_m({:g} Wb)", flux_wb);
+}
+
+bool is_saturated(const Result& result) noexcept {
+  return !result.curve_wb.empty();
 }
 
 bool is_salient(const Result& result) noexcept {
@@ -129,7 +165,7 @@ EstimateText text_of(const Result& r, const Estimate& e) {
   if (e.interval) text.interval = percent(*e.interval, e.value);
   if (e.truth) text.error = percent(e.value - *e.truth, *e.truth);
   const double by_equations = e.by_equations.value_or(e.value);
-  text.by_equations = fmt::format("{:.6g}", by_equations);
+  if (std::isfinite(by_equations)) text.by_equations = fmt::format("{:.6g}", by_equations);
   text.index = percent(e.index, by_equations);
   return text;
 }
@@ -248,6 +284,12 @@ std::string to_json(const Result& r) {
     all["sensors"][error.name] = {{"estimate", number(error.value)},
                                   {"unit", error.unit},
                                   {"interval", number(error.interval.value_or(0.0))}};
+  for (const double flux_wb : r.curve_wb) {
+    const Estimate& current = *r.find(curve_name(flux_wb));
+    all["magnetising_curve"].push_back({{"flux_wb", flux_wb},
+                                        {"current_a", number(current.value)},
+                                        {"interval_a", number(current.interval.value_or(0.0))}});
+  }
   if (!r.wiring.empty()) {
     nlohmann::json& wiring = all["wiring"] = nlohmann::json::object();
     for (const WiringFact& fact : r.wiring)
@@ -269,6 +311,7 @@ std::string to_motor_toml(const Result& r, const MotorFile& file) {
   if (r.kind != "pm_dc") text += fmt::format("star = {}\npole_pairs = {}\n", file.star, file.pole_pairs);
   for (const Row& row : machine_rows(r))
     text += line_of(row);
+  if (is_saturated(r)) text += curve_text(magnetising_curve(r));
   if (r.find("J") == nullptr) return text;
   text += "\n[mechanics]\n" + line_of({"inertia_kgm2", r.at("J"), false});
   // A negative friction is noise around zero.

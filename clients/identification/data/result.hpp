@@ -64,6 +64,7 @@ struct Result {
   std::optional<Explanation> explanation{};  ///< of the refinement
   std::vector<Estimate> sensors{};           ///< errors that were looked for: "i_a_a offset", "u_b_v gain"
   std::vector<WiringFact> wiring{};          ///< empty: not looked for
+  std::vector<double> curve_wb{};  ///< fluxes of the points of the magnetising curve, rising: curve_name()
   std::vector<std::string> notes{};
 
   /// The estimate of this name, or null.
@@ -76,6 +77,12 @@ struct Result {
   /// Puts the truth beside the estimates of these names.
   void compare(const std::map<std::string, double, std::less<>>& truth);
 };
+
+/// The name of the magnetising current at this flux, a parameter of a motor whose iron saturates.
+std::string curve_name(double flux_wb);
+
+/// Whether this is an induction motor with a magnetising curve.
+bool is_saturated(const Result& result) noexcept;
 
 /// Whether this is a PM synchronous motor with L_d and L_q in place of L_S.
 bool is_salient(const Result& result) noexcept;
@@ -110,8 +117,9 @@ std::string to_markdown(const Result& result);
 
 /// {kind, method, identifiable, unseen, verdict, parameters: {R_S: {estimate, unit, interval, by_equations,
 /// index, truth, inside}}, wiring: {pole_pairs: {found, unit, interval, used, given, contradicts, remark}},
-/// sensors: {"i_a_a offset": {estimate, unit, interval}}, explanation, ...}; a number that is not finite and
-/// the estimate of an unseen parameter are null.
+/// sensors: {"i_a_a offset": {estimate, unit, interval}}, magnetising_curve: [{flux_wb, current_a,
+/// interval_a}], explanation, ...}; a number that is not finite and the estimate of an unseen parameter are
+/// null.
 std::string to_json(const Result& result);
 
 /// The contents of a motor file beside the estimates.
@@ -123,8 +131,8 @@ struct MotorFile {
 };
 
 /// A file for configs/motors. An induction motor gets equal leakages, L_R = L_S, because its terminals do not
-/// show the split. Throws IdentificationError if a parameter is unseen or an estimate is impossible for a
-/// motor.
+/// show the split; one with a magnetising curve the likeliest split, and the curve up to the largest flux of
+/// the record. Throws IdentificationError if a parameter is unseen or an estimate is impossible for a motor.
 std::string to_motor_toml(const Result& result, const MotorFile& file);
 
 }  // namespace drivebench::identification

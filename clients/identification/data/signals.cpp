@@ -94,6 +94,14 @@ double largest(SeriesView x) noexcept {
   return most;
 }
 
+bool begins_at_rest(std::span<const SeriesView> currents, SeriesView speed) noexcept {
+  constexpr double kNoCurrent = 0.03;
+  constexpr double kNoSpeed = 0.05;
+  if (std::abs(speed[0]) > kNoSpeed * largest(speed)) return false;
+  return std::ranges::all_of(currents,
+                             [](SeriesView i) { return std::abs(i[0]) <= kNoCurrent * largest(i); });
+}
+
 TwoPhaseSeries two_phase(SeriesView a, SeriesView b, SeriesView c) {
   TwoPhaseSeries y = {.a = Series(a.size()), .b = Series(a.size())};
   for (std::size_t k = 0; k < a.size(); ++k) {

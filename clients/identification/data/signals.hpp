@@ -25,6 +25,10 @@ double value_at(SeriesView x, double position) noexcept;
 /// The largest absolute value.
 double largest(SeriesView x) noexcept;
 
+/// Whether the first sample has neither current nor speed: below 3 and 5 % of the largest ones. A filter sees
+/// a start some samples early, and the first sample of a start may be one period late.
+bool begins_at_rest(std::span<const SeriesView> currents, SeriesView speed) noexcept;
+
 /// Two-phase quantities in some frame.
 struct TwoPhaseSeries {
   Series a;

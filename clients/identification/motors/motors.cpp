@@ -31,8 +31,17 @@ class Reader {
   bool all_known_ = true;
 };
 
+Truth saturated_truth(Reader& read) {
+  Truth truth = {{"R_S", read("machine.stator_resistance_ohm")},
+                 {"R_R", read("machine.rotor_resistance_ohm")},
+                 {"l_s", read("machine.stator_leakage_h")},
+                 {"l_r", read("machine.rotor_leakage_h")}};
+  return read.all_known() ? truth : Truth{};
+}
+
 /// Source: the book, (8.97)-(8.101).
 Truth induction_truth(Reader& read) {
+  if (read.or_else("machine.stator_leakage_h", 0.0) > 0.0) return saturated_truth(read);
   const double r_s = read("machine.stator_resistance_ohm");
   const double r_r = read("machine.rotor_resistance_ohm");
   const double l_s = read("machine.stator_inductance_h");
@@ -99,6 +108,10 @@ Truth electrical_truth(MotorKind kind, Reader& read) {
 }
 
 }  // namespace
+
+bool is_machine_of(std::string_view machine, std::string_view motor_machine) noexcept {
+  return machine == motor_machine || (motor_machine == "induction" && machine == "saturated_induction");
+}
 
 const MotorName* find_motor(std::string_view name) noexcept {
   const auto* const found = std::ranges::find(kMotorNames, name, &MotorName::name);

@@ -27,6 +27,10 @@ inline constexpr std::array<MotorName, 4> kMotorNames = {
 const MotorName* find_motor(std::string_view name) noexcept;
 const MotorName& motor_name(MotorKind kind) noexcept;
 
+/// Whether a machine of this kind, as a bench names it, is a motor of this name: an induction motor may have
+/// a magnetising curve.
+bool is_machine_of(std::string_view machine, std::string_view motor_machine) noexcept;
+
 /// Parameters as a bench describes them, by their names: "machine.stator_resistance_ohm".
 using BenchParameters = std::map<std::string, double, std::less<>>;
 
@@ -54,9 +58,10 @@ void take_facts(const BenchParameters& bench, std::string_view drive, int subste
 Settings settings_of(MotorKind kind, const MeasurementFacts& facts, double period_s);
 
 /// The true values of the estimates on a bench with these parameters, by the names of the estimates. It
-/// leaves out values that the method does not define: M, L_R, R_R of an induction motor are those of equal
-/// leakages; a motor with different L_d and L_q has no L_S, one with equal ones no L_d, L_q, L_g; a shaft
-/// with its own load has no J; with a thermal model the resistances change.
+/// leaves out values that a bench does not describe, all that hangs on a magnetising curve, and values that
+/// the method does not define: M, L_R, R_R of an induction motor are those of equal leakages; a motor with
+/// different L_d and L_q has no L_S, one with equal ones no L_d, L_q, L_g; a shaft with its own load has no
+/// J; with a thermal model the resistances change.
 std::map<std::string, double, std::less<>> truth_of(MotorKind kind, const BenchParameters& bench);
 
 /// Adds the truth from column `load_nm`: tau_L and K17 if the load is constant in the window and the method

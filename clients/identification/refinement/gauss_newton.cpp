@@ -15,6 +15,10 @@ constexpr double kDifference = 1e-5;
 constexpr double kUnknownDeviation = 100.0;
 constexpr int kMostGaussNewtonSteps = 15;
 constexpr double kSmallStep2 = 1e-4;  // of a step in its own standard deviations, squared
+/// Up to a step of this size, as a coordinate and in standard deviations squared, the derivatives hold: the
+/// innovations of a motor are that straight.
+constexpr double kNearStep = 0.03;
+constexpr double kNearStep2 = 100.0;
 constexpr Eigen::Index kParts = 64;
 
 /// The residuals at a point and their derivatives.
@@ -70,11 +74,12 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) 
   fit.sum = l.residual.squaredNorm();
   double damping = 0.0;
   Matrix tried;
+  double size2 = 0.0;
+  bool near = false;
   for (int step = 0; step < kMostGaussNewtonSteps; ++step) {
-    if (!linearise(residuals, fit.at, l)) return fit;
+    if (!near && !linearise(residuals, fit.at, l)) return fit;
     const Vector gradient = l.jacobian.transpose() * l.residual.col(0);
     bool better = false;
-    double size2 = 0.0;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
       Matrix damped = l.information;
       damped.diagonal() *= 1.0 + damping;
@@ -90,6 +95,7 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) 
           fit.sum = sum;
           l.residual.swap(tried);
           better = true;
+          near = size2 < kNearStep2 && change.cwiseAbs().maxCoeff() < kNearStep;
         }
       }
       if (size2 < kSmallStep2) break;

@@ -15,7 +15,7 @@ struct Fit {
   double sum = 0.0;            ///< of squares
   Eigen::MatrixXd covariance;  ///< of the coordinates
   Eigen::VectorXd residual;    ///< at the minimum
-  Eigen::MatrixXd jacobian;    ///< of the residuals, at most a hundredth of a standard deviation from there
+  Eigen::MatrixXd jacobian;    ///< of the residuals, at most ten standard deviations and 0.03 from there
   bool found = false;
 };
 

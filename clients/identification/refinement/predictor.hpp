@@ -14,16 +14,9 @@
 #include "clients/identification/math/direction.hpp"
 #include "clients/identification/math/runge_kutta.hpp"
 #include "clients/identification/motors/motor_models.hpp"
-#include "clients/identification/motors/terminal_voltages.hpp"
+#include "clients/identification/refinement/record.hpp"
 
 namespace drivebench::identification {
-
-/// The errors of the sensors, white, rms.
-struct SensorNoise {
-  double voltage_v = 0.0;
-  double current_a = 0.0;
-  double angle_rad = 0.0;
-};
 
 /// What the sensors make of the truth: gain times it, plus offset, by phase.
 struct SensorErrors {
@@ -34,19 +27,6 @@ struct SensorErrors {
   double angle_offset_rad = 0.0;  ///< electrical, added to that of the measured shaft
 
   bool operator==(const SensorErrors&) const = default;
-};
-
-/// What the predictor needs of a record.
-struct PredictorRecord {
-  TerminalVoltages voltages;
-  std::vector<SeriesView> currents;  ///< of each phase
-  Series angle;                      ///< of the shaft as measured [rad]
-  SampleRange range;                 ///< samples that are predicted
-  double period_s;
-  double pole_pairs;
-  double first_speed;        ///< [rad/s]
-  double largest_current_a;  ///< in the record
-  double largest_speed;      ///< [rad/s]
 };
 
 /// A motor that is predicted from sample to sample: the model runs on the measured voltages, its own shaft
@@ -256,8 +236,9 @@ class Predictor {
   Square first_spread(const Model& model, const SensorNoise& noise) const {
     Square p = Square::Zero();
     const auto part = model.spread(kKnownPart * r_.largest_current_a, kKnownPart * r_.largest_speed);
+    constexpr double kRest = 0.02;
     for (int i = 0; i + 1 < kStates; ++i)
-      p(i, i) = part[at(i)] * part[at(i)];
+      p(i, i) = part[at(i)] * part[at(i)] * (r_.from_rest ? kRest * kRest : 1.0);
     p(kStates - 1, kStates - 1) = 4.0 * noise.angle_rad * noise.angle_rad;
     return p;
   }

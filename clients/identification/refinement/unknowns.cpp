@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "clients/identification/data/magnetising_curve.hpp"
+
 namespace drivebench::identification {
 namespace {
 
@@ -28,6 +30,9 @@ std::vector<Unknown> unknowns_of(const Settings& e, const Result& start, double 
   std::vector<Unknown> unknowns;
   for (std::string& name : positive_names(e.kind, is_salient(start)))
     unknowns.push_back({.name = std::move(name)});
+  for (const double flux_wb : start.curve_wb)
+    unknowns.push_back({.name = curve_name(flux_wb)});
+  if (is_saturated(start)) unknowns.push_back({.name = "split", .scale = kSplit});
   const double friction = start.at("J") / duration_s;
   for (const char* name : {"f", "f_c", "tau_L"}) {
     if (start.find(name) == nullptr) continue;
@@ -57,6 +62,13 @@ void put_dependent(const Settings& e, Result& result) {
   if (Estimate* const saliency = result.find("L_g"))
     saliency->value = 0.5 * (result.at("L_d") - result.at("L_q"));
   if (e.kind != MotorKind::kInduction) return;
+  if (is_saturated(result)) {
+    const SaturatedCircuit c = saturated_circuit(result);
+    result.find("R_R")->value = c.rotor_resistance_ohm;
+    result.find("l_s")->value = c.stator_leakage_h;
+    result.find("l_r")->value = c.rotor_leakage_h;
+    return;
+  }
   const double l_s = result.at("L_S");
   const double t_r = result.at("T_R");
   const double sigma = result.at("sigma");

@@ -16,6 +16,10 @@ struct Unknown {
   double scale = 0.0;  ///< of a coordinate of 1; 0: the coordinate is the logarithm
 };
 
+/// The standard deviation of the split of an induction motor's leakages before the record says anything: it lies
+/// between -1 and 1.
+inline constexpr double kSplit = 0.5;
+
 /// The unknowns of a kind of motor. A coordinate of friction or load is what brings the speed from its
 /// largest value to rest within the window, `inertia`·`speed`/`duration`.
 std::vector<Unknown> unknowns_of(const Settings& settings, const Result& start, double speed_rad_s,

@@ -116,6 +116,18 @@ Excitation verdict_against(const Result& result, const std::string& reason) {
   return e;
 }
 
+Excitation verdict_on_open_curve(const Result& saturated) {
+  Excitation e{.sufficient = false, .unseen = names_of(saturated), .verdict = {}};
+  e.verdict = fmt::format(
+      "the motor saturates at the flux of this record, and the record leaves its magnetising curve open: {} "
+      "may lie "
+      "far off; record a start from rest until 50 ms after the motor has run up, which goes through all "
+      "fluxes; or "
+      "{}",
+      fmt::join(saturated.excitation.unseen, ", "), kLessFlux);
+  return e;
+}
+
 Excitation verdict_on_saturation(const Result& result, const BendTest& bend) {
   Excitation e{.sufficient = false, .unseen = names_of(result), .verdict = {}};
   e.verdict = fmt::format(

@@ -25,6 +25,10 @@ Excitation verdict_without_start(MotorKind kind, const Result& result);
 /// The verdict on a motor that does not explain its record: no parameter is stated.
 Excitation verdict_against(const Result& result, const std::string& reason);
 
+/// The verdict on an induction motor whose iron bends and whose record leaves the curve open: no parameter is
+/// stated. `saturated` is the fit with its magnetising curve.
+Excitation verdict_on_open_curve(const Result& saturated);
+
 /// The verdict on an induction motor whose iron bends at the flux of the record: no parameter is stated.
 Excitation verdict_on_saturation(const Result& result, const BendTest& bend);
 

@@ -216,7 +216,7 @@ MeasuredMotor read_foreign(const IdentifyOptions& options) {
 MeasuredMotor read_measurement(const IdentifyOptions& options, const identification::MotorName& motor) {
   MeasuredMotor m = options.from_file.ends_with(".mcap") ? read_recording(options.from_file, options.axis)
                                                          : read_foreign(options);
-  if (!m.machine.empty() && m.machine != motor.machine)
+  if (!m.machine.empty() && !identification::is_machine_of(m.machine, motor.machine))
     throw UsageError(fmt::format("{} is of kind {}, --motor {} is for {}", m.source, m.machine, motor.name,
                                  motor.machine));
   return m;

@@ -94,7 +94,7 @@ std::string why_not(const IdentifyOptions& options, const WantedExperiment& want
                          listed(bench.axes(), &v1::AxisDescription::name));
     }
     const v1::AxisDescription& axis = bench.axes(static_cast<int>(*number));
-    if (axis.machine_kind() != wanted.machine)
+    if (!identification::is_machine_of(axis.machine_kind(), wanted.machine))
       return fmt::format("axis {} of the bench {} is of kind {}, not {}", axis.name(), bench.name(),
                          axis.machine_kind(), wanted.machine);
     link.list_experiments("");  // without an owner: a bench that keeps no experiments refuses

@@ -75,7 +75,7 @@ Forecasts::Forecasts(const IdentifyOptions& options, const MotorName& motor, con
 
 MeasuredMotor Forecasts::prepare(WantedExperiment& experiment) const {
   MeasuredMotor known = bench_.describe(experiment);
-  if (known.machine != motor_.machine)
+  if (!identification::is_machine_of(known.machine, motor_.machine))
     throw UsageError(fmt::format("the bench has a motor of kind {}, --motor {} is for {}", known.machine,
                                  motor_.name, motor_.machine));
   if (known.drive == "source") return known;

@@ -57,6 +57,7 @@ std::string percent(double part) {
 }
 
 std::string range_text(const Range& range) {
+  if (range.high == 0.0) return "-";
   return fmt::format("{:g} to {:g}{}{}", range.low, range.high, range.unit.empty() ? "" : " ", range.unit);
 }
 
@@ -93,7 +94,7 @@ Summary summary_of(const Trials& trials, std::size_t parameter) {
 }
 
 std::string summary_line(const Trials& trials, std::size_t parameter) {
-  const Range& range = trials.draw->identified[parameter];
+  const Range range = trials.draw->rows()[parameter];
   const Summary s = summary_of(trials, parameter);
   const auto of = [](int part, std::size_t all) {
     return percent(all == 0 ? std::nan("") : part / static_cast<double>(all));
@@ -135,7 +136,7 @@ void add_kind(std::vector<Line>& lines, const Trials& trials) {
        "error | "
        "95 % below | worst | in the interval | interval | not stated |"});
   lines.push_back({"|---|---|---|---|---|---|---|---|---|---|---|"});
-  for (std::size_t k = 0; k < draw.identified.size(); ++k)
+  for (std::size_t k = 0; k < draw.rows().size(); ++k)
     lines.push_back({summary_line(trials, k), Check::kTwoCells});
   lines.push_back({});
   lines.push_back({fmt::format(
@@ -143,7 +144,7 @@ void add_kind(std::vector<Line>& lines, const Trials& trials) {
   lines.push_back({});
   std::string names = "| no. |";
   std::string rule = "|---|";
-  for (const Range& range : draw.identified) {
+  for (const Range& range : draw.rows()) {
     names += fmt::format(" {}{}{} |", range.name, range.unit.empty() ? "" : " in ", range.unit);
     rule += "---|";
   }
@@ -258,6 +259,14 @@ std::vector<Trials> run_trials(std::span<const MotorDraw> draws, const MonteCarl
     parts.push_back(std::async(std::launch::async, run_part, thread));
   for (std::future<void>& part : parts)
     part.get();
+  return trials;
+}
+
+std::vector<Trials> run_table(const MonteCarloPlan& plan) {
+  std::vector<Trials> trials = run_trials(motor_draws(), plan);
+  MonteCarloPlan once = plan;
+  once.noises = 1;
+  trials.push_back(std::move(run_trials({&saturated_draw(), 1}, once).front()));
   return trials;
 }
 

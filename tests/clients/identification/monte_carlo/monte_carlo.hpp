@@ -31,6 +31,9 @@ struct Trials {
 /// Runs them all: trial k on thread k modulo their number.
 std::vector<Trials> run_trials(std::span<const MotorDraw> draws, const MonteCarloPlan& plan);
 
+/// Those of the table: motor_draws() by the plan, the motors of saturated_draw() once each.
+std::vector<Trials> run_table(const MonteCarloPlan& plan);
+
 /// The document. What it says of all motors needs kAllMotors, kAllNoises and kVerdictMotors.
 std::string markdown_of(const std::vector<Trials>& trials, const std::vector<VerdictTrials>& verdicts);
 

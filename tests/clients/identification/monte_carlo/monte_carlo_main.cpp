@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   try {
     const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
     if (argc == 1) {
-      const auto trials = run_trials(motor_draws(), {kAllMotors, kAllNoises, threads});
+      const auto trials = run_table({kAllMotors, kAllNoises, threads});
       const auto verdicts = run_verdicts(motor_draws(), kVerdictMotors, threads);
       std::fputs(markdown_of(trials, verdicts).c_str(), stdout);
       return 0;

@@ -11,8 +11,7 @@ namespace {
 
 /// The motors that the table shows one by one, run once for all tests.
 const std::vector<Trials>& shown() {
-  static const std::vector<Trials> trials =
-      run_trials(motor_draws(), {.motors = kShownMotors, .noises = 1, .threads = 2});
+  static const std::vector<Trials> trials = run_table({.motors = kShownMotors, .noises = 1, .threads = 2});
   return trials;
 }
 

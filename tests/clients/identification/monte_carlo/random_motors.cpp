@@ -41,6 +41,11 @@ constexpr std::array kSaturatedOthers =
                           {"phase of the line", "rad", 0.0, kTurn},
                           {"flux of twice the current", "Wb", 1.2, 6.0},
                           {"power of the curve", "", 2.0, 8.0}});
+constexpr std::array kCurve = std::to_array<Range>({{"i_m at 31 %", "A", 0.0, 0.0},
+                                                    {"i_m at 59 %", "A", 0.0, 0.0},
+                                                    {"i_m at 81 %", "A", 0.0, 0.0},
+                                                    {"i_m at 95 %", "A", 0.0, 0.0},
+                                                    {"i_m at 100 %", "A", 0.0, 0.0}});
 constexpr std::array kPm = std::to_array<Range>({{"R_S", "ohm", 0.3, 1.2},
                                                  {"L_S", "H", 1.2e-3, 4.8e-3},
                                                  {"K_m", "N m/A", 0.26, 1.03},
@@ -99,12 +104,17 @@ constexpr MotorDraw kSaturatedDraw = {
     MotorKind::kInduction,
     "Saturated induction motors",
     "im-8-5-5",
-    "The same starts of motors whose magnetising current is lambda/M (1 + (lambda/lambda_h)^n); the flux of "
-    "the line is 1.5 Wb.",
+    "The starts of the induction motors above with iron whose magnetising current is lambda/M (1 + "
+    "(lambda/lambda_h)^n); the flux of the line is 1.5 Wb. T_R, L_S and sigma are those without flux, i_m "
+    "is the "
+    "magnetising current at parts of the record's largest flux, which is the last of them. Motors that the "
+    "record "
+    "does not tell from straight ones count as not stated. Each is identified once.",
     kInduction,
     kSaturatedOthers,
     1.0,
-    Iron::kSaturated};
+    Iron::kSaturated,
+    kCurve};
 
 double four_digits(double x) {
   std::array<char, 32> text{};
@@ -163,6 +173,10 @@ Recorded run_dc(BenchConfig config, const std::vector<double>& motor) {
   return {std::move(record.data()), e};
 }
 
+double rotor_inductance_h(const MotorDraw& draw, const std::vector<double>& motor) {
+  return motor[2] * (draw.iron == Iron::kSaturated ? std::pow(1.0 - motor[3], motor[6]) : motor[6]);
+}
+
 InductionMachineParameters straight_machine(const std::vector<double>& motor, double rotor_h) {
   return {.pole_pairs = static_cast<int>(std::lround(motor[7])),
           .stator_resistance_ohm = motor[0],
@@ -171,6 +185,10 @@ InductionMachineParameters straight_machine(const std::vector<double>& motor, do
           .rotor_inductance_h = rotor_h,
           .mutual_inductance_h = std::sqrt((1.0 - motor[3]) * motor[2] * rotor_h),
           .star = true};
+}
+
+double magnetising_a(double mutual_h, double twice_wb, double power, double flux_wb) {
+  return flux_wb / mutual_h * (1.0 + std::pow(flux_wb / twice_wb, power));
 }
 
 /// The same with a magnetising current that is twice as large as that of a straight line at the flux
@@ -183,7 +201,7 @@ SaturatedInductionMachineParameters saturated_machine(const InductionMachinePara
   std::vector<CurvePoint> points;
   for (int k = 0; k <= kPoints; ++k) {
     const double flux_wb = kFarWb * k / kPoints;
-    points.push_back({.x = flux_wb / mutual_h * (1.0 + std::pow(flux_wb / twice_wb, power)), .y = flux_wb});
+    points.push_back({.x = magnetising_a(mutual_h, twice_wb, power, flux_wb), .y = flux_wb});
   }
   return {.pole_pairs = straight.pole_pairs,
           .stator_resistance_ohm = straight.stator_resistance_ohm,
@@ -200,8 +218,7 @@ Recorded run_induction(BenchConfig config, const MotorDraw& draw, const std::vec
   set_rate(config, 50'000, 4);
   AxisParameters& p = config.setup.axes[0].parameters;
   const bool saturated = draw.iron == Iron::kSaturated;
-  const double ratio = saturated ? std::pow(1.0 - motor[3], motor[6]) : motor[6];
-  const InductionMachineParameters straight = straight_machine(motor, ratio * motor[2]);
+  const InductionMachineParameters straight = straight_machine(motor, rotor_inductance_h(draw, motor));
   const int pole_pairs = straight.pole_pairs;
   if (saturated)
     p.machine = saturated_machine(straight, motor[9], motor[10]);
@@ -386,20 +403,41 @@ bool Finding::covered_by_index() const noexcept {
   return std::abs(by_equations - truth) <= index;
 }
 
+std::vector<Range> MotorDraw::rows() const {
+  std::vector<Range> all(identified.begin(), identified.end());
+  all.insert(all.end(), derived.begin(), derived.end());
+  return all;
+}
+
+namespace {
+
+Finding finding_of(const Result& found, const std::string& name, double truth) {
+  const Estimate* const estimate = found.find(name);
+  if (estimate == nullptr || found.is_unseen(name)) return {.truth = truth};
+  return {.truth = truth,
+          .by_equations = estimate->by_equations.value_or(estimate->value),
+          .index = estimate->index,
+          .estimate = estimate->value,
+          .interval = estimate->interval.value_or(0.0),
+          .stated = true};
+}
+
+}  // namespace
+
 std::vector<Finding> findings_of(const MotorDraw& draw, const std::vector<double>& motor,
                                  const Result& found) {
+  const bool curved = draw.iron == Iron::kSaturated;
+  const Result nothing;
+  const Result& stated = curved && found.curve_wb.empty() ? nothing : found;
   std::vector<Finding> findings;
-  for (std::size_t k = 0; k < draw.identified.size(); ++k) {
-    const std::string name(draw.identified[k].name);
-    const Estimate* const estimate = found.find(name);
-    findings.push_back({.truth = motor[k]});
-    if (estimate == nullptr || found.is_unseen(name)) continue;
-    findings[k] = {.truth = motor[k],
-                   .by_equations = estimate->by_equations.value_or(estimate->value),
-                   .index = estimate->index,
-                   .estimate = estimate->value,
-                   .interval = estimate->interval.value_or(0.0),
-                   .stated = true};
+  for (std::size_t k = 0; k < draw.identified.size(); ++k)
+    findings.push_back(finding_of(stated, std::string(draw.identified[k].name), motor[k]));
+  if (!curved) return findings;
+  const double mutual_h = straight_machine(motor, rotor_inductance_h(draw, motor)).mutual_inductance_h;
+  for (std::size_t k = 0; k < draw.derived.size(); ++k) {
+    const double flux_wb = stated.curve_wb.empty() ? 0.0 : stated.curve_wb[k];
+    findings.push_back(
+        finding_of(stated, curve_name(flux_wb), magnetising_a(mutual_h, motor[9], motor[10], flux_wb)));
   }
   return findings;
 }

@@ -31,9 +31,13 @@ struct MotorDraw {
   std::string_view bench;       ///< of configs/benches, whose motor stands in the middle of the ranges
   std::string_view experiment;  ///< for people
   std::span<const Range> identified;
-  std::span<const Range> others;  ///< parameters that the experiment does not identify
-  double longest_s;               ///< induction: the record ends here, whether the motor has run up or not
-  Iron iron = Iron::kPlain;       ///< salient: L_d and L_q of a PM rotor; saturated: a magnetising curve
+  std::span<const Range> others;     ///< parameters that the experiment does not identify
+  double longest_s;                  ///< induction: the record ends here, whether the motor has run up or not
+  Iron iron = Iron::kPlain;          ///< salient: L_d and L_q of a PM rotor; saturated: a magnetising curve
+  std::span<const Range> derived{};  ///< what the experiment identifies as well, and no range has
+
+  /// The identified parameters, then the derived ones.
+  std::vector<Range> rows() const;
 };
 
 /// DC, induction, PM synchronous round and, after brushless DC, salient; last the same induction motors with
@@ -41,7 +45,8 @@ struct MotorDraw {
 std::span<const MotorDraw> motor_draws() noexcept;
 
 /// The induction motors of the table with iron that saturates, from a curve that bends below the flux of the
-/// start to one that hardly bends at it. L_S, T_R and sigma are those without flux.
+/// start to one that hardly bends at it. L_S, T_R and sigma are those without flux. Derived are the currents
+/// of the points of the curve. Motors that are stated as straight count as not stated.
 const MotorDraw& saturated_draw() noexcept;
 
 /// Motor `number` of a kind, from 1 on, always the same: first the identified parameters, then the others.
@@ -77,11 +82,11 @@ Recorded record_motor(const MotorDraw& draw, int number, int noise);
 /// The experiment on a motor with these parameters, on a bench with this seed.
 Recorded record_motor(const MotorDraw& draw, const std::vector<double>& motor, std::uint64_t seed);
 
-/// The findings of a result, one for each of draw.identified.
+/// The findings of a result, one for each of draw.rows().
 std::vector<Finding> findings_of(const MotorDraw& draw, const std::vector<double>& motor,
                                  const Result& result);
 
-/// The same with its identification: a finding for each of draw.identified. Data that identify() refuses
+/// The same with its identification. Data that identify() refuses
 /// state nothing. May run on many threads at once.
 std::vector<Finding> identify_motor(const MotorDraw& draw, int number, int noise);
 

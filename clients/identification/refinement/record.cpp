@@ -1,0 +1,55 @@
+#include "clients/identification/refinement/record.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <string>
+
+#include "clients/identification/data/noise.hpp"
+
+namespace drivebench::identification {
+
+PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
+  PredictorRecord r{.voltages = {data, e},
+                    .currents = {},
+                    .angle = {},
+                    .range = window_of(data, e.processing),
+                    .period_s = data.period_s,
+                    .pole_pairs = static_cast<double>(e.pole_pairs),
+                    .first_speed = 0.0,
+                    .largest_current_a = 0.0,
+                    .largest_speed = 0.0};
+  r.range.end = std::min(r.range.end, r.range.first + e.most_samples);
+  const ShaftSignals shaft = shaft_signals(data, e, e.processing.shaft);
+  for (std::size_t k = 0; k < r.voltages.phases(); ++k) {
+    r.currents.push_back(data.at("i_" + std::string(1, static_cast<char>('a' + k)) + "_a"));
+    r.largest_current_a = std::max(r.largest_current_a, largest(r.currents.back()));
+  }
+  r.angle = measured_angle(data, e);
+  r.largest_speed = largest(shaft.speed);
+  r.first_speed = shaft.speed[r.range.first];
+  return r;
+}
+
+PredictorRecord from_rest(PredictorRecord record, const MeasuredData& data, const Settings& e) {
+  const ShaftSignals shaft = shaft_signals(data, e, e.processing.shaft);
+  if (!begins_at_rest(record.currents, shaft.speed)) return record;
+  record.range.first = 0;
+  record.first_speed = shaft.speed[0];
+  record.from_rest = true;
+  return record;
+}
+
+SensorNoise first_noise(const PredictorRecord& r, const Settings& e) {
+  constexpr double kFirstVoltage = 0.02;  // of the rms voltage: what the first round allows
+  SensorNoise noise{.voltage_v = kFirstVoltage * r.voltages.rms(r.range), .current_a = 0.0, .angle_rad = 0.0};
+  for (const SeriesView i : r.currents)
+    noise.current_a = std::max(noise.current_a, white_noise(i.subspan(r.range.first, r.range.count())));
+  noise.current_a = std::max(noise.current_a, kLeastCurrent * r.largest_current_a);
+  noise.angle_rad =
+      e.counts_per_revolution > 0.0
+          ? 2.0 * std::numbers::pi / e.counts_per_revolution / std::sqrt(12.0)
+          : std::max(1e-6, white_noise(SeriesView(r.angle).subspan(r.range.first, r.range.count())));
+  return noise;
+}
+
+}  // namespace drivebench::identification

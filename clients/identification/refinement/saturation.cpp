@@ -1,0 +1,69 @@
+#include "clients/identification/refinement/saturation.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <string>
+
+#include "clients/identification/data/magnetising_curve.hpp"
+
+namespace drivebench::identification {
+namespace {
+
+constexpr int kPoints = 5;
+
+double three_digits(double x) {
+  return std::strtod(fmt::format("{:.3g}", x).c_str(), nullptr);
+}
+
+Estimate unmeasured(std::string name, std::string unit, double value) {
+  return {.name = std::move(name),
+          .unit = std::move(unit),
+          .value = value,
+          .index = std::nan(""),
+          .truth = {},
+          .by_equations = std::nan("")};
+}
+
+}  // namespace
+
+Result saturated_start(const Result& straight, double largest_wb) {
+  Result start = straight;
+  start.kind = "saturated_induction";
+  start.method = "induction motor with a magnetising curve, begun from a straight one";
+  start.explanation.reset();
+  std::erase_if(start.parameters, [](const Estimate& e) {
+    return e.name.starts_with('K') || e.name == "M" || e.name == "L_R" || e.name == "R_R";
+  });
+  for (int k = 1; k <= kPoints; ++k) {
+    const double flux_wb = three_digits(largest_wb * std::sin(0.5 * std::numbers::pi * k / kPoints));
+    start.curve_wb.push_back(flux_wb);
+    start.parameters.push_back(unmeasured(curve_name(flux_wb), "A", flux_wb / straight.at("M")));
+  }
+  start.parameters.push_back(unmeasured("split", "1", 0.0));
+  for (const auto& [name, unit] : {std::pair{"R_R", "ohm"}, {"l_s", "H"}, {"l_r", "H"}})
+    start.parameters.push_back(unmeasured(name, unit, 0.0));
+  return start;
+}
+
+bool is_motor(const Result& result) {
+  const Estimate* const sigma = result.find("sigma");
+  if (sigma != nullptr && !(sigma->value < 1.0)) return false;
+  if (!is_saturated(result)) return true;
+  return std::abs(result.at("split")) < 1.0;
+}
+
+std::string curve_note(const Result& result) {
+  return fmt::format(
+      "T_R, L_S and sigma are those without flux; i_m is the magnetising current at a flux, up to {:.3g} "
+      "Wb{}",
+      result.curve_wb.back(),
+      result.is_unseen("l_s")
+          ? "; the record does not tell how the leakage divides between stator and rotor, and the "
+            "motor file has the likeliest split"
+          : "");
+}
+
+}  // namespace drivebench::identification

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "clients/identification/data/result.hpp"
+
+namespace drivebench::identification {
+
+/// A motor with a magnetising curve near a straight one, whose curve is still a line up to this flux: five
+/// points at the places of Chebyshev, where a polynomial does not swing between them.
+Result saturated_start(const Result& straight, double largest_wb);
+
+/// Whether the leakages of these values are above zero.
+bool is_motor(const Result& result);
+
+/// What a certified motor with a curve says beside its numbers.
+std::string curve_note(const Result& result);
+
+}  // namespace drivebench::identification
