@@ -120,7 +120,7 @@ class Pages(unittest.TestCase):
                             ("drivebench export --format cand", "drivebench export --format candump"),
                             ("drivebench control --preset servo/pos", "drivebench control --preset servo/pos"),
                             ("drivebench control --preset exercise/9.", "drivebench control --preset exercise/9.9"),
-                            ("drivebench watch --signals tick,encoder_c", "drivebench watch --signals tick,encoder_count"),
+                            ("drivebench watch --signals tick,encoder_co", "drivebench watch --signals tick,encoder_count"),
                             ("drivebench replay on", "drivebench replay one.mcap"),
                             ("drivebench dbc servo-mod", "drivebench dbc servo-modbus"),
                             ("drivebench demo --keep man", "drivebench demo --keep many/"),
