@@ -25,6 +25,7 @@ ONLY_PARSED = {
     "drivebench doctor --period-us 125": "its exit code is this machine's",
     **{f"drivebench rerun kept/servo-position.zip{more}": "needs a case that has failed" for more in ("", " --from 0.03s", " --interactive")},
     "drivebench test hil --filter servo --shrink hil/small.toml": "needs a case that fails",
+    "drivebench test hil --results /shared/results --slurm 32": "needs a cluster; test_slurm.py has one",
 }
 SERVING = ("drivebench web --listen 127.0.0.1:7380", "drivebench branch servo --port 0")
 # The bench that the examples of a verb need, where it is not a servo; and what comes before them.

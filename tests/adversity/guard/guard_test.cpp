@@ -30,6 +30,10 @@ namespace {
 
 constexpr Tick kTicks = 1'000'000;
 constexpr Owner kOwner = 1;
+constexpr Multisine kMultisine{.quantity = Multisine::Quantity::kCurrentOffset,
+                               .periods = 2,
+                               .amplitude = 1e-3,
+                               .lines = {.period_ticks = 100, .lowest = 1, .highest = 40, .ratio = 1.25}};
 
 /// The run of a controller that commands every tick, in batches, between which the other threads run.
 class BusyRun {
@@ -49,6 +53,7 @@ class BusyRun {
         requests_.push({.tick = tick + 50, .axis = 0, .owner = kOwner, .action = fault_of("bus_sag", 0.1)});
         requests_.push({.tick = tick + 90, .axis = 0, .owner = kOwner, .action = fault_of("bus_sag", 0.0)});
         requests_.push({.tick = tick + 60, .axis = 1, .owner = kOwner, .action = ShaftBump{1e-7}});
+        requests_.push({.tick = tick + 70, .axis = 1, .owner = kOwner, .action = kMultisine});
         requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = ClearFaults{}});
         requests_.push({.tick = 0, .axis = 0, .owner = kOwner, .action = RefusedCommand{}});
         requests_.push({.tick = 0, .axis = 0, .owner = 99, .action = RefusedCommand{}});  // a stranger's

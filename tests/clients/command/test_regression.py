@@ -49,12 +49,12 @@ server = next(int(p.name) for p in pathlib.Path("/proc").iterdir() if p.name.isd
 with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
     bench.acquire()
     sample = bench.newest()
-    while sample.tick < 400:
+    while sample.tick < 100:
         try:
             sample = bench.step(voltages=1.0)
         except drivebench.Refused:
             sample = bench.newest()
-        if server and sample.tick > 200:
+        if server and sample.tick > 50:
             os.kill(server, signal.SIGSTOP)
             time.sleep(0.03)
             os.kill(server, signal.SIGCONT)
@@ -293,7 +293,7 @@ class Programs(RegressionTest):
         """Catches: a device that is blamed for its bench, and an invalid run that ends with 0 or is kept as a result."""
         self.write("device.py", STOPS_ITS_BENCH)
         self.write("case.toml", PROGRAM.format(limit_s=60).replace("duration_s = 0.02", 'mode = "realtime"')
-                   + "[override.bench]\nperiod_us = 1000\ncommand_delay_ticks = 1\narming_commands = 1\n")
+                   + "[override.bench]\nperiod_us = 10000\ncommand_delay_ticks = 1\narming_commands = 1\n")
         results = self.folder / "results"
         for _ in range(2):
             done = self.run_test(self.folder / "suite", "--results", results, code=INVALID)

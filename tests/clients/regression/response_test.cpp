@@ -303,6 +303,7 @@ TEST(LoopMargins, AreNotReadBeyondTheLinesOrFromNoise) {
   EXPECT_FALSE(margins_of(points).reversal);
   EXPECT_FALSE(margins_of({}).crossover);
   points[3].gain_db = -3.0;
+  points[3].phase_deg = -170.0;
   points[3].error = 0.5;
   const LoopMargins m = margins_of(readable(points));
   EXPECT_NEAR(m.crossover->hz, 50.0, 1e-3);

@@ -153,6 +153,8 @@ TEST(Catalogue, NumbersOfTheWireStayAsTheyAre) {
   EXPECT_EQ(input.SerializeAsString(), "\x6a\x00"s);
   input.mutable_bump();
   EXPECT_EQ(input.SerializeAsString(), "\x72\x00"s);
+  input.mutable_multisine();
+  EXPECT_EQ(input.SerializeAsString(), "\x7a\x00"s);
 
   v1::Envelope welcome;
   welcome.set_id(1);
