@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "clients/identification/data/noise.hpp"
+
 namespace drivebench::identification {
 namespace {
 
@@ -70,6 +72,13 @@ double TerminalVoltages::rms(const SampleRange& range) const noexcept {
       sum += u[k] * u[k];
   }
   return std::sqrt(sum / static_cast<double>(u_.size() * range.count()));
+}
+
+double TerminalVoltages::white_v(const SampleRange& range) const {
+  double most = 0.0;
+  for (const Series& u : u_)
+    most = std::max(most, white_noise(SeriesView(u).subspan(range.first, range.count())));
+  return most;
 }
 
 }  // namespace drivebench::identification

@@ -21,6 +21,8 @@ class TerminalVoltages {
   std::array<double, 3> at(std::size_t sample, double part) const noexcept;
   /// Root of the mean square over samples and phases in the window.
   double rms(const SampleRange& range) const noexcept;
+  /// The white part of the noisiest phase in the window, rms, without a model.
+  double white_v(const SampleRange& range) const;
   std::size_t phases() const noexcept { return u_.size(); }
 
  private:

@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "clients/identification/data/magnetising_curve.hpp"
 #include "clients/identification/motors/bending_induction.hpp"
 #include "clients/identification/motors/saturated_induction.hpp"
 #include "clients/identification/refinement/bend.hpp"
@@ -149,8 +148,8 @@ std::string reason_against(const Result& result, const PredictorRecord& record) 
     if (reason.empty() && friction != nullptr && friction->value + *friction->interval < 0.0)
       reason = std::string(name) + " comes out below zero, a friction that drives";
   }
-  if (reason.empty() && is_saturated(result) && !magnetising_curve(result).rises())
-    reason = "its magnetising current falls where the flux grows";
+  if (reason.empty() && is_saturated(result))
+    reason = reason_against_curve(result, record.voltages.white_v(record.range));
   return reason;
 }
 

@@ -55,6 +55,23 @@ bool is_motor(const Result& result) {
   return std::abs(result.at("split")) < 1.0;
 }
 
+std::string reason_against_curve(const Result& result, double white_v) {
+  constexpr double kMostNoise = 3.0;
+  constexpr double kMostOfVoltage = 0.002;
+  const MagnetisingCurve curve = magnetising_curve(result);
+  const double largest_wb = curve.largest_wb();
+  if (!curve.rises()) return "its magnetising current falls where the flux grows";
+  if (curve.at(largest_wb * largest_wb).chord < curve.at(0.0).chord)
+    return "its iron needs less current per flux where the flux is large";
+  const Explanation& found = *result.explanation;
+  if (found.voltage_noise_v > kMostNoise * white_v + kMostOfVoltage * found.voltage_rms_v)
+    return fmt::format(
+        "with a magnetising curve it needs {:.3g} V rms beside the measured voltages, which have {:.3g} V of "
+        "noise",
+        found.voltage_noise_v, white_v);
+  return {};
+}
+
 std::string curve_note(const Result& result) {
   return fmt::format(
       "T_R, L_S and sigma are those without flux; i_m is the magnetising current at a flux, up to {:.3g} "

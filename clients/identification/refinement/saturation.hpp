@@ -11,6 +11,11 @@ Result saturated_start(const Result& straight, double largest_wb);
 /// Whether the leakages of these values are above zero.
 bool is_motor(const Result& result);
 
+/// Why a curve is none of iron; empty if it may be one: more flux needs more current, and no less of it per
+/// flux than without flux. Five points bend around a wrong instant of the voltages as well, but leave more of
+/// them unexplained than `white_v`, their measured noise.
+std::string reason_against_curve(const Result& result, double white_v);
+
 /// What a certified motor with a curve says beside its numbers.
 std::string curve_note(const Result& result);
 

@@ -16,8 +16,8 @@ struct Unknown {
   double scale = 0.0;  ///< of a coordinate of 1; 0: the coordinate is the logarithm
 };
 
-/// The standard deviation of the split of an induction motor's leakages before the record says anything: it lies
-/// between -1 and 1.
+/// The standard deviation of the split of an induction motor's leakages before the record says anything: it
+/// lies between -1 and 1.
 inline constexpr double kSplit = 0.5;
 
 /// The unknowns of a kind of motor. A coordinate of friction or load is what brings the speed from its

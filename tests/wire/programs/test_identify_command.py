@@ -104,6 +104,27 @@ class Identify(WireTest):
                       self.identify("--motor", "im", "--from", files["csv"], "--pole-pairs", 2, "--counts", 2048,
                                     "--voltages", "mean", "--load", "constant", code=1).stdout)  # which they are not
 
+    def test_a_bench_whose_motor_saturates_shows_its_curve(self):
+        """The motor found goes back into the bench and starts like the one that was measured. Catches: a machine of
+        another kind that is refused by its name, a curve that the bench does not take, one of another motor."""
+        motor = self.path / "saturated.toml"
+        words = ("--motor", "im", "--experiment", "dol-start", "--bench")
+        found = self.parameters(*words, "im-8-5-5-saturated", "--motor-file", motor)
+        self.assertEqual(found["kind"], "saturated_induction")
+        for name, percent in (("R_S", 0.3), ("R_R", 1), ("l_s", 3), ("l_r", 3), ("J", 1)):
+            self.assertPercent(found, name, percent)
+        for point in found["magnetising_curve"]:
+            flux, current = point["flux_wb"], point["current_a"]
+            self.assertAlmostEqual(current, flux / 0.64 * (1 + (flux / 1.6) ** 6), delta=0.03 * current)
+        for output, fit in found["validation"]["signals"].items():
+            self.assertLess(fit["normalised"], 0.02, output)
+        bench = self.path / "again.toml"
+        text = (BENCHES / "im-8-5-5-saturated.toml").read_text(encoding="utf-8")
+        bench.write_text(re.sub(r"motor = .*", f'motor = "{motor}"', text), encoding="utf-8")
+        again = self.parameters(*words, bench)
+        self.assertPercent(again, "R_R", 1)
+        self.assertEqual(len(again["magnetising_curve"]), 5)
+
     def test_every_named_experiment_identifies_its_motor(self):
         """Catches: an experiment that its bench refuses, or that does not identify its parameters."""
         listed = json.loads(self.identify("--list", "--json").stdout)["experiments"]
