@@ -127,9 +127,22 @@ TEST(Config, CanonicalTextHoldsNeitherTokenNorAnAddressThatNeedsIt) {
 BenchConfig bench_with_room() {
   std::string text =
       with("1.1e-4\n", "1.1e-4\nstatic_friction_nm = 1\nload_inertia_kgm2 = 1\nshaft_stiffness_nm = 10\n");
-  return parse(text +
-               "[axis.bus]\ncapacitance_f = 1e-3\nchopper_on_v = 90\nchopper_off_v = 85\n"
-               "[axis.tachometer]\ngain_vs_per_rad = 0.1\nripple_per_turn = 12\n");
+  BenchConfig config = parse(text +
+                             "[axis.bus]\ncapacitance_f = 1e-3\nchopper_on_v = 90\nchopper_off_v = 85\n"
+                             "[axis.tachometer]\ngain_vs_per_rad = 0.1\nripple_per_turn = 12\n");
+  AxisParameters& p = config.setup.axes[0].parameters;
+  p.sensors.current.bits = 12;
+  p.encoder.timer_bits = 16;
+  return config;
+}
+
+/// The same with three phases in a star, which comparators need.
+BenchConfig bench_with_star() {
+  BenchConfig config = bench_with_room();
+  AxisParameters& p = config.setup.axes[0].parameters;
+  std::get<InductionMachineParameters>(p.machine).star = true;
+  p.sensors.comparator.hysteresis_v = 0.1;
+  return config;
 }
 
 /// The same behind a transformer, whose values mean nothing alone.
@@ -161,9 +174,12 @@ std::optional<BenchConfig> with_another_value(const BenchConfig& base, const Par
 TEST(Config, EveryRowOfTheParameterTableHasAKeyOfItsOwn) {
   const BenchConfig room = bench_with_room();
   const BenchConfig transformer = bench_with_transformer();
+  const BenchConfig star = bench_with_star();
   std::string alone;
   for (const Parameter& row : axis_parameters(room.setup.axes[0].parameters)) {
-    const BenchConfig& base = row.name.starts_with("transformer.") ? transformer : room;
+    const BenchConfig& base = row.name.starts_with("transformer.")  ? transformer
+                              : row.name.starts_with("comparator.") ? star
+                                                                    : room;
     if (const auto config = with_another_value(base, row)) {
       expect_equal(parse(to_toml(*config)), *config);
       EXPECT_NE(to_toml(*config), to_toml(base)) << row.name;

@@ -21,9 +21,9 @@ const std::vector<ParameterInfo>& parameters() {
 
 const std::vector<Area>& areas() {
   static const std::vector<Area> whole = [] {
-    std::vector<Area> all{{0, 50},   {100, 13}, {120, 22}, {200, 136},
-                          {340, 16}, {400, 11}, {420, 14}, {1000, 2 * parameters().size()}};
-    for (std::size_t i = 0; i < 8; ++i)
+    std::vector<Area> all{{0, 56},   {100, 13}, {120, 22}, {200, 136}, {340, 16},
+                          {360, 32}, {400, 11}, {420, 14}, {440, 44},  {1000, 2 * parameters().size()}};
+    for (std::size_t i = 0; i < 10; ++i)
       all.push_back({all[i].start + 10'000, all[i].length});
     return all;
   }();
@@ -50,6 +50,7 @@ int verdict_of_zeros(std::size_t address, std::size_t count) {
       if (parameters()[row].minimum > 0.0) return 3;
     return 6;
   }
+  if (first >= 440) return 2;
   if (first >= 400) {
     const std::size_t block = first < 420 ? 400 : 420;
     const auto is_cut = [&](std::size_t at) { return at > block + 3 && at < block + 13 && at % 2 == 0; };
