@@ -123,6 +123,19 @@ TEST(Edges, ASwitchWaitsTheDeadTimeAfterTheOther) {
          {{0.0, kFree, 0.0}, {0.7e-6, kOn, -kUp}, {90e-6, kOn, -kUp}});
 }
 
+// With half a tick of delay a list begins in the middle of its tick and goes on in the next one. Catches:
+// offsets that count from the start of the tick, the rest of a list that the next tick forgets.
+TEST(Edges, ADelayedListCountsFromWhereItTakesOver) {
+  DriveParameters p = inverter();
+  p.amplifier.delay_ticks = 0.5;
+  p.inverter.pwm_periods_per_tick = 2;
+  Leg leg(p);
+  expect(leg.tick(edges(list({{0, kLow}, {10'000, kHigh}, {70'000, kLow}}))),
+         {{0.0, kFree, 0.0}, {50e-6, kOn, -kUp}, {60e-6, kOn, kUp}});
+  expect(leg.tick(edges(list({{30'000, kHigh}}))),
+         {{0.0, kOn, kUp}, {20e-6, kOn, -kUp}, {50e-6, kOn, -kUp}, {80e-6, kOn, kUp}});
+}
+
 // Volt-seconds: the times at the rails, and of the dead time the rail that the current comes from. Catches:
 // an energy or a mean that takes a leg off for one at a rail.
 TEST(Edges, TheVoltSecondsOfALegAreThoseOfItsTimes) {
