@@ -17,7 +17,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kLongestPeriod = 1e6;  ///< [ticks], of which a table of cosines is kept
+constexpr double kLongestPeriod = 1e6;   ///< [ticks], of which a table of cosines is kept
 constexpr double kFewestInjected = 3.0;  ///< one for transients to die, two that tell what is noise
 
 /// A bound that a check may have: what it is about, and on which side of the limit the value must lie.
