@@ -81,10 +81,12 @@ Summary summary_of(const Trials& trials, std::size_t parameter) {
       ++s.unstated;
       continue;
     }
-    s.by_equations.push_back(std::abs(f.error_by_equations()));
+    if (std::isfinite(f.by_equations)) {  // a curve is none of the equations
+      s.by_equations.push_back(std::abs(f.error_by_equations()));
+      s.in_index += f.covered_by_index() ? 1 : 0;
+    }
     s.errors.push_back(std::abs(f.error()));
     s.intervals.push_back(f.interval / f.truth);
-    s.in_index += f.covered_by_index() ? 1 : 0;
     s.in_interval += f.covered() ? 1 : 0;
     if (s.errors.back() < s.worst) continue;
     s.worst = s.errors.back();
