@@ -39,12 +39,13 @@ struct Bound {
   std::string_view path;  ///< from there
   std::size_t most;       ///< elements in a frame
 };
-constexpr std::size_t kMaxNames = 256;  // more than an axis has parameters
+constexpr std::size_t kMaxNames = 256;                      // more than an axis has parameters
+constexpr std::size_t kMaxEdges = kMaxAxes * kMaxLegEdges;  // of legs with one letter
 constexpr auto kBounds = std::to_array<Bound>({
     {"exchange", "commands", kMaxAxes},
-    {"exchange", "commands.edges_a", kMaxAxes * kMaxLegEdges},
-    {"exchange", "commands.edges_b", kMaxAxes * kMaxLegEdges},
-    {"exchange", "commands.edges_c", kMaxAxes * kMaxLegEdges},
+    {"exchange", "commands.edges_a", kMaxEdges},
+    {"exchange", "commands.edges_b", kMaxEdges},
+    {"exchange", "commands.edges_c", kMaxEdges},
     {"subscribe", "signals", kSignals.size()},
     {"read_parameters", "names", kMaxNames},
     {"run_experiment", "signals", kSignals.size()},
