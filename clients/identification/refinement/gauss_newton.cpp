@@ -15,10 +15,7 @@ constexpr double kDifference = 1e-5;
 constexpr double kUnknownDeviation = 100.0;
 constexpr int kMostGaussNewtonSteps = 15;
 constexpr double kSmallStep2 = 1e-4;  // of a step in its own standard deviations, squared
-/// Up to a step of this size, as a coordinate and in standard deviations squared, the derivatives hold: the
-/// innovations of a motor are that straight.
-constexpr double kNearStep = 0.03;
-constexpr double kNearStep2 = 100.0;
+constexpr double kNearStep2 = 100.0;  // the same: derivatives may stand
 constexpr Eigen::Index kParts = 64;
 
 /// The residuals at a point and their derivatives.
@@ -65,7 +62,7 @@ Matrix covariance_of(const Linear& l) {
 
 }  // namespace
 
-Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) {
+Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit, double near_step) {
   Fit fit;
   fit.at = start;
   fit.sum = std::numeric_limits<double>::infinity();
@@ -95,7 +92,7 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit) 
           fit.sum = sum;
           l.residual.swap(tried);
           better = true;
-          near = size2 < kNearStep2 && change.cwiseAbs().maxCoeff() < kNearStep;
+          near = size2 < kNearStep2 && change.cwiseAbs().maxCoeff() < near_step;
         }
       }
       if (size2 < kSmallStep2) break;

@@ -15,7 +15,8 @@ struct Fit {
   double sum = 0.0;            ///< of squares
   Eigen::MatrixXd covariance;  ///< of the coordinates
   Eigen::VectorXd residual;    ///< at the minimum
-  Eigen::MatrixXd jacobian;    ///< of the residuals, at most ten standard deviations and 0.03 from there
+  Eigen::MatrixXd jacobian;    ///< of the residuals, at most a hundredth of a standard deviation from there,
+                               ///< or what `near_step` allows
   bool found = false;
 };
 
@@ -23,7 +24,10 @@ struct Fit {
 /// that the residuals do not show stays where it is and has a standard deviation of 100. The covariance is
 /// component by component the larger one of two, by variance: the inverse of the information, and the same
 /// about the scatter of the scores of 64 parts of the record, which holds for residuals that are not white.
-/// `limit` bounds the change of a coordinate in a step.
-Fit gauss_newton(const Residuals& residuals, const Eigen::VectorXd& start, double limit);
+/// `limit` bounds the change of a coordinate in a step. After a step of less than `near_step` in every
+/// coordinate and ten standard deviations the derivatives stand: many coordinates are worth it, and estimates
+/// move by some hundredths of a standard deviation.
+Fit gauss_newton(const Residuals& residuals, const Eigen::VectorXd& start, double limit,
+                 double near_step = 0.0);
 
 }  // namespace drivebench::identification

@@ -17,6 +17,7 @@ inline constexpr int kRounds = 2;           ///< of linearisation, Gauss-Newton 
 inline constexpr int kSaturatedRounds = 4;  ///< of a motor with a magnetising curve, until the noises stand
 inline constexpr double kHopeless =
     25.0;  ///< mean square of the first round's innovations, where 1 is expected
+inline constexpr double kNearStep = 0.03;      ///< in which the derivatives of a motor with a curve stand
 inline constexpr double kLargestChange = 0.7;  ///< of a logarithm in a step
 
 /// The noises of voltages and currents that make the likelihood greatest, each to a fifth.
@@ -137,7 +138,7 @@ Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Mo
       noise = likeliest(predictor, model_at(fit.at), noise, least, most);
     }
     residuals.split_weight = round == 0 ? kHeldSplit : 1.0;
-    fit = gauss_newton(residuals, fit.at, kLargestChange);
+    fit = gauss_newton(residuals, fit.at, kLargestChange, is_saturated(trial) ? kNearStep : 0.0);
     if (round == 0 && fit.sum > kHopeless * static_cast<double>(predictor.rows())) fit.found = false;
     if (round > 1 && stands(noise, before)) break;
   }
