@@ -15,7 +15,7 @@ namespace {
 constexpr double kNoiseStepS = 1e-6;
 constexpr double kMostNoise = 8.58;  // gaussian_noise() is never beyond
 
-constexpr std::size_t at(int k) noexcept {
+constexpr std::size_t index_of(int k) noexcept {
   return static_cast<std::size_t>(k);
 }
 
@@ -162,7 +162,7 @@ void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double 
                        .middle_v = of(path.middle_v, k) - reference.b,
                        .end_v = of(path.end_v, k) - reference.c};
     Input input(u, duration_s);
-    double& y = filtered_v[at(k)];
+    double& y = filtered_v[index_of(k)];
     const double before_v = filters ? y : u.start_v;
     if (filters) input.filter(p_.rc_s, y);
     // An RC stays between where it was and what it is given.
@@ -219,9 +219,9 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
   const auto is_beyond = [&](double v) noexcept { return (m.levels & bit) != 0 ? v < -half_v : v > half_v; };
   const auto switch_at = [&](double t) noexcept {
     m.levels ^= bit;
-    ++m.edges[at(place.terminal)];
-    m.edge_tick[at(place.terminal)] = place.tick;
-    m.edge_s[at(place.terminal)] = place.start_s + t;
+    ++m.edges[index_of(place.terminal)];
+    m.edge_tick[index_of(place.terminal)] = place.tick;
+    m.edge_s[index_of(place.terminal)] = place.start_s + t;
   };
   double v = input.at(from_s) + added_v;
   if (is_beyond(v)) switch_at(from_s);  // a jump of the voltage or of the noise
