@@ -10,7 +10,6 @@
 
 #include "protocols/number_text.hpp"
 
-
 namespace drivebench::command {
 namespace {
 
