@@ -194,10 +194,9 @@ SaturatedInductionModel::State with_best_flux(const SaturatedInductionModel& mod
 Resimulation run_saturated(const Result& result, const Measured& m, const MeasuredData& data,
                            const Settings& e, const SampleRange& range) {
   const SaturatedInductionModel model(result, e);
-  const bool rest = begins_at_rest(m.i, m.shaft.speed);
-  const std::size_t start = rest ? 0 : range.first;
+  if (begins_at_rest(m.i, m.shaft.speed)) return run(model, {}, m, data, range, true);
+  const std::size_t start = range.first;
   const auto x = model.state_of(m.currents(start), m.shaft.speed[start], m.input(start, 0.0));
-  if (rest) return run(model, x, m, data, range, true);
   return run(model, with_best_flux(model, x, m, data, range), m, data, range, false);
 }
 

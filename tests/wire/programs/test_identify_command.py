@@ -117,7 +117,7 @@ class Identify(WireTest):
             flux, current = point["flux_wb"], point["current_a"]
             self.assertAlmostEqual(current, flux / 0.64 * (1 + (flux / 1.6) ** 6), delta=0.03 * current)
         for output, fit in found["validation"]["signals"].items():
-            self.assertLess(fit["normalised"], 0.02, output)
+            self.assertLess(fit["normalised"], 0.005, output)  # a start from a filtered sample, not from rest, leaves 0.02
         bench = self.path / "again.toml"
         text = (BENCHES / "im-8-5-5-saturated.toml").read_text(encoding="utf-8")
         bench.write_text(re.sub(r"motor = .*", f'motor = "{motor}"', text), encoding="utf-8")
