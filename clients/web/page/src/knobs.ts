@@ -108,12 +108,12 @@ export class Knobs {
         const [loadNm, rampS] = [this.number(load), this.number(ramp)];
         if (loadNm === null || rampS === null) return;
         void this.change(axis, "load", () => [{ set_load: { axis, load_nm: loadNm, ramp_ticks: this.ticks(rampS) } }]);
-      } }, "Load", load, "N·m in", ramp, "s", element("button", { type: "submit" }, "Set load")),
+      } }, "Load", load, "N*m in", ramp, "s", element("button", { type: "submit" }, "Set load")),
       element("form", { class: "bar", submit: (event) => {
         event.preventDefault();
         const impulseNms = this.number(impulse);
         if (impulseNms !== null) void this.change(axis, "bump", () => [{ shaft_bump: { axis, impulse_nms: impulseNms } }]);
-      } }, "Bump", impulse, "N·m·s", element("button", { type: "submit" }, "Bump")));
+      } }, "Bump", impulse, "N*m*s", element("button", { type: "submit" }, "Bump")));
   }
 
   private faultRows(axis: number): HTMLElement {
