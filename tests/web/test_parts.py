@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The parts of the page that calculate, by node's own tests: page/parts.test.mjs."""
+"""The parts of the page that calculate, by node's own tests: page/*.test.mjs."""
 import os
 import pathlib
 import shutil
@@ -15,9 +15,9 @@ PACKAGES = PAGE / "node_modules"
 
 class Parts(unittest.TestCase):
     def test_the_parts_calculate_rightly(self):
-        """Catches: what each test in page/parts.test.mjs names."""
+        """Catches: what each test in page/*.test.mjs names."""
         environment = {**os.environ, "PAGE_SOURCES": str(PAGE / "src"), "PAGE_PACKAGES": str(PACKAGES)}
-        done = subprocess.run(["node", "--test", HERE / "page/parts.test.mjs"], capture_output=True, text=True, env=environment,
+        done = subprocess.run(["node", "--test", *sorted((HERE / "page").glob("*.test.mjs"))], capture_output=True, text=True, env=environment,
                               timeout=300, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 

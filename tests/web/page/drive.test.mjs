@@ -1,0 +1,104 @@
+// node --test drive.test.mjs
+//
+// What the page says and asks while it drives, without a browser, and the reports that it shows. A test's comment names the mistake that it catches.
+import assert from "node:assert/strict";
+import test from "node:test";
+import { page } from "./sources.mjs";
+
+const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, pb } = page;
+
+// Catches: a common voltage of the terminals that counts as amplitude, the sum of three phases for their vector.
+test("the amplitude of terminals", () => {
+  const three = (angle) => [0, 1, 2].map((phase) => 24 + 10 * Math.cos(angle - (phase * 2 * Math.PI) / 3));
+  for (const angle of [0, 0.4, 2]) assert.ok(Math.abs(amplitude(three(angle)) - 10) < 1e-12);
+  assert.equal(amplitude([3, -4]), 5);
+  assert.equal(amplitude([-6]), -6);
+});
+
+// Catches: a run that ended early and is called done, a part of a run that is rounded up to the whole.
+test("the words for the run of a preset", () => {
+  const run = { number: 1, preset: "p", phase: "moving", progress: 0.999, failure: "", numbers: [] };
+  assert.equal(wordsOf(run), "p: moving, 99 %");
+  assert.equal(wordsOf({ ...run, phase: "failed", failure: "the bench latched trip" }), "p did not end: the bench latched trip");
+  assert.match(wordsOf({ ...run, phase: "done", progress: 1 }), /done, the gates are off/);
+  assert.match(wordsOf({ ...run, phase: "resting", progress: 0 }), /gates off until/);
+});
+
+// Catches: a bench that is called valid with a late tick or a recording with gaps, a valid one that is not, other words than those
+// of the verdict at the end.
+test("the verdict so far", () => {
+  const status = { mode: pb.Mode.MODE_REALTIME, tick: 1599, late_ticks: 0, worst_lateness_s: 94.81e-6, recording_gaps: 0 };
+  assert.deepEqual(verdictOf(status), { text: "real-time valid so far: 1599 ticks, none late, worst lateness 94.8 us", isGood: true });
+  assert.deepEqual(verdictOf({ ...status, late_ticks: 2 }), { text: "not real-time valid: 2 of 1599 ticks late, worst lateness 94.8 us", isGood: false });
+  const lost = verdictOf({ ...status, mode: pb.Mode.MODE_LOCKSTEP, recording_gaps: 3 });
+  assert.deepEqual(lost, { text: "lockstep exact so far: 1599 ticks; the recording lost 3 entries and does not replay", isGood: false });
+  assert.ok(verdictOf({ ...status, mode: pb.Mode.MODE_FREE }).text.startsWith("free run exact so far"));
+});
+
+// Catches: a transport that is down and not counted, a count under another name.
+test("the transports in words", () => {
+  const can = { name: "can memory", state: "the bus is off", counts: [{ name: "frames", value: 7 }, { name: "errors", value: 1 }] };
+  assert.equal(summaryOf([{ name: "tcp", state: "up", counts: [] }, can]), "Transports: 2, 1 not up");
+  assert.equal(summaryOf([{ name: "tcp", state: "up", counts: [] }]), "Transports: 1, all up");
+  assert.equal(countsOf(can), "frames 7, errors 1");
+});
+
+// Catches: a file of another program that is shown as a result, one of another shape that breaks the page or shows what is no
+// number, an interval under another parameter.
+test("the report of an identification", () => {
+  const report = {
+    motor: "dc", method: "least squares", source: "experiment 1", verdict: "the data see every parameter", notes: ["a note", 7],
+    parameters: { R: { estimate: 2, unit: "ohm", interval: 0.01, truth: 2.005, inside: true }, L: { estimate: null, unit: "H", interval: null, truth: 0.002, inside: false } },
+    validation: { signals: { i_a_a: { unit: "A", rms_error: 0.00123, normalised: 0.025 }, w: { unit: "rad/s", rms_error: 1, normalised: null } }, problem: "" },
+  };
+  const found = identificationIn(JSON.parse(JSON.stringify(report)));
+  assert.deepEqual(found.parameters[0], { name: "R", unit: "ohm", estimate: 2, interval: 0.01, truth: 2.005, inside: true });
+  assert.deepEqual(found.parameters.map(isInside), ["yes", "no"]);
+  assert.equal(found.validation[0], "simulated again, i_a_a differs by 0.001230 A rms, 2.50 % of it");
+  assert.equal(found.validation[1], "simulated again, w differs by 1.000 rad/s rms");
+  assert.deepEqual(found.notes, ["a note", ""]);
+  for (const other of [null, 7, "dc", [], {}, { motor: "dc" }, { motor: 7, parameters: {} }, { motor: "dc", parameters: [1] }]) assert.equal(identificationIn(other), null);
+  const hostile = identificationIn({ motor: "dc", parameters: { __proto__x: 7, R: { estimate: "2", unit: {}, inside: "yes" } }, validation: 7, notes: { a: 1 }, verdict: 8 });
+  assert.deepEqual(hostile.parameters[1], { name: "R", unit: "", estimate: null, interval: null, truth: null, inside: null });
+  assert.deepEqual([hostile.verdict, hostile.notes], ["", []]);
+});
+
+// Catches: a rotor that is drawn so fast that it seems to stand or to turn backwards, and a drawing that keeps silent about it.
+test("a fast rotor is drawn slower", () => {
+  assert.deepEqual(drawnSpeed(-3), { speed_rad_s: -3, note: "" });
+  const { speed_rad_s: drawn, note } = drawnSpeed(-100 * Math.PI);
+  assert.ok(Math.abs(drawn + 2 * Math.PI) < 1e-12);
+  assert.equal(note, "drawn 50 times slower");
+  assert.equal(drawnSpeed(3 * Math.PI).note, "drawn 1.5 times slower");
+});
+
+const axisOf = (connection, more = {}) => ({ connection, phases: 3, drive_kind: "averaged_inverter", ...more });
+
+// Catches: commands for a source, currents for a drive without a loop, fields in another unit, a duty of a star that is no half at
+// rest, a field winding without its field.
+test("a drive asks an axis for what it takes", () => {
+  assert.deepEqual(gatesOf(axisOf("star", { drive_kind: "source" })), []);
+  assert.deepEqual(gatesOf(axisOf("star", { shares_amplifier_with: "first" })), []);
+  assert.deepEqual(gatesOf(axisOf("star")), ["voltage", "duty"]);
+  assert.equal(gatesOf(axisOf("star", { drive_kind: "current_amplifier" }))[0], "current");
+  assert.deepEqual(wavesOf(axisOf("armature", { phases: 1 })), ["terminals"]);
+  const shown = (...what) => fieldsOf(...what).map(({ label, value }) => `${label}=${value}`);
+  assert.deepEqual(shown("terminals", "voltage", axisOf("armature", { phases: 1, field_winding: true })),
+    ["terminal a, V=0", "field winding, V=0", "ramp, s=1"]);
+  assert.deepEqual(shown("terminals", "duty", axisOf("star")), ["terminal a=0.5", "terminal b=0.5", "terminal c=0.5", "ramp, s=1"]);
+});
+
+// Catches: another transform than the power-invariant one, a beta that turns backwards, an amplitude that misses its target for
+// the boost or for a negative frequency, duties around another value than a half.
+test("the targets of a drive", () => {
+  const standing = (axis, gates, alpha, beta) => targetOf(1, axis, "standing", gates, { alpha, beta, ramp: 2 });
+  const [a, b, c] = standing(axisOf("star"), "voltage", 3, 4).constant;
+  assert.ok(Math.abs(a + b + c) < 1e-12 && Math.abs(a * a + b * b + c * c - 25) < 1e-12); // the power of a vector of length 5
+  assert.ok(Math.abs(b - c - 4 * Math.sqrt(2)) < 1e-12);
+  assert.deepEqual(standing(axisOf("two_phase"), "voltage", 3, 4).constant.slice(0, 2), [3, 4]);
+  assert.ok(Math.abs(standing(axisOf("star"), "duty", 0.3, 0).constant[0] - 0.5 - 0.3 * Math.sqrt(2 / 3)) < 1e-12);
+  const turning = targetOf(0, axisOf("star"), "rotating", "duty", { frequency: -20, amplitude: 0.4, boost: 0.1, ramp: 1 });
+  assert.deepEqual(turning.constant, [0.5, 0.5, 0.5, 0]);
+  assert.ok(Math.abs(turning.boost + turning.per_hz * 20 - 0.4) < 1e-12);
+  assert.equal(turning.frequency_hz, -20);
+});
