@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { page } from "./sources.mjs";
 
-const { envelope, pb, Track, recordedRows, recordedFile, csvOfRows, Pieces, inputsOf, channelsOf, fieldsOfShape, shapeOf, eventOf,
+const { pb, Track, recordedRows, recordedFile, csvOfRows, Pieces, inputsOf, channelsOf, fieldsOfShape, shapeOf, eventOf,
   identification, fetchExperiment, RequestKeys, fileNameOf, factsOf, arrivalOf } = page;
 
 const kBench = { name: "b", period_s: 1, axes: [{ name: "x", phases: 3 }, { name: "y", phases: 3 }],
