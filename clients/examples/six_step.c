@@ -50,10 +50,10 @@ static uint32_t comparator_capture(int phase) {
 typedef struct {
   int high, low, open, rises;
 } Step;
-static const Step steps[6] = {{1, 2, 0, 0}, {1, 0, 2, 1}, {2, 0, 1, 0},
-                              {2, 1, 0, 1}, {0, 1, 2, 0}, {0, 2, 1, 1}};
+static const Step kSteps[6] = {{1, 2, 0, 0}, {1, 0, 2, 1}, {2, 0, 1, 0},
+                               {2, 1, 0, 1}, {0, 1, 2, 0}, {0, 2, 1, 1}};
 
-static enum { ALIGN, RAMP, RUN } state;
+static enum { kAlign, kRamp, kRun } state;
 static int step = 2, crossed, good, lost, commutations;
 static uint32_t step_counts, commutated, commutate_at, last_crossing;
 static float duty = START_DUTY, integral, target_rpm, reference_rpm, speed_rpm;
@@ -69,8 +69,8 @@ static void commutate(uint32_t now) {
  * step the comparator does not count. */
 static int crossing(uint32_t now, uint32_t* at) {
   const uint32_t blanking = step_counts / 4, since = now - commutated;
-  const int open = steps[step].open;
-  if (crossed || since < blanking || comparator_level(open) != steps[step].rises) return 0;
+  const int open = kSteps[step].open;
+  if (crossed || since < blanking || comparator_level(open) != kSteps[step].rises) return 0;
   *at = comparator_capture(open);
   if (now - *at > since - blanking) *at = now; /* it has been there before */
   crossed = 1;
@@ -88,32 +88,32 @@ static void control_speed(void) {
 static void control_interrupt(void) {
   const uint32_t now = timer_read();
   uint32_t at;
-  if (state == ALIGN && now >= ALIGN_COUNTS) {
-    state = RAMP; /* the magnet stands along phase b: in the middle of step 2 */
+  if (state == kAlign && now >= ALIGN_COUNTS) {
+    state = kRamp; /* the magnet stands along phase b: in the middle of step 2 */
     step_counts = FIRST_STEP;
     commutated = now - FIRST_STEP / 2;
     commutate_at = now + FIRST_STEP / 2;
   }
-  if (state == RAMP) {
+  if (state == kRamp) {
     if (crossing(now, &at)) {
       /* in the middle half of a step: the rotor follows, and its emf shows */
       const uint32_t since = at - commutated;
       good = step_counts <= LAST_STEP && since < 3 * step_counts / 4 ? good + 1 : 0;
       last_crossing = at;
       if (good >= GOOD_STEPS) {
-        state = RUN;
+        state = kRun;
         integral = duty;
         speed_rpm = reference_rpm = RPM_COUNTS / (float)step_counts;
         commutate_at = at + step_counts / 2;
       }
     }
-    if (state == RAMP && (int32_t)(now - commutate_at) >= 0) {
+    if (state == kRamp && (int32_t)(now - commutate_at) >= 0) {
       if (!crossed) good = 0;
       commutate(now);
       if (step_counts > LAST_STEP) step_counts -= step_counts / 24;
       commutate_at += step_counts;
     }
-  } else if (state == RUN) {
+  } else if (state == kRun) {
     if (crossing(now, &at)) {
       step_counts = (3 * step_counts + (at - last_crossing)) / 4;
       last_crossing = at;
@@ -131,10 +131,10 @@ static void control_interrupt(void) {
     if (crossed && (int32_t)(now + TICK + TICK / 2 - commutate_at) >= 0) commutate(now + TICK);
   }
   /* With all legs on, the swing of the rotor about its axis drives a current, and dies. */
-  if (state == ALIGN) {
+  if (state == kAlign) {
     pwm_set(1, 0, duty);
   } else {
-    pwm_set(steps[step].high, 1u << steps[step].open, duty);
+    pwm_set(kSteps[step].high, 1u << kSteps[step].open, duty);
   }
 }
 

@@ -181,7 +181,7 @@ SaturatedInductionModel::State with_best_flux(const SaturatedInductionModel& mod
     Eigen::MatrixXd slopes(here.size(), 2);
     for (int k = 0; k < 2; ++k) {
       SaturatedInductionModel::State moved = x;
-      moved[static_cast<std::size_t>(2 + k)] += difference_wb;
+      moved[2 + static_cast<std::size_t>(k)] += difference_wb;
       slopes.col(k) = (errors(moved) - here) / difference_wb;
     }
     const Eigen::Vector2d change = slopes.householderQr().solve(-here);

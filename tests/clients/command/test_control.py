@@ -231,17 +231,18 @@ class Plot(ControlTest):
     def test_names_stand_above_the_curves(self):
         """Catches: a legend that lies over the curves, or that many signals push out of the picture."""
         file, _ = self.recording("own")
-        many = "i_a_a,i_b_a,true_i_a_a,true_i_b_a,i_c_a,i_f_a,true_i_c_a,true_i_f_a,meter_i_rms_a"
+        many = ("terminal_a_v,terminal_b_v,terminal_c_v,terminal_a_mean_v,terminal_b_mean_v,terminal_c_mean_v,bus_voltage_v,resolver_sin_v,"
+                "resolver_cos_v,tachometer_v")
         drawn = self.plot(file, "--signals", "speed_rad_s,load_speed_rad_s," + many).stdout
         names = [(float(x), float(y)) for x, y in re.findall(r"<text x='([\d.]+)' y='([\d.]+)' style", drawn)]
-        self.assertEqual(len(names), 2 + 9)
+        self.assertEqual(len(names), 2 + 10)
         panels = sorted({(float(top), float(bottom)) for top, bottom in re.findall(r"<line x1='[\d.]+' y1='([\d.]+)' x2='[\d.]+' y2='([\d.]+)'", drawn)
                          if top != bottom})
         self.assertEqual(len(panels), 2)
         for x, y in names:
             self.assertTrue(all(y < top or y > bottom for top, bottom in panels), (y, panels))
             self.assertLess(x + 80, 720)
-        self.assertEqual(len({y for _, y in names}), 1 + 2, "nine names take two rows")
+        self.assertEqual(len({y for _, y in names}), 1 + 2, "ten names take two rows")
 
     def test_an_impossible_picture_is_refused(self):
         """Catches: an empty picture with an exit code of 0."""

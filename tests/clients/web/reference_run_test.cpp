@@ -116,7 +116,7 @@ TEST(ReferenceRun, AnswersAsTheControllerDoes) {
     const auto row = std::ranges::find(rows, name, &reference::ReportRow::name);
     return row == rows.end() ? "missing" : row->value + " " + row->unit;
   };
-  EXPECT_EQ(number("duration"), "127.9 ms of the bench's time");
+  EXPECT_EQ(number("duration"), "127.88 ms of the bench's time");
   EXPECT_EQ(number("peak phase current"), "0.25 A");
   EXPECT_EQ(number("samples missed here"), "32 ");  // the last one at the end
   EXPECT_EQ(number("exchange p50"), "missing");

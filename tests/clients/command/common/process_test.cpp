@@ -33,7 +33,7 @@ TEST(Process, GivesLinesAndTheExitCode) {
 // Catches: a line of another kind, or no JSON at all, that passes for the server's.
 TEST(ServerReady, ReadsOnlyTheServersOwnLines) {
   const std::string ready =
-      R"({"event":"ready","tcp":"127.0.0.1:7300","unix":"","mode":"lockstep","bench":"servo"})";
+      R"({"event":"ready","tcp":"127.0.0.1:7300","can":[],"modbus":"","unix":"","mode":"lockstep","bench":"servo"})";
   ASSERT_TRUE(parse_ready(ready).has_value());
   EXPECT_EQ(parse_ready(ready)->tcp, "127.0.0.1:7300");
   for (const char* line : {"", "ready", "[]", "{}", R"({"event":"ready"})", R"({"event":5,"tcp":""})",
