@@ -46,6 +46,7 @@ class Week {
     const Tick hour = 3600 * per_second;
     const Tick check = std::min(hour, end / 3);  // a short run is checked as well
     std::size_t memory_before = 0;
+    bool memory_is_due = false;
     while (bench_.tick() < end && problem_.empty()) {
       const Tick tick = bench_.tick();
       if (tick >= next_event_) something_happens(tick);
@@ -53,12 +54,16 @@ class Week {
       bench_.step();
       ++steps_;
       account_.see(bench_.sample(0), late_);
-      if (bench_.tick() % check != 0) continue;
-      if (!pass_through_bytes()) problem_ = "a saved state can be restored";
+      if (bench_.tick() % check == 0) {
+        if (!pass_through_bytes()) problem_ = "a saved state can be restored";
+        tell(static_cast<double>(bench_.tick()) / static_cast<double>(hour), ::mallinfo2().uordblks);
+        memory_is_due = true;
+      }
+      if (!memory_is_due || !commands_act()) continue;
+      memory_is_due = false;
       const std::size_t memory = ::mallinfo2().uordblks;
       if (memory_before != 0 && memory > memory_before + 65536) problem_ = "memory stays flat";
       if (memory_before == 0) memory_before = memory;
-      tell(static_cast<double>(bench_.tick()) / static_cast<double>(hour), memory);
     }
     if (problem_.empty() && bench_.tick() != end) problem_ = "every step is counted";
     if (problem_.empty() && steps_ != static_cast<std::uint64_t>(end))
@@ -80,6 +85,11 @@ class Week {
   }
 
  private:
+  /// Only then the account is small: it keeps the commands since the one in force.
+  bool commands_act() const {
+    return bench_.sample(0).command_tick + 2 >= static_cast<std::int64_t>(bench_.tick());
+  }
+
   AxisAccount make_account() {
     return {config_.setup, 0, true, [this](const std::string& promise) {
               if (problem_.empty()) problem_ = promise;
