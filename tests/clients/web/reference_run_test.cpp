@@ -163,7 +163,8 @@ TEST(ReferenceRun, EndsWhereItCannotGoOn) {
     return run.failure();
   };
   EXPECT_EQ(failure_at(10, [](v1::Sample& s) { s.set_faults(2); }), "the bench latched overcurrent");
-  EXPECT_EQ(failure_at(10, [](v1::Sample& s) { s.set_i_b_a(std::nan("")); }), "the sample of tick 10 has no currents");
+  EXPECT_EQ(failure_at(10, [](v1::Sample& s) { s.set_i_b_a(std::nan("")); }),
+            "the sample of tick 10 has no currents");
   EXPECT_EQ(failure_at(3, [](v1::Sample&) {}), "the bench has gone back in time");
   ReferenceRun latched(bench, 0, kServo, 1);
   v1::Sample sample = sample_at(0);
