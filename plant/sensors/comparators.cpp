@@ -104,7 +104,9 @@ class Comparators::Input {
   }
   /// Where the slope itself turns; before the interval if it does not.
   double bend() const noexcept {
-    const double ratio = -2.0 * curve_ / (rate_per_s_ * rate_per_s_ * transient_v_);
+    const double bending = rate_per_s_ * rate_per_s_ * transient_v_;
+    if (bending == 0.0) return -1.0;
+    const double ratio = -2.0 * curve_ / bending;
     return ratio > 0.0 && std::isfinite(ratio) ? -logarithm(ratio) / rate_per_s_ : -1.0;
   }
   /// Between two instants the slope rises or falls all the time: it is zero at most once.
