@@ -134,7 +134,7 @@ struct Grown {
 }  // namespace
 template <>
 inline constexpr auto kLaterWords<Grown> =
-    std::to_array<WordRange>({{.first = 5, .count = 2}, {.first = 7, .count = 1}});
+    std::array{WordRange{.first = 5, .count = 2}, WordRange{.first = 7, .count = 1}};
 namespace {
 
 // Recordings hold hashes of earlier builds. Catches: words that a later build has added and that change the
