@@ -2,6 +2,7 @@
 """Foxglove's WebSocket of `drivebench web`: its own client reads it (foxglove/client.mjs), strangers do not break it."""
 import json
 import pathlib
+import select
 import shutil
 import struct
 import subprocess
@@ -78,6 +79,12 @@ class Peer(FoxgloveTest):
         with server.client() as controller:
             controller.lease()
             tick = 0
+            # Nothing answers a subscription: slow steps until it is in force, so that the motor has not run up by then.
+            while not select.select([peer.stdout], [], [], 0.1)[0]:
+                self.assertLess(tick, PATIENCE_S * 10, "the client does not get its first sample")
+                controller.step(tick)
+                tick += 1
+            self.assertEqual(peer.stdout.readline(), "reads\n")
             while peer.poll() is None:
                 self.assertLess(tick, 200_000, "the client does not get its samples")
                 controller.step(tick)

@@ -1,5 +1,5 @@
-// Foxglove's own client reads a bench: node client.mjs URL SUBPROTOCOL SAMPLES. Prints `subscribed`, then what it was
-// told as one line of JSON.
+// Foxglove's own client reads a bench: node client.mjs URL SUBPROTOCOL SAMPLES. Prints `subscribed`, `reads` with
+// the first sample, then what it was told as one line of JSON.
 import { createRequire } from "node:module";
 import { WebSocket } from "ws";
 
@@ -44,6 +44,7 @@ client.on("message", ({ subscriptionId, timestamp, data }) => {
   if (isOver) return;
   const sample = Sample.decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
   const { tick, speed_rad_s } = Sample.toObject(sample, { longs: Number, defaults: true });
+  if (told.samples.length === 0) console.log("reads");
   told.samples.push({ time: Number(timestamp), tick, speed: speed_rad_s });
   if (told.samples.length >= Number(wanted) && told.times.length > 0) end();
 });
