@@ -9,7 +9,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_ALL server tools data libraries development python documentation)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 2)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY ">=")
@@ -19,6 +19,7 @@ set(library libdrivebench${DRIVEBENCH_ABI})
 set(this_build "(= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
 set(this_library "${library} ${this_build}")
 set(these_benches "drivebench-data ${this_build}")
+set(all_in_one "drivebench (<< 0.1.0-2)") # drivebench had the server and the benches, too, before 0.1.0-2
 set(control ${CMAKE_CURRENT_LIST_DIR})
 
 set(CPACK_COMPONENT_SERVER_DESCRIPTION "test bench for electric drives, the server
@@ -29,6 +30,8 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${control}/server/postinst ${control}/server/postrm ${control}/server/conffiles)
 set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "adduser, ${these_benches}")
 set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS logrotate)
+set(CPACK_DEBIAN_SERVER_PACKAGE_BREAKS "${all_in_one}")
+set(CPACK_DEBIAN_SERVER_PACKAGE_REPLACES "${all_in_one}")
 
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION "test bench in software for the controllers of electric drives
 The program drivebench: reference controllers, identification, regression
@@ -47,6 +50,8 @@ programs and the library know by name.")
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME drivebench-data)
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_DATA_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_DATA_PACKAGE_BREAKS "${all_in_one}")
+set(CPACK_DEBIAN_DATA_PACKAGE_REPLACES "${all_in_one}")
 
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION "test bench for electric drives, the libraries
 The bench behind one C ABI: in the process of its controller, or over TCP, CAN

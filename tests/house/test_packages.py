@@ -15,6 +15,7 @@ from wire_client import PATIENCE_S, REPOSITORY, SERVER  # noqa: E402
 BUILD = SERVER.parent.parent
 SKIPPED = 77
 NAMES = ("drivebench-doc", "python3-drivebench", "drivebench", "drivebench-server", "drivebench-data", "libdrivebench-dev", "libdrivebench1")
+THIS, NEXT = "2", "3"  # releases of Debian packages: this build's, and a later one of the same sources
 SPINS = "147.368 rad/s at 0.842 A"
 # What a package manager and a root without services change by themselves.
 OWN_BUSINESS = re.compile(r"\./(var/(lib/(apt|dpkg|systemd|pam)|log|cache|mail|spool)|proc|sys|dev|run|tmp|root|packages|etc/(ld\.so|passwd|"
@@ -44,7 +45,7 @@ class Packages(unittest.TestCase):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="drivebench-packages-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
         cls.root = cls.folder / "debian"
-        for release in ("0", "1"):  # the build before, and this one
+        for release in (THIS, NEXT):
             build, library = f"(= 0.1.0-{release})", f"libdrivebench1 (= 0.1.0-{release})"
             needs = {"SERVER": f"adduser, drivebench-data {build}", "TOOLS": f"drivebench-data {build}, {library}",
                      "DEVELOPMENT": library, "PYTHON": f"python3 (>= 3.11), {library}"}
@@ -53,7 +54,7 @@ class Packages(unittest.TestCase):
                   for word in ("-D", f"CPACK_DEBIAN_{component}_PACKAGE_DEPENDS={need}")], cwd=BUILD)
         run("debootstrap", "--variant=minbase", "bookworm", cls.root, mirror(), seconds=600)
         shutil.copy("/etc/resolv.conf", cls.root / "etc/resolv.conf")
-        for release in ("0", "1"):
+        for release in (THIS, NEXT):
             shutil.copytree(cls.folder / release, cls.root / "packages" / release, ignore=shutil.ignore_patterns("_CPack*"))
         cls.inside("apt-get", "update")
 
@@ -78,7 +79,7 @@ class Packages(unittest.TestCase):
 
     # Catches: what Debian's own checker calls an error or a warning: no change log, man page or trigger, a wrong place.
     def test_lintian_finds_nothing(self):
-        packages = sorted((self.folder / "1").glob("*.deb"))
+        packages = sorted((self.folder / THIS).glob("*.deb"))
         self.assertEqual(run("lintian", "--no-cfg", "--allow-root", "--fail-on", "error,warning", *packages), "")
 
     # Catches: an instruction that no builder takes, a package that the image lacks, a container that runs as root or without its bench.
@@ -89,7 +90,7 @@ class Packages(unittest.TestCase):
         run(*buildah, "add", base, self.root, "/")
         run(*buildah, "commit", "--rm", base, "localhost/bare")
         run(*buildah, "bud", "--isolation", "chroot", "--build-arg", "BASE=localhost/bare", "--file", REPOSITORY / "configs/packages/Containerfile",
-            "--tag", "localhost/drivebench", self.folder / "1", seconds=600)
+            "--tag", "localhost/drivebench", self.folder / THIS, seconds=600)
         image = json.loads(run(*buildah, "inspect", "--type", "image", "localhost/drivebench"))["OCIv1"]["config"]
         self.assertEqual((image["User"], image["WorkingDir"]), ("drivebench", "/var/lib/drivebench"))
         container = run(*buildah, "from", "localhost/drivebench").strip()
@@ -100,13 +101,29 @@ class Packages(unittest.TestCase):
         run(*inside, "drivebench-server", "--replay", "run.mcap")
         run(*inside, "sh", "-c", 'test "$(id -un)" = drivebench')
 
+    def install_all_in_one(self):
+        """drivebench as it was before the server and the benches had packages of their own."""
+        root = self.root / "packages" / "before"
+        for name in ("drivebench-server", "drivebench-data", "drivebench"):
+            [package] = (self.folder / THIS).glob(f"{name}_*.deb")
+            run("dpkg-deb", "--extract", package, root)
+            run("dpkg-deb", "--control", package, self.folder / name)
+            for place in ("share/doc", "share/lintian/overrides") if name != "drivebench" else ():
+                run("rm", "-r", root / "usr" / place / name)
+        shutil.copytree(self.folder / "drivebench-server", root / "DEBIAN")  # its scripts and files of configuration
+        control = (self.folder / "drivebench/control").read_text(encoding="utf-8").replace(f"Version: 0.1.0-{THIS}", "Version: 0.1.0-1")
+        needs = re.sub(r" (drivebench-data|libdrivebench1) \([^)]*\),", "", control).replace("Depends:", "Depends: adduser,")
+        (root / "DEBIAN/control").write_text(needs, encoding="utf-8")
+        run("dpkg-deb", "--build", root, root.with_suffix(".deb"))
+        self.inside("apt-get", "install", "-y", "--no-install-recommends", "/packages/before.deb")
+
     def check_that_each_side_works_alone(self):
         """A rack has the server without the tools, a desk the tools without the server."""
-        self.install("0", "drivebench-server", "drivebench-data")
+        self.install(THIS, "drivebench-server", "drivebench-data")
         self.assertIn("/etc/drivebench/bench.toml: ", self.inside("drivebench-server", "--check-config", "/etc/drivebench/bench.toml"))
         self.inside("drivebench-server", "/usr/share/drivebench/benches/dc-a-voltage.toml", "--mode", "free", "--port", "0", "--duration", "0.1")
         self.inside("dpkg", "--purge", "drivebench-server")
-        self.install("0", "drivebench", "drivebench-data", "libdrivebench1")
+        self.install(THIS, "drivebench", "drivebench-data", "libdrivebench1")
         self.assertIn("counts", self.inside("drivebench", "control", "--link", "inproc:servo"))
         self.assertIn("package drivebench-server", self.inside("drivebench", "serve", code=(2,)))
 
@@ -116,7 +133,11 @@ class Packages(unittest.TestCase):
         self.inside("apt-get", "install", "-y", "--no-install-recommends", "adduser", "logrotate")
         before = self.files()
         self.check_that_each_side_works_alone()
-        self.install("0")
+        self.inside("dpkg", "--purge", "drivebench", "drivebench-data", "libdrivebench1")
+        self.install_all_in_one()
+        self.assertEqual(self.inside("dpkg-query", "-S", "/etc/drivebench/bench.toml").split(":")[0], "drivebench")
+        self.install(THIS)
+        self.assertEqual(self.inside("dpkg-query", "-S", "/etc/drivebench/bench.toml").split(":")[0], "drivebench-server")
         needed = self.inside("apt-mark", "showauto").split()
 
         # A busy machine is not real-time valid, which is no fault of the packages: code 1.
@@ -155,8 +176,8 @@ class Packages(unittest.TestCase):
         work = self.root / "var/lib/drivebench"
         work.mkdir(parents=True, exist_ok=True)
         (work / "run.mcap").write_bytes(b"a day of work")
-        self.install("1")
-        self.assertEqual(self.inside("dpkg-query", "-W", "-f", "${Version}", "drivebench"), "0.1.0-1")
+        self.install(NEXT)
+        self.assertEqual(self.inside("dpkg-query", "-W", "-f", "${Version}", "drivebench"), f"0.1.0-{NEXT}")
         self.assertIn("# ours", bench.read_text(encoding="utf-8"))
         self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
         self.assertIn(SPINS, self.inside("/root/blink"))
