@@ -230,7 +230,10 @@ int run_watch(const WatchOptions& options) {
       view.draw_news();
       const bool is_over = std::chrono::steady_clock::now() - heard >= patience;
       if (is_over && !is_silent && !interrupted()) view.note(silence_text(bench.mode()));
-      is_silent = is_silent || is_over;
+      if (is_over) {
+        is_silent = true;
+        patience = silence;
+      }
       continue;
     }
     patience = silence;

@@ -206,7 +206,7 @@ class Observing(CommandTest):
         return out.splitlines()
 
     def test_watch_shows_the_present_values_of_a_lockstep_without_a_controller(self):
-        """Catches: a viewer that waits for ever beside a bench whose time stands still, without a word."""
+        """Catches: a viewer that waits for ever beside a bench whose time stands still, without a word, or keeps a core busy with it."""
         present, = self.drivebench("watch", "--json", "--count", "1", link=self.link).stdout.splitlines()
         present = json.loads(present)
         self.assertEqual((present["bench"], present["tick"], present["time_s"], present["state"]), ("servo", 0, 0.0, 0))
@@ -215,6 +215,7 @@ class Observing(CommandTest):
         self.assertEqual(watching.stdout.readline().split()[:3], ["0", "0.000000", "idle"])
         watching.stderr.readline()
         self.assertSays(watching.stderr.readline(), self.STILL, "drivebench control", "the values go on then")
+        until(lambda: pathlib.Path(f"/proc/{watching.pid}/stat").read_text(encoding="utf-8").split()[2] == "S", "watch sleeps")
         self.drivebench("control", link=self.link)
         self.assertEqual(watching.stdout.readline().split()[2], "run")
 
