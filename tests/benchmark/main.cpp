@@ -3,9 +3,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "tests/benchmark/harness/compare.hpp"
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/measurements.hpp"
 
 namespace drivebench::speed {
@@ -14,7 +17,7 @@ namespace {
 struct Measurement {
   const char* name;
   const char* what;
-  std::vector<Row> (*measure)(const Plan&);
+  std::vector<Row> (*measure)();
 };
 
 constexpr std::array kMeasurements = std::to_array<Measurement>({
@@ -46,6 +49,34 @@ bool is_wanted(const Measurement& measurement, const std::vector<std::string>& o
   return only.empty() || std::find(only.begin(), only.end(), measurement.name) != only.end();
 }
 
+nlohmann::json read_json(const std::string& path) {
+  std::ifstream file(path);
+  nlohmann::json json = nlohmann::json::parse(file, nullptr, false);
+  if (json.is_discarded()) throw std::runtime_error(path + ": cannot be read, or is not JSON");
+  return json;
+}
+
+/// Whether something got worse.
+bool compare_files(const std::vector<std::string>& files) {
+  const std::vector<Compared> rows = compare(read_json(files[0]), read_json(files[1]));
+  print_comparison(rows);
+  return std::ranges::any_of(rows, [](const Compared& row) { return row.verdict == Change::kSlower; });
+}
+
+std::vector<Row> measure(const std::vector<std::string>& only, int times) {
+  std::vector<Row> rows;
+  for (const Measurement& m : kMeasurements) {
+    if (!is_wanted(m, only)) continue;
+    fmt::print(stderr, "measuring {}: {}\n", m.name, m.what);
+    std::vector<std::vector<Row>> runs;
+    for (int n = 0; n < times; ++n)
+      runs.push_back(m.measure());
+    for (Row& row : median_of(std::move(runs)))
+      rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
 int run(int argc, char** argv) {
   std::vector<std::string> names;
   std::string list;
@@ -57,17 +88,27 @@ int run(int argc, char** argv) {
   bool json = false;
   bool markdown = false;
   bool strict = false;
-  Plan plan;
+  int times = 1;
+  std::vector<std::string> compared;
   CLI::App app("drivebench-benchmark: measures speed and size on this machine, in about ten minutes.");
   app.add_option("--only", only, "these measurements only, separated by commas")
       ->delimiter(',')
       ->check(CLI::IsMember(names));
-  app.add_option("--soak", plan.soak_minutes, "minutes of the memory measurement")
+  app.add_option("--soak", plan().soak_minutes, "minutes of the memory measurement")
       ->check(CLI::Range(0.1, 1440.0))
       ->capture_default_str();
   app.add_flag("--json", json, "print one JSON object");
   app.add_flag("--markdown", markdown, "print the table of tests/benchmark/RESULTS.md")->excludes("--json");
-  app.add_flag("--strict", strict, "exit 1 if a figure is over its limit");
+  app.add_option("--times", times, "each measurement so often: its median, and its range in the JSON")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_flag("--brief", plan().brief,
+               "run everything once, as briefly as it goes; the figures say nothing");
+  app.add_option("--compare", compared,
+                 "two files of --json, before and after: what got worse; measures nothing")
+      ->expected(2)
+      ->type_name("FILE FILE");
+  app.add_flag("--strict", strict, "exit 1 if a figure is over its limit, or got worse");
   app.footer("Measurements:\n" + list);
   try {
     app.parse(argc, argv);
@@ -75,13 +116,8 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
 
-  std::vector<Row> rows;
-  for (const Measurement& m : kMeasurements) {
-    if (!is_wanted(m, only)) continue;
-    fmt::print(stderr, "measuring {}: {}\n", m.name, m.what);
-    for (Row& row : m.measure(plan))
-      rows.push_back(std::move(row));
-  }
+  if (!compared.empty()) return compare_files(compared) && strict ? 1 : 0;
+  const std::vector<Row> rows = measure(only, times);
   if (json) {
     fmt::print("{}\n", as_json(machine_description(), rows).dump(2));
   } else if (markdown) {

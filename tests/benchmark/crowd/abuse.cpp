@@ -15,6 +15,7 @@
 #include "tests/benchmark/crowd/abusers.hpp"
 #include "tests/benchmark/exchange/plain_modbus.hpp"
 #include "tests/benchmark/harness/canary.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
@@ -27,6 +28,7 @@ using namespace std::chrono_literals;
 constexpr double kMaxP99_ms = 5.0;
 constexpr double kMaxWorst_ms = 20.0;
 constexpr std::int64_t kDuration_ns = 5'000'000'000;
+constexpr std::int64_t kBrief_ns = 200'000'000;
 constexpr std::int64_t kScan_ns = 30'000'000'000;  // at most: nmap waits 5 s before its first probe
 constexpr std::int64_t kReadEvery_ns = 5'000'000;
 constexpr const char* kNmap = "/usr/bin/nmap";
@@ -79,7 +81,7 @@ Seen read_beside(Abuse abuse, std::uint16_t port) {
   std::vector<double> ms;
   std::array<std::uint16_t, 13> words{};
   Seen seen;
-  const std::int64_t end = now_ns() + (abuse == Abuse::kScan ? kScan_ns : kDuration_ns);
+  const std::int64_t end = now_ns() + planned(abuse == Abuse::kScan ? kScan_ns : kDuration_ns, kBrief_ns);
   for (std::int64_t due = now_ns(); due < end && !seen.gave_up && !abuser.has_ended();) {
     const std::int64_t begin = now_ns();
     seen.gave_up =
@@ -100,27 +102,28 @@ struct RealtimeRun {
   Seen seen;
   double ticks = 0.0;
   double late_ticks = 0.0;
-  double gone = 0.0;
+  Disturbance disturbance;
 };
 
 RealtimeRun beside_bench(Abuse abuse, const std::filesystem::path& bench) {
   // Before and after, since the bench itself takes its time.
-  GapCanary canary;
+  Canary canary;
   const CpuPair cpu = cpu_pair();
   canary.look(std::array{cpu.near, cpu.far});
   Server server({bench.string(), "--mode", "realtime"});
-  RealtimeRun run{.seen = read_beside(abuse, server.modbus_port())};
+  RealtimeRun run;
+  run.seen = read_beside(abuse, server.modbus_port());
   const nlohmann::json verdict = server.stop();
   run.ticks = verdict.at("ticks").get<double>();
   run.late_ticks = verdict.at("late_ticks").get<double>();
   canary.look(std::array{cpu.near, cpu.far});
-  run.gone = canary.gone();
+  run.disturbance = canary.seen();
   return run;
 }
 
 }  // namespace
 
-std::vector<Row> measure_abuse(const Plan&) {
+std::vector<Row> measure_abuse() {
   const ScratchFolder folder;
   BenchConfig config = load_config(command::find_config("servo-modbus"));
   config.modbus.port = 0;
@@ -144,20 +147,21 @@ std::vector<Row> measure_abuse(const Plan&) {
                     .unit = "ms",
                     .measured = run.seen.p99_ms,
                     .limit = Limit{Limit::Kind::kAtMost, kMaxP99_ms},
-                    .gone = run.gone,
+                    .disturbance = run.disturbance,
                     .note = fmt::format("of {} reads; quiet {:.2f} ms", run.seen.reads, quiet.seen.p99_ms)});
     rows.push_back(
         {.name = "worst" + beside,
          .unit = "ms",
          .measured = run.seen.worst_ms,
          .limit = Limit{Limit::Kind::kAtMost, kMaxWorst_ms},
-         .gone = run.gone,
+         .disturbance = run.disturbance,
          .note = fmt::format("quiet {:.2f} ms; plain libmodbus: {}", quiet.seen.worst_ms, plain.text())});
     if (run.seen.gave_up)
       throw std::runtime_error("a polite client got no answer beside " + std::string(kind.name));
     late.measured += run.late_ticks;
     *late.floor += quiet_share * run.ticks;
-    late.gone = std::max(late.gone, run.gone);
+    late.disturbance.gone = std::max(late.disturbance.gone, run.disturbance.gone);
+    late.disturbance.slowed = std::max(late.disturbance.slowed, run.disturbance.slowed);
     late.note += fmt::format("; {}: {:.0f} of {:.0f}", kind.name, run.late_ticks, run.ticks);
   }
   late.note += fmt::format("; quiet: {:.0f} of {:.0f}", quiet.late_ticks, quiet.ticks);

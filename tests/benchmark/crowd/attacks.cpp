@@ -52,7 +52,7 @@ constexpr std::array kAttacks = std::to_array<Attack>({
 
 }  // namespace
 
-std::vector<Row> measure_attacks(const Plan&) {
+std::vector<Row> measure_attacks() {
   const ScratchFolder folder;
   BenchConfig config = bench_config("servo-realtime");
   const std::string bench = guarded_bench(folder, "bench", config).string();
@@ -61,7 +61,7 @@ std::vector<Row> measure_attacks(const Plan&) {
   config.realtime.priority = 1;
   const std::string other = guarded_bench(folder, "other", config).string();
 
-  GapCanary canary;
+  Canary canary;
   const CpuPair cpu = cpu_pair();
   canary.look(std::array{cpu.near, cpu.far});
   Server server({bench});
@@ -80,12 +80,12 @@ std::vector<Row> measure_attacks(const Plan&) {
 
   std::vector<Row> rows;
   for (std::size_t n = 0; n < kAttacks.size(); ++n) {
-    rows.push_back(late_ticks_row(kAttacks[n].name, windows[n], canary.gone()));
+    rows.push_back(late_ticks_row(kAttacks[n].name, windows[n], canary.seen()));
     rows.push_back({.name = std::string("p99 of a healthy client beside ") + kAttacks[n].name,
                     .unit = "us",
                     .measured = median(windows[n].beside, &Window::p99_us),
                     .floor = median(windows[n].alone, &Window::p99_us),
-                    .gone = canary.gone(),
+                    .disturbance = canary.seen(),
                     .note = "floor: alone, in windows in turn"});
   }
   rows.push_back({.name = "resident memory of the server after each of them",

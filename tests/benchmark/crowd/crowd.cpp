@@ -51,15 +51,16 @@ Idlers deaf(const std::string& address) {
   return all;
 }
 
-void add_rows(std::vector<Row>& rows, const std::string& beside, const Windows& windows, double gone) {
+void add_rows(std::vector<Row>& rows, const std::string& beside, const Windows& windows,
+              const Disturbance& disturbance) {
   rows.push_back({.name = "p99 of a healthy client beside " + beside,
                   .unit = "us",
                   .measured = median(windows.beside, &Window::p99_us),
                   .floor = median(windows.alone, &Window::p99_us),
                   .limit = Limit{Limit::Kind::kRatioAtMost, kMaxP99Ratio},
-                  .gone = gone,
+                  .disturbance = disturbance,
                   .note = "floor: alone, in windows in turn"});
-  rows.push_back(late_ticks_row(beside, windows, gone));
+  rows.push_back(late_ticks_row(beside, windows, disturbance));
 }
 
 /// Both ends of all connections belong to this process or its child.
@@ -101,7 +102,7 @@ Cut cut_deaf(link::Link& client, const std::string& address, pid_t server) {
 
 }  // namespace
 
-std::vector<Row> measure_crowd(const Plan&) {
+std::vector<Row> measure_crowd() {
   allow_descriptors(4096);
   const ScratchFolder folder;
   BenchConfig config = bench_config("servo-realtime");
@@ -115,7 +116,7 @@ std::vector<Row> measure_crowd(const Plan&) {
   config.realtime.priority = 1;
   const std::string other = written(folder / "other.toml", to_toml(config)).string();
 
-  GapCanary canary;
+  Canary canary;
   const CpuPair cpu = cpu_pair();
   canary.look(std::array{cpu.near, cpu.far});
   Server server({bench.string()});
@@ -142,13 +143,13 @@ std::vector<Row> measure_crowd(const Plan&) {
   canary.look(std::array{cpu.near, cpu.far});
 
   std::vector<Row> rows;
-  add_rows(rows, "1,000 idle ones and 32 viewers at 1 kHz", crowded, canary.gone());
-  add_rows(rows, "50 that never read", unheard, canary.gone());
+  add_rows(rows, "1,000 idle ones and 32 viewers at 1 kHz", crowded, canary.seen());
+  add_rows(rows, "50 that never read", unheard, canary.seen());
   rows.push_back({.name = "until 50 that never read are cut off",
                   .unit = "s",
                   .measured = cut.elapsed_s,
                   .limit = Limit{Limit::Kind::kAtMost, kMaxCut_s},
-                  .gone = canary.gone()});
+                  .disturbance = canary.seen()});
   rows.push_back({.name = "memory that they cost",
                   .unit = "MiB",
                   .measured = cut.growth_mib,

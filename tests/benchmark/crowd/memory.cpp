@@ -9,6 +9,7 @@
 #include "clients/link/tcp/tcp_link.hpp"
 #include "tests/benchmark/crowd/viewers.hpp"
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/measurements.hpp"
 
@@ -21,7 +22,7 @@ constexpr double kMaxMiB = 64.0;
 constexpr double kMaxGrowthMiB = 1.0;  // "flat"
 constexpr int kViewers = 32;
 constexpr std::uint32_t kDecimation = 8;  // 1 kHz
-constexpr auto kWarmUp = 5s;
+constexpr auto kWarmUp = 5000ms;
 
 /// A controller at the pace of the bench, on a thread of its own.
 class Controller {
@@ -90,7 +91,7 @@ double peak_until(std::chrono::steady_clock::time_point end, pid_t server, const
 
 }  // namespace
 
-std::vector<Row> measure_memory(const Plan& plan) {
+std::vector<Row> measure_memory() {
   const ScratchFolder folder;
   const std::string path = folder / "bench.socket";
   Server server({command::find_config("servo-realtime").string(), "--unix", path});
@@ -99,8 +100,8 @@ std::vector<Row> measure_memory(const Plan& plan) {
   auto viewers = std::make_unique<Viewers>(server.address(), kViewers, kDecimation);
 
   const auto begin = std::chrono::steady_clock::now();
-  const auto soak = std::chrono::duration<double, std::ratio<60>>(plan.soak_minutes);
-  peak_until(begin + kWarmUp, pid, *controller, *viewers);
+  const auto soak = std::chrono::duration<double, std::ratio<60>>(planned(plan().soak_minutes, 0.01));
+  peak_until(begin + planned(kWarmUp, 100ms), pid, *controller, *viewers);
   const double early_mib = resident_mib(pid);
   const double peak_mib = peak_until(begin + std::chrono::duration_cast<std::chrono::nanoseconds>(soak), pid,
                                      *controller, *viewers);

@@ -11,6 +11,7 @@
 #include "server/pacing/pacer.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
@@ -22,7 +23,6 @@ constexpr double kMaxP99Ratio = 1.3;
 constexpr std::int64_t kPeriodNs = 125'000;
 constexpr std::size_t kTicksPerBlock = 1000;  // short, so that all loops see the same machine
 constexpr std::size_t kRounds = 20;
-constexpr int kServerSeconds = 5;
 
 /// The floor: the plain loop, with the kernel's timer and nothing else.
 class BarePacer final : public Pacer {
@@ -60,20 +60,28 @@ struct Round {
   Lateness bare, sleep, sleep_spin;
 };
 
-/// On a thread of its own, prepared like the server's tick; missing rights go to notes.
+/// Runs this on a thread of its own, prepared like the server's tick; returns what rights are missing.
+template <class Work>
+std::vector<std::string> in_realtime(Work work) {
+  std::vector<std::string> missing;
+  std::thread([&] {
+    missing = enter_realtime({.cpu = cpu_pair().far});
+    work();
+  }).join();
+  ::munlockall();  // enter_realtime locked the memory of the whole program
+  return missing;
+}
+
 Rounds<Round> alternate(std::vector<std::string>& notes) {
   Rounds<Round> rounds;
-  std::thread([&] {
-    const std::array cpu{cpu_pair().far};
-    notes = enter_realtime({.cpu = cpu[0]});
-    rounds = undisturbed_rounds(cpu, kRounds, []() -> Round {
+  notes = in_realtime([&rounds] {
+    rounds = undisturbed_rounds(std::array{cpu_pair().far}, kRounds, []() -> Round {
       BarePacer bare;
       return {.bare = lateness(bare),
               .sleep = lateness(*make_realtime_pacer(PacerKind::kSleep, kPeriodNs)),
               .sleep_spin = lateness(*make_realtime_pacer(PacerKind::kSleepSpin, kPeriodNs))};
     });
-  }).join();
-  ::munlockall();  // enter_realtime locked the memory of the whole program
+  });
   return rounds;
 }
 
@@ -89,38 +97,53 @@ Row row(const char* name, const Rounds<Round>& rounds, Lateness Round::*pacer) {
           .measured = p99(pacer),
           .floor = p99(&Round::bare),
           .limit = Limit{Limit::Kind::kRatioAtMost, kMaxP99Ratio},
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = fmt::format("p50 {:.2f} us; floor: clock_nanosleep alone, p50 {:.2f} us", p50(pacer),
                               p50(&Round::bare))};
 }
 
-Row late_ticks_of_server(const Rounds<Round>& rounds) {
-  double bare_share = 0.0;
-  for (const Round& round : rounds.results)
-    bare_share += round.bare.late_share / static_cast<double>(rounds.results.size());
+/// The plain loop and the server, a second of each in turn, so that both meet the same machine: a stall of
+/// the host counts for either.
+Row late_ticks_of_server() {
+  constexpr std::size_t kBlocks = 8;  // of 1000 ticks: a second
+  const int seconds = planned(10, 1);
+  const std::array cpus{cpu_pair().near, cpu_pair().far};
   const std::string bench = command::find_config("servo-realtime").string();
-  Server server({bench, "--duration", std::to_string(kServerSeconds)});
-  const nlohmann::json verdict = server.wait(std::chrono::seconds(10 * kServerSeconds));
-  return {.name = "late ticks of the server",
-          .measured = verdict.at("late_ticks").get<double>(),
-          .floor = bare_share * verdict.at("ticks").get<double>(),
-          .gone = rounds.gone,
-          .note = fmt::format("of {} in {} s, not pinned; floor: clock_nanosleep alone; lateness p50 {:.1f} "
-                              "us, p99 {:.1f} us, worst {:.1f} us",
-                              verdict.at("ticks").get<std::int64_t>(), kServerSeconds,
-                              verdict.at("lateness_p50_us").get<double>(),
-                              verdict.at("lateness_p99_us").get<double>(),
-                              verdict.at("worst_lateness_us").get<double>())};
+  Row row{.name = "late ticks of the server", .floor = 0.0};
+  std::int64_t ticks = 0;
+  std::vector<double> p99_us;
+  double worst_us = 0.0;
+  Canary canary;
+  canary.look(cpus);
+  for (int n = 0; n < seconds; ++n) {
+    in_realtime([&row] {
+      BarePacer bare;
+      for (std::size_t block = 0; block < kBlocks; ++block)
+        *row.floor += lateness(bare).late_share * static_cast<double>(kTicksPerBlock);
+    });
+    const nlohmann::json verdict = Server({bench, "--duration", "1"}).wait(std::chrono::seconds(30));
+    row.measured += verdict.at("late_ticks").get<double>();
+    ticks += verdict.at("ticks").get<std::int64_t>();
+    p99_us.push_back(verdict.at("lateness_p99_us").get<double>());
+    worst_us = std::max(worst_us, verdict.at("worst_lateness_us").get<double>());
+  }
+  canary.look(cpus);
+  row.disturbance = canary.seen();
+  row.note = fmt::format(
+      "of {}, not pinned; floor: clock_nanosleep alone, a second of each in turn; lateness p99 {:.1f} us in "
+      "the "
+      "median second, worst {:.1f} us",
+      ticks, percentile(p99_us, 0.5), worst_us);
+  return row;
 }
 
 }  // namespace
 
-std::vector<Row> measure_realtime(const Plan&) {
+std::vector<Row> measure_realtime() {
   std::vector<std::string> notes;
   const Rounds<Round> rounds = alternate(notes);
   std::vector<Row> rows{row("lateness p99, sleep", rounds, &Round::sleep),
-                        row("lateness p99, sleep+spin", rounds, &Round::sleep_spin),
-                        late_ticks_of_server(rounds)};
+                        row("lateness p99, sleep+spin", rounds, &Round::sleep_spin), late_ticks_of_server()};
   for (const std::string& note : notes)
     rows[0].note += "; " + note;
   return rows;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 
@@ -17,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kWindow = 2s;
+constexpr auto kWindow = 2000ms;
 constexpr int kRounds = 5;            // of windows of each kind, in turn
 constexpr double kMaxMoreLate = 5.0;  // of 10,000 ticks: windows of one kind differ by as much
 
@@ -25,7 +26,7 @@ Window watch(link::Link& client) {
   const auto newest = [&client] { return client.exchange({}).front().sample; };
   const Sample first = newest();
   std::vector<double> us;
-  const auto end = std::chrono::steady_clock::now() + kWindow;
+  const auto end = std::chrono::steady_clock::now() + planned(kWindow, 100ms);
   while (std::chrono::steady_clock::now() < end) {
     const std::int64_t begin = now_ns();
     newest();
@@ -47,7 +48,7 @@ double late_per_10000(const std::vector<Window>& windows) {
 Windows in_turn(link::Link& client, const std::string& here, const std::string& other, const Company& come) {
   constexpr auto kUntilTheyAreGone = 500ms;
   Windows windows;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < planned(kRounds, 1); ++round) {
     windows.alone.push_back(watch(client));
     {
       const auto company = come(here);
@@ -61,12 +62,12 @@ Windows in_turn(link::Link& client, const std::string& here, const std::string& 
   return windows;
 }
 
-Row late_ticks_row(const std::string& beside, const Windows& windows, double gone) {
+Row late_ticks_row(const std::string& beside, const Windows& windows, const Disturbance& disturbance) {
   return {.name = "late ticks per 10,000 beside " + beside,
           .measured = late_per_10000(windows.beside),
           .floor = late_per_10000(windows.elsewhere),
           .limit = Limit{Limit::Kind::kExcessAtMost, kMaxMoreLate},
-          .gone = gone,
+          .disturbance = disturbance,
           .note = fmt::format("floor: the same at another server on this machine; alone: {:.2f}",
                               late_per_10000(windows.alone))};
 }

@@ -35,7 +35,7 @@ Windows in_turn(link::Link& client, const std::string& here, const std::string& 
 double late_per_10000(const std::vector<Window>& windows);
 
 /// The row of the late ticks beside these clients, against the same clients at another server.
-Row late_ticks_row(const std::string& beside, const Windows& windows, double gone);
+Row late_ticks_row(const std::string& beside, const Windows& windows, const Disturbance& disturbance);
 
 /// A new file with this text.
 std::filesystem::path written(std::filesystem::path file, const std::string& text);

@@ -72,23 +72,24 @@ Round one_round(const can::MessageRow& row) {
 
 }  // namespace
 
-std::vector<Row> measure_can_codec(const Plan&) {
+std::vector<Row> measure_can_codec() {
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
   Row encode{.name = "CAN frame, encoded", .unit = "ns", .limit = Limit{Limit::Kind::kAtMost, kMaxFrame_ns}};
   Row decode{.name = "CAN frame, recognised and decoded",
              .unit = "ns",
              .limit = Limit{Limit::Kind::kAtMost, kMaxFrame_ns}};
-  const auto keep_slowest = [](Row& slowest, double measured_ns, double gone, const can::MessageRow& row) {
+  const auto keep_slowest = [](Row& slowest, double measured_ns, const Disturbance& disturbance,
+                               const can::MessageRow& row) {
     if (measured_ns <= slowest.measured) return;
     slowest.measured = measured_ns;
-    slowest.gone = gone;
+    slowest.disturbance = disturbance;
     slowest.note = fmt::format("the slowest message: {}, {} bytes", row.name, row.size);
   };
   for (const can::MessageRow& row : can::kMessages) {
     const auto rounds = undisturbed_rounds(cpu, kRounds, [&] { return one_round(row); });
-    keep_slowest(encode, median(rounds.results, &Round::encode_ns), rounds.gone, row);
-    keep_slowest(decode, median(rounds.results, &Round::decode_ns), rounds.gone, row);
+    keep_slowest(encode, median(rounds.results, &Round::encode_ns), rounds.disturbance, row);
+    keep_slowest(decode, median(rounds.results, &Round::decode_ns), rounds.disturbance, row);
   }
   return {encode, decode};
 }

@@ -233,7 +233,7 @@ Row row(std::string name, const Rounds<Round>& rounds, double Percentiles::*figu
           .unit = "us",
           .measured = median(rounds.results, [&](const Round& round) { return round.bench.*figure; }),
           .floor = median(rounds.results, [&](const Round& round) { return round.floor.*figure; }),
-          .gone = rounds.gone};
+          .disturbance = rounds.disturbance};
   if (max) row.limit = Limit{Limit::Kind::kRatioAtMost, *max};
   return row;
 }
@@ -267,7 +267,7 @@ std::vector<Row> in_both_profiles(const std::function<Bus(bool fd)>& bus_of) {
 
 }  // namespace
 
-std::vector<Row> measure_multicast(const Plan&) {
+std::vector<Row> measure_multicast() {
   return in_both_profiles([](bool fd) {
     Bus bus{.name = fd ? "udp_multicast, FD" : "udp_multicast, classic",
             .config = load_config(command::find_config("servo-can")).can.at(0),
@@ -287,7 +287,7 @@ std::vector<Row> measure_multicast(const Plan&) {
   });
 }
 
-std::vector<Row> measure_socketcan(const Plan&) {
+std::vector<Row> measure_socketcan() {
   if (!has_can(kInterface) || !has_can(kFloorInterface)) {
     // taskset, because user-mode Linux is several processes of the host: on several CPUs they wait for each
     // other's, and the ratio goes from 0.85 to 1.5.

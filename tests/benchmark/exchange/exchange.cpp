@@ -108,7 +108,7 @@ Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round:
           .unit = "us",
           .measured = median(rounds.results, figure_of(link)),
           .floor = median(rounds.results, figure_of(&Round::floor)),
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = std::move(note)};
   if (max_ratio) row.limit = Limit{Limit::Kind::kRatioAtMost, *max_ratio};
   return row;
@@ -116,7 +116,7 @@ Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round:
 
 }  // namespace
 
-std::vector<Row> measure_exchange(const Plan&) {
+std::vector<Row> measure_exchange() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   const std::string bench = command::find_config("servo").string();

@@ -128,7 +128,7 @@ std::string bench_file(const ScratchFolder& folder) {
 
 }  // namespace
 
-std::vector<Row> measure_experiment(const Plan&) {
+std::vector<Row> measure_experiment() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   auto pinned = std::make_unique<Pinned>(cpu.far);
@@ -150,7 +150,7 @@ std::vector<Row> measure_experiment(const Plan&) {
            .measured = median(rounds.results, ms(&Round::fetch_s)),
            .floor = median(rounds.results, ms(&Round::copy_s)),
            .limit = Limit{Limit::Kind::kRatioAtMost, kMaxRatio},
-           .gone = rounds.gone,
+           .disturbance = rounds.disturbance,
            .note = fmt::format("12 signals; floor: blocking TCP copy of the same {} bytes", kBytes)},
           {.name = "experiment run and fetch",
            .unit = "ms",

@@ -85,14 +85,14 @@ Row row(const char* name, const Rounds<Round>& rounds, double Percentiles::*figu
           .unit = "us",
           .measured = median(rounds.results, [&](const Round& round) { return round.bench.*figure; }),
           .floor = median(rounds.results, [&](const Round& round) { return round.plain.*figure; }),
-          .gone = rounds.gone};
+          .disturbance = rounds.disturbance};
   if (max) row.limit = Limit{Limit::Kind::kRatioAtMost, *max};
   return row;
 }
 
 }  // namespace
 
-std::vector<Row> measure_modbus(const Plan&) {
+std::vector<Row> measure_modbus() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   auto pinned = std::make_unique<Pinned>(cpu.far);  // the servers inherit it

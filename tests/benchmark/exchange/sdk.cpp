@@ -92,7 +92,7 @@ Round one_round(Pair& pair) {
 
 }  // namespace
 
-std::vector<Row> measure_sdk(const Plan&) {
+std::vector<Row> measure_sdk() {
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
   Pair pair;
@@ -105,7 +105,7 @@ std::vector<Row> measure_sdk(const Plan&) {
            .measured = abi_ns,
            .floor = direct_ns,
            .limit = Limit{Limit::Kind::kExcessAtMost, kMaxOverheadNs},
-           .gone = rounds.gone,
+           .disturbance = rounds.disturbance,
            .note = fmt::format("servo in process, {:.0f} times real time; floor: Bench::step",
                                static_cast<double>(bench_config("servo").setup.period_ns) / abi_ns)}};
 }

@@ -86,13 +86,13 @@ Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round:
           .measured = median(rounds.results, figure_of(way)),
           .floor = median(rounds.results, figure_of(&Round::floor)),
           .limit = limit,
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = std::move(note)};
 }
 
 }  // namespace
 
-std::vector<Row> measure_shared_memory(const Plan&) {
+std::vector<Row> measure_shared_memory() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   const std::string bench = command::find_config("servo").string();

@@ -2,9 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
-
-#include "tests/benchmark/harness/canary.hpp"
+#include <stdexcept>
 
 namespace drivebench::speed {
 namespace {
@@ -77,6 +77,24 @@ std::optional<double> Row::ratio() const {
   return measured / *floor;
 }
 
+std::vector<Row> median_of(std::vector<std::vector<Row>> runs) {
+  std::vector<Row> rows = runs.front();
+  if (runs.size() == 1) return rows;
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    std::vector<Row> same;
+    for (const std::vector<Row>& run : runs) {
+      if (n >= run.size() || run[n].name != rows[n].name)
+        throw std::runtime_error("two runs measured different things");
+      same.push_back(run[n]);
+    }
+    const auto figure = [](const Row& row) { return row.ratio().value_or(row.measured); };
+    std::ranges::sort(same, {}, figure);
+    rows[n] = same[same.size() / 2];
+    if (!rows[n].skipped) rows[n].range = {figure(same.front()), figure(same.back())};
+  }
+  return rows;
+}
+
 Judgement judgement(const Row& row) {
   if (!row.limit) return Judgement::kForInformation;
   const Limit::Kind kind = row.limit->kind;
@@ -85,7 +103,7 @@ Judgement judgement(const Row& row) {
                         : kind == Limit::Kind::kExcessAtMost ? row.measured - row.floor.value_or(0.0)
                                                              : row.measured;
   const bool within = kind == Limit::Kind::kAtLeast ? figure >= row.limit->value : figure <= row.limit->value;
-  if (row.gone > kMaxGone && (compares || !within)) return Judgement::kNotJudged;
+  if (row.disturbance.spoils() && (compares || !within)) return Judgement::kNotJudged;
   return within ? Judgement::kWithin : Judgement::kOver;
 }
 
@@ -95,14 +113,15 @@ std::string as_markdown(const std::string& machine, const std::string& date, con
       "Made by `./bench benchmark --markdown > tests/benchmark/RESULTS.md` on {}.\n\n"
       "{}\n\n"
       "Floor: the least that could do the job, measured in alternation in the same run. A figure is not "
-      "judged when others took "
-      "more than {:.0f} % of\nthe CPUs around the rounds that count.\n"
+      "judged when, around\nthe rounds that count, others took more than {:.0f} % of the CPUs' time or a "
+      "fixed "
+      "calculation ran more than {:.0f} % slower\nthan at its best.\n"
       "Where the kernel has no CAN, `taskset -c 0 tests/tools/can-vm -t 300 -- "
       "build/release/bin/drivebench-benchmark --only "
       "socketcan`\nmeasures it in a guest.\n\n"
       "| what | measured | floor | ratio | limit |\n"
       "|---|---|---|---|---|\n",
-      date, machine, 100.0 * kMaxGone);
+      date, machine, 100.0 * kMaxGone, 100.0 * kMaxSlowed);
   for (const Row& row : rows) {
     const std::string what = row.note.empty() ? row.name : fmt::format("{} ({})", row.name, row.note);
     if (row.skipped) {
@@ -119,23 +138,26 @@ std::string as_markdown(const std::string& machine, const std::string& date, con
 void print_table(const std::string& machine, const std::vector<Row>& rows) {
   fmt::print("{}\n\n", machine);
   const auto line = [](const auto&... cells) {
-    fmt::print("{:<34} {:>12} {:>12} {:>7} {:>12}  {:<10} {:>6}  {}\n", cells...);
+    fmt::print("{:<34} {:>12} {:>12} {:>7} {:>12}  {:<10} {:>6} {:>6}  {}\n", cells...);
   };
-  line("name", "measured", "floor", "ratio", "limit", "verdict", "gone", "");
+  line("name", "measured", "floor", "ratio", "limit", "verdict", "gone", "slowed", "");
   for (const Row& row : rows) {
     if (row.skipped) {
-      line(row.name, "-", "-", "-", "-", "skipped", "-", row.note);
+      line(row.name, "-", "-", "-", "-", "skipped", "-", "-", row.note);
       continue;
     }
     line(row.name, with_unit(row.measured, row.unit), row.floor ? with_unit(*row.floor, row.unit) : "-",
          row.ratio() ? number(*row.ratio()) : "-", limit_text(row), name_of(judgement(row)),
-         fmt::format("{:.1f} %", 100.0 * row.gone), row.note);
+         fmt::format("{:.1f} %", 100.0 * row.disturbance.gone),
+         fmt::format("{:.1f} %", 100.0 * row.disturbance.slowed), row.note);
   }
   fmt::print(
-      "\nfloor: the least that could do the job, measured in alternation. gone: share of the time that "
-      "others "
-      "took from the CPUs\naround the rounds that count; above {:.0f} % a ratio is not judged.\n",
-      100.0 * kMaxGone);
+      "\nfloor: the least that could do the job, measured in alternation. Around the rounds that count: "
+      "gone, "
+      "the share of the time\nthat others took from the CPUs; slowed, how much longer a fixed calculation "
+      "took "
+      "than at its best. Above {:.0f} % or {:.0f} %\na ratio is not judged.\n",
+      100.0 * kMaxGone, 100.0 * kMaxSlowed);
 }
 
 nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows) {
@@ -150,10 +172,12 @@ nlohmann::json as_json(const std::string& machine, const std::vector<Row>& rows)
         {"unit", row.unit},
         {"measured", row.measured},
         {"verdict", judgement(row) == Judgement::kForInformation ? "information" : name_of(judgement(row))},
-        {"gone_share", row.gone},
+        {"gone_share", row.disturbance.gone},
+        {"slowed_share", row.disturbance.slowed},
         {"note", row.note}};
     if (row.floor) entry["floor"] = *row.floor;
     if (row.ratio()) entry["ratio"] = *row.ratio();
+    if (row.range) entry["range"] = {row.range->first, row.range->second};
     if (row.limit) entry["limit"] = {{key_of(row.limit->kind), row.limit->value}};
     list.push_back(std::move(entry));
   }

@@ -3,7 +3,10 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "tests/benchmark/harness/disturbance.hpp"
 
 namespace drivebench::speed {
 
@@ -26,14 +29,21 @@ struct Row {
   double measured = 0.0;
   std::optional<double> floor{};  ///< the same for the least program that does the job, in the same run
   std::optional<Limit> limit{};   ///< none: for information
-  double gone = 0.0;              ///< share of the time that the canary found gone
+  Disturbance disturbance{};      ///< what the canary noticed
   std::string note{};
   bool skipped = false;  ///< not measured; the note says why
+
+  /// Of several runs, lowest and highest: of the ratio where there is a floor, of the figure otherwise.
+  std::optional<std::pair<double, double>> range{};
 
   std::optional<double> ratio() const;
 };
 
-/// kNotJudged: too much time was gone. A figure within its limit stays so: disturbances can only have spoiled
+/// The rows of several runs of one measurement, each as in the run whose ratio (or figure) is the median,
+/// with its range.
+std::vector<Row> median_of(std::vector<std::vector<Row>> runs);
+
+/// kNotJudged: others took too much. A figure within its limit stays so: disturbances can only have spoiled
 /// it.
 enum class Judgement { kWithin, kOver, kNotJudged, kForInformation };
 Judgement judgement(const Row& row);

@@ -30,12 +30,16 @@ TEST(BenchmarkReport, MarkdownMarksFiguresOverTheirLimitNotJudgedAndSkipped) {
   Row over = tick();
   over.measured = 1000.0;
   Row disturbed = tick();
-  disturbed.gone = 0.5;
+  disturbed.disturbance.gone = 0.5;
+  Row slowed = tick();
+  slowed.disturbance.slowed = 0.06;
   Row skipped{.name = "socketcan", .note = "no kernel CAN", .skipped = true};
   Row information{.name = "late ticks", .measured = 3.0};
-  const std::string text = as_markdown("A CPU", "2026-11-23", {over, disturbed, skipped, information});
+  const std::string text =
+      as_markdown("A CPU", "2026-11-23", {over, disturbed, slowed, skipped, information});
   EXPECT_TRUE(
       text.ends_with("| tick | 1000 ns | 225 ns | 4.44 | <= 4.00 x, over |\n"
+                     "| tick | 558 ns | 225 ns | 2.48 | <= 4.00 x, not judged |\n"
                      "| tick | 558 ns | 225 ns | 2.48 | <= 4.00 x, not judged |\n"
                      "| socketcan (no kernel CAN) | skipped | | | |\n"
                      "| late ticks | 3.00 |  |  |  |\n"))

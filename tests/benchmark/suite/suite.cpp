@@ -6,6 +6,7 @@
 #include "clients/command/common/programs/installation.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/suite/suite_run.hpp"
@@ -14,10 +15,6 @@ namespace drivebench::speed {
 namespace {
 
 constexpr std::size_t kRounds = 5;
-constexpr double kLong_s = 20.0;  ///< of the bench, so that the start of a case does not count
-constexpr int kLongCases = 4;     ///< an even number, for two cores
-constexpr int kShortCases = 100;
-constexpr int kProgramCases = 10;
 constexpr double kLeastSpeed = 100.0;
 constexpr double kLeastOnTwo = 1.9;
 constexpr double kMostForChecks = 1.25;
@@ -81,14 +78,18 @@ struct Round {
 
 }  // namespace
 
-std::vector<Row> measure_suite(const Plan&) {
+std::vector<Row> measure_suite() {
   const CpuPair cpu = cpu_pair();
-  const SuiteFile all_checks(preset_case(kLong_s, kLongCases, kAllChecks));
-  const SuiteFile one_check(preset_case(kLong_s, kLongCases, kOneCheck));
-  const SuiteFile shorter(preset_case(0.1, kShortCases, kOneCheck));
-  const SuiteFile longer(preset_case(0.2, kShortCases, kOneCheck));
-  const SuiteFile program_shorter(program_case(0.1, kProgramCases));
-  const SuiteFile program_longer(program_case(0.2, kProgramCases));
+  const double long_s = planned(20.0, 1.0);  // of the bench, so that the start of a case does not count
+  const int long_cases = planned(4, 2);      // an even number, for two cores
+  const int short_cases = planned(100, 2);
+  const int program_cases = planned(10, 1);
+  const SuiteFile all_checks(preset_case(long_s, long_cases, kAllChecks));
+  const SuiteFile one_check(preset_case(long_s, long_cases, kOneCheck));
+  const SuiteFile shorter(preset_case(0.1, short_cases, kOneCheck));
+  const SuiteFile longer(preset_case(0.2, short_cases, kOneCheck));
+  const SuiteFile program_shorter(program_case(0.1, program_cases));
+  const SuiteFile program_longer(program_case(0.2, program_cases));
   const std::array cpus{cpu.near, cpu.far};
   const Rounds<Round> rounds = undisturbed_rounds(cpus, kRounds, [&]() -> Round {
     return {.one_s = all_checks.wall_s(1),
@@ -106,32 +107,32 @@ std::vector<Row> measure_suite(const Plan&) {
   };
   return {{.name = "suite, a preset at 8 kHz with 12 checks",
            .unit = "times real time",
-           .measured = figure([](const Round& r) { return kLong_s * kLongCases / r.one_s; }),
+           .measured = figure([&](const Round& r) { return long_s * long_cases / r.one_s; }),
            .limit = Limit{Limit::Kind::kAtLeast, kLeastSpeed},
-           .gone = rounds.gone,
+           .disturbance = rounds.disturbance,
            .note = "one job"},
           {.name = "suite, two jobs against one",
            .unit = "times as fast",
            .measured = figure([](const Round& r) { return r.one_s / r.two_s; }),
            .limit = Limit{Limit::Kind::kAtLeast, kLeastOnTwo},
-           .gone = rounds.gone},
+           .disturbance = rounds.disturbance},
           {.name = "suite, 12 checks against one",
            .unit = "s",
            .measured = figure(&Round::one_s),
            .floor = figure(&Round::one_check_s),
            .limit = Limit{Limit::Kind::kRatioAtMost, kMostForChecks},
-           .gone = rounds.gone,
-           .note = fmt::format("{:g} s of the bench", kLong_s * kLongCases)},
+           .disturbance = rounds.disturbance,
+           .note = fmt::format("{:g} s of the bench", long_s * long_cases)},
           {.name = "case in process, beside its ticks",
            .unit = "ms",
-           .measured = overhead_ms(&Round::short_s, &Round::longer_s, kShortCases),
+           .measured = overhead_ms(&Round::short_s, &Round::longer_s, short_cases),
            .limit = Limit{Limit::Kind::kAtMost, kMostOverhead_ms},
-           .gone = rounds.gone},
+           .disturbance = rounds.disturbance},
           {.name = "case with a program, beside its ticks",
            .unit = "ms",
-           .measured = overhead_ms(&Round::program_short_s, &Round::program_longer_s, kProgramCases),
+           .measured = overhead_ms(&Round::program_short_s, &Round::program_longer_s, program_cases),
            .limit = Limit{Limit::Kind::kAtMost, kMostProgramOverhead_ms},
-           .gone = rounds.gone,
+           .disturbance = rounds.disturbance,
            .note = "drivebench control and a server, both started anew"}};
 }
 

@@ -70,7 +70,7 @@ Row update_of(std::string_view name) {
   Row row = {.name = fmt::format("update, {}", name),
              .unit = "ns",
              .measured = median(rounds.results, [](double ns) { return ns; }),
-             .gone = rounds.gone};
+             .disturbance = rounds.disturbance};
   if (name == "book/8.2.2") row.limit = Limit{Limit::Kind::kAtMost, kMostUpdateNs};
   return row;
 }
@@ -91,14 +91,14 @@ Row closed_loop_of(std::string_view name) {
   Row row = {.name = fmt::format("closed loop in process against real time, {}", name),
              .unit = "x",
              .measured = median(rounds.results, [](double times) { return times; }),
-             .gone = rounds.gone};
+             .disturbance = rounds.disturbance};
   if (name == "book/8.2.2") row.limit = Limit{Limit::Kind::kAtLeast, kLeastTimesRealTime};
   return row;
 }
 
 }  // namespace
 
-std::vector<Row> measure_control(const Plan&) {
+std::vector<Row> measure_control() {
   std::vector<Row> rows;
   for (const std::string_view name :
        {"book/8.2.2", "book/8.2.5-soft-flux", "book/9.1.4", "book/10.6", "wound-rotor/servo", "book/2.18"}) {

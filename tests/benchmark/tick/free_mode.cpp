@@ -6,6 +6,7 @@
 
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
@@ -14,8 +15,6 @@ namespace drivebench::speed {
 namespace {
 
 constexpr double kMinTimesRealTime = 150.0;
-constexpr int kShort_s = 20;
-constexpr int kLong_s = 120;
 constexpr std::size_t kRounds = 3;
 
 /// The servo with a load that drives its shaft: there is no controller in free mode. It ends at 125 rad/s.
@@ -45,22 +44,24 @@ struct Round {
 
 }  // namespace
 
-std::vector<Row> measure_free_mode(const Plan&) {
+std::vector<Row> measure_free_mode() {
+  const int short_run_s = planned(20, 1);
+  const int long_run_s = planned(120, 3);
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);  // the server inherits it: tick, recorder and this program share one CPU
   const ScratchFolder folder;
   write_turning_bench(folder / "turning.toml");
   const auto rounds = undisturbed_rounds(cpu, kRounds, [&]() -> Round {
-    const double short_s = wall_s(folder / "turning.toml", folder / "short.mcap", kShort_s);
-    const double long_s = wall_s(folder / "turning.toml", folder / "long.mcap", kLong_s);
-    const double times_real_time = (kLong_s - kShort_s) / (long_s - short_s);
-    return {.times_real_time = times_real_time, .start_s = short_s - kShort_s / times_real_time};
+    const double short_s = wall_s(folder / "turning.toml", folder / "short.mcap", short_run_s);
+    const double long_s = wall_s(folder / "turning.toml", folder / "long.mcap", long_run_s);
+    const double times_real_time = (long_run_s - short_run_s) / (long_s - short_s);
+    return {.times_real_time = times_real_time, .start_s = short_s - short_run_s / times_real_time};
   });
   return {{.name = "free mode with recording, one CPU",
            .unit = "x",
            .measured = median(rounds.results, &Round::times_real_time),
            .limit = Limit{Limit::Kind::kAtLeast, kMinTimesRealTime},
-           .gone = rounds.gone,
+           .disturbance = rounds.disturbance,
            .note = fmt::format("times real time at 8 kHz, start-up ({:.0f} ms) left out",
                                1e3 * median(rounds.results, &Round::start_s))}};
 }

@@ -6,6 +6,7 @@
 #include "clients/identification/identify.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"
+#include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 #include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
@@ -24,7 +25,7 @@ constexpr double kMostSeconds = 180.0;
 /// global search. The slowest of the motors counts.
 Row start_row() {
   std::vector<Recorded> starts;
-  for (int number = 1; number <= kStarts; ++number)
+  for (int number = 1; number <= planned(kStarts, 1); ++number)
     starts.push_back(record_motor(motor_draws().back(), number, 1));
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
@@ -42,7 +43,7 @@ Row start_row() {
           .unit = "ms",
           .measured = percentile(rounds.results, 0.5),
           .limit = Limit{Limit::Kind::kAtMost, kMostMs},
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = "slowest of 20 induction motors, 0.2 s at 20 kHz: filters, regressor, global search"};
 }
 
@@ -52,7 +53,7 @@ Row refinement_row() {
   constexpr double kMostRefinedMs = 1000.0;
   std::vector<Recorded> records;
   for (const MotorDraw& draw : motor_draws().first(4)) {
-    for (int number = 1; number <= kMotors; ++number)
+    for (int number = 1; number <= planned(kMotors, 1); ++number)
       records.push_back(record_motor(draw, number, 1));
   }
   const std::array cpu{cpu_pair().far};
@@ -73,36 +74,37 @@ Row refinement_row() {
       .unit = "ms",
       .measured = percentile(rounds.results, 0.5),
       .limit = Limit{Limit::Kind::kAtMost, kMostRefinedMs},
-      .gone = rounds.gone,
+      .disturbance = rounds.disturbance,
       .note = "slowest of 12 motors of four kinds, up to 20,000 samples: least squares, refinement, verdict"};
 }
 
 /// 200 motors of three kinds, experiments and identification, on two threads.
 Row monte_carlo_row() {
   constexpr int kThreads = 2;
+  const int motors = planned(kAllMotors, 2);
   const std::array cpus{cpu_pair().near, cpu_pair().far};
-  GapCanary canary;
+  Canary canary;
   canary.look(cpus);
   const std::int64_t begin = now_ns();
-  const auto trials = run_trials(motor_draws().first(3), {kAllMotors, 1, kThreads});
+  const auto trials = run_trials(motor_draws().first(3), {motors, 1, kThreads});
   const double seconds = static_cast<double>(now_ns() - begin) * 1e-9;
   canary.look(cpus);
   for (const Trials& kind : trials) {
     const auto stated = std::ranges::count_if(
         kind.findings, [](const std::vector<Finding>& motor) { return motor.front().stated; });
-    if (stated < kAllMotors * 9 / 10) throw std::runtime_error("too few motors are identified");
+    if (stated < motors * 9 / 10) throw std::runtime_error("too few motors are identified");
   }
   return {.name = "600 random motors",
           .unit = "s",
           .measured = seconds,
           .limit = Limit{Limit::Kind::kAtMost, kMostSeconds},
-          .gone = canary.gone(),
+          .disturbance = canary.seen(),
           .note = "200 DC, induction and PM synchronous ones with their experiments, two threads"};
 }
 
 }  // namespace
 
-std::vector<Row> measure_identification(const Plan&) {
+std::vector<Row> measure_identification() {
   return {start_row(), refinement_row(), monte_carlo_row()};
 }
 

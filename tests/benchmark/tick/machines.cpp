@@ -105,7 +105,7 @@ Row race(const char* name, const AxisParameters& p, const TerminalInput& u, Bare
           .measured = median(rounds.results, &Round::plant_ns),
           .floor = median(rounds.results, &Round::bare_ns),
           .limit = Limit{Limit::Kind::kRatioAtMost, kMaxStepRatio},
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = "floor: the same equations in a straight line"};
 }
 
@@ -197,7 +197,7 @@ Row timed(const std::string& name, double period_s, double at_least_times, Tick 
           .unit = "x real time",
           .measured = period_s * 1e9 / ns,
           .limit = Limit{Limit::Kind::kAtLeast, at_least_times},
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = fmt::format("{:.0f} ns a tick of {:.0f} us; {}", ns, period_s * 1e6, note)};
 }
 
@@ -272,7 +272,7 @@ Row switched_period() {
           .unit = "us",
           .measured = kPeriodS * 1e6 / row.measured,
           .limit = Limit{Limit::Kind::kAtMost, 1.5},
-          .gone = row.gone,
+          .disturbance = row.disturbance,
           .note = "BM500, 100 us, 10 substeps and 6 edges split exactly; a whole tick with encoder"};
 }
 
@@ -301,7 +301,7 @@ Row dynamometer() {
 
 }  // namespace
 
-std::vector<Row> measure_machines(const Plan&) {
+std::vector<Row> measure_machines() {
   std::vector<Row> rows = steps();
   rows.push_back(switched_period());
   for (Row& row : ticks())

@@ -156,14 +156,14 @@ Row measure(const std::string& name, bool running) {
           .measured = median(rounds.results, &Round::bench_ns),
           .floor = bare_ns,
           .limit = Limit{Limit::Kind::kRatioAtMost, kMaxRatio},
-          .gone = rounds.gone,
+          .disturbance = rounds.disturbance,
           .note = fmt::format("{:.1f} rad/s; floor: the bare RK4, {:.1f} ns a step", race.speed_rad_s(),
                               bare_ns / bench_config("servo").setup.substeps)};
 }
 
 }  // namespace
 
-std::vector<Row> measure_tick(const Plan&) {
+std::vector<Row> measure_tick() {
   return {measure("tick, standing", false), measure("tick, turning", true)};
 }
 
