@@ -3,8 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <span>
 #include <stdexcept>
+#include <vector>
 
+#include "plant/faults.hpp"
+#include "plant/injected_faults.hpp"
 #include "protocols/can/dbc.hpp"
 #include "protocols/can/table_text.hpp"
 #include "server/bench/terminals.hpp"
@@ -21,6 +25,16 @@ std::vector<can::BusAxis> bus_axes(const BenchConfig& config) {
                     .wide = terminals_of(config.setup.axes[i].parameters).is_wide()});
   }
   return axes;
+}
+
+/// The names of the bits in the signals `faults` and `injected`.
+std::vector<can::BitWord> fault_words() {
+  std::vector<can::BitWord> words{{.signal = "faults", .bits = {}}, {.signal = "injected", .bits = {}}};
+  for (const FaultInfo& fault : kFaultTable)
+    words[0].bits.push_back({static_cast<unsigned>(fault.bit), fault.name});
+  for (std::size_t row = 0; row < kInjectableFaultCount; ++row)
+    words[1].bits.push_back({1U << row, kInjectableFaults[row].name});
+  return words;
 }
 
 /// Whether the bench has a wide axis, whose frames need more identifiers.
@@ -122,10 +136,16 @@ std::vector<std::string> bus_overloads(const BenchConfig& config) {
 std::string interface_text(const BenchConfig& config, std::string_view what, std::size_t bus) {
   if (what.starts_with("modbus")) return modbus::map_of(config, what == "modbus-csv");
   const CanConfig chosen = chosen_bus(config, bus);
-  if (what == "dbc")
-    return can::dbc_text(config.name, chosen.profile, bus_axes(config), bus_load_of(config, chosen).messages);
-  return can::table_text(config.name, chosen.profile, bus_axes(config)) + "\n## Load in real time\n\n" +
-         can::load_text(bus_load_of(config, chosen));
+  const std::vector<can::BitWord> words = fault_words();
+  const can::BusLoad load = bus_load_of(config, chosen);
+  if (what == "dbc") {
+    const bool has_period =
+        config.mode != RunMode::kLockstep;  // a tick of lockstep takes as long as its command
+    return can::dbc_text(config.name, chosen.profile, bus_axes(config),
+                         has_period ? std::span(load.messages) : std::span<const can::MessageLoad>(), words);
+  }
+  return can::table_text(config.name, chosen.profile, bus_axes(config), words) +
+         "\n## Load in real time\n\n" + can::load_text(load);
 }
 
 }  // namespace drivebench

@@ -58,15 +58,6 @@ void hand_out(const drivebench_bench& bench, std::uint32_t axis, void* sample) n
   std::memcpy(sample, &bench.backend->sample(axis), bench.sample_size);
 }
 
-/// Clears what an earlier controller has left latched.
-int clear_what_is_latched(Backend& backend, std::uint32_t axis) noexcept {
-  constexpr std::uint64_t kTimeout = 3;
-  constexpr std::uint64_t kFault = 4;
-  if (const int code = backend.newest(axis); code != DRIVEBENCH_OK) return code;
-  const std::uint64_t state = backend.sample(axis).state;
-  return state == kTimeout || state == kFault ? backend.clear(axis) : DRIVEBENCH_OK;
-}
-
 }  // namespace
 
 extern "C" {
@@ -119,7 +110,7 @@ int drivebench_acquire(drivebench_bench* bench, uint32_t axis) {
   Backend* const backend = begin(bench);
   if (backend == nullptr) return DRIVEBENCH_BAD_ARGUMENT;
   const int code = backend->acquire(axis);
-  return code == DRIVEBENCH_OK && bench->clears_on_acquire ? clear_what_is_latched(*backend, axis) : code;
+  return code == DRIVEBENCH_OK && bench->clears_on_acquire ? backend->clear(axis) : code;
 }
 
 int drivebench_renew(drivebench_bench* bench, uint32_t axis) {

@@ -39,12 +39,12 @@ constexpr std::size_t index_of(Message message, bool fd, std::string_view field,
   return index_of(*row, field);
 }
 
+inline constexpr unsigned kVoltageMode = 1;
 /// The modes in which a command gives duties; one count of a classic frame is then kDutyUnit. The first
 /// counts the legs of a star from the middle of the link, -1 to 1; the second as every other link, 0 to 1
 /// from the negative rail.
 inline constexpr unsigned kDutyMode = 3;
 inline constexpr unsigned kLegDutyMode = 5;
-inline constexpr double kDutyUnit = 1.0 / 32767.0;
 /// The mode in which a command gives currents; one count is then current_unit_a of the profile.
 inline constexpr unsigned kCurrentMode = 4;
 

@@ -94,10 +94,11 @@ bool is_signed(const Field& field) {
          field.encoding == Encoding::kFloat;
 }
 
-/// The DBC multiplexer mark of a field of a paged message.
+/// The DBC multiplexer mark of a field of a message with pages, or with set-points, whose mode is the page.
 std::string page_text(const Field& field, const MessageRow& row) {
   if (field.page != kEveryPage) return " m" + std::to_string(field.page);
-  return is_paged(row) && &field == &row.fields.front() ? " M" : "";
+  const bool has_setpoints = std::ranges::any_of(row.fields, &Field::is_setpoint);
+  return (is_paged(row) && field.name == "page") || (has_setpoints && field.name == "mode") ? " M" : "";
 }
 
 std::string signal_line(const Field& field, const Profile& profile, const MessageRow& row) {
@@ -115,7 +116,17 @@ std::string no_value_text(const Field& field) {
   return field.encoding == Encoding::kFloat ? "; NaN: no value" : "";
 }
 
-std::string comments(const Entry& entry) {
+/// The names of bits, which a table of values gives to single ones alone.
+std::string bits_text(const Field& field, std::span<const BitWord> words) {
+  if (field.unit != "bits" || std::ranges::find(words, field.signal, &BitWord::signal) == words.end())
+    return "";
+  std::string text;
+  for (const Choice& bit : choices_of(field, words))
+    text += (text.empty() ? ": " : ", ") + std::to_string(bit.number) + " " + std::string(bit.label);
+  return text;
+}
+
+std::string comments(const Entry& entry, std::span<const BitWord> words) {
   const MessageRow& row = *entry.row;
   std::string about = entry.axis.empty() ? std::string() : "axis " + entry.axis + ": ";
   about += row.meaning;
@@ -126,17 +137,17 @@ std::string comments(const Entry& entry) {
         " edges of 16 bits, bits 0 to 14 the time in units of the sample period/32768, bit 15 counts down";
   }
   std::string text = "CM_ BO_ " + entry.id + " " + quoted(about) + ";\n";
-  for (const Field& field : row.fields) {
+  for (const Field& field : fields_of(row)) {
     text += "CM_ SG_ " + entry.id + " " + std::string(field.name) + " " +
-            quoted(std::string(field.meaning) + no_value_text(field)) + ";\n";
+            quoted(std::string(field.meaning) + bits_text(field, words) + no_value_text(field)) + ";\n";
   }
   return text;
 }
 
-std::string value_lists(const Entry& entry) {
+std::string value_lists(const Entry& entry, std::span<const BitWord> words) {
   std::string text;
   for (const Field& field : entry.row->fields) {
-    const std::vector<Choice> choices = choices_of(field);
+    const std::vector<Choice> choices = choices_of(field, words);
     if (choices.empty()) continue;
     text += "VAL_ " + entry.id + " " + std::string(field.name);
     for (const Choice& choice : choices)
@@ -180,7 +191,7 @@ std::string attributes(std::string_view bench, const Profile& profile, std::span
 }  // namespace
 
 std::string dbc_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes,
-                     std::span<const MessageLoad> periodic) {
+                     std::span<const MessageLoad> periodic, std::span<const BitWord> words) {
   const std::vector<Entry> entries = entries_of(profile, axes);
   std::string text = "VERSION \"" + std::to_string(version_of(profile, axes)) + "\"\n\nNS_ :\n\nBS_:\n\n";
   text += "BU_: Bench Controller\n\n";
@@ -191,14 +202,14 @@ std::string dbc_text(std::string_view bench, const Profile& profile, std::span<c
     const MessageRow& row = *entry.row;
     text += "BO_ " + entry.id + " " + entry.name + ": " + std::to_string(row.size) +
             (row.sender == Sender::kBench ? " Bench\n" : " Controller\n");
-    for (const Field& field : row.fields) {
+    for (const Field& field : fields_of(row)) {
       text += signal_line(field, profile, row);
       if (field.encoding == Encoding::kFloat)
         singles += "SIG_VALTYPE_ " + entry.id + " " + std::string(field.name) + " : 1;\n";
     }
     text += "\n";
-    about += comments(entry);
-    values += value_lists(entry);
+    about += comments(entry, words);
+    values += value_lists(entry, words);
   }
   text += "CM_ " + quoted("CAN messages of " + std::string(bench) + ", written by drivebench.") + ";\n";
   return text + about + attributes(bench, profile, entries) + cycle_times(entries, periodic) + values +

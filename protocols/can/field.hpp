@@ -26,6 +26,7 @@ enum class Unit : std::uint8_t {
   kEdgeTime,
   kResolver,     ///< always 1 mV
   kTemperature,  ///< always 0.1 K
+  kDuty,         ///< always 1/32767
 };
 
 /// The page number of a field that stands in every frame of its message.
@@ -42,6 +43,8 @@ struct Field {
   std::string_view meaning;
   /// The field stands only in frames with this value of the field `page`; kEveryPage: in all frames.
   std::uint8_t page = kEveryPage;
+  /// A set-point: a voltage in mode 1, a duty or a current in others: see fields_of().
+  bool is_setpoint = false;
 };
 
 /// Whether a field stands in the frames of this page.
@@ -87,6 +90,10 @@ constexpr Field real(std::string_view name, std::string_view unit, std::uint16_t
 /// A code in half a byte.
 constexpr Field half_byte(Field field) {
   field.bits = 4;
+  return field;
+}
+constexpr Field setpoint(Field field) {
+  field.is_setpoint = true;
   return field;
 }
 constexpr Field on_page(std::uint8_t page, Field field) {

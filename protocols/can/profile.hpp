@@ -11,6 +11,9 @@
 
 namespace drivebench::can {
 
+/// A count of a duty in a classic frame.
+inline constexpr double kDutyUnit = 1.0 / 32767.0;
+
 inline constexpr std::size_t kMessageCount = static_cast<std::size_t>(Message::kDetails) + 1;
 /// The largest node id; as in CANopen. The 11-bit identifiers of IdSet::kFree have room for fewer nodes.
 inline constexpr std::uint32_t kMaxNode = 127;
@@ -85,6 +88,8 @@ struct Profile {
         return 1e-3;
       case Unit::kTemperature:
         return 0.1;
+      case Unit::kDuty:
+        return kDutyUnit;
       case Unit::kNone:
         break;
     }

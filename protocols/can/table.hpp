@@ -134,26 +134,22 @@ inline constexpr auto kPhases = std::to_array<Field>({
 inline constexpr std::string_view kModeMeaning =
     "0 gates off, 1 voltages, 2 zero voltage, 3 duties from the middle of the link, 4 currents, 5 duties of "
     "legs";
-inline constexpr std::string_view kLegsOffMeaning = "legs that are off: 1 a, 2 b, 4 c";
+inline constexpr std::string_view kLegsOffMeaning = "1 a, 2 b, 4 c: legs that are off";
+inline constexpr std::string_view kSetpointMeaning = "voltage of this phase or winding";
 inline constexpr std::string_view kSetpointTick = "low bits of the tick of the sample that this answers";
 inline constexpr std::string_view kLeaseMeaning = "lease number that the bench gave";
 
 inline constexpr auto kCommand = std::to_array<Field>({
-    scaled("u_a", "V", 0, Unit::kVoltage, "",
-           "voltage for phase a; in modes 3 and 5 the duty in units of 1/32767, in mode 4 the current as i_a "
-           "counts"),
-    scaled("u_b", "V", 16, Unit::kVoltage, "",
-           "voltage for phase b; in modes 3 and 5 the duty in units of 1/32767, in mode 4 the current as i_b "
-           "counts"),
+    setpoint(scaled("u_a", "V", 0, Unit::kVoltage, "", kSetpointMeaning)),
+    setpoint(scaled("u_b", "V", 16, Unit::kVoltage, "", kSetpointMeaning)),
     counter("tick", 32, 16, "", kSetpointTick),
     half_byte(choice("mode", 48, "", kModeMeaning)),
     flags("legs_off", 52, 4, "", kLegsOffMeaning),
     code("lease", 56, 8, "", kLeaseMeaning),
 });
 inline constexpr auto kPhaseCommand = std::to_array<Field>({
-    scaled("u_c", "V", 0, Unit::kVoltage, "", "voltage for phase c; in modes 3 to 5 as u_a of the command"),
-    scaled("u_f", "V", 16, Unit::kVoltage, "",
-           "voltage for the field winding; in modes 3 to 5 as u_a of the command"),
+    setpoint(scaled("u_c", "V", 0, Unit::kVoltage, "", kSetpointMeaning)),
+    setpoint(scaled("u_f", "V", 16, Unit::kVoltage, "", kSetpointMeaning)),
     counter("tick", 32, 16, "", "as in the command that follows"),
     choice("mode", 48, "", kModeMeaning),
     code("lease", 56, 8, "", kLeaseMeaning),
@@ -161,13 +157,13 @@ inline constexpr auto kPhaseCommand = std::to_array<Field>({
 /// A narrow axis has only the first kNarrowCommandFields.
 inline constexpr auto kCommandFd = std::to_array<Field>({
     counter("tick", 0, 32, "", kSetpointTick),
-    real("u_a", "V", 32, "", "voltage for phase a; in modes 3 and 5 the duty, in mode 4 the current [A]"),
-    real("u_b", "V", 64, "", "voltage for phase b; in modes 3 and 5 the duty, in mode 4 the current [A]"),
+    setpoint(real("u_a", "V", 32, "", kSetpointMeaning)),
+    setpoint(real("u_b", "V", 64, "", kSetpointMeaning)),
     half_byte(choice("mode", 96, "", kModeMeaning)),
     flags("legs_off", 100, 4, "", kLegsOffMeaning),
     code("lease", 104, 8, "", kLeaseMeaning),
-    real("u_c", "V", 128, "", "voltage for phase c; in modes 3 to 5 as u_a"),
-    real("u_f", "V", 160, "", "voltage for the field winding; in modes 3 to 5 as u_a"),
+    setpoint(real("u_c", "V", 128, "", kSetpointMeaning)),
+    setpoint(real("u_f", "V", 160, "", kSetpointMeaning)),
 });
 inline constexpr std::size_t kNarrowCommandFields = 6;
 inline constexpr auto kEncoder = std::to_array<Field>({

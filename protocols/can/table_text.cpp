@@ -84,7 +84,8 @@ std::string field_line(const Field& field, const Profile& profile) {
   std::string line = "| " + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
   if (field.bits < 8) line += field.start_bit % 8U == 0 ? " low half" : " high half";
   line += " | " + std::string(field.name) + " | ";
-  if (field.page != kEveryPage) line += "page " + std::to_string(field.page) + ": ";
+  if (field.page != kEveryPage)
+    line += (field.is_setpoint ? "mode " : "page ") + std::to_string(field.page) + ": ";
   line += encoding_text(field, profile) + " | ";
   line += std::string(field.unit == "1" ? "-" : field.unit) + " | ";
   line += range ? number_text(range->minimum, 10) + " to " + number_text(range->maximum, 10) : "any";
@@ -100,7 +101,7 @@ std::string message_text(const MessageRow& row, const Profile& profile, const st
           (row.sender == Sender::kBench ? ", from the bench: " : ", from the controller: ") +
           std::string(row.meaning) + ".\n\n";
   text += "| bytes | field | encoding | unit | range | no value | meaning |\n|---|---|---|---|---|---|---|\n";
-  for (const Field& field : row.fields)
+  for (const Field& field : fields_of(row))
     text += field_line(field, profile);
   if (row.message == Message::kEdges) {
     text += "\nFrom byte " + std::to_string(kFirstEdgeByte) + " on: " + std::to_string(kEdgesPerFrame) +
@@ -172,7 +173,7 @@ Values example_values(const MessageRow& row) {
     const Field& field = row.fields[i];
     const std::vector<Choice> choices = choices_of(field);
     if (!field.signal.empty()) continue;
-    if (!choices.empty())
+    if (field.unit == "enum")
       values[i] = choices[1].number;
     else if (field.encoding == Encoding::kCode)
       values[i] = 7.0;
@@ -204,6 +205,18 @@ std::string example_text(const MessageRow& row, const Profile& profile, std::uin
   return text + " |\n";
 }
 
+/// The names of bits that are too many for the line of their field.
+std::string words_text(std::span<const BitWord> words) {
+  std::string text;
+  for (const BitWord& word : words) {
+    text += "## Bits of `" + std::string(word.signal) + "`\n\n| value | name |\n|---|---|\n";
+    for (const Choice& bit : word.bits)
+      text += "| " + hex(bit.number, 1) + " | " + std::string(bit.label) + " |\n";
+    text += "\n";
+  }
+  return text;
+}
+
 std::string conventions_text(const Profile& profile) {
   return std::string(profile.fd ? "CAN FD frames with bit rate switch" : "Classic CAN frames") +
          (profile.extended ? ", 29-bit identifiers" : ", 11-bit identifiers") +
@@ -217,9 +230,54 @@ std::string conventions_text(const Profile& profile) {
 
 }  // namespace
 
-std::vector<Choice> choices_of(const Field& field) {
+std::vector<Field> fields_of(const MessageRow& row) {
+  struct Other {
+    std::uint8_t mode;
+    std::array<std::string_view, 4> names;  // of phases a, b, c and the field winding
+    std::string_view unit;
+    Unit scale;
+    std::string_view meaning;
+  };
+  constexpr std::string_view kTerminals = "abcf";
+  constexpr auto kOthers = std::to_array<Other>(
+      {{kDutyMode,
+        {"duty_mid_a", "duty_mid_b", "duty_mid_c", "duty_mid_f"},
+        "1",
+        Unit::kDuty,
+        "duty from the middle of the DC link: -1 is the negative rail, 1 the positive one"},
+       {kCurrentMode,
+        {"i_a", "i_b", "i_c", "i_f"},
+        "A",
+        Unit::kCurrent,
+        "current into this phase or winding"},
+       {kLegDutyMode,
+        {"duty_a", "duty_b", "duty_c", "duty_f"},
+        "1",
+        Unit::kDuty,
+        "duty: of a leg from 0, the negative rail, to 1; across a winding with its own bridge from -1 to "
+        "1"}});
+  std::vector<Field> fields;
+  for (Field field : row.fields) {
+    if (field.is_setpoint) field.page = kVoltageMode;
+    fields.push_back(field);
+    if (!field.is_setpoint) continue;
+    for (const Other& other : kOthers) {
+      field.page = other.mode;
+      field.name = other.names[kTerminals.find(field.name.back())];
+      field.unit = other.unit;
+      if (field.encoding != Encoding::kFloat) field.scale = other.scale;
+      field.meaning = other.meaning;
+      fields.push_back(field);
+    }
+  }
+  return fields;
+}
+
+std::vector<Choice> choices_of(const Field& field, std::span<const BitWord> words) {
   std::vector<Choice> choices;
-  if (field.unit != "enum") return choices;
+  const auto word = std::ranges::find(words, field.signal, &BitWord::signal);
+  if (word != words.end() && !field.signal.empty()) return word->bits;
+  if (field.unit != "enum" && field.unit != "bits") return choices;
   std::string_view rest = field.meaning.substr(0, field.meaning.find(':'));
   while (!rest.empty()) {
     const std::string_view part = rest.substr(0, rest.find(", "));
@@ -282,7 +340,8 @@ std::string number_text(double value, int digits) {
       std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, digits).ptr};
 }
 
-std::string table_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes) {
+std::string table_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes,
+                       std::span<const BitWord> words) {
   const std::vector<const MessageRow*> rows = rows_of(profile, axes);
   std::string text = "# CAN messages of " + std::string(bench) + "\n\nVersion " +
                      std::to_string(version_of(profile, axes)) + " of the profile. " +
@@ -291,6 +350,7 @@ std::string table_text(std::string_view bench, const Profile& profile, std::span
   text += "## Fields\n\n";
   for (const MessageRow* row : rows)
     text += message_text(*row, profile, title_of(*row, rows));
+  text += words_text(words);
   text +=
       "## Examples\n\nAs `cansend` takes and `candump -L` prints them, with the values that they carry.\n\n"
       "| message | frame | values |\n|---|---|---|\n";

@@ -10,18 +10,30 @@
 
 namespace drivebench::can {
 
-/// The messages of a profile in Markdown: identifiers, fields, an example of each frame with its bytes, and
-/// how to decode recorded frames.
-std::string table_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes);
-
-// ---- shared with the DBC file ----
-
 struct Choice {
   unsigned number;
   std::string_view label;
 };
-/// The choices that the meaning of a field lists; none unless its unit is "enum".
-std::vector<Choice> choices_of(const Field& field);
+/// A signal of the catalogue that is a word of bits, with their names.
+struct BitWord {
+  std::string_view signal;
+  std::vector<Choice> bits;
+};
+
+/// The messages of a profile in Markdown: identifiers, fields, an example of each frame with its bytes, and
+/// how to decode recorded frames.
+std::string table_text(std::string_view bench, const Profile& profile, std::span<const BusAxis> axes,
+                       std::span<const BitWord> words = {});
+
+// ---- shared with the DBC file ----
+
+/// The fields of a message, a set-point once for each quantity: a voltage in mode 1, a duty from the middle
+/// of the link in mode 3, a current in mode 4, a duty of the leg in mode 5; `page` is then the mode.
+std::vector<Field> fields_of(const MessageRow& row);
+
+/// The numbers (unit "enum") or bits (unit "bits") that the meaning of a field lists, or `words` for its
+/// signal.
+std::vector<Choice> choices_of(const Field& field, std::span<const BitWord> words = {});
 
 struct Range {
   double minimum;

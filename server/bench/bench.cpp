@@ -354,8 +354,7 @@ PhaseCommand Bench::supervise(std::size_t axis) noexcept {
   }
   const std::uint64_t latched = a.axis.state().faults & kLatchedFaults;
   if (latched != 0) {
-    c.state =
-        (latched & ~(kCommandTimeout | kLeaseLost)) != 0 ? ControlState::kFault : ControlState::kTimeout;
+    c.state = state_with(latched);
     c.in_force = {};
     c.fresh = 0;
     c.good_commands = 0;

@@ -104,9 +104,15 @@ class Bench {
   /// Gives up every lease, as the controllers would do themselves. No tick runs.
   void release_leases() noexcept;
 
-  /// Whether a fault is latched on an axis. The bench then refuses commands, except those with the gates off.
-  bool is_latched(std::size_t axis) const noexcept {
-    return (axes_[axis].axis.state().faults & kLatchedFaults) != 0;
+  /// The latched faults of an axis: with one the bench refuses commands, except those with the gates off. Its
+  /// sample may be from before they came or were cleared.
+  std::uint64_t latched(std::size_t axis) const noexcept {
+    return axes_[axis].axis.state().faults & kLatchedFaults;
+  }
+  bool is_latched(std::size_t axis) const noexcept { return latched(axis) != 0; }
+  /// The control state of an axis, where its sample may be from before a change.
+  ControlState state(std::size_t axis) const noexcept {
+    return is_latched(axis) ? state_with(latched(axis)) : control_of(axes_[axis]).state;
   }
 
   /// The number of parameter changes of an axis since the start of the bench.

@@ -29,6 +29,11 @@ constexpr bool is_driven(ControlState state) noexcept {
   return state == ControlState::kRun || state == ControlState::kHold;
 }
 
+/// The state in which these latched faults leave an axis, at least one.
+constexpr ControlState state_with(std::uint64_t latched) noexcept {
+  return (latched & ~(kCommandTimeout | kLeaseLost)) != 0 ? ControlState::kFault : ControlState::kTimeout;
+}
+
 /// The state of the control of an axis. 8-byte members only.
 struct Control {
   Owner owner = 0;

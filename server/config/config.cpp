@@ -59,12 +59,11 @@ ChangeView change_view(const BenchConfig& config, std::size_t axis, const AxisPa
 
 namespace {
 
-/// The names of the latched faults among these, behind a sentence; empty if the sample does not show them
-/// yet.
-std::string latched_names(std::uint64_t faults) {
+/// The names of these latched faults, behind a sentence.
+std::string latched_names(std::uint64_t latched) {
   std::string names;
   for (const FaultInfo& fault : kFaultTable) {
-    if ((faults & fault.bit & kLatchedFaults) != 0)
+    if ((latched & fault.bit) != 0)
       names.append(names.empty() ? ": " : " ").append(fault.name);
   }
   return names;
@@ -72,8 +71,8 @@ std::string latched_names(std::uint64_t faults) {
 
 }  // namespace
 
-std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis, std::uint64_t faults) {
-  if (why == Refused::kLatched) return std::string(sentence_of(why)) + latched_names(faults);
+std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis, std::uint64_t latched) {
+  if (why == Refused::kLatched) return std::string(sentence_of(why)) + latched_names(latched);
   const std::optional<std::size_t> owner =
       axis < config.axes.size() ? config.setup.axes[axis].shares_amplifier_with : std::nullopt;
   if (why != Refused::kSharedAmplifier || !owner) return std::string(sentence_of(why));

@@ -184,8 +184,8 @@ std::vector<EventState> event_states(const BenchConfig& config, const Bench& ben
 ChangeView change_view(const BenchConfig& config, std::size_t axis, const AxisParameters& in_force,
                        Tick tick) noexcept;
 
-/// The reason for people why a request for this axis was refused, whose newest sample has these faults.
-std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis, std::uint64_t faults);
+/// The reason for people why a request for this axis was refused, which has these latched faults.
+std::string sentence_of(Refused why, const BenchConfig& config, std::size_t axis, std::uint64_t latched);
 
 /// The hash of physics_toml(): benches with the same hash give the same samples for the same inputs.
 std::uint64_t configuration_hash(const BenchConfig& config);

@@ -60,7 +60,7 @@ ChangeView Engine::change_view(std::size_t axis) const {
 }
 
 std::string Engine::sentence_of(Refused why, std::size_t axis) const {
-  return drivebench::sentence_of(why, config_, axis, axis < newest_.size() ? newest_[axis].faults : 0);
+  return drivebench::sentence_of(why, config_, axis, axis < newest_.size() ? latched(axis) : 0);
 }
 
 std::string Engine::try_parameter(std::size_t axis, std::uint32_t row, double value) {

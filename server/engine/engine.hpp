@@ -94,6 +94,10 @@ class Engine {
 
   /// The owner of the axis, as far as the I/O thread knows; 0: none.
   virtual Owner owner(std::size_t axis) const { return newest_[axis].owner; }
+  /// The newest sample with the owner, the state and the latched faults of now: in lockstep a controller may
+  /// have come, gone or cleared a fault since its tick.
+  virtual Sample present(std::size_t axis) const { return newest_[axis]; }
+  std::uint64_t latched(std::size_t axis) const { return present(axis).faults & kLatchedFaults; }
   /// Whether a new controller that asks for the lease now would get it.
   virtual bool may_be_acquired(std::uint32_t axis) { return owner(axis) == 0 && !takes_voltages(axis); }
   /// Whether the axis takes the voltages of another one, whose amplifier it shares: it has no commands and no

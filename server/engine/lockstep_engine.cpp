@@ -111,6 +111,13 @@ class LockstepEngine final : public Engine {
   }
 
   Owner owner(std::size_t axis) const override { return bench_.owner(axis); }
+  Sample present(std::size_t axis) const override {
+    Sample now = newest_[axis];
+    now.owner = bench_.owner(axis);
+    now.state = static_cast<std::uint64_t>(bench_.state(axis));
+    now.faults = (now.faults & ~kLatchedFaults) | bench_.latched(axis);
+    return now;
+  }
   bool may_be_acquired(std::uint32_t axis) override {
     return Engine::may_be_acquired(axis) && has_room() && !is_over();
   }

@@ -48,7 +48,7 @@ InprocBench::InprocBench(const BenchConfig& config) : config_(in_lockstep(config
 
 int InprocBench::fail_with(Refused why, std::uint32_t axis, std::string field, std::string more) noexcept {
   return fail(static_cast<int>(refusal_row(why).tcp),
-              sentence_of(why, config_, axis, bench_.sample(axis).faults) + more, std::move(field));
+              sentence_of(why, config_, axis, bench_.latched(axis)) + more, std::move(field));
 }
 
 int InprocBench::check_axis(std::uint32_t axis) noexcept {

@@ -15,6 +15,7 @@ from wire_client import PATIENCE_S, REPOSITORY, SERVER  # noqa: E402
 BUILD = SERVER.parent.parent
 SKIPPED = 77
 NAMES = ("drivebench-doc", "python3-drivebench", "drivebench", "drivebench-server", "drivebench-data", "libdrivebench-dev", "libdrivebench1")
+[VERSION] = re.findall(r"^project\(drivebench VERSION (\S+)", (REPOSITORY / "CMakeLists.txt").read_text(encoding="utf-8"), re.M)
 THIS, NEXT = "2", "3"  # releases of Debian packages: this build's, and a later one of the same sources
 SPINS = "147.368 rad/s at 0.842 A"
 # What a package manager and a root without services change by themselves.
@@ -46,7 +47,7 @@ class Packages(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
         cls.root = cls.folder / "debian"
         for release in (THIS, NEXT):
-            build, library = f"(= 0.1.0-{release})", f"libdrivebench1 (= 0.1.0-{release})"
+            build, library = f"(= {VERSION}-{release})", f"libdrivebench1 (= {VERSION}-{release})"
             needs = {"SERVER": f"adduser, drivebench-data {build}", "TOOLS": f"drivebench-data {build}, {library}",
                      "DEVELOPMENT": library, "PYTHON": f"python3 (>= 3.11), {library}"}
             run("cpack", "-G", "DEB", "-B", cls.folder / release, "-D", f"CPACK_DEBIAN_PACKAGE_RELEASE={release}",
@@ -111,7 +112,7 @@ class Packages(unittest.TestCase):
             for place in ("share/doc", "share/lintian/overrides") if name != "drivebench" else ():
                 run("rm", "-r", root / "usr" / place / name)
         shutil.copytree(self.folder / "drivebench-server", root / "DEBIAN")  # its scripts and files of configuration
-        control = (self.folder / "drivebench/control").read_text(encoding="utf-8").replace(f"Version: 0.1.0-{THIS}", "Version: 0.1.0-1")
+        control = (self.folder / "drivebench/control").read_text(encoding="utf-8").replace(f"Version: {VERSION}-{THIS}", f"Version: {VERSION}-1")
         needs = re.sub(r" (drivebench-data|libdrivebench1) \([^)]*\),", "", control).replace("Depends:", "Depends: adduser,")
         (root / "DEBIAN/control").write_text(needs, encoding="utf-8")
         run("dpkg-deb", "--build", root, root.with_suffix(".deb"))
@@ -144,14 +145,14 @@ class Packages(unittest.TestCase):
         said = self.inside("drivebench", "demo", "--json", code=(0, 1))
         self.assertRegex(said, r'"replay": \{\s*"equal": true')
         self.assertIn("/etc/drivebench/bench.toml: ", self.inside("drivebench-server", "--check-config", "/etc/drivebench/bench.toml"))
-        self.assertRegex(self.inside("drivebench", "--version"), r"drivebench 0\.1\.0, build ")
+        self.assertRegex(self.inside("drivebench", "--version"), rf"drivebench {re.escape(VERSION)}, build ")
         [libraries] = {file.parent for file in (self.root / "usr/lib").rglob("libdrivebench.so")}
         run("cc", REPOSITORY / "clients/examples/blink.c", "-o", self.root / "root/blink", f"-I{self.root}/usr/include",
             f"-L{libraries}", "-ldrivebench", f"-Wl,-rpath-link,{libraries}")
         self.assertIn(SPINS, self.inside("/root/blink"))
         shutil.copy(REPOSITORY / "clients/python/examples/speed_loop.py", self.root / "root")
         self.assertIn("50.000 rad/s of 50.000", self.inside("python3", "/root/speed_loop.py", "inproc:dc-a-voltage"))
-        self.assertEqual(self.inside("python3", "-c", "import importlib.metadata as m; print(m.version('drivebench'))"), "0.1.0\n")
+        self.assertEqual(self.inside("python3", "-c", "import importlib.metadata as m; print(m.version('drivebench'))"), f"{VERSION}\n")
         documents = self.root / "usr/share/doc/drivebench-doc"
         for name in ("README.md", "clients/README.md", "configs/OPERATION.md", "clients/python/examples/own_motor.py"):
             self.assertEqual((documents / name).read_bytes(), (REPOSITORY / name).read_bytes())
@@ -175,15 +176,18 @@ class Packages(unittest.TestCase):
         bench.write_text(bench.read_text(encoding="utf-8") + "\n# ours\n", encoding="utf-8")
         work = self.root / "var/lib/drivebench"
         work.mkdir(parents=True, exist_ok=True)
-        (work / "run.mcap").write_bytes(b"a day of work")
+        self.inside("drivebench-server", "/usr/share/drivebench/benches/dc-a-voltage.toml", "--mode", "free", "--port", "0",
+                    "--duration", "0.1", "--record", "/var/lib/drivebench/run.mcap")
+        recording = (work / "run.mcap").read_bytes()
         self.install(NEXT)
-        self.assertEqual(self.inside("dpkg-query", "-W", "-f", "${Version}", "drivebench"), f"0.1.0-{NEXT}")
+        self.assertEqual(self.inside("dpkg-query", "-W", "-f", "${Version}", "drivebench"), f"{VERSION}-{NEXT}")
         self.assertIn("# ours", bench.read_text(encoding="utf-8"))
-        self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
+        self.assertEqual((work / "run.mcap").read_bytes(), recording)
+        self.assertIn("equal", self.inside("drivebench", "replay", "/var/lib/drivebench/run.mcap"))
         self.assertIn(SPINS, self.inside("/root/blink"))
 
         self.inside("dpkg", "--purge", *NAMES)
-        self.assertEqual((work / "run.mcap").read_bytes(), b"a day of work")
+        self.assertEqual((work / "run.mcap").read_bytes(), recording)
         shutil.rmtree(work)
         self.inside("apt-get", "purge", "-y", *needed)
         self.assertEqual(sorted(self.files() - before), [])

@@ -103,6 +103,14 @@ bool keeps_promise(const DemoReport& report) {
          report.lockstep.control.peak_error_counts.value_or(HUGE_VAL) <= kPromisedErrorCounts;
 }
 
+/// This program as it can be typed here.
+std::string program() {
+  const std::string self = own_executable().string();
+  std::error_code ignored;
+  const fs::path relative = fs::relative(self, ignored);
+  return relative.empty() ? self : relative.string();
+}
+
 void print_comparison(const DemoReport& r) {
   const ControlReport& a = r.lockstep.control;
   const ControlReport& b = r.realtime.control;
@@ -137,8 +145,14 @@ void print_comparison(const DemoReport& r) {
   if (b.missed_ticks > 0) {
     fmt::print(
         "  The controller, an ordinary process, was woken too late for {} samples and went on with the next\n"
-        "  one: nothing is wrong, and the errors above show what it cost.\n",
-        b.missed_ticks);
+        "  one{} the errors above show what it cost.\n",
+        b.missed_ticks, r.realtime.verdict.late_ticks == 0 ? ": nothing is wrong, and" : ";");
+  }
+  if (r.realtime.verdict.late_ticks > 0 || !r.realtime.failure.empty()) {
+    fmt::print(
+        "  This machine was too busy for real time: the bench began {} ticks late. Lockstep does not mind.\n"
+        "  Run it again when less else runs; `{} doctor` tells what helps.\n",
+        r.realtime.verdict.late_ticks, program());
   }
   fmt::print("\n");
   for (const DemoRun* run : {&r.lockstep, &r.realtime}) {
@@ -154,16 +168,13 @@ void print_comparison(const DemoReport& r) {
 }
 
 void print_next_steps(const DemoReport& r) {
-  const std::string self = own_executable().string();
-  std::error_code ignored;
-  const fs::path relative = fs::relative(self, ignored);
-  const std::string program = relative.empty() ? self : relative.string();
+  const std::string self = program();
   fmt::print("\nwhat to try next:\n");
-  fmt::print("  {} export {} --out move.csv\n", program, r.lockstep.recording);
-  fmt::print("  {} serve            and in another terminal\n", program);
-  fmt::print("  {} control --load 0.1@0.0365 --set machine.rotor_resistance_ohm=5.85\n", program);
-  fmt::print("  {} control --preset book/8.2.2-clipped      the book's trap: 7 counts\n", program);
-  fmt::print("  {} new motor --help    your own motor, from its data sheet\n", program);
+  fmt::print("  {} export {} --out move.csv\n", self, r.lockstep.recording);
+  fmt::print("  {} serve            and in another terminal\n", self);
+  fmt::print("  {} control --load 0.1@0.0365 --set machine.rotor_resistance_ohm=5.85\n", self);
+  fmt::print("  {} control --preset book/8.2.2-clipped      the book's trap: 7 counts\n", self);
+  fmt::print("  {} new motor --help    your own motor, from its data sheet\n", self);
 }
 
 }  // namespace

@@ -152,7 +152,7 @@ bool AxisDesk::coil(std::size_t address, Visitor visitor) const {
 }
 
 bool AxisDesk::latched() const noexcept {
-  return (engine_.newest(axis_).faults & kLatchedFaults) != 0;
+  return engine_.latched(axis_) != 0;
 }
 
 DriveState AxisDesk::drive_state() const noexcept {

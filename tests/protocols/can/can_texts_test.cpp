@@ -94,17 +94,19 @@ TEST(CanBudget, TheTextHasALineForEachMessageAndTheSum) {
 
 // Catches: a list in the table that a loop reads differently from a reader.
 TEST(CanTexts, EveryEnumeratedFieldListsItsChoices) {
-  std::size_t lists = 0;
+  std::size_t seen = 0;
   for (const MessageRow& row : kMessages) {
     for (const Field& field : row.fields) {
       const std::vector<Choice> choices = choices_of(field);
-      EXPECT_EQ(choices.size() >= 2, field.unit == "enum") << row.name << " " << field.name;
+      const bool is_given = field.signal == "faults" || field.signal == "injected";  // by the caller
+      const bool lists = field.unit == "enum" || (field.unit == "bits" && !is_given);
+      EXPECT_EQ(choices.size() >= 2, lists) << row.name << " " << field.name;
       for (std::size_t i = 1; i < choices.size(); ++i)
         EXPECT_GT(choices[i].number, choices[i - 1].number) << row.name << " " << field.name;
-      if (!choices.empty()) ++lists;
+      if (!choices.empty()) ++seen;
     }
   }
-  EXPECT_GE(lists, 10u);
+  EXPECT_GE(seen, 15u);
   const MessageRow& sync = *find_message(Message::kSync, true);
   const std::vector<Choice> modes = choices_of(sync.fields[1]);
   ASSERT_EQ(modes.size(), 2u);
@@ -141,6 +143,29 @@ TEST(CanTexts, TheDbcFileHasTheseLines) {
   EXPECT_TRUE(contains(text,
                        "CM_ SG_ 2147876865 i_a \"measured current of phase a, into the machine; NaN: no "
                        "value\";\n"));
+}
+
+// Catches: a duty or a current that a CAN program shows in volts; a bit without a name.
+TEST(CanTexts, TheDbcFileHasUnitsForEveryModeAndNamesForBits) {
+  Profile profile;
+  profile.fd = false;
+  const std::vector<BusAxis> axes = {{"servo", 1}};
+  const std::vector<BitWord> words = {
+      {.signal = "faults", .bits = {{4, "over_current"}, {256, "lease_lost"}}}};
+  std::string text = dbc_text("bench", profile, axes, {}, words);
+  for (const char* line :
+       {" SG_ u_a m1 : 0|16@1- (0.01,0) [-327.67|327.67] \"V\" Bench\n",
+        " SG_ duty_mid_a m3 : 0|16@1- (3.051850947599719e-05,0) [-1|1] \"\" Bench\n",
+        " SG_ i_a m4 : 0|16@1- (0.001,0) [-32.767|32.767] \"A\" Bench\n",
+        " SG_ duty_b m5 : 16|16@1- (3.051850947599719e-05,0) [-1|1] \"\" Bench\n", " SG_ mode M : 48|4@1+",
+        "VAL_ 17 faults 4 \"over_current\" 256 \"lease_lost\" ;\n",
+        "VAL_ 49 legs_off 1 \"a\" 2 \"b\" 4 \"c\" ;\n",
+        "CM_ SG_ 17 faults \"fault word: 4 over_current, 256 lease_lost\";\n"})
+    EXPECT_TRUE(contains(text, line)) << line << text;
+  profile.fd = true;
+  text = dbc_text("bench", profile, axes);
+  EXPECT_TRUE(contains(text, " SG_ i_b m4 : 64|32@1- (1,0) [0|0] \"A\" Bench\n")) << text;
+  EXPECT_TRUE(contains(text, "SIG_VALTYPE_ 49 duty_a : 1;\n")) << text;
 }
 
 // Catches: a cycle time of all axes together, one in seconds, one for a message that is sent on demand, the

@@ -204,7 +204,7 @@ TEST(CanTexts, TheDbcFileListsTheSignalsOfEachAxis) {
   EXPECT_TRUE(contains(text, "VERSION \"4\"\n"));
   EXPECT_FALSE(contains(text, "servo_details"));
   EXPECT_FALSE(contains(text, "servo_phase"));
-  EXPECT_TRUE(contains(text, "BO_ 34 bldc_phase_command: 8 Controller\n SG_ u_c : 0|16@1- (0.01,0)"));
+  EXPECT_TRUE(contains(text, "BO_ 34 bldc_phase_command: 8 Controller\n SG_ u_c m1 : 0|16@1- (0.01,0)"));
   EXPECT_TRUE(contains(text, "BO_ 82 bldc_phases: 8 Bench\n"));
   EXPECT_TRUE(contains(text, "BO_ 1954 bldc_details: 8 Bench\n SG_ page M : 0|8@1+ (1,0) [0|255] \"\""));
   EXPECT_TRUE(contains(text, " SG_ u_b m0 : 32|16@1- (0.01,0) [-327.67|327.67] \"V\" Controller\n"));

@@ -135,13 +135,20 @@ class Commands(CommandTest):
         self.assertSays(self.drivebench("clear", "0", link=link).stdout, "cleared over_current_trip")
 
     def test_clear_works_where_time_stands_still(self):
-        """Catches: a clear that waits for a tick of a lockstep bench, one that the next controller does not feel."""
+        """Catches: a latch that no status and no refusal names before the next tick of a lockstep bench, a clear that waits for it,
+        one that the next controller does not feel."""
         with self.bench.client() as client:
             client.lease()
             for tick in range(3):
                 client.step(tick, 10.0)
+        until(lambda: self.status()["latched_set"] == ["lease_lost"], "the session's end is noticed")
+        self.assertSays(self.drivebench("status", link=self.link).stdout, "axis 0 (servo): timeout, owner none, faults lease_lost")
+        with self.bench.client() as client:
+            client.lease()
+            self.assertSays(client.exchange(3, 10.0).refusal.message, "a latched fault is in force", ": lease_lost")
         said = self.drivebench("clear", "servo", link=self.link).stdout
-        self.assertEqual(said, "axis 0 (servo): cleared, no latched fault showed, at tick 3\n")
+        self.assertEqual(said, "axis 0 (servo): cleared lease_lost at tick 3\n")
+        self.assertSays(self.drivebench("status", link=self.link).stdout, "axis 0 (servo): idle, owner none, faults none")
         with self.bench.client() as client:
             client.lease()
             self.assertEqual(client.step(3, 10.0).faults, 0)

@@ -157,9 +157,7 @@ void report_status(Dialogue& dialogue) {
   }
   for (std::uint32_t axis = 0; axis < dialogue.axis_count(); ++axis) {
     std::array<std::byte, kMaxSampleBytes> bytes;
-    Sample now = engine.newest(axis);
-    now.owner = engine.owner(axis);  // in lockstep the owner may have changed since the sample
-    const std::size_t size = encode_sample(now, kAllSignals, bytes.data());
+    const std::size_t size = encode_sample(engine.present(axis), kAllSignals, bytes.data());
     v1::AxisSample& sample = *status.add_axes();
     sample.set_axis(axis);
     sample.mutable_sample()->ParseFromArray(bytes.data(), static_cast<int>(size));
